@@ -1,0 +1,1 @@
+"""What a machine can do: kinematics, limits, machine files."""

@@ -1,0 +1,87 @@
+"""A machine: kinematics, axis names, limits, workspace, home, timing; what the post needs and nothing of G-code."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from machines.kinematics.base import Kinematics
+from toolpaths.arrays import Floats, frozen
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Per joint (J,): travel (mm, rad), velocity, acceleration, jerk (mm/s.., rad/s..).
+
+    Finite unless the machine file says unlimited (+-inf travel). `assumed` names the entries that no document states.
+    """
+
+    lower: Floats
+    upper: Floats
+    velocity: Floats
+    acceleration: Floats
+    jerk: Floats
+    assumed: frozenset[str] = frozenset()
+    """e.g. "X.velocity" """
+
+    def __post_init__(self) -> None:
+        n = len(self.lower)
+        for name in ("lower", "upper", "velocity", "acceleration", "jerk"):
+            object.__setattr__(self, name, frozen(getattr(self, name), np.float64, (n,), f"Limits.{name}"))
+
+
+@dataclass(frozen=True)
+class Timing:
+    """Seconds for what no axis limit says."""
+
+    tool_change: float = 0.0
+    clamp: float = 0.0
+    unclamp: float = 0.0
+
+
+@dataclass(frozen=True)
+class ControlKinematics:
+    """A kinematics module that the control itself runs, so that programs hold tip coordinates in the part.
+
+    `module` and `pins` name LinuxCNC's module and its HAL pins; `tool_length_pin` receives the tool length.
+    """
+
+    module: str
+    pins: Mapping[str, float] = field(default_factory=dict)
+    tool_length_pin: str = ""
+
+
+@dataclass(frozen=True)
+class Machine:
+    """One machine as loaded from its file.
+
+    Attributes:
+        name: file stem or `name` key
+        description: one line
+        structure: ISO 10791-6 code, or the parallel family
+        kinematics: at the gauge point
+        axis_names: letters, the order of q
+        rotary: per joint
+        limits: travel and dynamics per joint
+        home: (J,) joints where programs start and tool changes happen
+        retract_axis: index of the linear joint that lifts the tool at home (approach goes there last), or -1
+        control_kinematics: set where the control owns the kinematics (programs in tip coordinates)
+    """
+
+    name: str
+    description: str
+    structure: str
+    kinematics: Kinematics
+    axis_names: tuple[str, ...]
+    rotary: tuple[bool, ...]
+    limits: Limits
+    home: Floats
+    retract_axis: int = -1
+    timing: Timing = field(default_factory=Timing)
+    control_kinematics: ControlKinematics | None = None
+    file: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "home", frozen(self.home, np.float64, (len(self.axis_names),), "Machine.home"))

@@ -1,0 +1,1 @@
+"""Decides and writes: CL file in, proved G-code out."""

@@ -1,0 +1,1 @@
+"""What the cutter must do, in the part's frame: CL files in, arrays out."""

@@ -1,0 +1,39 @@
+"""Rotations of 3-space and great circles of tool axes, vectorised over points."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from toolpaths.arrays import Floats
+
+
+def rotation(direction: Floats, angle: Floats) -> Floats:
+    """Matrices (N, 3, 3) of the rotation by `angle` (N,) rad about the unit `direction` (3,) (Rodrigues)."""
+    x, y, z = direction
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    outer = np.outer(direction, direction)
+    c = np.cos(angle)[:, None, None]
+    s = np.sin(angle)[:, None, None]
+    result: Floats = c * np.eye(3) + s * cross + (1.0 - c) * outer
+    return result
+
+
+def angle_between(a: Floats, b: Floats) -> Floats:
+    """Angle (N,) rad between unit vectors `a` and `b` (N, 3), accurate near 0 and pi (Kahan)."""
+    result: Floats = 2.0 * np.arctan2(np.linalg.norm(a - b, axis=-1), np.linalg.norm(a + b, axis=-1))
+    return result
+
+
+def slerp(a: Floats, b: Floats, t: Floats) -> Floats:
+    """Unit vectors (N, 3) at fraction `t` (N,) of the great circle from `a` to `b` (N, 3).
+
+    Antiparallel ends have no great circle; callers refuse them before.
+    """
+    angle = angle_between(a, b)
+    small = angle < 1e-7
+    s = np.where(small, 1.0, np.sin(angle))
+    wa = np.where(small, 1.0 - t, np.sin((1.0 - t) * angle) / s)[..., None]
+    wb = np.where(small, t, np.sin(t * angle) / s)[..., None]
+    v = wa * a + wb * b
+    result: Floats = v / np.linalg.norm(v, axis=-1, keepdims=True)
+    return result

@@ -1,0 +1,250 @@
+"""What the cutter must do: positions, axes and feeds in the part's frame, as arrays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, fields
+from enum import IntEnum
+
+import numpy as np
+
+from toolpaths.arrays import Array, Floats, frozen
+
+
+class Kind(IntEnum):
+    """How a point is reached from the one before it."""
+
+    RAPID = 0
+    FEED = 1
+    ARC = 2
+
+
+class Role(IntEnum):
+    """Which record of the CL file put the point there."""
+
+    POINT = 0
+    """GOTO, GODLTA, or the end of an arc or spline."""
+    HOLE = 1
+    """GOTO under an armed CYCLE: the top of a hole, `cycle` names the cycle."""
+    START = 2
+    """FROM: where the tool stands; no motion leads there."""
+    HOME = 3
+    """GOHOME with a point."""
+
+
+class FeedMode(IntEnum):
+    """What the number in `feed` means."""
+
+    PER_TIME = 0
+    """mm/s"""
+    PER_REVOLUTION = 1
+    """mm per spindle revolution"""
+    INVERSE_TIME = 2
+    """1/s: the block takes 1/feed"""
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """A record without motion that acts before point `index` (APT word and its parameters, as in the file)."""
+
+    index: int
+    word: str
+    values: tuple[str | float, ...] = ()
+    line: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Tool:
+    """A cutter. Lengths in mm, angles in rad; None where the file does not say."""
+
+    number: int
+    name: str = ""
+    shape: str = ""
+    """MILL, DRILL, ... as the file says"""
+    diameter: float | None = None
+    corner_radius: float | None = None
+    length: float | None = None
+    """length of the cutter as CAM draws it, not the gauge length"""
+    taper: float | None = None
+    tip_angle: float | None = None
+    flute_length: float | None = None
+    length_register: int | None = None
+    """ADJUST or OSETNO"""
+    cutter: tuple[float, ...] = ()
+    """APT seven parameters of CUTTER, mm and degrees as written"""
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """A named system of the file: `rotation` (3, 3) and `origin` (3,) take its coordinates to the part frame."""
+
+    name: str
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    rotation: tuple[tuple[float, float, float], ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+
+@dataclass(frozen=True, slots=True)
+class Operation:
+    """One operation of the CAM system. `turning` operations are read but cannot be converted."""
+
+    name: str = ""
+    tool_name: str = ""
+    frame: int = 0
+    turning: bool = False
+    line: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Cycle:
+    """A drilling cycle; lengths in mm measured from the hole's top along the tool axis, up is positive.
+
+    `depth` is positive downwards. `retract` None means: back to the level the tool came from.
+    `feed` and `feed_mode` as in Toolpath; `steps` are the pecks (first, following).
+    """
+
+    kind: str
+    depth: float
+    clearance: float
+    retract: float | None
+    feed: float
+    feed_mode: FeedMode = FeedMode.PER_TIME
+    steps: tuple[float, ...] = ()
+    dwell: float = 0.0
+    """s"""
+    dwell_revolutions: float = 0.0
+    pitch: float | None = None
+    """mm per revolution of a tap, where the file states it"""
+    words: tuple[str | float, ...] = ()
+    """the parameters as written"""
+    line: int = 0
+
+
+@dataclass(frozen=True)
+class Arcs:
+    """K circular arcs or helices, in the part frame.
+
+    Attributes:
+        center (K, 3): a point of the axis, at the height of the arc's start
+        normal (K, 3): unit, the motion is counter-clockwise seen against it (right-hand)
+        radius (K,): mm, distance of the start from the axis
+        sweep (K,): rad, positive, whole turns included
+    """
+
+    center: Floats
+    normal: Floats
+    radius: Floats
+    sweep: Floats
+
+    def __post_init__(self) -> None:
+        n = len(self.radius)
+        for name, shape in (("center", (n, 3)), ("normal", (n, 3)), ("radius", (n,)), ("sweep", (n,))):
+            object.__setattr__(self, name, frozen(getattr(self, name), np.float64, shape, f"Arcs.{name}"))
+
+    def __len__(self) -> int:
+        return len(self.radius)
+
+    @staticmethod
+    def none() -> Arcs:
+        """No arcs at all."""
+        return Arcs(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros(0))
+
+
+_COLUMNS: dict[str, tuple[type, tuple[int, ...]]] = {
+    "tip": (np.float64, (3,)),
+    "axis": (np.float64, (3,)),
+    "feed": (np.float64, ()),
+    "feed_mode": (np.int8, ()),
+    "kind": (np.int8, ()),
+    "role": (np.int8, ()),
+    "arc": (np.int32, ()),
+    "cycle": (np.int32, ()),
+    "tool": (np.int32, ()),
+    "operation": (np.int32, ()),
+    "pass_": (np.int32, ()),
+    "line": (np.int64, ()),
+}
+
+
+@dataclass(frozen=True)
+class Toolpath:
+    """The path of the cutter in the part frame (the absolute frame of the CL file), one row per commanded position.
+
+    Attributes (N rows):
+        tip (N, 3): mm, the tool tip
+        axis (N, 3): unit, from the tip to the spindle
+        feed (N,): see `feed_mode`; NaN where the file had stated none, and for rapids
+        feed_mode (N,): FeedMode
+        kind (N,): Kind of the motion that ends here
+        role (N,): Role of the record
+        arc (N,): index into `arcs`, -1 for straight motion
+        cycle (N,): index into `cycles` for holes, else -1
+        tool (N,): index into `tools`, -1 where none was named yet
+        operation (N,): index into `operations`
+        pass_ (N,): number of the pass; a pass is an unbroken run of cutting motion, rapids before it count to it
+        line (N,): 1-based line of the file
+        normal (N, 3) or None: unit surface normal, NaN where a point has none
+        contact (N, 3) or None: contact point, NaN where a point has none
+        units: "mm" or "inch": what the file was written in (the arrays are mm)
+    """
+
+    tip: Floats
+    axis: Floats
+    feed: Floats
+    feed_mode: Array
+    kind: Array
+    role: Array
+    arc: Array
+    cycle: Array
+    tool: Array
+    operation: Array
+    pass_: Array
+    line: Array
+    arcs: Arcs = field(default_factory=Arcs.none)
+    cycles: tuple[Cycle, ...] = ()
+    tools: tuple[Tool, ...] = ()
+    operations: tuple[Operation, ...] = (Operation(),)
+    frames: tuple[Frame, ...] = (Frame("absolute"),)
+    events: tuple[Event, ...] = ()
+    normal: Floats | None = None
+    contact: Floats | None = None
+    units: str = "mm"
+    name: str = ""
+    """PARTNO"""
+    file: str = ""
+
+    def __post_init__(self) -> None:
+        n = len(self.tip)
+        for name, (dtype, tail) in _COLUMNS.items():
+            object.__setattr__(self, name, frozen(getattr(self, name), dtype, (n, *tail), f"Toolpath.{name}"))
+        for name in ("normal", "contact"):
+            value = getattr(self, name)
+            if value is not None:
+                object.__setattr__(self, name, frozen(value, np.float64, (n, 3), f"Toolpath.{name}"))
+        for name, count in (("arc", len(self.arcs)), ("cycle", len(self.cycles)), ("tool", len(self.tools)),
+                            ("operation", len(self.operations))):
+            column = getattr(self, name)
+            if n and int(column.max()) >= count:
+                raise ValueError(f"Toolpath.{name} holds {int(column.max())}, only {count} exist")
+
+    def __len__(self) -> int:
+        return len(self.tip)
+
+    def equals(self, other: Toolpath) -> bool:
+        """True where every value is the same bit for bit, apart from source lines and the file's name."""
+        for f in fields(self):
+            if f.name in ("line", "file"):
+                continue
+            if not _same(getattr(self, f.name), getattr(other, f.name)):
+                return False
+        return True
+
+
+def _same(a: object, b: object) -> bool:
+    if isinstance(a, np.ndarray) and isinstance(b, np.ndarray):
+        return a.shape == b.shape and bool(np.array_equal(a, b, equal_nan=a.dtype.kind == "f"))
+    if isinstance(a, Arcs) and isinstance(b, Arcs):
+        return all(_same(getattr(a, f.name), getattr(b, f.name)) for f in fields(a))
+    if isinstance(a, tuple) and isinstance(b, tuple):
+        return len(a) == len(b) and all(_same(x, y) for x, y in zip(a, b, strict=True))
+    if isinstance(a, (Event, Operation, Cycle)) and type(a) is type(b):
+        return all(_same(getattr(a, f.name), getattr(b, f.name)) for f in fields(a) if f.name != "line")
+    return a == b
