@@ -1,0 +1,123 @@
+"""Where each key of a TOML text stands: the line numbers that the standard parser does not keep.
+
+Only for texts that `tomllib` has accepted, so the scanner need not check anything.
+"""
+
+from __future__ import annotations
+
+import re
+
+Path = tuple[str | int, ...]
+"""keys and array indices from the root, as pydantic's error locations"""
+
+_BLANK = re.compile(r"(?:[ \t\r\n]|#[^\n]*)*")
+_KEY_PART = re.compile(r"""[ \t]*(?:"((?:[^"\\]|\\.)*)"|'([^']*)'|([A-Za-z0-9_-]+))[ \t]*""")
+_STRING = re.compile(r'"{3}(?:[^\\]|\\.)*?"{3,5}|\'{3}.*?\'{3,5}|"(?:[^"\\]|\\.)*"|\'[^\']*\'', re.DOTALL)
+_SCALAR = re.compile(r"[^,\]}\n#]+")
+
+
+def key_lines(text: str) -> dict[Path, int]:
+    """1-based line of every table, key and array element of a valid TOML text."""
+    return _Scanner(text).scan()
+
+
+class _Scanner:
+    def __init__(self, text: str):
+        self.text = text
+        self.at = 0
+        self.lines: dict[Path, int] = {}
+        self.elements: dict[Path, int] = {}
+        self._line = 1
+        self._counted = 0
+
+    def scan(self) -> dict[Path, int]:
+        table: Path = ()
+        self._blank()
+        while self.at < len(self.text):
+            if self.text[self.at] == "[":
+                table = self._header()
+            else:
+                self._pair(table)
+            self._blank()
+        return self.lines
+
+    def _line_here(self) -> int:
+        self._line += self.text.count("\n", self._counted, self.at)
+        self._counted = self.at
+        return self._line
+
+    def _mark(self, path: Path) -> None:
+        line = self._line_here()
+        for n in range(1, len(path) + 1):
+            self.lines.setdefault(path[:n], line)
+
+    def _blank(self) -> None:
+        found = _BLANK.match(self.text, self.at)
+        assert found
+        self.at = found.end()
+
+    def _key(self) -> tuple[str, ...]:
+        parts: list[str] = []
+        while found := _KEY_PART.match(self.text, self.at):
+            parts.append(next(g for g in found.groups() if g is not None))
+            self.at = found.end()
+            if self.text[self.at] != ".":
+                break
+            self.at += 1
+        return tuple(parts)
+
+    def _header(self) -> Path:
+        """`[a.b]` or `[[a.b]]`: the path of the table that follows; arrays of tables get the index in."""
+        double = self.text.startswith("[[", self.at)
+        self.at += 2 if double else 1
+        keys = self._key()
+        self.at += 2 if double else 1
+        path: Path = ()
+        for key in keys[:-1]:
+            path = self._into_last((*path, key))
+        path = (*path, keys[-1])
+        if double:
+            self.elements[path] = self.elements.get(path, -1) + 1
+        path = self._into_last(path)
+        self._mark(path)
+        return path
+
+    def _into_last(self, path: Path) -> Path:
+        return (*path, self.elements[path]) if path in self.elements else path
+
+    def _pair(self, table: Path) -> None:
+        start = self.at
+        path = (*table, *self._key())
+        end, self.at = self.at, start
+        self._mark(path)
+        self.at = end + 1  # the equals sign
+        self._value(path)
+
+    def _value(self, path: Path) -> None:
+        self._blank()
+        if self.text[self.at] == "[":
+            self._items(path, "]")
+        elif self.text[self.at] == "{":
+            self._items(path, "}")
+        else:
+            found = _STRING.match(self.text, self.at) or _SCALAR.match(self.text, self.at)
+            assert found
+            self.at = found.end()
+
+    def _items(self, path: Path, close: str) -> None:
+        """An array or inline table, from its opening bracket to behind its closing one."""
+        self.at += 1
+        index = 0
+        self._blank()
+        while self.text[self.at] != close:
+            if close == "}":
+                self._pair(path)
+            else:
+                self._mark((*path, index))
+                self._value((*path, index))
+                index += 1
+            self._blank()
+            if self.text[self.at] == ",":
+                self.at += 1
+                self._blank()
+        self.at += 1

@@ -1,0 +1,269 @@
+"""Files that a user writes (machine, controller, set-up, error model): TOML in, a checked model or diagnostics out.
+
+A file may begin with `base = "name"`: the values of that built-in file (or of a .toml file beside it) are taken
+first, tables are merged key by key, everything else is replaced. Every problem names the file and line of the value.
+"""
+
+from __future__ import annotations
+
+import difflib
+import json
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path as FilePath
+from typing import Any, TypeVar, get_args, get_origin
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic_core import ErrorDetails
+
+from machines.toml_lines import Path, key_lines
+from toolpaths.diagnostics import Diagnostic, error
+
+Values = dict[str, Any]
+
+
+class UserModel(BaseModel):
+    """Base of every model of a user's file: frozen, no unknown key, no conversion between types, no inf or nan."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False,
+                              use_attribute_docstrings=True)
+
+
+M = TypeVar("M", bound=BaseModel)
+
+
+@dataclass(frozen=True)
+class Origin:
+    """The file and 1-based line that a value was written in."""
+
+    file: str
+    line: int
+
+
+@dataclass(frozen=True)
+class UserFile:
+    """A TOML file with its base files merged in, not yet checked against a model."""
+
+    name: str
+    """built-in name or file stem"""
+    file: str
+    values: Values
+    origins: Mapping[Path, Origin]
+    """by path of keys, e.g. ("axes", "X", "travel")"""
+
+    def origin(self, path: Sequence[str | int]) -> Origin:
+        """Where the value at `path` was written, or the nearest table around it."""
+        for n in range(len(path), 0, -1):
+            found = self.origins.get(tuple(path[:n]))
+            if found:
+                return found
+        return Origin(self.file, 1)
+
+    def problem(self, code: str, path: Sequence[str | int], message: str, hint: str = "") -> Diagnostic:
+        """An ERROR at the line where `path` was written."""
+        origin = self.origin(path)
+        return error(code, message, file=origin.file, lines=[origin.line], hint=hint)
+
+
+def load_toml(source: str | FilePath, model: type[M], builtin: Mapping[str, FilePath] | None = None,
+              kind: str = "file") -> tuple[M | None, list[Diagnostic]]:
+    """The checked `model` of a built-in name or a path; None and what is wrong where there are errors.
+
+    Args:
+        source: a key of `builtin`, or a path
+        builtin: built-in files by name; also what `base` may name
+        kind: what such a file is called in messages, e.g. "machine"
+    """
+    file, diagnostics = read_toml(source, builtin, kind)
+    if file is None:
+        return None, diagnostics
+    return validate(file, model)
+
+
+def read_toml(source: str | FilePath, builtin: Mapping[str, FilePath] | None = None,
+              kind: str = "file") -> tuple[UserFile | None, list[Diagnostic]]:
+    """The merged values of a file and its bases, with the origin of each, unchecked; arguments as `load_toml`."""
+    return _read(str(source), builtin or {}, kind, None, ())
+
+
+def validate(file: UserFile, model: type[M]) -> tuple[M | None, list[Diagnostic]]:
+    """`file` as a `model`; None and one diagnostic per fault where it does not fit."""
+    try:
+        return model.model_validate_json(json.dumps(file.values, default=str)), []
+    except ValidationError as faults:
+        return None, [_diagnostic(file, model, fault) for fault in faults.errors(include_url=False)]
+
+
+def schema(model: type[BaseModel]) -> Values:
+    """The JSON schema of a user's file, with the `base` key that `read_toml` takes out."""
+    result = model.model_json_schema()
+    base = {"type": "string", "description": "built-in file (or .toml file beside this one) whose values hold where "
+                                             "this file gives none"}
+    result["properties"] = {"base": base} | result.get("properties", {})
+    return result
+
+
+def nearest(word: str, known: Sequence[str]) -> str:
+    """A hint: the known word nearest to `word`, else the list of all."""
+    close = difflib.get_close_matches(word.lower(), [k.lower() for k in known], n=1, cutoff=0.6)
+    match = next((k for k in known if close and k.lower() == close[0]), None)
+    if match is not None:
+        return f"did you mean {match!r}?"
+    return "known: " + ", ".join(sorted(known)) if known else ""
+
+
+# ---- reading and merging ----------------------------------------------------------------------------------------
+
+def _read(source: str, builtin: Mapping[str, FilePath], kind: str, wanted_by: UserFile | None,
+          above: tuple[str, ...]) -> tuple[UserFile | None, list[Diagnostic]]:
+    path = _resolve(source, builtin, wanted_by)
+    key = str(path.resolve())
+    if key in above:
+        assert wanted_by is not None
+        message = f"base = {source!r} leads back to a file that it is the base of"
+        return None, [wanted_by.problem("file.base-cycle", ("base",), message, "take one of the base keys out")]
+    text, problem = _text(path, source, builtin, kind, wanted_by)
+    if text is None:
+        return None, [problem] if problem else []
+    name = source if source in builtin else path.stem
+    try:
+        values = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as fault:
+        return None, [_syntax(fault, str(path), text)]
+    origins = {p: Origin(str(path), line) for p, line in key_lines(text).items()}
+    return _with_base(UserFile(name, str(path), values, origins), builtin, kind, (*above, key))
+
+
+def _resolve(source: str, builtin: Mapping[str, FilePath], wanted_by: UserFile | None) -> FilePath:
+    if source in builtin:
+        return builtin[source]
+    return FilePath(wanted_by.file).parent / source if wanted_by else FilePath(source)
+
+
+def _text(path: FilePath, source: str, builtin: Mapping[str, FilePath], kind: str,
+          wanted_by: UserFile | None) -> tuple[str | None, Diagnostic | None]:
+    origin = wanted_by.origin(("base",)) if wanted_by else None
+    file, lines = (origin.file, [origin.line]) if origin else ("", [])
+    try:
+        return path.read_bytes().decode("utf-8-sig").replace("\r\n", "\n"), None
+    except FileNotFoundError:
+        what = f"no {kind} is called {source!r}" + ("" if source in builtin else " and there is no such file")
+        return None, error("file.not-found", what, file=file, lines=lines, hint=nearest(source, sorted(builtin)))
+    except OSError as fault:
+        return None, error("file.unreadable", f"cannot read {path}: {fault.strerror}", file=file, lines=lines)
+    except UnicodeDecodeError as fault:
+        return None, error("file.encoding", f"byte {fault.start} is not UTF-8", file=str(path),
+                           hint="save the file as UTF-8 text")
+
+
+def _syntax(fault: tomllib.TOMLDecodeError, file: str, text: str) -> Diagnostic:
+    message = str(fault)
+    what, _, place = message.partition(" (at ")
+    line = int(place.split()[1].rstrip(",")) if place.startswith("line ") else text.count("\n") + 1
+    return error("file.syntax", f"not valid TOML: {what}", file=file, lines=[line],
+                 hint="write key = value, text in quotes, [table] in brackets")
+
+
+def _with_base(file: UserFile, builtin: Mapping[str, FilePath], kind: str,
+               above: tuple[str, ...]) -> tuple[UserFile | None, list[Diagnostic]]:
+    if "base" not in file.values:
+        return file, []
+    base = file.values["base"]
+    if not isinstance(base, str):
+        return None, [file.problem("file.type", ("base",), f"base = {base!r}: expected the name of a {kind} in quotes")]
+    under, diagnostics = _read(base, builtin, kind, file, above)
+    if under is None:
+        return None, diagnostics
+    own = {k: v for k, v in file.values.items() if k != "base"}
+    values, origins = _merge(under.values, own, under.origins, file.origins, ())
+    return UserFile(file.name, file.file, values, origins), diagnostics
+
+
+def _merge(under: Values, over: Values, under_at: Mapping[Path, Origin], over_at: Mapping[Path, Origin],
+           prefix: Path) -> tuple[Values, dict[Path, Origin]]:
+    """Tables merged key by key, all else replaced, with the origins of what is kept."""
+    values = dict(under)
+    origins = dict(under_at)
+    for key, value in over.items():
+        path = (*prefix, key)
+        old = values.get(key)
+        if isinstance(old, dict) and isinstance(value, dict):
+            values[key], origins = _merge(old, value, origins, over_at, path)
+            continue
+        values[key] = value
+        n = len(path)
+        origins = {p: o for p, o in origins.items() if p[:n] != path}
+        origins |= {p: o for p, o in over_at.items() if p[:n] == path}
+    return values, origins
+
+
+# ---- faults of the values ---------------------------------------------------------------------------------------
+
+_CODES = {"extra_forbidden": "file.unknown-key", "missing": "file.missing-key", "value_error": "file.value",
+          "assertion_error": "file.value"}
+_RANGE = ("greater_than", "less_than", "too_short", "too_long", "multiple_of", "finite_number", "literal_error", "enum",
+          "pattern_mismatch")
+
+
+def _diagnostic(file: UserFile, model: type[BaseModel], fault: ErrorDetails) -> Diagnostic:
+    path = tuple(fault["loc"])
+    key = dotted(path)
+    kind = fault["type"]
+    if kind == "extra_forbidden":
+        known = _known_keys(model, path[:-1])
+        return file.problem(_CODES[kind], path, f"unknown key {key!r}", nearest(str(path[-1]), known))
+    if kind == "missing":
+        where = dotted(path[:-1])
+        return file.problem(_CODES[kind], path, f"key {key!r} is missing", f"add {path[-1]} = ... to [{where}]" if where
+                            else f"add {path[-1]} = ... at the top")
+    if kind in ("value_error", "assertion_error"):
+        reason = str(fault.get("ctx", {}).get("error", fault["msg"]))
+        return file.problem(_CODES[kind], path, f"{key}: {reason}" if key else reason)
+    code = "file.range" if any(word in kind for word in _RANGE) else "file.type"
+    wanted = fault["msg"][:1].lower() + fault["msg"][1:]
+    return file.problem(code, path, f"{key} = {_shown(fault['input'])}: {wanted}")
+
+
+def dotted(path: Sequence[str | int]) -> str:
+    """("axes", 0, "name") as axes[0].name"""
+    text = ""
+    for part in path:
+        text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else str(part)
+    return text
+
+
+def _shown(value: object) -> str:
+    text = json.dumps(value, default=str)
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def _known_keys(model: type[BaseModel], path: Sequence[str | int]) -> list[str]:
+    """Keys that the tables of `model` at `path` know."""
+    found: list[Any] = [model]
+    for part in path:
+        found = [inner for kind in found for inner in _inside(kind, part)]
+    models = [m for kind in found for m in _models(kind)]
+    keys = {field.alias or name for m in models for name, field in m.model_fields.items()}
+    return sorted(keys if path else keys | {"base"})
+
+
+def _models(annotation: Any) -> list[type[BaseModel]]:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return [annotation]
+    if get_origin(annotation) in (dict, list, tuple):
+        return []
+    return [m for part in get_args(annotation) for m in _models(part)]
+
+
+def _inside(annotation: Any, part: str | int) -> list[Any]:
+    """Types that the element `part` of a value of this type may have; a union's tag in a location stays where it is."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        fields = {f.alias or n: f for n, f in annotation.model_fields.items()}
+        return [fields[str(part)].annotation] if part in fields else [annotation]
+    origin, args = get_origin(annotation), get_args(annotation)
+    if origin in (dict, Mapping):
+        return [args[1]]
+    if origin in (list, tuple):
+        return [a for a in args if a is not Ellipsis]
+    return [inner for a in args for inner in _inside(a, part)]

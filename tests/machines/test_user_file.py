@@ -1,0 +1,179 @@
+"""Files that a user writes: each fault is a diagnostic with file, line, what was found and what to do."""
+
+from pathlib import Path
+
+import pytest
+from pydantic import Field
+
+from machines.toml_lines import key_lines
+from machines.user_file import Origin, UserModel, load_toml, read_toml, schema
+
+
+class Axis(UserModel):
+    travel: tuple[float, float]
+    velocity: float = Field(gt=0)
+
+
+class File(UserModel):
+    name: str
+    axes: dict[str, Axis]
+    pins: dict[str, float] = Field(default_factory=dict)
+    steps: tuple[Axis, ...] = ()
+
+
+GOOD = """\
+name = "small"
+
+[axes.X]
+travel = [-10, 10.5]
+velocity = 500
+"""
+
+
+def write(folder: Path, text: str, name: str = "m.toml") -> Path:
+    path = folder / name
+    path.write_text(text)
+    return path
+
+
+def only(folder: Path, text: str, **builtin: Path):
+    model, diagnostics = load_toml(write(folder, text), File, builtin, "machine")
+    assert model is None
+    assert len(diagnostics) == 1, diagnostics
+    return diagnostics[0]
+
+
+def test_a_good_file_loads_without_diagnostics(tmp_path):
+    model, diagnostics = load_toml(write(tmp_path, GOOD), File)
+    assert diagnostics == []
+    assert model == File(name="small", axes={"X": Axis(travel=(-10.0, 10.5), velocity=500.0)})
+
+
+def test_windows_line_ends_and_byte_order_mark(tmp_path):
+    path = tmp_path / "m.toml"
+    path.write_bytes(b"\xef\xbb\xbf" + GOOD.replace("\n", "\r\n").encode())
+    assert load_toml(path, File)[0] is not None
+
+
+def test_syntax_error_has_its_line(tmp_path):
+    d = only(tmp_path, GOOD + "velocity 3\n")
+    assert (d.code, d.lines) == ("file.syntax", (6,))
+    assert d.file.endswith("m.toml")
+
+
+def test_unclosed_text_at_the_end_has_a_line(tmp_path):
+    assert only(tmp_path, GOOD + 'name = """x').lines == (6,)
+
+
+def test_unknown_key_names_the_nearest(tmp_path):
+    d = only(tmp_path, GOOD + "velocty = 3\n")
+    assert (d.code, d.lines) == ("file.unknown-key", (6,))
+    assert "axes.X.velocty" in d.message and "'velocity'" in d.hint
+
+
+def test_unknown_key_at_the_top_and_in_an_array(tmp_path):
+    assert only(tmp_path, "pin = 1\n" + GOOD).hint == "did you mean 'pins'?"
+    step = "[[steps]]\ntravel = [0, 1]\nvelocity = 1\n"
+    d = only(tmp_path, GOOD + step + step + "trave = 3\n")
+    assert (d.lines, d.hint) == ((12,), "did you mean 'travel'?")
+
+
+def test_unknown_key_without_near_one_lists_all(tmp_path):
+    assert only(tmp_path, GOOD + "q = 3\n").hint == "known: travel, velocity"
+
+
+def test_missing_key_points_at_its_table(tmp_path):
+    d = only(tmp_path, GOOD.replace("velocity = 500\n", ""))
+    assert (d.code, d.lines) == ("file.missing-key", (3,))
+    assert "axes.X.velocity" in d.message
+
+
+@pytest.mark.parametrize("value", ['"fast"', "true", "[1]", "2024-01-01"])
+def test_wrong_type(tmp_path, value):
+    d = only(tmp_path, GOOD.replace("500", value))
+    assert (d.code, d.lines) == ("file.type", (5,))
+
+
+@pytest.mark.parametrize("value", ["0", "-1.5", "inf", "nan"])
+def test_out_of_range(tmp_path, value):
+    d = only(tmp_path, GOOD.replace("500", value))
+    assert (d.code, d.lines) == ("file.range", (5,))
+
+
+def test_array_of_the_wrong_length(tmp_path):
+    assert only(tmp_path, GOOD.replace("10.5", "1, 2")).lines == (4,)
+
+
+def test_all_faults_are_reported_at_once(tmp_path):
+    _, diagnostics = load_toml(write(tmp_path, GOOD.replace("500", "0").replace("name", "nam")), File)
+    assert sorted(d.code for d in diagnostics) == ["file.missing-key", "file.range", "file.unknown-key"]
+
+
+def test_no_such_name_suggests_one(tmp_path):
+    model, (d,) = load_toml("mikrom", File, {"mikron": tmp_path, "mill": tmp_path}, "machine")
+    assert model is None and d.code == "file.not-found"
+    assert "machine" in d.message and "'mikron'" in d.hint
+
+
+def test_a_folder_and_binary_are_refused(tmp_path):
+    assert load_toml(tmp_path, File)[1][0].code == "file.unreadable"
+    (tmp_path / "b.toml").write_bytes(b"name = '\xff'")
+    assert load_toml(tmp_path / "b.toml", File)[1][0].code == "file.encoding"
+
+
+def test_base_merges_tables_and_replaces_the_rest(tmp_path):
+    base = write(tmp_path, GOOD + "[pins]\na = 1\nb = 2\n", "base.toml")
+    own = write(tmp_path, 'base = "small"\nname = "mine"\n[axes.X]\ntravel = [0, 1]\n[pins]\nb = 3\n')
+    model, diagnostics = load_toml(own, File, {"small": base})
+    assert diagnostics == [] and model is not None
+    assert model.name == "mine" and model.pins == {"a": 1, "b": 3}
+    assert model.axes["X"] == Axis(travel=(0.0, 1.0), velocity=500.0)
+
+
+def test_origin_of_each_value_through_a_base(tmp_path):
+    base = write(tmp_path, GOOD, "base.toml")
+    own = write(tmp_path, 'base = "small"\n[axes.X]\ntravel = [0, 1]\n')
+    file, _ = read_toml(own, {"small": base})
+    assert file is not None
+    assert file.origin(("axes", "X", "travel")) == Origin(str(own), 3)
+    assert file.origin(("axes", "X", "velocity")) == Origin(str(base), 5)
+
+
+def test_a_fault_in_the_base_names_the_base_file(tmp_path):
+    base = write(tmp_path, GOOD.replace("500", "0"), "base.toml")
+    d = only(tmp_path, 'base = "small"\n', small=base)
+    assert (d.file, d.lines) == (str(base), (5,))
+
+
+def test_base_may_be_a_file_beside_this_one(tmp_path):
+    write(tmp_path, GOOD, "base.toml")
+    assert load_toml(write(tmp_path, 'base = "base.toml"\n'), File)[0] is not None
+
+
+def test_base_cycle_unknown_base_and_wrong_type(tmp_path):
+    d = only(tmp_path, 'base = "other"\n', other=write(tmp_path, 'base = "m.toml"\n', "other.toml"))
+    assert (d.code, d.lines) == ("file.base-cycle", (1,))
+    d = only(tmp_path, '\nbase = "smal"\n', small=write(tmp_path, GOOD, "b.toml"))
+    assert (d.code, d.lines) == ("file.not-found", (2,))
+    assert only(tmp_path, "base = 3\n").code == "file.type"
+
+
+def test_schema_knows_base_and_forbids_the_rest():
+    s = schema(File)
+    assert "base" in s["properties"] and s["additionalProperties"] is False
+
+
+def test_key_lines_of_every_construct():
+    text = (
+        '# a = 1\na.b = """x\n[no]\n""" # c\n"q.r" = [ # note ]\n  {c = 1, d = "]}"},\n  {c = 2},\n]\n'
+        "\n[t.'u v']\nk = '''\nz=1\n'''\nl = 3\n[[n]]\nk = 1\n[n.m]\nk = 2\n[[n]]\nk = 3\n"
+    )
+    lines = key_lines(text)
+    assert lines["a", "b"] == 2
+    assert lines["q.r",] == 5
+    assert lines["q.r", 0, "d"] == 6
+    assert lines["q.r", 1, "c"] == 7
+    assert lines["t", "u v", "l"] == 14
+    assert lines["n", 0, "m", "k"] == 18
+    assert lines["n", 1, "k"] == 20
+    assert ("no",) not in lines and ("z",) not in lines
