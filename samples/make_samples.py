@@ -1,0 +1,34 @@
+"""Write every CL sample and expected_counts.json: python samples/make_samples.py [FOLDER]."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import prismatic
+import surfaces
+
+SAMPLES = {
+    "pocket.cls": prismatic.pocket,
+    "five_faces.cls": prismatic.five_faces,
+    "five_tilted.cls": prismatic.five_tilted,
+    "indexed_4axis.cls": prismatic.indexed_4axis,
+    "inch_plate.apt": prismatic.inch_plate,
+    "blade.cls": surfaces.blade,
+    "bicubic.cls": surfaces.bicubic,
+    "tool_axis_tour.apt": surfaces.tour,
+}
+
+
+def main(folder: Path) -> None:
+    """Write the samples and what a reader must find in them into `folder`."""
+    expected = {}
+    for name, make in SAMPLES.items():
+        text, expected[name] = make()
+        (folder / name).write_bytes(text.encode("ascii"))
+    (folder / "expected_counts.json").write_bytes((json.dumps(expected, indent=1) + "\n").encode("ascii"))
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent)

@@ -1,0 +1,127 @@
+"""The samples: reproducible, what they claim to be, and read with the counts that the script knows."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import toolpaths
+from toolpaths.diagnostics import has_errors
+
+FOLDER = Path(__file__).parents[1] / "samples"
+EXPECTED = json.loads((FOLDER / "expected_counts.json").read_text())
+NAMES = sorted(EXPECTED)
+SIZE_LIMIT = 400_000
+needs_reader = pytest.mark.skipif(not hasattr(toolpaths, "read"), reason="toolpaths.read is not there")
+
+
+def run_script(name: str, *arguments: str | Path) -> None:
+    subprocess.run([sys.executable, FOLDER / name, *map(str, arguments)], check=True, timeout=60)
+
+
+def goto_rows(name: str) -> np.ndarray:
+    """(N, 3) positions as written."""
+    rows = re.findall(r"^GOTO\s*/\s*(.*)$", (FOLDER / name).read_text(), re.MULTILINE)
+    return np.array([[float(v) for v in row.split(",")[:3]] for row in rows])
+
+
+@pytest.fixture(scope="module")
+def remade(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("samples")
+    run_script("make_samples.py", folder)
+    return folder
+
+
+@pytest.mark.parametrize("name", [*NAMES, "expected_counts.json"])
+def test_script_reproduces_the_file(name: str, remade: Path) -> None:
+    assert (remade / name).read_bytes() == (FOLDER / name).read_bytes()
+
+
+def test_nothing_is_left_over() -> None:
+    assert {p.name for p in FOLDER.iterdir() if p.suffix in (".cls", ".apt")} == set(NAMES)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_small_explained_and_listed(name: str) -> None:
+    data = (FOLDER / name).read_bytes()
+    assert len(data) < SIZE_LIMIT
+    assert data.startswith(b"$$ ")
+    assert b"-0.0000" not in re.sub(rb"-0\.0000\d*[1-9]", b"", data)
+    assert f"`{name}`" in (FOLDER / "README.md").read_text()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_fits_a_table_of_the_mikron(name: str) -> None:
+    """Turned any way about the origin, the tip stays inside the shortest travel (Z +-250) with room for the tool."""
+    corner = [max(abs(v) for v in pair) for pair in EXPECTED[name]["extents_mm"].values()]
+    assert np.hypot(np.hypot(corner[0], corner[1]), corner[2]) < 150
+    assert EXPECTED[name]["largest_tilt_deg"] <= (180 if "4axis" in name else 90)
+
+
+def test_bicubic_ball_touches_the_surface_and_keeps_its_plane() -> None:
+    """Distance from each ball centre to a dense grid of the surface, built from cubic smooth steps, is the radius."""
+    tip = goto_rows("bicubic.cls").reshape(61, 64, 3)
+    assert np.array_equal(tip[..., 0], np.tile(np.arange(61.0)[:, None], (1, 64)))
+    centers = tip[::6, 2:63:5] + [0, 0, 8]
+    assert np.array_equal(centers[0, :, 1], np.arange(0, 61, 5))
+    grid = np.linspace(0, 60, 601)
+    step = 3 * (grid / 60) ** 2 - 2 * (grid / 60) ** 3
+    z = 10 * (np.outer(1 - step, step) + np.outer(step, 1 - step))
+    surface = np.stack((*np.meshgrid(grid, grid, indexing="ij"), z), axis=-1).reshape(-1, 3)
+    for center in centers.reshape(-1, 3):
+        nearest = np.sqrt(np.min(np.sum((surface - center) ** 2, axis=1)))
+        assert 8 - 1e-5 < nearest < 8 + 1e-3
+
+
+def test_tour_is_for_a_simulator() -> None:
+    tour = EXPECTED["tool_axis_tour.apt"]
+    assert 60 <= tour["points"] <= 120
+    assert tour["largest_tilt_deg"] <= 60
+    assert np.abs(list(tour["extents_mm"].values())).max() <= 60
+    axes = re.findall(r"^GOTO.*?,.*?,.*?,(.*)$", (FOLDER / "tool_axis_tour.apt").read_text(), re.MULTILINE)
+    assert [a.strip() for a in axes[:-1]].count("0.000000000, 0.000000000, 1.000000000".replace(" ", "")) == 2
+
+
+@needs_reader
+@pytest.mark.parametrize("flags", [(), ("--five-axis",)])
+def test_big_file_has_the_points_asked_for(flags: tuple[str, ...], tmp_path: Path) -> None:
+    run_script("make_big.py", "2345", tmp_path / "big.cls", *flags)
+    path, diagnostics = toolpaths.read(tmp_path / "big.cls")
+    assert not has_errors(diagnostics)
+    assert len(path) == 2345
+
+
+@needs_reader
+@pytest.mark.parametrize("name", NAMES)
+def test_reader_finds_what_the_script_wrote(name: str) -> None:
+    path, diagnostics = toolpaths.read(FOLDER / name)
+    want = EXPECTED[name]
+    assert not has_errors(diagnostics), [str(d) for d in diagnostics]
+    role = np.bincount(path.role, minlength=4)
+    assert role[0] + role[1] == want["points"]
+    assert (role[1], role[2], role[3]) == (want["holes"], want["starts"], want["homes"])
+    assert (len(path.arcs), len(path.cycles)) == (want["arcs"], want["cycles"])
+    assert len(path.operations) == want["operations"]
+    assert path.units == want["units"]
+
+
+@needs_reader
+@pytest.mark.parametrize("name", NAMES)
+def test_reader_puts_the_points_where_the_script_had_them(name: str) -> None:
+    path, _ = toolpaths.read(FOLDER / name)
+    want = EXPECTED[name]
+    for i, (low, high) in enumerate(want["extents_mm"].values()):
+        assert np.allclose((path.tip[:, i].min(), path.tip[:, i].max()), (low, high), atol=2e-4)
+    tilt = np.degrees(np.arccos(np.clip(path.axis[:, 2], -1, 1))).max()
+    assert abs(tilt - want["largest_tilt_deg"]) < 2e-3
+    straight = (path.kind == 1) & (path.role == 0)
+    length = np.linalg.norm(np.diff(path.tip, axis=0, prepend=path.tip[:1]), axis=1)[straight].sum()
+    rise = np.einsum("ni,ni->n", np.diff(path.tip, axis=0, prepend=path.tip[:1])[path.arc >= 0], path.arcs.normal)
+    length += np.hypot(path.arcs.radius * path.arcs.sweep, rise).sum()
+    assert abs(length - want["feed_length_mm"]) < 0.02
