@@ -1,0 +1,43 @@
+# Everything happens in .venv; nothing needs root. `make demo` and `make test` set up what is missing first.
+
+PYTHON ?= $(shell for p in python3 python3.13 python3.12 python3.11; do \
+	"$$p" -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo "$$p" && break; done)
+BIN := .venv/bin
+STAMP := .venv/installed
+PYTEST_ARGS ?= -n auto --maxprocesses 4 -rs
+SOURCES := toolpaths machines postproc
+
+.PHONY: demo test lint lock clean
+
+demo: $(STAMP)
+	@mkdir -p out
+	$(BIN)/postproc convert samples/pocket.cls -m mill-3axis -c linuxcnc -o out/pocket.ngc
+
+test: $(STAMP)
+	$(BIN)/pytest $(PYTEST_ARGS)
+
+lint: $(STAMP)
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+
+# Pinned versions with hashes, and the project itself from this tree, so that edits count at once.
+$(STAMP): requirements.lock pyproject.toml
+	@test -n "$(PYTHON)" || { echo "Python 3.11 or newer is needed; found: $$(python3 --version 2>&1)." \
+		"Install one, or name it: make PYTHON=/path/to/python3.12 $(MAKECMDGOALS)" >&2; exit 1; }
+	@test -x $(BIN)/pip || "$(PYTHON)" -m venv --clear .venv || { rm -rf .venv; \
+		echo "$(PYTHON) cannot make a virtual environment; on Debian and Ubuntu: apt-get install python3-venv" >&2; exit 1; }
+	$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
+	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
+	@touch $@
+
+# Newest versions that pyproject.toml allows. Run it with Python 3.11: a lock made there also serves 3.12 and 3.13.
+lock: $(STAMP)
+	$(BIN)/pip install --quiet --disable-pip-version-check pip-tools
+	echo "# Pinned with hashes for Python 3.11 to 3.13, from pyproject.toml; renew with: make lock" > requirements.new
+	$(BIN)/pip-compile --quiet --upgrade --all-extras --all-build-deps --allow-unsafe --generate-hashes --strip-extras \
+		--no-header --no-annotate --no-emit-index-url --no-emit-find-links --no-emit-trusted-host \
+		--output-file - pyproject.toml | sed '/^#/d;/^$$/d' >> requirements.new
+	mv requirements.new requirements.lock
+
+clean:
+	rm -rf .venv out build *.egg-info
