@@ -1,1 +1,44 @@
 """What a machine can do: kinematics, limits, machine files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from machines.machine import Machine
+    from toolpaths.diagnostics import Diagnostic
+
+__all__ = ["load", "load_checked", "names", "schema"]
+
+
+def load(source: str | Path) -> Machine:
+    """The machine of a built-in name or a path to a TOML file.
+
+    Raises:
+        toolpaths.diagnostics.DiagnosticError: where the file has errors; carries all of them.
+    """
+    from machines import loader
+
+    return loader.load(source)
+
+
+def load_checked(source: str | Path) -> tuple[Machine | None, list[Diagnostic]]:
+    """The machine of a built-in name or a path, or None and every fault of its file."""
+    from machines import loader
+
+    return loader.load_checked(source)
+
+
+def names() -> list[str]:
+    """The built-in machines."""
+    from machines import loader
+
+    return loader.names()
+
+
+def schema() -> dict[str, Any]:
+    """The JSON schema of a machine file."""
+    from machines import loader
+
+    return loader.machine_schema()

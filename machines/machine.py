@@ -39,6 +39,8 @@ class Timing:
     tool_change: float = 0.0
     clamp: float = 0.0
     unclamp: float = 0.0
+    assumed: frozenset[str] = frozenset()
+    """names of the entries that no document states"""
 
 
 @dataclass(frozen=True)

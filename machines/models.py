@@ -1,0 +1,160 @@
+"""The machine file: what each key may hold. Lengths mm, angles degrees, times s (so mm/s, deg/s2, ...)."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, Field
+
+from machines.kinematics.base import Kinematics
+from machines.machine import ControlKinematics
+from machines.user_file import UserModel
+
+Positive = Annotated[float, Field(gt=0)]
+NotNegative = Annotated[float, Field(ge=0)]
+Vector = tuple[float, float, float]
+
+
+def _upward(travel: Any) -> Any:
+    if travel != "unlimited" and not travel[0] < travel[1]:
+        raise ValueError(f"{list(travel)} is empty; write [lower, upper]")
+    return travel
+
+
+Travel = Annotated[tuple[float, float] | Literal["unlimited"], AfterValidator(_upward)]
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A fault that only several keys together show: stable code, path of the key at fault, message, hint."""
+
+    code: str
+    path: tuple[str | int, ...]
+    message: str
+    hint: str = ""
+
+
+class KinematicsModel(UserModel):
+    """Base of the `[kinematics]` table of every family."""
+
+    family: str
+    """kind of kinematics; decides which other keys there are"""
+
+    @abstractmethod
+    def build(self) -> Kinematics:
+        """The kinematics at the gauge point; called only where `problems` has none."""
+
+    @abstractmethod
+    def describe(self) -> str:
+        """The structure in one line: ISO 10791-6 code or the parallel family."""
+
+    @property
+    @abstractmethod
+    def axis_names(self) -> tuple[str, ...]:
+        """Axis letters, the order of q."""
+
+    def problems(self) -> Iterator[Problem]:
+        """What makes the geometry unusable; paths within this table."""
+        yield from ()
+
+    def control(self, module: str) -> ControlKinematics:
+        """The control's kinematics `module` with the pins that this geometry gives.
+
+        Raises:
+            ValueError: where the module cannot describe this machine, saying why.
+        """
+        raise ValueError(f"no module of a control is known for family {self.family!r}")
+
+
+class AxisModel(UserModel):
+    """One `[axes.LETTER]` table."""
+
+    travel: Travel
+    """[lower, upper] in machine coordinates, mm or degrees; "unlimited" for a rotary axis that turns on and on"""
+    velocity: Positive
+    """mm/s or deg/s"""
+    acceleration: Positive
+    """mm/s2 or deg/s2"""
+    jerk: Positive
+    """mm/s3 or deg/s3"""
+    home: float
+    """position for tool change and programme start, mm or degrees"""
+    assumed: tuple[Literal["travel", "velocity", "acceleration", "jerk"], ...] = ()
+    """keys of this table whose figure no document states"""
+
+    @property
+    def range(self) -> tuple[float, float]:
+        """(lower, upper), infinite where unlimited."""
+        return (-float("inf"), float("inf")) if self.travel == "unlimited" else self.travel
+
+
+class TimingModel(UserModel):
+    """The `[timing]` table, seconds."""
+
+    tool_change: NotNegative
+    """chip to chip at home"""
+    clamp: NotNegative
+    """to clamp a rotary axis"""
+    unclamp: NotNegative
+    """to release it"""
+    assumed: tuple[Literal["tool_change", "clamp", "unclamp"], ...] = ()
+    """keys of this table whose figure no document states"""
+
+
+class ControlModel(UserModel):
+    """The `[control]` table of a machine whose control computes the joints itself."""
+
+    module: str
+    """LinuxCNC kinematics module; its pins follow from `[kinematics]`"""
+
+
+class MachineModel(UserModel):
+    """A machine file."""
+
+    description: str
+    """one line"""
+    kinematics: KinematicsModel
+    axes: dict[str, AxisModel]
+    """travel and dynamics by axis letter"""
+    retract_axis: str | None = None
+    """linear axis that lifts the tool off the part at home"""
+    timing: TimingModel
+    control: ControlModel | None = None
+
+    def problems(self) -> Iterator[Problem]:
+        """Faults between tables; the geometry's first, for without it the rest means nothing."""
+        geometry = [Problem(p.code, ("kinematics", *p.path), p.message, p.hint) for p in self.kinematics.problems()]
+        yield from geometry
+        if geometry:
+            return
+        kinematics = self.kinematics.build()
+        rotary = dict(zip(kinematics.axis_names, kinematics.rotary, strict=True))
+        yield from self._axis_problems(rotary)
+        if self.retract_axis is not None and rotary.get(self.retract_axis, True):
+            linear = ", ".join(name for name, turns in rotary.items() if not turns)
+            yield Problem("machine.retract-axis", ("retract_axis",),
+                          f"retract_axis = {self.retract_axis!r} is no linear axis of this machine",
+                          f"choose from {linear}")
+        if self.control is not None:
+            try:
+                self.kinematics.control(self.control.module)
+            except ValueError as fault:
+                yield Problem("machine.control", ("control", "module"), str(fault))
+
+    def _axis_problems(self, rotary: dict[str, bool]) -> Iterator[Problem]:
+        for name in rotary.keys() - self.axes.keys():
+            yield Problem("machine.axis-missing", ("axes",), f"axis {name} of the kinematics has no table",
+                          f"add [axes.{name}] with travel, velocity, acceleration, jerk, home")
+        for name, axis in self.axes.items():
+            if name not in rotary:
+                yield Problem("machine.axis-unknown", ("axes", name),
+                              f"[axes.{name}]: the kinematics has no axis {name}", f"its axes are {', '.join(rotary)}")
+            elif axis.travel == "unlimited" and not rotary[name]:
+                yield Problem("machine.travel", ("axes", name, "travel"),
+                              f"linear axis {name} cannot have unlimited travel", "write travel = [lower, upper] in mm")
+            elif not axis.range[0] <= axis.home <= axis.range[1]:
+                yield Problem("machine.home", ("axes", name, "home"),
+                              f"home {axis.home:g} of {name} lies outside its travel {list(axis.range)}")
