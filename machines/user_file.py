@@ -12,9 +12,9 @@ import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path as FilePath
-from typing import Any, TypeVar, get_args, get_origin
+from typing import Any, TypeVar, Union, get_args, get_origin
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 from pydantic_core import ErrorDetails
 
 from machines.toml_lines import Path, key_lines
@@ -95,13 +95,18 @@ def validate(file: UserFile, model: type[M]) -> tuple[M | None, list[Diagnostic]
         return None, [_diagnostic(file, model, fault) for fault in faults.errors(include_url=False)]
 
 
-def schema(model: type[BaseModel]) -> Values:
-    """The JSON schema of a user's file, with the `base` key that `read_toml` takes out."""
-    result = model.model_json_schema()
+def schema(*models: type[BaseModel]) -> Values:
+    """The JSON schema of a user's file that is any of the models, with the `base` key that `read_toml` takes out.
+
+    It holds for a file with its base merged in: a file that names a base may leave out what that gives.
+    """
+    result = TypeAdapter(Union[models]).json_schema()  # noqa: UP007
     base = {"type": "string", "description": "built-in file (or .toml file beside this one) whose values hold where "
                                              "this file gives none"}
-    result["properties"] = {"base": base} | result.get("properties", {})
-    return result
+    tops = [result] if len(models) == 1 else [result["$defs"][choice["$ref"].split("/")[-1]] for choice in result["anyOf"]]
+    for top in tops:
+        top["properties"] = {"base": base} | top.get("properties", {})
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema"} | result
 
 
 def nearest(word: str, known: Sequence[str]) -> str:

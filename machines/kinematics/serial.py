@@ -30,7 +30,7 @@ DEPENDENT = 1e-9
 """least determinant of the three linear directions; below it they do not span space"""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Joint:
     """One axis: letter, kind, unit direction (3,), for a rotary one a point (3,) of its line in mm; all at q = 0."""
 
@@ -44,7 +44,7 @@ class Joint:
         object.__setattr__(self, "point", frozen(self.point, np.float64, (3,), "point"))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Serial(Kinematics):
     """Three linear axes and up to two rotary ones.
 
@@ -151,16 +151,17 @@ class Serial(Kinematics):
         """
         tip, axis = as_points(tip, 3, "tip"), _unit(as_points(axis, 3, "axis"))
         q = np.zeros((self.branches, len(tip), self.joints))
+        out = ~self._reachable(axis)
         for branch in range(self.branches):
             for joint, value in zip(self._turns, self._angles(axis, branch, near), strict=True):
                 q[branch, :, self.axis_names.index(joint.name)] = value
             self._set_slides(q[branch], tip)
+        q[:, out] = np.nan
         return q
 
     def _angles(self, axis: Floats, branch: int, near: Floats | None) -> list[Floats]:
         """Angles (N,) of the rotary axes in chain order that take the tool to the unit `axis` (N, 3)."""
         turns = self._turns
-        out = ~self._reachable(axis)
         if not turns:
             return []
         first = turns[0]
@@ -175,7 +176,7 @@ class Serial(Kinematics):
         if np.any(free):
             value = np.where(free, self._wanted(first, near, len(axis)), value)
         angles.insert(0, value)
-        return [np.where(out, np.nan, a) for a in angles]
+        return angles
 
     def _wanted(self, joint: Joint, near: Floats | None, n: int) -> Floats:
         if near is None:
