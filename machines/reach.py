@@ -1,0 +1,243 @@
+"""Reach of a parallel machine: signed margins to its workspace, joint stops and collisions, at joints and between them.
+
+Rods, rails and spindle are round bars (segments with a radius); two bars clear each other by the distance of their
+middle lines less both radii. Source: Company 2000, II.4.2.1 (rods and slides), II.4.2.2 (rods), II.4.2.3 (rods and
+spindle). Rods that end in one joint (II-16) cannot be told apart there and are left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cached_property, partial
+from typing import Protocol
+
+import numpy as np
+
+from machines.kinematics.rig import Clearance, Rig
+from machines.kinematics.sliders import Legs
+from machines.kinematics.workspace import Workspace
+from toolpaths.arrays import Bools, Floats
+from toolpaths.rotations import angle_between
+
+BLOCK = 4096
+"""points at a time"""
+TOUCH = 1e-6
+"""mm: rods whose ends are nearer share a joint"""
+
+
+Column = tuple[str, bool, Callable[[Rig], Floats]]
+"""name, True for rad, margin (N,) of a rig"""
+
+
+class SliderMachine(Protocol):
+    """What the clearances need of a kinematics."""
+
+    @property
+    def workspace(self) -> Workspace: ...
+    @property
+    def clearance(self) -> Clearance | None: ...
+    @property
+    def legs(self) -> Legs: ...
+    @property
+    def axis_names(self) -> tuple[str, ...]: ...
+    def rig(self, q: Floats, near: Floats | None = None) -> Rig: ...
+    def middle_rig(self) -> Rig: ...
+
+
+@dataclass(frozen=True, eq=False)
+class Margins:
+    """Signed margins: negative where a bound is passed, NaN where the joints have no pose.
+
+    Attributes:
+        names: what each column is, e.g. "rod X1 - rod Y1"
+        angular: (M,) True for rad, False for mm
+        values: (N, M)
+    """
+
+    names: tuple[str, ...]
+    angular: Bools
+    values: Floats
+
+    def passed(self) -> list[tuple[str, bool, int, int, float]]:
+        """Each bound that is passed: (name, angular, rows, worst row, margin there), worst of each unit first."""
+        found = []
+        for name, angular, column in zip(self.names, self.angular, self.values.T, strict=True):
+            rows = np.flatnonzero(column < 0.0)
+            if len(rows):
+                worst = int(rows[np.argmin(column[rows])])
+                found.append((name, bool(angular), len(rows), worst, float(column[worst])))
+        return sorted(found, key=lambda f: (f[1], f[4]))
+
+
+def is_checked(kinematics: object) -> bool:
+    """True for a kinematics that `reach` knows how to look at."""
+    return hasattr(kinematics, "rig") and hasattr(kinematics, "workspace")
+
+
+def reach(kinematics: SliderMachine, q: Floats, near: Floats | None = None) -> Margins:
+    """Margins at joints q (N, J); `near` as for `Kinematics.pose`."""
+    checks = _Checks(kinematics)
+    blocks = []
+    for first in range(0, len(q), BLOCK):
+        part = slice(first, first + BLOCK)
+        hint = near[part] if near is not None and near.ndim == 2 else near
+        blocks.append(checks.values(kinematics.rig(q[part], hint)))
+    values = np.concatenate(blocks) if blocks else np.empty((0, len(checks.names)))
+    return Margins(checks.names, checks.angular, values)
+
+
+def reach_between(kinematics: SliderMachine, q: Floats, depth: int = 6) -> Margins:
+    """Least margins (N-1, M) on the straight joint moves between consecutive q (N, J), their ends included.
+
+    A move is halved until it cannot hide a negative margin, `depth` times at most. The test for that: a margin
+    changes along a move by no more than the fastest of its changes seen at ends and middle, doubled; where that could
+    bring it below 0 the halves are looked at.
+    """
+    checks = _Checks(kinematics)
+    ends = reach(kinematics, q).values
+    least = np.minimum(ends[:-1], ends[1:])
+    _halve(kinematics, checks, q[:-1], q[1:], ends[:-1], ends[1:], least, np.arange(len(q) - 1), depth)
+    return Margins(checks.names, checks.angular, least)
+
+
+def _halve(kinematics: SliderMachine, checks: _Checks, q0: Floats, q1: Floats, m0: Floats, m1: Floats, least: Floats,
+           move: np.ndarray[tuple[int], np.dtype[np.int64]], depth: int) -> None:
+    if not len(move) or depth == 0:
+        return
+    middle = 0.5 * (q0 + q1)
+    m = reach(kinematics, middle).values
+    np.minimum.at(least, move, m)
+    swing = 2.0 * np.maximum(np.abs(m - m0), np.abs(m1 - m))
+    risky = np.flatnonzero(((np.minimum(np.minimum(m0, m1), m) - swing < 0.0) & (least[move] >= 0.0)).any(axis=1))
+    both = np.concatenate([risky, risky])
+    _halve(kinematics, checks, np.concatenate([q0[risky], middle[risky]]), np.concatenate([middle[risky], q1[risky]]),
+           np.concatenate([m0[risky], m[risky]]), np.concatenate([m[risky], m1[risky]]), least, move[both], depth - 1)
+
+
+class _Checks:
+    """The columns of one machine, built once: name, unit and a function of the rig."""
+
+    def __init__(self, kinematics: SliderMachine) -> None:
+        self.space = kinematics.workspace
+        self.letters = kinematics.axis_names
+        self.middle = kinematics.middle_rig()
+        self.legs = kinematics.legs
+        self.columns: list[Column] = list(self._workspace())
+        if kinematics.clearance is not None:
+            self.clearance = kinematics.clearance
+            self.columns += [*self._stops(), *self._bars()]
+        self.names = tuple(name for name, _, _ in self.columns)
+        self.angular = np.array([angular for _, angular, _ in self.columns], dtype=np.bool_)
+
+    def values(self, rig: Rig) -> Floats:
+        """(N, M)"""
+        return np.stack([column(rig) for _, _, column in self.columns], axis=1)
+
+    def _workspace(self) -> Iterator[Column]:
+        for i, letter in enumerate("xyz"):
+            yield f"workspace {letter}", False, partial(self._face, i)
+        if self.space.tilt[0] < self.space.tilt[1]:
+            yield "tilt", True, self._tilt
+
+    def _face(self, i: int, rig: Rig) -> Floats:
+        return self.space.margins(rig.place)[:, i]
+
+    def _tilt(self, rig: Rig) -> Floats:
+        low, high = self.space.tilt
+        return np.minimum(rig.tilt - low, high - rig.tilt)
+
+    def _stops(self) -> Iterator[Column]:
+        stops = (("slide", self.clearance.carriage_angle), ("platform", self.clearance.platform_angle))
+        for k, letter in enumerate(self.letters[: len(self.legs.lengths)]):
+            for where, most in stops:
+                if most is not None:
+                    yield f"joint {letter} at {where}", True, partial(self._swing, k, most, where == "platform")
+
+    def _swing(self, k: int, most: float, carried: bool, rig: Rig) -> Floats:
+        """The stop `most` less the rod's angle from its direction in the middle; `carried` by the tilting platform."""
+        rod = _unit(rig.ends[:, k] - rig.carriages[:, k])
+        middle = _unit(self.middle.ends[:, k] - self.middle.carriages[:, k])
+        if carried:
+            rod, middle = _level(rod, rig.tilt), _level(middle, self.middle.tilt)
+        return np.asarray(most - angle_between(rod, middle), dtype=np.float64)
+
+    def _bars(self) -> Iterator[Column]:
+        given = self.clearance
+        if given.rod_radius is None:
+            return
+        for a, name in enumerate(self.rod_names):
+            for b in range(a + 1, len(self.rod_names)):
+                if given.leg[a] != given.leg[b] and not self._share_a_joint(a, b):
+                    yield (f"{name} - {self.rod_names[b]}", False,
+                           partial(self._gap, a, partial(self.rod, b), 2.0 * given.rod_radius))
+            if given.spindle_radius is not None:
+                thick = given.rod_radius + given.spindle_radius
+                yield f"{name} - spindle", False, partial(self._gap, a, self.spindle, thick)
+            if given.rail_radius is not None:
+                for k, letter in enumerate(self.letters[: len(self.legs.lengths)]):
+                    yield (f"{name} - slide {letter}", False,
+                           partial(self._gap, a, partial(self.rail, k), given.rod_radius + given.rail_radius))
+
+    def _gap(self, a: int, other: Callable[[Rig], tuple[Floats, Floats]], thick: float, rig: Rig) -> Floats:
+        return np.asarray(segment_distance(*self.rod(a, rig), *other(rig)) - thick, dtype=np.float64)
+
+    @cached_property
+    def rod_names(self) -> list[str]:
+        """rod X1, rod X2, rod Y1, ..."""
+        leg = self.clearance.leg.tolist()
+        return [f"rod {self.letters[k]}{1 + leg[:i].count(k)}" for i, k in enumerate(leg)]
+
+    def _share_a_joint(self, a: int, b: int) -> bool:
+        ends = [self.rod(i, self.middle)[1] for i in (a, b)]
+        return bool(np.linalg.norm(ends[0] - ends[1]) < TOUCH)
+
+    def rod(self, i: int, rig: Rig) -> tuple[Floats, Floats]:
+        """Both ends (N, 3) of rod i."""
+        k, shift = int(self.clearance.leg[i]), self.clearance.shift[i]
+        return rig.carriages[:, k] + shift, rig.ends[:, k] + shift
+
+    def spindle(self, rig: Rig) -> tuple[Floats, Floats]:
+        """Both ends (N, 3) of the spindle."""
+        low, high = self.clearance.spindle
+        return rig.gauge + low * rig.axis, rig.gauge + high * rig.axis
+
+    def rail(self, k: int, rig: Rig) -> tuple[Floats, Floats]:
+        """Both ends (1, 3) of the rail of slide k."""
+        given = self.clearance
+        assert given.rail_offset is not None and given.rail_ends is not None
+        start, u = self.legs.points[k] + given.rail_offset[k], self.legs.directions[k]
+        low, high = given.rail_ends[k]
+        return (start + low * u)[None], (start + high * u)[None]
+
+
+def segment_distance(a: Floats, b: Floats, c: Floats, d: Floats) -> Floats:
+    """Least distance (N,) mm between segments ab and cd, each end (N, 3) or (1, 3).
+
+    Closest points of two segments by clamping the parameters in turn (Ericson, Real-Time Collision Detection, 5.1.9).
+    """
+    u, v, w = b - a, d - c, a - c
+    uu, vv, uv = _dot(u, u), _dot(v, v), _dot(u, v)
+    uw, vw = _dot(u, w), _dot(v, w)
+    under = uu * vv - uv * uv
+    apart = under > 1e-12 * uu * vv
+    s = np.where(apart, np.clip((uv * vw - uw * vv) / np.where(apart, under, 1.0), 0.0, 1.0), 0.0)
+    t = np.clip((uv * s + vw) / vv, 0.0, 1.0)
+    s = np.clip((uv * t - uw) / uu, 0.0, 1.0)
+    gap = w + s[:, None] * u - t[:, None] * v
+    return np.asarray(np.linalg.norm(gap, axis=1), dtype=np.float64)
+
+
+def _level(v: Floats, tilt: Floats) -> Floats:
+    """Vectors (N, 3) in the platform's own directions: turned back about x."""
+    c, s = np.cos(tilt), np.sin(tilt)
+    return np.stack([v[:, 0], c * v[:, 1] + s * v[:, 2], c * v[:, 2] - s * v[:, 1]], axis=1)
+
+
+def _unit(v: Floats) -> Floats:
+    return np.asarray(v / np.linalg.norm(v, axis=-1, keepdims=True), dtype=np.float64)
+
+
+def _dot(a: Floats, b: Floats) -> Floats:
+    result: Floats = np.sum(a * b, axis=-1)
+    return result

@@ -1,0 +1,129 @@
+"""Linear Delta: identity over the workspace, both assembly modes, Jacobian, III-11, LinuxCNC's lineardeltakins."""
+
+import numpy as np
+import pytest
+
+import machines
+from machines.kinematics.linear_delta import LinearDelta
+from toolpaths.arrays import Floats
+
+NAMES = [name for name in machines.names() if name.startswith("delta-")] + ["uranesx", "linuxcnc-lineardelta"]
+
+
+def delta(name: str) -> LinearDelta:
+    kinematics = machines.load(name).kinematics
+    assert isinstance(kinematics, LinearDelta)
+    return kinematics
+
+
+def up(n: int) -> Floats:
+    return np.tile([0.0, 0.0, 1.0], (n, 1))
+
+
+def poses(kinematics: LinearDelta, n: int, seed: int = 0) -> Floats:
+    return kinematics.workspace.random(np.random.default_rng(seed), n)[0]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_forward_of_inverse_is_identity_over_the_workspace(name: str) -> None:
+    kinematics = delta(name)
+    tip = poses(kinematics, 100_000)
+    q = kinematics.inverse(tip, up(len(tip)))
+    assert q.shape == (1, len(tip), 3)
+    found, axis = kinematics.forward(q[0])
+    assert np.abs(found - tip).max() < 1e-9
+    np.testing.assert_array_equal(axis, up(len(tip)))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_choice_of_roots_is_a_pose_of_the_machine(name: str) -> None:
+    kinematics = delta(name).with_tool(40.0)
+    every = LinearDelta(kinematics.legs, kinematics.platform, kinematics.workspace, tool_length=40.0, all_roots=True)
+    tip = poses(kinematics, 2000)
+    q = every.inverse(tip, up(len(tip)))
+    assert q.shape == (8, len(tip), 3) and every.branches == 8
+    np.testing.assert_array_equal(q[0], kinematics.inverse(tip, up(len(tip)))[0])
+    for branch in q:
+        tips, _ = every.assembly_modes(branch)
+        assert np.nanmin(np.linalg.norm(tips - tip, axis=2), axis=0).max() < 1e-6
+        near, _ = every.forward(branch, np.hstack([tip, up(len(tip))]))
+        assert np.abs(near - tip).max() < 1e-6
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_assembly_modes_close_the_rods_and_differ(name: str) -> None:
+    kinematics = delta(name)
+    q = kinematics.inverse(poses(kinematics, 2000), up(2000))[0]
+    tips, _ = kinematics.assembly_modes(q)
+    assert tips.shape == (2, 2000, 3)
+    for tip in tips:
+        length = np.linalg.norm(kinematics.rods(q, tip), axis=2)
+        np.testing.assert_allclose(length, np.broadcast_to(kinematics.legs.lengths, length.shape), atol=1e-8)
+    assert np.linalg.norm(tips[0] - tips[1], axis=1).min() > 1.0
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_jacobian_is_the_derivative_of_forward(name: str) -> None:
+    kinematics = delta(name)
+    q = kinematics.inverse(poses(kinematics, 300), up(300))[0]
+    h = 1e-3
+    numeric = np.stack([(kinematics.forward(q + h * e)[0] - kinematics.forward(q - h * e)[0]) / (2 * h)
+                        for e in np.eye(3)], axis=2)
+    jacobian = kinematics.jacobian(q)
+    np.testing.assert_allclose(jacobian[:, :3], numeric, atol=1e-7)
+    assert not jacobian[:, 3:].any()
+    np.testing.assert_array_equal(kinematics.twist_jacobian(q), jacobian)
+
+
+def test_forward_agrees_with_the_closed_form_of_the_thesis() -> None:
+    """III-11 with B and D as in the errata: E = r - R + D, y = A z + B, x = C z + D, the lower of the two roots."""
+    kinematics = delta("uranesx")
+    q = kinematics.inverse(poses(kinematics, 1000), up(1000))[0]
+    q1, q2, q3 = q.T
+    f, length = 150.0 - 700.0, 1300.0
+    a = (q2 - q3) / (np.sqrt(3) * f)
+    b = (q3**2 - q2**2) / (2 * np.sqrt(3) * f)
+    c = (2 * (q2 - q1) - a * f * np.sqrt(3)) / (-3 * f)
+    d = (q1**2 - q2**2 - b * np.sqrt(3) * f) / (-3 * f)
+    e = f + d
+    two, one, none = a**2 + c**2 + 1, 2 * (a * b + c * e - q1), e**2 + b**2 + q1**2 - length**2
+    z = (-one - np.sqrt(one**2 - 4 * two * none)) / (2 * two)
+    np.testing.assert_allclose(kinematics.forward(q)[0], np.stack([c * z + d, a * z + b, z], axis=1), atol=1e-8)
+
+
+def test_a_tilted_tool_axis_has_no_solution_and_z_is_nearest() -> None:
+    kinematics = delta("uranesx")
+    axis = np.array([[0.0, 0.0, 1.0], [0.0, 1e-6, 1.0], [0.0, 0.0, -1.0], [0.0, 0.0, 0.0], [0.0, 0.0, 2.0]])
+    q = kinematics.inverse(np.zeros((5, 3)), axis)
+    assert np.isfinite(q[0, [0, 4]]).all() and np.isnan(q[0, 1:4]).all()
+    np.testing.assert_array_equal(kinematics.nearest_axis(axis), up(5))
+
+
+def test_out_of_reach_is_nan_both_ways() -> None:
+    kinematics = delta("uranesx")
+    assert np.isnan(kinematics.inverse(np.array([[2000.0, 0.0, 0.0]]), up(1))).all()
+    tip, axis, spin = kinematics.pose(np.array([[0.0, 0.0, 4000.0]]))
+    assert np.isnan(tip).all() and np.isnan(axis).all() and np.isnan(spin).all()
+    assert np.isnan(kinematics.jacobian(np.array([[0.0, 0.0, 4000.0]]))[:, :3]).all()
+
+
+def test_one_point_is_a_batch_of_one() -> None:
+    kinematics = delta("delta-parallel-x")
+    tip = poses(kinematics, 50)
+    q = kinematics.inverse(tip, up(50))
+    for i in range(50):
+        np.testing.assert_array_equal(kinematics.inverse(tip[i : i + 1], up(1))[:, 0], q[:, i])
+
+
+def test_lineardeltakins_positions_that_linuxcnc_commanded() -> None:
+    """Joints of LinuxCNC 2.9's simulation at standstill, module lineardeltakins with its default pins."""
+    kinematics = delta("linuxcnc-lineardelta")
+    control = machines.load("linuxcnc-lineardelta").control_kinematics
+    assert control is not None and control.pins == {"lineardeltakins.L": 269.0, "lineardeltakins.R": 130.25}
+    tip = np.array([[30.0, -20.0, 25.5], [-60.0, -50.0, 120.0]])
+    joints = np.array(LINUXCNC)
+    np.testing.assert_allclose(kinematics.inverse(tip, up(2))[0], joints, atol=1e-6)
+    np.testing.assert_allclose(kinematics.forward(joints)[0], tip, atol=1e-6)
+
+
+LINUXCNC = ((246.601645177, 248.956816789, 277.430399179), (310.449304278, 383.333276593, 325.602676147))
