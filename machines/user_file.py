@@ -10,7 +10,7 @@ import difflib
 import json
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path as FilePath
 from typing import Any, TypeVar, Union, get_args, get_origin
 
@@ -91,8 +91,8 @@ def validate(file: UserFile, model: type[M]) -> tuple[M | None, list[Diagnostic]
     """`file` as a `model`; None and one diagnostic per fault where it does not fit."""
     try:
         return model.model_validate_json(json.dumps(file.values, default=str)), []
-    except ValidationError as faults:
-        return None, [_diagnostic(file, model, fault) for fault in faults.errors(include_url=False)]
+    except ValidationError as found:
+        return None, [_diagnostic(file, model, fault) for fault in _faults(file.values, model, found)]
 
 
 def schema(*models: type[BaseModel]) -> Values:
@@ -100,22 +100,27 @@ def schema(*models: type[BaseModel]) -> Values:
 
     It holds for a file with its base merged in: a file that names a base may leave out what that gives.
     """
-    result = TypeAdapter(Union[models]).json_schema()  # noqa: UP007
+    any_of: Any = Union[models]  # noqa: UP007
+    result: Values = TypeAdapter(any_of).json_schema()
     base = {"type": "string", "description": "built-in file (or .toml file beside this one) whose values hold where "
                                              "this file gives none"}
-    tops = [result] if len(models) == 1 else [result["$defs"][choice["$ref"].split("/")[-1]] for choice in result["anyOf"]]
-    for top in tops:
+    several = [result["$defs"][choice["$ref"].split("/")[-1]] for choice in result.get("anyOf", [])]
+    for top in several or [result]:
         top["properties"] = {"base": base} | top.get("properties", {})
     return {"$schema": "https://json-schema.org/draft/2020-12/schema"} | result
 
 
 def nearest(word: str, known: Sequence[str]) -> str:
     """A hint: the known word nearest to `word`, else the list of all."""
-    close = difflib.get_close_matches(word.lower(), [k.lower() for k in known], n=1, cutoff=0.6)
-    match = next((k for k in known if close and k.lower() == close[0]), None)
+    match = _nearest(word, known)
     if match is not None:
         return f"did you mean {match!r}?"
     return "known: " + ", ".join(sorted(known)) if known else ""
+
+
+def _nearest(word: str, known: Sequence[str]) -> str | None:
+    close = difflib.get_close_matches(word.lower(), [k.lower() for k in known], n=1, cutoff=0.6)
+    return next((k for k in known if close and k.lower() == close[0]), None)
 
 
 # ---- reading and merging ----------------------------------------------------------------------------------------
@@ -205,29 +210,67 @@ def _merge(under: Values, over: Values, under_at: Mapping[Path, Origin], over_at
 
 # ---- faults of the values ---------------------------------------------------------------------------------------
 
-_CODES = {"extra_forbidden": "file.unknown-key", "missing": "file.missing-key", "value_error": "file.value",
-          "assertion_error": "file.value"}
+_CODES = {"value_error": "file.value", "assertion_error": "file.value"}
 _RANGE = ("greater_than", "less_than", "too_short", "too_long", "multiple_of", "finite_number", "literal_error", "enum",
           "pattern_mismatch")
 
 
-def _diagnostic(file: UserFile, model: type[BaseModel], fault: ErrorDetails) -> Diagnostic:
-    path = tuple(fault["loc"])
-    key = dotted(path)
-    kind = fault["type"]
-    if kind == "extra_forbidden":
-        known = _known_keys(model, path[:-1])
-        return file.problem(_CODES[kind], path, f"unknown key {key!r}", nearest(str(path[-1]), known))
-    if kind == "missing":
-        where = dotted(path[:-1])
-        return file.problem(_CODES[kind], path, f"key {key!r} is missing", f"add {path[-1]} = ... to [{where}]" if where
-                            else f"add {path[-1]} = ... at the top")
-    if kind in ("value_error", "assertion_error"):
-        reason = str(fault.get("ctx", {}).get("error", fault["msg"]))
-        return file.problem(_CODES[kind], path, f"{key}: {reason}" if key else reason)
-    code = "file.range" if any(word in kind for word in _RANGE) else "file.type"
-    wanted = fault["msg"][:1].lower() + fault["msg"][1:]
-    return file.problem(code, path, f"{key} = {_shown(fault['input'])}: {wanted}")
+@dataclass(frozen=True)
+class _Fault:
+    path: Path
+    """as it stands in the file"""
+    kind: str
+    """pydantic's name"""
+    message: str
+    value: object
+
+
+def _faults(values: Values, model: type[BaseModel], found: ValidationError) -> list[_Fault]:
+    """One fault per key: the words of a union's members are joined, a missing key that is only misspelt left out."""
+    by_key: dict[Path, _Fault] = {}
+    for detail in found.errors(include_url=False):
+        path, kind = _in_file(values, detail), detail["type"]
+        message = str(detail.get("ctx", {}).get("error", detail["msg"]))
+        if kind == "missing" and isinstance(path[-1], int):
+            message = f"at least {path[-1] + 1} elements are needed"
+            path, kind = path[:-1], "too_short"
+        fault = _Fault(path, kind, message[:1].lower() + message[1:], detail["input"])
+        said = by_key.get(path)
+        by_key[path] = replace(said, message=f"{said.message}, or {fault.message}") if said else fault
+    misspelt = {(*f.path[:-1], _nearest_key(f.path, model)) for f in by_key.values() if f.kind == "extra_forbidden"}
+    around = {path[:n] for path in by_key for n in range(1, len(path))}  # the fault inside says more
+    return [f for f in by_key.values() if f.path not in around and not (f.kind == "missing" and f.path in misspelt)]
+
+
+def _in_file(values: Values, detail: ErrorDetails) -> Path:
+    """The location of a fault without the union members that pydantic names in it."""
+    path: list[str | int] = []
+    at: Any = values
+    for part in detail["loc"]:
+        known = part in at if isinstance(at, dict) else isinstance(at, list) and part in range(len(at))
+        if known:
+            at = at[part]
+            path.append(part)
+    return (*path, detail["loc"][-1]) if detail["type"] == "missing" else tuple(path)
+
+
+def _nearest_key(path: Path, model: type[BaseModel]) -> str | None:
+    return _nearest(str(path[-1]), _known_keys(model, path[:-1]))
+
+
+def _diagnostic(file: UserFile, model: type[BaseModel], fault: _Fault) -> Diagnostic:
+    path, key = fault.path, dotted(fault.path)
+    code = _CODES.get(fault.kind)
+    if fault.kind == "extra_forbidden":
+        return file.problem("file.unknown-key", path, f"unknown key {key!r}",
+                            nearest(str(path[-1]), _known_keys(model, path[:-1])))
+    if fault.kind == "missing":
+        where = f"to [{dotted(path[:-1])}]" if path[1:] else "at the top"
+        return file.problem("file.missing-key", path, f"key {key!r} is missing", f"add {path[-1]} = ... {where}")
+    if code:
+        return file.problem(code, path, f"{key}: {fault.message}" if key else fault.message)
+    code = "file.range" if any(word in fault.kind for word in _RANGE) else "file.type"
+    return file.problem(code, path, f"{key} = {_shown(fault.value)}: {fault.message}")
 
 
 def dotted(path: Sequence[str | int]) -> str:

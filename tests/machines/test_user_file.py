@@ -1,6 +1,7 @@
 """Files that a user writes: each fault is a diagnostic with file, line, what was found and what to do."""
 
 from pathlib import Path
+from typing import Literal
 
 import pytest
 from pydantic import Field
@@ -12,6 +13,7 @@ from machines.user_file import Origin, UserModel, load_toml, read_toml, schema
 class Axis(UserModel):
     travel: tuple[float, float]
     velocity: float = Field(gt=0)
+    reach: tuple[float, float] | Literal["all"] = "all"
 
 
 class File(UserModel):
@@ -79,7 +81,7 @@ def test_unknown_key_at_the_top_and_in_an_array(tmp_path):
 
 
 def test_unknown_key_without_near_one_lists_all(tmp_path):
-    assert only(tmp_path, GOOD + "q = 3\n").hint == "known: travel, velocity"
+    assert only(tmp_path, GOOD + "q = 3\n").hint == "known: reach, travel, velocity"
 
 
 def test_missing_key_points_at_its_table(tmp_path):
@@ -105,8 +107,18 @@ def test_array_of_the_wrong_length(tmp_path):
 
 
 def test_all_faults_are_reported_at_once(tmp_path):
-    _, diagnostics = load_toml(write(tmp_path, GOOD.replace("500", "0").replace("name", "nam")), File)
+    _, diagnostics = load_toml(write(tmp_path, GOOD.replace("500", "0").replace("name", "label")), File)
     assert sorted(d.code for d in diagnostics) == ["file.missing-key", "file.range", "file.unknown-key"]
+
+
+def test_a_misspelt_key_is_not_missing_as_well(tmp_path):
+    assert only(tmp_path, GOOD.replace("velocity", "velocty")).code == "file.unknown-key"
+
+
+@pytest.mark.parametrize("value", ['"none"', "[1]", "[1, 2, 3]", "true", '["a", 2]'])
+def test_a_union_gives_one_fault_that_names_the_choices(tmp_path, value):
+    d = only(tmp_path, GOOD + f"reach = {value}\n")
+    assert d.lines == (6,) and "axes.X.reach" in d.message
 
 
 def test_no_such_name_suggests_one(tmp_path):
