@@ -1,0 +1,285 @@
+"""From the state of `Builder` to a `Toolpath`: everything that is done to all rows at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TypeVar
+
+import numpy as np
+
+from toolpaths.arrays import Array, Bools, Floats, Ints
+from toolpaths.cl.arcs import UNIT_ROUNDING, Records, arcs_of, unit
+from toolpaths.cl.build import Builder, Track
+from toolpaths.toolpath import Arcs, FeedMode, Frame, Kind, Operation, Role, Tool, Toolpath
+
+NORMAL_ROUNDING = 1e-3
+T = TypeVar("T")
+
+
+@dataclass
+class Rows:
+    """The N rows while they are worked on, mm; `given` (N,): the record carries an axis of its own."""
+
+    tip: Floats
+    axis: Floats
+    third: Floats | None
+    line: Ints
+    given: Bools
+
+    def __len__(self) -> int:
+        return len(self.line)
+
+
+def assemble(b: Builder) -> Toolpath:
+    """The toolpath; consumes the builder's arrays."""
+    rows = _rows(b)
+    n = len(rows)
+    _fill_axis(b, rows)
+    if b.scale != 1.0:
+        rows.tip *= b.scale
+    normal, contact = _normals(b, rows)
+    rows.axis = _checked_axis(b, rows)
+    _to_part_frame(b, rows, normal, contact)
+    _add_deltas(b, rows)
+    role, kind, arc = _kinds(b, n)
+    arcs = _arcs(b, rows, kind, arc)
+    cycle = spread(b.cycle, n, np.int32)
+    cycle[(role != Role.POINT) | (arc >= 0)] = -1
+    role[cycle >= 0] = Role.HOLE
+    kind[cycle >= 0] = Kind.RAPID
+    feed, mode = _feeds(b, rows, kind)
+    operation, operations, frames = _operations(b, n)
+    tool, tools = _tools(b, n)
+    pass_ = passes((kind == Kind.RAPID) & (role != Role.HOLE), operation, tool)
+    return Toolpath(rows.tip, rows.axis, feed, mode, kind, role, arc, cycle, tool, operation, pass_, rows.line, arcs,
+                    tuple(b.cycles), tools, operations, frames, tuple(b.events), normal, contact,
+                    b.declared.units if b.declared else b.units, b.name, b.log.file)
+
+
+def spread(track: Track[T], n: int, dtype: type) -> Array:
+    """The value of each of n rows."""
+    starts = np.minimum(np.array([*track.starts, n]), n)
+    return np.repeat(np.array(track.values, dtype), np.diff(starts))
+
+
+def _rows(b: Builder) -> Rows:
+    """Plain points and the others in the order of the program."""
+    points, extras = b.points, b.extras
+    axis, third = points.axis, points.third
+    if b.pieces == [(0, len(points))] or (not b.pieces and not len(points)):
+        given = np.zeros(len(points), bool) if axis is None else ~np.isnan(axis[:, 0])
+        return Rows(points.xyz, axis if axis is not None else np.full((len(points), 3), np.nan), third, points.line,
+                    given)
+    source = _source(b)
+    tip = _merged(points.xyz, extras.xyz, len(points))[source]
+    axis = _merged(axis, extras.axis, len(points))[source]
+    has_third = third is not None or any(t[0] == t[0] for t in extras.third)
+    third = _merged(third, extras.third, len(points))[source] if has_third else None
+    line = np.concatenate([points.line, np.array(extras.line, np.int64)])[source]
+    return Rows(tip, axis, third, line, ~np.isnan(axis[:, 0]))
+
+
+def _merged(plain: Floats | None, extra: list[tuple[float, float, float]], n: int) -> Floats:
+    first = np.full((n, 3), np.nan) if plain is None else plain
+    return np.concatenate([first, np.array(extra, np.float64).reshape(-1, 3)])
+
+
+def _source(b: Builder) -> Ints:
+    """Index into plain points followed by extras, per row."""
+    pieces = np.array(b.pieces, np.int64).reshape(-1, 2)
+    single = pieces[:, 0] < 0
+    low = np.where(single, len(b.points) - 1 - pieces[:, 0], pieces[:, 0])
+    length = np.where(single, 1, pieces[:, 1] - pieces[:, 0])
+    first = np.cumsum(length) - length
+    source: Ints = np.repeat(low - first, length) + np.arange(int(length.sum()))
+    return source
+
+
+def _fill_axis(b: Builder, rows: Rows) -> None:
+    """Modal axis: the last one given or set, (0, 0, 1) before any."""
+    n = len(rows)
+    if rows.given.all():
+        return
+    marks = dict(b.axis_marks)
+    at = np.array([r for r in marks if r < n and not rows.given[r]], np.int64)
+    source = np.where(rows.given, np.arange(n), -1)
+    source[at] = at
+    if len(at):
+        rows.axis[at] = [marks[int(r)] for r in at]
+    source = np.maximum.accumulate(source) if n else source
+    rows.axis = np.where((source < 0)[:, None], [0.0, 0.0, 1.0], rows.axis[source])
+
+
+def _checked_axis(b: Builder, rows: Rows) -> Floats:
+    norm = np.linalg.norm(rows.axis, axis=1)
+    bad = ~(np.abs(norm - 1.0) <= UNIT_ROUNDING)
+    for k in np.flatnonzero(bad):
+        b.log.error("cl.axis", f"the tool axis has length {norm[k]:.6g}, it must be 1 within {UNIT_ROUNDING}",
+                    int(rows.line[k]))
+    return unit(rows.axis)
+
+
+def _normals(b: Builder, rows: Rows) -> tuple[Floats | None, Floats | None]:
+    """Numbers 7 to 9 as (unit normal, contact point), NaN where a row has none."""
+    if rows.third is None:
+        return None, None
+    norm = np.linalg.norm(rows.third, axis=1)
+    is_normal = np.abs(norm - 1.0) <= NORMAL_ROUNDING
+    is_contact = ~np.isnan(norm) & ~is_normal
+    normal = unit(np.where(is_normal[:, None], rows.third, np.nan)) if is_normal.any() else None
+    if not is_contact.any():
+        return normal, None
+    where = np.flatnonzero(is_contact)
+    for k in where:
+        b.log.warning("cl.contact", "numbers 7 to 9 of GOTO are no unit vector, read as the contact point",
+                      int(rows.line[k]))
+    return normal, np.where(is_contact[:, None], rows.third * b.scale, np.nan)
+
+
+def _to_part_frame(b: Builder, rows: Rows, normal: Floats | None, contact: Floats | None) -> None:
+    n = len(rows)
+    ends = [*b.map.starts[1:], n]
+    for start, end, index in zip(b.map.starts, ends, b.map.values, strict=True):
+        found = b.maps[index]
+        if found is None or start >= min(end, n):
+            continue
+        rotation, origin = found
+        where = slice(start, min(end, n))
+        local = np.flatnonzero(~rows.given[where]) + start if b.dialect.six_common else where
+        rows.tip[local] = rows.tip[local] @ rotation.T + origin
+        rows.axis[local] = unit(rows.axis[local] @ rotation.T)
+        if normal is not None:
+            normal[local] = unit(normal[local] @ rotation.T)
+        if contact is not None:
+            contact[local] = contact[local] @ rotation.T + origin
+
+
+def _add_deltas(b: Builder, rows: Rows) -> None:
+    """GODLTA: each from the row before it, in order."""
+    if not b.deltas:
+        return
+    index = spread(b.map, len(rows), np.int64)
+    for row, step in b.deltas:
+        if step[1] != step[1]:
+            move = step[0] * b.scale * rows.axis[row]
+        else:
+            found = b.maps[index[row]]
+            local = found is not None and not (b.dialect.six_common and rows.given[row])
+            move = np.array(step) * b.scale
+            if local and found is not None:
+                move = found[0] @ move
+        rows.tip[row] = rows.tip[row - 1] + move
+
+
+def _kinds(b: Builder, n: int) -> tuple[Array, Array, Array]:
+    """(role, kind, arc index) by what the records say; cycles come later."""
+    role = np.full(n, Role.POINT, np.int8)
+    if b.roles:
+        role[list(b.roles)] = list(b.roles.values())
+    kind = np.full(n, Kind.FEED, np.int8)
+    kind[role == Role.START] = Kind.RAPID
+    rapids = np.array(b.rapids, np.int64)
+    kind[rapids[rapids < n]] = Kind.RAPID
+    arc = np.full(n, -1, np.int32)
+    return role, kind, arc
+
+
+def _arcs(b: Builder, rows: Rows, kind: Array, arc: Array) -> Arcs:
+    """Arcs of the circle records; marks their rows."""
+    t = b.arcs
+    keep = [k for k, row in enumerate(t.row) if _has_start(b, rows, kind, k, row)]
+    if not keep:
+        return Arcs.none()
+    row = np.array(t.row, np.int64)[keep]
+    numbers = np.array(t.numbers, np.float64).reshape(-1, 6)[keep]
+    center, normal = numbers[:, :3] * b.scale, numbers[:, 3:] * np.array(t.sense, np.float64)[keep, None] + 0.0
+    _map_arcs(b, rows, row, center, normal)
+    arc[row] = np.arange(len(row))
+    kind[row] = Kind.ARC
+    records = Records(rows.tip[row - 1], rows.tip[row], center, normal, np.array(t.radius)[keep] * b.scale,
+                      np.array(t.times)[keep], np.array(t.sweep)[keep], np.array(t.line, np.int64)[keep])
+    return arcs_of(records, b.dialect.full_circles, b.log)
+
+
+def _has_start(b: Builder, rows: Rows, kind: Array, k: int, row: int) -> bool:
+    if row >= len(rows):
+        return False
+    if row == 0:
+        b.log.error("cl.arc-start", "an arc needs a point before it", b.arcs.line[k])
+        return False
+    if kind[row] == Kind.RAPID:
+        b.log.error("cl.arc-rapid", "RAPID does not go with an arc", b.arcs.line[k], "put RAPID before a GOTO")
+        return False
+    return b.arcs.row[k + 1:k + 2] != [row]
+
+
+def _map_arcs(b: Builder, rows: Rows, row: Ints, center: Floats, normal: Floats) -> None:
+    index = spread(b.map, len(rows), np.int64)[row]
+    if b.dialect.six_common:
+        index = np.where(rows.given[row], 0, index)
+    for i in np.unique(index):
+        found = b.maps[i]
+        if found is not None:
+            where = index == i
+            center[where] = center[where] @ found[0].T + found[1]
+            normal[where] = normal[where] @ found[0].T
+
+
+def _feeds(b: Builder, rows: Rows, kind: Array) -> tuple[Floats, Array]:
+    """Modal feed per row; NaN on rapids. A cutting move must have one, and it must be positive."""
+    n = len(rows)
+    starts = np.minimum(np.array([*b.feed.starts, n]), n)
+    feed = np.repeat(np.array([v for v, _ in b.feed.values]), np.diff(starts))
+    mode = np.repeat(np.array([m for _, m in b.feed.values], np.int8), np.diff(starts))
+    rapid = kind == Kind.RAPID
+    feed[rapid] = np.nan
+    mode[rapid | np.isnan(feed)] = FeedMode.PER_TIME
+    for k in np.flatnonzero(~rapid & np.isnan(feed)):
+        b.log.warning("cl.no-feed", "cutting motion before any FEDRAT", int(rows.line[k]))
+    for k in np.flatnonzero(~rapid & (feed <= 0.0)):
+        b.log.error("cl.feed", f"cutting motion at a feed of {feed[k]:g}; it must be above 0", int(rows.line[k]))
+    return feed, mode
+
+
+def _operations(b: Builder, n: int) -> tuple[Array, tuple[Operation, ...], tuple[Frame, ...]]:
+    """(operation per row, operations with their frames, frames)."""
+    column = spread(b.operation, n, np.int32)
+    if b.declared is not None and b.declared.operations:
+        return np.maximum(column, 0), tuple(b.declared.operations), tuple(b.declared.frames) or (Frame("absolute"),)
+    operations = [replace(op, turning=i in b.turning) for i, op in enumerate(b.operations)]
+    if not operations or (n and column[0] < 0):
+        operations.insert(0, Operation(turning=-1 in b.turning))
+        column = column + 1
+    used, first = np.unique(column, return_index=True)
+    system = spread(b.system, n, np.int32)
+    frame_of = dict(zip(used.tolist(), system[first].tolist() if n else [], strict=True))
+    frames = list(b.frames)
+    if not frames:
+        return column, tuple(operations), (Frame("absolute"),)
+    if -1 in frame_of.values():
+        front = n > 0 and system[0] < 0
+        frames.insert(0 if front else len(frames), Frame("absolute"))
+        shift = 1 if front else 0
+        frame_of = {k: (0 if front else len(frames) - 1) if v < 0 else v + shift for k, v in frame_of.items()}
+    return column, tuple(replace(op, frame=frame_of.get(i, 0)) for i, op in enumerate(operations)), tuple(frames)
+
+
+def _tools(b: Builder, n: int) -> tuple[Array, tuple[Tool, ...]]:
+    if b.declared is not None:
+        return spread(b.declared.tool, n, np.int32), tuple(b.declared.tools)
+    order: dict[Tool, int] = {}
+    index: Track[int] = Track(-1)
+    for start, tool in zip(b.tool.starts, b.tool.values, strict=True):
+        index.set(start, -1 if tool is None else order.setdefault(tool, len(order)))
+    return spread(index, n, np.int32), tuple(order)
+
+
+def passes(free: Bools, operation: Array, tool: Array) -> Array:
+    """Number of the pass per row: a run of cutting rows and the `free` (rapid) rows before it.
+
+    A change of the operation or the tool between two cutting rows also begins a pass.
+    """
+    begins = np.zeros(len(free), bool)
+    change = (operation[1:] != operation[:-1]) | (tool[1:] != tool[:-1])
+    begins[1:] = ~free[:-1] & (free[1:] | change)
+    return np.cumsum(begins).astype(np.int32)

@@ -1,0 +1,181 @@
+"""The state of reading: where we are in the file, what holds from here on, what was found so far.
+
+Plain points are never touched one by one: a record that changes something notes the row from which it holds (`Track`),
+and `assemble` spreads these over the rows at the end.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Generic, TypeVar
+
+import numpy as np
+
+from toolpaths.arrays import Floats
+from toolpaths.cl.arcs import ArcTable
+from toolpaths.cl.dialects import SCALE, Dialect
+from toolpaths.cl.log import Log
+from toolpaths.cl.scan import Points
+from toolpaths.cl.statements import Program, Statement
+from toolpaths.toolpath import Cycle, Event, FeedMode, Frame, Operation, Role, Tool
+
+Triple = tuple[float, float, float]
+Map = tuple[Floats, Floats]
+"""rotation (3, 3) and origin (3,) mm: local to part frame"""
+NO_NUMBERS: Triple = (float("nan"),) * 3
+V = TypeVar("V")
+
+
+class Track(Generic[V]):
+    """A value that holds from a row on until the next change."""
+
+    __slots__ = ("starts", "values")
+
+    def __init__(self, first: V):
+        self.starts, self.values = [0], [first]
+
+    def set(self, row: int, value: V) -> None:
+        """From `row` on."""
+        if self.starts[-1] == row:
+            self.values[-1] = value
+        elif value != self.values[-1]:
+            self.starts.append(row)
+            self.values.append(value)
+
+    @property
+    def now(self) -> V:
+        """The value at the end."""
+        return self.values[-1]
+
+
+@dataclass
+class Declared:
+    """Lists that text of our own writer states outright, and the tool index in use."""
+
+    units: str
+    frames: list[Frame] = field(default_factory=list)
+    tools: list[Tool] = field(default_factory=list)
+    operations: list[Operation] = field(default_factory=list)
+    tool: Track[int] = field(default_factory=lambda: Track(-1))
+
+
+class Extras:
+    """Points that are not plain GOTO lines, as written; NaN where a record has no numbers of that kind."""
+
+    def __init__(self) -> None:
+        self.xyz: list[Triple] = []
+        self.axis: list[Triple] = []
+        self.third: list[Triple] = []
+        self.line: list[int] = []
+
+
+class Builder:
+    """Reads one program. Handlers get it with the statement and use what they need."""
+
+    def __init__(self, program: Program, points: Points, dialect: Dialect, units: str, log: Log,
+                 allow_unknown: Iterable[str] = ()):
+        self.program, self.points, self.dialect, self.log = program, points, dialect, log
+        self.units, self.scale = units, SCALE[units]
+        self.allow_unknown = frozenset(w.upper() for w in allow_unknown)
+        self.row = self.fast = self.line = self.index = self.stop = 0
+        self._piece = 0
+        self.pieces: list[tuple[int, int]] = []
+        self.extras = Extras()
+        self._start_tracks()
+        self._start_lists()
+
+    def _start_tracks(self) -> None:
+        self.feed: Track[tuple[float, FeedMode]] = Track((float("nan"), FeedMode.PER_TIME))
+        self.tool: Track[Tool | None] = Track(None)
+        self.operation = Track(-1)
+        self.cycle = Track(-1)
+        self.system = Track(-1)
+        self.map = Track(0)
+
+    def _start_lists(self) -> None:
+        self.maps: list[Map | None] = [None]
+        self.axis_marks: list[tuple[int, Triple]] = []
+        self.rapids: list[int] = []
+        self.roles: dict[int, Role] = {}
+        self.deltas: list[tuple[int, Triple]] = []
+        self.arcs = ArcTable()
+        self.events: list[Event] = []
+        self.frames: list[Frame] = []
+        self.operations: list[Operation] = []
+        self.cycles: list[Cycle] = []
+        self.turning: set[int] = set()
+        self.declared: Declared | None = None
+        self.zsurf: float | None = None
+        self.name = ""
+        self.unknown: dict[str, list[tuple[int, int, int]]] = {}
+        self.texts: list[tuple[int, int, int, str]] = []
+        self.memory: dict[str, object] = {}
+        """what one room of handlers keeps between records (armed cycle, shifts, subprograms)"""
+        self.cycle_records = 0
+        self.arc_records = 0
+
+    def advance(self, before: int) -> None:
+        """Pass the plain points that stand before the next statement."""
+        self.row += before - self.fast
+        self.fast = before
+
+    def add_point(self, xyz: Triple, axis: Triple = NO_NUMBERS, third: Triple = NO_NUMBERS,
+                  role: Role = Role.POINT) -> None:
+        """A row of its own."""
+        self._end_piece()
+        self.pieces.append((-1 - len(self.extras.line), -1 - len(self.extras.line)))
+        self.extras.xyz.append(xyz)
+        self.extras.axis.append(axis)
+        self.extras.third.append(third)
+        self.extras.line.append(self.line)
+        if role is not Role.POINT:
+            self.roles[self.row] = role
+        self.row += 1
+
+    def _end_piece(self) -> None:
+        if self.fast > self._piece:
+            self.pieces.append((self._piece, self.fast))
+        self._piece = self.fast
+
+    def jump(self, fast: int) -> None:
+        """Go on at another plain point (subprograms)."""
+        self._end_piece()
+        self.fast = self._piece = fast
+
+    def finish_rows(self) -> None:
+        """Pass what is left of the plain points."""
+        self.advance(len(self.points))
+        self._end_piece()
+
+    def use_map(self, found: Map | None) -> None:
+        """Points from here on are in that frame (None: the part frame)."""
+        if found is not None and np.array_equal(found[0], np.eye(3)) and not found[1].any():
+            found = None
+        for i, known in enumerate(self.maps):
+            if known is found or (known is not None and found is not None and np.array_equal(known[0], found[0])
+                                  and np.array_equal(known[1], found[1])):
+                self.map.set(self.row, i)
+                return
+        self.maps.append(found)
+        self.map.set(self.row, len(self.maps) - 1)
+
+    def event(self, word: str, values: tuple[str | float, ...] = ()) -> None:
+        """Note an event before the next row."""
+        self.events.append(Event(self.row, word, values, self.line))
+
+    def next_is_point(self) -> bool:
+        """True where the very next record (display records apart) is a GOTO."""
+        statements, before = self.program.statements, self.program.before
+        for i in range(self.index + 1, self.stop):
+            if before[i] > self.fast:
+                return True
+            if statements[i].major not in ("PAINT", "$$"):
+                return statements[i].major == "GOTO"
+        end = before[self.stop] if self.stop < len(before) else len(self.points)
+        return end > self.fast
+
+    def note_unknown(self, statement: Statement, word: str) -> None:
+        """Count a word that the reader does not know."""
+        numbers = sum(isinstance(w, float) for w in statement.words)
+        self.unknown.setdefault(word, []).append((self.line, self.row, numbers))

@@ -1,0 +1,67 @@
+"""FEDRAT: all units, both orders, to mm/s, mm per revolution or 1/s."""
+
+from __future__ import annotations
+
+import math
+
+from toolpaths.cl.build import Builder
+from toolpaths.cl.statements import Statement, Word
+from toolpaths.toolpath import FeedMode
+from toolpaths.units import MM_PER_FOOT, MM_PER_INCH
+
+Feed = tuple[float, FeedMode]
+MINUTE = 60.0
+PER_MINUTE = {"MMPM": 1.0, "IPM": MM_PER_INCH, "FPM": MM_PER_FOOT, "MPM": 1000.0, "PERMIN": math.nan}
+PER_SECOND = {"MMPS": 1.0, "IPS": MM_PER_INCH}
+PER_REVOLUTION = {"MMPR": 1.0, "IPR": MM_PER_INCH, "FPR": MM_PER_FOOT, "PERREV": math.nan}
+UNITS = frozenset(PER_MINUTE) | frozenset(PER_SECOND) | frozenset(PER_REVOLUTION)
+"""NaN: the unit of the part."""
+
+
+def feed_in(value: float, unit: str, scale: float) -> Feed:
+    """`value` in the named unit as (mm/s or mm/rev, mode); `scale` is mm per unit of the part, "" per minute in it."""
+    if unit in PER_REVOLUTION:
+        factor = PER_REVOLUTION[unit]
+        return value * (scale if math.isnan(factor) else factor), FeedMode.PER_REVOLUTION
+    if unit in PER_SECOND:
+        return value * PER_SECOND[unit], FeedMode.PER_TIME
+    factor = PER_MINUTE.get(unit, math.nan)
+    return value * (scale if math.isnan(factor) else factor) / MINUTE, FeedMode.PER_TIME
+
+
+def unit_of(words: tuple[Word, ...]) -> str:
+    """The first feed unit among the words, "" where there is none."""
+    return next((w for w in words if isinstance(w, str) and w in UNITS), "")
+
+
+def fedrat(b: Builder, s: Statement) -> None:
+    """Set the modal feed."""
+    if s.has("INVERS"):
+        _inverse(b, s)
+        return
+    numbers = [w for w in s.words if isinstance(w, float)]
+    if not numbers:
+        b.log.error("cl.feed", f"FEDRAT/{s.body} holds no number", b.line, "write for example FEDRAT/MMPM,250.0")
+        return
+    strange = [w for w in s.words if isinstance(w, str) and w not in UNITS]
+    if len(numbers) > 1 or strange:
+        b.log.warning("cl.feed-option", f"FEDRAT/{s.body}: only the feed itself is used", b.line)
+    unit = unit_of(s.words)
+    value = s.after(unit)
+    b.feed.set(b.row, feed_in(numbers[0] if value is None else value, unit, b.scale))
+
+
+def _inverse(b: Builder, s: Statement) -> None:
+    value = s.after("INVERS")
+    if s.has("PERSEC"):
+        value = s.after("PERSEC")
+        b.feed.set(b.row, (math.nan if value is None else value, FeedMode.INVERSE_TIME))
+    elif value is not None:
+        b.feed.set(b.row, (value / MINUTE, FeedMode.INVERSE_TIME))
+    elif s.has("AUTO", "ON", "OFF"):
+        b.event("FEDRAT", tuple(w for w in s.words if w != ""))
+    else:
+        b.log.error("cl.feed", f"FEDRAT/{s.body}: INVERS needs a number, AUTO or OFF", b.line)
+
+
+HANDLERS = {"FEDRAT": fedrat}

@@ -1,0 +1,106 @@
+"""Statements to the state of `Builder`: which word goes to which handler, and what becomes of the others."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from toolpaths.cl import cycles, feeds, frames, motion, structure, tools
+from toolpaths.cl.build import Builder
+from toolpaths.cl.statements import DATA_COMMENT, TEXT, Statement
+from toolpaths.cl.words import SILENT, UNSUPPORTED_MOTION
+
+Handler = Callable[[Builder, Statement], None]
+HANDLERS: dict[str, Handler] = {**dict.fromkeys(SILENT, structure.nothing), **structure.HANDLERS, **feeds.HANDLERS,
+                                **motion.HANDLERS, **frames.HANDLERS, **tools.HANDLERS, **cycles.HANDLERS}
+_MANY = 3
+
+
+def known(major: str) -> bool:
+    """True for every word the reader has an answer to, be it an error."""
+    return major in HANDLERS or major in UNSUPPORTED_MOTION
+
+
+def run(b: Builder, start: int, stop: int) -> None:
+    """Carry out statements `start` to `stop`; plain points between them are only counted."""
+    statements, lines, before, handlers = b.program.statements, b.program.lines, b.program.before, HANDLERS
+    outer, b.stop = b.stop, stop
+    b.index = start
+    while b.index < stop:
+        i = b.index
+        fast = before[i]
+        b.row += fast - b.fast
+        b.fast = fast
+        b.line = lines[i]
+        statement = statements[i]
+        handler = handlers.get(statement.major)
+        if handler is not None:
+            handler(b, statement)
+        else:
+            _other(b, statement)
+        b.index += 1
+    b.stop = outer
+
+
+def _other(b: Builder, s: Statement) -> None:
+    if s.major in UNSUPPORTED_MOTION:
+        _unsupported(b, s)
+    elif s.major == TEXT:
+        b.texts.append((b.line, b.row, sum(isinstance(w, float) for w in s.words), s.body))
+    elif not s.major.startswith(DATA_COMMENT):
+        first = s.major.replace(",", " ").split(" ")[0]
+        if s.slash or not known(first) or first in SILENT:
+            b.note_unknown(s, s.major if s.slash else first)
+        else:
+            b.log.error("cl.slash", f"{first} is not followed by a slash", b.line, f"write {first}/...", key=first)
+
+
+def _unsupported(b: Builder, s: Statement) -> None:
+    if s.major in b.allow_unknown:
+        b.note_unknown(s, s.major)
+        return
+    b.log.error("cl.unsupported-motion", f"{s.major} moves the tool or changes how it moves, and is not supported",
+                b.line, f"--allow-unknown {s.major} leaves it out", key=s.major)
+
+
+def report_others(b: Builder) -> dict[str, int]:
+    """Diagnostics of unknown words and of text that is no record; how often each unknown word stands."""
+    first, last = _extent(b)
+    listing = [line for line, _, _, _ in b.texts if not first <= line <= last]
+    for line, row, numbers, body in b.texts:
+        if not first <= line <= last:
+            continue
+        if numbers >= _MANY and 0 < row < b.row and "(TEXT)" not in b.allow_unknown:
+            b.log.error("cl.text", f"no record: {body[:60]!r}, with numbers between motions", line)
+        else:
+            b.log.warning("cl.text", f"no record: {body[:60]!r}", line)
+    counts = {word: len(found) for word, found in b.unknown.items()}
+    for word, found in b.unknown.items():
+        _report_word(b, word, found)
+    if listing:
+        b.log.info("cl.listing-text", f"{len(listing)} lines of text before or after the program", listing[0])
+    return counts
+
+
+def _report_word(b: Builder, word: str, found: list[tuple[int, int, int]]) -> None:
+    for line, row, numbers in found:
+        if numbers >= _MANY and 0 < row < b.row and word not in b.allow_unknown:
+            b.log.error("cl.unknown-motion", f"unknown word {word} with {numbers} numbers between motions", line,
+                        f"--allow-unknown {word} leaves it out", key=word)
+        else:
+            b.log.warning("cl.unknown-word", f"unknown word {word}, left out", line, key=word)
+
+
+def _extent(b: Builder) -> tuple[int, int]:
+    """First and last line of a known record."""
+    lines = [line for s, line in _known_ends(b)]
+    if len(b.points):
+        lines += [int(b.points.line[0]), int(b.points.line[-1])]
+    return (min(lines), max(lines)) if lines else (0, 0)
+
+
+def _known_ends(b: Builder) -> list[tuple[Statement, int]]:
+    pairs = list(zip(b.program.statements, b.program.lines, strict=True))
+    found = []
+    for order in (pairs, reversed(pairs)):
+        found += [next((p for p in order if known(p[0].major) and p[0].major != "$$"), None)]
+    return [p for p in found if p is not None]

@@ -1,0 +1,51 @@
+"""Collects diagnostics while a file is read: repeats of one problem become one entry with its lines."""
+
+from __future__ import annotations
+
+from toolpaths.diagnostics import Diagnostic, Severity
+
+_LINES_KEPT = 10
+
+
+class _Entry:
+    __slots__ = ("code", "count", "hint", "lines", "message", "severity")
+
+    def __init__(self, severity: Severity, code: str, message: str, hint: str):
+        self.severity, self.code, self.message, self.hint = severity, code, message, hint
+        self.lines: list[int] = []
+        self.count = 0
+
+
+class Log:
+    """Diagnostics of one file, merged by code and `key` (the first message stands for all)."""
+
+    def __init__(self, file: str = ""):
+        self.file = file
+        self._entries: dict[tuple[Severity, str, str], _Entry] = {}
+
+    def add(self, severity: Severity, code: str, message: str, line: int = 0, hint: str = "", key: str = "") -> None:
+        """Note one problem; `key` tells apart problems of one code that are to be listed apart."""
+        entry = self._entries.get((severity, code, key))
+        if entry is None:
+            entry = self._entries[severity, code, key] = _Entry(severity, code, message, hint)
+        entry.count += 1
+        if line > 0 and len(entry.lines) < _LINES_KEPT and line not in entry.lines:
+            entry.lines.append(line)
+
+    def error(self, code: str, message: str, line: int = 0, hint: str = "", key: str = "") -> None:
+        """An ERROR."""
+        self.add(Severity.ERROR, code, message, line, hint, key)
+
+    def warning(self, code: str, message: str, line: int = 0, hint: str = "", key: str = "") -> None:
+        """A WARNING."""
+        self.add(Severity.WARNING, code, message, line, hint, key)
+
+    def info(self, code: str, message: str, line: int = 0, hint: str = "", key: str = "") -> None:
+        """An INFO."""
+        self.add(Severity.INFO, code, message, line, hint, key)
+
+    def diagnostics(self) -> list[Diagnostic]:
+        """What was noted, errors first, then by line."""
+        found = [Diagnostic(e.severity, e.code, e.message, self.file, tuple(e.lines), e.count, e.hint)
+                 for e in self._entries.values()]
+        return sorted(found, key=lambda d: (-int(d.severity), d.lines[:1] or (0,)))

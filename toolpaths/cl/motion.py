@@ -1,0 +1,150 @@
+"""Records that move the tool: GOTO in its rarer spellings, GODLTA, FROM, GOHOME, RAPID, CIRCLE, MOVARC, TLAXIS."""
+
+from __future__ import annotations
+
+import math
+
+from toolpaths.cl.build import NO_NUMBERS, Builder, Triple
+from toolpaths.cl.feeds import feed_in
+from toolpaths.cl.statements import Statement
+from toolpaths.toolpath import Role
+
+_NAN = math.nan
+_CLOCKWISE = {"CLOCKWISE": -1, "CLW": -1, "COUNTERCLOCKWISE": 1, "CCLW": 1}
+_NX_COUNT = 11
+
+
+def _triple(numbers: list[float], at: int) -> Triple:
+    if len(numbers) < at + 3:
+        return NO_NUMBERS
+    return numbers[at], numbers[at + 1], numbers[at + 2]
+
+
+def goto(b: Builder, s: Statement) -> None:
+    """A point of 3, 6 or 9 numbers; 4 or 7: the last is a feed; 2: z from ZSURF."""
+    numbers = s.numbers
+    if len(numbers) != len(s.words):
+        b.log.error("cl.number", f"GOTO/{s.body[:60]}: {s.tail[0] or 'an empty field'} is not a number", b.line,
+                    "GOTO takes 3, 6 or 9 numbers")
+        return
+    if len(numbers) == 2 and b.zsurf is not None:
+        numbers = [*numbers, b.zsurf]
+    if len(numbers) in (4, 7):
+        b.feed.set(b.row, feed_in(numbers.pop(), "", b.scale))
+        b.log.warning("cl.goto-feed", "the last number of GOTO is read as a feed", b.line)
+    if len(numbers) not in (3, 6, 9):
+        b.log.error("cl.goto", f"GOTO has {len(numbers)} numbers, it takes 3, 6 or 9", b.line)
+        return
+    b.add_point(_triple(numbers, 0), _triple(numbers, 3), _triple(numbers, 6))
+
+
+def godlta(b: Builder, s: Statement) -> None:
+    """A move by (dx, dy, dz), or by one number along the tool axis, away from the part where positive."""
+    numbers = s.numbers
+    if len(numbers) != len(s.words) or len(numbers) not in (1, 3, 6):
+        b.log.error("cl.godlta", f"GODLTA/{s.body[:60]}: it takes 1, 3 or 6 numbers", b.line)
+        return
+    if b.row == 0:
+        b.log.error("cl.godlta", "GODLTA before any point: there is nothing to move from", b.line,
+                    "begin with FROM or GOTO")
+        return
+    b.deltas.append((b.row, (numbers[0], _NAN, _NAN) if len(numbers) == 1 else _triple(numbers, 0)))
+    b.add_point(NO_NUMBERS, _triple(numbers, 3))
+
+
+def from_(b: Builder, s: Statement) -> None:
+    """Where the tool stands; a RAPID before it counts for the move after it."""
+    numbers = s.numbers
+    if len(numbers) < 3:
+        b.log.error("cl.from", f"FROM/{s.body[:60]}: it takes 3 or 6 numbers", b.line)
+        return
+    waiting = bool(b.rapids) and b.rapids[-1] == b.row
+    b.add_point(_triple(numbers, 0), _triple(numbers, 3), role=Role.START)
+    if waiting:
+        b.rapids.append(b.row)
+
+
+def gohome(b: Builder, s: Statement) -> None:
+    """A rapid to the point; without one, an event."""
+    numbers = s.numbers
+    if len(numbers) >= 3:
+        b.rapids.append(b.row)
+        b.add_point(_triple(numbers, 0), _triple(numbers, 3), role=Role.HOME)
+    else:
+        b.event("GOHOME", tuple(w for w in s.words if w != ""))
+
+
+def rapid(b: Builder, s: Statement) -> None:
+    """The next move is rapid."""
+    b.rapids.append(b.row)
+    if s.words:
+        b.log.warning("cl.rapid-option", f"RAPID/{s.body}: the parameters are not used", b.line)
+
+
+def tlaxis(b: Builder, s: Statement) -> None:
+    """The tool axis of points of three numbers from here on."""
+    if len(s.numbers) != 3:
+        b.log.error("cl.tlaxis", f"TLAXIS/{s.body}: only three numbers are understood", b.line)
+        return
+    b.axis_marks.append((b.row, _triple(s.numbers, 0)))
+
+
+def zsurf(b: Builder, s: Statement) -> None:
+    """The height of points of two numbers from here on."""
+    if len(s.words) == 1 and s.numbers:
+        b.zsurf = s.numbers[0]
+    else:
+        b.log.error("cl.motion-word", f"ZSURF/{s.body}: only a single height is understood", b.line)
+
+
+def circle(b: Builder, s: Statement) -> None:
+    """An arc that ends in the very next GOTO."""
+    b.arc_records += 1
+    if not b.next_is_point():
+        b.log.error("cl.circle-end", "CIRCLE is not followed by a GOTO, which gives its end", b.line)
+        return
+    numbers = _circle_numbers(s.numbers)
+    if numbers is None:
+        b.log.error("cl.circle", f"CIRCLE has {len(s.numbers)} numbers, it takes center, axis, radius (4, 6, 7 or 11)",
+                    b.line)
+        return
+    times, sweep = s.after("TIMES"), s.after("SWEEP")
+    if s.has("TIMES") and (times is None or times < 0.0 or times != math.floor(times)):
+        b.log.error("cl.circle-times", f"CIRCLE/...{s.tail}: TIMES takes a whole number", b.line)
+        times = None
+    vector, sense = _axis_and_sense(b, s, numbers)
+    b.arcs.add(b.row, numbers[:3] + vector, numbers[6], times or 0.0, sense, _NAN if sweep is None else sweep, b.line)
+
+
+def _circle_numbers(n: list[float]) -> tuple[float, ...] | None:
+    """(center, axis, radius) of 4, 6, 7 or more numbers; NaN where there is no radius."""
+    if len(n) == 4:
+        return (*n[:3], 0.0, 0.0, 1.0, n[3])
+    if len(n) == 6:
+        return (*n, _NAN)
+    return tuple(n[:7]) if len(n) >= 7 else None
+
+
+def _axis_and_sense(b: Builder, s: Statement, numbers: tuple[float, ...]) -> tuple[tuple[float, ...], int]:
+    for word in s.tail:
+        if isinstance(word, str) and word in _CLOCKWISE:
+            return (0.0, 0.0, 1.0), _CLOCKWISE[word]
+    if b.dialect.name == "generic" and len(s.numbers) >= _NX_COUNT:
+        return numbers[3:6], -1
+    return numbers[3:6], b.dialect.arc_sense or 1
+
+
+def movarc(b: Builder, s: Statement) -> None:
+    """MOVARC/center, axis, radius, ANGLE, degrees; the next GOTO is its end."""
+    b.arc_records += 1
+    angle, numbers = s.after("ANGLE"), s.numbers
+    if len(numbers) != 7 or angle is None:
+        b.log.error("cl.circle", f"MOVARC/{s.body[:60]}: it takes center, axis, radius, ANGLE, degrees", b.line)
+    elif not b.next_is_point():
+        b.log.error("cl.circle-end", "MOVARC is not followed by a GOTO, which gives its end", b.line)
+    else:
+        b.arcs.add(b.row, tuple(numbers[:6]), numbers[6], 0.0, 1 if angle > 0 else -1, math.radians(abs(angle)), b.line)
+
+
+HANDLERS = {"GOTO": goto, "GODLTA": godlta, "FROM": from_, "GOHOME": gohome, "RAPID": rapid, "TLAXIS": tlaxis,
+            "ZSURF": zsurf, "CIRCLE": circle, "MOVARC": movarc}

@@ -1,0 +1,126 @@
+"""Read a CL file: bytes -> lines -> statements -> dialect and units -> rows -> Toolpath."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from pathlib import Path
+
+from toolpaths.cl.assemble import assemble
+from toolpaths.cl.build import Builder
+from toolpaths.cl.dialects import DIALECTS, Dialect, detect, units_said
+from toolpaths.cl.interpret import known, report_others, run
+from toolpaths.cl.log import Log
+from toolpaths.cl.scan import Progress, scan
+from toolpaths.cl.source import normalise
+from toolpaths.cl.statements import Lexer, Program
+from toolpaths.diagnostics import Diagnostic, error
+from toolpaths.toolpath import Toolpath
+
+
+@dataclass(frozen=True)
+class ReadResult:
+    """What a CL file holds, and what reading it showed.
+
+    `evidence` says by what the dialect was recognised; records are counted as the file writes them.
+    """
+
+    toolpath: Toolpath
+    diagnostics: list[Diagnostic]
+    unknown_words: dict[str, int] = field(default_factory=dict)
+    dialect: str = "generic"
+    evidence: str = ""
+    arc_records: int = 0
+    cycle_records: int = 0
+    lines: int = 0
+
+
+def read_file(path: str | Path, *, units: str | None = None, dialect: str | None = None,
+              allow_unknown: Iterable[str] = (), progress: Progress | None = None) -> ReadResult:
+    """Read the file at `path`; see `read_bytes`. A file that cannot be opened is a diagnostic too."""
+    try:
+        data = Path(path).read_bytes()
+    except (OSError, ValueError) as fault:
+        reason = getattr(fault, "strerror", None) or str(fault)
+        return ReadResult(_empty(str(path)), [error("cl.open", f"cannot be read: {reason}", file=str(path))])
+    return read_bytes(data, file=str(path), units=units, dialect=dialect, allow_unknown=allow_unknown,
+                      progress=progress)
+
+
+def read_bytes(data: bytes | str, *, file: str = "", units: str | None = None, dialect: str | None = None,
+               allow_unknown: Iterable[str] = (), progress: Progress | None = None) -> ReadResult:
+    """Read the text of a CL file.
+
+    Args:
+        data: the file, in any encoding if bytes
+        units: "mm" or "inch", used instead of what the file says
+        dialect: one of `DIALECTS`, used instead of the recognised one
+        allow_unknown: words that may be left out although they look like motion
+        progress: called with (bytes read, bytes in all)
+
+    Raises:
+        ValueError: for a dialect or unit that does not exist (wrong use; faults of the file are diagnostics).
+    """
+    _check_options(units, dialect)
+    log = Log(file)
+    plain = normalise(data.encode("utf-8", "replace") if isinstance(data, str) else bytes(data), log)
+    parts = scan(plain, progress)
+    program = Lexer(plain, parts, log, known).program()
+    del plain
+    found, evidence = (DIALECTS[dialect], "given") if dialect else detect(program)
+    b = Builder(program, parts.points, found, _units(program, units, log), log, allow_unknown)
+    run(b, 0, len(program.statements))
+    b.finish_rows()
+    counts = report_others(b)
+    if b.row == 0:
+        log.error("cl.empty", "the file holds no point", hint="a CL file has GOTO records")
+    toolpath = assemble(b)
+    return ReadResult(toolpath, log.diagnostics(), counts, found.name, evidence, b.arc_records, b.cycle_records,
+                      parts.lines)
+
+
+def _check_options(units: str | None, dialect: str | None) -> None:
+    if units not in (None, "mm", "inch"):
+        raise ValueError(f"units are mm or inch, not {units!r}")
+    if dialect is not None and dialect not in DIALECTS:
+        near = get_close_matches(dialect, DIALECTS, 1)
+        raise ValueError(f"no dialect {dialect!r}; {f'did you mean {near[0]!r}? ' if near else ''}known: "
+                         + ", ".join(DIALECTS))
+
+
+def _units(program: Program, given: str | None, log: Log) -> str:
+    """The unit of the file: as given, by its UNITS word, by its feed units, else mm."""
+    said = units_said(program)
+    for body, line in said.wrong:
+        log.error("cl.units", f"UNITS/{body}: the units are MM or INCHES", line)
+    if given is not None:
+        if said.words and given not in said.words:
+            log.warning("cl.units", f"the file says {'/'.join(said.words)}, {given} was asked for and is taken",
+                        next(iter(said.words.values())))
+        return given
+    if len(said.words) > 1:
+        log.error("cl.units", "the file changes its units", max(said.words.values()), "give them with --units")
+    if said.words:
+        return next(iter(said.words))
+    return _units_of_feeds(said.feeds, log)
+
+
+def _units_of_feeds(feeds: dict[str, int], log: Log) -> str:
+    if len(feeds) == 1:
+        (unit, line), = feeds.items()
+        add = log.info if unit == "mm" else log.warning
+        add("cl.no-units", f"the file has no UNITS record; {unit} is taken from the unit of its feeds", line,
+            "give the units with --units")
+        return unit
+    log.warning("cl.no-units", "the file has no UNITS record; mm is taken", hint="give the units with --units")
+    return "mm"
+
+
+def _empty(file: str) -> Toolpath:
+    log = Log(file)
+    b = Builder(Program(), scan(b"").points, _GENERIC, "mm", log)
+    return assemble(b)
+
+
+_GENERIC: Dialect = DIALECTS["generic"]

@@ -1,0 +1,198 @@
+"""Plain GOTO lines to arrays, all other lines to slices: the part of reading that must be fast.
+
+A line is plain where it is `GOTO`, blanks, `/` and 3, 6 or 9 numbers with commas between, nothing else. Its numbers go
+through numpy's text parser (correctly rounded); every doubtful line is left to the statements, which say what is wrong.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from toolpaths.arrays import Bools, Floats, Ints
+
+CHUNK = 1 << 22
+_NUMERIC = np.zeros(256, bool)
+_NUMERIC[list(b"0123456789+-.,eE \t\n")] = True
+_MAX_BLANKS = 16
+Bytes = npt.NDArray[np.uint8]
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class Points:
+    """Plain GOTO lines (F rows), as written: file units, local frame.
+
+    `axis` and `third` (numbers 4-6 and 7-9) are NaN where a line does not have them, None where no line does.
+    """
+
+    xyz: Floats
+    axis: Floats | None
+    third: Floats | None
+    line: Ints
+
+    def __len__(self) -> int:
+        return len(self.line)
+
+
+@dataclass(frozen=True)
+class Scan:
+    """The file split in two: `points`, and the S other lines that are not blank.
+
+    start, end (S,): byte slices; line (S,): 1-based; before (S,): plain points before that line; lines: all lines
+    """
+
+    points: Points
+    start: list[int]
+    end: list[int]
+    line: list[int]
+    before: list[int]
+    lines: int
+
+
+@dataclass
+class _Chunk:
+    numbers: Floats
+    count: Ints
+    point_line: Ints
+    start: Ints
+    end: Ints
+    line: Ints
+    before: Ints
+    lines: int
+
+
+def scan(data: bytes, progress: Progress | None = None) -> Scan:
+    """Split normalised `data`; `progress(bytes done, bytes in all)` is called now and then."""
+    chunks: list[_Chunk] = []
+    position, lines = 0, 0
+    while position < len(data):
+        stop = data.find(b"\n", position + CHUNK) + 1 or len(data)
+        chunks.append(_scan_chunk(data, position, stop, lines))
+        lines += chunks[-1].lines
+        position = stop
+        if progress is not None:
+            progress(position, len(data))
+    return _join(chunks, lines)
+
+
+def _scan_chunk(data: bytes, position: int, stop: int, lines_before: int) -> _Chunk:
+    c = np.frombuffer(data, np.uint8, stop - position, position)
+    if c[-1] != 10:
+        c = np.append(c, np.uint8(10))
+    ends = np.flatnonzero(c == 10)
+    starts = np.concatenate([[0], ends[:-1] + 1])
+    count = np.add.reduceat(c == 44, starts, dtype=np.int32) + 1
+    plain = _looks_plain(c, starts, ends) & ((count == 3) | (count == 6) | (count == 9))
+    rows = np.flatnonzero(plain)
+    numbers, bad = _numbers(c, starts, ends, count, rows)
+    plain[bad] = False
+    others = np.flatnonzero(~plain & (ends > starts))
+    return _Chunk(numbers, count[plain], np.flatnonzero(plain) + lines_before + 1, starts[others] + position,
+                  ends[others] + position, others + lines_before + 1, np.cumsum(plain)[others], len(ends))
+
+
+def _looks_plain(c: Bytes, starts: Ints, ends: Ints) -> Bools:
+    """Lines that hold exactly `GOTO`, blanks, `/` besides characters of numbers."""
+    letters = np.add.reduceat(~_NUMERIC[c], starts, dtype=np.int32)
+    plain: Bools = (letters == 5) & (ends - starts >= 10)
+    at = starts[plain]
+    good = np.ones(len(at), bool)
+    for k, letter in enumerate(b"GOTO"):
+        good &= (c[at + k] & 0xDF) == letter
+    slash = at + 4
+    for _ in range(_MAX_BLANKS):
+        blank = good & (c[slash] == 32)
+        if not blank.any():
+            break
+        slash = slash + blank
+    good &= c[slash] == 47
+    plain[plain] = good
+    return plain
+
+
+def _numbers(c: Bytes, starts: Ints, ends: Ints, count: Ints, rows: Ints) -> tuple[Floats, Ints]:
+    """(numbers of the plain `rows`, rows whose numbers cannot be read): halves until the bad ones are found."""
+    if not len(rows):
+        return np.zeros(0), rows
+    values = _parse(c, starts, ends, rows)
+    if values is not None and len(values) == int(count[rows].sum()) and bool(np.isfinite(values).all()):
+        return values, rows[:0]
+    if len(rows) == 1:
+        return np.zeros(0), rows
+    half = len(rows) // 2
+    a, bad_a = _numbers(c, starts, ends, count, rows[:half])
+    b, bad_b = _numbers(c, starts, ends, count, rows[half:])
+    return np.concatenate([a, b]), np.concatenate([bad_a, bad_b])
+
+
+def _parse(c: Bytes, starts: Ints, ends: Ints, rows: Ints) -> Floats | None:
+    low, high = int(starts[rows[0]]), int(ends[rows[-1]]) + 1
+    lengths = ends[rows] + 1 - starts[rows]
+    text = c[low:high]
+    if int(lengths.sum()) == high - low:
+        text = text.copy()
+    else:
+        keep = np.zeros(high - low + 1, np.int8)
+        keep[starts[rows] - low] += 1
+        keep[ends[rows] + 1 - low] -= 1
+        text = text[np.cumsum(keep[:-1], dtype=np.int8).view(bool)]
+    text[~_NUMERIC[text]] = 32
+    text[text == 10] = 44
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        try:
+            return np.fromstring(text[:-1].tobytes(), sep=" , ")
+        except (DeprecationWarning, ValueError):
+            return None
+
+
+def _join(chunks: list[_Chunk], lines: int) -> Scan:
+    before, done = [], 0
+    for chunk in chunks:
+        before.append(chunk.before + done)
+        done += len(chunk.count)
+    return Scan(_points(chunks, done), _listed([c.start for c in chunks]), _listed([c.end for c in chunks]),
+                _listed([c.line for c in chunks]), _listed(before), lines)
+
+
+def _listed(parts: list[Ints]) -> list[int]:
+    result: list[int] = np.concatenate(parts).tolist() if parts else []
+    return result
+
+
+def _points(chunks: list[_Chunk], total: int) -> Points:
+    """Rows of 3 from the chunks; a chunk's numbers are dropped as soon as they are copied."""
+    width = max((int(c.count.max()) for c in chunks if len(c.count)), default=3)
+    xyz = np.empty((total, 3))
+    axis = np.full((total, 3), np.nan) if width > 3 else None
+    third = np.full((total, 3), np.nan) if width > 6 else None
+    line = np.empty(total, np.int64)
+    row = 0
+    for chunk in chunks:
+        stop = row + len(chunk.count)
+        line[row:stop] = chunk.point_line
+        for column, table in enumerate((xyz, axis, third)):
+            if table is not None:
+                _fill(table[row:stop], chunk, column)
+        row = stop
+        chunk.numbers = np.zeros(0)
+    return Points(xyz, axis, third, line)
+
+
+def _fill(table: Floats, chunk: _Chunk, column: int) -> None:
+    """Numbers 3 column + (1, 2, 3) of each line into `table`, where the line has them."""
+    if not len(chunk.count):
+        return
+    width = int(chunk.count[0])
+    if (chunk.count == width).all():
+        if width > 3 * column:
+            table[:] = chunk.numbers.reshape(-1, width)[:, 3 * column:3 * column + 3]
+        return
+    first = np.concatenate([[0], np.cumsum(chunk.count)[:-1]])
+    has = chunk.count > 3 * column
+    table[has] = chunk.numbers[(first[has] + 3 * column)[:, None] + np.arange(3)]

@@ -1,0 +1,230 @@
+"""Lines to statements: comments, continuation, case, blanks, numbers and words."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from toolpaths.cl.log import Log
+from toolpaths.cl.scan import Scan
+from toolpaths.cl.source import text_of
+from toolpaths.cl.words import BARE_STARTS, TEXT_WORDS
+
+Word = str | float
+_NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?", re.ASCII)
+_MAJOR = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_ ,=*.+-]*", re.ASCII)
+_BLANKS = re.compile(r"[\s-]*[\s]+[\s-]*")
+COMMENT = "$$"
+DATA_COMMENT = "$$->"
+_RARELY_REPEATED = frozenset({"GOTO", "GODLTA", "CNTRL", "KNOT"})
+TEXT = "(text)"
+"""Major of a line that has not the form of a statement."""
+
+
+@dataclass(frozen=True, slots=True)
+class Statement:
+    """One record. `words` are its parameters: numbers as float, everything else upper case; `body` as written."""
+
+    major: str
+    body: str = ""
+    words: tuple[Word, ...] = ()
+    slash: bool = True
+
+    @property
+    def numbers(self) -> list[float]:
+        """The numbers before the first word."""
+        found: list[float] = []
+        for word in self.words:
+            if isinstance(word, str):
+                break
+            found.append(word)
+        return found
+
+    @property
+    def tail(self) -> tuple[Word, ...]:
+        """The parameters from the first word on."""
+        return self.words[len(self.numbers):]
+
+    def has(self, *names: str) -> bool:
+        """True where one of the words stands among the parameters."""
+        return any(word in names for word in self.words if isinstance(word, str))
+
+    def after(self, *names: str) -> float | None:
+        """The number right after the first of these words, None where there is none."""
+        for word, value in zip(self.words, self.words[1:], strict=False):
+            if isinstance(word, str) and word in names and isinstance(value, float):
+                return value
+        return None
+
+
+@dataclass
+class Program:
+    """The slow part of a file in order: statement, its first line, and how many plain points stand before it.
+
+    `first` tells for each different statement (points apart) the line where it stands first.
+    """
+
+    statements: list[Statement] = field(default_factory=list)
+    lines: list[int] = field(default_factory=list)
+    before: list[int] = field(default_factory=list)
+    first: dict[Statement, int] = field(default_factory=dict)
+
+
+def words_of(body: str) -> tuple[Word, ...]:
+    """Parameters between commas or blanks; trailing empty ones left out, inner empty ones kept as ''."""
+    found: list[Word] = []
+    for part in body.split(","):
+        pieces = part.split()
+        found.extend(map(_word, pieces) if pieces else ("",))
+    while found and found[-1] == "":
+        found.pop()
+    return tuple(found)
+
+
+def _word(text: str) -> Word:
+    if _NUMBER.fullmatch(text):
+        value = float(text.replace("D", "E").replace("d", "e"))
+        if math.isfinite(value):
+            return value
+    return text.upper()
+
+
+def major_of(head: str) -> str:
+    """A major word in its one spelling: upper case, single blanks, none beside hyphens and commas."""
+    head = " ".join(head.upper().split())
+    return head.replace(" -", "-").replace("- ", "-").replace(" ,", ",").replace(", ", ",")
+
+
+def statement_of(text: str) -> Statement:
+    """A whole statement (continuation joined, comment removed)."""
+    head, slash, body = text.partition("/")
+    head = head.strip()
+    if not _MAJOR.fullmatch(head) or not any(ch.isalpha() for ch in head):
+        return Statement(TEXT, text, words_of(text), False)
+    body = body.strip()
+    return Statement(major_of(head), body, words_of(body), bool(slash))
+
+
+def _text_statement(text: str) -> Statement | None:
+    upper = text[:7].upper()
+    for word in TEXT_WORDS:
+        if upper.startswith(word):
+            body = text[len(word):].lstrip()
+            return Statement(word, (body[1:] if body.startswith("/") else body).strip())
+    return None
+
+
+def _comment(text: str) -> Statement:
+    if text.startswith(DATA_COMMENT):
+        head, _, body = text[len(DATA_COMMENT):].partition("/")
+        body = body.strip()
+        return Statement(DATA_COMMENT + major_of(head), body, () if body.startswith(("{", "[")) else words_of(body))
+    return Statement(COMMENT, text[2:].strip())
+
+
+class Lexer:
+    """Cuts the slow lines of a file into statements; equal lines are looked at once."""
+
+    def __init__(self, data: bytes, scan: Scan, log: Log, known: Callable[[str], bool]):
+        self.data, self.scan, self.log, self.known = data, scan, log, known
+        self.memo: dict[bytes, Statement | None] = {}
+        self.next = 0
+
+    def program(self) -> Program:
+        """All statements of the file."""
+        out, scan, memo, data = Program(), self.scan, self.memo, self.data
+        total = len(scan.start)
+        while self.next < total:
+            i = self.next
+            self.next = i + 1
+            raw = data[scan.start[i]:scan.end[i]]
+            if raw in memo:
+                statement = memo[raw]
+            else:
+                statement = self._read(raw, i)
+                if statement is None or statement.major not in _RARELY_REPEATED:
+                    if self.next == i + 1 and b"$" not in raw.replace(b"$$", b""):
+                        memo[raw] = statement
+                    if statement is not None:
+                        out.first.setdefault(statement, scan.line[i])
+            if statement is not None:
+                out.statements.append(statement)
+                out.lines.append(scan.line[i])
+                out.before.append(scan.before[i])
+        return out
+
+    def _read(self, raw: bytes, i: int) -> Statement | None:
+        text = text_of(raw).strip()
+        if not text:
+            return None
+        if text.startswith(COMMENT):
+            return _comment(self._joined(text, i) if text.startswith(DATA_COMMENT) else text)
+        fixed = _text_statement(text)
+        if fixed is not None:
+            return _text_statement(self._joined(text, i, text_word=True)) if text.endswith("$") else fixed
+        joined = self._joined(text, i).strip()
+        return statement_of(joined) if joined else None
+
+    def _joined(self, text: str, i: int, text_word: bool = False) -> str:
+        """`text` with the lines that continue it."""
+        parts: list[str] = []
+        depth = 0
+        while True:
+            part, continued = _cut(text, not parts and text.startswith(DATA_COMMENT), text_word)
+            parts.append(part)
+            depth += part.count("(") - part.count(")")
+            if not continued:
+                return "".join(parts)
+            following = self._following(i, depth > 0, continued == "certain" and not text_word)
+            if following is None:
+                return "".join(parts)
+            text = following
+
+    def _following(self, i: int, nested: bool, certain: bool) -> str | None:
+        """The line that goes on after a continuation mark; None (and a diagnostic) where a new statement stands."""
+        scan = self.scan
+        line = scan.line[self.next - 1]
+        while self.next < len(scan.start) and scan.before[self.next] == scan.before[i]:
+            text = text_of(self.data[scan.start[self.next]:scan.end[self.next]])
+            bare = text.strip()
+            if bare.startswith(COMMENT):
+                if not bare.startswith(DATA_COMMENT):
+                    self.next += 1
+                    continue
+                break
+            if not bare or (not nested and self._begins(bare)):
+                break
+            self.next += 1
+            return text
+        if certain:
+            self.log.error("cl.continuation", "a continuation mark $ is followed by a new statement", line,
+                           "remove the mark or put the missing rest on the next line")
+        return None
+
+    def _begins(self, text: str) -> bool:
+        """True where a line is the start of a statement by its first word."""
+        head, slash, _ = text.partition("/")
+        major = major_of(head)
+        if slash:
+            return self.known(major)
+        return major in BARE_STARTS or _text_statement(text) is not None
+
+
+def _cut(text: str, comment: bool, text_word: bool) -> tuple[str, str]:
+    """(text before a comment or continuation mark, "" | "certain" | "maybe" continued)."""
+    if comment:
+        return (text.rstrip()[:-1], "certain") if text.rstrip().endswith("$") else (text, "")
+    if text_word:
+        return (text.rstrip()[:-1], "maybe") if text.rstrip().endswith("$") else (text, "")
+    at = text.find("$")
+    if at < 0:
+        return text, ""
+    head, rest = text[:at], text[at:]
+    if rest.startswith(COMMENT):
+        return head, ""
+    after = rest[1:].strip()
+    if not after or after.startswith("$"):
+        return head, "certain"
+    return head, "certain" if head.rstrip().endswith((",", "/")) else "maybe"

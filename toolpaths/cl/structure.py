@@ -1,0 +1,176 @@
+"""Records about the program itself: operations, part name, events, subprograms, and the lists of our own writer."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable
+
+from toolpaths.cl.build import Builder, Declared
+from toolpaths.cl.statements import Statement
+from toolpaths.cl.tools import describe
+from toolpaths.cl.words import EVENTS, LENGTH_EVENTS
+from toolpaths.toolpath import Frame, Operation, Tool
+
+_TOOL_PATH = re.compile(r"(.*?),\s*TOOL\s*(?:,(.*))?$", re.IGNORECASE | re.DOTALL)
+_CATIA_OPERATION = re.compile(r"OPERATION NAME\s*:\s*(.*)", re.IGNORECASE)
+
+
+def begin_operation(b: Builder, name: str, tool_name: str = "") -> None:
+    """A new operation from here on; a cycle that is still armed ends."""
+    end_cycle(b)
+    b.operations.append(Operation(name, tool_name, 0, False, b.line))
+    b.operation.set(b.row, len(b.operations) - 1)
+    if b.dialect.axis_reset:
+        b.axis_marks.append((b.row, (0.0, 0.0, 1.0)))
+
+
+def end_cycle(b: Builder) -> None:
+    """Disarm a cycle that the file has not ended."""
+    if b.cycle.now >= 0:
+        b.log.warning("cl.cycle-open", "the operation ends with a cycle still armed; it is ended here", b.line)
+        b.cycle.set(b.row, -1)
+
+
+def tool_path(b: Builder, s: Statement) -> None:
+    """TOOL PATH/name, TOOL, tool name."""
+    found = _TOOL_PATH.match(s.body)
+    name, tool_name = (found[1].strip(), (found[2] or "").strip()) if found else (s.body, "")
+    begin_operation(b, name, tool_name)
+    if tool_name:
+        describe(b, name=tool_name)
+
+
+def end_of_path(b: Builder, s: Statement) -> None:
+    """END-OF-PATH."""
+    end_cycle(b)
+
+
+def feature(b: Builder, s: Statement) -> None:
+    """Creo: $$-> FEATNO / n begins the sequence of feature n."""
+    begin_operation(b, f"FEATNO {s.body}")
+
+
+def partno(b: Builder, s: Statement) -> None:
+    """The name of the part; the first one counts."""
+    b.name = b.name or s.body
+
+
+def comment(b: Builder, s: Statement) -> None:
+    """CATIA names its operations in comments."""
+    found = _CATIA_OPERATION.match(s.body) if b.dialect.name == "catia" else None
+    if found:
+        begin_operation(b, found[1].strip())
+
+
+def text_event(b: Builder, s: Statement) -> None:
+    """PPRINT and INSERT, one text each; INSERT of SolidWorks is a comment."""
+    if s.major == "INSERT" and b.dialect.insert_is_comment:
+        return
+    b.event(s.major, (s.body,) if s.body else ())
+
+
+def plain_event(b: Builder, s: Statement) -> None:
+    """Words that only the machine needs; lengths to mm."""
+    words = tuple(w for w in s.words if w != "")
+    if s.major in LENGTH_EVENTS:
+        words = tuple(w * b.scale if isinstance(w, float) else w for w in words)
+    b.event(s.major, words)
+
+
+def spindl(b: Builder, s: Statement) -> None:
+    """An event; a surface speed belongs to turning."""
+    if s.has("SFM", "SMM"):
+        b.turning.add(b.operation.now)
+    plain_event(b, s)
+
+
+def nothing(b: Builder, s: Statement) -> None:
+    """Read elsewhere (UNITS), or of no meaning here (MULTAX: the points tell by themselves)."""
+
+
+def own_header(b: Builder, s: Statement) -> None:
+    """$$-> TOOLPATH / {...}: text of our own writer; lists of frames, tools, operations follow."""
+    found = _json(b, s)
+    if found is not None:
+        b.declared = Declared("inch" if found.get("units") == "inch" else "mm")
+
+
+def _json(b: Builder, s: Statement) -> dict[str, object] | None:
+    try:
+        found = json.loads(s.body)
+    except (ValueError, RecursionError):
+        found = None
+    if isinstance(found, dict):
+        return found
+    b.log.error("cl.data-comment", f"{s.major} takes a JSON object", b.line)
+    return None
+
+
+def own_item(b: Builder, s: Statement) -> None:
+    """$$-> FRAME | TOOL | OPERATION / {...}: one more of the list."""
+    found = _json(b, s) if b.declared is not None else None
+    if found is None or b.declared is None:
+        return
+    try:
+        if s.major == "$$->FRAME":
+            b.declared.frames.append(_frame(found))
+        elif s.major == "$$->TOOL":
+            b.declared.tools.append(_tool(found))
+        else:
+            b.declared.operations.append(Operation(str(found.get("name", "")), str(found.get("tool_name", "")),
+                                                   _index(found, "frame"), bool(found.get("turning")), b.line))
+    except (TypeError, ValueError, KeyError) as fault:
+        b.log.error("cl.data-comment", f"{s.major}: {fault}", b.line)
+
+
+def _index(found: dict[str, object], key: str) -> int:
+    value = found.get(key, 0)
+    if not isinstance(value, int):
+        raise ValueError(f"{key} is not a whole number")
+    return value
+
+
+def _numbers(value: object, count: int | None) -> tuple[float, ...]:
+    if not isinstance(value, list) or (count is not None and len(value) != count):
+        raise ValueError(f"expected a list of {count} numbers")
+    return tuple(float(v) for v in value)
+
+
+def _frame(found: dict[str, object]) -> Frame:
+    r = _numbers(found["rotation"], 9)
+    o = _numbers(found["origin"], 3)
+    return Frame(str(found.get("name", "")), (o[0], o[1], o[2]),
+                 ((r[0], r[1], r[2]), (r[3], r[4], r[5]), (r[6], r[7], r[8])))
+
+
+_TOOL_FLOATS = ("diameter", "corner_radius", "length", "taper", "tip_angle", "flute_length")
+
+
+def _tool(found: dict[str, object]) -> Tool:
+    sizes = {key: _numbers([found[key]], 1)[0] for key in _TOOL_FLOATS if found.get(key) is not None}
+    register = None if found.get("length_register") is None else _index(found, "length_register")
+    return Tool(_index(found, "number"), str(found.get("name", "")), str(found.get("shape", "")),
+                **sizes, length_register=register, cutter=_numbers(found.get("cutter", []), None))
+
+
+def own_use(b: Builder, s: Statement) -> None:
+    """$$-> USE / operation, tool: indices into the lists from here on."""
+    if b.declared is None:
+        return
+    values = [int(n) for n in s.numbers]
+    if len(values) != 2 or not 0 <= values[0] < len(b.declared.operations) \
+            or not -1 <= values[1] < len(b.declared.tools):
+        b.log.error("cl.data-comment", f"$$-> USE / {s.body}: no such operation or tool was declared", b.line)
+        return
+    b.operation.set(b.row, values[0])
+    b.declared.tool.set(b.row, values[1])
+
+
+HANDLERS: dict[str, Callable[[Builder, Statement], None]] = {
+    "TOOL PATH": tool_path, "END-OF-PATH": end_of_path, "$$->FEATNO": feature, "PARTNO": partno, "$$": comment,
+    "PPRINT": text_event, "INSERT": text_event, "REMARK": nothing, "LPRINT": nothing, "PPLABEL": nothing,
+    "LETTER": nothing, "UNITS": nothing, "UNIT": nothing, "MULTAX": nothing, "FINI": nothing, "SET": nothing,
+    "$$->TOOLPATH": own_header, "$$->FRAME": own_item, "$$->TOOL": own_item, "$$->OPERATION": own_item,
+    "$$->USE": own_use, **dict.fromkeys(EVENTS, plain_event), "SPINDL": spindl,
+}

@@ -1,0 +1,160 @@
+"""Tools: their numbers (LOADTL, LOAD/TOOL, TURRET, TOOLNO) and what the file tells of their shape.
+
+Systems give the shape before or after the number. Records without a point between them describe one tool; after a
+point, a description begins anew.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+from toolpaths.cl.build import Builder
+from toolpaths.cl.statements import Statement
+from toolpaths.toolpath import Tool
+
+TURNING = frozenset({"TURN", "GROOVE", "THREAD", "TURNING"})
+_MAX_NUMBER = 10 ** 9
+_CUTTER_ANGLES = (4, 5)
+
+
+@dataclass
+class _State:
+    number: int = 0
+    row: int = -1
+    fields: dict[str, Any] = field(default_factory=dict)
+    by_number: dict[int, dict[str, Any]] = field(default_factory=dict)
+
+
+def _state(b: Builder) -> _State:
+    state = b.memory.setdefault("tools", _State())
+    assert isinstance(state, _State)
+    if state.row != b.row:
+        state.row, state.fields = b.row, {}
+    return state
+
+
+def describe(b: Builder, **fields: Any) -> None:
+    """Add what is known of the tool in use from here on."""
+    state = _state(b)
+    state.fields.update(fields)
+    _use(b, state)
+
+
+def _use(b: Builder, state: _State) -> None:
+    state.by_number[state.number] = state.fields
+    b.tool.set(b.row, Tool(state.number, **state.fields))
+
+
+def change(b: Builder, number: float, register: float | None, more: tuple[float, ...] = ()) -> None:
+    """Load tool `number`; the event LOADTL and the tool index follow."""
+    if number != math.floor(number) or not 0 <= number < _MAX_NUMBER:
+        b.log.error("cl.tool-number", f"{number:g} is no tool number", b.line)
+        return
+    state = _state(b)
+    known = state.by_number.get(int(number), {})
+    state.number = int(number)
+    state.fields = {**known, **state.fields} if set(state.fields) <= {"name"} else state.fields
+    if register is not None:
+        state.fields["length_register"] = int(register)
+    b.event("LOADTL", (number,) + (() if register is None else (register,)) + more)
+    if b.declared is None:
+        _use(b, state)
+
+
+def loadtl(b: Builder, s: Statement) -> None:
+    """LOADTL/number[, register][, ADJUST | OSETNO | LENGTH | OFFSET, register]."""
+    numbers = s.numbers
+    if not numbers:
+        b.log.error("cl.tool-number", f"LOADTL/{s.body}: it takes a tool number", b.line)
+        return
+    register = s.after("ADJUST", "OSETNO", "OFFSET")
+    change(b, numbers[0], register if register is not None else (numbers[1] if len(numbers) > 1 else None))
+
+
+def load(b: Builder, s: Statement) -> None:
+    """LOAD/TOOL, number[, ADJUST, register]."""
+    number = s.after("TOOL")
+    if number is None:
+        b.log.error("cl.tool-number", f"LOAD/{s.body}: it takes TOOL and a number", b.line)
+        return
+    change(b, number, s.after("ADJUST", "OSETNO"))
+
+
+def turret(b: Builder, s: Statement) -> None:
+    """TURRET/number[, OSETNO, register, ...]."""
+    if not s.numbers:
+        b.log.error("cl.tool-number", f"TURRET/{s.body}: it takes a station number", b.line)
+        return
+    change(b, s.numbers[0], s.after("OSETNO"))
+
+
+def toolno(b: Builder, s: Statement) -> None:
+    """CATIA: TOOLNO/number, kind, dimensions: describes, LOADTL loads."""
+    if s.has(*TURNING):
+        b.turning.add(b.operation.now)
+    kind = next((w for w in s.words if isinstance(w, str) and w), "")
+    size = [w for w in s.words[1:] if isinstance(w, float)]
+    fields: dict[str, Any] = {"shape": kind} if kind else {}
+    if kind not in TURNING and size:
+        fields["diameter"] = size[0] * b.scale
+        if len(size) > 1:
+            fields["corner_radius"] = size[1] * b.scale
+    if s.numbers and 0 <= s.numbers[0] < _MAX_NUMBER:
+        _state(b).number = int(s.numbers[0])
+    describe(b, **fields)
+
+
+def tldata(b: Builder, s: Statement) -> None:
+    """TLDATA/MILL, d, r, length, taper, tip, ... or DRILL[, MILL], d, r, length, point angle, flute length."""
+    kinds = [w for w in s.words if isinstance(w, str) and w]
+    n = [w for w in s.words if isinstance(w, float)]
+    shape = kinds[0] if kinds else ""
+    if shape in TURNING:
+        b.turning.add(b.operation.now)
+        describe(b, shape=shape)
+        return
+    names = ("diameter", "corner_radius", "length")
+    fields: dict[str, Any] = {key: v * b.scale for key, v in zip(names, n, strict=False)}
+    if shape == "DRILL":
+        fields |= {"tip_angle": math.radians(n[3])} if len(n) > 3 else {}
+        fields |= {"flute_length": n[4] * b.scale} if len(n) > 4 else {}
+    else:
+        fields |= {key: math.radians(v) for key, v in zip(("taper", "tip_angle"), n[3:], strict=False)}
+    describe(b, shape=shape, **fields)
+
+
+def cutter(b: Builder, s: Statement) -> None:
+    """CUTTER/d[, r, e, f, a, b, h], the seven parameters of APT."""
+    n = s.numbers
+    if not n:
+        if not s.has("DISPLY"):
+            b.log.warning("cl.cutter", f"CUTTER/{s.body} names no diameter", b.line)
+        return
+    params = tuple(v if i in _CUTTER_ANGLES else v * b.scale for i, v in enumerate(n[:7]))
+    corner = {"corner_radius": params[1]} if len(params) > 1 else {}
+    describe(b, diameter=params[0], cutter=params, **corner)
+
+
+def flute_length(b: Builder, s: Statement) -> None:
+    """CSI_SET_FLUTE_LENGTH/length."""
+    if s.numbers:
+        describe(b, flute_length=s.numbers[0] * b.scale)
+
+
+def tprint(b: Builder, s: Statement) -> None:
+    """TPRINT/name, ...: the name of the tool."""
+    name = s.body.split(",")[0].strip()
+    if name:
+        describe(b, name=name)
+
+
+def select(b: Builder, s: Statement) -> None:
+    """SELECT/TOOL, number: the tool to prepare."""
+    number = next((w for w in s.words if isinstance(w, float)), None)
+    b.event("SELECT", () if number is None else (number,))
+
+
+HANDLERS = {"LOADTL": loadtl, "LOAD": load, "TURRET": turret, "TOOLNO": toolno, "TLDATA": tldata, "CUTTER": cutter,
+            "$$->CUTTER": cutter, "CSI_SET_FLUTE_LENGTH": flute_length, "TPRINT": tprint, "SELECT": select}

@@ -1,0 +1,65 @@
+"""The vocabulary: which major words the reader knows, and what becomes of each.
+
+Words with a handler of their own are listed where they are handled (`HANDLERS` of motion, feeds, frames, tools,
+cycles and structure). Here stand the words that need none.
+"""
+
+from __future__ import annotations
+
+TEXT_WORDS = ("PARTNO", "PPRINT", "INSERT", "REMARK", "TPRINT", "LPRINT", "PPLABEL", "LETTER")
+"""Free text follows, with or without a slash; it may hold any character."""
+
+EVENTS: dict[str, str] = {
+    "SPINDL": "speed and sense as in the file: rev/min with RPM, surface speed with SFM or SMM",
+    "COOLNT": "words as in the file",
+    "CUTCOM": "words as in the file; a plain number is a register",
+    "DELAY": "seconds, or revolutions where REV follows",
+    "STOP": "none",
+    "OPSTOP": "none",
+    "OPSKIP": "ON or OFF",
+    "SEQNO": "numbers as in the file",
+    "PREFUN": "number of the G function",
+    "AUXFUN": "number of the M function, NOW or NEXT",
+    "MODE": "as in the file",
+    "SELECT": "tool number to prepare",
+    "UNLOAD": "as in the file",
+    "SELCTL": "as in the file",
+    "OFSTNO": "register",
+    "CLAMP": "as in the file",
+    "RETRCT": "as in the file; lengths mm",
+    "CLEARP": "as in the file; lengths mm",
+    "CLRSRF": "as in the file; lengths mm",
+    "REWIND": "as in the file",
+    "BREAK": "as in the file",
+    "CHECK": "as in the file",
+    "LEADER": "length mm",
+    "HEAD": "as in the file",
+    "POD": "as in the file",
+    "AIR": "as in the file",
+    "SLOWDN": "as in the file",
+    "END": "none",
+}
+"""Records without motion that become an Event, and what its values hold. Also events, from their own handlers: LOADTL
+(tool number, then the length register where the file names one), ROTATE, ROTABL and ROTHED (as in the file),
+PPRINT and INSERT (one text), GOHOME without a point (none), FEDRAT/INVERS,AUTO or OFF (the words)."""
+
+LENGTH_EVENTS = frozenset({"RETRCT", "CLEARP", "CLRSRF", "LEADER"})
+"""Events whose numbers are lengths: converted to mm."""
+
+SILENT = frozenset({
+    "PAINT", "PPWORD", "PPFUN", "SYN", "OPFEATSTART", "OPFEATEND", "MOVE_ATTRIB", "BOX", "SETUP", "SWITCH", "DISPLY",
+    "AUTOPS", "INTOL", "OUTTOL", "TOLER", "LINTOL", "MACHIN", "ALIGN", "PLABEL", "CLPRNT", "NOPOST", "PLOT", "TRNTYP",
+    "CSI_SET_EXTENSION_LENGTH", "MCHTOL", "DEFINE", "LOADTL_NAME", "NUMPTS", "INDEXF",
+})
+"""Display, listing, tolerance and bookkeeping: no motion, nothing for the machine."""
+
+UNSUPPORTED_MOTION = frozenset({
+    "CUT", "DNTCUT", "COPY", "TRACUT", "GOFWD", "GOLFT", "GORGT", "GOBACK", "GOUP", "GODOWN", "GO", "OFFSET",
+    "MOVNRB", "INDIRP", "PSIS", "THREAD", "POCKET", "SCURV", "RMILL", "SMILL", "FMILL", "PATH", "CALL", "INDEX",
+    "MACRO", "LOOPST", "LOOPND", "JUMPTO", "TLLFT", "TLRGT", "TLON", "MOVETO", "CIRCUL", "ARCDAT", "ARCMOV",
+    "MIRROR", "XFORM", "MATRIX", "BSPLINE", "SPLINE", "ELLIPS",
+})
+"""Words that move the tool or change how it moves, and that this reader does not carry out: an error."""
+
+BARE_STARTS = frozenset({"RAPID", "FINI", "END-OF-PATH", "GOHOME", "STOP", "OPSTOP", "END"})
+"""Words that begin a new statement even without a slash."""
