@@ -1,0 +1,46 @@
+"""Fixtures for every folder: LinuxCNC as a peer, where it is installed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+
+import pytest
+
+from tests.linuxcnc import interpreter, simulator
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Whatever asks for LinuxCNC can be chosen with `-m linuxcnc`."""
+    for item in items:
+        if {"interpret", "simulate", "standstill"} & set(getattr(item, "fixturenames", ())):
+            item.add_marker(pytest.mark.linuxcnc)
+
+
+@cache
+def _missing(module: str) -> str:
+    return {"interpreter": interpreter, "simulator": simulator}[module].missing()
+
+
+def _or_skip(function: Callable, module: str) -> Callable:
+    if reason := _missing(module):
+        pytest.skip(reason)
+    return function
+
+
+@pytest.fixture(scope="session")
+def interpret() -> Callable[..., interpreter.Canonical]:
+    """`interpreter.interpret`, or a skipped test."""
+    return _or_skip(interpreter.interpret, "interpreter")
+
+
+@pytest.fixture(scope="session")
+def simulate() -> Callable[..., simulator.Run]:
+    """`simulator.simulate`, or a skipped test."""
+    return _or_skip(simulator.simulate, "simulator")
+
+
+@pytest.fixture(scope="session")
+def standstill() -> Callable[..., simulator.Floats]:
+    """`simulator.standstill`, or a skipped test."""
+    return _or_skip(simulator.standstill, "simulator")
