@@ -25,6 +25,8 @@ class Kinematics(ABC):
     """mm from the gauge point to the tip, along the tool axis"""
     branches: int
     """B of `inverse`"""
+    slides_affine: bool = False
+    """True where, at fixed rotary joints, the tip is an affine function of the linear joints (serial machines)"""
 
     @abstractmethod
     def inverse(self, tip: Floats, axis: Floats, spin: float | Floats = 0.0,

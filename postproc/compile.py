@@ -1,0 +1,211 @@
+"""Path to canonical Program: words rounded, feeds, commands at their places, holes that may become canned cycles."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from machines.kinematics.base import Kinematics
+from postproc.commands import commands_of
+from postproc.control import Control
+from postproc.controllers.model import ControllerFile
+from postproc.feed import Feeds, plan_feeds
+from postproc.moves import Moves, Phase
+from postproc.path import ARC, FEED, Path
+from postproc.program import Command, Hole, Program
+from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.diagnostics import Diagnostic, error, info, warning
+from toolpaths.toolpath import Toolpath
+
+SNAP = 2.5
+"""X, Y, Z residues beside a rotary move, in units of the last decimal, that are not written"""
+
+
+@dataclass(frozen=True)
+class Rounding:
+    """Largest deviation that the rounding of words can make: tip in mm, axis in rad."""
+
+    tip: float
+    axis: float
+
+
+def decimals(control: Control, controller: ControllerFile) -> Ints:
+    """(J,) decimals of the axis words."""
+    f = controller.format
+    return np.where(control.machine.rotary, f.rotary_decimals, f.linear_decimals).astype(np.int64)
+
+
+def rounding_bound(control: Control, kin: Kinematics, q: Floats, places: Ints) -> Rounding:
+    """Worst case of half a last decimal in every word at joints q (K, J), to first order (Jacobian)."""
+    some = q[np.linspace(0, len(q) - 1, min(len(q), 500)).astype(int)]
+    step = 0.5 * 10.0 ** -places / control.unit
+    jacobian = kin.jacobian(some)
+    axis = np.linalg.norm(jacobian[:, 3:], axis=1) @ step
+    if control.tip_law:
+        return Rounding(float(np.linalg.norm(step[control.slides])), float(axis.max()))
+    slides, rotary = control.slides, control.rotary
+    tip = np.linalg.norm(jacobian[:, :3], axis=1)
+    linear = np.linalg.norm(tip[:, slides] * step[slides], axis=1)
+    return Rounding(float((linear + tip[:, rotary] @ step[rotary]).max()), float(axis.max()))
+
+
+def compile_program(toolpath: Toolpath, moves: Moves, path: Path, control: Control, controller: ControllerFile,
+                    kinematics: Callable[[int], Kinematics], lengths: Callable[[int], float],
+                    feed_mode: str) -> tuple[Program, Feeds, list[Diagnostic]]:
+    """The canonical program of a path; `lengths` gives the gauge length of the tool of an index."""
+    places = decimals(control, controller)
+    exact = _words(path, moves, control, kinematics, lengths)
+    words = _snapped(np.round(exact / 10.0 ** -places) * 10.0 ** -places, path, control, places)
+    words = np.round(words, int(places.max()))
+    write = _written(words, path, control)
+    native, holes = _holes(toolpath, moves, path, words, control, controller)
+    feeds = plan_feeds(path, control, words, moves.feed[path.move], toolpath.pass_[moves.row[path.move]], native,
+                       feed_mode, controller.feed.least_inverse_rate)
+    commands, diagnostics = commands_of(toolpath, moves, path, controller, native)
+    keep = write.any(axis=1) | (path.code == ARC)
+    new = np.concatenate([[0], np.cumsum(keep)])
+    moved: dict[int, tuple[Command, ...]] = {}
+    for k, group in sorted(commands.items()):
+        moved[int(new[k])] = moved.get(int(new[k]), ()) + group
+    kept_holes = tuple(Hole(int(new[h.first]), int(new[h.last + 1]) - 1, h.cycle, h.plane_level, h.bottom, h.retract,
+                            h.initial) for h in holes)
+    home_words = np.where(path.home[:, None], np.round(path.q * control.unit, int(places.max())), words)
+    program = Program(control.machine.axis_names, home_words[keep], write[keep], path.code[keep], feeds.feed[keep],
+                      feeds.mode[keep], path.plane[keep], path.ccw[keep], path.center[keep], path.home[keep],
+                      np.isnan(path.u[keep]), moves.row[path.move[keep]], moves.line[path.move[keep]], moved, kept_holes,
+                      places)
+    return program, feeds, diagnostics + _slowed(feeds, moves, path, toolpath.file) + _lost_taps(
+        toolpath, moves, holes, controller)
+
+
+def _words(path: Path, moves: Moves, control: Control, kinematics: Callable[[int], Kinematics],
+           lengths: Callable[[int], float]) -> Floats:
+    """Unrounded words (K, J); blocks before a tool change still carry the tool that leaves."""
+    tool = moves.tool[path.move]
+    leaving = np.arange(len(path)) < path.begin[path.move]
+    tool = np.where(leaving & (path.move > 0), moves.tool[np.maximum(path.move - 1, 0)], tool)
+    words = np.empty_like(path.q)
+    for index in np.unique(tool):
+        k = np.flatnonzero(tool == index)
+        words[k] = control.words(path.q[k], kinematics(int(index)), lengths(int(index)))
+    return words
+
+
+def _snapped(words: Floats, path: Path, control: Control, places: Ints) -> Floats:
+    """Words without tiny X, Y, Z residues beside a rotary move.
+
+    Under inverse time LinuxCNC takes the length of X, Y, Z alone where any of them moves, so that a residue of
+    rounding would set the speed of the whole block. What is left out is at most SNAP last decimals, and never adds up:
+    each block is compared with the last written position.
+    """
+    slides, rotary = control.slides, control.rotary
+    if not len(rotary) or len(words) < 2:
+        return words
+    snap = SNAP * 10.0 ** -places[slides]
+    turning = (words[1:, rotary] != words[:-1, rotary]).any(axis=1) & (path.code[1:] == FEED)
+    step = np.abs(words[1:, slides] - words[:-1, slides])
+    rows = np.flatnonzero(turning & (step <= snap).all(axis=1) & (step > 0.0).any(axis=1)) + 1
+    wanted = words.copy()
+    todo = set(rows.tolist())
+    for k in rows.tolist():
+        while k in todo or (k < len(words) and (words[k - 1, slides] != wanted[k - 1, slides]).any()):
+            todo.discard(k)
+            if not turning[k - 1] or (np.abs(wanted[k, slides] - words[k - 1, slides]) > snap).any():
+                break
+            words[k, slides] = words[k - 1, slides]
+            k += 1
+            if k >= len(words):
+                break
+    return words
+
+
+def _written(words: Floats, path: Path, control: Control) -> Bools:
+    """Words (K, J) that a block states: those it names, else those that change; both plane words of an arc."""
+    changed = np.zeros(words.shape, dtype=bool)
+    changed[1:] = words[1:] != words[:-1]
+    write: Bools = np.asarray(np.where(path.state.any(axis=1)[:, None], path.state, changed))
+    for k in np.flatnonzero(path.code == ARC):
+        third = {17: 2, 18: 1, 19: 0}[int(path.plane[k])]
+        write[k, [c for i, c in enumerate(control.xyz) if i != third]] = True
+    return write
+
+
+def _holes(toolpath: Toolpath, moves: Moves, path: Path, words: Floats, control: Control,
+           controller: ControllerFile) -> tuple[Bools, list[Hole]]:
+    """Blocks of holes that the controller can drill by itself, and the holes.
+
+    Native where the tool stands along Z of the words, the kind is in the controller's table and the way out ends at
+    the clearance plane or at the level that the tool came from.
+    """
+    native = np.zeros(len(path), dtype=bool)
+    holes: list[Hole] = []
+    z = int(control.xyz[2])
+    if not controller.cycles.enabled or z < 0 or not (moves.hole >= 0).any():
+        return native, holes
+    hole = np.where(np.isnan(path.u), -1, moves.hole[path.move])
+    change = np.flatnonzero(np.diff(hole)) + 1
+    before_initial = 0.0
+    previous_last = -2
+    for first, last in zip([0, *change], [*(change - 1), len(path) - 1], strict=True):
+        if hole[first] < 0:
+            continue
+        level = float(words[first - 1, z]) if first > 0 else np.inf
+        initial = before_initial if previous_last == first - 1 else level
+        before_initial, previous_last = initial, last
+        found = _hole(toolpath, moves, path, words, control, controller, int(first), int(last), initial)
+        if found is not None:
+            holes.append(found)
+            native[first:last + 1] = True
+    return native, holes
+
+
+def _hole(toolpath: Toolpath, moves: Moves, path: Path, words: Floats, control: Control, controller: ControllerFile,
+          first: int, last: int, initial: float) -> Hole | None:
+    cycle = toolpath.cycles[int(moves.cycle[path.move[first]])]
+    spec = controller.cycles.with_dwell if cycle.dwell > 0.0 else controller.cycles.table
+    phases = moves.phase[path.move[first:last + 1]]
+    bottom = first + int(np.flatnonzero(phases == Phase.DRILL)[-1])
+    columns = [c for c in range(words.shape[1]) if c != int(control.xyz[2])]
+    z = int(control.xyz[2])
+    start = first + int(np.flatnonzero(phases <= Phase.APPROACH)[-1]) if (phases <= Phase.APPROACH).any() else first - 1
+    along = bool((words[start:last + 1][:, columns] == words[start, columns]).all())
+    plane, out = float(words[start, z]), float(words[last, z])
+    if cycle.kind not in spec or not along or words[bottom, z] >= plane or len(set(cycle.steps)) > 1:
+        return None
+    if abs(out - plane) > 1e-9 and abs(out - initial) > 1e-9:
+        return None
+    return Hole(first, last, int(moves.cycle[path.move[first]]), plane, float(words[bottom, z]), out, initial)
+
+
+def _slowed(feeds: Feeds, moves: Moves, path: Path, file: str) -> list[Diagnostic]:
+    rows = np.flatnonzero(feeds.slowed)
+    if not len(rows):
+        return []
+    share = path.seconds[rows] / feeds.seconds[rows]
+    return [info("feed.reduced", f"feed reduced to {100.0 * share.min():.1f} % at the least, where an axis would be "
+                 "faster than its limit", file=file, lines=np.unique(moves.line[path.move[rows]])[:6].tolist(),
+                 count=len(rows))]
+
+
+def _lost_taps(toolpath: Toolpath, moves: Moves, holes: list[Hole], controller: ControllerFile) -> list[Diagnostic]:
+    bad = np.array([c.kind in controller.cycles.rigid_only for c in toolpath.cycles], dtype=bool)
+    rows = np.flatnonzero((moves.phase == Phase.DRILL) & (moves.cycle >= 0))
+    tapped = int(bad[moves.cycle[rows]].sum()) if len(bad) else 0
+    written = sum(bad[h.cycle] for h in holes)
+    if tapped <= written:
+        return []
+    return [error("cycle.not_native", "a tapping cycle cannot be written as single moves, and this one not as a canned "
+                  "cycle", file=toolpath.file, lines=moves.line[rows[bad[moves.cycle[rows]]]][:6].tolist(),
+                  count=int(tapped - written), hint="the tool must stand along the machine's Z, the retract level must "
+                  "be the clearance plane or the level the tool comes from")]
+
+
+def rounding_problem(bound: Rounding, tolerance: float, axis_tolerance: float) -> list[Diagnostic]:
+    """Rounding may take a third of the tolerances."""
+    if bound.tip <= tolerance / 3.0 and bound.axis <= axis_tolerance / 3.0:
+        return []
+    return [warning("tolerance.rounding", f"rounding of the words alone may move the tip by {bound.tip:.5f} mm, the "
+                    f"tolerance is {tolerance:g} mm", hint="more decimals in the controller's [format], or a wider "
+                    "--tolerance")]

@@ -1,0 +1,170 @@
+"""The controller file: formats, modal groups, interpolation, arcs, cycles, feeds, comments, program frame."""
+
+from __future__ import annotations
+
+from importlib import resources
+from pathlib import Path
+from typing import Literal
+
+from pydantic import Field
+
+from machines.user_file import UserModel, load_toml
+from toolpaths.diagnostics import Diagnostic
+
+
+class Format(UserModel):
+    """How numbers and blocks are spelt."""
+
+    linear_decimals: int = Field(default=4, ge=0, le=9)
+    rotary_decimals: int = Field(default=4, ge=0, le=9)
+    feed_decimals: int = Field(default=4, ge=0, le=9)
+    trim_zeros: bool = True
+    """no zeros at the end of a decimal fraction"""
+    decimal_point: bool = False
+    """a point even in whole numbers"""
+    space: bool = True
+    """a blank between words"""
+    line_length: int = Field(default=252, ge=40)
+    """most characters of a block"""
+    sequence_step: int = Field(default=0, ge=0)
+    """N words: step, 0 for none"""
+
+
+class Comment(UserModel):
+    """Comments of a block."""
+
+    open: str = "("
+    close: str = ")"
+    forbidden: str = "()"
+    """characters that a comment must not hold"""
+
+
+class Frame(UserModel):
+    """Blocks that stand around every program."""
+
+    begin: tuple[str, ...] = ("%",)
+    preamble: tuple[str, ...] = ()
+    """safe start: units, modes and planes that the program relies on"""
+    path_tolerance: str = ""
+    """block that sets the control's own smoothing; {tolerance} and {chain} in mm"""
+    ending: tuple[str, ...] = ("M30",)
+    end: tuple[str, ...] = ("%",)
+
+
+class Codes(UserModel):
+    """G and M codes by canonical function."""
+
+    traverse: str = "G0"
+    feed: str = "G1"
+    arc_cw: str = "G2"
+    arc_ccw: str = "G3"
+    planes: dict[str, str] = {"17": "G17", "18": "G18", "19": "G19"}
+    per_minute: str = "G94"
+    inverse_time: str = "G93"
+    machine_coordinates: str = "G53"
+    spindle_cw: str = "M3"
+    spindle_ccw: str = "M4"
+    spindle_stop: str = "M5"
+    flood: str = "M8"
+    mist: str = "M7"
+    through: str = ""
+    """coolant through the tool; empty: the controller has none, flood is used with a warning"""
+    coolant_off: str = "M9"
+    stop: str = "M0"
+    optional_stop: str = "M1"
+    tool_select: str = "T{number}"
+    tool_change: str = "T{number} M6"
+    length_offset: str = "G43 H{register}"
+    length_cancel: str = "G49"
+    dwell: str = "G4 P{seconds}"
+    compensation_left: str = "G41 D{register}"
+    compensation_right: str = "G42 D{register}"
+    compensation_off: str = "G40"
+
+
+class Arcs(UserModel):
+    """Which arcs the controller takes."""
+
+    enabled: bool = True
+    largest_radius: float = Field(default=10000.0, gt=0.0)
+    """mm; larger arcs are written as lines"""
+
+
+class CannedCycle(UserModel):
+    """One drilling cycle of the controller."""
+
+    code: str
+    peck: str = ""
+    """word of the peck depth"""
+    dwell: str = ""
+    """word of the dwell, s"""
+
+
+class Cycles(UserModel):
+    """Canned cycles by the kind of the CL file; kinds that are missing are written as single moves."""
+
+    enabled: bool = True
+    table: dict[str, CannedCycle] = {}
+    with_dwell: dict[str, CannedCycle] = {}
+    """used instead where the cycle dwells"""
+    to_initial: str = "G98"
+    to_plane: str = "G99"
+    cancel: str = "G80"
+    planes: tuple[int, ...] = (17,)
+    """planes in which cycles may run"""
+    rigid_only: tuple[str, ...] = ("TAP",)
+    """kinds that single moves cannot replace"""
+    peck_relief: float = 0.254
+    """mm before the last depth to which the tool returns rapidly"""
+
+
+class Feed(UserModel):
+    """Rules of the feed word."""
+
+    inverse_time: bool = True
+    """the controller has a feed by inverse time"""
+    word_every_inverse_block: bool = True
+    cleared_by_mode_change: bool = True
+    """the feed must be stated anew after a change of the feed mode"""
+    least_inverse_rate: float = Field(default=0.0, ge=0.0)
+    """mm/min below which inverse time runs X, Y, Z faster than asked (LinuxCNC 0.1)"""
+
+
+class Kinematics(UserModel):
+    """Which motion lies between two blocks."""
+
+    linear: Literal["joints"] = "joints"
+    rapids: Literal["straight"] = "straight"
+    modules: bool = False
+    """the controller can run the kinematics named in a machine's [control] table; programs then hold the tip"""
+    smoothing_share: float = Field(default=0.0, ge=0.0, le=0.8)
+    """share of the tolerance left to the controller's own smoothing"""
+
+
+class ControllerFile(UserModel):
+    """A controller."""
+
+    description: str
+    writer: Literal["iso", "linuxcnc"] = "iso"
+    """class that adds what data cannot say"""
+    sources: tuple[str, ...] = ()
+    """documents that the rules come from"""
+    format: Format = Format()
+    comment: Comment = Comment()
+    program: Frame = Frame()
+    codes: Codes = Codes()
+    arcs: Arcs = Arcs()
+    cycles: Cycles = Cycles()
+    feed: Feed = Feed()
+    kinematics: Kinematics = Kinematics()
+
+
+def builtin_files() -> dict[str, Path]:
+    """Controller files of the product by name."""
+    folder = Path(str(resources.files("postproc.controllers")))
+    return {p.stem: p for p in sorted(folder.glob("*.toml"))}
+
+
+def load_controller(source: str | Path) -> tuple[ControllerFile | None, list[Diagnostic]]:
+    """The controller of a built-in name or a path."""
+    return load_toml(source, ControllerFile, builtin=builtin_files(), kind="controller")

@@ -1,0 +1,76 @@
+"""Records without motion as states of the machine: tool, spindle, coolant."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from toolpaths.arrays import Floats
+from toolpaths.toolpath import Event, Toolpath
+from toolpaths.units import PER_MINUTE
+
+TOOL_WORDS = frozenset({"LOADTL", "LOAD/TOOL", "LOAD", "TURRET"})
+
+
+@dataclass(frozen=True)
+class ToolChange:
+    """A tool change before row `index`."""
+
+    index: int
+    number: int
+    register: int | None
+    line: int
+
+
+def numbers(event: Event) -> list[float]:
+    """The numbers among an event's values, in order."""
+    return [v for v in event.values if isinstance(v, (int, float))]
+
+
+def words(event: Event) -> list[str]:
+    """The words among an event's values, upper case."""
+    return [v.upper() for v in event.values if isinstance(v, str)]
+
+
+def tool_changes(toolpath: Toolpath) -> list[ToolChange]:
+    """Every record that puts another tool into the spindle; naming the loaded tool again is no change."""
+    changes: list[ToolChange] = []
+    for event in toolpath.events:
+        if event.word not in TOOL_WORDS or not numbers(event):
+            continue
+        number, *rest = numbers(event)
+        if changes and changes[-1].number == int(number):
+            continue
+        changes.append(ToolChange(event.index, int(number), int(rest[0]) if rest else None, event.line))
+    return changes
+
+
+@dataclass(frozen=True)
+class Spindle:
+    """State of the spindle: `rpm` NaN where none is known; direction -1 anti-clockwise, 0 off, 1 clockwise."""
+
+    rpm: float = math.nan
+    direction: int = 0
+
+
+def spindle_after(event: Event, before: Spindle) -> Spindle:
+    """The spindle after a SPINDL record; ON takes the last speed up again."""
+    said = words(event)
+    speed = numbers(event)
+    if "OFF" in said:
+        return Spindle(before.rpm, 0)
+    direction = -1 if "CCLW" in said else 1 if "CLW" in said or before.direction == 0 else before.direction
+    return Spindle(speed[0] if speed else before.rpm, direction)
+
+
+def spindle_speed(toolpath: Toolpath) -> Floats:
+    """Revolutions per second (N,) at every row, NaN while unknown."""
+    speed = np.full(len(toolpath), np.nan)
+    state = Spindle()
+    for event in toolpath.events:
+        if event.word == "SPINDL":
+            state = spindle_after(event, state)
+            speed[event.index:] = state.rpm * PER_MINUTE
+    return speed

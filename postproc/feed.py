@@ -1,0 +1,90 @@
+"""Feed words: the time of each block, not faster than the axes allow, as a feed per minute or inverse time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from postproc.control import Control
+from postproc.path import ARC, Path
+from postproc.program import INVERSE, PER_MINUTE
+from toolpaths.arrays import Array, Bools, Floats, Ints
+
+
+@dataclass(frozen=True)
+class Feeds:
+    """Feed words (K,) with their mode (K,), the time of each block (K,) s, and the blocks slowed for an axis (K,)."""
+
+    feed: Floats
+    mode: Array
+    seconds: Floats
+    slowed: Bools
+
+
+def block_lengths(words: Floats, before: Floats, arc_length: Floats, xyz: Ints, rotary: Ints) -> tuple[Floats, Floats]:
+    """(length of X, Y, Z words (K,) mm with arcs by their true length, length of rotary words (K,) degrees).
+
+    The length that a feed per minute refers to is that of X, Y, Z where any of them moves, else that of the rotary
+    words (LinuxCNC, NIST RS274/NGC 2.1.2.5).
+    """
+    step = words - before
+    linear = np.linalg.norm(step[:, xyz[xyz >= 0]], axis=1)
+    linear = np.where(np.isfinite(arc_length), arc_length, linear)
+    turned = np.linalg.norm(step[:, rotary], axis=1) if len(rotary) else np.zeros(len(words))
+    return linear, turned
+
+
+def plan_feeds(path: Path, control: Control, words: Floats, asked: Floats, passes: Ints, native: Bools,
+               feed_mode: str, least_rate: float) -> Feeds:
+    """Feed words for the blocks of a path.
+
+    Args:
+        words: program words (K, J); asked: tip feed (K,) mm/s, NaN where a time was asked for
+        passes: pass (K,) of each block: a pass keeps one mode
+        native (K,): blocks of canned cycles, which need a feed per minute
+        feed_mode: "auto", "per-minute" or "inverse-time"
+        least_rate: where inverse time would make X, Y, Z slower than this (mm/min) the control runs faster than
+            asked, so that such blocks are written per minute (0: no such rule)
+    """
+    joints = np.concatenate([control.machine.home[None, :], path.q[:-1]])
+    velocity = control.machine.limits.velocity
+    needed = (np.abs(path.q - joints) / velocity).max(axis=1)
+    cutting = path.code != 0
+    wanted = np.where(cutting, np.nan_to_num(path.seconds), np.nan)
+    arc = path.code == ARC
+    if arc.any() and not control.tip_law:
+        top = asked / velocity[control.xyz].min()
+        needed = np.where(arc & np.isfinite(top), wanted * top, needed)
+    seconds = np.fmax(wanted, needed)
+    slowed = cutting & (needed > wanted * (1.0 + 1e-9)) & (wanted > 0.0)
+    before = np.concatenate([words[:1], words[:-1]])
+    length = np.where(arc & np.isfinite(asked), wanted * asked, np.nan)
+    linear, turned = block_lengths(words, before, length, control.xyz, control.rotary)
+    reference = np.where(linear > 0.0, linear, turned)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        per_minute = 60.0 * reference / seconds
+        inverse = 60.0 / seconds
+        rate = np.nan_to_num(inverse * linear)
+    words_are_tip = control.tip_law or control.machine.kinematics.slides_affine
+    same = cutting & ~slowed & np.isfinite(asked) & (turned == 0.0) & words_are_tip
+    per_minute = np.where(same, 60.0 * asked, per_minute)
+    mode = np.where(native, PER_MINUTE, _modes(path, control, turned, cutting, passes, feed_mode))
+    if least_rate > 0.0:
+        mode = np.where((mode == INVERSE) & (linear > 0.0) & (rate < least_rate), PER_MINUTE, mode)
+    feed = np.where(cutting, np.where(mode == INVERSE, inverse, per_minute), np.nan)
+    return Feeds(feed, mode.astype(np.int8), np.where(cutting, seconds, np.nan), slowed)
+
+
+def _modes(path: Path, control: Control, turned: Floats, cutting: Bools, passes: Ints, feed_mode: str) -> Array:
+    """Inverse time for passes that move rotary axes while cutting, where X, Y, Z words are joints."""
+    n = len(path)
+    if feed_mode == "per-minute" or (feed_mode == "auto" and control.tip_law):
+        return np.full(n, PER_MINUTE)
+    if feed_mode == "inverse-time":
+        return np.where(cutting, INVERSE, PER_MINUTE)
+    joints_only = not control.machine.kinematics.slides_affine
+    turning = cutting & ((turned > 0.0) | joints_only)
+    chosen = np.zeros(int(passes.max(initial=0)) + 1, dtype=bool)
+    chosen[passes[turning]] = True
+    return np.where(cutting & chosen[passes], INVERSE, PER_MINUTE)

@@ -1,0 +1,143 @@
+"""Everything that stands around one conversion: machine, controller, set-up, tools, the reference moves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from machines.kinematics.base import Kinematics
+from machines.machine import Machine
+from postproc.control import Control
+from postproc.controllers.model import ControllerFile
+from postproc.events import tool_changes
+from postproc.links import SafeSpace, safe_space
+from postproc.moves import Moves, build_moves
+from postproc.options import Options
+from postproc.setup import Placement, SetupFile, part_placement, work_frame
+from toolpaths.arrays import Floats
+from toolpaths.diagnostics import Diagnostic, error, has_errors, warning
+from toolpaths.toolpath import Role, Toolpath
+from toolpaths.units import DEG
+
+
+@dataclass(frozen=True)
+class Job:
+    """One CL file on one machine, ready to be solved or compared with; `moves` are in the table frame."""
+
+    toolpath: Toolpath
+    machine: Machine
+    controller: ControllerFile
+    setup: SetupFile
+    options: Options
+    placement: Placement
+    control: Control
+    moves: Moves
+    space: SafeSpace
+
+    @property
+    def axis_tolerance(self) -> float:
+        """rad"""
+        return self.options.axis_tolerance * DEG
+
+    def gauge_length(self, index: int) -> float:
+        """Gauge length of the tool of that index, mm; 0 where the set-up does not tell."""
+        number = self.toolpath.tools[index].number if index >= 0 else 0
+        return self.length_of(number)
+
+    def length_of(self, number: int) -> float:
+        """Gauge length of a tool by its number."""
+        tool = self.setup.tools.get(str(number))
+        return tool.gauge_length if tool else 0.0
+
+    def kinematics(self, index: int) -> Kinematics:
+        """The kinematics at the tip of the tool of that index."""
+        return self.kinematics_of(self.toolpath.tools[index].number if index >= 0 else 0)
+
+    def kinematics_of(self, number: int) -> Kinematics:
+        """The kinematics at the tip of a tool by its number."""
+        length = self.length_of(number)
+        if length not in self._cache:
+            self._cache[length] = self.machine.kinematics.with_tool(length)
+        return self._cache[length]
+
+    @cached_property
+    def _cache(self) -> dict[float, Kinematics]:
+        return {}
+
+    def register_lengths(self) -> dict[int, float]:
+        """Tool length by length register."""
+        result = {}
+        for change in tool_changes(self.toolpath):
+            register = change.register if change.register is not None else change.number
+            result[register] = self.length_of(change.number)
+        return result
+
+    def home_rows(self) -> frozenset[int]:
+        """Moves whose link goes by home: the first, and those after a tool change or GOHOME."""
+        first = np.searchsorted(self.moves.row, [e.index for e in self.toolpath.events if e.word == "GOHOME"]
+                                + [c.index for c in tool_changes(self.toolpath)])
+        return frozenset({0, *first.tolist()})
+
+
+def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, setup: SetupFile,
+            options: Options) -> tuple[Job | None, list[Diagnostic]]:
+    """The job, or None and why there is none."""
+    diagnostics = _refused(toolpath)
+    placement, found = part_placement(setup, options.setup)
+    diagnostics += found
+    frame, found = work_frame(setup, toolpath)
+    diagnostics += found
+    if placement is None or frame is None or has_errors(diagnostics):
+        return None, diagnostics
+    axis_tolerance = options.axis_tolerance * DEG
+    moves, found = build_moves(toolpath, setup, axis_tolerance)
+    diagnostics += found
+    moves = moves.placed(placement)
+    tip_law = machine.control_kinematics is not None and controller.kinematics.modules
+    origin = placement.points(np.array([frame.origin]))[0]
+    control = Control(machine, tip_law, origin)
+    job = Job(toolpath, machine, controller, setup, options, placement, control, moves, safe_space(moves, setup, placement))
+    return job, diagnostics + _tool_lengths(job)
+
+
+def _refused(toolpath: Toolpath) -> list[Diagnostic]:
+    result = []
+    turning = [op for op in toolpath.operations if op.turning]
+    if turning:
+        result.append(error("convert.turning", "turning operations cannot be converted", file=toolpath.file,
+                            lines=[op.line for op in turning][:6], count=len(turning),
+                            hint="take them out of the CL file; inspect reads them"))
+    if not bool((toolpath.role != Role.START).any()):
+        result.append(error("convert.no_motion", "the file commands no motion", file=toolpath.file,
+                            hint="it needs GOTO records"))
+    return result
+
+
+def _tool_lengths(job: Job) -> list[Diagnostic]:
+    """A missing gauge length is an error where program words depend on it, else a warning: travel leaves it out."""
+    used = sorted({int(t) for t in np.unique(job.moves.tool)})
+    missing = [job.toolpath.tools[t].number if t >= 0 else 0 for t in used
+               if job.gauge_length(t) == 0.0]
+    if not missing:
+        return []
+    names = ", ".join(f"T{n}" for n in sorted(set(missing)))
+    hint = f"add [tools.{missing[0]}] gauge_length = ... to the set-up"
+    if words_depend_on_length(job.control, job.machine.kinematics, job.moves.axis):
+        return [error("tool.length", f"no gauge length for {names}: on {job.machine.name} the axis positions depend on it",
+                      file=job.toolpath.file, hint=hint)]
+    return [warning("tool.length", f"no gauge length for {names}: travel is checked as if it were 0", hint=hint,
+                    file=job.toolpath.file)]
+
+
+def words_depend_on_length(control: Control, kin: Kinematics, axis: Floats) -> bool:
+    """True where a length offset on Z does not make program words free of the tool length (heads, parallel machines)."""
+    if control.tip_law:
+        return False
+    some = np.unique(axis[np.linspace(0, len(axis) - 1, min(len(axis), 200)).astype(int)], axis=0)
+    some = kin.nearest_axis(some)
+    tip = np.tile(kin.forward(control.machine.home[None, :])[0], (len(some), 1))
+    short, long = (control.words(tool.inverse(tip, some)[0], tool, length)
+                   for tool, length in ((kin, 0.0), (kin.with_tool(1.0), 1.0)))
+    return bool(np.nanmax(np.abs(long - short), initial=0.0) > 1e-9)

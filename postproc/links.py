@@ -1,0 +1,205 @@
+"""Linking moves: retract along the tool axis to the safe plane, index, approach along the new tool axis.
+
+A safe plane stands square to the tool axis at a distance from the centre of the part; behind the planes of all
+directions lies a sphere that holds the whole path, so that a tool that stays above its own plane cannot touch it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from machines.kinematics.base import Kinematics
+from machines.machine import Limits
+from postproc.control import Control
+from postproc.joint_path import TRAVEL_SLACK, nearest_solution
+from postproc.linearise import linearise
+from postproc.moves import Moves
+from postproc.setup import Placement, SetupFile
+from toolpaths.arrays import Bools, Floats
+from toolpaths.rotations import angle_between
+from toolpaths.shape import Curves
+
+_RISE = 10.0
+"""mm above the safe plane for index moves, so that their dips stay above it"""
+_MARGINS = (1.0, 0.4, 0.2, 0.1)
+"""shares of the set-up's margin that are tried where travel is short"""
+_STEPS = (0, 1, 3, 7, 15)
+_SAMPLES = 17
+_LEG_TOLERANCE = 0.01
+"""mm off the straight line for retract and approach"""
+
+
+@dataclass(frozen=True)
+class SafeSpace:
+    """Centre (3,) of the part in the table frame, radius of the path about it, its box (8, 3), distances in mm."""
+
+    centre: Floats
+    radius: float
+    corners: Floats
+    distance: float | None
+    margin: float
+
+    def plane(self, axis: Floats, turning: bool, share: float) -> float:
+        """Distance of the safe plane square to `axis` from the centre; `share` of the margin."""
+        if self.distance is not None:
+            return self.distance
+        reach = self.radius if turning else float((self.corners @ axis).max() - self.centre @ axis)
+        return reach + share * self.margin
+
+
+def safe_space(moves: Moves, setup: SetupFile, placement: Placement) -> SafeSpace:
+    """The safe planes of a path (already in the table frame)."""
+    tips = moves.tip
+    if len(moves.arcs):
+        reach = moves.arcs.radius[:, None] * np.sqrt(np.maximum(1.0 - moves.arcs.normal**2, 0.0))
+        tips = np.concatenate([tips, moves.arcs.center - reach, moves.arcs.center + reach])
+    low, high = tips.min(axis=0), tips.max(axis=0)
+    centre = 0.5 * (low + high)
+    if setup.clearance.centre is not None:
+        centre = placement.points(np.array([setup.clearance.centre]))[0]
+    pick = np.array(np.meshgrid([0, 1], [0, 1], [0, 1])).reshape(3, 8).T
+    corners = np.where(pick == 0, low, high)
+    radius = float(np.sqrt(((tips - centre) ** 2).sum(axis=1).max()))
+    return SafeSpace(centre, radius, corners, setup.clearance.distance, setup.clearance.margin)
+
+
+@dataclass(frozen=True)
+class Link:
+    """Joints (K, J) of the four parts of a linking move.
+
+    `retract` along the tool axis, `home` in machine coordinates (tool change, end of program), `index` to above the
+    new pose, `approach` along the tool axis down to it. `home_state`, `index_state` (K, J) mark axes that a block must
+    state even where they stand already (after a tool change nobody knows where the axes are).
+    """
+
+    retract: Floats
+    home: Floats
+    index: Floats
+    approach: Floats
+    home_state: Bools
+    index_state: Bools
+    clear: bool
+    """False where no way above the safe planes was found"""
+
+
+@dataclass(frozen=True)
+class Pose:
+    """A pose with its joints."""
+
+    tip: Floats
+    axis: Floats
+    q: Floats
+
+
+def plan_link(control: Control, kin0: Kinematics, kin1: Kinematics, space: SafeSpace, limits: Limits,
+              before: Pose | None, after: Pose | None, by_home: bool) -> Link:
+    """The way from pose `before` (None: at home) to above pose `after` (None: home), with the tools of kin0, kin1."""
+    turning = before is None or after is None or bool(angle_between(before.axis, after.axis) > 1e-9)
+    first: Link | None = None
+    for share in _MARGINS if space.distance is None else (1.0,):
+        link = _link(control, kin0, kin1, space, before, after, by_home, turning, share)
+        if first is None:
+            first = link
+        q = np.concatenate([link.retract, link.index, link.approach])
+        if link.clear and np.isfinite(q).all() and _inside(q, limits):
+            return link
+    assert first is not None
+    return first
+
+
+def _inside(q: Floats, limits: Limits) -> bool:
+    return bool(((q >= limits.lower - TRAVEL_SLACK) & (q <= limits.upper + TRAVEL_SLACK)).all())
+
+
+def _link(control: Control, kin0: Kinematics, kin1: Kinematics, space: SafeSpace, before: Pose | None,
+          after: Pose | None, by_home: bool, turning: bool, share: float) -> Link:
+    none = np.zeros((0, kin0.joints))
+    up0 = _above(kin0, space, before, turning, share) if before is not None else None
+    up1 = _above(kin1, space, after, turning, share) if after is not None else None
+    retract = none if before is None or up0 is None else _leg(control, kin0, before, up0)
+    approach = none if after is None or up1 is None else _leg(control, kin1, up1, after)
+    home, home_state = _home_moves(control, up0, after is None) if by_home else (none, none > 0.0)
+    if up1 is None:
+        return Link(retract, home, none, none, home_state, none > 0.0, True)
+    if by_home and _has_retract_axis(control):
+        index, state = _from_home(control, home[-1], up1)
+        return Link(retract, home, index, approach, home_state, state, True)
+    begin = up0.q if up0 is not None else control.machine.home
+    index, clear = _index(control, kin1, space, begin, up1, share, turning)
+    return Link(retract, home, index, approach, home_state, np.full(index.shape, by_home), clear)
+
+
+def _above(kin: Kinematics, space: SafeSpace, pose: Pose, turning: bool, share: float) -> Pose:
+    """The pose lifted along its tool axis to its safe plane; left where it is already above."""
+    rise = _RISE if turning else 0.0
+    lift = space.plane(pose.axis, turning, share) + rise - float(pose.axis @ (pose.tip - space.centre))
+    tip = pose.tip + max(lift, 0.0) * pose.axis
+    q = nearest_solution(kin, tip[None, :], pose.axis[None, :], pose.q[None, :])[0]
+    return Pose(tip, pose.axis, q)
+
+
+def _leg(control: Control, kin: Kinematics, start: Pose, end: Pose) -> Floats:
+    """Joints from one pose to another on the same tool axis, tip on the straight line between; none where equal."""
+    if bool((start.q == end.q).all()):
+        return np.zeros((0, len(end.q)))
+    line = Curves(start.tip[None], end.tip[None], start.axis[None], end.axis[None], np.zeros(1, dtype=bool),
+                  np.zeros((1, 3)), np.zeros((1, 3)), np.zeros(1))
+    return linearise(control, kin, line, start.q[None], end.q[None], np.zeros(1, dtype=bool), _LEG_TOLERANCE, 1e-3).q
+
+
+def _has_retract_axis(control: Control) -> bool:
+    return control.machine.retract_axis >= 0 and not control.tip_law
+
+
+def _home_moves(control: Control, up: Pose | None, whole: bool) -> tuple[Floats, Bools]:
+    """From above the part to home: the retract axis first, then, at the end of a program, the rest."""
+    machine = control.machine
+    if not _has_retract_axis(control):
+        return np.zeros((0, len(machine.axis_names))), np.zeros((0, len(machine.axis_names)), dtype=bool)
+    lifted = (machine.home if up is None else up.q).copy()
+    lifted[machine.retract_axis] = machine.home[machine.retract_axis]
+    state = np.zeros((2, len(lifted)), dtype=bool)
+    state[0, machine.retract_axis] = True
+    state[1] = ~state[0]
+    count = 2 if whole else 1
+    return np.stack([lifted, machine.home])[:count], state[:count]
+
+
+def _from_home(control: Control, begin: Floats, up: Pose) -> tuple[Floats, Bools]:
+    """Rotary axes, then the slides but the retract axis, then that one; each stated."""
+    last = control.machine.retract_axis
+    turned, moved = begin.copy(), up.q.copy()
+    turned[control.rotary] = up.q[control.rotary]
+    moved[last] = begin[last]
+    rotary = np.array(control.machine.rotary)
+    lifting = np.arange(len(begin)) == last
+    steps = [(turned, rotary), (moved, ~rotary & ~lifting), (up.q, lifting)]
+    kept = [(q, state) for q, state in steps if state.any()]
+    return np.stack([q for q, _ in kept]), np.stack([state for _, state in kept])
+
+
+def _index(control: Control, kin: Kinematics, space: SafeSpace, begin: Floats, up: Pose, share: float,
+           turning: bool) -> tuple[Floats, bool]:
+    """Joints from `begin` to the pose above, by way of points over the centre where the straight way dips too low."""
+    floor = space.plane(up.axis, turning, share) - 1e-6
+    for count in _STEPS:
+        t = np.arange(1, count + 1) / (count + 1)
+        near = begin + t[:, None] * (up.q - begin)
+        if count:
+            _, axes = kin.forward(near)
+            near = nearest_solution(kin, space.centre + (floor + _RISE) * axes, axes, near)
+        q = np.concatenate([near, up.q[None, :]])
+        if np.isfinite(q).all() and _stays_above(control, kin, space, np.concatenate([begin[None, :], q]), floor):
+            return q, True
+    return up.q[None, :], False
+
+
+def _stays_above(control: Control, kin: Kinematics, space: SafeSpace, q: Floats, floor: float) -> bool:
+    for t in np.linspace(0.0, 1.0, _SAMPLES):
+        tip, axis, _ = control.between(q[:-1], q[1:], np.full(len(q) - 1, t), kin)
+        height = np.einsum("ni,ni->n", tip - space.centre, axis)
+        if not bool((height >= floor).all()):
+            return False
+    return True

@@ -1,0 +1,32 @@
+"""What the user asked for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+FeedMode = Literal["auto", "per-minute", "inverse-time"]
+
+
+@dataclass(frozen=True)
+class Options:
+    """Options of convert, verify and trace; mm and degrees as on the command line."""
+
+    tolerance: float = 0.01
+    axis_tolerance: float = 0.05
+    feed_mode: FeedMode = "auto"
+    setup: str = ""
+    units: str = ""
+    dialect: str = ""
+    allow_unknown: tuple[str, ...] = ()
+
+    def header(self) -> list[str]:
+        """The options as comment lines of an output file."""
+        lines = [f"tolerance {self.tolerance:g} mm, axis tolerance {self.axis_tolerance:g} degrees",
+                 f"feed mode {self.feed_mode}"]
+        for name in ("setup", "units", "dialect"):
+            if getattr(self, name):
+                lines.append(f"{name} {getattr(self, name)}")
+        if self.allow_unknown:
+            lines.append("allow unknown " + " ".join(self.allow_unknown))
+        return lines

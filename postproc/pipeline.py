@@ -1,0 +1,146 @@
+"""The journey of one toolpath, stage by stage; only reading and writing touch files."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path as FilePath
+
+import numpy as np
+
+import toolpaths
+from machines.machine import Machine
+from postproc.compile import compile_program, rounding_bound, rounding_problem
+from postproc.controllers import writer_for
+from postproc.controllers.model import ControllerFile, load_controller
+from postproc.feed import Feeds
+from postproc.job import Job, prepare
+from postproc.options import Options
+from postproc.path import Path, build_path
+from postproc.program import Program
+from postproc.readback.compare import Comparison
+from postproc.readback.verify import read_back
+from postproc.setup import SetupFile, load_setup
+from postproc.travel import check_travel
+from toolpaths.diagnostics import Diagnostic, has_errors
+from toolpaths.toolpath import Toolpath
+from toolpaths.units import DEG
+
+Progress = Callable[[str, int, int], None]
+VERSION = "0.1.0"
+
+
+@dataclass(frozen=True)
+class PostResult:
+    """A conversion with everything between: `text` is "" where a diagnostic is an ERROR."""
+
+    text: str
+    options: Options
+    machine: Machine
+    controller: ControllerFile
+    controller_name: str
+    setup: SetupFile
+    diagnostics: tuple[Diagnostic, ...]
+    toolpath: Toolpath | None = None
+    job: Job | None = None
+    path: Path | None = None
+    program: Program | None = None
+    feeds: Feeds | None = None
+    comparison: Comparison | None = None
+    extents: dict[str, tuple[float, float]] | None = None
+    shares: dict[str, float] | None = None
+
+    @property
+    def ok(self) -> bool:
+        """True where nothing stands against writing the text."""
+        return not has_errors(self.diagnostics)
+
+
+def convert(path: Toolpath, machine: Machine, controller: str | FilePath = "linuxcnc", setup: SetupFile | None = None,
+            options: Options | None = None, diagnostics: list[Diagnostic] | None = None,
+            progress: Progress | None = None) -> PostResult:
+    """A Toolpath as G-code for a machine and a controller, read back and compared with the path.
+
+    Args:
+        controller: built-in name or path of a controller file
+        setup: default: the file that the options name, else the default set-up
+        diagnostics: what reading the path found; an ERROR among them stops the conversion
+
+    Raises:
+        DiagnosticError: where the controller or the set-up cannot be loaded.
+    """
+    options = options or Options()
+    spec, found = load_controller(controller)
+    toolpaths.diagnostics.require(found)
+    if setup is None:
+        setup, more = load_setup(options.setup or None)
+        toolpaths.diagnostics.require(more)
+    assert spec is not None and setup is not None
+    start = PostResult("", options, machine, spec, FilePath(controller).stem, setup, tuple(diagnostics or ()), path)
+    return start if not start.ok else _stages(start, progress)
+
+
+def _stages(result: PostResult, progress: Progress | None) -> PostResult:
+    """prepare -> solve, link, linearise -> travel -> compile -> write -> read back."""
+    assert result.toolpath is not None
+    options, file = result.options, result.toolpath.file
+    toolpath = result.toolpath
+    job, found = prepare(toolpath, result.machine, result.controller, result.setup, options)
+    result = _with(result, found, job=job)
+    if job is None or not result.ok:
+        return result
+    shares = tolerance_shares(job)
+    path, found = build_path(job.control, job.kinematics, job.moves, job.space, job.home_rows(), shares["linearising"],
+                             shares["axis_linearising"] * DEG, file, progress)
+    result = _with(result, found, path=path, shares=shares)
+    if path is None:
+        return result
+    found, extents = check_travel(path, job.moves, job.control, job.kinematics, file)
+    result = _with(result, found, extents=extents)
+    if not result.ok:
+        return result
+    program, feeds, found = compile_program(toolpath, job.moves, path, job.control, result.controller,
+                                            job.kinematics, job.gauge_length, options.feed_mode)
+    bound = rounding_bound(job.control, job.kinematics(int(job.moves.tool[0])), path.q, program.decimals)
+    shares = shares | {"rounding": bound.tip, "axis_rounding": bound.axis / DEG}
+    found = found + rounding_problem(bound, options.tolerance, job.axis_tolerance)
+    result = _with(result, found, program=program, feeds=feeds, shares=shares)
+    if not result.ok:
+        return result
+    text = write_text(result)
+    comparison, found = read_back(text.encode("ascii", "replace"), job, file, progress)
+    result = _with(result, found, comparison=comparison)
+    return replace(result, text=text) if result.ok else result
+
+
+def _with(result: PostResult, diagnostics: list[Diagnostic], **values: object) -> PostResult:
+    return replace(result, diagnostics=(*result.diagnostics, *diagnostics), **values)  # type: ignore[arg-type]
+
+
+def tolerance_shares(job: Job) -> dict[str, float]:
+    """Where the tolerance goes (mm; axis_ in degrees): what the control's smoothing and rounding leave is linearising."""
+    tolerance, axis = job.options.tolerance, job.options.axis_tolerance
+    smoothing = job.controller.kinematics.smoothing_share * tolerance
+    return {"smoothing": smoothing, "linearising": 0.8 * (tolerance - smoothing), "axis_linearising": 0.7 * axis}
+
+
+def write_text(result: PostResult) -> str:
+    """The text of the program, header with what made it."""
+    assert result.program is not None and result.toolpath is not None and result.job is not None
+    job, machine = result.job, result.machine
+    letters = zip(machine.axis_names, job.control.work_offset, strict=True)
+    offset = " ".join(f"{k}{v:.4f}" for k, v in letters)
+    header = [f"postproc {VERSION}", f"source {FilePath(result.toolpath.file).name}", f"machine {machine.name}",
+              f"controller {result.controller_name}", *result.options.header(),
+              f"words: {'tip in the work offset' if job.control.tip_law else 'axis positions'}",
+              f"work offset {result.setup.work_offset_code} in machine coordinates: {offset}"]
+    if result.toolpath.name:
+        header.insert(1, f"part {result.toolpath.name}")
+    writer = writer_for(result.controller, result.program, result.toolpath.cycles, job.control.length_on_z,
+                        (result.shares or {})["smoothing"])
+    return "\n".join(writer.lines(header)) + "\n"
+
+
+def points_in(toolpath: Toolpath) -> int:
+    """Commanded positions, without FROM and GOHOME."""
+    return int(np.isin(toolpath.role, (0, 1)).sum())

@@ -1,0 +1,74 @@
+"""The canonical program: moves and commands named as the NIST canonical functions; it knows no controller."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from toolpaths.arrays import Array, Bools, Floats, Ints
+
+PER_MINUTE, INVERSE = 0, 1
+
+
+@dataclass(frozen=True)
+class Command:
+    """A canonical function without motion, e.g. ("START_SPINDLE_CLOCKWISE", (1200.0,)); `line` is its CL line."""
+
+    name: str
+    args: tuple[float | str, ...] = ()
+    line: int = 0
+
+
+@dataclass(frozen=True)
+class Hole:
+    """A hole that may be written as a canned cycle instead of its blocks `first` to `last`.
+
+    Levels are words on the axis of the tool (mm); `initial` is the level that the tool comes from.
+    """
+
+    first: int
+    last: int
+    cycle: int
+    plane_level: float
+    bottom: float
+    retract: float
+    initial: float
+
+
+@dataclass(frozen=True)
+class Program:
+    """K blocks with the commands before them.
+
+    Attributes:
+        letters: the axis words, the order of the columns of `words`
+        words (K, J): end positions, mm and degrees, already rounded to the controller's decimals; positions of
+            `home` (K,) blocks are machine coordinates
+        write (K, J): words that the block states
+        code (K,): 0 STRAIGHT_TRAVERSE, 1 STRAIGHT_FEED, 2 ARC_FEED
+        feed (K,): mm/min or deg/min, or 1/min where mode is INVERSE; NaN for traverses
+        mode (K,): PER_MINUTE or INVERSE
+        plane, ccw, center: of the arcs; center (K, 3) is relative to the block's start, mm
+        row (K,): row of the Toolpath; line (K,): CL line; link (K,): True for linking blocks
+        commands: commands before block k, by k; K holds what follows the last block
+        holes: by running number
+        decimals (J,): of the words
+    """
+
+    letters: tuple[str, ...]
+    words: Floats
+    write: Bools
+    code: Array
+    feed: Floats
+    mode: Array
+    plane: Array
+    ccw: Bools
+    center: Floats
+    home: Bools
+    link: Bools
+    row: Ints
+    line: Ints
+    commands: dict[int, tuple[Command, ...]]
+    holes: tuple[Hole, ...]
+    decimals: Ints
+
+    def __len__(self) -> int:
+        return len(self.words)

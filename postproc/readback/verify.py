@@ -1,0 +1,36 @@
+"""Text back to motion and against the CL file: the proof of every conversion, and `postproc verify`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from postproc.job import Job
+from postproc.readback.compare import Comparison, Executed, compare
+from postproc.readback.execute import Offsets, execute
+from postproc.readback.words import tokenise
+from toolpaths.diagnostics import Diagnostic, error, has_errors
+
+
+def read_back(data: bytes, job: Job, file: str,
+              progress: Callable[[str, int, int], None] | None = None) -> tuple[Comparison | None, list[Diagnostic]]:
+    """Execute a program on the job's machine and compare its motion with the job's CL file."""
+    machine, control = job.machine, job.control
+    words, diagnostics = tokenise(data, file)
+    if has_errors(diagnostics):
+        return None, diagnostics
+    offsets = Offsets(control.work_offset, control.xyz, job.register_lengths(), machine.home * control.unit,
+                      control.length_on_z, job.controller.cycles.peck_relief)
+    motion, found = execute(words, machine.axis_names, offsets, file)
+    diagnostics += found
+    if has_errors(diagnostics):
+        return None, diagnostics
+    if not len(motion):
+        return None, [*diagnostics, error("verify.no_motion", "the program moves nothing", file=file)]
+    if progress:
+        progress("read back", 0, len(motion))
+    executed = Executed(control, job.kinematics_of, offsets.lengths)
+    with np.errstate(invalid="ignore"):
+        comparison = compare(motion, job.moves, executed, job.space, job.options.tolerance, job.axis_tolerance, file)
+    return comparison, [*diagnostics, *comparison.diagnostics]

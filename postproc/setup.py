@@ -1,0 +1,125 @@
+"""The set-up file: where the part stands, which system is the work offset, safe distances, tool lengths."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from machines.user_file import UserModel, load_toml
+from toolpaths.arrays import Floats
+from toolpaths.diagnostics import Diagnostic, error
+from toolpaths.toolpath import Frame, Toolpath
+
+Vector = Annotated[tuple[float, float, float], Field(description="x, y, z")]
+
+
+class PartPlacement(UserModel):
+    """Where the part frame (the absolute frame of the CL file) stands on the table, all axes at zero."""
+
+    origin: Vector = (0.0, 0.0, 0.0)
+    """its origin in the table frame, mm"""
+    x_axis: Vector = (1.0, 0.0, 0.0)
+    """its x direction in the table frame"""
+    y_axis: Vector = (0.0, 1.0, 0.0)
+    """its y direction in the table frame"""
+
+
+class Clearance(UserModel):
+    """How linking moves keep away from the part."""
+
+    centre: Vector | None = None
+    """centre of the safe planes in the part frame, mm; default: middle of the path's extents"""
+    distance: float | None = Field(default=None, gt=0.0)
+    """from the centre to every safe plane (each stands square to the tool axis), mm; default: outside the path"""
+    margin: float = Field(default=50.0, gt=0.0)
+    """added to the path's own extent where no distance is given, mm"""
+    link_angle: float = Field(default=5.0, gt=0.0, le=180.0)
+    """a rapid that turns the tool axis by more than this is linked by the safe planes, degrees"""
+
+
+class ToolSetup(UserModel):
+    """One tool in the machine."""
+
+    gauge_length: float = Field(gt=0.0)
+    """from the gauge point of the spindle to the tip, mm"""
+
+
+class SetupFile(UserModel):
+    """A set-up. Everything has a default: part frame on the table frame, first system of the file as work offset."""
+
+    description: str = ""
+    work_offset: str = ""
+    """name of the system of the CL file that is the work offset; default: its first"""
+    work_offset_code: str = "G54"
+    part: PartPlacement = PartPlacement()
+    clearance: Clearance = Clearance()
+    tools: dict[str, ToolSetup] = {}
+    """by tool number"""
+
+
+@dataclass(frozen=True)
+class Placement:
+    """A rigid change of frame: `rotation` (3, 3) and `origin` (3,), to the outer frame."""
+
+    rotation: Floats
+    origin: Floats
+
+    def points(self, values: Floats) -> Floats:
+        """Points (N, 3) in the outer frame; untouched where nothing moves, so that numbers stay bit for bit."""
+        if self.is_identity:
+            return values
+        return self.directions(values) + self.origin
+
+    def directions(self, values: Floats) -> Floats:
+        """Directions (N, 3) in the outer frame."""
+        if bool((self.rotation == np.eye(3)).all()):
+            return values
+        result: Floats = values @ self.rotation.T
+        return result
+
+    def inverse(self) -> Placement:
+        """The way back."""
+        return Placement(self.rotation.T, -self.rotation.T @ self.origin)
+
+    @property
+    def is_identity(self) -> bool:
+        """True where outer and inner frame are the same."""
+        return bool((self.rotation == np.eye(3)).all() and (self.origin == 0.0).all())
+
+
+def load_setup(path: str | Path | None) -> tuple[SetupFile | None, list[Diagnostic]]:
+    """The set-up of a file, or the default without one."""
+    if path is None:
+        return SetupFile(), []
+    return load_toml(path, SetupFile, kind="set-up")
+
+
+def part_placement(setup: SetupFile, file: str = "") -> tuple[Placement | None, list[Diagnostic]]:
+    """T_table_part of a set-up; its two directions must be square to each other within 1e-6."""
+    x, y = np.array(setup.part.x_axis), np.array(setup.part.y_axis)
+    if not np.linalg.norm(x) > 0.0 or not np.linalg.norm(y) > 0.0:
+        return None, [error("setup.axes", "part.x_axis and part.y_axis must not be zero", file=file)]
+    x, y = x / np.linalg.norm(x), y / np.linalg.norm(y)
+    if abs(float(x @ y)) > 1e-6:
+        found = np.degrees(np.arccos(np.clip(x @ y, -1.0, 1.0)))
+        return None, [error("setup.axes", f"part.x_axis and part.y_axis enclose {found:.4f} degrees, allowed: 90",
+                            file=file, hint="give two directions square to each other")]
+    y = y - (x @ y) * x
+    y = y / np.linalg.norm(y)
+    return Placement(np.stack([x, y, np.cross(x, y)], axis=1), np.array(setup.part.origin)), []
+
+
+def work_frame(setup: SetupFile, toolpath: Toolpath) -> tuple[Frame | None, list[Diagnostic]]:
+    """The system of the CL file that is the work offset."""
+    if not setup.work_offset:
+        return toolpath.frames[0], []
+    for frame in toolpath.frames:
+        if frame.name.lower() == setup.work_offset.lower():
+            return frame, []
+    names = ", ".join(f.name for f in toolpath.frames)
+    return None, [error("setup.work_offset", f"work_offset = {setup.work_offset!r} is no system of the CL file",
+                        file=toolpath.file, hint=f"it has: {names}")]

@@ -1,0 +1,77 @@
+"""Arcs that stay arcs: whether an arc of the path is one in the words of the program, in which plane and sense."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from machines.kinematics.base import Kinematics
+from postproc.control import Control
+from toolpaths.arrays import Array, Bools, Floats, Ints
+from toolpaths.shape import Curves
+
+PLANE_COLUMNS = {17: (0, 1), 18: (2, 0), 19: (1, 2)}
+"""numbers (of X, Y, Z) of the first and second axis of G17, G18, G19; G3 turns the first towards the second"""
+_SQUARE = 1e-7
+_SHORTEST = 0.01
+_RADIUS_SLACK = 0.002
+
+
+@dataclass(frozen=True)
+class WordArcs:
+    """For N curves: `keep` (N,) True where the words describe the same arc; then `plane` (17, 18, 19), `ccw` as seen
+    from the positive end of the third axis, `center` (N, 3) in the words X, Y, Z relative to the start point, and
+    `parts` (N,) equal blocks of at most one turn each."""
+
+    keep: Bools
+    plane: Array
+    ccw: Bools
+    center: Floats
+    parts: Ints
+
+
+def word_arcs(control: Control, kin: Kinematics, curves: Curves, q0: Floats, q1: Floats) -> WordArcs:
+    """Which of the curves, run at fixed rotary joints between q0 and q1 (N, J), are arcs in a plane of the words."""
+    n = len(curves)
+    keep, center = np.zeros(n, dtype=bool), np.zeros((n, 3))
+    plane, ccw = np.full(n, 17, dtype=np.int8), np.zeros(n, dtype=bool)
+    parts = np.ones(n, dtype=np.int64)
+    rows = np.flatnonzero(curves.is_arc)
+    if len(rows) and (control.tip_law or kin.slides_affine) and (control.xyz >= 0).all():
+        arc = curves.take(rows)
+        rotary = np.array(kin.rotary)
+        fixed = (q0[rows][:, rotary] == q1[rows][:, rotary]).all(axis=1) & (arc.axis0 == arc.axis1).all(axis=1)
+        to_words = _tip_to_words(control, kin, q0[rows])
+        square = np.abs(to_words @ np.swapaxes(to_words, 1, 2) - np.eye(3)).max(axis=(1, 2)) < 1e-9
+        turn = np.asarray(np.linalg.det(to_words))
+        normal = np.asarray(np.einsum("nij,nj->ni", to_words, arc.normal)) * turn[:, None]
+        third = np.abs(normal).argmax(axis=1)
+        along = np.take_along_axis(normal, third[:, None], axis=1)[:, 0]
+        keep[rows] = fixed & square & (np.abs(along) > 1.0 - _SQUARE**2 / 2) & _well_shaped(arc)
+        plane[rows] = np.array([19, 18, 17], dtype=np.int8)[third]
+        ccw[rows] = along > 0.0
+        center[rows] = np.einsum("nij,nj->ni", to_words, arc.center - arc.start)
+        parts[rows] = np.maximum(np.ceil(arc.sweep / (2.0 * np.pi) - 1e-9), 1).astype(np.int64)
+    return WordArcs(keep, plane, ccw, center, parts)
+
+
+def _tip_to_words(control: Control, kin: Kinematics, q: Floats) -> Floats:
+    """(N, 3, 3): change of the words X, Y, Z per change of the tip, rotary joints fixed."""
+    if control.tip_law:
+        return np.tile(np.eye(3), (len(q), 1, 1))
+    return np.asarray(np.linalg.inv(kin.jacobian(q)[:, :3, :][:, :, control.xyz]))
+
+
+def _well_shaped(arc: Curves) -> Bools:
+    """Same radius at both ends, and ends that rounding cannot take for one another."""
+    def radial(tip: Floats) -> Floats:
+        offset = tip - arc.center
+        result: Floats = offset - np.einsum("ni,ni->n", offset, arc.normal)[:, None] * arc.normal
+        return result
+    first, last = radial(arc.start), radial(arc.end)
+    r0, r1 = np.linalg.norm(first, axis=1), np.linalg.norm(last, axis=1)
+    gap = np.linalg.norm(last - first, axis=1)
+    whole = np.abs(arc.sweep - 2.0 * np.pi * np.round(arc.sweep / (2.0 * np.pi))) < 1e-9
+    ends = np.where(whole, gap < 1e-6, gap > _SHORTEST)
+    return np.asarray((np.abs(r0 - r1) < _RADIUS_SLACK) & (r0 > _SHORTEST) & ends)

@@ -1,0 +1,119 @@
+"""The curve between two points: straight lines with great circles of the axis, arcs and helices."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.rotations import angle_between, slerp
+
+_EPS = 1e-12
+
+
+def turn_about(vector: Floats, normal: Floats, angle: Floats) -> Floats:
+    """`vector` (N, 3) turned by `angle` (N,) rad about unit `normal` (N, 3) (Rodrigues)."""
+    c, s = np.cos(angle)[:, None], np.sin(angle)[:, None]
+    along = np.einsum("ni,ni->n", vector, normal)[:, None] * normal
+    result: Floats = along + c * (vector - along) + s * np.cross(normal, vector)
+    return result
+
+
+@dataclass(frozen=True)
+class Curves:
+    """N reference motions (DESIGN: straight tip or arc, axis on the great circle), each over u in [0, 1].
+
+    Attributes:
+        start, end (N, 3): tips, mm
+        axis0, axis1 (N, 3): unit tool axes at both ends
+        is_arc (N,): True where the tip follows an arc; center, normal (N, 3), sweep (N,) then count as in Arcs
+    """
+
+    start: Floats
+    end: Floats
+    axis0: Floats
+    axis1: Floats
+    is_arc: Bools
+    center: Floats
+    normal: Floats
+    sweep: Floats
+
+    def __len__(self) -> int:
+        return len(self.start)
+
+    def take(self, index: Ints) -> Curves:
+        """The curves with these indices, in this order."""
+        return Curves(*(getattr(self, name)[index] for name in self.__dataclass_fields__))
+
+    def at(self, u: Floats) -> tuple[Floats, Floats]:
+        """(tip (N, 3), axis (N, 3)) at u (N,). The ends are the given ends to the last bit."""
+        tip = self.start + u[:, None] * (self.end - self.start)
+        arc = np.flatnonzero(self.is_arc)
+        if len(arc):
+            tip[arc] = self._arc_tip(arc, u[arc])
+        tip = np.where((u == 1.0)[:, None], self.end, tip)
+        turning = (self.axis0 != self.axis1).any(axis=1)
+        axis = self.axis0.copy()
+        where = np.flatnonzero(turning)
+        if len(where):
+            axis[where] = slerp(self.axis0[where], self.axis1[where], u[where])
+        return tip, np.where((u == 1.0)[:, None], self.axis1, axis)
+
+    def _arc_tip(self, arc: Ints, u: Floats) -> Floats:
+        """Helix through both ends: radius and height run linearly with the angle (ends may differ by rounding)."""
+        normal, center = self.normal[arc], self.center[arc]
+        first = self.start[arc] - center
+        last = turn_about(self.end[arc] - center, normal, -self.sweep[arc])
+        blend = first + u[:, None] * (last - first)
+        result: Floats = center + turn_about(blend, normal, u * self.sweep[arc])
+        return result
+
+    def length(self) -> Floats:
+        """Path length (N,) of the tip, mm; helices by their true length."""
+        chord: Floats = np.linalg.norm(self.end - self.start, axis=1).astype(np.float64)
+        arc = np.flatnonzero(self.is_arc)
+        if len(arc):
+            normal, radial = self.normal[arc], self.start[arc] - self.center[arc]
+            radial = radial - np.einsum("ni,ni->n", radial, normal)[:, None] * normal
+            rise = np.einsum("ni,ni->n", self.end[arc] - self.start[arc], normal)
+            chord[arc] = np.hypot(np.linalg.norm(radial, axis=1) * self.sweep[arc], rise)
+        return chord
+
+    def project(self, tip: Floats, guess: Floats) -> Floats:
+        """u (N,) in [0, 1] of the point of each curve nearest to `tip` (N, 3).
+
+        On arcs the turn nearest `guess` (N,) counts; where a curve has no extent the guess itself is returned.
+        """
+        span = self.end - self.start
+        size = np.einsum("ni,ni->n", span, span)
+        along = np.einsum("ni,ni->n", tip - self.start, span)
+        u = np.where(size > _EPS, along / np.where(size > _EPS, size, 1.0), guess)
+        arc = np.flatnonzero(self.is_arc)
+        if len(arc):
+            u[arc] = self._arc_project(arc, tip[arc], guess[arc])
+        result: Floats = np.clip(u, 0.0, 1.0)
+        return result
+
+    def _arc_project(self, arc: Ints, tip: Floats, guess: Floats) -> Floats:
+        normal, center, sweep = self.normal[arc], self.center[arc], self.sweep[arc]
+        radial = self.start[arc] - center
+        radial = radial - np.einsum("ni,ni->n", radial, normal)[:, None] * normal
+        across = np.cross(normal, radial)
+        offset = tip - center
+        angle = np.arctan2(np.einsum("ni,ni->n", offset, across), np.einsum("ni,ni->n", offset, radial))
+        angle = angle + 2.0 * np.pi * np.round((guess * sweep - angle) / (2.0 * np.pi))
+        result: Floats = angle / sweep
+        return result
+
+    def deviation(self, tip: Floats, axis: Floats, guess: Floats) -> tuple[Floats, Floats, Floats]:
+        """How far poses are off their curves: (tip (N,) mm, axis (N,) rad, u (N,)).
+
+        The tip is measured to the nearest point of the curve, the axis against the great circle at that point (at
+        the guess where the tip hardly moves).
+        """
+        u = self.project(tip, guess)
+        on_tip, _ = self.at(u)
+        v = np.where(self.length() > 0.1, u, guess)
+        _, on_axis = self.at(v)
+        return np.linalg.norm(tip - on_tip, axis=1), angle_between(axis, on_axis), u
