@@ -37,7 +37,7 @@ def pocket_level(nx: NxFile, top: float, z: float, turns: int) -> None:
     """Helix down to z, then three loops from inside to the wall."""
     nx.feed(400, ENGAGE_COLOR)
     nx.go([(5, 0, top)])
-    nx.arc((0, 0), (-5, 0, z), ccw=True, turns=turns)
+    nx.arc((0, 0), (0, 5, z), ccw=True, turns=turns)
     nx.feed(900)
     for half, corner in (((14, 4), 1), ((19, 9), 1), ((24, 14), 6)):
         nx.go([(0, -half[1], z)])

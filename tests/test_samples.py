@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import machines
 import toolpaths
 from toolpaths.diagnostics import has_errors
 
@@ -18,7 +19,6 @@ FOLDER = Path(__file__).parents[1] / "samples"
 EXPECTED = json.loads((FOLDER / "expected_counts.json").read_text())
 NAMES = sorted(EXPECTED)
 SIZE_LIMIT = 400_000
-needs_reader = pytest.mark.skipif(not hasattr(toolpaths, "read"), reason="toolpaths.read is not there")
 
 
 def run_script(name: str, *arguments: str | Path) -> None:
@@ -88,7 +88,6 @@ def test_tour_is_for_a_simulator() -> None:
     assert [a.strip() for a in axes[:-1]].count("0.000000000, 0.000000000, 1.000000000".replace(" ", "")) == 2
 
 
-@needs_reader
 @pytest.mark.parametrize("flags", [(), ("--five-axis",)])
 def test_big_file_has_the_points_asked_for(flags: tuple[str, ...], tmp_path: Path) -> None:
     run_script("make_big.py", "2345", tmp_path / "big.cls", *flags)
@@ -97,7 +96,6 @@ def test_big_file_has_the_points_asked_for(flags: tuple[str, ...], tmp_path: Pat
     assert len(path) == 2345
 
 
-@needs_reader
 @pytest.mark.parametrize("name", NAMES)
 def test_reader_finds_what_the_script_wrote(name: str) -> None:
     path, diagnostics = toolpaths.read(FOLDER / name)
@@ -111,7 +109,6 @@ def test_reader_finds_what_the_script_wrote(name: str) -> None:
     assert path.units == want["units"]
 
 
-@needs_reader
 @pytest.mark.parametrize("name", NAMES)
 def test_reader_puts_the_points_where_the_script_had_them(name: str) -> None:
     path, _ = toolpaths.read(FOLDER / name)
@@ -125,3 +122,19 @@ def test_reader_puts_the_points_where_the_script_had_them(name: str) -> None:
     rise = np.einsum("ni,ni->n", np.diff(path.tip, axis=0, prepend=path.tip[:1])[path.arc >= 0], path.arcs.normal)
     length += np.hypot(path.arcs.radius * path.arcs.sweep, rise).sum()
     assert abs(length - want["feed_length_mm"]) < 0.02
+
+
+@pytest.mark.parametrize(("name", "machine"), [
+    *((name, "mikron-ucp710") for name in NAMES if "4axis" not in name),
+    ("indexed_4axis.cls", "mill-4axis"),
+    *((name, "mill-3axis") for name in ("pocket.cls", "bicubic.cls", "inch_plate.apt")),
+])
+def test_every_point_is_within_the_travel_of_a_machine(name: str, machine: str) -> None:
+    """At least one branch of the inverse, tool length 0 and 100 mm, part at the table's origin."""
+    path, _ = toolpaths.read(FOLDER / name)
+    loaded = machines.load(machine)
+    # 1e-6: the seventh decimal of the axis, in mm over 150 mm and in rad
+    lower, upper = loaded.limits.lower - 1e-6, loaded.limits.upper + 1e-6
+    for length in (0.0, 100.0):
+        q = loaded.kinematics.with_tool(length).inverse(path.tip, path.axis)
+        assert ((q >= lower) & (q <= upper)).all(axis=2).any(axis=0).all()
