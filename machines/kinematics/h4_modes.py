@@ -61,8 +61,8 @@ def _coefficients(carriages: Floats, joints: Floats, lengths: Floats) -> Complex
     top = sum(side * right[:, :, k, None] for k, side in enumerate(sides))
     value = np.sum((top - det[..., None] * e[:, :, 0]) ** 2, axis=-1) - (lengths[0] / scale * det) ** 2
     spectrum = np.fft.fft(value, axis=1) / SAMPLES
-    size = np.abs(spectrum[:, : SAMPLES // 2]) / np.max(np.abs(spectrum), axis=1, keepdims=True)
-    degree = int(np.max(np.flatnonzero((size > NEGLIGIBLE).any(axis=0)), initial=1))
+    size = np.abs(spectrum[:, : SAMPLES // 2])
+    degree = int(np.max(np.flatnonzero((size > NEGLIGIBLE * size.max(axis=1, keepdims=True)).any(axis=0)), initial=1))
     powers = np.arange(degree, -degree - 1, -1)
     result: Complex = spectrum[:, powers]
     return result
