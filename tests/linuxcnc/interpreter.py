@@ -59,8 +59,8 @@ class Canonical:
         line (N,): 1-based line of the program
         tool (N,): tool in the spindle, 0 for none
         plane (N,): 17, 18 or 19
-        center (N, 2): of arcs, in the plane, program coordinates; nan elsewhere
-        turn (N,): of arcs, whole and broken turns, counter-clockwise positive
+        center (N, 2): of arcs, program coordinates, (x, y) in plane 17, (z, x) in 18, (y, z) in 19; nan elsewhere
+        turn (N,): of arcs, turns begun, counter-clockwise (G3) positive; 0 elsewhere
         events: (index of the next move, function, arguments as text) of the other canonical calls, feeds left out
         error: the interpreter's message, "" where the program was accepted
     """
@@ -171,9 +171,12 @@ def _canonical(rows: Floats, events: tuple[tuple[int, str, str], ...], error: st
 
 
 def _seconds(rows: Floats) -> Floats:
-    """Nominal time of each row: LinuxCNC's length (xyz where any of them moves, else the angles) over the feed."""
+    """Nominal time of each row: LinuxCNC's length (xyz where any of them moves, else the angles) over the feed.
+
+    The first move starts at machine zero.
+    """
     kind, feed = rows[:, 0], rows[:, 13]
-    before = np.vstack([np.zeros((1, 6)), rows[:-1, 1:7]])
+    before = np.vstack([np.zeros((1, 6)), rows[:-1, 1:7] + rows[:-1, 7:13]]) - rows[:, 7:13]
     delta = rows[:, 1:7] - before
     straight = np.linalg.norm(delta[:, :3], axis=1)
     length = np.where(straight > 0, straight, np.linalg.norm(delta[:, 3:], axis=1))

@@ -9,7 +9,7 @@ import shutil
 import subprocess
 import tempfile
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -158,9 +158,8 @@ def _launch(folder: Path, time_limit: float) -> None:
         for path in (folder, *folder.iterdir()):
             os.chown(path, NOBODY, NOBODY)
     command = [*_isolation(), *(_AS_NOBODY if root else ()), SYSTEM_PYTHON, "-B", folder / "session.py", folder]
-    with _alone() if not _isolation() else _free():
-        process = subprocess.Popen(command, cwd=folder, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
-                                   stderr=(folder / "stderr").open("w"))
+    with nullcontext() if _isolation() else _alone(), (folder / "stderr").open("w") as stderr:
+        process = subprocess.Popen(command, cwd=folder, stdin=subprocess.DEVNULL, stdout=stderr, stderr=stderr)
         try:
             code = process.wait(time_limit + 60.0)
         except BaseException:
@@ -171,11 +170,6 @@ def _launch(folder: Path, time_limit: float) -> None:
         log = [line for name in ("log", "stderr") if (folder / name).exists()
                for line in (folder / name).read_text(errors="replace").splitlines()[-15:]]
         raise RuntimeError("LinuxCNC did not run:\n" + "\n".join(log))
-
-
-@contextmanager
-def _free() -> Iterator[None]:
-    yield
 
 
 @contextmanager

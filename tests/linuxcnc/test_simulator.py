@@ -1,0 +1,92 @@
+"""LinuxCNC's motion control beside our machines: the same joints for the same pose, and times that theory gives."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import machines
+from machines.machine import Machine
+from tests.linuxcnc import config
+from toolpaths.arrays import Floats
+
+TIGHT = 1e-6
+"""mm and degrees"""
+
+
+def write(folder: Path, text: str) -> Path:
+    program = folder / "program.ngc"
+    program.write_text(text)
+    return program
+
+
+def random_poses(machine: Machine, count: int) -> Floats:
+    """(N, 5) tip x y z within 200 mm and both rotary joints inside their travel, as a program has them."""
+    rng = np.random.default_rng(7)
+    rotary = np.flatnonzero(machine.rotary)
+    span = np.degrees(np.clip(machine.limits.upper[rotary], None, 2.5 * np.pi))
+    return np.hstack([rng.uniform(-200, 200, (count, 3)), rng.uniform(-0.95, 0.95, (count, len(rotary))) * span])
+
+
+@pytest.mark.parametrize("name", ["linuxcnc-xyzac-trt", "linuxcnc-xyzbc-trt"])
+@pytest.mark.parametrize("tool_length", [0.0, 75.5])
+def test_joints_at_standstill_are_our_inverse(standstill, name: str, tool_length: float) -> None:
+    machine = machines.load(name)
+    poses = random_poses(machine, 60)
+    joints = standstill(machine, poses, tool_length)
+    model, unit = machine.kinematics.with_tool(tool_length), np.where(machine.rotary, 180 / np.pi, 1.0)
+    angles = np.where(machine.rotary, joints / unit, 0.0)
+    axis = model.forward(angles)[1]
+    branches = model.inverse(poses[:, :3], axis, near=joints / unit) * unit
+    distance = np.abs(branches - joints)
+    turns = np.where(machine.rotary, np.minimum(np.mod(distance, 360), 360 - np.mod(distance, 360)), distance)
+    best = np.nanmin(turns.max(axis=2), axis=0)
+    assert best.max() < TIGHT
+    np.testing.assert_allclose(joints[:, 3:], poses[:, 3:], rtol=0, atol=TIGHT)
+
+
+def test_delta_joints_at_standstill_are_our_inverse(standstill) -> None:
+    if "linuxcnc-lineardelta" not in machines.names():
+        pytest.skip("no machine linuxcnc-lineardelta")
+    machine = machines.load("linuxcnc-lineardelta")
+    home = machine.kinematics.forward(machine.home[None])[0][0]
+    tip = home + np.random.default_rng(3).uniform(-40, 40, (40, 3))
+    poses = np.hstack([tip, np.zeros((len(tip), len(config.letters(machine)) - 3))])
+    joints = standstill(machine, poses)[:, :3]
+    axis = np.tile([0.0, 0.0, 1.0], (len(tip), 1))
+    branches = machine.kinematics.inverse(tip, axis)[:, :, :3]
+    assert np.nanmin(np.abs(branches - joints).max(axis=2), axis=0).max() < TIGHT
+
+
+def test_straight_move_takes_length_over_feed_and_one_ramp(simulate, tmp_path: Path) -> None:
+    machine = machines.load("mill-3axis")
+    run = simulate(machine, write(tmp_path, "G21 G90 G94 G61\nF1000\nG1 X100\nM2\n"))
+    speed, acceleration = 1000 / 60, float(machine.limits.acceleration[0])
+    assert run.errors == ()
+    assert run.seconds == pytest.approx(100 / speed + speed / acceleration, abs=0.006)
+    np.testing.assert_allclose(run.joints[-1], np.add(machine.home, [100, 0, 0]), atol=1e-9)
+
+
+def test_warp_does_not_change_the_machine_time(simulate, tmp_path: Path) -> None:
+    program = write(tmp_path, "G21 G90 G94 G61\nF6000\nG1 X50\nG1 Y30\nM2\n")
+    times = [simulate(machines.load("mill-3axis"), program, warp=warp).seconds for warp in (1, 20)]
+    assert times[0] == pytest.approx(times[1], abs=0.005)
+
+
+def test_pose_and_joints_belong_together_in_motion(simulate, tmp_path: Path) -> None:
+    """Joints trail the pose through a smoothing of 1 ms, nothing more."""
+    machine = machines.load("linuxcnc-xyzac-trt")
+    text = "G21 G90 G94 G61\nT1 M6\nG43 H1\nF3000\nG1 X20 Y10 Z5 A20 C40\nG1 X-20 A-15 C-60\nM2\n"
+    run = simulate(machine, write(tmp_path, text), {1: (75.5, 6.0)})
+    assert run.errors == () and run.axes == "XYZAC"
+    unit = np.where(machine.rotary, 180 / np.pi, 1.0)
+    tip = machine.kinematics.with_tool(75.5).forward(run.joints / unit)[0]
+    assert np.abs(tip - (run.pose[:, :3] - np.array([0, 0, 75.5]))).max() < 2e-3
+    assert set(run.line[run.line > 0]) == {5, 6}
+
+
+def test_what_the_control_refuses_is_told(simulate, tmp_path: Path) -> None:
+    run = simulate(machines.load("mill-3axis"), write(tmp_path, "G21 G90 G94\nG1 X600 F3000\nM2\n"))
+    assert any("exceed" in error for error in run.errors)
