@@ -16,6 +16,7 @@ from toolpaths.toolpath import Tool
 
 TURNING = frozenset({"TURN", "GROOVE", "THREAD", "TURNING"})
 _MAX_NUMBER = 10 ** 9
+_NOT_SHAPE = {"name", "length_register"}
 _CUTTER_ANGLES = (4, 5)
 
 
@@ -31,7 +32,8 @@ def _state(b: Builder) -> _State:
     state = b.memory.setdefault("tools", _State())
     assert isinstance(state, _State)
     if state.row != b.row:
-        state.row, state.fields = b.row, {}
+        kept = state.fields.get("length_register")
+        state.row, state.fields = b.row, {} if kept is None else {"length_register": kept}
     return state
 
 
@@ -53,9 +55,11 @@ def change(b: Builder, number: float, register: float | None, more: tuple[float,
         b.log.error("cl.tool-number", f"{number:g} is no tool number", b.line)
         return
     state = _state(b)
+    if int(number) != state.number:
+        state.fields.pop("length_register", None)
     known = state.by_number.get(int(number), {})
     state.number = int(number)
-    state.fields = {**known, **state.fields} if set(state.fields) <= {"name"} else state.fields
+    state.fields = {**known, **state.fields} if set(state.fields) <= _NOT_SHAPE else state.fields
     if register is not None:
         state.fields["length_register"] = int(register)
     b.event("LOADTL", (number,) + (() if register is None else (register,)) + more)

@@ -1,0 +1,132 @@
+"""What a CL file holds, as figures for people and for `postproc inspect --json`."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict
+
+import numpy as np
+
+from toolpaths.arrays import Bools, Floats
+from toolpaths.cl.dialects import DIALECTS
+from toolpaths.cl.read import ReadResult
+from toolpaths.rotations import angle_between
+from toolpaths.toolpath import Kind, Role, Tool, Toolpath
+from toolpaths.units import DEG
+
+SAME_DIRECTION = 1e-6
+"""rad"""
+_TOOL_ANGLES = ("taper", "tip_angle")
+
+
+def inspect(result: ReadResult) -> dict[str, object]:
+    """The JSON form: lengths mm, angles degrees.
+
+    `points` counts each commanded position once (not FROM, GOHOME), `cycles` the CYCLE records that name a kind,
+    `rapids` the rapid moves; `axis_motion` is fixed, indexed (between cuts only) or continuous, and `five_axis` is
+    true unless it is fixed; `extents` are those of the commanded positions.
+    """
+    p = result.toolpath
+    point = is_point(p)
+    lengths = cutting_lengths(p)
+    motion = axis_motion(p)
+    return {
+        "file": p.file, "name": p.name, "dialect": result.dialect, "evidence": result.evidence,
+        "points": int(point.sum()), "rapids": int((point & (p.kind == Kind.RAPID) & (p.role != Role.HOLE)).sum()),
+        "arcs": len(p.arcs), "holes": int((p.role == Role.HOLE).sum()), "cycles": result.cycle_records,
+        "operations": _operations(p, point, lengths), "tools": [tool_dict(t) for t in p.tools],
+        "frames": [asdict(f) for f in p.frames], "units": p.units, "five_axis": motion != "fixed",
+        "axis_motion": motion, "length_mm": float(lengths.sum()), "extents": extents(p),
+        "unknown_words": dict(result.unknown_words), "diagnostics": [d.as_dict() for d in result.diagnostics],
+    }
+
+
+def is_point(p: Toolpath) -> Bools:
+    """True (N,) for positions that the program commands."""
+    result: Bools = (p.role == Role.POINT) | (p.role == Role.HOLE)
+    return result
+
+
+def cutting_lengths(p: Toolpath) -> Floats:
+    """Length (N,) mm of the cutting motion to each row, 0 for rapids; arcs and helices by their true length."""
+    if not len(p):
+        return np.zeros(0)
+    length = np.append(0.0, np.linalg.norm(np.diff(p.tip, axis=0), axis=1))
+    rows = np.flatnonzero(p.arc >= 0)
+    if len(rows):
+        k = p.arc[rows]
+        rise = np.einsum("ki,ki->k", p.tip[rows] - p.tip[rows - 1], p.arcs.normal[k])
+        length[rows] = np.hypot(p.arcs.radius[k] * p.arcs.sweep[k], rise)
+    length[p.kind == Kind.RAPID] = 0.0
+    return length
+
+
+def axis_motion(p: Toolpath) -> str:
+    """"fixed" (one direction), "indexed" (it changes in rapids and at holes only) or "continuous"."""
+    if len(p) < 2:
+        return "fixed"
+    turned = angle_between(p.axis[1:], p.axis[:-1]) > SAME_DIRECTION
+    if not turned.any():
+        return "fixed"
+    return "continuous" if bool((turned & (p.kind[1:] != Kind.RAPID)).any()) else "indexed"
+
+
+def extents(p: Toolpath) -> dict[str, list[float]]:
+    """Least and greatest x, y, z of all rows, mm; empty for no rows."""
+    if not len(p):
+        return {}
+    low, high = p.tip.min(axis=0).tolist(), p.tip.max(axis=0).tolist()
+    return {name: [low[i], high[i]] for i, name in enumerate("xyz")}
+
+
+def tool_dict(tool: Tool) -> dict[str, object]:
+    """What the file says of a tool, angles in degrees."""
+    found = {key: value for key, value in asdict(tool).items() if value not in (None, "", ())}
+    return {key: value / DEG if key in _TOOL_ANGLES else value for key, value in found.items()}
+
+
+def _operations(p: Toolpath, point: Bools, lengths: Floats) -> list[dict[str, object]]:
+    count = len(p.operations)
+    rows = np.bincount(p.operation, minlength=count)
+    points = np.bincount(p.operation[point], minlength=count)
+    length = np.bincount(p.operation, lengths, minlength=count)
+    first = np.zeros(count, np.int64)
+    used, at = np.unique(p.operation, return_index=True)
+    first[used] = at
+    return [{"name": op.name, "tool_name": op.tool_name, "line": op.line, "frame": p.frames[op.frame].name,
+             "turning": op.turning, "points": int(points[i]), "length_mm": float(length[i]),
+             "tool": _tool_number(p, int(first[i])) if rows[i] else None} for i, op in enumerate(p.operations)]
+
+
+def _tool_number(p: Toolpath, row: int) -> int | None:
+    return p.tools[p.tool[row]].number if p.tool[row] >= 0 else None
+
+
+def summary(result: ReadResult) -> str:
+    """The same for people, a few lines."""
+    p = result.toolpath
+    found = inspect(result)
+    title = DIALECTS[result.dialect].title
+    lines = [f"{p.file or 'CL text'}: {title} ({result.evidence}), {p.units}, {result.lines} lines",
+             f"  {found['points']} points ({found['rapids']} rapid, {found['arcs']} arcs, {found['holes']} holes of "
+             f"{found['cycles']} cycles), {sum(lengths_of(p)):.1f} mm of cutting, tool axis {found['axis_motion']}"]
+    lines += [f"  {name} {low:.3f} to {high:.3f} mm" for name, (low, high) in extents(p).items()]
+    lines += [f"  operation {op.name or i + 1}{' (turning)' if op.turning else ''}: "
+              f"{int((p.operation == i).sum())} rows" for i, op in enumerate(p.operations)]
+    lines += [f"  tool {t.number}{' ' + t.name if t.name else ''}{_size(t)}" for t in p.tools]
+    if result.unknown_words:
+        lines.append("  unknown words: " + ", ".join(f"{w} ({n})" for w, n in result.unknown_words.items()))
+    return "\n".join([*lines, *(f"  {d}" for d in result.diagnostics)])
+
+
+def lengths_of(p: Toolpath) -> list[float]:
+    """Cutting length per operation, mm."""
+    result: list[float] = np.bincount(p.operation, cutting_lengths(p), minlength=len(p.operations)).tolist()
+    return result
+
+
+def _size(tool: Tool) -> str:
+    if tool.diameter is None or not math.isfinite(tool.diameter):
+        return ""
+    corner = f", corner {tool.corner_radius:g}" if tool.corner_radius else ""
+    return f": {tool.shape + ' ' if tool.shape else ''}diameter {tool.diameter:g}{corner} mm"
