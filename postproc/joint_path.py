@@ -9,11 +9,15 @@ import numpy as np
 from machines.kinematics.base import Kinematics
 from machines.machine import Limits
 from toolpaths.arrays import Bools, Floats, Ints
-from toolpaths.rotations import angle_between
+from toolpaths.rotations import angle_between, slerp
 
 TWO_PI = 2.0 * np.pi
 TRAVEL_SLACK = 1e-9
 """mm or rad: round-off that is no excess of travel"""
+_SMALL_STEP = 0.35
+"""rad of rotary way that a branch is followed without a look between"""
+_CROSSING = 1e-3
+_LEAST_STEP = 1e-10
 
 
 @dataclass(frozen=True)
@@ -56,7 +60,7 @@ def solve(kin: Kinematics, tip: Floats, axis: Floats, limits: Limits, start: Flo
     if family.any():
         branches = _fill_family(kin, tip, axis, branches, family, start)
     best: tuple[tuple[float, float, float], Ints, Floats] | None = None
-    for track in _tracks(branches, rotary):
+    for track in _tracks(kin, tip, axis, branches, family, limits):
         q = _unwound(branches[track, np.arange(len(tip))], rotary, limits, start)
         cost = _cost(q, rotary, limits, start)
         if best is None or cost < best[0]:
@@ -94,26 +98,85 @@ def _distance(a: Floats, b: Floats, rotary: Bools) -> Floats:
     return result
 
 
-def _tracks(branches: Floats, rotary: Bools) -> list[Ints]:
-    """Branch numbers (N,) of the nearest-neighbour track from each branch that the first pose has."""
+def _tracks(kin: Kinematics, tip: Floats, axis: Floats, branches: Floats, family: Bools, limits: Limits) -> list[Ints]:
+    """Branch numbers (N,) of the continuous track from each branch that the first pose has.
+
+    Where the tool lies along a rotary axis the branch may change on the spot: it does where the nearest one would
+    leave travel before the next such pose and another would not.
+    """
     count, n, _ = branches.shape
     begin = [b for b in range(count) if np.isfinite(branches[b, 0]).all()] or [0]
     if count == 1 or n == 1:
         return [np.full(n, b) for b in begin]
-    step = np.stack([[_distance(branches[b, :-1], branches[c, 1:], rotary) for c in range(count)]
-                     for b in range(count)])
-    stay = step[np.arange(count), np.arange(count)]
-    following = np.where((stay <= step.min(axis=1) + 1e-9) & np.isfinite(stay), np.arange(count)[:, None],
-                         step.argmin(axis=1))
-    switches = np.flatnonzero((following != np.arange(count)[:, None]).any(axis=0))
+    following, free = _following(kin, tip, axis, branches, family)
+    outside = np.cumsum(~_fits(branches, np.array(kin.rotary), limits), axis=1)
+    stretch_end = np.append(np.flatnonzero(free), n - 1)
+    switches = np.flatnonzero((following != np.arange(count)[:, None]).any(axis=0) | free)
     tracks = []
     for b in begin:
         track = np.full(n, b)
         for i in switches:
-            if following[track[i], i] != track[i]:
-                track[i + 1:] = following[track[i], i]
+            target = following[track[i], i]
+            if free[i]:
+                last = stretch_end[np.searchsorted(stretch_end, i, side="right")]
+                target = _least(outside[:, last] - outside[:, i], int(target))
+            if target != track[i]:
+                track[i + 1:] = target
         tracks.append(track)
     return tracks
+
+
+def _least(count: Ints, preferred: int) -> int:
+    """The branch with the fewest poses outside travel; the preferred one among equals."""
+    return preferred if count[preferred] == count.min() else int(count.argmin())
+
+
+def _fits(branches: Floats, rotary: Bools, limits: Limits) -> Bools:
+    """(B, N) True where every joint is inside travel, rotary ones in some winding."""
+    turns = np.where(rotary & np.isfinite(limits.lower), np.ceil((limits.lower - branches - TRAVEL_SLACK) / TWO_PI), 0.0)
+    lifted = branches + TWO_PI * turns
+    return np.asarray(((lifted >= limits.lower - TRAVEL_SLACK) & (lifted <= limits.upper + TRAVEL_SLACK)).all(axis=2))
+
+
+def _following(kin: Kinematics, tip: Floats, axis: Floats, branches: Floats, family: Bools) -> tuple[Ints, Bools]:
+    """(B, N - 1) the branch that a branch of each pose leads to at the next, and (N - 1,) where it is free to change.
+
+    It is the nearest where the step is small or one end is free; elsewhere it is found by walking there."""
+    count = len(branches)
+    rotary = np.array(kin.rotary)
+    step = np.stack([[_distance(branches[b, :-1], branches[c, 1:], rotary) for c in range(count)]
+                     for b in range(count)])
+    own = np.arange(count)
+    stay = step[own, own]
+    following = np.where((stay <= step.min(axis=1) + 1e-9) & np.isfinite(stay), own[:, None], step.argmin(axis=1))
+    free = family[:, :-1].any(axis=0) | family[:, 1:].any(axis=0)
+    doubtful = ((following != own[:, None]) | (stay > _SMALL_STEP)) & np.isfinite(stay) & ~free
+    for b, i in np.argwhere(doubtful):
+        end = _walk(kin, tip[i:i + 2], axis[i:i + 2], branches[b, i], int(b))
+        following[b, i] = int(_distance(end, branches[:, i + 1], rotary).argmin())
+    return following, free
+
+
+def _walk(kin: Kinematics, tip: Floats, axis: Floats, q: Floats, branch: int) -> Floats:
+    """Joints at the second of two poses, reached from joints q of the first without a jump.
+
+    Steps are halved until the joints move little; the branch may only change where it comes as near as where the tool
+    passes through a singular direction.
+    """
+    rotary = np.array(kin.rotary)
+    u, size = 0.0, 0.25
+    while u < 1.0:
+        size = min(size, 1.0 - u)
+        t = np.array([u + size])
+        found = kin.inverse(tip[:1] + t[:, None] * (tip[1:] - tip[:1]), slerp(axis[:1], axis[1:], t), near=q[None, :])[:, 0]
+        distance = _distance(q, found, rotary)
+        near = int(distance.argmin())
+        if distance[near] > (_SMALL_STEP if near == branch else _CROSSING) and size > _LEAST_STEP:
+            size *= 0.5
+            continue
+        q, branch, u = found[near], near, u + size
+        size *= 2.0
+    return q
 
 
 def _unwound(q: Floats, rotary: Bools, limits: Limits, start: Floats) -> Floats:

@@ -1,7 +1,7 @@
 """Linking moves: retract along the tool axis to the safe plane, index, approach along the new tool axis.
 
-A safe plane stands square to the tool axis at a distance from the centre of the part; behind the planes of all
-directions lies a sphere that holds the whole path, so that a tool that stays above its own plane cannot touch it.
+A safe plane stands square to the tool axis at a distance from the centre of the part. A linking move is clear while the
+tool is above everything that is cut, seen along its own axis, or its axis line misses the sphere round all that.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from postproc.setup import Placement, SetupFile
 from toolpaths.arrays import Bools, Floats
 from toolpaths.rotations import angle_between
 from toolpaths.shape import Curves
+from toolpaths.toolpath import Kind
 
 _RISE = 10.0
 """mm above the safe plane for index moves, so that their dips stay above it"""
@@ -33,7 +34,7 @@ _LEG_TOLERANCE = 0.01
 
 @dataclass(frozen=True)
 class SafeSpace:
-    """Centre (3,) of the part in the table frame, radius of the path about it, its box (8, 3), distances in mm."""
+    """Centre (3,) of the part in the table frame, radius about it and box (8, 3) of all that is cut, distances in mm."""
 
     centre: Floats
     radius: float
@@ -48,10 +49,21 @@ class SafeSpace:
         reach = self.radius if turning else float((self.corners @ axis).max() - self.centre @ axis)
         return reach + share * self.margin
 
+    def clear(self, tip: Floats, axis: Floats, margin: float) -> Bools:
+        """(N,) True where the tool, a half line from its tip along its axis, stays `margin` mm off the path's extent."""
+        offset = tip - self.centre
+        height = np.einsum("ni,ni->n", offset, axis)
+        above = height >= ((self.corners - self.centre) @ axis.T).max(axis=0) + margin
+        nearest = np.sqrt(np.maximum((offset**2).sum(axis=1) - np.minimum(height, 0.0) ** 2, 0.0))
+        return np.asarray(above | (nearest >= self.radius + margin))
+
 
 def safe_space(moves: Moves, setup: SetupFile, placement: Placement) -> SafeSpace:
-    """The safe planes of a path (already in the table frame)."""
-    tips = moves.tip
+    """The safe planes of a path (already in the table frame); what is only passed in rapid does not count."""
+    cutting = moves.kind != Kind.RAPID
+    starts = cutting & ~moves.link
+    used = cutting | np.append(starts[1:], False)
+    tips = moves.tip[used] if used.any() else moves.tip
     if len(moves.arcs):
         reach = moves.arcs.radius[:, None] * np.sqrt(np.maximum(1.0 - moves.arcs.normal**2, 0.0))
         tips = np.concatenate([tips, moves.arcs.center - reach, moves.arcs.center + reach])
@@ -123,11 +135,13 @@ def _link(control: Control, kin0: Kinematics, kin1: Kinematics, space: SafeSpace
     home, home_state = _home_moves(control, up0, after is None) if by_home else (none, none > 0.0)
     if up1 is None:
         return Link(retract, home, none, none, home_state, none > 0.0, True)
+    slack = 0.5 * share * space.margin
     if by_home and _has_retract_axis(control):
         index, state = _from_home(control, home[-1], up1)
-        return Link(retract, home, index, approach, home_state, state, True)
+        clear = _stays_clear(control, kin1, space, np.concatenate([home[-1:], index]), slack)
+        return Link(retract, home, index, approach, home_state, state, clear)
     begin = up0.q if up0 is not None else control.machine.home
-    index, clear = _index(control, kin1, space, begin, up1, share, turning)
+    index, clear = _index(control, kin1, space, begin, up1, space.plane(up1.axis, turning, share), slack)
     return Link(retract, home, index, approach, home_state, np.full(index.shape, by_home), clear)
 
 
@@ -180,10 +194,10 @@ def _from_home(control: Control, begin: Floats, up: Pose) -> tuple[Floats, Bools
     return np.stack([q for q, _ in kept]), np.stack([state for _, state in kept])
 
 
-def _index(control: Control, kin: Kinematics, space: SafeSpace, begin: Floats, up: Pose, share: float,
-           turning: bool) -> tuple[Floats, bool]:
-    """Joints from `begin` to the pose above, by way of points over the centre where the straight way dips too low."""
-    floor = space.plane(up.axis, turning, share) - 1e-6
+def _index(control: Control, kin: Kinematics, space: SafeSpace, begin: Floats, up: Pose, floor: float,
+           slack: float) -> tuple[Floats, bool]:
+    """Joints from `begin` to the pose above, by way of points over the centre where the straight way comes too near."""
+    lifted = _lifted(kin, space, begin, floor, slack)
     for count in _STEPS:
         t = np.arange(1, count + 1) / (count + 1)
         near = begin + t[:, None] * (up.q - begin)
@@ -191,15 +205,24 @@ def _index(control: Control, kin: Kinematics, space: SafeSpace, begin: Floats, u
             _, axes = kin.forward(near)
             near = nearest_solution(kin, space.centre + (floor + _RISE) * axes, axes, near)
         q = np.concatenate([near, up.q[None, :]])
-        if np.isfinite(q).all() and _stays_above(control, kin, space, np.concatenate([begin[None, :], q]), floor):
-            return q, True
+        start = begin[None, :] if lifted is None else lifted[None, :]
+        if np.isfinite(q).all() and _stays_clear(control, kin, space, np.concatenate([start, q]), slack):
+            return (q if lifted is None else np.concatenate([start, q])), True
     return up.q[None, :], False
 
 
-def _stays_above(control: Control, kin: Kinematics, space: SafeSpace, q: Floats, floor: float) -> bool:
+def _lifted(kin: Kinematics, space: SafeSpace, q: Floats, floor: float, slack: float) -> Floats | None:
+    """Joints with the tool drawn back along its axis to above the safe plane, None where it is clear already."""
+    tip, axis = kin.forward(q[None, :])
+    if bool(space.clear(tip, axis, slack)[0]):
+        return None
+    lift = floor + _RISE - float(axis[0] @ (tip[0] - space.centre))
+    return np.asarray(nearest_solution(kin, tip + lift * axis, axis, q[None, :])[0])
+
+
+def _stays_clear(control: Control, kin: Kinematics, space: SafeSpace, q: Floats, slack: float) -> bool:
     for t in np.linspace(0.0, 1.0, _SAMPLES):
         tip, axis, _ = control.between(q[:-1], q[1:], np.full(len(q) - 1, t), kin)
-        height = np.einsum("ni,ni->n", tip - space.centre, axis)
-        if not bool((height >= floor).all()):
+        if not bool(space.clear(tip, axis, slack).all()):
             return False
     return True

@@ -262,9 +262,7 @@ def _links(motion: Motion, executed: Executed, moves: Moves, owner: Ints, space:
     m = owner[rows]
     for t in SAMPLES:
         tip, axis = executed.poses(motion, rows, t)
-        height = np.einsum("ni,ni->n", tip - space.centre, axis)
-        reach = np.array([space.plane(a, False, 0.0) for a in axis]) if len(rows) < 2000 else space.radius
-        low = height < reach - tolerance
+        low = ~space.clear(tip, axis, -tolerance)
         approach = _off_line(tip, moves.tip[m], moves.axis[m]) <= tolerance
         before = np.maximum(m - 1, 0)
         retract = (_off_line(tip, moves.tip[before], moves.axis[before]) <= tolerance) & (m > 0)
