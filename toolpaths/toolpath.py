@@ -29,6 +29,8 @@ class Role(IntEnum):
     """FROM: where the tool stands; no motion leads there."""
     HOME = 3
     """GOHOME with a point."""
+    SPLINE = 4
+    """On a spline between its ends: the program does not command it."""
 
 
 class FeedMode(IntEnum):

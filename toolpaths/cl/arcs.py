@@ -37,9 +37,11 @@ class ArcTable:
     sense: list[int] = field(default_factory=list)
     sweep: list[float] = field(default_factory=list)
     line: list[int] = field(default_factory=list)
+    toward: dict[int, tuple[float, ...]] = field(default_factory=dict)
+    """by record: the direction at the start, where it decides the sense"""
 
-    def add(self, row: int, numbers: tuple[float, ...], radius: float, times: float, sense: int, sweep: float,
-            line: int) -> None:
+    def add(self, row: int, numbers: tuple[float, ...], line: int, radius: float = math.nan, times: float = 0.0,
+            sense: int = 1, sweep: float = math.nan) -> None:
         """One record."""
         for column, value in zip((self.row, self.numbers, self.radius, self.times, self.sense, self.sweep, self.line),
                                  (row, numbers, radius, times, sense, sweep, line), strict=True):

@@ -125,12 +125,12 @@ def _normals(b: Builder, rows: Rows) -> tuple[Floats | None, Floats | None]:
         return None, None
     norm = np.linalg.norm(rows.third, axis=1)
     is_normal = np.abs(norm - 1.0) <= NORMAL_ROUNDING
+    is_normal[b.contacts] = False
     is_contact = ~np.isnan(norm) & ~is_normal
     normal = unit(np.where(is_normal[:, None], rows.third, np.nan)) if is_normal.any() else None
     if not is_contact.any():
         return normal, None
-    where = np.flatnonzero(is_contact)
-    for k in where:
+    for k in np.setdiff1d(np.flatnonzero(is_contact), b.contacts):
         b.log.warning("cl.contact", "numbers 7 to 9 of GOTO are no unit vector, read as the contact point",
                       int(rows.line[k]))
     return normal, np.where(is_contact[:, None], rows.third * b.scale, np.nan)
@@ -193,7 +193,10 @@ def _arcs(b: Builder, rows: Rows, kind: Array, arc: Array) -> Arcs:
     row = np.array(t.row, np.int64)[keep]
     numbers = np.array(t.numbers, np.float64).reshape(-1, 6)[keep]
     center, normal = numbers[:, :3] * b.scale, numbers[:, 3:] * np.array(t.sense, np.float64)[keep, None] + 0.0
-    _map_arcs(b, rows, row, center, normal)
+    toward = np.array([t.toward.get(k, (np.nan,) * 3) for k in keep])
+    _map_arcs(b, rows, row, center, normal, toward)
+    against = np.einsum("ki,ki->k", np.cross(normal, rows.tip[row - 1] - center), toward) < 0.0
+    normal[against] *= -1.0
     arc[row] = np.arange(len(row))
     kind[row] = Kind.ARC
     records = Records(rows.tip[row - 1], rows.tip[row], center, normal, np.array(t.radius)[keep] * b.scale,
@@ -213,7 +216,7 @@ def _has_start(b: Builder, rows: Rows, kind: Array, k: int, row: int) -> bool:
     return b.arcs.row[k + 1:k + 2] != [row]
 
 
-def _map_arcs(b: Builder, rows: Rows, row: Ints, center: Floats, normal: Floats) -> None:
+def _map_arcs(b: Builder, rows: Rows, row: Ints, center: Floats, normal: Floats, toward: Floats) -> None:
     index = spread(b.map, len(rows), np.int64)[row]
     if b.dialect.six_common:
         index = np.where(rows.given[row], 0, index)
@@ -223,6 +226,7 @@ def _map_arcs(b: Builder, rows: Rows, row: Ints, center: Floats, normal: Floats)
             where = index == i
             center[where] = center[where] @ found[0].T + found[1]
             normal[where] = normal[where] @ found[0].T
+            toward[where] = toward[where] @ found[0].T
 
 
 def _feeds(b: Builder, rows: Rows, kind: Array) -> tuple[Floats, Array]:

@@ -107,6 +107,13 @@ class Builder:
         self.turning: set[int] = set()
         self.declared: Declared | None = None
         self.zsurf: float | None = None
+        self.subprograms: dict[float, tuple[int, int]] | None = None
+        self.calls: list[tuple[int, int]] = []
+        self.table = [0.0, 0.0, 0.0]
+        self.turned: Floats = np.eye(3)
+        self.toward: Triple | None = None
+        self.contacts: list[int] = []
+        self.axis_system: list[list[float]] | None = None
         self.name = ""
         self.unknown: dict[str, list[tuple[int, int, int]]] = {}
         self.texts: list[tuple[int, int, int, str]] = []
@@ -163,6 +170,19 @@ class Builder:
     def event(self, word: str, values: tuple[str | float, ...] = ()) -> None:
         """Note an event before the next row."""
         self.events.append(Event(self.row, word, values, self.line))
+
+    def last_point(self) -> Triple | None:
+        """Coordinates of the row before, as written; None where there is none."""
+        if self.fast > self._piece:
+            x, y, z = self.points.xyz[self.fast - 1].tolist()
+            return x, y, z
+        if not self.pieces:
+            return None
+        low, high = self.pieces[-1]
+        if low < 0:
+            return self.extras.xyz[-1 - low]
+        x, y, z = self.points.xyz[high - 1].tolist()
+        return x, y, z
 
     def next_is_point(self) -> bool:
         """True where the very next record (display records apart) is a GOTO."""

@@ -21,6 +21,7 @@ _DEPTH = frozenset({"FEDTO", "DEPTH"})
 _RETRACT = frozenset({"RTRCTO", "RETURN"})
 _PECKS = frozenset({"STEP", "INCR", "PECKING", "1STPECK", "SUBPECK"})
 _OTHER = frozenset({"DIAMET", "TLANGL", "TIMES", "BACK", "OFFSET", "REPEAT", "PARAMS", "ORIENT", "CSKDIA", "PLUNGE"})
+_PLAIN = frozenset({"G98", "G99", "AUTO", "MANUAL", "ON", "REV", "", "SEC", "NEXT"})
 _WORDS = "words"
 _LAST = "cycle"
 
@@ -44,6 +45,7 @@ class Values:
     angle: float = math.nan
     free: tuple[float, ...] = ()
     empty: tuple[str, ...] = field(default=(), compare=False)
+    strange: tuple[str, ...] = field(default=(), compare=False)
 
 
 def cycle(b: Builder, s: Statement) -> None:
@@ -88,6 +90,7 @@ def _values(v: Values, words: tuple[Word, ...], b: Builder) -> Values:
     free: list[float] = []
     steps: list[float] = []
     empty: list[str] = []
+    strange: list[str] = []
     i = 0
     while i < len(words):
         word, i = words[i], i + 1
@@ -98,15 +101,16 @@ def _values(v: Values, words: tuple[Word, ...], b: Builder) -> Values:
         while i < len(words) and isinstance(words[i], float):
             numbers.append(words[i])
             i += 1
-        taken = _label(word, [float(x) for x in numbers], words[i] if i < len(words) else "", found, free, steps, empty)
+        taken = _label(word, [float(x) for x in numbers], words[i] if i < len(words) else "", found, free, steps, empty,
+                       strange)
         free.extend(float(x) for x in numbers[taken:])
     if steps:
         found["steps"] = tuple(steps)
-    return replace(v, **found, free=tuple(free), empty=tuple(empty))  # type: ignore[arg-type]
+    return replace(v, **found, free=tuple(free), empty=tuple(empty), strange=tuple(strange))  # type: ignore[arg-type]
 
 
 def _label(word: str, n: list[float], following: Word, found: dict[str, object], free: list[float],
-           steps: list[float], empty: list[str]) -> int:
+           steps: list[float], empty: list[str], strange: list[str]) -> int:
     """Take the numbers `n` that belong to `word`; how many were taken."""
     if word in _PECKS:
         steps.extend(n)
@@ -122,6 +126,8 @@ def _label(word: str, n: list[float], following: Word, found: dict[str, object],
         found[_SIMPLE[word]] = n[0]
     elif word in _OTHER:
         return len(n)
+    elif word not in _PLAIN and word not in KINDS and word not in _SIMPLE:
+        strange.append(word)
     if not n and (word in _SIMPLE or word in _PECKS):
         empty.append(word)
     if word in _PECKS:
@@ -168,6 +174,8 @@ def _arm(b: Builder, v: Values) -> None:
     b.memory[_LAST] = v
     for word in v.empty:
         b.log.error("cl.cycle-value", f"CYCLE/{v.kind}: {word} has no number", b.line, "write the number behind it")
+    for word in v.strange:
+        b.log.warning("cl.cycle-option", f"CYCLE/{v.kind}: {word} is not used", b.line, key=word)
     made = _made(b, v)
     index = len(b.cycles)
     if b.cycles and replace(b.cycles[-1], line=0) == replace(made, line=0) and b.cycle.now == -1 and not v.words:
@@ -196,7 +204,7 @@ def _depth(b: Builder, v: Values) -> float:
     depth = v.depth * b.dialect.depth_sign
     if math.isnan(depth) and v.kind == "CSINK" and v.diameter > 0.0 and 0.0 < v.angle < 180.0:
         return 0.5 * v.diameter / math.tan(math.radians(0.5 * v.angle))
-    if math.isnan(depth):
+    if math.isnan(depth) and _DEPTH.isdisjoint(v.empty):
         b.log.error("cl.cycle-value", f"CYCLE/{v.kind} states no depth", b.line, "write it with DEPTH or FEDTO")
     elif depth < 0.0:
         b.log.error("cl.cycle-depth", f"CYCLE/{v.kind}: the depth {v.depth:g} points away from the part", b.line,

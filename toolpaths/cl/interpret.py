@@ -4,15 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from toolpaths.cl import cycles, feeds, frames, motion, structure, tools
+from toolpaths.cl import curves, cycles, feeds, frames, motion, structure, tools
 from toolpaths.cl.build import Builder
 from toolpaths.cl.statements import DATA_COMMENT, TEXT, Statement
 from toolpaths.cl.words import SILENT, UNSUPPORTED_MOTION
 
 Handler = Callable[[Builder, Statement], None]
 HANDLERS: dict[str, Handler] = {**dict.fromkeys(SILENT, structure.nothing), **structure.HANDLERS, **feeds.HANDLERS,
-                                **motion.HANDLERS, **frames.HANDLERS, **tools.HANDLERS, **cycles.HANDLERS}
+                                **motion.HANDLERS, **curves.HANDLERS, **frames.HANDLERS, **tools.HANDLERS,
+                                **cycles.HANDLERS}
 _MANY = 3
+_DEEPEST = 8
+_MOST_ROWS = 50_000_000
 
 
 def known(major: str) -> bool:
@@ -39,6 +42,51 @@ def run(b: Builder, start: int, stop: int) -> None:
             _other(b, statement)
         b.index += 1
     b.stop = outer
+
+
+def subprograms(b: Builder) -> dict[float, tuple[int, int]]:
+    """Statements of DEFSUB and ENDSUB by number, found once."""
+    if b.subprograms is None:
+        b.subprograms = {}
+        begun: list[tuple[float, int]] = []
+        for i, s in enumerate(b.program.statements):
+            if s.major == "DEFSUB":
+                begun.append((s.numbers[0] if s.numbers else -1.0, i))
+            elif s.major == "ENDSUB" and begun:
+                number, start = begun.pop()
+                b.subprograms[number] = (start, i)
+    return b.subprograms
+
+
+def defsub(b: Builder, s: Statement) -> None:
+    """Pass over the subprogram; CALSUB carries it out."""
+    for start, end in subprograms(b).values():
+        if start == b.index:
+            b.jump(b.program.before[end])
+            b.index = end
+            return
+    b.log.error("cl.subprogram", "DEFSUB without ENDSUB", b.line)
+
+
+def calsub(b: Builder, s: Statement) -> None:
+    """Carry out the statements and points of a subprogram here, under the frame that holds here."""
+    found = subprograms(b).get(s.numbers[0]) if s.numbers else None
+    if found is None or len(b.calls) >= _DEEPEST or found in b.calls or b.row > _MOST_ROWS:
+        why = "is not defined" if found is None else "calls itself" if found in b.calls else "makes too many points"
+        b.log.error("cl.subprogram", f"CALSUB/{s.body}: the subprogram {why}", b.line)
+        return
+    start, end = found
+    index, fast = b.index, b.fast
+    b.calls.append(found)
+    b.jump(b.program.before[start])
+    run(b, start + 1, end)
+    b.advance(b.program.before[end])
+    b.jump(fast)
+    b.calls.pop()
+    b.index = index
+
+
+HANDLERS.update({"DEFSUB": defsub, "CALSUB": calsub, "ENDSUB": structure.nothing})
 
 
 def _other(b: Builder, s: Statement) -> None:

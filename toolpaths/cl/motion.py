@@ -23,7 +23,9 @@ def _triple(numbers: list[float], at: int) -> Triple:
 def goto(b: Builder, s: Statement) -> None:
     """A point of 3, 6 or 9 numbers; 4 or 7: the last is a feed; 2: z from ZSURF."""
     numbers = s.numbers
-    if len(numbers) != len(s.words):
+    if s.tail == ("CONTACT",):
+        b.contacts.append(b.row)
+    elif s.tail:
         b.log.error("cl.number", f"GOTO/{s.body[:60]}: {s.tail[0] or 'an empty field'} is not a number", b.line,
                     "GOTO takes 3, 6 or 9 numbers")
         return
@@ -113,7 +115,7 @@ def circle(b: Builder, s: Statement) -> None:
         b.log.error("cl.circle-times", f"CIRCLE/...{s.tail}: TIMES takes a whole number", b.line)
         times = None
     vector, sense = _axis_and_sense(b, s, numbers)
-    b.arcs.add(b.row, numbers[:3] + vector, numbers[6], times or 0.0, sense, _NAN if sweep is None else sweep, b.line)
+    b.arcs.add(b.row, numbers[:3] + vector, b.line, numbers[6], times or 0.0, sense, _NAN if sweep is None else sweep)
 
 
 def _circle_numbers(n: list[float]) -> tuple[float, ...] | None:
@@ -143,7 +145,8 @@ def movarc(b: Builder, s: Statement) -> None:
     elif not b.next_is_point():
         b.log.error("cl.circle-end", "MOVARC is not followed by a GOTO, which gives its end", b.line)
     else:
-        b.arcs.add(b.row, tuple(numbers[:6]), numbers[6], 0.0, 1 if angle > 0 else -1, math.radians(abs(angle)), b.line)
+        b.arcs.add(b.row, tuple(numbers[:6]), b.line, numbers[6], 0.0, 1 if angle > 0 else -1,
+                   math.radians(abs(angle)))
 
 
 HANDLERS = {"GOTO": goto, "GODLTA": godlta, "FROM": from_, "GOHOME": gohome, "RAPID": rapid, "TLAXIS": tlaxis,

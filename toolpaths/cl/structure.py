@@ -6,11 +6,12 @@ import json
 import re
 from collections.abc import Callable
 
+from toolpaths.cl import frames
 from toolpaths.cl.build import Builder, Declared
 from toolpaths.cl.statements import Statement
 from toolpaths.cl.tools import describe
 from toolpaths.cl.words import EVENTS, LENGTH_EVENTS
-from toolpaths.toolpath import Frame, Operation, Tool
+from toolpaths.toolpath import Frame, Operation, Role, Tool
 
 _TOOL_PATH = re.compile(r"(.*?),\s*TOOL\s*(?:,(.*))?$", re.IGNORECASE | re.DOTALL)
 _CATIA_OPERATION = re.compile(r"OPERATION NAME\s*:\s*(.*)", re.IGNORECASE)
@@ -57,7 +58,8 @@ def partno(b: Builder, s: Statement) -> None:
 
 
 def comment(b: Builder, s: Statement) -> None:
-    """CATIA names its operations in comments."""
+    """CATIA names its axis system and its operations in comments."""
+    frames.comment(b, s)
     found = _CATIA_OPERATION.match(s.body) if b.dialect.name == "catia" else None
     if found:
         begin_operation(b, found[1].strip())
@@ -154,6 +156,17 @@ def _tool(found: dict[str, object]) -> Tool:
                 **sizes, length_register=register, cutter=_numbers(found.get("cutter", []), None))
 
 
+def own_spline(b: Builder, s: Statement) -> None:
+    """$$-> SPLINE / n: the next n points lie on a spline between its ends."""
+    count = s.numbers[0] if s.numbers else -1.0
+    if b.declared is None:
+        return
+    if not 0 <= count <= len(b.points) + len(b.program.lines):
+        b.log.error("cl.data-comment", f"$$-> SPLINE / {s.body}: it takes a count of points", b.line)
+        return
+    b.roles.update(dict.fromkeys(range(b.row, b.row + int(count)), Role.SPLINE))
+
+
 def own_use(b: Builder, s: Statement) -> None:
     """$$-> USE / operation, tool: indices into the lists from here on."""
     if b.declared is None:
@@ -172,5 +185,5 @@ HANDLERS: dict[str, Callable[[Builder, Statement], None]] = {
     "PPRINT": text_event, "INSERT": text_event, "REMARK": nothing, "LPRINT": nothing, "PPLABEL": nothing,
     "LETTER": nothing, "UNITS": nothing, "UNIT": nothing, "MULTAX": nothing, "FINI": nothing, "SET": nothing,
     "$$->TOOLPATH": own_header, "$$->FRAME": own_item, "$$->TOOL": own_item, "$$->OPERATION": own_item,
-    "$$->USE": own_use, **dict.fromkeys(EVENTS, plain_event), "SPINDL": spindl,
+    "$$->USE": own_use, "$$->SPLINE": own_spline, **dict.fromkeys(EVENTS, plain_event), "SPINDL": spindl,
 }

@@ -48,16 +48,16 @@ LENGTH_EVENTS = frozenset({"RETRCT", "CLEARP", "CLRSRF", "LEADER"})
 
 SILENT = frozenset({
     "PAINT", "PPWORD", "PPFUN", "SYN", "OPFEATSTART", "OPFEATEND", "MOVE_ATTRIB", "BOX", "SETUP", "SWITCH", "DISPLY",
-    "AUTOPS", "INTOL", "OUTTOL", "TOLER", "LINTOL", "MACHIN", "ALIGN", "PLABEL", "CLPRNT", "NOPOST", "PLOT", "TRNTYP",
-    "CSI_SET_EXTENSION_LENGTH", "MCHTOL", "DEFINE", "LOADTL_NAME", "NUMPTS", "INDEXF",
+    "AUTOPS", "PSIS", "INTOL", "OUTTOL", "TOLER", "LINTOL", "MACHIN", "ALIGN", "PLABEL", "CLPRNT", "NOPOST", "PLOT",
+    "TRNTYP", "CSI_SET_EXTENSION_LENGTH", "MCHTOL", "DEFINE", "LOADTL_NAME", "NUMPTS", "INDEXF",
 })
 """Display, listing, tolerance and bookkeeping: no motion, nothing for the machine."""
 
 UNSUPPORTED_MOTION = frozenset({
     "CUT", "DNTCUT", "COPY", "TRACUT", "GOFWD", "GOLFT", "GORGT", "GOBACK", "GOUP", "GODOWN", "GO", "OFFSET",
-    "MOVNRB", "INDIRP", "PSIS", "THREAD", "POCKET", "SCURV", "RMILL", "SMILL", "FMILL", "PATH", "CALL", "INDEX",
-    "MACRO", "LOOPST", "LOOPND", "JUMPTO", "TLLFT", "TLRGT", "TLON", "MOVETO", "CIRCUL", "ARCDAT", "ARCMOV",
-    "MIRROR", "XFORM", "MATRIX", "BSPLINE", "SPLINE", "ELLIPS",
+    "MOVNRB", "INDIRP", "THREAD", "POCKET", "SCURV", "RMILL", "SMILL", "FMILL", "PATH", "CALL", "INDEX",
+    "MACRO", "LOOPST", "LOOPND", "JUMPTO", "TLLFT", "TLRGT", "TLON", "MOVETO", "KNOT", "CNTRL", "CIRCUL",
+    "ARCDAT", "ARCMOV", "MIRROR", "XFORM", "MATRIX", "BSPLINE", "SPLINE", "ELLIPS",
 })
 """Words that move the tool or change how it moves, and that this reader does not carry out: an error."""
 

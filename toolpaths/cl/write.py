@@ -14,6 +14,7 @@ from dataclasses import asdict
 import numpy as np
 
 from toolpaths.arrays import Array, Bools, Floats
+from toolpaths.cl.assemble import NORMAL_ROUNDING
 from toolpaths.cl.feeds import MINUTE
 from toolpaths.toolpath import Cycle, Event, FeedMode, Kind, Role, Toolpath
 
@@ -86,6 +87,8 @@ def _points(p: Toolpath) -> list[str]:
         has = np.flatnonzero(~np.isnan(third[:, 0]))
         for k, extra in zip(has.tolist(), third[has].tolist(), strict=True):
             lines[k] += "".join(f",{v!r}" for v in extra)
+    for k in _contacts(p):
+        lines[k] += ",CONTACT"
     for role, word in _RECORDS.items():
         for k in np.flatnonzero(p.role == role).tolist():
             lines[k] = word + lines[k][5:]
@@ -98,6 +101,15 @@ def _third(p: Toolpath) -> Floats | None:
     if p.normal is None or p.contact is None:
         return p.normal if p.contact is None else p.contact
     return np.where(np.isnan(p.normal), p.contact, p.normal)
+
+
+def _contacts(p: Toolpath) -> list[int]:
+    """Rows whose contact point could be taken for a normal."""
+    if p.contact is None:
+        return []
+    near = np.abs(np.linalg.norm(p.contact, axis=1) - 1.0) <= 2.0 * NORMAL_ROUNDING
+    found: list[int] = np.flatnonzero(near).tolist()
+    return found
 
 
 def _before(p: Toolpath) -> dict[int, list[str]]:
@@ -114,6 +126,9 @@ def _before(p: Toolpath) -> dict[int, list[str]]:
     for row, lines in _feeds(p):
         add(row, *lines)
     _cycles(p, add)
+    spline = np.append(p.role == Role.SPLINE, False)
+    for row in np.flatnonzero(spline & ~np.roll(spline, 1)).tolist():
+        add(row, f"$$-> SPLINE / {int(np.argmin(spline[row:]))}")
     for row in np.flatnonzero((p.kind == Kind.RAPID) & (p.role == Role.POINT)).tolist():
         add(row, "RAPID")
     for row in np.flatnonzero(p.arc >= 0).tolist():

@@ -1,0 +1,155 @@
+"""Curves that carry their own end: CATIA's arcs to a line or plane, NX splines."""
+
+from __future__ import annotations
+
+import math
+import re
+
+import numpy as np
+
+from toolpaths.arrays import Floats
+from toolpaths.cl.build import Builder, Triple
+from toolpaths.cl.statements import Statement, words_of
+from toolpaths.toolpath import Role
+
+SPLINE_CHORD = 0.001
+"""mm: a spline is followed by chords no further from it than this"""
+_DEGREE = 3
+_MOST_CHORDS = 10000
+_GEOMETRY = re.compile(r"\b(CIRCLE|LINE|CYLNDR|POINT)\s*/([^()]*)", re.IGNORECASE)
+
+
+def indirv(b: Builder, s: Statement) -> None:
+    """INDIRV/i, j, k: the direction in which the next curve begins."""
+    if len(s.numbers) != 3:
+        b.log.error("cl.indirv", f"INDIRV/{s.body}: it takes three numbers", b.line)
+        return
+    b.toward = (s.numbers[0], s.numbers[1], s.numbers[2])
+
+
+def tlon(b: Builder, s: Statement) -> None:
+    """TLON,GOFWD/(CIRCLE/...),ON[,2,INTOF],(LINE/center, end) or /(CYLNDR/...),ON,(PLANE/...(POINT/end)).
+
+    The end is written out, so that counting crossings (2,INTOF) is not needed to find it.
+    """
+    b.arc_records += 1
+    found = [(m[1].upper(), [w for w in words_of(m[2]) if isinstance(w, float)]) for m in _GEOMETRY.finditer(s.body)]
+    arc, end = _arc_numbers(found), _end_of(found)
+    if arc is None or end is None:
+        b.log.error("cl.circle", f"TLON,GOFWD/{s.body[:60]}: only arcs of CIRCLE to LINE and CYLNDR to PLANE through "
+                    "POINT are understood", b.line)
+        return
+    if b.toward is None:
+        b.log.error("cl.indirv", "TLON,GOFWD without INDIRV: the direction of the arc is not known", b.line)
+        return
+    b.arcs.toward[len(b.arcs.row)] = b.toward
+    b.arcs.add(b.row, tuple(arc[:6]), b.line, arc[6])
+    b.toward = None
+    b.add_point(end)
+
+
+def _arc_numbers(found: list[tuple[str, list[float]]]) -> list[float] | None:
+    """Center, axis, radius of the first CIRCLE (axis z) or CYLNDR."""
+    for word, n in found:
+        if word == "CIRCLE" and len(n) == 4:
+            return [*n[:3], 0.0, 0.0, 1.0, n[3]]
+        if word == "CYLNDR" and len(n) == 7:
+            return n
+    return None
+
+
+def _end_of(found: list[tuple[str, list[float]]]) -> Triple | None:
+    """The far end of LINE, else the last POINT."""
+    for word, n in found:
+        if word == "LINE" and len(n) == 6:
+            return n[3], n[4], n[5]
+    ends = [n for word, n in found if word == "POINT" and len(n) == 3]
+    return (ends[-1][0], ends[-1][1], ends[-1][2]) if ends else None
+
+
+def nurbs(b: Builder, s: Statement) -> None:
+    """NURBS, KNOT/values, CNTRL/x,y,z ...: a clamped cubic that begins at the current point.
+
+    The knots written are the inner ones and the end; with the first point there are three more control points than
+    knots (inferred from files, no document states it).
+    """
+    knots, control = _gather(b)
+    start = b.last_point()
+    if start is None or math.isnan(start[0]):
+        b.log.error("cl.nurbs", "a spline needs a GOTO before it", b.line)
+        return
+    if len(control) != len(knots) + 2 or not knots:
+        b.log.error("cl.nurbs", f"the spline has {len(knots)} knots and {len(control)} control points; a cubic has two "
+                    "more points than knots", b.line)
+        return
+    inner = np.array(knots) / knots[-1] if knots[-1] > 0.0 else np.array([-1.0])
+    if (np.diff(np.append(0.0, inner)) < 0.0).any():
+        b.log.error("cl.nurbs", "the knots of the spline do not rise from 0", b.line)
+        return
+    points = spline_points(np.array([start, *control]), inner, SPLINE_CHORD / b.scale).tolist()
+    for x, y, z in points[:-1]:
+        b.add_point((x, y, z), role=Role.SPLINE)
+    b.add_point(control[-1])
+
+
+def _gather(b: Builder) -> tuple[list[float], list[Triple]]:
+    """Knots and control points of the KNOT and CNTRL records that follow; passes them."""
+    knots: list[float] = []
+    control: list[Triple] = []
+    statements = b.program.statements
+    while b.index + 1 < b.stop and statements[b.index + 1].major in ("KNOT", "CNTRL") \
+            and b.program.before[b.index + 1] == b.fast:
+        b.index += 1
+        n = statements[b.index].numbers
+        if statements[b.index].major == "KNOT":
+            knots += n
+        elif len(n) == 3:
+            control.append((n[0], n[1], n[2]))
+        else:
+            b.log.error("cl.nurbs", f"CNTRL has {len(n)} numbers, it takes 3", b.program.lines[b.index])
+    return knots, control
+
+
+def spline_points(control: Floats, inner: Floats, chord: float) -> Floats:
+    """Points (M, 3) after the first of a clamped cubic on [0, 1] whose chords keep within `chord` of it.
+
+    control (n, 3); inner (n - 3,): the inner knots and 1. The number of chords of a span of length h is
+    h sqrt(max |C''| / (8 chord)), the bound of linear interpolation.
+    """
+    knots = np.concatenate([np.zeros(_DEGREE + 1), inner, np.ones(_DEGREE)])
+    breaks = np.unique(knots)
+    bend = _second_derivatives(control, knots, breaks)
+    steps = np.ceil(np.diff(breaks) * np.sqrt(bend / (8.0 * chord)))
+    counts = np.clip(steps, 1, _MOST_CHORDS).astype(int)
+    at = np.concatenate([np.linspace(a, c, n + 1)[1:] for a, c, n in zip(breaks, breaks[1:], counts, strict=False)])
+    return de_boor(control, knots, at, _DEGREE)
+
+
+def _second_derivatives(control: Floats, knots: Floats, breaks: Floats) -> Floats:
+    """Greatest |C''| in each span between breaks: C'' is linear there, so that its ends decide."""
+    points, degree = control, _DEGREE
+    for _ in range(2):
+        width = knots[degree + 1:degree + len(points)] - knots[1:len(points)]
+        points = degree * np.diff(points, axis=0) / np.where(width > 0.0, width, 1.0)[:, None]
+        knots, degree = knots[1:-1], degree - 1
+    inside = np.concatenate([breaks[:-1], breaks[:-1] + (1.0 - 1e-9) * np.diff(breaks)])
+    size = np.linalg.norm(de_boor(points, knots, inside, degree), axis=1).reshape(2, -1)
+    result: Floats = size.max(axis=0)
+    return result
+
+
+def de_boor(control: Floats, knots: Floats, at: Floats, degree: int) -> Floats:
+    """Points (M, 3) of the B-spline at parameters (M,), by de Boor's recursion (The NURBS Book, A3.1)."""
+    span = np.clip(np.searchsorted(knots, at, side="right") - 1, degree, len(control) - 1)
+    d = control[span[:, None] + np.arange(-degree, 1)]
+    for level in range(1, degree + 1):
+        for j in range(degree, level - 1, -1):
+            low = knots[span + j - degree]
+            high = knots[span + j + 1 - level]
+            t = np.where(high > low, (at - low) / np.where(high > low, high - low, 1.0), 0.0)[:, None]
+            d[:, j] = (1.0 - t) * d[:, j - 1] + t * d[:, j]
+    result: Floats = d[:, degree]
+    return result
+
+
+HANDLERS = {"INDIRV": indirv, "TLON,GOFWD": tlon, "NURBS": nurbs}
