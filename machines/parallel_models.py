@@ -1,160 +1,23 @@
-"""`[kinematics] family = "linear-delta"` and `"h4-linear"`: legs, workspace, clearances of slider machines."""
+"""`[kinematics] family = "linear-delta"` and `"h4-linear"`: the two families and what makes them unusable."""
 
 from __future__ import annotations
 
-from abc import abstractmethod
 from collections.abc import Iterator
-from typing import Annotated, Literal
+from typing import Literal
 
 import numpy as np
-from pydantic import AfterValidator, Field
+from pydantic import Field
 
-from machines.kinematics.h4_linear import H4Linear, H4SpindleAxis, H4TableAxis
+from machines.kinematics.h4_axes import H4SpindleAxis, H4TableAxis
+from machines.kinematics.h4_linear import H4Linear
 from machines.kinematics.h4_platform import H4Platform
 from machines.kinematics.linear_delta import LinearDelta
-from machines.kinematics.rig import Clearance
-from machines.kinematics.sliders import Legs
-from machines.kinematics.workspace import Workspace
 from machines.machine import ControlKinematics
 from machines.mobility import delta_faults, h4_faults, reach_faults
-from machines.models import KinematicsModel, NotNegative, Positive, Problem, Vector
+from machines.models import NotNegative, Problem, Vector
+from machines.slider_models import SliderModel
 from machines.user_file import UserModel
-from toolpaths.arrays import Floats
 from toolpaths.units import DEG
-
-UNIT = 1e-6
-"""how far the length of a direction may be from 1 (it is normalised)"""
-
-
-def _upward(span: tuple[float, float]) -> tuple[float, float]:
-    if not span[0] < span[1]:
-        raise ValueError(f"{list(span)} is empty; write [lower, upper]")
-    return span
-
-
-Span = Annotated[tuple[float, float], AfterValidator(_upward)]
-
-
-class LegModel(UserModel):
-    """One `[kinematics.legs.LETTER]` table, mm; the order of the tables is the order of the joints."""
-
-    slide: Vector
-    """carriage joint at q = 0, in the machine frame"""
-    direction: Vector
-    """unit vector of positive q"""
-    joint: Vector = (0.0, 0.0, 0.0)
-    """platform joint relative to the platform's reference point"""
-    rod: Positive
-    """length of the rods"""
-    root: Literal[1, -1] = 1
-    """1 where the carriage stands on the positive side of the platform joint (larger q of two), -1 on the other"""
-    rods: tuple[Vector, ...] = ()
-    """each rod's place beside the leg's line, the same at both ends: two for a pair of parallel rods"""
-    rail_offset: Vector = (0.0, 0.0, 0.0)
-    """from the line of the carriage joint to the middle of the rail"""
-    rail_ends: Span | None = None
-    """q of the rail's ends; without it the rail is left out of the clearances"""
-
-
-class WorkspaceModel(UserModel):
-    """`[kinematics.workspace]`: box of the platform's reference point in the machine frame, mm; tilt in degrees."""
-
-    x: Span
-    y: Span
-    z: Span
-    tilt: tuple[float, float] = (0.0, 0.0)
-    """range of the platform's tilt about x"""
-
-    def build(self) -> Workspace:
-        """In mm and rad."""
-        low, high = zip(self.x, self.y, self.z, strict=True)
-        return Workspace(np.array(low), np.array(high), (self.tilt[0] * DEG, self.tilt[1] * DEG))
-
-
-class ClearanceModel(UserModel):
-    """`[kinematics.clearance]`: what may touch, mm and degrees; a key left out is not checked."""
-
-    rod_radius: Positive | None = None
-    spindle_radius: Positive | None = None
-    spindle: Span = (0.0, 1.0)
-    """lower and upper end of the spindle above the gauge point along the tool axis"""
-    rail_radius: NotNegative | None = None
-    carriage_angle: Positive | None = None
-    """largest swing of a rod at its carriage from its direction in the middle of the workspace"""
-    platform_angle: Positive | None = None
-    """the same at its platform joint"""
-    assumed: tuple[Literal["rod_radius", "spindle_radius", "spindle", "rail_radius", "carriage_angle",
-                           "platform_angle"], ...] = ()
-    """keys of this table whose figure no document states"""
-
-
-class SliderModel(KinematicsModel):
-    """What the families share."""
-
-    legs: dict[str, LegModel]
-    """by axis letter"""
-    workspace: WorkspaceModel
-    clearance: ClearanceModel = ClearanceModel()
-
-    def build_legs(self) -> Legs:
-        """The leg law's numbers."""
-        legs = self.legs.values()
-        return Legs(np.array([leg.slide for leg in legs]), np.array([leg.direction for leg in legs]),
-                    np.array([leg.rod for leg in legs]), np.array([float(leg.root) for leg in legs]))
-
-    def platform_joints(self) -> Floats:
-        """(K, 3) mm"""
-        return np.array([leg.joint for leg in self.legs.values()])
-
-    def build_clearance(self) -> Clearance:
-        """In mm and rad."""
-        legs, given = list(self.legs.values()), self.clearance
-        shifts = [(k, shift) for k, leg in enumerate(legs) for shift in leg.rods or ((0.0, 0.0, 0.0),)]
-        rails = all(leg.rail_ends is not None for leg in legs) and given.rail_radius is not None
-        return Clearance(
-            leg=np.array([k for k, _ in shifts]), shift=np.array([s for _, s in shifts]),
-            rod_radius=given.rod_radius,
-            spindle_radius=given.spindle_radius, spindle=given.spindle,
-            rail_radius=given.rail_radius if rails else None,
-            rail_offset=np.array([leg.rail_offset for leg in legs]),
-            rail_ends=np.array([leg.rail_ends or (0.0, 0.0) for leg in legs]),
-            carriage_angle=_radians(given.carriage_angle), platform_angle=_radians(given.platform_angle))
-
-    @property
-    @abstractmethod
-    def leg_count(self) -> int:
-        """Legs that this family has."""
-
-    def problems(self) -> Iterator[Problem]:
-        """Vectors that are no directions, a workspace out of reach, a platform that moves otherwise than the family."""
-        found = list(self._leg_problems())
-        yield from found
-        if not found:
-            yield from self.mobility_problems()
-
-    def _leg_problems(self) -> Iterator[Problem]:
-        if len(self.legs) != self.leg_count:
-            yield Problem("machine.geometry", ("legs",),
-                          f"{len(self.legs)} legs; family {self.family!r} has {self.leg_count}",
-                          "write one [kinematics.legs.LETTER] table per leg")
-        for name, leg in self.legs.items():
-            length = float(np.linalg.norm(leg.direction))
-            if abs(length - 1.0) > UNIT:
-                yield Problem("machine.geometry", ("legs", name, "direction"),
-                              f"{list(leg.direction)} has length {length:.6g}, not 1", "write a unit vector")
-            if len(name) != 1 or name not in "XYZUVWPQR":
-                yield Problem("machine.axis-letter", ("legs", name), f"{name!r} is no letter of a linear axis",
-                              "choose from X Y Z U V W P Q R")
-            if len(leg.rods) > 2:
-                yield Problem("machine.geometry", ("legs", name, "rods"), f"{len(leg.rods)} rods; a leg has one or two")
-
-    @abstractmethod
-    def mobility_problems(self) -> Iterator[Problem]:
-        """Faults that show over the workspace."""
-
-
-def _radians(degrees: float | None) -> float | None:
-    return None if degrees is None else degrees * DEG
 
 
 class LinearDeltaModel(SliderModel):
@@ -260,9 +123,10 @@ class H4LinearModel(SliderModel):
             count = ", ".join(f"{name} {len(leg.rods)}" for name, leg in self.legs.items())
             yield Problem("machine.geometry", ("legs",), f"rods per leg: {count}; an H4a has two pairs and two single "
                           "rods", "write rods = [[x, 0, 0], [-x, 0, 0]] for a pair, [[x, 0, 0]] for a single rod")
-        if self.workspace.tilt[0] > 0.0 or self.workspace.tilt[1] < 0.0:
-            yield Problem("machine.geometry", ("workspace", "tilt"), f"{list(self.workspace.tilt)} does not hold 0",
-                          "write tilt = [lower, upper] about the level platform, degrees")
+        low, high = self.workspace.tilt
+        if not -90.0 < low <= 0.0 <= high < 90.0:
+            yield Problem("machine.geometry", ("workspace", "tilt"), f"{[low, high]} does not hold 0 or reaches "
+                          "90 degrees", "write tilt = [lower, upper] about the level platform, degrees")
         if self.rotary.carries == "part" and self.rotary.pivot != (0.0, 0.0, 0.0):
             yield Problem("machine.geometry", ("rotary", "pivot"), "a table turns about z through the machine origin",
                           "take pivot out and give the slides relative to the table's axis")

@@ -1,16 +1,16 @@
-"""Five-axis machines on the asymmetric H4: a C table under the part, or a B axis between platform and spindle.
+"""Five-axis machines on the asymmetric H4: what those with a C table and with a B axis at the spindle share.
 
-The platform tilts about x by theta, which no axis shows: it follows from the four slides. The machine frame is that
-of the slides. At theta = 0 and rotary axis = 0 the gauge point is `gauge` below the platform's reference point C (h1 of
-the thesis); a tool lengthens it. Source: Company 2000, V.5.2 (both machines), V.7 (model); the tilt and table pairs
-are those of J = Rz(C) Rx(A), axis = (sinA sinC, -sinA cosC, cosA).
+The machines themselves are in `h4_axes`. The platform tilts about x by theta, which no axis shows: it follows from the
+four slides. The machine frame is that of the slides. At theta = 0 and rotary axis = 0 the gauge point is `gauge` below
+the platform's reference point C (h1 of the thesis); a tool lengthens it. Source: Company 2000, V.5.2 (both machines),
+V.7 (model).
 """
 
 from __future__ import annotations
 
 from abc import abstractmethod
-from dataclasses import dataclass, field, replace
-from typing import Self
+from dataclasses import dataclass, replace
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from machines.kinematics.h4_platform import H4Platform
 from machines.kinematics.rig import Clearance, Rig
 from machines.kinematics.sliders import Legs
 from machines.kinematics.workspace import Workspace
-from toolpaths.arrays import Bools, Floats, frozen
+from toolpaths.arrays import Floats
 
 ROUND_OFF = 1e-12
 """rad: directions nearer than this are the same"""
@@ -32,8 +32,8 @@ Pair = tuple[Floats, Floats]
 class H4Linear(Kinematics):
     """What both machines share. Joints: four slides, then the rotary axis.
 
-    `inverse` gives the machine's own leg roots for each of the two tilt/rotary pairs (branches = 2). With `all_roots`
-    every choice of the four leg roots for each pair (32): the two own ones first, then in the order of
+    `inverse` gives the machine's own leg roots for each pair of tilt and rotary axis (`pairs`). With `all_roots` it
+    gives every choice of the four leg roots for each pair: the own ones first, then in the order of
     `Legs.root_choices`. A leg cannot change its root without passing the position where the rod is square to its slide.
     """
 
@@ -48,10 +48,13 @@ class H4Linear(Kinematics):
     clearance: Clearance | None = None
     rotary: tuple[bool, ...] = (False, False, False, False, True)
 
+    pairs: ClassVar[int]
+    """how many tilts take the tool to a direction"""
+
     @property
     def branches(self) -> int:  # type: ignore[override]
-        """2 tilt/rotary pairs, times 16 with `all_roots`"""
-        return 32 if self.all_roots else 2
+        """`pairs`, times 16 with `all_roots`"""
+        return self.pairs * (16 if self.all_roots else 1)
 
     @property
     def workspace(self) -> Workspace:
@@ -66,8 +69,8 @@ class H4Linear(Kinematics):
     # ---- what differs ----------------------------------------------------------------------------------------------
 
     @abstractmethod
-    def _pairs(self, axis: Floats, free: Floats) -> tuple[Pair, Pair]:
-        """The two pairs that take the tool to the unit `axis` (N, 3); a free rotary axis stands at `free` (N,)."""
+    def _pairs(self, axis: Floats, free: Floats) -> tuple[Pair, ...]:
+        """The pairs that take the tool to the unit `axis` (N, 3); a free rotary axis stands at `free` (N,)."""
 
     @abstractmethod
     def _tool(self, turn: Floats) -> tuple[Floats, Floats, Floats]:
@@ -88,14 +91,11 @@ class H4Linear(Kinematics):
         return replace(self, tool_length=float(length))
 
     def inverse(self, tip: Floats, axis: Floats, spin: float | Floats = 0.0, near: Floats | None = None) -> Floats:
-        """Joints (B, N, 5), V-22; NaN where a rod does not reach or the tilt leaves the workspace's range.
-
-        The first pair has theta >= 0 (C table) or B within +-90 degrees (B axis).
-        """
-        tip, axis = as_points(tip, 3, "tip"), _unit(as_points(axis, 3, "axis"))
+        """Joints (B, N, 5), V-22; NaN where a rod does not reach or the tilt leaves the workspace's range."""
+        tip, axis = as_points(tip, 3, "tip"), unit(as_points(axis, 3, "axis"))
         free = np.zeros(len(tip)) if near is None else np.broadcast_to(near, (len(tip), 5))[:, 4]
-        pairs = [self._slides(tip, *pair) for pair in self._pairs(axis, free)]
-        return np.stack([branch for roots in zip(*pairs, strict=True) for branch in roots])
+        solved = [self._slides(tip, *pair) for pair in self._pairs(axis, free)]
+        return np.stack([branch for roots in zip(*solved, strict=True) for branch in roots])
 
     def _slides(self, tip: Floats, tilt: Floats, turn: Floats) -> list[Floats]:
         """Joints (N, 5) of one pair for each choice of roots asked for."""
@@ -108,7 +108,7 @@ class H4Linear(Kinematics):
     def _platform_at(self, tip: Floats, tilt: Floats, turn: Floats) -> Floats:
         """Platform (N, 4) that puts the tip (N, 3) there at that tilt and rotary axis."""
         reach, _, _ = self._tool(turn)
-        return np.column_stack([self._to_part(tip, -turn) - _tilted(reach, tilt), tilt])
+        return np.column_stack([self._to_part(tip, -turn) - tilted(reach, tilt), tilt])
 
     def solve_platform(self, q: Floats, near: Floats | None = None) -> Floats:
         """Platform (N, 4) of joints (N, 5) in the mode nearest the pose `near` (6,) or (N, 6), else the home mode."""
@@ -126,7 +126,7 @@ class H4Linear(Kinematics):
 
     def place(self, p: Floats, turn: Floats) -> tuple[Floats, Floats, Floats]:
         """(tip, axis, x of the tool), each (N, 3) in the table frame, of platform (N, 4) and rotary axis (N,)."""
-        reach, axis, side = (_tilted(v, p[:, 3]) for v in self._tool(turn))
+        reach, axis, side = (tilted(v, p[:, 3]) for v in self._tool(turn))
         return self._to_part(p[:, :3] + reach, turn), self._to_part(axis, turn), self._to_part(side, turn)
 
     def pose(self, q: Floats, near: Floats | None = None) -> tuple[Floats, Floats, Floats]:
@@ -143,9 +143,14 @@ class H4Linear(Kinematics):
     def rig(self, q: Floats, near: Floats | None = None) -> Rig:
         """Where the parts are at joints q (N, 5), for the clearances."""
         p = self.solve_platform(q, near)
-        reach, axis, _ = (_tilted(v, p[:, 3]) for v in self._tool(q[:, 4]))
+        reach, axis, _ = (tilted(v, p[:, 3]) for v in self._tool(q[:, 4]))
         gauge = p[:, :3] + reach + self.tool_length * axis
         return Rig(p[:, :3], p[:, 3], self.platform.legs.carriages(q[:, :4]), self.platform.ends(p), gauge, axis)
+
+    def random_slides(self, rng: np.random.Generator, n: int) -> Floats:
+        """Slides (n, 4) of random places and tilts of the workspace."""
+        place, tilt = self.workspace.random(rng, n)
+        return self.platform.inverse(np.column_stack([place, tilt]))
 
     def middle_rig(self) -> Rig:
         """The same in the middle of the workspace, rotary axis at 0."""
@@ -167,7 +172,7 @@ class H4Linear(Kinematics):
         """(v (N, 3, 5), omega (N, 3, 5), tool axis (N, 3)) in the table frame."""
         p, turn = self.solve_platform(q, near), q[:, 4]
         tip, axis, _ = self.place(p, turn)
-        arm = _tilted(self._tool(turn)[0], p[:, 3])
+        arm = tilted(self._tool(turn)[0], p[:, 3])
         dp = self.platform.rates(p, q[:, :4])
         v, omega = np.zeros((len(q), 3, 5)), np.zeros((len(q), 3, 5))
         omega[:, 0, :4] = dp[:, 3]
@@ -178,109 +183,13 @@ class H4Linear(Kinematics):
         return v, omega, axis
 
 
-@dataclass(frozen=True, eq=False)
-class H4TableAxis(H4Linear):
-    """The part on a C table about z through the machine origin; seen from it, +C turns the tool by +C."""
-
-    def _pairs(self, axis: Floats, free: Floats) -> tuple[Pair, Pair]:
-        flat = np.hypot(axis[:, 0], axis[:, 1])
-        tilt, along = np.arctan2(flat, axis[:, 2]), flat < ROUND_OFF
-        heading = np.arctan2(axis[:, 0], -axis[:, 1])
-        both = [np.where(along, free, wrap(self.sense * h)) for h in (heading, heading + np.pi)]
-        return (tilt, both[0]), (-tilt, both[1])
-
-    def _tool(self, turn: Floats) -> tuple[Floats, Floats, Floats]:
-        n = len(turn)
-        return (np.tile([0.0, 0.0, -self.gauge - self.tool_length], (n, 1)), np.tile([0.0, 0.0, 1.0], (n, 1)),
-                np.tile([1.0, 0.0, 0.0], (n, 1)))
-
-    def _to_part(self, v: Floats, turn: Floats) -> Floats:
-        shape = (len(turn),) + (1,) * (v.ndim - 2)
-        c, s = np.cos(turn).reshape(shape), self.sense * np.sin(turn).reshape(shape)
-        return np.stack([c * v[:, 0] - s * v[:, 1], s * v[:, 0] + c * v[:, 1], v[:, 2]], axis=1)
-
-    def _line(self, p: Floats) -> tuple[Floats, Floats]:
-        return np.tile([0.0, 0.0, self.sense], (len(p), 1)), np.zeros((len(p), 3))
-
-    def singular(self, q: Floats) -> Bools:
-        """True (N,) where the tool is along the table's axis: theta = 0."""
-        tilt = self.solve_platform(q)[:, 3]
-        result: Bools = np.abs(np.sin(tilt)) < ROUND_OFF
-        return result
-
-    def nearest_axis(self, axis: Floats) -> Floats:
-        """Tool directions (N, 3) nearest to `axis`: within the greater end of the tilt range from z."""
-        unit = _unit(as_points(axis, 3, "axis"))
-        most = max(abs(t) for t in self.workspace.tilt)
-        flat = np.hypot(unit[:, 0], unit[:, 1])
-        side = np.where((flat > 0.0)[:, None], unit[:, :2] / np.where(flat > 0.0, flat, 1.0)[:, None], [0.0, -1.0])
-        edge = np.column_stack([np.sin(most) * side, np.full(len(unit), np.cos(most))])
-        inside = np.arctan2(flat, unit[:, 2]) <= most + ROUND_OFF
-        result: Floats = np.where(inside[:, None], axis, edge)
-        return result
-
-
-@dataclass(frozen=True, eq=False)
-class H4SpindleAxis(H4Linear):
-    """The spindle on a B axis that the platform carries: about the platform's y through C + pivot."""
-
-    pivot: Floats = field(default_factory=lambda: np.zeros(3))
-    """(3,) mm in the platform; the gauge point is `gauge` below it"""
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "pivot", frozen(self.pivot, np.float64, (3,), "H4SpindleAxis.pivot"))
-
-    def _pairs(self, axis: Floats, free: Floats) -> tuple[Pair, Pair]:
-        flat = np.hypot(axis[:, 1], axis[:, 2])
-        turn = np.arctan2(axis[:, 0], flat)
-        tilt = np.arctan2(-axis[:, 1], axis[:, 2])
-        other = np.arctan2(axis[:, 1], -axis[:, 2])
-        return (tilt, wrap(self.sense * turn)), (other, wrap(self.sense * (np.pi - turn)))
-
-    def _tool(self, turn: Floats) -> tuple[Floats, Floats, Floats]:
-        c, s, zero = np.cos(turn), self.sense * np.sin(turn), 0.0 * turn
-        axis = np.stack([s, zero, c], axis=1)
-        return self.pivot - (self.gauge + self.tool_length) * axis, axis, np.stack([c, zero, -s], axis=1)
-
-    def _to_part(self, v: Floats, turn: Floats) -> Floats:
-        return v
-
-    def _line(self, p: Floats) -> tuple[Floats, Floats]:
-        n = len(p)
-        return (_tilted(np.tile([0.0, self.sense, 0.0], (n, 1)), p[:, 3]),
-                p[:, :3] + _tilted(np.tile(self.pivot, (n, 1)), p[:, 3]))
-
-    def singular(self, q: Floats) -> Bools:
-        """True (N,) where the tool is along x, the platform's tilt axis: B = +-90 degrees."""
-        result: Bools = np.abs(np.cos(as_points(q, 5, "q")[:, 4])) < ROUND_OFF
-        return result
-
-    def nearest_axis(self, axis: Floats) -> Floats:
-        """Tool directions (N, 3) nearest to `axis`: those whose tilt, with B or its other value, is in range."""
-        unit = _unit(as_points(axis, 3, "axis"))
-        low, high = self.workspace.tilt
-        tilt = np.arctan2(-unit[:, 1], unit[:, 2])
-        inside = [(t >= low - ROUND_OFF) & (t <= high + ROUND_OFF) for t in (tilt, wrap(tilt + np.pi))]
-        edges = np.stack([_onto_tilt(unit, t) for t in (low, high)])
-        cosine = np.sum(edges * unit, axis=2)
-        best = np.where((cosine[0] >= cosine[1])[:, None], edges[0], edges[1])
-        result: Floats = np.where((inside[0] | inside[1])[:, None], axis, best)
-        return result
-
-
-def _onto_tilt(unit: Floats, tilt: float) -> Floats:
-    """Directions (N, 3) nearest to `unit` on the great circle that B sweeps at that tilt."""
-    normal = np.array([0.0, np.cos(tilt), np.sin(tilt)])
-    return _unit(unit - (unit @ normal)[:, None] * normal)
-
-
-def _tilted(v: Floats, tilt: Floats) -> Floats:
+def tilted(v: Floats, tilt: Floats) -> Floats:
     """Rx(tilt) v (N, 3)."""
     c, s = np.cos(tilt), np.sin(tilt)
     return np.stack([v[:, 0] + 0.0 * c, c * v[:, 1] - s * v[:, 2], s * v[:, 1] + c * v[:, 2]], axis=1)
 
 
-def _unit(v: Floats) -> Floats:
+def unit(v: Floats) -> Floats:
     norm = np.linalg.norm(v, axis=1, keepdims=True)
     result: Floats = v / np.where(norm > 0.0, norm, np.nan)
     return result
