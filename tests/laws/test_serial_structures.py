@@ -5,7 +5,8 @@ from itertools import permutations
 import numpy as np
 import pytest
 
-from machines.kinematics.serial import ROUND_OFF, Joint, Serial
+from machines.kinematics.frames import reference_x
+from machines.kinematics.serial import Joint, Serial
 from toolpaths.rotations import angle_between, rotation
 
 X, Y, Z = np.eye(3)
@@ -96,10 +97,17 @@ def skew_head():
     return Serial((*SLIDES, Joint("C", True, Z), Joint("B", True, second)), ("X", "Y", "Z", "B", "C"), tool)
 
 
+def obtuse_head():
+    """Axes 100 degrees apart, tool 120 degrees from the second: reach from 20 to 360 - 220 = 140 degrees."""
+    a, b = np.radians(100), np.radians(220)
+    second, tool = np.array([np.sin(a), 0, np.cos(a)]), np.array([np.sin(b), 0, np.cos(b)])
+    return Serial((*SLIDES, Joint("C", True, Z), Joint("B", True, second)), ("X", "Y", "Z", "B", "C"), tool)
+
+
 OFFSETS = np.concatenate([[0.0], 10.0 ** np.arange(-17.0, -0.5, 0.25)])
 
 
-@pytest.mark.parametrize("make", [trunnion, nutating, skew_head])
+@pytest.mark.parametrize("make", [trunnion, nutating, skew_head, obtuse_head])
 @pytest.mark.parametrize("end", [0, 1])
 def test_no_digits_are_lost_near_the_singular_direction_and_the_edge_of_reach(make, end):
     k = make().with_tool(100.0)
@@ -116,11 +124,12 @@ def test_no_digits_are_lost_near_the_singular_direction_and_the_edge_of_reach(ma
             assert angle_between(direction, axis)[well].max() < 2e-15
 
 
-def test_directions_just_out_of_reach_are_refused():
-    k = skew_head()
+@pytest.mark.parametrize("make", [skew_head, obtuse_head])
+def test_directions_just_out_of_reach_are_refused(make):
+    k = make()
     tip = np.zeros((1, 3))
     for edge, sign in zip(k.reach(), (-1, 1), strict=True):
-        for step, taken in ((0.5 * ROUND_OFF, True), (1e-11, False), (0.1, False)):
+        for step, taken in ((3e-13, True), (1e-11, False), (0.1, False)):
             polar = edge + sign * step
             axis = np.array([[np.sin(polar), 0.0, np.cos(polar)]])
             assert np.isfinite(k.inverse(tip, axis)).all() == taken
@@ -169,3 +178,13 @@ def test_spin_is_measured_from_the_carried_x():
     k = trunnion()
     spin = k.pose(np.array([[0, 0, 0, 0, 0.5], [0, 0, 0, 0.7, 0.5]]))[2]
     np.testing.assert_allclose(spin, [0.5, 0.5], atol=1e-15)  # Rz(C) Rx(A): least tilt has no spin, so C is all
+
+
+def test_reference_x_is_carried_by_the_least_rotation_also_near_minus_z():
+    axis = np.vstack([unit(np.random.default_rng(3), 100), [[1e-9, 2e-9, -1.0], [0, 0, 1], [0, 0, -1]]])
+    x = reference_x(axis)
+    np.testing.assert_allclose(np.linalg.norm(x, axis=1), 1.0, rtol=0, atol=1e-14)
+    np.testing.assert_allclose((x * axis).sum(axis=1), 0.0, rtol=0, atol=1e-14)
+    turn = np.cross([0.0, 0.0, 1.0], axis)  # what lies along the axis of the least rotation stays
+    np.testing.assert_allclose((x * turn).sum(axis=1), turn[:, 0], rtol=0, atol=1e-14)
+    np.testing.assert_array_equal(x[-1], [1, 0, 0])

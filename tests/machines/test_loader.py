@@ -67,6 +67,14 @@ def test_positive_minus_one_turns_the_sense(tmp_path):
     np.testing.assert_array_equal(ours.forward(q), theirs.forward(mirrored))
 
 
+def test_home_and_travel_are_in_radians(tmp_path):
+    path = tmp_path / "m.toml"
+    path.write_text('base = "mikron-ucp710"\n[axes.A]\nhome = 90\n')
+    m = machines.load(path)
+    np.testing.assert_allclose(m.home, [0, 0, 250, np.pi / 2, 0])
+    np.testing.assert_allclose(m.limits.upper, [355, 275, 250, np.pi * 2 / 3, np.inf])
+
+
 @pytest.mark.parametrize(("old", "new", "code", "words"), [
     ("velocity = 500 ", "velocty = 500 ", "file.unknown-key", "did you mean 'velocity'?"),
     ('family = "serial"', 'family = "seriall"', "machine.family", "did you mean 'serial'?"),

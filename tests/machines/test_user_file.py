@@ -167,7 +167,8 @@ def test_base_cycle_unknown_base_and_wrong_type(tmp_path):
     assert (d.code, d.lines) == ("file.base-cycle", (1,))
     d = only(tmp_path, '\nbase = "smal"\n', small=write(tmp_path, GOOD, "b.toml"))
     assert (d.code, d.lines) == ("file.not-found", (2,))
-    assert only(tmp_path, "base = 3\n").code == "file.type"
+    d = only(tmp_path, "\nbase = 3\n")
+    assert (d.code, d.lines) == ("file.type", (2,))
 
 
 def test_schema_knows_base_and_forbids_the_rest():
