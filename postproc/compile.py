@@ -125,7 +125,8 @@ def _written(words: Floats, path: Path, control: Control) -> Bools:
     """Words (K, J) that a block states: those it names, else those that change; both plane words of an arc."""
     changed = np.zeros(words.shape, dtype=bool)
     changed[1:] = words[1:] != words[:-1]
-    write: Bools = np.asarray(np.where(path.state.any(axis=1)[:, None], path.state, changed))
+    names = np.asarray(path.state.any(axis=1))[:, None]
+    write: Bools = np.asarray(np.where(names, path.state, changed))
     for k in np.flatnonzero(path.code == ARC):
         third = {17: 2, 18: 1, 19: 0}[int(path.plane[k])]
         write[k, [c for i, c in enumerate(control.xyz) if i != third]] = True

@@ -149,7 +149,7 @@ def _following(kin: Kinematics, tip: Floats, axis: Floats, branches: Floats, fam
     own = np.arange(count)
     stay = step[own, own]
     following = np.where((stay <= step.min(axis=1) + 1e-9) & np.isfinite(stay), own[:, None], step.argmin(axis=1))
-    free = family[:, :-1].any(axis=0) | family[:, 1:].any(axis=0)
+    free = np.asarray(family[:, :-1].any(axis=0) | family[:, 1:].any(axis=0))
     doubtful = ((following != own[:, None]) | (stay > _SMALL_STEP)) & np.isfinite(stay) & ~free
     for b, i in np.argwhere(doubtful):
         end = _walk(kin, tip[i:i + 2], axis[i:i + 2], branches[b, i], int(b))

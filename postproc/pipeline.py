@@ -22,7 +22,7 @@ from postproc.readback.compare import Comparison
 from postproc.readback.verify import read_back
 from postproc.setup import SetupFile, load_setup
 from postproc.travel import check_travel
-from toolpaths.diagnostics import Diagnostic, has_errors
+from toolpaths.diagnostics import Diagnostic, DiagnosticError, error, has_errors
 from toolpaths.toolpath import Toolpath
 from toolpaths.units import DEG
 
@@ -144,3 +144,45 @@ def write_text(result: PostResult) -> str:
 def points_in(toolpath: Toolpath) -> int:
     """Commanded positions, without FROM and GOHOME."""
     return int(np.isin(toolpath.role, (0, 1)).sum())
+
+
+@dataclass(frozen=True)
+class VerifyResult:
+    """What reading a G-code file back showed."""
+
+    gcode: str
+    comparison: Comparison | None
+    diagnostics: tuple[Diagnostic, ...]
+
+    @property
+    def ok(self) -> bool:
+        """True where the program does what the CL file says."""
+        return self.comparison is not None and not has_errors(self.diagnostics)
+
+
+def verify(gcode: str | FilePath, path: Toolpath, machine: Machine, controller: str | FilePath = "linuxcnc",
+           options: Options | None = None, diagnostics: list[Diagnostic] | None = None,
+           progress: Progress | None = None) -> VerifyResult:
+    """A G-code file against a Toolpath on a machine.
+
+    Raises:
+        DiagnosticError: where the controller or the set-up cannot be loaded, or the G-code file not be opened.
+    """
+    options, found = options or Options(), list(diagnostics or ())
+    spec, more = load_controller(controller)
+    toolpaths.diagnostics.require(more)
+    setup, more = load_setup(options.setup or None)
+    toolpaths.diagnostics.require(more)
+    assert spec is not None and setup is not None
+    try:
+        data = FilePath(gcode).read_bytes()
+    except OSError as fault:
+        raise DiagnosticError([error("gcode.open", f"cannot be read: {fault.strerror}", file=str(gcode))]) from fault
+    if has_errors(found):
+        return VerifyResult(str(gcode), None, tuple(found))
+    job, more = prepare(path, machine, spec, setup, options)
+    found += more
+    if job is None or has_errors(found):
+        return VerifyResult(str(gcode), None, tuple(found))
+    comparison, more = read_back(data, job, path.file, progress, str(gcode))
+    return VerifyResult(str(gcode), comparison, (*found, *more))

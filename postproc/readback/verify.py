@@ -14,20 +14,21 @@ from toolpaths.diagnostics import Diagnostic, error, has_errors
 
 
 def read_back(data: bytes, job: Job, file: str,
-              progress: Callable[[str, int, int], None] | None = None) -> tuple[Comparison | None, list[Diagnostic]]:
+              progress: Callable[[str, int, int], None] | None = None,
+              gcode: str = "") -> tuple[Comparison | None, list[Diagnostic]]:
     """Execute a program on the job's machine and compare its motion with the job's CL file."""
     machine, control = job.machine, job.control
-    words, diagnostics = tokenise(data, file)
+    words, diagnostics = tokenise(data, gcode)
     if has_errors(diagnostics):
         return None, diagnostics
     offsets = Offsets(control.work_offset, control.xyz, job.register_lengths(), machine.home * control.unit,
                       control.length_on_z, job.controller.cycles.peck_relief)
-    motion, found = execute(words, machine.axis_names, offsets, file)
+    motion, found = execute(words, machine.axis_names, offsets, gcode)
     diagnostics += found
     if has_errors(diagnostics):
         return None, diagnostics
     if not len(motion):
-        return None, [*diagnostics, error("verify.no_motion", "the program moves nothing", file=file)]
+        return None, [*diagnostics, error("verify.no_motion", "the program moves nothing", file=gcode)]
     if progress:
         progress("read back", 0, len(motion))
     executed = Executed(control, job.kinematics_of, offsets.lengths)

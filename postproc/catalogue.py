@@ -1,0 +1,83 @@
+"""Machines and controllers as people and programs read them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from machines.machine import Machine
+from machines.user_file import read_toml
+from postproc.controllers.model import builtin_files, load_controller
+from toolpaths.diagnostics import DiagnosticError, require
+from toolpaths.units import DEG
+
+_COLUMNS = ("lower", "upper", "velocity", "acceleration", "jerk")
+
+
+def machine_dict(machine: Machine) -> dict[str, Any]:
+    """A machine with its limits; lengths mm, angles degrees; travel without end is null."""
+    axes = []
+    for j, name in enumerate(machine.axis_names):
+        unit = 1.0 / DEG if machine.rotary[j] else 1.0
+        row: dict[str, Any] = {"letter": name, "kind": "rotary" if machine.rotary[j] else "linear",
+                               "unit": "deg" if machine.rotary[j] else "mm"}
+        for key in _COLUMNS:
+            value = float(getattr(machine.limits, key)[j]) * unit
+            row[key] = round(value, 9) if np.isfinite(value) else None
+        row["home"] = round(float(machine.home[j]) * unit, 9)
+        row["assumed"] = sorted(k.split(".", 1)[1] for k in machine.limits.assumed if k.split(".")[0] == name)
+        axes.append(row)
+    control = machine.control_kinematics
+    return {"name": machine.name, "description": machine.description, "structure": machine.structure,
+            "file": machine.file, "axes": axes,
+            "retract_axis": machine.axis_names[machine.retract_axis] if machine.retract_axis >= 0 else None,
+            "timing_s": {"tool_change": machine.timing.tool_change, "clamp": machine.timing.clamp,
+                         "unclamp": machine.timing.unclamp},
+            "control": {"module": control.module, "pins": dict(control.pins)} if control else None}
+
+
+def machine_text(machine: Machine) -> str:
+    """The same for people."""
+    d = machine_dict(machine)
+    lines = [f"{d['name']}: {d['description']}", f"structure {d['structure']}", "",
+             "axis  travel                        velocity  acceleration       jerk  home"]
+    for row in d["axes"]:
+        travel = "unlimited" if row["lower"] is None else f"{row['lower']:g} to {row['upper']:g} {row['unit']}"
+        lines.append(f"{row['letter']:4}  {travel:28} {row['velocity']:9g} {row['acceleration']:13g} {row['jerk']:10g} "
+                     f"{row['home']:5g}" + (f"  (assumed: {', '.join(row['assumed'])})" if row["assumed"] else ""))
+    lines.append("velocity per s, acceleration per s2, jerk per s3, in mm or degrees")
+    if d["control"]:
+        pins = ", ".join(f"{k} {v:g}" for k, v in d["control"]["pins"].items())
+        lines.append(f"the control runs the kinematics {d['control']['module']} ({pins})")
+    return "\n".join(lines)
+
+
+def controller_values(source: str) -> tuple[dict[str, Any], dict[str, str]]:
+    """Every value of a controller, flat by dotted key, and the file and line (or "default") it comes from.
+
+    Raises:
+        DiagnosticError: where the file has faults.
+    """
+    spec, found = load_controller(source)
+    require(found)
+    file, _ = read_toml(source, builtin=builtin_files(), kind="controller")
+    if spec is None or file is None:
+        raise DiagnosticError(found)
+    values = _flat(spec.model_dump(), "")
+    origins = {}
+    for key in values:
+        origin = file.origins.get(tuple(key.split(".")))
+        origins[key] = f"{Path(origin.file).name}:{origin.line}" if origin else "default"
+    return values, origins
+
+
+def _flat(values: dict[str, Any], prefix: str) -> dict[str, Any]:
+    result: dict[str, Any] = {}
+    for key, value in values.items():
+        if isinstance(value, dict) and value:
+            result |= _flat(value, f"{prefix}{key}.")
+        else:
+            result[prefix + key] = value
+    return result

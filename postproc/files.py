@@ -1,0 +1,44 @@
+"""Output files are replaced whole or not at all."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from pathlib import Path
+
+from toolpaths.diagnostics import Diagnostic, DiagnosticError, error
+
+
+def write_atomically(path: Path, text: str) -> None:
+    """Write `text` beside `path` and put it in its place at once; folders are made as needed.
+
+    Raises:
+        DiagnosticError: where the file cannot be written; what stood there stays.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    except OSError as fault:
+        raise DiagnosticError([_cannot(path, fault)]) from fault
+    temporary = Path(name)
+    try:
+        with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as file:
+            file.write(text)
+        temporary.chmod(0o666 & ~_umask())
+        temporary.replace(path)
+    except OSError as fault:
+        temporary.unlink(missing_ok=True)
+        raise DiagnosticError([_cannot(path, fault)]) from fault
+    except BaseException:
+        temporary.unlink(missing_ok=True)
+        raise
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
+
+
+def _cannot(path: Path, fault: OSError) -> Diagnostic:
+    return error("file.write", f"cannot be written: {fault.strerror}", file=str(path), hint="choose another place with -o")

@@ -1,0 +1,95 @@
+"""The figures of a conversion, as JSON and for people."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from postproc.pipeline import PostResult, VerifyResult, points_in
+from toolpaths.units import DEG
+
+
+def as_dict(result: PostResult, output: str) -> dict[str, Any]:
+    """The keys of `convert --json`; lengths mm, angles degrees, times s; null where a stage was not reached."""
+    c = result.comparison
+    return {
+        "output": output if result.ok else None,
+        "machine": result.machine.name,
+        "controller": result.controller_name,
+        "points_in": points_in(result.toolpath) if result.toolpath is not None else 0,
+        "blocks_out": len(result.program) if result.program is not None else 0,
+        "points_added": points_added(result),
+        "cycle_time_s": None,
+        "worst_tip_deviation_mm": _number(c.worst_tip) if c else None,
+        "worst_axis_deviation_deg": _number(c.worst_axis / DEG) if c else None,
+        "rewinds": 0,
+        "singular_events": len(result.path.turns) if result.path is not None else 0,
+        "feed_reduced_blocks": int(result.feeds.slowed.sum()) if result.feeds is not None else 0,
+        "axis_extents": {k: list(v) for k, v in (result.extents or {}).items()},
+        "tolerance_shares": result.shares or {},
+        "diagnostics": [d.as_dict() for d in result.diagnostics],
+    }
+
+
+def _number(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def points_added(result: PostResult) -> int:
+    """Blocks that linearising put between CL points."""
+    if result.path is None:
+        return 0
+    return int((np.isfinite(result.path.u) & (result.path.u < 1.0)).sum())
+
+
+def as_text(result: PostResult, output: str) -> str:
+    """The summary on standard output."""
+    if not result.ok:
+        return "nothing written"
+    d = as_dict(result, output)
+    shares = d["tolerance_shares"]
+    lines = [f"{output}: {d['blocks_out']} blocks from {d['points_in']} points ({d['points_added']} added) for "
+             f"{d['machine']}, {d['controller']}",
+             f"proved: tip within {d['worst_tip_deviation_mm']:.6f} mm, axis within "
+             f"{d['worst_axis_deviation_deg']:.6f} degrees of the CL file (allowed {result.options.tolerance:g} mm, "
+             f"{result.options.axis_tolerance:g} degrees)",
+             f"tolerance: linearising {shares['linearising']:.4f}, control's smoothing {shares['smoothing']:.4f}, "
+             f"rounding at most {shares['rounding']:.5f} mm"]
+    if result.job is not None:
+        offset = " ".join(f"{k}{v:.4f}" for k, v in zip(result.machine.axis_names, result.job.control.work_offset,
+                                                       strict=True))
+        lines.append(f"work offset {result.setup.work_offset_code}: {offset}")
+    lines.append("axes: " + ", ".join(f"{k} {lo:.3f} to {hi:.3f}" for k, (lo, hi) in d["axis_extents"].items()))
+    if d["feed_reduced_blocks"]:
+        lines.append(f"feed reduced for an axis limit in {d['feed_reduced_blocks']} blocks")
+    if d["singular_events"]:
+        lines.append(f"turns on the spot where the tool lies along a rotary axis: {d['singular_events']}")
+    return "\n".join(lines)
+
+
+def verify_dict(result: VerifyResult) -> dict[str, Any]:
+    """The figures of `verify --json`."""
+    c = result.comparison
+    return {
+        "gcode": result.gcode,
+        "proved": result.ok,
+        "blocks": len(c.owner) if c else 0,
+        "worst_tip_deviation_mm": _number(c.worst_tip) if c else None,
+        "worst_axis_deviation_deg": _number(c.worst_axis / DEG) if c else None,
+        "worst_tip_lines": list(c.worst_tip_line) if c else None,
+        "worst_axis_lines": list(c.worst_axis_line) if c else None,
+        "diagnostics": [d.as_dict() for d in result.diagnostics],
+    }
+
+
+def verify_text(result: VerifyResult) -> str:
+    """The verdict for people."""
+    c = result.comparison
+    if c is None:
+        return "not proved"
+    verdict = "proved" if result.ok else "NOT proved"
+    return (f"{verdict}: {len(c.owner)} blocks; tip within {c.worst_tip:.6f} mm (CL line {c.worst_tip_line[0]}, block line "
+            f"{c.worst_tip_line[1]}), axis within {c.worst_axis / DEG:.6f} degrees (CL line {c.worst_axis_line[0]}, block "
+            f"line {c.worst_axis_line[1]})")

@@ -1,0 +1,140 @@
+"""One point of a CL file through every stage."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from postproc.controllers import writer_for
+from postproc.pipeline import PostResult
+from toolpaths.arrays import Floats, Ints
+from toolpaths.diagnostics import Diagnostic, error
+from toolpaths.toolpath import Kind, Role
+from toolpaths.units import DEG
+
+
+def trace_line(result: PostResult, line: int) -> tuple[dict[str, Any], list[Diagnostic]]:
+    """The stages of the points that CL line `line` commands, as far as the conversion went; mm and degrees."""
+    toolpath = result.toolpath
+    stages: dict[str, Any] = {"line": line, "record": _record(toolpath.file if toolpath else "", line), "points": []}
+    if toolpath is None:
+        return stages, []
+    rows = np.flatnonzero(toolpath.line == line)
+    if not len(rows):
+        near = toolpath.line[np.argsort(np.abs(toolpath.line - line))[:2]].tolist() if len(toolpath) else []
+        hint = f"points stand at lines {', '.join(map(str, sorted(near)))}" if near else ""
+        return stages, [error("trace.no_point", f"line {line} commands no position", file=toolpath.file, lines=[line],
+                              hint=hint)]
+    stages["points"] = [_point(result, int(row)) for row in rows]
+    return stages, []
+
+
+def _record(file: str, line: int) -> str:
+    try:
+        with open(file, "rb") as stream:
+            for number, text in enumerate(stream, 1):
+                if number == line:
+                    return text.decode("utf-8", "replace").strip()
+    except OSError:
+        return ""
+    return ""
+
+
+def _point(result: PostResult, row: int) -> dict[str, Any]:
+    toolpath = result.toolpath
+    assert toolpath is not None
+    operation = toolpath.operations[int(toolpath.operation[row])]
+    point: dict[str, Any] = {
+        "toolpath": {"tip_mm": toolpath.tip[row].tolist(), "axis": toolpath.axis[row].tolist(),
+                     "kind": Kind(int(toolpath.kind[row])).name, "role": Role(int(toolpath.role[row])).name,
+                     "operation": operation.name, "pass": int(toolpath.pass_[row])}}
+    if result.job is None:
+        return point
+    moves = result.job.moves
+    point["moves"] = [_move(result, int(m)) for m in np.flatnonzero(moves.row == row)]
+    return point
+
+
+def _move(result: PostResult, m: int) -> dict[str, Any]:
+    job = result.job
+    assert job is not None
+    moves, unit = job.moves, job.control.unit
+    kin = job.kinematics(int(moves.tool[m]))
+    branches = kin.inverse(moves.tip[m:m + 1], moves.axis[m:m + 1])[:, 0] * unit
+    entry: dict[str, Any] = {
+        "table_frame": {"tip_mm": moves.tip[m].tolist(), "axis": moves.axis[m].tolist()},
+        "linked": bool(moves.link[m]), "feed_mm_per_min": _finite(moves.feed[m] * 60.0),
+        "branches": [_named(result, b) for b in branches]}
+    if result.path is None or result.program is None:
+        return entry
+    path = result.path
+    blocks = np.flatnonzero(path.move == m)
+    entry["joints"] = [_named(result, path.q[b] * unit) for b in blocks]
+    written = np.flatnonzero(result.program.row == moves.row[m])
+    entry["blocks"] = _texts(result, written)
+    c = result.comparison
+    if c is not None:
+        keep = np.cumsum(moves.phase != 4) - 1
+        match = int(c.match[keep[m]])
+        if moves.phase[m] != 4 and match >= 0:
+            tip, axis = c.tip[match], c.axis[match]
+            entry["read_back"] = {"tip_mm": tip.tolist(), "axis": axis.tolist(),
+                                  "tip_deviation_mm": float(np.linalg.norm(tip - moves.tip[m])),
+                                  "axis_deviation_deg": float(np.linalg.norm(axis - moves.axis[m])) / DEG}
+    return entry
+
+
+def _named(result: PostResult, values: Floats) -> dict[str, float | None]:
+    return {k: _finite(v) for k, v in zip(result.machine.axis_names, values.tolist(), strict=True)}
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+def _texts(result: PostResult, blocks: Ints) -> list[str]:
+    """The words of blocks, each stated in full as a block of its own."""
+    program = result.program
+    assert program is not None and result.toolpath is not None and result.job is not None
+    writer = writer_for(result.controller, program, result.toolpath.cycles, result.job.control.length_on_z, 0.0)
+    texts = []
+    for k in blocks.tolist():
+        words = "".join(column[0] for column in writer.word_columns(k, k + 1))
+        feed = writer.feed_text(float(program.feed[k])) if np.isfinite(program.feed[k]) else ""
+        head = ("traverse", "feed", "arc")[int(program.code[k])]
+        texts.append(f"{head}{words}{writer.arc_words(k, k + 1)[0]}" + (f" F{feed}" if feed else ""))
+    return texts
+
+
+def as_text(stages: dict[str, Any]) -> str:
+    """The stages for people."""
+    lines = [f"line {stages['line']}: {stages['record']}"]
+    for point in stages["points"]:
+        t = point["toolpath"]
+        lines.append(f"  toolpath     tip {_vector(t['tip_mm'])}  axis {_vector(t['axis'])}  {t['kind']} {t['role']}  "
+                     f"operation {t['operation'] or '-'}  pass {t['pass']}")
+        for move in point.get("moves", []):
+            lines += _move_text(move)
+    return "\n".join(lines)
+
+
+def _move_text(move: dict[str, Any]) -> list[str]:
+    lines = [f"  table frame  tip {_vector(move['table_frame']['tip_mm'])}  axis {_vector(move['table_frame']['axis'])}"
+             + ("  (reached by a linking move)" if move["linked"] else "")]
+    lines += [f"  branch {k}     {_joints(b)}" for k, b in enumerate(move["branches"])]
+    lines += [f"  joints       {_joints(q)}" for q in move.get("joints", [])]
+    lines += [f"  block        {text}" for text in move.get("blocks", [])]
+    if "read_back" in move:
+        r = move["read_back"]
+        lines.append(f"  read back    tip {_vector(r['tip_mm'])}  axis {_vector(r['axis'])}  off by "
+                     f"{r['tip_deviation_mm']:.6f} mm, {r['axis_deviation_deg']:.6f} degrees")
+    return lines
+
+
+def _vector(values: list[float]) -> str:
+    return "(" + ", ".join(f"{v:.6f}" for v in values) + ")"
+
+
+def _joints(values: dict[str, float | None]) -> str:
+    return "  ".join(f"{k} {v:.6f}" if v is not None else f"{k} -" for k, v in values.items())
