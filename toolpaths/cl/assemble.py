@@ -10,7 +10,7 @@ import numpy as np
 from toolpaths.arrays import Array, Bools, Floats, Ints
 from toolpaths.cl.arcs import UNIT_ROUNDING, Records, arcs_of, unit
 from toolpaths.cl.build import Builder, Track
-from toolpaths.toolpath import Arcs, FeedMode, Frame, Kind, Operation, Role, Tool, Toolpath
+from toolpaths.toolpath import Arcs, Cycle, FeedMode, Frame, Kind, Operation, Role, Tool, Toolpath
 
 NORMAL_ROUNDING = 1e-3
 T = TypeVar("T")
@@ -47,12 +47,13 @@ def assemble(b: Builder) -> Toolpath:
     cycle[(role != Role.POINT) | (arc >= 0)] = -1
     role[cycle >= 0] = Role.HOLE
     kind[cycle >= 0] = Kind.RAPID
+    cycle, cycles = _used_cycles(b, cycle)
     feed, mode = _feeds(b, rows, kind)
     operation, operations, frames = _operations(b, n)
     tool, tools = _tools(b, n)
     pass_ = passes((kind == Kind.RAPID) & (role != Role.HOLE), operation, tool)
     return Toolpath(rows.tip, rows.axis, feed, mode, kind, role, arc, cycle, tool, operation, pass_, rows.line, arcs,
-                    tuple(b.cycles), tools, operations, frames, tuple(b.events), normal, contact,
+                    cycles, tools, operations, frames, tuple(b.events), normal, contact,
                     b.declared.units if b.declared else b.units, b.name, b.log.file)
 
 
@@ -227,6 +228,16 @@ def _map_arcs(b: Builder, rows: Rows, row: Ints, center: Floats, normal: Floats,
             center[where] = center[where] @ found[0].T + found[1]
             normal[where] = normal[where] @ found[0].T
             toward[where] = toward[where] @ found[0].T
+
+
+def _used_cycles(b: Builder, cycle: Array) -> tuple[Array, tuple[Cycle, ...]]:
+    """(index per row, cycles) without the cycles that drill no hole."""
+    used = np.unique(cycle[cycle >= 0])
+    for i in np.setdiff1d(np.arange(len(b.cycles)), used):
+        b.log.info("cl.cycle-empty", "no hole follows the CYCLE record", b.cycles[i].line)
+    index = np.full(len(b.cycles) + 1, -1, np.int32)
+    index[used] = np.arange(len(used))
+    return index[cycle], tuple(b.cycles[i] for i in used)
 
 
 def _feeds(b: Builder, rows: Rows, kind: Array) -> tuple[Floats, Array]:

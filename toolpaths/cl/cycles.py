@@ -176,13 +176,8 @@ def _arm(b: Builder, v: Values) -> None:
         b.log.error("cl.cycle-value", f"CYCLE/{v.kind}: {word} has no number", b.line, "write the number behind it")
     for word in v.strange:
         b.log.warning("cl.cycle-option", f"CYCLE/{v.kind}: {word} is not used", b.line, key=word)
-    made = _made(b, v)
-    index = len(b.cycles)
-    if b.cycles and replace(b.cycles[-1], line=0) == replace(made, line=0) and b.cycle.now == -1 and not v.words:
-        index -= 1
-    else:
-        b.cycles.append(made)
-    b.cycle.set(b.row, index)
+    b.cycle.set(b.row, len(b.cycles))
+    b.cycles.append(_made(b, v))
 
 
 def _placed(v: Values) -> Values:

@@ -19,6 +19,8 @@ CHUNK = 1 << 22
 _NUMERIC = np.zeros(256, bool)
 _NUMERIC[list(b"0123456789+-.,eE \t\n")] = True
 _MAX_BLANKS = 16
+LARGEST = 1e12
+"""a number beyond it is no length, angle or feed, and is refused"""
 Bytes = npt.NDArray[np.uint8]
 Progress = Callable[[int, int], None]
 
@@ -120,7 +122,7 @@ def _numbers(c: Bytes, starts: Ints, ends: Ints, count: Ints, rows: Ints) -> tup
     if not len(rows):
         return np.zeros(0), rows
     values = _parse(c, starts, ends, rows)
-    if values is not None and len(values) == int(count[rows].sum()) and bool(np.isfinite(values).all()):
+    if values is not None and len(values) == int(count[rows].sum()) and bool((np.abs(values) <= LARGEST).all()):
         return values, rows[:0]
     if len(rows) == 1:
         return np.zeros(0), rows

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from toolpaths.cl.log import Log
-from toolpaths.cl.scan import Scan
+from toolpaths.cl.scan import LARGEST, Scan
 from toolpaths.cl.source import text_of
 from toolpaths.cl.words import BARE_STARTS, TEXT_WORDS
 
@@ -86,7 +85,7 @@ def words_of(body: str) -> tuple[Word, ...]:
 def _word(text: str) -> Word:
     if _NUMBER.fullmatch(text):
         value = float(text.replace("D", "E").replace("d", "e"))
-        if math.isfinite(value):
+        if abs(value) <= LARGEST:
             return value
     return text.upper()
 

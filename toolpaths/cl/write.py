@@ -191,14 +191,15 @@ def feed_words(feed: float, mode: FeedMode) -> str:
 
 
 def _cycles(p: Toolpath, add: Callable[..., None]) -> None:
-    """CYCLE before the first hole of each, CYCLE/OFF before the first row after its last."""
-    holes = np.flatnonzero(_changes(p.cycle))
-    for row in holes.tolist():
-        if row > 0 and p.cycle[row - 1] >= 0:
-            add(row, "CYCLE/OFF")
-        if p.cycle[row] >= 0:
-            add(row, *_cycle(p.cycles[p.cycle[row]]))
-    if len(p) and p.cycle[-1] >= 0:
+    """CYCLE before the first hole of each, CYCLE/OFF before a plain point after it; other rows do not end a cycle."""
+    decides = (p.cycle >= 0) | ((p.role == Role.POINT) & (p.arc < 0))
+    rows = np.flatnonzero(decides)
+    cycle = p.cycle[rows]
+    before = np.append(-1, cycle)[:len(rows)]
+    for k in np.flatnonzero(cycle != before).tolist():
+        row = int(rows[k])
+        add(row, "CYCLE/OFF" if cycle[k] < 0 else "\n".join(_cycle(p.cycles[cycle[k]])))
+    if len(rows) and cycle[-1] >= 0:
         add(len(p), "CYCLE/OFF")
 
 
