@@ -1,0 +1,1 @@
+"""What a machine is good for: condition number, transmission, reachable box."""

@@ -1,0 +1,137 @@
+"""Figures of the thesis: condition numbers of annex C, motor speed and acceleration of UraneSX, safe grid steps."""
+
+from functools import partial
+
+import numpy as np
+import pytest
+
+import machines
+from machines.analysis.box import reachable_box, reached
+from machines.analysis.report import analyse
+from machines.analysis.singularity import grid_step_that_proves, growth, safe_radius
+from machines.analysis.transmission import (
+    condition_number,
+    force_transmission,
+    lever,
+    rates,
+    speed_acceleration,
+    speed_transmission,
+    worst,
+)
+from machines.kinematics.h4_linear import H4Linear
+from machines.kinematics.linear_delta import LinearDelta
+
+
+def delta(name: str) -> LinearDelta:
+    kinematics = machines.load(name).kinematics
+    assert isinstance(kinematics, LinearDelta)
+    return kinematics
+
+
+@pytest.mark.parametrize(("name", "value", "tolerance"), [
+    ("delta-parallel-x", 2.246, 0.003), ("delta-parallel-z", 2.382, 0.002), ("delta-parallel-z-compact", 2.694, 0.002),
+    ("delta-star", 1.798, 0.002), ("delta-parallel-x-compact", 2.67, 0.004)])
+def test_worst_condition_number_of_the_layouts(name: str, value: float, tolerance: float) -> None:
+    """Annex C and figure III-5 over x, y within 250 mm, z within 200 mm."""
+    kinematics = delta(name)
+    found = worst(partial(condition_number, kinematics), kinematics.workspace)
+    assert found.value == pytest.approx(value, rel=tolerance)
+
+
+def test_condition_number_is_that_of_the_jacobian() -> None:
+    kinematics = delta("delta-hybrid")
+    place, tilt = kinematics.workspace.random(np.random.default_rng(0), 200)
+    q = kinematics.inverse(place, np.tile([0.0, 0.0, 1.0], (200, 1)))[0]
+    jacobian = kinematics.jacobian(q)[:, :3]
+    np.testing.assert_allclose(condition_number(kinematics, place, tilt), np.linalg.cond(jacobian), rtol=1e-9)
+    np.testing.assert_allclose(rates(kinematics, place, tilt), jacobian, atol=1e-9)
+
+
+def test_motors_of_uranesx() -> None:
+    """III.9: 2.76 m/s at 2 m/s; 56.4 m/s2 at 35 m/s2 and 2 m/s, the maxima of both terms added."""
+    kinematics = delta("uranesx")
+    space = kinematics.workspace
+    speed = worst(partial(speed_transmission, kinematics), space).value
+    bent = worst(partial(speed_acceleration, kinematics), space).value
+    assert 2.0 * speed == pytest.approx(2.761, rel=1e-3)
+    assert speed * 35.0 + bent * 1000.0 * 2.0**2 == pytest.approx(56.41, rel=2e-3)
+
+
+def test_speed_acceleration_is_the_second_derivative_of_the_inverse() -> None:
+    kinematics = delta("delta-cone")
+    rng = np.random.default_rng(1)
+    place, tilt = kinematics.workspace.random(rng, 20)
+    direction = rng.normal(size=(4000, 3))
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    bound = speed_acceleration(kinematics, place, tilt)
+    h, up = 0.1, np.tile([0.0, 0.0, 1.0], (4000, 1))
+    for i in range(20):
+        ahead, here, behind = (kinematics.inverse(place[i] + s * direction, up)[0] for s in (h, 0.0, -h))
+        largest = np.abs(ahead - 2 * here + behind).max() / h**2
+        assert largest == pytest.approx(bound[i], rel=5e-3)
+
+
+def test_force_is_dual_to_speed() -> None:
+    kinematics = delta("uranesx")
+    place, tilt = kinematics.workspace.random(np.random.default_rng(2), 50)
+    jacobian = rates(kinematics, place, tilt)
+    force = np.random.default_rng(3).normal(size=(5000, 3))
+    force /= np.linalg.norm(force, axis=1, keepdims=True)
+    slides = np.abs(np.einsum("nij,mi->nmj", jacobian, force)).max(axis=(1, 2))
+    np.testing.assert_allclose(force_transmission(kinematics, place, tilt), slides, rtol=5e-3)
+
+
+def test_h4a_condition_number_stays_below_six() -> None:
+    """V.7: 400 x 400 mm, 45 degrees either way, the turn divided by d = 100 mm."""
+    kinematics = machines.load("h4a-c-table").kinematics
+    assert isinstance(kinematics, H4Linear) and lever(kinematics) == 100.0
+    found = worst(partial(condition_number, kinematics), kinematics.workspace, (9, 2, 9, 9))
+    assert 5.7 < found.value < 6.0 and found.least > 3.0
+
+
+def test_worst_finds_a_maximum_inside_the_box() -> None:
+    space = delta("uranesx").workspace
+    peak = np.array([31.0, -77.0, 123.0])
+    found = worst(lambda place, tilt: -np.linalg.norm(place - peak, axis=1), space)
+    np.testing.assert_allclose(found.place, peak, atol=0.5)
+
+
+def test_singular_values_between_grid_points() -> None:
+    """III-37 and III-42 as corrected: alpha 100, rho 250 sqrt(2), UraneSX."""
+    spread = 550.0 + 250.0 * np.sqrt(2.0)
+    assert growth(spread, 1300.0, 100.0) == pytest.approx(2.040, rel=2e-3)
+    assert safe_radius(spread, 1300.0, 100.0) == pytest.approx(0.1136, rel=2e-3)
+
+
+def test_the_workspace_of_uranesx_is_proved_free_of_singular_points() -> None:
+    kinematics = delta("uranesx")
+    step = grid_step_that_proves(kinematics, floor=100.0)
+    assert step is not None and 1.0 < step <= 100.0
+    assert grid_step_that_proves(kinematics, floor=1000.0) is None
+
+
+def test_reachable_box_is_the_largest_in_travel() -> None:
+    machine = machines.load("uranesx")
+    kinematics = delta("uranesx")
+    shape = np.array([500.0, 500.0, 500.0])
+    box = reachable_box(machine, kinematics.workspace.middle, shape)
+    assert box is not None and box.upper[0] >= 249.0
+    corners = np.stack(np.meshgrid(*zip(box.lower, box.upper, strict=True)), axis=-1).reshape(-1, 3)
+    up = np.tile([0.0, 0.0, 1.0], (8, 1))
+    assert reached(machine, corners * 0.999, up).all()
+    assert not reached(machine, corners * 1.01, up).all()
+    assert reachable_box(machine, np.array([0.0, 0.0, 9000.0]), shape) is None
+
+
+def test_reachable_box_of_a_serial_machine_is_its_travel() -> None:
+    found = analyse(machines.load("mill-3axis"))
+    machine = machines.load("mill-3axis")
+    for letter, lower, upper in zip("xyz", machine.limits.lower, machine.limits.upper, strict=True):
+        np.testing.assert_allclose(found["reachable_box_mm"][letter], [lower, upper], atol=1e-3)
+
+
+@pytest.mark.parametrize("name", ["uranesx", "h4a-c-table"])
+def test_report_has_its_units_in_its_keys(name: str) -> None:
+    found = analyse(machines.load(name))
+    assert found["condition_number"]["worst"] > 1.0 and found["reachable_box_mm"] is not None
+    assert set(found["workspace_mm"]) == set("xyz")
