@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from machines.kinematics.base import Kinematics
-from machines.machine import Limits
+from machines.machine import Machine
+from postproc import reach
 from postproc.control import Control
 from postproc.joint_path import TRAVEL_SLACK, nearest_solution
 from postproc.linearise import linearise
@@ -105,8 +106,8 @@ class Pose:
     q: Floats
 
 
-def plan_link(control: Control, kin0: Kinematics, kin1: Kinematics, space: SafeSpace, limits: Limits,
-              before: Pose | None, after: Pose | None, by_home: bool) -> Link:
+def plan_link(control: Control, kin0: Kinematics, kin1: Kinematics, space: SafeSpace, before: Pose | None,
+              after: Pose | None, by_home: bool) -> Link:
     """The way from pose `before` (None: at home) to above pose `after` (None: home), with the tools of kin0, kin1."""
     turning = before is None or after is None or bool(angle_between(before.axis, after.axis) > 1e-9)
     first: Link | None = None
@@ -115,14 +116,18 @@ def plan_link(control: Control, kin0: Kinematics, kin1: Kinematics, space: SafeS
         if first is None:
             first = link
         q = np.concatenate([link.retract, link.index, link.approach])
-        if link.clear and np.isfinite(q).all() and _inside(q, limits):
+        if link.clear and np.isfinite(q).all() and _inside(q, control.machine):
             return link
     assert first is not None
     return first
 
 
-def _inside(q: Floats, limits: Limits) -> bool:
-    return bool(((q >= limits.lower - TRAVEL_SLACK) & (q <= limits.upper + TRAVEL_SLACK)).all())
+def _inside(q: Floats, machine: Machine) -> bool:
+    """True where joints (N, J) are inside travel and inside the reach of a parallel machine."""
+    limits = machine.limits
+    if not bool(((q >= limits.lower - TRAVEL_SLACK) & (q <= limits.upper + TRAVEL_SLACK)).all()):
+        return False
+    return not len(q) or not reach.is_checked(machine.kinematics) or reach.inside(machine.kinematics, q)
 
 
 def _link(control: Control, kin0: Kinematics, kin1: Kinematics, space: SafeSpace, before: Pose | None,

@@ -126,7 +126,7 @@ def build_path(control: Control, kinematics: Callable[[int], Kinematics], moves:
             continue
         singular[rows] = found.singular
         target = Pose(moves.tip[first], axis[0], found.q[0])
-        link = plan_link(control, before, kin, space, machine.limits, state, target, first in home_rows)
+        link = plan_link(control, before, kin, space, state, target, first in home_rows)
         _add_link(out, moves, int(first), link)
         if not link.clear:
             diagnostics.append(_no_way(moves, int(first), file))
@@ -253,7 +253,7 @@ def _cut_turns(kin: Kinematics, curves: Curves, arcs: WordArcs, curve: Ints, u: 
 
 
 def _add_end(out: _Builder, control: Control, kin: Kinematics, space: SafeSpace, state: Pose, row: int) -> None:
-    link = plan_link(control, kin, kin, space, control.machine.limits, state, None, True)
+    link = plan_link(control, kin, kin, space, state, None, True)
     out.link(link.retract, row)
     out.link(link.home, row, True, link.home_state)
 

@@ -18,6 +18,7 @@ from postproc.job import Job, prepare
 from postproc.options import Options
 from postproc.path import Path, build_path
 from postproc.program import Program
+from postproc.reach import check_reach
 from postproc.readback.compare import Comparison
 from postproc.readback.verify import read_back
 from postproc.setup import SetupFile, load_setup
@@ -96,7 +97,7 @@ def _stages(result: PostResult, progress: Progress | None) -> PostResult:
     if path is None:
         return result
     found, extents = check_travel(path, job.moves, job.control, job.kinematics, file)
-    result = _with(result, found, extents=extents)
+    result = _with(result, [*found, *check_reach(path, job.moves, job.control, file)], extents=extents)
     if not result.ok:
         return result
     program, feeds, found = compile_program(toolpath, job.moves, path, job.control, result.controller,
