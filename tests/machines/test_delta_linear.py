@@ -1,5 +1,7 @@
 """Linear Delta: identity over the workspace, both assembly modes, Jacobian, III-11, LinuxCNC's lineardeltakins."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -127,3 +129,23 @@ def test_lineardeltakins_positions_that_linuxcnc_commanded() -> None:
 
 
 LINUXCNC = ((246.601645177, 248.956816789, 277.430399179), (310.449304278, 383.333276593, 325.602676147))
+
+
+@pytest.mark.parametrize(("text", "code", "words"), [
+    ('base = "delta-star"\n[kinematics.workspace]\nz = [-200, 1200]', "machine.singular", "det Jx"),
+    ('base = "uranesx"\n[kinematics.workspace]\nx = [-900, 900]', "machine.workspace", "does not reach"),
+    ('base = "uranesx"\n' + "\n".join(f"[kinematics.legs.{x}]\nrods = [[0, 0, 50], [0, 0, -50]]" for x in "XYZ"),
+     "machine.mobility", "three pairs"),
+    ('base = "uranesx"\n[kinematics.legs.U]\nslide = [0, 0, 0]\ndirection = [0, 0, 1]\nrod = 9', "machine.geometry",
+     "4 legs"),
+    ('base = "uranesx"\n[control]\nmodule = "lineardeltakins"', "machine.control", "90, 210, 330"),
+    ('base = "linuxcnc-lineardelta"\n[control]\nmodule = "genhexkins"', "machine.control", "not known"),
+    ('base = "linuxcnc-lineardelta"\n[kinematics.legs.X]\nrod = 270', "machine.control", "one length"),
+])
+def test_a_machine_file_that_does_not_work_is_refused_with_the_reason(tmp_path: Path, text: str, code: str,
+                                                                      words: str) -> None:
+    file = tmp_path / "bad.toml"
+    file.write_text(text, encoding="utf-8")
+    machine, diagnostics = machines.load_checked(file)
+    assert machine is None
+    assert diagnostics[0].code == code and words in diagnostics[0].message and diagnostics[0].lines
