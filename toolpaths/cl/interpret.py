@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 
 from toolpaths.cl import curves, cycles, feeds, frames, motion, structure, tools
@@ -14,6 +15,7 @@ HANDLERS: dict[str, Handler] = {**dict.fromkeys(SILENT, structure.nothing), **st
                                 **motion.HANDLERS, **curves.HANDLERS, **frames.HANDLERS, **tools.HANDLERS,
                                 **cycles.HANDLERS}
 _MANY = 3
+_WORD = re.compile(r"[A-Z0-9_-]+")
 _DEEPEST = 8
 _MOST_ROWS = 50_000_000
 
@@ -96,8 +98,10 @@ def _other(b: Builder, s: Statement) -> None:
         b.texts.append((b.line, b.row, sum(isinstance(w, float) for w in s.words), s.body))
     elif not s.major.startswith(DATA_COMMENT):
         first = s.major.replace(",", " ").split(" ")[0]
-        if s.slash or not known(first) or first in SILENT:
-            b.note_unknown(s, s.major if s.slash else first)
+        if s.slash or s.major in b.allow_unknown:
+            b.note_unknown(s, s.major)
+        elif not known(first) or first in SILENT:
+            b.texts.append((b.line, b.row, 0, s.major))
         else:
             b.log.error("cl.slash", f"{first} is not followed by a slash", b.line, f"write {first}/...", key=first)
 
@@ -117,7 +121,9 @@ def report_others(b: Builder) -> dict[str, int]:
     for line, row, numbers, body in b.texts:
         if not first <= line <= last:
             continue
-        if numbers >= _MANY and 0 < row < b.row and "(TEXT)" not in b.allow_unknown:
+        if _WORD.fullmatch(body):
+            b.unknown.setdefault(body, []).append((line, row, numbers))
+        elif numbers >= _MANY and 0 < row < b.row and "(TEXT)" not in b.allow_unknown:
             b.log.error("cl.text", f"no record: {body[:60]!r}, with numbers between motions", line)
         else:
             b.log.warning("cl.text", f"no record: {body[:60]!r}", line)

@@ -1,0 +1,143 @@
+"""How lines become statements: section by section the habits of real files."""
+
+from __future__ import annotations
+
+import pytest
+
+from toolpaths.cl.log import Log
+from toolpaths.cl.read import ReadResult, read_bytes
+from toolpaths.cl.source import normalise
+from toolpaths.cl.statements import statement_of, words_of
+from toolpaths.diagnostics import Severity, has_errors
+
+
+def read(text: str | bytes, **options: str) -> ReadResult:
+    return read_bytes(text, **options)  # type: ignore[arg-type]
+
+
+def clean(text: str | bytes) -> ReadResult:
+    result = read(text)
+    assert not [str(d) for d in result.diagnostics if d.severity is not Severity.INFO]
+    return result
+
+
+HEAD = "UNITS/MM\nFEDRAT/100\n"
+
+
+@pytest.mark.parametrize("line", [
+    "GOTO/1,2,3,0,0,1", "GOTO  /   1.00000,2.,  3.0 , 0,0,1", "goto/1,2,3,0,0,1   ", "  GOTO/1,2,3,0,0,1",
+    "GOTO/1 2 3 0 0 1", "GOTO/1.0,2.0, $\n 3.0,0,$\n0,1", "GOTO/1,2,3, $ the rest is below\n0,0,1",
+    "GOTO/1,2,3,$ $$ and a comment\n0,0,1", "GOTO/1,2,3,0,0,1 $$-> note", "GOTO/+1.,2,.3E1,0,0,1.",
+    "GOTO/1,2,3,0,0,1,", "GOTO/1,2,3,0,0,1,,", "GOTO/1.0D0,2,3,-0,0,1", "\tGOTO /\t1,2,3,0,0,1\t",
+    "GOTO/1,2,$\n$$ between\n3,0,0,1", "GOTO/1,2,3,0.0000000,-0.0000000,1",
+])
+def test_one_point_in_many_spellings(line: str) -> None:
+    p = clean(HEAD + line).toolpath
+    assert p.tip.tolist() == [[1.0, 2.0, 3.0]]
+    assert p.axis.tolist() == [[0.0, 0.0, 1.0]]
+    assert p.line.tolist() == [3]
+
+
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
+def test_line_ends(end: str) -> None:
+    p = clean((HEAD + "GOTO/1,2,3\nRAPID\nGOTO/1,2,$\n4").replace("\n", end)).toolpath
+    assert p.tip[:, 2].tolist() == [3.0, 4.0]
+    assert p.line.tolist() == [3, 5]
+
+
+def test_mixed_line_ends_keep_the_line_numbers() -> None:
+    assert clean("UNITS/MM\r\nFEDRAT/1\nGOTO/1,2,3\rGOTO/1,2,4\r\n\r\nGOTO/1,2,5").toolpath.line.tolist() == [3, 4, 6]
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "utf-16-le", "utf-16-be", "latin-1", "utf-32"])
+def test_encodings(encoding: str) -> None:
+    result = clean(("PARTNO/Stützplatte é\n" + HEAD + "GOTO/1,2,3\n").encode(encoding))
+    assert result.toolpath.name == "Stützplatte é"
+    assert result.toolpath.tip.tolist() == [[1.0, 2.0, 3.0]]
+
+
+@pytest.mark.parametrize(("line", "word", "text"), [
+    ("PPRINT hello", "PPRINT", "hello"), ("PPRINT/A/B,C=[1] $x", "PPRINT", "A/B,C=[1] $x"),
+    ("INSERT/[HOLDER=C40-32ERP412] 20.0mm JOBBER DRILL", "INSERT", "[HOLDER=C40-32ERP412] 20.0mm JOBBER DRILL"),
+    ("PPRINT / x, 1, 2, 3", "PPRINT", "x, 1, 2, 3"), ("INSERT G4 X2", "INSERT", "G4 X2"),
+    ("PPRINTTEXT IN COLUMN 7", "PPRINT", "TEXT IN COLUMN 7"),
+])
+def test_text_words(line: str, word: str, text: str) -> None:
+    events = clean(HEAD + line + "\nGOTO/1,2,3").toolpath.events
+    assert [(e.word, e.values) for e in events] == [(word, (text,))]
+
+
+def test_a_dollar_in_text_does_not_swallow_the_next_record() -> None:
+    p = clean(HEAD + "PPRINT it costs 5$\nRAPID\nGOTO/1,2,3").toolpath
+    assert p.kind.tolist() == [0]
+
+
+def test_words_that_begin_with_a_digit() -> None:
+    assert words_of("DEEP2, 1STPECK ,5.,3DCOMP,2 3,,x,,") == ("DEEP2", "1STPECK", 5.0, "3DCOMP", 2.0, 3.0, "", "X")
+
+
+@pytest.mark.parametrize(("text", "major"), [
+    ("TOOL PATH/a", "TOOL PATH"), ("tool   path / a", "TOOL PATH"), ("END-OF-PATH", "END-OF-PATH"),
+    ("CSI_SET_FLUTE_LENGTH/5", "CSI_SET_FLUTE_LENGTH"), ("RAPID/", "RAPID"), ("TLON,GOFWD/ (x)", "TLON,GOFWD"),
+    ("TLON, GOFWD /(x)", "TLON,GOFWD"),
+])
+def test_majors(text: str, major: str) -> None:
+    assert statement_of(text).major == major
+
+
+def test_word_lists_continue_behind_the_comma() -> None:
+    p = clean(HEAD + "SPINDL / RPM,  1000.0, $\n  CLW\nLOADTL / 4,  $\n OSETNO,  4 $$-> THREAD TOOL\nGOTO/1,2,3").toolpath
+    assert [(e.word, e.values) for e in p.events] == [("SPINDL", ("RPM", 1000.0, "CLW")), ("LOADTL", (4.0, 4.0))]
+    assert [e.line for e in p.events] == [3, 5]
+
+
+def test_continued_data_comment() -> None:
+    text = HEAD + "$$-> CSYS / 1.0, 0.0, 0.0, 10.0,  $\n 0.0, 1.0, 0.0, 20.0,  $\n 0.0, 0.0, 1.0, 30.0\nGOTO/1,2,3"
+    assert clean(text).toolpath.tip.tolist() == [[11.0, 22.0, 33.0]]
+
+
+def test_listing_text_around_the_program() -> None:
+    text = ("=====\nInformation listing created by :  someone\nDate :  2/4/2013 9:17:44 PM\n" + HEAD +
+            "GOTO/1,2,3\nEND-OF-PATH\nTool Path Listing has 34633 lines.\nIZLAZ\n\x02\n")
+    result = read(text)
+    assert not has_errors(result.diagnostics)
+    assert result.unknown_words == {}
+    assert {d.code for d in result.diagnostics} == {"cl.listing-text"}
+
+
+def test_card_numbers_are_left_out() -> None:
+    lines = ["UNITS/MM", "FEDRAT/100", "GOTO/1,2,3", "GOTO/4,5,6", "GOTO/7,8,9", "FINI"]
+    text = "\n".join(f"{line:<72}{10 * k:08d}" for k, line in enumerate(lines, 1))
+    result = read(text)
+    assert result.toolpath.tip.tolist() == [[1, 2, 3], [4, 5, 6], [7, 8, 9]]
+    assert [d.code for d in result.diagnostics] == ["cl.card-numbers"]
+
+
+def test_long_lines_are_not_cut() -> None:
+    numbers = ",".join(["1.00000000000000000000000"] * 3) + ",0.00000000000000000000,0.0000000000000000,1.000000000000"
+    log = Log()
+    data = ("UNITS/MM\n" + f"GOTO/{numbers}\n" * 8).encode()
+    assert normalise(data, log) == data
+    assert not log.diagnostics()
+
+
+def test_unknown_words_are_counted_once_with_their_lines() -> None:
+    result = read(HEAD + "FLUB/1\nGOTO/1,2,3\nFLUB/ON\nBLAB\nGOTO/1,2,3")
+    assert result.unknown_words == {"FLUB": 2, "BLAB": 1}
+    found = {d.message.split()[2].strip(","): (d.lines, d.count) for d in result.diagnostics}
+    assert found == {"FLUB": ((3, 5), 2), "BLAB": ((6,), 1)}
+
+
+def test_allow_unknown() -> None:
+    text = HEAD + "GOTO/1,2,3\nMOVEXYZ/1,2,3\nTRACUT/5\nGOTO/1,2,4"
+    assert has_errors(read(text).diagnostics)
+    result = read_bytes(text, allow_unknown=["movexyz", "TRACUT"])
+    assert not has_errors(result.diagnostics)
+    assert result.unknown_words == {"MOVEXYZ": 1, "TRACUT": 1}
+
+
+def test_wrong_use_raises() -> None:
+    with pytest.raises(ValueError, match="did you mean 'creo'"):
+        read("", dialect="croe")
+    with pytest.raises(ValueError, match="mm or inch"):
+        read("", units="cm")
