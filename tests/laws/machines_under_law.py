@@ -9,6 +9,8 @@ from machines.machine import Machine
 
 SCALE = 100.0
 """mm per rad: weighs angles against lengths in condition numbers"""
+CALM = 30.0
+"""condition number"""
 
 
 @cache
@@ -23,13 +25,28 @@ def joints(m: Machine, n: int, seed: int = 1) -> np.ndarray:
     return np.random.default_rng(seed).uniform(low, high, (n, len(low)))
 
 
-def poses(m: Machine, n: int, seed: int = 1) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(q, tip, axis) of n random joint positions, without those that a parallel machine cannot take."""
-    q = joints(m, n, seed)
+def poses(m: Machine, n: int, seed: int = 1, calm: bool = True) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(q, tip, axis) of n random joint positions; for a parallel machine, whose legs seldom meet at those, of up to n
+    random poses around the ones that do, `calm` without those next to a singular one."""
+    q = joints(m, n if m.kinematics.slides_affine else 1000, seed)
     tip, axis = m.kinematics.forward(q)
-    real = np.isfinite(tip).all(axis=1) & np.isfinite(m.kinematics.inverse(tip, axis)).all(axis=(0, 2))
-    assert real.sum() >= n // 50, f"{real.sum()} of {n} random joint positions are poses of the machine"
-    return q[real], tip[real], axis[real]
+    if m.kinematics.slides_affine:
+        return q, tip, axis
+    met = np.isfinite(tip).all(axis=1)
+    rng = np.random.default_rng(seed)
+    tip = rng.uniform(tip[met].min(axis=0), tip[met].max(axis=0), (4 * n, 3))
+    axis = m.kinematics.nearest_axis(unit(rng.normal(size=(4 * n, 3))))
+    branches = m.kinematics.inverse(tip, axis)
+    real = np.isfinite(branches).all(axis=(0, 2)) & (branches[0] >= m.limits.lower).all(axis=1)
+    real &= (branches[0] <= m.limits.upper).all(axis=1)
+    assert real.sum() >= n // 2, f"{real.sum()} of {4 * n} random poses can be taken"
+    q, tip, axis = branches[0][real][:n], tip[real][:n], axis[real][:n]
+    keep = condition(m, q, tip, axis) < CALM if calm else slice(None)
+    return q[keep], tip[keep], axis[keep]
+
+
+def unit(v: np.ndarray) -> np.ndarray:
+    return v / np.linalg.norm(v, axis=1, keepdims=True)
 
 
 def gap(m: Machine, a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -38,11 +55,16 @@ def gap(m: Machine, a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.where(m.rotary, np.abs((d + np.pi) % (2 * np.pi) - np.pi), d)
 
 
-def tolerance(m: Machine, q: np.ndarray, tip: np.ndarray, axis: np.ndarray) -> np.ndarray:
-    """(N,) mm: 1e-9, or 1e-13 x size x condition number of the Jacobian where that is more."""
+def condition(m: Machine, q: np.ndarray, tip: np.ndarray, axis: np.ndarray) -> np.ndarray:
+    """(N,) ratio of the greatest to the least singular value of the Jacobian, angles weighed by SCALE."""
     jacobian = m.kinematics.jacobian(q, near=np.hstack([tip, axis])).copy()
     jacobian[:, 3:] *= SCALE
     jacobian[:, :, np.array(m.rotary)] /= SCALE
-    size = np.maximum(np.abs(tip).max(axis=1), np.abs(q).max(axis=1))
     values = np.linalg.svd(jacobian, compute_uv=False)[:, : np.linalg.matrix_rank(jacobian[0])]
-    return np.maximum(1e-9, 1e-13 * size * values[:, 0] / np.maximum(values[:, -1], 1e-300))
+    return values[:, 0] / np.maximum(values[:, -1], 1e-300)
+
+
+def tolerance(m: Machine, q: np.ndarray, tip: np.ndarray, axis: np.ndarray) -> np.ndarray:
+    """(N,) mm: 1e-9, or 1e-13 x size x condition number of the Jacobian where that is more."""
+    size = np.maximum(np.abs(tip).max(axis=1), np.abs(q).max(axis=1))
+    return np.maximum(1e-9, 1e-13 * size * condition(m, q, tip, axis))
