@@ -41,7 +41,6 @@ def linearise(control: Control, kin: Kinematics, curves: Curves, q0: Floats, q1:
 
     `keep` (N,) marks curves whose block follows them by itself (kept arcs).
     """
-    n = len(curves)
     exact = keep | _straight_already(control, kin, curves, q0, q1)
     done_curve, done_u, done_q = [np.flatnonzero(exact)], [np.ones(int(exact.sum()))], [q1[exact]]
     index = np.flatnonzero(~exact)

@@ -114,7 +114,7 @@ def build_path(control: Control, kinematics: Callable[[int], Kinematics], moves:
     kin = kinematics(int(moves.tool[0]))
     diagnostics: list[Diagnostic] = []
     worst, turns = np.zeros(2), [np.zeros(0, dtype=np.int64)]
-    starts = np.flatnonzero(moves.link)
+    starts, reference = np.flatnonzero(moves.link), moves.curves()
     for first, last in zip(starts, [*starts[1:], len(moves)], strict=True):
         before, kin = kin, kinematics(int(moves.tool[first]))
         rows = np.arange(first, last)
@@ -130,8 +130,8 @@ def build_path(control: Control, kinematics: Callable[[int], Kinematics], moves:
         _add_link(out, moves, int(first), link)
         if not link.clear:
             diagnostics.append(_no_way(moves, int(first), file))
-        curves = moves.curves().take(rows[1:]) if len(rows) > 1 else None
-        if curves is not None:
+        if len(rows) > 1:
+            curves = reference.take(rows[1:])
             left, turned, broken = _add_run(out, control, kin, moves, rows[1:], _with_axes(curves, axis), found.q,
                                             tolerance, axis_tolerance - float(moved.max()))
             worst = np.maximum(worst, left)

@@ -57,7 +57,7 @@ class SetupFile(UserModel):
     work_offset_code: str = "G54"
     part: PartPlacement = PartPlacement()
     clearance: Clearance = Clearance()
-    tools: dict[str, ToolSetup] = {}
+    tools: dict[str, ToolSetup] = Field(default_factory=dict)
     """by tool number"""
 
 

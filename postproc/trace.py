@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -32,7 +33,7 @@ def trace_line(result: PostResult, line: int) -> tuple[dict[str, Any], list[Diag
 
 def _record(file: str, line: int) -> str:
     try:
-        with open(file, "rb") as stream:
+        with Path(file).open("rb") as stream:
             for number, text in enumerate(stream, 1):
                 if number == line:
                     return text.decode("utf-8", "replace").strip()

@@ -58,7 +58,7 @@ class Codes(UserModel):
     feed: str = "G1"
     arc_cw: str = "G2"
     arc_ccw: str = "G3"
-    planes: dict[str, str] = {"17": "G17", "18": "G18", "19": "G19"}
+    planes: dict[str, str] = Field(default_factory=lambda: {"17": "G17", "18": "G18", "19": "G19"})
     per_minute: str = "G94"
     inverse_time: str = "G93"
     machine_coordinates: str = "G53"
@@ -104,8 +104,8 @@ class Cycles(UserModel):
     """Canned cycles by the kind of the CL file; kinds that are missing are written as single moves."""
 
     enabled: bool = True
-    table: dict[str, CannedCycle] = {}
-    with_dwell: dict[str, CannedCycle] = {}
+    table: dict[str, CannedCycle] = Field(default_factory=dict)
+    with_dwell: dict[str, CannedCycle] = Field(default_factory=dict)
     """used instead where the cycle dwells"""
     to_initial: str = "G98"
     to_plane: str = "G99"

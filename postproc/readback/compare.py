@@ -22,6 +22,8 @@ from toolpaths.toolpath import Kind
 from toolpaths.units import DEG
 
 SAMPLES = (0.2, 0.4, 0.6, 0.8, 1.0)
+CHUNK = 50_000
+"""blocks that are sampled at a time, so that memory does not grow with the samples"""
 ALLOWED_SPEED = 1.02
 """share of the programmed feed above which a move counts as too fast (short blocks carry rounding)"""
 
@@ -144,12 +146,15 @@ def _deviations(motion: Motion, executed: Executed, curves: Curves, rows: Ints, 
     tip_off, axis_off = np.zeros(len(rows)), np.zeros(len(rows))
     if not len(rows):
         return tip_off, axis_off
-    curve = curves.take(owner[rows])
     first, blocks = _place(rows, owner)
-    for t in SAMPLES:
-        tip, axis = executed.poses(motion, rows, t)
-        d, e, _ = curve.deviation(tip, axis, np.minimum((first + t) / blocks, 1.0))
-        tip_off, axis_off = np.fmax(tip_off, np.nan_to_num(d, nan=np.inf)), np.fmax(axis_off, np.nan_to_num(e, nan=np.inf))
+    for at in range(0, len(rows), CHUNK):
+        part = slice(at, at + CHUNK)
+        curve = curves.take(owner[rows[part]])
+        for t in SAMPLES:
+            tip, axis = executed.poses(motion, rows[part], t)
+            d, e, _ = curve.deviation(tip, axis, np.minimum((first[part] + t) / blocks[part], 1.0))
+            tip_off[part] = np.fmax(tip_off[part], np.nan_to_num(d, nan=np.inf))
+            axis_off[part] = np.fmax(axis_off[part], np.nan_to_num(e, nan=np.inf))
     return tip_off, axis_off
 
 
