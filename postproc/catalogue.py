@@ -81,3 +81,22 @@ def _flat(values: dict[str, Any], prefix: str) -> dict[str, Any]:
         else:
             result[prefix + key] = value
     return result
+
+
+def analysis_text(figures: dict[str, Any], indent: str = "") -> str:
+    """Figures of an analysis, one a line; the keys carry the units."""
+    lines = []
+    for key, value in figures.items():
+        if isinstance(value, dict):
+            lines += [f"{indent}{key}", analysis_text(value, indent + "  ")]
+        else:
+            lines.append(f"{indent}{key:40} {_plain(value)}")
+    return "\n".join(lines)
+
+
+def _plain(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    if isinstance(value, (list, tuple)):
+        return ", ".join(_plain(v) for v in value)
+    return str(value)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 app = typer.Typer(name="postproc", no_args_is_help=True, add_completion=False, rich_markup_mode=None,
                   context_settings={"help_option_names": ["-h", "--help"]},
                   help="CL file in, proved G-code out: a toolpath post-processor that plans the machine's motion.")
-machine_app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Machines: list, show, check, schema.")
+machine_app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Machines: list, show, check, analyse, schema.")
 controller_app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Controllers: list, show, schema.")
 app.add_typer(machine_app, name="machine")
 app.add_typer(controller_app, name="controller")
@@ -143,6 +143,17 @@ def machine_check(file: Annotated[str, typer.Argument(help="TOML file or name")]
     m, found = machines.load_checked(file)
     good = f"{file}: good: {m.name}, {m.structure}, axes {' '.join(m.axis_names)}" if m else ""
     _report(tuple(found), json, {"name": m.name if m else None, "diagnostics": [d.as_dict() for d in found]}, good)
+
+
+@machine_app.command("analyse", epilog="Example: postproc machine analyse uranesx --json -")
+def machine_analyse(name: Annotated[str, typer.Argument(help="name or TOML file")], json: Json = "") -> None:
+    """Condition number, speed and force transmission, reachable box of a parallel machine, over its workspace."""
+    from machines.analysis.report import analyse
+    from postproc.catalogue import analysis_text
+
+    with _errors(json):
+        found = analyse(_machine(name))
+    _report((), json, found, analysis_text(found))
 
 
 @machine_app.command("schema")
