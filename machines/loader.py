@@ -72,7 +72,7 @@ def _family(file: UserFile) -> tuple[str | None, list[Diagnostic]]:
         return None, [file.problem("file.missing-key", ("kinematics", "family"), "key 'kinematics.family' is missing",
                                    "add [kinematics] family = one of " + ", ".join(FAMILIES))]
     family = table["family"]
-    if family not in FAMILIES:
+    if not isinstance(family, str) or family not in FAMILIES:
         return None, [file.problem("machine.family", ("kinematics", "family"),
                                    f"no kinematics family is called {family!r}", nearest(str(family), list(FAMILIES)))]
     return family, []

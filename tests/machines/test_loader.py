@@ -78,6 +78,7 @@ def test_home_and_travel_are_in_radians(tmp_path):
 @pytest.mark.parametrize(("old", "new", "code", "words"), [
     ("velocity = 500 ", "velocty = 500 ", "file.unknown-key", "did you mean 'velocity'?"),
     ('family = "serial"', 'family = "seriall"', "machine.family", "did you mean 'serial'?"),
+    ('family = "serial"', 'family = ["serial"]', "machine.family", "did you mean 'serial'?"),
     ("w C' A' b X Y Z (C1) t", "w C' A b X Y Z (C1) t", "file.value", "primed"),
     ("w C' A' b X Y Z (C1) t", "w C' A' b X Y (C1) t", "file.value", "three linear"),
     ("w C' A' b X Y Z (C1) t", "w C' A' B' b X Y Z t", "file.value", "up to two rotary"),
