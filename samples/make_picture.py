@@ -79,8 +79,8 @@ def picture() -> str:
     setup, _ = load_setup(HERE / "tools.setup.toml")
     result = postproc.convert(path, machine, "linuxcnc", setup=setup, diagnostics=found)
     worst = result.comparison.worst_tip
-    title = [f'<text x="20" y="28" font-size="16">CL file: {len(path)} points, tool axis all round the blade</text>',
-             f'<text x="{LEFT + 14}" y="28" font-size="16">G-code for {machine.name}: {len(result.program)} blocks, read back: '
+    title = [f'<text x="20" y="28" font-size="14">CL file: {len(path)} points, tool axis all round the blade</text>',
+             f'<text x="{LEFT + 14}" y="28" font-size="14">G-code for {machine.name}: {len(result.program)} blocks, read back: '
              f'tip within {1000 * worst:.1f} µm</text>']
     body = "\n".join([*title, *scene(path), *charts(result)])
     return (f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" font-family="sans-serif" '
