@@ -238,6 +238,13 @@ def test_trans_and_subprograms_under_changing_frames() -> None:
     assert p.line.tolist() == [9, 5, 7, 13, 5, 7]
 
 
+def test_points_of_subprograms_are_local_even_with_six_numbers() -> None:
+    text = ("$$-> MFGNO / A\nUNITS/MM\nFEDRAT/1\nMULTAX / ON\nDEFSUB / 1\nGOTO/1,0,0,0,0,1\nENDSUB\n"
+            "$$-> CSYS / 1,0,0,10, $\n0,1,0,0, $\n0,0,1,0\nCALSUB / 1\nGOTO/1,0,0,0,0,1\n"
+            "$$-> CSYS / 1,0,0,20, $\n0,1,0,0, $\n0,0,1,0\nCALSUB / 1\n")
+    assert read(text).tip[:, 0].tolist() == [11, 1, 21]
+
+
 def test_catia_axis_system_and_operation_names() -> None:
     text = ("$$*CATIA0\n$$ Manufacturing Program.1\n$$    1.00000    0.00000    0.00000   10.00000\n"
             "$$    0.00000   -1.00000    0.00000    0.00000\n$$    0.00000    0.00000   -1.00000    5.00000\n"

@@ -25,6 +25,7 @@ class Rows:
     third: Floats | None
     line: Ints
     given: Bools
+    common: Bools | None = None
 
     def __len__(self) -> int:
         return len(self.line)
@@ -34,6 +35,7 @@ def assemble(b: Builder) -> Toolpath:
     """The toolpath; consumes the builder's arrays."""
     rows = _rows(b)
     n = len(rows)
+    rows.common = rows.given & ~spread(b.in_subprogram, n, np.bool_) if b.dialect.six_common else None
     _fill_axis(b, rows)
     if b.scale != 1.0:
         rows.tip *= b.scale
@@ -146,7 +148,7 @@ def _to_part_frame(b: Builder, rows: Rows, normal: Floats | None, contact: Float
             continue
         rotation, origin = found
         where = slice(start, min(end, n))
-        local = np.flatnonzero(~rows.given[where]) + start if b.dialect.six_common else where
+        local = where if rows.common is None else np.flatnonzero(~rows.common[where]) + start
         rows.tip[local] = rows.tip[local] @ rotation.T + origin
         rows.axis[local] = unit(rows.axis[local] @ rotation.T)
         if normal is not None:
@@ -165,9 +167,8 @@ def _add_deltas(b: Builder, rows: Rows) -> None:
             move = step[0] * b.scale * rows.axis[row]
         else:
             found = b.maps[index[row]]
-            local = found is not None and not (b.dialect.six_common and rows.given[row])
             move = np.array(step) * b.scale
-            if local and found is not None:
+            if found is not None and (rows.common is None or not rows.common[row]):
                 move = found[0] @ move
         rows.tip[row] = rows.tip[row - 1] + move
 
@@ -219,8 +220,8 @@ def _has_start(b: Builder, rows: Rows, kind: Array, k: int, row: int) -> bool:
 
 def _map_arcs(b: Builder, rows: Rows, row: Ints, center: Floats, normal: Floats, toward: Floats) -> None:
     index = spread(b.map, len(rows), np.int64)[row]
-    if b.dialect.six_common:
-        index = np.where(rows.given[row], 0, index)
+    if rows.common is not None:
+        index = np.where(rows.common[row], 0, index)
     for i in np.unique(index):
         found = b.maps[i]
         if found is not None:

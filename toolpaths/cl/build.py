@@ -92,6 +92,7 @@ class Builder:
         self.cycle = Track(-1)
         self.system = Track(-1)
         self.map = Track(0)
+        self.in_subprogram = Track(False)
 
     def _start_lists(self) -> None:
         self.maps: list[Map | None] = [None]
@@ -108,6 +109,8 @@ class Builder:
         self.declared: Declared | None = None
         self.zsurf: float | None = None
         self.subprograms: dict[float, tuple[int, int]] | None = None
+        self.finished = -1
+        """row at the first FINI"""
         self.calls: list[tuple[int, int]] = []
         self.table = [0.0, 0.0, 0.0]
         self.turned: Floats = np.eye(3)

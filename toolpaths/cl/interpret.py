@@ -80,11 +80,13 @@ def calsub(b: Builder, s: Statement) -> None:
     start, end = found
     index, fast = b.index, b.fast
     b.calls.append(found)
+    b.in_subprogram.set(b.row, True)
     b.jump(b.program.before[start])
     run(b, start + 1, end)
     b.advance(b.program.before[end])
     b.jump(fast)
     b.calls.pop()
+    b.in_subprogram.set(b.row, bool(b.calls))
     b.index = index
 
 
@@ -116,6 +118,8 @@ def _unsupported(b: Builder, s: Statement) -> None:
 
 def report_others(b: Builder) -> dict[str, int]:
     """Diagnostics of unknown words and of text that is no record; how often each unknown word stands."""
+    if 0 <= b.finished < b.row:
+        b.log.warning("cl.after-fini", f"{b.row - b.finished} points stand after FINI, they are read too")
     first, last = _extent(b)
     listing = [line for line, _, _, _ in b.texts if not first <= line <= last]
     for line, row, numbers, body in b.texts:

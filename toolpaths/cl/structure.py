@@ -91,6 +91,20 @@ def nothing(b: Builder, s: Statement) -> None:
     """Read elsewhere (UNITS), or of no meaning here (MULTAX: the points tell by themselves)."""
 
 
+def fini(b: Builder, s: Statement) -> None:
+    """The end of the program."""
+    if b.finished < 0:
+        b.finished = b.row
+
+
+def mode(b: Builder, s: Statement) -> None:
+    """MODE and SET: incremental coordinates are refused, the rest is an event (MODE) or nothing (SET)."""
+    if s.has("INCR", "INCRE", "INCREM") and not s.has("OFF"):
+        b.log.error("cl.motion-word", f"{s.major}/{s.body}: incremental coordinates are not supported", b.line)
+    elif s.major == "MODE":
+        plain_event(b, s)
+
+
 def own_header(b: Builder, s: Statement) -> None:
     """$$-> TOOLPATH / {...}: text of our own writer; lists of frames, tools, operations follow."""
     found = _json(b, s)
@@ -183,7 +197,8 @@ def own_use(b: Builder, s: Statement) -> None:
 HANDLERS: dict[str, Callable[[Builder, Statement], None]] = {
     "TOOL PATH": tool_path, "END-OF-PATH": end_of_path, "$$->FEATNO": feature, "PARTNO": partno, "$$": comment,
     "PPRINT": text_event, "INSERT": text_event, "REMARK": nothing, "LPRINT": nothing, "PPLABEL": nothing,
-    "LETTER": nothing, "UNITS": nothing, "UNIT": nothing, "MULTAX": nothing, "FINI": nothing, "SET": nothing,
+    "LETTER": nothing, "UNITS": nothing, "UNIT": nothing, "MULTAX": nothing, "FINI": fini, "SET": mode,
     "$$->TOOLPATH": own_header, "$$->FRAME": own_item, "$$->TOOL": own_item, "$$->OPERATION": own_item,
     "$$->USE": own_use, "$$->SPLINE": own_spline, **dict.fromkeys(EVENTS, plain_event), "SPINDL": spindl,
+    "MODE": mode,
 }
