@@ -6,6 +6,7 @@ import json
 import sys
 from pathlib import Path
 
+import gentle
 import prismatic
 import surfaces
 
@@ -18,6 +19,8 @@ SAMPLES = {
     "blade.cls": surfaces.blade,
     "bicubic.cls": surfaces.bicubic,
     "tool_axis_tour.apt": surfaces.tour,
+    "h4a_dome.cls": gentle.h4a_dome,
+    "h4a_indexed.cls": gentle.h4a_indexed,
 }
 
 
