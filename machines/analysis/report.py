@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from machines.analysis.box import Box, reachable_box
+from machines.analysis.directions import tilts
 from machines.analysis.transmission import (
     Measure,
     Worst,
@@ -26,7 +27,7 @@ from toolpaths.units import DEG
 
 
 def analyse(machine: Machine) -> dict[str, Any]:
-    """Figures of a machine; a serial one has its reachable box only."""
+    """Figures of a machine; a serial one, whose slides pass their speed on as it is, has no transmission."""
     found: dict[str, Any] = {"machine": machine.name, "structure": machine.structure, "axes": list(machine.axis_names)}
     kinematics = machine.kinematics
     if isinstance(kinematics, LinearDelta | H4Linear):
@@ -34,6 +35,9 @@ def analyse(machine: Machine) -> dict[str, Any]:
         found["workspace_mm"] = _span(space.lower, space.upper)
         found["tilt_range_deg"] = [t / DEG for t in space.tilt]
         found |= _transmission(kinematics)
+    every, largest = tilts(machine)
+    found["tilt_in_every_direction_deg"] = every if np.isfinite(every) else None
+    found["largest_tilt_deg"] = largest
     found["reachable_box_mm"] = _box(machine)
     return found
 
@@ -66,10 +70,12 @@ def _box(machine: Machine) -> dict[str, list[float]] | None:
         tip = space.middle - (0.0 if isinstance(kinematics, LinearDelta) else kinematics.gauge) * np.array([0, 0, 1.0])
         box = reachable_box(machine, tip, space.upper - space.lower)
     else:
-        q = np.where(machine.rotary, machine.home, 0.5 * (machine.limits.lower + machine.limits.upper))
-        tip, axis = kinematics.forward(np.nan_to_num(q)[None])
         linear = ~np.array(machine.rotary)
-        box = reachable_box(machine, tip[0], (machine.limits.upper - machine.limits.lower)[linear], axis[0])
+        lower, upper = machine.limits.lower[linear], machine.limits.upper[linear]
+        q = machine.home.copy()
+        q[linear] = 0.5 * (lower + upper)
+        tip, axis = kinematics.forward(q[None])
+        box = reachable_box(machine, tip[0], upper - lower, axis[0])
     return _sides(box)
 
 

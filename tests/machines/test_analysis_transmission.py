@@ -7,6 +7,7 @@ import pytest
 
 import machines
 from machines.analysis.box import reachable_box, reached
+from machines.analysis.directions import tilts
 from machines.analysis.report import analyse
 from machines.analysis.singularity import grid_step_that_proves, growth, safe_radius
 from machines.analysis.transmission import (
@@ -135,3 +136,18 @@ def test_report_has_its_units_in_its_keys(name: str) -> None:
     found = analyse(machines.load(name))
     assert found["condition_number"]["worst"] > 1.0 and found["reachable_box_mm"] is not None
     assert set(found["workspace_mm"]) == set("xyz")
+
+
+@pytest.mark.parametrize("name", machines.names())
+def test_every_machine_is_analysed(name: str) -> None:
+    """Unlimited axes included; the box is there for all that reach their middle with the tool as at home."""
+    found = analyse(machines.load(name))
+    assert found["axes"] == list(machines.load(name).axis_names) and found["reachable_box_mm"] is not None
+
+
+@pytest.mark.parametrize(("name", "every", "largest"), [
+    ("mill-3axis", 0.0, 0.0), ("mikron-ucp710", 120.0, 120.0), ("mill-4axis", 0.0, 180.0), ("uranesx", 0.0, 0.0),
+    ("h4a-c-table", 45.0, 45.0), ("h4a-spindle-axis", 45.0, 60.0)])
+def test_tilt_of_the_tool(name: str, every: float, largest: float) -> None:
+    """Mikron: A to 120 degrees with C unlimited. H4a with B: tilt and B of 45 degrees, cos of both is 1/2."""
+    assert tilts(machines.load(name)) == pytest.approx((every, largest), abs=0.5)  # the step of the grid
