@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from dataclasses import replace
 
 import numpy as np
 from hypothesis import HealthCheck, example, given, settings
@@ -15,7 +16,7 @@ from toolpaths.cl.read import read_bytes
 from toolpaths.cl.scan import scan
 from toolpaths.cl.source import normalise
 from toolpaths.diagnostics import has_errors
-from toolpaths.toolpath import Toolpath
+from toolpaths.toolpath import FeedMode, Toolpath
 
 SLOW = settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 number = st.one_of(st.integers(-500, 500).map(str), st.floats(-1e4, 1e4).map(lambda x: f"{x:.4f}"),
@@ -140,3 +141,20 @@ def test_chunks_do_not_matter(monkeypatch: object) -> None:
     parts = read_bytes(text).toolpath
     assert parts.equals(whole)
     assert np.array_equal(parts.line, whole.line)
+
+
+def test_feeds_read_back_to_the_bit() -> None:
+    rng = np.random.default_rng(11)
+    feeds = np.exp(rng.uniform(-8, 8, 2000))
+    n = len(feeds)
+    zero, base = np.zeros(n, np.int8), read_bytes("UNITS/MM\nFEDRAT/1\n" + "GOTO/1,2,3\n" * n).toolpath
+    for mode in FeedMode:
+        p = replace(base, feed=feeds, feed_mode=zero + mode)
+        assert_writes_back(p)
+
+
+def test_contact_points_that_look_like_normals() -> None:
+    text = "UNITS/INCHES\nFEDRAT/1\n" + "".join(f"GOTO/1,2,3,0,0,1,{x},0,0\n" for x in (1 / 25.4, 5, 1, 0.02))
+    p = read_bytes(text).toolpath
+    assert p.contact is not None and abs(p.contact[0, 0] - 1.0) < 1e-12
+    assert_writes_back(p)

@@ -291,3 +291,14 @@ def test_where_units_come_from() -> None:
     assert units("GOTO/1,2,3\n") == ("mm", [("cl.no-units", "WARNING")])
     assert units("GOTO/1,2,3\n", units="inch") == ("inch", [])
     assert units("UNITS/MM\nGOTO/1,2,3\n", units="inch") == ("inch", [("cl.units", "WARNING")])
+
+
+def test_axis_starts_anew_even_without_a_system() -> None:
+    p = read("TOOL PATH/A,TOOL,T\nFEDRAT/MMPM,1\nGOTO/0,0,0,1,0,0\nEND-OF-PATH\nTOOL PATH/B,TOOL,T\nGOTO/1,0,0\n")
+    assert p.axis.tolist() == [[1, 0, 0], [0, 0, 1]]
+
+
+def test_a_new_operation_begins_a_pass_without_a_rapid() -> None:
+    p = read("TOOL PATH/A,TOOL,T\nFEDRAT/MMPM,1\nGOTO/0,0,0\nGOTO/1,0,0\nEND-OF-PATH\nTOOL PATH/B,TOOL,T\nGOTO/2,0,0\n"
+             "LOADTL/2\nGOTO/3,0,0\n")
+    assert p.pass_.tolist() == [0, 0, 1, 2]
