@@ -93,7 +93,7 @@ def _walk(tip: Any, axis: Any, swept: Any, start: Any, end: Any, axis0: Any, axi
     j = -1
     for i in range(moves):
         still = kind[i] == 0 and _apart(start[i], end[i]) < 1e-3 and _angle(axis0[i], axis1[i]) < 1e-6 and j >= 0
-        if still and (j + 1 >= count or _apart(tip[j + 1], end[i]) > 1e-3):
+        if still and (j + 1 >= count or _apart(tip[j + 1], end[i]) > 1e-3 or _angle(axis[j + 1], axis1[i]) > 1e-5):
             match[i] = j
             continue
         angle = 0.0
