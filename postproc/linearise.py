@@ -56,11 +56,12 @@ def linearise(control: Control, kin: Kinematics, curves: Curves, q0: Floats, q1:
         if good.any():
             worst = np.maximum(worst, [tip_off[good].max(), axis_off[good].max()])
         small = ~good & (u1 - u0 <= _SMALLEST)
+        small[~good] |= _end_off(kin, curves.take(index[~good]), b[~good], u1[~good]) > tolerance
         broken.append(index[small])
-        done_curve.append(index[good])
-        done_u.append(u1[good])
-        done_q.append(b[good])
         bad = ~good & ~small
+        done_curve.append(index[~bad])
+        done_u.append(u1[~bad])
+        done_q.append(b[~bad])
         index, u0, u1, a, b = _split(kin, curves, index[bad], u0[bad], u1[bad], a[bad], b[bad], ratio[bad])
     curve, u, q = np.concatenate(done_curve), np.concatenate(done_u), np.concatenate(done_q)
     order = np.lexsort((u, curve))
@@ -88,6 +89,12 @@ def _deviation(control: Control, kin: Kinematics, curves: Curves, a: Floats, b: 
         tip_off = np.fmax(tip_off, np.nan_to_num(d, nan=np.inf))
         axis_off = np.fmax(axis_off, np.nan_to_num(e, nan=np.inf))
     return tip_off, axis_off
+
+
+def _end_off(kin: Kinematics, curves: Curves, q: Floats, u: Floats) -> Floats:
+    """How far (N,) mm the machine's pose at joints q (N, J) is from point u of the curves: no cutting mends that."""
+    tip, _ = kin.forward(q)
+    return np.nan_to_num(np.linalg.norm(tip - curves.at(u)[0], axis=1), nan=np.inf)
 
 
 def _split(kin: Kinematics, curves: Curves, index: Ints, u0: Floats, u1: Floats, a: Floats, b: Floats,
