@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import toolpaths
@@ -181,3 +183,15 @@ def test_progress_is_told() -> None:
     seen: list[tuple[int, int]] = []
     read_bytes("GOTO/1,2,3\n" * 10, progress=lambda done, total: seen.append((done, total)))
     assert seen == [(110, 110)]
+
+
+def test_what_cannot_be_written_is_refused() -> None:
+    p = read("UNITS/MM\nFEDRAT/60\nGOTO/1,2,3\nGOTO/2,2,3\n")
+    nan = np.array([1.0, math.nan])
+    with pytest.raises(ValueError, match="unknown"):
+        toolpaths.write(replace(p, feed=nan))
+    with pytest.raises(ValueError, match="finite"):
+        toolpaths.write(replace(p, tip=p.tip * nan[:, None]))
+    vectors = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
+    with pytest.raises(ValueError, match="both"):
+        toolpaths.write(replace(p, normal=vectors, contact=vectors))

@@ -10,6 +10,7 @@ import numpy as np
 from toolpaths.arrays import Array, Bools, Floats, Ints
 from toolpaths.cl.arcs import UNIT_ROUNDING, Records, arcs_of, unit
 from toolpaths.cl.build import Builder, Track
+from toolpaths.diagnostics import Severity
 from toolpaths.toolpath import Arcs, Cycle, FeedMode, Frame, Kind, Operation, Role, Tool, Toolpath
 
 NORMAL_ROUNDING = 1e-3
@@ -116,9 +117,9 @@ def _fill_axis(b: Builder, rows: Rows) -> None:
 def _checked_axis(b: Builder, rows: Rows) -> Floats:
     norm = np.linalg.norm(rows.axis, axis=1)
     bad = ~(np.abs(norm - 1.0) <= UNIT_ROUNDING)
-    for k in np.flatnonzero(bad):
-        b.log.error("cl.axis", f"the tool axis has length {norm[k]:.6g}, it must be 1 within {UNIT_ROUNDING}",
-                    int(rows.line[k]))
+    if bad.any():
+        b.log.many(Severity.ERROR, "cl.axis", f"the tool axis has length {norm[bad][0]:.6g}, it must be 1 within "
+                   f"{UNIT_ROUNDING}", rows.line[bad])
     return unit(rows.axis)
 
 
@@ -133,9 +134,9 @@ def _normals(b: Builder, rows: Rows) -> tuple[Floats | None, Floats | None]:
     normal = unit(np.where(is_normal[:, None], rows.third, np.nan)) if is_normal.any() else None
     if not is_contact.any():
         return normal, None
-    for k in np.setdiff1d(np.flatnonzero(is_contact), b.contacts):
-        b.log.warning("cl.contact", "numbers 7 to 9 of GOTO are no unit vector, read as the contact point",
-                      int(rows.line[k]))
+    untold = np.setdiff1d(np.flatnonzero(is_contact), b.contacts)
+    b.log.many(Severity.WARNING, "cl.contact", "numbers 7 to 9 of GOTO are no unit vector, read as the contact point",
+               rows.line[untold])
     return normal, np.where(is_contact[:, None], rows.third * b.scale, np.nan)
 
 
@@ -250,10 +251,8 @@ def _feeds(b: Builder, rows: Rows, kind: Array) -> tuple[Floats, Array]:
     rapid = kind == Kind.RAPID
     feed[rapid] = np.nan
     mode[rapid | np.isnan(feed)] = FeedMode.PER_TIME
-    for k in np.flatnonzero(~rapid & np.isnan(feed)):
-        b.log.warning("cl.no-feed", "cutting motion before any FEDRAT", int(rows.line[k]))
-    for k in np.flatnonzero(~rapid & (feed <= 0.0)):
-        b.log.error("cl.feed", f"cutting motion at a feed of {feed[k]:g}; it must be above 0", int(rows.line[k]))
+    b.log.many(Severity.WARNING, "cl.no-feed", "cutting motion before any FEDRAT", rows.line[~rapid & np.isnan(feed)])
+    b.log.many(Severity.ERROR, "cl.feed", "cutting motion at a feed of 0 or less", rows.line[~rapid & (feed <= 0.0)])
     return feed, mode
 
 

@@ -114,6 +114,8 @@ class Builder:
         self.calls: list[tuple[int, int]] = []
         self.table = [0.0, 0.0, 0.0]
         self.turned: Floats = np.eye(3)
+        self.here: Map = (np.eye(3), np.zeros(3))
+        self.shift: Floats = np.zeros(3)
         self.toward: Triple | None = None
         self.contacts: list[int] = []
         self.axis_system: list[list[float]] | None = None
@@ -121,7 +123,7 @@ class Builder:
         self.unknown: dict[str, list[tuple[int, int, int]]] = {}
         self.texts: list[tuple[int, int, int, str]] = []
         self.memory: dict[str, object] = {}
-        """what one room of handlers keeps between records (armed cycle, shifts, subprograms)"""
+        """what one file of handlers keeps between records (tool in hand, last cycle)"""
         self.cycle_records = 0
         self.arc_records = 0
 

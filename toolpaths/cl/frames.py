@@ -12,8 +12,6 @@ from toolpaths.toolpath import Frame
 from toolpaths.units import DEG
 
 _ORTHOGONAL = 2e-3
-_SHIFT = "trans"
-_SYSTEM = "system"
 
 
 def set_system(b: Builder, name: str, matrix: Floats, origin: Floats) -> None:
@@ -27,7 +25,7 @@ def set_system(b: Builder, name: str, matrix: Floats, origin: Floats) -> None:
         index = len(b.frames)
         b.frames.append(Frame(f"{name} {index + 1}", frame.origin, frame.rotation))
     b.system.set(b.row, index)
-    b.memory[_SYSTEM] = (matrix, origin)
+    b.here = (matrix, origin)
     b.turned = np.eye(3)
     _refresh(b)
     b.axis_marks.append((b.row, (0.0, 0.0, 1.0)))
@@ -35,10 +33,9 @@ def set_system(b: Builder, name: str, matrix: Floats, origin: Floats) -> None:
 
 def _refresh(b: Builder) -> None:
     """The map of points from the system and the shift (TRANS) that hold now."""
-    system, shift = b.memory.get(_SYSTEM), b.memory.get(_SHIFT)
-    matrix, origin = system if isinstance(system, tuple) else (np.eye(3), np.zeros(3))
-    if isinstance(shift, np.ndarray):
-        origin = matrix @ shift + origin
+    matrix, origin = b.here
+    if b.shift.any():
+        origin = matrix @ b.shift + origin
     b.use_map((b.turned @ matrix, b.turned @ origin))
 
 
@@ -92,8 +89,7 @@ def trans(b: Builder, s: Statement) -> None:
     if len(s.numbers) != 3 or len(s.words) != 3:
         b.log.error("cl.frame", f"TRANS/{s.body}: only three numbers are understood", b.line)
         return
-    shift = np.array(s.numbers) * b.scale
-    b.memory[_SHIFT] = shift if shift.any() else None
+    b.shift = np.array(s.numbers) * b.scale
     _refresh(b)
 
 

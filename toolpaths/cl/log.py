@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from toolpaths.arrays import Ints
 from toolpaths.diagnostics import Diagnostic, Severity
 
 _LINES_KEPT = 10
@@ -31,6 +32,14 @@ class Log:
         entry.count += 1
         if line > 0 and len(entry.lines) < _LINES_KEPT and line not in entry.lines:
             entry.lines.append(line)
+
+    def many(self, severity: Severity, code: str, message: str, lines: Ints, hint: str = "") -> None:
+        """The same problem in many lines (K,); nothing where there are none."""
+        if not len(lines):
+            return
+        for line in lines[:_LINES_KEPT].tolist():
+            self.add(severity, code, message, line, hint)
+        self._entries[severity, code, ""].count += max(0, len(lines) - _LINES_KEPT)
 
     def error(self, code: str, message: str, line: int = 0, hint: str = "", key: str = "") -> None:
         """An ERROR."""

@@ -49,15 +49,15 @@ LENGTH_EVENTS = frozenset({"RETRCT", "CLEARP", "CLRSRF", "LEADER"})
 SILENT = frozenset({
     "PAINT", "PPWORD", "PPFUN", "SYN", "OPFEATSTART", "OPFEATEND", "MOVE_ATTRIB", "BOX", "SETUP", "SWITCH", "DISPLY",
     "AUTOPS", "PSIS", "INTOL", "OUTTOL", "TOLER", "LINTOL", "MACHIN", "ALIGN", "PLABEL", "CLPRNT", "NOPOST", "PLOT",
-    "TRNTYP", "CSI_SET_EXTENSION_LENGTH", "MCHTOL", "DEFINE", "LOADTL_NAME", "NUMPTS", "INDEXF",
+    "TRNTYP", "CSI_SET_EXTENSION_LENGTH", "MCHTOL",
 })
 """Display, listing, tolerance and bookkeeping: no motion, nothing for the machine."""
 
 UNSUPPORTED_MOTION = frozenset({
-    "CUT", "DNTCUT", "COPY", "TRACUT", "GOFWD", "GOLFT", "GORGT", "GOBACK", "GOUP", "GODOWN", "GO", "OFFSET",
-    "MOVNRB", "INDIRP", "THREAD", "POCKET", "SCURV", "RMILL", "SMILL", "FMILL", "PATH", "CALL", "INDEX",
-    "MACRO", "LOOPST", "LOOPND", "JUMPTO", "TLLFT", "TLRGT", "TLON", "MOVETO", "KNOT", "CNTRL", "CIRCUL",
-    "ARCDAT", "ARCMOV", "MIRROR", "XFORM", "MATRIX", "BSPLINE", "SPLINE", "ELLIPS",
+    "CUT", "DNTCUT", "COPY", "TRACUT", "GOFWD", "GOLFT", "GORGT", "GOBACK", "GOUP", "GODOWN", "GO",
+    "MOVNRB", "INDIRP", "THREAD", "POCKET", "SCURV", "RMILL", "SMILL", "FMILL", "CALL", "INDEX",
+    "MACRO", "LOOPST", "LOOPND", "JUMPTO", "TLLFT", "TLRGT", "TLON", "MOVETO", "KNOT", "CNTRL",
+    "ARCDAT", "MIRROR", "XFORM", "MATRIX", "BSPLINE", "SPLINE", "ELLIPS",
 })
 """Words that move the tool or change how it moves, and that this reader does not carry out: an error."""
 

@@ -26,11 +26,11 @@ _TEXT_EVENTS = ("PPRINT", "INSERT")
 
 
 def text_of(p: Toolpath) -> str:
-    """The text of `p`.
+    """The text of `p`; its passes are not written but counted anew when it is read.
 
     Raises:
         ValueError: where `p` holds what a CL file cannot say (NaN positions, a feed that becomes unknown again, a
-            pass numbering of its own).
+            point with both a normal and a contact point).
     """
     _check(p)
     return "\n".join([*_header(p), *_body(p), "FINI", ""])
