@@ -96,6 +96,7 @@ class Builder:
 
     def _start_lists(self) -> None:
         self.maps: list[Map | None] = [None]
+        self.map_index = {b"": 0}
         self.axis_marks: list[tuple[int, Triple]] = []
         self.rapids: list[int] = []
         self.roles: dict[int, Role] = {}
@@ -103,6 +104,7 @@ class Builder:
         self.arcs = ArcTable()
         self.events: list[Event] = []
         self.frames: list[Frame] = []
+        self.frame_index: dict[object, int] = {}
         self.operations: list[Operation] = []
         self.cycles: list[Cycle] = []
         self.turning: set[int] = set()
@@ -164,13 +166,11 @@ class Builder:
         """Points from here on are in that frame (None: the part frame)."""
         if found is not None and np.array_equal(found[0], np.eye(3)) and not found[1].any():
             found = None
-        for i, known in enumerate(self.maps):
-            if known is found or (known is not None and found is not None and np.array_equal(known[0], found[0])
-                                  and np.array_equal(known[1], found[1])):
-                self.map.set(self.row, i)
-                return
-        self.maps.append(found)
-        self.map.set(self.row, len(self.maps) - 1)
+        key = b"" if found is None else (found[0] + 0.0).tobytes() + (found[1] + 0.0).tobytes()
+        index = self.map_index.setdefault(key, len(self.maps))
+        if index == len(self.maps):
+            self.maps.append(found)
+        self.map.set(self.row, index)
 
     def event(self, word: str, values: tuple[str | float, ...] = ()) -> None:
         """Note an event before the next row."""

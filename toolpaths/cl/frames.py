@@ -17,12 +17,8 @@ _ORTHOGONAL = 2e-3
 def set_system(b: Builder, name: str, matrix: Floats, origin: Floats) -> None:
     """Points from here on are in that system; the tool axis is its z until a point says otherwise."""
     frame = Frame("", tuple(origin.tolist()), tuple(tuple(row) for row in matrix.tolist()))
-    for i, known in enumerate(b.frames):
-        if (known.origin, known.rotation) == (frame.origin, frame.rotation):
-            index = i
-            break
-    else:
-        index = len(b.frames)
+    index = b.frame_index.setdefault((frame.origin, frame.rotation), len(b.frames))
+    if index == len(b.frames):
         b.frames.append(Frame(f"{name} {index + 1}", frame.origin, frame.rotation))
     b.system.set(b.row, index)
     b.here = (matrix, origin)
