@@ -94,7 +94,7 @@ def _deviation(control: Control, kin: Kinematics, curves: Curves, a: Floats, b: 
 def _end_off(kin: Kinematics, curves: Curves, q: Floats, u: Floats) -> Floats:
     """How far (N,) mm the machine's pose at joints q (N, J) is from point u of the curves: no cutting mends that."""
     tip, _ = kin.forward(q)
-    return np.nan_to_num(np.linalg.norm(tip - curves.at(u)[0], axis=1), nan=np.inf)
+    return np.asarray(np.nan_to_num(np.linalg.norm(tip - curves.at(u)[0], axis=1), nan=np.inf))
 
 
 def _split(kin: Kinematics, curves: Curves, index: Ints, u0: Floats, u1: Floats, a: Floats, b: Floats,
