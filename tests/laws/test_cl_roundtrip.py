@@ -158,3 +158,10 @@ def test_contact_points_that_look_like_normals() -> None:
     p = read_bytes(text).toolpath
     assert p.contact is not None and abs(p.contact[0, 0] - 1.0) < 1e-12
     assert_writes_back(p)
+
+
+def test_numbers_that_grow_by_conversion() -> None:
+    text = "UNITS/INCHES\nFEDRAT/9e11,IPM\nGOTO/9e11,2,3\nCYCLE/DRILL,DEPTH,1,1e11,.003,CLEAR,9e11\nGOTO/1,2,3\n"
+    result = read_bytes(text)
+    assert not has_errors(result.diagnostics)
+    assert_writes_back(result.toolpath)

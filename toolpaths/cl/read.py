@@ -12,11 +12,13 @@ from toolpaths.cl.build import Builder
 from toolpaths.cl.dialects import DIALECTS, Dialect, detect, units_said
 from toolpaths.cl.interpret import known, report_others, run
 from toolpaths.cl.log import Log
-from toolpaths.cl.scan import Progress, scan
+from toolpaths.cl.scan import LARGEST, LARGEST_OWN, Progress, scan
 from toolpaths.cl.source import normalise
 from toolpaths.cl.statements import Lexer, Program
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.toolpath import Toolpath
+
+_OWN_HEAD = b"$$-> TOOLPATH /"
 
 
 @dataclass(frozen=True)
@@ -65,8 +67,9 @@ def read_bytes(data: bytes | str, *, file: str = "", units: str | None = None, d
     _check_options(units, dialect)
     log = Log(file)
     plain = normalise(data.encode("utf-8", "replace") if isinstance(data, str) else bytes(data), log)
-    parts = scan(plain, progress)
-    program = Lexer(plain, parts, log, known).program()
+    largest = LARGEST_OWN if plain.startswith(_OWN_HEAD) else LARGEST
+    parts = scan(plain, progress, largest)
+    program = Lexer(plain, parts, log, known, largest).program()
     del plain
     found, evidence = (DIALECTS[dialect], "given") if dialect else detect(program)
     b = Builder(program, parts.points, found, _units(program, units, log), log, allow_unknown)

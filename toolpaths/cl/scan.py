@@ -21,6 +21,8 @@ _NUMERIC[list(b"0123456789+-.,eE \t\n")] = True
 _MAX_BLANKS = 16
 LARGEST = 1e12
 """a number beyond it is no length, angle or feed, and is refused"""
+LARGEST_OWN = 1e18
+"""the same for text of our own writer, where converted numbers may be larger than the ones that were read"""
 Bytes = npt.NDArray[np.uint8]
 Progress = Callable[[int, int], None]
 
@@ -68,13 +70,13 @@ class _Chunk:
     lines: int
 
 
-def scan(data: bytes, progress: Progress | None = None) -> Scan:
+def scan(data: bytes, progress: Progress | None = None, largest: float = LARGEST) -> Scan:
     """Split normalised `data`; `progress(bytes done, bytes in all)` is called now and then."""
     chunks: list[_Chunk] = []
     position, lines = 0, 0
     while position < len(data):
         stop = data.find(b"\n", position + CHUNK) + 1 or len(data)
-        chunks.append(_scan_chunk(data, position, stop, lines))
+        chunks.append(_scan_chunk(data, position, stop, lines, largest))
         lines += chunks[-1].lines
         position = stop
         if progress is not None:
@@ -82,7 +84,7 @@ def scan(data: bytes, progress: Progress | None = None) -> Scan:
     return _join(chunks, lines)
 
 
-def _scan_chunk(data: bytes, position: int, stop: int, lines_before: int) -> _Chunk:
+def _scan_chunk(data: bytes, position: int, stop: int, lines_before: int, largest: float) -> _Chunk:
     c = np.frombuffer(data, np.uint8, stop - position, position)
     if c[-1] != 10:
         c = np.append(c, np.uint8(10))
@@ -91,7 +93,7 @@ def _scan_chunk(data: bytes, position: int, stop: int, lines_before: int) -> _Ch
     count = np.add.reduceat(c == 44, starts, dtype=np.int32) + 1
     plain = _looks_plain(c, starts, ends) & ((count == 3) | (count == 6) | (count == 9))
     rows = np.flatnonzero(plain)
-    numbers, bad = _numbers(c, starts, ends, count, rows)
+    numbers, bad = _numbers(c, starts, ends, count, rows, largest)
     plain[bad] = False
     others = np.flatnonzero(~plain & (ends > starts))
     return _Chunk(numbers, count[plain], np.flatnonzero(plain) + lines_before + 1, starts[others] + position,
@@ -117,18 +119,19 @@ def _looks_plain(c: Bytes, starts: Ints, ends: Ints) -> Bools:
     return plain
 
 
-def _numbers(c: Bytes, starts: Ints, ends: Ints, count: Ints, rows: Ints) -> tuple[Floats, Ints]:
+def _numbers(c: Bytes, starts: Ints, ends: Ints, count: Ints, rows: Ints,
+             largest: float) -> tuple[Floats, Ints]:
     """(numbers of the plain `rows`, rows whose numbers cannot be read): halves until the bad ones are found."""
     if not len(rows):
         return np.zeros(0), rows
     values = _parse(c, starts, ends, rows)
-    if values is not None and len(values) == int(count[rows].sum()) and bool((np.abs(values) <= LARGEST).all()):
+    if values is not None and len(values) == int(count[rows].sum()) and bool((np.abs(values) <= largest).all()):
         return values, rows[:0]
     if len(rows) == 1:
         return np.zeros(0), rows
     half = len(rows) // 2
-    a, bad_a = _numbers(c, starts, ends, count, rows[:half])
-    b, bad_b = _numbers(c, starts, ends, count, rows[half:])
+    a, bad_a = _numbers(c, starts, ends, count, rows[:half], largest)
+    b, bad_b = _numbers(c, starts, ends, count, rows[half:], largest)
     return np.concatenate([a, b]), np.concatenate([bad_a, bad_b])
 
 

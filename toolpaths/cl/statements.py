@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from toolpaths.cl.log import Log
-from toolpaths.cl.scan import LARGEST, Scan
+from toolpaths.cl.scan import LARGEST, LARGEST_OWN, Scan
 from toolpaths.cl.source import text_of
 from toolpaths.cl.words import BARE_STARTS, TEXT_WORDS
 
@@ -85,7 +85,7 @@ def words_of(body: str) -> tuple[Word, ...]:
 def _word(text: str) -> Word:
     if _NUMBER.fullmatch(text):
         value = float(text.replace("D", "E").replace("d", "e"))
-        if abs(value) <= LARGEST:
+        if abs(value) <= LARGEST_OWN:
             return value
     return text.upper()
 
@@ -126,8 +126,8 @@ def _comment(text: str) -> Statement:
 class Lexer:
     """Cuts the slow lines of a file into statements; equal lines are looked at once."""
 
-    def __init__(self, data: bytes, scan: Scan, log: Log, known: Callable[[str], bool]):
-        self.data, self.scan, self.log, self.known = data, scan, log, known
+    def __init__(self, data: bytes, scan: Scan, log: Log, known: Callable[[str], bool], largest: float = LARGEST):
+        self.data, self.scan, self.log, self.known, self.largest = data, scan, log, known, largest
         self.memo: dict[bytes, Statement | None] = {}
         self.next = 0
 
@@ -142,7 +142,7 @@ class Lexer:
             if raw in memo:
                 statement = memo[raw]
             else:
-                statement = self._read(raw, i)
+                statement = self._limited(self._read(raw, i))
                 if statement is None or statement.major not in _RARELY_REPEATED:
                     if self.next == i + 1 and b"$" not in raw.replace(b"$$", b""):
                         memo[raw] = statement
@@ -153,6 +153,13 @@ class Lexer:
                 out.lines.append(scan.line[i])
                 out.before.append(scan.before[i])
         return out
+
+    def _limited(self, statement: Statement | None) -> Statement | None:
+        """Numbers beyond the limit are words, which no record takes for a number."""
+        if statement is None or not any(isinstance(w, float) and abs(w) > self.largest for w in statement.words):
+            return statement
+        return replace(statement, words=tuple(repr(w) if isinstance(w, float) and abs(w) > self.largest else w
+                                              for w in statement.words))
 
     def _read(self, raw: bytes, i: int) -> Statement | None:
         text = text_of(raw).strip()
