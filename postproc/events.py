@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from toolpaths.arrays import Floats
+from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.toolpath import Event, Toolpath
 from toolpaths.units import PER_MINUTE
 
@@ -65,12 +65,26 @@ def spindle_after(event: Event, before: Spindle) -> Spindle:
     return Spindle(speed[0] if speed else before.rpm, direction)
 
 
-def spindle_speed(toolpath: Toolpath) -> Floats:
-    """Revolutions per second (N,) at every row, NaN while unknown."""
-    speed = np.full(len(toolpath), np.nan)
+def spindle_states(toolpath: Toolpath) -> tuple[Ints, Floats]:
+    """(direction (N,), rev/min (N,) NaN while unknown) of the spindle at every row."""
+    direction, rpm = np.zeros(len(toolpath), dtype=np.int64), np.full(len(toolpath), np.nan)
     state = Spindle()
     for event in toolpath.events:
         if event.word == "SPINDL":
             state = spindle_after(event, state)
-            speed[event.index:] = state.rpm * PER_MINUTE
-    return speed
+            direction[event.index:], rpm[event.index:] = state.direction, state.rpm
+    return direction, rpm
+
+
+def spindle_speed(toolpath: Toolpath) -> Floats:
+    """Revolutions per second (N,) at every row, NaN while unknown."""
+    return np.asarray(spindle_states(toolpath)[1] * PER_MINUTE)
+
+
+def coolant_states(toolpath: Toolpath) -> Bools:
+    """(N,) True where any coolant is on."""
+    on = np.zeros(len(toolpath), dtype=bool)
+    for event in toolpath.events:
+        if event.word == "COOLNT":
+            on[event.index:] = "OFF" not in words(event)
+    return on

@@ -7,8 +7,9 @@ from collections.abc import Callable
 import numpy as np
 
 from postproc.job import Job
-from postproc.readback.compare import Comparison, Executed, compare
+from postproc.readback.compare import Comparison, compare
 from postproc.readback.execute import Offsets, execute
+from postproc.readback.poses import Executed
 from postproc.readback.words import tokenise
 from toolpaths.diagnostics import Diagnostic, error, has_errors
 
@@ -33,5 +34,6 @@ def read_back(data: bytes, job: Job, file: str,
         progress("read back", 0, len(motion))
     executed = Executed(control, job.kinematics_of, offsets.lengths)
     with np.errstate(invalid="ignore"):
-        comparison = compare(motion, job.moves, executed, job.space, job.options.tolerance, job.axis_tolerance, file)
+        comparison = compare(motion, job.toolpath, job.moves, executed, job.space, job.options.tolerance,
+                             job.axis_tolerance, file)
     return comparison, [*diagnostics, *comparison.diagnostics]
