@@ -78,7 +78,7 @@ def body(text: str) -> list[str]:
     """The blocks between the first tool change and the end, without comments."""
     lines = [n for n in text.splitlines() if not n.startswith(("(", "%"))]
     first = next(i for i, n in enumerate(lines) if "M6" in n)
-    last = next(i for i, n in enumerate(lines) if n in ("M5 M9", "M5"))
+    last = max(i for i, n in enumerate(lines) if n in ("M5 M9", "M5"))
     return lines[first:last]
 
 
@@ -247,7 +247,8 @@ class Peer:
                 leg("rapid", over, depth + 0.254)
                 depth -= sticky["Q"] * scale
         leg("feed", over, bottom)
-        leg("feed" if code in (84, 85, 89) else "rapid", over, plane)
+        if code in (84, 85, 89):
+            leg("feed", over, plane)
         leg("rapid", over, max(initial, plane) if retract == 98 else plane)
         for kind, point in legs:
             if not (point == at).all():
