@@ -12,7 +12,7 @@ from postproc.moves import Moves, Phase
 from postproc.path import Path
 from postproc.program import Command
 from toolpaths.arrays import Bools
-from toolpaths.diagnostics import Diagnostic, warning
+from toolpaths.diagnostics import Diagnostic, error, warning
 from toolpaths.toolpath import Event, Kind, Toolpath
 from toolpaths.units import PER_MINUTE
 
@@ -30,6 +30,7 @@ def commands_of(toolpath: Toolpath, moves: Moves, path: Path, controller: Contro
     changes = {c.index: c for c in tool_changes(toolpath)}
     changed: set[int] = set()
     spindle = Spindle()
+    compensation = _Compensation(moves)
     lost: dict[str, list[int]] = {}
     for event in toolpath.events:
         block = int(path.begin[first_move[event.index]])
@@ -37,12 +38,16 @@ def commands_of(toolpath: Toolpath, moves: Moves, path: Path, controller: Contro
         if event.word == "SPINDL":
             spindle = spindle_after(event, spindle)
             out.append(_spindle(spindle, event))
+            diagnostics += _surface_speed(event, toolpath.file)
+        elif event.word == "CUTCOM":
+            out += compensation.commands(event, int(first_move[event.index]))
         elif event.word == "LOADTL":
             change = changes.get(event.index)
             if change is not None and event.index not in changed and change.number == int(numbers(event)[0]):
                 changed.add(event.index)
                 register = change.register if change.register is not None else change.number
-                out[:0] = [Command("STOP_SPINDLE_TURNING"), Command("COOLANT_OFF")] if spindle.direction else []
+                out[:0] = compensation.off() + (
+                    [Command("STOP_SPINDLE_TURNING"), Command("COOLANT_OFF")] if spindle.direction else [])
                 out.append(Command("CHANGE_TOOL", (float(change.number),), event.line))
                 out.append(Command("USE_TOOL_LENGTH_OFFSET", (float(register),), event.line))
         elif command := _simple(event, controller, spindle):
@@ -51,6 +56,8 @@ def commands_of(toolpath: Toolpath, moves: Moves, path: Path, controller: Contro
             lost.setdefault(event.word, []).append(event.line)
     diagnostics += [warning("event.not_carried_out", f"{word} is not carried out", file=toolpath.file, lines=lines[:6],
                             count=len(lines)) for word, lines in lost.items()]
+    result.setdefault(len(path), []).extend(compensation.off())
+    diagnostics += compensation.diagnostics(toolpath.file)
     for k in _dwells(toolpath, moves, path, native, spindle):
         result.setdefault(k[0], []).insert(0, k[1])
     return {k: tuple(v) for k, v in result.items() if v}, diagnostics + _no_spindle(toolpath, moves)
@@ -79,12 +86,63 @@ def _simple(event: Event, controller: ControllerFile, spindle: Spindle) -> Comma
         return Command("INSERT", (" ".join(str(v) for v in event.values),), event.line)
     if event.word == "SELECT" and values:
         return Command("SELECT_TOOL", (values[0],), event.line)
-    if event.word == "CUTCOM":
-        side = next((w for w in said if w in ("LEFT", "RIGHT", "OFF")), "")
-        return Command(f"CUTTER_COMPENSATION_{side}", tuple(values[:1]), event.line) if side else None
     if event.word in ("PREFUN", "AUXFUN") and values:
         return Command("INSERT", (f"{'G' if event.word == 'PREFUN' else 'M'}{values[0]:g}",), event.line)
     return None
+
+
+class _Compensation:
+    """CUTCOM as the control's cutter compensation: stated when it changes, off before tool changes and the end.
+
+    The points are written as the file has them; what the control adds depends on its register.
+    """
+
+    def __init__(self, moves: Moves) -> None:
+        self.moves, self.active = moves, ""
+        self.written: list[int] = []
+        self.tilted: list[int] = []
+
+    def commands(self, event: Event, move: int) -> list[Command]:
+        """The commands of one CUTCOM record that acts before a row of Moves."""
+        side = next((w for w in words(event) if w in ("LEFT", "RIGHT", "OFF")), "")
+        if side in ("", self.active) or (side == "OFF" and not self.active):
+            return []
+        if side == "OFF":
+            return self.off(event.line)
+        if move >= len(self.moves) or abs(self.moves.axis[move, 2]) < 1.0 - 1e-9:
+            self.tilted.append(event.line)
+            return []
+        before = self.off(event.line)
+        self.active = side
+        self.written.append(event.line)
+        return [*before, Command(f"CUTTER_COMPENSATION_{side}", tuple(numbers(event)[:1]), event.line)]
+
+    def off(self, line: int = 0) -> list[Command]:
+        """The command that ends it, where it is on."""
+        if not self.active:
+            return []
+        self.active = ""
+        return [Command("CUTTER_COMPENSATION_OFF", (), line)]
+
+    def diagnostics(self, file: str) -> list[Diagnostic]:
+        """What the operator has to know, and records that could not be carried out."""
+        result = []
+        if self.written:
+            result.append(warning("cutcom.register", "cutter compensation is written and proved as the programmed contour: "
+                                  "the control adds what its register holds", file=file, lines=self.written[:6],
+                                  count=len(self.written), hint="points of the tool centre: the register holds the wear "
+                                  "only; points of the contour: the radius"))
+        if self.tilted:
+            result.append(warning("cutcom.tilted", "CUTCOM while the tool axis is tilted is not carried out", file=file,
+                                  lines=self.tilted[:6], count=len(self.tilted)))
+        return result
+
+
+def _surface_speed(event: Event, file: str) -> list[Diagnostic]:
+    if not {"SFM", "SMM"} & set(words(event)):
+        return []
+    return [error("spindle.surface_speed", "the spindle speed is given as a cutting speed", file=file, lines=[event.line],
+                  hint="state rev/min (SPINDL/RPM,n,CLW) in the CAM system")]
 
 
 def _coolant(said: list[str], controller: ControllerFile) -> str:

@@ -16,8 +16,9 @@ from postproc.moves import Moves, Phase
 from postproc.path import ARC, FEED, Path
 from postproc.program import Command, Hole, Program
 from toolpaths.arrays import Bools, Floats, Ints
-from toolpaths.diagnostics import Diagnostic, error, info, warning
+from toolpaths.diagnostics import Diagnostic, error, info
 from toolpaths.toolpath import Toolpath
+from toolpaths.units import DEG
 
 SNAP = 2.5
 """X, Y, Z residues beside a rotary move, in units of the last decimal, that are not written"""
@@ -37,9 +38,13 @@ def decimals(control: Control, controller: ControllerFile) -> Ints:
     return np.where(control.machine.rotary, f.rotary_decimals, f.linear_decimals).astype(np.int64)
 
 
-def rounding_bound(control: Control, kin: Kinematics, q: Floats, places: Ints) -> Rounding:
-    """Worst case of half a last decimal in every word at joints q (K, J), to first order (Jacobian)."""
-    some = q[np.linspace(0, len(q) - 1, min(len(q), 500)).astype(int)]
+def rounding_bound(control: Control, kin: Kinematics, moves: Moves, places: Ints) -> Rounding:
+    """Worst case of half a last decimal in every word, to first order (Jacobian), at up to 500 of the poses."""
+    rows = np.unique(np.linspace(0, len(moves) - 1, min(len(moves), 500)).astype(int))
+    some = kin.inverse(moves.tip[rows], kin.nearest_axis(moves.axis[rows]))[0]
+    some = some[np.isfinite(some).all(axis=1)]
+    if not len(some):
+        return Rounding(0.0, 0.0)
     step = 0.5 * 10.0 ** -places / control.unit
     jacobian = kin.jacobian(some)
     axis = np.linalg.norm(jacobian[:, 3:], axis=1) @ step
@@ -204,9 +209,10 @@ def _lost_taps(toolpath: Toolpath, moves: Moves, holes: list[Hole], controller: 
 
 
 def rounding_problem(bound: Rounding, tolerance: float, axis_tolerance: float) -> list[Diagnostic]:
-    """Rounding may take a third of the tolerances."""
-    if bound.tip <= tolerance / 3.0 and bound.axis <= axis_tolerance / 3.0:
+    """Rounding of the words may take a half of the tolerances at most: the rest is for the path."""
+    if bound.tip <= tolerance / 2.0 and bound.axis <= axis_tolerance / 2.0:
         return []
-    return [warning("tolerance.rounding", f"rounding of the words alone may move the tip by {bound.tip:.5f} mm, the "
-                    f"tolerance is {tolerance:g} mm", hint="more decimals in the controller's [format], or a wider "
-                    "--tolerance")]
+    return [error("tolerance.rounding", f"rounding of the words alone may move the tip by {bound.tip:.6f} mm and the axis "
+                  f"by {bound.axis / DEG:.6f} degrees, of {tolerance:g} mm and {axis_tolerance / DEG:g} degrees that are "
+                  "allowed beside the control's own smoothing", hint="more decimals in the controller's [format], or a "
+                  "wider --tolerance, --axis-tolerance")]

@@ -10,7 +10,7 @@ import numpy as np
 
 import toolpaths
 from machines.machine import Machine
-from postproc.compile import compile_program, rounding_bound, rounding_problem
+from postproc.compile import compile_program, decimals, rounding_bound, rounding_problem
 from postproc.controllers import writer_for
 from postproc.controllers.model import ControllerFile, load_controller
 from postproc.feed import Feeds
@@ -29,6 +29,8 @@ from toolpaths.units import DEG
 
 Progress = Callable[[str, int, int], None]
 VERSION = "0.1.0"
+MARGIN = 0.85
+"""of what is left for linearising: deviations are looked at in samples, the read-back looks at others"""
 
 
 @dataclass(frozen=True)
@@ -90,10 +92,13 @@ def _stages(result: PostResult, progress: Progress | None) -> PostResult:
     result = _with(result, found, job=job)
     if job is None or not result.ok:
         return result
-    shares = tolerance_shares(job)
+    shares, found = tolerance_shares(job)
+    result = _with(result, found, shares=shares)
+    if not result.ok:
+        return result
     path, found = build_path(job.control, job.kinematics, job.moves, job.space, job.home_rows(), shares["linearising"],
                              shares["axis_linearising"] * DEG, file, progress)
-    result = _with(result, found, path=path, shares=shares)
+    result = _with(result, found, path=path)
     if path is None:
         return result
     found, extents = check_travel(path, job.moves, job.control, job.kinematics, file)
@@ -102,14 +107,11 @@ def _stages(result: PostResult, progress: Progress | None) -> PostResult:
         return result
     program, feeds, found = compile_program(toolpath, job.moves, path, job.control, result.controller,
                                             job.kinematics, job.gauge_length, options.feed_mode)
-    bound = rounding_bound(job.control, job.kinematics(int(job.moves.tool[0])), path.q, program.decimals)
-    shares = shares | {"rounding": bound.tip, "axis_rounding": bound.axis / DEG}
-    found = found + rounding_problem(bound, options.tolerance, job.axis_tolerance)
-    result = _with(result, found, program=program, feeds=feeds, shares=shares)
+    result = _with(result, found, program=program, feeds=feeds)
     if not result.ok:
         return result
     text = write_text(result)
-    comparison, found = read_back(text.encode("ascii", "replace"), job, file, progress)
+    comparison, found = read_back(text.encode(), job, file, progress)
     result = _with(result, found, comparison=comparison)
     return replace(result, text=text) if result.ok else result
 
@@ -118,11 +120,16 @@ def _with(result: PostResult, diagnostics: list[Diagnostic], **values: object) -
     return replace(result, diagnostics=(*result.diagnostics, *diagnostics), **values)  # type: ignore[arg-type]
 
 
-def tolerance_shares(job: Job) -> dict[str, float]:
+def tolerance_shares(job: Job) -> tuple[dict[str, float], list[Diagnostic]]:
     """Where the tolerance goes (mm; axis_ in degrees): what the control's smoothing and rounding leave is linearising."""
     tolerance, axis = job.options.tolerance, job.options.axis_tolerance
+    bound = rounding_bound(job.control, job.kinematics(int(job.moves.tool[0])), job.moves,
+                           decimals(job.control, job.controller))
     smoothing = job.controller.kinematics.smoothing_share * tolerance
-    return {"smoothing": smoothing, "linearising": 0.8 * (tolerance - smoothing), "axis_linearising": 0.7 * axis}
+    shares = {"smoothing": smoothing, "rounding": bound.tip, "axis_rounding": bound.axis / DEG,
+              "linearising": MARGIN * (tolerance - smoothing - bound.tip),
+              "axis_linearising": MARGIN * (axis - bound.axis / DEG)}
+    return shares, rounding_problem(bound, tolerance - smoothing, job.axis_tolerance)
 
 
 def write_text(result: PostResult) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -42,16 +42,20 @@ def align(tip: Floats, axis: Floats, sweep: Floats, curves: Curves, link: Bools,
 def _fast() -> Callable[..., Any]:
     """The same functions compiled; the module's helpers are replaced, so that compiled code calls compiled code."""
     if not _compiled:
-        from numba import njit
-
-        for name in ("_dot", "_apart", "_angle", "_turned", "_line_done"):
-            globals()[name] = njit(globals()[name], cache=True)
-        _compiled.append(njit(_walk, cache=True))
+        for name in ("_apart", "_angle", "_turned", "_line_done"):
+            globals()[name] = _jit(globals()[name])
+        _compiled.append(_jit(_walk))
     return _compiled[0]
 
 
-def _dot(a: Any, b: Any) -> Any:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+def _jit(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Compiled when first called; kept on disk where the package's folder can be written."""
+    from numba import njit
+
+    try:
+        return cast(Callable[..., Any], njit(function, cache=True))
+    except RuntimeError:
+        return cast(Callable[..., Any], njit(function))
 
 
 def _apart(a: Any, b: Any) -> Any:
