@@ -1,14 +1,17 @@
 /* A clock that runs WARP times faster for every process that preloads this: the time of day counts from EPOCH, the
- * monotonic clock from 0, so that all processes agree without talking; sleeps and time-outs shrink by WARP.
+ * monotonic clock from 0, so that all processes agree without talking; sleeps and time-outs shrink by WARP. Threads
+ * may run on every processor.
  * gcc -O2 -shared -fPIC -o clock.so clock.c */
 #define _GNU_SOURCE
 #include <dlfcn.h>
+#include <pthread.h>
 #include <stdlib.h>
 #include <sys/prctl.h>
 #include <sys/select.h>
 #include <sys/sem.h>
 #include <sys/time.h>
 #include <time.h>
+#include <unistd.h>
 
 typedef long long nanos;
 enum { SECOND = 1000000000LL };
@@ -80,4 +83,25 @@ int semtimedop(int id, struct sembuf *ops, size_t count, const struct timespec *
     if (!wait) return real(id, ops, count, NULL);
     struct timespec t = to(from(wait) / warp + 1000);
     return real(id, ops, count, &t);
+}
+
+/* LinuxCNC ties its servo thread to one processor; on a shared host that one may be busy while another is free. */
+int pthread_attr_setaffinity_np(pthread_attr_t *attributes, size_t size, const cpu_set_t *processors) {
+    (void)attributes, (void)size, (void)processors;
+    return 0;
+}
+
+/* A session of its own would be a scheduling group of its own (autogroup), and some kernels starve such small groups for
+ * seconds beside busy ones. */
+pid_t setsid(void) { return getpid(); }
+
+/* What LinuxCNC writes is thrown away after the run; waiting for the disk would only hold the program up. */
+int fsync(int file) {
+    (void)file;
+    return 0;
+}
+
+int fdatasync(int file) {
+    (void)file;
+    return 0;
 }

@@ -15,9 +15,11 @@ from toolpaths.arrays import Floats
 MODULES = "/usr/lib/linuxcnc/modules"
 PERIOD = 0.001
 """s, the servo cycle"""
-SAMPLER_DEPTH = 32000
+SAMPLER_DEPTH = 200_000
 NML_KEYS = range(0x706F7301, 0x706F7306)
 """Shared memory of our own, apart from the keys of an ordinary LinuxCNC."""
+PATIENCE = 3600.0
+"""s of the fast clock that LinuxCNC's parts wait for each other: a busy host must not make them give up"""
 _FAST = 1e6
 
 
@@ -77,7 +79,7 @@ def _ini(folder: Path, machine: Machine, axes: str) -> Iterator[str]:
     yield from ("[EMC]", "VERSION = 1.1", "MACHINE = simulation", "DEBUG = 0", f"NML_FILE = {folder}/sim.nml")
     yield from ("[DISPLAY]", "DISPLAY = dummy", "[TASK]", "TASK = milltask", "CYCLE_TIME = 0.001")
     yield from ("[RS274NGC]", f"PARAMETER_FILE = {folder}/sim.var")
-    yield from ("[EMCMOT]", "EMCMOT = motmod", f"SERVO_PERIOD = {round(PERIOD * 1e9)}", "COMM_TIMEOUT = 10")
+    yield from ("[EMCMOT]", "EMCMOT = motmod", f"SERVO_PERIOD = {round(PERIOD * 1e9)}", f"COMM_TIMEOUT = {PATIENCE}")
     yield from ("[EMCIO]", "EMCIO = io", "CYCLE_TIME = 0.01", f"TOOL_TABLE = {folder}/tool.tbl")
     yield from ("[TRAJ]", f"COORDINATES = {' '.join(axes)}", "LINEAR_UNITS = mm", "ANGULAR_UNITS = degree")
     for kind in ("LINEAR", "ANGULAR"):
@@ -114,9 +116,9 @@ def _nml() -> Iterator[str]:
                ("emcError", 8192, " queue"), ("toolCmd", 1024, ""), ("toolSts", 1024, ""))
     for number, ((name, size, extra), key) in enumerate(zip(buffers, NML_KEYS, strict=True), 1):
         yield f"B {name} SHMEM localhost {size} 0 0 {number} 16 {key} xdr{extra}"
-    users = (("emc", 0, 0, "1.0", 0, "RW W W W R"), ("emcsvr", 2, 1, "1.0", 1, "W R R W R"),
-             ("tool", 3, 0, "1.0", 0, "- - W R W"), ("xemc", 10, 0, "10.0", 0, "W R R - -"))
-    for user, number, server, timeout, master, rights in users:
+    users = (("emc", 0, 0, 0, "RW W W W R"), ("emcsvr", 2, 1, 1, "W R R W R"),
+             ("tool", 3, 0, 0, "- - W R W"), ("xemc", 10, 0, 0, "W R R - -"))
+    for user, number, server, master, rights in users:
         for (buffer, _, _), right in zip(buffers, rights.split(), strict=True):
             if right != "-":
-                yield f"P {user} {buffer} LOCAL localhost {right} {server} {timeout} {master} {number}"
+                yield f"P {user} {buffer} LOCAL localhost {right} {server} {PATIENCE} {master} {number}"

@@ -21,6 +21,8 @@ from pathlib import Path
 PR_SET_CHILD_SUBREAPER = 36
 POLL = 0.005
 IDLE_POLLS = 6
+PAUSE = 20
+"""Servo cycles that M0 and M1 last."""
 START_LIMIT = 20.0
 
 
@@ -34,9 +36,7 @@ class Session:
                     "NMLFILE": str(folder / "sim.nml"), "RTAPI_FIFO_PATH": str(folder / "fifo"),
                     "HAL_RTMOD_DIR": self.job["modules"], "LINUXCNC_FORCE_REALTIME": "0"}
         self.env.pop("DISPLAY", None)
-        self.warped = dict(self.env)
-        if self.job["warp"] > 1:
-            self.warped |= {"LD_PRELOAD": str(folder / "clock.so"), "WARP": str(self.job["warp"])}
+        self.warped = {**self.env, "LD_PRELOAD": str(folder / "clock.so"), "WARP": str(self.job["warp"])}
         self.log = (folder / "log").open("w")
 
     def __enter__(self) -> Session:
@@ -46,8 +46,8 @@ class Session:
         return self
 
     def __exit__(self, *_: object) -> None:
-        for sign in (signal.SIGTERM, signal.SIGKILL):
-            deadline = time.monotonic() + 2.0
+        for sign, patience in ((signal.SIGTERM, 0.3), (signal.SIGKILL, 2.0)):
+            deadline = time.monotonic() + patience
             for pid in descendants(os.getpid()):
                 os.kill(pid, sign)
             while time.monotonic() < deadline and any_child():
@@ -182,6 +182,11 @@ class Controller:
         self.poll()
 
     @property
+    def heard(self) -> bool:
+        """True once the last command has been taken up."""
+        return self.stat.echo_serial_number == self.command.serial
+
+    @property
     def busy(self) -> bool:
         return self.stat.interp_state != self.api.INTERP_IDLE or not self.stat.inpos or self.stat.queue > 0
 
@@ -199,6 +204,11 @@ class Recorder:
         self.drain()
         self.rows = array("d")
         self.lost = self.stream.num_overruns
+
+    @property
+    def newest(self) -> int:
+        """Number of the last servo cycle seen."""
+        return self.stream.sampleno
 
     def drain(self) -> None:
         """Take what has come in."""
@@ -222,19 +232,18 @@ def run_program(controller: Controller, recorder: Recorder, limit: float) -> dic
     """Run to the end, recording. Returns how often the motion queue was found nearly empty."""
     api, deadline = controller.api, time.monotonic() + limit
     controller.command.auto(api.AUTO_RUN, 0)
-    started, idle, polls, low = False, 0, 0, 0
-    patience = time.monotonic() + 3.0
-    while idle < IDLE_POLLS and (started or time.monotonic() < patience):
+    idle, polls, low, paused_at = 0, 0, 0, 0
+    while idle < IDLE_POLLS:
         recorder.drain()
         controller.poll()
-        started = started or controller.busy
-        idle = 0 if controller.busy or not started else idle + 1
+        idle = idle + 1 if controller.heard and not controller.busy else 0
         if controller.stat.interp_state in (api.INTERP_READING, api.INTERP_WAITING):
             polls, low = polls + 1, low + (controller.stat.queue < 5)
-        if controller.stat.task_paused:
-            controller.command.auto(api.AUTO_RESUME)
-        if not started and controller.errors:
-            break
+        if controller.heard and controller.stat.interp_state == api.INTERP_PAUSED:
+            paused_at = paused_at or recorder.newest
+            if recorder.newest >= paused_at + PAUSE:
+                controller.command.auto(api.AUTO_RESUME)
+                paused_at = 0
         if time.monotonic() > deadline:
             controller.command.abort()
             raise RuntimeError(f"the program did not end in {limit:g} s")

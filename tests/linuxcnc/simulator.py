@@ -24,6 +24,10 @@ from toolpaths.arrays import Array, Floats
 NOBODY = 65534
 DELAY = 2
 """Servo cycles by which LinuxCNC's joint commands (interpolated) trail the pose that they belong to."""
+ATTEMPTS = 3
+"""On a busy host LinuxCNC may take a pause for one before the motion ahead of it has begun."""
+STILL = 1e-10
+"""mm or degrees per servo cycle that count as no motion: LinuxCNC may compute a joint anew while it rests"""
 REST = 8
 """Servo cycles without motion that count as standing still."""
 _APART = ("unshare", "--ipc", "--net", "--pid", "--fork", "--kill-child", "--mount-proc")
@@ -107,32 +111,44 @@ def standstill(machine: Machine, poses: Floats, tool_length: float = 0.0, warp: 
 
     Args:
         machine: its velocities do not matter here.
-        poses: (N, A) in the order of `config.letters(machine)`, mm and degrees; neighbours must differ.
+        poses: (N, A) in the order of `config.letters(machine)`, mm and degrees.
         tool_length: mm, as tool length offset.
 
     Raises:
-        RuntimeError: where the control complains or the rests do not match the poses.
+        RuntimeError: where the control complains or does not rest at every pose.
     """
     fast = np.full(len(machine.axis_names), 1e4)
     quick = replace(machine, limits=replace(machine.limits, velocity=fast, acceleration=fast * 100))
+    shift = np.where(np.array(list(config.letters(machine))) == "Z", tool_length, 0.0)
+    joints = np.full((len(poses), len(machine.axis_names)), np.nan)
+    for _ in range(ATTEMPTS):
+        wanted = np.flatnonzero(np.isnan(joints[:, 0]))
+        run = _stop_at(quick, poses[wanted], tool_length, warp)
+        rests = _rests(run)
+        there = np.abs(run.pose[rests] - (poses[wanted] + shift)[:, None]).max(axis=2) < 1e-7
+        found = there.any(axis=1)
+        joints[wanted[found]] = run.joints[rests[there.argmax(axis=1)[found]]]
+        if np.all(found):
+            return joints
+    raise RuntimeError(f"no rest at {np.sum(~found)} of {len(poses)} poses; {'; '.join(run.errors)}")
+
+
+def _stop_at(machine: Machine, poses: Floats, tool_length: float, warp: int) -> Run:
+    """Run a program that goes to each pose and pauses there, twice: see ATTEMPTS."""
     axes = config.letters(machine)
-    moves = ("G0 " + " ".join(f"{a}{v:.9f}" for a, v in zip(axes, row, strict=True)) + "\nG4 P0.03" for row in poses)
+    moves = ("G0 " + " ".join(f"{a}{v:.9f}" for a, v in zip(axes, row, strict=True)) + "\nM0\nM0" for row in poses)
     with tempfile.TemporaryDirectory(prefix="postproc-rest-") as name:
         program = Path(name) / "rest.ngc"
-        program.write_text("\n".join(["G21 G90 G61", "T1 M6", "G43 H1", "G4 P0.03", *moves, "M2", ""]))
-        run = simulate(quick, program, {1: ToolEntry(z=tool_length)}, warp)
-    rests = _rests(run)
-    if run.errors or len(rests) < len(poses):
-        raise RuntimeError(f"{len(rests)} rests for {len(poses)} poses; {'; '.join(run.errors)}")
-    return rests[-len(poses):]
+        program.write_text("\n".join(["G21 G90 G61", "T1 M6", "G43 H1", *moves, "M2", ""]))
+        return simulate(machine, program, {1: ToolEntry(z=tool_length)}, warp)
 
 
-def _rests(run: Run) -> Floats:
-    """Joints (M, J) of each standstill of at least REST cycles, in order."""
-    still = np.concatenate([[False], np.all(np.diff(run.joints, axis=0) == 0, axis=1), [False]])
+def _rests(run: Run) -> Array:
+    """Rows (M,) of the end of each standstill of at least REST cycles."""
+    still = np.concatenate([[False], np.all(np.abs(np.diff(run.joints, axis=0)) < STILL, axis=1), [False]])
     edges = np.flatnonzero(np.diff(still.astype(np.int8)))
     starts, ends = edges[::2], edges[1::2]
-    return run.joints[ends[ends - starts >= REST] - 1]
+    return ends[ends - starts >= REST] - 1
 
 
 @cache

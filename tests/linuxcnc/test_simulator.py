@@ -34,7 +34,7 @@ def random_poses(machine: Machine, count: int) -> Floats:
 @pytest.mark.parametrize("tool_length", [0.0, 75.5])
 def test_joints_at_standstill_are_our_inverse(standstill, name: str, tool_length: float) -> None:
     machine = machines.load(name)
-    poses = random_poses(machine, 60)
+    poses = random_poses(machine, 40)
     joints = standstill(machine, poses, tool_length)
     model, unit = machine.kinematics.with_tool(tool_length), np.where(machine.rotary, 180 / np.pi, 1.0)
     angles = np.where(machine.rotary, joints / unit, 0.0)
