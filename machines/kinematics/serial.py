@@ -13,14 +13,18 @@ the product of exponentials (Brockett 1984; Murray, Li, Sastry, A Mathematical I
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Self
 
 import numpy as np
 
+from machines.kinematics import columns
 from machines.kinematics.base import Kinematics, as_points
+from machines.kinematics.columns import Columns
 from machines.kinematics.frames import reference_x, spin_about
+from machines.kinematics.spherical import angle, azimuth, basis, meet, perpendicular, wrap
 from toolpaths.arrays import Bools, Floats, frozen
 from toolpaths.rotations import angle_between
 
@@ -28,6 +32,8 @@ ROUND_OFF = 1e-12
 """rad: directions nearer than this are the same (reach, singular direction)"""
 DEPENDENT = 1e-9
 """least determinant of the three linear directions; below it they do not span space"""
+Turning = dict[str, tuple[Floats, Floats]]
+"""cosine and sine (N,) of each rotary joint by its letter"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,9 +78,21 @@ class Serial(Kinematics):
         object.__setattr__(self, "rotary", tuple(kind[name] for name in self.axis_names))
         object.__setattr__(self, "branches", 2 if len(self._turns) == 2 else 1)
 
-    @property
+    @cached_property
     def _turns(self) -> list[Joint]:
         return [joint for joint in self.chain if joint.rotary]
+
+    @cached_property
+    def _slides(self) -> list[Joint]:
+        return [joint for joint in self.chain if not joint.rotary]
+
+    @cached_property
+    def _from_slides(self) -> Floats:
+        """(3, 3): slides per displacement of the tip, with no rotary axis between them; NaN where they depend."""
+        directions = np.stack([joint.direction for joint in self._slides], axis=1)
+        if abs(np.linalg.det(directions)) < DEPENDENT:
+            return np.full((3, 3), np.nan)
+        return np.asarray(np.linalg.inv(directions)) + 0.0
 
     def with_tool(self, length: float) -> Self:
         """The same machine at the tip: tip = gauge point - length * axis."""
@@ -84,30 +102,53 @@ class Serial(Kinematics):
 
     def pose(self, q: Floats, near: Floats | None = None) -> tuple[Floats, Floats, Floats]:
         """(tip (N, 3), axis (N, 3), spin (N,)) of joints q (N, J); there is one assembly, so `near` is not used."""
-        tip, vectors = self._sweep(as_points(q, self.joints, "q"), self._tool_frame())
-        return tip, vectors[0], spin_about(vectors[0], vectors[1])
+        tip, axis, side = self._placed(as_points(q, self.joints, "q"), self._tool_frame())
+        return tip, axis, spin_about(axis, side)
 
     def forward(self, q: Floats, near: Floats | None = None) -> tuple[Floats, Floats]:
         """(tip (N, 3), axis (N, 3)) of joints q (N, J)."""
-        tip, vectors = self._sweep(as_points(q, self.joints, "q"), [self.tool_axis])
-        return tip, vectors[0]
+        tip, axis = self._placed(as_points(q, self.joints, "q"), [self.tool_axis])
+        return tip, axis
 
     def _tool_frame(self) -> list[Floats]:
         return [self.tool_axis, reference_x(self.tool_axis[None])[0]]
 
-    def _sweep(self, q: Floats, carried: Sequence[Floats]) -> tuple[Floats, list[Floats]]:
-        """The tip (N, 3) and the vectors (N, 3) `carried` (each (3,)) by the tool, moved by every axis in turn."""
-        tip = np.tile(-self.tool_length * self.tool_axis, (len(q), 1))
-        vectors = [np.tile(v, (len(q), 1)) for v in carried]
-        for joint in reversed(self.chain):
-            value = q[:, self.axis_names.index(joint.name)]
+    def _placed(self, q: Floats, carried: Sequence[Floats]) -> list[Floats]:
+        """The tip and the vectors `carried` (each (3,)) by the tool, moved by every axis in turn, each (N, 3)."""
+        result = [np.empty((len(q), 3)) for _ in range(1 + len(carried))]
+        for first in range(0, len(q), columns.BLOCK):
+            part = slice(first, first + columns.BLOCK)
+            moved = self._sweep(self.chain, q[part], self._turning(q[part]),
+                                [self._tip_at_zero(), *map(columns.of_one, carried)])
+            for rows, vector in zip(result, moved, strict=True):
+                rows[part] = columns.to_rows(vector, len(q[part]))
+        return result
+
+    def _tip_at_zero(self) -> list[Floats | float]:
+        return columns.of_one(-self.tool_length * self.tool_axis)
+
+    def _turning(self, q: Floats) -> Turning:
+        """Cosine and sine (N,) of each rotary joint of q (N, J)."""
+        index = {joint.name: self.axis_names.index(joint.name) for joint in self._turns}
+        return {name: (np.cos(q[:, j]), np.sin(q[:, j])) for name, j in index.items()}
+
+    def _sweep(self, chain: Sequence[Joint], q: Floats | None, turning: Turning,
+               carried: Sequence[Columns]) -> list[list[Floats | float]]:
+        """A point and any number of directions `carried` through the joints of `chain`, the last one first.
+
+        Slides stand at 0 without `q`.
+        """
+        point, *vectors = map(list, carried)
+        for joint in reversed(chain):
             if joint.rotary:
-                cos, sin = np.cos(value)[:, None], np.sin(value)[:, None]
-                tip = joint.point + _turn(joint.direction, cos, sin, tip - joint.point)
-                vectors = [_turn(joint.direction, cos, sin, v) for v in vectors]
-            else:
-                tip = tip + value[:, None] * joint.direction
-        return tip, vectors
+                cos, sin = turning[joint.name]
+                place = columns.of_one(joint.point)
+                point = columns.plus(columns.turn(joint.direction, cos, sin, columns.minus(point, place)), place)
+                vectors = [columns.turn(joint.direction, cos, sin, v) for v in vectors]
+            elif q is not None:
+                value = q[:, self.axis_names.index(joint.name)]
+                point = [x if d == 0.0 else x + value * d for x, d in zip(point, joint.direction.tolist(), strict=True)]
+        return [point, *vectors]
 
     # ---- rates ---------------------------------------------------------------------------------------------------
 
@@ -120,26 +161,29 @@ class Serial(Kinematics):
         return self._rates(as_points(q, self.joints, "q"), twist=True)
 
     def _rates(self, q: Floats, twist: bool) -> Floats:
-        n = len(q)
-        tip = np.tile(-self.tool_length * self.tool_axis, (n, 1))
-        axis = np.tile(self.tool_axis, (n, 1))
-        columns = np.zeros((self.joints, 2, n, 3))
+        n, turning = len(q), self._turning(q)
+        tip, axis = self._tip_at_zero(), columns.of_one(self.tool_axis)
+        rates = np.zeros((3, self.joints, 2, n))
         done: list[int] = []
         for joint in reversed(self.chain):
             index = self.axis_names.index(joint.name)
+            w = columns.of_one(joint.direction)
             if not joint.rotary:
-                tip = tip + q[:, index, None] * joint.direction
-                columns[index, 0] = joint.direction
+                tip = columns.plus(tip, columns.times(q[:, index], w))
+                rates[:, index, 0] = joint.direction[:, None]
             else:
-                cos, sin = np.cos(q[:, index, None]), np.sin(q[:, index, None])
-                tip = _turn(joint.direction, cos, sin, tip - joint.point)
-                axis = _turn(joint.direction, cos, sin, axis)
-                columns[done] = _turn(joint.direction, cos, sin, columns[done])
-                columns[index, 0] = np.cross(joint.direction, tip)
-                columns[index, 1] = joint.direction if twist else np.cross(joint.direction, axis)
-                tip = tip + joint.point
+                cos, sin = turning[joint.name]
+                place = columns.of_one(joint.point)
+                tip = columns.turn(joint.direction, cos, sin, columns.minus(tip, place))
+                axis = columns.turn(joint.direction, cos, sin, axis)
+                for i, column in enumerate(columns.turn(joint.direction, cos, sin, rates[:, done])):
+                    rates[i, done] = column
+                for i, (v, turned) in enumerate(zip(columns.cross(w, tip), w if twist else columns.cross(w, axis),
+                                                    strict=True)):
+                    rates[i, index, 0], rates[i, index, 1] = v, turned
+                tip = columns.plus(tip, place)
             done.append(index)
-        return np.ascontiguousarray(columns.transpose(2, 1, 3, 0)).reshape(n, 6, self.joints)
+        return np.ascontiguousarray(rates.transpose(3, 2, 0, 1)).reshape(n, 6, self.joints)
 
     # ---- inverse -------------------------------------------------------------------------------------------------
 
@@ -149,63 +193,85 @@ class Serial(Kinematics):
         A free rotary joint (tool along it) takes its value from `near` as it is, windings included. `spin` is not
         used: no serial machine of five axes can choose it.
         """
-        tip, axis = as_points(tip, 3, "tip"), _unit(as_points(axis, 3, "axis"))
-        q = np.zeros((self.branches, len(tip), self.joints))
-        out = ~self._reachable(axis)
-        for branch in range(self.branches):
-            for joint, value in zip(self._turns, self._angles(axis, branch, near), strict=True):
-                q[branch, :, self.axis_names.index(joint.name)] = value
-            self._set_slides(q[branch], tip)
-        q[:, out] = np.nan
+        tip, axis = as_points(tip, 3, "tip"), as_points(axis, 3, "axis")
+        wanted = np.broadcast_to(0.0 if near is None else np.asarray(near, dtype=np.float64), (len(tip), self.joints))
+        q = np.empty((self.branches, len(tip), self.joints))
+        for first in range(0, len(tip), columns.BLOCK):
+            part = slice(first, first + columns.BLOCK)
+            self._solve(columns.of_rows(tip[part]), columns.unit(columns.of_rows(axis[part])), wanted[part], q[:, part])
         return q
 
-    def _angles(self, axis: Floats, branch: int, near: Floats | None) -> list[Floats]:
-        """Angles (N,) of the rotary axes in chain order that take the tool to the unit `axis` (N, 3)."""
+    def _solve(self, tip: Columns, axis: Columns, wanted: Floats, q: Floats) -> None:
+        """Fill q (B, N, J) for tips and unit axes."""
+        from_pole = columns.angle(axis, columns.of_one(self._pole()))
+        out = ~self._in_reach(from_pole)
+        for branch, angles in enumerate(self._angles(axis, from_pole, wanted)):
+            turning: Turning = {}
+            for joint, value in zip(self._turns, angles, strict=True):
+                q[branch, :, self.axis_names.index(joint.name)] = value
+                turning[joint.name] = (np.cos(value), np.sin(value))
+            slides = self._slides_to(tip, turning)
+            for joint, value in zip(self._slides, slides, strict=True):
+                q[branch, :, self.axis_names.index(joint.name)] = value
+            dependent = np.isnan(slides[0])
+            if dependent.any():
+                q[branch, dependent] = np.nan
+        if out.any():
+            q[:, out] = np.nan
+
+    def _angles(self, axis: Columns, from_pole: Floats, wanted: Floats) -> Iterator[tuple[Floats, ...]]:
+        """For each branch the angles (N,) of the rotary axes in chain order that take the tool to the unit `axis`."""
         turns = self._turns
         if not turns:
-            return []
+            yield ()
+            return
         first = turns[0]
-        carried = np.broadcast_to(self.tool_axis, axis.shape)
-        angles = []
-        if len(turns) == 2:
-            value = _meet(first.direction, turns[1].direction, self.tool_axis, axis, branch)
-            carried = _turn(turns[1].direction, np.cos(value)[:, None], np.sin(value)[:, None], carried)
-            angles.append(value)
-        value = _wrap(_azimuth(first.direction, axis) - _azimuth(first.direction, carried))
-        free = _along(first.direction, axis)
-        if np.any(free):
-            value = np.where(free, self._wanted(first, near, len(axis)), value)
-        angles.insert(0, value)
-        return angles
+        heading = azimuth(first.direction, axis)
+        free = columns.along(columns.of_one(first.direction), axis, ROUND_OFF)
+        value = wanted[:, self.axis_names.index(first.name)]
+        if len(turns) == 1:
+            beside = float(azimuth(first.direction, columns.of_one(self.tool_axis)))
+            yield (np.where(free, value, wrap(heading - beside)),)
+            return
+        second = turns[1]
+        for tilt in meet(first.direction, second.direction, self.tool_axis, from_pole):
+            carried = columns.turn(second.direction, np.cos(tilt), np.sin(tilt), columns.of_one(self.tool_axis))
+            turned = wrap(heading - azimuth(first.direction, carried))
+            yield np.where(free, value, turned), tilt
 
-    def _wanted(self, joint: Joint, near: Floats | None, n: int) -> Floats:
-        if near is None:
-            return np.zeros(n)
-        wanted = np.broadcast_to(np.asarray(near, dtype=np.float64), (n, self.joints))
-        return wanted[:, self.axis_names.index(joint.name)]
+    def _slides_to(self, tip: Columns, turning: Turning) -> list[Floats]:
+        """Linear joints (N,) in chain order that bring the tip there, the rotary ones standing at `turning`."""
+        slides = self._slides
+        first, last = self.chain.index(slides[0]), self.chain.index(slides[-1])
+        if any(joint.rotary for joint in self.chain[first:last]):
+            return self._slides_apart(tip, turning)
+        for joint in self.chain[:first]:
+            cos, sin = turning[joint.name]
+            place = columns.of_one(joint.point)
+            tip = columns.plus(columns.turn(joint.direction, cos, -sin, columns.minus(tip, place)), place)
+        at_zero, = self._sweep(self.chain[last + 1:], None, turning, [self._tip_at_zero()])
+        gap = columns.minus(tip, at_zero)
+        return [columns.dot(columns.of_one(row), gap) for row in self._from_slides]
 
-    def _set_slides(self, q: Floats, tip: Floats) -> None:
-        """Fill the linear joints of q (N, J), whose rotary ones are set, so that the tip is at `tip` (N, 3).
+    def _slides_apart(self, tip: Columns, turning: Turning) -> list[Floats]:
+        """The same with rotary axes between the slides, which then are not square to each other in every position.
 
         The tip is linear in the slides: tip = tip(slides at 0) + their directions (as turned) times q; Cramer's rule.
         """
-        slides = [joint for joint in self.chain if not joint.rotary]
-        at_zero, _ = self._sweep(q, [])
-        a, b, c = (self._turned(joint, q) for joint in slides)
-        gap = tip - at_zero
-        volume = _dot(a, np.cross(b, c))
+        at_zero, = self._sweep(self.chain, None, turning, [self._tip_at_zero()])
+        gap = columns.minus(tip, at_zero)
+        a, b, c = (self._turned(joint, turning) for joint in self._slides)
+        sides = (columns.cross(b, c), columns.cross(c, a), columns.cross(a, b))
+        volume = columns.dot(a, sides[0])
         volume = np.where(np.abs(volume) < DEPENDENT, np.nan, volume)
-        for joint, other in zip(slides, (np.cross(b, c), np.cross(c, a), np.cross(a, b)), strict=True):
-            q[:, self.axis_names.index(joint.name)] = _dot(gap, other) / volume
-        q[np.isnan(volume)] = np.nan
+        return [columns.dot(gap, side) / volume for side in sides]
 
-    def _turned(self, slide: Joint, q: Floats) -> Floats:
-        """Direction (N, 3) of a linear axis in the table frame: turned by the rotary axes between it and the part."""
-        vector = np.broadcast_to(slide.direction, (len(q), 3))
+    def _turned(self, slide: Joint, turning: Turning) -> list[Floats | float]:
+        """Direction of a linear axis in the table frame: turned by the rotary axes between it and the part."""
+        vector = columns.of_one(slide.direction)
         for joint in reversed(self.chain[: self.chain.index(slide)]):
             if joint.rotary:
-                value = q[:, self.axis_names.index(joint.name), None]
-                vector = _turn(joint.direction, np.cos(value), np.sin(value), vector)
+                vector = columns.turn(joint.direction, *turning[joint.name], vector)
         return vector
 
     # ---- what directions there are ---------------------------------------------------------------------------------
@@ -218,10 +284,10 @@ class Serial(Kinematics):
         """
         turns = self._turns
         if len(turns) < 2:
-            angle = _angle(turns[0].direction, self.tool_axis) if turns else 0.0
-            return angle, angle
-        a1 = _angle(turns[0].direction, turns[1].direction)
-        a2 = _angle(turns[1].direction, self.tool_axis)
+            only = angle(turns[0].direction, self.tool_axis) if turns else 0.0
+            return only, only
+        a1 = angle(turns[0].direction, turns[1].direction)
+        a2 = angle(turns[1].direction, self.tool_axis)
         return abs(a1 - a2), min(a1 + a2, 2.0 * np.pi - a1 - a2)
 
     def _pole(self) -> Floats:
@@ -229,10 +295,9 @@ class Serial(Kinematics):
         turns = self._turns
         return turns[0].direction if turns else self.tool_axis
 
-    def _reachable(self, axis: Floats) -> Bools:
+    def _in_reach(self, from_pole: Floats) -> Bools:
         low, high = self.reach()
-        angle = angle_between(axis, self._pole())
-        result: Bools = (angle >= low - ROUND_OFF) & (angle <= high + ROUND_OFF)
+        result: Bools = (from_pole >= low - ROUND_OFF) & (from_pole <= high + ROUND_OFF)
         return result
 
     def nearest_axis(self, axis: Floats) -> Floats:
@@ -243,12 +308,13 @@ class Serial(Kinematics):
         """
         unit, pole = _unit(as_points(axis, 3, "axis")), self._pole()
         low, high = self.reach()
-        angle = np.clip(angle_between(unit, pole), low, high)[:, None]
+        from_pole = angle_between(unit, pole)
+        kept = np.clip(from_pole, low, high)[:, None]
         across = unit - _dot(unit, pole)[:, None] * pole
-        side = np.where(_along(pole, unit)[:, None], _perpendicular(pole, self.tool_axis), across)
-        side = _unit(np.where(np.linalg.norm(side, axis=1, keepdims=True) > 0.0, side, _basis(pole)[0]))
-        projected = np.cos(angle) * pole + np.sin(angle) * side
-        result: Floats = np.where(self._reachable(unit)[:, None], axis, projected)
+        side = np.where(_along(pole, unit)[:, None], perpendicular(pole, self.tool_axis), across)
+        side = _unit(np.where(np.linalg.norm(side, axis=1, keepdims=True) > 0.0, side, basis(pole)[0]))
+        projected = np.cos(kept) * pole + np.sin(kept) * side
+        result: Floats = np.where(self._in_reach(from_pole)[:, None], axis, projected)
         return result
 
     def singular(self, q: Floats) -> Bools:
@@ -257,67 +323,16 @@ class Serial(Kinematics):
         turns = self._turns
         if not turns:
             return np.zeros(len(q), dtype=np.bool_)
-        carried = np.tile(self.tool_axis, (len(q), 1))
-        for joint in turns[1:]:
-            value = q[:, self.axis_names.index(joint.name), None]
-            carried = _turn(joint.direction, np.cos(value), np.sin(value), carried)
-        return _along(turns[0].direction, carried)
-
-
-# ---- rotation algebra ------------------------------------------------------------------------------------------------
-
-def _meet(first: Floats, second: Floats, tool: Floats, axis: Floats, branch: int) -> Floats:
-    """Angle (N,) about `second` that brings `tool` to the angle from `first` that `axis` (N, 3) has.
-
-    Second subproblem of Paden (1986) and Kahan as a spherical triangle with the sides a1 = first-second, a2 = second-
-    tool and phi = first-axis; its angle psi at `second` by the half-angle formula, which keeps its digits near the
-    singular direction (phi = |a1 - a2|) and near the edge of reach (phi = a1 + a2):
-    tan^2(psi/2) = sin((phi+d)/2) sin((phi-d)/2) / (sin((s+phi)/2) sin((s-phi)/2)), d = a1 - a2, s = a1 + a2.
-    """
-    a1, a2 = _angle(first, second), _angle(second, tool)
-    phi = angle_between(axis, first)
-    over = np.sin((phi + a1 - a2) / 2.0) * np.sin((phi - a1 + a2) / 2.0)
-    under = np.sin((a1 + a2 + phi) / 2.0) * np.sin((a1 + a2 - phi) / 2.0)
-    psi = 2.0 * np.arctan2(np.sqrt(np.maximum(over, 0.0)), np.sqrt(np.maximum(under, 0.0)))
-    nearest = float(_azimuth(second, first[None])[0] - _azimuth(second, tool[None])[0])
-    return _wrap(nearest + (psi if branch == 0 else -psi))
-
-
-def _turn(direction: Floats, cos: Floats, sin: Floats, v: Floats) -> Floats:
-    """Vectors (..., N, 3) turned about the unit `direction` (3,) (Rodrigues); cos and sin (N, 1)."""
-    along = (v @ direction)[..., None] * direction
-    result: Floats = along + cos * (v - along) + sin * np.cross(direction, v)
-    return result
-
-
-def _azimuth(pole: Floats, v: Floats) -> Floats:
-    """Angle (N,) of v (N, 3) about the unit `pole` (3,), from a fixed direction across it."""
-    e1, e2 = _basis(pole)
-    result: Floats = np.arctan2(v @ e2, v @ e1)
-    return result
-
-
-def _basis(pole: Floats) -> tuple[Floats, Floats]:
-    """Two unit vectors (3,) that make a right-handed frame with the unit `pole` (3,) as third."""
-    helper = np.eye(3)[(int(np.argmax(np.abs(pole))) + 1) % 3]
-    e1 = _perpendicular(pole, helper)
-    e1 = e1 / np.linalg.norm(e1)
-    return e1, np.cross(pole, e1)
-
-
-def _perpendicular(pole: Floats, v: Floats) -> Floats:
-    result: Floats = v - (v @ pole) * pole
-    return result
+        _, carried = self._sweep(turns[1:], None, self._turning(q), [columns.of_one(np.zeros(3)),
+                                                                     columns.of_one(self.tool_axis)])
+        found = columns.along(columns.of_one(turns[0].direction), carried, ROUND_OFF)
+        return np.broadcast_to(found, (len(q),)).copy()
 
 
 def _along(direction: Floats, v: Floats) -> Bools:
     """True (N,) where v (N, 3) lies along +-direction."""
     result: Bools = np.linalg.norm(np.cross(v, direction), axis=1) < ROUND_OFF
     return result
-
-
-def _angle(a: Floats, b: Floats) -> float:
-    return float(angle_between(a, b))
 
 
 def _unit_vector(v: Floats, name: str) -> Floats:
@@ -333,10 +348,4 @@ def _unit(v: Floats) -> Floats:
 
 def _dot(a: Floats, b: Floats) -> Floats:
     result: Floats = np.sum(a * b, axis=-1)
-    return result
-
-
-def _wrap(angle: Floats) -> Floats:
-    """The same angles in (-pi, pi]."""
-    result: Floats = angle - 2.0 * np.pi * np.ceil((angle - np.pi) / (2.0 * np.pi))
     return result
