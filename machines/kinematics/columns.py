@@ -6,7 +6,7 @@ stay in the processor's cache. Only the kinematics use this inside; their interf
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -85,6 +85,12 @@ def along(direction: Columns, v: Columns, tolerance: float) -> Bools:
     """True where v lies along +-direction within `tolerance` rad."""
     result: Bools = np.asarray(norm(cross(v, direction)) < tolerance)
     return result
+
+
+def blocks(n: int) -> Iterator[slice]:
+    """Slices of BLOCK points that cover n."""
+    for first in range(0, n, BLOCK):
+        yield slice(first, first + BLOCK)
 
 
 def of_rows(rows: Floats) -> list[Floats | float]:

@@ -15,6 +15,7 @@ from typing import ClassVar, Self
 import numpy as np
 
 from machines.kinematics.base import Kinematics, as_points
+from machines.kinematics.columns import blocks
 from machines.kinematics.frames import spin_about
 from machines.kinematics.h4_platform import H4Platform
 from machines.kinematics.rig import Clearance, Rig
@@ -94,8 +95,11 @@ class H4Linear(Kinematics):
         """Joints (B, N, 5), V-22; NaN where a rod does not reach or the tilt leaves the workspace's range."""
         tip, axis = as_points(tip, 3, "tip"), unit(as_points(axis, 3, "axis"))
         free = np.zeros(len(tip)) if near is None else np.broadcast_to(near, (len(tip), 5))[:, 4]
-        solved = [self._slides(tip, *pair) for pair in self._pairs(axis, free)]
-        return np.stack([branch for roots in zip(*solved, strict=True) for branch in roots])
+        q = np.empty((self.branches, len(tip), 5))
+        for part in blocks(len(tip)):
+            solved = [self._slides(tip[part], *pair) for pair in self._pairs(axis[part], free[part])]
+            q[:, part] = [branch for roots in zip(*solved, strict=True) for branch in roots]
+        return q
 
     def _slides(self, tip: Floats, tilt: Floats, turn: Floats) -> list[Floats]:
         """Joints (N, 5) of one pair for each choice of roots asked for."""

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from machines.kinematics.columns import blocks
 from machines.kinematics.h4_modes import candidates
 from machines.kinematics.sliders import Legs, determinant, platform_rates, unsolvable
 from machines.kinematics.workspace import Workspace
@@ -82,12 +83,16 @@ class H4Platform:
         elsewhere, all modes are computed and the one asked for is taken.
         """
         start = np.broadcast_to(self.home if near is None else near, (len(q), 4))
+        parts = [self._forward(q[part], start[part], near is None) for part in blocks(len(q))]
+        return np.concatenate(parts) if parts else np.empty((0, 4))
+
+    def _forward(self, q: Floats, start: Floats, home: bool) -> Floats:
         p, closed = self.newton(q, start)
-        good = closed & (self.at_home(p, q) if near is None else _distance(p, start) < TRUSTED)
+        good = closed & (self.at_home(p, q) if home else _distance(p, start) < TRUSTED)
         rest = np.flatnonzero(~good & np.isfinite(q).all(axis=1))
         p[~good] = np.nan
         if len(rest):
-            p[rest] = self._pick(q[rest], None if near is None else start[rest])
+            p[rest] = self._pick(q[rest], None if home else start[rest])
         return p
 
     def modes(self, q: Floats) -> Floats:

@@ -12,6 +12,7 @@ from typing import Self
 import numpy as np
 
 from machines.kinematics.base import Kinematics, as_points
+from machines.kinematics.columns import blocks
 from machines.kinematics.rig import Clearance, Rig
 from machines.kinematics.sliders import Legs, determinant, three_spheres
 from machines.kinematics.workspace import Workspace
@@ -60,8 +61,12 @@ class LinearDelta(Kinematics):
         """Slides (B, N, 3), III-2; NaN where the rods do not reach or the tool axis is not +z."""
         tip, axis = as_points(tip, 3, "tip"), as_points(axis, 3, "axis")
         tilted = (np.hypot(axis[:, 0], axis[:, 1]) > ROUND_OFF * np.abs(axis[:, 2])) | (axis[:, 2] <= 0.0)
-        joints = self._joints(np.where(tilted[:, None], np.nan, tip))
-        return self.legs.both(joints) if self.all_roots else self.legs.inverse(joints)[None]
+        tip = np.where(tilted[:, None], np.nan, tip)
+        q = np.empty((self.branches, len(tip), 3))
+        for part in blocks(len(tip)):
+            joints = self._joints(tip[part])
+            q[:, part] = self.legs.both(joints) if self.all_roots else self.legs.inverse(joints)
+        return q
 
     def assembly_modes(self, q: Floats) -> tuple[Floats, Floats]:
         """Both poses (tip, axis), each (2, N, 3), of slides q (N, 3): the home mode first.

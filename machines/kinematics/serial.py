@@ -116,8 +116,7 @@ class Serial(Kinematics):
     def _placed(self, q: Floats, carried: Sequence[Floats]) -> list[Floats]:
         """The tip and the vectors `carried` (each (3,)) by the tool, moved by every axis in turn, each (N, 3)."""
         result = [np.empty((len(q), 3)) for _ in range(1 + len(carried))]
-        for first in range(0, len(q), columns.BLOCK):
-            part = slice(first, first + columns.BLOCK)
+        for part in columns.blocks(len(q)):
             moved = self._sweep(self.chain, q[part], self._turning(q[part]),
                                 [self._tip_at_zero(), *map(columns.of_one, carried)])
             for rows, vector in zip(result, moved, strict=True):
@@ -196,8 +195,7 @@ class Serial(Kinematics):
         tip, axis = as_points(tip, 3, "tip"), as_points(axis, 3, "axis")
         wanted = np.broadcast_to(0.0 if near is None else np.asarray(near, dtype=np.float64), (len(tip), self.joints))
         q = np.empty((self.branches, len(tip), self.joints))
-        for first in range(0, len(tip), columns.BLOCK):
-            part = slice(first, first + columns.BLOCK)
+        for part in columns.blocks(len(tip)):
             self._solve(columns.of_rows(tip[part]), columns.unit(columns.of_rows(axis[part])), wanted[part], q[:, part])
         return q
 
