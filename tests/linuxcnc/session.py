@@ -18,7 +18,7 @@ import time
 from array import array
 from pathlib import Path
 
-PR_SET_CHILD_SUBREAPER = 36
+PR_SET_PDEATHSIG, PR_SET_CHILD_SUBREAPER = 1, 36
 POLL = 0.005
 IDLE_POLLS = 6
 PAUSE = 20
@@ -40,8 +40,10 @@ class Session:
         self.log = (folder / "log").open("w")
 
     def __enter__(self) -> Session:
-        """Daemons that LinuxCNC's programs leave behind become children of this process, so that it can end them."""
-        ctypes.CDLL(None).prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
+        """End with the caller, and adopt the daemons of LinuxCNC's programs, so that they can be ended too."""
+        prctl = ctypes.CDLL(None).prctl
+        prctl(PR_SET_PDEATHSIG, signal.SIGTERM, 0, 0, 0)
+        prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
         os.environ.update(self.env)
         return self
 

@@ -168,18 +168,25 @@ def _isolation() -> tuple[str, ...]:
     return prefix if works else ()
 
 
+def _identity() -> tuple[str, ...]:
+    """Command prefix that leaves root, as which LinuxCNC refuses to run."""
+    return _AS_NOBODY if os.getuid() == 0 else ()
+
+
 def _launch(folder: Path, time_limit: float) -> None:
-    root = os.getuid() == 0
-    if root:
+    if os.getuid() == 0:
         for path in (folder, *folder.iterdir()):
             os.chown(path, NOBODY, NOBODY)
-    command = [*_isolation(), *(_AS_NOBODY if root else ()), SYSTEM_PYTHON, "-B", folder / "session.py", folder]
+    command = [*_isolation(), *_identity(), SYSTEM_PYTHON, "-B", folder / "session.py", folder]
     with nullcontext() if _isolation() else _alone(), (folder / "stderr").open("w") as stderr:
         process = subprocess.Popen(command, cwd=folder, stdin=subprocess.DEVNULL, stdout=stderr, stderr=stderr)
         try:
             code = process.wait(time_limit + 60.0)
         except BaseException:
-            process.terminate()
+            if _isolation():
+                process.kill()
+            else:
+                process.terminate()
             process.wait(10.0)
             raise
     if code or not (folder / "result.json").exists():
@@ -201,8 +208,8 @@ def _alone() -> Iterator[None]:
         finally:
             for kind, key, number in _shared_objects() - before:
                 if key in (*_HAL_KEYS, *config.NML_KEYS):
-                    subprocess.run(["ipcrm", "-m" if kind == "shm" else "-s", str(number)], capture_output=True,
-                                   check=False)
+                    remove = [*_identity(), "ipcrm", "-m" if kind == "shm" else "-s", str(number)]
+                    subprocess.run(remove, capture_output=True, check=False)
 
 
 def _shared_objects() -> set[tuple[str, int, int]]:
