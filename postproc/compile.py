@@ -157,6 +157,7 @@ def _holes(toolpath: Toolpath, moves: Moves, path: Path, words: Floats, control:
     for first, last in zip([0, *change], [*(change - 1), len(path) - 1], strict=True):
         if hole[first] < 0:
             continue
+        first += _rises_first(words, z, int(first), int(last))
         level = float(words[first - 1, z]) if first > 0 else np.inf
         initial = before_initial if previous_last == first - 1 else level
         before_initial, previous_last = initial, last
@@ -165,6 +166,16 @@ def _holes(toolpath: Toolpath, moves: Moves, path: Path, words: Floats, control:
             holes.append(found)
             native[first:last + 1] = True
     return native, holes
+
+
+def _rises_first(words: Floats, z: int, first: int, last: int) -> bool:
+    """True where block `first` only lifts the tool to the clearance plane.
+
+    It stays a block of its own: inside a sequence of cycles LinuxCNC goes aslant to a higher plane under G99, others
+    cross over before they rise.
+    """
+    step = words[first] - words[first - 1]
+    return 0 < first < last and bool(step[z] > 0.0) and not np.delete(step, z).any()
 
 
 def _hole(toolpath: Toolpath, moves: Moves, path: Path, words: Floats, control: Control, controller: ControllerFile,

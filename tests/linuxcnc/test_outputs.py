@@ -1,0 +1,266 @@
+"""Every sample on every machine: LinuxCNC's interpreter reads from our text what we meant and what we read back."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import machines
+import postproc
+import toolpaths
+from postproc.pipeline import PostResult
+from postproc.readback.checks import block_seconds
+from postproc.setup import PartPlacement, SetupFile, ToolSetup, load_setup
+from tests.linuxcnc import outputs
+from tests.linuxcnc.interpreter import Canonical, Move
+from tests.linuxcnc.outputs import Output
+from toolpaths.toolpath import Toolpath
+
+SAMPLES = Path("samples")
+EXACT = 1e-9
+"""mm and degrees"""
+LEAST = {"bicubic.cls": 17, "blade.cls": 6, "five_faces.cls": 7, "five_tilted.cls": 7, "inch_plate.apt": 9,
+         "indexed_4axis.cls": 1, "pocket.cls": 10, "tool_axis_tour.apt": 6}
+"""Machines that must be able to make each sample, so that this test cannot shrink in silence."""
+CODES = {73, 81, 82, 83, 84, 85, 86, 89}
+
+CYCLES = """PARTNO CYCLES
+UNITS/MM
+LOADTL/1
+SPINDL/RPM,900,CLW
+COOLNT/FLOOD
+RAPID
+GOTO/0,0,30,0,0,1
+CYCLE/DRILL,DEPTH,8,CLEAR,2,MMPM,100
+GOTO/0,0,0
+GOTO/10,0,0
+CYCLE/DRILL,DEPTH,8,CLEAR,2,MMPM,100,DWELL,0.5
+GOTO/20,0,0
+GOTO/20,10,-3
+CYCLE/DEEP,DEPTH,9,STEP,2,CLEAR,2,MMPM,80
+GOTO/10,10,0
+GOTO/0,10,0
+CYCLE/BRKCHP,DEPTH,7,STEP,3,CLEAR,2,MMPM,80
+GOTO/0,20,0
+CYCLE/BORE,DEPTH,8,CLEAR,2,MMPM,60
+GOTO/10,20,0
+CYCLE/OFF
+FEDRAT/200,MMPM
+GOTO/20,20,5
+GOTO/30,20,5
+RAPID
+GOTO/30,20,50
+SPINDL/OFF
+FINI
+"""
+
+
+def samples() -> list[str]:
+    return sorted(p.name for p in SAMPLES.iterdir() if p.suffix in (".cls", ".apt"))
+
+
+def setup_file() -> SetupFile:
+    setup, _ = load_setup(SAMPLES / "tools.setup.toml")
+    assert setup is not None
+    return setup
+
+
+def convert(path: Toolpath, found: list, machine: str, setup: SetupFile | None = None,
+            feed_mode: str = "auto") -> PostResult:
+    return postproc.convert(path, machines.load(machine), "linuxcnc", setup or setup_file(),
+                            postproc.Options(feed_mode=feed_mode), found)  # type: ignore[arg-type]
+
+
+def all_outputs(interpret, sample: str) -> list[Output]:
+    """The sample on each machine that takes it."""
+    path, found = toolpaths.read(SAMPLES / sample)
+    made = [r for r in (convert(path, found, name) for name in machines.names()) if r.ok and outputs.readable(r)]
+    with ThreadPoolExecutor(2) as pool:
+        return list(pool.map(lambda r: outputs.output(r, interpret), made))
+
+
+def check(o: Output) -> None:
+    """Everything that the three readings share."""
+    assert o.canonical.error == ""
+    check_motion(o)
+    check_feeds(o)
+    check_program(o)
+    check_states(o)
+    check_text(o)
+
+
+def check_motion(o: Output) -> None:
+    c, m, rows = o.canonical, o.motion, o.moves
+    np.testing.assert_array_equal(c.line[rows], m.line)
+    np.testing.assert_array_equal(c.kind[rows], m.code)
+    sure = outputs.known(o)
+    off = np.abs(c.machine[rows][:, o.columns] - m.end)
+    assert off[sure].max() < EXACT
+    assert sure.mean() > 0.9 and sure[:, o.machine.rotary].all()
+    arcs, ours, theirs = outputs.centers(o)
+    assert np.abs(ours - theirs).max(initial=0.0) < EXACT
+    np.testing.assert_array_equal(c.turn[rows[arcs]] > 0, m.ccw[arcs])
+    np.testing.assert_array_equal(c.plane[rows[arcs]], m.plane[arcs])
+
+
+def check_feeds(o: Output) -> None:
+    """F words, and the time that LinuxCNC gives each block: tiny residues of X, Y, Z would spoil it under G93."""
+    c, m, rows = o.canonical, o.motion, o.moves
+    cut = m.code > 0
+    np.testing.assert_array_equal(c.inverse[rows[cut]], m.inverse[cut])
+    minute = cut & ~m.inverse
+    np.testing.assert_allclose(c.feed[rows[minute]], m.feed[minute], rtol=1e-12)
+    assert o.result.job is not None
+    ours = block_seconds(m, o.result.job.control)[cut]
+    theirs = c.seconds[rows[cut]]
+    moved = np.isfinite(theirs) & (ours > 0.0)
+    np.testing.assert_allclose(theirs[moved], ours[moved], rtol=1e-7, atol=1e-9)
+
+
+def check_program(o: Output) -> None:
+    """The canonical Program block for block; canned cycles by their bottoms and by where they leave the tool."""
+    p, c = o.result.program, o.canonical
+    assert p is not None
+    cycle_lines = np.unique(o.motion.line[o.motion.hole])
+    assert len(cycle_lines) == len(p.holes)
+    single = np.ones(len(p), dtype=bool)
+    for hole in p.holes:
+        single[hole.first:hole.last + 1] = False
+    alone = ~o.motion.hole
+    rows = o.moves[alone]
+    assert len(rows) == single.sum()
+    theirs = np.where(p.home[single][:, None], c.machine[rows][:, o.columns], c.pos[rows][:, o.columns])
+    told = outputs.known(o)[alone] & (p.write[single] | ~p.home[single][:, None])
+    assert np.abs(theirs - p.words[single])[told].max() < EXACT
+    np.testing.assert_array_equal(c.kind[rows], p.code[single])
+    z = int(o.result.job.control.xyz[2]) if o.result.job else 2
+    for line, hole in zip(cycle_lines, p.holes, strict=True):
+        legs = c.pos[o.moves[o.motion.line == line]][:, o.columns]
+        assert legs[:, z].min() == pytest.approx(hole.bottom, abs=EXACT)
+        np.testing.assert_allclose(legs[-1], p.words[hole.last], rtol=0, atol=EXACT)
+
+
+def check_states(o: Output) -> None:
+    c, m, rows, p = o.canonical, o.motion, o.moves, o.result.program
+    assert p is not None
+    theirs = outputs.states(c)
+    np.testing.assert_array_equal(c.tool[rows], np.maximum(m.tool, 0))
+    for name, ours in (("spindle", m.spindle), ("flood", m.flood), ("mist", m.mist)):
+        np.testing.assert_array_equal(theirs[name][rows], ours)
+    turning = m.spindle != 0
+    np.testing.assert_allclose(theirs["rpm"][rows][turning], m.rpm[turning], rtol=0, atol=1e-4)
+    ours_in_order = [x.name for k in sorted(p.commands) for x in p.commands[k]]
+    called = outputs.commands(o)
+    assert called == [name for name in ours_in_order if name in set(called)]
+    dwells = [x.args[0] for k in sorted(p.commands) for x in p.commands[k] if x.name == "DWELL"]
+    inside = np.isin(c.line, m.line[m.hole])
+    assert c.seconds[(c.kind == Move.DWELL) & ~inside].tolist() == pytest.approx(dwells)
+
+
+def check_text(o: Output) -> None:
+    """What LinuxCNC punishes: long lines, G93 without F or with a cycle, a cycle's code changed without its words."""
+    lines, w = o.lines, o.words
+    assert max(map(len, lines)) <= 252
+    assert lines[-2:] == ["M2", "%"] and lines[1] == "%"
+    m = o.motion
+    cutting = np.unique(m.line[(m.code > 0) & m.inverse])
+    assert np.isin(cutting, w.line[w.letter == ord("F")]).all()
+    assert not m.inverse[m.hole].any()
+    code = 0
+    for line in np.unique(m.line[m.hole]).tolist():
+        stated = {(chr(k), float(v)) for k, v in zip(w.letter[w.line == line], w.value[w.line == line], strict=True)}
+        cycle = next((int(v) for k, v in stated if k == "G" and v in CODES), code)
+        if cycle != code:
+            assert {"Z", "R", "F"} <= {k for k, _ in stated} and (cycle not in (73, 83) or "Q" in {k for k, _ in stated})
+        code = cycle
+
+
+@pytest.mark.parametrize("sample", samples())
+def test_linuxcnc_reads_what_we_meant(interpret, sample: str) -> None:
+    made = all_outputs(interpret, sample)
+    assert len(made) >= LEAST.get(sample, 1)
+    for o in made:
+        try:
+            check(o)
+        except AssertionError as fault:
+            raise AssertionError(f"{sample} on {o.machine.name}: {fault}") from fault
+
+
+@pytest.mark.parametrize("machine", ["mill-3axis", "mikron-ucp710", "linuxcnc-xyzac-trt"])
+def test_every_cycle(interpret, tmp_path: Path, machine: str) -> None:
+    (tmp_path / "cycles.apt").write_text(CYCLES)
+    result = convert(*toolpaths.read(tmp_path / "cycles.apt"), machine)
+    assert result.ok, result.diagnostics
+    o = outputs.output(result, interpret)
+    check(o)
+    said = set(o.words.value[(o.words.letter == ord("G")) & np.isin(o.words.value, list(CODES))].astype(int).tolist())
+    assert said == {81, 82, 83, 73, 85}
+
+
+@pytest.mark.parametrize("machine", ["mikron-ucp710", "linuxcnc-xyzac-trt"])
+def test_inverse_time_everywhere(interpret, machine: str) -> None:
+    """Every feed block by its time; LinuxCNC's least rate of 0.1 mm/min and tiny residues show in its times."""
+    for sample in ("tool_axis_tour.apt", "five_tilted.cls", "blade.cls"):
+        result = convert(*toolpaths.read(SAMPLES / sample), machine, feed_mode="inverse-time")
+        assert result.ok, result.diagnostics
+        o = outputs.output(result, interpret)
+        assert o.motion.inverse[(o.motion.code > 0) & ~o.motion.hole].mean() > 0.9
+        check(o)
+
+
+SHORT = {str(k): ToolSetup(gauge_length=v) for k, v in ((1, 41.25), (2, 35.5), (3, 50.0))}
+"""Tools with which the raised part stays inside the travel of every machine."""
+TURNED = PartPlacement(origin=(30.0, -20.0, 40.0), x_axis=(np.cos(np.pi / 6), 0.5, 0.0),
+                       y_axis=(-0.5, np.cos(np.pi / 6), 0.0))
+
+
+@pytest.mark.parametrize("machine", ["mikron-ucp710", "linuxcnc-xyzac-trt", "trunnion-bc", "fork-head-ab", "head-table"])
+@pytest.mark.parametrize(("sample", "system"), [("five_tilted.cls", ""), ("five_tilted.cls", 1)])
+def test_machine_coordinates_are_our_joints(interpret, machine: str, sample: str, system: str | int) -> None:
+    """A placed and turned part under a work offset of its own: LinuxCNC's machine coordinates are the planned joints."""
+    path, found = toolpaths.read(SAMPLES / sample)
+    name = path.frames[system].name if isinstance(system, int) else system
+    setup = setup_file().model_copy(update={"part": TURNED, "work_offset": name, "tools": SHORT})
+    result = convert(path, found, machine, setup)
+    assert result.ok, result.diagnostics
+    o = outputs.output(result, interpret)
+    check(o)
+    check_joints(o)
+
+
+def check_joints(o: Output) -> None:
+    """Machine coordinates of LinuxCNC against the joints of the Path, through our kinematics with the tool."""
+    path, job, c = o.result.path, o.result.job, o.canonical
+    assert path is not None and job is not None and o.result.program is not None
+    assert np.any(np.abs(job.control.work_offset[job.control.xyz]) > 1.0)
+    alone = np.flatnonzero(~o.motion.hole & outputs.known(o).all(axis=1))
+    rows = o.moves[alone]
+    machine = c.machine[rows][:, o.columns]
+    wanted = np.concatenate([path.q * job.control.unit])
+    if job.control.tip_law:
+        for h in np.unique(o.motion.register[alone]):
+            k = np.flatnonzero(o.motion.register[alone] == h)
+            length = job.register_lengths().get(int(h), 0.0)
+            world = machine[k].copy()
+            world[:, job.control.xyz[2]] -= length
+            kin = job.machine.kinematics.with_tool(length)
+            q = world / job.control.unit
+            q[:, job.control.slides] = 0.0
+            tip, axis = kin.forward(q)
+            columns = kin.jacobian(q)[:, :3][:, :, job.control.slides]
+            q[:, job.control.slides] = np.linalg.solve(columns, (world[:, job.control.xyz] - tip)[..., None])[..., 0]
+            machine[k] = q * job.control.unit
+    nearest = np.min(np.abs(machine[:, None, :] - wanted[None, :, :]).max(axis=2), axis=1)
+    assert nearest.max() < (2e-2 if job.control.tip_law else 2.5e-4)
+
+
+def test_offset_in_the_header_is_the_one_used() -> None:
+    path, found = toolpaths.read(SAMPLES / "five_tilted.cls")
+    result = convert(path, found, "mikron-ucp710", setup_file().model_copy(update={"part": TURNED, "tools": SHORT}))
+    line = next(line for line in result.text.splitlines() if line.startswith("(work offset G54"))
+    stated = [float(word[1:]) for word in line.strip("()").split()[-5:]]
+    assert result.job is not None
+    np.testing.assert_allclose(stated, result.job.control.work_offset, atol=5e-5)
