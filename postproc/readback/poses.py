@@ -9,6 +9,7 @@ import numpy as np
 
 from machines.kinematics.base import Kinematics
 from postproc.control import Control
+from postproc.readback import assembly
 from postproc.readback.execute import Motion
 from postproc.word_arcs import PLANE_COLUMNS
 from toolpaths.arrays import Bools, Floats, Ints
@@ -19,11 +20,15 @@ SAMPLES = (0.2, 0.4, 0.6, 0.8, 1.0)
 
 @dataclass(frozen=True)
 class Executed:
-    """Gives the poses of a program's blocks: control, kinematics by tool number, gauge length by register."""
+    """Gives the poses of a program's blocks: control, kinematics by tool number, gauge length by register.
+
+    `before` (E, 6) is the gauge point's pose where each block begins, on machines whose joints do not tell it alone.
+    """
 
     control: Control
     kinematics: Callable[[int], Kinematics]
     lengths: dict[int, float]
+    before: Floats | None = None
 
     def poses(self, motion: Motion, rows: Ints, t: float) -> tuple[Floats, Floats]:
         """(tip, axis) (K, 3) of the blocks `rows` at fraction t."""
@@ -32,7 +37,11 @@ class Executed:
         tool, register = motion.tool[rows], motion.register[rows]
         for number, h in {*zip(tool.tolist(), register.tolist(), strict=True)}:
             k = np.flatnonzero((tool == number) & (register == h))
-            tip[k], axis[k] = self._pose(position[k], self.kinematics(number), self.lengths.get(h, 0.0) if h >= 0 else 0.0)
+            kin, offset = self.kinematics(number), self.lengths.get(h, 0.0) if h >= 0 else 0.0
+            if self.before is None:
+                tip[k], axis[k] = self._pose(position[k], kin, offset)
+            else:
+                tip[k], axis[k] = self._followed(motion, rows[k], position[k], kin)
         return tip, axis
 
     def _pose(self, position: Floats, kin: Kinematics, offset: float) -> tuple[Floats, Floats]:
@@ -43,11 +52,35 @@ class Executed:
         held = self.control.machine.kinematics.with_tool(offset)
         return kin.forward(self.control.joints(words, held, offset))
 
+    def _followed(self, motion: Motion, rows: Ints, position: Floats, kin: Kinematics) -> tuple[Floats, Floats]:
+        assert self.before is not None
+        near = self.before[rows].copy()
+        near[:, :3] -= kin.tool_length * near[:, 3:]
+        unit = self.control.unit
+        pose = assembly.walk(kin, begins(motion, rows) / unit, position / unit, near)
+        return pose[:, :3], pose[:, 3:]
+
+
+def poses_before(motion: Motion, control: Control) -> Floats | None:
+    """`Executed.before` of a program; None where the joints alone tell the pose."""
+    kin = control.machine.kinematics
+    if control.tip_law or kin.slides_affine:
+        return None
+    home = motion.start / control.unit
+    ends = assembly.ends(kin, motion.end / control.unit, home)
+    return np.concatenate([np.hstack(kin.forward(home[None, :])), ends[:-1]])
+
+
+def begins(motion: Motion, rows: Ints) -> Floats:
+    """Machine coordinates (K, J) where blocks begin."""
+    result: Floats = np.where((rows == 0)[:, None], motion.start, motion.end[np.maximum(rows - 1, 0)])
+    return result
+
 
 def positions(motion: Motion, control: Control, rows: Ints, t: float) -> Floats:
     """Machine coordinates (K, J) of blocks at fraction t: straight, or on the arc in its plane."""
     end = motion.end[rows]
-    before = np.where((rows == 0)[:, None], motion.start, motion.end[np.maximum(rows - 1, 0)])
+    before = begins(motion, rows)
     if t == 1.0:
         return end
     result = before + t * (end - before)

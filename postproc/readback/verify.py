@@ -9,7 +9,7 @@ import numpy as np
 from postproc.job import Job
 from postproc.readback.compare import Comparison, compare
 from postproc.readback.execute import Offsets, execute
-from postproc.readback.poses import Executed
+from postproc.readback.poses import Executed, poses_before
 from postproc.readback.words import tokenise
 from toolpaths.diagnostics import Diagnostic, error, has_errors
 
@@ -32,7 +32,7 @@ def read_back(data: bytes, job: Job, file: str,
         return None, [*diagnostics, error("verify.no_motion", "the program moves nothing", file=gcode)]
     if progress:
         progress("read back", 0, len(motion))
-    executed = Executed(control, job.kinematics_of, offsets.lengths)
+    executed = Executed(control, job.kinematics_of, offsets.lengths, poses_before(motion, control))
     with np.errstate(invalid="ignore"):
         comparison = compare(motion, job.toolpath, job.moves, executed, job.space, job.options.tolerance,
                              job.axis_tolerance, file)
