@@ -198,7 +198,9 @@ def main() -> None:
     """Entry point of the console script."""
     try:
         app()
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, SystemExit) as end:
+        if isinstance(end, SystemExit) and end.code != 130:
+            raise
         typer.echo("interrupted; nothing was written", err=True)
         raise SystemExit(130) from None
 
