@@ -185,7 +185,8 @@ def test_random_programs_as_the_own_executor_runs_them(seed: int) -> None:
 
 @pytest.mark.parametrize(("text", "code"), [
     ("G0 X1\nG68.2 X1\n", "gcode.unknown_code"), ("G91 G1 X1 F9\n", "gcode.unknown_code"),
-    ("G55 X1\n", "gcode.unknown_code"), ("M98 P2\n", "gcode.unknown_code"), ("G0 B5\n", "gcode.unknown_word"), ("G0 U5\n", "gcode.unknown_word"),
+    ("G55 X1\n", "gcode.unknown_code"), ("M98 P2\n", "gcode.unknown_code"),
+    ("G0 B5\n", "gcode.unknown_word"), ("G0 U5\n", "gcode.unknown_word"),
     ("G0 X1 X2\n", "gcode.repeated"), ("G0 G1 X1 F9\n", "gcode.repeated"), ("G17 G18 G0 X1\n", "gcode.repeated"),
     ("G0 X#1\n", "gcode.syntax"), ("G0 X[1+2]\n", "gcode.syntax"),
     ("O100 SUB\n", "gcode.syntax"), ("G0 X1e3\n", "gcode.unknown_word"),
@@ -255,7 +256,7 @@ def walked(data: tuple, blocks: slice = slice(None)) -> tuple[np.ndarray, np.nda
 def test_compiled_walk_is_the_plain_walk(monkeypatch: pytest.MonkeyPatch) -> None:
     cases = [random_walk(np.random.default_rng(seed), 150) for seed in range(8)]
     plain = [walked(c) for c in cases] + [walked(c, slice(0, 90)) for c in cases]
-    for name in ("_dot", "_apart", "_angle", "_turned", "_line_done"):
+    for name in ("_apart", "_angle", "_turned", "_line_done"):
         monkeypatch.setattr(align, name, getattr(align, name))
     monkeypatch.setattr(align, "_COMPILE_FROM", 0)
     fast = [walked(c) for c in cases] + [walked(c, slice(0, 90)) for c in cases]

@@ -71,11 +71,11 @@ def test_generic_iso_writes_points_in_whole_numbers() -> None:
 
 
 def test_shop_file_numbers_blocks_and_sets_decimals(tmp_path: Path) -> None:
-    shop = shop_file(tmp_path, "[format]\nsequence_step = 10\nlinear_decimals = 2\nspace = false\n")
+    shop = shop_file(tmp_path, "[format]\nsequence_step = 10\nlinear_decimals = 3\nspace = false\n")
     result = good(convert(toolpath("RAPID", "GOTO/0,0,5", "GOTO/1.234567,0,5"), "mill-3axis", shop))
     numbered = [n for n in result.text.splitlines() if not n.startswith(("%", "("))]
     assert [int(re.match(r"N(\d+)", n)[1]) for n in numbered] == [10 * (i + 1) for i in range(len(numbered))]
-    assert any(re.fullmatch(r"N\d+G1X1.23F600", n) for n in numbered)
+    assert any(re.fullmatch(r"N\d+G1X1.235F600", n) for n in numbered)
     assert not [n for n in numbered if "G53 G0" not in n and re.search(r"[XYZ][\d.-]+ ", n)]
 
 
@@ -311,7 +311,8 @@ def test_each_kind_of_cycle(record: str, want: str) -> None:
 def test_cycle_words_are_restated_when_anything_changes() -> None:
     """Another top, another depth, another feed: Z, R and F again; the same again: place alone; G80 at the end."""
     got = cycle("CYCLE/DRILL,DEPTH,12,MMPM,100,CLEAR,3", "GOTO/10,0,0", "GOTO/20,0,-5",
-                "CYCLE/DRILL,DEPTH,6,MMPM,100,CLEAR,3", "GOTO/30,0,-5", "CYCLE/DRILL,DEPTH,6,MMPM,80,CLEAR,3", "GOTO/40,0,-5", "GOTO/50,0,-5", "CYCLE/OFF",
+                "CYCLE/DRILL,DEPTH,6,MMPM,100,CLEAR,3", "GOTO/30,0,-5",
+                "CYCLE/DRILL,DEPTH,6,MMPM,80,CLEAR,3", "GOTO/40,0,-5", "GOTO/50,0,-5", "CYCLE/OFF",
                 "RAPID", "GOTO/50,0,50")
     assert got == ["G99 G81 X10 Y0 Z-12 R3 F100", "G99 G81 X20 Y0 Z-17 R-2 F100", "G99 G81 X30 Y0 Z-11 R-2 F100",
                    "G99 G81 X40 Y0 Z-11 R-2 F80", "X50 Y0", "G80"]

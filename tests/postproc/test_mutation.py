@@ -1,0 +1,202 @@
+"""Programs spoilt in one place: the read-back must refuse every one of them.
+
+What may be changed without harm is left out on purpose: the way above the safe planes, pecks on the way to a bottom,
+feeds that an axis limit had reduced below the programmed one, and blocks that linearising put in with room to spare.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from functools import cache
+
+import numpy as np
+import pytest
+
+from postproc.pipeline import PostResult
+from postproc.readback.verify import read_back
+from tests.postproc.kit import codes, convert, execute, good, goto, sample, tilted, toolpath
+from toolpaths.diagnostics import Severity
+
+FLAT = [("pocket.cls", "mill-3axis", "linuxcnc"), ("inch_plate.apt", "mill-3axis", "generic-iso"),
+        ("five_faces.cls", "mikron-ucp710", "linuxcnc"), ("indexed_4axis.cls", "mill-4axis", "linuxcnc")]
+FIVE = [("tool_axis_tour.apt", "mikron-ucp710", "linuxcnc"), ("tool_axis_tour.apt", "linuxcnc-xyzac-trt", "linuxcnc")]
+MOST = 60
+
+
+def found(result: PostResult, lines: list[str]) -> set[str]:
+    _, diagnostics = read_back(("\n".join(lines) + "\n").encode(), result.job, "f.cls")
+    return codes(d for d in diagnostics if d.severity is Severity.ERROR)
+
+
+@cache
+def cutting(case: tuple[str, str, str]) -> list[int]:
+    """0-based lines that cut, but canned cycles (their words are Z, R and Q) and holes in single moves (pecks)."""
+    result = sample(*case)
+    holes = {int(n) for n in result.toolpath.line[result.toolpath.role == 1]}
+    pecked = bool(holes) and not result.program.holes
+    lines = sorted({s.line - 1 for s in execute(result) if s.kind != "rapid" and np.isnan(s.level)})
+    return [] if pecked else lines
+
+
+def some(items: list, count: int = MOST) -> list:
+    """At most `count` of the items, evenly."""
+    return [items[k] for k in np.unique(np.linspace(0, len(items) - 1, count).astype(int))] if items else []
+
+
+def survivors(result: PostResult, mutants: Iterator[tuple[str, list[str]]]) -> list[str]:
+    seen, left = 0, []
+    for name, lines in mutants:
+        seen += 1
+        if not found(result, lines):
+            left.append(name)
+    assert seen
+    return left
+
+
+def replaced(lines: list[str], i: int, block: str) -> list[str]:
+    return [*lines[:i], block, *lines[i + 1:]]
+
+
+def numbers(result: PostResult, letters: str, steps: tuple[float, ...], rows: list[int]) -> Iterator[tuple[str, list[str]]]:
+    lines = result.text.splitlines()
+    for i in rows:
+        for m in re.finditer(rf"([{letters}])(-?[\d.]+)", lines[i]):
+            for step in steps:
+                block = lines[i][:m.start(2)] + f"{float(m[2]) + step:.4f}" + lines[i][m.end(2):]
+                yield f"{i + 1}: {lines[i]} -> {block}", replaced(lines, i, block)
+
+
+@pytest.mark.parametrize("case", [*FLAT, *FIVE])
+def test_unspoilt_programs_pass(case: tuple[str, str, str]) -> None:
+    result = sample(*case)
+    assert not found(result, result.text.splitlines())
+
+
+@pytest.mark.parametrize("case", FLAT)
+def test_wrong_number(case: tuple[str, str, str]) -> None:
+    """0.02 mm off, and far off, in every word of every kind of cutting block."""
+    result = sample(*case)
+    rows = some(cutting(case))
+    assert not survivors(result, numbers(result, "XYZ", (0.021, -0.3, 7.0), rows))
+    if case == FLAT[0]:
+        assert not survivors(result, numbers(result, "IJ", (-0.3, 7.0), rows))
+
+
+@pytest.mark.parametrize("case", FIVE)
+def test_wrong_number_in_five_axes(case: tuple[str, str, str]) -> None:
+    result = sample(*case)
+    assert not survivors(result, numbers(result, "XYZ", (0.05, -7.0), some(cutting(case), 12)))
+    assert not survivors(result, numbers(result, "ABC", (10.0, -25.0), some(cutting(case), 12)))
+
+
+@pytest.mark.parametrize("case", FLAT[:2])
+def test_wrong_number_in_a_canned_cycle(case: tuple[str, str, str]) -> None:
+    result = sample(*case)
+    lines = result.text.splitlines()
+    rows = [i for i, n in enumerate(lines) if re.search(r"G8[1-9]|G73", n)]
+    rows += [i + 1 for i in rows if re.fullmatch(r"X\S+ Y\S+", lines[i + 1])]
+    assert not survivors(result, numbers(result, "XYZR", (0.021, -0.3, 7.0), rows))
+
+
+@pytest.mark.parametrize("case", FLAT[:3])
+def test_missing_block(case: tuple[str, str, str]) -> None:
+    result = sample(*case)
+    lines = result.text.splitlines()
+    assert not survivors(result, ((f"{i + 1}: {lines[i]}", [*lines[:i], *lines[i + 1:]]) for i in some(cutting(case))))
+
+
+@pytest.mark.parametrize("case", FLAT[:3])
+def test_swapped_blocks(case: tuple[str, str, str]) -> None:
+    result = sample(*case)
+    lines, rows = result.text.splitlines(), cutting(case)
+    pairs = [i for i in rows if i + 1 in rows and lines[i] != lines[i + 1]]
+    assert not survivors(result, ((f"{i + 1}: {lines[i]} <> {lines[i + 1]}",
+                                   [*lines[:i], lines[i + 1], lines[i], *lines[i + 2:]]) for i in some(pairs)))
+
+
+@pytest.mark.parametrize("case", [*FLAT[:3], FIVE[0]])
+@pytest.mark.parametrize(("code", "other"), [("G1", "G0"), ("G2", "G3"), ("G3", "G2"), ("G93", "G94")])
+def test_wrong_motion_code(case: tuple[str, str, str], code: str, other: str) -> None:
+    result = sample(*case)
+    lines = result.text.splitlines()
+    rows = [i for i in cutting(case) if re.search(rf"{code}\b", lines[i])]
+    if rows:
+        assert not survivors(result, ((f"{i + 1}: {lines[i]}", replaced(lines, i, re.sub(rf"{code}\b", other, lines[i])))
+                                      for i in some(rows, 10)))
+
+
+@pytest.mark.parametrize("case", FLAT)
+def test_feed_doubled(case: tuple[str, str, str]) -> None:
+    result = sample(*case)
+    lines = result.text.splitlines()
+    rows = [i for i, n in enumerate(lines) if re.search(r"F[\d.]+$", n) and not n.startswith("(")]
+    assert not survivors(result, ((f"{i + 1}: {lines[i]}", replaced(lines, i, re.sub(
+        r"F([\d.]+)", lambda m: f"F{2 * float(m[1]):.4f}", lines[i]))) for i in some(rows, 20)))
+
+
+def test_feed_doubled_all_over_a_five_axis_move() -> None:
+    """Inverse time: every F of one CL move doubled."""
+    axes = np.array([tilted(20 + 5 * k, 30) for k in range(4)])
+    tips = np.array([[0, 0, 0], [20, 0, 0], [40, 0, 0], [60, 0, 0.0]])
+    result = good(convert(toolpath("RAPID", *goto(tips[:1], axes[:1]), "FEDRAT/MMPM,100", *goto(tips[1:], axes[1:])),
+                          "mikron-ucp710"))
+    lines = result.text.splitlines()
+    rows = [i for i, n in enumerate(lines) if re.search(r"F[\d.]+$", n)]
+    assert len(rows) > 6
+    assert "verify.feed" in found(result, [re.sub(r"F([\d.]+)$", lambda m: f"F{2 * float(m[1]):.4f}", n) for n in lines])
+
+
+@pytest.mark.parametrize("case", FLAT)
+@pytest.mark.parametrize(("pattern", "code"), [
+    (r"T1 M6", ""), (r"T2 M6", ""), (r"S\d+ M3", "verify.state"), (r"M8", "verify.state"), (r"G43 H1", ""), (r"G43 H2", "")])
+def test_missing_change_of_state(case: tuple[str, str, str], pattern: str, code: str) -> None:
+    """The first of its kind left out, so that nothing later makes up for it."""
+    result = sample(*case)
+    lines = result.text.splitlines()
+    at = next(i for i, n in enumerate(lines) if re.fullmatch(pattern, n))
+    got = found(result, [*lines[:at], *lines[at + 1:]])
+    assert got and (not code or code in got)
+
+
+@pytest.mark.parametrize("case", FLAT)
+@pytest.mark.parametrize(("pattern", "text"), [(r"T1 M6", "T2 M6"), (r"G43 H1", "G43 H2"), (r"G43 H2", "G43 H1"),
+                                               (r"S\d+ M3", "S1 M3"), (r"G43 H1", "G43 H9")])
+def test_wrong_tool_register_or_speed(case: tuple[str, str, str], pattern: str, text: str) -> None:
+    result = sample(*case)
+    lines = result.text.splitlines()
+    at = next(i for i, n in enumerate(lines) if re.fullmatch(pattern, n))
+    assert found(result, replaced(lines, at, text))
+
+
+@pytest.mark.parametrize("case", FLAT)
+def test_spindle_the_wrong_way_round(case: tuple[str, str, str]) -> None:
+    result = sample(*case)
+    assert "verify.state" in found(result, result.text.replace(" M3\n", " M4\n").splitlines())
+
+
+@pytest.mark.parametrize(("old", "new"), [("G21 ", "G20 "), ("G90 ", "G91 "), ("\nG54\n", "\nG55\n")])
+def test_wrong_preamble(old: str, new: str) -> None:
+    result = sample(*FLAT[0])
+    assert found(result, result.text.replace(old, new, 1).splitlines())
+
+
+def test_cut_short() -> None:
+    result = sample(*FLAT[0])
+    lines = result.text.splitlines()
+    for share in (0.3, 0.6, 0.9):
+        assert "verify.not_reached" in found(result, lines[:int(share * len(lines))])
+
+
+def test_the_program_of_another_path() -> None:
+    result, other = sample("pocket.cls", "mill-3axis"), sample("inch_plate.apt", "mill-3axis")
+    assert found(result, other.text.splitlines())
+
+
+def test_linking_moves_through_the_part() -> None:
+    """The level of an index move lowered into the block: 3+2 drilling, every rapid at the safe plane."""
+    result = sample("five_faces.cls", "mikron-ucp710")
+    lines = result.text.splitlines()
+    at = lines.index("T2 M6")
+    row = next(i for i in range(at, len(lines)) if re.fullmatch(r"Z1\d\d\.\d+", lines[i]))
+    assert found(result, replaced(lines, row, "Z-20"))
