@@ -4,7 +4,7 @@ PYTHON ?= $(shell for p in python3 python3.13 python3.12 python3.11; do \
 	"$$p" -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo "$$p" && break; done)
 BIN := .venv/bin
 STAMP := .venv/installed
-PYTEST_ARGS ?= -n auto --maxprocesses 4 -rs
+PYTEST_ARGS ?= -n auto --maxprocesses 4 -rfEs
 SOURCES := toolpaths machines postproc
 
 .PHONY: demo test lint lock clean
