@@ -49,6 +49,19 @@ class Control:
         names = self.machine.axis_names
         return np.array([names.index(k) if k in names else -1 for k in XYZ])
 
+    def feed_length(self, step: Floats) -> Floats:
+        """(K,) the length of word steps (K, J) that a feed per minute refers to, mm or degrees.
+
+        That of X, Y, Z where any of them moves, else of U, V, W, else of A, B, C (LinuxCNC, `find_straight_length`;
+        NIST RS274/NGC 2.1.2.5 for X, Y, Z and A, B, C).
+        """
+        names = self.machine.axis_names
+        result = np.zeros(len(step))
+        for letters in ("ABC", "UVW", "XYZ"):
+            length = np.linalg.norm(step[:, [j for j, name in enumerate(names) if name in letters]], axis=1)
+            result = np.where(length > 0.0, length, result)
+        return result
+
     @cached_property
     def unit(self) -> Floats:
         """(J,) word units per joint unit: 1 for mm, degrees per radian for rotaries."""

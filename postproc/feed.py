@@ -22,19 +22,6 @@ class Feeds:
     slowed: Bools
 
 
-def block_lengths(words: Floats, before: Floats, arc_length: Floats, xyz: Ints, rotary: Ints) -> tuple[Floats, Floats]:
-    """(length of X, Y, Z words (K,) mm with arcs by their true length, length of rotary words (K,) degrees).
-
-    The length that a feed per minute refers to is that of X, Y, Z where any of them moves, else that of the rotary
-    words (LinuxCNC, NIST RS274/NGC 2.1.2.5).
-    """
-    step = words - before
-    linear = np.linalg.norm(step[:, xyz[xyz >= 0]], axis=1)
-    linear = np.where(np.isfinite(arc_length), arc_length, linear)
-    turned = np.linalg.norm(step[:, rotary], axis=1) if len(rotary) else np.zeros(len(words))
-    return linear, turned
-
-
 def plan_feeds(path: Path, control: Control, words: Floats, asked: Floats, passes: Ints, native: Bools,
                feed_mode: str, least_rate: float) -> Feeds:
     """Feed words for the blocks of a path.
@@ -44,8 +31,8 @@ def plan_feeds(path: Path, control: Control, words: Floats, asked: Floats, passe
         passes: pass (K,) of each block: a pass keeps one mode
         native (K,): blocks of canned cycles, which need a feed per minute
         feed_mode: "auto", "per-minute" or "inverse-time"
-        least_rate: where inverse time would make X, Y, Z slower than this (mm/min) the control runs faster than
-            asked, so that such blocks are written per minute (0: no such rule)
+        least_rate: where inverse time would come to less than this (mm/min or degrees/min) the control runs faster
+            than asked, so that such blocks are written per minute (0: no such rule)
     """
     joints = np.concatenate([control.machine.home[None, :], path.q[:-1]])
     velocity = control.machine.limits.velocity
@@ -59,19 +46,18 @@ def plan_feeds(path: Path, control: Control, words: Floats, asked: Floats, passe
     seconds = np.fmax(wanted, needed)
     slowed = cutting & (needed > wanted * (1.0 + 1e-9)) & (wanted > 0.0)
     before = np.concatenate([words[:1], words[:-1]])
-    length = np.where(arc & np.isfinite(asked), wanted * asked, np.nan)
-    linear, turned = block_lengths(words, before, length, control.xyz, control.rotary)
-    reference = np.where(linear > 0.0, linear, turned)
+    turned = np.abs(words - before)[:, control.rotary].sum(axis=1)
+    length = np.where(arc & np.isfinite(asked), wanted * asked, control.feed_length(words - before))
     with np.errstate(divide="ignore", invalid="ignore"):
-        per_minute = 60.0 * reference / seconds
+        per_minute = 60.0 * length / seconds
         inverse = 60.0 / seconds
-        rate = np.nan_to_num(inverse * linear)
+        rate = np.nan_to_num(inverse * length)
     words_are_tip = control.tip_law or control.machine.kinematics.slides_affine
     same = cutting & ~slowed & np.isfinite(asked) & (turned == 0.0) & words_are_tip
     per_minute = np.where(same, 60.0 * asked, per_minute)
     mode = np.where(native, PER_MINUTE, _modes(path, control, turned, cutting, passes, feed_mode))
     if least_rate > 0.0:
-        mode = np.where((mode == INVERSE) & (linear > 0.0) & (rate < least_rate), PER_MINUTE, mode)
+        mode = np.where((mode == INVERSE) & (length > 0.0) & (rate < least_rate), PER_MINUTE, mode)
     feed = np.where(cutting, np.where(mode == INVERSE, inverse, per_minute), np.nan)
     return Feeds(feed, mode.astype(np.int8), np.where(cutting, seconds, np.nan), slowed)
 

@@ -100,11 +100,11 @@ def check_speeds(motion: Motion, control: Control, moves: Moves, curves: Curves,
 def block_seconds(motion: Motion, control: Control) -> Floats:
     """(E,) time of each cutting block at constant feed, s.
 
-    Per minute the length is that of X, Y, Z where any of them moves, else of the rotary axes in degrees.
+    Per minute the length is `Control.feed_length`, that of arcs along the arc.
     """
     before = np.concatenate([motion.start[None, :], motion.end[:-1]])
     step = motion.end - before
-    linear = np.linalg.norm(step[:, control.xyz[control.xyz >= 0]], axis=1)
+    length = control.feed_length(step)
     sweep = arc_sweeps(motion, control)
     for plane, (i, j) in PLANE_COLUMNS.items():
         k = np.flatnonzero(np.isfinite(sweep) & (motion.plane == plane))
@@ -112,9 +112,7 @@ def block_seconds(motion: Motion, control: Control) -> Floats:
             columns = [int(control.xyz[i]), int(control.xyz[j])]
             radius = np.linalg.norm(before[k][:, columns] - motion.center[k][:, (i, j)], axis=1)
             rise = step[k, int(control.xyz[3 - i - j])]
-            linear[k] = np.hypot(radius * sweep[k], rise)
-    turned = np.linalg.norm(step[:, control.rotary], axis=1) if len(control.rotary) else np.zeros(len(motion))
-    length = np.where(linear > 0.0, linear, turned)
+            length[k] = np.hypot(radius * sweep[k], rise)
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.asarray(np.where(motion.inverse, 60.0 / motion.feed, 60.0 * length / motion.feed))
 
