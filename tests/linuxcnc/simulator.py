@@ -198,7 +198,8 @@ def _launch(folder: Path, time_limit: float) -> None:
 @contextmanager
 def _alone() -> Iterator[None]:
     """Without isolation one session at a time, none beside a LinuxCNC of somebody else, and nothing left behind."""
-    with (Path(tempfile.gettempdir()) / f"postproc-sim-{os.getuid()}.lock").open("w") as lock:
+    lock = os.open(tempfile.gettempdir(), os.O_RDONLY)
+    try:
         fcntl.flock(lock, fcntl.LOCK_EX)
         before = _shared_objects()
         if any(key in _HAL_KEYS for _, key, _ in before):
@@ -210,6 +211,8 @@ def _alone() -> Iterator[None]:
                 if key in (*_HAL_KEYS, *config.NML_KEYS):
                     remove = [*_identity(), "ipcrm", "-m" if kind == "shm" else "-s", str(number)]
                     subprocess.run(remove, capture_output=True, check=False)
+    finally:
+        os.close(lock)
 
 
 def _shared_objects() -> set[tuple[str, int, int]]:
