@@ -254,9 +254,13 @@ def _read(file: Path, options: Options, progress: Any) -> tuple[Toolpath, list[D
 
 
 def _output_is_not(output: Path, file: Path) -> None:
-    if output.exists() and file.exists() and output.samefile(file):
+    try:
+        same, folder = output.exists() and file.exists() and output.samefile(file), output.is_dir()
+    except OSError:  # no name a file can have: writing says so
+        return
+    if same:
         raise typer.BadParameter("the output would replace the CL file", param_hint="-o")
-    if output.is_dir():
+    if folder:
         raise typer.BadParameter(f"{output} is a folder; name a file", param_hint="-o")
 
 

@@ -49,20 +49,22 @@ def tool_changes(toolpath: Toolpath) -> list[ToolChange]:
 
 @dataclass(frozen=True)
 class Spindle:
-    """State of the spindle: `rpm` NaN where none is known; direction -1 anti-clockwise, 0 off, 1 clockwise."""
+    """State of the spindle: `rpm` NaN where none is known; direction -1 anti-clockwise, 0 off, 1 clockwise; `last` of
+    the two that turn."""
 
     rpm: float = math.nan
     direction: int = 0
+    last: int = 1
 
 
 def spindle_after(event: Event, before: Spindle) -> Spindle:
-    """The spindle after a SPINDL record; ON takes the last speed up again."""
+    """The spindle after a SPINDL record; ON takes the last speed and direction up again."""
     said = words(event)
     speed = numbers(event)
     if "OFF" in said:
-        return Spindle(before.rpm, 0)
-    direction = -1 if "CCLW" in said else 1 if "CLW" in said or before.direction == 0 else before.direction
-    return Spindle(speed[0] if speed else before.rpm, direction)
+        return Spindle(before.rpm, 0, before.last)
+    direction = -1 if "CCLW" in said else 1 if "CLW" in said else before.last
+    return Spindle(speed[0] if speed else before.rpm, direction, direction)
 
 
 def spindle_states(toolpath: Toolpath) -> tuple[Ints, Floats]:
