@@ -69,13 +69,19 @@ def spindle_after(event: Event, before: Spindle) -> Spindle:
 
 def spindle_states(toolpath: Toolpath) -> tuple[Ints, Floats]:
     """(direction (N,), rev/min (N,) NaN while unknown) of the spindle at every row."""
-    direction, rpm = np.zeros(len(toolpath), dtype=np.int64), np.full(len(toolpath), np.nan)
-    state = Spindle()
+    states = [Spindle()]
+    starts = [0]
     for event in toolpath.events:
         if event.word == "SPINDL":
-            state = spindle_after(event, state)
-            direction[event.index:], rpm[event.index:] = state.direction, state.rpm
-    return direction, rpm
+            states.append(spindle_after(event, states[-1]))
+            starts.append(event.index)
+    at = _state_at(starts, len(toolpath))
+    return np.array([s.direction for s in states])[at], np.array([s.rpm for s in states])[at]
+
+
+def _state_at(starts: list[int], count: int) -> Ints:
+    """(count,) number of the state in force at each row; `starts` are in order, the last of equal ones counts."""
+    return np.searchsorted(np.array(starts), np.arange(count), side="right") - 1
 
 
 def spindle_speed(toolpath: Toolpath) -> Floats:
@@ -85,8 +91,9 @@ def spindle_speed(toolpath: Toolpath) -> Floats:
 
 def coolant_states(toolpath: Toolpath) -> Bools:
     """(N,) True where any coolant is on."""
-    on = np.zeros(len(toolpath), dtype=bool)
+    states, starts = [False], [0]
     for event in toolpath.events:
         if event.word == "COOLNT":
-            on[event.index:] = "OFF" not in words(event)
-    return on
+            states.append("OFF" not in words(event))
+            starts.append(event.index)
+    return np.array(states)[_state_at(starts, len(toolpath))]

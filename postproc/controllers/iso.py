@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import cached_property
 
 import numpy as np
 
 from postproc.controllers.model import CannedCycle, ControllerFile
 from postproc.program import INVERSE, Command, Hole, Program
-from toolpaths.arrays import Array, Floats
+from toolpaths.arrays import Array, Bools, Floats
 from toolpaths.toolpath import Cycle
 
 _CHUNK = 20000
@@ -146,9 +147,9 @@ class IsoWriter:
         p = self.program
         result = []
         every = self.controller.feed.word_every_inverse_block
-        previous = self._modes_before(first, last)
+        changes = self.mode_changes[first:last].tolist()
         for value, mode, cutting, changed in zip(p.feed[first:last].tolist(), p.mode[first:last].tolist(),
-                                                 (p.code[first:last] > 0).tolist(), previous, strict=True):
+                                                 (p.code[first:last] > 0).tolist(), changes, strict=True):
             if not cutting:
                 result.append("")
                 continue
@@ -158,16 +159,15 @@ class IsoWriter:
             result.append(f"{self.space}F{text}" if needed else "")
         return result
 
-    def _modes_before(self, first: int, last: int) -> list[bool]:
-        """True where a cutting block follows one of another feed mode."""
+    @cached_property
+    def mode_changes(self) -> Bools:
+        """(K,) True where a cutting block follows one of another feed mode and so has to state its feed."""
         p = self.program
-        cutting = np.flatnonzero(p.code[:last] > 0)
-        cutting = cutting[max(int(np.searchsorted(cutting, first)) - 1, 0):]
-        changed = np.zeros(last - first, dtype=bool)
+        cutting = np.flatnonzero(p.code > 0)
+        changed = np.zeros(len(p), dtype=bool)
         modes: Array = p.mode[cutting]
-        where = cutting[1:][modes[1:] != modes[:-1]]
-        changed[where[where >= first] - first] = self.controller.feed.cleared_by_mode_change
-        return list(changed)
+        changed[cutting[1:][modes[1:] != modes[:-1]]] = self.controller.feed.cleared_by_mode_change
+        return changed
 
     def arc_words(self, first: int, last: int) -> list[str]:
         """I, J, K of arc blocks, relative to the start: the two of the plane."""
