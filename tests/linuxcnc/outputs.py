@@ -97,8 +97,8 @@ def readable(result: PostResult) -> bool:
     return set(result.machine.axis_names) <= set(AXES)
 
 
-def output(result: PostResult, interpret: Callable[..., Canonical]) -> Output:
-    """Read a program's text with both readers."""
+def read(result: PostResult) -> tuple[Words, Motion]:
+    """The text through our own reader."""
     assert result.job is not None
     words, found = tokenise(result.text.encode())
     assert not has_errors(found)
@@ -107,6 +107,12 @@ def output(result: PostResult, interpret: Callable[..., Canonical]) -> Output:
                       control.length_on_z, result.job.controller.cycles.peck_relief)
     motion, found = execute(words, result.machine.axis_names, offsets)
     assert not has_errors(found)
+    return words, motion
+
+
+def output(result: PostResult, interpret: Callable[..., Canonical]) -> Output:
+    """Read a program's text with both readers."""
+    words, motion = read(result)
     with tempfile.TemporaryDirectory(prefix="postproc-outputs-") as folder:
         program = Path(folder) / "program.ngc"
         program.write_text(on_machine(result))
