@@ -32,7 +32,8 @@ def commands_of(toolpath: Toolpath, moves: Moves, path: Path, controller: Contro
     spindle = Spindle()
     compensation = _Compensation(moves)
     lost: dict[str, list[int]] = {}
-    for event in toolpath.events:
+    coolant = Command("COOLANT_OFF")
+    for at, event in enumerate(toolpath.events):
         block = int(path.begin[first_move[event.index]])
         out = result.setdefault(block, [])
         if event.word == "SPINDL":
@@ -46,12 +47,18 @@ def commands_of(toolpath: Toolpath, moves: Moves, path: Path, controller: Contro
             if change is not None and event.index not in changed and change.number == int(numbers(event)[0]):
                 changed.add(event.index)
                 register = change.register if change.register is not None else change.number
-                out[:0] = compensation.off() + (
+                out += compensation.off() + (
                     [Command("STOP_SPINDLE_TURNING"), Command("COOLANT_OFF")] if spindle.direction else [])
                 out.append(Command("CHANGE_TOOL", (float(change.number),), event.line))
                 out.append(Command("USE_TOOL_LENGTH_OFFSET", (float(register),), event.line))
+                follows = {e.word for e in toolpath.events[at + 1:] if e.index == event.index}
+                if spindle.direction and "SPINDL" not in follows:
+                    out.append(_spindle(spindle, event))
+                if spindle.direction and coolant.name != "COOLANT_OFF" and "COOLNT" not in follows:
+                    out.append(coolant)
         elif command := _simple(event, controller, spindle):
             out.append(command)
+            coolant = command if event.word == "COOLNT" else coolant
         elif event.word not in QUIET:
             lost.setdefault(event.word, []).append(event.line)
     diagnostics += [warning("event.not_carried_out", f"{word} is not carried out", file=toolpath.file, lines=lines[:6],

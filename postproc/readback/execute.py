@@ -179,7 +179,9 @@ def _legs(code: int, start: Floats, target: Floats, z: int, level: float, bottom
     legs: list[tuple[int, Floats]] = []
     if level < plane:
         legs.append((0, at(start, plane)))
-    legs.append((0, at(target, max(level, plane))))
+    over = at(target, max(level, plane))
+    if (over != (legs[-1][1] if legs else start)).any():
+        legs.append((0, over))
     if level > plane:
         legs.append((0, at(target, plane)))
     if code in (73, 83):
