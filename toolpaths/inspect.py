@@ -16,15 +16,19 @@ from toolpaths.units import DEG
 
 SAME_DIRECTION = 1e-6
 """rad"""
+HALF_TURN = 1e-3
+"""rad beyond 180 degrees that still count as half a turn; a whole turn may miss its end by rounding"""
 _TOOL_ANGLES = ("taper", "tip_angle")
 
 
 def inspect(result: ReadResult) -> dict[str, object]:
     """The JSON form: lengths mm, angles degrees.
 
-    `points` counts each commanded position once (not FROM, GOHOME), `cycles` the CYCLE records that name a kind,
-    `rapids` the rapid moves; `axis_motion` is fixed, indexed (between cuts only) or continuous, and `five_axis` is
-    true unless it is fixed; `extents` are those of the commanded positions.
+    `points` counts each commanded position once (not FROM, GOHOME), `arcs` the CIRCLE and other arc records, `cycles`
+    the CYCLE records that name a kind, `rapids` the rapid moves; `arcs_over_180_deg` tells whether the sense of the
+    arcs fits the dialect: few arcs of a real path sweep more than half a turn (whole turns apart); `axis_motion` is
+    fixed, indexed (between cuts only) or continuous, and `five_axis` is true unless it is fixed; `extents` are those
+    of the commanded positions.
     """
     p = result.toolpath
     point = is_point(p)
@@ -33,7 +37,8 @@ def inspect(result: ReadResult) -> dict[str, object]:
     return {
         "file": p.file, "name": p.name, "dialect": result.dialect, "evidence": result.evidence,
         "points": int(point.sum()), "rapids": int((point & (p.kind == Kind.RAPID) & (p.role != Role.HOLE)).sum()),
-        "arcs": len(p.arcs), "holes": int((p.role == Role.HOLE).sum()), "cycles": result.cycle_records,
+        "arcs": result.arc_records, "arcs_over_180_deg": over_half(p), "holes": int((p.role == Role.HOLE).sum()),
+        "cycles": result.cycle_records,
         "operations": _operations(p, point, lengths), "tools": [tool_dict(t) for t in p.tools],
         "frames": [asdict(f) for f in p.frames], "units": p.units, "five_axis": motion != "fixed",
         "axis_motion": motion, "length_mm": float(lengths.sum()), "extents": extents(p),
@@ -45,6 +50,11 @@ def is_point(p: Toolpath) -> Bools:
     """True (N,) for positions that the program commands."""
     result: Bools = (p.role == Role.POINT) | (p.role == Role.HOLE)
     return result
+
+
+def over_half(p: Toolpath) -> int:
+    """Number of arcs that sweep more than 180 degrees beyond their whole turns."""
+    return int((np.remainder(p.arcs.sweep, 2.0 * math.pi) > math.pi + HALF_TURN).sum())
 
 
 def cutting_lengths(p: Toolpath) -> Floats:
@@ -110,6 +120,8 @@ def summary(result: ReadResult) -> str:
     lines = [f"{p.file or 'CL text'}: {title} ({result.evidence}), {p.units}, {result.lines} lines",
              f"  {found['points']} points ({found['rapids']} rapid, {found['arcs']} arcs, {found['holes']} holes of "
              f"{found['cycles']} cycles), {sum(lengths_of(p)):.1f} mm of cutting, tool axis {found['axis_motion']}"]
+    if len(p.arcs):
+        lines.append(f"  sense of the arcs: {found['arcs_over_180_deg']} of {len(p.arcs)} sweep more than 180 degrees")
     lines += [f"  {name} {low:.3f} to {high:.3f} mm" for name, (low, high) in extents(p).items()]
     lines += [f"  operation {op.name or i + 1}{' (turning)' if op.turning else ''}: "
               f"{int((p.operation == i).sum())} rows" for i, op in enumerate(p.operations)]

@@ -24,6 +24,8 @@ Triple = tuple[float, float, float]
 Map = tuple[Floats, Floats]
 """rotation (3, 3) and origin (3,) mm: local to part frame"""
 NO_NUMBERS: Triple = (float("nan"),) * 3
+BETWEEN = frozenset({"FEDRAT", "PPRINT", "REMARK", "LPRINT", "COOLNT", "SPINDL", "CUTCOM", "MOVE_ATTRIB", "PAINT", "$$"})
+"""Records that may stand between an arc and the GOTO of its end."""
 V = TypeVar("V")
 
 
@@ -190,12 +192,12 @@ class Builder:
         return x, y, z
 
     def next_is_point(self) -> bool:
-        """True where the very next record (display records apart) is a GOTO."""
+        """True where the next record that moves the tool or changes how it moves (`BETWEEN` apart) is a GOTO."""
         statements, before = self.program.statements, self.program.before
         for i in range(self.index + 1, self.stop):
             if before[i] > self.fast:
                 return True
-            if statements[i].major not in ("PAINT", "$$"):
+            if statements[i].major not in BETWEEN:
                 return statements[i].major == "GOTO"
         end = before[self.stop] if self.stop < len(before) else len(self.points)
         return end > self.fast

@@ -16,7 +16,8 @@ SPLINE_CHORD = 0.001
 """mm: a spline is followed by chords no further from it than this"""
 _DEGREE = 3
 _MOST_CHORDS = 10000
-_GEOMETRY = re.compile(r"\b(CIRCLE|LINE|CYLNDR|POINT)\s*/([^()]*)", re.IGNORECASE)
+_GEOMETRY = re.compile(r"\b(CIRCLE|LINE|CYLNDR|POINT|PLANE)\s*/([^()]*)", re.IGNORECASE)
+_TANGENT = re.compile(r"\)\s*,\s*TANTO\b", re.IGNORECASE)
 
 
 def indirv(b: Builder, s: Statement) -> None:
@@ -27,14 +28,27 @@ def indirv(b: Builder, s: Statement) -> None:
     b.toward = (s.numbers[0], s.numbers[1], s.numbers[2])
 
 
-def tlon(b: Builder, s: Statement) -> None:
-    """TLON,GOFWD/(CIRCLE/...),ON[,2,INTOF],(LINE/center, end) or /(CYLNDR/...),ON,(PLANE/...(POINT/end)).
+def indirp(b: Builder, s: Statement) -> None:
+    """INDIRP/x, y, z: a point towards which the next curve begins."""
+    start = b.last_point()
+    if len(s.numbers) != 3 or start is None or math.isnan(start[0]):
+        b.log.error("cl.indirv", f"INDIRP/{s.body}: it takes three numbers and a GOTO before it", b.line)
+        return
+    x, y, z = (v - w for v, w in zip(s.numbers, start, strict=True))
+    b.toward = (x, y, z)
 
-    The end is written out, so that counting crossings (2,INTOF) is not needed to find it.
+
+def tlon(b: Builder, s: Statement) -> None:
+    """TLON,GOFWD/(CIRCLE/...),ON[,2,INTOF],(LINE/center, end) or /(CYLNDR/...),ON,(PLANE/...(POINT/end)), or of
+    PostWorks (NCL) /(CIRCLE/CANON,center,axis,radius),ON|TANTO,(PLANE/a, b, c, d).
+
+    Where the end is written out, counting crossings (2,INTOF) is not needed to find it.
     """
     b.arc_records += 1
     found = [(m[1].upper(), [w for w in words_of(m[2]) if isinstance(w, float)]) for m in _GEOMETRY.finditer(s.body)]
     arc, end = _arc_numbers(found), _end_of(found)
+    if arc is not None and end is None:
+        end = _end_on_plane(b, arc, found, _TANGENT.search(s.body) is not None)
     if arc is None or end is None:
         b.log.error("cl.circle", f"TLON,GOFWD/{s.body[:60]}: only arcs of CIRCLE to LINE and CYLNDR to PLANE through "
                     "POINT are understood", b.line)
@@ -53,7 +67,7 @@ def _arc_numbers(found: list[tuple[str, list[float]]]) -> list[float] | None:
     for word, n in found:
         if word == "CIRCLE" and len(n) == 4:
             return [*n[:3], 0.0, 0.0, 1.0, n[3]]
-        if word == "CYLNDR" and len(n) == 7:
+        if word in ("CIRCLE", "CYLNDR") and len(n) == 7:
             return n
     return None
 
@@ -65,6 +79,34 @@ def _end_of(found: list[tuple[str, list[float]]]) -> Triple | None:
             return n[3], n[4], n[5]
     ends = [n for word, n in found if word == "POINT" and len(n) == 3]
     return (ends[-1][0], ends[-1][1], ends[-1][2]) if ends else None
+
+
+def _end_on_plane(b: Builder, arc: list[float], found: list[tuple[str, list[float]]], tangent: bool) -> Triple | None:
+    """End of an arc at the plane n . p = d: where the plane touches it, or crosses it through its centre.
+
+    Of the two crossings it is the first one after the start in the direction of INDIRP.
+    """
+    planes = [n for word, n in found if word == "PLANE" and len(n) == 4]
+    start = b.last_point()
+    if not planes or b.toward is None or start is None or math.isnan(start[0]):
+        return None
+    center, axis, radius = np.array(arc[:3]), np.array(arc[3:6]), arc[6]
+    normal = np.array(planes[0][:3])
+    ray = normal if tangent else np.cross(axis, normal)
+    size = float(np.linalg.norm(ray))
+    if not size > 0.0:
+        return None
+    u = np.array(start) - center
+    ray = ray * (radius / size)
+    if tangent:
+        ends = [ray]
+    else:
+        sense = 1.0 if float(np.cross(axis, u) @ np.array(b.toward)) >= 0.0 else -1.0
+        ends = sorted((ray, -ray), key=lambda v: math.atan2(sense * float(np.cross(u, v) @ axis), float(u @ v))
+                      % (2.0 * math.pi) or 2.0 * math.pi)
+    height = float(u @ axis) / float(axis @ axis)
+    x, y, z = (center + ends[0] + height * axis).tolist()
+    return x, y, z
 
 
 def nurbs(b: Builder, s: Statement) -> None:
@@ -152,4 +194,4 @@ def de_boor(control: Floats, knots: Floats, at: Floats, degree: int) -> Floats:
     return result
 
 
-HANDLERS = {"INDIRV": indirv, "TLON,GOFWD": tlon, "NURBS": nurbs}
+HANDLERS = {"INDIRV": indirv, "INDIRP": indirp, "TLON,GOFWD": tlon, "NURBS": nurbs}

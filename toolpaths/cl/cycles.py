@@ -22,6 +22,8 @@ _RETRACT = frozenset({"RTRCTO", "RETURN"})
 _PECKS = frozenset({"STEP", "INCR", "PECKING", "1STPECK", "SUBPECK"})
 _OTHER = frozenset({"DIAMET", "TLANGL", "TIMES", "BACK", "OFFSET", "REPEAT", "PARAMS", "ORIENT", "CSKDIA", "PLUNGE"})
 _PLAIN = frozenset({"G98", "G99", "AUTO", "MANUAL", "ON", "REV", "", "SEC", "NEXT"})
+_START = ("RAPTO", "CLEAR")
+"""where both stand, RAPTO is the start plane"""
 _WORDS = "words"
 _LAST = "cycle"
 
@@ -44,6 +46,8 @@ class Values:
     diameter: float = math.nan
     angle: float = math.nan
     free: tuple[float, ...] = ()
+    placed: bool = False
+    """the depth has no word of its own: numbers by their place"""
     empty: tuple[str, ...] = field(default=(), compare=False)
     strange: tuple[str, ...] = field(default=(), compare=False)
 
@@ -104,6 +108,7 @@ def _values(v: Values, words: tuple[Word, ...], b: Builder) -> Values:
         taken = _label(word, [float(x) for x in numbers], words[i] if i < len(words) else "", found, free, steps, empty,
                        strange)
         free.extend(float(x) for x in numbers[taken:])
+    found.pop("start", None)
     if steps:
         found["steps"] = tuple(steps)
     return replace(v, **found, free=tuple(free), empty=tuple(empty), strange=tuple(strange))  # type: ignore[arg-type]
@@ -123,7 +128,10 @@ def _label(word: str, n: list[float], following: Word, found: dict[str, object],
     elif word in ("REV", "ON") and n:
         found["revolutions" if word == "REV" else "dwell"] = n[0]
     elif word in _SIMPLE and n:
-        found[_SIMPLE[word]] = n[0]
+        if word != "CLEAR" or found.get("start") != "RAPTO":
+            found[_SIMPLE[word]] = n[0]
+        if word in _START:
+            found["start"] = word
     elif word in _OTHER:
         return len(n)
     elif word not in _PLAIN and word not in KINDS and word not in _SIMPLE:
@@ -176,6 +184,11 @@ def _arm(b: Builder, v: Values) -> None:
         b.log.error("cl.cycle-value", f"CYCLE/{v.kind}: {word} has no number", b.line, "write the number behind it")
     for word in v.strange:
         b.log.warning("cl.cycle-option", f"CYCLE/{v.kind}: {word} is not used", b.line, key=word)
+    if v.placed and b.dialect.name == "catia":
+        b.log.warning("cl.cycle-place", f"CYCLE/{v.kind}: numbers without words, read as depth {v.depth:g}"
+                      + ("" if v.feed is None else f", feed {v.feed[0]:g}")
+                      + ("" if math.isnan(v.clearance) else f", start plane {v.clearance:g}"), b.line,
+                      "their order is that of the user's table in CATIA")
     b.cycle.set(b.row, len(b.cycles))
     b.cycles.append(_made(b, v))
 
@@ -183,11 +196,11 @@ def _arm(b: Builder, v: Values) -> None:
 def _placed(v: Values) -> Values:
     """Numbers without a word by their place: depth, then feed where no unit stands, then clearance and retract."""
     free = list(v.free)
-    found: dict[str, float] = {}
+    found: dict[str, object] = {}
     if math.isnan(v.depth) and free:
-        found["depth"] = free.pop(0)
+        found["depth"], found["placed"] = free.pop(0), True
         if v.feed is None and free:
-            return replace(v, **found, feed=(free.pop(0), ""), free=())  # type: ignore[arg-type]
+            found["feed"] = (free.pop(0), "")
     if math.isnan(v.clearance) and free:
         found["clearance"] = free.pop(0)
     if v.retract is not None and math.isnan(v.retract) and free:
@@ -225,7 +238,11 @@ def _cycle_feed(b: Builder, v: Values) -> tuple[float, FeedMode, float | None]:
 
 
 def _made(b: Builder, v: Values) -> Cycle:
-    if math.isnan(v.clearance):
+    if math.isnan(v.clearance) and v.placed:
+        b.log.warning("cl.cycle-start", f"CYCLE/{v.kind} states no start plane, the point of the GOTO is taken", b.line,
+                      "state one in the table of the CAM system if the point touches the part")
+        v = replace(v, clearance=0.0)
+    elif math.isnan(v.clearance):
         b.log.error("cl.cycle-value", f"CYCLE/{v.kind} states no start plane above the hole", b.line,
                     "write it with CLEAR or RAPTO")
     retract = v.retract

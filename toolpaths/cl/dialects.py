@@ -50,10 +50,12 @@ _MAJORS = (
     ("solidworks-clt", ("MOVE_ATTRIB", "OPFEATSTART", "OPFEATEND", "BOX")),
     ("solidworks", ("CSI_SET_FLUTE_LENGTH", "CSI_SET_EXTENSION_LENGTH", "TRNTYP", "SETUP")),
     ("nx", ("TOOL PATH", "END-OF-PATH", "TLDATA", "MSYS", "PAINT")),
+    ("ncl", ("INDIRP",)),
     ("catia", (COMMENT + "*CATIA0", "TLON,GOFWD", "INDIRV", "AUTOPS", "PSIS", "TOOLNO")),
     ("creo", ("CAMERA", "PPWORD")),
 )
-_TEXTS = (("makino", "MAKINO"), ("catia", "CATIA"), ("catia", "TOOLCHANGEBEGINNING"), ("nx", "CENTERLINE DATA"),
+_TEXTS = (("makino", "MAKINO-FF"), ("makino", "FF/CAM"),
+          ("catia", "CATIA"), ("catia", "TOOLCHANGEBEGINNING"), ("nx", "CENTERLINE DATA"),
           ("ncl", "NCL"), ("creo", "PRO/NC"), ("creo", "PRO/CLFILE"), ("creo", "CREO"))
 OWN = DATA_COMMENT + "TOOLPATH"
 """Mark of the text that `write` makes."""

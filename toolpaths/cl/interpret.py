@@ -15,6 +15,8 @@ HANDLERS: dict[str, Handler] = {**dict.fromkeys(SILENT, structure.nothing), **st
                                 **motion.HANDLERS, **curves.HANDLERS, **frames.HANDLERS, **tools.HANDLERS,
                                 **cycles.HANDLERS}
 _MANY = 3
+_NO_SLASH = -1
+"""in place of a count of numbers: text that begins with a known word and has no slash"""
 _WORD = re.compile(r"[A-Z0-9_-]+")
 _DEEPEST = 8
 _MOST_ROWS = 50_000_000
@@ -72,6 +74,10 @@ def defsub(b: Builder, s: Statement) -> None:
 
 def calsub(b: Builder, s: Statement) -> None:
     """Carry out the statements and points of a subprogram here, under the frame that holds here."""
+    if not s.numbers and s.words:
+        b.log.warning("cl.subprogram", f"CALSUB/{s.body}: no subprogram of the file, left out", b.line,
+                      "moves of a program that the machine keeps are not checked", key="named")
+        return
     found = subprograms(b).get(s.numbers[0]) if s.numbers else None
     if found is None or len(b.calls) >= _DEEPEST or found in b.calls or b.row > _MOST_ROWS:
         why = "is not defined" if found is None else "calls itself" if found in b.calls else "makes too many points"
@@ -99,21 +105,32 @@ def _other(b: Builder, s: Statement) -> None:
     elif s.major == TEXT:
         b.texts.append((b.line, b.row, sum(isinstance(w, float) for w in s.words), s.body))
     elif not s.major.startswith(DATA_COMMENT):
-        first = s.major.replace(",", " ").split(" ")[0]
+        first = _first_word(s.major)
         if s.slash or s.major in b.allow_unknown:
             b.note_unknown(s, s.major)
         elif not known(first) or first in SILENT:
             b.texts.append((b.line, b.row, 0, s.major))
         else:
-            b.log.error("cl.slash", f"{first} is not followed by a slash", b.line, f"write {first}/...", key=first)
+            b.texts.append((b.line, b.row, _NO_SLASH, s.major))
 
 
 def _unsupported(b: Builder, s: Statement) -> None:
     if s.major in b.allow_unknown:
         b.note_unknown(s, s.major)
         return
+    if s.has("NOMORE") and len(s.words) == 1:
+        return
     b.log.error("cl.unsupported-motion", f"{s.major} moves the tool or changes how it moves, and is not supported",
                 b.line, f"--allow-unknown {s.major} leaves it out", key=s.major)
+
+
+def _first_word(body: str) -> str:
+    return body.replace(",", " ").split(" ")[0]
+
+
+def _is_motion(numbers: int, body: str) -> bool:
+    """True for text like `GOTO 1 2 3`, which is no listing text wherever it stands."""
+    return numbers == _NO_SLASH and _first_word(body) in motion.HANDLERS and body[-1:].isdigit()
 
 
 def report_others(b: Builder) -> dict[str, int]:
@@ -121,11 +138,14 @@ def report_others(b: Builder) -> dict[str, int]:
     if 0 <= b.finished < b.row:
         b.log.warning("cl.after-fini", f"{b.row - b.finished} points stand after FINI, they are read too")
     first, last = _extent(b)
-    listing = [line for line, _, _, _ in b.texts if not first <= line <= last]
+    listing = [line for line, _, numbers, body in b.texts if not first <= line <= last and not _is_motion(numbers, body)]
     for line, row, numbers, body in b.texts:
-        if not first <= line <= last:
+        if not first <= line <= last and not _is_motion(numbers, body):
             continue
-        if _WORD.fullmatch(body):
+        if numbers == _NO_SLASH:
+            word = _first_word(body)
+            b.log.error("cl.slash", f"{word} is not followed by a slash", line, f"write {word}/...", key=word)
+        elif _WORD.fullmatch(body):
             b.unknown.setdefault(body, []).append((line, row, numbers))
         elif numbers >= _MANY and 0 < row < b.row and "(TEXT)" not in b.allow_unknown:
             b.log.error("cl.text", f"no record: {body[:60]!r}, with numbers between motions", line)

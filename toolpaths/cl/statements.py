@@ -115,6 +115,11 @@ def _text_statement(text: str) -> Statement | None:
     return None
 
 
+def _closed(text: str) -> str:
+    """`$$ ->` as `$$->`."""
+    return DATA_COMMENT + text[2:].lstrip()[2:] if text[2:].lstrip().startswith("->") else text
+
+
 def _comment(text: str) -> Statement:
     if text.startswith(DATA_COMMENT):
         head, _, body = text[len(DATA_COMMENT):].partition("/")
@@ -166,6 +171,7 @@ class Lexer:
         if not text:
             return None
         if text.startswith(COMMENT):
+            text = _closed(text)
             return _comment(self._joined(text, i) if text.startswith(DATA_COMMENT) else text)
         fixed = _text_statement(text)
         if fixed is not None:

@@ -80,6 +80,9 @@ def loadtl(b: Builder, s: Statement) -> None:
 def load(b: Builder, s: Statement) -> None:
     """LOAD/TOOL, number[, ADJUST, register]."""
     number = s.after("TOOL")
+    if number is None and s.has("WIRE"):
+        b.log.warning("cl.wire", "LOAD/WIRE: this operation cuts with a wire, not with a tool", b.line)
+        return
     if number is None:
         b.log.error("cl.tool-number", f"LOAD/{s.body}: it takes TOOL and a number", b.line)
         return

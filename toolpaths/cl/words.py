@@ -49,13 +49,13 @@ LENGTH_EVENTS = frozenset({"RETRCT", "CLEARP", "CLRSRF", "LEADER"})
 SILENT = frozenset({
     "PAINT", "PPWORD", "PPFUN", "SYN", "OPFEATSTART", "OPFEATEND", "MOVE_ATTRIB", "BOX", "SETUP", "SWITCH", "DISPLY",
     "AUTOPS", "PSIS", "INTOL", "OUTTOL", "TOLER", "LINTOL", "MACHIN", "ALIGN", "PLABEL", "CLPRNT", "NOPOST", "PLOT",
-    "TRNTYP", "CSI_SET_EXTENSION_LENGTH", "MCHTOL",
+    "TRNTYP", "CSI_SET_EXTENSION_LENGTH", "MCHTOL", "CUT", "START_OP", "END_OP", "TOOLPATH_TYPE",
 })
 """Display, listing, tolerance and bookkeeping: no motion, nothing for the machine."""
 
 UNSUPPORTED_MOTION = frozenset({
-    "CUT", "DNTCUT", "COPY", "TRACUT", "GOFWD", "GOLFT", "GORGT", "GOBACK", "GOUP", "GODOWN", "GO",
-    "MOVNRB", "INDIRP", "THREAD", "POCKET", "SCURV", "RMILL", "SMILL", "FMILL", "CALL", "INDEX",
+    "DNTCUT", "COPY", "TRACUT", "GOFWD", "GOLFT", "GORGT", "GOBACK", "GOUP", "GODOWN", "GO",
+    "MOVNRB", "THREAD", "POCKET", "SCURV", "RMILL", "SMILL", "FMILL", "CALL", "INDEX",
     "MACRO", "LOOPST", "LOOPND", "JUMPTO", "TLLFT", "TLRGT", "TLON", "MOVETO", "KNOT", "CNTRL",
     "ARCDAT", "MIRROR", "XFORM", "MATRIX", "BSPLINE", "SPLINE", "ELLIPS",
 })
