@@ -23,6 +23,8 @@ SYSTEM_PYTHON = Path("/usr/bin/python3")
 """LinuxCNC's Python modules are Debian's and only fit Debian's Python."""
 MM_PER_INCH = 25.4
 TIME_LIMIT = 300
+UNMOVED = 1e-8
+"""mm: displacements that LinuxCNC's motion takes for none"""
 _MOTIONS = {"STRAIGHT_TRAVERSE", "STRAIGHT_FEED", "ARC_FEED", "STRAIGHT_PROBE", "RIGID_TAP", "DWELL"}
 _CALL = re.compile(r"^\s*\d+\s+N\S*?\s*([A-Z][A-Z_0-9]+)\((.*)\)\s*$")
 
@@ -179,7 +181,7 @@ def _seconds(rows: Floats) -> Floats:
     before = np.vstack([np.zeros((1, 6)), rows[:-1, 1:7] + rows[:-1, 7:13]]) - rows[:, 7:13]
     delta = rows[:, 1:7] - before
     straight = np.linalg.norm(delta[:, :3], axis=1)
-    length = np.where(straight > 0, straight, np.linalg.norm(delta[:, 3:], axis=1))
+    length = np.where(straight > UNMOVED, straight, np.linalg.norm(delta[:, 3:], axis=1))
     length = np.where(kind == Move.ARC, _arc_length(rows, before), length)
     cutting = np.isin(kind, (Move.FEED, Move.ARC, Move.PROBE)) & (feed > 0)
     seconds = np.divide(60.0 * length, feed, out=np.full(len(rows), np.nan), where=cutting)

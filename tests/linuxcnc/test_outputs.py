@@ -25,6 +25,8 @@ EXACT = 1e-9
 """mm and degrees"""
 ROUNDED = 1e-4
 """mm and degrees: half a last decimal of a word, and what the rounding of an angle does to the slides"""
+RESIDUE = 2e-4
+"""mm: shorter X, Y, Z moves beside a rotary one would set its speed"""
 LEAST = {"bicubic.cls": 17, "blade.cls": 6, "five_faces.cls": 7, "five_tilted.cls": 7, "inch_plate.apt": 9,
          "indexed_4axis.cls": 1, "pocket.cls": 10, "tool_axis_tour.apt": 6}
 """Machines that must be able to make each sample, so that this test cannot shrink in silence."""
@@ -212,6 +214,22 @@ def test_inverse_time_everywhere(interpret, machine: str) -> None:
         o = outputs.output(result, interpret)
         assert o.motion.inverse[(o.motion.code > 0) & ~o.motion.hole].mean() > 0.9
         check(o)
+
+
+def test_no_tiny_residues_beside_a_turn(interpret, tmp_path: Path) -> None:
+    """The tool turns about a point 2 um off the C axis: X and Y would move by tenths of a micron with C."""
+    turn = np.radians(np.arange(0, 121, 4))
+    points = [f"GOTO/0.002,0,0,{0.5 * np.cos(a):.9f},{0.5 * np.sin(a):.9f},{np.sqrt(0.75):.9f}" for a in turn]
+    (tmp_path / "turn.apt").write_text("\n".join(["PARTNO TURN", "UNITS/MM", "LOADTL/1", "SPINDL/RPM,900,CLW", "MULTAX/ON",
+                                                  "RAPID", points[0], "FEDRAT/500,MMPM", *points[1:], "FINI", ""]))
+    result = convert(*toolpaths.read(tmp_path / "turn.apt"), "mikron-ucp710")
+    assert result.ok, result.diagnostics
+    o = outputs.output(result, interpret)
+    check(o)
+    step = np.abs(np.diff(o.motion.end, axis=0))[o.motion.inverse[1:] & (o.motion.code[1:] > 0)]
+    linear = step[:, ~np.array(o.machine.rotary)].max(axis=1)
+    assert len(step) >= len(turn) - 1
+    assert ((linear == 0.0) | (linear > RESIDUE)).all()
 
 
 SHORT = {str(k): ToolSetup(gauge_length=v) for k, v in ((1, 41.25), (2, 35.5), (3, 50.0))}
