@@ -103,7 +103,7 @@ def assemble(file: UserFile, model: MachineModel) -> Machine:
         axis_names=names, rotary=kinematics.rotary, limits=_limits(model, kinematics),
         home=np.array([model.axes[name].home for name in names]) * _scale(kinematics), retract_axis=retract,
         timing=Timing(timing.tool_change, timing.clamp, timing.unclamp, frozenset(timing.assumed)),
-        control_kinematics=model.kinematics.control(model.control.module) if model.control else None, file=file.file)
+        control_kinematics=model.control_kinematics(), file=file.file)
 
 
 def _limits(model: MachineModel, kinematics: Kinematics) -> Limits:

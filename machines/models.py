@@ -16,6 +16,8 @@ from machines.user_file import UserModel
 Positive = Annotated[float, Field(gt=0)]
 NotNegative = Annotated[float, Field(ge=0)]
 Vector = tuple[float, float, float]
+JOINTS_ARE_AXES = "trivkins"
+"""LinuxCNC's name for no kinematics of the control's own"""
 
 
 def _upward(travel: Any) -> Any:
@@ -108,7 +110,7 @@ class ControlModel(UserModel):
     """The `[control]` table of a machine whose control computes the joints itself."""
 
     module: str
-    """LinuxCNC kinematics module; its pins follow from `[kinematics]`"""
+    """LinuxCNC kinematics module; its pins follow from `[kinematics]`. trivkins: none, words are joints after all"""
 
 
 class MachineModel(UserModel):
@@ -140,9 +142,19 @@ class MachineModel(UserModel):
                           f"choose from {linear}")
         if self.control is not None:
             try:
-                self.kinematics.control(self.control.module)
+                self.control_kinematics()
             except ValueError as fault:
                 yield Problem("machine.control", ("control", "module"), str(fault))
+
+    def control_kinematics(self) -> ControlKinematics | None:
+        """What the control runs; None where joints are the program's axes.
+
+        Raises:
+            ValueError: where the module cannot describe this machine, saying why.
+        """
+        if self.control is None or self.control.module == JOINTS_ARE_AXES:
+            return None
+        return self.kinematics.control(self.control.module)
 
     def _axis_problems(self, rotary: dict[str, bool]) -> Iterator[Problem]:
         for name in rotary.keys() - self.axes.keys():
