@@ -1,4 +1,4 @@
-"""Linear Delta: identity over the workspace, both assembly modes, Jacobian, III-11, LinuxCNC's lineardeltakins."""
+"""Linear Delta: identity over the workspace, both assembly modes, Jacobian, LinuxCNC's lineardeltakins."""
 
 from pathlib import Path
 
@@ -75,22 +75,6 @@ def test_jacobian_is_the_derivative_of_forward(name: str) -> None:
     np.testing.assert_allclose(jacobian[:, :3], numeric, atol=1e-7)
     assert not jacobian[:, 3:].any()
     np.testing.assert_array_equal(kinematics.twist_jacobian(q), jacobian)
-
-
-def test_forward_agrees_with_the_closed_form_of_the_thesis() -> None:
-    """III-11 with B and D as in the errata: E = r - R + D, y = A z + B, x = C z + D, the lower of the two roots."""
-    kinematics = delta("uranesx")
-    q = kinematics.inverse(poses(kinematics, 1000), up(1000))[0]
-    q1, q2, q3 = q.T
-    f, length = 150.0 - 700.0, 1300.0
-    a = (q2 - q3) / (np.sqrt(3) * f)
-    b = (q3**2 - q2**2) / (2 * np.sqrt(3) * f)
-    c = (2 * (q2 - q1) - a * f * np.sqrt(3)) / (-3 * f)
-    d = (q1**2 - q2**2 - b * np.sqrt(3) * f) / (-3 * f)
-    e = f + d
-    two, one, none = a**2 + c**2 + 1, 2 * (a * b + c * e - q1), e**2 + b**2 + q1**2 - length**2
-    z = (-one - np.sqrt(one**2 - 4 * two * none)) / (2 * two)
-    np.testing.assert_allclose(kinematics.forward(q)[0], np.stack([c * z + d, a * z + b, z], axis=1), atol=1e-8)
 
 
 def test_a_tilted_tool_axis_has_no_solution_and_z_is_nearest() -> None:
