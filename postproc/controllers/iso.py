@@ -268,7 +268,7 @@ class IsoWriter:
         extra = ""
         if spec.peck:
             step = cycle.steps[0] if cycle.steps else cycle.depth + cycle.clearance
-            extra += f"{self.space}{spec.peck}{self.plain(step)}"
+            extra += f"{self.space}{spec.peck}{self.number_text(np.array([step]), places)[0]}"
         if spec.dwell:
             extra += f"{self.space}{spec.dwell}{self.plain(cycle.dwell)}"
         self.feed = self.feed_text(feed)
