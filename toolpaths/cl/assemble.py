@@ -177,8 +177,11 @@ def _add_deltas(b: Builder, rows: Rows) -> None:
 def _kinds(b: Builder, n: int) -> tuple[Array, Array, Array]:
     """(role, kind, arc index) by what the records say; cycles come later."""
     role = np.full(n, Role.POINT, np.int8)
-    if b.roles:
-        role[list(b.roles)] = list(b.roles.values())
+    rows = np.array(list(b.roles), np.int64)
+    if (rows >= n).any():
+        b.log.error("cl.data-comment", "$$-> SPLINE counts more points than follow")
+    inside = rows < n
+    role[rows[inside]] = np.array(list(b.roles.values()), np.int8)[inside]
     kind = np.full(n, Kind.FEED, np.int8)
     kind[role == Role.START] = Kind.RAPID
     rapids = np.array(b.rapids, np.int64)

@@ -16,6 +16,8 @@ PER_SECOND = {"MMPS": 1.0, "IPS": MM_PER_INCH}
 PER_REVOLUTION = {"MMPR": 1.0, "IPR": MM_PER_INCH, "FPR": MM_PER_FOOT, "PERREV": math.nan}
 UNITS = frozenset(PER_MINUTE) | frozenset(PER_SECOND) | frozenset(PER_REVOLUTION)
 """NaN: the unit of the part."""
+_MODIFIERS = ("SCALE", "LENGTH", "LOCK", "MAXIPM", "MAXRPM", "OVPLOT")
+"""Words of FEDRAT (NCL) whose number is no feed."""
 
 
 def feed_in(value: float, unit: str, scale: float) -> Feed:
@@ -39,16 +41,24 @@ def fedrat(b: Builder, s: Statement) -> None:
     if s.has("INVERS"):
         _inverse(b, s)
         return
-    numbers = [w for w in s.words if isinstance(w, float)]
+    numbers = _feeds(s.words)
+    if not numbers and s.has(*_MODIFIERS):
+        b.log.warning("cl.feed-option", f"FEDRAT/{s.body}: it states no feed and is not used", b.line)
+        return
     if not numbers:
         b.log.error("cl.feed", f"FEDRAT/{s.body} holds no number", b.line, "write for example FEDRAT/MMPM,250.0")
         return
-    strange = [w for w in s.words if isinstance(w, str) and w not in UNITS]
-    if len(numbers) > 1 or strange:
+    if len(numbers) > 1 or any(isinstance(w, str) and w not in UNITS for w in s.words):
         b.log.warning("cl.feed-option", f"FEDRAT/{s.body}: only the feed itself is used", b.line)
     unit = unit_of(s.words)
     value = s.after(unit)
     b.feed.set(b.row, feed_in(numbers[0] if value is None else value, unit, b.scale))
+
+
+def _feeds(words: tuple[Word, ...]) -> list[float]:
+    """The numbers that may be a feed: not those of a modifier."""
+    return [w for before, w in zip(("", *words), words, strict=False)
+            if isinstance(w, float) and not (isinstance(before, str) and before in _MODIFIERS)]
 
 
 def _inverse(b: Builder, s: Statement) -> None:

@@ -80,6 +80,11 @@ def plain_event(b: Builder, s: Statement) -> None:
     b.event(s.major, words)
 
 
+def dwell(b: Builder, s: Statement) -> None:
+    """DWELL/seconds, or revolutions with REV: another word for DELAY."""
+    b.event("DELAY", tuple(w for w in s.words if w != ""))
+
+
 def spindl(b: Builder, s: Statement) -> None:
     """An event; a surface speed belongs to turning."""
     if s.has("SFM", "SMM"):
@@ -199,6 +204,6 @@ HANDLERS: dict[str, Callable[[Builder, Statement], None]] = {
     "PPRINT": text_event, "INSERT": text_event, "REMARK": nothing, "LPRINT": nothing, "PPLABEL": nothing,
     "LETTER": nothing, "UNITS": nothing, "UNIT": nothing, "MULTAX": nothing, "FINI": fini, "SET": mode,
     "$$->TOOLPATH": own_header, "$$->FRAME": own_item, "$$->TOOL": own_item, "$$->OPERATION": own_item,
-    "$$->USE": own_use, "$$->SPLINE": own_spline, **dict.fromkeys(EVENTS, plain_event), "SPINDL": spindl,
+    "$$->USE": own_use, "$$->SPLINE": own_spline, **dict.fromkeys(EVENTS, plain_event), "SPINDL": spindl, "DWELL": dwell,
     "MODE": mode,
 }

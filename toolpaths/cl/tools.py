@@ -18,6 +18,8 @@ TURNING = frozenset({"TURN", "GROOVE", "THREAD", "TURNING"})
 _MAX_NUMBER = 10 ** 9
 _NOT_SHAPE = {"name", "length_register"}
 _CUTTER_ANGLES = (4, 5)
+_SHORT_TOOLNO = 5
+"""number, kind and three sizes; longer forms follow the user's table, and CUTTER has the sizes"""
 
 
 @dataclass
@@ -49,16 +51,21 @@ def _use(b: Builder, state: _State) -> None:
     b.tool.set(b.row, Tool(state.number, **state.fields))
 
 
+def _renumber(state: _State, number: int) -> None:
+    """Another tool has another length register."""
+    if number != state.number:
+        state.fields.pop("length_register", None)
+    state.number = number
+
+
 def change(b: Builder, number: float, register: float | None, more: tuple[float, ...] = ()) -> None:
     """Load tool `number`; the event LOADTL and the tool index follow."""
     if number != math.floor(number) or not 0 <= number < _MAX_NUMBER:
         b.log.error("cl.tool-number", f"{number:g} is no tool number", b.line)
         return
     state = _state(b)
-    if int(number) != state.number:
-        state.fields.pop("length_register", None)
+    _renumber(state, int(number))
     known = state.by_number.get(int(number), {})
-    state.number = int(number)
     state.fields = {**known, **state.fields} if set(state.fields) <= _NOT_SHAPE else state.fields
     if register is not None:
         state.fields["length_register"] = int(register)
@@ -98,18 +105,21 @@ def turret(b: Builder, s: Statement) -> None:
 
 
 def toolno(b: Builder, s: Statement) -> None:
-    """CATIA: TOOLNO/number, kind, dimensions: describes, LOADTL loads."""
+    """CATIA: TOOLNO/number, kind[, diameter[, corner radius[, length]]] describes, LOADTL loads.
+
+    The longer forms follow a table of the user: their numbers are left alone, CUTTER has the sizes.
+    """
     if s.has(*TURNING):
         b.turning.add(b.operation.now)
     kind = next((w for w in s.words if isinstance(w, str) and w), "")
     size = [w for w in s.words[1:] if isinstance(w, float)]
     fields: dict[str, Any] = {"shape": kind} if kind else {}
-    if kind not in TURNING and size:
+    if kind not in TURNING and size and len(s.words) <= _SHORT_TOOLNO:
         fields["diameter"] = size[0] * b.scale
         if len(size) > 1:
             fields["corner_radius"] = size[1] * b.scale
     if s.numbers and 0 <= s.numbers[0] < _MAX_NUMBER:
-        _state(b).number = int(s.numbers[0])
+        _renumber(_state(b), int(s.numbers[0]))
     describe(b, **fields)
 
 
