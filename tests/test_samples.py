@@ -43,6 +43,24 @@ def test_script_reproduces_the_file(name: str, remade: Path) -> None:
     assert (remade / name).read_bytes() == (FOLDER / name).read_bytes()
 
 
+DIALECTS = sorted(p.name for p in (FOLDER / "dialects").iterdir())
+
+
+def test_script_reproduces_the_dialects(tmp_path: Path) -> None:
+    run_script("make_dialects.py", tmp_path)
+    assert sorted(p.name for p in (tmp_path / "dialects").iterdir()) == DIALECTS
+    for name in DIALECTS:
+        assert (tmp_path / "dialects" / name).read_bytes() == (FOLDER / "dialects" / name).read_bytes()
+
+
+@pytest.mark.parametrize("name", DIALECTS)
+def test_dialects_are_small_explained_and_listed(name: str) -> None:
+    data = (FOLDER / "dialects" / name).read_bytes()
+    assert len(data) < SIZE_LIMIT
+    assert data.startswith(b"$$ ")
+    assert f"`{name.removeprefix('inch_')}`" in (FOLDER / "README.md").read_text()
+
+
 def test_nothing_is_left_over() -> None:
     assert {p.name for p in FOLDER.iterdir() if p.suffix in (".cls", ".apt")} == set(NAMES)
 

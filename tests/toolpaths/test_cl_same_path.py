@@ -1,219 +1,112 @@
-"""One path spelt by five systems: the Toolpath must be the same to the written decimals."""
+"""One path spelt by six systems, in mm and in inches: the Toolpath must be the same to the written decimals."""
 
 from __future__ import annotations
+
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from toolpaths.cl.read import read_bytes
-from toolpaths.diagnostics import has_errors
-from toolpaths.toolpath import Toolpath
+import toolpaths
+from toolpaths.cl.read import ReadResult, read_file
+from toolpaths.diagnostics import Severity
+from toolpaths.inspect import inspect
+from toolpaths.toolpath import Kind, Role, Toolpath
 
-NX = """\
-TOOL PATH/POCKET,TOOL,MILL_10
-TLDATA/MILL,10.0000,0.0000,75.0000,0.0000,0.0000
-MSYS/0.0000,0.0000,0.0000,1.0000000,0.0000000,0.0000000,0.0000000,1.0000000,0.0000000
-$$ centerline data
-PAINT/PATH
-LOAD/TOOL,1
-SPINDL/RPM,3000,CLW
-RAPID
-GOTO/10.0000,0.0000,50.0000,0.0000000,0.0000000,1.0000000
-RAPID
-GOTO/10.0000,0.0000,2.0000
-FEDRAT/MMPM,250.0000
-GOTO/10.0000,0.0000,-3.0000
-CIRCLE/0.0000,0.0000,-3.0000,0.0000000,0.0000000,-1.0000000,10.0000,0.0300,0.5000,10.0000,0.0000
-GOTO/0.0000,10.0000,-3.0000
-CIRCLE/0.0000,5.0000,-5.0000,0.0000000,0.0000000,1.0000000,5.0000,0.0300,0.5000,10.0000,0.0000
-GOTO/0.0000,0.0000,-5.0000
-FEDRAT/MMPM,600.0000
-GOTO/20.0000,0.0000,-5.0000
-GOTO/25.0000,0.0000,-5.0000,0.6000000,0.0000000,0.8000000
-RAPID
-GOTO/25.0000,0.0000,50.0000,0.0000000,0.0000000,1.0000000
-CYCLE/DRILL,FEDTO,-12.0000,RAPTO,3.0000,RTRCTO,20.0000,MANUAL,MMPM,120.0000
-GOTO/30.0000,5.0000,0.0000
-GOTO/40.0000,5.0000,0.0000
-CYCLE/OFF
-RAPID
-GOTO/40.0000,5.0000,50.0000
-END-OF-PATH
-"""
-CREO = """\
-$$*         Pro/CLfile  Version
-$$-> MFGNO / PART
-PARTNO / PART
-$$-> FEATNO / 12
-MACHIN / UNCX01, 1
-UNITS / MM
-LOADTL / 1
-$$-> CUTTER / 10.000000
-$$-> CSYS / 1.0000000000, 0.0000000000, 0.0000000000, 0.0000000000,  $
-            0.0000000000, 1.0000000000, 0.0000000000, 0.0000000000,  $
-            0.0000000000, 0.0000000000, 1.0000000000, 0.0000000000
-MULTAX / ON
-SPINDL / RPM, 3000.000000,  CLW
-RAPID
-GOTO / 10.0000000000, 0.0000000000, 50.0000000000, $
- 0.0000000000, 0.0000000000, 1.0000000000
-RAPID
-GOTO / 10.0000000000, 0.0000000000, 2.0000000000, 0.0000000000, 0.0000000000, 1.0000000000
-FEDRAT / 250.000000,  MMPM
-GOTO / 10.0000000000, 0.0000000000, -3.0000000000, 0.0000000000, 0.0000000000, 1.0000000000
-CIRCLE / 0.0000000000, 0.0000000000, -3.0000000000, $
-0.0000000000, 0.0000000000, 1.0000000000, 10.0000000000
-GOTO / 0.0000000000, 10.0000000000, -3.0000000000, 0.0000000000, 0.0000000000, 1.0000000000
-CIRCLE / 0.0000000000, 5.0000000000, -3.0000000000, 0.0000000000, 0.0000000000, -1.0000000000, 5.0000000000
-GOTO / 0.0000000000, 0.0000000000, -5.0000000000, 0.0000000000, 0.0000000000, 1.0000000000
-FEDRAT / 600.000000,  MMPM
-GOTO / 20.0000000000, 0.0000000000, -5.0000000000, 0.0000000000, 0.0000000000, 1.0000000000
-GOTO / 25.0000000000, 0.0000000000, -5.0000000000, 0.6000000000, 0.0000000000, 0.8000000000
-RAPID
-GOTO / 25.0000000000, 0.0000000000, 50.0000000000, 0.0000000000, 0.0000000000, 1.0000000000
-CYCLE / DRILL, DEPTH, 12.000000, MMPM, 120.000000, CLEAR, 3.000000, $
-RETURN, 20.000000
-GOTO / 30.0000000000, 5.0000000000, 0.0000000000, 0.0000000000, 0.0000000000, 1.0000000000
-GOTO / 40.0000000000, 5.0000000000, 0.0000000000, 0.0000000000, 0.0000000000, 1.0000000000
-CYCLE / OFF
-RAPID
-GOTO / 40.0000000000, 5.0000000000, 50.0000000000, 0.0000000000, 0.0000000000, 1.0000000000
-$$-> END /
-FINI
-"""
-SOLIDWORKS = """\
-PARTNO/1
-MACHIN/PWORKS,0
-UNIT/MM
-LOAD/TOOL,1
-CUTTER/10.,0.,5.,0.,0.,0.,75.
-SETUP/START,1
-TRNTYP/WORLD,0,0,0
-CSYS/1.,0.,0.,0.,0.,1.,0.,0.,0.,0.,1.,0.
-INSERT/[HOLDER=X] 10mm EM
-SPINDL/3000,RPM,CLW
-RAPID/
-GOTO/10.,0,50.,0,0,1.
-RAPID/
-GOTO/10.,0,2.,0,0,1.
-FEDRAT/250.,MMPM
-GOTO/10.,0,-3.,0,0,1.
-CIRCLE/0,0,-3.,0,0,1.
-GOTO/0,10.,-3.,0,0,1.
-CIRCLE/0,5.,-3.,0,0,-1.
-GOTO/0,0,-5.,0,0,1.
-FEDRAT/600.,MMPM
-GOTO/20.,0,-5.,0,0,1.
-GOTO/25.,0,-5.,.6,0,.8
-RAPID/
-GOTO/25.,0,50.,0,0,1.
-CYCLE/INIT
-CYCLE/DRILL,FEDTO,12.,MMPM,120.,RAPTO,3.,RTRCTO,20.
-GOTO/30.,5.,0,0,0,1.
-GOTO/40.,5.,0,0,0,1.
-CYCLE/OFF
-RAPID/
-GOTO/40.,5.,50.,0,0,1.
-SETUP/END,1
-FINI
-"""
-CATIA = """\
-$$*CATIA0
-$$ Manufacturing Program.1
-$$    1.00000    0.00000    0.00000    0.00000
-$$    0.00000    1.00000    0.00000    0.00000
-$$    0.00000    0.00000    1.00000    0.00000
-PARTNO PART
-$$ OPERATION NAME : Pocketing.1
-TPRINT/MILL_10
-TOOLNO/1,MILL,10.000000,0.000000,75.000000
-LOADTL/1
-MULTAX
-SPINDL/ 3000.0000,RPM,CLW
-RAPID
-GOTO  /   10.00000,    0.00000,   50.00000, 0.000000, 0.000000, 1.000000
-RAPID
-GOTO  /   10.00000,    0.00000,    2.00000, 0.000000, 0.000000, 1.000000
-FEDRAT/  250.0000,MMPM
-GOTO  /   10.00000,    0.00000,   -3.00000, 0.000000, 0.000000, 1.000000
-AUTOPS
-INDIRV/    0.00000,    1.00000,    0.00000
-TLON,GOFWD/ (CIRCLE/    0.00000,    0.00000,   -3.00000,$
-   10.00000),ON,(LINE/    0.00000,    0.00000,   -3.00000,$
-    0.00000,   10.00000,   -3.00000)
-AUTOPS
-INDIRV/    1.00000,    0.00000,    0.00000
-TLON,GOFWD/ (CIRCLE/    0.00000,    5.00000,   -3.00000,$
-    5.00000),ON,(LINE/    0.00000,    5.00000,   -3.00000,$
-    0.00000,    0.00000,   -5.00000)
-FEDRAT/  600.0000,MMPM
-GOTO  /   20.00000,    0.00000,   -5.00000, 0.000000, 0.000000, 1.000000
-GOTO  /   25.00000,    0.00000,   -5.00000, 0.600000, 0.000000, 0.800000
-RAPID
-GOTO  /   25.00000,    0.00000,   50.00000, 0.000000, 0.000000, 1.000000
-CYCLE/DRILL,DEPTH,12.000000,MMPM,120.0000,CLEAR,3.000000,$
-RETURN,20.000000
-GOTO  /   30.00000,    5.00000,    0.00000, 0.000000, 0.000000, 1.000000
-GOTO  /   40.00000,    5.00000,    0.00000, 0.000000, 0.000000, 1.000000
-CYCLE/OFF
-RAPID
-GOTO  /   40.00000,    5.00000,   50.00000, 0.000000, 0.000000, 1.000000
-REWIND/0
-END
-"""
-NCL = """\
-$$ NCL clfile listing
-PARTNO PART                                                             PAR00010
-UNITS/MM
-LOADTL/1
-CUTTER/     10.0000,      0.0000,     75.0000
-MULTAX/ON
-SPINDL/RPM,    3000.0000,CLW
-RAPID
-GOTO  /   10.0000,    0.0000,   50.0000, 0.0000000, 0.0000000, 1.0000000
-RAPID
-GOTO  /   10.0000,    0.0000,    2.0000, 0.0000000, 0.0000000, 1.0000000
-FEDRAT/MMPM,      250.0000
-GOTO  /   10.0000,    0.0000,   -3.0000, 0.0000000, 0.0000000, 1.0000000
-CIRCLE/    0.0000,    0.0000,   -3.0000, 0.0000000, 0.0000000, 1.0000000,   10.0000
-GOTO  /    0.0000,   10.0000,   -3.0000, 0.0000000, 0.0000000, 1.0000000
-CIRCLE/    0.0000,    5.0000,   -3.0000, 0.0000000, 0.0000000,-1.0000000,    5.0000
-GOTO  /    0.0000,    0.0000,   -5.0000, 0.0000000, 0.0000000, 1.0000000
-FEDRAT/MMPM,      600.0000
-GOTO  /   20.0000,    0.0000,   -5.0000, 0.0000000, 0.0000000, 1.0000000
-GOTO  /   25.0000,    0.0000,   -5.0000, 0.6000000, 0.0000000, 0.8000000
-RAPID
-GOTO  /   25.0000,    0.0000,   50.0000, 0.0000000, 0.0000000, 1.0000000
-CYCLE/DRILL,FEDTO,     12.0000,MMPM,      120.0000,RAPTO,      3.0000,RTRCTO,     20.0000
-GOTO  /   30.0000,    5.0000,    0.0000, 0.0000000, 0.0000000, 1.0000000
-GOTO  /   40.0000,    5.0000,    0.0000, 0.0000000, 0.0000000, 1.0000000
-CYCLE/OFF
-RAPID
-GOTO  /   40.0000,    5.0000,   50.0000, 0.0000000, 0.0000000, 1.0000000
-FINI
-"""
-TEXTS = {"nx": NX, "creo": CREO, "solidworks": SOLIDWORKS, "catia": CATIA, "ncl": NCL}
+FOLDER = Path(__file__).parents[2] / "samples" / "dialects"
+FILES = {"nx": "nx.cls", "creo": "creo.ncl", "solidworks": "solidworks.apt", "solidworks-clt": "solidworks.clt",
+         "catia": "catia.aptsource", "ncl": "ncl.as"}
+WITHOUT_UNITS = ("nx", "catia")
+DECIMALS = {"mm": 1e-4, "inch": 1.3e-3}
+"""mm: half the last digit of NX, in inches of five digits and with the rounding of two numbers"""
 
 
-def read(name: str) -> Toolpath:
-    result = read_bytes(TEXTS[name])
+def read(name: str, unit: str = "mm") -> ReadResult:
+    prefix = "" if unit == "mm" else "inch_"
+    result = read_file(FOLDER / f"{prefix}{FILES[name]}", units=unit if name in WITHOUT_UNITS else None)
     assert result.dialect == name
-    assert not has_errors(result.diagnostics), [str(d) for d in result.diagnostics]
+    assert not [str(d) for d in result.diagnostics if d.severity is not Severity.INFO]
     assert not result.unknown_words
-    return result.toolpath
+    assert result.toolpath.units == unit
+    return result
 
 
-@pytest.mark.parametrize("name", ["creo", "solidworks", "catia", "ncl"])
-def test_same_path(name: str) -> None:
-    nx, other = read("nx"), read(name)
-    for column in ("tip", "axis", "feed"):
-        assert np.allclose(getattr(other, column), getattr(nx, column), atol=1e-9, rtol=0, equal_nan=True), column
-    for column in ("feed_mode", "kind", "role", "arc", "cycle", "pass_", "operation"):
-        assert getattr(other, column).tolist() == getattr(nx, column).tolist(), column
-    for column in ("center", "normal", "radius", "sweep"):
-        assert getattr(other.arcs, column) == pytest.approx(getattr(nx.arcs, column), abs=1e-9), column
-    for c, d in zip(nx.cycles, other.cycles, strict=True):
-        assert (c.kind, c.depth, c.clearance, c.retract, c.feed) == (d.kind, d.depth, d.clearance, d.retract, d.feed)
-    assert [t.number for t in other.tools] == [1]
-    assert other.tools[0].diameter == 10.0
-    assert ("SPINDL", {"RPM", 3000.0, "CLW"}) in [(e.word, set(e.values)) for e in other.events]
+def same(p: Toolpath, q: Toolpath, atol: float) -> None:
+    """The first len(q) rows of p are those of q."""
+    n, k = len(q), len(q.arcs)
+    assert q.tip == pytest.approx(p.tip[:n], abs=atol)
+    assert q.axis == pytest.approx(p.axis[:n], abs=1e-6)
+    assert np.allclose(q.feed, p.feed[:n], atol=atol, rtol=1e-5, equal_nan=True)
+    for column in ("feed_mode", "kind", "role", "arc", "cycle", "tool"):
+        assert getattr(q, column).tolist() == getattr(p, column)[:n].tolist(), column
+    for column, tolerance in (("center", 2 * atol), ("normal", 1e-6), ("radius", 2 * atol), ("sweep", atol)):
+        assert getattr(q.arcs, column) == pytest.approx(getattr(p.arcs, column)[:k], abs=tolerance), column
+    for c, d in zip(p.cycles, q.cycles, strict=True):
+        assert c.kind == d.kind
+        assert (d.depth, d.clearance, d.retract, d.feed) == pytest.approx((c.depth, c.clearance, c.retract, c.feed),
+                                                                         abs=atol)
+        assert set(np.round(d.steps, 1)) == set(np.round(c.steps, 1))
+    for t, u in zip(p.tools, q.tools, strict=True):
+        assert (u.number, u.diameter) == (t.number, pytest.approx(t.diameter, abs=atol))
+
+
+def events(p: Toolpath) -> list[tuple[int, str, frozenset[str | float]]]:
+    """What all systems state of tools, spindle and coolant, in any order at one row."""
+    found = [(e.index, e.word, frozenset(e.values[:1] if e.word == "LOADTL" else e.values))
+             for e in p.events if e.word in ("LOADTL", "SPINDL", "COOLNT")]
+    return sorted(found, key=str)
+
+
+@pytest.mark.parametrize("unit", ["mm", "inch"])
+@pytest.mark.parametrize("name", [name for name in FILES if name != "nx"])
+def test_same_path(name: str, unit: str) -> None:
+    nx, other = read("nx", unit).toolpath, read(name, unit).toolpath
+    same(nx, other, DECIMALS[unit])
+    first = [e for e in events(nx) if e[0] < len(other)]
+    assert [e for e in events(other) if e[0] < len(other)] == first
+
+
+@pytest.mark.parametrize("name", list(FILES))
+def test_inches_are_the_same_path(name: str) -> None:
+    same(read(name).toolpath, read(name, "inch").toolpath, 5e-3)
+
+
+
+
+def test_the_path_is_what_the_script_says() -> None:
+    """Numbers worked out by hand, so that six equal mistakes would show."""
+    p = read("ncl").toolpath
+    assert np.bincount(p.role, minlength=2).tolist() == [24, 4]
+    assert np.degrees(p.arcs.sweep) == pytest.approx([90, 180, 90, 360, 270, 180], abs=1e-3)
+    assert p.arcs.normal == pytest.approx(np.array([[0, 0, 1], [0, 0, -1], [0, 0, 1], [0, 0, 1], [0, 0, -1],
+                                                    [0.6, 0, 0.8]]), abs=1e-7)
+    assert p.arcs.center[[2, 3]].tolist() == [[20, 5, -3], [20, 5, -5]]
+    assert p.arcs.center[5] == pytest.approx([50 + 8 - 0.6, 5, -6 - 0.8], abs=1e-4)
+    assert p.tip[p.role == Role.HOLE].tolist() == [[30, 5, 0], [40, 5, 0], [30, -5, 0], [40, -5, 0]]
+    assert [(c.kind, c.depth, c.clearance, c.retract, c.feed * 60, c.steps) for c in p.cycles] == [
+        ("DRILL", 12, 3, 20, 120, ()), ("DEEP", 12, 3, 20, 100, (4,))]
+    assert p.axis[[17, 25, 26, 27]] == pytest.approx(np.array([[0.6, 0, 0.8], [0, 0, 1], [0.6, 0, 0.8], [0.6, 0, 0.8]]))
+    assert (p.kind == Kind.RAPID).sum() == 15
+
+
+@pytest.mark.parametrize("unit", ["mm", "inch"])
+@pytest.mark.parametrize("name", list(FILES))
+def test_plain_counts_and_the_way_back(name: str, unit: str) -> None:
+    """Points are the GOTO and the arcs of CATIA, which carry their ends; what is written reads back the same."""
+    result = read(name, unit)
+    prefix = "" if unit == "mm" else "inch_"
+    text = (FOLDER / f"{prefix}{FILES[name]}").read_text()
+    lines = ["".join(line.split()) for line in text.splitlines()]
+    arcs = sum(line.startswith(("CIRCLE/", "TLON,GOFWD/")) for line in lines)
+    ends = sum(line.startswith("TLON,GOFWD/") for line in lines)
+    found = inspect(result)
+    assert found["points"] == sum(line.startswith("GOTO/") for line in lines) + ends
+    assert found["arcs"] == arcs == (6 if unit == "mm" else 5)
+    assert found["cycles"] == sum(line.startswith(("CYCLE/D",)) for line in lines) == 2
+    assert found["arcs_over_180_deg"] == 1
+    assert toolpaths.read_bytes(toolpaths.write(result.toolpath))[0].equals(result.toolpath)
+
+
+def test_insert_of_solidworks_is_no_output() -> None:
+    assert "INSERT" not in [e.word for e in read("solidworks").toolpath.events]
+    assert "INSERT/[HOLDER=C40] MILL_10" in (FOLDER / "solidworks.apt").read_text()

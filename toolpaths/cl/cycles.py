@@ -177,8 +177,10 @@ def _retract(word: str, n: list[float], following: Word, found: dict[str, object
 
 
 def _arm(b: Builder, v: Values) -> None:
-    """Check what was stated and make the cycle current."""
+    """Check what was stated and make the cycle current. `.clt` names pecking in a word of its own."""
     v = _placed(v)
+    if v.kind == "DRILL" and "PECKING" in v.words and any(v.steps):
+        v = replace(v, kind="DEEP")
     b.memory[_LAST] = v
     for word in v.empty:
         b.log.error("cl.cycle-value", f"CYCLE/{v.kind}: {word} has no number", b.line, "write the number behind it")
