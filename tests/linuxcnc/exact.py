@@ -17,7 +17,8 @@ import gcode
 
 MM = 25.4
 TRAVERSE, FEED, ARC, PROBE, TAP, DWELL = range(6)
-WIDTH = 23
+AXES = 9
+WIDTH = 11 + 2 * AXES
 LAST_GOOD = 3
 """The interpreter's codes up to this are kinds of success."""
 NO_TOOL = (-1,) + (0.0,) * 12 + (0,)
@@ -36,15 +37,15 @@ def load_tools(table: Path) -> list[tuple[float, ...]]:
 
 
 class Recorder:
-    """What the interpreter calls; the machine is one in millimetres with the axes X Y Z A B C."""
+    """What the interpreter calls; the machine is one in millimetres with the axes X Y Z A B C U V W."""
 
     def __init__(self, folder: Path) -> None:
         self.parameter_file = str(folder / "parameters")
         Path(self.parameter_file).touch()
         self.tools = load_tools(folder / "tool.tbl")
         self.rows = array("d")
-        self.at = [0.0] * 6
-        self.g5x, self.g92, self.length = [0.0] * 6, [0.0] * 6, [0.0] * 6
+        self.at = [0.0] * AXES
+        self.g5x, self.g92, self.length = [0.0] * AXES, [0.0] * AXES, [0.0] * AXES
         self.feed, self.inverse, self.plane, self.line, self.tool, self.rotation = 0.0, False, 1, 0, 0, 0.0
 
     def record(self, kind, at, first=0.0, second=0.0, turn=0, dwell=0.0):
@@ -115,7 +116,7 @@ class Recorder:
         return 1.0
 
     def get_axis_mask(self):
-        return 0b111111
+        return 0b111111111
 
     def get_block_delete(self):
         return False
@@ -134,8 +135,8 @@ class Recorder:
 
 
 def pose(v) -> list[float]:
-    """x y z in mm, a b c in degrees, of the interpreter's nine values in inch and degrees."""
-    return [v[0] * MM, v[1] * MM, v[2] * MM, v[3], v[4], v[5]]
+    """x y z in mm, a b c in degrees, u v w in mm, of the interpreter's nine values in inch and degrees."""
+    return [v[0] * MM, v[1] * MM, v[2] * MM, v[3], v[4], v[5], v[6] * MM, v[7] * MM, v[8] * MM]
 
 
 def main() -> None:

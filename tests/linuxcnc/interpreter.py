@@ -25,6 +25,9 @@ MM_PER_INCH = 25.4
 TIME_LIMIT = 300
 UNMOVED = 1e-8
 """mm: displacements that LinuxCNC's motion takes for none"""
+_AXES = 9
+_AT, _OFFSET, _REST = slice(1, 1 + _AXES), slice(1 + _AXES, 1 + 2 * _AXES), 1 + 2 * _AXES
+"""Columns of the rows that exact.py writes: position, offsets, then feed and what follows."""
 _MOTIONS = {"STRAIGHT_TRAVERSE", "STRAIGHT_FEED", "ARC_FEED", "STRAIGHT_PROBE", "RIGID_TAP", "DWELL"}
 _CALL = re.compile(r"^\s*\d+\s+N\S*?\s*([A-Z][A-Z_0-9]+)\((.*)\)\s*$")
 
@@ -53,8 +56,8 @@ class Canonical:
 
     Attributes:
         kind (N,): Move
-        pos (N, 6): x y z a b c at the end of the move in program coordinates, mm and degrees
-        machine (N, 6): the same with work offset, G92 and tool length offset
+        pos (N, 9): x y z a b c u v w at the end of the move in program coordinates, mm and degrees
+        machine (N, 9): the same with work offset, G92 and tool length offset
         feed (N,): mm/min (deg/min where only rotary axes move); with G93 the feed that gives the block its time
         inverse (N,): True where G93 was active
         seconds (N,): nominal time at constant feed, nan for traverses and taps
@@ -63,7 +66,8 @@ class Canonical:
         plane (N,): 17, 18 or 19
         center (N, 2): of arcs, program coordinates, (x, y) in plane 17, (z, x) in 18, (y, z) in 19; nan elsewhere
         turn (N,): of arcs, turns begun, counter-clockwise (G3) positive; 0 elsewhere
-        events: (index of the next move, function, arguments as text) of the other canonical calls, feeds left out
+        events: (index of the next move, function, arguments as text) of the other canonical calls, feeds left out;
+            none where the program moves U, V or W
         error: the interpreter's message, "" where the program was accepted
     """
 
@@ -110,7 +114,7 @@ def interpret(program: str | Path, tools: Mapping[int, ToolEntry | tuple[float, 
     with tempfile.TemporaryDirectory(prefix="postproc-rs274-") as name:
         folder = Path(name)
         shutil.copyfile(program, folder / "program.ngc")
-        events, error = _run_rs274(folder, tools or {})
+        events, error = ((), "") if _beside(folder / "program.ngc") else _run_rs274(folder, tools or {})
         rows, exact_error = _run_exact(folder, tools or {})
     return _canonical(rows, events, error or exact_error)
 
@@ -124,6 +128,11 @@ def table_text(tools: Mapping[int, ToolEntry | tuple[float, float]], unit: float
 def _run(folder: Path, *command: str | Path) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, cwd=folder, env={**os.environ, "HOME": str(folder)}, stdin=subprocess.DEVNULL,
                           capture_output=True, text=True, errors="replace", timeout=TIME_LIMIT, check=False)
+
+
+def _beside(program: Path) -> bool:
+    """True where a program moves U, V or W: the machine that rs274 is has none, the interpreter of exact.py has."""
+    return re.search(r"[UVWuvw]\s*[-+.\d]", re.sub(r"\([^)]*\)|;.*", "", program.read_text(errors="replace"))) is not None
 
 
 def _run_rs274(folder: Path, tools: Mapping[int, ToolEntry | tuple[float, float]]
@@ -160,43 +169,45 @@ def _run_exact(folder: Path, tools: Mapping[int, ToolEntry | tuple[float, float]
 
 
 def _canonical(rows: Floats, events: tuple[tuple[int, str, str], ...], error: str) -> Canonical:
-    if np.any(rows[:, 22]):
+    feed, inverse, line, tool, plane, first, second, turn, _, rotation = rows[:, _REST:].T
+    if np.any(rotation):
         raise RuntimeError("the program turns the work offset about Z, which Canonical.machine does not hold")
     kind = rows[:, 0].astype(np.int8)
     arc = kind == Move.ARC
     return Canonical(
-        kind=kind, pos=rows[:, 1:7], machine=rows[:, 1:7] + rows[:, 7:13], feed=rows[:, 13], inverse=rows[:, 14] > 0,
-        seconds=_seconds(rows), line=rows[:, 15].astype(np.int64), tool=rows[:, 16].astype(np.int64),
-        plane=np.array([0, 17, 19, 18])[rows[:, 17].astype(np.int64)],
-        center=np.where(arc[:, None], rows[:, 18:20], np.nan), turn=rows[:, 20].astype(np.int64),
+        kind=kind, pos=rows[:, _AT], machine=rows[:, _AT] + rows[:, _OFFSET], feed=feed, inverse=inverse > 0,
+        seconds=_seconds(rows), line=line.astype(np.int64), tool=tool.astype(np.int64),
+        plane=np.array([0, 17, 19, 18])[plane.astype(np.int64)],
+        center=np.where(arc[:, None], np.stack([first, second], axis=1), np.nan), turn=turn.astype(np.int64),
         events=events, error=error)
 
 
 def _seconds(rows: Floats) -> Floats:
-    """Nominal time of each row: LinuxCNC's length (xyz where any of them moves, else the angles) over the feed.
+    """Nominal time of each row: LinuxCNC's length (xyz where any of them moves, else uvw, else abc) over the feed.
 
     The first move starts at machine zero.
     """
-    kind, feed = rows[:, 0], rows[:, 13]
-    before = np.vstack([np.zeros((1, 6)), rows[:-1, 1:7] + rows[:-1, 7:13]]) - rows[:, 7:13]
-    delta = rows[:, 1:7] - before
-    straight = np.linalg.norm(delta[:, :3], axis=1)
-    length = np.where(straight > UNMOVED, straight, np.linalg.norm(delta[:, 3:], axis=1))
+    kind, feed, dwell = rows[:, 0], rows[:, _REST], rows[:, _REST + 8]
+    before = np.vstack([np.zeros((1, _AXES)), rows[:-1, _AT] + rows[:-1, _OFFSET]]) - rows[:, _OFFSET]
+    delta = rows[:, _AT] - before
+    straight, beside = np.linalg.norm(delta[:, :3], axis=1), np.linalg.norm(delta[:, 6:], axis=1)
+    length = np.where(beside > 0, beside, np.linalg.norm(delta[:, 3:6], axis=1))
+    length = np.where(straight > 0, straight, length)
     length = np.where(kind == Move.ARC, _arc_length(rows, before), length)
     cutting = np.isin(kind, (Move.FEED, Move.ARC, Move.PROBE)) & (feed > 0)
     seconds = np.divide(60.0 * length, feed, out=np.full(len(rows), np.nan), where=cutting)
-    return np.where(kind == Move.DWELL, rows[:, 21], seconds)
+    return np.where(kind == Move.DWELL, dwell, seconds)
 
 
 def _arc_length(rows: Floats, before: Floats) -> Floats:
     """Length of rows as helices from the position before, by their centre, plane and turns."""
-    first, second, height = np.array([[0, 0, 0], [0, 1, 2], [1, 2, 0], [2, 0, 1]])[rows[:, 17].astype(np.int64)].T
-    row = np.arange(len(rows))
-    u0, v0 = before[row, first] - rows[:, 18], before[row, second] - rows[:, 19]
-    u1, v1 = rows[row, 1 + first] - rows[:, 18], rows[row, 1 + second] - rows[:, 19]
-    turn = rows[:, 20]
+    plane, center1, center2, turn = rows[:, _REST + 4:_REST + 8].T
+    first, second, height = np.array([[0, 0, 0], [0, 1, 2], [1, 2, 0], [2, 0, 1]])[plane.astype(np.int64)].T
+    row, at = np.arange(len(rows)), rows[:, _AT]
+    u0, v0 = before[row, first] - center1, before[row, second] - center2
+    u1, v1 = at[row, first] - center1, at[row, second] - center2
     sense = np.where(turn >= 0, 1.0, -1.0)
     part = np.mod(sense * (np.arctan2(v1, u1) - np.arctan2(v0, u0)), 2 * np.pi)
     part = np.where((part < 1e-9) | (part > 2 * np.pi - 1e-9), 2 * np.pi, part)
     angle = part + 2 * np.pi * np.maximum(np.abs(turn) - 1, 0)
-    return np.hypot(np.hypot(u0, v0) * angle, rows[row, 1 + height] - before[row, height])
+    return np.hypot(np.hypot(u0, v0) * angle, at[row, height] - before[row, height])

@@ -19,7 +19,7 @@ from tests.linuxcnc.interpreter import Canonical, Move, ToolEntry
 from toolpaths.arrays import Array, Bools, Floats, Ints
 from toolpaths.diagnostics import has_errors
 
-AXES = "XYZABC"
+AXES = "XYZABCUVW"
 """Columns of `Canonical.pos`."""
 OFFSET_LINE, HOME_LINE = 2, 3
 """Lines of the header, comments as written, that `on_machine` fills."""
@@ -93,8 +93,8 @@ class Output:
 
 
 def readable(result: PostResult) -> bool:
-    """True where the interpreter of `exact.py`, a machine with the axes X Y Z A B C, has all letters of the program."""
-    return set(result.machine.axis_names) <= set(AXES)
+    """True where the machine that rs274 is, one with the axes X Y Z A B C, has all letters of the program."""
+    return set(result.machine.axis_names) <= set("XYZABC")
 
 
 def read(result: PostResult) -> tuple[Words, Motion]:
