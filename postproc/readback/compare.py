@@ -78,10 +78,20 @@ def _deviations(motion: Motion, executed: Executed, curves: Curves, rows: Ints, 
         curve = curves.take(owner[rows[part]])
         for t in SAMPLES:
             tip, axis = executed.poses(motion, rows[part], t)
-            d, e, _ = curve.deviation(tip, axis, np.minimum((first[part] + t) / blocks[part], 1.0))
+            guess = _turned_so_far(curve, axis, np.minimum((first[part] + t) / blocks[part], 1.0))
+            d, e, _ = curve.deviation(tip, axis, guess)
             tip_off[part] = np.fmax(tip_off[part], np.nan_to_num(d, nan=np.inf))
             axis_off[part] = np.fmax(axis_off[part], np.nan_to_num(e, nan=np.inf))
     return tip_off, axis_off
+
+
+def _turned_so_far(curve: Curves, axis: Floats, guess: Floats) -> Floats:
+    """Where on their great circle axes (K, 3) stand, for moves whose tip hardly moves; `guess` (K,) for others."""
+    turn = angle_between(curve.axis0, curve.axis1)
+    spot = (curve.length() <= 0.1) & (turn > 1e-6)
+    across = np.cross(np.cross(curve.axis0, curve.axis1), curve.axis0) / np.sin(np.where(spot, turn, 1.0))[:, None]
+    angle = np.arctan2((axis * across).sum(axis=1), (axis * curve.axis0).sum(axis=1))
+    return np.where(spot, np.clip(angle / np.where(spot, turn, 1.0), 0.0, 1.0), guess)
 
 
 def _place(rows: Ints, owner: Ints) -> tuple[Floats, Floats]:
