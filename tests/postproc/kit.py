@@ -187,11 +187,12 @@ class Peer:
                 assert "F" in words, f"line {number}: no F with inverse time"
             if motion >= 73:
                 assert not inverse, f"line {number}: a cycle under inverse time"
-                if not cycling:
+                first = not cycling
+                if first:
                     initial, sticky = at[z], {}
                 cycling = True
                 sticky |= {k: words[k] for k in "ZRQP" if k in words}
-                at = self._cycle(number, motion, at, target, sticky, z, shift[z], scale, initial, retract, state)
+                at = self._cycle(number, motion, at, target, sticky, z, shift[z], scale, initial, retract, state, first)
                 continue
             kind = {0: "rapid", 1: "feed"}.get(motion, "arc")
             t = np.linspace(0.0, 1.0, dense + 1)[1:, None]
@@ -223,7 +224,8 @@ class Peer:
         return points
 
     def _cycle(self, number: int, code: int, at: np.ndarray, target: np.ndarray, sticky: dict[str, float], z: int,
-               shift: float, scale: float, initial: float, retract: int, state: tuple) -> np.ndarray:
+               shift: float, scale: float, initial: float, retract: int, state: tuple, first: bool) -> np.ndarray:
+        """LinuxCNC rises to R where it stands at the first hole of a sequence only; later ones it goes to aslant."""
         bottom, plane = sticky["Z"] * scale + shift, sticky["R"] * scale + shift
         over = target.copy()
         legs: list[tuple[str, np.ndarray]] = []
@@ -233,7 +235,7 @@ class Peer:
             point[z] = height
             legs.append((kind, point))
 
-        if at[z] < plane:
+        if at[z] < plane and first:
             leg("rapid", at, plane)
         leg("rapid", over, max(at[z], plane))
         leg("rapid", over, plane)

@@ -145,7 +145,7 @@ def random_program(rng: np.random.Generator) -> str:
         elif kind == 5:
             code = ["81", "82", "83", "73", "84", "85", "89"][rng.integers(0, 7)]
             lines += ["G94 G17 G0 Z60", f"G9{rng.integers(8, 10)} G{code} X{x} Y{y} Z{-abs(z) - 5} R3 Q4 P1 F90",
-                      f"X{y} Y{x}", f"G9{rng.integers(8, 10)} X{x - 1} R4", "G80", "G0 Z60"]
+                      f"X{y} Y{x}", f"G9{rng.integers(8, 10)} X{x - 1} R2", "G80", "G0 Z60"]
             here = [float(x) - 1, float(x), 60.0]
         elif kind == 6:
             lines += ["G53 G0 Z400", "G49", f"T{rng.integers(1, 3)} M6", f"G43 H{rng.integers(1, 3)}", "S900 M3", "M8",
@@ -185,7 +185,7 @@ def test_random_programs_as_the_own_executor_runs_them(seed: int) -> None:
 
 @pytest.mark.parametrize(("text", "code"), [
     ("G0 X1\nG68.2 X1\n", "gcode.unknown_code"), ("G91 G1 X1 F9\n", "gcode.unknown_code"),
-    ("G55 X1\n", "gcode.unknown_code"), ("M98 P2\n", "gcode.unknown_code"),
+    ("G58.1 X1\n", "gcode.unknown_code"), ("M98 P2\n", "gcode.unknown_code"),
     ("G0 B5\n", "gcode.unknown_word"), ("G0 U5\n", "gcode.unknown_word"),
     ("G0 X1 X2\n", "gcode.repeated"), ("G0 G1 X1 F9\n", "gcode.repeated"), ("G17 G18 G0 X1\n", "gcode.repeated"),
     ("G0 X#1\n", "gcode.syntax"), ("G0 X[1+2]\n", "gcode.syntax"),
@@ -200,7 +200,7 @@ def test_what_it_cannot_execute_is_an_error_with_the_line(text: str, code: str) 
     assert code in codes(found)
     d = next(d for d in found if d.code == code)
     assert d.lines and d.lines[0] == next(i for i, n in enumerate(text.splitlines(), 1) if re.search(
-        r"G68|G91|G55|M98|B5|U5|X1 X2|G0 G1|G17 G18|#|\[|SUB|1e3|,|X$|--|\(open|G81 X1 Y1|G83", n))
+        r"G68|G91|G58|M98|B5|U5|X1 X2|G0 G1|G17 G18|#|\[|SUB|1e3|,|X$|--|\(open|G81 X1 Y1|G83", n))
 
 
 def test_nothing_at_all() -> None:
