@@ -89,6 +89,29 @@ def spindle_speed(toolpath: Toolpath) -> Floats:
     return np.asarray(spindle_states(toolpath)[1] * PER_MINUTE)
 
 
+def loaded_tools(toolpath: Toolpath) -> Ints:
+    """(N,) number of the tool in the spindle at every row, -1 before any tool change."""
+    changes = tool_changes(toolpath)
+    return np.array([-1, *(c.number for c in changes)])[_state_at([0, *(c.index for c in changes)], len(toolpath))]
+
+
+def compensation_states(toolpath: Toolpath) -> Ints:
+    """(N,) 40, 41 or 42 as CUTCOM says at every row."""
+    states, starts = [40], [0]
+    for event in toolpath.events:
+        if event.word == "CUTCOM":
+            side = next((w for w in words(event) if w in _SIDES), "")
+            states.append(_SIDES.get(side, states[-1]))
+            starts.append(event.index)
+        elif event.word in TOOL_WORDS:
+            states.append(40 if states[-1] != 40 else states[-1])
+            starts.append(event.index)
+    return np.array(states)[_state_at(starts, len(toolpath))]
+
+
+_SIDES = {"LEFT": 41, "RIGHT": 42, "OFF": 40}
+
+
 def coolant_states(toolpath: Toolpath) -> Bools:
     """(N,) True where any coolant is on."""
     states, starts = [False], [0]

@@ -145,7 +145,7 @@ def write_text(result: PostResult) -> str:
     if result.toolpath.name:
         header.insert(1, f"part {result.toolpath.name}")
     writer = writer_for(result.controller, result.program, result.toolpath.cycles, job.control.length_on_z,
-                        (result.shares or {})["smoothing"])
+                        (result.shares or {})["smoothing"], result.setup.work_offset_code)
     return "\n".join(writer.lines(header)) + "\n"
 
 

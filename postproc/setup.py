@@ -54,11 +54,12 @@ class SetupFile(UserModel):
     description: str = ""
     work_offset: str = ""
     """name of the system of the CL file that is the work offset; default: its first"""
-    work_offset_code: str = "G54"
+    work_offset_code: str = Field(default="G54", pattern=r"^G(5[4-9]|59\.[1-3])$")
+    """register of the control that holds it: G54 to G59, or G59.1 to G59.3 where the control has them"""
     part: PartPlacement = PartPlacement()
     clearance: Clearance = Clearance()
-    tools: dict[str, ToolSetup] = Field(default_factory=dict)
-    """by tool number"""
+    tools: dict[Annotated[str, Field(pattern=r"^[0-9]+$")], ToolSetup] = Field(default_factory=dict)
+    """by tool number, e.g. [tools.1]"""
 
 
 @dataclass(frozen=True)

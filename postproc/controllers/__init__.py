@@ -12,10 +12,10 @@ if TYPE_CHECKING:
 
 
 def writer_for(controller: ControllerFile, program: Program, cycles: tuple[Cycle, ...], length_offsets: bool,
-               smoothing: float) -> IsoWriter:
+               smoothing: float, work_offset: str = "G54") -> IsoWriter:
     """The writer that the controller file names; `smoothing` in mm is left to the controller's own smoothing."""
     from postproc.controllers.iso import IsoWriter
     from postproc.controllers.linuxcnc import LinuxcncWriter
 
     writer = {"iso": IsoWriter, "linuxcnc": LinuxcncWriter}[controller.writer]
-    return writer(controller, program, cycles, length_offsets, smoothing)
+    return writer(controller, program, cycles, length_offsets, smoothing, work_offset)

@@ -19,9 +19,9 @@ class IsoWriter:
     """Writes one program; the state is what the controller holds while it reads."""
 
     def __init__(self, controller: ControllerFile, program: Program, cycles: tuple[Cycle, ...], tools: bool,
-                 smoothing: float) -> None:
+                 smoothing: float, work_offset: str = "G54") -> None:
         self.controller, self.program, self.cycles = controller, program, cycles
-        self.length_offsets, self.smoothing = tools, smoothing
+        self.length_offsets, self.smoothing, self.work_offset = tools, smoothing, work_offset
         self.space = " " if controller.format.space else ""
         self.motion, self.plane, self.mode, self.feed = "", 17, 0, ""
         self.number = 0
@@ -32,7 +32,7 @@ class IsoWriter:
         yield from frame.begin
         yield from (self.comment(text) for text in header)
         for block in (*frame.preamble, *self.modes()):
-            yield self.numbered(block)
+            yield self.numbered(block.replace("{work_offset}", self.work_offset))
         yield from map(self.numbered, self.body())
         for block in frame.ending:
             yield self.numbered(block)

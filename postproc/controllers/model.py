@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from importlib import resources
 from pathlib import Path
-from typing import Literal
+from string import Formatter
+from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import AfterValidator, Field
 
 from machines.user_file import UserModel, load_toml
 from toolpaths.diagnostics import Diagnostic
@@ -44,11 +45,29 @@ class Frame(UserModel):
 
     begin: tuple[str, ...] = ("%",)
     preamble: tuple[str, ...] = ()
-    """safe start: units, modes and planes that the program relies on"""
+    """safe start: units, modes and planes that the program relies on; {work_offset} is the set-up's code"""
+    passive: tuple[Annotated[str, Field(pattern=r"^[GM][0-9]+(\.[0-9]+)?$")], ...] = ()
+    """codes of the shop's own blocks that move nothing: read back without being executed"""
     path_tolerance: str = ""
     """block that sets the control's own smoothing; {tolerance} and {chain} in mm"""
     ending: tuple[str, ...] = ("M30",)
     end: tuple[str, ...] = ("%",)
+
+
+def _placeholders(allowed: str) -> AfterValidator:
+    """Only {allowed} may stand in braces."""
+    def check(text: str) -> str:
+        found = {name for _, name, _, _ in Formatter().parse(text) if name is not None}
+        if found - {allowed}:
+            wrong = ", ".join("{" + str(name) + "}" for name in sorted(found - {allowed}))
+            raise ValueError(f"unknown placeholder {wrong}; allowed is {{{allowed}}}")
+        return text
+    return AfterValidator(check)
+
+
+Numbered = Annotated[str, _placeholders("number")]
+Registered = Annotated[str, _placeholders("register")]
+Timed = Annotated[str, _placeholders("seconds")]
 
 
 class Codes(UserModel):
@@ -72,13 +91,13 @@ class Codes(UserModel):
     coolant_off: str = "M9"
     stop: str = "M0"
     optional_stop: str = "M1"
-    tool_select: str = "T{number}"
-    tool_change: str = "T{number} M6"
-    length_offset: str = "G43 H{register}"
+    tool_select: Numbered = "T{number}"
+    tool_change: Numbered = "T{number} M6"
+    length_offset: Registered = "G43 H{register}"
     length_cancel: str = "G49"
-    dwell: str = "G4 P{seconds}"
-    compensation_left: str = "G41 D{register}"
-    compensation_right: str = "G42 D{register}"
+    dwell: Timed = "G4 P{seconds}"
+    compensation_left: Registered = "G41 D{register}"
+    compensation_right: Registered = "G42 D{register}"
     compensation_off: str = "G40"
 
 
@@ -96,7 +115,7 @@ class CannedCycle(UserModel):
     code: str
     peck: str = ""
     """word of the peck depth"""
-    dwell: str = ""
+    dwell: Timed = ""
     """word of the dwell, s"""
 
 

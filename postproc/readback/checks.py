@@ -5,38 +5,43 @@ from __future__ import annotations
 import numpy as np
 
 from postproc.control import Control
-from postproc.events import coolant_states, spindle_states
+from postproc.events import compensation_states, coolant_states, loaded_tools, spindle_states
+from postproc.job import Job
 from postproc.links import SafeSpace
 from postproc.moves import Moves, Phase
 from postproc.readback.execute import Motion
+from postproc.readback.faults import Faults
 from postproc.readback.poses import SAMPLES, Executed, arc_sweeps
 from postproc.word_arcs import PLANE_COLUMNS
-from toolpaths.arrays import Array, Bools, Floats, Ints
-from toolpaths.diagnostics import Diagnostic, error
+from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.diagnostics import Diagnostic
 from toolpaths.shape import Curves
-from toolpaths.toolpath import Kind, Toolpath
+from toolpaths.toolpath import Kind
 
 ALLOWED_SPEED = 1.02
 """share of the programmed feed above which a move counts as too fast (short blocks carry rounding)"""
 
+ROUNDING_SLACK = 1e-3
+"""mm or degrees by which rounded words may pass a limit that the exact ones keep"""
 
-def check_kinds(motion: Motion, moves: Moves, owner: Ints, file: str) -> list[Diagnostic]:
+
+def check_kinds(motion: Motion, moves: Moves, owner: Ints, faults: Faults) -> list[Diagnostic]:
     """Rapids where the CL file cuts, cuts where it moves rapidly; pecks may return rapidly above what is drilled."""
     rows = np.flatnonzero(owner < len(moves))
     m = owner[rows]
     cutting = (moves.kind[m] != Kind.RAPID) & ~moves.link[m]
     rapid = motion.code[rows] == 0
-    wrong = (cutting & rapid & ~_above_drilled(motion, moves, rows, m)) | (~cutting & ~rapid & ~moves.link[m])
+    wrong = np.flatnonzero((cutting & rapid & ~_above_drilled(motion, moves, rows, m))
+                           | (~cutting & ~rapid & ~moves.link[m]))
     diagnostics = []
-    if wrong.any():
-        first = rows[wrong][0]
-        kind = "rapid motion where the CL file cuts" if cutting[wrong][0] else "feed motion where the CL file is rapid"
-        diagnostics.append(error("verify.kind", f"{kind} (block line {int(motion.line[first])})", file=file,
-                                 lines=np.unique(moves.line[m[wrong]])[:6].tolist(), count=int(wrong.sum())))
+    if len(wrong):
+        k = wrong[0]
+        kind = "rapid motion where the CL file cuts" if cutting[k] else "feed motion where the CL file is rapid"
+        diagnostics.append(faults.error("verify.kind", kind, int(moves.line[m[k]]), int(motion.line[rows[k]]), len(wrong)))
     bad = rows[motion.missing_feed[rows]]
     if len(bad):
-        diagnostics.append(error("verify.feed_missing", f"no feed in force in block line {int(motion.line[bad[0]])}",
-                                 file=file, lines=[int(moves.line[owner[bad[0]]])], count=len(bad)))
+        diagnostics.append(faults.error("verify.feed_missing", "no feed in force", int(moves.line[owner[bad[0]]]),
+                                        int(motion.line[bad[0]]), len(bad)))
     return diagnostics
 
 
@@ -50,37 +55,82 @@ def _above_drilled(motion: Motion, moves: Moves, rows: Ints, m: Ints) -> Bools:
     return result
 
 
-def check_states(motion: Motion, toolpath: Toolpath, moves: Moves, owner: Ints, file: str) -> list[Diagnostic]:
-    """Tool, spindle and coolant while cutting, against the records of the CL file."""
+_SPINDLE = {-1: "anti-clockwise (M4)", 0: "stopped (M5)", 1: "clockwise (M3)"}
+_COMPENSATION = {40: "off (G40)", 41: "left (G41)", 42: "right (G42)"}
+
+
+def check_states(motion: Motion, job: Job, moves: Moves, owner: Ints, faults: Faults) -> list[Diagnostic]:
+    """Tool, spindle, coolant, compensation and work offset while cutting, against the CL file and the set-up."""
     rows = np.flatnonzero((owner < len(moves)) & (motion.code > 0))
     rows = rows[moves.kind[owner[rows]] != Kind.RAPID]
-    m = owner[rows]
-    row = moves.row[m]
-    numbers = np.array([*(t.number for t in toolpath.tools), -1])
-    direction, rpm = spindle_states(toolpath)
-    same_speed = (np.abs(motion.rpm[rows] - rpm[row]) <= 0.5) | np.isnan(rpm[row]) | (direction[row] == 0)
-    coolant = coolant_states(toolpath)[row] == (motion.flood[rows] | motion.mist[rows])
+    row = moves.row[owner[rows]]
+    tool = loaded_tools(job.toolpath)[row]
+    direction, rpm = (a[row] for a in spindle_states(job.toolpath))
+    cooled, coolant = coolant_states(job.toolpath)[row], motion.flood[rows] | motion.mist[rows]
+    side, tilted = compensation_states(job.toolpath)[row], np.abs(moves.axis[owner[rows], 2]) < 1.0 - 1e-9
+    same_speed = (np.abs(motion.rpm[rows] - rpm) <= 0.5) | np.isnan(rpm) | (direction == 0)
+    given = motion.compensation[rows]
+    code = np.full(len(rows), float(job.setup.work_offset_code[1:]))
+
+    def number(value: float) -> str:
+        return f"{value:g}" if np.isfinite(value) and value >= 0 else "none"
     result: list[Diagnostic] = []
-    for what, good, found, wanted in (
-            ("tool", motion.tool[rows] == numbers[moves.tool[m]], motion.tool[rows], numbers[moves.tool[m]]),
-            ("spindle direction", motion.spindle[rows] == direction[row], motion.spindle[rows], direction[row]),
-            ("spindle speed", same_speed, motion.rpm[rows], rpm[row]),
-            ("coolant", coolant, (motion.flood | motion.mist)[rows].astype(int), coolant_states(toolpath)[row].astype(int))):
-        result += _state(what, good, found, wanted, motion.line[rows], moves.line[m], file)
+    for what, good, found, wanted, name in (
+            ("tool", motion.tool[rows] == tool, motion.tool[rows], tool, number),
+            ("spindle", motion.spindle[rows] == direction, motion.spindle[rows], direction, _SPINDLE.__getitem__),
+            ("spindle speed", same_speed, motion.rpm[rows], rpm, number),
+            ("coolant", coolant == cooled, coolant, cooled, lambda on: "on" if on else "off"),
+            ("cutter compensation", (given == side) | (tilted & (given == 40)), given, side, _COMPENSATION.__getitem__),
+            ("work offset", motion.offset[rows] == code, motion.offset[rows], code, lambda g: f"G{g:g}")):
+        bad = np.flatnonzero(~np.asarray(good))
+        if len(bad):
+            k = int(bad[0])
+            result.append(faults.error(
+                "verify.state", f"{what} is {name(found[k])}, it should be {name(wanted[k])}",
+                int(moves.line[owner[rows[k]]]), int(motion.line[rows[k]]), len(bad)))
     return result
 
 
-def _state(what: str, good: Bools, found: Array, wanted: Array, block: Ints, line: Ints, file: str) -> list[Diagnostic]:
-    bad = np.flatnonzero(~good)
+def check_travel(motion: Motion, executed: Executed, moves: Moves, owner: Ints, faults: Faults) -> list[Diagnostic]:
+    """Travel of every axis at the ends of all blocks and between them, whatever the blocks are for."""
+    limits, machine = executed.control.machine.limits, executed.control.machine
+    rows = np.arange(len(motion))
+    worst = np.full((len(rows), len(machine.axis_names)), -np.inf)
+    for t in SAMPLES:
+        q = executed.joints(motion, rows, t)
+        worst = np.fmax(worst, np.maximum(limits.lower - q, q - limits.upper))
+    result = []
+    for j, name in enumerate(machine.axis_names):
+        unit, slack = executed.control.unit[j], ROUNDING_SLACK / executed.control.unit[j]
+        bad = np.flatnonzero(worst[:, j] > slack)
+        if len(bad):
+            k = int(bad[worst[bad, j].argmax()])
+            line = int(moves.line[owner[k]]) if owner[k] < len(moves) else 0
+            lower, upper = limits.lower[j] * unit, limits.upper[j] * unit
+            result.append(faults.error("verify.travel", f"axis {name} goes {worst[k, j] * unit:.4f} beyond its travel "
+                                       f"{lower:g} to {upper:g}", line, int(motion.line[k]), len(bad)))
+    return result
+
+
+def check_smoothing(motion: Motion, job: Job, moves: Moves, owner: Ints, faults: Faults) -> list[Diagnostic]:
+    """The control's own smoothing while cutting: stated where the controller has it, and inside its share."""
+    if not job.controller.program.path_tolerance:
+        return []
+    share = job.controller.kinematics.smoothing_share * job.options.tolerance
+    rows = np.flatnonzero((owner < len(moves)) & (motion.code > 0))
+    bad = rows[~(motion.blend[rows] <= share * (1.0 + 1e-6))]
     if not len(bad):
         return []
     k = int(bad[0])
-    return [error("verify.state", f"{what} is {found[k]:g} in block line {int(block[k])}, the CL file has {wanted[k]:g}",
-                  file=file, lines=[int(line[k])], count=len(bad))]
+    found = "is not stated" if np.isnan(motion.blend[k]) else "has no limit (G64 without P)" if np.isinf(motion.blend[k]) \
+        else f"may take {motion.blend[k]:g} mm"
+    return [faults.error("verify.smoothing", f"the control's smoothing {found}, its share of the tolerance is {share:g} mm",
+                         int(moves.line[owner[k]]), int(motion.line[k]), len(bad), hint="G64 P Q as the post writes it, or "
+                         "G61")]
 
 
 def check_speeds(motion: Motion, control: Control, moves: Moves, curves: Curves, owner: Ints, match: Ints,
-            file: str) -> list[Diagnostic]:
+            faults: Faults) -> list[Diagnostic]:
     """Moves that the F words run faster than programmed, over the whole move."""
     seconds = block_seconds(motion, control)
     cutting = (owner < len(moves)) & (motion.code > 0)
@@ -93,8 +143,8 @@ def check_speeds(motion: Motion, control: Control, moves: Moves, curves: Curves,
     if not len(fast):
         return []
     k = fast[int((asked[fast] / total[fast]).argmax())]
-    return [error("verify.feed", f"block line {int(motion.line[match[k]])} runs at {asked[k] / total[k]:.3f} times the "
-                  "programmed feed", file=file, lines=[int(moves.line[k])], count=len(fast))]
+    return [faults.error("verify.feed", f"the move runs at {asked[k] / total[k]:.3f} times the programmed feed",
+                         int(moves.line[k]), int(motion.line[match[k]]), len(fast))]
 
 
 def block_seconds(motion: Motion, control: Control) -> Floats:
@@ -118,24 +168,28 @@ def block_seconds(motion: Motion, control: Control) -> Floats:
 
 
 def check_links(motion: Motion, executed: Executed, moves: Moves, owner: Ints, space: SafeSpace, tolerance: float,
-           file: str) -> list[Diagnostic]:
-    """Linking blocks stay on the line of retract, above the path, or on the line of approach."""
-    rows = np.flatnonzero((owner < len(moves)) & moves.link[np.minimum(owner, len(moves) - 1)])
+           faults: Faults) -> list[Diagnostic]:
+    """Linking blocks, those after the last point too, stay on the line of retract, clear of the path, or on the line of
+    approach."""
+    rows = np.flatnonzero((owner >= len(moves)) | moves.link[np.minimum(owner, len(moves) - 1)])
     rows = rows[rows > 0]
     bad = np.zeros(len(rows), dtype=bool)
     m = owner[rows]
+    ends = m >= len(moves)
+    to = np.minimum(m, len(moves) - 1)
     for t in SAMPLES:
         tip, axis = executed.poses(motion, rows, t)
         low = ~space.clear(tip, axis, -tolerance)
-        approach = _off_line(tip, moves.tip[m], moves.axis[m]) <= tolerance
+        approach = (_off_line(tip, moves.tip[to], moves.axis[to]) <= tolerance) & ~ends
         before = np.maximum(m - 1, 0)
         retract = (_off_line(tip, moves.tip[before], moves.axis[before]) <= tolerance) & (m > 0)
         bad |= low & ~approach & ~retract
     if not bad.any():
         return []
     k = int(np.flatnonzero(bad)[0])
-    return [error("verify.link", f"the linking move in block line {int(motion.line[rows[k]])} comes too near to the part",
-                  file=file, lines=[int(moves.line[m[k]])], count=int(bad.sum()))]
+    line = int(moves.line[m[k]]) if m[k] < len(moves) else 0
+    return [faults.error("verify.link", "a linking move comes too near to the part", line, int(motion.line[rows[k]]),
+                         int(bad.sum()))]
 
 
 def _off_line(tip: Floats, end: Floats, axis: Floats) -> Floats:

@@ -6,17 +6,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from postproc.links import SafeSpace
+from postproc.job import Job
 from postproc.moves import Moves
 from postproc.readback.align import align, unreached
-from postproc.readback.checks import check_kinds, check_links, check_speeds, check_states
+from postproc.readback.checks import check_kinds, check_links, check_smoothing, check_speeds, check_states, check_travel
 from postproc.readback.execute import Motion
+from postproc.readback.faults import Faults
 from postproc.readback.poses import SAMPLES, Executed, arc_sweeps
 from toolpaths.arrays import Floats, Ints
-from toolpaths.diagnostics import Diagnostic, error
+from toolpaths.diagnostics import Diagnostic
 from toolpaths.rotations import angle_between
 from toolpaths.shape import Curves
-from toolpaths.toolpath import Toolpath
 from toolpaths.units import DEG
 
 CHUNK = 50_000
@@ -38,36 +38,46 @@ class Comparison:
     diagnostics: tuple[Diagnostic, ...]
 
 
-def compare(motion: Motion, toolpath: Toolpath, moves: Moves, executed: Executed, space: SafeSpace, tolerance: float,
-            axis_tolerance: float, file: str) -> Comparison:
-    """Every block on its stretch of the reference, every move done, in order, with the right kind of motion."""
-    moves = moves.without_pecks()
+def compare(motion: Motion, job: Job, executed: Executed, gcode: str = "") -> Comparison:
+    """Every block on its stretch of the reference, every move done, in order, as the CL file has it, inside travel.
+
+    Faults point into the CL file, or into the program where `gcode` names it.
+    """
+    tolerance, axis_tolerance = job.options.tolerance, job.axis_tolerance
+    moves, faults = job.moves.without_pecks(), Faults(job.toolpath.file, gcode)
     curves = moves.curves()
     tip, axis = executed.poses(motion, np.arange(len(motion)), 1.0)
     match, owner = align(tip, axis, arc_sweeps(motion, executed.control), curves, moves.link, tolerance, axis_tolerance)
     lost = unreached(match)
-    diagnostics: list[Diagnostic] = []
-    if lost >= 0:
-        diagnostics.append(error("verify.not_reached", "the program never comes to this point", file=file,
-                                 lines=[int(moves.line[lost])], hint="the program is not made from this CL file with "
-                                 "this machine, set-up and tools, or a block is missing or wrong"))
+    diagnostics = [] if lost < 0 else [_not_reached(motion, moves, match, lost, faults)]
     rows = np.flatnonzero((owner < len(moves)) & ~moves.link[np.minimum(owner, len(moves) - 1)])
-    tip_off, axis_off = _deviations(motion, executed, curves, rows, owner, match)
+    tip_off, axis_off = _deviations(motion, executed, curves, rows, owner)
     done = np.flatnonzero(match >= 0)
     visit = np.linalg.norm(tip[match[done]] - moves.tip[done], axis=1)
     tilt = angle_between(axis[match[done]], moves.axis[done])
     worst_tip, tip_line = _worst((tip_off, visit), (owner[rows], done), (rows, match[done]), moves, motion)
     worst_axis, axis_line = _worst((axis_off, tilt), (owner[rows], done), (rows, match[done]), moves, motion)
-    diagnostics += _beyond(worst_tip, tolerance, tip_line, worst_axis, axis_tolerance, axis_line, file)
-    diagnostics += check_kinds(motion, moves, owner, file)
-    diagnostics += check_states(motion, toolpath, moves, owner, file)
-    diagnostics += check_speeds(motion, executed.control, moves, curves, owner, match, file)
-    diagnostics += check_links(motion, executed, moves, owner, space, tolerance, file)
+    diagnostics += _beyond("tip", "mm", worst_tip, tolerance, tip_line, faults)
+    diagnostics += _beyond("axis", "degrees", worst_axis / DEG, axis_tolerance / DEG, axis_line, faults)
+    diagnostics += check_kinds(motion, moves, owner, faults)
+    diagnostics += check_states(motion, job, moves, owner, faults)
+    diagnostics += check_speeds(motion, executed.control, moves, curves, owner, match, faults)
+    diagnostics += check_links(motion, executed, moves, owner, job.space, tolerance, faults)
+    diagnostics += check_travel(motion, executed, moves, owner, faults)
+    diagnostics += check_smoothing(motion, job, moves, owner, faults)
     return Comparison(worst_tip, worst_axis, tip_line, axis_line, tip, axis, match, owner, tuple(diagnostics))
 
 
-def _deviations(motion: Motion, executed: Executed, curves: Curves, rows: Ints, owner: Ints,
-                match: Ints) -> tuple[Floats, Floats]:
+def _not_reached(motion: Motion, moves: Moves, match: Ints, lost: int, faults: Faults) -> Diagnostic:
+    x, y, z = moves.tip[lost]
+    last = int(motion.line[match[lost - 1]]) if lost else int(motion.line[0])
+    return faults.error("verify.not_reached", f"the program never comes to the point ({x:.4f}, {y:.4f}, {z:.4f}) mm of the "
+                        "table frame", int(moves.line[lost]), last, hint="a block behind this line is missing or wrong, or "
+                        "the program is not made from this CL file with this machine, set-up and tools")
+
+
+def _deviations(motion: Motion, executed: Executed, curves: Curves, rows: Ints,
+                owner: Ints) -> tuple[Floats, Floats]:
     """Worst (tip, axis) deviation (K,) over samples of each block from the curve of its move."""
     tip_off, axis_off = np.zeros(len(rows)), np.zeros(len(rows))
     if not len(rows):
@@ -111,14 +121,9 @@ def _worst(values: tuple[Floats, Floats], move: tuple[Ints, Ints], block: tuple[
     return float(value[k]), (int(moves.line[m[k]]), int(motion.line[b[k]]))
 
 
-def _beyond(worst_tip: float, tolerance: float, tip_line: tuple[int, int], worst_axis: float, axis_tolerance: float,
-            axis_line: tuple[int, int], file: str) -> list[Diagnostic]:
-    result = []
-    for what, worst, allowed, lines, unit in (
-            ("tip", worst_tip, tolerance, tip_line, "mm"),
-            ("axis", worst_axis / DEG, axis_tolerance / DEG, axis_line, "degrees")):
-        if not worst <= allowed * (1.0 + 1e-9):
-            result.append(error(f"verify.{what}", f"the {what} is off by {worst:.6f} {unit} in block line {lines[1]}, "
-                                f"allowed {allowed:g} {unit}", file=file, lines=[lines[0]],
-                                hint="do not run this program"))
-    return result
+def _beyond(what: str, unit: str, worst: float, allowed: float, lines: tuple[int, int],
+            faults: Faults) -> list[Diagnostic]:
+    if worst <= allowed * (1.0 + 1e-9):
+        return []
+    return [faults.error(f"verify.{what}", f"the {what} is off by {worst:.6f} {unit}, allowed {allowed:g} {unit}", *lines,
+                         hint="do not run this program")]

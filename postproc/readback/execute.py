@@ -25,6 +25,7 @@ class Motion:
         spindle (E,): -1, 0, 1; rpm (E,); flood, mist (E,)
         hole (E,): True inside a canned cycle
         missing_feed (E,): a cutting block without a feed in force
+        compensation (E,): 40, 41, 42; offset (E,): work offset code; blend (E,): mm of the control's smoothing (Modal)
     """
 
     line: Ints
@@ -44,6 +45,9 @@ class Motion:
     mist: Bools
     hole: Bools
     missing_feed: Bools
+    compensation: Array
+    offset: Floats
+    blend: Floats
 
     def __len__(self) -> int:
         return len(self.line)
@@ -125,8 +129,9 @@ def _cycles(words: Words, modal: Modal, end: Floats, stated: Bools, drilling: In
             offsets: Offsets, z: int, diagnostics: list[Diagnostic], file: str) -> dict[int, list[tuple[int, Floats]]]:
     """Legs (code, end) of each drilling line; sets Z of `end` to where the cycle leaves the tool.
 
-    As LinuxCNC does: up to R first where the tool is lower, over to the hole, down to R, drill, out to R (G99) or to
-    the level before the first cycle of the sequence, if that is higher (G98).
+    As LinuxCNC does: up to R first where the tool is lower (aslant to R above the hole at all but the first hole of a
+    sequence), over to the hole, down to R, drill, out to R (G99) or to the level before the first cycle of the sequence,
+    if that is higher (G98).
     """
     extra = _columns(words, ("Z", "R", "Q", "P"))
     legs: dict[int, list[tuple[int, Floats]]] = {}
@@ -139,7 +144,8 @@ def _cycles(words: Words, modal: Modal, end: Floats, stated: Bools, drilling: In
     for line in drilling.tolist():
         before = motion_lines[np.searchsorted(motion_lines, line) - 1] if line > motion_lines[0] else -1
         level = _level(end, known, line, previous, z, offsets)
-        if previous < 0 or before != previous or modal.motion[previous + 1:line].min(initial=99) < 73:
+        first = bool(previous < 0 or before != previous or modal.motion[previous + 1:line].min(initial=99) < 73)
+        if first:
             initial = level
             sticky[:] = np.nan
         if modal.motion[line] != code:
@@ -157,7 +163,7 @@ def _cycles(words: Words, modal: Modal, end: Floats, stated: Bools, drilling: In
         out = plane if modal.level[line] == 99 else max(plane, initial)
         start = here[line - 1].copy()
         start[z] = level
-        legs[line] = _legs(code, start, here[line], z, level, bottom, plane, out, step, offsets.peck_relief)
+        legs[line] = _legs(code, start, here[line], z, level, bottom, plane, out, step, offsets.peck_relief, first)
         end[line, z] = out
         previous = line
     return legs
@@ -171,13 +177,13 @@ def _level(end: Floats, known: Ints, line: int, previous: int, z: int, offsets: 
 
 
 def _legs(code: int, start: Floats, target: Floats, z: int, level: float, bottom: float, plane: float, out: float,
-          step: float, relief: float) -> list[tuple[int, Floats]]:
+          step: float, relief: float, first: bool) -> list[tuple[int, Floats]]:
     def at(base: Floats, height: float) -> Floats:
         point = base.copy()
         point[z] = height
         return point
     legs: list[tuple[int, Floats]] = []
-    if level < plane:
+    if level < plane and first:
         legs.append((0, at(start, plane)))
     over = at(target, max(level, plane))
     if (over != (legs[-1][1] if legs else start)).any():
@@ -226,7 +232,8 @@ def _motion(words: Words, modal: Modal, filled: Floats, moving: Bools, legs: dic
     feed, missing = _feeds(words, modal, line, code)
     return Motion(line, code, end, offsets.home, modal.plane[line], motion == 3, center, feed, modal.inverse[line],
                   modal.tool[line], modal.length_register[line], modal.spindle[line], modal.rpm[line], modal.flood[line],
-                  modal.mist[line], hole, missing)
+                  modal.mist[line], hole, missing, modal.compensation[line], modal.offset[line],
+                  np.where(np.isfinite(modal.blend), modal.blend * np.where(modal.inch, 25.4, 1.0), modal.blend)[line])
 
 
 def _feeds(words: Words, modal: Modal, line: Ints, code: Array) -> tuple[Floats, Bools]:

@@ -14,8 +14,8 @@ MOTION = (0, 1, 2, 3, 73, 80, 81, 82, 83, 84, 85, 86, 89)
 CYCLES = (73, 81, 82, 83, 84, 85, 86, 89)
 GROUPS: dict[str, tuple[float, ...]] = {
     "motion": MOTION, "plane": (17, 18, 19), "distance": (90,), "feed_mode": (93, 94), "units": (20, 21),
-    "offset": (54,), "length": (43, 49), "level": (98, 99), "compensation": (40, 41, 42), "path": (61, 61.1, 64),
-    "once": (4, 53), "arc_distance": (91.1,),
+    "offset": (54, 55, 56, 57, 58, 59, 59.1, 59.2, 59.3), "length": (43, 49), "level": (98, 99),
+    "compensation": (40, 41, 42), "path": (61, 61.1, 64), "once": (4, 53), "arc_distance": (91.1,),
 }
 M_CODES = (0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 30)
 _GROUP_OF = {code: name for name, codes in GROUPS.items() for code in codes}
@@ -44,6 +44,10 @@ class Modal:
     """G4 in this line"""
     compensation: Array
     """G40, 41, 42"""
+    offset: Floats
+    """work offset code, 54 and on"""
+    blend: Floats
+    """mm that the control's smoothing may take: 0 exact path, inf without a limit, NaN where none was stated"""
 
 
 def fill(lines: Array, values: Array, count: int, initial: float) -> Floats:
@@ -95,7 +99,39 @@ def modal_state(words: Words) -> Modal:
                  group("feed_mode", 94) == 93, group("units", 21) == 20, group("level", 98).astype(np.int8),
                  register.astype(np.int64), loaded.astype(np.int64), spindle.astype(np.int8), _number_of(words, "S", n),
                  fill(coolant_line, coolant == 8, n, 0.0) > 0.5, fill(coolant_line, coolant == 7, n, 0.0) > 0.5,
-                 machine, dwell, group("compensation", 40).astype(np.int8))
+                 machine, dwell, group("compensation", 40).astype(np.int8), group("offset", 54), _blend(words))
+
+
+def _blend(words: Words) -> Floats:
+    """Smoothing in force: G61 none, G64 P blends within P and merges short lines within Q (P where it is not stated)."""
+    line, code = _g(words, "path")
+    value = np.where(code == 64, np.inf, 0.0)
+    for k, n in enumerate(line.tolist()):
+        here = words.line == n
+        p, q = (words.value[here & (words.letter == ord(letter))] for letter in "PQ")
+        if code[k] == 64 and len(p):
+            value[k] = p[0] + (q[0] if len(q) else p[0])
+    filled = np.full(words.lines + 1, np.nan)
+    for n, v in zip(line.tolist(), value.tolist(), strict=True):
+        filled[n:] = v
+    return filled
+
+
+def drop_passive(words: Words, passive: tuple[str, ...]) -> Words:
+    """Words without the blocks that hold a code the controller file calls passive, and without program numbers (O)."""
+    drop = words.letter == ord("O")
+    for code in passive:
+        lines = words.line[(words.letter == ord(code[0])) & (words.value == float(code[1:]))]
+        drop |= np.isin(words.line, lines)
+    return Words(words.letter[~drop], words.value[~drop], words.line[~drop], words.lines)
+
+
+def check_end(words: Words, file: str) -> list[Diagnostic]:
+    """A program ends with M2 or M30."""
+    if bool(((words.letter == ord("M")) & np.isin(words.value, (2, 30))).any()):
+        return []
+    return [error("gcode.no_end", "the program has no end (M2 or M30)", file=file, lines=[words.lines],
+                  hint="it may have been cut off")]
 
 
 def check_codes(words: Words, letters: tuple[str, ...], file: str) -> list[Diagnostic]:

@@ -44,13 +44,27 @@ class Executed:
                 tip[k], axis[k] = self._followed(motion, rows[k], position[k], kin)
         return tip, axis
 
+    def joints(self, motion: Motion, rows: Ints, t: float) -> Floats:
+        """Joints (K, J) of the blocks `rows` at fraction t."""
+        position = positions(motion, self.control, rows, t)
+        if not self.control.tip_law:
+            return np.asarray(position / self.control.unit)
+        q = np.empty_like(position)
+        for h in np.unique(motion.register[rows]).tolist():
+            k = np.flatnonzero(motion.register[rows] == h)
+            q[k] = self._held(position[k], self.lengths.get(h, 0.0) if h >= 0 else 0.0)
+        return q
+
+    def _held(self, position: Floats, offset: float) -> Floats:
+        """Joints that a control with its own kinematics takes under a tool length offset."""
+        words = position - self.control.work_offset
+        words[:, self.control.xyz[2]] -= offset
+        return self.control.joints(words, self.control.machine.kinematics.with_tool(offset), offset)
+
     def _pose(self, position: Floats, kin: Kinematics, offset: float) -> tuple[Floats, Floats]:
         if not self.control.tip_law:
             return kin.forward(position / self.control.unit)
-        words = position - self.control.work_offset
-        words[:, self.control.xyz[2]] -= offset
-        held = self.control.machine.kinematics.with_tool(offset)
-        return kin.forward(self.control.joints(words, held, offset))
+        return kin.forward(self._held(position, offset))
 
     def _followed(self, motion: Motion, rows: Ints, position: Floats, kin: Kinematics) -> tuple[Floats, Floats]:
         assert self.before is not None

@@ -9,6 +9,7 @@ import numpy as np
 from postproc.job import Job
 from postproc.readback.compare import Comparison, compare
 from postproc.readback.execute import Offsets, execute
+from postproc.readback.modal import check_end, drop_passive
 from postproc.readback.poses import Executed, poses_before
 from postproc.readback.words import tokenise
 from toolpaths.diagnostics import Diagnostic, error, has_errors
@@ -22,8 +23,11 @@ def read_back(data: bytes, job: Job, file: str,
     words, diagnostics = tokenise(data, gcode)
     if has_errors(diagnostics):
         return None, diagnostics
-    offsets = Offsets(control.work_offset, control.xyz, job.register_lengths(), machine.home * control.unit,
-                      control.length_on_z, job.controller.cycles.peck_relief)
+    home = control.words(machine.home[None, :], machine.kinematics, 0.0)[0] + control.work_offset
+    offsets = Offsets(control.work_offset, control.xyz, job.register_lengths(), home, control.length_on_z,
+                      job.controller.cycles.peck_relief)
+    words = drop_passive(words, job.controller.program.passive)
+    diagnostics += check_end(words, gcode)
     motion, found = execute(words, machine.axis_names, offsets, gcode)
     diagnostics += found
     if has_errors(diagnostics):
@@ -34,6 +38,5 @@ def read_back(data: bytes, job: Job, file: str,
         progress("read back", 0, len(motion))
     executed = Executed(control, job.kinematics_of, offsets.lengths, poses_before(motion, control))
     with np.errstate(invalid="ignore"):
-        comparison = compare(motion, job.toolpath, job.moves, executed, job.space, job.options.tolerance,
-                             job.axis_tolerance, file)
+        comparison = compare(motion, job, executed, gcode)
     return comparison, [*diagnostics, *comparison.diagnostics]

@@ -33,10 +33,11 @@ class Words:
 
 
 def tokenise(data: bytes, file: str = "") -> tuple[Words, list[Diagnostic]]:
-    """The words of a program. Comments, % lines and block-delete signs are taken out; what is no word is an error."""
+    """The words of a program. Comments and % lines are taken out; block-delete signs and what is no word are errors."""
     text = _COMMENTS.sub(b"", data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")).upper()
     text = re.sub(rb"(?m)^\s*%[^\n]*", b"", text)
-    text = re.sub(rb"(?m)^\s*/", b"", text)
+    skipped = [text.count(b"\n", 0, m.start()) + 1 for m in re.finditer(rb"(?m)^[ \t]*/", text)]
+    text = re.sub(rb"(?m)^[ \t]*/", b"", text)
     if not text.endswith(b"\n"):
         text += b"\n"
     codes = np.frombuffer(text, dtype=np.uint8)
@@ -47,8 +48,16 @@ def tokenise(data: bytes, file: str = "") -> tuple[Words, list[Diagnostic]]:
     line = (np.cumsum(newline) + 1)[where]
     values = _numbers(text) if not len(strange) else None
     if values is None or len(values) != len(where) or not _each_has_number(codes, where):
-        return _slowly(text, file)
-    return Words(codes[where], values, line, int(newline.sum())), []
+        words, found = _slowly(text, file)
+        return words, found + _block_delete(skipped, file)
+    return Words(codes[where], values, line, int(newline.sum())), _block_delete(skipped, file)
+
+
+def _block_delete(lines: list[int], file: str) -> list[Diagnostic]:
+    if not lines:
+        return []
+    return [error("gcode.block_delete", "a block that a switch at the control leaves out (/)", file=file, lines=lines[:6],
+                  count=len(lines), hint="take the / away: what is proved must not depend on a switch")]
 
 
 def _numbers(text: bytes) -> Floats | None:

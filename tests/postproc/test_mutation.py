@@ -185,7 +185,8 @@ def test_cut_short() -> None:
     result = sample(*FLAT[0])
     lines = result.text.splitlines()
     for share in (0.3, 0.6, 0.9):
-        assert "verify.not_reached" in found(result, lines[:int(share * len(lines))])
+        assert "gcode.no_end" in found(result, lines[:int(share * len(lines))])
+        assert "verify.not_reached" in found(result, [*lines[:int(share * len(lines))], "M2"])
 
 
 def test_the_program_of_another_path() -> None:

@@ -1,0 +1,43 @@
+"""Limits of the joints as the planner sees them, and what they allow at a point of the path."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from toolpaths.arrays import Floats, frozen
+
+
+@dataclass(frozen=True)
+class JointLimits:
+    """Largest magnitudes per joint (J,), in joint units per s, s2, s3; inf means unlimited.
+
+    A row need not be a joint: any quantity with derivatives along the path may be limited as one more row.
+    """
+
+    velocity: Floats
+    acceleration: Floats
+    jerk: Floats
+
+    def __post_init__(self) -> None:
+        joints = len(np.atleast_1d(self.velocity))
+        for name in ("velocity", "acceleration", "jerk"):
+            values = frozen(getattr(self, name), np.float64, (joints,), f"JointLimits.{name}")
+            if not np.all(values > 0.0):
+                raise ValueError(f"JointLimits.{name} must be positive, found {values.min()}")
+            object.__setattr__(self, name, values)
+
+
+def squared_speed(dq: Floats, velocity: Floats) -> Floats:
+    """Largest x = sigma_dot^2 (N,) that keeps |q' sigma_dot| <= V in every joint; inf where nothing moves."""
+    with np.errstate(divide="ignore"):
+        return np.asarray((np.min(velocity / np.abs(dq), axis=1)) ** 2)
+
+
+def steady_cap(d2q: Floats, d3q: Floats, limits: JointLimits) -> Floats:
+    """Largest constant x (N,) under acceleration and jerk: |q''| x <= A, |q'''| x^1.5 <= J; inf on straight lines."""
+    with np.errstate(divide="ignore"):
+        acceleration = np.min(limits.acceleration / np.abs(d2q), axis=1)
+        jerk = np.min(limits.jerk / np.abs(d3q), axis=1) ** (2.0 / 3.0)
+    return np.asarray(np.minimum(acceleration, jerk))
