@@ -191,8 +191,8 @@ def _seconds(rows: Floats) -> Floats:
     before = np.vstack([np.zeros((1, _AXES)), rows[:-1, _AT] + rows[:-1, _OFFSET]]) - rows[:, _OFFSET]
     delta = rows[:, _AT] - before
     straight, beside = np.linalg.norm(delta[:, :3], axis=1), np.linalg.norm(delta[:, 6:], axis=1)
-    length = np.where(beside > 0, beside, np.linalg.norm(delta[:, 3:6], axis=1))
-    length = np.where(straight > 0, straight, length)
+    length = np.where(beside > UNMOVED, beside, np.linalg.norm(delta[:, 3:6], axis=1))
+    length = np.where(straight > UNMOVED, straight, length)
     length = np.where(kind == Move.ARC, _arc_length(rows, before), length)
     cutting = np.isin(kind, (Move.FEED, Move.ARC, Move.PROBE)) & (feed > 0)
     seconds = np.divide(60.0 * length, feed, out=np.full(len(rows), np.nan), where=cutting)
