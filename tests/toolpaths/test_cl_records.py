@@ -115,7 +115,7 @@ def test_tools_of_other_systems() -> None:
              "CSI_SET_FLUTE_LENGTH/40\nINSERT/[x] note\nGOTO/0,0,0\n")
     assert p.tools[0].cutter == (20.0, 0.0, 10.0, 6.008606, 31.0, 0.0, 215.0)
     assert p.tools[0].flute_length == 40.0
-    assert [e.word for e in p.events] == ["LOADTL"]
+    assert [(e.word, e.values) for e in p.events] == [("LOADTL", (7.0,)), ("PPRINT", ("[x] note",))]
     p = read("$$ CATIA\nTPRINT/T1 End Mill D 10,T1\nTOOLNO/1,MILL,10.0,2.0,100\nLOADTL/1,1\nFEDRAT/1\nGOTO/0,0,0\n")
     assert (p.tools[0].name, p.tools[0].diameter, p.tools[0].corner_radius) == ("T1 End Mill D 10", 10, 2)
 

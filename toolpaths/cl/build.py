@@ -24,7 +24,8 @@ Triple = tuple[float, float, float]
 Map = tuple[Floats, Floats]
 """rotation (3, 3) and origin (3,) mm: local to part frame"""
 NO_NUMBERS: Triple = (float("nan"),) * 3
-BETWEEN = frozenset({"FEDRAT", "PPRINT", "REMARK", "LPRINT", "COOLNT", "SPINDL", "CUTCOM", "MOVE_ATTRIB", "PAINT", "$$"})
+BETWEEN = frozenset({"FEDRAT", "PPRINT", "REMARK", "LPRINT", "COOLNT", "SPINDL", "CUTCOM", "MOVE_ATTRIB", "PAINT",
+                     "$$"})
 """Records that may stand between an arc and the GOTO of its end."""
 V = TypeVar("V")
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from itertools import compress
 
 from toolpaths.cl import curves, cycles, feeds, frames, motion, structure, tools
 from toolpaths.cl.build import Builder
@@ -138,10 +139,9 @@ def report_others(b: Builder) -> dict[str, int]:
     if 0 <= b.finished < b.row:
         b.log.warning("cl.after-fini", f"{b.row - b.finished} points stand after FINI, they are read too")
     first, last = _extent(b)
-    listing = [line for line, _, numbers, body in b.texts if not first <= line <= last and not _is_motion(numbers, body)]
-    for line, row, numbers, body in b.texts:
-        if not first <= line <= last and not _is_motion(numbers, body):
-            continue
+    inside = [first <= line <= last or _is_motion(numbers, body) for line, _, numbers, body in b.texts]
+    listing = [text[0] for text, here in zip(b.texts, inside, strict=True) if not here]
+    for line, row, numbers, body in compress(b.texts, inside):
         if numbers == _NO_SLASH:
             word = _first_word(body)
             b.log.error("cl.slash", f"{word} is not followed by a slash", line, f"write {word}/...", key=word)

@@ -66,10 +66,9 @@ def comment(b: Builder, s: Statement) -> None:
 
 
 def text_event(b: Builder, s: Statement) -> None:
-    """PPRINT and INSERT, one text each; INSERT of SolidWorks is a comment."""
-    if s.major == "INSERT" and b.dialect.insert_is_comment:
-        return
-    b.event(s.major, (s.body,) if s.body else ())
+    """PPRINT and INSERT, one text each; INSERT of SolidWorks is for people: a PPRINT."""
+    word = "PPRINT" if b.dialect.insert_is_comment else s.major
+    b.event(word, (s.body,) if s.body else ())
 
 
 def plain_event(b: Builder, s: Statement) -> None:
