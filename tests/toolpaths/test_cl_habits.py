@@ -39,9 +39,11 @@ def counts(text: str, *codes: str) -> tuple[object, ...]:
 def test_counts_of_an_nx_listing_with_text_around_it() -> None:
     text = ("=" * 60 + "\nInformation listing created by :  somebody\nDate              :  2/4/2013 9:17:44\n"
             "Current work part :  C:\\parts\\plate.prt\nNode name         :  pc7\n" + "=" * 60 + "\n" + NX
-            + "FROM/0,0,99\nRAPID\nGOTO/0,0,50,0,0,1\nRAPID\nRAPID\nGOTO/10,0,0\nCIRCLE/0,0,0,0,0,-1,10,.03,.5,10,0\nGOTO/0,10,0\nPAINT/COLOR,37\nCYCLE/DRILL,RAPTO,3,FEDTO,-5,RTRCTO,AUTO,"
-            "MMPM,90\nPAINT/COLOR,31\nGOTO/1,1,0\nGOTO/2,1,0\nCYCLE/ON,FEDTO,-7\nGOTO/3,1,0\nCYCLE/OFF\nGOHOME/0,0,99\n"
-            "PAINT/TOOL,NOMORE\nEND-OF-PATH\nTool Path Listing has 34 lines.\nIZLAZ\n")
+            + "FROM/0,0,99\nRAPID\nGOTO/0,0,50,0,0,1\nRAPID\nRAPID\nGOTO/10,0,0\n"
+            "CIRCLE/0,0,0,0,0,-1,10,.03,.5,10,0\nGOTO/0,10,0\nPAINT/COLOR,37\n"
+            "CYCLE/DRILL,RAPTO,3,FEDTO,-5,RTRCTO,AUTO,MMPM,90\nPAINT/COLOR,31\nGOTO/1,1,0\nGOTO/2,1,0\n"
+            "CYCLE/ON,FEDTO,-7\nGOTO/3,1,0\nCYCLE/OFF\nGOHOME/0,0,99\nPAINT/TOOL,NOMORE\nEND-OF-PATH\n"
+            "Tool Path Listing has 34 lines.\nIZLAZ\n")
     assert counts(text) == (6, 1, 1, 3)
 
 
