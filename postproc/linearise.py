@@ -44,8 +44,7 @@ def linearise(control: Control, kin: Kinematics, curves: Curves, q0: Floats, q1:
     exact = keep | _straight_already(control, kin, curves, q0, q1)
     done_curve, done_u, done_q = [np.flatnonzero(exact)], [np.ones(int(exact.sum()))], [q1[exact]]
     index = np.flatnonzero(~exact)
-    u0, u1 = np.zeros(len(index)), np.ones(len(index))
-    a, b = q0[index], q1[index]
+    index, u0, u1, a, b = _quarters(kin, curves, index, q0[index], q1[index])
     worst, broken = np.zeros(2), [np.zeros(0, dtype=np.int64)]
     for _ in range(_ROUNDS):
         if not len(index):
@@ -97,11 +96,27 @@ def _end_off(kin: Kinematics, curves: Curves, q: Floats, u: Floats) -> Floats:
     return np.asarray(np.nan_to_num(np.linalg.norm(tip - curves.at(u)[0], axis=1), nan=np.inf))
 
 
+Stretches = tuple[Ints, Floats, Floats, Floats, Floats]
+"""curve, u at both ends, joints at both ends"""
+
+
+def _quarters(kin: Kinematics, curves: Curves, index: Ints, a: Floats, b: Floats) -> Stretches:
+    """The whole curves, arcs cut into quarter turns: of a longer piece the chord says nothing."""
+    parts = np.where(curves.is_arc[index], np.ceil(curves.sweep[index] / (0.5 * np.pi)), 1).astype(np.int64)
+    return _cut(kin, curves, index, np.zeros(len(index)), np.ones(len(index)), a, b, np.maximum(parts, 1))
+
+
 def _split(kin: Kinematics, curves: Curves, index: Ints, u0: Floats, u1: Floats, a: Floats, b: Floats,
-           ratio: Floats) -> tuple[Ints, Floats, Floats, Floats, Floats]:
+           ratio: Floats) -> Stretches:
     """The stretches cut into equal parts, as many as a deviation that falls with the square of the length needs."""
     finite = np.where(np.isfinite(ratio), ratio, _MOST_PIECES**2)
     parts = np.clip(np.ceil(np.sqrt(finite)), 2, _MOST_PIECES).astype(np.int64)
+    return _cut(kin, curves, index, u0, u1, a, b, parts)
+
+
+def _cut(kin: Kinematics, curves: Curves, index: Ints, u0: Floats, u1: Floats, a: Floats, b: Floats,
+         parts: Ints) -> Stretches:
+    """Each stretch in that many equal parts."""
     piece = np.repeat(np.arange(len(index)), parts)
     k = np.arange(len(piece)) - np.repeat(np.cumsum(parts) - parts, parts)
     share = (k + 1) / parts[piece]

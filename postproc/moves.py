@@ -6,33 +6,19 @@ This is the reference that output is made from and that read-back compares with.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from enum import IntEnum
 
 import numpy as np
 
 from postproc.events import spindle_speed, tool_changes
+from postproc.holes import Phase as Phase
+from postproc.holes import hole_legs
 from postproc.setup import Placement, SetupFile
 from toolpaths.arrays import Array, Bools, Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.rotations import angle_between
 from toolpaths.shape import Curves
-from toolpaths.toolpath import Arcs, Cycle, FeedMode, Kind, Role, Toolpath
+from toolpaths.toolpath import Arcs, FeedMode, Kind, Role, Toolpath
 from toolpaths.units import DEG
-
-
-class Phase(IntEnum):
-    """What a move of a drilling cycle does."""
-
-    NONE = 0
-    POSITION = 1
-    """to above the hole"""
-    APPROACH = 2
-    """down to the clearance plane"""
-    DRILL = 3
-    """to the bottom at feed, in pecks where the cycle says so"""
-    PECK = 4
-    """chip breaking on the way to the bottom: out or up, back, and the depths between"""
-    RETRACT = 5
 
 
 @dataclass(frozen=True)
@@ -103,9 +89,9 @@ class Moves:
 def link_rows(toolpath: Toolpath, setup: SetupFile, axis_tolerance: float) -> Bools:
     """Rows (N,) that are reached by a linking move.
 
-    The first motion, the first after a tool change or a bare GOHOME, the first of an operation whose tool axis differs
-    from the last one's by more than `axis_tolerance` (rad), and rapids that turn the axis by more than the set-up's
-    link_angle. A cutting move that turns the axis is never replaced by a linking move.
+    The first motion, the first after a tool change, a bare GOHOME or a FROM elsewhere, the first of an operation whose
+    tool axis differs from the last one's by more than `axis_tolerance` (rad), and rapids that turn the axis by more than
+    the set-up's link_angle. Where such a row cuts, `build_moves` puts a linked row before it.
     """
     n = len(toolpath)
     link = np.zeros(n, dtype=bool)
@@ -121,7 +107,7 @@ def link_rows(toolpath: Toolpath, setup: SetupFile, axis_tolerance: float) -> Bo
     linked = rapid & ((boundary & (turn > axis_tolerance)) | (turn > setup.clearance.link_angle * DEG))
     linked[0] = True
     stops = [e.index for e in toolpath.events if e.word == "GOHOME"] + [c.index for c in tool_changes(toolpath)]
-    for index in stops:
+    for index in [*stops, *_starts_elsewhere(toolpath)]:
         at = int(np.searchsorted(moving, index))
         if at < len(moving):
             linked[at] = True
@@ -129,31 +115,64 @@ def link_rows(toolpath: Toolpath, setup: SetupFile, axis_tolerance: float) -> Bo
     return link
 
 
+def _starts_elsewhere(toolpath: Toolpath) -> list[int]:
+    """FROM rows that are not where the tool stands already."""
+    rows = np.flatnonzero(toolpath.role == Role.START)
+    return [int(k) for k in rows if k == 0 or (toolpath.tip[k] != toolpath.tip[k - 1]).any()
+            or (toolpath.axis[k] != toolpath.axis[k - 1]).any()]
+
+
+def _begins(toolpath: Toolpath, link: Bools) -> Ints:
+    """(N,) for linked rows that cut: the row whose pose the cut begins at (FROM, or the last position), else -1.
+
+    The link then leads to that pose. A file whose very first record cuts has none: the tool comes down at its feed.
+    """
+    result = np.full(len(toolpath), -1)
+    cutting = (toolpath.kind != Kind.RAPID) & (toolpath.role != Role.HOLE)
+    rows = np.flatnonzero(link & cutting)
+    result[rows] = rows - 1
+    return result
+
+
 def build_moves(toolpath: Toolpath, setup: SetupFile, axis_tolerance: float) -> tuple[Moves, list[Diagnostic]]:
     """The reference moves of a Toolpath, in the part frame."""
     link = link_rows(toolpath, setup, axis_tolerance)
     feed, seconds, diagnostics = _feeds(toolpath)
-    counts = np.where(toolpath.role == Role.START, 0, 1)
+    begin = _begins(toolpath, link)
+    counts = np.where(toolpath.role == Role.START, 0, 1 + (begin >= 0))
     holes = np.flatnonzero(toolpath.role == Role.HOLE)
-    legs = _hole_legs(toolpath, link, holes)
+    legs = hole_legs(toolpath, link, holes)
     counts[holes] = [len(leg) for leg in legs]
     row = np.repeat(np.arange(len(toolpath)), counts)
     first = np.zeros(len(row), dtype=bool)
     first[np.cumsum(counts)[counts > 0] - counts[counts > 0]] = True
-    tip, kind = toolpath.tip[row], toolpath.kind[row].copy()
+    back = first & (begin[row] >= 0)
+    pose = np.where(back, begin[row], row)
+    tip, kind = toolpath.tip[pose], np.where(back, Kind.RAPID, toolpath.kind[row]).astype(np.int8)
+    arc = np.where(back, -1, toolpath.arc[row])
     hole, phase = np.full(len(row), -1), np.zeros(len(row), dtype=np.int8)
-    feed, seconds = feed[row], seconds[row]
+    feed, seconds = np.where(back, np.nan, feed[row]), np.where(back, np.nan, seconds[row])
     if len(holes):
         where = np.flatnonzero(toolpath.role[row] == Role.HOLE)
-        flat = [leg for hole_legs in legs for leg in hole_legs]
+        flat = [leg for of_hole in legs for leg in of_hole]
         tip[where] = [point for point, _, _ in flat]
         phase[where] = [p for _, p, _ in flat]
         kind[where] = [k for _, _, k in flat]
         hole[where] = np.repeat(np.arange(len(holes)), counts[holes])
         feed[where] = np.where(kind[where] == Kind.FEED, feed[where], np.nan)
-    moves = Moves(tip, toolpath.axis[row], kind, feed, seconds, toolpath.arc[row], row, hole, phase,
-                  toolpath.cycle[row], link[row] & first, toolpath.tool[row], toolpath.line[row], toolpath.arcs)
-    return moves, diagnostics + _missing_feeds(toolpath, moves) + _opposite_axes(toolpath, moves)
+    moves = Moves(tip, toolpath.axis[pose], kind, feed, seconds, arc, row, hole, phase, toolpath.cycle[row],
+                  link[row] & first, toolpath.tool[row], toolpath.line[row], toolpath.arcs)
+    return moves, diagnostics + _missing_feeds(toolpath, moves) + _opposite_axes(toolpath, moves) + _lone_arcs(
+        toolpath, moves)
+
+
+def _lone_arcs(toolpath: Toolpath, moves: Moves) -> list[Diagnostic]:
+    """Arcs without a point to begin at."""
+    bad = np.flatnonzero(moves.link & (moves.arc >= 0))
+    if not len(bad):
+        return []
+    return [error("arc.no_start", "an arc before any position is known", file=toolpath.file,
+                  lines=moves.line[bad][:6].tolist(), count=len(bad), hint="put FROM or a GOTO before CIRCLE")]
 
 
 def _feeds(toolpath: Toolpath) -> tuple[Floats, Floats, list[Diagnostic]]:
@@ -201,81 +220,3 @@ def _opposite_axes(toolpath: Toolpath, moves: Moves) -> list[Diagnostic]:
     return [error("axis.opposite", "the tool axis turns by 180 degrees between two points: no great circle leads there",
                   file=toolpath.file, lines=moves.line[bad][:6].tolist(), count=len(bad),
                   hint="put a point between, or retract with RAPID")]
-
-
-Leg = tuple[Floats, Phase, Kind]
-
-
-def _hole_legs(toolpath: Toolpath, link: Bools, holes: Ints) -> list[list[Leg]]:
-    """The legs of each hole. The level is the height along the tool axis the tool comes from."""
-    result: list[list[Leg]] = []
-    before: Floats | None = None
-    initial = 0.0
-    for k, row in enumerate(holes):
-        chained = k > 0 and holes[k - 1] == row - 1 and not link[row]
-        if not chained:
-            before = toolpath.tip[row - 1] if row > 0 and not link[row] else None
-        axis = toolpath.axis[row]
-        if not chained and before is not None:
-            initial = float(axis @ before)
-        legs = _legs(toolpath.tip[row], axis, toolpath.cycles[toolpath.cycle[row]], before, initial)
-        before = legs[-1][0]
-        result.append(legs)
-    return result
-
-
-def _legs(top: Floats, axis: Floats, cycle: Cycle, before: Floats | None, initial: float) -> list[Leg]:
-    """Above the hole at the level the tool is at (never below the clearance plane), down, drill, out.
-
-    Without a known level (`before` None: a linking move leads here) the tool comes straight to the clearance plane
-    and AUTO retracts to it.
-    """
-    height = float(axis @ top)
-    plane = height + cycle.clearance
-    legs: list[Leg] = []
-    level = plane
-    if before is not None:
-        level = max(float(axis @ before), plane)
-        if float(axis @ before) < plane - 1e-9:
-            legs.append((before + (plane - float(axis @ before)) * axis, Phase.POSITION, Kind.RAPID))
-    legs.append((top + (level - height) * axis, Phase.POSITION, Kind.RAPID))
-    if level > plane + 1e-9:
-        legs.append((top + cycle.clearance * axis, Phase.APPROACH, Kind.RAPID))
-    legs += _pecks(top, axis, cycle)
-    legs.append((top - cycle.depth * axis, Phase.DRILL, Kind.FEED))
-    out = cycle.retract if cycle.retract is not None else (initial - height if before is not None else -np.inf)
-    kind = Kind.FEED if cycle.kind in FEED_OUT else Kind.RAPID
-    if kind is Kind.FEED:
-        legs.append((top + cycle.clearance * axis, Phase.RETRACT, Kind.FEED))
-        if out > cycle.clearance + 1e-9:
-            legs.append((top + out * axis, Phase.RETRACT, Kind.RAPID))
-    else:
-        legs.append((top + max(cycle.clearance, out) * axis, Phase.RETRACT, Kind.RAPID))
-    return legs
-
-
-def _pecks(top: Floats, axis: Floats, cycle: Cycle) -> list[Leg]:
-    """Depths between of DEEP (out to the clearance plane each time) and BRKCHP (a little up each time)."""
-    if cycle.kind not in PECKING or not cycle.steps or not cycle.steps[-1] > 0.0:
-        return []
-    legs: list[Leg] = []
-    total = cycle.depth + cycle.clearance
-    done, k = cycle.steps[0], 1
-    while done < total - 1e-9:
-        at = top + (cycle.clearance - done) * axis
-        legs.append((at, Phase.PECK, Kind.FEED))
-        if cycle.kind == "DEEP":
-            legs.append((top + cycle.clearance * axis, Phase.PECK, Kind.RAPID))
-            legs.append((at + min(PECK_RELIEF, done) * axis, Phase.PECK, Kind.RAPID))
-        else:
-            legs.append((at + min(PECK_RELIEF, done) * axis, Phase.PECK, Kind.RAPID))
-        done += cycle.steps[min(k, len(cycle.steps) - 1)]
-        k += 1
-    return legs
-
-
-PECKING = frozenset({"DEEP", "BRKCHP"})
-PECK_RELIEF = 0.254
-"""mm short of the last depth where the next peck begins (LinuxCNC G83, G73: 0.010 inch)"""
-FEED_OUT = frozenset({"BORE", "REAM", "TAP"})
-"""Cycles that leave the hole at feed, up to the clearance plane."""

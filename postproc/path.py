@@ -142,9 +142,9 @@ def build_path(control: Control, kinematics: Callable[[int], Kinematics], moves:
             progress("joints", int(last), len(moves))
     if has_errors(diagnostics):
         return None, merged(diagnostics)
-    out.begin[len(moves)] = out.count
     if state is not None:
         _add_end(out, control, kin, space, state, len(moves) - 1)
+    out.begin[len(moves)] = out.count
     columns = {k: out.joined(k) for k in out.columns}
     path = Path(**columns, begin=out.begin, singular=singular, turns=np.concatenate(turns),
                 worst_tip=float(worst[0]), worst_axis=float(worst[1]))
@@ -207,7 +207,7 @@ def _on_the_spot(curves: Curves, where: Ints) -> Curves:
 def _emit(out: _Builder, moves: Moves, rows: Ints, kin: Kinematics, curves: Curves, arcs: WordArcs, curve: Ints,
           u: Floats, q: Floats) -> None:
     """Blocks of a run in order, kept arcs cut into whole turns, with code and seconds."""
-    if (arcs.parts[curve] > 1).any():
+    if ((arcs.parts > 1) & arcs.keep)[curve].any():
         curve, u, q = _cut_turns(kin, curves, arcs, curve, u, q)
     row = rows[curve]
     first = np.ones(len(curve), dtype=bool)
@@ -240,7 +240,7 @@ def _turned_centers(arcs: WordArcs, curve: Ints, angle: Floats) -> Floats:
 
 def _cut_turns(kin: Kinematics, curves: Curves, arcs: WordArcs, curve: Ints, u: Floats,
                q: Floats) -> tuple[Ints, Floats, Floats]:
-    parts = arcs.parts[curve]
+    parts = np.where(arcs.keep, arcs.parts, 1)[curve]
     piece = np.repeat(np.arange(len(curve)), parts)
     k = np.arange(len(piece)) - np.repeat(np.cumsum(parts) - parts, parts)
     share = np.where(parts[piece] == 1, u[piece], (k + 1) / parts[piece])

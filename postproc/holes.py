@@ -1,0 +1,103 @@
+"""A drilling cycle as the moves that it stands for."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+import numpy as np
+
+from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.toolpath import Cycle, Kind, Toolpath
+
+
+class Phase(IntEnum):
+    """What a move of a drilling cycle does."""
+
+    NONE = 0
+    POSITION = 1
+    """to above the hole"""
+    APPROACH = 2
+    """down to the clearance plane"""
+    DRILL = 3
+    """to the bottom at feed, in pecks where the cycle says so"""
+    PECK = 4
+    """chip breaking on the way to the bottom: out or up, back, and the depths between"""
+    RETRACT = 5
+
+
+Leg = tuple[Floats, Phase, Kind]
+
+
+def hole_legs(toolpath: Toolpath, link: Bools, holes: Ints) -> list[list[Leg]]:
+    """The legs of each hole. The level is the height along the tool axis the tool comes from."""
+    result: list[list[Leg]] = []
+    before: Floats | None = None
+    initial = 0.0
+    for k, row in enumerate(holes):
+        chained = k > 0 and holes[k - 1] == row - 1 and not link[row]
+        if not chained:
+            before = toolpath.tip[row - 1] if row > 0 and not link[row] else None
+        axis = toolpath.axis[row]
+        if not chained and before is not None:
+            initial = float(axis @ before)
+        legs = _legs(toolpath.tip[row], axis, toolpath.cycles[toolpath.cycle[row]], before, initial)
+        before = legs[-1][0]
+        result.append(legs)
+    return result
+
+
+def _legs(top: Floats, axis: Floats, cycle: Cycle, before: Floats | None, initial: float) -> list[Leg]:
+    """Above the hole at the level the tool is at (never below the clearance plane), down, drill, out.
+
+    Without a known level (`before` None: a linking move leads here) the tool comes straight to the clearance plane
+    and AUTO retracts to it.
+    """
+    height = float(axis @ top)
+    plane = height + cycle.clearance
+    legs: list[Leg] = []
+    level = plane
+    if before is not None:
+        level = max(float(axis @ before), plane)
+        if float(axis @ before) < plane - 1e-9:
+            legs.append((before + (plane - float(axis @ before)) * axis, Phase.POSITION, Kind.RAPID))
+    legs.append((top + (level - height) * axis, Phase.POSITION, Kind.RAPID))
+    if level > plane + 1e-9:
+        legs.append((top + cycle.clearance * axis, Phase.APPROACH, Kind.RAPID))
+    legs += _pecks(top, axis, cycle)
+    legs.append((top - cycle.depth * axis, Phase.DRILL, Kind.FEED))
+    out = cycle.retract if cycle.retract is not None else (initial - height if before is not None else -np.inf)
+    kind = Kind.FEED if cycle.kind in FEED_OUT else Kind.RAPID
+    if kind is Kind.FEED:
+        legs.append((top + cycle.clearance * axis, Phase.RETRACT, Kind.FEED))
+        if out > cycle.clearance + 1e-9:
+            legs.append((top + out * axis, Phase.RETRACT, Kind.RAPID))
+    else:
+        legs.append((top + max(cycle.clearance, out) * axis, Phase.RETRACT, Kind.RAPID))
+    return legs
+
+
+def _pecks(top: Floats, axis: Floats, cycle: Cycle) -> list[Leg]:
+    """Depths between of DEEP (out to the clearance plane each time) and BRKCHP (a little up each time)."""
+    if cycle.kind not in PECKING or not cycle.steps or not cycle.steps[-1] > 0.0:
+        return []
+    legs: list[Leg] = []
+    total = cycle.depth + cycle.clearance
+    done, k = cycle.steps[0], 1
+    while done < total - 1e-9:
+        at = top + (cycle.clearance - done) * axis
+        legs.append((at, Phase.PECK, Kind.FEED))
+        if cycle.kind == "DEEP":
+            legs.append((top + cycle.clearance * axis, Phase.PECK, Kind.RAPID))
+            legs.append((at + min(PECK_RELIEF, done) * axis, Phase.PECK, Kind.RAPID))
+        else:
+            legs.append((at + min(PECK_RELIEF, done) * axis, Phase.PECK, Kind.RAPID))
+        done += cycle.steps[min(k, len(cycle.steps) - 1)]
+        k += 1
+    return legs
+
+
+PECKING = frozenset({"DEEP", "BRKCHP"})
+PECK_RELIEF = 0.254
+"""mm short of the last depth where the next peck begins (LinuxCNC G83, G73: 0.010 inch)"""
+FEED_OUT = frozenset({"BORE", "REAM", "TAP"})
+"""Cycles that leave the hole at feed, up to the clearance plane."""
