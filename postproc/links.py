@@ -137,17 +137,22 @@ def _link(control: Control, kin0: Kinematics, kin1: Kinematics, space: SafeSpace
     up1 = _above(kin1, space, after, turning, share) if after is not None else None
     retract = none if before is None or up0 is None else _leg(control, kin0, before, up0)
     approach = none if after is None or up1 is None else _leg(control, kin1, up1, after)
-    home, home_state = _home_moves(control, up0, after is None) if by_home else (none, none > 0.0)
-    if up1 is None:
-        return Link(retract, home, none, none, home_state, none > 0.0, True)
     slack = 0.5 * share * space.margin
+    home, home_state, way = none, none > 0.0, True
+    if by_home and _has_retract_axis(control):
+        home, home_state = _lift_home(control, up0, after is None)
+    elif by_home:
+        home, way = _all_home(control, kin0, space, up0, share, slack)
+        home_state = np.ones(home.shape, dtype=bool)
+    if up1 is None:
+        return Link(retract, home, none, none, home_state, none > 0.0, way)
     if by_home and _has_retract_axis(control):
         index, state = _from_home(control, home[-1], up1)
         clear = _stays_clear(control, kin1, space, np.concatenate([home[-1:], index]), slack)
         return Link(retract, home, index, approach, home_state, state, clear)
-    begin = up0.q if up0 is not None else control.machine.home
+    begin = home[-1] if by_home else up0.q if up0 is not None else control.machine.home
     index, clear = _index(control, kin1, space, begin, up1, space.plane(up1.axis, turning, share), slack)
-    return Link(retract, home, index, approach, home_state, np.full(index.shape, by_home), clear)
+    return Link(retract, home, index, approach, home_state, np.full(index.shape, by_home), clear and way)
 
 
 def _above(kin: Kinematics, space: SafeSpace, pose: Pose, turning: bool, share: float) -> Pose:
@@ -172,11 +177,19 @@ def _has_retract_axis(control: Control) -> bool:
     return control.machine.retract_axis >= 0 and not control.tip_law
 
 
-def _home_moves(control: Control, up: Pose | None, whole: bool) -> tuple[Floats, Bools]:
+def _all_home(control: Control, kin: Kinematics, space: SafeSpace, up: Pose | None, share: float,
+              slack: float) -> tuple[Floats, bool]:
+    """All axes home at once, clear of the part, on machines without an axis that lifts the tool by itself."""
+    home = control.machine.home
+    if up is None:
+        return home[None, :], True
+    tip, axis = kin.forward(home[None, :])
+    return _index(control, kin, space, up.q, Pose(tip[0], axis[0], home), space.plane(axis[0], True, share), slack)
+
+
+def _lift_home(control: Control, up: Pose | None, whole: bool) -> tuple[Floats, Bools]:
     """From above the part to home: the retract axis first, then, at the end of a program, the rest."""
     machine = control.machine
-    if not _has_retract_axis(control):
-        return np.zeros((0, len(machine.axis_names))), np.zeros((0, len(machine.axis_names)), dtype=bool)
     lifted = (machine.home if up is None else up.q).copy()
     lifted[machine.retract_axis] = machine.home[machine.retract_axis]
     state = np.zeros((2, len(lifted)), dtype=bool)

@@ -127,7 +127,7 @@ def build_path(control: Control, kinematics: Callable[[int], Kinematics], moves:
         singular[rows] = found.singular
         target = Pose(moves.tip[first], axis[0], found.q[0])
         link = plan_link(control, before, kin, space, state, target, first in home_rows)
-        _add_link(out, moves, int(first), link)
+        _add_link(out, control, moves, int(first), link)
         if not link.clear:
             diagnostics.append(_no_way(moves, int(first), file))
         if len(rows) > 1:
@@ -156,13 +156,13 @@ def _with_axes(curves: Curves, axis: Floats) -> Curves:
                   curves.sweep)
 
 
-def _add_link(out: _Builder, moves: Moves, row: int, link: Link) -> None:
+def _add_link(out: _Builder, control: Control, moves: Moves, row: int, link: Link) -> None:
     """Retract, home, then the records without motion, then index and the approach to the pose itself.
 
     A cutting move that is linked to (no RAPID before it) is approached at its feed.
     """
     out.link(link.retract, row)
-    out.link(link.home, row, True, link.home_state)
+    out.link(link.home, row, not control.tip_law, link.home_state)
     out.begin[row] = out.count
     out.link(link.index, row, False, link.index_state)
     if not len(link.approach):
@@ -255,7 +255,7 @@ def _cut_turns(kin: Kinematics, curves: Curves, arcs: WordArcs, curve: Ints, u: 
 def _add_end(out: _Builder, control: Control, kin: Kinematics, space: SafeSpace, state: Pose, row: int) -> None:
     link = plan_link(control, kin, kin, space, state, None, True)
     out.link(link.retract, row)
-    out.link(link.home, row, True, link.home_state)
+    out.link(link.home, row, not control.tip_law, link.home_state)
 
 
 def merged(diagnostics: list[Diagnostic]) -> list[Diagnostic]:
