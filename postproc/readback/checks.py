@@ -25,13 +25,13 @@ ROUNDING_SLACK = 1e-3
 """mm or degrees by which rounded words may pass a limit that the exact ones keep"""
 
 
-def check_kinds(motion: Motion, moves: Moves, owner: Ints, faults: Faults) -> list[Diagnostic]:
+def check_kinds(motion: Motion, moves: Moves, owner: Ints, tip: Floats, faults: Faults) -> list[Diagnostic]:
     """Rapids where the CL file cuts, cuts where it moves rapidly; pecks may return rapidly above what is drilled."""
     rows = np.flatnonzero(owner < len(moves))
     m = owner[rows]
     cutting = (moves.kind[m] != Kind.RAPID) & ~moves.link[m]
     rapid = motion.code[rows] == 0
-    wrong = np.flatnonzero((cutting & rapid & ~_above_drilled(motion, moves, rows, m))
+    wrong = np.flatnonzero((cutting & rapid & ~_above_drilled(motion, moves, rows, m, tip))
                            | (~cutting & ~rapid & ~moves.link[m]))
     diagnostics = []
     if len(wrong):
@@ -45,13 +45,16 @@ def check_kinds(motion: Motion, moves: Moves, owner: Ints, faults: Faults) -> li
     return diagnostics
 
 
-def _above_drilled(motion: Motion, moves: Moves, rows: Ints, m: Ints) -> Bools:
-    """True for rapids of a peck: the hole has been drilled deeper before in the same move."""
-    drill = moves.phase[m] == Phase.DRILL
+def _above_drilled(motion: Motion, moves: Moves, rows: Ints, m: Ints, tip: Floats) -> Bools:
+    """True for rapids of a peck: they end no deeper than the same move has drilled before."""
     result = np.zeros(len(rows), dtype=bool)
-    for k in np.flatnonzero(drill & (motion.code[rows] == 0)):
-        same = (m[:k] == m[k]) & (motion.code[rows[:k]] > 0)
-        result[k] = bool(same.any())
+    height = np.einsum("ni,ni->n", tip[rows], moves.axis[m])
+    edges = np.flatnonzero(np.diff(m, prepend=-1, append=-1))
+    rapid = motion.code[rows] == 0
+    pecked = (moves.phase[m[edges[:-1]]] == Phase.DRILL) & np.logical_or.reduceat(rapid, edges[:-1])
+    for first, last in zip(edges[:-1][pecked], edges[1:][pecked], strict=True):
+        drilled = np.minimum.accumulate(np.where(rapid[first:last], np.inf, height[first:last]))
+        result[first + 1:last] = height[first + 1:last] >= drilled[:-1] - 1e-3
     return result
 
 
