@@ -6,6 +6,7 @@ import pytest
 
 from toolpaths.cl.log import Log
 from toolpaths.cl.read import ReadResult, read_bytes
+from toolpaths.cl.scan import scan as scanned
 from toolpaths.cl.source import normalise
 from toolpaths.cl.statements import statement_of, words_of
 from toolpaths.diagnostics import Severity, has_errors
@@ -141,3 +142,25 @@ def test_wrong_use_raises() -> None:
         read("", dialect="croe")
     with pytest.raises(ValueError, match="mm or inch"):
         read("", units="cm")
+
+
+@pytest.mark.parametrize("spoilt", [
+    "", "GOTO / 7, 8, $\n", "GOTO / 7, 8, 9, $\n 0, 0, 1, 5\n", "GOTO / 7, 8, 9 $\n 0, 0, 1\n",
+    "GOTO / 7, 8, 9, $$ half a note $\n", "$$-> NOTE / 1, $\n 2, 3\n",
+])
+def test_continued_points_are_read_at_once_or_one_by_one_with_the_same_result(spoilt: str) -> None:
+    """One line that is no plain continuation sends its block to the slow way: rows and lines must not change."""
+    lines = "".join(f"GOTO / {k}, 2, 3, $\n 0, 0, 1\nGOTO / {k}.5, 2, 3, 0, 0, 1  \nGOTO / {k}, $  \n{k}, 3\n"
+                    for k in range(5))
+    p = read(HEAD + lines + spoilt + lines).toolpath
+    one, per = read(HEAD + lines).toolpath, lines.count("\n") + spoilt.count("\n")
+    assert p.tip[:15].tolist() == one.tip.tolist() == p.tip[-15:].tolist()
+    assert p.line[:15].tolist() == one.line.tolist() == (p.line[-15:] - per).tolist()
+    assert one.line.tolist() == [3 + 5 * (i // 3) + (0, 2, 3)[i % 3] for i in range(15)]
+    assert one.tip[:3].tolist() == [[0, 2, 3], [0.5, 2, 3], [0, 0, 3]]
+
+
+def test_continued_points_go_the_fast_way() -> None:
+    scan = scanned(b"GOTO / 1, 2, 3, $\n 0, 0, 1\nRAPID\nGOTO/1,2,3,$\n0,0,1\nGOTO/4,5,6")
+    assert scan.points.line.tolist() == [1, 4, 6]
+    assert (scan.line, scan.before, scan.lines) == ([3], [1], 6)

@@ -88,6 +88,27 @@ def _scan_chunk(data: bytes, position: int, stop: int, lines_before: int, larges
     c = np.frombuffer(data, np.uint8, stop - position, position)
     if c[-1] != 10:
         c = np.append(c, np.uint8(10))
+    joined, marks = _joined(c)
+    if len(marks):
+        found = _split(joined, largest)
+        if found.plain[np.searchsorted(found.ends, marks)].all():
+            return _chunk(found, np.flatnonzero(c == 10), position, lines_before)
+    found = _split(c, largest)
+    return _chunk(found, found.ends, position, lines_before)
+
+
+@dataclass
+class _Lines:
+    """Lines of a chunk: which are plain, how many numbers each has, and the numbers of the plain ones."""
+
+    starts: Ints
+    ends: Ints
+    plain: Bools
+    count: Ints
+    numbers: Floats
+
+
+def _split(c: Bytes, largest: float) -> _Lines:
     ends = np.flatnonzero(c == 10)
     starts = np.concatenate([[0], ends[:-1] + 1])
     count = np.add.reduceat(c == 44, starts, dtype=np.int32) + 1
@@ -95,9 +116,38 @@ def _scan_chunk(data: bytes, position: int, stop: int, lines_before: int, larges
     rows = np.flatnonzero(plain)
     numbers, bad = _numbers(c, starts, ends, count, rows, largest)
     plain[bad] = False
-    others = np.flatnonzero(~plain & (ends > starts))
-    return _Chunk(numbers, count[plain], np.flatnonzero(plain) + lines_before + 1, starts[others] + position,
-                  ends[others] + position, others + lines_before + 1, np.cumsum(plain)[others], len(ends))
+    return _Lines(starts, ends, plain, count, numbers)
+
+
+def _chunk(found: _Lines, line_ends: Ints, position: int, lines_before: int) -> _Chunk:
+    """`line_ends` are those of the file: a line of `found` may hold several."""
+    plain = found.plain
+    line = np.searchsorted(line_ends, found.starts) + lines_before + 1
+    others = np.flatnonzero(~plain & (found.ends > found.starts))
+    return _Chunk(found.numbers, found.count[plain], line[plain], found.starts[others] + position,
+                  found.ends[others] + position, line[others], np.cumsum(plain, dtype=np.int64)[others], len(line_ends))
+
+
+def _joined(c: Bytes) -> tuple[Bytes, Ints]:
+    """(`c` with each GOTO line that ends in `$` joined to the line of numbers after it, positions of those marks)."""
+    marks = np.flatnonzero(c == 36)
+    if not len(marks):
+        return c, marks
+    ends = np.flatnonzero(c == 10)
+    line = np.searchsorted(ends, marks)
+    starts = np.concatenate([[0], ends[:-1] + 1])
+    strange = np.add.reduceat(~_NUMERIC[c], starts, dtype=np.int32)
+    ink = np.append(0, np.cumsum(c > 32))
+    after = np.minimum(line + 1, len(ends) - 1)
+    good = (strange[line] == 6) & (ink[ends[line]] == ink[marks + 1]) & (line + 1 < len(ends)) \
+        & (strange[after] == 0) & (ink[ends[after]] > ink[starts[after]])
+    for k, letter in enumerate(b"GOTO"):
+        good &= (c[np.minimum(starts[line] + k, len(c) - 1)] & 0xDF) == letter
+    marks, line = marks[good], line[good]
+    joined = c.copy()
+    joined[marks] = 32
+    joined[ends[line]] = 32
+    return joined, marks
 
 
 def _looks_plain(c: Bytes, starts: Ints, ends: Ints) -> Bools:
