@@ -58,6 +58,10 @@ def simulated(simulate, result: PostResult, folder: Path, warp: int = 20) -> Run
     return run
 
 
+LINE_LAG = 2
+"""servo cycles by which LinuxCNC's line number follows the joints: the last of a stretch belong to the rapid behind it"""
+
+
 def cutting(result: PostResult, run: Run) -> tuple[Ints, Ints, Floats]:
     """(servo cycles (N,) in feed blocks of the path, the CL move (N,) of each, its tool's gauge length (N,))."""
     assert result.comparison is not None and result.job is not None
@@ -69,7 +73,9 @@ def cutting(result: PostResult, run: Run) -> tuple[Ints, Ints, Floats]:
     register[motion.line] = motion.register
     plain = np.ones(last + 1, dtype=bool)
     plain[motion.line[motion.hole]] = False
-    cycles = np.flatnonzero((move[run.line] >= 0) & plain[run.line])
+    feeds = (move[run.line] >= 0) & plain[run.line]
+    feeds[:-LINE_LAG] &= feeds[LINE_LAG:]
+    cycles = np.flatnonzero(feeds)
     lengths = result.job.register_lengths()
     length = np.array([lengths.get(int(h), 0.0) for h in range(-1, int(register.max()) + 1)])
     return cycles, move[run.line[cycles]], length[register[run.line[cycles]] + 1]
