@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from postproc.path import Path
 
 _SAMPLES = (0.25, 0.5, 0.75)
-_SLACK = 1e-6
+_SLACK = 1e-5
 """mm or rad: round-off that passes no bound"""
 is_checked = clearances.is_checked
 
