@@ -23,7 +23,7 @@ PIECES = [
     (SAMPLES / "inch_plate.apt", "mill-3axis", "linuxcnc"),
     (SAMPLES / "five_faces.cls", "mikron-ucp710", "linuxcnc"),
     (GOLDEN / "short_five_axis.apt", "mikron-ucp710", "linuxcnc"),
-    (GOLDEN / "short_five_axis.apt", "linuxcnc-xyzac-trt", "linuxcnc"),
+    (GOLDEN / "short_five_axis.apt", "head-table", "generic-iso"),
 ]
 
 

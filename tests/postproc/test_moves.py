@@ -85,6 +85,11 @@ def test_rows_that_link() -> None:
     assert np.flatnonzero(moves.link).tolist() == [0, 3, 6, 7]
 
 
+def test_first_motion_links_without_any_tool() -> None:
+    moves, _ = moves_of("RAPID", "GOTO/0,0,50", "GOTO/0,0,5", head=["UNITS/MM", "FEDRAT/MMPM,60"])
+    assert moves.link.tolist() == [True, False]
+
+
 def test_link_angle_of_the_setup_moves_the_threshold() -> None:
     lines = ["RAPID", *goto([[0, 0, 50]], [[0, 0, 1]]), "RAPID", *goto([[0, 0, 60]], [tilted(8, 0)])]
     for angle, links in ((7.9, [0, 1]), (8.1, [0])):

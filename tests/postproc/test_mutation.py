@@ -181,6 +181,26 @@ def test_wrong_preamble(old: str, new: str) -> None:
     assert found(result, result.text.replace(old, new, 1).splitlines())
 
 
+def test_rapid_into_uncut_metal() -> None:
+    """Pecks in single moves: the rapid back into the hole may end above the last depth, not below it."""
+    path = toolpath("RAPID", "GOTO/0,0,50", "CYCLE/DEEP,DEPTH,12,RAPTO,3,RTRCTO,20,MANUAL,MMPM,100,STEP,5", "GOTO/10,0,0")
+    result = good(convert(path, "mill-3axis"))
+    lines = result.text.splitlines()
+    for old, new, bad in (("Z-1.746", "Z-11.9", True), ("Z-1.746", "Z-2.1", True), ("Z-6.746", "Z-7.5", True),
+                          ("Z-1.746", "Z-1", False), ("Z-6.746", "Z1", False)):
+        assert bool(found(result, replaced(lines, lines.index(old), new))) == bad, (old, new)
+
+
+@pytest.mark.parametrize(("old", "new", "code"), [
+    ("\nZ129.3733\nG53", "\nZ-129.3733\nG53", "verify.link"), ("G64 P0.002 Q0.001\n", "", "verify.smoothing"),
+    ("G64 P0.002", "G64 P2", "verify.smoothing"), ("G53 G0 Z400", "G0 Z400", "verify.travel"), ("M2\n", "", "gcode.no_end")])
+def test_spoilt_beside_the_path(old: str, new: str, code: str) -> None:
+    """The way out at the end, the control's smoothing, travel, the end itself."""
+    result = sample(*FLAT[0])
+    assert old in result.text
+    assert code in found(result, result.text.replace(old, new).splitlines())
+
+
 def test_cut_short() -> None:
     result = sample(*FLAT[0])
     lines = result.text.splitlines()

@@ -112,7 +112,7 @@ def test_pecking_and_boring() -> None:
 
 
 def test_lower_case_blanks_numbers_and_comments() -> None:
-    text = "%\n(head X9)\nn10 g 0 x 1.5 y+2.\n/N20 G1 z-.5F100 ; X7\nX 3 (between X8) Y4\r\n%\n"
+    text = "%\n(head X9)\nn10 g 0 x 1.5 y+2.\nN20 G1 z-.5F100 ; X7\nX 3 (between X8) Y4\r\n%\n"
     assert ends(text) == [[11.5, 22, 400], [11.5, 22, 29.5], [13, 24, 29.5]]
 
 
@@ -192,6 +192,7 @@ def test_random_programs_as_the_own_executor_runs_them(seed: int) -> None:
     ("O100 SUB\n", "gcode.syntax"), ("G0 X1e3\n", "gcode.unknown_word"),
     ("G0 X1,5\n", "gcode.syntax"), ("G0 X\n", "gcode.syntax"), ("G0 X--1\n", "gcode.syntax"),
     ("G0 X1 (open\n", "gcode.syntax"),
+    ("G0 X1\n/G0 X2\n", "gcode.block_delete"),
     ("G0 Z5\nG81 X1 Y1 F9\n", "gcode.cycle"), ("G0 Z5\nG83 X1 Y1 Z-5 R2 F9\n", "gcode.cycle"),
     ("G0 Z5\nG81 X1 Z-5 R2 F9\nG83 X2\n", "gcode.cycle"),
 ])
@@ -200,7 +201,7 @@ def test_what_it_cannot_execute_is_an_error_with_the_line(text: str, code: str) 
     assert code in codes(found)
     d = next(d for d in found if d.code == code)
     assert d.lines and d.lines[0] == next(i for i, n in enumerate(text.splitlines(), 1) if re.search(
-        r"G68|G91|G58|M98|B5|U5|X1 X2|G0 G1|G17 G18|#|\[|SUB|1e3|,|X$|--|\(open|G81 X1 Y1|G83", n))
+        r"^/|G68|G91|G58|M98|B5|U5|X1 X2|G0 G1|G17 G18|#|\[|SUB|1e3|,|X$|--|\(open|G81 X1 Y1|G83", n))
 
 
 def test_nothing_at_all() -> None:

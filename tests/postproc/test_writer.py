@@ -92,7 +92,8 @@ def test_too_few_decimals_for_the_tolerance_are_told(tmp_path: Path) -> None:
 def test_no_tiny_residue_beside_a_rotary_move(name: str) -> None:
     """What LinuxCNC would take for the length of an inverse-time block: X, Y, Z steps of a few last decimals."""
     spin = [tilted(30, p) for p in range(0, 60, 3)]
-    path = toolpath("RAPID", *goto([[0, 0, 0.0]], [spin[0]]), *goto(np.zeros((len(spin), 3)), np.array(spin)))
+    tips = np.random.default_rng(6).normal(0, 7e-5, (len(spin), 3))
+    path = toolpath("RAPID", *goto([[0, 0, 0.0]], [spin[0]]), *goto(tips, np.array(spin)))
     result = good(convert(path, name))
     before: dict[str, float] = {}
     seen = 0
@@ -330,6 +331,13 @@ def test_retract_that_no_code_makes_is_written_as_single_moves() -> None:
     blocks = body(good(convert(path, "mill-3axis")).text)
     at = blocks.index("X10")
     assert blocks[at:at + 8] == ["X10", "Z3", "G1 Z-12 F100", "G0 Z20", "X20", "Z3", "G1 Z-12", "G0 Z20"]
+
+
+def test_pecks_that_grow_smaller_are_written_as_single_moves() -> None:
+    """5 first, then 2: from R3 to -2, -4, -6, -7; no code says that."""
+    path = toolpath("RAPID", "GOTO/0,0,50", "CYCLE/DEEP,DEPTH,7,MMPM,100,CLEAR,3,STEP,5,2", "GOTO/10,0,0")
+    blocks = body(good(convert(path, "mill-3axis")).text)
+    assert [b.split()[1] for b in blocks if b.startswith("G1")] == ["Z-2", "Z-4", "Z-6", "Z-7"]
 
 
 def test_tapping_is_never_written_as_single_moves() -> None:
