@@ -144,16 +144,20 @@ def test_wrong_use_raises() -> None:
         read("", units="cm")
 
 
-@pytest.mark.parametrize("spoilt", [
-    "", "GOTO / 7, 8, $\n", "GOTO / 7, 8, 9, $\n 0, 0, 1, 5\n", "GOTO / 7, 8, 9 $\n 0, 0, 1\n",
-    "GOTO / 7, 8, 9, $$ half a note $\n", "$$-> NOTE / 1, $\n 2, 3\n",
+@pytest.mark.parametrize(("spoilt", "rows"), [
+    ("", 0), ("GOTO / 7, 8, $\n", 0), ("GOTO / 7, 8, 9, $\n 0, 0, 1, 5\n", 1), ("GOTO / 7, 8, 9 $\n 0, 0, 1\n", 1),
+    ("GOTO / 7, 8, 9, $$ half a note $\n", 1), ("$$-> NOTE / 1, $\n 2, 3\n", 0), ("GOTO / 7, $\n8, $\n9\n", 1),
 ])
-def test_continued_points_are_read_at_once_or_one_by_one_with_the_same_result(spoilt: str) -> None:
+def test_continued_points_are_read_at_once_or_one_by_one_with_the_same_result(spoilt: str, rows: int) -> None:
     """One line that is no plain continuation sends its block to the slow way: rows and lines must not change."""
     lines = "".join(f"GOTO / {k}, 2, 3, $\n 0, 0, 1\nGOTO / {k}.5, 2, 3, 0, 0, 1  \nGOTO / {k}, $  \n{k}, 3\n"
                     for k in range(5))
-    p = read(HEAD + lines + spoilt + lines).toolpath
+    result = read(HEAD + lines + spoilt + lines)
+    p = result.toolpath
+    assert has_errors(result.diagnostics) == (spoilt == "GOTO / 7, 8, $\n")
     one, per = read(HEAD + lines).toolpath, lines.count("\n") + spoilt.count("\n")
+    assert len(p) == 30 + rows
+    assert not rows or p.tip[15].tolist() == [7, 8, 9]
     assert p.tip[:15].tolist() == one.tip.tolist() == p.tip[-15:].tolist()
     assert p.line[:15].tolist() == one.line.tolist() == (p.line[-15:] - per).tolist()
     assert one.line.tolist() == [3 + 5 * (i // 3) + (0, 2, 3)[i % 3] for i in range(15)]
