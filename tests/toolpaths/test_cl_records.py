@@ -87,7 +87,8 @@ def test_tilted_holes_keep_their_axes() -> None:
 
 
 @pytest.mark.parametrize("record", ["LOADTL/3,5", "LOADTL / 3, OSETNO, 5", "LOAD/TOOL,3,ADJUST,5",
-                                    "TURRET/3,OSETNO,5,SETOOL,0,0,1", "LOADTL/3,5,1"])
+                                    "TURRET/3,OSETNO,5,SETOOL,0,0,1", "LOADTL/3,5,1", "LOADTL/3,7,99.5,5",
+                                    "LOADTL/3, IN, 7, LENGTH, 99.5, OSETNO, 5"])
 def test_every_tool_change_is_one_event(record: str) -> None:
     p = read(f"UNITS/MM\nFEDRAT/60\n{record}\nGOTO/1,2,3\n")
     assert [(e.word, e.values) for e in p.events] == [("LOADTL", (3.0, 5.0))]

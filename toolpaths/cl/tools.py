@@ -18,6 +18,7 @@ TURNING = frozenset({"TURN", "GROOVE", "THREAD", "TURNING"})
 _MAX_NUMBER = 10 ** 9
 _NOT_SHAPE = {"name", "length_register"}
 _CUTTER_ANGLES = (4, 5)
+_ISO_REGISTER = 3
 _SHORT_TOOLNO = 5
 """number, kind and three sizes; longer forms follow the user's table, and CUTTER has the sizes"""
 
@@ -75,13 +76,15 @@ def change(b: Builder, number: float, register: float | None, more: tuple[float,
 
 
 def loadtl(b: Builder, s: Statement) -> None:
-    """LOADTL/number[, register][, ADJUST | OSETNO | LENGTH | OFFSET, register]."""
+    """LOADTL/number[, register][, ADJUST | OSETNO | OFFSET, register], or number, pocket, length, register (ISO)."""
     numbers = s.numbers
     if not numbers:
         b.log.error("cl.tool-number", f"LOADTL/{s.body}: it takes a tool number", b.line)
         return
     register = s.after("ADJUST", "OSETNO", "OFFSET")
-    change(b, numbers[0], register if register is not None else (numbers[1] if len(numbers) > 1 else None))
+    if register is None and len(numbers) > 1:
+        register = numbers[_ISO_REGISTER] if len(numbers) > _ISO_REGISTER else numbers[1]
+    change(b, numbers[0], register)
 
 
 def load(b: Builder, s: Statement) -> None:

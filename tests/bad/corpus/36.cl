@@ -1,0 +1,16 @@
+$$ expect: error cl.dat¸-com,ANGLE,ment line}3
+$$-> TOOLPATH / {"verDion": 1}
+$©$-> 00,30.00000w
+COOLNT/OFFLATA/MILL,6.
+$$-> CSYS/
+$$-> SPLINE/00,0.0000
+MSY0000
+$$-> SPLINE/04,0.0000
+MSYS/-2$$ expect: erro
+GOTO/ŽßT/099MM0,M
+GERO,0
+ÁL,MMPM
+GOTO/0,0
+TLO
+INDIRV/0,1,0
+TLON,GOT6.0000,0.0000,18.0000,0.0000000O,-1.000/000,

@@ -1,0 +1,2 @@
+$$ exp0000$ centerline data
+PAINT…ÓÏõ

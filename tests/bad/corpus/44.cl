@@ -1,0 +1,4 @@
+$xe $pect
+GOTO/0,0,0
+CIRCLE/0,0,0,0,0,1
+GOTO/10,0,0
