@@ -56,10 +56,9 @@ def solve(steps: Steps, rows: int, seconds: float, tolerance: float = TOLERANCE,
     Any iterate respects the limits, so that a solution that is not `solved` is slow, not wrong.
     """
     mu, primal, dual = 5.0 * seconds / rows, 0.0, 0.0
-    gap, time, best = np.inf, seconds, np.inf
+    gap, time = np.inf, seconds
     for iteration in range(most):
         gap, time = steps.assemble(mu, primal, dual)
-        best = min(best, gap / time)
         if gap < tolerance * time:
             return Solution(steps.c, iteration, gap / time, True)
         primal, dual = (min(1.0, TAU * step) for step in steps.direction(mu))
@@ -85,16 +84,17 @@ class NumpySteps:
         """See `Steps`."""
         self.c += primal * self._dc
         self._x = self.problem.basis.values(self.c)
-        slack = self._slacks()
+        slack = self.slacks()
         self._z = [z + dual * dz for z, dz in zip(self._z, self._dz, strict=True)] if self._z else [mu / g for g in slack]
         self._slack = slack
         self._newton(mu)
         gap = sum(float(np.sum(z * g)) for z, g in zip(self._z, slack, strict=True))
         return gap, float(np.sum(self.problem.weight * self._x[0] ** -0.5))
 
-    def _slacks(self) -> list[Floats]:
+    def slacks(self) -> list[Floats]:
         """Velocity (K,), acceleration + and - (J, K), jerk + and - (J, K), coefficients (K + 2,)."""
-        x, root = self._x, self._x[0] ** -0.5
+        x = self.problem.basis.values(self.c)
+        root = x[0] ** -0.5
         acceleration = np.einsum("ijk,ik->jk", self._a, x[:2])
         jerk = np.einsum("ijk,ik->jk", self._j, x)
         return [1.0 - x[0] / self.problem.cap, 1.0 - acceleration, 1.0 + acceleration, root - jerk, root + jerk, self.c]
@@ -123,6 +123,8 @@ class NumpySteps:
     def direction(self, mu: float) -> tuple[float, float]:
         """See `Steps`."""
         self._dc = solve_tied(self._band, self._force, self.problem.basis.tied)
+        if not np.any(self._dc):
+            return 0.0, 0.0
         dx = self.problem.basis.values(self._dc)
         bend = -0.5 * self._x[0] ** -1.5 * dx[0]
         acceleration, jerk = np.einsum("ijk,ik->jk", self._a, dx[:2]), np.einsum("ijk,ik->jk", self._j, dx)
@@ -156,11 +158,10 @@ def _band(parts: Floats, diagonal: Floats) -> Floats:
     return band
 
 
-def solve_tied(band: Floats, force: Floats, tied: tuple[int, int]) -> Floats:
-    """Solve the pentadiagonal equations with the coefficients at either end tied to one unknown; NaN if not definite."""
+def tie(low: Floats, right: Floats, tied: tuple[int, int]) -> slice:
+    """Sum the equations of tied coefficients into one at either end, in place; the part that is left to solve."""
     first, last = tied
-    n = len(force)
-    low, right = np.array(band), np.array(force)
+    n = len(right)
     for start, stop, keep in ((0, first, first - 1), (n - last, n, n - last)):
         inner = [low[d, start:stop - d].sum() for d in range(3)]
         low[0, keep], right[keep] = inner[0] + 2.0 * (inner[1] + inner[2]), right[start:stop].sum()
@@ -168,9 +169,15 @@ def solve_tied(band: Floats, force: Floats, tied: tuple[int, int]) -> Floats:
         low[1, first - 1] += low[2, first - 2]
     if last > 1:
         low[1, n - last - 1] += low[2, n - last - 1]
-    here = slice(first - 1, n - last + 1)
+    return slice(first - 1, n - last + 1)
+
+
+def solve_tied(low: Floats, right: Floats, tied: tuple[int, int]) -> Floats:
+    """Solve the pentadiagonal equations, lower band (3, n) and right side (n,); zeros where they are not definite."""
+    here = tie(low, right, tied)
     try:
-        answer = solveh_banded(low[:, here], right[here], lower=True, check_finite=False)
+        right[here] = solveh_banded(low[:, here], right[here], lower=True, check_finite=False)
     except np.linalg.LinAlgError:
-        return np.full(n, np.nan)
-    return np.concatenate((np.full(first - 1, answer[0]), answer, np.full(last - 1, answer[-1])))
+        return np.zeros_like(right)
+    right[:here.start], right[here.stop:] = right[here.start], right[here.stop - 1]
+    return right

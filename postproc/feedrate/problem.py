@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
 from postproc.feedrate.limits import JointLimits, squared_speed, steady_cap
-from postproc.feedrate.paths import Derivatives
-from postproc.feedrate.spline import Basis
+from postproc.feedrate.paths import Eased
+from postproc.feedrate.spline import Basis, rest_basis
 from toolpaths.arrays import Floats
 
 UNBOUND = 1e4
@@ -32,7 +33,6 @@ class Problem:
     d3q: Floats
     limits: JointLimits
     cap: Floats
-    steady: Floats
     weight: Floats
     tight: Floats
 
@@ -41,13 +41,6 @@ class Problem:
         """Number of limits, positive coefficients included."""
         joints, knots = self.dq.shape
         return knots * (4 * joints + 1) + knots + 2
-
-    def part(self, first: int, last: int) -> Problem:
-        """The problem on knots [first, last), free at ends inside."""
-        here = slice(first, last)
-        cut = {name: np.ascontiguousarray(getattr(self, name)[..., here])
-               for name in ("dq", "d2q", "d3q", "cap", "steady", "weight", "tight")}
-        return replace(self, basis=self.basis.part(first, last), **cut)
 
     def acceleration_rows(self) -> Floats:
         """(2, J, K): factors of x and x'."""
@@ -60,29 +53,54 @@ class Problem:
         return np.stack((self.d3q * scale, 1.5 * self.d2q * scale, 0.5 * self.dq * scale))
 
     def start(self) -> Floats:
-        """Coefficients (K + 2,), equal, that keep every limit strictly; halved until the ends at rest do, too."""
-        low = 0.9 * float(np.min(np.minimum(self.cap, self.steady) / self.tight.max(axis=0)))
-        acceleration, jerk = self.acceleration_rows(), self.jerk_rows()
-        for _ in range(200):
-            c = np.full(self.basis.knots + 2, low)
-            x = self.basis.values(c)
-            if (np.all(x[0] > 0.0) and np.all(x[0] < self.cap)
-                    and np.all(np.abs(np.einsum("ijk,ik->jk", acceleration, x[:2])) < 1.0)
-                    and np.all(np.abs(np.einsum("ijk,ik->jk", jerk, x)) < x[0] ** -0.5)):
-                return c
-            low *= 0.5
-        raise ArithmeticError("no slow motion respects the limits: the derivatives of the path are not finite")
+        """Equal coefficients (K + 2,), 0.9 of the largest that keep every limit."""
+        ones = np.ones(self.basis.knots + 2)
+        with np.errstate(divide="ignore"):
+            velocity, acceleration, jerk = 1.0 / np.max(self.ratios(ones) * np.stack((np.ones_like(self.cap), *self.tight)), axis=1)
+        low = 0.9 * min(velocity**2, acceleration, jerk ** (2.0 / 3.0))
+        if not (0.0 < low < np.inf):
+            raise ArithmeticError("no slow motion respects the limits: the derivatives of the path are not finite")
+        return low * ones
+
+    def ratios(self, c: Floats) -> Floats:
+        """Velocity, acceleration and jerk over their limits at the knots, the worst joint, tightening left out, (3, K)."""
+        x = self.basis.values(c)
+        acceleration = np.abs(np.einsum("ijk,ik->jk", self.acceleration_rows(), x[:2])).max(axis=0) / self.tight[0]
+        jerk = np.abs(np.einsum("ijk,ik->jk", self.jerk_rows(), x)).max(axis=0) / self.tight[1]
+        return np.array([np.sqrt(x[0] / self.cap), acceleration, jerk * np.sqrt(x[0])])
 
 
-def build(basis: Basis, sigma: Floats, at: Derivatives, limits: JointLimits, feed: Floats) -> Problem:
-    """The problem at knots sigma (K,); `feed` (K,) is the largest sigma_dot that the program allows, inf if none."""
-    steady = steady_cap(at.d2q, at.d3q, limits)
-    cap = np.minimum(squared_speed(at.dq, limits.velocity), feed**2)
-    cap = np.where(np.isinf(cap), UNBOUND * steady, cap)
-    if not np.all(np.isfinite(cap)):
-        raise ValueError("the path stands still somewhere between its ends: no limit bounds the speed there")
-    steady = np.minimum(steady, cap)
-    h = np.diff(sigma)
-    weight = 0.5 * (np.append(h, 0.0) + np.insert(h, 0, 0.0))
-    rows = [np.ascontiguousarray(order.T) for order in at[1:]]
-    return Problem(basis, *rows, limits, cap, steady, weight, np.ones((2, len(sigma))))
+@dataclass(frozen=True)
+class Knots:
+    """One motion from rest to rest on its knots; problems are made for stretches of it, so that memory stays small.
+
+    `eased` path, `sigma` (K,) knots, `limits`; `feed` gives the largest ds/dt at s; `tight` (3, K) factors >= 1 on the velocity,
+    acceleration and jerk limits, None for ones.
+    """
+
+    eased: Eased
+    sigma: Floats
+    limits: JointLimits
+    feed: Callable[[Floats], Floats]
+    tight: Floats | None = None
+
+    def speed_limit(self, sigma: Floats) -> Floats:
+        """Largest sigma_dot (N,) that the feed allows; inf at rest, where s stands still."""
+        s = self.eased.parameter(sigma)
+        with np.errstate(divide="ignore"):
+            return np.asarray(self.feed(s[0]) / s[1])
+
+    def problem(self, first: int = 0, last: int | None = None) -> Problem:
+        """On knots [first, last), free at ends inside the motion."""
+        last = len(self.sigma) if last is None else last
+        sigma = self.sigma[first:last]
+        at = self.eased.derivatives(sigma)
+        tight = np.ones((3, len(sigma))) if self.tight is None else np.ascontiguousarray(self.tight[:, first:last])
+        cap = np.minimum(squared_speed(at.dq, self.limits.velocity), self.speed_limit(sigma) ** 2)
+        cap = np.where(np.isinf(cap), UNBOUND * steady_cap(at.d2q, at.d3q, self.limits), cap) / tight[0] ** 2
+        if not np.all(np.isfinite(cap)):
+            raise ValueError("the path stands still somewhere between its ends: no limit bounds the speed there")
+        h = np.diff(sigma)
+        weight = 0.5 * (np.append(h, 0.0) + np.insert(h, 0, 0.0))
+        rows = [np.ascontiguousarray(order.T) for order in at[1:]]
+        return Problem(rest_basis(self.sigma, self.eased.ease, first, last), *rows, self.limits, cap, weight, tight[1:])

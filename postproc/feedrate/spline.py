@@ -59,21 +59,22 @@ class Basis:
         s = self.stencil
         return np.asarray(s[:, 0] * c[:-2] + s[:, 1] * c[1:-1] + s[:, 2] * c[2:])
 
-    def part(self, first: int, last: int) -> Basis:
-        """Knots [first, last); an end inside is free."""
-        return Basis(np.ascontiguousarray(self.stencil[:, :, first:last]),
-                     (self.tied[0] if first == 0 else 1, self.tied[1] if last == self.knots else 1))
 
-
-def rest_basis(sigma: Floats, ease: float) -> Basis:
-    """Basis with both ends at rest. At least 2 REST + 7 knots."""
+def rest_basis(sigma: Floats, ease: float, first: int = 0, last: int | None = None) -> Basis:
+    """Knots [first, last) of the basis on all of sigma (K,), whose own ends are at rest; at least 2 REST + 7 knots in all."""
     if len(sigma) < 2 * REST + 7:
         raise ValueError(f"{len(sigma)} knots; a motion from rest to rest needs at least {2 * REST + 7}")
-    table = stencils(sigma)
-    mirrored = np.array([1.0, -1.0, 1.0])[:, None, None]
-    table = _tie(table, (sigma - sigma[0]) / ease, ease)
-    table = _tie(table[:, ::-1, ::-1] * mirrored, (sigma[-1] - sigma[::-1]) / ease, ease)[:, ::-1, ::-1] * mirrored
-    return Basis(np.ascontiguousarray(table), (REST + 3, REST + 3))
+    last = len(sigma) if last is None else last
+    low = max(first - 2, 0)
+    table = stencils(sigma[low:last + 2])[:, :, first - low:last - low]
+    mirror = np.array([1.0, -1.0, 1.0])[:, None, None]
+    tied = [1, 1]
+    if first == 0:
+        table, tied[0] = _tie(table, (sigma[:last] - sigma[0]) / ease, ease), REST + 3
+    if last == len(sigma):
+        table = _tie(table[:, ::-1, ::-1] * mirror, (sigma[-1] - sigma[first:][::-1]) / ease, ease)[:, ::-1, ::-1] * mirror
+        tied[1] = REST + 3
+    return Basis(np.ascontiguousarray(table), (tied[0], tied[1]))
 
 
 def _tie(table: Floats, u: Floats, ease: float) -> Floats:

@@ -1,0 +1,82 @@
+"""One linearisation of `interior.py` on compiled loops: values packed for `interior_kernel.py`."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from postproc.feedrate.compiled import compiled
+from postproc.feedrate.interior import NumpySteps, tie
+from postproc.feedrate.interior_kernel import COMMON, LANES, PER_JOINT, assemble, band, direction, pentadiagonal
+from postproc.feedrate.problem import Problem
+from toolpaths.arrays import Floats
+
+
+class PackedSteps:
+    """As `NumpySteps`, which makes the first z; see `interior.Steps`."""
+
+    def __init__(self, problem: Problem, c: Floats) -> None:
+        self.problem = problem
+        knots, joints = problem.basis.knots, len(problem.dq)
+        blocks = -(-knots // LANES)
+        self._room = blocks * LANES + 2
+        self._size, self._blocks = knots + 2, np.uint64(blocks)
+        self._all = np.ones(self._room)
+        self._all[:self._size] = c
+        self._step = np.zeros(self._room)
+        self._inverse = np.ascontiguousarray(np.stack((1.0 / problem.limits.acceleration, 1.0 / problem.limits.jerk)))
+        self._w = np.zeros((blocks, COMMON, LANES))
+        self._v = np.zeros((blocks, joints, PER_JOINT, LANES))
+        self._zc = self._rc = np.zeros(0)
+        self._low, self._force = np.zeros((3, self._room)), np.zeros(self._room)
+        self._scratch = np.empty((3, self._room))
+        self._fill(self._w, 0, problem.basis.stencil.reshape(9, knots))
+        self._fill(self._w, 9, np.stack((1.0 / problem.cap, problem.weight, *problem.tight)))
+        self._fill(self._w, 13, np.zeros((1, knots)), pad=1.0)
+        for j in range(joints):
+            self._fill(self._v[:, j], 0, np.stack((problem.dq[j], problem.d2q[j], problem.d3q[j])))
+
+    @property
+    def c(self) -> Floats:
+        """Coefficients (K + 2,)."""
+        return self._all[:self._size]
+
+    def _fill(self, into: Floats, field: int, rows: Floats, pad: float = 0.0) -> None:
+        """Put rows (F, K) into fields from `field` on."""
+        whole = np.full((len(rows), self._room - 2), pad)
+        whole[:, :rows.shape[1]] = rows
+        into[:, field:field + len(rows)] = whole.reshape(len(rows), -1, LANES).transpose(1, 0, 2)
+
+    def _first(self, mu: float) -> None:
+        """z = mu / slack everywhere."""
+        slack = NumpySteps(self.problem, self.c).slacks()
+        self._fill(self._w, 14, mu / slack[0][None], pad=mu)
+        for j in range(len(self.problem.dq)):
+            self._fill(self._v[:, j], 3, mu / np.stack([slack[i][j] for i in range(1, 5)]), pad=mu)
+        self._zc, self._rc = mu / self.c, np.zeros(self._size)
+
+    def assemble(self, mu: float, primal: float, dual: float) -> tuple[float, float]:
+        """See `interior.Steps`."""
+        self._all += primal * self._step
+        if not len(self._zc):
+            self._first(mu)
+        self._zc *= 1.0 + dual * self._rc
+        gap, time = compiled(assemble)(self._w.reshape(-1), self._v.reshape(-1), self._all, self._inverse, self._blocks, mu, dual)
+        self._low[:], self._force[:] = 0.0, 0.0
+        self._low[0, :self._size], self._force[:self._size] = self._zc / self.c, mu / self.c
+        compiled(band)(self._w.reshape(-1), self._blocks, self._low, self._force)
+        return gap + float(np.sum(self._zc * self.c)), time
+
+    def direction(self, mu: float) -> tuple[float, float]:
+        """See `interior.Steps`."""
+        low, right = self._low[:, :self._size], self._force[:self._size]
+        here = tie(low, right, self.problem.basis.tied)
+        room = self._scratch[:, here]
+        if not compiled(pentadiagonal)(low[:, here], right[here], room[0], room[1:]):
+            return 0.0, 0.0
+        right[:here.start], right[here.stop:] = right[here.start], right[here.stop - 1]
+        self._step[:self._size] = right
+        fall, loss = compiled(direction)(self._w.reshape(-1), self._v.reshape(-1), self._step, self._inverse, self._blocks, mu)
+        rate = right / self.c
+        self._rc = mu / (self.c * self._zc) - 1.0 - rate
+        fall, loss = max(fall, float(np.max(-rate))), max(loss, float(np.max(-self._rc)))
+        return (1.0 / fall if fall > 0.0 else np.inf, 1.0 / loss if loss > 0.0 else np.inf)

@@ -1,0 +1,83 @@
+"""Where the knots go: equal times at the speed that the limits would allow, finer where that speed drops."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from postproc.feedrate.limits import JointLimits, squared_speed, steady_cap
+from postproc.feedrate.paths import Path
+from toolpaths.arrays import Floats
+
+CHUNK = 16384
+FEWEST = 128
+"""Intervals of a motion between stops at least."""
+
+
+@dataclass(frozen=True)
+class Spacing:
+    """Knot spacing clip(dt sqrt(cap), lowest, longest), dt in s, changing by at most `slope` per unit of length."""
+
+    dt: float = 2.5e-3
+    longest: float = 0.25
+    slope: float = 0.15
+    probes: float = 1.0
+    """first probing spacing over `longest`"""
+
+
+def mesh(path: Path, limits: JointLimits, top: Callable[[Floats], Floats], spacing: Spacing) -> Floats:
+    """Knots (K,) from path.start to path.end.
+
+    The limits are probed at the breaks of the path, on both their sides, and between them; `top(sigma)` bounds the speed along sigma.
+    """
+    at = _probes(path, spacing)
+    speed = np.concatenate([_speed(path, limits, top, at[i:i + CHUNK]) for i in range(0, len(at), CHUNK)])
+    h = np.minimum(spacing.dt * speed, min(spacing.longest, (path.end - path.start) / FEWEST))
+    h = np.maximum(h, 1e-9 * (path.end - path.start))
+    return _place(at, _gentle(at, h, spacing.slope))
+
+
+def _speed(path: Path, limits: JointLimits, top: Callable[[Floats], Floats], at: Floats) -> Floats:
+    """Speed along sigma that all limits would allow if it were constant."""
+    found = path.derivatives(at)
+    cap = np.minimum(squared_speed(found.dq, limits.velocity), steady_cap(found.d2q, found.d3q, limits))
+    return np.asarray(np.minimum(np.sqrt(cap), top(at)))
+
+
+def _probes(path: Path, spacing: Spacing) -> Floats:
+    """Breaks, points just beside them, and a uniform grid."""
+    length = path.end - path.start
+    grid = np.linspace(path.start, path.end, max(FEWEST, int(length / (spacing.probes * spacing.longest))) + 1)
+    inside = np.asarray(path.breaks, dtype=np.float64)
+    beside = 1e-9 * length
+    every = np.unique(np.concatenate((grid, inside, inside - beside, inside + beside)))
+    return np.asarray(every[(every >= path.start) & (every <= path.end)])
+
+
+def _gentle(at: Floats, h: Floats, slope: float) -> Floats:
+    """The largest spacing below `h` (N,) whose slope stays within +-`slope`."""
+    ahead = np.minimum.accumulate(h - slope * at) + slope * at
+    behind = np.minimum.accumulate((ahead + slope * at)[::-1])[::-1] - slope * at
+    return np.asarray(behind)
+
+
+def _place(at: Floats, h: Floats) -> Floats:
+    """Knots such that one knot passes per `h` of length: the integral of 1/h, exact for h linear between probes."""
+    step = np.diff(at)
+    low, high = h[:-1], h[1:]
+    change = (high - low) / low
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = np.where(np.abs(change) > 1e-6, np.log1p(change) / change, 1.0 - 0.5 * change)
+    passed = np.append(0.0, np.cumsum(step / low * share))
+    wanted = np.linspace(0.0, passed[-1], int(np.ceil(passed[-1])) + 1)
+    cell = np.clip(np.searchsorted(passed, wanted, side="right") - 1, 0, len(step) - 1)
+    rate = (high - low)[cell] / step[cell]
+    ahead = (wanted - passed[cell]) * rate
+    with np.errstate(divide="ignore", invalid="ignore"):
+        way = np.where(np.abs(ahead) > 1e-6, low[cell] * np.expm1(ahead) / rate,
+                       low[cell] * (wanted - passed[cell]) * (1.0 + 0.5 * ahead))
+    knots = at[cell] + way
+    knots[0], knots[-1] = at[0], at[-1]
+    return np.asarray(knots)

@@ -1,0 +1,215 @@
+"""The planner: path, limits, feed and stops in; the motion of least time out. It knows no machine."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from postproc.feedrate.limits import JointLimits, squared_speed
+from postproc.feedrate.mesh import Spacing, mesh
+from postproc.feedrate.paths import Eased, Path
+from postproc.feedrate.problem import Knots
+from postproc.feedrate.profile import Profile, linear_profile, spline_profile
+from postproc.feedrate.second_order import second_order
+from postproc.feedrate.spline import rest_basis
+from postproc.feedrate.tightening import tightened
+from postproc.feedrate.trajectory import JointTrajectory
+from postproc.feedrate.windows import Method, Solved, solved
+from toolpaths.arrays import Floats
+
+Feed = float | Callable[[Floats], Floats]
+"""Largest ds/dt: one number, or a function of s (N,) that returns (N,). With s the length along the tip's path, the tip's feed."""
+SAMPLE = 1e-3
+"""Step of the delivered samples, s."""
+CHUNK = 65536
+"""Intervals or samples handled at once."""
+ROUNDS = 12
+
+
+@dataclass(frozen=True)
+class Options:
+    """`ease`: length of path at each stop over which the parameter is changed; `spacing` of knots; `method` of solving;
+    `strict`: nothing exceeded in the delivered samples; `step` of these; `passes` of tightening in strict mode."""
+
+    ease: float = 25.0
+    spacing: Spacing = field(default_factory=Spacing)
+    method: Method = field(default_factory=Method)
+    strict: bool = False
+    step: float = SAMPLE
+    passes: int = 2
+
+
+@dataclass(frozen=True)
+class Piece:
+    """Motion between two stops."""
+
+    eased: Eased
+    profile: Profile
+
+    @property
+    def seconds(self) -> float:
+        return float(self.profile.times[-1])
+
+
+@dataclass(frozen=True)
+class Plan:
+    """The planned motion: pieces in order, and how the solving went.
+
+    `iterations`: most of any window; `mismatch`: worst stitch of windows; `solved`: False where some window stopped early: the
+    motion then respects the limits but is not the fastest.
+    """
+
+    pieces: tuple[Piece, ...]
+    limits: JointLimits
+    feed: Callable[[Floats], Floats]
+    step: float = SAMPLE
+    iterations: int = 0
+    mismatch: float = 0.0
+    solved: bool = True
+
+    @property
+    def seconds(self) -> float:
+        """Time of the whole motion."""
+        return float(self.ends[-1])
+
+    @property
+    def ends(self) -> Floats:
+        """Time at the end of each piece."""
+        return np.cumsum([piece.seconds for piece in self.pieces])
+
+    def trajectory(self) -> JointTrajectory:
+        """Samples each `step`, the last one at rest."""
+        ends = self.ends
+        t = self.step * np.arange(int(np.ceil(ends[-1] / self.step)) + 1)
+        which = np.minimum(np.searchsorted(ends, t, side="right"), len(ends) - 1)
+        cuts = np.searchsorted(which, np.arange(len(ends) + 1))
+        parts = [self._sampled(i, t[cuts[i] + k:min(cuts[i] + k + CHUNK, cuts[i + 1])] - (ends[i] - self.pieces[i].seconds))
+                 for i in range(len(ends)) for k in range(0, cuts[i + 1] - cuts[i], CHUNK)]
+        return JointTrajectory(t, *(np.concatenate(column) for column in zip(*parts, strict=True)))
+
+    def _sampled(self, i: int, t: Floats) -> tuple[Floats, ...]:
+        """s, q, qd, qdd, qddd, sd, feed at times t since the start of piece i."""
+        eased, profile = self.pieces[i].eased, self.pieces[i].profile
+        at = profile.at(np.minimum(t, profile.times[-1]))
+        still = (t > profile.times[-1])[:, None]
+        q, d1, d2, d3 = eased.derivatives(at.sigma)
+        v, a, j = at.speed[:, None], at.acceleration[:, None], at.jerk[:, None]
+        s = eased.parameter(at.sigma)
+        rates = [np.where(still, 0.0, rate)
+                 for rate in (d1 * v, d2 * v**2 + d1 * a, d3 * v**3 + 3.0 * d2 * v * a + d1 * j, s[1][:, None] * v)]
+        return s[0], q, *rates[:3], rates[3][:, 0], self.feed(s[0])
+
+
+def plan(path: Path, limits: JointLimits, feed: Feed = np.inf, stops: Sequence[float] = (), options: Options | None = None,
+         knots: Floats | None = None) -> Plan:
+    """Least time under velocity, acceleration, jerk and feed, from rest at the start to rest at the end.
+
+    Args:
+        path: three times continuously differentiable between `stops`
+        limits: per joint of the path, jerk finite
+        feed: largest ds/dt
+        stops: s of exact stops inside the path; corners must be among them
+        options: see `Options`
+        knots: sigma of the knots, instead of the mesh; only without stops
+
+    Raises:
+        ValueError: stops outside the path or not rising; knots with stops; an infinite jerk limit everywhere.
+    """
+    options = options or Options()
+    if not np.all(np.isfinite(limits.jerk)):
+        raise ValueError("a joint without a jerk limit: plan_second_order is for machines that state none")
+    allowed = _as_function(feed)
+    if knots is not None and len(stops):
+        raise ValueError("knots are for a motion without stops")
+    pieces, reports = [], []
+    for eased in _stretches(path, stops, options.ease):
+        sigma = knots if knots is not None else mesh(eased, limits, _speed_limit(eased, allowed), options.spacing)
+        grid, report = _solve(Knots(eased, sigma, limits, allowed), options)
+        pieces.append(Piece(eased, _profile(grid, report.c)))
+        reports.append(report)
+    made = Plan(tuple(pieces), limits, allowed, options.step, max(r.iterations for r in reports),
+                max(r.mismatch for r in reports), all(r.solved for r in reports))
+    return _within(made) if options.strict else made
+
+
+def plan_second_order(path: Path, limits: JointLimits, feed: Feed = np.inf, stops: Sequence[float] = (),
+                      options: Options | None = None, knots: Floats | None = None) -> Plan:
+    """Least time under velocity, acceleration and feed only: a bound, and the plan of machines that state no jerk."""
+    options = options or Options()
+    allowed = _as_function(feed)
+    pieces = []
+    for eased in _stretches(path, stops, 0.0):
+        sigma = knots if knots is not None else mesh(eased, limits, _speed_limit(eased, allowed), options.spacing)
+        at = eased.derivatives(sigma)
+        cap = np.minimum(squared_speed(at.dq, limits.velocity), allowed(eased.parameter(sigma)[0]) ** 2)
+        x = second_order(sigma, at.dq, at.d2q, limits.acceleration, cap, options.method.kernel)
+        pieces.append(Piece(eased, linear_profile(sigma, x)))
+    return Plan(tuple(pieces), limits, allowed, options.step)
+
+
+def _as_function(feed: Feed) -> Callable[[Floats], Floats]:
+    return feed if callable(feed) else lambda s: np.full(len(s), float(feed))
+
+
+def _speed_limit(eased: Eased, feed: Callable[[Floats], Floats]) -> Callable[[Floats], Floats]:
+    """Largest sigma_dot at sigma under the feed."""
+    def limit(sigma: Floats) -> Floats:
+        s = eased.parameter(sigma)
+        with np.errstate(divide="ignore"):
+            return np.asarray(feed(s[0]) / s[1])
+    return limit
+
+
+def _stretches(path: Path, stops: Sequence[float], ease: float) -> list[Eased]:
+    """One eased stretch between each two stops."""
+    ends = np.concatenate(([path.start], np.asarray(stops, dtype=np.float64), [path.end]))
+    if np.any(np.diff(ends) <= 0.0):
+        raise ValueError(f"stops must rise strictly between {path.start} and {path.end}, found {list(stops)}")
+    return [Eased.between(path, first, last, ease) for first, last in zip(ends[:-1], ends[1:], strict=True)]
+
+
+def _solve(grid: Knots, options: Options) -> tuple[Knots, Solved]:
+    """One solve; in strict mode again with tightened limits where they are exceeded between the knots."""
+    report = solved(grid, options.method)
+    for _ in range(options.passes if options.strict else 0):
+        tight = tightened(grid, _profile(grid, report.c))
+        if tight is None:
+            break
+        grid = replace(grid, tight=tight)
+        report = solved(grid, options.method)
+    return grid, report
+
+
+def _profile(grid: Knots, c: Floats) -> Profile:
+    """Piecewise cubic, made in chunks."""
+    count = len(grid.sigma)
+    cuts = np.linspace(0, count, max(1, count // CHUNK) + 1).astype(int)
+    parts = []
+    for first, last in zip(cuts[:-1], cuts[1:], strict=True):
+        stop = min(last + 1, count)
+        parts.append(spline_profile(grid.sigma[first:stop], rest_basis(grid.sigma, grid.eased.ease, first, stop),
+                                    c[first:stop + 2]).pieces)
+    return Profile(grid.sigma, np.concatenate(parts, axis=1))
+
+
+def _within(made: Plan) -> Plan:
+    """Slow each piece down until nothing is exceeded in the samples that are delivered.
+
+    All limits are homogeneous in time, so that x/g^2 divides velocity by g, acceleration by g^2 and jerk by g^3. Samples of the slower
+    motion fall elsewhere, so it is measured again.
+    """
+    factor = np.ones(len(made.pieces))
+    for turn in range(ROUNDS):
+        trajectory = made.trajectory()
+        worst = trajectory.worst_slowdown(made.limits)
+        which = np.minimum(np.searchsorted(made.ends, trajectory.t, side="right"), len(factor) - 1)
+        factor[:] = 0.0
+        np.maximum.at(factor, which, worst)
+        if factor.max() <= 1.0 and turn:
+            return made
+        factor = np.maximum(factor, 1e-3) * (1.0 + 1e-7) if turn == 0 else np.maximum(factor * (1.0 + 1e-7), 1.0)
+        pieces = tuple(replace(piece, profile=piece.profile.slower(g)) for piece, g in zip(made.pieces, factor, strict=True))
+        made = replace(made, pieces=pieces)
+    raise ArithmeticError(f"the limits are still exceeded by {factor.max() - 1.0:.2g} after {ROUNDS} rounds of slowing down")

@@ -1,0 +1,92 @@
+"""A speed profile x(sigma), exact between knots, and the time that belongs to each place."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from postproc.feedrate.spline import Basis
+from toolpaths.arrays import Floats, Ints
+
+_GAUSS = np.polynomial.legendre.leggauss(5)
+
+
+class Places(NamedTuple):
+    """Along sigma at some times, each (N,): place, and its first three time derivatives."""
+
+    sigma: Floats
+    speed: Floats
+    acceleration: Floats
+    jerk: Floats
+
+
+@dataclass(frozen=True)
+class Profile:
+    """x = sigma_dot^2 as a cubic in each interval: sigma (K,), pieces (4, K-1), powers of sigma - sigma[k] rising."""
+
+    sigma: Floats
+    pieces: Floats
+
+    @cached_property
+    def times(self) -> Floats:
+        """Time at the knots (K,): integral of x^-1/2; in closed form where x is linear, as it may then reach 0."""
+        return np.append(0.0, np.cumsum(self._spent(np.arange(len(self.sigma) - 1), np.diff(self.sigma))))
+
+    def slower(self, factor: float) -> Profile:
+        """The same motion, `factor` times as long: velocities fall by it, accelerations by its square, jerks by its cube."""
+        return Profile(self.sigma, self.pieces / factor**2)
+
+    def squared(self, k: Ints, way: Floats) -> tuple[Floats, Floats, Floats]:
+        """x, x', x'' at `way` behind knots k."""
+        a, b, c, d = self.pieces[:, k]
+        return (a + way * (b + way * (c + way * d)), b + way * (2.0 * c + 3.0 * d * way), 2.0 * c + 6.0 * d * way)
+
+    def _linear(self) -> bool:
+        return not np.any(self.pieces[2:])
+
+    def _spent(self, k: Ints, way: Floats) -> Floats:
+        """Time from knots k to `way` behind them."""
+        if self._linear():
+            end = np.maximum(self.squared(k, way)[0], 0.0)
+            return np.asarray(2.0 * way / np.maximum(np.sqrt(self.pieces[0, k]) + np.sqrt(end), 1e-300))
+        total = np.zeros(len(k))
+        for node, weight in zip(*_GAUSS, strict=True):
+            total += weight / np.sqrt(self.squared(k, 0.5 * way * (1.0 + node))[0])
+        return np.asarray(0.5 * way * total)
+
+    def at(self, t: Floats) -> Places:
+        """Places at times t (N,) within [0, times[-1]]."""
+        times = self.times
+        k = np.clip(np.searchsorted(times, t, side="right") - 1, 0, len(self.sigma) - 2)
+        rest, h = t - times[k], np.diff(self.sigma)[k]
+        if self._linear():
+            way = np.clip(rest * (np.sqrt(self.pieces[0, k]) + 0.25 * self.pieces[1, k] * rest), 0.0, h)
+        else:
+            way = h * rest / (times[k + 1] - times[k])
+            for _ in range(4):
+                way = np.clip(way + (rest - self._spent(k, way)) * np.sqrt(self.squared(k, way)[0]), 0.0, h)
+        x, x1, x2 = self.squared(k, way)
+        speed = np.sqrt(np.maximum(x, 0.0))
+        return Places(self.sigma[k] + way, speed, 0.5 * x1, 0.5 * x2 * speed)
+
+
+def spline_profile(sigma: Floats, basis: Basis, c: Floats) -> Profile:
+    """From coefficients; next to rest, where x follows the law of constant jerk, by cubics with its values and slopes."""
+    x, x1, x2 = basis.values(c)
+    h = np.diff(sigma)
+    pieces = np.array([x[:-1], x1[:-1], 0.5 * x2[:-1], np.diff(x2) / (6.0 * h)])
+    for end, k in enumerate((np.arange(basis.tied[0] - 3), len(h) - 1 - np.arange(basis.tied[1] - 3))):
+        if basis.tied[end] > 1:
+            rise = (x[k + 1] - x[k]) / h[k]
+            pieces[2, k] = (3.0 * rise - 2.0 * x1[k] - x1[k + 1]) / h[k]
+            pieces[3, k] = (x1[k] + x1[k + 1] - 2.0 * rise) / h[k] ** 2
+    return Profile(sigma, pieces)
+
+
+def linear_profile(sigma: Floats, x: Floats) -> Profile:
+    """From squared speeds at the knots, linear between them."""
+    zero = np.zeros(len(x) - 1)
+    return Profile(sigma, np.array([x[:-1], np.diff(x) / np.diff(sigma), zero, zero]))

@@ -1,0 +1,125 @@
+"""The planned motion in time, and what it uses of the limits, measured from its own samples."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from postproc.feedrate.limits import JointLimits
+from toolpaths.arrays import Floats, Ints, frozen
+
+REST_PAD = 3
+"""Samples at rest before and behind, so that differences see the start and the end."""
+BINDS = 0.98
+"""Ratio to a limit from which it is said to bind."""
+ORDERS = ("velocity", "acceleration", "jerk")
+
+
+@dataclass(frozen=True)
+class Usage:
+    """Largest ratios to the limits, per joint (J,), and of the feed.
+
+    Each is the larger of two measures: the derivatives at the samples, and the differences of the positions, padded with rest.
+    """
+
+    velocity: Floats
+    acceleration: Floats
+    jerk: Floats
+    feed: float
+
+    @property
+    def worst(self) -> float:
+        """The largest of all."""
+        return float(max(self.velocity.max(), self.acceleration.max(), self.jerk.max(), self.feed))
+
+    @property
+    def slowdown(self) -> float:
+        """Factor on time that brings every ratio to 1 (less than 1: to spare); jerk falls by its cube."""
+        return float(max(self.velocity.max(), self.feed, self.acceleration.max() ** 0.5, self.jerk.max() ** (1.0 / 3.0)))
+
+
+class Binding(NamedTuple):
+    """Per sample (N,): joint (-1 the feed), order (1 velocity, 2 acceleration, 3 jerk, 0 where nothing binds), ratio."""
+
+    axis: Ints
+    order: Ints
+    ratio: Floats
+
+
+@dataclass(frozen=True)
+class JointTrajectory:
+    """Samples at equal times from rest to rest.
+
+    Attributes:
+        t: (N,) s; the last is the first multiple of the step at which all stands still
+        s: (N,) path parameter
+        q, qd, qdd, qddd: (N, J) joints and time derivatives, from the path's exact derivatives
+        sd: (N,) ds/dt
+        feed: (N,) largest ds/dt that the program allows, inf where none
+    """
+
+    t: Floats
+    s: Floats
+    q: Floats
+    qd: Floats
+    qdd: Floats
+    qddd: Floats
+    sd: Floats
+    feed: Floats
+
+    def __post_init__(self) -> None:
+        n, joints = np.shape(self.q)
+        for name in ("t", "s", "sd", "feed"):
+            object.__setattr__(self, name, frozen(getattr(self, name), np.float64, (n,), f"JointTrajectory.{name}"))
+        for name in ("q", "qd", "qdd", "qddd"):
+            object.__setattr__(self, name, frozen(getattr(self, name), np.float64, (n, joints), f"JointTrajectory.{name}"))
+
+    @property
+    def step(self) -> float:
+        """Time between samples; infinite for a single one."""
+        return float(self.t[1] - self.t[0]) if len(self.t) > 1 else np.inf
+
+    def usage(self, limits: JointLimits) -> Usage:
+        """Worst ratios over all samples, joints of `limits` in the order of q."""
+        derived, differences = self._derived(limits), self._differences(limits)
+        most = [np.maximum(a.max(axis=0), b.max(axis=0)) for a, b in zip(derived, differences, strict=True)]
+        return Usage(*most, feed=float(np.max(self.sd / self.feed)))
+
+    def worst_slowdown(self, limits: JointLimits) -> Floats:
+        """Factor on time per sample (N,) that would bring the ratios seen there to 1."""
+        velocity, acceleration, jerk = (a.max(axis=1) for a in self._derived(limits))
+        most = np.maximum(np.maximum(velocity, self.sd / self.feed), np.maximum(acceleration**0.5, jerk ** (1.0 / 3.0)))
+        for order, ratio in enumerate(self._differences(limits), start=1):
+            worst = ratio.max(axis=1) ** (1.0 / order)
+            for shift in range(order + 1):
+                start = REST_PAD - shift
+                most = np.maximum(most, worst[start:start + len(most)])
+        return np.asarray(most)
+
+    def binding(self, limits: JointLimits) -> Binding:
+        """Per sample the joint and order nearest to its limit."""
+        ratios = np.stack(self._derived(limits))
+        joints = ratios.shape[2]
+        flat = np.concatenate((ratios.transpose(1, 0, 2).reshape(len(self.t), -1), (self.sd / self.feed)[:, None]), axis=1)
+        which = flat.argmax(axis=1)
+        ratio = flat[np.arange(len(flat)), which]
+        fed = which == 3 * joints
+        axis, order = np.where(fed, -1, which % joints), np.where(fed, 1, which // joints + 1)
+        order[ratio < BINDS] = 0
+        return Binding(axis, order, ratio)
+
+    def _derived(self, limits: JointLimits) -> list[Floats]:
+        """(N, J) ratios of velocity, acceleration, jerk from the derivatives."""
+        return [np.abs(values) / getattr(limits, name)
+                for name, values in zip(ORDERS, (self.qd, self.qdd, self.qddd), strict=True)]
+
+    def _differences(self, limits: JointLimits) -> list[Floats]:
+        """Ratios of first, second, third differences of q, padded with rest; (N + 2 REST_PAD - order, J)."""
+        at = np.pad(self.q, ((REST_PAD, REST_PAD), (0, 0)), mode="edge")
+        ratios = []
+        for order, name in enumerate(ORDERS, start=1):
+            at = np.diff(at, axis=0)
+            ratios.append(np.abs(at) / (self.step**order * getattr(limits, name)))
+        return ratios

@@ -1,0 +1,115 @@
+"""Solving a motion: in one piece, or for long ones in windows that overlap, every stitch checked.
+
+Windows have free ends: far enough from its ends the optimal speed does not depend on them, so that neighbours agree in the middle
+of the overlap. There the coefficients are blended; where they differ or the blend exceeds a limit the overlap is widened.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+
+from postproc.feedrate.interior import NumpySteps, Solution, Steps, solve
+from postproc.feedrate.problem import Knots, Problem
+from toolpaths.arrays import Floats
+
+WINDOW, OVERLAP = 8192, 1024
+"""Knots of a window, and on each side beyond it."""
+APART, OVER = 1e-3, 1.002
+"""Relative difference of neighbours, and ratio to a limit in the blend, from which the overlap is widened."""
+KERNEL_FROM = 20_000
+"""Knots from which compiling pays."""
+
+
+@dataclass(frozen=True)
+class Method:
+    """How to solve: compiled loops or numpy (None: by size), threads, window and overlap in knots."""
+
+    kernel: bool | None = None
+    threads: int = 1
+    window: int = WINDOW
+    overlap: int = OVERLAP
+
+    def steps(self, knots: int) -> Callable[[Problem, Floats], Steps]:
+        """What makes one linearisation for a motion of so many knots."""
+        if self.kernel or (self.kernel is None and knots >= KERNEL_FROM):
+            from postproc.feedrate.interior_packed import PackedSteps
+
+            return PackedSteps
+        return NumpySteps
+
+
+@dataclass(frozen=True)
+class Solved:
+    """Coefficients (K + 2,); most iterations of a window; worst stitch (relative difference); whether all were solved."""
+
+    c: Floats
+    iterations: int
+    mismatch: float
+    solved: bool
+
+
+def solved(knots: Knots, method: Method) -> Solved:
+    """Least time on the knots."""
+    count = len(knots.sigma)
+    make = method.steps(count)
+    inner = np.linspace(0, count, max(1, round(count / method.window)) + 1).astype(int).tolist()
+    windows = list(zip(inner[:-1], inner[1:], strict=True))
+    wide = [method.overlap] * len(windows)
+    found: list[tuple[int, Solution]] = [(0, Solution(np.empty(0), 0, 0.0, False))] * len(windows)
+    again = list(range(len(windows)))
+    while again:
+        _solve_some(knots, windows, wide, again, found, make, method.threads)
+        c, bad, worst = _stitched(knots, inner, [min(pair) for pair in zip(wide[:-1], wide[1:], strict=True)], found)
+        again = sorted({i for j in bad for i in (j, j + 1) if wide[i] < count})
+        for i in again:
+            wide[i] *= 2
+    return Solved(c, max(one.iterations for _, one in found), worst, all(one.solved for _, one in found))
+
+
+def _solve_some(knots: Knots, windows: Sequence[tuple[int, int]], wide: Sequence[int], which: Sequence[int],
+                found: list[tuple[int, Solution]], make: Callable[[Problem, Floats], Steps], threads: int) -> None:
+    def one(i: int) -> None:
+        first, last = max(windows[i][0] - wide[i], 0), min(windows[i][1] + wide[i], len(knots.sigma))
+        # A tied end needs its knots in one window.
+        first, last = (0 if first < 16 else first), (len(knots.sigma) if last > len(knots.sigma) - 16 else last)
+        found[i] = first, solve_problem(knots.problem(first, last), make)
+
+    if threads > 1 and len(which) > 1:
+        with ThreadPoolExecutor(threads) as pool:
+            list(pool.map(one, which))
+    else:
+        for i in which:
+            one(i)
+
+
+def solve_problem(problem: Problem, make: Callable[[Problem, Floats], Steps]) -> Solution:
+    """One problem from its slow start."""
+    start = problem.start()
+    seconds = float(np.sum(problem.weight * problem.basis.values(start)[0] ** -0.5))
+    return solve(make(problem, start), problem.rows, seconds)
+
+
+def _stitched(knots: Knots, inner: Sequence[int], wide: Sequence[int],
+              found: Sequence[tuple[int, Solution]]) -> tuple[Floats, list[int], float]:
+    """All coefficients, the stitches that must be widened, the worst relative difference."""
+    c = np.empty(len(knots.sigma) + 2)
+    for i, (first, one) in enumerate(found):
+        low, high = (0 if i == 0 else inner[i]), (len(c) if i == len(found) - 1 else inner[i + 1])
+        c[low:high] = one.c[low - first:high - first]
+    bad, worst = [], 0.0
+    for i, middle in enumerate(inner[1:-1]):
+        half = min(wide[i] // 4, middle, len(c) - middle)
+        here = slice(middle - half, middle + half)
+        left, right = (one.c[here.start - first:here.stop - first] for first, one in found[i:i + 2])
+        u = (np.arange(2 * half) + 0.5) / (2 * half)
+        c[here] = left + (right - left) * u**3 * (10.0 - 15.0 * u + 6.0 * u**2)
+        apart = float(np.max(np.abs(right - left) / np.minimum(left, right)))
+        over = float(knots.problem(here.start, here.stop - 2).ratios(c[here]).max())
+        worst = max(worst, apart)
+        if apart > APART or over > OVER:
+            bad.append(i)
+    return c, bad, worst
