@@ -6,7 +6,7 @@ tool is above everything that is cut, seen along its own axis, or its axis line 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -108,7 +108,10 @@ class Pose:
 
 def plan_link(control: Control, kin0: Kinematics, kin1: Kinematics, space: SafeSpace, before: Pose | None,
               after: Pose | None, by_home: bool) -> Link:
-    """The way from pose `before` (None: at home) to above pose `after` (None: home), with the tools of kin0, kin1."""
+    """The way from pose `before` (None: at home) to above pose `after` (None: home), with the tools of kin0, kin1.
+
+    Where travel is too short for any, the first is returned: the travel check then names the axis and the value.
+    """
     turning = before is None or after is None or bool(angle_between(before.axis, after.axis) > 1e-9)
     first: Link | None = None
     for share in _MARGINS if space.distance is None else (1.0,):
@@ -119,6 +122,9 @@ def plan_link(control: Control, kin0: Kinematics, kin1: Kinematics, space: SafeS
         if link.clear and np.isfinite(q).all() and _inside(q, control.machine):
             return link
     assert first is not None
+    reached = np.concatenate([first.retract, first.index, first.approach])
+    if np.isfinite(reached).all() and not _inside(reached, control.machine):
+        return replace(first, clear=True)
     return first
 
 

@@ -95,8 +95,11 @@ def _excess(path: Path, moves: Moves, control: Control, j: int, low: Floats, hig
     lines = np.unique(moves.line[path.move[bad]])
     first = int(moves.line[path.move[worst]])
     linking = " in a linking move" if np.isnan(path.u[worst]) else ""
-    hint = ("turn the part in the set-up, or split the operation" if rotary else
-            "move the part in the set-up (part.origin), check the tool's gauge_length")
+    hint = "move the part in the set-up (part.origin)"
+    if rotary:
+        hint = "turn the part in the set-up, or split the operation"
+    elif linking:
+        hint += ", lower clearance.margin, or use a shorter tool (gauge_length)"
     return error("travel.exceeded", f"axis {machine.axis_names[j]} goes to {value * unit:.4f} {name}{linking}, allowed "
                  f"{lower:.4f} to {upper:.4f} {name}", file=file,
-                 lines=[first, *(n for n in lines[:6].tolist() if n != first)], count=len(bad), hint=hint)
+                 lines=[first, *(n for n in lines[:6].tolist() if n != first)], count=len(lines), hint=hint)
