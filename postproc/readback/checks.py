@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from postproc.control import Control
-from postproc.events import compensation_states, coolant_states, loaded_tools, spindle_states
+from postproc.events import TOOL_WORDS, compensation_states, coolant_states, loaded_tools, numbers, spindle_states
 from postproc.job import Job
 from postproc.links import SafeSpace
-from postproc.moves import Moves, Phase
+from postproc.holes import PECKING, Phase
+from postproc.moves import Moves
 from postproc.readback.execute import Motion
 from postproc.readback.faults import Faults
 from postproc.readback.poses import SAMPLES, Executed, arc_sweeps
@@ -16,7 +17,7 @@ from postproc.word_arcs import PLANE_COLUMNS
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.diagnostics import Diagnostic
 from toolpaths.shape import Curves
-from toolpaths.toolpath import Kind
+from toolpaths.toolpath import Kind, Toolpath
 
 ALLOWED_SPEED = 1.02
 """share of the programmed feed above which a move counts as too fast (short blocks carry rounding)"""
@@ -58,6 +59,45 @@ def _above_drilled(motion: Motion, moves: Moves, rows: Ints, m: Ints, tip: Float
     return result
 
 
+def check_holes(motion: Motion, job: Job, moves: Moves, tip: Floats, owner: Ints, faults: Faults) -> list[Diagnostic]:
+    """Pecks no deeper than the CL file's, and its dwell at the bottom, hole by hole."""
+    drill = (owner < len(moves)) & (moves.phase[np.minimum(owner, len(moves) - 1)] == Phase.DRILL)
+    rows = np.flatnonzero(drill)
+    if not len(rows):
+        return []
+    m = owner[rows]
+    starts = np.flatnonzero(np.diff(m, prepend=-1))
+    bad_peck, bad_dwell = [], []
+    for at, stop in zip(starts, [*starts[1:], len(rows)], strict=True):
+        cycle = job.toolpath.cycles[int(moves.cycle[m[at]])]
+        part = rows[at:stop]
+        if cycle.dwell > 0.0 and motion.dwell[part].sum() < cycle.dwell * 0.99 - 1e-3:
+            bad_dwell.append(part[0])
+        if cycle.kind in PECKING and cycle.steps:
+            depth = (moves.tip[m[at]] - tip[part]) @ moves.axis[m[at]]
+            deepest = np.maximum.accumulate(np.concatenate([[-cycle.clearance], depth[motion.code[part] > 0]]))
+            if np.diff(deepest).max(initial=0.0) > max(cycle.steps) + 0.01:
+                bad_peck.append(part[0])
+    result = []
+    for bad, what in ((bad_peck, "the hole is drilled in deeper pecks than the CL file says"),
+                      (bad_dwell, "the tool rests at the bottom for less time than the CL file says")):
+        if bad:
+            result.append(faults.error("verify.hole", what, int(moves.line[owner[bad[0]]]), int(motion.line[bad[0]]), len(bad)))
+    return result
+
+
+def loaded_registers(toolpath: Toolpath) -> Ints:
+    """(N,) length register that should be in force at every row, -1 before any tool change."""
+    found, starts, loaded = [-1], [0], -1
+    for event in toolpath.events:
+        if event.word in TOOL_WORDS and numbers(event):
+            number, *rest = (int(v) for v in numbers(event))
+            found.append(rest[0] if rest else number if number != loaded else found[-1])
+            starts.append(event.index)
+            loaded = number
+    return np.array(found)[np.searchsorted(np.array(starts), np.arange(len(toolpath)), side="right") - 1]
+
+
 _SPINDLE = {-1: "anti-clockwise (M4)", 0: "stopped (M5)", 1: "clockwise (M3)"}
 _COMPENSATION = {40: "off (G40)", 41: "left (G41)", 42: "right (G42)"}
 
@@ -67,7 +107,7 @@ def check_states(motion: Motion, job: Job, moves: Moves, owner: Ints, faults: Fa
     rows = np.flatnonzero((owner < len(moves)) & (motion.code > 0))
     rows = rows[moves.kind[owner[rows]] != Kind.RAPID]
     row = moves.row[owner[rows]]
-    tool = loaded_tools(job.toolpath)[row]
+    tool, register = loaded_tools(job.toolpath)[row], loaded_registers(job.toolpath)[row]
     direction, rpm = (a[row] for a in spindle_states(job.toolpath))
     cooled, coolant = coolant_states(job.toolpath)[row], motion.flood[rows] | motion.mist[rows]
     side, tilted = compensation_states(job.toolpath)[row], np.abs(moves.axis[owner[rows], 2]) < 1.0 - 1e-9
@@ -83,6 +123,8 @@ def check_states(motion: Motion, job: Job, moves: Moves, owner: Ints, faults: Fa
             ("spindle", motion.spindle[rows] == direction, motion.spindle[rows], direction, _SPINDLE.__getitem__),
             ("spindle speed", same_speed, motion.rpm[rows], rpm, number),
             ("coolant", coolant == cooled, coolant, cooled, lambda on: "on" if on else "off"),
+            ("length register", (motion.register[rows] == register) | ~job.control.length_on_z, motion.register[rows], register,
+             number),
             ("cutter compensation", (given == side) | (tilted & (given == 40)), given, side, _COMPENSATION.__getitem__),
             ("work offset", motion.offset[rows] == code, motion.offset[rows], code, lambda g: f"G{g:g}")):
         bad = np.flatnonzero(~np.asarray(good))

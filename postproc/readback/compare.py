@@ -9,7 +9,7 @@ import numpy as np
 from postproc.job import Job
 from postproc.moves import Moves
 from postproc.readback.align import align, unreached
-from postproc.readback.checks import check_kinds, check_links, check_smoothing, check_speeds, check_states, check_travel
+from postproc.readback.checks import check_holes, check_kinds, check_links, check_smoothing, check_speeds, check_states, check_travel
 from postproc.readback.execute import Motion
 from postproc.readback.faults import Faults
 from postproc.readback.poses import SAMPLES, Executed, arc_sweeps
@@ -61,6 +61,7 @@ def compare(motion: Motion, job: Job, executed: Executed, gcode: str = "") -> Co
     diagnostics += _beyond("axis", "degrees", worst_axis / DEG, axis_tolerance / DEG, axis_line, faults)
     diagnostics += check_kinds(motion, moves, owner, tip, faults)
     diagnostics += check_states(motion, job, moves, owner, faults)
+    diagnostics += check_holes(motion, job, moves, tip, owner, faults)
     diagnostics += check_speeds(motion, executed.control, moves, curves, owner, match, faults)
     diagnostics += check_links(motion, executed, moves, owner, job.space, tolerance, faults)
     diagnostics += check_travel(motion, executed, moves, owner, faults)

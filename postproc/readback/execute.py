@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from postproc.readback.modal import CYCLES, Modal, check_codes, modal_state
+from postproc.readback.modal import CYCLES, Modal, check_codes, dwells, modal_state
 from postproc.readback.words import Words
 from toolpaths.arrays import Array, Bools, Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
@@ -25,6 +25,7 @@ class Motion:
         spindle (E,): -1, 0, 1; rpm (E,); flood, mist (E,)
         hole (E,): True inside a canned cycle
         missing_feed (E,): a cutting block without a feed in force
+        dwell (E,): s that the tool rests at the end of the block
         compensation (E,): 40, 41, 42; offset (E,): work offset code; blend (E,): mm of the control's smoothing (Modal)
     """
 
@@ -45,6 +46,7 @@ class Motion:
     mist: Bools
     hole: Bools
     missing_feed: Bools
+    dwell: Floats
     compensation: Array
     offset: Floats
     blend: Floats
@@ -80,13 +82,29 @@ def execute(words: Words, letters: tuple[str, ...], offsets: Offsets, file: str 
     z = int(offsets.xyz[2])
     drilling = np.flatnonzero(cycle & moving)
     legs: dict[int, list[tuple[int, Floats]]] = {}
+    rests = dwells(words)
     if len(drilling):
-        legs = _cycles(words, modal, end, stated, drilling, length, scale, offsets, z, diagnostics, file)
+        legs = _cycles(words, modal, end, stated, drilling, length, scale, offsets, z, rests, diagnostics, file)
     arc = np.isin(modal.motion, (2, 3)) & ~modal.dwell
     ijk = _columns(words, ("I", "J", "K"))
     moving |= arc & np.isfinite(ijk).any(axis=1)
     filled = _carried(end, offsets.home)
-    return _motion(words, modal, filled, moving, legs, ijk, scale, offsets), diagnostics
+    diagnostics += _without_number(words, modal, rests, file)
+    return _motion(words, modal, filled, moving, legs, ijk, scale, offsets, rests), diagnostics
+
+
+def _without_number(words: Words, modal: Modal, rests: Floats, file: str) -> list[Diagnostic]:
+    """G4 without P, M6 without a T before it."""
+    result = []
+    lines = np.flatnonzero(np.isnan(rests))
+    if len(lines):
+        result.append(error("gcode.dwell", "G4 lacks P", file=file, lines=lines[:6].tolist(), count=len(lines),
+                            hint="state the seconds: G4 P0.5"))
+    change = words.line[(words.letter == ord("M")) & (words.value == 6)]
+    lines = change[modal.tool[change] < 0]
+    if len(lines):
+        result.append(error("gcode.tool", "M6 without a tool number", file=file, lines=lines[:6].tolist(), count=len(lines)))
+    return result
 
 
 def _columns(words: Words, letters: tuple[str, ...]) -> Floats:
@@ -126,7 +144,7 @@ def _carried(end: Floats, home: Floats) -> Floats:
 
 
 def _cycles(words: Words, modal: Modal, end: Floats, stated: Bools, drilling: Ints, length: Floats, scale: Floats,
-            offsets: Offsets, z: int, diagnostics: list[Diagnostic], file: str) -> dict[int, list[tuple[int, Floats]]]:
+            offsets: Offsets, z: int, rests: Floats, diagnostics: list[Diagnostic], file: str) -> dict[int, list[tuple[int, Floats]]]:
     """Legs (code, end) of each drilling line; sets Z of `end` to where the cycle leaves the tool.
 
     As LinuxCNC does: up to R first where the tool is lower (aslant to R above the hole at all but the first hole of a
@@ -163,6 +181,7 @@ def _cycles(words: Words, modal: Modal, end: Floats, stated: Bools, drilling: In
         out = plane if modal.level[line] == 99 else max(plane, initial)
         start = here[line - 1].copy()
         start[z] = level
+        rests[line] = sticky[3] if code in (82, 89) else 0.0
         legs[line] = _legs(code, start, here[line], z, level, bottom, plane, out, step, offsets.peck_relief, first)
         end[line, z] = out
         previous = line
@@ -209,7 +228,7 @@ def _legs(code: int, start: Floats, target: Floats, z: int, level: float, bottom
 
 
 def _motion(words: Words, modal: Modal, filled: Floats, moving: Bools, legs: dict[int, list[tuple[int, Floats]]],
-            ijk: Floats, scale: Floats, offsets: Offsets) -> Motion:
+            ijk: Floats, scale: Floats, offsets: Offsets, rests: Floats) -> Motion:
     """Blocks in order; a drilling line becomes its legs."""
     lines = np.flatnonzero(moving)
     counts = np.array([len(legs[n]) if n in legs else 1 for n in lines.tolist()]) if legs else \
@@ -230,10 +249,24 @@ def _motion(words: Words, modal: Modal, filled: Floats, moving: Bools, legs: dic
     if len(where):
         center[where] = np.nan_to_num(ijk[line[where]]) * scale[line[where]][:, None] + before[where][:, offsets.xyz]
     feed, missing = _feeds(words, modal, line, code)
+    dwell = _dwell(line, code, hole, rests)
     return Motion(line, code, end, offsets.home, modal.plane[line], motion == 3, center, feed, modal.inverse[line],
                   modal.tool[line], modal.length_register[line], modal.spindle[line], modal.rpm[line], modal.flood[line],
-                  modal.mist[line], hole, missing, modal.compensation[line], modal.offset[line],
+                  modal.mist[line], hole, missing, dwell, modal.compensation[line], modal.offset[line],
                   np.where(np.isfinite(modal.blend), modal.blend * np.where(modal.inch, 25.4, 1.0), modal.blend)[line])
+
+
+def _dwell(line: Ints, code: Array, hole: Bools, rests: Floats) -> Floats:
+    """(E,) s of rest at the end of each block: of a cycle at its bottom, of G4 where the block before it ends."""
+    dwell = np.zeros(len(line))
+    if not len(line):
+        return dwell
+    bottoms = np.flatnonzero(hole & (code == 1))
+    bottoms = bottoms[np.unique(line[bottoms], return_index=True)[1]] if len(bottoms) else bottoms
+    dwell[bottoms] = np.nan_to_num(rests[line[bottoms]])
+    alone = np.setdiff1d(np.flatnonzero(rests > 0.0), line[hole])
+    np.add.at(dwell, np.maximum(np.searchsorted(line, alone) - 1, 0), rests[alone])
+    return dwell
 
 
 def _feeds(words: Words, modal: Modal, line: Ints, code: Array) -> tuple[Floats, Bools]:

@@ -91,9 +91,10 @@ def modal_state(words: Words) -> Modal:
     length_line, length = _g(words, "length")
     register = fill(length_line, np.where(length == 43, h[length_line], -1.0), n, -1.0)
     change_line, _ = _m(words, (6,))
-    loaded = fill(change_line, tool[change_line], n, -1.0)
-    turn_line, turn = _m(words, (3, 4, 5))
-    spindle = fill(turn_line, np.where(turn == 3, 1, np.where(turn == 4, -1, 0)), n, 0.0)
+    loaded = fill(change_line, np.nan_to_num(tool[change_line], nan=-1.0), n, -1.0)
+    turn_line, turn = _m(words, (3, 4, 5, 6))
+    order = np.lexsort((turn != 6, turn_line))
+    spindle = fill(turn_line[order], np.where(turn == 3, 1, np.where(turn == 4, -1, 0))[order], n, 0.0)
     coolant_line, coolant = _m(words, (7, 8, 9))
     return Modal(group("motion", 1).astype(np.int16), group("plane", 17).astype(np.int8),
                  group("feed_mode", 94) == 93, group("units", 21) == 20, group("level", 98).astype(np.int8),
@@ -117,6 +118,17 @@ def _blend(words: Words) -> Floats:
     return filled
 
 
+def dwells(words: Words) -> Floats:
+    """(L + 1,) seconds that a line dwells by G4 P, 0 elsewhere, NaN where P is missing."""
+    lines = words.line[(words.letter == ord("G")) & (words.value == 4)]
+    p = words.letter == ord("P")
+    stated = np.full(words.lines + 1, np.nan)
+    stated[words.line[p]] = words.value[p]
+    result = np.zeros(words.lines + 1)
+    result[lines] = stated[lines]
+    return result
+
+
 def drop_passive(words: Words, passive: tuple[str, ...]) -> Words:
     """Words without the blocks that hold a code the controller file calls passive, and without program numbers (O)."""
     drop = words.letter == ord("O")
@@ -127,11 +139,16 @@ def drop_passive(words: Words, passive: tuple[str, ...]) -> Words:
 
 
 def check_end(words: Words, file: str) -> list[Diagnostic]:
-    """A program ends with M2 or M30."""
-    if bool(((words.letter == ord("M")) & np.isin(words.value, (2, 30))).any()):
+    """A program ends with M2 or M30, and holds nothing behind it."""
+    ends = words.line[(words.letter == ord("M")) & np.isin(words.value, (2, 30))]
+    if not len(ends):
+        return [error("gcode.no_end", "the program has no end (M2 or M30)", file=file, lines=[words.lines],
+                      hint="it may have been cut off")]
+    after = np.unique(words.line[words.line > ends.min()])
+    if not len(after):
         return []
-    return [error("gcode.no_end", "the program has no end (M2 or M30)", file=file, lines=[words.lines],
-                  hint="it may have been cut off")]
+    return [error("gcode.after_end", f"blocks behind the end of the program in line {int(ends.min())}: the control never "
+                  "reaches them", file=file, lines=after[:6].tolist(), count=len(after), hint="take the early end out")]
 
 
 def check_codes(words: Words, letters: tuple[str, ...], file: str) -> list[Diagnostic]:
