@@ -3,11 +3,21 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
 from postproc.controllers.model import ControllerFile
-from postproc.events import Spindle, numbers, spindle_after, tool_changes, words
+from postproc.events import (
+    Spindle,
+    ToolChange,
+    compensation_side,
+    numbers,
+    register_changes,
+    spindle_after,
+    tool_changes,
+    words,
+)
 from postproc.moves import Moves, Phase
 from postproc.path import Path
 from postproc.program import Command
@@ -25,49 +35,86 @@ def commands_of(toolpath: Toolpath, moves: Moves, path: Path, controller: Contro
                 native: Bools) -> tuple[Commands, list[Diagnostic]]:
     """Commands by block, and what could not be carried out."""
     result: dict[int, list[Command]] = {}
-    diagnostics: list[Diagnostic] = []
     first_move = np.searchsorted(moves.row, np.arange(len(toolpath) + 1))
-    changes = {c.index: c for c in tool_changes(toolpath)}
-    changed: set[int] = set()
-    spindle = Spindle()
-    compensation = _Compensation(moves)
+    changes = {(c.index, c.line): c for c in tool_changes(toolpath)}
+    registers = {(c.index, c.line): c for c in register_changes(toolpath)}
+    spindle, state = Spindle(), _Written()
+    compensation = _Compensation(moves, path, result)
     lost: dict[str, list[int]] = {}
-    coolant = Command("COOLANT_OFF")
     for at, event in enumerate(toolpath.events):
-        block = int(path.begin[first_move[event.index]])
-        out = result.setdefault(block, [])
+        move = int(first_move[event.index])
+        compensation.off_before(move)
+        out = result.setdefault(int(path.begin[move]), [])
+        key = event.index, event.line
         if event.word == "SPINDL":
             spindle = spindle_after(event, spindle)
-            out.append(_spindle(spindle, event))
-            diagnostics += _surface_speed(event, toolpath.file)
+            out += state.spindle(_spindle(spindle, event))
+        elif event.word == "COOLNT":
+            out += state.coolant(Command(_coolant(words(event), controller), (), event.line))
         elif event.word == "CUTCOM":
-            out += compensation.commands(event, int(first_move[event.index]))
+            compensation.begin(event, move)
         elif event.word == "LOADTL":
-            change = changes.get(event.index)
-            if change is not None and event.index not in changed and change.number == int(numbers(event)[0]):
-                changed.add(event.index)
-                register = change.register if change.register is not None else change.number
-                out += compensation.off() + (
-                    [Command("STOP_SPINDLE_TURNING"), Command("COOLANT_OFF")] if spindle.direction else [])
-                out.append(Command("CHANGE_TOOL", (float(change.number),), event.line))
-                out.append(Command("USE_TOOL_LENGTH_OFFSET", (float(register),), event.line))
-                follows = {e.word for e in toolpath.events[at + 1:] if e.index == event.index}
-                if spindle.direction and "SPINDL" not in follows:
-                    out.append(_spindle(spindle, event))
-                if spindle.direction and coolant.name != "COOLANT_OFF" and "COOLNT" not in follows:
-                    out.append(coolant)
-        elif command := _simple(event, controller, spindle):
+            if key in changes:
+                follows = {e.word for e in toolpath.events[at + 1:at + 20] if e.index == event.index}
+                out += compensation.off() + state.change(changes[key], follows)
+            elif key in registers:
+                out.append(Command("USE_TOOL_LENGTH_OFFSET", (float(registers[key].register or 0),), event.line))
+        elif command := _simple(event, spindle):
             out.append(command)
-            coolant = command if event.word == "COOLNT" else coolant
         elif event.word not in QUIET:
             lost.setdefault(event.word, []).append(event.line)
-    diagnostics += [warning("event.not_carried_out", f"{word} is not carried out", file=toolpath.file, lines=lines[:6],
-                            count=len(lines)) for word, lines in lost.items()]
+    compensation.off_before(len(moves))
     result.setdefault(len(path), []).extend(compensation.off())
+    diagnostics = [warning("event.not_carried_out", f"{word} is not carried out", file=toolpath.file, lines=lines[:6],
+                           count=len(lines)) for word, lines in lost.items()]
     diagnostics += compensation.diagnostics(toolpath.file)
-    for k in _dwells(toolpath, moves, path, native, spindle):
+    for k in _dwells(toolpath, moves, path, native):
         result.setdefault(k[0], []).insert(0, k[1])
     return {k: tuple(v) for k, v in result.items() if v}, diagnostics + _no_spindle(toolpath, moves)
+
+
+class _Written:
+    """Spindle and coolant as the commands so far leave them: stated only where they change."""
+
+    def __init__(self) -> None:
+        self.turning: Command | None = None
+        self.cooling: Command | None = None
+
+    def spindle(self, wanted: Command) -> list[Command]:
+        """The command where it changes something."""
+        if self.turning is not None and (self.turning.name, self.turning.args) == (wanted.name, wanted.args):
+            return []
+        self.turning = wanted
+        return [wanted]
+
+    def coolant(self, wanted: Command) -> list[Command]:
+        """The command where it changes something."""
+        if self.cooling is not None and self.cooling.name == wanted.name:
+            return []
+        self.cooling = wanted
+        return [wanted]
+
+    def change(self, change: ToolChange, follows: set[str]) -> list[Command]:
+        """A tool change with spindle and coolant off, and on again where no record that `follows` says otherwise."""
+        before, cooled = self.turning, self.cooling
+        out: list[Command] = []
+        if before is not None and before.name != _STOPPED:
+            out.append(Command(_STOPPED))
+        if cooled is not None and cooled.name != _DRY:
+            out.append(Command(_DRY))
+        register = change.register if change.register is not None else change.number
+        out.append(Command("CHANGE_TOOL", (float(change.number),), change.line))
+        out.append(Command("USE_TOOL_LENGTH_OFFSET", (float(register),), change.line))
+        if before is not None:
+            self.turning = Command(_STOPPED)
+            out += [] if "SPINDL" in follows else self.spindle(replace(before, line=change.line))
+        if cooled is not None:
+            self.cooling = Command(_DRY)
+            out += [] if "COOLNT" in follows else self.coolant(replace(cooled, line=change.line))
+        return out
+
+
+_STOPPED, _DRY = "STOP_SPINDLE_TURNING", "COOLANT_OFF"
 
 
 def _spindle(state: Spindle, event: Event) -> Command:
@@ -77,11 +124,9 @@ def _spindle(state: Spindle, event: Event) -> Command:
     return Command(name, () if math.isnan(state.rpm) else (state.rpm,), event.line)
 
 
-def _simple(event: Event, controller: ControllerFile, spindle: Spindle) -> Command | None:
+def _simple(event: Event, spindle: Spindle) -> Command | None:
     """Commands of events that stand for themselves."""
     said, values = words(event), numbers(event)
-    if event.word == "COOLNT":
-        return Command(_coolant(said, controller), (), event.line)
     if event.word == "DELAY" and values:
         seconds = values[0] / (spindle.rpm * PER_MINUTE) if "REV" in said else values[0]
         return Command("DWELL", (seconds,), event.line)
@@ -93,36 +138,57 @@ def _simple(event: Event, controller: ControllerFile, spindle: Spindle) -> Comma
         return Command("INSERT", (" ".join(str(v) for v in event.values),), event.line)
     if event.word == "SELECT" and values:
         return Command("SELECT_TOOL", (values[0],), event.line)
-    if event.word in ("PREFUN", "AUXFUN") and values:
-        return Command("INSERT", (f"{'G' if event.word == 'PREFUN' else 'M'}{values[0]:g}",), event.line)
     return None
 
 
 class _Compensation:
-    """CUTCOM as the control's cutter compensation: stated when it changes, off before tool changes and the end.
+    """CUTCOM as the control's cutter compensation: stated when it changes, off before linking moves, holes, tool changes.
 
     The points are written as the file has them; what the control adds depends on its register.
     """
 
-    def __init__(self, moves: Moves) -> None:
-        self.moves, self.active = moves, ""
+    def __init__(self, moves: Moves, path: Path, commands: dict[int, list[Command]]) -> None:
+        self.moves, self.path, self.out = moves, path, commands
+        self.active, self.since = "", 0
         self.written: list[int] = []
         self.tilted: list[int] = []
+        self.left_on: list[int] = []
+        self.own = np.isnan(path.u) | (moves.hole[path.move] >= 0)
+        """(K,) blocks that compensation must not touch"""
+        self.breaks = np.flatnonzero(self.own & ~np.concatenate([[False], self.own[:-1]]))
+        self.cut = np.append(np.flatnonzero((moves.kind != Kind.RAPID) & (moves.hole < 0)), len(moves))
 
-    def commands(self, event: Event, move: int) -> list[Command]:
-        """The commands of one CUTCOM record that acts before a row of Moves."""
-        side = next((w for w in words(event) if w in ("LEFT", "RIGHT", "OFF")), "")
+    def off_before(self, move: int) -> None:
+        """Switch off at the first break before a row of Moves; cutting between the two is not compensated."""
+        if not self.active:
+            return
+        at = int(np.searchsorted(self.breaks, self.since))
+        if at == len(self.breaks) or self.breaks[at] > self.path.begin[move]:
+            return
+        block = int(self.breaks[at])
+        self.out.setdefault(block, []).extend(self.off())
+        served = block > 0 and self.path.move[block - 1] == self.path.move[block]
+        row = int(self.path.move[block]) + int(served)
+        after = int(self.cut[np.searchsorted(self.cut, row)])
+        if after < move:
+            self.left_on.append(int(self.moves.line[after]))
+
+    def begin(self, event: Event, move: int) -> None:
+        """Carry one CUTCOM record out that acts before a row of Moves, or behind the linking move that leads there."""
+        side, block = compensation_side(event), int(self.path.begin[move])
         if side in ("", self.active) or (side == "OFF" and not self.active):
-            return []
+            return
+        self.out.setdefault(block, []).extend(self.off(event.line))
         if side == "OFF":
-            return self.off(event.line)
+            return
         if move >= len(self.moves) or abs(self.moves.axis[move, 2]) < 1.0 - 1e-9:
             self.tilted.append(event.line)
-            return []
-        before = self.off(event.line)
-        self.active = side
+            return
+        block += int(np.argmin(np.append(self.own[block:], False)))
+        self.active, self.since = side, block
         self.written.append(event.line)
-        return [*before, Command(f"CUTTER_COMPENSATION_{side}", tuple(numbers(event)[:1]), event.line)]
+        command = Command(f"CUTTER_COMPENSATION_{side}", tuple(numbers(event)[:1]), event.line)
+        self.out.setdefault(block, []).append(command)
 
     def off(self, line: int = 0) -> list[Command]:
         """The command that ends it, where it is on."""
@@ -139,17 +205,14 @@ class _Compensation:
                                   "the control adds what its register holds", file=file, lines=self.written[:6],
                                   count=len(self.written), hint="points of the tool centre: the register holds the wear "
                                   "only; points of the contour: the radius"))
+        if self.left_on:
+            result.append(error("cutcom.left_on", "cutting goes on under CUTCOM after a linking move or a hole, which need "
+                                "it off", file=file, lines=self.left_on[:6], count=len(self.left_on),
+                                hint="write CUTCOM/OFF before the retract and CUTCOM/LEFT or RIGHT after the approach"))
         if self.tilted:
             result.append(warning("cutcom.tilted", "CUTCOM while the tool axis is tilted is not carried out", file=file,
                                   lines=self.tilted[:6], count=len(self.tilted)))
         return result
-
-
-def _surface_speed(event: Event, file: str) -> list[Diagnostic]:
-    if not {"SFM", "SMM"} & set(words(event)):
-        return []
-    return [error("spindle.surface_speed", "the spindle speed is given as a cutting speed", file=file, lines=[event.line],
-                  hint="state rev/min (SPINDL/RPM,n,CLW) in the CAM system")]
 
 
 def _coolant(said: list[str], controller: ControllerFile) -> str:
@@ -160,7 +223,7 @@ def _coolant(said: list[str], controller: ControllerFile) -> str:
     return "THROUGH_ON" if "THRU" in said and controller.codes.through else "FLOOD_ON"
 
 
-def _dwells(toolpath: Toolpath, moves: Moves, path: Path, native: Bools, spindle: Spindle) -> list[tuple[int, Command]]:
+def _dwells(toolpath: Toolpath, moves: Moves, path: Path, native: Bools) -> list[tuple[int, Command]]:
     """Dwell at the bottom of holes that are written as single moves."""
     result = []
     for m in np.flatnonzero(moves.phase == Phase.DRILL):

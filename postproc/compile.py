@@ -11,6 +11,7 @@ from machines.kinematics.base import Kinematics
 from postproc.commands import commands_of
 from postproc.control import Control
 from postproc.controllers.model import ControllerFile
+from postproc.events import spindle_states
 from postproc.feed import Feeds, plan_feeds
 from postproc.moves import Moves, Phase
 from postproc.path import ARC, FEED, Path
@@ -22,6 +23,8 @@ from toolpaths.units import DEG
 
 SNAP = 2.5
 """X, Y, Z residues beside a rotary move, in units of the last decimal, that are not written"""
+SINGLE_MOVES = frozenset({"DRILL", "THRU", "CSINK", "FACE", "DEEP", "BRKCHP", "BORE", "REAM"})
+"""kinds of cycles that rapids, feeds and dwells replace"""
 
 
 @dataclass(frozen=True)
@@ -67,7 +70,7 @@ def compile_program(toolpath: Toolpath, moves: Moves, path: Path, control: Contr
     write = _written(words, path, control)
     native, holes = _holes(toolpath, moves, path, words, control, controller)
     feeds = plan_feeds(path, control, words, moves.feed[path.move], toolpath.pass_[moves.row[path.move]], native,
-                       feed_mode, controller.feed.least_inverse_rate)
+                       feed_mode if controller.feed.inverse_time else "per-minute", controller.feed.least_inverse_rate)
     commands, diagnostics = commands_of(toolpath, moves, path, controller, native)
     keep = write.any(axis=1) | (path.code == ARC)
     new = np.concatenate([[0], np.cumsum(keep)])
@@ -75,22 +78,22 @@ def compile_program(toolpath: Toolpath, moves: Moves, path: Path, control: Contr
     for k, group in sorted(commands.items()):
         moved[int(new[k])] = moved.get(int(new[k]), ()) + group
     kept_holes = tuple(Hole(int(new[h.first]), int(new[h.last + 1]) - 1, h.cycle, h.plane_level, h.bottom, h.retract,
-                            h.initial) for h in holes)
+                            h.initial, h.key) for h in holes)
     home_words = np.where(path.home[:, None], np.round(path.q * control.unit, int(places.max())), words)
     program = Program(control.machine.axis_names, home_words[keep], write[keep], path.code[keep], feeds.feed[keep],
                       feeds.mode[keep], path.plane[keep], path.ccw[keep], path.center[keep], path.home[keep],
                       np.isnan(path.u[keep]), moves.row[path.move[keep]], moves.line[path.move[keep]], moved, kept_holes,
                       places)
-    return program, feeds, diagnostics + _slowed(feeds, moves, path, toolpath.file) + _lost_taps(
-        toolpath, moves, holes, controller)
+    return program, feeds, diagnostics + _slowed(feeds, moves, path, toolpath.file) + _not_native(
+        toolpath, moves, path, native, controller)
 
 
 def _words(path: Path, moves: Moves, control: Control, kinematics: Callable[[int], Kinematics],
            lengths: Callable[[int], float]) -> Floats:
-    """Unrounded words (K, J); blocks before a tool change still carry the tool that leaves."""
+    """Unrounded words (K, J); blocks before a tool change still carry the tool that leaves, none before the first."""
     tool = moves.tool[path.move]
     leaving = np.arange(len(path)) < path.begin[path.move]
-    tool = np.where(leaving & (path.move > 0), moves.tool[np.maximum(path.move - 1, 0)], tool)
+    tool = np.where(leaving, np.where(path.move > 0, moves.tool[np.maximum(path.move - 1, 0)], -1), tool)
     words = np.empty_like(path.q)
     for index in np.unique(tool):
         k = np.flatnonzero(tool == index)
@@ -148,9 +151,10 @@ def _holes(toolpath: Toolpath, moves: Moves, path: Path, words: Floats, control:
     native = np.zeros(len(path), dtype=bool)
     holes: list[Hole] = []
     z = int(control.xyz[2])
-    if not controller.cycles.enabled or z < 0 or not (moves.hole >= 0).any():
+    if not controller.cycles.enabled or 17 not in controller.cycles.planes or z < 0 or not (moves.hole >= 0).any():
         return native, holes
     hole = np.where(np.isnan(path.u), -1, moves.hole[path.move])
+    turning = spindle_states(toolpath)[0]
     change = np.flatnonzero(np.diff(hole)) + 1
     before_initial = 0.0
     previous_last = -2
@@ -161,7 +165,8 @@ def _holes(toolpath: Toolpath, moves: Moves, path: Path, words: Floats, control:
         level = float(words[first - 1, z]) if first > 0 else np.inf
         initial = before_initial if previous_last == first - 1 else level
         before_initial, previous_last = initial, last
-        found = _hole(toolpath, moves, path, words, control, controller, int(first), int(last), initial)
+        key = _key(toolpath.cycles[int(moves.cycle[path.move[first]])].kind, int(turning[moves.row[path.move[first]]]))
+        found = _hole(toolpath, moves, path, words, control, controller, int(first), int(last), initial, key)
         if found is not None:
             holes.append(found)
             native[first:last + 1] = True
@@ -179,7 +184,7 @@ def _rises_first(words: Floats, z: int, first: int, last: int) -> bool:
 
 
 def _hole(toolpath: Toolpath, moves: Moves, path: Path, words: Floats, control: Control, controller: ControllerFile,
-          first: int, last: int, initial: float) -> Hole | None:
+          first: int, last: int, initial: float, key: str) -> Hole | None:
     cycle = toolpath.cycles[int(moves.cycle[path.move[first]])]
     spec = controller.cycles.with_dwell if cycle.dwell > 0.0 else controller.cycles.table
     phases = moves.phase[path.move[first:last + 1]]
@@ -189,11 +194,11 @@ def _hole(toolpath: Toolpath, moves: Moves, path: Path, words: Floats, control: 
     start = first + int(np.flatnonzero(phases <= Phase.APPROACH)[-1]) if (phases <= Phase.APPROACH).any() else first - 1
     along = bool((words[start:last + 1][:, columns] == words[start, columns]).all())
     plane, out = float(words[start, z]), float(words[last, z])
-    if cycle.kind not in spec or not along or words[bottom, z] >= plane or len(set(cycle.steps)) > 1:
+    if key not in spec or not along or words[bottom, z] >= plane or len(set(cycle.steps)) > 1:
         return None
     if abs(out - plane) > 1e-9 and abs(out - initial) > 1e-9:
         return None
-    return Hole(first, last, int(moves.cycle[path.move[first]]), plane, float(words[bottom, z]), out, initial)
+    return Hole(first, last, int(moves.cycle[path.move[first]]), plane, float(words[bottom, z]), out, initial, key)
 
 
 def _slowed(feeds: Feeds, moves: Moves, path: Path, file: str) -> list[Diagnostic]:
@@ -206,17 +211,31 @@ def _slowed(feeds: Feeds, moves: Moves, path: Path, file: str) -> list[Diagnosti
                  count=len(rows))]
 
 
-def _lost_taps(toolpath: Toolpath, moves: Moves, holes: list[Hole], controller: ControllerFile) -> list[Diagnostic]:
-    bad = np.array([c.kind in controller.cycles.rigid_only for c in toolpath.cycles], dtype=bool)
+def _key(kind: str, turning: int) -> str:
+    """The controller's table tells taps that turn anti-clockwise from the others; a tap that stands has no entry."""
+    return kind if kind != "TAP" else {1: "TAP", -1: "TAP_LEFT"}.get(turning, "")
+
+
+def _not_native(toolpath: Toolpath, moves: Moves, path: Path, native: Bools, controller: ControllerFile) -> list[Diagnostic]:
+    """Cycles that single moves do not replace and that could not be written as canned cycles."""
+    only = np.array([c.kind not in SINGLE_MOVES or c.kind in controller.cycles.rigid_only for c in toolpath.cycles],
+                    dtype=bool)
     rows = np.flatnonzero((moves.phase == Phase.DRILL) & (moves.cycle >= 0))
-    tapped = int(bad[moves.cycle[rows]].sum()) if len(bad) else 0
-    written = sum(bad[h.cycle] for h in holes)
-    if tapped <= written:
-        return []
-    return [error("cycle.not_native", "a tapping cycle cannot be written as single moves, and this one not as a canned "
-                  "cycle", file=toolpath.file, lines=moves.line[rows[bad[moves.cycle[rows]]]][:6].tolist(),
-                  count=int(tapped - written), hint="the tool must stand along the machine's Z, the retract level must "
-                  "be the clearance plane or the level the tool comes from")]
+    rows = rows[only[moves.cycle[rows]]] if len(only) else rows[:0]
+    rows = rows[~native[np.minimum(path.begin[rows], len(native) - 1)]]
+    turning = spindle_states(toolpath)[0][moves.row[rows]]
+    keys = np.array([_key(toolpath.cycles[int(moves.cycle[m])].kind, int(t)) or "TAP without a turning spindle"
+                     for m, t in zip(rows, turning, strict=True)], dtype=str)
+    result = []
+    for key in np.unique(keys):
+        lines = moves.line[rows[keys == key]]
+        known = str(key) in controller.cycles.table or str(key) in controller.cycles.with_dwell
+        hint = "the tool must stand along the machine's Z, the retract level must be the clearance plane or the level the " \
+            "tool comes from, a dwell needs an entry in cycles.with_dwell" if known else \
+            f"the controller's cycles.table has no {key}; take another cycle in the CAM system"
+        result.append(error("cycle.not_native", f"a cycle {key} cannot be written as single moves, and this one not as a "
+                            "canned cycle", file=toolpath.file, lines=lines[:6].tolist(), count=len(lines), hint=hint))
+    return result
 
 
 def rounding_problem(bound: Rounding, tolerance: float, axis_tolerance: float) -> list[Diagnostic]:

@@ -6,6 +6,7 @@ kinematics: XYZ are the tip in the work offset, straight; rotary words linear).
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -27,11 +28,13 @@ class Control:
         machine: the machine
         tip_law: True where the control owns the kinematics
         origin (3,): origin of the work offset in the table frame, mm
+        arc_limit: largest radius that may stay an arc, mm; 0 for no arcs
     """
 
     machine: Machine
     tip_law: bool
     origin: Floats
+    arc_limit: float = math.inf
 
     @cached_property
     def rotary(self) -> Ints:

@@ -47,6 +47,23 @@ def tool_changes(toolpath: Toolpath) -> list[ToolChange]:
     return changes
 
 
+def register_changes(toolpath: Toolpath) -> list[ToolChange]:
+    """Records that name the loaded tool again with another length register."""
+    loaded: ToolChange | None = None
+    result: list[ToolChange] = []
+    for event in toolpath.events:
+        if event.word not in TOOL_WORDS or not numbers(event):
+            continue
+        number, *rest = (int(v) for v in numbers(event))
+        said = ToolChange(event.index, number, rest[0] if rest else None, event.line)
+        if loaded is None or loaded.number != number:
+            loaded = said
+        elif said.register is not None and said.register != (loaded.number if loaded.register is None else loaded.register):
+            loaded = said
+            result.append(said)
+    return result
+
+
 @dataclass(frozen=True)
 class Spindle:
     """State of the spindle: `rpm` NaN where none is known; direction -1 anti-clockwise, 0 off, 1 clockwise; `last` of
@@ -57,14 +74,29 @@ class Spindle:
     last: int = 1
 
 
+def speed_said(event: Event) -> float | None:
+    """rev/min of a SPINDL record: the number after RPM, else the only one that belongs to no other word."""
+    loose: list[float] = []
+    for before, value in zip(("", *event.values), event.values, strict=False):
+        if isinstance(value, (int, float)):
+            word = str(before).upper()
+            if word == "RPM":
+                return float(value)
+            if word not in _RANGES:
+                loose.append(float(value))
+    return loose[0] if len(loose) == 1 else None
+
+
+_RANGES = frozenset({"RANGE", "LOW", "MEDIUM", "HIGH"})
+
+
 def spindle_after(event: Event, before: Spindle) -> Spindle:
-    """The spindle after a SPINDL record; ON takes the last speed and direction up again."""
-    said = words(event)
-    speed = numbers(event)
-    if "OFF" in said:
+    """The spindle after a SPINDL record; ON takes the last speed and direction up again, NEUTRL stops it."""
+    said, speed = words(event), speed_said(event)
+    if {"OFF", "NEUTRL", "NEUTRAL"} & set(said):
         return Spindle(before.rpm, 0, before.last)
     direction = -1 if "CCLW" in said else 1 if "CLW" in said else before.last
-    return Spindle(speed[0] if speed else before.rpm, direction, direction)
+    return Spindle(before.rpm if speed is None else speed, direction, direction)
 
 
 def spindle_states(toolpath: Toolpath) -> tuple[Ints, Floats]:
@@ -95,18 +127,22 @@ def loaded_tools(toolpath: Toolpath) -> Ints:
     return np.array([-1, *(c.number for c in changes)])[_state_at([0, *(c.index for c in changes)], len(toolpath))]
 
 
+def compensation_side(event: Event) -> str:
+    """LEFT, RIGHT or OFF of a CUTCOM record, "" where it says none of them."""
+    return next((w for w in words(event) if w in _SIDES), "")
+
+
 def compensation_states(toolpath: Toolpath) -> Ints:
-    """(N,) 40, 41 or 42 as CUTCOM says at every row."""
+    """(N,) 40, 41 or 42 as CUTCOM says at every row; holes and tool changes need it off."""
     states, starts = [40], [0]
     for event in toolpath.events:
         if event.word == "CUTCOM":
-            side = next((w for w in words(event) if w in _SIDES), "")
-            states.append(_SIDES.get(side, states[-1]))
+            states.append(_SIDES.get(compensation_side(event), states[-1]))
             starts.append(event.index)
         elif event.word in TOOL_WORDS:
-            states.append(40 if states[-1] != 40 else states[-1])
+            states.append(40)
             starts.append(event.index)
-    return np.array(states)[_state_at(starts, len(toolpath))]
+    return np.where(toolpath.cycle >= 0, 40, np.array(states)[_state_at(starts, len(toolpath))])
 
 
 _SIDES = {"LEFT": 41, "RIGHT": 42, "OFF": 40}

@@ -54,12 +54,24 @@ def plan_feeds(path: Path, control: Control, words: Floats, asked: Floats, passe
         rate = np.nan_to_num(inverse * length)
     words_are_tip = control.tip_law or control.machine.kinematics.slides_affine
     same = cutting & ~slowed & np.isfinite(asked) & (turned == 0.0) & words_are_tip
+    if control.tip_law:
+        near = np.abs(length - wanted * asked) <= _ROUNDING * length
+        same |= cutting & near & (needed <= (1.0 - _ROUNDING) * wanted) & _moves_tip(words - before, control)
     per_minute = np.where(same, 60.0 * asked, per_minute)
     mode = np.where(native, PER_MINUTE, _modes(path, control, turned, cutting, passes, feed_mode))
     if least_rate > 0.0:
         mode = np.where((mode == INVERSE) & (length > 0.0) & (rate < least_rate), PER_MINUTE, mode)
     feed = np.where(cutting, np.where(mode == INVERSE, inverse, per_minute), np.nan)
     return Feeds(feed, mode.astype(np.int8), np.where(cutting, seconds, np.nan), slowed)
+
+
+_ROUNDING = 0.005
+"""share of a block's length that the rounding of its words may change, as far as the feed word is concerned"""
+
+
+def _moves_tip(step: Floats, control: Control) -> Bools:
+    """(K,) blocks whose feed per minute is that of X, Y, Z, the tip."""
+    return np.asarray((step[:, control.xyz] != 0.0).any(axis=1))
 
 
 def _modes(path: Path, control: Control, turned: Floats, cutting: Bools, passes: Ints, feed_mode: str) -> Array:

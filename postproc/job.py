@@ -11,10 +11,11 @@ from machines.kinematics.base import Kinematics
 from machines.machine import Machine
 from postproc.control import Control
 from postproc.controllers.model import ControllerFile
-from postproc.events import tool_changes
+from postproc.events import register_changes, tool_changes
 from postproc.links import SafeSpace, safe_space
 from postproc.moves import Moves, build_moves
 from postproc.options import Options
+from postproc.records import plain_records
 from postproc.setup import Placement, SetupFile, part_placement, work_frame
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic, error, has_errors, warning
@@ -69,7 +70,7 @@ class Job:
     def register_lengths(self) -> dict[int, float]:
         """Tool length by length register."""
         result = {}
-        for change in tool_changes(self.toolpath):
+        for change in (*tool_changes(self.toolpath), *register_changes(self.toolpath)):
             register = change.register if change.register is not None else change.number
             result[register] = self.length_of(change.number)
         return result
@@ -83,8 +84,9 @@ class Job:
 
 def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, setup: SetupFile,
             options: Options) -> tuple[Job | None, list[Diagnostic]]:
-    """The job, or None and why there is none."""
-    diagnostics = _refused(toolpath)
+    """The job (its path has plain records, see `plain_records`), or None and why there is none."""
+    toolpath, diagnostics = plain_records(toolpath, controller)
+    diagnostics += [*_refused(toolpath), *_no_inverse_time(controller, options)]
     placement, found = part_placement(setup, options.setup)
     diagnostics += found
     frame, found = work_frame(setup, toolpath)
@@ -97,7 +99,7 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
     moves = moves.placed(placement)
     tip_law = machine.control_kinematics is not None and controller.kinematics.modules
     origin = placement.points(np.array([frame.origin]))[0]
-    control = Control(machine, tip_law, origin)
+    control = Control(machine, tip_law, origin, controller.arcs.largest_radius if controller.arcs.enabled else 0.0)
     job = Job(toolpath, machine, controller, setup, options, placement, control, moves, safe_space(moves, setup, placement))
     return job, diagnostics + _tool_lengths(job)
 
@@ -113,6 +115,12 @@ def _refused(toolpath: Toolpath) -> list[Diagnostic]:
         result.append(error("convert.no_motion", "the file commands no motion", file=toolpath.file,
                             hint="it needs GOTO records"))
     return result
+
+
+def _no_inverse_time(controller: ControllerFile, options: Options) -> list[Diagnostic]:
+    if controller.feed.inverse_time or options.feed_mode != "inverse-time":
+        return []
+    return [error("feed.no_inverse_time", "the controller has no inverse-time feed", hint="--feed-mode auto or per-minute")]
 
 
 def _tool_lengths(job: Job) -> list[Diagnostic]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -185,6 +185,7 @@ def _add_run(out: _Builder, control: Control, kin: Kinematics, moves: Moves, row
     start = q0.copy()
     start[where] = begun
     arcs = word_arcs(control, kin, curves, start, q1)
+    arcs = replace(arcs, keep=arcs.keep & (np.linalg.norm(curves.start - curves.center, axis=1) <= control.arc_limit))
     main = linearise(control, kin, curves, start, q1, arcs.keep, tolerance, axis_tolerance)
     spot = _on_the_spot(curves, where)
     turning = linearise(control, kin, spot, q0[where], begun, np.zeros(len(where), dtype=bool), tolerance,

@@ -8,6 +8,7 @@ from pathlib import Path as FilePath
 
 import numpy as np
 
+import machines
 import toolpaths
 from machines.machine import Machine
 from postproc.compile import compile_program, decimals, rounding_bound, rounding_problem
@@ -59,28 +60,40 @@ class PostResult:
         return not has_errors(self.diagnostics)
 
 
-def convert(path: Toolpath, machine: Machine, controller: str | FilePath = "linuxcnc", setup: SetupFile | None = None,
-            options: Options | None = None, diagnostics: list[Diagnostic] | None = None,
-            progress: Progress | None = None) -> PostResult:
+def convert(path: Toolpath, machine: Machine | str | FilePath, controller: str | FilePath = "linuxcnc",
+            setup: SetupFile | str | FilePath | None = None, options: Options | None = None,
+            diagnostics: list[Diagnostic] | None = None, progress: Progress | None = None) -> PostResult:
     """A Toolpath as G-code for a machine and a controller, read back and compared with the path.
 
     Args:
+        machine: one that is loaded, or a built-in name or path of a machine file
         controller: built-in name or path of a controller file
-        setup: default: the file that the options name, else the default set-up
-        diagnostics: what reading the path found; an ERROR among them stops the conversion
+        setup: one that is loaded, or its path; default: the file that the options name, else the default set-up
+        diagnostics: what reading the path found; an ERROR among them, or among the path's own faults, stops the
+            conversion
 
     Raises:
-        DiagnosticError: where the controller or the set-up cannot be loaded.
+        DiagnosticError: where machine, controller or set-up cannot be loaded.
     """
     options = options or Options()
     spec, found = load_controller(controller)
     toolpaths.diagnostics.require(found)
-    if setup is None:
+    machine = machine if isinstance(machine, Machine) else machines.load(machine)
+    if not isinstance(setup, SetupFile):
+        if setup is not None:
+            options = replace(options, setup=str(setup))
         setup, more = load_setup(options.setup or None)
         toolpaths.diagnostics.require(more)
     assert spec is not None and setup is not None
-    start = PostResult("", options, machine, spec, FilePath(controller).stem, setup, tuple(diagnostics or ()), path)
+    known = _reading(path, diagnostics)
+    start = PostResult("", options, machine, spec, FilePath(controller).stem, setup, known, path)
     return start if not start.ok else _stages(start, progress)
+
+
+def _reading(path: Toolpath, diagnostics: list[Diagnostic] | None) -> tuple[Diagnostic, ...]:
+    """What reading found, with the faults that the path itself carries."""
+    found = tuple(diagnostics or ())
+    return (*found, *(d for d in path.faults if d not in found))
 
 
 def _stages(result: PostResult, progress: Progress | None) -> PostResult:
@@ -92,6 +105,8 @@ def _stages(result: PostResult, progress: Progress | None) -> PostResult:
     result = _with(result, found, job=job)
     if job is None or not result.ok:
         return result
+    toolpath = job.toolpath
+    result = _with(result, [], toolpath=toolpath)
     shares, found = tolerance_shares(job)
     result = _with(result, found, shares=shares)
     if not result.ok:
@@ -111,6 +126,9 @@ def _stages(result: PostResult, progress: Progress | None) -> PostResult:
     if not result.ok:
         return result
     text = write_text(result)
+    result = _with(result, long_blocks(text, result.controller.format.line_length, file))
+    if not result.ok:
+        return result
     comparison, found = read_back(text.encode(), job, file, progress)
     result = _with(result, found, comparison=comparison)
     return replace(result, text=text) if result.ok else result
@@ -149,6 +167,16 @@ def write_text(result: PostResult) -> str:
     return "\n".join(writer.lines(header)) + "\n"
 
 
+def long_blocks(text: str, most: int, file: str) -> list[Diagnostic]:
+    """Blocks with more characters than the controller reads."""
+    long = [(n, line) for n, line in enumerate(text.splitlines(), 1) if len(line) > most]
+    if not long:
+        return []
+    number, line = long[0]
+    return [error("write.line_length", f"block {number} of the program has {len(line)} characters, the controller reads "
+                  f"{most}: {line[:60]}", file=file, count=len(long), hint="format.line_length of the controller file")]
+
+
 def points_in(toolpath: Toolpath) -> int:
     """Commanded positions, without FROM and GOHOME."""
     return int(np.isin(toolpath.role, (0, 1)).sum())
@@ -168,17 +196,18 @@ class VerifyResult:
         return self.comparison is not None and not has_errors(self.diagnostics)
 
 
-def verify(gcode: str | FilePath, path: Toolpath, machine: Machine, controller: str | FilePath = "linuxcnc",
-           options: Options | None = None, diagnostics: list[Diagnostic] | None = None,
-           progress: Progress | None = None) -> VerifyResult:
+def verify(gcode: str | FilePath, path: Toolpath, machine: Machine | str | FilePath,
+           controller: str | FilePath = "linuxcnc", options: Options | None = None,
+           diagnostics: list[Diagnostic] | None = None, progress: Progress | None = None) -> VerifyResult:
     """A G-code file against a Toolpath on a machine.
 
     Raises:
-        DiagnosticError: where the controller or the set-up cannot be loaded, or the G-code file not be opened.
+        DiagnosticError: where machine, controller or set-up cannot be loaded, or the G-code file not be opened.
     """
-    options, found = options or Options(), list(diagnostics or ())
+    options, found = options or Options(), list(_reading(path, diagnostics))
     spec, more = load_controller(controller)
     toolpaths.diagnostics.require(more)
+    machine = machine if isinstance(machine, Machine) else machines.load(machine)
     setup, more = load_setup(options.setup or None)
     toolpaths.diagnostics.require(more)
     assert spec is not None and setup is not None

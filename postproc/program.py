@@ -32,6 +32,8 @@ class Hole:
     bottom: float
     retract: float
     initial: float
+    key: str
+    """of the controller's tables"""
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from enum import IntEnum
 import numpy as np
 
 from toolpaths.arrays import Array, Floats, frozen
+from toolpaths.diagnostics import Diagnostic
 
 
 class Kind(IntEnum):
@@ -212,6 +213,8 @@ class Toolpath:
     name: str = ""
     """PARTNO"""
     file: str = ""
+    faults: tuple[Diagnostic, ...] = ()
+    """errors that reading met: what they stand for is missing, so that nothing may be written from the path"""
 
     def __post_init__(self) -> None:
         n = len(self.tip)
@@ -231,9 +234,9 @@ class Toolpath:
         return len(self.tip)
 
     def equals(self, other: Toolpath) -> bool:
-        """True where every value is the same bit for bit, apart from source lines and the file's name."""
+        """True where every value is the same bit for bit, apart from source lines, faults and the file's name."""
         for f in fields(self):
-            if f.name in ("line", "file"):
+            if f.name in ("line", "file", "faults"):
                 continue
             if not _same(getattr(self, f.name), getattr(other, f.name)):
                 return False

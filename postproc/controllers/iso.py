@@ -232,7 +232,7 @@ class IsoWriter:
         """A canned cycle: in full where anything but the place of the hole changes, else the place alone."""
         p, cycles = self.program, self.controller.cycles
         cycle = self.cycles[hole.cycle]
-        spec = (cycles.with_dwell if cycle.dwell > 0.0 else cycles.table)[cycle.kind]
+        spec = (cycles.with_dwell if cycle.dwell > 0.0 else cycles.table)[hole.key]
         at = self._place(hole)
         if self.mode == INVERSE:
             yield self.controller.codes.per_minute

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from pathlib import Path
 
@@ -15,7 +15,7 @@ from toolpaths.cl.log import Log
 from toolpaths.cl.scan import LARGEST, LARGEST_OWN, Progress, scan
 from toolpaths.cl.source import normalise
 from toolpaths.cl.statements import Lexer, Program
-from toolpaths.diagnostics import Diagnostic, error
+from toolpaths.diagnostics import Diagnostic, Severity, error
 from toolpaths.toolpath import Toolpath
 
 _OWN_HEAD = b"$$-> TOOLPATH /"
@@ -45,7 +45,8 @@ def read_file(path: str | Path, *, units: str | None = None, dialect: str | None
         data = Path(path).read_bytes()
     except (OSError, ValueError) as fault:
         reason = getattr(fault, "strerror", None) or str(fault)
-        return ReadResult(_empty(str(path)), [error("cl.open", f"cannot be read: {reason}", file=str(path))])
+        diagnostics = [error("cl.open", f"cannot be read: {reason}", file=str(path))]
+        return ReadResult(_with_faults(_empty(str(path)), diagnostics), diagnostics)
     return read_bytes(data, file=str(path), units=units, dialect=dialect, allow_unknown=allow_unknown,
                       progress=progress)
 
@@ -79,8 +80,9 @@ def read_bytes(data: bytes | str, *, file: str = "", units: str | None = None, d
     if b.row == 0:
         log.error("cl.empty", "the file holds no point", hint="a CL file has GOTO records")
     toolpath = assemble(b)
-    return ReadResult(toolpath, log.diagnostics(), counts, found.name, evidence, b.arc_records, b.cycle_records,
-                      parts.lines)
+    diagnostics = log.diagnostics()
+    return ReadResult(_with_faults(toolpath, diagnostics), diagnostics, counts, found.name, evidence,
+                      b.arc_records, b.cycle_records, parts.lines)
 
 
 def _check_options(units: str | None, dialect: str | None) -> None:
@@ -118,6 +120,10 @@ def _units_of_feeds(feeds: dict[str, int], log: Log) -> str:
         return unit
     log.warning("cl.no-units", "the file has no UNITS record; mm is taken", hint="give the units with --units")
     return "mm"
+
+
+def _with_faults(toolpath: Toolpath, diagnostics: list[Diagnostic]) -> Toolpath:
+    return replace(toolpath, faults=tuple(d for d in diagnostics if d.severity is Severity.ERROR))
 
 
 def _empty(file: str) -> Toolpath:

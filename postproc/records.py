@@ -1,0 +1,245 @@
+"""Records without motion before anything is planned: refused where they cannot be carried out, put into plain words.
+
+INSERT and AUXFUN that switch spindle or coolant become SPINDL and COOLNT, so that one place knows the states.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from postproc.controllers.model import ControllerFile
+from postproc.events import Spindle, numbers, speed_said, spindle_after, spindle_states, words
+from toolpaths.diagnostics import Diagnostic, Severity
+from toolpaths.toolpath import Event, Kind, Tool, Toolpath
+from toolpaths.units import PER_MINUTE
+
+Report = Callable[[Severity, str, str, int, str], None]
+_SPINDLE = frozenset({"RPM", "CLW", "CCLW", "ON", "OFF", "SFM", "SMM", "NEUTRL", "NEUTRAL"})
+_RANGES = frozenset({"RANGE", "LOW", "MEDIUM", "HIGH"})
+_COOLANT = frozenset({"ON", "OFF", "FLOOD", "MIST", "THRU"})
+_SIDES = frozenset({"LEFT", "RIGHT", "OFF"})
+_PLAIN_CUTCOM = frozenset({*_SIDES, "XYPLAN", "DIAMET", "RADIUS", "TOOL", "OSETNO", "LENGTH", "ADJUST"})
+_BLOCK = re.compile(r"(?:[A-Z]\s*[-+]?(?:\d+\.?\d*|\.\d+)\s*)+")
+_WORD = re.compile(r"([A-Z])\s*([-+]?(?:\d+\.?\d*|\.\d+))")
+_SWITCHES: dict[tuple[str, float], tuple[str, tuple[str, ...]]] = {
+    ("M", 5): ("SPINDL", ("OFF",)), ("M", 7): ("COOLNT", ("MIST",)), ("M", 8): ("COOLNT", ("FLOOD",)),
+    ("M", 9): ("COOLNT", ("OFF",)), ("M", 0): ("STOP", ()), ("M", 1): ("OPSTOP", ())}
+_OWN: dict[str, str] = {"G": "motion, planes, offsets and modes", "F": "feeds (FEDRAT)", "H": "length offsets (LOADTL)",
+                        "T": "tools (LOADTL)", "M2": "the end", "M30": "the end", "M6": "tool changes (LOADTL)"}
+
+
+class _Found:
+    """Diagnostics of equal text as one."""
+
+    def __init__(self, file: str) -> None:
+        self.file = file
+        self.lines: dict[tuple[Severity, str, str, str], list[int]] = {}
+
+    def add(self, severity: Severity, code: str, message: str, line: int, hint: str = "") -> None:
+        self.lines.setdefault((severity, code, message, hint), []).append(line)
+
+    def diagnostics(self) -> list[Diagnostic]:
+        return [Diagnostic(s, code, text, self.file, tuple(n for n in lines if n)[:6], len(lines), hint)
+                for (s, code, text, hint), lines in self.lines.items()]
+
+
+def plain_records(toolpath: Toolpath, controller: ControllerFile) -> tuple[Toolpath, list[Diagnostic]]:
+    """The path with its records in plain words and its dwells in seconds, and what cannot be carried out."""
+    found = _Found(toolpath.file)
+    events: list[Event] = []
+    spindle = Spindle()
+    for event in toolpath.events:
+        for plain in _plain(event, spindle, controller, found.add):
+            if plain.word == "SPINDL":
+                _check_spindle(plain, found.add)
+                spindle = spindle_after(plain, spindle)
+            elif plain.word == "DELAY":
+                _check_delay(plain, spindle, found.add)
+            elif plain.word == "COOLNT":
+                _check_coolant(plain, controller, found.add)
+            elif plain.word == "CUTCOM":
+                _check_compensation(plain, found.add)
+            events.append(plain)
+    _check_tools(toolpath, found.add)
+    plain_path = _dwells_in_seconds(replace(toolpath, events=tuple(events)), found.add)
+    return plain_path, found.diagnostics()
+
+
+def _plain(event: Event, spindle: Spindle, controller: ControllerFile, report: Report) -> list[Event]:
+    """INSERT, AUXFUN and PREFUN as the records that they stand for; others as they are."""
+    if event.word == "INSERT":
+        text = " ".join(str(v) for v in event.values).strip()
+    elif event.word in ("AUXFUN", "PREFUN") and numbers(event):
+        text = f"{'G' if event.word == 'PREFUN' else 'M'}{numbers(event)[0]:g}"
+    else:
+        return [event]
+    bare = re.sub(r"\([^()]*\)|;.*", "", text).strip().upper()
+    if not bare:
+        return [Event(event.index, "PPRINT", (text.strip("(); "),), event.line)] if text else []
+    if not _BLOCK.fullmatch(bare):
+        report(Severity.ERROR, "insert.refused", f"{event.word}/{text[:60]} is no block of G-code", event.line,
+               "write text for people with PPRINT")
+        return []
+    said = [(letter, float(value)) for letter, value in _WORD.findall(bare)]
+    codes = {f"{letter}{value:g}" for letter, value in said}
+    if codes & set(controller.program.passive):
+        return [Event(event.index, "INSERT", (bare,), event.line)]
+    result = _switches(event, said, spindle)
+    if result is None:
+        wrong = next(c for c in (f"{letter}{value:g}" for letter, value in said) if not _is_switch(c))
+        own = _OWN.get(wrong) or _OWN.get(wrong[0])
+        hint = f"the post writes {own} itself" if own else "where the code moves nothing, name it in the controller's " \
+            "program.passive"
+        report(Severity.ERROR, "insert.refused", f"{event.word}/{text[:60]}: {wrong} cannot be put in", event.line, hint)
+        return []
+    if not result:
+        report(Severity.ERROR, "insert.refused", f"{event.word}/{text[:60]}: a speed while the spindle stands", event.line,
+               "state SPINDL/RPM,n,CLW in the CAM system")
+    return result
+
+
+def _is_switch(code: str) -> bool:
+    return code[0] == "S" or code in ("M0", "M1", "M3", "M4", "M5", "M7", "M8", "M9")
+
+
+def _switches(event: Event, said: list[tuple[str, float]], spindle: Spindle) -> list[Event] | None:
+    """Records for the words of a block that only switches; None where it does more, none for S alone at a standstill."""
+    if not all(_is_switch(f"{letter}{value:g}") for letter, value in said):
+        return None
+    speed = [("RPM", value) for letter, value in said if letter == "S"]
+    result = []
+    turning = False
+    for letter, value in said:
+        if letter == "M" and value in (3, 4):
+            turning = True
+            result.append(Event(event.index, "SPINDL", (*(speed[0] if speed else ()), "CLW" if value == 3 else "CCLW"),
+                                event.line))
+        elif letter == "M":
+            word, values = _SWITCHES[letter, value]
+            result.append(Event(event.index, word, values, event.line))
+    if speed and not turning and spindle.direction:
+        side = "CLW" if spindle.direction > 0 else "CCLW"
+        result.insert(0, Event(event.index, "SPINDL", (*speed[0], side), event.line))
+    elif speed and not turning:
+        return []
+    return result
+
+
+def _check_spindle(event: Event, report: Report) -> None:
+    said = set(words(event))
+    for word in words(event):
+        if word in _RANGES:
+            report(Severity.WARNING, "spindle.range", f"SPINDL: {word} is not carried out", event.line, "")
+        elif word not in _SPINDLE:
+            report(Severity.ERROR, "spindle.word", f"SPINDL: {word} cannot be carried out", event.line,
+                   "allowed: SPINDL/RPM,n,CLW or CCLW, ON, OFF")
+    if {"NEUTRL", "NEUTRAL"} & said:
+        report(Severity.WARNING, "spindle.neutral", "SPINDL/NEUTRL is written as a stop of the spindle", event.line, "")
+    speed = speed_said(event)
+    if {"SFM", "SMM"} & said:
+        report(Severity.ERROR, "spindle.surface_speed", "the spindle speed is given as a cutting speed", event.line,
+               "state rev/min (SPINDL/RPM,n,CLW) in the CAM system")
+    elif speed is None and numbers(event) and "OFF" not in said and said <= _SPINDLE | _RANGES and (
+            not said & _RANGES or "RPM" in said):
+        report(Severity.ERROR, "spindle.speed", "SPINDL: which of the numbers is the speed?", event.line,
+               "write SPINDL/RPM,n,CLW")
+    elif speed is not None and speed <= 0.0 and "OFF" not in said:
+        report(Severity.ERROR, "spindle.speed", f"SPINDL: the speed is {speed:g} rev/min", event.line,
+               "a speed above 0, or SPINDL/OFF")
+
+
+def _check_delay(event: Event, spindle: Spindle, report: Report) -> None:
+    value = next(iter(numbers(event)), 0.0)
+    if value < 0.0 or not math.isfinite(value):
+        report(Severity.ERROR, "delay.value", f"DELAY: the time is {value:g}", event.line, "seconds, 0 or more")
+    elif "REV" in words(event) and not (spindle.direction and spindle.rpm > 0.0):
+        report(Severity.ERROR, "delay.revolutions", "DELAY in revolutions while the spindle stands or its speed is unknown",
+               event.line, "state seconds, or the speed before it (SPINDL/RPM,n,CLW)")
+
+
+def _check_coolant(event: Event, controller: ControllerFile, report: Report) -> None:
+    said = words(event)
+    if "OFF" in said:
+        return
+    if "THRU" in said and not controller.codes.through:
+        report(Severity.WARNING, "coolant.through", "COOLNT/THRU: the controller has no code for it, flood is written",
+               event.line, "set codes.through in the controller file")
+    for word in said:
+        if word not in _COOLANT:
+            written = "mist" if word == "AIR" else "flood"
+            report(Severity.WARNING, "coolant.word", f"COOLNT/{word} is written as {written}", event.line, "")
+
+
+def _check_compensation(event: Event, report: Report) -> None:
+    said = words(event)
+    side = next((w for w in said if w in _SIDES), "")
+    planes = [w for w in said if w in ("ZXPLAN", "YZPLAN")]
+    if planes and side != "OFF":
+        report(Severity.ERROR, "cutcom.plane", f"CUTCOM in {planes[0]} cannot be written", event.line,
+               "XYPLAN only; else let the CAM system compensate")
+        return
+    for word in said:
+        if word not in _PLAIN_CUTCOM and word not in planes:
+            report(Severity.WARNING, "cutcom.word", f"CUTCOM/{word} is not carried out", event.line, "")
+
+
+def _check_tools(toolpath: Toolpath, report: Report) -> None:
+    """Different tools under one number that both cut."""
+    cutting = toolpath.tool[(toolpath.kind != Kind.RAPID) | (toolpath.cycle >= 0)]
+    lines = toolpath.line[(toolpath.kind != Kind.RAPID) | (toolpath.cycle >= 0)]
+    used, first = np.unique(cutting, return_index=True)
+    known: dict[int, list[tuple[Tool, int]]] = {}
+    for index, at in sorted(zip(used.tolist(), first.tolist(), strict=True), key=lambda pair: pair[1]):
+        if index < 0:
+            continue
+        tool, line = toolpath.tools[index], int(lines[at])
+        others = known.setdefault(tool.number, [])
+        other = next((o for o in others if _differ(o[0], tool)), None)
+        if other:
+            hint = f"cutting begins at lines {other[1]} and {line}; number the tools in the CAM system"
+            report(Severity.ERROR, "tool.same_number", f"different tools have the number {tool.number}: "
+                   f"{_called(other[0])} and {_called(tool)}", other[1], hint)
+        others.append((tool, line))
+
+
+def _differ(a: Tool, b: Tool) -> bool:
+    """True where a text or size that both state is not the same."""
+    names = a.name and b.name and a.name != b.name
+    shapes = a.shape and b.shape and a.shape != b.shape
+    sizes = any(x is not None and y is not None and abs(x - y) > 1e-6 for x, y in (
+        (a.diameter, b.diameter), (a.corner_radius, b.corner_radius), (a.tip_angle, b.tip_angle), (a.taper, b.taper)))
+    return bool(names or shapes or sizes)
+
+
+def _called(tool: Tool) -> str:
+    size = "" if tool.diameter is None else f" diameter {tool.diameter:g}"
+    return f"{tool.name or tool.shape or 'a tool'}{size}"
+
+
+def _dwells_in_seconds(toolpath: Toolpath, report: Report) -> Toolpath:
+    """The path with dwells of cycles in seconds at the spindle speed of each hole."""
+    index = np.flatnonzero([c.dwell_revolutions > 0.0 for c in toolpath.cycles])
+    rows = np.flatnonzero(np.isin(toolpath.cycle, index)) if len(index) else index
+    if not len(rows):
+        return toolpath
+    direction, rpm = (a[rows] for a in spindle_states(toolpath))
+    cycle, cycles = toolpath.cycle.copy(), list(toolpath.cycles)
+    made: dict[tuple[int, float], int] = {}
+    for row, turning, speed in zip(rows.tolist(), direction.tolist(), rpm.tolist(), strict=True):
+        before = cycles[int(toolpath.cycle[row])]
+        if not turning or not speed > 0.0:
+            report(Severity.ERROR, "cycle.dwell", f"CYCLE/{before.kind} dwells in revolutions while the spindle "
+                   "stands or its speed is unknown", before.line or int(toolpath.line[row]),
+                   "state SPINDL/RPM,n,CLW before it")
+            continue
+        key = int(toolpath.cycle[row]), speed
+        if key not in made:
+            made[key] = len(cycles)
+            cycles.append(replace(before, dwell=before.dwell_revolutions / (speed * PER_MINUTE), dwell_revolutions=0.0))
+        cycle[row] = made[key]
+    return replace(toolpath, cycle=cycle, cycles=tuple(cycles))
