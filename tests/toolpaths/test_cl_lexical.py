@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import random
+
+import numpy as np
 import pytest
 
+from toolpaths.cl import scan
 from toolpaths.cl.log import Log
 from toolpaths.cl.read import ReadResult, read_bytes
-from toolpaths.cl.scan import scan as scanned
 from toolpaths.cl.source import normalise
 from toolpaths.cl.statements import statement_of, words_of
 from toolpaths.diagnostics import Severity, has_errors
@@ -165,6 +168,41 @@ def test_continued_points_are_read_at_once_or_one_by_one_with_the_same_result(sp
 
 
 def test_continued_points_go_the_fast_way() -> None:
-    scan = scanned(b"GOTO / 1, 2, 3, $\n 0, 0, 1\nRAPID\nGOTO/1,2,3,$\n0,0,1\nGOTO/4,5,6")
-    assert scan.points.line.tolist() == [1, 4, 6]
-    assert (scan.line, scan.before, scan.lines) == ([3], [1], 6)
+    found = scan.scan(b"GOTO / 1, 2, 3, $\n 0, 0, 1\nRAPID\nGOTO/1,2,3,$\n0,0,1\nGOTO/4,5,6")
+    assert found.points.line.tolist() == [1, 4, 6]
+    assert (found.line, found.before, found.lines) == ([3], [1], 6)
+
+
+@pytest.mark.parametrize("line", ["GOTO/ ,1,2", "GOTO/,1,2", "GOTO / , 1, 2", "GOTO/1, ,2", "GOTO/ , $\n 1,2"])
+def test_a_missing_first_number_is_no_number(line: str) -> None:
+    result = read(f"{HEAD}{line}\nGOTO/4,5,6\n")
+    assert [d.code for d in result.diagnostics] == ["cl.number"]
+    assert result.toolpath.tip.tolist() == [[4, 5, 6]]
+
+
+def test_text_never_ends_in_a_continuation_mark() -> None:
+    events = clean(HEAD + "PPRINT/now  $$ \nPPRINT 5$\nGOTO/1,2,3").toolpath.events
+    assert [e.values for e in events] == [("now",), ("5",)]
+
+
+def test_joining_at_once_changes_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Random spellings of continued lines, in blocks of any size, with the joining and without it."""
+    rng = random.Random(5)
+    breaks = ["$\n", " $ \n", "$ \n ", "$$ c\n", "$ x\n", "\n", "$\n\n", "$\n$$ c\n", "", "", "", "", "", "", ""]
+    heads = ["GOTO/", "GOTO / ", "goto/", "GOTO/", "GOTO", "GOXO/", "$$-> CSYS /", "CIRCLE/", "PPRINT ", "GODLTA/"]
+    numbers = ["1", "2.5", "-3", "0", "1.", "0,0,1", "1 2", ""]
+    for _ in range(500):
+        text = HEAD
+        for _ in range(rng.randint(1, 8)):
+            fields = [rng.choice(numbers) + rng.choice(breaks) for _ in range(rng.randint(1, 7))]
+            text += rng.choice(heads) + ",".join(fields) + rng.choice(["\n", ",\n", "$\n", "\n1,2,3\n", "\nRAPID\n"])
+        results = []
+        for size, joined in ((1 << 22, scan._joined), (40, scan._joined), (60, lambda c: (c, np.zeros(0, np.int64)))):
+            with monkeypatch.context() as patch:
+                patch.setattr(scan, "CHUNK", size)
+                patch.setattr(scan, "_joined", joined)
+                results.append(read(text))
+        for other in results[1:]:
+            assert other.toolpath.equals(results[0].toolpath), text
+            assert other.toolpath.line.tolist() == results[0].toolpath.line.tolist(), text
+            assert [(d.code, d.lines) for d in other.diagnostics] == [(d.code, d.lines) for d in results[0].diagnostics]

@@ -201,7 +201,8 @@ def _parse(c: Bytes, starts: Ints, ends: Ints, rows: Ints) -> Floats | None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         try:
-            return np.fromstring(text[:-1].tobytes(), sep=" , ")
+            # without its blanks, a missing first number is a fault; with them numpy reads it as -1
+            return np.fromstring(text[:-1].tobytes().lstrip(), sep=" , ")
         except (DeprecationWarning, ValueError):
             return None
 

@@ -229,7 +229,7 @@ def _cut(text: str, comment: bool, text_word: bool) -> tuple[str, str]:
     if comment:
         return (text.rstrip()[:-1], "certain") if text.rstrip().endswith("$") else (text, "")
     if text_word:
-        return (text.rstrip()[:-1], "maybe") if text.rstrip().endswith("$") else (text, "")
+        return (text.rstrip().rstrip("$ "), "maybe") if text.rstrip().endswith("$") else (text, "")
     at = text.find("$")
     if at < 0:
         return text, ""
