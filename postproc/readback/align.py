@@ -16,7 +16,7 @@ _compiled: list[Callable[..., Any]] = []
 
 
 def align(tip: Floats, axis: Floats, sweep: Floats, curves: Curves, link: Bools, tolerance: float,
-          axis_tolerance: float) -> tuple[Ints, Ints]:
+          axis_tolerance: float, grain: tuple[float, float] = (1e-3, 1e-6)) -> tuple[Ints, Ints]:
     """Walk blocks along the reference.
 
     A move is done by the first block that has come to its end: past the end on a line, the whole sweep on an arc,
@@ -27,6 +27,7 @@ def align(tip: Floats, axis: Floats, sweep: Floats, curves: Curves, link: Bools,
         sweep (E,): rad, of blocks that are arcs, NaN for others
         curves, link (M): the reference motion of each move; linked ones only have to arrive
         tolerance, axis_tolerance: mm, rad: how near to its end a move counts as done
+        grain: mm, rad: moves below this may have vanished in the rounding of the words
 
     Returns:
         (match (M,), owner (E,)): the block that ends each move (-1: never reached), and the move that each block
@@ -35,7 +36,7 @@ def align(tip: Floats, axis: Floats, sweep: Floats, curves: Curves, link: Bools,
     kind = np.where(link, 2, np.where(curves.is_arc, 1, 0)).astype(np.int8)
     walk = _walk if len(tip) < _COMPILE_FROM else _fast()
     match, owner = walk(tip, axis, sweep, curves.start, curves.end, curves.axis0, curves.axis1, kind, curves.center,
-                        curves.normal, curves.sweep, tolerance, axis_tolerance)
+                        curves.normal, curves.sweep, tolerance, axis_tolerance, *grain)
     return match, owner
 
 
@@ -90,14 +91,15 @@ def _line_done(tip: Any, axis: Any, start: Any, end: Any, axis0: Any, axis1: Any
 
 
 def _walk(tip: Any, axis: Any, swept: Any, start: Any, end: Any, axis0: Any, axis1: Any, kind: Any, center: Any,
-          normal: Any, sweep: Any, tol: float, axis_tol: float) -> tuple[Any, Any]:
+          normal: Any, sweep: Any, tol: float, axis_tol: float, grain: float, axis_grain: float) -> tuple[Any, Any]:
     count, moves = len(tip), len(end)
     match = np.full(moves, -1, np.int64)
     owner = np.full(count, moves, np.int64)
     j = -1
     for i in range(moves):
-        still = kind[i] == 0 and _apart(start[i], end[i]) < 1e-3 and _angle(axis0[i], axis1[i]) < 1e-6 and j >= 0
-        if still and (j + 1 >= count or _apart(tip[j + 1], end[i]) > 1e-3 or _angle(axis[j + 1], axis1[i]) > 1e-5):
+        still = kind[i] == 0 and _apart(start[i], end[i]) < grain and _angle(axis0[i], axis1[i]) < axis_grain and j >= 0
+        if still and (j + 1 >= count or _apart(tip[j + 1], end[i]) > grain
+                      or _angle(axis[j + 1], axis1[i]) > 10.0 * axis_grain):
             match[i] = j
             continue
         angle = 0.0

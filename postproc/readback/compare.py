@@ -47,7 +47,10 @@ def compare(motion: Motion, job: Job, executed: Executed, gcode: str = "") -> Co
     moves, faults = job.moves.without_pecks(), Faults(job.toolpath.file, gcode)
     curves = moves.curves()
     tip, axis = executed.poses(motion, np.arange(len(motion)), 1.0)
-    match, owner = align(tip, axis, arc_sweeps(motion, executed.control), curves, moves.link, tolerance, axis_tolerance)
+    words = job.controller.format
+    grain = max(1e-3, 1.5 * 10.0**-words.linear_decimals), max(1e-6, 1.5 * DEG * 10.0**-words.rotary_decimals)
+    match, owner = align(tip, axis, arc_sweeps(motion, executed.control), curves, moves.link, tolerance, axis_tolerance,
+                         grain)
     lost = unreached(match)
     diagnostics = [] if lost < 0 else [_not_reached(motion, moves, match, lost, faults)]
     rows = np.flatnonzero((owner < len(moves)) & ~moves.link[np.minimum(owner, len(moves) - 1)])
