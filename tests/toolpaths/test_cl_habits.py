@@ -163,3 +163,15 @@ def test_set_ups_turned_over() -> None:
     assert p.tip.tolist() == [[1, 2, 3], [1, -2, -13]]
     assert p.axis.tolist() == [[0, 0, 1], [0, 0, -1]]
     assert p.role.tolist() == [Role.POINT, Role.POINT]
+
+
+@pytest.mark.parametrize("end", ["10,0,-2", "10,0.0003,-2", "9.9999999,-0.0003,-2"])
+def test_a_helix_that_ends_below_its_start_makes_a_whole_turn(end: str) -> None:
+    """On a tilted face rounding moves the end a hair ahead of the start: no tiny arc climbs that steeply."""
+    p = read(ISO + f"GOTO/10,0,0\nCIRCLE/0,0,0,0,0,1,10\nGOTO/{end}\n")
+    assert p.arcs.sweep.tolist() == pytest.approx([2 * math.pi], abs=1e-4)
+
+
+def test_a_tiny_arc_in_the_plane_stays_tiny() -> None:
+    p = read(ISO + "GOTO/10,0,0\nCIRCLE/0,0,0,0,0,1,10\nGOTO/10,0.0003,0\n")
+    assert p.arcs.sweep.tolist() == pytest.approx([3e-5])

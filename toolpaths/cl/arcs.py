@@ -20,7 +20,10 @@ RADIUS_ERROR = 0.1
 SAME_POINT = 2e-5
 """mm: ends this near count as one point where a system means a whole turn"""
 ROUNDING = 2e-3
-"""mm: an end this little behind the start is there by rounding, where a system writes no whole circles"""
+"""mm: an end this near to its start is there by rounding: where a system writes no whole circles and it lies behind the
+start; where it does and the arc is a helix"""
+_STEEP = 10.0
+"""a helix that ends above its start and rises more than this times the chord between them makes a whole turn"""
 _SENSE_LEAST = 8
 _TURN = 2.0 * math.pi
 
@@ -108,6 +111,9 @@ def _sweep(u: Floats, v: Floats, normal: Floats, r: Records, full_circles: bool,
     angle = np.where(whole & behind, angle - _TURN, angle)
     if full_circles:
         angle = np.where(near & ~whole, _TURN, angle)
+        steep = np.abs(np.einsum("ki,ki->k", r.end - r.start, normal)) > _STEEP * chord
+        turn = steep & (chord <= ROUNDING) & (angle < math.pi) & ~whole & np.isnan(r.sweep)
+        angle = np.where(turn, angle + _TURN, angle)
     else:
         for k in np.flatnonzero(~whole & (behind | (near & (angle == 0.0))) & np.isnan(r.sweep)):
             log.error("cl.arc-ends", "the arc ends where it starts, and this system does not write whole circles",
