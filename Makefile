@@ -11,7 +11,8 @@ SOURCES := toolpaths machines postproc
 
 demo: $(STAMP)
 	@mkdir -p out
-	$(BIN)/postproc convert samples/pocket.cls -m mill-3axis -c linuxcnc -o out/pocket.ngc
+	$(BIN)/postproc convert samples/pocket.cls -m mill-3axis -c linuxcnc --setup samples/tools.setup.toml \
+		-o out/pocket.ngc
 
 test: $(STAMP)
 	$(BIN)/pytest $(PYTEST_ARGS)

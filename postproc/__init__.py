@@ -8,7 +8,9 @@ if TYPE_CHECKING:
     from postproc.options import Options
     from postproc.pipeline import PostResult, VerifyResult, convert, verify
 
-__all__ = ["Options", "PostResult", "VerifyResult", "convert", "verify"]
+VERSION = "0.1.0"
+
+__all__ = ["VERSION", "Options", "PostResult", "VerifyResult", "convert", "verify"]
 
 
 def __getattr__(name: str) -> Any:

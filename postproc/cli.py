@@ -20,20 +20,37 @@ app = typer.Typer(name="postproc", no_args_is_help=True, add_completion=False, r
                   help="CL file in, proved G-code out: a toolpath post-processor that plans the machine's motion.")
 machine_app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Machines: list, show, check, analyse, schema.")
 controller_app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Controllers: list, show, schema.")
+setup_app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Set-up files: check, schema.")
 app.add_typer(machine_app, name="machine")
+app.add_typer(setup_app, name="setup")
 app.add_typer(controller_app, name="controller")
 
 ClFile = Annotated[Path, typer.Argument(metavar="FILE", help="CL file (APT text)")]
 MachineName = Annotated[str, typer.Option("-m", "--machine", help="machine: a name from the list, or a TOML file")]
 ControllerName = Annotated[str, typer.Option("-c", "--controller", help="controller: a name from the list, or a TOML file")]
 Setup = Annotated[str, typer.Option("--setup", metavar="S.toml", help="set-up file: placement, tools, safe distances")]
-Tolerance = Annotated[float, typer.Option("--tolerance", metavar="MM", min=1e-6, help="tolerance of the tip")]
-AxisTolerance = Annotated[float, typer.Option("--axis-tolerance", metavar="DEG", min=1e-6, help="tolerance of the axis")]
+Tolerance = Annotated[float, typer.Option("--tolerance", metavar="MM", min=1e-6, max=10.0, help="tolerance of the tip")]
+AxisTolerance = Annotated[float, typer.Option("--axis-tolerance", metavar="DEG", min=1e-6, max=10.0,
+                                               help="tolerance of the axis")]
 Units = Annotated[str, typer.Option("--units", help="units of a CL file that states none: mm or inch")]
 Dialect = Annotated[str, typer.Option("--dialect", help="read the CL file as this dialect instead of the recognised one")]
 Allow = Annotated[list[str] | None, typer.Option("--allow-unknown", metavar="WORD",
                                                  help="leave this word out although it looks like motion")]
 Json = Annotated[str, typer.Option("--json", metavar="FILE", help="write the figures as JSON; - for standard output")]
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        from postproc import VERSION
+
+        typer.echo(f"postproc {VERSION}")
+        raise typer.Exit
+
+
+@app.callback()
+def options_of_all(version: Annotated[bool, typer.Option("--version", is_eager=True, callback=_version,
+                                                         help="show the version")] = False) -> None:
+    """Options before the command."""
 
 
 @app.command(epilog="Example: postproc convert part.cls -m mikron-ucp710 -c linuxcnc -o part.ngc")
@@ -48,13 +65,13 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
     _choice("--orient", orient, ("keep",))
     _choice("--feed", feed, ("programmed",))
     options = _options(tolerance, axis_tolerance, feed_mode, setup, units, dialect, allow_unknown)
+    _targets({"-o": str(output), "--json": json}, {"the CL file": str(file), "the set-up": setup})
     from postproc import summary
     from postproc.files import write_atomically
     from postproc.pipeline import convert as run
 
     with _errors(json), _progress() as progress:
         m, spec = _machine(machine), _controller(controller)
-        _output_is_not(output, file)
         path, found = _read(file, options, progress)
         result = run(path, m, spec, options=options, diagnostics=found, progress=progress)
         if result.ok:
@@ -69,6 +86,7 @@ def verify(gcode: Annotated[Path, typer.Argument(metavar="GCODE", help="G-code f
            json: Json = "") -> None:
     """Read a G-code file back and compare its motion with a CL file."""
     options = _options(tolerance, axis_tolerance, "auto", setup, units, dialect, allow_unknown)
+    _targets({"--json": json}, {"the CL file": str(file), "the G-code file": str(gcode), "the set-up": setup})
     from postproc import summary
     from postproc.pipeline import verify as run
 
@@ -86,6 +104,7 @@ def trace(file: ClFile, line: Annotated[int, typer.Option("--line", metavar="L",
           json: Json = "") -> None:
     """Show one point of a CL file through every stage, from its record to its blocks and back."""
     options = _options(tolerance, axis_tolerance, "auto", setup, units, dialect, allow_unknown)
+    _targets({"--json": json}, {"the CL file": str(file), "the set-up": setup})
     from postproc.pipeline import convert as run
     from postproc.trace import as_text, trace_line
 
@@ -101,6 +120,7 @@ def trace(file: ClFile, line: Annotated[int, typer.Option("--line", metavar="L",
 def inspect(file: ClFile, units: Units = "", dialect: Dialect = "", allow_unknown: Allow = None, json: Json = "") -> None:
     """Show what a CL file holds: operations, tools, points, extents, unknown words."""
     options = _options(0.01, 0.05, "auto", "", units, dialect, allow_unknown)
+    _targets({"--json": json}, {"the CL file": str(file)})
     from toolpaths.cl.read import read_file
     from toolpaths.inspect import inspect as figures
     from toolpaths.inspect import summary as text_of
@@ -164,6 +184,28 @@ def machine_schema() -> None:
     _print_json(machines.schema())
 
 
+@setup_app.command("check", epilog="Example: postproc setup check part.setup.toml")
+def setup_check(file: Annotated[str, typer.Argument(help="TOML file")], json: Json = "") -> None:
+    """Check a set-up file and say what is wrong with it."""
+    from postproc.setup import load_setup, part_placement
+    from toolpaths.diagnostics import has_errors
+
+    _targets({"--json": json}, {"the set-up": file})
+    spec, found = load_setup(file)
+    found = list(found) + (part_placement(spec, file)[1] if spec else [])
+    good = "" if spec is None or has_errors(found) else f"{file}: good: {len(spec.tools)} tools"
+    _report(tuple(found), json, {"diagnostics": [d.as_dict() for d in found]}, good)
+
+
+@setup_app.command("schema")
+def setup_schema() -> None:
+    """Print the JSON schema of a set-up file."""
+    from machines.user_file import schema
+    from postproc.setup import SetupFile
+
+    _print_json(schema(SetupFile))
+
+
 @controller_app.command("list")
 def controller_list(json: Json = "") -> None:
     """List the built-in controllers."""
@@ -214,6 +256,9 @@ def _options(tolerance: float, axis_tolerance: float, feed_mode: str, setup: str
              allow_unknown: list[str] | None) -> Options:
     from postproc.options import Options
 
+    for option, value in (("--tolerance", tolerance), ("--axis-tolerance", axis_tolerance)):
+        if not 1e-6 <= value <= 10.0:
+            raise typer.BadParameter(f"{value} is not between 1e-6 and 10", param_hint=option)
     _choice("--feed-mode", feed_mode, ("auto", "per-minute", "inverse-time"))
     if units:
         _choice("--units", units, ("mm", "inch"))
@@ -253,15 +298,34 @@ def _read(file: Path, options: Options, progress: Any) -> tuple[Toolpath, list[D
                           allow_unknown=options.allow_unknown, progress=lambda at, total: progress("reading", at, total))
 
 
-def _output_is_not(output: Path, file: Path) -> None:
+def _targets(outputs: dict[str, str], inputs: dict[str, str]) -> None:
+    """Wrong use where an output would replace an input or another output, or is no regular file."""
+    known = [(_place(name), what) for what, name in inputs.items() if name]
+    for option, name in outputs.items():
+        if not name or (name == "-" and option == "--json"):
+            continue
+        if name == "-":
+            raise typer.BadParameter("a program is written whole or not at all, so not to standard output; name a file",
+                                     param_hint=option)
+        place = _place(name)
+        try:
+            same = next((what for other, what in known if other == place or (
+                other.exists() and place.exists() and other.samefile(place))), "")
+            kind = "" if not place.exists() or place.is_file() else "a folder; name a file" if place.is_dir() else \
+                "no regular file"
+        except OSError:  # no name a file can have: writing says so
+            continue
+        if same or kind:
+            raise typer.BadParameter(f"the output would replace {same}" if same else f"{name} is {kind}", param_hint=option)
+        known.append((place, f"the file of {option}"))
+
+
+def _place(name: str) -> Path:
+    """Where a name leads, through links; loops stay as they are."""
     try:
-        same, folder = output.exists() and file.exists() and output.samefile(file), output.is_dir()
-    except OSError:  # no name a file can have: writing says so
-        return
-    if same:
-        raise typer.BadParameter("the output would replace the CL file", param_hint="-o")
-    if folder:
-        raise typer.BadParameter(f"{output} is a folder; name a file", param_hint="-o")
+        return Path(name).resolve()
+    except (OSError, RuntimeError):
+        return Path(name)
 
 
 @contextmanager
@@ -303,18 +367,39 @@ def _report(diagnostics: tuple[Diagnostic, ...], target: str, values: dict[str, 
 
     for d in diagnostics:
         typer.echo(str(d), err=True)
+    failed = has_errors(diagnostics)
     if target == "-":
-        _print_json(values)
+        _print_json(rounded(values))
     elif target:
-        import json
-
-        from postproc.files import write_atomically
-
-        write_atomically(Path(target), json.dumps(values, indent=2, allow_nan=False, default=str) + "\n")
+        failed |= not _json_file(target, values)
     if target != "-" and text:
         typer.echo(text)
-    if has_errors(diagnostics):
+    if failed:
         raise typer.Exit(1)
+
+
+def _json_file(target: str, values: dict[str, Any]) -> bool:
+    """Write the figures; False, and why on standard error, where that fails."""
+    import json
+
+    from postproc.files import write_atomically
+    from toolpaths.diagnostics import DiagnosticError
+
+    try:
+        write_atomically(Path(target), json.dumps(rounded(values), indent=2, allow_nan=False, default=str) + "\n")
+    except DiagnosticError as fault:
+        typer.echo(str(fault), err=True)
+        return False
+    return True
+
+
+def rounded(value: Any) -> Any:
+    """JSON values with numbers of at most 9 decimals, no -0."""
+    if isinstance(value, float):
+        return round(value, 9) + 0.0
+    if isinstance(value, dict):
+        return {key: rounded(v) for key, v in value.items()}
+    return [rounded(v) for v in value] if isinstance(value, (list, tuple)) else value
 
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import tempfile
 from pathlib import Path
@@ -10,14 +11,19 @@ from toolpaths.diagnostics import Diagnostic, DiagnosticError, error
 
 
 def write_atomically(path: Path, text: str) -> None:
-    """Write `text` beside `path` and put it in its place at once; folders are made as needed.
+    """Write `text` beside `path` and put it in its place at once; folders are made as needed, links are kept.
 
     Raises:
         DiagnosticError: where the file cannot be written; what stood there stays.
     """
     try:
+        path = path.resolve()
+        if path.exists() and not path.is_file():
+            raise OSError(errno.EINVAL, "it is no regular file")
         path.parent.mkdir(parents=True, exist_ok=True)
         handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    except RuntimeError as fault:
+        raise DiagnosticError([_cannot(path, OSError(errno.ELOOP, "its links lead in a circle"))]) from fault
     except OSError as fault:
         raise DiagnosticError([_cannot(path, fault)]) from fault
     temporary = Path(name)
@@ -41,4 +47,4 @@ def _umask() -> int:
 
 
 def _cannot(path: Path, fault: OSError) -> Diagnostic:
-    return error("file.write", f"cannot be written: {fault.strerror}", file=str(path), hint="choose another place with -o")
+    return error("file.write", f"cannot be written: {fault.strerror}", file=str(path), hint="choose another place")

@@ -18,7 +18,7 @@ from postproc.options import Options
 from postproc.records import plain_records
 from postproc.setup import Placement, SetupFile, part_placement, work_frame
 from toolpaths.arrays import Floats
-from toolpaths.diagnostics import Diagnostic, error, has_errors, warning
+from toolpaths.diagnostics import Diagnostic, error, has_errors, info, warning
 from toolpaths.toolpath import Role, Toolpath
 from toolpaths.units import DEG
 
@@ -89,7 +89,7 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
     diagnostics += [*_refused(toolpath), *_no_inverse_time(controller, options)]
     placement, found = part_placement(setup, options.setup)
     diagnostics += found
-    frame, found = work_frame(setup, toolpath)
+    frame, found = work_frame(setup, toolpath, options.setup)
     diagnostics += found
     if placement is None or frame is None or has_errors(diagnostics):
         return None, diagnostics
@@ -99,9 +99,10 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
     moves = moves.placed(placement)
     tip_law = machine.control_kinematics is not None and controller.kinematics.modules
     origin = placement.points(np.array([frame.origin]))[0]
-    control = Control(machine, tip_law, origin, controller.arcs.largest_radius if controller.arcs.enabled else 0.0)
+    largest = controller.arcs.largest_radius if controller.arcs.enabled else 0.0
+    control = Control(machine, tip_law, origin, largest)
     job = Job(toolpath, machine, controller, setup, options, placement, control, moves, safe_space(moves, setup, placement))
-    return job, diagnostics + _tool_lengths(job)
+    return job, diagnostics + _tool_lengths(job) + _unused_tools(job)
 
 
 def _refused(toolpath: Toolpath) -> list[Diagnostic]:
@@ -137,6 +138,14 @@ def _tool_lengths(job: Job) -> list[Diagnostic]:
                       file=job.toolpath.file, hint=hint)]
     return [warning("tool.length", f"no gauge length for {names}: travel is checked as if it were 0", hint=hint,
                     file=job.toolpath.file)]
+
+
+def _unused_tools(job: Job) -> list[Diagnostic]:
+    """Tools of the set-up that the CL file never loads."""
+    used = {str(t.number) for t in job.toolpath.tools} | {str(c.number) for c in tool_changes(job.toolpath)}
+    unused = [f"T{number}" for number in job.setup.tools if number not in used]
+    return [info("setup.tool_unused", f"the CL file does not use {', '.join(unused)} of the set-up",
+                 file=job.options.setup)] if unused else []
 
 
 def words_depend_on_length(control: Control, kin: Kinematics, axis: Floats) -> bool:

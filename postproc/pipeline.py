@@ -11,6 +11,7 @@ import numpy as np
 import machines
 import toolpaths
 from machines.machine import Machine
+from postproc import VERSION
 from postproc.compile import compile_program, decimals, rounding_bound, rounding_problem
 from postproc.controllers import writer_for
 from postproc.controllers.model import ControllerFile, load_controller
@@ -29,7 +30,6 @@ from toolpaths.toolpath import Toolpath
 from toolpaths.units import DEG
 
 Progress = Callable[[str, int, int], None]
-VERSION = "0.1.0"
 MARGIN = 0.85
 """of what is left for linearising: deviations are looked at in samples, the read-back looks at others"""
 

@@ -9,7 +9,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from machines.user_file import UserModel, load_toml
+from machines.user_file import UserModel, load_toml, read_toml
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.toolpath import Frame, Toolpath
@@ -58,8 +58,8 @@ class SetupFile(UserModel):
     """register of the control that holds it: G54 to G59, or G59.1 to G59.3 where the control has them"""
     part: PartPlacement = PartPlacement()
     clearance: Clearance = Clearance()
-    tools: dict[Annotated[str, Field(pattern=r"^[0-9]+$")], ToolSetup] = Field(default_factory=dict)
-    """by tool number, e.g. [tools.1]"""
+    tools: dict[Annotated[str, Field(pattern=r"^(0|[1-9][0-9]*)$")], ToolSetup] = Field(default_factory=dict)
+    """by tool number without leading zeros, e.g. [tools.1]"""
 
 
 @dataclass(frozen=True)
@@ -108,14 +108,20 @@ def part_placement(setup: SetupFile, file: str = "") -> tuple[Placement | None, 
     if abs(float(x @ y)) > 1e-6:
         found = np.degrees(np.arccos(np.clip(x @ y, -1.0, 1.0)))
         return None, [error("setup.axes", f"part.x_axis and part.y_axis enclose {found:.4f} degrees, allowed: 90",
-                            file=file, hint="give two directions square to each other")]
+                            file=file, hint="give two directions square to each other" + _at_default(setup))]
     y = y - (x @ y) * x
     y = y / np.linalg.norm(y)
     return Placement(np.stack([x, y, np.cross(x, y)], axis=1), np.array(setup.part.origin)), []
 
 
-def work_frame(setup: SetupFile, toolpath: Toolpath) -> tuple[Frame | None, list[Diagnostic]]:
-    """The system of the CL file that is the work offset."""
+def _at_default(setup: SetupFile) -> str:
+    """Which of the two directions the file does not give."""
+    missing = [name for name in ("x_axis", "y_axis") if name not in setup.part.model_fields_set]
+    return "".join(f"; part.{name} stands at its default {getattr(setup.part, name)}" for name in missing)
+
+
+def work_frame(setup: SetupFile, toolpath: Toolpath, file: str = "") -> tuple[Frame | None, list[Diagnostic]]:
+    """The system of the CL file that is the work offset; `file` is that of the set-up."""
     if not setup.work_offset:
         return toolpath.frames[0], []
     for frame in toolpath.frames:
@@ -123,4 +129,10 @@ def work_frame(setup: SetupFile, toolpath: Toolpath) -> tuple[Frame | None, list
             return frame, []
     names = ", ".join(f.name for f in toolpath.frames)
     return None, [error("setup.work_offset", f"work_offset = {setup.work_offset!r} is no system of the CL file",
-                        file=toolpath.file, hint=f"it has: {names}")]
+                        file=file or toolpath.file, lines=_line(file, "work_offset"), hint=f"it has: {names}")]
+
+
+def _line(file: str, key: str) -> list[int]:
+    """Where a set-up file states a key."""
+    values = read_toml(file)[0] if file else None
+    return [values.origin((key,)).line] if values else []

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -37,6 +38,10 @@ def _number(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
+def _places(value: float) -> str:
+    return f"{round(value, 3) + 0.0:.3f}"
+
+
 def points_added(result: PostResult) -> int:
     """Blocks that linearising put between CL points."""
     if result.path is None:
@@ -47,7 +52,7 @@ def points_added(result: PostResult) -> int:
 def as_text(result: PostResult, output: str) -> str:
     """The summary on standard output."""
     if not result.ok:
-        return "nothing written"
+        return f"nothing written; {output} is left as it was" if Path(output).exists() else "nothing written"
     d = as_dict(result, output)
     shares = d["tolerance_shares"]
     lines = [f"{output}: {d['blocks_out']} blocks from {d['points_in']} points ({d['points_added']} added) for "
@@ -58,10 +63,10 @@ def as_text(result: PostResult, output: str) -> str:
              f"tolerance: linearising {shares['linearising']:.4f}, control's smoothing {shares['smoothing']:.4f}, "
              f"rounding at most {shares['rounding']:.5f} mm"]
     if result.job is not None:
-        offset = " ".join(f"{k}{v:.4f}" for k, v in zip(result.machine.axis_names, result.job.control.work_offset,
-                                                       strict=True))
+        offset = " ".join(f"{k}{round(v, 4) + 0.0:.4f}" for k, v in zip(
+            result.machine.axis_names, result.job.control.work_offset, strict=True))
         lines.append(f"work offset {result.setup.work_offset_code}: {offset}")
-    lines.append("axes: " + ", ".join(f"{k} {lo:.3f} to {hi:.3f}" for k, (lo, hi) in d["axis_extents"].items()))
+    lines.append("axes: " + ", ".join(f"{k} {_places(lo)} to {_places(hi)}" for k, (lo, hi) in d["axis_extents"].items()))
     if d["feed_reduced_blocks"]:
         lines.append(f"feed reduced for an axis limit in {d['feed_reduced_blocks']} blocks")
     if d["singular_events"]:
