@@ -186,7 +186,7 @@ class Ncl(Spelling):
     """NCL: fixed columns, six numbers in the part frame, right-hand arcs."""
 
     def head(self) -> None:
-        self.lines += ["$$ One path, spelt six ways: APT source of NCL.", f"{'PARTNO SAMPLE':72}PAR00010",
+        self.lines += ["$$ One path, spelt six ways: APT source of NCL.", f"{'PARTNO SAMPLE':72}",
                        f"UNITS/{'MM' if self.unit == 'MM' else 'INCHES'}", "MULTAX/ON"]
 
     def wide(self, values: Iterable[float]) -> str:

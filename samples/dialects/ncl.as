@@ -1,5 +1,5 @@
 $$ One path, spelt six ways: APT source of NCL.
-PARTNO SAMPLE                                                           PAR00010
+PARTNO SAMPLE                                                           
 UNITS/MM
 MULTAX/ON
 PPRINT POCKET

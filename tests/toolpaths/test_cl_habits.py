@@ -175,3 +175,10 @@ def test_a_helix_that_ends_below_its_start_makes_a_whole_turn(end: str) -> None:
 def test_a_tiny_arc_in_the_plane_stays_tiny() -> None:
     p = read(ISO + "GOTO/10,0,0\nCIRCLE/0,0,0,0,0,1,10\nGOTO/10,0.0003,0\n")
     assert p.arcs.sweep.tolist() == pytest.approx([3e-5])
+
+
+def test_few_arcs_that_all_sweep_more_than_half_a_turn_are_told() -> None:
+    arcs = "".join(f"CIRCLE/0,0,0,0,0,-1,10\nGOTO/{end}\n" for end in ("0,10,0", "-10,0,0", "-6,-8,0"))
+    found = result(ISO + "GOTO/10,0,0\n" + arcs.replace("-10,0,0", "-6,8,0"), "cl.arc-sense")
+    assert inspect(found)["arcs_over_180_deg"] == 3
+    assert inspect(read_bytes(ISO + "GOTO/10,0,0\n" + arcs, dialect="nx"))["arcs_over_180_deg"] == 0

@@ -24,7 +24,8 @@ ROUNDING = 2e-3
 start; where it does and the arc is a helix"""
 _STEEP = 10.0
 """a helix that ends above its start and rises more than this times the chord between them makes a whole turn"""
-_SENSE_LEAST = 8
+_SENSE_LEAST, _SENSE_ALL = 8, 3
+"""so many arcs of which most, or so many that all, sweep more than half a turn are told"""
 _TURN = 2.0 * math.pi
 
 
@@ -145,6 +146,6 @@ def _check_radius(start: Floats, end: Floats, r: Records, log: Log) -> None:
 
 def _check_sense(sweep: Floats, line: Ints, log: Log) -> None:
     long = sweep % _TURN > math.pi + 1e-3
-    if len(sweep) >= _SENSE_LEAST and long.sum() > 0.5 * len(sweep):
+    if (len(sweep) >= _SENSE_LEAST and long.sum() > 0.5 * len(sweep)) or (len(sweep) >= _SENSE_ALL and long.all()):
         log.warning("cl.arc-sense", f"{int(long.sum())} of {len(sweep)} arcs sweep more than 180 degrees: the sense "
                     "of the circles is likely that of another system", int(line[long][0]), "name it with dialect=")

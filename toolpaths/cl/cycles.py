@@ -188,7 +188,7 @@ def _arm(b: Builder, v: Values) -> None:
         b.log.warning("cl.cycle-option", f"CYCLE/{v.kind}: {word} is not used", b.line, key=word)
     if v.placed and b.dialect.name == "catia":
         b.log.warning("cl.cycle-place", f"CYCLE/{v.kind}: numbers without words, read as depth {v.depth:g}"
-                      + ("" if v.feed is None else f", feed {v.feed[0]:g}")
+                      + ("" if v.feed is None else f", feed {v.feed[0]:g} {v.feed[1] or 'per minute'}")
                       + ("" if math.isnan(v.clearance) else f", start plane {v.clearance:g}"), b.line,
                       "their order is that of the user's table in CATIA")
     b.cycle.set(b.row, len(b.cycles))
