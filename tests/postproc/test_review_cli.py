@@ -24,7 +24,8 @@ def test_outputs_that_would_replace_something_are_wrong_use(tmp_path: Path) -> N
     fifo = tmp_path / "fifo"
     os.mkfifo(fifo)
     before = path.read_bytes()
-    for arguments in (["convert", path, *MILL, "-o", out, "--json", path], ["convert", path, *MILL, "-o", out, "--json", out],
+    for arguments in (["convert", path, *MILL, "-o", out, "--json", path],
+                      ["convert", path, *MILL, "-o", out, "--json", out],
                       ["convert", path, *MILL, "-o", setup, "--setup", setup], ["convert", path, *MILL, "-o", "-"],
                       ["convert", path, *MILL, "-o", out, "--json", setup, "--setup", setup],
                       ["convert", path, *MILL, "-o", fifo], ["convert", path, *MILL, "-o", "/dev/null"],

@@ -1,0 +1,133 @@
+"""Every key of a controller file is read: another value gives another program, or is refused."""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from postproc.controllers.model import ControllerFile, load_controller
+from tests.linuxcnc import outputs
+from tests.postproc.kit import convert, good, toolpath
+from toolpaths.diagnostics import DiagnosticError
+
+TEXTS = {"description", "sources"}
+"""for people"""
+ONE_VALUE = {"kinematics.linear", "kinematics.rapids"}
+"""statements of the file that have one allowed value so far"""
+READ_BACK = {"cycles.peck_relief"}
+"""how the control moves inside a canned cycle, which the read-back follows and no block states"""
+OTHER: dict[str, Any] = {
+    "writer": "iso", "format.line_length": 40, "program.passive": ["M19"], "program.path_tolerance": "",
+    "codes.planes": {"17": "G17", "18": "G18.0", "19": "G19"}, "codes.through": "M88", "codes.tool_select": "T0{number}",
+    "codes.tool_change": "M6 T{number}", "codes.length_offset": "G43.0 H{register}", "codes.dwell": "G04 P{seconds}",
+    "codes.compensation_left": "G41.0 D{register}", "codes.compensation_right": "G42.0 D{register}",
+    "arcs.largest_radius": 5.0, "cycles.planes": [18], "cycles.rigid_only": ["DEEP"], "feed.least_inverse_rate": 1e4,
+    "cycles.table": {"DRILL": {"code": "G81.0"}}, "cycles.with_dwell": {"DRILL": {"code": "G82.0", "dwell": "P"}},
+    "comment.open": "((", "comment.close": "))", "comment.forbidden": "E", "format.sequence_step": 5,
+    "kinematics.smoothing_share": 0.1, "format.trim_zeros": False, "format.decimal_point": True}
+HEAD = ["UNITS/MM", "LOADTL/1", "SPINDL/RPM,1000,CLW", "FEDRAT/MMPM,600"]
+FLAT = ["PPRINT/NOTE A LONG TEXT FOR PEOPLE", "COOLNT/FLOOD", "RAPID", "GOTO/0,0,50", "GOTO/10,0,5", "CUTCOM/LEFT,1",
+        "GOTO/20.125,0,5",
+        "CUTCOM/OFF", "CUTCOM/RIGHT,1", "GOTO/30,0,5", "CUTCOM/OFF", "COOLNT/MIST", "STOP", "OPSTOP", "DELAY/2",
+        "SELECT/TOOL,2",
+        "COOLNT/THRU", "SPINDL/RPM,900,CCLW", "GOTO/40,0,5", "SPINDL/OFF", "COOLNT/OFF", "SPINDL/RPM,700,CLW",
+        "CYCLE/DRILL,DEPTH,5,MMPM,100,CLEAR,3", "GOTO/40,0,0", "CYCLE/DRILL,DEPTH,5,MMPM,100,CLEAR,3,DWELL,1", "GOTO/50,0,0",
+        "CYCLE/DRILL,DEPTH,5,MMPM,100,RAPTO,3,RTRCTO,AUTO", "GOTO/60,0,0", "CYCLE/OFF", "RAPID", "GOTO/60,0,50", "LOADTL/2",
+        "RAPID", "GOTO/0,0,5", "GOTO/1,0,5"]
+PECK = ["RAPID", "GOTO/0,0,50", "CYCLE/DEEP,DEPTH,5,STEP,2,MMPM,100,RAPTO,3,RTRCTO,20", "GOTO/40,0,0", "CYCLE/OFF"]
+NX = ["TOOL PATH/A,TOOL,T", "MSYS/0,0,0,1,0,0,0,1,0", "LOAD/TOOL,1", "SPINDL/RPM,1000,CLW"]
+ARCS = ["RAPID", "GOTO/10,0,5,0,0,1", "FEDRAT/MMPM,600", "GOTO/10,0,0", "CIRCLE/0,0,0,0,0,-1,10,0.03,0.5,10,0",
+        "GOTO/0,10,0",
+        "CIRCLE/0,0,0,0,0,1,10,0.03,0.5,10,0", "GOTO/10,0,0", "CIRCLE/0,0,0,0,1,0,10,0.03,0.5,10,0", "GOTO/0,0,10",
+        "END-OF-PATH"]
+FIRST, THEN = "0,0.17513,0.9845447", "0.05,0.3420201433257,0.9383616"
+TURN = ["RAPID", f"GOTO/0,0,5,{FIRST}", "FEDRAT/MMPM,500", f"GOTO/0.0312,0,5,{FIRST}", f"GOTO/9.0312,0,5,{THEN}",
+        f"GOTO/10.0312,0,5,{THEN}", "RAPID", f"GOTO/10,0,50,{THEN}", f"GOTO/20,0,50,{THEN}", "RAPID", f"GOTO/9,0,50,{THEN}",
+        "CYCLE/DRILL,DEPTH,5,MMPM,100,CLEAR,3", f"GOTO/9,0,0,{THEN}", "CYCLE/OFF", "RAPID", f"GOTO/9,0,50,{THEN}",
+        f"GOTO/12,0,50,{THEN}"]
+"""the last block before the rapids takes 1/500 min: F500 as an inverse time and as a feed"""
+INSERTED = ["RAPID", "GOTO/0,0,5", "INSERT/M19", "GOTO/1,0,5"]
+
+
+def keys(model: Any = ControllerFile, prefix: str = "") -> list[str]:
+    result = []
+    for name, field in model.model_fields.items():
+        inner = field.annotation
+        result += keys(inner, f"{prefix}{name}.") if hasattr(inner, "model_fields") else [prefix + name]
+    return result
+
+
+def other(key: str, value: Any) -> Any:
+    if key in OTHER:
+        return OTHER[key]
+    if isinstance(value, bool):
+        return not value
+    if isinstance(value, int):
+        return value - 1
+    if isinstance(value, str):
+        return value[0] + "0" + value[1:]
+    return [*value, "M9"]
+
+
+def inline(value: Any) -> str:
+    """TOML of a value."""
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f'"{k}" = {inline(v)}' for k, v in value.items()) + " }"
+    return json.dumps(value)
+
+
+def texts(controller: str | Path) -> list[str]:
+    """What becomes of each path: its program, or the errors."""
+    result = []
+    for lines, head, name, mode in ((FLAT, HEAD, "mill-3axis", "auto"), (ARCS, NX, "mill-3axis", "auto"),
+                                    (TURN, HEAD, "mikron-ucp710", "auto"), (INSERTED, HEAD, "mill-3axis", "auto"),
+                                    (PECK, HEAD, "mill-3axis", "auto"), (TURN, HEAD, "linuxcnc-xyzac-trt", "auto"),
+                                    (TURN, HEAD, "mikron-ucp710", "inverse-time")):
+        try:
+            made = convert(toolpath(*lines, head=head), name, controller, feed_mode=mode)
+        except DiagnosticError as fault:
+            return [str(fault)]
+        header = f"(controller {made.controller_name})\n"
+        result.append(made.text.replace(header, "") or " ".join(sorted(d.code for d in made.diagnostics if d.severity == 2)))
+    return result
+
+
+@cache
+def usual() -> tuple[str, ...]:
+    return tuple(texts("linuxcnc"))
+
+
+def test_the_paths_use_everything() -> None:
+    assert [t.startswith("%") for t in usual()] == [True, True, True, False, True, True, True], usual()
+
+
+def test_the_read_back_follows_the_controls_pecks(tmp_path: Path) -> None:
+    """Three pecks of 2 mm: the way back down ends 0.254 or 1 mm above the last depth."""
+    shop = tmp_path / "shop.toml"
+    shop.write_text('base = "linuxcnc"\n[cycles]\npeck_relief = 1.0\n')
+    heights = []
+    for controller in ("linuxcnc", shop):
+        cycle = "CYCLE/DEEP,DEPTH,5,STEP,2,MMPM,100,CLEAR,1"
+        made = good(convert(toolpath("RAPID", "GOTO/0,0,50", cycle, "GOTO/40,0,0", head=HEAD), "mill-3axis", controller))
+        motion = outputs.read(made)[1]
+        heights.append(sorted(set((motion.end[motion.hole, 2] - 120.0).round(6).tolist())))
+    assert set(heights[0]) - set(heights[1]) == {-0.746, -2.746} and {0.0, -2.0} <= set(heights[1])
+
+
+@pytest.mark.parametrize("key", [k for k in keys() if k not in TEXTS | ONE_VALUE | READ_BACK])
+def test_each_key_counts(key: str, tmp_path: Path) -> None:
+    spec, _ = load_controller("linuxcnc")
+    value: Any = spec
+    for part in key.split("."):
+        value = getattr(value, part)
+    *table, name = key.split(".")
+    changed = other(key, value)
+    assert changed != value
+    lines = [f"[{'.'.join(table)}]" if table else "", f"{name} = {inline(changed)}"]
+    shop = tmp_path / "shop.toml"
+    shop.write_text("\n".join(['base = "linuxcnc"', *lines]))
+    assert tuple(texts(shop)) != usual()
