@@ -97,6 +97,17 @@ def test_arcs_of_postworks_to_a_plane(end: str, plane: str, crossing: str, sweep
     assert found.toolpath.tip[1, 2] == 5.0
 
 
+def test_indirp_is_a_point_and_the_circle_may_lie_below_the_start() -> None:
+    p = read(ISO + "GOTO/10,20,5\nINDIRP/9,15,5\nTLON,GOFWD/(CIRCLE/CANON,0,20,2,0,0,1,10),ON,(PLANE/1,0,0,0)\n")
+    assert p.tip[1] == pytest.approx([0, 10, 5])
+    assert p.arcs.normal.tolist() == [[0, 0, -1]]
+
+
+def test_records_are_counted_even_where_they_cannot_be_carried_out() -> None:
+    found = inspect(read_bytes(ISO + "GOTO/1,0,0\nCIRCLE/0,0,0,0,0,1,1\nRAPID\nGOTO/0,1,0\n"))
+    assert (found["points"], found["arcs"]) == (2, 1)
+
+
 def test_a_machine_called_makino_does_not_turn_the_arcs_of_creo() -> None:
     text = CREO + "MACHIN / MAKINO, 01\nGOTO / 10,0,0\nCIRCLE / 0,0,0,0,0,1,10\nGOTO / 0,10,0\nFINI\n"
     assert result(text).dialect == "creo"
