@@ -62,7 +62,8 @@ def charts(result: postproc.PostResult) -> list[str]:
     for j, letter in enumerate(result.program.letters):
         top = 50.0 + j * height
         line = np.stack([np.arange(len(words)), -words[:, j]], axis=1)[::4]
-        parts.append(f'<rect x="{LEFT + 40}" y="{top + 4}" width="{WIDTH - LEFT - 150}" height="{height - 8}" fill="#f4f6f8"/>')
+        parts.append(f'<rect x="{LEFT + 40}" y="{top + 4}" width="{WIDTH - LEFT - 150}" height="{height - 8}" '
+                     'fill="#f4f6f8"/>')
         parts.append(polyline(fitted(line, (LEFT + 44, top + 8, WIDTH - LEFT - 158, height - 16), False), "#1f5f8b", 1.0))
         unit = "°" if letter in "ABC" else " mm"
         low, high = words[:, j].min(), words[:, j].max()
@@ -80,7 +81,8 @@ def picture() -> str:
     result = postproc.convert(path, machine, "linuxcnc", setup=setup, diagnostics=found)
     worst = result.comparison.worst_tip
     title = [f'<text x="20" y="28" font-size="14">CL file: {len(path)} points, tool axis all round the blade</text>',
-             f'<text x="{LEFT + 14}" y="28" font-size="14">G-code for {machine.name}: {len(result.program)} blocks, read back: '
+             f'<text x="{LEFT + 14}" y="28" font-size="14">G-code for {machine.name}: {len(result.program)} blocks, '
+             'read back: '
              f'tip within {1000 * worst:.1f} µm</text>']
     body = "\n".join([*title, *scene(path), *charts(result)])
     return (f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" font-family="sans-serif" '

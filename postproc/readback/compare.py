@@ -9,7 +9,15 @@ import numpy as np
 from postproc.job import Job
 from postproc.moves import Moves
 from postproc.readback.align import align, unreached
-from postproc.readback.checks import check_holes, check_kinds, check_links, check_smoothing, check_speeds, check_states, check_travel
+from postproc.readback.checks import (
+    check_holes,
+    check_kinds,
+    check_links,
+    check_smoothing,
+    check_speeds,
+    check_states,
+    check_travel,
+)
 from postproc.readback.execute import Motion
 from postproc.readback.faults import Faults
 from postproc.readback.poses import SAMPLES, Executed, arc_sweeps

@@ -12,6 +12,12 @@ from toolpaths.arrays import Array, Bools, Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
 
 
+Leg = tuple[int, Floats]
+"""code and end of one leg of a canned cycle"""
+Legs = dict[int, list[Leg]]
+"""legs by line"""
+
+
 @dataclass(frozen=True)
 class Motion:
     """E executed blocks.
@@ -81,7 +87,7 @@ def execute(words: Words, letters: tuple[str, ...], offsets: Offsets, file: str 
     moving = stated.any(axis=1) & ~modal.dwell
     z = int(offsets.xyz[2])
     drilling = np.flatnonzero(cycle & moving)
-    legs: dict[int, list[tuple[int, Floats]]] = {}
+    legs: Legs = {}
     rests = dwells(words)
     if len(drilling):
         legs = _cycles(words, modal, end, stated, drilling, length, scale, offsets, z, rests, diagnostics, file)
@@ -144,7 +150,7 @@ def _carried(end: Floats, home: Floats) -> Floats:
 
 
 def _cycles(words: Words, modal: Modal, end: Floats, stated: Bools, drilling: Ints, length: Floats, scale: Floats,
-            offsets: Offsets, z: int, rests: Floats, diagnostics: list[Diagnostic], file: str) -> dict[int, list[tuple[int, Floats]]]:
+            offsets: Offsets, z: int, rests: Floats, diagnostics: list[Diagnostic], file: str) -> Legs:
     """Legs (code, end) of each drilling line; sets Z of `end` to where the cycle leaves the tool.
 
     As LinuxCNC does: up to R first where the tool is lower (aslant to R above the hole at all but the first hole of a
@@ -152,7 +158,7 @@ def _cycles(words: Words, modal: Modal, end: Floats, stated: Bools, drilling: In
     if that is higher (G98).
     """
     extra = _columns(words, ("Z", "R", "Q", "P"))
-    legs: dict[int, list[tuple[int, Floats]]] = {}
+    legs: Legs = {}
     sticky = np.full(4, np.nan)
     initial, code = np.nan, 0
     known = np.flatnonzero(np.isfinite(end[:, z]))
@@ -196,12 +202,12 @@ def _level(end: Floats, known: Ints, line: int, previous: int, z: int, offsets: 
 
 
 def _legs(code: int, start: Floats, target: Floats, z: int, level: float, bottom: float, plane: float, out: float,
-          step: float, relief: float, first: bool) -> list[tuple[int, Floats]]:
+          step: float, relief: float, first: bool) -> list[Leg]:
     def at(base: Floats, height: float) -> Floats:
         point = base.copy()
         point[z] = height
         return point
-    legs: list[tuple[int, Floats]] = []
+    legs: list[Leg] = []
     if level < plane and first:
         legs.append((0, at(start, plane)))
     over = at(target, max(level, plane))
@@ -227,7 +233,7 @@ def _legs(code: int, start: Floats, target: Floats, z: int, level: float, bottom
     return legs
 
 
-def _motion(words: Words, modal: Modal, filled: Floats, moving: Bools, legs: dict[int, list[tuple[int, Floats]]],
+def _motion(words: Words, modal: Modal, filled: Floats, moving: Bools, legs: Legs,
             ijk: Floats, scale: Floats, offsets: Offsets, rests: Floats) -> Motion:
     """Blocks in order; a drilling line becomes its legs."""
     lines = np.flatnonzero(moving)
