@@ -120,7 +120,11 @@ class CannedCycle(UserModel):
 
 
 class Cycles(UserModel):
-    """Canned cycles by the kind of the CL file; kinds that are missing are written as single moves."""
+    """Canned cycles by the kind of the CL file.
+
+    Where a kind is missing, DRILL, THRU, CSINK, FACE, DEEP, BRKCHP, BORE and REAM become single moves; others are refused.
+    TAP_LEFT stands for taps that turn anti-clockwise.
+    """
 
     enabled: bool = True
     table: dict[str, CannedCycle] = Field(default_factory=dict)
@@ -132,8 +136,8 @@ class Cycles(UserModel):
     planes: tuple[int, ...] = (17,)
     """planes in which cycles may run"""
     rigid_only: tuple[str, ...] = ("TAP",)
-    """kinds that single moves cannot replace"""
-    peck_relief: float = 0.254
+    """kinds that must not become single moves, beside those that never do"""
+    peck_relief: float = Field(default=0.254, ge=0.0)
     """mm before the last depth to which the tool returns rapidly"""
 
 
