@@ -11,7 +11,8 @@ from typing import Any, cast
 def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
     """`function` compiled without the interpreter lock, kept on disk where the package's folder can be written.
 
-    Contraction and reassociation are allowed, NaN and infinity keep their meaning (the test of positive pivots needs it).
+    Contraction and reassociation are allowed, NaN and infinity keep their meaning (the test of positive pivots needs
+    it).
     """
     from numba import njit
 

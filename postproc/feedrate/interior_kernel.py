@@ -1,8 +1,9 @@
 """Plain loops of `interior.py`, compiled for long motions; `NumpySteps` there is the reference.
 
-Values of LANES neighbouring knots stand together in flat arrays: block b of w starts at b COMMON LANES, joint j of block b of v at
-(b J + j) PER_JOINT LANES, and field f follows at f LANES. Constant distances and unsigned indices let the compiler prove that nothing
-overlaps, so that it turns the loops over lanes into vector instructions; the loop over joints stays outside them.
+Values of LANES neighbouring knots stand together in flat arrays: block b of w starts at b COMMON LANES, joint j of
+block b of v at (b J + j) PER_JOINT LANES, and field f follows at f LANES. Constant distances and unsigned indices
+let the compiler prove that nothing overlaps, so that it turns the loops over lanes into vector instructions; the
+loop over joints stays outside them.
 """
 
 from __future__ import annotations
@@ -146,7 +147,10 @@ def band(w: Any, blocks: Any, low: Any, force: Any) -> None:
 
 
 def pentadiagonal(low: Any, x: Any, inverse: Any, below: Any) -> Any:
-    """Solve by LDL': lower band (3, n), x (n,) right side then answer, room inverse (n,), below (2, n). False: not definite."""
+    """Solve by LDL': lower band (3, n), x (n,) right side, then answer; room inverse (n,), below (2, n).
+
+    False where the matrix is not positive definite.
+    """
     n = x.shape[0]
     l1, l2, second, a1, d2, d22, y1, y2 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(n):

@@ -60,10 +60,11 @@ class PackedSteps:
         if not len(self._zc):
             self._first(mu)
         self._zc *= 1.0 + dual * self._rc
-        gap, time = compiled(assemble)(self._w.reshape(-1), self._v.reshape(-1), self._all, self._inverse, self._blocks, mu, dual)
+        w, v = self._w.reshape(-1), self._v.reshape(-1)
+        gap, time = compiled(assemble)(w, v, self._all, self._inverse, self._blocks, mu, dual)
         self._low[:], self._force[:] = 0.0, 0.0
         self._low[0, :self._size], self._force[:self._size] = self._zc / self.c, mu / self.c
-        compiled(band)(self._w.reshape(-1), self._blocks, self._low, self._force)
+        compiled(band)(w, self._blocks, self._low, self._force)
         return gap + float(np.sum(self._zc * self.c)), time
 
     def direction(self, mu: float) -> tuple[float, float]:
@@ -75,7 +76,8 @@ class PackedSteps:
             return 0.0, 0.0
         right[:here.start], right[here.stop:] = right[here.start], right[here.stop - 1]
         self._step[:self._size] = right
-        fall, loss = compiled(direction)(self._w.reshape(-1), self._v.reshape(-1), self._step, self._inverse, self._blocks, mu)
+        w, v = self._w.reshape(-1), self._v.reshape(-1)
+        fall, loss = compiled(direction)(w, v, self._step, self._inverse, self._blocks, mu)
         rate = right / self.c
         self._rc = mu / (self.c * self._zc) - 1.0 - rate
         fall, loss = max(fall, float(np.max(-rate))), max(loss, float(np.max(-self._rc)))

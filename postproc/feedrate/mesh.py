@@ -12,6 +12,7 @@ from postproc.feedrate.paths import Path
 from toolpaths.arrays import Floats
 
 CHUNK = 16384
+RAMP = 32
 FEWEST = 128
 """Intervals of a motion between stops at least."""
 
@@ -27,16 +28,30 @@ class Spacing:
     """first probing spacing over `longest`"""
 
 
-def mesh(path: Path, limits: JointLimits, top: Callable[[Floats], Floats], spacing: Spacing) -> Floats:
+def mesh(path: Path, limits: JointLimits, top: Callable[[Floats], Floats], spacing: Spacing,
+         ramp: float = np.inf) -> Floats:
     """Knots (K,) from path.start to path.end.
 
-    The limits are probed at the breaks of the path, on both their sides, and between them; `top(sigma)` bounds the speed along sigma.
+    The limits are probed at the breaks of the path, on both their sides, and between them; `top(sigma)` bounds the
+    speed along sigma; `ramp` is the time of full jerk after rest, into which RAMP knots go.
     """
     at = _probes(path, spacing)
     speed = np.concatenate([_speed(path, limits, top, at[i:i + CHUNK]) for i in range(0, len(at), CHUNK)])
     h = np.minimum(spacing.dt * speed, min(spacing.longest, (path.end - path.start) / FEWEST))
+    h[[0, -1]] = np.minimum(h[[0, -1]], ramp / RAMP * speed[[0, -1]])
     h = np.maximum(h, 1e-9 * (path.end - path.start))
     return _place(at, _gentle(at, h, spacing.slope))
+
+
+def ramp_time(dq: Floats, limits: JointLimits, feed: Floats) -> float:
+    """Least time of full jerk from rest until acceleration or speed is reached, over the given places.
+
+    dq (N, J) by s, feed (N,) largest ds/dt there; inf where nothing of this is limited.
+    """
+    with np.errstate(divide="ignore"):
+        speed, acceleration, jerk = (np.min(limit / np.abs(dq), axis=1)
+                                     for limit in (limits.velocity, limits.acceleration, limits.jerk))
+    return float(np.min(np.minimum(acceleration / jerk, np.sqrt(np.minimum(speed, feed) / jerk))))
 
 
 def _speed(path: Path, limits: JointLimits, top: Callable[[Floats], Floats], at: Floats) -> Floats:

@@ -1,8 +1,8 @@
 """Paths q(sigma) with exact derivatives, and the change of parameter that lets a motion start and end at rest.
 
-Near rest under bounded jerk x = s_dot^2 grows as s^(4/3), which no polynomial in s follows. With the parameter sigma, where
-s = d (2 u^3 - 2 u^4 + 0.6 u^5), u = sigma/d on the first and last d (three times differentiable joint with s = sigma - 0.4 d),
-sigma_dot is finite at rest, and rest needs no condition of its own.
+Near rest under bounded jerk x = s_dot^2 grows as s^(4/3), which no polynomial in s follows. With the parameter
+sigma, where s = d (2 u^3 - 2 u^4 + 0.6 u^5), u = sigma/d on the first and last d (three times differentiable joint
+with s = sigma - 0.4 d), sigma_dot is finite at rest, and rest needs no condition of its own.
 """
 
 from __future__ import annotations
@@ -120,7 +120,8 @@ class Eased:
     def derivatives(self, sigma: Floats) -> Derivatives:
         """Chain rule to third order, exact; see `Path`."""
         s = self.parameter(sigma)
-        inner = self.path.derivatives(np.clip(s[0], self.first, self.last))
+        # Derivatives at a corner are those from inside the stretch.
+        inner = self.path.derivatives(np.clip(s[0], self.first, np.nextafter(self.last, self.first)))
         bent = np.flatnonzero((sigma < self.ease) | (sigma > self.end - self.ease))
         s1, s2, s3 = s[1:, bent, None]
         q1, q2, q3 = inner.dq[bent], inner.d2q[bent], inner.d3q[bent]

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 
 import numpy as np
 
 from postproc.feedrate.limits import JointLimits, squared_speed
-from postproc.feedrate.mesh import Spacing, mesh
+from postproc.feedrate.mesh import Spacing, mesh, ramp_time
 from postproc.feedrate.paths import Eased, Path
 from postproc.feedrate.problem import Knots
 from postproc.feedrate.profile import Profile, linear_profile, spline_profile
@@ -20,7 +21,7 @@ from postproc.feedrate.windows import Method, Solved, solved
 from toolpaths.arrays import Floats
 
 Feed = float | Callable[[Floats], Floats]
-"""Largest ds/dt: one number, or a function of s (N,) that returns (N,). With s the length along the tip's path, the tip's feed."""
+"""Largest ds/dt: one number, or a function of s (N,) that returns (N,). The tip's feed, if s is the length of its path."""
 SAMPLE = 1e-3
 """Step of the delivered samples, s."""
 CHUNK = 65536
@@ -57,8 +58,8 @@ class Piece:
 class Plan:
     """The planned motion: pieces in order, and how the solving went.
 
-    `iterations`: most of any window; `mismatch`: worst stitch of windows; `solved`: False where some window stopped early: the
-    motion then respects the limits but is not the fastest.
+    `iterations`: most of any window; `mismatch`: worst stitch of windows; `solved`: False where some window stopped
+    early: the motion then respects the limits but is not the fastest.
     """
 
     pieces: tuple[Piece, ...]
@@ -82,7 +83,7 @@ class Plan:
     def trajectory(self) -> JointTrajectory:
         """Samples each `step`, the last one at rest."""
         ends = self.ends
-        t = self.step * np.arange(int(np.ceil(ends[-1] / self.step)) + 1)
+        t = np.float64(self.step) * np.arange(int(np.ceil(ends[-1] / self.step)) + 1)
         which = np.minimum(np.searchsorted(ends, t, side="right"), len(ends) - 1)
         cuts = np.searchsorted(which, np.arange(len(ends) + 1))
         parts = [self._sampled(i, t[cuts[i] + k:min(cuts[i] + k + CHUNK, cuts[i + 1])] - (ends[i] - self.pieces[i].seconds))
@@ -125,7 +126,7 @@ def plan(path: Path, limits: JointLimits, feed: Feed = np.inf, stops: Sequence[f
         raise ValueError("knots are for a motion without stops")
     pieces, reports = [], []
     for eased in _stretches(path, stops, options.ease):
-        sigma = knots if knots is not None else mesh(eased, limits, _speed_limit(eased, allowed), options.spacing)
+        sigma = knots if knots is not None else _mesh(eased, limits, allowed, options.spacing)
         grid, report = _solve(Knots(eased, sigma, limits, allowed), options)
         pieces.append(Piece(eased, _profile(grid, report.c)))
         reports.append(report)
@@ -162,12 +163,19 @@ def _speed_limit(eased: Eased, feed: Callable[[Floats], Floats]) -> Callable[[Fl
     return limit
 
 
+def _mesh(eased: Eased, limits: JointLimits, feed: Callable[[Floats], Floats], spacing: Spacing) -> Floats:
+    """Knots between two stops, fine enough beside them."""
+    ends = np.array([eased.first, np.nextafter(eased.last, eased.first)])
+    ramp = ramp_time(eased.path.derivatives(ends).dq, limits, feed(ends))
+    return mesh(eased, limits, _speed_limit(eased, feed), spacing, ramp)
+
+
 def _stretches(path: Path, stops: Sequence[float], ease: float) -> list[Eased]:
     """One eased stretch between each two stops."""
     ends = np.concatenate(([path.start], np.asarray(stops, dtype=np.float64), [path.end]))
     if np.any(np.diff(ends) <= 0.0):
         raise ValueError(f"stops must rise strictly between {path.start} and {path.end}, found {list(stops)}")
-    return [Eased.between(path, first, last, ease) for first, last in zip(ends[:-1], ends[1:], strict=True)]
+    return [Eased.between(path, first, last, ease) for first, last in pairwise(ends)]
 
 
 def _solve(grid: Knots, options: Options) -> tuple[Knots, Solved]:
@@ -187,7 +195,7 @@ def _profile(grid: Knots, c: Floats) -> Profile:
     count = len(grid.sigma)
     cuts = np.linspace(0, count, max(1, count // CHUNK) + 1).astype(int)
     parts = []
-    for first, last in zip(cuts[:-1], cuts[1:], strict=True):
+    for first, last in pairwise(cuts):
         stop = min(last + 1, count)
         parts.append(spline_profile(grid.sigma[first:stop], rest_basis(grid.sigma, grid.eased.ease, first, stop),
                                     c[first:stop + 2]).pieces)
@@ -197,8 +205,8 @@ def _profile(grid: Knots, c: Floats) -> Profile:
 def _within(made: Plan) -> Plan:
     """Slow each piece down until nothing is exceeded in the samples that are delivered.
 
-    All limits are homogeneous in time, so that x/g^2 divides velocity by g, acceleration by g^2 and jerk by g^3. Samples of the slower
-    motion fall elsewhere, so it is measured again.
+    All limits are homogeneous in time, so that x/g^2 divides velocity by g, acceleration by g^2 and jerk by g^3.
+    Samples of the slower motion fall elsewhere, so it is measured again.
     """
     factor = np.ones(len(made.pieces))
     for turn in range(ROUNDS):
@@ -209,7 +217,7 @@ def _within(made: Plan) -> Plan:
         np.maximum.at(factor, which, worst)
         if factor.max() <= 1.0 and turn:
             return made
-        factor = np.maximum(factor, 1e-3) * (1.0 + 1e-7) if turn == 0 else np.maximum(factor * (1.0 + 1e-7), 1.0)
+        factor = np.maximum(factor, 1.0 if turn else 1e-3) * np.where(factor > 1.0, 1.0 + 1e-7 * 4.0**turn, 1.0)
         pieces = tuple(replace(piece, profile=piece.profile.slower(g)) for piece, g in zip(made.pieces, factor, strict=True))
         made = replace(made, pieces=pieces)
-    raise ArithmeticError(f"the limits are still exceeded by {factor.max() - 1.0:.2g} after {ROUNDS} rounds of slowing down")
+    raise ArithmeticError(f"limits still exceeded by {factor.max() - 1.0:.2g} after slowing down {ROUNDS} times")

@@ -39,8 +39,7 @@ class Problem:
     @property
     def rows(self) -> int:
         """Number of limits, positive coefficients included."""
-        joints, knots = self.dq.shape
-        return knots * (4 * joints + 1) + knots + 2
+        return self.basis.knots * (4 * len(self.dq) + 2) + 2
 
     def acceleration_rows(self) -> Floats:
         """(2, J, K): factors of x and x'."""
@@ -56,11 +55,12 @@ class Problem:
         """Equal coefficients (K + 2,), 0.9 of the largest that keep every limit."""
         ones = np.ones(self.basis.knots + 2)
         with np.errstate(divide="ignore"):
-            velocity, acceleration, jerk = 1.0 / np.max(self.ratios(ones) * np.stack((np.ones_like(self.cap), *self.tight)), axis=1)
+            most = np.max(self.ratios(ones) * np.stack((np.ones_like(self.cap), *self.tight)), axis=1)
+            velocity, acceleration, jerk = (1.0 / most).tolist()
         low = 0.9 * min(velocity**2, acceleration, jerk ** (2.0 / 3.0))
         if not (0.0 < low < np.inf):
             raise ArithmeticError("no slow motion respects the limits: the derivatives of the path are not finite")
-        return low * ones
+        return np.asarray(low * ones)
 
     def ratios(self, c: Floats) -> Floats:
         """Velocity, acceleration and jerk over their limits at the knots, the worst joint, tightening left out, (3, K)."""
@@ -74,8 +74,8 @@ class Problem:
 class Knots:
     """One motion from rest to rest on its knots; problems are made for stretches of it, so that memory stays small.
 
-    `eased` path, `sigma` (K,) knots, `limits`; `feed` gives the largest ds/dt at s; `tight` (3, K) factors >= 1 on the velocity,
-    acceleration and jerk limits, None for ones.
+    `eased` path, `sigma` (K,) knots, `limits`; `feed` gives the largest ds/dt at s; `tight` (3, K) factors >= 1 on
+    the velocity, acceleration and jerk limits, None for ones.
     """
 
     eased: Eased
@@ -102,5 +102,6 @@ class Knots:
             raise ValueError("the path stands still somewhere between its ends: no limit bounds the speed there")
         h = np.diff(sigma)
         weight = 0.5 * (np.append(h, 0.0) + np.insert(h, 0, 0.0))
-        rows = [np.ascontiguousarray(order.T) for order in at[1:]]
-        return Problem(rest_basis(self.sigma, self.eased.ease, first, last), *rows, self.limits, cap, weight, tight[1:])
+        dq, d2q, d3q = (np.ascontiguousarray(order.T) for order in at[1:])
+        basis = rest_basis(self.sigma, self.eased.ease, first, last)
+        return Problem(basis, dq, d2q, d3q, self.limits, cap, weight, tight[1:])

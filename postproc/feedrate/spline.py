@@ -1,9 +1,9 @@
 """The squared speed x(sigma) as a cubic B-spline over its knots, and the law it follows next to rest.
 
-At a knot only three basis functions are non-zero, so x, x', x'' there are three-term stencils of the coefficients c[k:k+3].
-Over the first REST intervals from rest x = X0 Psi(u), the law of constant jerk: near u = 0 slope and curvature of x have no weight
-in any limit, and an optimiser left free there would use it. X0 is one unknown: the coefficients c[:REST + 3] are tied to it, and
-the stencils carry the factors.
+At a knot only three basis functions are non-zero, so x, x', x'' there are three-term stencils of the coefficients
+c[k:k+3]. Over the first REST intervals from rest x = X0 Psi(u), the law of constant jerk: near u = 0 slope and
+curvature of x have no weight in any limit, and an optimiser left free there would use it. X0 is one unknown: the
+coefficients c[:REST + 3] are tied to it, and the stencils carry the factors.
 """
 
 from __future__ import annotations
@@ -31,7 +31,8 @@ def stencils(sigma: Floats) -> Floats:
 
 
 def rest_law(u: Floats, ease: float) -> Floats:
-    """Psi and its first two derivatives by sigma, (3, N), for u = sigma/d: constant jerk from rest in the eased parameter.
+    """Psi and its first two derivatives by sigma, (3, N), for u = sigma/d: constant jerk from rest in the eased
+    parameter.
 
     s = j t^3/6 and s = d (2u^3 - 2u^4 + 0.6u^5) give u_dot^2 ~ Psi = (1 - u + .3u^2)^(4/3) / (1 - 4u/3 + u^2/2)^2.
     """
@@ -52,7 +53,7 @@ class Basis:
 
     @property
     def knots(self) -> int:
-        return self.stencil.shape[2]
+        return int(self.stencil.shape[2])
 
     def values(self, c: Floats) -> Floats:
         """x, x', x'' (3, K) at the knots from coefficients c (K + 2,)."""
@@ -61,7 +62,7 @@ class Basis:
 
 
 def rest_basis(sigma: Floats, ease: float, first: int = 0, last: int | None = None) -> Basis:
-    """Knots [first, last) of the basis on all of sigma (K,), whose own ends are at rest; at least 2 REST + 7 knots in all."""
+    """Knots [first, last) of the basis on all of sigma (K,) with both ends at rest; 2 REST + 7 knots or more in all."""
     if len(sigma) < 2 * REST + 7:
         raise ValueError(f"{len(sigma)} knots; a motion from rest to rest needs at least {2 * REST + 7}")
     last = len(sigma) if last is None else last

@@ -21,7 +21,8 @@ ORDERS = ("velocity", "acceleration", "jerk")
 class Usage:
     """Largest ratios to the limits, per joint (J,), and of the feed.
 
-    Each is the larger of two measures: the derivatives at the samples, and the differences of the positions, padded with rest.
+    Each is the larger of two measures: the derivatives at the samples, and the differences of the positions, padded
+    with rest.
     """
 
     velocity: Floats
@@ -84,8 +85,9 @@ class JointTrajectory:
     def usage(self, limits: JointLimits) -> Usage:
         """Worst ratios over all samples, joints of `limits` in the order of q."""
         derived, differences = self._derived(limits), self._differences(limits)
-        most = [np.maximum(a.max(axis=0), b.max(axis=0)) for a, b in zip(derived, differences, strict=True)]
-        return Usage(*most, feed=float(np.max(self.sd / self.feed)))
+        velocity, acceleration, jerk = (np.maximum(a.max(axis=0), b.max(axis=0))
+                                        for a, b in zip(derived, differences, strict=True))
+        return Usage(velocity, acceleration, jerk, float(np.max(self.sd / self.feed)))
 
     def worst_slowdown(self, limits: JointLimits) -> Floats:
         """Factor on time per sample (N,) that would bring the ratios seen there to 1."""

@@ -1,7 +1,8 @@
 """Solving a motion: in one piece, or for long ones in windows that overlap, every stitch checked.
 
-Windows have free ends: far enough from its ends the optimal speed does not depend on them, so that neighbours agree in the middle
-of the overlap. There the coefficients are blended; where they differ or the blend exceeds a limit the overlap is widened.
+Windows have free ends: far enough from its ends the optimal speed does not depend on them, so that neighbours agree
+in the middle of the overlap. There the coefficients are blended; where they differ or the blend exceeds a limit the
+overlap is widened.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -57,13 +59,13 @@ def solved(knots: Knots, method: Method) -> Solved:
     count = len(knots.sigma)
     make = method.steps(count)
     inner = np.linspace(0, count, max(1, round(count / method.window)) + 1).astype(int).tolist()
-    windows = list(zip(inner[:-1], inner[1:], strict=True))
+    windows = list(pairwise(inner))
     wide = [method.overlap] * len(windows)
     found: list[tuple[int, Solution]] = [(0, Solution(np.empty(0), 0, 0.0, False))] * len(windows)
     again = list(range(len(windows)))
     while again:
         _solve_some(knots, windows, wide, again, found, make, method.threads)
-        c, bad, worst = _stitched(knots, inner, [min(pair) for pair in zip(wide[:-1], wide[1:], strict=True)], found)
+        c, bad, worst = _stitched(knots, inner, [min(pair) for pair in pairwise(wide)], found)
         again = sorted({i for j in bad for i in (j, j + 1) if wide[i] < count})
         for i in again:
             wide[i] *= 2

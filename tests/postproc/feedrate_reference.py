@@ -1,0 +1,102 @@
+"""Converged optima by other people's solvers, for the same discretised problems."""
+
+from __future__ import annotations
+
+import clarabel
+import numpy as np
+from scipy import sparse
+from scipy.optimize import linprog
+
+from postproc.feedrate.problem import Problem
+from toolpaths.arrays import Floats
+
+
+def least_jerk_time(problem: Problem, c: Floats, rounds: int = 60, close: float = 1e-6) -> float:
+    """Sequence of convex problems from the feasible c (K + 2,): x^-1/2 of the jerk rows by its tangent, the objective exact.
+
+    Each is min sum w t with t >= x^-1/2, a power cone per knot. Unknowns are relative to the last solution.
+    """
+    best = np.inf
+    for _ in range(rounds):
+        better, time = _convex(problem, c)
+        if better is None:  # numerical trouble of the solver; a little slower is feasible, too
+            c = 0.99 * c
+            continue
+        if abs(best - time) < close * time:
+            return min(best, time)
+        c, best = better, min(best, time)
+    raise ArithmeticError("the reference did not converge")
+
+
+def _convex(problem: Problem, c: Floats) -> tuple[Floats | None, float]:
+    basis, knots = problem.basis, problem.basis.knots
+    order = [_operator(basis.stencil[i]) @ sparse.diags(c) @ _tie(knots + 2, basis.tied) for i in range(3)]
+    x = basis.values(c)[0]
+    joints, n = len(problem.dq), order[0].shape[1]
+    a, j = problem.acceleration_rows(), problem.jerk_rows()
+    root = sparse.diags(x**-0.5)
+    rows, right = [sparse.diags(1.0 / problem.cap) @ order[0], -sparse.eye(n)], [np.ones(knots), np.zeros(n)]
+    for i in range(joints):
+        use = sum(sparse.diags(a[k, i]) @ order[k] for k in range(2))
+        rows += [use, -use]
+        right += [np.ones(knots)] * 2
+        # Divided by x^-1/2 at the last solution, so that all rows are of order one.
+        use = sparse.diags(x**0.5) @ sum(sparse.diags(j[k, i]) @ order[k] for k in range(3))
+        tangent = 0.5 * sparse.diags(1.0 / x) @ order[0]
+        rows += [use + tangent, tangent - use]
+        right += [np.full(knots, 1.5)] * 2
+    linear = sparse.vstack(rows)
+    count = linear.shape[0]
+    cone = sparse.lil_matrix((3 * knots, n + knots))
+    cone[0::3, :n] = -(sparse.diags(1.0 / x) @ order[0])
+    cone[1::3, n:] = -sparse.eye(knots)
+    fixed = np.zeros(3 * knots)
+    fixed[2::3] = 1.0
+    matrix = sparse.vstack((sparse.hstack((linear, sparse.csc_matrix((count, knots)))), cone)).tocsc()
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    settings.tol_gap_rel = settings.tol_gap_abs = settings.tol_feas = 1e-8
+    goal = np.concatenate((np.zeros(n), problem.weight * root.diagonal()))
+    solver = clarabel.DefaultSolver(sparse.csc_matrix((n + knots,) * 2), goal / goal.sum(), matrix,
+                                    np.concatenate((*right, fixed)),
+                                    [clarabel.NonnegativeConeT(count)] + [clarabel.PowerConeT(1.0 / 3.0)] * knots, settings)
+    found = solver.solve()
+    if found.status != clarabel.SolverStatus.Solved:
+        return None, np.inf
+    answer = np.asarray(found.x)[:n]
+    c = c * (_tie(knots + 2, basis.tied) @ answer)
+    return c, float(np.sum(problem.weight * basis.values(c)[0] ** -0.5))
+
+
+def _operator(stencil: Floats) -> sparse.csc_matrix:
+    """(K, K + 2) matrix of one order of the stencil (3, K)."""
+    knots = stencil.shape[1]
+    at = np.arange(knots)
+    return sum(sparse.csc_matrix((stencil[i], (at, at + i)), (knots, knots + 2)) for i in range(3))
+
+
+def _tie(n: int, tied: tuple[int, int]) -> sparse.csc_matrix:
+    """(n, unknowns): coefficients from unknowns."""
+    which = np.clip(np.arange(n) - tied[0] + 1, 0, n - tied[0] - tied[1] + 1)
+    return sparse.csc_matrix((np.ones(n), (np.arange(n), which)), (n, which[-1] + 1))
+
+
+def largest_second_order(sigma: Floats, dq: Floats, d2q: Floats, acceleration: Floats, cap: Floats) -> Floats:
+    """Squared speeds (N,) of the greatest sum under the limits of `second_order`, by HiGHS."""
+    h = np.diff(sigma)[:, None]
+    n, joints = dq.shape
+    p, r = dq / acceleration, d2q / acceleration
+    here, there = r[:-1] - p[:-1] / (2 * h), p[:-1] / (2 * h)
+    back, front = -p[1:] / (2 * h), r[1:] + p[1:] / (2 * h)
+    row = np.arange(2 * joints * (n - 1)).reshape(2, n - 1, joints)
+    first = np.broadcast_to(np.arange(n - 1)[:, None], (n - 1, joints))
+    values = np.concatenate([part.ravel() for part in (here, there, back, front)])
+    rows = np.concatenate([row[0].ravel(), row[0].ravel(), row[1].ravel(), row[1].ravel()])
+    columns = np.concatenate([first.ravel(), first.ravel() + 1] * 2)
+    matrix = sparse.csr_matrix((values, (rows, columns)), (row.size, n))
+    top = np.array(cap)
+    top[0] = top[-1] = 0.0
+    scale = np.median(top[1:-1])
+    found = linprog(-np.ones(n), A_ub=sparse.vstack((matrix, -matrix)) * scale, b_ub=np.ones(2 * row.size),
+                    bounds=np.stack((np.zeros(n), top / scale), axis=1), method="highs")
+    return np.asarray(found.x) * scale

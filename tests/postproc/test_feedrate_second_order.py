@@ -1,0 +1,94 @@
+"""Second-order plan: closed forms, toppra, HiGHS, compiled against numpy."""
+
+from __future__ import annotations
+
+import warnings
+from typing import Any
+
+import numpy as np
+import pytest
+
+from postproc.feedrate.limits import JointLimits, squared_speed
+from postproc.feedrate.paths import SplinePath
+from postproc.feedrate.plan import Options, plan_second_order
+from postproc.feedrate.second_order import least_time, second_order
+from tests.postproc.feedrate_kit import MIKRON, PolynomialPath, bezier, random_path
+from tests.postproc.feedrate_reference import largest_second_order
+from toolpaths.arrays import Floats
+
+
+def planned(path: SplinePath, sigma: Floats, kernel: bool) -> Floats:
+    at = path.derivatives(sigma)
+    return second_order(sigma, at.dq, at.d2q, MIKRON.acceleration, squared_speed(at.dq, MIKRON.velocity), kernel)
+
+
+def toppra_time(path: SplinePath, sigma: Floats) -> float:
+    """Least time by TOPP-RA on the same grid, limits taken at both ends of each interval."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        import toppra
+        import toppra.algorithm
+        from toppra import constraint
+
+    class Evaluated(toppra.interpolator.AbstractGeometricPath):  # type: ignore[misc]
+        dof, path_interval, waypoints = 5, np.array([path.start, path.end]), None
+
+        def __call__(self, s: Any, order: int = 0) -> Any:
+            at = path.derivatives(np.atleast_1d(s))[order]
+            return at[0] if np.ndim(s) == 0 else at
+
+    both = constraint.DiscretizationType.Interpolation
+    rows = [constraint.JointVelocityConstraint(np.stack((-MIKRON.velocity, MIKRON.velocity), axis=1)),
+            constraint.JointAccelerationConstraint(np.stack((-MIKRON.acceleration, MIKRON.acceleration), axis=1),
+                                                   discretization_scheme=both)]
+    speed = toppra.algorithm.TOPPRA(rows, Evaluated(), gridpoints=sigma, solver_wrapper="seidel"
+                                    ).compute_parameterization(0.0, 0.0, return_data=True)[1]
+    return least_time(sigma, speed**2)
+
+
+@pytest.mark.parametrize("path", [bezier(seed) for seed in range(1, 6)])
+def test_compiled_equals_numpy_and_toppra(path: SplinePath) -> None:
+    sigma = np.linspace(path.start, path.end, 301)
+    fast, plain = planned(path, sigma, True), planned(path, sigma, False)
+    np.testing.assert_allclose(fast, plain, rtol=1e-9, atol=1e-9 * plain.max())
+    assert least_time(sigma, plain) == pytest.approx(toppra_time(path, sigma), rel=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_every_limit_holds_and_no_linear_program_is_much_faster(seed: int) -> None:
+    """Where a joint reverses, a larger sum of squares may exist that alternates between grid points; it is hardly faster."""
+    path, sigma = random_path(seed), np.linspace(0.0, 100.0, 401)
+    at = path.derivatives(sigma)
+    cap = squared_speed(at.dq, MIKRON.velocity)
+    x = planned(path, sigma, False)
+    rate = 0.5 * np.diff(x) / np.diff(sigma)
+    for here in (slice(0, -1), slice(1, None)):
+        used = np.abs(at.d2q[here] * x[here, None] + at.dq[here] * rate[:, None]) / MIKRON.acceleration
+        assert used.max() <= 1.0 + 1e-9
+    assert np.all(x <= cap * (1.0 + 1e-12))
+    best = largest_second_order(sigma, at.dq, at.d2q, MIKRON.acceleration, cap)
+    assert least_time(sigma, x) <= 1.001 * least_time(sigma, np.maximum(best, 0.0))
+
+
+@pytest.mark.parametrize(("velocity", "seconds"), [(1e6, 2.0 * np.sqrt(50.0 / 2000.0)),
+                                                   (100.0, 50.0 / 100.0 + 100.0 / 2000.0)])
+def test_straight_line(velocity: float, seconds: float) -> None:
+    """Triangle and trapezium of speed: 2 sqrt(S/A), S/V + V/A."""
+    limits = JointLimits(np.array([velocity]), np.array([2000.0]), np.array([np.inf]))
+    made = plan_second_order(PolynomialPath([[0.0, 1.0]], 50.0), limits)
+    assert made.seconds == pytest.approx(seconds, rel=2e-4)
+    samples = made.trajectory()
+    assert samples.q[0, 0] == 0.0 and samples.q[-1, 0] == pytest.approx(50.0, abs=1e-12)
+    np.testing.assert_allclose(np.diff(samples.q[:, 0]) / 1e-3, 0.5 * (samples.qd[1:, 0] + samples.qd[:-1, 0]), atol=1.1)
+    used = samples.usage(limits)
+    assert max(used.velocity[0], used.acceleration[0]) <= 1.0 + 1e-6 and used.jerk[0] == 0.0
+
+
+def test_feed_and_stops() -> None:
+    path = random_path(1)
+    made = plan_second_order(path, MIKRON, feed=30.0, stops=[40.0], options=Options())
+    samples = made.trajectory()
+    assert samples.usage(MIKRON).feed <= 1.0 + 1e-9 and samples.sd.max() == pytest.approx(30.0, rel=1e-6)
+    assert made.seconds == pytest.approx(sum(piece.seconds for piece in made.pieces))
+    near = np.interp(40.0, samples.s, samples.sd)
+    assert near < 0.1 * 30.0
