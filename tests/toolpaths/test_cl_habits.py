@@ -193,3 +193,23 @@ def test_few_arcs_that_all_sweep_more_than_half_a_turn_are_told() -> None:
     found = result(ISO + "GOTO/10,0,0\n" + arcs.replace("-10,0,0", "-6,8,0"), "cl.arc-sense")
     assert inspect(found)["arcs_over_180_deg"] == 3
     assert inspect(read_bytes(ISO + "GOTO/10,0,0\n" + arcs, dialect="nx"))["arcs_over_180_deg"] == 0
+
+
+@pytest.mark.parametrize(("record", "end", "sweep"), [
+    ("MOVARC/ CENTER, 0, 0, 0, AXIS, 0, 0, 1, RADIUS, 10", "0, 10, 0", 90),
+    ("ARCSLP/ -2\nMOVARC/ CENTER, 0, 0, 0, AXIS, 0, 0, -1, RADIUS, 10", "0, 10, -2", 270),
+    ("MOVARC/CENTER,0,0,0,AXIS,0,0,1,RADIUS,10,TIMES,2", "0,10,-4", 810),
+    ("MOVARC/CENTER,0,0,0,AXIS,0,0,1,RADIUS,10,ANGLE,450", "0,10,-4", 450),
+    ("MOVARC/CENTER,0,0,0,AXIS,0,0,1,RADIUS,10", "10,0,0", 360),
+])
+def test_movarc_with_words_for_its_parts(record: str, end: str, sweep: float) -> None:
+    p = read(ISO + f"GOTO/10,0,0\n{record}\nGOTO/{end}\n")
+    assert np.degrees(p.arcs.sweep) == pytest.approx([sweep])
+    assert p.arcs.radius.tolist() == [10]
+
+
+@pytest.mark.parametrize("record", ["MOVARC/CENTER,0,0,0,AXIS,0,0,1", "MOVARC/CENTER,0,0,RADIUS,5,AXIS,0,0,1",
+                                    "MOVARC/0,0,0,0,0,1,9"])
+def test_movarc_without_one_of_its_parts(record: str) -> None:
+    found = read_bytes(ISO + f"GOTO/10,0,0\n{record}\nGOTO/0,10,0\n")
+    assert [d.code for d in found.diagnostics] == ["cl.circle"]

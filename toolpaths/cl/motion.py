@@ -110,12 +110,18 @@ def circle(b: Builder, s: Statement) -> None:
         b.log.error("cl.circle", f"CIRCLE has {len(s.numbers)} numbers, it takes center, axis, radius (4, 6, 7 or 11)",
                     b.line)
         return
-    times, sweep = s.after("TIMES"), s.after("SWEEP")
-    if s.has("TIMES") and (times is None or times < 0.0 or times != math.floor(times)):
-        b.log.error("cl.circle-times", f"CIRCLE/...{s.tail}: TIMES takes a whole number", b.line)
-        times = None
+    sweep = s.after("SWEEP")
     vector, sense = _axis_and_sense(b, s, numbers)
-    b.arcs.add(b.row, numbers[:3] + vector, b.line, numbers[6], times or 0.0, sense, _NAN if sweep is None else sweep)
+    b.arcs.add(b.row, numbers[:3] + vector, b.line, numbers[6], _turns(b, s), sense, _NAN if sweep is None else sweep)
+
+
+def _turns(b: Builder, s: Statement) -> float:
+    """The whole turns of TIMES, 0 without it."""
+    times = s.after("TIMES")
+    if s.has("TIMES") and (times is None or times < 0.0 or times != math.floor(times)):
+        b.log.error("cl.circle-times", f"{s.major}/...{s.tail}: TIMES takes a whole number", b.line)
+        return 0.0
+    return times or 0.0
 
 
 def _circle_numbers(n: list[float]) -> tuple[float, ...] | None:
@@ -137,16 +143,27 @@ def _axis_and_sense(b: Builder, s: Statement, numbers: tuple[float, ...]) -> tup
 
 
 def movarc(b: Builder, s: Statement) -> None:
-    """MOVARC/center, axis, radius, ANGLE, degrees; the next GOTO is its end."""
+    """MOVARC/center, axis, radius, ANGLE, degrees, or MOVARC/CENTER, x, y, z, AXIS, i, j, k, RADIUS, r[, TIMES, n]
+    with or without ANGLE; the next GOTO is its end."""
     b.arc_records += 1
-    angle, numbers = s.after("ANGLE"), s.numbers
-    if len(numbers) != 7 or angle is None:
+    angle, numbers = s.after("ANGLE"), _labelled(s) if s.has("CENTER") else s.numbers
+    if len(numbers) != 7 or (angle is None and not s.has("CENTER")):
         b.log.error("cl.circle", f"MOVARC/{s.body[:60]}: it takes center, axis, radius, ANGLE, degrees", b.line)
     elif not b.next_is_point():
         b.log.error("cl.circle-end", "MOVARC is not followed by a GOTO, which gives its end", b.line)
     else:
-        b.arcs.add(b.row, tuple(numbers[:6]), b.line, numbers[6], 0.0, 1 if angle > 0 else -1,
-                   math.radians(abs(angle)))
+        sweep = _NAN if angle is None else math.radians(abs(angle))
+        b.arcs.add(b.row, tuple(numbers[:6]), b.line, numbers[6], _turns(b, s) if angle is None else 0.0,
+                   -1 if angle is not None and angle < 0 else 1, sweep)
+
+
+def _labelled(s: Statement) -> list[float]:
+    """Center, axis and radius behind their words; fewer than 7 numbers where one is missing."""
+    found: list[float] = []
+    for word, count in (("CENTER", 3), ("AXIS", 3), ("RADIUS", 1)):
+        at = s.words.index(word) + 1 if word in s.words else len(s.words)
+        found += [w for w in s.words[at:at + count] if isinstance(w, float)]
+    return found
 
 
 HANDLERS = {"GOTO": goto, "GODLTA": godlta, "FROM": from_, "GOHOME": gohome, "RAPID": rapid, "TLAXIS": tlaxis,
