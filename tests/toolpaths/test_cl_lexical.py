@@ -33,7 +33,7 @@ HEAD = "UNITS/MM\nFEDRAT/100\n"
     "GOTO/1 2 3 0 0 1", "GOTO/1.0,2.0, $\n 3.0,0,$\n0,1", "GOTO/1,2,3, $ the rest is below\n0,0,1",
     "GOTO/1,2,3,$ $$ and a comment\n0,0,1", "GOTO/1,2,3,0,0,1 $$-> note", "GOTO/+1.,2,.3E1,0,0,1.",
     "GOTO/1,2,3,0,0,1,", "GOTO/1,2,3,0,0,1,,", "GOTO/1.0D0,2,3,-0,0,1", "\tGOTO /\t1,2,3,0,0,1\t",
-    "GOTO/1,2,$\n$$ between\n3,0,0,1", "GOTO/1,2,3,0.0000000,-0.0000000,1",
+    "GOTO/1,2,$\n$$ between\n3,0,0,1", "GOTO/1,2,$\n   \n\n3,0,0,1", "GOTO/1,2,3,0.0000000,-0.0000000,1",
 ])
 def test_one_point_in_many_spellings(line: str) -> None:
     p = clean(HEAD + line).toolpath

@@ -201,12 +201,10 @@ class Lexer:
         while self.next < len(scan.start) and scan.before[self.next] == scan.before[i]:
             text = text_of(self.data[scan.start[self.next]:scan.end[self.next]])
             bare = text.strip()
-            if bare.startswith(COMMENT):
-                if not bare.startswith(DATA_COMMENT):
-                    self.next += 1
-                    continue
-                break
-            if not bare or (not nested and self._begins(bare)):
+            if not bare or (bare.startswith(COMMENT) and not bare.startswith(DATA_COMMENT)):
+                self.next += 1
+                continue
+            if bare.startswith(COMMENT) or (not nested and self._begins(bare)):
                 break
             self.next += 1
             return text
