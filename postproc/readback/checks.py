@@ -6,9 +6,9 @@ import numpy as np
 
 from postproc.control import Control
 from postproc.events import TOOL_WORDS, compensation_states, coolant_states, loaded_tools, numbers, spindle_states
+from postproc.holes import PECKING, Phase
 from postproc.job import Job
 from postproc.links import SafeSpace
-from postproc.holes import PECKING, Phase
 from postproc.moves import Moves
 from postproc.readback.execute import Motion
 from postproc.readback.faults import Faults
@@ -82,7 +82,8 @@ def check_holes(motion: Motion, job: Job, moves: Moves, tip: Floats, owner: Ints
     for bad, what in ((bad_peck, "the hole is drilled in deeper pecks than the CL file says"),
                       (bad_dwell, "the tool rests at the bottom for less time than the CL file says")):
         if bad:
-            result.append(faults.error("verify.hole", what, int(moves.line[owner[bad[0]]]), int(motion.line[bad[0]]), len(bad)))
+            result.append(faults.error("verify.hole", what, int(moves.line[owner[bad[0]]]), int(motion.line[bad[0]]),
+                                       len(bad)))
     return result
 
 
@@ -123,8 +124,8 @@ def check_states(motion: Motion, job: Job, moves: Moves, owner: Ints, faults: Fa
             ("spindle", motion.spindle[rows] == direction, motion.spindle[rows], direction, _SPINDLE.__getitem__),
             ("spindle speed", same_speed, motion.rpm[rows], rpm, number),
             ("coolant", coolant == cooled, coolant, cooled, lambda on: "on" if on else "off"),
-            ("length register", (motion.register[rows] == register) | ~job.control.length_on_z, motion.register[rows], register,
-             number),
+            ("length register", (motion.register[rows] == register) | ~job.control.length_on_z, motion.register[rows],
+             register, number),
             ("cutter compensation", (given == side) | (tilted & (given == 40)), given, side, _COMPENSATION.__getitem__),
             ("work offset", motion.offset[rows] == code, motion.offset[rows], code, lambda g: f"G{g:g}")):
         bad = np.flatnonzero(~np.asarray(good))

@@ -11,7 +11,6 @@ from postproc.readback.words import Words
 from toolpaths.arrays import Array, Bools, Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
 
-
 Leg = tuple[int, Floats]
 """code and end of one leg of a canned cycle"""
 Legs = dict[int, list[Leg]]
@@ -224,7 +223,7 @@ def _legs(code: int, start: Floats, target: Floats, z: int, level: float, bottom
             legs.append((0, at(target, min(depth + relief, plane))))
             depth -= step
     legs.append((1, at(target, bottom)))
-    if code in (84, 85, 89):
+    if code in (74, 84, 85, 89):
         legs.append((1, at(target, plane)))
         if out > plane:
             legs.append((0, at(target, out)))

@@ -10,8 +10,8 @@ from postproc.readback.words import Words
 from toolpaths.arrays import Array, Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
 
-MOTION = (0, 1, 2, 3, 73, 80, 81, 82, 83, 84, 85, 86, 89)
-CYCLES = (73, 81, 82, 83, 84, 85, 86, 89)
+MOTION = (0, 1, 2, 3, 73, 74, 80, 81, 82, 83, 84, 85, 86, 89)
+CYCLES = (73, 74, 81, 82, 83, 84, 85, 86, 89)
 GROUPS: dict[str, tuple[float, ...]] = {
     "motion": MOTION, "plane": (17, 18, 19), "distance": (90,), "feed_mode": (93, 94), "units": (20, 21),
     "offset": (54, 55, 56, 57, 58, 59, 59.1, 59.2, 59.3), "length": (43, 49), "level": (98, 99),

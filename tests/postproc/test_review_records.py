@@ -45,11 +45,12 @@ def test_these_may_be_single_moves(kind: str) -> None:
     assert good(holes(f"{kind},DEPTH,5,MMPM,100,RAPTO,3,RTRCTO,20"))
 
 
-@pytest.mark.parametrize("spindle", ["SPINDL/RPM,600,CCLW", "SPINDL/OFF"])
-def test_a_tap_that_turns_the_wrong_way_is_refused(spindle: str) -> None:
-    """LinuxCNC stops G84 under M4; the built-in tables hold no other code."""
-    assert refused(holes("TAP,DEPTH,5,MMPM,100,CLEAR,3", spindle), "cycle.not_native") == 9
-    assert "G84" in good(holes("TAP,DEPTH,5,MMPM,100,CLEAR,3")).text
+def test_taps_of_both_hands_and_none_without_a_turning_spindle() -> None:
+    """LinuxCNC stops G84 under M4 and G74 under M3."""
+    assert refused(holes("TAP,DEPTH,5,MMPM,100,CLEAR,3", "SPINDL/OFF"), "cycle.not_native") == 9
+    right, left = (good(holes("TAP,DEPTH,5,MMPM,100,CLEAR,3", f"SPINDL/RPM,600,{turn}")).text for turn in ("CLW", "CCLW"))
+    assert "G84" in right and "G74" not in right
+    assert "G74" in left and "G84" not in left
 
 
 def test_dwell_in_revolutions_is_written_in_seconds() -> None:
