@@ -213,3 +213,16 @@ def test_movarc_with_words_for_its_parts(record: str, end: str, sweep: float) ->
 def test_movarc_without_one_of_its_parts(record: str) -> None:
     found = read_bytes(ISO + f"GOTO/10,0,0\n{record}\nGOTO/0,10,0\n")
     assert [d.code for d in found.diagnostics] == ["cl.circle"]
+
+
+def test_eleven_numbers_of_a_circle_are_left_hand_where_the_system_writes_fewer() -> None:
+    text = ("UNITS/MM\nCSI_SET_FLUTE_LENGTH/30\nLOADTL/1, 0, 75, 1\nFEDRAT/600, MMPM\nGOTO/10, 0, 0\n"
+            "CIRCLE/0, 0, 0, 0, 0, -1, 10, 90.0, 0.0, 0.0, 0.0\nGOTO/0, 10, 0\n")
+    assert read(text).arcs.sweep.tolist() == pytest.approx([math.pi / 2])
+    assert read(text.replace("10, 90.0, 0.0, 0.0, 0.0", "10")).arcs.sweep.tolist() == pytest.approx([1.5 * math.pi])
+
+
+def test_rigid_tapping_by_pitch() -> None:
+    record = "CYCLE/RIGID, DEPTH, 12, PITCH, 1.25, CLEAR, 15, RETURN, 20, RAPTO, 3"
+    c = read(ISO + f"GOTO/0,0,9\n{record}\nGOTO/1,2,3\n").cycles[0]
+    assert (c.kind, c.depth, c.clearance, c.retract, c.pitch, c.feed, int(c.feed_mode)) == ("TAP", 12, 3, 20, 1.25, 1.25, 1)

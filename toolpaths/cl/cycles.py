@@ -13,7 +13,7 @@ from toolpaths.toolpath import Cycle, FeedMode
 from toolpaths.units import MM_PER_INCH
 
 KINDS = {"DRILL": "DRILL", "DEEP": "DEEP", "DEEP2": "DEEP", "PECK": "DEEP", "BRKCHP": "BRKCHP", "BREAKCHP": "BRKCHP",
-         "TAP": "TAP", "BORE": "BORE", "BORE7": "BORE7", "BORE8": "BORE8", "BORE9": "BORE9", "REAM": "REAM",
+         "TAP": "TAP", "RIGID": "TAP", "BORE": "BORE", "BORE7": "BORE7", "BORE8": "BORE8", "BORE9": "BORE9", "REAM": "REAM",
          "FACE": "FACE", "CSINK": "CSINK", "THRU": "THRU", "MILL": "MILL", "REVERS": "REVERS", "SHIFT": "SHIFT",
          "CIRCUL": "CIRCUL", "THREAD": "THREAD", "SPOT": "DRILL"}
 _OFF = frozenset({"OFF", "NOMORE"})
@@ -231,6 +231,8 @@ def _cycle_feed(b: Builder, v: Values) -> tuple[float, FeedMode, float | None]:
     if v.feed is not None:
         feed, mode = feed_in(*v.feed, b.scale)
         return feed, mode, feed if v.kind == "TAP" and mode is FeedMode.PER_REVOLUTION and pitch is None else pitch
+    if v.kind == "TAP" and pitch is not None:
+        return pitch, FeedMode.PER_REVOLUTION, pitch
     feed, mode = b.feed.now
     if math.isnan(feed) and b.feed.values:
         b.log.error("cl.cycle-value", f"CYCLE/{v.kind} states no feed and none holds", b.line)
