@@ -120,6 +120,9 @@ def nurbs(b: Builder, s: Statement) -> None:
     if start is None or math.isnan(start[0]):
         b.log.error("cl.nurbs", "a spline needs a GOTO before it", b.line)
         return
+    if b.rapids and b.rapids[-1] == b.row:
+        b.log.error("cl.nurbs", "RAPID does not go with a spline", b.line, "put RAPID before a GOTO")
+        return
     if len(control) != len(knots) + 2 or not knots:
         b.log.error("cl.nurbs", f"the spline has {len(knots)} knots and {len(control)} control points; a cubic has two "
                     "more points than knots", b.line)
