@@ -12,6 +12,7 @@ from toolpaths.cl.log import Log
 from toolpaths.cl.read import ReadResult, read_bytes
 from toolpaths.cl.source import normalise
 from toolpaths.cl.statements import statement_of, words_of
+from toolpaths.cl.write import text_of
 from toolpaths.diagnostics import Severity, has_errors
 
 
@@ -206,3 +207,11 @@ def test_joining_at_once_changes_nothing(monkeypatch: pytest.MonkeyPatch) -> Non
             assert other.toolpath.equals(results[0].toolpath), text
             assert other.toolpath.line.tolist() == results[0].toolpath.line.tolist(), text
             assert [(d.code, d.lines) for d in other.diagnostics] == [(d.code, d.lines) for d in results[0].diagnostics]
+
+
+def test_long_events_are_wrapped_where_no_record_could_begin() -> None:
+    words = ["RPM", "ABCDEFGHIJ", "TPRINT", "FINI"] * 20 + ["5"] * 150 + ["END"] * 40
+    p = read(HEAD + "SPINDL/" + ",".join(words) + "\nGOTO/1,2,3\n").toolpath
+    text = text_of(p)
+    assert text.count("$\n") > 1
+    assert read(text).toolpath.equals(p)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Callable, Iterator
 from dataclasses import asdict
 
@@ -23,6 +24,7 @@ WIDTH = 200
 _PER_MINUTE = {FeedMode.PER_TIME: ("MMPM", "MMPS"), FeedMode.INVERSE_TIME: ("INVERS", "INVERS,PERSEC")}
 _RECORDS = {Role.START: "FROM/", Role.HOME: "GOHOME/"}
 _TEXT_EVENTS = ("PPRINT", "INSERT")
+_BREAK = re.compile(r",(?=[-+.\d])")
 
 
 def text_of(p: Toolpath) -> str:
@@ -143,10 +145,13 @@ def _changes(column: Array) -> Bools:
 
 
 def _wrapped(line: str) -> str:
-    """`line` continued by $ behind a comma where it is longer than WIDTH."""
+    """`line` continued by $ between a comma and a number where it is longer than WIDTH.
+
+    A rest that began with a word could be taken for a new record.
+    """
     parts: list[str] = []
     while len(line) > WIDTH:
-        at = line.rfind(",", 0, WIDTH - 1) + 1
+        at = max((m.end() for m in _BREAK.finditer(line, 0, WIDTH - 1)), default=0)
         if at <= 0:
             break
         parts.append(line[:at] + "$")
