@@ -210,7 +210,7 @@ def test_joining_at_once_changes_nothing(monkeypatch: pytest.MonkeyPatch) -> Non
 
 
 def test_long_events_are_wrapped_where_no_record_could_begin() -> None:
-    words = ["RPM", "ABCDEFGHIJ", "TPRINT", "FINI"] * 20 + ["5"] * 150 + ["END"] * 40
+    words = ["RPM", *["TPRINT"] * 40, *["5"] * 150, *["FINI"] * 60]
     p = read(HEAD + "SPINDL/" + ",".join(words) + "\nGOTO/1,2,3\n").toolpath
     text = text_of(p)
     assert text.count("$\n") > 1

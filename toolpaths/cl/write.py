@@ -150,13 +150,13 @@ def _wrapped(line: str) -> str:
     A rest that began with a word could be taken for a new record.
     """
     parts: list[str] = []
-    while len(line) > WIDTH:
-        at = max((m.end() for m in _BREAK.finditer(line, 0, WIDTH - 1)), default=0)
-        if at <= 0:
-            break
-        parts.append(line[:at] + "$")
-        line = line[at:]
-    return "\n".join([*parts, line])
+    start = last = 0
+    for end in [*(m.end() for m in _BREAK.finditer(line)), len(line)]:
+        if end - start > WIDTH - 1 and last > start:
+            parts.append(line[start:last] + "$")
+            start = last
+        last = end
+    return "\n".join([*parts, line[start:]])
 
 
 def _event(event: Event) -> list[str]:
