@@ -226,3 +226,9 @@ def test_rigid_tapping_by_pitch() -> None:
     record = "CYCLE/RIGID, DEPTH, 12, PITCH, 1.25, CLEAR, 15, RETURN, 20, RAPTO, 3"
     c = read(ISO + f"GOTO/0,0,9\n{record}\nGOTO/1,2,3\n").cycles[0]
     assert (c.kind, c.depth, c.clearance, c.retract, c.pitch, c.feed, int(c.feed_mode)) == ("TAP", 12, 3, 20, 1.25, 1.25, 1)
+
+
+def test_an_nx_arc_that_ends_a_hair_behind_its_start_goes_back_that_way() -> None:
+    p = read(NX + "GOTO/68.9,0,0,0,0,1\nCIRCLE/0,0,0,0,0,-1,68.9,.03,.5,10,0\nGOTO/68.9,-0.0001,0\n", "cl.arc-back")
+    assert p.arcs.sweep.tolist() == pytest.approx([0.0001 / 68.9], rel=1e-6)
+    assert p.arcs.normal.tolist() == [[0, 0, -1]]

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from toolpaths.arrays import Floats, Ints
+from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.cl.log import Log
 from toolpaths.toolpath import Arcs
 
@@ -87,7 +87,8 @@ def arcs_of(r: Records, full_circles: bool, log: Log) -> Arcs:
     u, v = r.start - center, r.end - center
     v = v - np.einsum("ki,ki->k", v, normal)[:, None] * normal
     radius = np.linalg.norm(u, axis=1)
-    sweep = _sweep(u, v, normal, r, full_circles, log)
+    sweep, back = _sweep(u, v, normal, r, full_circles, log)
+    normal = np.where(back[:, None], -normal, normal)
     _check_radius(radius, np.linalg.norm(v, axis=1), r, log)
     radius = np.where(exact & (np.abs(radius - r.radius) < RADIUS_ERROR), r.radius, radius)
     _check_sense(sweep[~exact], r.line[~exact], log)
@@ -101,8 +102,11 @@ def _normals(r: Records, log: Log) -> Floats:
     return np.where((norm > 0.0)[:, None], unit(r.normal), [0.0, 0.0, 1.0])
 
 
-def _sweep(u: Floats, v: Floats, normal: Floats, r: Records, full_circles: bool, log: Log) -> Floats:
-    """Angle from u to v about the normal in (0, 2 pi], whole turns added; a written sweep is checked and kept."""
+def _sweep(u: Floats, v: Floats, normal: Floats, r: Records, full_circles: bool, log: Log) -> tuple[Floats, Bools]:
+    """Angle from u to v about the normal in (0, 2 pi], whole turns added; a written sweep is checked and kept.
+
+    Second: arcs that end behind their start by rounding, where no whole circles are written; they go back that way.
+    """
     angle = np.arctan2(np.einsum("ki,ki->k", np.cross(u, v), normal), np.einsum("ki,ki->k", u, v))
     angle = np.where(angle < 0.0, angle + _TURN, angle)
     chord = np.linalg.norm(u - v, axis=1)
@@ -110,19 +114,24 @@ def _sweep(u: Floats, v: Floats, normal: Floats, r: Records, full_circles: bool,
     whole = r.times > 0.0
     behind = near & (angle > math.pi)
     angle = np.where(whole & behind, angle - _TURN, angle)
+    back = near & behind & ~whole & np.isnan(r.sweep) & (not full_circles)
     if full_circles:
         angle = np.where(near & ~whole, _TURN, angle)
         steep = np.abs(np.einsum("ki,ki->k", r.end - r.start, normal)) > _STEEP * chord
         turn = steep & (chord <= ROUNDING) & (angle < math.pi) & ~whole & np.isnan(r.sweep)
         angle = np.where(turn, angle + _TURN, angle)
     else:
-        for k in np.flatnonzero(~whole & (behind | (near & (angle == 0.0))) & np.isnan(r.sweep)):
+        for k in np.flatnonzero(back):
+            log.warning("cl.arc-back", f"the arc ends {chord[k]:.2g} mm behind its start; by rounding, so no whole circle "
+                        "is made", int(r.line[k]), "give whole turns with TIMES,n")
+        angle = np.where(back, _TURN - angle, angle)
+        for k in np.flatnonzero(~whole & near & (angle == 0.0) & np.isnan(r.sweep)):
             log.error("cl.arc-ends", "the arc ends where it starts, and this system does not write whole circles",
                       int(r.line[k]), "give the whole turns with TIMES,n")
     angle = angle + _TURN * r.times
     for k in np.flatnonzero(~np.isnan(r.sweep)):
         _check_written(float(angle[k]), float(r.sweep[k]), float(np.linalg.norm(u[k])), int(r.line[k]), log)
-    return np.where(np.isnan(r.sweep), angle, r.sweep)
+    return np.where(np.isnan(r.sweep), angle, r.sweep), back
 
 
 def _check_written(angle: float, sweep: float, radius: float, line: int, log: Log) -> None:
