@@ -1,0 +1,126 @@
+"""Commands on the files that describe machines, set-ups and controllers."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from postproc.console import (
+    Json,
+    controller_file,
+    controller_of,
+    machine_of,
+    print_json,
+    refuse_overwriting,
+    report,
+    shown_errors,
+)
+
+machine_app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Machines: list, show, check, analyse, schema.")
+controller_app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Controllers: list, show, schema.")
+setup_app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Set-up files: check, schema.")
+
+
+@machine_app.command("list")
+def machine_list(json: Json = "") -> None:
+    """List the built-in machines."""
+    import machines
+
+    found = [machines.load(name) for name in machines.names()]
+    rows = [{"name": m.name, "structure": m.structure, "axes": list(m.axis_names), "description": m.description}
+            for m in found]
+    width = max(len(m.name) for m in found)
+    report((), json, {"machines": rows},
+            "\n".join(f"{m.name:{width}}  {' '.join(m.axis_names):10}  {m.description}" for m in found))
+
+
+@machine_app.command("show")
+def machine_show(name: Annotated[str, typer.Argument(help="name or TOML file")], json: Json = "") -> None:
+    """Show a machine: axes, travel, limits, which values are assumed."""
+    from postproc.catalogue import machine_dict, machine_text
+
+    with shown_errors(json):
+        m = machine_of(name)
+    report((), json, machine_dict(m), machine_text(m))
+
+
+@machine_app.command("check", epilog="Example: postproc machine check my-machine.toml")
+def machine_check(file: Annotated[str, typer.Argument(help="TOML file or name")], json: Json = "") -> None:
+    """Check a machine file and say what is wrong with it."""
+    import machines
+
+    m, found = machines.load_checked(file)
+    good = f"{file}: good: {m.name}, {m.structure}, axes {' '.join(m.axis_names)}" if m else ""
+    report(tuple(found), json, {"name": m.name if m else None, "diagnostics": [d.as_dict() for d in found]}, good)
+
+
+@machine_app.command("analyse", epilog="Example: postproc machine analyse uranesx --json -")
+def machine_analyse(name: Annotated[str, typer.Argument(help="name or TOML file")], json: Json = "") -> None:
+    """Condition number, speed and force transmission, reachable box of a parallel machine, over its workspace."""
+    from machines.analysis.report import analyse
+    from postproc.catalogue import analysis_text
+
+    with shown_errors(json):
+        found = analyse(machine_of(name))
+    report((), json, found, analysis_text(found))
+
+
+@machine_app.command("schema")
+def machine_schema() -> None:
+    """Print the JSON schema of a machine file."""
+    import machines
+
+    print_json(machines.schema())
+
+
+@setup_app.command("check", epilog="Example: postproc setup check part.setup.toml")
+def setup_check(file: Annotated[str, typer.Argument(help="TOML file")], json: Json = "") -> None:
+    """Check a set-up file and say what is wrong with it."""
+    from postproc.setup import load_setup, part_placement
+    from toolpaths.diagnostics import has_errors
+
+    refuse_overwriting({"--json": json}, {"the set-up": file})
+    spec, found = load_setup(file)
+    found = list(found) + (part_placement(spec, file)[1] if spec else [])
+    good = "" if spec is None or has_errors(found) else f"{file}: good: {len(spec.tools)} tools"
+    report(tuple(found), json, {"diagnostics": [d.as_dict() for d in found]}, good)
+
+
+@setup_app.command("schema")
+def setup_schema() -> None:
+    """Print the JSON schema of a set-up file."""
+    from machines.user_file import schema
+    from postproc.setup import SetupFile
+
+    print_json(schema(SetupFile))
+
+
+@controller_app.command("list")
+def controller_list(json: Json = "") -> None:
+    """List the built-in controllers."""
+    from postproc.controllers.model import builtin_files
+
+    found = {name: controller_file(name) for name in builtin_files()}
+    rows = [{"name": name, "description": spec.description} for name, spec in found.items()]
+    report((), json, {"controllers": rows}, "\n".join(f"{r['name']:12}  {r['description']}" for r in rows))
+
+
+@controller_app.command("show")
+def controller_show(name: Annotated[str, typer.Argument(help="name or TOML file")], json: Json = "") -> None:
+    """Show every value of a controller file, and which file it comes from."""
+    from postproc.catalogue import controller_values
+
+    with shown_errors(json):
+        values, origins = controller_values(controller_of(name))
+    text = "\n".join(f"{key} = {value!r}  ({origins[key]})" for key, value in values.items())
+    report((), json, {"values": values, "origins": origins}, text)
+
+
+@controller_app.command("schema")
+def controller_schema() -> None:
+    """Print the JSON schema of a controller file."""
+    from machines.user_file import schema
+    from postproc.controllers.model import ControllerFile
+
+    print_json(schema(ControllerFile))

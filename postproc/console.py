@@ -1,0 +1,141 @@
+"""What all commands share: machines and controllers by name, diagnostics, progress, figures as text or JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from machines.machine import Machine
+    from toolpaths.diagnostics import Diagnostic
+
+Json = Annotated[str, typer.Option("--json", metavar="FILE", help="write the figures as JSON; - for standard output")]
+
+
+def machine_of(name: str) -> Machine:
+    import machines
+
+    return machines.load(name)
+
+
+def controller_of(name: str) -> str:
+    controller_file(name)
+    return name
+
+
+def controller_file(name: str) -> Any:
+    from postproc.controllers.model import load_controller
+    from toolpaths.diagnostics import DiagnosticError
+
+    spec, found = load_controller(name)
+    if spec is None:
+        raise DiagnosticError(found)
+    return spec
+
+
+@contextmanager
+def shown_errors(json: str) -> Iterator[None]:
+    """Diagnostics that a library call raises, as output and exit code 1."""
+    from toolpaths.diagnostics import DiagnosticError
+
+    try:
+        yield
+    except DiagnosticError as fault:
+        report(fault.diagnostics, json, {"diagnostics": [d.as_dict() for d in fault.diagnostics]}, "")
+
+
+@contextmanager
+def progress_bar() -> Iterator[Any]:
+    """A bar on standard error for long work; silent where that is no terminal."""
+    import sys
+
+    if not sys.stderr.isatty():
+        yield lambda stage, at, total: None
+        return
+    from rich.console import Console
+    from rich.progress import Progress
+
+    with Progress(console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("")
+        yield lambda stage, at, total: bar.update(task, description=stage, completed=at, total=total)
+
+
+def print_json(values: object) -> None:
+    import json
+
+    typer.echo(json.dumps(values, indent=2, allow_nan=False, default=str))
+
+
+def report(diagnostics: tuple[Diagnostic, ...], target: str, values: dict[str, Any], text: str) -> None:
+    """Messages to standard error, the figures where they were asked for; exit code 1 where there are errors."""
+    from toolpaths.diagnostics import has_errors
+
+    for d in diagnostics:
+        typer.echo(str(d), err=True)
+    failed = has_errors(diagnostics)
+    if target == "-":
+        print_json(rounded(values))
+    elif target:
+        failed |= not _json_file(target, values)
+    if target != "-" and text:
+        typer.echo(text)
+    if failed:
+        raise typer.Exit(1)
+
+
+def _json_file(target: str, values: dict[str, Any]) -> bool:
+    """Write the figures; False, and why on standard error, where that fails."""
+    import json
+
+    from postproc.files import write_atomically
+    from toolpaths.diagnostics import DiagnosticError
+
+    try:
+        write_atomically(Path(target), json.dumps(rounded(values), indent=2, allow_nan=False, default=str) + "\n")
+    except DiagnosticError as fault:
+        typer.echo(str(fault), err=True)
+        return False
+    return True
+
+
+def rounded(value: Any) -> Any:
+    """JSON values with numbers of at most 9 decimals, no -0."""
+    if isinstance(value, float):
+        return round(value, 9) + 0.0
+    if isinstance(value, dict):
+        return {key: rounded(v) for key, v in value.items()}
+    return [rounded(v) for v in value] if isinstance(value, (list, tuple)) else value
+
+
+def refuse_overwriting(outputs: dict[str, str], inputs: dict[str, str]) -> None:
+    """Wrong use where an output would replace an input or another output, or is no regular file."""
+    known = [(_place(name), what) for what, name in inputs.items() if name]
+    for option, name in outputs.items():
+        if not name or (name == "-" and option == "--json"):
+            continue
+        if name == "-":
+            raise typer.BadParameter("a program is written whole or not at all, so not to standard output; name a file",
+                                     param_hint=option)
+        place = _place(name)
+        try:
+            same = next((what for other, what in known if other == place or (
+                other.exists() and place.exists() and other.samefile(place))), "")
+            kind = "" if not place.exists() or place.is_file() else "a folder; name a file" if place.is_dir() else \
+                "no regular file"
+        except OSError:  # no name a file can have: writing says so
+            continue
+        if same or kind:
+            raise typer.BadParameter(f"the output would replace {same}" if same else f"{name} is {kind}", param_hint=option)
+        known.append((place, f"the file of {option}"))
+
+
+def _place(name: str) -> Path:
+    """Where a name leads, through links; loops stay as they are."""
+    try:
+        return Path(name).resolve()
+    except (OSError, RuntimeError):
+        return Path(name)
