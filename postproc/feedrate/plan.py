@@ -35,11 +35,16 @@ class Options:
     `strict`: nothing exceeded in the delivered samples; `step` of these; `passes` of tightening in strict mode."""
 
     ease: float = 25.0
-    spacing: Spacing = field(default_factory=Spacing)
+    spacing: Spacing | None = None
     method: Method = field(default_factory=Method)
     strict: bool = False
     step: float = SAMPLE
-    passes: int = 2
+    passes: int = 3
+
+    @property
+    def knots(self) -> Spacing:
+        """`spacing`, by default narrower in strict mode, where each per mille between the knots slows the whole piece."""
+        return self.spacing or Spacing(dt=2e-3 if self.strict else 2.5e-3)
 
 
 @dataclass(frozen=True)
@@ -126,7 +131,7 @@ def plan(path: Path, limits: JointLimits, feed: Feed = np.inf, stops: Sequence[f
         raise ValueError("knots are for a motion without stops")
     pieces, reports = [], []
     for eased in _stretches(path, stops, options.ease):
-        sigma = knots if knots is not None else _mesh(eased, limits, allowed, options.spacing)
+        sigma = knots if knots is not None else _mesh(eased, limits, allowed, options.knots)
         grid, report = _solve(Knots(eased, sigma, limits, allowed), options)
         pieces.append(Piece(eased, _profile(grid, report.c)))
         reports.append(report)
@@ -142,7 +147,7 @@ def plan_second_order(path: Path, limits: JointLimits, feed: Feed = np.inf, stop
     allowed = _as_function(feed)
     pieces = []
     for eased in _stretches(path, stops, 0.0):
-        sigma = knots if knots is not None else mesh(eased, limits, _speed_limit(eased, allowed), options.spacing)
+        sigma = knots if knots is not None else mesh(eased, limits, _speed_limit(eased, allowed), options.knots)
         at = eased.derivatives(sigma)
         cap = np.minimum(squared_speed(at.dq, limits.velocity), allowed(eased.parameter(sigma)[0]) ** 2)
         x = second_order(sigma, at.dq, at.d2q, limits.acceleration, cap, options.method.kernel)

@@ -10,6 +10,8 @@ from toolpaths.arrays import Floats
 
 ENOUGH = 1.002
 """Ratio between knots that is left to the final slowing down."""
+MORE = 1.6
+"""Power of the excess by which rows are tightened: a peak between knots falls by some 60 % of what its knots do."""
 BETWEEN = (0.25, 0.5, 0.75)
 CHUNK = 16384
 
@@ -22,7 +24,7 @@ def tightened(grid: Knots, profile: Profile) -> Floats | None:
         excess[:, here] = np.max([_ratios(grid, profile, here, share) for share in BETWEEN], axis=0)
     if excess.max() <= ENOUGH:
         return None
-    excess = np.maximum(excess, 1.0)
+    excess = np.maximum(excess, 1.0) ** MORE
     at_knots = np.maximum(np.pad(excess, ((0, 0), (1, 0)), mode="edge"), np.pad(excess, ((0, 0), (0, 1)), mode="edge"))
     return at_knots if grid.tight is None else grid.tight * at_knots
 

@@ -47,13 +47,12 @@ def random_path(seed: int, points: int = 20, length: float = 100.0, bend: float 
     return SplinePath(spline.t, spline.c)
 
 
-def zigzag(length: float, seed: int = 5) -> SplinePath:
-    """Passes to and fro over a wavy surface, smooth turns, orientation following the surface; parameter about the length."""
-    at = np.arange(0.0, length + 4.0, 4.0)
-    phase = at / 40.0
-    wave = np.random.default_rng(seed).uniform(0.5, 1.5, 3)
-    q = np.stack((40.0 * np.sin(phase), 0.02 * at, 6.0 * np.sin(wave[0] * phase * 2.0),
-                  0.15 * np.sin(wave[1] * phase), 0.2 * np.sin(wave[2] * phase * 1.5)), axis=1)
+def zigzag(length: float) -> SplinePath:
+    """Passes of 48 mm to and fro with tight turns over a wavy surface, orientation following; a period takes 100."""
+    at = np.arange(0.0, length + 2.0, 2.0)
+    phase = TURN * at / 100.0
+    q = np.stack((48.0 / np.pi * np.arcsin(0.98 * np.sin(phase)), 0.02 * at + np.cos(2.0 * phase),
+                  2.0 * np.sin(2.0 * phase + 0.5), 0.02 * np.sin(phase + 0.3), 0.03 * np.sin(2.0 * phase + 0.4)), axis=1)
     spline = make_interp_spline(at, q, k=5)
     return SplinePath(spline.t, spline.c)
 

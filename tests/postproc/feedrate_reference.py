@@ -61,7 +61,7 @@ def _convex(problem: Problem, c: Floats) -> tuple[Floats | None, float]:
                                     np.concatenate((*right, fixed)),
                                     [clarabel.NonnegativeConeT(count)] + [clarabel.PowerConeT(1.0 / 3.0)] * knots, settings)
     found = solver.solve()
-    if found.status != clarabel.SolverStatus.Solved:
+    if found.status not in (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved):
         return None, np.inf
     answer = np.asarray(found.x)[:n]
     c = c * (_tie(knots + 2, basis.tied) @ answer)

@@ -1,0 +1,173 @@
+"""Speed, memory and optimality of the planned motion, beside toppra and Clarabel in one run.
+
+    python tests/benchmarks/bench_feedrate.py [speed] [memory] [optimality] [limits]
+
+speed: points per second against toppra (velocity and acceleration only), path evaluation included, medians of
+interleaved runs.
+memory: growth of the resident set at 10^6 knots, in a process of its own. optimality: 150 random paths against a
+converged sequence of convex problems. limits: worst ratio in the 1 ms samples, fast and strict. Compiled code is warm.
+"""
+
+from __future__ import annotations
+
+import os
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import logging
+import statistics
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[2]))
+
+from postproc.feedrate.interior import NumpySteps
+from postproc.feedrate.limits import squared_speed
+from postproc.feedrate.paths import Eased, SplinePath
+from postproc.feedrate.plan import Options, plan, plan_second_order
+from postproc.feedrate.second_order import least_time, second_order
+from postproc.feedrate.windows import Method, solve_problem
+from tests.postproc.feedrate_kit import MIKRON, bezier, random_path, uniform, zigzag
+from tests.postproc.feedrate_reference import least_jerk_time
+from tests.postproc.test_feedrate_second_order import toppra_time
+from toolpaths.arrays import Floats
+
+STEP = 0.1
+
+
+def own_second_order(path: SplinePath, sigma: Floats) -> float:
+    at = path.derivatives(sigma)
+    cap = squared_speed(at.dq, MIKRON.velocity)
+    return least_time(sigma, second_order(sigma, at.dq, at.d2q, MIKRON.acceleration, cap, kernel=True))
+
+
+PATHS = [("bezier", bezier(), 1000, 7), ("bezier", bezier(), 10_000, 5), ("zigzag", zigzag(100.0), 1000, 7),
+         ("zigzag", zigzag(1000.0), 10_000, 5), ("zigzag", zigzag(10_000.0), 100_000, 3),
+         ("zigzag", zigzag(100_000.0), 1_000_000, 1)]
+COLUMNS = ("2nd", "fast", "2 threads", "mesh", "strict", "numpy")
+Run = Callable[[], tuple[float, int]]
+"""A plan's time of motion and its number of points."""
+
+
+def jerk(path: SplinePath, knots: Floats | None, strict: bool = False, threads: int = 1, kernel: bool = True) -> Run:
+    def run() -> tuple[float, int]:
+        options = Options(method=Method(kernel=kernel, threads=threads), strict=strict)
+        made = plan(path, MIKRON, options=options, knots=knots)
+        return made.seconds, len(made.pieces[0].profile.sigma)
+    return run
+
+
+def contenders(path: SplinePath, count: int) -> dict[str, Run]:
+    """toppra and the own plans of one path; without numpy on the longest."""
+    plain = np.linspace(path.start, path.end, count + 1)
+    sigma = np.linspace(0.0, Eased.between(path, path.start, path.end, 25.0).end, count + 1)
+    runs: dict[str, Run] = {
+        "toppra": lambda: (toppra_time(path, plain), count + 1), "2nd": lambda: (own_second_order(path, plain), count + 1),
+        "fast": jerk(path, sigma), "2 threads": jerk(path, sigma, threads=2), "mesh": jerk(path, None),
+        "strict": jerk(path, None, strict=True)}
+    if count <= 100_000:
+        runs["numpy"] = jerk(path, sigma, kernel=False)
+    return runs
+
+
+def speed() -> None:
+    """Interleaved runs on uniform grids (2nd, fast, 2 threads, numpy) and on the mesh (mesh, strict)."""
+    print(f"{'path, points':16} {'toppra':>10} | points per second over toppra's:",
+          "".join(f"{name:>10}" for name in COLUMNS), sep="")
+    for name, path, count, repeats in PATHS:
+        runs = contenders(path, count)
+        motion = {key: run()[0] for key, run in runs.items()} if repeats > 1 else {}
+        rates: dict[str, list[float]] = {key: [] for key in runs}
+        for _ in range(repeats):
+            for key, run in runs.items():
+                start = time.perf_counter()
+                motion[key], points = run()
+                rates[key].append(points / (time.perf_counter() - start))
+        rate = {key: statistics.median(values) for key, values in rates.items()}
+        ratios = "".join(f"{rate[key] / rate['toppra']:10.1f}" if key in rate else "         -" for key in COLUMNS)
+        print(f"{name + ' ' + str(count):16} {rate['toppra'] / 1e3:6.1f} k/s |{' ' * 33}{ratios}", flush=True)
+        print(f"    motion: 2nd {motion['2nd']:.4f} s, over toppra's {motion['2nd'] / motion['toppra'] - 1.0:+.0e}; "
+              f"jerk fast {motion['fast']:.4f} s, on the mesh {motion['mesh']:.4f} s, "
+              f"strict {motion['strict'] / motion['mesh'] - 1.0:+.2%}")
+
+
+def peak() -> float:
+    """Highest resident set since the peak was last forgotten, MB."""
+    status = Path("/proc/self/status").read_text().split()
+    return int(status[status.index("VmHWM:") + 1]) / 1024.0
+
+
+def memory() -> None:
+    """Growth of the peak resident set by planning 10^6 knots, the path itself left out."""
+    if "--inner" not in sys.argv:
+        subprocess.run([sys.executable, __file__, "memory", "--inner"], check=True)
+        return
+    path, small = zigzag(100_000.0), zigzag(3000.0)
+    method = Method(kernel=True)
+    plan(small, MIKRON, options=Options(method=method), knots=uniform(small, 30_000).sigma)
+    sigma = uniform(path, 1_000_000).sigma
+    Path("/proc/self/clear_refs").write_text("5")  # forgets the peak so far
+    before = peak()
+    made = plan(path, MIKRON, options=Options(method=method), knots=sigma)
+    grown = peak() - before
+    print(f"10^6 knots: {grown:.0f} MB more, stitches {made.mismatch:.1e}, {made.iterations} iterations, "
+          f"{made.seconds:.1f} s of motion")
+
+
+def optimality() -> None:
+    """150 random paths on 256 intervals."""
+    above, iterations, unsolved = [], [], 0
+    own, other, failed = 0.0, 0.0, 0
+    for seed in range(150):
+        problem = uniform(random_path(seed, bend=(0.3, 1.0, 3.0)[seed % 3]), 256).problem()
+        start = time.perf_counter()
+        found = solve_problem(problem, NumpySteps)
+        middle = time.perf_counter()
+        iterations.append(found.iterations)
+        unsolved += not found.solved
+        try:
+            best = least_jerk_time(problem, 0.8 * found.c)
+        except ArithmeticError:
+            failed += 1
+            continue
+        own, other = own + middle - start, other + time.perf_counter() - middle
+        above.append(float(np.sum(problem.weight * problem.basis.values(found.c)[0] ** -0.5)) / best - 1.0)
+    print(f"150 random paths: {unsolved} unsolved, iterations median {statistics.median(iterations):.0f} "
+          f"most {max(iterations)}; "
+          f"time above the reference median {statistics.median(above):.1e} most {max(above):.1e} "
+          f"least {min(above):.1e}; "
+          f"reference {other / own:.0f}x as long, not converged on {failed}")
+
+
+def limits() -> None:
+    """Worst ratios over 1 ms samples, differences included, and the price of strict."""
+    worst: dict[bool, list[float]] = {False: [], True: []}
+    price, bound = [], []
+    for seed in range(50):
+        path = random_path(seed, bend=(0.3, 1.0, 3.0)[seed % 3])
+        made = {strict: plan(path, MIKRON, options=Options(strict=strict)) for strict in (False, True)}
+        for strict, one in made.items():
+            worst[strict].append(one.trajectory().usage(MIKRON).worst)
+        price.append(made[True].seconds / made[False].seconds - 1.0)
+        bound.append(made[False].seconds / plan_second_order(path, MIKRON).seconds)
+    print(f"50 random paths: worst ratio fast median {statistics.median(worst[False]):.3f} most {max(worst[False]):.3f}, "
+          f"strict most {max(worst[True]):.9f}; "
+          f"strict is slower by median {statistics.median(price):.2%} most {max(price):.2%}; "
+          f"jerk costs {statistics.median(bound):.2f}x the second-order time")
+
+
+def main() -> None:
+    """Run what is named, or all."""
+    logging.disable(logging.CRITICAL)
+    parts = {"speed": speed, "memory": memory, "optimality": optimality, "limits": limits}
+    for name in [arg for arg in sys.argv[1:] if arg in parts] or parts:
+        parts[name]()
+
+
+if __name__ == "__main__":
+    main()
