@@ -25,9 +25,7 @@ def _triple(numbers: list[float], at: int) -> Triple:
 def goto(b: Builder, s: Statement) -> None:
     """A point of 3, 6 or 9 numbers; 4 or 7: the last is a feed; 2: z from ZSURF."""
     numbers = s.numbers
-    if s.tail == ("CONTACT",):
-        b.contacts.append(b.row)
-    elif s.tail:
+    if s.tail and s.tail != ("CONTACT",):
         b.log.error("cl.number", f"GOTO/{s.body[:60]}: {s.tail[0] or 'an empty field'} is not a number", b.line,
                     "GOTO takes 3, 6 or 9 numbers")
         return
@@ -39,6 +37,8 @@ def goto(b: Builder, s: Statement) -> None:
     if len(numbers) not in (3, 6, 9):
         b.log.error("cl.goto", f"GOTO has {len(numbers)} numbers, it takes 3, 6 or 9", b.line)
         return
+    if s.tail:
+        b.contacts.append(b.row)
     b.add_point(_triple(numbers, 0), _triple(numbers, 3), _triple(numbers, 6))
 
 
