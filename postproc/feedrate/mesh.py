@@ -37,6 +37,9 @@ def mesh(path: Path, limits: JointLimits, top: Callable[[Floats], Floats], spaci
     """
     at = _probes(path, spacing)
     speed = np.concatenate([_speed(path, limits, top, at[i:i + CHUNK]) for i in range(0, len(at), CHUNK)])
+    if not np.all(speed > 0.0):
+        where = at[np.flatnonzero(~(speed > 0.0))[0]]
+        raise ValueError(f"no speed above 0 is allowed at {where:.6g} of {path.end:.6g}: feed 0, or no finite derivatives")
     h = np.minimum(spacing.dt * speed, min(spacing.longest, (path.end - path.start) / FEWEST))
     h[[0, -1]] = np.minimum(h[[0, -1]], ramp / RAMP * speed[[0, -1]])
     h = np.maximum(h, 1e-9 * (path.end - path.start))
@@ -48,10 +51,11 @@ def ramp_time(dq: Floats, limits: JointLimits, feed: Floats) -> float:
 
     dq (N, J) by s, feed (N,) largest ds/dt there; inf where nothing of this is limited.
     """
-    with np.errstate(divide="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore"):
         speed, acceleration, jerk = (np.min(limit / np.abs(dq), axis=1)
                                      for limit in (limits.velocity, limits.acceleration, limits.jerk))
-    return float(np.min(np.minimum(acceleration / jerk, np.sqrt(np.minimum(speed, feed) / jerk))))
+        times = np.minimum(acceleration / jerk, np.sqrt(np.minimum(speed, feed) / jerk))
+    return float(np.min(np.where(times > 0.0, times, np.inf)))
 
 
 def _speed(path: Path, limits: JointLimits, top: Callable[[Floats], Floats], at: Floats) -> Floats:

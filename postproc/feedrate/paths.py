@@ -7,6 +7,7 @@ with s = sigma - 0.4 d), sigma_dot is finite at rest, and rest needs no conditio
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
@@ -116,6 +117,12 @@ class Eased:
             guess = np.clip(guess - (there[0] - s[bent]) / np.maximum(there[1], 1e-12), 0.0, self.end)
         sigma[bent] = guess
         return sigma
+
+    def speed_limit(self, sigma: Floats, feed: Callable[[Floats], Floats]) -> Floats:
+        """Largest sigma_dot (N,) under `feed`, the largest ds/dt at s; inf at rest, where s stands still."""
+        s = self.parameter(sigma)
+        allowed = feed(s[0])
+        return np.where(s[1] > 0.0, allowed / np.where(s[1] > 0.0, s[1], 1.0), np.inf)
 
     def derivatives(self, sigma: Floats) -> Derivatives:
         """Chain rule to third order, exact; see `Path`."""

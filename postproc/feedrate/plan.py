@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -147,7 +148,7 @@ def plan_second_order(path: Path, limits: JointLimits, feed: Feed = np.inf, stop
     allowed = _as_function(feed)
     pieces = []
     for eased in _stretches(path, stops, 0.0):
-        sigma = knots if knots is not None else mesh(eased, limits, _speed_limit(eased, allowed), options.knots)
+        sigma = knots if knots is not None else mesh(eased, limits, partial(eased.speed_limit, feed=allowed), options.knots)
         at = eased.derivatives(sigma)
         cap = np.minimum(squared_speed(at.dq, limits.velocity), allowed(eased.parameter(sigma)[0]) ** 2)
         x = second_order(sigma, at.dq, at.d2q, limits.acceleration, cap, options.method.kernel)
@@ -159,20 +160,11 @@ def _as_function(feed: Feed) -> Callable[[Floats], Floats]:
     return feed if callable(feed) else lambda s: np.full(len(s), float(feed))
 
 
-def _speed_limit(eased: Eased, feed: Callable[[Floats], Floats]) -> Callable[[Floats], Floats]:
-    """Largest sigma_dot at sigma under the feed."""
-    def limit(sigma: Floats) -> Floats:
-        s = eased.parameter(sigma)
-        with np.errstate(divide="ignore"):
-            return np.asarray(feed(s[0]) / s[1])
-    return limit
-
-
 def _mesh(eased: Eased, limits: JointLimits, feed: Callable[[Floats], Floats], spacing: Spacing) -> Floats:
     """Knots between two stops, fine enough beside them."""
     ends = np.array([eased.first, np.nextafter(eased.last, eased.first)])
     ramp = ramp_time(eased.path.derivatives(ends).dq, limits, feed(ends))
-    return mesh(eased, limits, _speed_limit(eased, feed), spacing, ramp)
+    return mesh(eased, limits, partial(eased.speed_limit, feed=feed), spacing, ramp)
 
 
 def _stretches(path: Path, stops: Sequence[float], ease: float) -> list[Eased]:

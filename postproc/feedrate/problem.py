@@ -85,10 +85,8 @@ class Knots:
     tight: Floats | None = None
 
     def speed_limit(self, sigma: Floats) -> Floats:
-        """Largest sigma_dot (N,) that the feed allows; inf at rest, where s stands still."""
-        s = self.eased.parameter(sigma)
-        with np.errstate(divide="ignore"):
-            return np.asarray(self.feed(s[0]) / s[1])
+        """Largest sigma_dot (N,) that the feed allows."""
+        return self.eased.speed_limit(sigma, self.feed)
 
     def problem(self, first: int = 0, last: int | None = None) -> Problem:
         """On knots [first, last), free at ends inside the motion."""

@@ -101,8 +101,9 @@ def test_stops_stand_still_and_add_up() -> None:
 
 
 def test_corner_at_a_stop_uses_its_own_side() -> None:
-    """Two straight lines at a right angle: twice the time of one."""
-    line = plan(PolynomialPath([[0.0, 1.0], [0.0]], 20.0), only_jerk([5000.0, 5000.0])).seconds
+    """Two straight lines at a right angle: each takes its own joint's time."""
+    limits = only_jerk([5000.0, 500.0])
+    times = [plan(PolynomialPath(line, 20.0), limits).seconds for line in ([[0.0, 1.0], [0.0]], [[0.0], [0.0, 1.0]])]
 
     class Corner(PolynomialPath):
         def derivatives(self, s):  # type: ignore[no-untyped-def]
@@ -111,8 +112,8 @@ def test_corner_at_a_stop_uses_its_own_side() -> None:
             return type(at)(*(np.where(second[:, None], other, one) for one, other in zip(
                 at, PolynomialPath([[20.0], [-20.0, 1.0]], 40.0).derivatives(s), strict=True)))
 
-    both = plan(Corner([[0.0, 1.0], [0.0]], 40.0), only_jerk([5000.0, 5000.0]), stops=[20.0])
-    assert both.seconds == pytest.approx(2.0 * line, rel=1e-4)
+    both = plan(Corner([[0.0, 1.0], [0.0]], 40.0), limits, stops=[20.0])
+    assert [piece.seconds for piece in both.pieces] == pytest.approx(times, rel=1e-4)
 
 
 def test_feed_binds_and_steps() -> None:
@@ -171,3 +172,5 @@ def test_bad_requests_are_refused() -> None:
         plan(path, replace(MIKRON, jerk=np.full(5, np.inf)))
     with pytest.raises(ValueError, match="without stops"):
         plan(path, MIKRON, stops=[50.0], knots=np.linspace(0.0, 1.0, 100))
+    with pytest.raises(ValueError, match="no speed above 0"):
+        plan(path, MIKRON, feed=lambda s: np.where(s > 50.0, 0.0, 10.0))
