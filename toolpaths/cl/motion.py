@@ -74,6 +74,8 @@ def gohome(b: Builder, s: Statement) -> None:
     if len(numbers) >= 3:
         b.rapids.append(b.row)
         b.add_point(_triple(numbers, 0), _triple(numbers, 3), role=Role.HOME)
+    elif s.words[:1] == ("",):
+        b.log.error("cl.from", f"GOHOME/{s.body[:60]}: its first number is missing", b.line)
     else:
         b.event("GOHOME", tuple(w for w in s.words if w != ""))
 
