@@ -44,19 +44,23 @@ def commands_of(toolpath: Toolpath, moves: Moves, path: Path, controller: Contro
     for at, event in enumerate(toolpath.events):
         move = int(first_move[event.index])
         compensation.off_before(move)
-        out = result.setdefault(int(path.begin[move]), [])
+        here = moves.link[move] if move < len(moves) else True
+        waits = event.word == "DELAY" and here and not _gone(toolpath.events, at)
+        out = result.setdefault(_behind(path, move) if waits else int(path.begin[move]), [])
+        loads = any(e.word == "LOADTL" and (e.index, e.line) in changes and e.index == event.index
+                    for e in toolpath.events[at + 1:at + 20])
         key = event.index, event.line
         if event.word == "SPINDL":
             spindle = spindle_after(event, spindle)
-            out += state.spindle(_spindle(spindle, event))
+            out += state.spindle(_spindle(spindle, event), loads)
         elif event.word == "COOLNT":
-            out += state.coolant(Command(_coolant(words(event), controller), (), event.line))
+            out += state.coolant(Command(_coolant(words(event), controller), (), event.line), loads)
         elif event.word == "CUTCOM":
             compensation.begin(event, move)
         elif event.word == "LOADTL":
             if key in changes:
                 follows = {e.word for e in toolpath.events[at + 1:at + 20] if e.index == event.index}
-                out += compensation.off() + state.change(changes[key], follows)
+                out += compensation.off() + state.change(changes[key], follows, move < len(moves))
             elif key in registers:
                 out.append(Command("USE_TOOL_LENGTH_OFFSET", (float(registers[key].register or 0),), event.line))
         elif command := _simple(event, spindle):
@@ -73,37 +77,63 @@ def commands_of(toolpath: Toolpath, moves: Moves, path: Path, controller: Contro
     return {k: tuple(v) for k, v in result.items() if v}, diagnostics + _no_spindle(toolpath, moves)
 
 
+def _gone(events: tuple[Event, ...], at: int) -> bool:
+    """True where a record of the same place, before this one, sends the tool away already."""
+    return any(e.index == events[at].index and e.word in ("LOADTL", "GOHOME") for e in events[max(at - 20, 0):at])
+
+
+def _behind(path: Path, move: int) -> int:
+    """The block behind the last of the move before `move`: a dwell belongs there, not behind the retract."""
+    last = np.flatnonzero((path.move == move - 1) & np.isfinite(path.u))
+    return int(last[-1]) + 1 if len(last) else int(path.begin[min(move, len(path.begin) - 1)])
+
+
 class _Written:
     """Spindle and coolant as the commands so far leave them: stated only where they change."""
 
     def __init__(self) -> None:
         self.turning: Command | None = None
         self.cooling: Command | None = None
+        self.waiting: dict[str, Command] = {}
+        """what a tool change that comes first will switch on"""
 
-    def spindle(self, wanted: Command) -> list[Command]:
-        """The command where it changes something."""
+    def spindle(self, wanted: Command, loads: bool = False) -> list[Command]:
+        """The command where it changes something; a start waits for the tool change that `loads`."""
+        if loads and wanted.name != _STOPPED:
+            self.waiting["spindle"] = wanted
+            return []
         if self.turning is not None and (self.turning.name, self.turning.args) == (wanted.name, wanted.args):
             return []
         self.turning = wanted
         return [wanted]
 
-    def coolant(self, wanted: Command) -> list[Command]:
-        """The command where it changes something."""
+    def coolant(self, wanted: Command, loads: bool = False) -> list[Command]:
+        """The command where it changes something; a start waits for the tool change that `loads`."""
+        if loads and wanted.name != _DRY:
+            self.waiting["coolant"] = wanted
+            return []
         if self.cooling is not None and self.cooling.name == wanted.name:
             return []
         self.cooling = wanted
         return [wanted]
 
-    def change(self, change: ToolChange, follows: set[str]) -> list[Command]:
-        """A tool change with spindle and coolant off, and on again where no record that `follows` says otherwise."""
-        before, cooled = self.turning, self.cooling
+    def change(self, change: ToolChange, follows: set[str], moves_on: bool) -> list[Command]:
+        """A tool change with spindle and coolant off, and on again where no record that `follows` says otherwise.
+
+        Nothing is switched on, and no length taken, where no motion follows.
+        """
         out: list[Command] = []
-        if before is not None and before.name != _STOPPED:
+        if self.turning is not None and self.turning.name != _STOPPED:
             out.append(Command(_STOPPED))
-        if cooled is not None and cooled.name != _DRY:
+        if self.cooling is not None and self.cooling.name != _DRY:
             out.append(Command(_DRY))
+        before = self.waiting.pop("spindle", self.turning)
+        cooled = self.waiting.pop("coolant", self.cooling)
         register = change.register if change.register is not None else change.number
         out.append(Command("CHANGE_TOOL", (float(change.number),), change.line))
+        if not moves_on:
+            self.turning, self.cooling = Command(_STOPPED), Command(_DRY)
+            return out
         out.append(Command("USE_TOOL_LENGTH_OFFSET", (float(register),), change.line))
         if before is not None:
             self.turning = Command(_STOPPED)

@@ -148,10 +148,13 @@ def build_moves(toolpath: Toolpath, setup: SetupFile, axis_tolerance: float) -> 
     first[np.cumsum(counts)[counts > 0] - counts[counts > 0]] = True
     back = first & (begin[row] >= 0)
     pose = np.where(back, begin[row], row)
-    tip, kind = toolpath.tip[pose], np.where(back, Kind.RAPID, toolpath.kind[row]).astype(np.int8)
+    # A position to return to may be in the material: the way down to it is made at the feed of the cut.
+    again = back & (toolpath.role[pose] != Role.START)
+    kind = np.where(back, np.where(again, Kind.FEED, Kind.RAPID), toolpath.kind[row]).astype(np.int8)
+    tip = toolpath.tip[pose]
     arc = np.where(back, -1, toolpath.arc[row])
     hole, phase = np.full(len(row), -1), np.zeros(len(row), dtype=np.int8)
-    feed, seconds = np.where(back, np.nan, feed[row]), np.where(back, np.nan, seconds[row])
+    feed, seconds = np.where(back & ~again, np.nan, feed[row]), np.where(back & ~again, np.nan, seconds[row])
     if len(holes):
         where = np.flatnonzero(toolpath.role[row] == Role.HOLE)
         flat = [leg for of_hole in legs for leg in of_hole]

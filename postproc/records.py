@@ -202,18 +202,19 @@ def _check_tools(toolpath: Toolpath, report: Report) -> None:
         other = next((o for o in others if _differ(o[0], tool)), None)
         if other:
             hint = f"cutting begins at lines {other[1]} and {line}; number the tools in the CAM system"
-            report(Severity.ERROR, "tool.same_number", f"different tools have the number {tool.number}: "
-                   f"{_called(other[0])} and {_called(tool)}", other[1], hint)
+            named = other[0].name or tool.name or other[0].shape or tool.shape
+            report(Severity.ERROR if named else Severity.WARNING, "tool.same_number", "different tools have the number "
+                   f"{tool.number}: {_called(other[0])} and {_called(tool)}", other[1], hint)
         others.append((tool, line))
 
 
 def _differ(a: Tool, b: Tool) -> bool:
     """True where a text or size that both state is not the same."""
-    names = a.name and b.name and a.name != b.name
+    pairs = ((a.diameter, b.diameter), (a.corner_radius, b.corner_radius), (a.tip_angle, b.tip_angle), (a.taper, b.taper))
+    stated = [abs(x - y) > 1e-6 for x, y in pairs if x is not None and y is not None]
+    names = a.name and b.name and a.name.upper() != b.name.upper() and not stated
     shapes = a.shape and b.shape and a.shape != b.shape
-    sizes = any(x is not None and y is not None and abs(x - y) > 1e-6 for x, y in (
-        (a.diameter, b.diameter), (a.corner_radius, b.corner_radius), (a.tip_angle, b.tip_angle), (a.taper, b.taper)))
-    return bool(names or shapes or sizes)
+    return bool(names or shapes or any(stated))
 
 
 def _called(tool: Tool) -> str:

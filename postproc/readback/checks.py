@@ -67,7 +67,7 @@ def check_holes(motion: Motion, job: Job, moves: Moves, tip: Floats, owner: Ints
         return []
     m = owner[rows]
     starts = np.flatnonzero(np.diff(m, prepend=-1))
-    bad_peck, bad_dwell = [], []
+    bad_peck, bad_out, bad_dwell = [], [], []
     for at, stop in zip(starts, [*starts[1:], len(rows)], strict=True):
         cycle = job.toolpath.cycles[int(moves.cycle[m[at]])]
         part = rows[at:stop]
@@ -75,11 +75,17 @@ def check_holes(motion: Motion, job: Job, moves: Moves, tip: Floats, owner: Ints
             bad_dwell.append(part[0])
         if cycle.kind in PECKING and cycle.steps:
             depth = (moves.tip[m[at]] - tip[part]) @ moves.axis[m[at]]
-            deepest = np.maximum.accumulate(np.concatenate([[-cycle.clearance], depth[motion.code[part] > 0]]))
+            total, feeding = cycle.depth + cycle.clearance, motion.code[part] > 0
+            pecks = feeding & ~np.append(feeding[1:], False)
+            deepest = np.maximum.accumulate(np.concatenate([[-total], depth[pecks]]))
+            out = int((~feeding & (depth <= 0.01 - total)).sum())
             if np.diff(deepest).max(initial=0.0) > max(cycle.steps) + 0.01:
                 bad_peck.append(part[0])
+            elif cycle.kind == "DEEP" and out < int(pecks.sum()) - 1:
+                bad_out.append(part[0])
     result = []
-    for bad, what in ((bad_peck, "the hole is drilled in deeper pecks than the CL file says"),
+    for bad, what in ((bad_out, "the tool does not leave the hole between pecks as the CL file says"),
+                      (bad_peck, "the hole is drilled in deeper pecks than the CL file says"),
                       (bad_dwell, "the tool rests at the bottom for less time than the CL file says")):
         if bad:
             result.append(faults.error("verify.hole", what, int(moves.line[owner[bad[0]]]), int(motion.line[bad[0]]),
@@ -127,7 +133,8 @@ def check_states(motion: Motion, job: Job, moves: Moves, owner: Ints, faults: Fa
             ("length register", (motion.register[rows] == register) | ~job.control.length_on_z, motion.register[rows],
              register, number),
             ("cutter compensation", (given == side) | (tilted & (given == 40)), given, side, _COMPENSATION.__getitem__),
-            ("work offset", motion.offset[rows] == code, motion.offset[rows], code, lambda g: f"G{g:g}")):
+            ("work offset", motion.offset[rows] == code, motion.offset[rows], code,
+             lambda g: f"G{g:g}" if np.isfinite(g) else "not stated")):
         bad = np.flatnonzero(~np.asarray(good))
         if len(bad):
             k = int(bad[0])

@@ -94,8 +94,18 @@ def execute(words: Words, letters: tuple[str, ...], offsets: Offsets, file: str 
     ijk = _columns(words, ("I", "J", "K"))
     moving |= arc & np.isfinite(ijk).any(axis=1)
     filled = _carried(end, offsets.home)
-    diagnostics += _without_number(words, modal, rests, file)
+    diagnostics += _without_number(words, modal, rests, file) + _cancelled(words, modal, stated, file)
     return _motion(words, modal, filled, moving, legs, ijk, scale, offsets, rests), diagnostics
+
+
+def _cancelled(words: Words, modal: Modal, stated: Bools, file: str) -> list[Diagnostic]:
+    """Axis words while G80 holds: there is no motion they could belong to."""
+    lines = np.flatnonzero((modal.motion == 80) & stated.any(axis=1) & ~modal.dwell)
+    lines = lines[~np.isin(lines, words.line[(words.letter == ord("G")) & np.isin(words.value, (0, 1, 2, 3))])]
+    if not len(lines):
+        return []
+    return [error("gcode.no_motion", "axis words under G80, without a code of motion", file=file, lines=lines[:6].tolist(),
+                  count=len(lines), hint="state G0 or G1")]
 
 
 def _without_number(words: Words, modal: Modal, rests: Floats, file: str) -> list[Diagnostic]:

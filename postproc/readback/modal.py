@@ -100,7 +100,7 @@ def modal_state(words: Words) -> Modal:
                  group("feed_mode", 94) == 93, group("units", 21) == 20, group("level", 98).astype(np.int8),
                  register.astype(np.int64), loaded.astype(np.int64), spindle.astype(np.int8), _number_of(words, "S", n),
                  fill(coolant_line, coolant == 8, n, 0.0) > 0.5, fill(coolant_line, coolant == 7, n, 0.0) > 0.5,
-                 machine, dwell, group("compensation", 40).astype(np.int8), group("offset", 54), _blend(words))
+                 machine, dwell, group("compensation", 40).astype(np.int8), group("offset", np.nan), _blend(words))
 
 
 def _blend(words: Words) -> Floats:

@@ -35,7 +35,8 @@ class Words:
 def tokenise(data: bytes, file: str = "") -> tuple[Words, list[Diagnostic]]:
     """The words of a program. Comments and % lines are taken out; block-delete signs and what is no word are errors."""
     text = _COMMENTS.sub(b"", data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")).upper()
-    text = re.sub(rb"(?m)^\s*%[^\n]*", b"", text)
+    ends = _tape_marks(text)
+    text = re.sub(rb"(?m)^[ \t]*%[^\n]*", b"", text)
     skipped = [text.count(b"\n", 0, m.start()) + 1 for m in re.finditer(rb"(?m)^[ \t]*/", text)]
     text = re.sub(rb"(?m)^[ \t]*/", b"", text)
     if not text.endswith(b"\n"):
@@ -49,8 +50,22 @@ def tokenise(data: bytes, file: str = "") -> tuple[Words, list[Diagnostic]]:
     values = _numbers(text) if not len(strange) else None
     if values is None or len(values) != len(where) or not _each_has_number(codes, where):
         words, found = _slowly(text, file)
-        return words, found + _block_delete(skipped, file)
-    return Words(codes[where], values, line, int(newline.sum())), _block_delete(skipped, file)
+        return words, found + _block_delete(skipped, file) + _early_end(ends, file)
+    return Words(codes[where], values, line, int(newline.sum())), _block_delete(skipped, file) + _early_end(ends, file)
+
+
+def _tape_marks(text: bytes) -> list[int]:
+    """Lines of % that stand between blocks, where a control stops reading."""
+    lines = [n for n, line in enumerate(text.split(b"\n"), 1) if line.strip()]
+    marks = [text.count(b"\n", 0, m.start()) + 1 for m in re.finditer(rb"(?m)^[ \t]*%", text)]
+    return [n for n in marks if lines and n not in (lines[0], lines[-1])]
+
+
+def _early_end(lines: list[int], file: str) -> list[Diagnostic]:
+    if not lines:
+        return []
+    return [error("gcode.after_end", "% between blocks: the control stops reading there", file=file, lines=lines[:6],
+                  count=len(lines), hint="% may only be the first and the last line")]
 
 
 def _block_delete(lines: list[int], file: str) -> list[Diagnostic]:

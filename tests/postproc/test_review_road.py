@@ -46,8 +46,8 @@ def test_a_cut_after_a_tool_change_begins_where_the_last_one_ended() -> None:
     text = "RAPID\nGOTO/5,5,20\nFEDRAT/250,MMPM\nGOTO/5,5,0\nLOADTL/2\nSPINDL/RPM,1000,CLW\nGOTO/40,5,0\n"
     lines = blocks(converted(text))
     change = lines.index("T2 M6")
-    cut = next(k for k in range(change, len(lines)) if lines[k].startswith("G1"))
-    assert lines[cut].startswith("G1 X40") and "G0 X5 Y5" in lines[change:cut] and lines[cut - 1] == "Z0"
+    cut = next(k for k in range(change, len(lines)) if lines[k].startswith("X40"))
+    assert "G0 X5 Y5" in lines[change:cut] and lines[cut - 1].startswith("G1 Z0")
 
 
 def test_an_arc_without_a_start_is_refused() -> None:

@@ -105,7 +105,7 @@ def test_back_and_forth_on_one_line() -> None:
 
 
 def test_spindle_stands_at_every_tool_change() -> None:
-    """Speeds stated before the change belong to the tool that leaves; the own executor knows whether it turns."""
+    """Speeds stated at the place of a change turn the new tool; the own executor knows whether it turns."""
     path = toolpath("COOLNT/ON", "RAPID", "GOTO/0,0,5", "GOTO/1,0,5", "SPINDL/RPM,2000,CLW", "LOADTL/2", "RAPID",
                     "GOTO/0,0,5", "GOTO/1,0,5", "LOADTL/3", "SPINDL/RPM,700,CLW", "RAPID", "GOTO/0,0,5", "GOTO/1,0,5")
     spindle, changes, speeds = 0, [], []
@@ -115,7 +115,7 @@ def test_spindle_stands_at_every_tool_change() -> None:
         if "M6" in block and not block.startswith("("):
             changes.append(spindle)
     assert changes == [0, 0, 0]
-    assert speeds == ["1000", "2000", "2000", "700"], "the speed in force is taken up again unless another follows"
+    assert speeds == ["1000", "2000", "700"], "a speed stated before the change waits for it; one stated behind it counts"
 
 
 def test_spindle_and_coolant_go_on_with_the_next_tool() -> None:
