@@ -16,6 +16,7 @@ from postproc.feed import Feeds, plan_feeds
 from postproc.moves import Moves, Phase
 from postproc.path import ARC, FEED, Path
 from postproc.program import Command, Hole, Program
+from postproc.word_arcs import PLANE_AXIS
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error, info
 from toolpaths.toolpath import Toolpath
@@ -136,7 +137,7 @@ def _written(words: Floats, path: Path, control: Control) -> Bools:
     names = np.asarray(path.state.any(axis=1))[:, None]
     write: Bools = np.asarray(np.where(names, path.state, changed))
     for k in np.flatnonzero(path.code == ARC):
-        third = {17: 2, 18: 1, 19: 0}[int(path.plane[k])]
+        third = PLANE_AXIS[int(path.plane[k])]
         write[k, [c for i, c in enumerate(control.xyz) if i != third]] = True
     return write
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -34,34 +35,29 @@ def words(event: Event) -> list[str]:
     return [v.upper() for v in event.values if isinstance(v, str)]
 
 
-def tool_changes(toolpath: Toolpath) -> list[ToolChange]:
-    """Every record that puts another tool into the spindle; naming the loaded tool again is no change."""
-    changes: list[ToolChange] = []
-    for event in toolpath.events:
-        if event.word not in TOOL_WORDS or not numbers(event):
-            continue
-        number, *rest = numbers(event)
-        if changes and changes[-1].number == int(number):
-            continue
-        changes.append(ToolChange(event.index, int(number), int(rest[0]) if rest else None, event.line))
-    return changes
-
-
-def register_changes(toolpath: Toolpath) -> list[ToolChange]:
-    """Records that name the loaded tool again with another length register."""
-    loaded: ToolChange | None = None
-    result: list[ToolChange] = []
+def tool_loads(toolpath: Toolpath) -> list[tuple[ToolChange, int, bool]]:
+    """Every record that names a tool: (the record, length register then in force, True where it is another tool)."""
+    result: list[tuple[ToolChange, int, bool]] = []
     for event in toolpath.events:
         if event.word not in TOOL_WORDS or not numbers(event):
             continue
         number, *rest = (int(v) for v in numbers(event))
         said = ToolChange(event.index, number, rest[0] if rest else None, event.line)
-        if loaded is None or loaded.number != number:
-            loaded = said
-        elif said.register is not None and said.register != (loaded.number if loaded.register is None else loaded.register):
-            loaded = said
-            result.append(said)
+        other = not result or result[-1][0].number != number
+        register = said.register if said.register is not None else number if other else result[-1][1]
+        result.append((said, register, other))
     return result
+
+
+def tool_changes(toolpath: Toolpath) -> list[ToolChange]:
+    """Every record that puts another tool into the spindle; naming the loaded tool again is no change."""
+    return [said for said, _, other in tool_loads(toolpath) if other]
+
+
+def register_changes(toolpath: Toolpath) -> list[ToolChange]:
+    """Records that name the loaded tool again with another length register."""
+    loads = tool_loads(toolpath)
+    return [said for (_, before, _), (said, register, other) in pairwise(loads) if not other and register != before]
 
 
 @dataclass(frozen=True)
@@ -130,6 +126,12 @@ def loaded_tools(toolpath: Toolpath) -> Ints:
 def compensation_side(event: Event) -> str:
     """LEFT, RIGHT or OFF of a CUTCOM record, "" where it says none of them."""
     return next((w for w in words(event) if w in _SIDES), "")
+
+
+def loaded_registers(toolpath: Toolpath) -> Ints:
+    """(N,) length register that should be in force at every row, -1 before any tool change."""
+    loads = tool_loads(toolpath)
+    return np.array([-1, *(r for _, r, _ in loads)])[_state_at([0, *(c.index for c, _, _ in loads)], len(toolpath))]
 
 
 def compensation_states(toolpath: Toolpath) -> Ints:

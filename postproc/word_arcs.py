@@ -13,6 +13,8 @@ from toolpaths.shape import Curves
 
 PLANE_COLUMNS = {17: (0, 1), 18: (2, 0), 19: (1, 2)}
 """numbers (of X, Y, Z) of the first and second axis of G17, G18, G19; G3 turns the first towards the second"""
+PLANE_AXIS = {plane: 3 - i - j for plane, (i, j) in PLANE_COLUMNS.items()}
+"""number of the axis square to the plane"""
 _SQUARE = 1e-7
 _SHORTEST = 0.01
 _RADIUS_SLACK = 0.002

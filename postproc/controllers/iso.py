@@ -9,6 +9,7 @@ import numpy as np
 
 from postproc.controllers.model import CannedCycle, ControllerFile
 from postproc.program import INVERSE, Command, Hole, Program
+from postproc.word_arcs import PLANE_AXIS
 from toolpaths.arrays import Array, Bools, Floats
 from toolpaths.toolpath import Cycle
 
@@ -175,7 +176,7 @@ class IsoWriter:
         result = [""] * (last - first)
         places = self.controller.format.linear_decimals
         for k in np.flatnonzero(p.code[first:last] == 2).tolist():
-            third = {17: 2, 18: 1, 19: 0}[int(p.plane[first + k])]
+            third = PLANE_AXIS[int(p.plane[first + k])]
             texts = self.number_text(p.center[first + k], places)
             result[k] = "".join(f"{self.space}{'IJK'[i]}{texts[i]}" for i in range(3) if i != third)
         return result

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from postproc.control import Control
-from postproc.events import TOOL_WORDS, compensation_states, coolant_states, loaded_tools, numbers, spindle_states
+from postproc.events import compensation_states, coolant_states, loaded_registers, loaded_tools, spindle_states
 from postproc.holes import PECKING, Phase
 from postproc.job import Job
 from postproc.links import SafeSpace
@@ -17,7 +17,7 @@ from postproc.word_arcs import PLANE_COLUMNS
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.diagnostics import Diagnostic
 from toolpaths.shape import Curves
-from toolpaths.toolpath import Kind, Toolpath
+from toolpaths.toolpath import Kind
 
 ALLOWED_SPEED = 1.02
 """share of the programmed feed above which a move counts as too fast (short blocks carry rounding)"""
@@ -91,18 +91,6 @@ def check_holes(motion: Motion, job: Job, moves: Moves, tip: Floats, owner: Ints
             result.append(faults.error("verify.hole", what, int(moves.line[owner[bad[0]]]), int(motion.line[bad[0]]),
                                        len(bad)))
     return result
-
-
-def loaded_registers(toolpath: Toolpath) -> Ints:
-    """(N,) length register that should be in force at every row, -1 before any tool change."""
-    found, starts, loaded = [-1], [0], -1
-    for event in toolpath.events:
-        if event.word in TOOL_WORDS and numbers(event):
-            number, *rest = (int(v) for v in numbers(event))
-            found.append(rest[0] if rest else number if number != loaded else found[-1])
-            starts.append(event.index)
-            loaded = number
-    return np.array(found)[np.searchsorted(np.array(starts), np.arange(len(toolpath)), side="right") - 1]
 
 
 _SPINDLE = {-1: "anti-clockwise (M4)", 0: "stopped (M5)", 1: "clockwise (M3)"}

@@ -118,8 +118,7 @@ def _turned_so_far(curve: Curves, axis: Floats, guess: Floats) -> Floats:
 
 def _place(rows: Ints, owner: Ints) -> tuple[Floats, Floats]:
     """(how many blocks of the same move stand before, how many there are in all) for each block (K,)."""
-    groups, start, inverse, size = np.unique(owner[rows], return_index=True, return_inverse=True, return_counts=True)
-    del groups
+    _, start, inverse, size = np.unique(owner[rows], return_index=True, return_inverse=True, return_counts=True)
     return (np.arange(len(rows)) - start[inverse]).astype(np.float64), size[inverse].astype(np.float64)
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from postproc.readback.modal import CYCLES, Modal, check_codes, dwells, modal_state
+from postproc.readback.modal import CYCLES, Modal, check_codes, dwells, fill_values, modal_state
 from postproc.readback.words import Words
 from toolpaths.arrays import Array, Bools, Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
@@ -297,11 +297,3 @@ def _feeds(words: Words, modal: Modal, line: Ints, code: Array) -> tuple[Floats,
     value = np.where(modal.inverse[line], stated[line], force[line])
     missing = (code > 0) & ~(value > 0.0)
     return value, missing
-
-
-def fill_values(lines: Ints, values: Floats, count: int) -> Floats:
-    """(count + 1,) the value stated last, NaN before the first."""
-    index = np.zeros(count + 1, dtype=np.int64)
-    index[lines] = np.arange(1, len(lines) + 1)
-    filled: Floats = np.concatenate([[np.nan], values])[np.maximum.accumulate(index)]
-    return filled

@@ -60,6 +60,14 @@ def fill(lines: Array, values: Array, count: int, initial: float) -> Floats:
     return filled
 
 
+def fill_values(lines: Ints, values: Floats, count: int) -> Floats:
+    """(count + 1,) the value stated last, NaN before the first."""
+    index = np.zeros(count + 1, dtype=np.int64)
+    index[lines] = np.arange(1, len(lines) + 1)
+    filled: Floats = np.concatenate([[np.nan], values])[np.maximum.accumulate(index)]
+    return filled
+
+
 def _g(words: Words, group: str) -> tuple[Ints, Floats]:
     pick = (words.letter == ord("G")) & np.isin(words.value, GROUPS[group])
     return words.line[pick], words.value[pick]
@@ -112,10 +120,7 @@ def _blend(words: Words) -> Floats:
         p, q = (words.value[here & (words.letter == ord(letter))] for letter in "PQ")
         if code[k] == 64 and len(p):
             value[k] = p[0] + (q[0] if len(q) else p[0])
-    filled = np.full(words.lines + 1, np.nan)
-    for n, v in zip(line.tolist(), value.tolist(), strict=True):
-        filled[n:] = v
-    return filled
+    return fill_values(line, value, words.lines)
 
 
 def dwells(words: Words) -> Floats:

@@ -23,7 +23,6 @@ class Words:
 
     Attributes:
         letter (W,): ASCII codes, upper case; value (W,): numbers; line (W,): 1-based lines; lines: how many there are
-        ended: line of the program end or 0
     """
 
     letter: Array
