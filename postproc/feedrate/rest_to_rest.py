@@ -105,7 +105,7 @@ def _states(q0: Floats, q1: Floats, limits: tuple[Floats, Floats, Floats], law: 
     result = ruckig.Ruckig(joints).calculate(wanted, found)
     if result != ruckig.Result.Working:
         raise ArithmeticError(f"no motion from {q0} to {q1}: ruckig answers {result.name}")
-    t = np.arange(int(np.ceil(found.duration / step)) + 1) * step
+    t = np.float64(step) * np.arange(int(np.ceil(found.duration / step)) + 1)
     states = [np.stack(rows, axis=1) for rows in zip(*(_read(joint, t) for joint in found.profiles[0]), strict=True)]
     states[0][0], states[0][-1] = q0, q1
     return states
