@@ -1,40 +1,111 @@
 """What the words of a program mean on one machine: joints or tip, offsets, and the motion between two blocks.
 
-Two laws: "joints" (words are joint positions, straight in joints between blocks) and "tip" (the control runs the
-kinematics: XYZ are the tip in the work offset, straight; rotary words linear).
+Three laws. "axes": words are joint positions, straight in joints between blocks. "tcp": the control runs the kinematics;
+X, Y, Z are the tip in the work offset, straight, rotary words linear. "tilted": rotary axes stand still, X, Y, Z are the
+tip in the frame of a plane.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 
 from machines.kinematics.base import Kinematics
+from machines.kinematics.frames import reference_x
 from machines.machine import Machine
-from toolpaths.arrays import Floats, Ints
+from postproc.planes import Plane
+from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.units import DEG
 
 XYZ = ("X", "Y", "Z")
+Law = Literal["axes", "tcp", "tilted"]
+Rapids = Literal["straight", "dog-leg"]
+FeedLength = Literal["xyz-first", "all", "geometry"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Control:
-    """The control of a machine as programs see it.
+    """The control of a machine as programs see it, under one law; `under` gives it under another.
 
     Attributes:
         machine: the machine
-        tip_law: True where the control owns the kinematics
+        law: what words mean
         origin (3,): origin of the work offset in the table frame, mm
         arc_limit: largest radius that may stay an arc, mm; 0 for no arcs
+        base: the law at the program's start; "tcp" where the control runs the kinematics for the whole program
+        plane: of the law "tilted"
+        rapids: "straight", or "dog-leg": each axis at its own rapid speed (not under "tcp")
+        feed_rule: what a feed per minute refers to under the law "axes", see `feed_length`
+        own_kinematics: at the gauge point, as the control holds it; None: the machine's
     """
 
     machine: Machine
-    tip_law: bool
+    law: Law
     origin: Floats
     arc_limit: float = math.inf
+    base: Law = "axes"
+    plane: Plane | None = None
+    rapids: Rapids = "straight"
+    feed_rule: FeedLength = "xyz-first"
+    own_kinematics: Kinematics | None = None
+
+    @cached_property
+    def _others(self) -> dict[tuple[object, ...], Control]:
+        return {(self.law, self.plane.key if self.plane else ()): self}
+
+    def under(self, law: Law, plane: Plane | None = None) -> Control:
+        """The same control under another law; equal questions get the same object."""
+        key = law, plane.key if plane else ()
+        if key not in self._others:
+            other = replace(self, law=law, plane=plane)
+            other.__dict__["_others"] = self._others
+            self._others[key] = other
+        return self._others[key]
+
+    @property
+    def tip_law(self) -> bool:
+        """True where X, Y, Z are the tip in the work offset."""
+        return self.law == "tcp"
+
+    @cached_property
+    def tips_straight(self) -> bool:
+        """True where a block at standing rotary axes takes the tip along a straight line."""
+        return self.law != "axes" or self.machine.kinematics.slides_affine
+
+    @cached_property
+    def kinematics(self) -> Kinematics:
+        """The kinematics that the control computes with, at the gauge point."""
+        return self.own_kinematics or self.machine.kinematics
+
+    @cached_property
+    def has_tip_modes(self) -> bool:
+        """True where a controller's own tip and plane modes can be used on the machine.
+
+        Three slides X, Y, Z along the axes of the machine frame, one rotary axis at least, tool along Z at q = 0: then one
+        work offset serves every law.
+        """
+        kin = self.machine.kinematics
+        if not kin.slides_affine or not any(kin.rotary) or (self.xyz < 0).any() or len(self.slides) != 3:
+            return False
+        zero = np.zeros((1, kin.joints))
+        moved = kin.jacobian(zero)[0, :3][:, self.xyz]
+        return bool(np.allclose(moved, np.eye(3), atol=1e-9)) and bool(
+            np.allclose(kin.forward(zero)[1], [[0.0, 0.0, 1.0]], atol=1e-9))
+
+    @cached_property
+    def has_rotary_tables_only(self) -> bool:
+        """True where every rotary axis carries the part: the slides then run along the tool's own axes at every pose."""
+        kin = self.machine.kinematics
+        if not self.has_tip_modes:
+            return False
+        q = np.zeros((8, kin.joints))
+        q[:, self.rotary] = np.linspace(-1.0, 1.3, 8 * len(self.rotary)).reshape(8, -1)
+        along = np.swapaxes(tool_frames(kin, q), 1, 2) @ kin.jacobian(q)[:, :3][:, :, self.xyz]
+        return bool(np.allclose(along, np.eye(3), atol=1e-9))
 
     @cached_property
     def rotary(self) -> Ints:
@@ -55,10 +126,18 @@ class Control:
     def feed_length(self, step: Floats) -> Floats:
         """(K,) the length of word steps (K, J) that a feed per minute refers to, mm or degrees.
 
-        That of X, Y, Z where any of them moves, else of U, V, W, else of A, B, C (LinuxCNC, `find_straight_length`;
-        NIST RS274/NGC 2.1.2.5 for X, Y, Z and A, B, C).
+        "xyz-first": that of X, Y, Z where any of them moves, else of U, V, W, else of A, B, C (LinuxCNC,
+        `find_straight_length`; NIST RS274/NGC 2.1.2.5 for X, Y, Z and A, B, C). "geometry": that of X, Y, Z where any
+        of them moves, else of all other axes (Siemens, FGROUP of the geometry axes). "all": root of the squares of all
+        mm and degrees. Where X, Y, Z are the tip the feed is that of the tip, by every rule.
         """
         names = self.machine.axis_names
+        if self.law == "axes" and self.feed_rule == "all":
+            return np.asarray(np.linalg.norm(step, axis=1))
+        if self.law == "axes" and self.feed_rule == "geometry":
+            own = [j for j, name in enumerate(names) if name in XYZ]
+            length = np.linalg.norm(step[:, own], axis=1)
+            return np.asarray(np.where(length > 0.0, length, np.linalg.norm(np.delete(step, own, axis=1), axis=1)))
         result = np.zeros(len(step))
         for letters in ("ABC", "UVW", "XYZ"):
             length = np.linalg.norm(step[:, [j for j, name in enumerate(names) if name in letters]], axis=1)
@@ -74,7 +153,7 @@ class Control:
     def length_on_z(self) -> bool:
         """True where a tool length offset on Z moves the controlled point from gauge point to tip at q = 0."""
         kin, z = self.machine.kinematics, self.xyz[2]
-        if self.tip_law:
+        if self.base == "tcp":
             return True
         if z < 0 or not kin.slides_affine:
             return False
@@ -86,18 +165,18 @@ class Control:
 
     @cached_property
     def work_offset(self) -> Floats:
-        """(J,) machine position of the program's zero: what the work offset register must hold (mm, deg)."""
+        """(J,) machine position of the program's zero: what the work offset register must hold (mm, deg), by every law."""
         kin = self.machine.kinematics
-        if self.tip_law:
+        if self.base == "tcp":
             offset = np.zeros(kin.joints)
             offset[self.xyz] = self.origin
             return offset
         if not kin.slides_affine:
             return np.zeros(kin.joints)
-        result: Floats = self._slides_for(kin, self.origin[None, :], np.zeros((1, kin.joints)))[0] * self.unit
+        result: Floats = self.slides_for(kin, self.origin[None, :], np.zeros((1, kin.joints)))[0] * self.unit
         return result
 
-    def _slides_for(self, kin: Kinematics, tip: Floats, q: Floats) -> Floats:
+    def slides_for(self, kin: Kinematics, tip: Floats, q: Floats) -> Floats:
         """q with the linear joints that bring the tip (N, 3) there at the rotary joints of q (N, J)."""
         result = q.copy()
         result[:, self.slides] = 0.0
@@ -112,9 +191,9 @@ class Control:
         `kin` is the kinematics with the tool, `length` its gauge length.
         """
         result = q * self.unit
-        if self.tip_law:
+        if self.law != "axes":
             tip, _ = kin.forward(q)
-            result[:, self.xyz] = tip - self.origin
+            result[:, self.xyz] = tip - self.origin if self.plane is None else self.plane.to_plane(tip)
             return result
         result = result - self.work_offset
         if self.length_on_z:
@@ -123,29 +202,62 @@ class Control:
 
     def joints(self, words: Floats, kin: Kinematics, length: float) -> Floats:
         """Joints (N, J) of program words (N, J): the inverse of `words`; NaN where the machine cannot go."""
-        if not self.tip_law:
+        if self.law == "axes":
             result = words + self.work_offset
             if self.length_on_z:
                 result[:, self.xyz[2]] += length
             return np.asarray(result / self.unit)
         q = words / self.unit
-        tip = words[:, self.xyz] + self.origin
+        xyz = words[:, self.xyz]
+        tip = xyz + self.origin if self.plane is None else self.plane.to_table(xyz)
         if kin.slides_affine:
-            return self._slides_for(kin, tip, q)
+            return self.slides_for(kin, tip, q)
         axis = np.tile(kin.nearest_axis(np.array([[0.0, 0.0, 1.0]])), (len(q), 1))
         return np.asarray(kin.inverse(tip, axis)[0])
 
-    def between(self, q0: Floats, q1: Floats, t: Floats, kin: Kinematics) -> tuple[Floats, Floats, Floats]:
-        """(tip, axis (N, 3), joints (N, J)) at fraction t (N,) of the straight blocks from q0 to q1 (N, J)."""
-        q = q0 + t[:, None] * (q1 - q0)
-        if not self.tip_law:
+    def tip_to_words(self, kin: Kinematics, q: Floats) -> Floats:
+        """(N, 3, 3): change of the words X, Y, Z per change of the tip at joints q (N, J), rotary joints fixed."""
+        if self.law == "axes":
+            return np.asarray(np.linalg.inv(kin.jacobian(q)[:, :3, :][:, :, self.xyz]))
+        return np.tile(np.eye(3) if self.plane is None else self.plane.rotation.T, (len(q), 1, 1))
+
+    def between(self, q0: Floats, q1: Floats, t: Floats, kin: Kinematics,
+                rapid: Bools | None = None) -> tuple[Floats, Floats, Floats]:
+        """(tip, axis (N, 3), joints (N, J)) at fraction t (N,) of the time of the blocks from q0 to q1 (N, J).
+
+        Blocks are straight but for those of `rapid` (N,) where rapids are dog-legs.
+        """
+        if self.law != "tcp":
+            q = self._toward(q0, q1, t, rapid)
             tip, axis = kin.forward(q, near=None)
             return tip, axis, q
+        q = q0 + t[:, None] * (q1 - q0)
         tip0, _ = kin.forward(q0)
         tip1, _ = kin.forward(q1)
         tip = tip0 + t[:, None] * (tip1 - tip0)
         if kin.slides_affine:
-            q = self._slides_for(kin, tip, q)
+            q = self.slides_for(kin, tip, q)
             return tip, kin.forward(q)[1], q
         axis = kin.forward(q0)[1]
         return tip, axis, kin.inverse(tip, axis)[0]
+
+    def _toward(self, q0: Floats, q1: Floats, t: Floats, rapid: Bools | None) -> Floats:
+        """Joints at fraction t (N,) of the time: all at once, or each axis at its own rapid speed until it is there."""
+        step = q1 - q0
+        share = np.broadcast_to(t[:, None], step.shape)
+        if rapid is not None and self.rapids == "dog-leg" and rapid.any():
+            own = np.abs(step) / self.machine.limits.velocity
+            with np.errstate(divide="ignore", invalid="ignore"):
+                faster = np.minimum(t[:, None] * own.max(axis=1, keepdims=True) / own, 1.0)
+            share = np.where(rapid[:, None] & (own > 0.0), faster, share)
+        result: Floats = q0 + share * step
+        return result
+
+
+def tool_frames(kin: Kinematics, q: Floats) -> Floats:
+    """(N, 3, 3): columns are the tool's own x, y and z (its axis) in the table frame at joints q (N, J)."""
+    _, axis, spin = kin.pose(q)
+    first = reference_x(axis)
+    second = np.cross(axis, first)
+    c, s = np.cos(spin)[:, None], np.sin(spin)[:, None]
+    return np.stack([c * first + s * second, c * second - s * first, axis], axis=2)

@@ -9,7 +9,7 @@ import numpy as np
 
 from machines.kinematics.base import Kinematics
 from machines.machine import Machine
-from postproc.control import Control
+from postproc.control import Control, Law
 from postproc.controllers.model import ControllerFile
 from postproc.events import register_changes, tool_changes
 from postproc.links import SafeSpace, safe_space
@@ -100,7 +100,8 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
     tip_law = machine.control_kinematics is not None and controller.kinematics.modules
     origin = placement.points(np.array([frame.origin]))[0]
     largest = controller.arcs.largest_radius if controller.arcs.enabled else 0.0
-    control = Control(machine, tip_law, origin, largest)
+    law: Law = "tcp" if tip_law else "axes"
+    control = Control(machine, law, origin, largest, law)
     job = Job(toolpath, machine, controller, setup, options, placement, control, moves, safe_space(moves, setup, placement))
     return job, diagnostics + _tool_lengths(job) + _unused_tools(job)
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from postproc.control import Law
+from postproc.planes import Plane
 from toolpaths.arrays import Array, Bools, Floats, Ints
 
 PER_MINUTE, INVERSE = 0, 1
@@ -11,11 +13,33 @@ PER_MINUTE, INVERSE = 0, 1
 
 @dataclass(frozen=True)
 class Command:
-    """A canonical function without motion, e.g. ("START_SPINDLE_CLOCKWISE", (1200.0,)); `line` is its CL line."""
+    """A canonical function without motion, e.g. ("START_SPINDLE_CLOCKWISE", (1200.0,)); `line` is its CL line.
+
+    ("ENTER_SECTION", (i,)) and ("LEAVE_SECTION", (i,)) stand where a section that needs codes begins and ends.
+    """
 
     name: str
     args: tuple[float | str, ...] = ()
     line: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Section:
+    """Blocks from `first` to the next section, whose words mean the same.
+
+    Attributes:
+        first: number of the first block
+        law: "axes", "tcp" (X, Y, Z are the tip in the work offset) or "tilted" (the tip in `plane`)
+        plane: of "tilted", as the controller's printed angles give it; its origin is the work offset's zero
+        angles: the printed angles in degrees, in the order of the controller's convention
+        rotary: words (degrees) where the rotary axes stand on entering, by letter
+    """
+
+    first: int
+    law: Law
+    plane: Plane | None = None
+    angles: tuple[float, ...] = ()
+    rotary: tuple[tuple[str, float], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -53,6 +77,7 @@ class Program:
         commands: commands before block k, by k; K holds what follows the last block
         holes: by running number
         decimals (J,): of the words
+        sections: in order, the first begins at block 0 in the law that the control starts with
     """
 
     letters: tuple[str, ...]
@@ -71,6 +96,7 @@ class Program:
     commands: dict[int, tuple[Command, ...]]
     holes: tuple[Hole, ...]
     decimals: Ints
+    sections: tuple[Section, ...] = (Section(0, "axes"),)
 
     def __len__(self) -> int:
         return len(self.words)

@@ -40,11 +40,11 @@ def word_arcs(control: Control, kin: Kinematics, curves: Curves, q0: Floats, q1:
     plane, ccw = np.full(n, 17, dtype=np.int8), np.zeros(n, dtype=bool)
     parts = np.ones(n, dtype=np.int64)
     rows = np.flatnonzero(curves.is_arc)
-    if len(rows) and (control.tip_law or kin.slides_affine) and (control.xyz >= 0).all():
+    if len(rows) and control.tips_straight and (control.xyz >= 0).all():
         arc = curves.take(rows)
         rotary = np.array(kin.rotary)
         fixed = (q0[rows][:, rotary] == q1[rows][:, rotary]).all(axis=1) & (arc.axis0 == arc.axis1).all(axis=1)
-        to_words = _tip_to_words(control, kin, q0[rows])
+        to_words = control.tip_to_words(kin, q0[rows])
         square = np.abs(to_words @ np.swapaxes(to_words, 1, 2) - np.eye(3)).max(axis=(1, 2)) < 1e-9
         turn = np.asarray(np.linalg.det(to_words))
         normal = np.asarray(np.einsum("nij,nj->ni", to_words, arc.normal)) * turn[:, None]
@@ -56,13 +56,6 @@ def word_arcs(control: Control, kin: Kinematics, curves: Curves, q0: Floats, q1:
         center[rows] = np.einsum("nij,nj->ni", to_words, arc.center - arc.start)
         parts[rows] = np.maximum(np.ceil(arc.sweep / (2.0 * np.pi) - 1e-9), 1).astype(np.int64)
     return WordArcs(keep, plane, ccw, center, parts)
-
-
-def _tip_to_words(control: Control, kin: Kinematics, q: Floats) -> Floats:
-    """(N, 3, 3): change of the words X, Y, Z per change of the tip, rotary joints fixed."""
-    if control.tip_law:
-        return np.tile(np.eye(3), (len(q), 1, 1))
-    return np.asarray(np.linalg.inv(kin.jacobian(q)[:, :3, :][:, :, control.xyz]))
 
 
 def _well_shaped(arc: Curves) -> Bools:

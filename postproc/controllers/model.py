@@ -151,17 +151,59 @@ class Feed(UserModel):
     """the feed must be stated anew after a change of the feed mode"""
     least_inverse_rate: float = Field(default=0.0, ge=0.0)
     """mm/min below which inverse time runs X, Y, Z faster than asked (LinuxCNC 0.1)"""
+    length: Literal["xyz-first", "all", "geometry"] = "xyz-first"
+    """what a feed per minute refers to where X, Y, Z are axis positions: X, Y, Z before rotary axes, all axes alike, or
+    the geometry axes before all others"""
+    arc_inverse: Literal["length", "radius", "refuse"] = "length"
+    """inverse time in arcs: speed by length, speed by radius, or not allowed"""
 
 
 class Kinematics(UserModel):
     """Which motion lies between two blocks."""
 
     linear: Literal["joints"] = "joints"
-    rapids: Literal["straight"] = "straight"
+    rapids: Literal["straight", "dog-leg"] = "straight"
+    """dog-leg: every axis at its own rapid speed, so that the tool leaves the straight line"""
     modules: bool = False
     """the controller can run the kinematics named in a machine's [control] table; programs then hold the tip"""
     smoothing_share: float = Field(default=0.0, ge=0.0, le=0.8)
     """share of the tolerance left to the controller's own smoothing"""
+
+
+class TcpMode(UserModel):
+    """Tool-centre-point mode: X, Y, Z are the tip in the work offset, fixed to the part; F is the speed of the tip."""
+
+    enter: tuple[str, ...]
+    """blocks that switch it on; {register} is the length register in force"""
+    leave: tuple[str, ...]
+    """blocks that switch it off; {register} likewise"""
+    arcs: bool = True
+    """arcs may stand in it while the rotary axes stand still"""
+    cycles: bool = False
+    """canned cycles may stand in it"""
+    compensation: bool = False
+    """cutter compensation may stand in it"""
+
+
+class TiltedMode(UserModel):
+    """Tilted working plane: rotary axes stand still, X, Y, Z are the tip in a turned frame at the work offset's zero."""
+
+    enter: tuple[str, ...]
+    """blocks that state the plane; {0}, {1}, {2} are the angles in the order of `angles`, rotary axes by letter: {A}"""
+    leave: tuple[str, ...]
+    angles: Literal["ZXZ", "ZYX", "XYZ", "rotary"]
+    """turns about the axes of the moving frame, in order; "rotary": the frame is that of the rotary axes themselves"""
+    decimals: int = Field(default=4, ge=0, le=9)
+    """of the angles"""
+    tables_only: bool = False
+    """only for machines whose rotary axes all carry the part"""
+
+
+class Modes(UserModel):
+    """Output modes beside axis positions."""
+
+    tcp: TcpMode | None = None
+    tilted: TiltedMode | None = None
 
 
 class ControllerFile(UserModel):
@@ -180,6 +222,7 @@ class ControllerFile(UserModel):
     cycles: Cycles = Cycles()
     feed: Feed = Feed()
     kinematics: Kinematics = Kinematics()
+    modes: Modes = Modes()
 
 
 def builtin_files() -> dict[str, Path]:

@@ -38,7 +38,7 @@ def ends(name: str, curves: Curves) -> tuple[np.ndarray, np.ndarray]:
 def split(name: str, curves: Curves, tip: float = TIP, axis: float = AXIS) -> tuple[Pieces, np.ndarray]:
     m = machine(name)
     q0, q1 = ends(name, curves)
-    control = Control(m, False, np.zeros(3))
+    control = Control(m, "axes", np.zeros(3))
     return linearise(control, m.kinematics, curves, q0, q1, np.zeros(len(curves), dtype=bool), tip, axis), q0
 
 
@@ -205,7 +205,7 @@ def test_jump_of_the_joints_is_named_not_hidden() -> None:
     curves = lines(np.array([[30.0, 0, 0]]), np.array([[31.0, 0, 0]]), tilted(30, 40)[None], tilted(31, 40)[None])
     b0 = m.kinematics.inverse(curves.start, curves.axis0)
     b1 = m.kinematics.inverse(curves.end, curves.axis1)
-    control = Control(m, False, np.zeros(3))
+    control = Control(m, "axes", np.zeros(3))
     got = linearise(control, m.kinematics, curves, b0[0], b1[1], np.zeros(1, dtype=bool), TIP, AXIS)
     assert got.broken.tolist() == [0]
 

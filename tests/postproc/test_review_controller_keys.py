@@ -16,7 +16,7 @@ from toolpaths.diagnostics import DiagnosticError
 
 TEXTS = {"description", "sources"}
 """for people"""
-ONE_VALUE = {"kinematics.linear", "kinematics.rapids"}
+ONE_VALUE = {"kinematics.linear", "kinematics.rapids", "feed.length", "feed.arc_inverse", "modes.tcp", "modes.tilted"}
 """statements of the file that have one allowed value so far"""
 READ_BACK = {"cycles.peck_relief"}
 """how the control moves inside a canned cycle, which the read-back follows and no block states"""
