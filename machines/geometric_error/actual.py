@@ -1,0 +1,70 @@
+"""The machine as it is: a nominal kinematics with its errors. What every kind of machine gives to the correction.
+
+Everything is computed in coordinates `w` (N, 3 + R) in which any machine is a chain: three displacements of the tip, then
+R turns. For a serial machine they are its joints, for a Delta the place of its platform, for an H4 place, tilt and rotary
+axis. `w` stands for commands: the errors come in between w and the tool.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+
+import numpy as np
+
+from machines.kinematics.base import Kinematics
+from toolpaths.arrays import Bools, Floats
+
+Placed = tuple[Floats, Floats, Floats]
+"""tip, tool axis, x of the tool, each (N, 3), in the table frame"""
+
+
+class Actual(ABC):
+    """A machine with errors; frozen."""
+
+    kinematics: Kinematics
+    """without errors, with its tool"""
+    turns: int
+    """R"""
+
+    @abstractmethod
+    def coordinates(self, q: Floats, near: Floats | None = None) -> Floats:
+        """w (N, 3 + R) of joints q (N, J); `near` as in `Kinematics.pose`."""
+
+    @abstractmethod
+    def joints(self, w: Floats) -> Floats:
+        """q (N, J), NaN where the machine cannot go."""
+
+    @abstractmethod
+    def place(self, w: Floats, direction: Floats | None = None) -> Placed:
+        """Where the tool is, exactly, when w (N, 3 + R) is commanded.
+
+        Args:
+            direction: (N, J) sign of each joint's last motion, for tables with two ways; without it their mean
+        """
+
+    @abstractmethod
+    def rates(self, w: Floats) -> Floats:
+        """d(tip, axis)/dw (N, 6, 3 + R) of the machine without errors; the first three columns do not move the axis."""
+
+    @abstractmethod
+    def sensitivity(self, w: Floats, direction: Floats | None = None) -> Floats:
+        """First-order motion (N, 6, P) of the tip (mm) and turn (rad) per parameter, in the table frame."""
+
+    @abstractmethod
+    def outside(self, w: Floats, margin: float = 0.0) -> Bools:
+        """True (N, J) where a joint stands outside what was measured of it by more than `margin` mm or rad."""
+
+    def deviation(self, w: Floats, values: Floats, direction: Floats | None = None) -> Floats:
+        """First-order displacement of the tip and turn (N, 6) for parameters (P,)."""
+        result: Floats = self.sensitivity(w, direction) @ values
+        return result
+
+
+def approach(q: Floats) -> Floats:
+    """Sign of each joint's last motion (N, J) along a path q (N, J): +1, -1; 0 before it has first moved."""
+    moved = np.zeros(q.shape)
+    moved[1:] = np.sign(np.diff(q, axis=0))
+    last = np.where(moved != 0.0, np.arange(len(q))[:, None], 0)
+    np.maximum.accumulate(last, axis=0, out=last)
+    result: Floats = np.take_along_axis(moved, last, axis=0)
+    return result

@@ -1,0 +1,239 @@
+"""A machine on slides and rods with its errors: linear Delta and both H4a, through the exact closure of `rods`.
+
+The rotary axis of an H4 (table under the part, or axis at the spindle) and the spindle take the errors of a serial
+machine's axis; they stand before and after the platform in the chain.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from machines.geometric_error.actual import Actual, Placed
+from machines.geometric_error.axis_motion import Line, actual_line, actual_tool, driven
+from machines.geometric_error.names import SPINDLE
+from machines.geometric_error.rods import RodErrors, RodFrame, platform_turn, rod_frame
+from machines.geometric_error.serial_errors import SerialErrors
+from machines.geometric_error.transforms import carried
+from machines.kinematics import columns
+from machines.kinematics.columns import Columns
+from machines.kinematics.h4_axes import H4SpindleAxis
+from machines.kinematics.h4_linear import H4Linear
+from machines.kinematics.linear_delta import LinearDelta
+from machines.kinematics.serial import Joint
+from toolpaths.arrays import Bools, Floats
+from toolpaths.rotations import rotation
+
+UP = np.array([0.0, 0.0, 1.0])
+
+
+@dataclass(frozen=True, eq=False)
+class ActualRods(Actual):
+    """What Delta and H4 share: the platform."""
+
+    rods: RodErrors
+    chain: SerialErrors = field(default_factory=SerialErrors)
+    """errors of the rotary axis and of the spindle"""
+
+    @cached_property
+    def frame(self) -> RodFrame:
+        """Nominal rods."""
+        return rod_frame(self._slides_of)
+
+    @property
+    def any(self) -> bool:
+        """False where every parameter is 0: the machine is the nominal one, to the last digit."""
+        return bool(self.rods.values.any() or self.chain.values.any())
+
+    @property
+    @abstractmethod
+    def _slides_of(self) -> LinearDelta | H4Linear:
+        """The kinematics."""
+
+    @abstractmethod
+    def _platform(self, w: Floats) -> tuple[Floats, Floats, Floats]:
+        """Nominal (place (N, 3), turn (N, 3, 3)) of the platform and the slides (N, K) that hold it."""
+
+    def _carried(self, w: Floats, point: list[Columns]) -> list[Columns]:
+        """A point and directions of the platform by the platform as it really stands."""
+        place, turned, slides = self._platform(w)
+        place, turned = self.frame.solve(slides, place, turned, self.rods)
+        rows = np.moveaxis(turned, 0, 2)
+        result: list[Columns] = [[columns.dot(row, v) for row in rows] for v in point]
+        return [columns.plus(result[0], columns.of_rows(place)), *result[1:]]
+
+    def _twist(self, w: Floats) -> tuple[Floats, Floats]:
+        """(platform's place (N, 3), its motion per rod parameter (N, 6, P)), machine frame."""
+        place, turned, slides = self._platform(w)
+        return place, self.frame.platform_sensitivity(slides, place, turned)
+
+
+@dataclass(frozen=True, eq=False)
+class ActualDelta(ActualRods):
+    """w = nominal tip."""
+
+    kinematics: LinearDelta = field(kw_only=True)
+    turns = 0
+
+    @property
+    def _slides_of(self) -> LinearDelta:
+        return self.kinematics
+
+    def coordinates(self, q: Floats, near: Floats | None = None) -> Floats:
+        """See the base class."""
+        return self.kinematics.pose(q, near)[0]
+
+    def joints(self, w: Floats) -> Floats:
+        """See the base class."""
+        return np.asarray(self.kinematics.inverse(w, np.broadcast_to(UP, w.shape))[0])
+
+    def rates(self, w: Floats) -> Floats:
+        """See the base class."""
+        return np.broadcast_to(np.eye(6, 3), (len(w), 6, 3)).copy()
+
+    def outside(self, w: Floats, margin: float = 0.0) -> Bools:
+        """False: dimensions hold everywhere."""
+        return np.zeros((len(w), 3), dtype=np.bool_)
+
+    def _platform(self, w: Floats) -> tuple[Floats, Floats, Floats]:
+        place = w + self.kinematics.tool_length * UP
+        return place, np.tile(np.eye(3), (len(w), 1, 1)), self.joints(w)
+
+    def place(self, w: Floats, direction: Floats | None = None) -> Placed:
+        """See the base class."""
+        if not self.any:
+            return w, np.tile(UP, (len(w), 1)), np.tile(np.eye(3)[0], (len(w), 1))
+        tool: list[Columns] = [columns.of_one(v) for v in actual_tool(UP, self.kinematics.tool_length, self.chain)]
+        tip, axis, side = (columns.to_rows(v, len(w)) for v in self._carried(w, tool))
+        return tip, axis, side
+
+    def sensitivity(self, w: Floats, direction: Floats | None = None) -> Floats:
+        """See the base class: T^-1 S (E-15), carried to the tip, then the spindle's."""
+        place, twist = self._twist(w)
+        unit = np.tile(np.eye(3), (len(w), 1, 1))
+        return np.concatenate([carried(unit, w - place) @ twist, _spindle_columns(self.chain, unit, w - place)], axis=2)
+
+
+@dataclass(frozen=True, eq=False)
+class ActualH4(ActualRods):
+    """w = nominal platform (x, y, z, tilt) and rotary axis."""
+
+    kinematics: H4Linear = field(kw_only=True)
+    turns = 2
+
+    @property
+    def _slides_of(self) -> H4Linear:
+        return self.kinematics
+
+    @cached_property
+    def line(self) -> Line:
+        """The rotary axis, as its errors leave it; its reference point is on the nominal line."""
+        name, sense = self.kinematics.axis_names[4], self.kinematics.sense
+        at_spindle = isinstance(self.kinematics, H4SpindleAxis)
+        joint = Joint(name, True, np.array([0.0, sense, 0.0]) if at_spindle else np.array([0.0, 0.0, sense]), self.pivot)
+        return actual_line(joint, 4, self.chain)
+
+    @property
+    def pivot(self) -> Floats:
+        """(3,) point of the rotary axis: in the platform, or the machine origin."""
+        return self.kinematics.pivot if isinstance(self.kinematics, H4SpindleAxis) else np.zeros(3)
+
+    def coordinates(self, q: Floats, near: Floats | None = None) -> Floats:
+        """See the base class."""
+        return np.column_stack([self.kinematics.solve_platform(q, near), q[:, 4]])
+
+    def joints(self, w: Floats) -> Floats:
+        """See the base class."""
+        return np.column_stack([self.kinematics.platform.inverse(w[:, :4]), w[:, 4]])
+
+    def rates(self, w: Floats) -> Floats:
+        """See the base class: the turns are the tilt about x and the rotary axis."""
+        turned, tip, axis = self._part(w), *self.kinematics.place(w[:, :4], w[:, 4])[:2]
+        place = np.einsum("nij,nj->ni", turned, w[:, :3])
+        tilt = turned[:, :, 0]
+        at_spindle = isinstance(self.kinematics, H4SpindleAxis)
+        tilted = platform_turn(w[:, 3])
+        line = tilted @ self.line.joint.direction if at_spindle else np.broadcast_to(self.line.joint.direction, tip.shape)
+        point = place + tilted @ self.pivot if at_spindle else np.zeros(3)
+        result = np.zeros((len(w), 6, 5))
+        result[:, :3, :3] = turned
+        for k, (direction, through) in enumerate(((tilt, place), (line, point)), 3):
+            result[:, :3, k], result[:, 3:, k] = np.cross(direction, tip - through), np.cross(direction, axis)
+        return result
+
+    def _part(self, w: Floats) -> Floats:
+        """Machine frame to table frame (N, 3, 3)."""
+        if isinstance(self.kinematics, H4SpindleAxis):
+            return np.tile(np.eye(3), (len(w), 1, 1))
+        return rotation(self.line.joint.direction, w[:, 4])
+
+    def outside(self, w: Floats, margin: float = 0.0) -> Bools:
+        """See the base class; only the rotary axis has a range."""
+        return self.chain.outside(self.kinematics.axis_names, np.column_stack([np.zeros((len(w), 4)), w[:, 4]]), margin)
+
+    def _platform(self, w: Floats) -> tuple[Floats, Floats, Floats]:
+        return w[:, :3], platform_turn(w[:, 3]), self.kinematics.platform.inverse(w[:, :4])
+
+    def place(self, w: Floats, direction: Floats | None = None) -> Placed:
+        """See the base class."""
+        if not self.any:
+            return self.kinematics.place(w[:, :4], w[:, 4])
+        way = 0.0 if direction is None else direction[:, 4]
+        tool: list[Columns] = [columns.of_one(v) for v in actual_tool(UP, self.kinematics.tool_length, self.chain)]
+        tool[0] = columns.plus(tool[0], columns.of_one(self.pivot * self._at_spindle - self.kinematics.gauge * UP))
+        if self._at_spindle:
+            tool = driven(self.line, w[:, 4], way, self.chain, tool)
+        tool = self._carried(w, tool)
+        if not self._at_spindle:
+            tool = driven(self.line, w[:, 4], way, self.chain, tool)
+        tip, axis, side = (columns.to_rows(v, len(w)) for v in tool)
+        return tip, axis, side
+
+    @property
+    def _at_spindle(self) -> bool:
+        return isinstance(self.kinematics, H4SpindleAxis)
+
+    def sensitivity(self, w: Floats, direction: Floats | None = None) -> Floats:
+        """See the base class: the platform's, the rotary axis's, the spindle's, all at the tip in the table frame."""
+        tip, axis, _ = self.kinematics.place(w[:, :4], w[:, 4])
+        part, (place, twist) = self._part(w), self._twist(w)
+        arm = np.einsum("nji,nj->ni", part, tip) - place
+        generalised = np.zeros((len(w), 6, 6))
+        generalised[:, :3, :3] = generalised[:, 3:, 3:] = part
+        rods = generalised @ carried(np.tile(np.eye(3), (len(w), 1, 1)), arm) @ twist
+        return np.concatenate([rods, self._chain_columns(w, part, tip, axis, direction)], axis=2)
+
+    def _chain_columns(self, w: Floats, part: Floats, tip: Floats, axis: Floats, direction: Floats | None) -> Floats:
+        """(N, 6, P) of the errors in `chain`: the rotary axis stands before the platform or after it."""
+        way = np.zeros(len(w)) if direction is None else direction[:, 4]
+        tilted = platform_turn(w[:, 3])
+        before = tilted if self._at_spindle else np.tile(np.eye(3), (len(w), 1, 1))
+        after = before @ rotation(self.line.joint.direction, w[:, 4])
+        shift = w[:, :3] if self._at_spindle else np.zeros((len(w), 3))
+        at_axis = shift + before @ self.pivot
+        reference = at_axis + (after if self.line.moving else before) @ (self.line.reference - self.pivot)
+        spindle = after if self._at_spindle else after @ tilted
+        found = [np.zeros((len(w), 6, 0))]
+        for component in self.chain.components:
+            column = carried(after if self.line.moving else before, tip - reference)[:, :, component.name.part]
+            found.append(column[:, :, None] * component.curve.basis(w[:, 4], way)[:, None, :])
+        for text in self.chain.constants:
+            torsor = SerialErrors(constants={text: 1.0}).location(text[-1])
+            gauge = -self.kinematics.tool_length * axis
+            effect = carried(spindle, gauge) @ torsor if text[-1] == SPINDLE else \
+                (carried(before, tip - at_axis) - carried(after, tip - at_axis)) @ torsor
+            found.append(effect[:, :, None])
+        return np.concatenate(found, axis=2)
+
+
+def _spindle_columns(chain: SerialErrors, turned: Floats, arm: Floats) -> Floats:
+    """(N, 6, P) of the spindle's constants; the gauge point is at `arm` (N, 3) less the tool."""
+    at_tip = carried(turned, arm)
+    found = [np.zeros((len(arm), 6, 0))]
+    found += [(at_tip @ SerialErrors(constants={text: 1.0}).location(SPINDLE))[:, :, None] for text in chain.constants]
+    return np.concatenate(found, axis=2)
+
+

@@ -1,0 +1,146 @@
+"""A serial machine with its errors, exactly (homogeneous transforms) and to first order (transport matrices).
+
+The exact chain is that of `serial_errors`, carried out from the tool to the workpiece on the tip and the tool's own
+directions by columns, which is the product of the 4 x 4 matrices without their constant row (C 1.1, 1.11).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from machines.geometric_error.actual import Actual, Placed
+from machines.geometric_error.axis_motion import Line, actual_line, actual_tool, driven
+from machines.geometric_error.names import SPINDLE
+from machines.geometric_error.serial_errors import SerialErrors
+from machines.geometric_error.transforms import carried
+from machines.kinematics import columns
+from machines.kinematics.columns import Columns
+from machines.kinematics.serial import Joint, Serial
+from toolpaths.arrays import Bools, Floats
+from toolpaths.rotations import rotation
+
+
+@dataclass(frozen=True, eq=False)
+class ActualSerial(Actual):
+    """w = q: linear joints first."""
+
+    kinematics: Serial
+    errors: SerialErrors
+
+    @property
+    def turns(self) -> int:  # type: ignore[override]
+        """Rotary axes."""
+        return sum(self.kinematics.rotary)
+
+    @cached_property
+    def lines(self) -> list[Line]:
+        """From the workpiece to the tool."""
+        names = self.kinematics.axis_names
+        return [actual_line(joint, names.index(joint.name), self.errors) for joint in self.kinematics.chain]
+
+    def coordinates(self, q: Floats, near: Floats | None = None) -> Floats:
+        """q itself."""
+        return q
+
+    def joints(self, w: Floats) -> Floats:
+        """w itself."""
+        return w
+
+    def rates(self, w: Floats) -> Floats:
+        """See the base class."""
+        return self.kinematics.jacobian(w)
+
+    def outside(self, w: Floats, margin: float = 0.0) -> Bools:
+        """See the base class."""
+        return self.errors.outside(self.kinematics.axis_names, w, margin)
+
+    # ---- exact -----------------------------------------------------------------------------------------------------
+
+    def place(self, w: Floats, direction: Floats | None = None) -> Placed:
+        """See the base class."""
+        result = np.empty((3, len(w), 3))
+        for part in columns.blocks(len(w)):
+            way = None if direction is None else direction[part]
+            for rows, vector in zip(result, self._sweep(w[part], way), strict=True):
+                rows[part] = columns.to_rows(vector, len(w[part]))
+        return result[0], result[1], result[2]
+
+    def _sweep(self, q: Floats, way: Floats | None) -> list[Columns]:
+        carried_along: list[Columns] = [columns.of_one(v) for v in self.tool()]
+        for line in reversed(self.lines):
+            last = 0.0 if way is None else way[:, line.index]
+            carried_along = driven(line, q[:, line.index], last, self.errors, carried_along)
+        return carried_along
+
+    def tool(self) -> tuple[Floats, Floats, Floats]:
+        """(tip, axis, x), each (3,), at q = 0, as the spindle's errors leave them."""
+        return actual_tool(self.kinematics.tool_axis, self.kinematics.tool_length, self.errors)
+
+    # ---- first order -----------------------------------------------------------------------------------------------
+
+    def sensitivity(self, w: Floats, direction: Floats | None = None) -> Floats:
+        """See the base class: transport matrices (C 1.20, 1.25) times the basis of each curve."""
+        way = np.zeros(w.shape) if direction is None else direction
+        before, after, centres, tip = self._frames(w)
+        result, at = np.zeros((len(w), 6, len(self.errors.names))), 0
+        index = {line.joint.name: k for k, line in enumerate(self.lines)}
+        for component in self.errors.components:
+            k = index[component.name.axis]
+            line = self.lines[k]
+            column = carried((after if line.moving else before)[k], tip - centres[k])[:, :, component.name.part]
+            basis = component.curve.basis(w[:, line.index], way[:, line.index])
+            result[:, :, at:at + basis.shape[1]] = column[:, :, None] * basis[:, None, :]
+            at += basis.shape[1]
+        for text in self.errors.constants:
+            result[:, :, at] = self._location_column(text, w, before, after, tip)
+            at += 1
+        return result
+
+    def _location_column(self, text: str, w: Floats, before: list[Floats], after: list[Floats], tip: Floats) -> Floats:
+        """Effect (N, 6) of one location error: what L does before the axis less what it undoes after it."""
+        axis, torsor = text[-1], SerialErrors(constants={text: 1.0}).location(text[-1])
+        if axis == SPINDLE:
+            gauge = -self.kinematics.tool_length * self.kinematics.tool_axis
+            arm = np.einsum("nij,j->ni", after[-1], gauge)
+            spun: Floats = carried(after[-1], arm) @ torsor
+            return spun
+        k = next(k for k, line in enumerate(self.lines) if line.joint.name == axis)
+        line = self.lines[k]
+        pivot = line.joint.point if line.joint.rotary else line.reference
+        fixed = self._origin(k, w, pivot)
+        at_rest = fixed if line.joint.rotary else fixed + np.einsum(
+            "nij,j->ni", before[k], line.joint.direction) * w[:, line.index, None]
+        result: Floats = carried(before[k], tip - fixed) @ torsor - carried(after[k], tip - at_rest) @ torsor
+        return result
+
+    def _frames(self, w: Floats) -> tuple[list[Floats], list[Floats], list[Floats], Floats]:
+        """Turns (N, 3, 3) before and after each axis, reference points (N, 3), tip, without errors."""
+        before, after, centres = [], [], []
+        turned, shift = np.broadcast_to(np.eye(3), (len(w), 3, 3)), np.zeros((len(w), 3))
+        for line in self.lines:
+            before.append(turned)
+            turned, shift = _step(line.joint, w[:, line.index], turned, shift)
+            after.append(turned)
+            centres.append(shift + turned @ line.reference)
+        tip = shift + turned @ (-self.kinematics.tool_length * self.kinematics.tool_axis)
+        return before, after, centres, tip
+
+    def _origin(self, k: int, w: Floats, point: Floats) -> Floats:
+        """Where a point (3,) fixed before axis k is, (N, 3)."""
+        turned, shift = np.broadcast_to(np.eye(3), (len(w), 3, 3)), np.zeros((len(w), 3))
+        for line in self.lines[:k]:
+            turned, shift = _step(line.joint, w[:, line.index], turned, shift)
+        result: Floats = shift + turned @ point
+        return result
+
+
+def _step(joint: Joint, x: Floats, turned: Floats, shift: Floats) -> tuple[Floats, Floats]:
+    """The frame (turn (N, 3, 3), origin (N, 3)) carried on by one nominal motion."""
+    if not joint.rotary:
+        return turned, shift + np.einsum("nij,j->ni", turned, joint.direction) * x[:, None]
+    own = rotation(joint.direction, x)
+    origin = joint.point - own @ joint.point
+    return turned @ own, shift + np.einsum("nij,nj->ni", turned, origin)

@@ -1,0 +1,78 @@
+"""The motion of one axis with its errors, exactly: what points and directions on its tool side do (columns)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from machines.geometric_error.names import SPINDLE
+from machines.geometric_error.serial_errors import SerialErrors
+from machines.geometric_error.transforms import homogeneous
+from machines.kinematics import columns
+from machines.kinematics.columns import Columns
+from machines.kinematics.frames import reference_x
+from machines.kinematics.serial import Joint
+from toolpaths.arrays import Floats
+
+X, Y, Z = np.eye(3)
+
+
+@dataclass(frozen=True, eq=False)
+class Line:
+    """An axis as its location errors leave it: direction (3,), a point of its line (3,), reference point (3,)."""
+
+    joint: Joint
+    index: int
+    direction: Floats
+    point: Floats
+    reference: Floats
+    moving: bool
+
+
+def actual_line(joint: Joint, index: int, errors: SerialErrors) -> Line:
+    """L M(q) L^-1 is the motion about or along the line that L has moved."""
+    centre = np.asarray(errors.reference.get(joint.name, joint.point), dtype=np.float64)
+    pivot = joint.point if joint.rotary else centre
+    location = homogeneous(errors.location(joint.name)[None])[0]
+    moving = not joint.rotary or errors.frame.get(joint.name, "fixed") == "moving"
+    return Line(joint, index, location[:3, :3] @ joint.direction, pivot + location[:3, 3], centre, moving)
+
+
+def actual_tool(axis: Floats, length: float, errors: SerialErrors) -> tuple[Floats, Floats, Floats]:
+    """(tip, axis, x of the tool), each (3,) from the gauge point, as the spindle's errors leave them."""
+    spindle = homogeneous(errors.location(SPINDLE)[None])[0]
+    turned = [spindle[:3, :3] @ v for v in (-length * axis, axis, reference_x(axis[None])[0])]
+    return turned[0] + spindle[:3, 3], turned[1], turned[2]
+
+
+def driven(line: Line, x: Floats, way: Floats | float, errors: SerialErrors,
+           carried_along: Sequence[Columns]) -> list[Columns]:
+    """A point and directions by T_i of `serial_errors`: the axis commanded to x (N,), its last motion `way` (N,)."""
+    error = errors.torsors(line.joint.name, x, way)
+    if line.moving:
+        return moved(line, x, displaced(error, line.reference, carried_along))
+    return displaced(error, line.reference, moved(line, x, carried_along))
+
+
+def moved(line: Line, x: Floats, carried_along: Sequence[Columns]) -> list[Columns]:
+    """A point and directions by the axis's motion along or about its actual line."""
+    point, *vectors = carried_along
+    if not line.joint.rotary:
+        return [columns.plus(point, [x * d if d != 0.0 else 0.0 for d in line.direction.tolist()]), *vectors]
+    cos, sin, place = np.cos(x), np.sin(x), columns.of_one(line.point)
+    turned = columns.plus(columns.turn(line.direction, cos, sin, columns.minus(point, place)), place)
+    return [turned, *(columns.turn(line.direction, cos, sin, v) for v in vectors)]
+
+
+def displaced(torsor: list[Floats | float], centre: Floats, carried_along: Sequence[Columns]) -> list[Columns]:
+    """A point and directions by one small transform about `centre`: turned about z, y, x, then displaced (C 1.14)."""
+    place = columns.of_one(centre)
+    turned: list[Columns] = [columns.minus(carried_along[0], place), *carried_along[1:]]
+    for axis, angle in ((Z, torsor[5]), (Y, torsor[4]), (X, torsor[3])):
+        if isinstance(angle, float):
+            continue
+        cos, sin = np.cos(angle), np.sin(angle)
+        turned = [columns.turn(axis, cos, sin, v) for v in turned]
+    return [columns.plus(columns.plus(turned[0], place), torsor[:3]), *turned[1:]]

@@ -1,0 +1,183 @@
+"""One component error as a function of the position of its axis: table, Fourier series or polynomial.
+
+All curves are linear in their parameters: value = basis(x) . values. Positions mm or rad, values mm or rad. Beyond its
+range a curve keeps its end value; `outside` tells, and callers refuse such positions unless they are told otherwise.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, field, replace
+from typing import Literal, Self
+
+import numpy as np
+
+from toolpaths.arrays import Bools, Floats, frozen
+
+EVERYWHERE = (-np.inf, np.inf)
+
+
+class Curve(ABC):
+    """A function of one position, linear in P values."""
+
+    values: Floats
+    """(P,)"""
+    range: tuple[float, float]
+    """least and greatest position that the curve was made for"""
+
+    @abstractmethod
+    def labels(self) -> list[str]:
+        """What each value is called after the name of the component, P of them."""
+
+    @abstractmethod
+    def basis(self, x: Floats, direction: Floats) -> Floats:
+        """(N, P) derivatives of the value by the parameters, arguments as in `at`."""
+
+    def at(self, x: Floats, direction: Floats | float = 0.0) -> Floats:
+        """Values (N,) at positions (N,) reached in `direction` (N,): +1, -1, or 0 for the mean of both."""
+        result: Floats = self.basis(x, np.broadcast_to(np.asarray(direction, dtype=np.float64), x.shape)) @ self.values
+        return result
+
+    def outside(self, x: Floats, margin: float = 0.0) -> Bools:
+        """True (N,) where x lies outside the range by more than `margin`."""
+        result: Bools = (x < self.range[0] - margin) | (x > self.range[1] + margin)
+        return result
+
+    def with_values(self, values: Floats) -> Self:
+        """The same curve with other parameters (P,)."""
+        return replace(self, values=frozen(values, np.float64, self.values.shape, "Curve.values"))  # type: ignore[type-var]
+
+
+@dataclass(frozen=True, eq=False)
+class Table(Curve):
+    """Values measured at M ascending positions, both ways where `both`.
+
+    Attributes:
+        x: (M,) ascending
+        values: (M,), or (2 M,) with `both`: approached forwards, then backwards
+        rule: "linear", or "spline": the cubic spline through the points (not-a-knot; periodic with a period)
+        period: 0, or the length after which the table repeats; x then lies within one period, its end left out
+    """
+
+    x: Floats
+    values: Floats
+    rule: Literal["linear", "spline"] = "linear"
+    both: bool = False
+    period: float = 0.0
+    range: tuple[float, float] = field(init=False)
+
+    def __post_init__(self) -> None:
+        n = len(self.x)
+        object.__setattr__(self, "x", frozen(self.x, np.float64, (n,), "Table.x"))
+        object.__setattr__(self, "values", frozen(self.values, np.float64, (2 * n if self.both else n,), "Table.values"))
+        object.__setattr__(self, "range", EVERYWHERE if self.period else (float(self.x[0]), float(self.x[-1])))
+
+    def labels(self) -> list[str]:
+        """[0], [1] ... by position; [0]+ forwards, [0]- backwards."""
+        one = [f"[{k}]" for k in range(len(self.x))]
+        return [name + "+" for name in one] + [name + "-" for name in one] if self.both else one
+
+    def at(self, x: Floats, direction: Floats | float = 0.0) -> Floats:
+        """See the base class."""
+        inside = self._inside(x)
+        if not self.both:
+            return self._way(inside, self.values)
+        forward, backward = (self._way(inside, half) for half in np.split(self.values, 2))
+        way = np.broadcast_to(direction, x.shape)
+        result: Floats = np.where(way > 0.0, forward, np.where(way < 0.0, backward, 0.5 * (forward + backward)))
+        return result
+
+    def basis(self, x: Floats, direction: Floats) -> Floats:
+        """See the base class."""
+        inside = self._inside(x)
+        hats = self._spline(np.eye(len(self.x)), inside) if self.rule == "spline" else self._hats(inside)
+        if not self.both:
+            return hats
+        share = np.clip(0.5 * (1.0 + np.sign(direction)), 0.0, 1.0)[:, None]
+        return np.concatenate([share * hats, (1.0 - share) * hats], axis=1)
+
+    def _inside(self, x: Floats) -> Floats:
+        if self.period:
+            result: Floats = self.x[0] + np.mod(x - self.x[0], self.period)
+            return result
+        return np.clip(x, self.x[0], self.x[-1])
+
+    def _closed(self, values: Floats) -> tuple[Floats, Floats]:
+        """Positions (M or M + 1,) and values that go with them, the first repeated one period on."""
+        if not self.period:
+            return self.x, values
+        return np.append(self.x, self.x[0] + self.period), np.concatenate([values, values[:1]])
+
+    def _way(self, x: Floats, values: Floats) -> Floats:
+        return self._spline(values, x) if self.rule == "spline" else np.interp(x, *self._closed(values))
+
+    def _spline(self, values: Floats, x: Floats) -> Floats:
+        from scipy.interpolate import CubicSpline
+
+        result: Floats = CubicSpline(*self._closed(values), bc_type="periodic" if self.period else "not-a-knot")(x)
+        return result
+
+    def _hats(self, x: Floats) -> Floats:
+        at_rest, n = self._closed(self.values[: len(self.x)])[0], len(self.x)
+        result = np.zeros((len(x), n))
+        if len(at_rest) == 1:
+            result[:, 0] = 1.0
+            return result
+        at = np.clip(np.searchsorted(at_rest, x, side="right") - 1, 0, len(at_rest) - 2)
+        share = (x - at_rest[at]) / (at_rest[at + 1] - at_rest[at])
+        rows = np.arange(len(x))
+        result[rows, at] = 1.0 - share
+        result[rows, (at + 1) % n] += share
+        return result
+
+
+@dataclass(frozen=True, eq=False)
+class Fourier(Curve):
+    """mean + sum over k = 1.. of cosine_k cos(k phase) + sine_k sin(k phase), phase = 2 pi (x - origin) / period.
+
+    `values` (1 + 2 K,): mean, K cosines, K sines.
+    """
+
+    values: Floats
+    period: float = 2.0 * np.pi
+    origin: float = 0.0
+    range: tuple[float, float] = EVERYWHERE
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "values", frozen(self.values, np.float64, (-1,), "Fourier.values"))
+        if len(self.values) % 2 == 0:
+            raise ValueError(f"Fourier.values has {len(self.values)} entries, expected 1 + 2 K")
+
+    def labels(self) -> list[str]:
+        """mean, cos1, ..., sin1, ..."""
+        harmonics = range(1, 1 + len(self.values) // 2)
+        return [".mean", *(f".cos{k}" for k in harmonics), *(f".sin{k}" for k in harmonics)]
+
+    def basis(self, x: Floats, direction: Floats) -> Floats:
+        """See the base class."""
+        harmonics = np.arange(1, 1 + len(self.values) // 2)
+        phase = (np.clip(x, *self.range) - self.origin)[:, None] * (2.0 * np.pi / self.period) * harmonics
+        return np.concatenate([np.ones((len(x), 1)), np.cos(phase), np.sin(phase)], axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class Polynomial(Curve):
+    """sum over k = 0.. of values_k ((x - origin) / scale)^k."""
+
+    values: Floats
+    range: tuple[float, float]
+    origin: float = 0.0
+    scale: float = 1.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "values", frozen(self.values, np.float64, (-1,), "Polynomial.values"))
+
+    def labels(self) -> list[str]:
+        """.c0, .c1, ..."""
+        return [f".c{k}" for k in range(len(self.values))]
+
+    def basis(self, x: Floats, direction: Floats) -> Floats:
+        """See the base class."""
+        t = (np.clip(x, *self.range) - self.origin) / self.scale
+        result: Floats = np.vander(t, len(self.values), increasing=True)
+        return result

@@ -1,0 +1,216 @@
+"""Dimensional errors of machines on slides and rods, and the exact closure of their six rods.
+
+Rod r belongs to leg k. The rail of leg k is at P_k, its carriage at P_k + q u_k, the joint of the rod on the carriage and
+on the platform as the machine file has them. With the errors of annex E (Company 2000, "T"; II-52 to II-58, E-1 to E-9):
+
+    A_r = P_k + dP_k + G_k (q u_k + a_r) + R_k dA_r,     B_r = X + R (b_r + dB_r),     |B_r - A_r| = L_r + dl_r,
+
+G_k: exact turn of the guide about x, y, z of the machine frame, a_r: from the rail's point to the joint, R_k: guide frame
+(z along the slide, x from the rail to the joint). The six equations give the platform's place X and turn R, which no
+longer only translates or tilts.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+
+from machines.geometric_error.transforms import turns
+from machines.kinematics.h4_linear import H4Linear
+from machines.kinematics.linear_delta import LinearDelta
+from toolpaths.arrays import Floats, Ints, frozen
+
+RODS = 6
+STEPS = 12
+"""of the chord iteration at most; it gains about four digits each"""
+CLOSED = 1e-15
+"""largest (|AB|^2 - L^2) / 2 L^2 of a solved platform"""
+LEAST_GAIN = 0.5
+"""a step that leaves more of the error than this is the last: rounding is reached"""
+
+
+@dataclass(frozen=True, eq=False)
+class RodErrors:
+    """Errors of K legs and six rods, mm and rad; the order of the parameters is that of E-14.
+
+    Attributes:
+        rail: (K, 3) dP, machine frame
+        guide: (K, 3) turns of the slide about x, y, z of the machine frame
+        carriage: (6, 3) dA, guide frame
+        platform: (6, 3) dB, platform frame
+        length: (6,) dl
+        legs, rods: names of the legs, and of the rods ("X1", "X2" ...)
+    """
+
+    rail: Floats
+    guide: Floats
+    carriage: Floats
+    platform: Floats
+    length: Floats
+    legs: tuple[str, ...]
+    rods: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        k = len(self.legs)
+        for name, shape in (("rail", (k, 3)), ("guide", (k, 3)), ("carriage", (RODS, 3)), ("platform", (RODS, 3)),
+                            ("length", (RODS,))):
+            object.__setattr__(self, name, frozen(getattr(self, name), np.float64, shape, f"RodErrors.{name}"))
+
+    @classmethod
+    def none(cls, legs: tuple[str, ...], rods: tuple[str, ...]) -> Self:
+        """All zero."""
+        k = len(legs)
+        return cls(np.zeros((k, 3)), np.zeros((k, 3)), np.zeros((RODS, 3)), np.zeros((RODS, 3)), np.zeros(RODS), legs, rods)
+
+    @property
+    def names(self) -> list[str]:
+        """X.rail.x ..., X.guide.x ..., X1.carriage.x ..., X1.platform.x ..., X1.length ..."""
+        return [f"{who}.{what}.{letter}" for what, group in (("rail", self.legs), ("guide", self.legs),
+                                                             ("carriage", self.rods), ("platform", self.rods))
+                for who in group for letter in "xyz"] + [f"{rod}.length" for rod in self.rods]
+
+    @property
+    def values(self) -> Floats:
+        """(6 K + 42,): 60 for a Delta (E-14), 66 for an H4."""
+        return np.concatenate([getattr(self, name).ravel() for name in ("rail", "guide", "carriage", "platform", "length")])
+
+    def with_values(self, values: Floats) -> Self:
+        """The same machine with other parameters (P,)."""
+        k = len(self.legs)
+        rail, guide, carriage, platform, length = np.split(np.asarray(values, dtype=np.float64),
+                                                           np.cumsum([3 * k, 3 * k, 3 * RODS, 3 * RODS]))
+        return replace(self, rail=rail.reshape(k, 3), guide=guide.reshape(k, 3), carriage=carriage.reshape(RODS, 3),
+                       platform=platform.reshape(RODS, 3), length=length)
+
+
+@dataclass(frozen=True, eq=False)
+class RodFrame:
+    """Nominal geometry of six rods, mm, machine frame.
+
+    Attributes:
+        leg: (6,) leg of each rod
+        rail, direction: (K, 3) point of the rail at q = 0 and unit direction of the slide
+        arm: (6, 3) from the rail's point to the rod's joint on the carriage
+        joint: (6, 3) joint on the platform, platform frame
+        length: (6,)
+        guide: (K, 3, 3) guide frames, columns x, y, z
+    """
+
+    leg: Ints
+    rail: Floats
+    direction: Floats
+    arm: Floats
+    joint: Floats
+    length: Floats
+    guide: Floats
+
+    def carriage_joints(self, q: Floats, errors: RodErrors | None = None) -> Floats:
+        """A (N, 6, 3) of slides q (N, K)."""
+        reach = q[:, self.leg, None] * self.direction[self.leg] + self.arm
+        if errors is None:
+            return np.asarray(self.rail[self.leg] + reach)
+        turned = np.einsum("rij,nrj->nri", turns(errors.guide)[self.leg], reach)
+        own = np.einsum("rij,rj->ri", self.guide[self.leg], errors.carriage)
+        return np.asarray((self.rail + errors.rail)[self.leg] + turned + own)
+
+    def solve(self, q: Floats, place: Floats, turned: Floats, errors: RodErrors) -> tuple[Floats, Floats]:
+        """The platform (X (N, 3), R (N, 3, 3)) that closes the six rods with their errors, exactly.
+
+        Chord iteration from the nominal platform `place` (N, 3), `turned` (N, 3, 3); NaN where it does not close.
+        """
+        a, b, lengths = self.carriage_joints(q, errors), self.joint + errors.platform, self.length + errors.length
+        inverse = inverted(self.twist_rows(self.carriage_joints(q), place, turned))
+        turned, before = np.array(turned), np.full(len(q), np.inf)
+        for _ in range(STEPS):
+            ends = np.einsum("nij,rj->nri", turned, b)
+            rods = place[:, None] + ends - a
+            gap = 0.5 * (np.einsum("nri,nri->nr", rods, rods) - lengths**2)
+            step = -np.einsum("nij,nj->ni", inverse, gap)
+            place = place + step[:, :3]
+            turned = turns(step[:, 3:]) @ turned
+            worst = np.abs(gap / lengths**2).max(axis=1)
+            if not np.any((worst > CLOSED) & (worst < LEAST_GAIN * before)):
+                break
+            before = worst
+        bad = ~(worst < 1e-12)
+        return np.where(bad[:, None], np.nan, place), np.where(bad[:, None, None], np.nan, turned)
+
+    def twist_rows(self, carriages: Floats, place: Floats, turned: Floats) -> Floats:
+        """T (N, 6, 6), E-16: rows (AB, DB x AB) that act on the platform's displacement and turn about X."""
+        ends = np.einsum("nij,rj->nri", turned, self.joint)
+        rods = place[:, None] + ends - carriages
+        return np.concatenate([rods, np.cross(ends, rods)], axis=2)
+
+    def sensitivity(self, q: Floats, place: Floats, turned: Floats) -> Floats:
+        """S (N, 6, P) of T (dX, dR) = S E, E-15 to E-31 as corrected: P parameters in the order of E-14."""
+        carriages = self.carriage_joints(q)
+        rods = place[:, None] + np.einsum("nij,rj->nri", turned, self.joint) - carriages
+        n, k = len(q), len(self.rail)
+        rail, guide = np.zeros((n, RODS, k, 3)), np.zeros((n, RODS, k, 3))
+        own, ends, lengths = np.zeros((n, RODS, RODS, 3)), np.zeros((n, RODS, RODS, 3)), np.zeros((n, RODS, RODS))
+        for r, leg in enumerate(self.leg):
+            rail[:, r, leg] = rods[:, r]
+            guide[:, r, leg] = np.cross(carriages[:, r] - self.rail[leg], rods[:, r])
+            own[:, r, r] = rods[:, r] @ self.guide[leg]
+            ends[:, r, r] = -np.einsum("ni,nij->nj", rods[:, r], turned)
+            lengths[:, r, r] = self.length[r]
+        return np.concatenate([part.reshape(n, RODS, -1) for part in (rail, guide, own, ends, lengths)], axis=2)
+
+    def platform_sensitivity(self, q: Floats, place: Floats, turned: Floats) -> Floats:
+        """d(X, turn)/dE (N, 6, P): T^-1 S."""
+        rows = self.twist_rows(self.carriage_joints(q), place, turned)
+        result: Floats = inverted(rows) @ self.sensitivity(q, place, turned)
+        return result
+
+
+def inverted(matrices: Floats) -> Floats:
+    """Inverses (N, M, M), NaN where one is singular or not finite."""
+    bad = ~(np.abs(np.linalg.det(np.nan_to_num(matrices))) > 0.0) | ~np.isfinite(matrices).all(axis=(1, 2))
+    safe = np.where(bad[:, None, None], np.eye(matrices.shape[1]), matrices)
+    result: Floats = np.asarray(np.linalg.inv(safe), dtype=np.float64)
+    result[bad] = np.nan
+    return result
+
+
+def rod_frame(kinematics: LinearDelta | H4Linear) -> RodFrame:
+    """The rods of a machine.
+
+    Raises:
+        ValueError: where its file does not give six rods.
+    """
+    platform = kinematics.platform if isinstance(kinematics, LinearDelta) else kinematics.platform.joints
+    legs, rods = kinematics.legs, kinematics.clearance
+    if rods is None or len(rods.leg) != RODS:
+        raise ValueError(f"the machine file gives {0 if rods is None else len(rods.leg)} rods, a platform needs {RODS}; "
+                         "write rods = [[x, y, z], [x, y, z]] in its leg tables")
+    offset = np.zeros_like(legs.points) if rods.rail_offset is None else rods.rail_offset
+    rail = legs.points + offset
+    guide = np.stack([_guide(u, -o, kinematics.workspace.middle - p)
+                      for u, o, p in zip(legs.directions, offset, rail, strict=True)])
+    return RodFrame(rods.leg, rail, legs.directions, rods.shift - offset[rods.leg], platform[rods.leg] + rods.shift,
+                    legs.lengths[rods.leg], guide)
+
+
+def rod_names(frame: RodFrame, legs: tuple[str, ...]) -> tuple[str, ...]:
+    """X1, X2, Y1 ... by leg and number in the leg."""
+    count = [int(np.sum(frame.leg[:r] == leg)) + 1 for r, leg in enumerate(frame.leg)]
+    return tuple(f"{legs[leg]}{number}" for leg, number in zip(frame.leg, count, strict=True))
+
+
+def _guide(direction: Floats, *towards: Floats) -> Floats:
+    """Columns x, y, z of a guide frame: z along the slide, x across it, from the rail to the joint, else to the middle."""
+    across = [v - (v @ direction) * direction for v in (*towards, np.eye(3)[int(np.argmin(np.abs(direction)))])]
+    x = next(v for v in across if np.linalg.norm(v) > 1e-9)
+    x = x / np.linalg.norm(x)
+    return np.stack([x, np.cross(direction, x), direction], axis=1)
+
+
+def platform_turn(tilt: Floats) -> Floats:
+    """Rx(tilt) (N, 3, 3) of the nominal platform."""
+    angles = np.zeros((len(tilt), 3))
+    angles[:, 0] = tilt
+    return turns(angles)
+
+
