@@ -7,82 +7,18 @@ from functools import cached_property
 
 import numpy as np
 
-from postproc.controllers.model import CannedCycle, ControllerFile
-from postproc.program import INVERSE, Command, Hole, Program
+from postproc.controllers.model import CannedCycle
+from postproc.controllers.writer import Writer
+from postproc.program import INVERSE, Hole
 from postproc.word_arcs import PLANE_AXIS
-from toolpaths.arrays import Array, Bools, Floats
+from toolpaths.arrays import Array, Bools
 from toolpaths.toolpath import Cycle
 
-_CHUNK = 20000
+CHUNK = 20000
 
 
-class IsoWriter:
-    """Writes one program; the state is what the controller holds while it reads."""
-
-    def __init__(self, controller: ControllerFile, program: Program, cycles: tuple[Cycle, ...], tools: bool,
-                 smoothing: float, work_offset: str = "G54") -> None:
-        self.controller, self.program, self.cycles = controller, program, cycles
-        self.length_offsets, self.smoothing, self.work_offset = tools, smoothing, work_offset
-        self.space = " " if controller.format.space else ""
-        self.motion, self.plane, self.mode, self.feed = "", 17, 0, ""
-        self.number = 0
-
-    def lines(self, header: list[str]) -> Iterator[str]:
-        """The blocks of the whole program, without line ends."""
-        frame = self.controller.program
-        yield from frame.begin
-        yield from (self.comment(text) for text in header)
-        for block in (*frame.preamble, *self.modes()):
-            yield self.numbered(block.replace("{work_offset}", self.work_offset))
-        yield from map(self.numbered, self.body())
-        for block in frame.ending:
-            yield self.numbered(block)
-        yield from frame.end
-
-    def modes(self) -> list[str]:
-        """Blocks after the preamble that depend on the options."""
-        return []
-
-    def numbered(self, block: str) -> str:
-        """The block with its N word where the controller numbers blocks."""
-        if not self.controller.format.sequence_step or block.startswith(self.controller.comment.open):
-            return block
-        self.number += self.controller.format.sequence_step
-        return f"N{self.number}{self.space}{block}"
-
-    def comment(self, text: str) -> str:
-        """One comment block, without characters that would end it, cut to the line length."""
-        style = self.controller.comment
-        clean = "".join(" " if c in style.forbidden or not 32 <= ord(c) < 127 else c for c in text)
-        room = self.controller.format.line_length - len(style.open) - len(style.close) - 12
-        return f"{style.open}{clean[:room]}{style.close}"
-
-    def body(self) -> Iterator[str]:
-        """Blocks between preamble and ending: stretches of plain motion at once, all else one by one."""
-        p = self.program
-        stops = sorted({*p.commands, *(h.first for h in p.holes), *(h.last + 1 for h in p.holes), len(p)})
-        holes = {h.first: h for h in p.holes}
-        at = 0
-        for stop in stops:
-            if stop > at:
-                yield from self.blocks(at, stop)
-                at = stop
-            for command in p.commands.get(stop, ()):
-                yield from self.command(command)
-            if stop in holes:
-                yield from self.hole(holes[stop])
-                at = holes[stop].last + 1
-        if self.motion == "cycle":
-            yield self.controller.cycles.cancel
-
-    def number_text(self, values: Floats, places: int) -> list[str]:
-        """Numbers as text, rounded to `places`, -0 as 0."""
-        texts = [f"{v:.{places}f}" for v in (values + 0.0).tolist()]
-        style = self.controller.format
-        if style.trim_zeros and places:
-            texts = [t.rstrip("0").rstrip("." if not style.decimal_point else "\0") for t in texts]
-            texts = ["0" if t == "-0" else "0." if t == "-0." else t for t in texts]
-        return texts
+class IsoWriter(Writer):
+    """Blocks of words as ISO 6983 has them."""
 
     def word_columns(self, at: int, stop: int) -> list[list[str]]:
         """The axis words of blocks at..stop by letter, '' where a block does not state one."""
@@ -100,13 +36,11 @@ class IsoWriter:
 
     def blocks(self, at: int, stop: int) -> Iterator[str]:
         """Motion blocks at..stop."""
-        if self.motion == "cycle":
-            yield self.controller.cycles.cancel
-            self.motion = ""
-        for first in range(at, stop, _CHUNK):
-            last = min(first + _CHUNK, stop)
+        for first in range(at, stop, CHUNK):
+            last = min(first + CHUNK, stop)
             words = self.word_columns(first, last)
             heads = self.heads(first, last)
+            self.add_length(heads, first, last)
             feeds = self.feeds(first, last)
             arcs = self.arc_words(first, last)
             for head, axes, arc, feed in zip(heads, zip(*words, strict=True), arcs, feeds, strict=True):
@@ -132,11 +66,24 @@ class IsoWriter:
                 self.plane = plane
             if home:
                 words.append(codes.machine_coordinates)
+                if self.controller.tools.home_without_length:
+                    words.append(codes.length_cancel)
+                    self.length_off = True
             if home or names[code] != self.motion:
                 words.append(names[code])
                 self.motion = names[code]
             result.append("".join(self.space + w for w in words))
         return result
+
+    def add_length(self, heads: list[str], first: int, last: int) -> None:
+        """The waiting length register into the first block that states Z in the work offset."""
+        p = self.program
+        if not self.length_off or not self.register or not (self.length_offsets or self.law == "tilted") or "Z" not in p.letters:
+            return
+        rows = np.flatnonzero(p.write[first:last, p.letters.index("Z")] & ~p.home[first:last])
+        if len(rows):
+            heads[int(rows[0])] += self.space + self.controller.codes.length_offset.format(register=self.register)
+            self.length_off = bool(p.home[first + rows[0]:last].any()) and self.controller.tools.home_without_length
 
     def feed_text(self, value: float) -> str:
         """The number of a feed word: the controller's decimals, more for feeds below 1."""
@@ -181,85 +128,49 @@ class IsoWriter:
             result[k] = "".join(f"{self.space}{'IJK'[i]}{texts[i]}" for i in range(3) if i != third)
         return result
 
-    def command(self, command: Command) -> Iterator[str]:
-        """The blocks of one canonical command."""
-        if self.motion == "cycle":
-            yield self.controller.cycles.cancel
-            self.motion = ""
-        codes, args = self.controller.codes, command.args
-        fixed = {"STOP_SPINDLE_TURNING": codes.spindle_stop, "FLOOD_ON": codes.flood, "MIST_ON": codes.mist,
-                 "THROUGH_ON": codes.through, "COOLANT_OFF": codes.coolant_off, "PROGRAM_STOP": codes.stop,
-                 "OPTIONAL_PROGRAM_STOP": codes.optional_stop, "CUTTER_COMPENSATION_OFF": codes.compensation_off}
-        if command.name in fixed:
-            yield fixed[command.name]
-        elif command.name.startswith("START_SPINDLE"):
-            code = codes.spindle_cw if command.name.endswith("_CLOCKWISE") else codes.spindle_ccw
-            yield f"S{self.plain(args[0])}{self.space}{code}" if args else code
-        elif command.name == "COMMENT":
-            yield self.comment(str(args[0]))
-        elif command.name == "INSERT":
-            yield str(args[0])
-        else:
-            yield from self.numbered_command(command)
-
-    def numbered_command(self, command: Command) -> Iterator[str]:
-        """Commands that carry a number."""
-        codes, args = self.controller.codes, command.args
-        value = self.plain(args[0]) if args else ""
-        if command.name == "CHANGE_TOOL":
-            if self.length_offsets:
-                yield codes.length_cancel
-            yield codes.tool_change.format(number=value)
-            self.motion = ""
-        elif command.name == "SELECT_TOOL":
-            yield codes.tool_select.format(number=value)
-        elif command.name == "USE_TOOL_LENGTH_OFFSET":
-            if self.length_offsets:
-                yield codes.length_offset.format(register=value)
-        elif command.name == "DWELL":
-            yield codes.dwell.format(seconds=value)
-        elif command.name.startswith("CUTTER_COMPENSATION"):
-            code = codes.compensation_left if command.name.endswith("LEFT") else codes.compensation_right
-            yield code.format(register=value) if value else code.split(" ")[0]
-        else:
-            raise ValueError(f"no text for the command {command.name}")
-
-    @staticmethod
-    def plain(value: float | str) -> str:
-        """A number without an exponent or needless zeros."""
-        return f"{float(value):.6f}".rstrip("0").rstrip(".")
-
     def hole(self, hole: Hole) -> Iterator[str]:
         """A canned cycle: in full where anything but the place of the hole changes, else the place alone."""
-        p, cycles = self.program, self.controller.cycles
         cycle = self.cycles[hole.cycle]
-        spec = (cycles.with_dwell if cycle.dwell > 0.0 else cycles.table)[hole.key]
-        at = self._place(hole)
+        spec = self.cycle_of(hole, cycle)
+        yield from self.before_cycle(hole)
+        text = self._cycle_text(hole, cycle, spec, self.hole_feed(hole))
+        place = self.place(hole)
+        if self.in_cycle and text == self.cycle_text:
+            yield place.removeprefix(" ")
+            return
+        if hole.key.startswith("TAP") and self.controller.codes.rigid_tap:
+            yield from self.end_cycle()
+            yield self.controller.codes.rigid_tap.format(speed=self.plain(abs(self.speed)))
+        self.cycle_text = text
+        head, _, tail = text.partition("|")
+        yield f"{head}{place}{tail}"
+
+    def cycle_of(self, hole: Hole, cycle: Cycle) -> CannedCycle:
+        """The controller's cycle for a hole."""
+        cycles = self.controller.cycles
+        return (cycles.with_dwell if cycle.dwell > 0.0 else cycles.table)[hole.key]
+
+    def before_cycle(self, hole: Hole) -> Iterator[str]:
+        """Feed per minute, and the XY plane, where they do not stand."""
         if self.mode == INVERSE:
             yield self.controller.codes.per_minute
             self.mode, self.feed = 0, ""
         if self.plane != 17:
             yield self.controller.codes.planes["17"]
             self.plane = 17
-        drill = next(k for k in range(hole.first, hole.last + 1) if p.code[k] > 0)
-        text = self._cycle_text(hole, cycle, spec, float(p.feed[drill]))
-        place = "".join(f"{self.space}{letter}{value}" for letter, value in at)
-        if self.motion == "cycle" and text == self.cycle_text:
-            yield place.removeprefix(" ")
-            return
-        self.cycle_text, self.motion = text, "cycle"
-        head, _, tail = text.partition("|")
-        yield f"{head}{place}{tail}"
 
-    cycle_text = ""
-
-    def _place(self, hole: Hole) -> list[tuple[str, str]]:
+    def hole_feed(self, hole: Hole) -> float:
+        """Feed of the way down, mm/min."""
         p = self.program
-        result = []
+        return float(p.feed[next(k for k in range(hole.first, hole.last + 1) if p.code[k] > 0)])
+
+    def place(self, hole: Hole) -> str:
+        """X and Y of a hole."""
+        p = self.program
+        result = ""
         for j, letter in enumerate(p.letters):
             if letter in ("X", "Y"):
-                result.append((letter, self.number_text(p.words[hole.first, j:j + 1] if hole.first == hole.last
-                                                        else p.words[hole.last, j:j + 1], int(p.decimals[j]))[0]))
+                result += f"{self.space}{letter}{self.number_text(p.words[hole.last, j:j + 1], int(p.decimals[j]))[0]}"
         return result
 
     def _cycle_text(self, hole: Hole, cycle: Cycle, spec: CannedCycle, feed: float) -> str:
@@ -268,10 +179,15 @@ class IsoWriter:
         out = cycles.to_plane if abs(hole.retract - hole.plane_level) < 1e-9 else cycles.to_initial
         extra = ""
         if spec.peck:
-            step = cycle.steps[0] if cycle.steps else cycle.depth + cycle.clearance
-            extra += f"{self.space}{spec.peck}{self.number_text(np.array([step]), places)[0]}"
+            extra += f"{self.space}{spec.peck}{self.number_text(np.array([peck_of(cycle)]), places)[0]}"
         if spec.dwell:
-            extra += f"{self.space}{spec.dwell}{self.plain(cycle.dwell)}"
+            dwell = str(round(cycle.dwell * 1000.0)) if cycles.dwell_milliseconds else self.plain(cycle.dwell)
+            extra += f"{self.space}{spec.dwell}{dwell}"
         self.feed = self.feed_text(feed)
         tail = f"{self.space}Z{z}{self.space}R{r}{extra}{self.space}F{self.feed}"
         return f"{out}{self.space}{spec.code}|{tail}"
+
+
+def peck_of(cycle: Cycle) -> float:
+    """Depth of a peck, mm: the whole way down where the cycle names none."""
+    return cycle.steps[0] if cycle.steps else cycle.depth + cycle.clearance

@@ -18,9 +18,9 @@ class LinuxcncWriter(IsoWriter):
         """A comment; one that LinuxCNC would carry out becomes plain text."""
         return super().comment(f"text: {text}" if ACTIVE.match(text) else text)
 
-    def modes(self) -> list[str]:
+    def smoothing_blocks(self) -> list[str]:
         """G64 P (blending) and Q (merging of short lines); both add up to the share (measured: Q adds to P)."""
-        block = self.controller.program.path_tolerance
-        if not block or self.smoothing <= 0.0:
+        if self.smoothing <= 0.0:
             return []
-        return [block.format(tolerance=self.plain(self.smoothing * 2.0 / 3.0), chain=self.plain(self.smoothing / 3.0))]
+        shares = {"tolerance": self.plain(self.smoothing * 2.0 / 3.0), "chain": self.plain(self.smoothing / 3.0), "axis": "0"}
+        return [block.format(**shares) for block in self.controller.program.path_tolerance]

@@ -28,7 +28,11 @@ class Format(UserModel):
     line_length: int = Field(default=252, ge=40)
     """most characters of a block"""
     sequence_step: int = Field(default=0, ge=0)
-    """N words: step, 0 for none"""
+    """block numbers: step, 0 for none"""
+    sequence_prefix: str = Field(default="N", pattern=r"^[N:]?$")
+    """letter before a block number"""
+    plus_sign: bool = False
+    """a sign before positive numbers too"""
 
 
 class Comment(UserModel):
@@ -40,34 +44,53 @@ class Comment(UserModel):
     """characters that a comment must not hold"""
 
 
-class Frame(UserModel):
-    """Blocks that stand around every program."""
-
-    begin: tuple[str, ...] = ("%",)
-    preamble: tuple[str, ...] = ()
-    """safe start: units, modes and planes that the program relies on; {work_offset} is the set-up's code"""
-    passive: tuple[Annotated[str, Field(pattern=r"^[GM][0-9]+(\.[0-9]+)?$")], ...] = ()
-    """codes of the shop's own blocks that move nothing: read back without being executed"""
-    path_tolerance: str = ""
-    """block that sets the control's own smoothing; {tolerance} and {chain} in mm"""
-    ending: tuple[str, ...] = ("M30",)
-    end: tuple[str, ...] = ("%",)
-
-
-def _placeholders(allowed: str) -> AfterValidator:
-    """Only {allowed} may stand in braces."""
+def _placeholders(*allowed: str) -> AfterValidator:
+    """Only the names `allowed` may stand in braces."""
     def check(text: str) -> str:
         found = {name for _, name, _, _ in Formatter().parse(text) if name is not None}
-        if found - {allowed}:
-            wrong = ", ".join("{" + str(name) + "}" for name in sorted(found - {allowed}))
-            raise ValueError(f"unknown placeholder {wrong}; allowed is {{{allowed}}}")
+        if found - set(allowed):
+            wrong = ", ".join("{" + str(name) + "}" for name in sorted(found - set(allowed)))
+            raise ValueError(f"unknown placeholder {wrong}; allowed is {', '.join('{' + a + '}' for a in allowed)}")
         return text
     return AfterValidator(check)
 
 
+def _all_offsets(offsets: dict[str, str]) -> dict[str, str]:
+    missing = [code for code in WORK_OFFSETS if code not in offsets]
+    if offsets and (missing or len(offsets) > len(WORK_OFFSETS)):
+        strange = sorted(set(offsets) - set(WORK_OFFSETS))
+        raise ValueError(f"needs one entry for each of {', '.join(WORK_OFFSETS)}; missing: {', '.join(missing) or 'none'}, "
+                         f"unknown: {', '.join(strange) or 'none'}")
+    return offsets
+
+
+WORK_OFFSETS = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
+"""the codes that a set-up may name"""
+WorkOffsets = Annotated[dict[str, str], AfterValidator(_all_offsets)]
+Named = Annotated[str, _placeholders("name", "number")]
 Numbered = Annotated[str, _placeholders("number")]
 Registered = Annotated[str, _placeholders("register")]
-Timed = Annotated[str, _placeholders("seconds")]
+Timed = Annotated[str, _placeholders("seconds", "milliseconds")]
+
+
+class Frame(UserModel):
+    """Blocks that stand around every program."""
+
+    begin: tuple[Named, ...] = ("%",)
+    """{name} is the program's name, {number} its number in four digits"""
+    number: int = Field(default=1, ge=1, le=9999)
+    """of the program, where the controller has numbers"""
+    preamble: tuple[Annotated[str, _placeholders("work_offset")], ...] = ()
+    """safe start: units, modes and planes that the program relies on; {work_offset} is the set-up's code"""
+    work_offsets: WorkOffsets = {}
+    """what the controller writes for G54 to G59 and G59.1 to G59.3; empty: those codes themselves"""
+    passive: tuple[Annotated[str, Field(pattern=r"^[GM][0-9]+(\.[0-9]+)?$")], ...] = ()
+    """codes of the shop's own blocks that move nothing: read back without being executed"""
+    path_tolerance: tuple[Annotated[str, _placeholders("tolerance", "chain", "axis")], ...] = ()
+    """blocks that set the control's own smoothing; {tolerance} and {chain} in mm, {axis} in degrees"""
+    ending: tuple[str, ...] = ("M30",)
+    end: tuple[Named, ...] = ("%",)
+    """{name} and {number} as in `begin`"""
 
 
 class Codes(UserModel):
@@ -96,9 +119,22 @@ class Codes(UserModel):
     length_offset: Registered = "G43 H{register}"
     length_cancel: str = "G49"
     dwell: Timed = "G4 P{seconds}"
+    rigid_tap: Annotated[str, _placeholders("speed")] = ""
+    """block before a tapping cycle that couples feed and spindle"""
     compensation_left: Registered = "G41 D{register}"
     compensation_right: Registered = "G42 D{register}"
     compensation_off: str = "G40"
+
+
+class Tools(UserModel):
+    """Tool change, length register and preload."""
+
+    preload: bool = False
+    """the next tool is selected right after a change"""
+    length_with_z: bool = False
+    """the length register stands in the first block that states Z, not in a block of its own"""
+    home_without_length: bool = False
+    """blocks in machine coordinates switch the length register off"""
 
 
 class Arcs(UserModel):
@@ -107,16 +143,26 @@ class Arcs(UserModel):
     enabled: bool = True
     largest_radius: float = Field(default=10000.0, gt=0.0)
     """mm; larger arcs are written as lines"""
+    helix_planes: tuple[Literal[17, 18, 19], ...] = (17, 18, 19)
+    """planes in which an arc may move along the third axis too"""
+
+
+CYCLE_VALUES = ("retract", "surface", "clearance", "bottom", "depth", "step", "breaks", "dwell", "feed", "pitch", "speed",
+                "second")
+"""what a cycle's text may name: retract level, surface and bottom (mm on the tool's axis), clearance above the surface,
+depth below it, peck, number of pecks, dwell in s, feed in mm/min, pitch in mm (negative: left-hand), speed in 1/min, retract
+level above the surface"""
 
 
 class CannedCycle(UserModel):
     """One drilling cycle of the controller."""
 
-    code: str
+    code: Annotated[str, _placeholders(*CYCLE_VALUES)]
+    """its code, or its whole text with values in braces (`CYCLE_VALUES`), a line each"""
     peck: str = ""
     """word of the peck depth"""
-    dwell: Timed = ""
-    """word of the dwell, s"""
+    dwell: str = ""
+    """word of the dwell"""
 
 
 class Cycles(UserModel):
@@ -137,6 +183,8 @@ class Cycles(UserModel):
     """planes in which cycles may run"""
     rigid_only: tuple[str, ...] = ("TAP",)
     """kinds that must not become single moves, beside those that never do"""
+    dwell_milliseconds: bool = False
+    """the dwell of a cycle is a whole number of ms, else s"""
     peck_relief: float = Field(default=0.254, ge=0.0)
     """mm before the last depth to which the tool returns rapidly"""
 
@@ -168,29 +216,46 @@ class Kinematics(UserModel):
     """the controller can run the kinematics named in a machine's [control] table; programs then hold the tip"""
     smoothing_share: float = Field(default=0.0, ge=0.0, le=0.8)
     """share of the tolerance left to the controller's own smoothing"""
+    smoothing_fixed: float | None = Field(default=None, ge=0.0)
+    """mm that it takes instead of a share, where its tolerance is a parameter of the control"""
+    axis_smoothing_share: float = Field(default=0.0, ge=0.0, le=0.8)
+    """share of the axis tolerance left to it"""
 
 
-class TcpMode(UserModel):
-    """Tool-centre-point mode: X, Y, Z are the tip in the work offset, fixed to the part; F is the speed of the tip."""
+class Mode(UserModel):
+    """How a mode is switched on and off, and what may stand in it."""
 
-    enter: tuple[str, ...]
-    """blocks that switch it on; {register} is the length register in force"""
-    leave: tuple[str, ...]
-    """blocks that switch it off; {register} likewise"""
+    start: tuple[str, ...] = ()
+    """blocks of the safe start, in programs that use the mode"""
+    length: Literal["any", "off", "on"] = "any"
+    """how the length register must stand where the mode is entered, and where its `leave` blocks begin"""
     arcs: bool = True
     """arcs may stand in it while the rotary axes stand still"""
-    cycles: bool = False
+    cycles: bool = True
     """canned cycles may stand in it"""
-    compensation: bool = False
+    compensation: bool = True
     """cutter compensation may stand in it"""
 
 
-class TiltedMode(UserModel):
+class TcpMode(Mode):
+    """Tool-centre-point mode: X, Y, Z are the tip in the work offset, fixed to the part; F is the speed of the tip."""
+
+    enter: tuple[Annotated[str, _placeholders("register", "work_offset")], ...]
+    """blocks that switch it on; {register} is the length register in force"""
+    leave: tuple[Annotated[str, _placeholders("register", "work_offset")], ...]
+    """blocks that switch it off"""
+    cycles: bool = False
+    compensation: bool = False
+
+
+class TiltedMode(Mode):
     """Tilted working plane: rotary axes stand still, X, Y, Z are the tip in a turned frame at the work offset's zero."""
 
-    enter: tuple[str, ...]
-    """blocks that state the plane; {0}, {1}, {2} are the angles in the order of `angles`, rotary axes by letter: {A}"""
-    leave: tuple[str, ...]
+    enter: tuple[Annotated[str, _placeholders("first", "second", "third", "direction", "work_offset")], ...]
+    """blocks that state the plane; {first}, {second}, {third} are the angles in the order of `angles`, {direction} is 1,
+    or -1 where the first rotary axis that tilts the tool stands at a negative angle"""
+    leave: tuple[Annotated[str, _placeholders("work_offset")], ...]
+    """blocks that end it"""
     angles: Literal["ZXZ", "ZYX", "XYZ", "rotary"]
     """turns about the axes of the moving frame, in order; "rotary": the frame is that of the rotary axes themselves"""
     decimals: int = Field(default=4, ge=0, le=9)
@@ -210,7 +275,7 @@ class ControllerFile(UserModel):
     """A controller."""
 
     description: str
-    writer: Literal["iso", "linuxcnc"] = "iso"
+    writer: Literal["iso", "linuxcnc", "fanuc", "haas", "siemens", "heidenhain"] = "iso"
     """class that adds what data cannot say"""
     sources: tuple[str, ...] = ()
     """documents that the rules come from"""
@@ -218,6 +283,7 @@ class ControllerFile(UserModel):
     comment: Comment = Comment()
     program: Frame = Frame()
     codes: Codes = Codes()
+    tools: Tools = Tools()
     arcs: Arcs = Arcs()
     cycles: Cycles = Cycles()
     feed: Feed = Feed()

@@ -16,19 +16,28 @@ from toolpaths.diagnostics import DiagnosticError
 
 TEXTS = {"description", "sources"}
 """for people"""
-ONE_VALUE = {"kinematics.linear", "kinematics.rapids", "feed.length", "feed.arc_inverse", "modes.tcp", "modes.tilted"}
+ONE_VALUE = {"kinematics.linear"}
 """statements of the file that have one allowed value so far"""
+OTHERS = {"kinematics.rapids", "feed.length", "feed.arc_inverse", "modes.tcp", "modes.tilted", "arcs.helix_planes",
+          "kinematics.smoothing_fixed", "kinematics.axis_smoothing_share", "tools.preload"}
+"""keys of what LinuxCNC has not: test_controllers_*.py and test_output_modes*.py show what they do"""
 READ_BACK = {"cycles.peck_relief"}
 """how the control moves inside a canned cycle, which the read-back follows and no block states"""
 OTHER: dict[str, Any] = {
-    "writer": "iso", "format.line_length": 40, "program.passive": ["M19"], "program.path_tolerance": "",
+    "writer": "iso", "format.line_length": 40, "program.passive": ["M19"], "program.path_tolerance": [],
     "codes.planes": {"17": "G17", "18": "G18.0", "19": "G19"}, "codes.through": "M88", "codes.tool_select": "T0{number}",
     "codes.tool_change": "M6 T{number}", "codes.length_offset": "G43.0 H{register}", "codes.dwell": "G04 P{seconds}",
     "codes.compensation_left": "G41.0 D{register}", "codes.compensation_right": "G42.0 D{register}",
     "arcs.largest_radius": 5.0, "cycles.planes": [18], "cycles.rigid_only": ["DEEP"], "feed.least_inverse_rate": 1e4,
     "cycles.table": {"DRILL": {"code": "G81.0"}}, "cycles.with_dwell": {"DRILL": {"code": "G82.0", "dwell": "P"}},
     "comment.open": "((", "comment.close": "))", "comment.forbidden": "E", "format.sequence_step": 5,
+    "format.sequence_prefix": ":", "program.number": 77, "codes.rigid_tap": "M19",
+    "program.work_offsets": {f"G{n}": f"G{n} (SHOP)" for n in ("54", "55", "56", "57", "58", "59", "59.1", "59.2", "59.3")},
     "kinematics.smoothing_share": 0.1, "format.trim_zeros": False, "format.decimal_point": True}
+WITH: dict[str, list[str]] = {
+    "format.sequence_prefix": ["format.sequence_step = 5"], "program.number": ['program.begin = ["%", "O{number}"]'],
+    "codes.rigid_tap": ['program.passive = ["M19"]']}
+"""values of other keys beside which a key counts"""
 HEAD = ["UNITS/MM", "LOADTL/1", "SPINDL/RPM,1000,CLW", "FEDRAT/MMPM,600"]
 FLAT = ["PPRINT/NOTE A LONG TEXT FOR PEOPLE", "COOLNT/FLOOD", "RAPID", "GOTO/0,0,50", "GOTO/10,0,5", "CUTCOM/LEFT,1",
         "GOTO/20.125,0,5",
@@ -36,7 +45,8 @@ FLAT = ["PPRINT/NOTE A LONG TEXT FOR PEOPLE", "COOLNT/FLOOD", "RAPID", "GOTO/0,0
         "SELECT/TOOL,2",
         "COOLNT/THRU", "SPINDL/RPM,900,CCLW", "GOTO/40,0,5", "SPINDL/OFF", "COOLNT/OFF", "SPINDL/RPM,700,CLW",
         "CYCLE/DRILL,DEPTH,5,MMPM,100,CLEAR,3", "GOTO/40,0,0", "CYCLE/DRILL,DEPTH,5,MMPM,100,CLEAR,3,DWELL,1", "GOTO/50,0,0",
-        "CYCLE/DRILL,DEPTH,5,MMPM,100,RAPTO,3,RTRCTO,AUTO", "GOTO/60,0,0", "CYCLE/OFF", "RAPID", "GOTO/60,0,50", "LOADTL/2",
+        "CYCLE/DRILL,DEPTH,5,MMPM,100,RAPTO,3,RTRCTO,AUTO", "GOTO/60,0,0", "CYCLE/TAP,DEPTH,5,MMPM,700,CLEAR,3", "GOTO/70,0,0",
+        "CYCLE/OFF", "RAPID", "GOTO/60,0,50", "LOADTL/2",
         "RAPID", "GOTO/0,0,5", "GOTO/1,0,5"]
 PECK = ["RAPID", "GOTO/0,0,50", "CYCLE/DEEP,DEPTH,5,STEP,2,MMPM,100,RAPTO,3,RTRCTO,20", "GOTO/40,0,0", "CYCLE/OFF"]
 NX = ["TOOL PATH/A,TOOL,T", "MSYS/0,0,0,1,0,0,0,1,0", "LOAD/TOOL,1", "SPINDL/RPM,1000,CLW"]
@@ -118,16 +128,16 @@ def test_the_read_back_follows_the_controls_pecks(tmp_path: Path) -> None:
     assert set(heights[0]) - set(heights[1]) == {-0.746, -2.746} and {0.0, -2.0} <= set(heights[1])
 
 
-@pytest.mark.parametrize("key", [k for k in keys() if k not in TEXTS | ONE_VALUE | READ_BACK])
+@pytest.mark.parametrize("key", [k for k in keys() if k not in TEXTS | ONE_VALUE | OTHERS | READ_BACK])
 def test_each_key_counts(key: str, tmp_path: Path) -> None:
     spec, _ = load_controller("linuxcnc")
     value: Any = spec
     for part in key.split("."):
         value = getattr(value, part)
-    *table, name = key.split(".")
     changed = other(key, value)
     assert changed != value
-    lines = [f"[{'.'.join(table)}]" if table else "", f"{name} = {inline(changed)}"]
-    shop = tmp_path / "shop.toml"
-    shop.write_text("\n".join(['base = "linuxcnc"', *lines]))
-    assert tuple(texts(shop)) != usual()
+    plain, shop = tmp_path / "plain" / "shop.toml", tmp_path / "shop.toml"
+    plain.parent.mkdir()
+    plain.write_text("\n".join(['base = "linuxcnc"', *WITH.get(key, [])]))
+    shop.write_text("\n".join(['base = "linuxcnc"', *WITH.get(key, []), f"{key} = {inline(changed)}"]))
+    assert texts(shop) != (texts(plain) if key in WITH else list(usual()))
