@@ -12,7 +12,7 @@ al., IEEE T-RO 29 (2013); primal-dual interior point: Nocedal and Wright, Numeri
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from scipy.linalg import solveh_banded
@@ -29,12 +29,21 @@ MOST = 120
 
 @dataclass(frozen=True)
 class Solution:
-    """Coefficients (K + 2,), iterations used, last gap over time, whether the tolerance was reached."""
+    """Coefficients (K + 2,), iterations used, last gap over time, whether the tolerance was reached, multipliers."""
 
     c: Floats
     iterations: int
     gap: float
     solved: bool
+    multipliers: Multipliers
+
+
+class Multipliers(NamedTuple):
+    """Of the rows: velocity (K,); acceleration and jerk (J, K), that of the upper bound less that of the lower."""
+
+    velocity: Floats
+    acceleration: Floats
+    jerk: Floats
 
 
 class Steps(Protocol):
@@ -53,6 +62,10 @@ class Steps(Protocol):
         """Solve them; the largest primal and dual steps (before the factor TAU)."""
         ...
 
+    def multipliers(self) -> Multipliers:
+        """At the last `assemble`."""
+        ...
+
 
 def solve(steps: Steps, rows: int, seconds: float, tolerance: float = TOLERANCE, most: int = MOST) -> Solution:
     """Drive `steps` until the gap is below tolerance x time.
@@ -64,14 +77,14 @@ def solve(steps: Steps, rows: int, seconds: float, tolerance: float = TOLERANCE,
     for iteration in range(most):
         gap, time = steps.assemble(mu, primal, dual)
         if gap < tolerance * time:
-            return Solution(steps.c, iteration, gap / time, True)
+            return Solution(steps.c, iteration, gap / time, True, steps.multipliers())
         primal, dual = (min(1.0, TAU * step) for step in steps.direction(mu))
         if not primal > 0.0:
             break
         shortest = min(primal, dual)
         expected = gap * (1.0 - shortest) + shortest * rows * mu
         mu = min(max((1.0 - shortest) ** 1.4 + 0.3, 0.3), 0.5) * expected / rows
-    return Solution(steps.c, most, gap / time, False)
+    return Solution(steps.c, most, gap / time, False, steps.multipliers())
 
 
 class NumpySteps:
@@ -135,6 +148,12 @@ class NumpySteps:
         change = [-dx[0] / self.problem.cap, -acceleration, acceleration, bend - jerk, bend + jerk, self._dc]
         self._dz = [mu / g - z - z / g * d for z, g, d in zip(self._z, self._slack, change, strict=True)]
         return (_reach(self._slack, change), _reach(self._z, self._dz))
+
+
+    def multipliers(self) -> Multipliers:
+        """See `Steps`."""
+        z = self._z
+        return Multipliers(z[0], z[1] - z[2], z[3] - z[4])
 
 
 def _reach(values: list[Floats], changes: list[Floats]) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from postproc.feedrate.compiled import compiled
-from postproc.feedrate.interior import NumpySteps, tie
+from postproc.feedrate.interior import Multipliers, NumpySteps, tie
 from postproc.feedrate.interior_kernel import COMMON, LANES, PER_JOINT, assemble, band, direction, pentadiagonal
 from postproc.feedrate.problem import Problem
 from toolpaths.arrays import Floats
@@ -53,6 +53,12 @@ class PackedSteps:
         for j in range(len(self.problem.dq)):
             self._fill(self._v[:, j], 3, mu / np.stack([slack[i][j] for i in range(1, 5)]), pad=mu)
         self._zc, self._rc = mu / self.c, np.zeros(self._size)
+
+    def multipliers(self) -> Multipliers:
+        """See `interior.Steps`."""
+        knots, joints = self.problem.basis.knots, len(self.problem.dq)
+        z = self._v[:, :, 3:7].transpose(1, 2, 0, 3).reshape(joints, 4, -1)[:, :, :knots]
+        return Multipliers(self._w[:, 14].reshape(-1)[:knots], z[:, 0] - z[:, 1], z[:, 2] - z[:, 3])
 
     def assemble(self, mu: float, primal: float, dual: float) -> tuple[float, float]:
         """See `interior.Steps`."""

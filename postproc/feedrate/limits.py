@@ -10,15 +10,26 @@ from toolpaths.arrays import Floats, frozen
 
 
 @dataclass(frozen=True)
-class JointLimits:
-    """Largest magnitudes per joint (J,), in joint units per s, s2, s3; inf means unlimited.
+class ToolLimits:
+    """Largest magnitudes at the tool: rate of its axis, rad/s; acceleration and jerk of the tip, mm/s2 and mm/s3."""
 
-    A row need not be a joint: any quantity with derivatives along the path may be limited as one more row.
-    """
+    tilt_rate: float = np.inf
+    acceleration: float = np.inf
+    jerk: float = np.inf
+
+    def __post_init__(self) -> None:
+        if not min(self.tilt_rate, self.acceleration, self.jerk) > 0.0:
+            raise ValueError(f"limits at the tool must be positive, found {self}")
+
+
+@dataclass(frozen=True)
+class JointLimits:
+    """Largest magnitudes per joint (J,), in joint units per s, s2, s3; inf means unlimited; `tool` where stated."""
 
     velocity: Floats
     acceleration: Floats
     jerk: Floats
+    tool: ToolLimits | None = None
 
     def __post_init__(self) -> None:
         joints = len(np.atleast_1d(self.velocity))

@@ -48,6 +48,18 @@ class Path(Protocol):
         ...
 
 
+class ToolPath(Path, Protocol):
+    """A path that also knows the tool, as limits at the tool need it."""
+
+    def tip(self, s: Floats) -> Derivatives:
+        """Tip in the part frame at s (N,): each (N, 3)."""
+        ...
+
+    def axis(self, s: Floats) -> Derivatives:
+        """Tool axis in the part frame, likewise; the first derivative suffices."""
+        ...
+
+
 class SplinePath:
     """Joint-space B-spline of degree 4 or more (5 is usual); parameter in the units of its knots."""
 
@@ -108,14 +120,13 @@ class Eased:
         return s
 
     def sigma(self, s: Floats) -> Floats:
-        """Inverse of `parameter` (N,), by Newton's method from outside (monotone)."""
+        """Inverse of `parameter` (N,), by Newton's method."""
         sigma = np.asarray(s - self.first + 0.4 * self.ease, dtype=np.float64)
-        bent = (sigma < self.ease) | (sigma > self.end - self.ease)
-        guess = np.clip(sigma[bent], 0.3 * self.ease, self.end - 0.3 * self.ease)
-        for _ in range(60):
-            there = self.parameter(guess)
-            guess = np.clip(guess - (there[0] - s[bent]) / np.maximum(there[1], 1e-12), 0.0, self.end)
-        sigma[bent] = guess
+        for first, edge, sense in ((True, self.first, 1.0), (False, self.last, -1.0)):
+            bent = (sigma < self.ease) if first else (sigma > self.end - self.ease)
+            if bent.any():
+                way = self.ease * _eased_back(np.maximum(sense * (s[bent] - edge), 0.0) / self.ease)
+                sigma[bent] = way if first else self.end - way
         return sigma
 
     def speed_limit(self, sigma: Floats, feed: Callable[[Floats], Floats]) -> Floats:
@@ -127,9 +138,17 @@ class Eased:
     def derivatives(self, sigma: Floats) -> Derivatives:
         """Chain rule to third order, exact; see `Path`."""
         s = self.parameter(sigma)
-        # Derivatives at a corner are those from inside the stretch.
-        inner = self.path.derivatives(np.clip(s[0], self.first, np.nextafter(self.last, self.first)))
+        return self.chained(sigma, s, self.path.derivatives(self.inside(s[0])))
+
+    def inside(self, s: Floats) -> Floats:
+        """`s` moved so far that derivatives at a corner are those from inside the stretch."""
+        return np.clip(s, self.first, np.nextafter(self.last, self.first))
+
+    def chained(self, sigma: Floats, s: Floats, inner: Derivatives) -> Derivatives:
+        """Derivatives by sigma from those by s; s (4, N) as of `parameter`."""
         bent = np.flatnonzero((sigma < self.ease) | (sigma > self.end - self.ease))
+        if not len(bent):
+            return inner
         s1, s2, s3 = s[1:, bent, None]
         q1, q2, q3 = inner.dq[bent], inner.d2q[bent], inner.d3q[bent]
         outer = Derivatives(inner.q, *(np.array(order) for order in inner[1:]))
@@ -137,6 +156,16 @@ class Eased:
         outer.d2q[bent] = q2 * s1**2 + q1 * s2
         outer.d3q[bent] = q3 * s1**3 + 3.0 * q2 * s1 * s2 + q1 * s3
         return outer
+
+
+def _eased_back(way: Floats) -> Floats:
+    """u (N,) in [0, 1] with 2 u^3 - 2 u^4 + 0.6 u^5 = way."""
+    u = np.minimum(np.cbrt(0.5 * way) * (1.0 + np.cbrt(0.5 * way) * (1.0 / 3.0 + 0.4 * way)), 1.0)
+    for _ in range(6):
+        slope = u**2 * (6.0 - 8.0 * u + 3.0 * u**2)
+        excess = u**3 * (2.0 - 2.0 * u + 0.6 * u**2) - way
+        u = np.clip(u - np.divide(excess, slope, out=np.zeros_like(u), where=slope > 0.0), 0.0, 1.0)
+    return u
 
 
 def _eased(sigma: Floats, ease: float) -> Floats:

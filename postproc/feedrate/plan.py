@@ -11,29 +11,28 @@ import numpy as np
 
 from postproc.feedrate.limits import JointLimits, squared_speed
 from postproc.feedrate.mesh import Spacing, mesh, ramp_time
+from postproc.feedrate.motion import CHUNK, SAMPLE, Piece, Plan
 from postproc.feedrate.paths import Eased, Path
 from postproc.feedrate.problem import Knots
 from postproc.feedrate.profile import Profile, linear_profile, spline_profile
+from postproc.feedrate.rows import steady_tool_speed
 from postproc.feedrate.second_order import second_order
+from postproc.feedrate.shares import shares
 from postproc.feedrate.spline import rest_basis
 from postproc.feedrate.tightening import tightened
-from postproc.feedrate.trajectory import JointTrajectory
 from postproc.feedrate.windows import Method, Solved, solved
 from toolpaths.arrays import Floats
 
 Feed = float | Callable[[Floats], Floats]
 """Largest ds/dt: one number, or a function of s (N,) that returns (N,). The tip's feed, if s is the length of its path."""
-SAMPLE = 1e-3
-"""Step of the delivered samples, s."""
-CHUNK = 65536
-"""Intervals or samples handled at once."""
 ROUNDS = 12
 
 
 @dataclass(frozen=True)
 class Options:
     """`ease`: length of path at each stop over which the parameter is changed; `spacing` of knots; `method` of solving;
-    `strict`: nothing exceeded in the delivered samples; `step` of these; `passes` of tightening in strict mode."""
+    `strict`: nothing exceeded in the delivered samples; `step` of these; `passes` of tightening in strict mode;
+    `override`: factor on the feed, as the operator's switch; limits of the machine stay."""
 
     ease: float = 25.0
     spacing: Spacing | None = None
@@ -41,72 +40,12 @@ class Options:
     strict: bool = False
     step: float = SAMPLE
     passes: int = 3
+    override: float = 1.0
 
     @property
     def knots(self) -> Spacing:
         """`spacing`, by default narrower in strict mode, where each per mille between the knots slows the whole piece."""
         return self.spacing or Spacing(dt=2e-3 if self.strict else 2.5e-3)
-
-
-@dataclass(frozen=True)
-class Piece:
-    """Motion between two stops."""
-
-    eased: Eased
-    profile: Profile
-
-    @property
-    def seconds(self) -> float:
-        return float(self.profile.times[-1])
-
-
-@dataclass(frozen=True)
-class Plan:
-    """The planned motion: pieces in order, and how the solving went.
-
-    `iterations`: most of any window; `mismatch`: worst stitch of windows; `solved`: False where some window stopped
-    early: the motion then respects the limits but is not the fastest.
-    """
-
-    pieces: tuple[Piece, ...]
-    limits: JointLimits
-    feed: Callable[[Floats], Floats]
-    step: float = SAMPLE
-    iterations: int = 0
-    mismatch: float = 0.0
-    solved: bool = True
-
-    @property
-    def seconds(self) -> float:
-        """Time of the whole motion."""
-        return float(self.ends[-1])
-
-    @property
-    def ends(self) -> Floats:
-        """Time at the end of each piece."""
-        return np.cumsum([piece.seconds for piece in self.pieces])
-
-    def trajectory(self) -> JointTrajectory:
-        """Samples each `step`, the last one at rest."""
-        ends = self.ends
-        t = np.float64(self.step) * np.arange(int(np.ceil(ends[-1] / self.step)) + 1)
-        which = np.minimum(np.searchsorted(ends, t, side="right"), len(ends) - 1)
-        cuts = np.searchsorted(which, np.arange(len(ends) + 1))
-        parts = [self._sampled(i, t[cuts[i] + k:min(cuts[i] + k + CHUNK, cuts[i + 1])] - (ends[i] - self.pieces[i].seconds))
-                 for i in range(len(ends)) for k in range(0, cuts[i + 1] - cuts[i], CHUNK)]
-        return JointTrajectory(t, *(np.concatenate(column) for column in zip(*parts, strict=True)))
-
-    def _sampled(self, i: int, t: Floats) -> tuple[Floats, ...]:
-        """s, q, qd, qdd, qddd, sd, feed at times t since the start of piece i."""
-        eased, profile = self.pieces[i].eased, self.pieces[i].profile
-        at = profile.at(np.minimum(t, profile.times[-1]))
-        still = (t > profile.times[-1])[:, None]
-        q, d1, d2, d3 = eased.derivatives(at.sigma)
-        v, a, j = at.speed[:, None], at.acceleration[:, None], at.jerk[:, None]
-        s = eased.parameter(at.sigma)
-        rates = [np.where(still, 0.0, rate)
-                 for rate in (d1 * v, d2 * v**2 + d1 * a, d3 * v**3 + 3.0 * d2 * v * a + d1 * j, s[1][:, None] * v)]
-        return s[0], q, *rates[:3], rates[3][:, 0], self.feed(s[0])
 
 
 def plan(path: Path, limits: JointLimits, feed: Feed = np.inf, stops: Sequence[float] = (), options: Options | None = None,
@@ -127,14 +66,16 @@ def plan(path: Path, limits: JointLimits, feed: Feed = np.inf, stops: Sequence[f
     options = options or Options()
     if not np.all(np.isfinite(limits.jerk)):
         raise ValueError("a joint without a jerk limit: plan_second_order is for machines that state none")
-    allowed = _as_function(feed)
+    allowed = _as_function(feed, options.override)
     if knots is not None and len(stops):
         raise ValueError("knots are for a motion without stops")
     pieces, reports = [], []
     for eased in _stretches(path, stops, options.ease):
         sigma = knots if knots is not None else _mesh(eased, limits, allowed, options.knots)
         grid, report = _solve(Knots(eased, sigma, limits, allowed), options)
-        pieces.append(Piece(eased, _profile(grid, report.c)))
+        profile = _profile(grid, report.c)
+        joints = len(limits.velocity)
+        pieces.append(Piece(eased, profile, shares(report.weights, joints, float(profile.times[-1]))))
         reports.append(report)
     made = Plan(tuple(pieces), limits, allowed, options.step, max(r.iterations for r in reports),
                 max(r.mismatch for r in reports), all(r.solved for r in reports))
@@ -145,7 +86,7 @@ def plan_second_order(path: Path, limits: JointLimits, feed: Feed = np.inf, stop
                       options: Options | None = None, knots: Floats | None = None) -> Plan:
     """Least time under velocity, acceleration and feed only: a bound, and the plan of machines that state no jerk."""
     options = options or Options()
-    allowed = _as_function(feed)
+    allowed = _as_function(feed, options.override)
     pieces = []
     for eased in _stretches(path, stops, 0.0):
         sigma = knots if knots is not None else mesh(eased, limits, partial(eased.speed_limit, feed=allowed), options.knots)
@@ -156,15 +97,23 @@ def plan_second_order(path: Path, limits: JointLimits, feed: Feed = np.inf, stop
     return Plan(tuple(pieces), limits, allowed, options.step)
 
 
-def _as_function(feed: Feed) -> Callable[[Floats], Floats]:
-    return feed if callable(feed) else lambda s: np.full(len(s), float(feed))
+def _as_function(feed: Feed, override: float) -> Callable[[Floats], Floats]:
+    if not override > 0.0:
+        raise ValueError(f"an override must be positive, found {override}")
+    return (lambda s: override * feed(s)) if callable(feed) else (lambda s: np.full(len(s), override * feed))
 
 
 def _mesh(eased: Eased, limits: JointLimits, feed: Callable[[Floats], Floats], spacing: Spacing) -> Floats:
     """Knots between two stops, fine enough beside them."""
     ends = np.array([eased.first, np.nextafter(eased.last, eased.first)])
     ramp = ramp_time(eased.path.derivatives(ends).dq, limits, feed(ends))
-    return mesh(eased, limits, partial(eased.speed_limit, feed=feed), spacing, ramp)
+    return mesh(eased, limits, partial(_top, eased, limits, feed), spacing, ramp)
+
+
+def _top(eased: Eased, limits: JointLimits, feed: Callable[[Floats], Floats], sigma: Floats) -> Floats:
+    """Largest constant sigma_dot (N,) under the feed and the limits at the tool."""
+    allowed = eased.speed_limit(sigma, feed)
+    return allowed if limits.tool is None else np.minimum(allowed, steady_tool_speed(eased, sigma, limits.tool))
 
 
 def _stretches(path: Path, stops: Sequence[float], ease: float) -> list[Eased]:
@@ -207,14 +156,13 @@ def _within(made: Plan) -> Plan:
     """
     factor = np.ones(len(made.pieces))
     for turn in range(ROUNDS):
-        trajectory = made.trajectory()
-        worst = trajectory.worst_slowdown(made.limits)
-        which = np.minimum(np.searchsorted(made.ends, trajectory.t, side="right"), len(factor) - 1)
         factor[:] = 0.0
-        np.maximum.at(factor, which, worst)
+        for chunk, own in made.chunks():
+            which = np.minimum(np.searchsorted(made.ends, chunk.t[own], side="right"), len(factor) - 1)
+            np.maximum.at(factor, which, chunk.worst_slowdown(made.limits)[own])
         if factor.max() <= 1.0 and turn:
             return made
         factor = np.maximum(factor, 1.0 if turn else 1e-3) * np.where(factor > 1.0, 1.0 + 1e-7 * 4.0**turn, 1.0)
-        pieces = tuple(replace(piece, profile=piece.profile.slower(g)) for piece, g in zip(made.pieces, factor, strict=True))
+        pieces = tuple(piece.slower(g) for piece, g in zip(made.pieces, factor.tolist(), strict=True))
         made = replace(made, pieces=pieces)
     raise ArithmeticError(f"limits still exceeded by {factor.max() - 1.0:.2g} after slowing down {ROUNDS} times")

@@ -7,21 +7,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from postproc.feedrate.limits import JointLimits, squared_speed, steady_cap
+from postproc.feedrate.limits import JointLimits
 from postproc.feedrate.paths import Eased
+from postproc.feedrate.rows import rows
 from postproc.feedrate.spline import Basis, rest_basis
-from toolpaths.arrays import Floats
-
-UNBOUND = 1e4
-"""Where no velocity bounds x, this many times the steady cap does, so that numbers stay comparable."""
+from toolpaths.arrays import Floats, Ints
 
 
 @dataclass(frozen=True)
 class Problem:
     """Minimise sum w x^-1/2 over coefficients of x, K knots, J joints.
 
-    rows `dq`, `d2q`, `d3q` (J, K) by sigma; `cap` (K,) bound on x; `weight` (K,); `tight` (2, K) factors >= 1 on the
-    acceleration and jerk rows. Per knot and joint
+    rows `dq`, `d2q`, `d3q` (J, K) by sigma; `cap` (K,) bound on x and the row it comes from, `capped` (K,);
+    `weight` (K,); `tight` (2, K) factors >= 1 on the acceleration and jerk rows. Per knot and joint
         velocity      1 - x/cap >= 0
         acceleration  1 -+ (q'' x + q' x'/2)/A >= 0
         jerk          x^-1/2 -+ (q''' x + 3/2 q'' x' + 1/2 q' x'')/J >= 0
@@ -33,6 +31,7 @@ class Problem:
     d3q: Floats
     limits: JointLimits
     cap: Floats
+    capped: Ints
     weight: Floats
     tight: Floats
 
@@ -92,14 +91,10 @@ class Knots:
         """On knots [first, last), free at ends inside the motion."""
         last = len(self.sigma) if last is None else last
         sigma = self.sigma[first:last]
-        at = self.eased.derivatives(sigma)
+        at = rows(self.eased, sigma, self.limits, self.feed)
         tight = np.ones((3, len(sigma))) if self.tight is None else np.ascontiguousarray(self.tight[:, first:last])
-        cap = np.minimum(squared_speed(at.dq, self.limits.velocity), self.speed_limit(sigma) ** 2)
-        cap = np.where(np.isinf(cap), UNBOUND * steady_cap(at.d2q, at.d3q, self.limits), cap) / tight[0] ** 2
-        if not np.all(np.isfinite(cap)):
-            raise ValueError("the path stands still somewhere between its ends: no limit bounds the speed there")
         h = np.diff(sigma)
         weight = 0.5 * (np.append(h, 0.0) + np.insert(h, 0, 0.0))
-        dq, d2q, d3q = (np.ascontiguousarray(order.T) for order in at[1:])
+        dq, d2q, d3q = (np.ascontiguousarray(order.T) for order in at[:3])
         basis = rest_basis(self.sigma, self.eased.ease, first, last)
-        return Problem(basis, dq, d2q, d3q, self.limits, cap, weight, tight[1:])
+        return Problem(basis, dq, d2q, d3q, at.limits, at.cap / tight[0] ** 2, at.capped, weight, tight[1:])

@@ -68,6 +68,15 @@ class Profile:
             way = h * rest / (times[k + 1] - times[k])
             for _ in range(4):
                 way = np.clip(way + (rest - self._spent(k, way)) * np.sqrt(self.squared(k, way)[0]), 0.0, h)
+        return self._places(k, way)
+
+    def when(self, sigma: Floats) -> tuple[Floats, Places]:
+        """Times (N,) at which places sigma (N,) are passed, and the motion there."""
+        k = np.clip(np.searchsorted(self.sigma, sigma, side="right") - 1, 0, len(self.sigma) - 2)
+        way = sigma - self.sigma[k]
+        return self.times[k] + self._spent(k, way), self._places(k, way)
+
+    def _places(self, k: Ints, way: Floats) -> Places:
         x, x1, x2 = self.squared(k, way)
         speed = np.sqrt(np.maximum(x, 0.0))
         return Places(self.sigma[k] + way, speed, 0.5 * x1, 0.5 * x2 * speed)

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from postproc.feedrate.paths import Derivatives
 from postproc.feedrate.problem import Knots
 from postproc.feedrate.profile import Profile
-from toolpaths.arrays import Floats
+from postproc.feedrate.rows import tool
+from toolpaths.arrays import Floats, Ints
 
 ENOUGH = 1.002
 """Ratio between knots that is left to the final slowing down."""
@@ -29,14 +31,29 @@ def tightened(grid: Knots, profile: Profile) -> Floats | None:
     return at_knots if grid.tight is None else grid.tight * at_knots
 
 
-def _ratios(grid: Knots, profile: Profile, k: np.ndarray[tuple[int], np.dtype[np.int64]], share: float) -> Floats:
+def _ratios(grid: Knots, profile: Profile, k: Ints, share: float) -> Floats:
     """Velocity (feed included), acceleration and jerk over their limits, (3, N), at `share` of intervals k."""
     way = share * (grid.sigma[k + 1] - grid.sigma[k])
     sigma = grid.sigma[k] + way
-    at = grid.eased.derivatives(sigma)
-    x, x1, x2 = (value[:, None] for value in profile.squared(k, way))
-    limits, speed = grid.limits, np.sqrt(x)
-    velocity = np.maximum((np.abs(at.dq) * speed / limits.velocity).max(axis=1), speed[:, 0] / grid.speed_limit(sigma))
-    acceleration = (np.abs(at.d2q * x + 0.5 * at.dq * x1) / limits.acceleration).max(axis=1)
-    jerk = (np.abs(at.d3q * x + 1.5 * at.d2q * x1 + 0.5 * at.dq * x2) * speed / limits.jerk).max(axis=1)
+    s = grid.eased.parameter(sigma)
+    at = grid.eased.chained(sigma, s, grid.eased.path.derivatives(grid.eased.inside(s[0])))
+    x = profile.squared(k, way)
+    limits, speed = grid.limits, np.sqrt(x[0])
+    velocity, acceleration, jerk = (
+        (np.abs(rate) / limit).max(axis=1) for rate, limit in
+        zip(_in_time(at, x), (limits.velocity, limits.acceleration, limits.jerk), strict=True))
+    velocity = np.maximum(velocity, s[1] * speed / grid.feed(s[0]))
+    if limits.tool is not None:
+        known = tool(grid.eased, sigma, s)
+        _, bend, snap = (np.linalg.norm(rate, axis=1) for rate in _in_time(known.tip, x))
+        velocity = np.maximum(velocity, known.tilt * speed / limits.tool.tilt_rate)
+        acceleration = np.maximum(acceleration, bend / limits.tool.acceleration)
+        jerk = np.maximum(jerk, snap / limits.tool.jerk)
     return np.array([velocity, acceleration, jerk])
+
+
+def _in_time(at: Derivatives, x: tuple[Floats, Floats, Floats]) -> tuple[Floats, Floats, Floats]:
+    """Velocity, acceleration, jerk (N, J) at squared speed x and its derivatives."""
+    x0, x1, x2 = (value[:, None] for value in x)
+    root = np.sqrt(x0)
+    return at.dq * root, at.d2q * x0 + 0.5 * at.dq * x1, (at.d3q * x0 + 1.5 * at.d2q * x1 + 0.5 * at.dq * x2) * root

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 
-from postproc.feedrate.limits import JointLimits
+from postproc.feedrate.limits import JointLimits, ToolLimits
 from toolpaths.arrays import Floats, Ints, frozen
 
 REST_PAD = 3
@@ -19,7 +19,7 @@ ORDERS = ("velocity", "acceleration", "jerk")
 
 @dataclass(frozen=True)
 class Usage:
-    """Largest ratios to the limits, per joint (J,), and of the feed.
+    """Largest ratios to the limits, per joint (J,), of the feed, and of the tool's (3,): tilt rate, acceleration, jerk.
 
     Each is the larger of two measures: the derivatives at the samples, and the differences of the positions, padded
     with rest.
@@ -29,20 +29,30 @@ class Usage:
     acceleration: Floats
     jerk: Floats
     feed: float
+    tool: Floats = field(default_factory=lambda: np.zeros(3))
 
     @property
     def worst(self) -> float:
         """The largest of all."""
-        return float(max(self.velocity.max(), self.acceleration.max(), self.jerk.max(), self.feed))
+        return float(max(self.velocity.max(), self.acceleration.max(), self.jerk.max(), self.feed, self.tool.max()))
 
     @property
     def slowdown(self) -> float:
         """Factor on time that brings every ratio to 1 (less than 1: to spare); jerk falls by its cube."""
-        return float(max(self.velocity.max(), self.feed, self.acceleration.max() ** 0.5, self.jerk.max() ** (1.0 / 3.0)))
+        tilt, acceleration, jerk = self.tool.tolist()
+        return float(max(self.velocity.max(), self.feed, tilt, max(self.acceleration.max(), acceleration) ** 0.5,
+                         max(self.jerk.max(), jerk) ** (1.0 / 3.0)))
+
+    def worse(self, other: Usage) -> Usage:
+        """The larger of each two ratios."""
+        larger = (np.maximum(getattr(self, name), getattr(other, name)) for name in (*ORDERS, "feed", "tool"))
+        velocity, acceleration, jerk, feed, tool = larger
+        return Usage(velocity, acceleration, jerk, float(feed), tool)
 
 
 class Binding(NamedTuple):
-    """Per sample (N,): joint (-1 the feed), order (1 velocity, 2 acceleration, 3 jerk, 0 where nothing binds), ratio."""
+    """Per sample (N,): joint (-1 the feed, J the tool), order (1 velocity, 2 acceleration, 3 jerk, 0 where nothing binds),
+    ratio; of the tool, velocity is the rate of its axis."""
 
     axis: Ints
     order: Ints
@@ -51,7 +61,7 @@ class Binding(NamedTuple):
 
 @dataclass(frozen=True)
 class JointTrajectory:
-    """Samples at equal times from rest to rest.
+    """Samples at equal times (by `Plan.at` at given places), by default from rest to rest.
 
     Attributes:
         t: (N,) s; the last is the first multiple of the step at which all stands still
@@ -59,6 +69,7 @@ class JointTrajectory:
         q, qd, qdd, qddd: (N, J) joints and time derivatives, from the path's exact derivatives
         sd: (N,) ds/dt
         feed: (N,) largest ds/dt that the program allows, inf where none
+        tool: (N, 3) rate of the tool axis, acceleration and jerk of the tip; zeros where nothing limits them
     """
 
     t: Floats
@@ -69,9 +80,12 @@ class JointTrajectory:
     qddd: Floats
     sd: Floats
     feed: Floats
+    tool: Floats | None = None
 
     def __post_init__(self) -> None:
         n, joints = np.shape(self.q)
+        tool = np.zeros((n, 3)) if self.tool is None else self.tool
+        object.__setattr__(self, "tool", frozen(tool, np.float64, (n, 3), "JointTrajectory.tool"))
         for name in ("t", "s", "sd", "feed"):
             object.__setattr__(self, name, frozen(getattr(self, name), np.float64, (n,), f"JointTrajectory.{name}"))
         for name in ("q", "qd", "qdd", "qddd"):
@@ -82,16 +96,25 @@ class JointTrajectory:
         """Time between samples; infinite for a single one."""
         return float(self.t[1] - self.t[0]) if len(self.t) > 1 else np.inf
 
-    def usage(self, limits: JointLimits) -> Usage:
-        """Worst ratios over all samples, joints of `limits` in the order of q."""
-        derived, differences = self._derived(limits), self._differences(limits)
-        velocity, acceleration, jerk = (np.maximum(a.max(axis=0), b.max(axis=0))
-                                        for a, b in zip(derived, differences, strict=True))
-        return Usage(velocity, acceleration, jerk, float(np.max(self.sd / self.feed)))
+    def usage(self, limits: JointLimits, own: slice = slice(None)) -> Usage:
+        """Worst ratios over the samples `own`, joints of `limits` in the order of q.
+
+        Samples outside `own` serve the differences alone: they are neighbours of a part of a motion.
+        """
+        first, last, _ = own.indices(len(self.t))
+        found = []
+        measures = zip(self._derived(limits), self._differences(limits), strict=True)
+        for order, (derived, differences) in enumerate(measures, start=1):
+            seen = differences[first + REST_PAD - order:last + REST_PAD]
+            found.append(np.maximum(derived[own].max(axis=0), seen.max(axis=0)))
+        velocity, acceleration, jerk = found
+        return Usage(velocity, acceleration, jerk, float(np.max(self.sd[own] / self.feed[own])),
+                     self._tool(limits)[own].max(axis=0))
 
     def worst_slowdown(self, limits: JointLimits) -> Floats:
         """Factor on time per sample (N,) that would bring the ratios seen there to 1."""
-        velocity, acceleration, jerk = (a.max(axis=1) for a in self._derived(limits))
+        velocity, acceleration, jerk = (np.maximum(a.max(axis=1), b) for a, b in
+                                        zip(self._derived(limits), self._tool(limits).T, strict=True))
         most = np.maximum(np.maximum(velocity, self.sd / self.feed), np.maximum(acceleration**0.5, jerk ** (1.0 / 3.0)))
         for order, ratio in enumerate(self._differences(limits), start=1):
             worst = ratio.max(axis=1) ** (1.0 / order)
@@ -103,6 +126,7 @@ class JointTrajectory:
     def binding(self, limits: JointLimits) -> Binding:
         """Per sample the joint and order nearest to its limit."""
         ratios = np.stack(self._derived(limits))
+        ratios = np.concatenate((ratios, self._tool(limits).T[:, :, None]), axis=2)
         joints = ratios.shape[2]
         flat = np.concatenate((ratios.transpose(1, 0, 2).reshape(len(self.t), -1), (self.sd / self.feed)[:, None]), axis=1)
         which = flat.argmax(axis=1)
@@ -116,6 +140,12 @@ class JointTrajectory:
         """(N, J) ratios of velocity, acceleration, jerk from the derivatives."""
         return [np.abs(values) / getattr(limits, name)
                 for name, values in zip(ORDERS, (self.qd, self.qdd, self.qddd), strict=True)]
+
+    def _tool(self, limits: JointLimits) -> Floats:
+        """(N, 3) ratios of the tool."""
+        assert self.tool is not None
+        most = limits.tool or ToolLimits()
+        return np.asarray(self.tool / np.array([most.tilt_rate, most.acceleration, most.jerk]))
 
     def _differences(self, limits: JointLimits) -> list[Floats]:
         """Ratios of first, second, third differences of q, padded with rest; (N + 2 REST_PAD - order, J)."""

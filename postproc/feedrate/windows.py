@@ -11,11 +11,13 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
 from postproc.feedrate.interior import NumpySteps, Solution, Steps, solve
 from postproc.feedrate.problem import Knots, Problem
+from postproc.feedrate.shares import weigh
 from toolpaths.arrays import Floats
 
 WINDOW, OVERLAP = 8192, 1024
@@ -46,12 +48,24 @@ class Method:
 
 @dataclass(frozen=True)
 class Solved:
-    """Coefficients (K + 2,); most iterations of a window; worst stitch (relative difference); whether all were solved."""
+    """Coefficients (K + 2,); most iterations of a window; worst stitch (relative difference); whether all were solved;
+    seconds of each row (3, R + 1), see `shares.weigh`."""
 
     c: Floats
     iterations: int
     mismatch: float
     solved: bool
+    weights: Floats
+
+
+class Found(NamedTuple):
+    """A window's first knot, coefficients, iterations, success, and the seconds of the rows in its own part."""
+
+    first: int
+    c: Floats
+    iterations: int
+    solved: bool
+    weights: Floats
 
 
 def solved(knots: Knots, method: Method) -> Solved:
@@ -61,7 +75,7 @@ def solved(knots: Knots, method: Method) -> Solved:
     inner = np.linspace(0, count, max(1, round(count / method.window)) + 1).astype(int).tolist()
     windows = list(pairwise(inner))
     wide = [method.overlap] * len(windows)
-    found: list[tuple[int, Solution]] = [(0, Solution(np.empty(0), 0, 0.0, False))] * len(windows)
+    found = [Found(0, np.empty(0), 0, False, np.empty(0))] * len(windows)
     again = list(range(len(windows)))
     while again:
         _solve_some(knots, windows, wide, again, found, make, method.threads)
@@ -69,16 +83,20 @@ def solved(knots: Knots, method: Method) -> Solved:
         again = sorted({i for j in bad for i in (j, j + 1) if wide[i] < count})
         for i in again:
             wide[i] *= 2
-    return Solved(c, max(one.iterations for _, one in found), worst, all(one.solved for _, one in found))
+    return Solved(c, max(one.iterations for one in found), worst, all(one.solved for one in found),
+                  np.sum([one.weights for one in found], axis=0))
 
 
 def _solve_some(knots: Knots, windows: Sequence[tuple[int, int]], wide: Sequence[int], which: Sequence[int],
-                found: list[tuple[int, Solution]], make: Callable[[Problem, Floats], Steps], threads: int) -> None:
+                found: list[Found], make: Callable[[Problem, Floats], Steps], threads: int) -> None:
     def one(i: int) -> None:
         first, last = max(windows[i][0] - wide[i], 0), min(windows[i][1] + wide[i], len(knots.sigma))
         # A tied end needs its knots in one window.
         first, last = (0 if first < 16 else first), (len(knots.sigma) if last > len(knots.sigma) - 16 else last)
-        found[i] = first, solve_problem(knots.problem(first, last), make)
+        problem = knots.problem(first, last)
+        one = solve_problem(problem, make)
+        weights = weigh(problem, one.c, one.multipliers, windows[i][0] - first, windows[i][1] - first)
+        found[i] = Found(first, one.c, one.iterations, one.solved, weights)
 
     if threads > 1 and len(which) > 1:
         with ThreadPoolExecutor(threads) as pool:
@@ -96,17 +114,17 @@ def solve_problem(problem: Problem, make: Callable[[Problem, Floats], Steps]) ->
 
 
 def _stitched(knots: Knots, inner: Sequence[int], wide: Sequence[int],
-              found: Sequence[tuple[int, Solution]]) -> tuple[Floats, list[int], float]:
+              found: Sequence[Found]) -> tuple[Floats, list[int], float]:
     """All coefficients, the stitches that must be widened, the worst relative difference."""
     c = np.empty(len(knots.sigma) + 2)
-    for i, (first, one) in enumerate(found):
+    for i, one in enumerate(found):
         low, high = (0 if i == 0 else inner[i]), (len(c) if i == len(found) - 1 else inner[i + 1])
-        c[low:high] = one.c[low - first:high - first]
+        c[low:high] = one.c[low - one.first:high - one.first]
     bad, worst = [], 0.0
     for i, middle in enumerate(inner[1:-1]):
         half = min(wide[i] // 4, middle, len(c) - middle)
         here = slice(middle - half, middle + half)
-        left, right = (one.c[here.start - first:here.stop - first] for first, one in found[i:i + 2])
+        left, right = (one.c[here.start - one.first:here.stop - one.first] for one in found[i:i + 2])
         u = (np.arange(2 * half) + 0.5) / (2 * half)
         c[here] = left + (right - left) * u**3 * (10.0 - 15.0 * u + 6.0 * u**2)
         apart = float(np.max(np.abs(right - left) / np.minimum(left, right)))

@@ -1,0 +1,120 @@
+"""What limits the motion at places of a path: joints, and where asked for the tool, as rows of one kind.
+
+The tip's acceleration lies in the plane of tangent t and normal n of its path, and so does its jerk but for
+|b p'''| x^1.5 along the binormal b, which only caps x. The disc of allowed vectors in that plane is replaced by the
+regular octagon inside it that touches it along +-t and +-n: on straight lines nothing is given away, elsewhere at most
+1 - cos(pi/8) = 7.6 %.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple, cast
+
+import numpy as np
+
+from postproc.feedrate.limits import JointLimits, ToolLimits, steady_cap
+from postproc.feedrate.paths import Derivatives, Eased, ToolPath
+from toolpaths.arrays import Floats, Ints
+
+UNBOUND = 1e4
+"""Where no velocity bounds x, this many times the steady cap does, so that numbers stay comparable."""
+OCTAGON = np.pi / 8.0 * np.array([1.0, 3.0, 5.0, 7.0])
+"""Directions of its sides from the tangent; the opposite ones come with each row."""
+
+
+class Rows(NamedTuple):
+    """Derivatives by sigma (N, R), limits (R,) of acceleration and jerk, largest x = sigma_dot^2 (N,) and what caps it.
+
+    Rows are the joints, behind them those of the tool; `capped` (N,) is the joint, J for the tool, R for the feed.
+    """
+
+    dq: Floats
+    d2q: Floats
+    d3q: Floats
+    limits: JointLimits
+    cap: Floats
+    capped: Ints
+
+
+class Tool(NamedTuple):
+    """At places of a path: tip by sigma, unit tangent, normal and binormal (N, 3), |d axis/d sigma| (N,)."""
+
+    tip: Derivatives
+    frame: tuple[Floats, Floats, Floats]
+    tilt: Floats
+
+
+def rows(eased: Eased, sigma: Floats, limits: JointLimits, feed: Callable[[Floats], Floats]) -> Rows:
+    """All rows at sigma (N,); `feed` gives the largest ds/dt at s."""
+    s = eased.parameter(sigma)
+    at = eased.chained(sigma, s, eased.path.derivatives(eased.inside(s[0])))
+    allowed = np.where(s[1] > 0.0, feed(s[0]) / np.where(s[1] > 0.0, s[1], 1.0), np.inf)
+    with np.errstate(divide="ignore"):
+        speeds = limits.velocity / np.abs(at.dq)
+    if limits.tool is None:
+        return _capped(at, limits, speeds, np.full(len(sigma), np.inf), allowed)
+    found = tool(eased, sigma, s)
+    with np.errstate(divide="ignore"):
+        binormal = limits.tool.jerk / np.abs(np.einsum("ij,ij->i", found.frame[2], found.tip.d3q))
+        tilted = np.minimum(limits.tool.tilt_rate / found.tilt, np.cbrt(binormal))
+    inner, most = _octagon(found, limits.tool)
+    both = Derivatives(at.q, *(np.concatenate(pair, axis=1) for pair in zip(at[1:], inner, strict=True)))
+    velocity, acceleration, jerk = (np.append(old, np.full(4, new)) for old, new in (
+        (limits.velocity, np.inf), (limits.acceleration, most[0]), (limits.jerk, most[1])))
+    wide = JointLimits(velocity, acceleration, jerk)
+    return _capped(both, wide, speeds, tilted, allowed)
+
+
+def tool(eased: Eased, sigma: Floats, s: Floats) -> Tool:
+    """The tool at sigma (N,), s (4, N) as of `Eased.parameter`."""
+    path, inside = cast(ToolPath, eased.path), eased.inside(s[0])
+    inner = path.tip(inside)
+    tangent = _unit(inner.dq)
+    normal = _across(inner.d2q, tangent)
+    flat = np.linalg.norm(normal, axis=1) <= 1e-12 * np.linalg.norm(inner.d2q, axis=1)
+    normal[flat] = _across(inner.d3q, tangent)[flat]
+    normal = _unit(normal)
+    tilt = np.linalg.norm(path.axis(inside).dq, axis=1) * s[1]
+    return Tool(eased.chained(sigma, s, inner), (tangent, normal, np.cross(tangent, normal)), tilt)
+
+
+def steady_tool_speed(eased: Eased, sigma: Floats, limits: ToolLimits) -> Floats:
+    """Largest constant sigma_dot (N,) under the limits at the tool."""
+    found = tool(eased, sigma, eased.parameter(sigma))
+    with np.errstate(divide="ignore"):
+        acceleration, jerk = (limit / np.linalg.norm(order, axis=1) for limit, order in
+                              ((limits.acceleration, found.tip.d2q), (limits.jerk, found.tip.d3q)))
+        steady = np.minimum(np.sqrt(acceleration), np.cbrt(jerk))
+        return np.asarray(np.minimum(limits.tilt_rate / found.tilt, steady))
+
+
+def _octagon(found: Tool, limits: ToolLimits) -> tuple[list[Floats], tuple[float, float]]:
+    """Derivatives of the tip along the normals of the octagon's sides, (N, 4) each; limits of acceleration and jerk."""
+    tangent, normal = (np.stack([np.einsum("ij,ij->i", axis, order) for order in found.tip[1:]]) for axis in found.frame[:2])
+    sides = tangent[:, :, None] * np.cos(OCTAGON) + normal[:, :, None] * np.sin(OCTAGON)
+    inscribed = float(np.cos(np.pi / 8.0))
+    return list(sides), (inscribed * limits.acceleration, inscribed * limits.jerk)
+
+
+def _capped(at: Derivatives, limits: JointLimits, joints: Floats, tool: Floats, feed: Floats) -> Rows:
+    """With the cap from velocities, feed and tool as speeds along sigma; joints (N, J), the others (N,)."""
+    count, named = at.dq.shape[1], joints.shape[1]
+    speeds = np.column_stack((joints, tool, feed))
+    which = speeds.argmin(axis=1)
+    cap = speeds[np.arange(len(speeds)), which] ** 2
+    free = np.isinf(cap)
+    if free.any():
+        cap[free] = UNBOUND * steady_cap(at.d2q[free], at.d3q[free], limits)
+    if not np.all(np.isfinite(cap)):
+        raise ValueError("the path stands still somewhere between its ends: no limit bounds the speed there")
+    return Rows(at.dq, at.d2q, at.d3q, limits, cap, np.where(which > named, count, which))
+
+
+def _unit(vectors: Floats) -> Floats:
+    length = np.linalg.norm(vectors, axis=1, keepdims=True)
+    return np.asarray(np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0.0))
+
+
+def _across(vectors: Floats, tangent: Floats) -> Floats:
+    return np.asarray(vectors - np.einsum("ij,ij->i", vectors, tangent)[:, None] * tangent)

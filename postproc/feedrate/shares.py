@@ -1,0 +1,72 @@
+"""Which limit costs how much time: the plan's multipliers as seconds that add up to its time.
+
+Time is homogeneous in the limits: velocities and feed times k, accelerations times k^2, jerks times k^3 give 1/k of the
+time. By Euler's theorem T = sum over limits of n (-dT/dln L), n = 1, 2, 3 for velocity, acceleration, jerk, and
+-dT/dln L is the multiplier z of a row times what it uses of its limit.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from postproc.feedrate.interior import Multipliers
+from postproc.feedrate.problem import Problem
+from toolpaths.arrays import Floats, frozen
+
+
+@dataclass(frozen=True)
+class Shares:
+    """Seconds of each limit: `feed`, and `limits` (3, J + 1) for velocity, acceleration, jerk of the joints.
+
+    The last column is the tool: rate of its axis, acceleration and jerk of the tip.
+    """
+
+    feed: float
+    limits: Floats
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "limits", frozen(self.limits, np.float64, (3, -1), "Shares.limits"))
+
+    @property
+    def seconds(self) -> float:
+        """Sum of all."""
+        return self.feed + float(self.limits.sum())
+
+    def lost(self, alone: float) -> Shares:
+        """The time lost against a motion that takes `alone` at the feed: over the limits in the proportion of their shares.
+
+        `feed` is then `alone`, and the sum stays.
+        """
+        spent, lost = float(self.limits.sum()), self.seconds - alone
+        return Shares(alone, self.limits * (lost / spent)) if spent > 0.0 else self
+
+    def scaled(self, seconds: float) -> Shares:
+        """With this sum."""
+        factor = seconds / self.seconds
+        return Shares(self.feed * factor, self.limits * factor)
+
+    def __add__(self, other: Shares) -> Shares:
+        return Shares(self.feed + other.feed, self.limits + other.limits)
+
+
+def weigh(problem: Problem, c: Floats, z: Multipliers, first: int, last: int) -> Floats:
+    """Seconds (3, R + 1) of each row of knots [first, last); the last column is the feed's."""
+    x = problem.basis.values(c)[:, first:last]
+    here = slice(first, last)
+    count = len(problem.dq) + 1
+    velocity = 2.0 * z.velocity[here] * x[0] / problem.cap[here]
+    found = np.zeros((3, count))
+    found[0] = np.bincount(problem.capped[here], velocity, minlength=count)
+    for order, rows, multipliers in ((1, problem.acceleration_rows(), z.acceleration), (2, problem.jerk_rows(), z.jerk)):
+        used = np.einsum("ijk,ik->jk", rows[:, :, here], x[:len(rows)])
+        found[order, :-1] = (order + 1) * np.einsum("jk,jk->j", multipliers[:, here], used)
+    return found
+
+
+def shares(weights: Floats, joints: int, seconds: float) -> Shares:
+    """From sums of `weigh`, the tool's rows together; the last bit, the gap of the solver, in proportion."""
+    positive = np.maximum(weights, 0.0)
+    tool = positive[:, joints:-1].sum(axis=1, keepdims=True)
+    return Shares(float(positive[0, -1]), np.concatenate((positive[:, :joints], tool), axis=1)).scaled(seconds)
