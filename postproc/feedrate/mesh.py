@@ -43,7 +43,7 @@ def mesh(path: Path, limits: JointLimits, top: Callable[[Floats], Floats], spaci
     h = np.minimum(spacing.dt * speed, min(spacing.longest, (path.end - path.start) / FEWEST))
     h[[0, -1]] = np.minimum(h[[0, -1]], ramp / RAMP * speed[[0, -1]])
     h = np.maximum(h, 1e-9 * (path.end - path.start))
-    return _place(at, _gentle(at, h, spacing.slope))
+    return place(at, gentle(at, h, spacing.slope))
 
 
 def ramp_time(dq: Floats, limits: JointLimits, feed: Floats) -> float:
@@ -75,14 +75,14 @@ def _probes(path: Path, spacing: Spacing) -> Floats:
     return np.asarray(every[(every >= path.start) & (every <= path.end)])
 
 
-def _gentle(at: Floats, h: Floats, slope: float) -> Floats:
+def gentle(at: Floats, h: Floats, slope: float) -> Floats:
     """The largest spacing below `h` (N,) whose slope stays within +-`slope`."""
     ahead = np.minimum.accumulate(h - slope * at) + slope * at
     behind = np.minimum.accumulate((ahead + slope * at)[::-1])[::-1] - slope * at
     return np.asarray(behind)
 
 
-def _place(at: Floats, h: Floats) -> Floats:
+def place(at: Floats, h: Floats) -> Floats:
     """Knots such that one knot passes per `h` of length: the integral of 1/h, exact for h linear between probes."""
     step = np.diff(at)
     low, high = h[:-1], h[1:]
