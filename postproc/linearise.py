@@ -1,4 +1,8 @@
-"""Points between the CL points, so that the control's motion stays on the reference within the tolerance."""
+"""Points between the CL points, so that the control's motion stays on the reference within the tolerance, proved.
+
+From the start of each curve the longest block is taken whose bound (`bound.py`) is inside the tolerance, then the next:
+where a shorter block is never worse than a longer one, no division that the same bound allows has fewer blocks.
+"""
 
 from __future__ import annotations
 
@@ -7,16 +11,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from machines.kinematics.base import Kinematics
+from postproc.bound import Stretch, bounds
 from postproc.control import Control
 from postproc.joint_path import nearest_solution, wrap
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.rotations import angle_between
 from toolpaths.shape import Curves
 
-_SAMPLES = (0.25, 0.5, 0.75)
-_ROUNDS = 40
-_MOST_PIECES = 16
 _SMALLEST = 1e-9
+"""of a curve: a block that short and still outside is a jump"""
+_AIM, _ENOUGH = 0.95, 0.85
+"""of the tolerance: what a step aims at, and what is near enough to the longest"""
+_NARROW = 1.05
+"""a longest step that is known within this factor is known"""
 
 
 @dataclass(frozen=True)
@@ -24,7 +31,7 @@ class Pieces:
     """Blocks that follow curves: piece k ends at `q` (K, J), at `u` (K,) of curve `curve` (K,).
 
     `broken` names curves that no number of points brings inside the tolerance (a jump of the joints).
-    `worst_tip` (mm) and `worst_axis` (rad) are the largest deviations seen at the samples between points.
+    `worst_tip` (mm) and `worst_axis` (rad) bound the deviation of all blocks anywhere between their ends.
     """
 
     curve: Ints
@@ -42,30 +49,14 @@ def linearise(control: Control, kin: Kinematics, curves: Curves, q0: Floats, q1:
     `keep` (N,) marks curves whose block follows them by itself (kept arcs).
     """
     exact = keep | _straight_already(control, kin, curves, q0, q1)
-    done_curve, done_u, done_q = [np.flatnonzero(exact)], [np.ones(int(exact.sum()))], [q1[exact]]
-    index = np.flatnonzero(~exact)
-    index, u0, u1, a, b = _quarters(kin, curves, index, q0[index], q1[index])
-    worst, broken = np.zeros(2), [np.zeros(0, dtype=np.int64)]
-    for _ in range(_ROUNDS):
-        if not len(index):
-            break
-        tip_off, axis_off = _deviation(control, kin, curves.take(index), a, b, u0, u1)
-        ratio = np.maximum(tip_off / tolerance, axis_off / axis_tolerance)
-        good = ratio <= 1.0
-        if good.any():
-            worst = np.maximum(worst, [tip_off[good].max(), axis_off[good].max()])
-        small = ~good & (u1 - u0 <= _SMALLEST)
-        small[~good] |= _end_off(kin, curves.take(index[~good]), b[~good], u1[~good]) > tolerance
-        broken.append(index[small])
-        bad = ~good & ~small
-        done_curve.append(index[~bad])
-        done_u.append(u1[~bad])
-        done_q.append(b[~bad])
-        index, u0, u1, a, b = _split(kin, curves, index[bad], u0[bad], u1[bad], a[bad], b[bad], ratio[bad])
-    curve, u, q = np.concatenate(done_curve), np.concatenate(done_u), np.concatenate(done_q)
+    front = _Front(control, kin, curves, q0, q1, np.flatnonzero(~exact), tolerance, axis_tolerance)
+    while len(front.index):
+        front.advance()
+    curve = np.concatenate([np.flatnonzero(exact), *front.curve])
+    u, q = np.concatenate([np.ones(int(exact.sum())), *front.u]), np.concatenate([q1[exact], *front.q])
     order = np.lexsort((u, curve))
-    never = np.unique(np.concatenate([*broken, index]))
-    return Pieces(curve[order], u[order], q[order], never, float(worst[0]), float(worst[1]))
+    broken = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *front.broken]))
+    return Pieces(curve[order], u[order], q[order], broken, float(front.worst[0]), float(front.worst[1]))
 
 
 def _straight_already(control: Control, kin: Kinematics, curves: Curves, q0: Floats, q1: Floats) -> Bools:
@@ -78,58 +69,83 @@ def _straight_already(control: Control, kin: Kinematics, curves: Curves, q0: Flo
     return np.zeros(len(curves), dtype=bool)
 
 
-def _deviation(control: Control, kin: Kinematics, curves: Curves, a: Floats, b: Floats, u0: Floats,
-               u1: Floats) -> tuple[Floats, Floats]:
-    """Largest (tip mm, axis rad) deviation (N,) of the blocks a -> b from their stretch u0..u1, at the samples."""
-    tip_off, axis_off = np.zeros(len(curves)), np.zeros(len(curves))
-    for t in _SAMPLES:
-        tip, axis, _ = control.between(a, b, np.full(len(a), t), kin)
-        d, e, _ = curves.deviation(tip, axis, u0 + t * (u1 - u0))
-        tip_off = np.fmax(tip_off, np.nan_to_num(d, nan=np.inf))
-        axis_off = np.fmax(axis_off, np.nan_to_num(e, nan=np.inf))
-    return tip_off, axis_off
+class _Front:
+    """Where each unfinished curve stands, and the blocks done so far: one step of all curves at a time.
 
+    `at`, `joints`, `pose`: where the next block begins; `step`: its length to be tried; `held`, `failed`: the longest step
+    that is inside the tolerance and the shortest that is not, of the block being looked for.
+    """
 
-def _end_off(kin: Kinematics, curves: Curves, q: Floats, u: Floats) -> Floats:
-    """How far (N,) mm the machine's pose at joints q (N, J) is from point u of the curves: no cutting mends that."""
-    tip, _ = kin.forward(q)
-    return np.asarray(np.nan_to_num(np.linalg.norm(tip - curves.at(u)[0], axis=1), nan=np.inf))
+    def __init__(self, control: Control, kin: Kinematics, curves: Curves, q0: Floats, q1: Floats, index: Ints,
+                 tolerance: float, axis_tolerance: float) -> None:
+        self.control, self.kin, self.curves, self.last = control, kin, curves, q1
+        self.tolerance, self.axis_tolerance = tolerance, axis_tolerance
+        self.index, self.at, self.joints = index, np.zeros(len(index)), q0[index]
+        self.pose = kin.forward(self.joints)
+        turn = np.where(curves.is_arc, curves.sweep, 0.0)[index]
+        self.longest = np.minimum(0.5 * np.pi / np.maximum(turn, 1e-9), 1.0)
+        self.step = self.longest.copy()
+        self.held, self.failed = np.zeros(len(index)), np.full(len(index), np.inf)
+        self.curve: list[Ints] = []
+        self.u: list[Floats] = []
+        self.q: list[Floats] = []
+        self.broken: list[Ints] = []
+        self.worst = np.zeros(2)
 
+    def advance(self) -> None:
+        """Try the steps, take those that are long enough, forget finished and broken curves."""
+        u1, q1, pose = self._tried()
+        stretch = Stretch(self.curves.take(self.index), self.at, u1, self.joints, q1, self.pose, pose)
+        tip, axis = bounds(self.control, self.kin, stretch, self.tolerance, self.axis_tolerance)
+        ratio = np.maximum(tip / self.tolerance, axis / self.axis_tolerance)
+        good = ratio <= 1.0
+        full = (u1 == 1.0) | (self.step >= self.longest)
+        taken = good & (full | (ratio >= _ENOUGH) | (self.failed <= _NARROW * self.step))
+        self._record(taken, u1, q1, tip, axis)
+        gone = ~good & (self.step <= _SMALLEST)
+        self.broken.append(self.index[gone])
+        self._next(taken, good, ratio, u1, q1, pose)
+        self._keep(~(gone | (taken & (u1 == 1.0))))
 
-Stretches = tuple[Ints, Floats, Floats, Floats, Floats]
-"""curve, u at both ends, joints at both ends"""
+    def _tried(self) -> tuple[Floats, Floats, tuple[Floats, Floats]]:
+        """(u, joints, pose) at the end of the steps."""
+        u1 = np.where(self.at + self.step >= 1.0 - _SMALLEST, 1.0, self.at + self.step)
+        q1 = self.last[self.index]
+        inner = np.flatnonzero(u1 < 1.0)
+        if len(inner):
+            tip, axis = self.curves.take(self.index[inner]).at(u1[inner])
+            share = (u1 - self.at)[inner] / (1.0 - self.at[inner])
+            near = self.joints[inner] + share[:, None] * (q1[inner] - self.joints[inner])
+            q1[inner] = nearest_solution(self.kin, tip, axis, near)
+        return u1, q1, self.kin.forward(q1)
 
+    def _record(self, taken: Bools, u1: Floats, q1: Floats, tip: Floats, axis: Floats) -> None:
+        if taken.any():
+            self.curve.append(self.index[taken])
+            self.u.append(u1[taken])
+            self.q.append(q1[taken])
+            self.worst = np.maximum(self.worst, [tip[taken].max(), axis[taken].max()])
 
-def _quarters(kin: Kinematics, curves: Curves, index: Ints, a: Floats, b: Floats) -> Stretches:
-    """The whole curves, arcs cut into quarter turns: of a longer piece the chord says nothing."""
-    parts = np.where(curves.is_arc[index], np.ceil(curves.sweep[index] / (0.5 * np.pi)), 1).astype(np.int64)
-    return _cut(kin, curves, index, np.zeros(len(index)), np.ones(len(index)), a, b, np.maximum(parts, 1))
+    def _next(self, taken: Bools, good: Bools, ratio: Floats, u1: Floats, q1: Floats,
+              pose: tuple[Floats, Floats]) -> None:
+        """Where the next blocks begin, and what they try: deviations go with the square of the length."""
+        held = np.where(good, self.step, self.held)
+        failed = np.where(good, self.failed, self.step)
+        better = self.step * np.clip(np.sqrt(_AIM / np.clip(ratio, 1e-6, 1e6)), 0.1, 4.0)
+        between = np.where(held > 0.0, np.sqrt(np.maximum(held, 1e-300) * failed), 0.5 * failed)
+        inside = (better > held) & (better < failed)
+        narrowed = np.where(held > 0.0, between, np.minimum(better, between))
+        step = np.where(inside | ~np.isfinite(failed), better, narrowed)
+        self.step = np.clip(step, 0.5 * _SMALLEST, self.longest)
+        self.held, self.failed = np.where(taken, 0.0, held), np.where(taken, np.inf, failed)
+        self.at = np.where(taken, u1, self.at)
+        self.joints = np.where(taken[:, None], q1, self.joints)
+        self.pose = (np.where(taken[:, None], pose[0], self.pose[0]), np.where(taken[:, None], pose[1], self.pose[1]))
 
-
-def _split(kin: Kinematics, curves: Curves, index: Ints, u0: Floats, u1: Floats, a: Floats, b: Floats,
-           ratio: Floats) -> Stretches:
-    """The stretches cut into equal parts, as many as a deviation that falls with the square of the length needs."""
-    finite = np.where(np.isfinite(ratio), ratio, _MOST_PIECES**2)
-    parts = np.clip(np.ceil(np.sqrt(finite)), 2, _MOST_PIECES).astype(np.int64)
-    return _cut(kin, curves, index, u0, u1, a, b, parts)
-
-
-def _cut(kin: Kinematics, curves: Curves, index: Ints, u0: Floats, u1: Floats, a: Floats, b: Floats,
-         parts: Ints) -> Stretches:
-    """Each stretch in that many equal parts."""
-    piece = np.repeat(np.arange(len(index)), parts)
-    k = np.arange(len(piece)) - np.repeat(np.cumsum(parts) - parts, parts)
-    share = (k + 1) / parts[piece]
-    end_u = np.where(k + 1 == parts[piece], u1[piece], u0[piece] + share * (u1 - u0)[piece])
-    near = a[piece] + share[:, None] * (b - a)[piece]
-    inner = k + 1 < parts[piece]
-    q = b[piece].copy()
-    if inner.any():
-        tip, axis = curves.take(index[piece][inner]).at(end_u[inner])
-        q[inner] = nearest_solution(kin, tip, axis, near[inner])
-    begin_u = np.where(k == 0, u0[piece], np.roll(end_u, 1))
-    begin_q = np.where((k == 0)[:, None], a[piece], np.roll(q, 1, axis=0))
-    return index[piece], begin_u, end_u, begin_q, q
+    def _keep(self, rows: Bools) -> None:
+        for name in ("index", "at", "joints", "longest", "step", "held", "failed"):
+            setattr(self, name, getattr(self, name)[rows])
+        self.pose = (self.pose[0][rows], self.pose[1][rows])
 
 
 def family_turns(kin: Kinematics, curves: Curves, q0: Floats, q1: Floats) -> tuple[Ints, Floats]:

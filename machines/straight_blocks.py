@@ -1,0 +1,226 @@
+"""Tip and tool axis along straight joint moves, with a bound of their third derivative over the whole move.
+
+Each family of machines goes the way from joints to the tool once with jets instead of numbers (`kinematics/jets.py`).
+Serial: the chain of axes. Parallel: the platform follows from the rods' fixed lengths, differentiated three times; that
+Jx stays regular all along the move is proved on the way, and where it cannot be, there is no bound.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from machines.kinematics import columns
+from machines.kinematics.base import Kinematics
+from machines.kinematics.h4_axes import H4SpindleAxis, H4TableAxis
+from machines.kinematics.h4_linear import H4Linear
+from machines.kinematics.jets import ZERO, Angle, Jet, straight
+from machines.kinematics.linear_delta import LinearDelta
+from machines.kinematics.serial import Serial
+from machines.kinematics.sliders import Legs
+from toolpaths.arrays import Floats
+
+_Z = (0.0, 0.0, 1.0)
+_ROUNDS = 6
+_GROWTH = 1.02
+UNBOUNDED = 1e30
+"""a third derivative for which no bound was found"""
+
+
+def pose_jets(kin: Kinematics, q0: Floats, q1: Floats) -> tuple[Jet, Jet]:
+    """(tip in mm, tool axis) in the table frame along the straight moves q0 -> q1 (N, J).
+
+    Parallel machines are taken in their home mode. The third derivative is UNBOUNDED where the platform cannot
+    be proved regular all along.
+
+    Raises:
+        TypeError: for a family of kinematics without such a bound.
+    """
+    if isinstance(kin, Serial):
+        return _serial(kin, q0, q1)
+    if isinstance(kin, LinearDelta):
+        return _delta(kin, q0, q1)
+    if isinstance(kin, H4Linear):
+        return _h4(kin, q0, q1)
+    raise TypeError(f"{type(kin).__name__} has no bound for straight joint moves")
+
+
+def _serial(kin: Serial, q0: Floats, q1: Floats) -> tuple[Jet, Jet]:
+    """The product of exponentials (see `Serial`), axis by axis from the tool to the part."""
+    tip, axis = Jet(columns.of_one(-kin.tool_length * kin.tool_axis)), Jet(columns.of_one(kin.tool_axis))
+    for joint in reversed(kin.chain):
+        j = kin.axis_names.index(joint.name)
+        by, direction = Angle(0.5 * (q0[:, j] + q1[:, j]), q1[:, j] - q0[:, j]), columns.of_one(joint.direction)
+        if joint.rotary:
+            tip, axis = tip.turned(direction, columns.of_one(joint.point), by), axis.turned(direction, ZERO, by)
+        else:
+            tip = tip.slid(direction, by)
+    return tip, axis
+
+
+def _delta(kin: LinearDelta, q0: Floats, q1: Floats) -> tuple[Jet, Jet]:
+    middle, step = 0.5 * (q0 + q1), q1 - q0
+    tip, _ = kin.forward(middle)
+    rods = kin.rods(middle, tip)
+    place, _ = _Loop(rods, np.zeros_like(rods), kin.legs, step, False).jets(
+        tip + kin.tool_length * np.array(_Z), np.zeros(len(tip)))
+    return place - Jet(columns.of_one(kin.tool_length * np.array(_Z))), Jet(list(_Z))
+
+
+def _h4(kin: H4Linear, q0: Floats, q1: Floats) -> tuple[Jet, Jet]:
+    middle, step = 0.5 * (q0 + q1), q1 - q0
+    p = kin.solve_platform(middle)
+    arms = kin.platform.ends(p) - p[:, None, :3]
+    rods = p[:, None, :3] + arms - kin.legs.carriages(middle[:, :4])
+    place, tilt = _Loop(rods, arms, kin.legs, step[:, :4], True).jets(p[:, :3], p[:, 3])
+    turn, down = Angle(middle[:, 4], step[:, 4]), -(kin.gauge + kin.tool_length)
+    if isinstance(kin, H4TableAxis):
+        about = (0.0, 0.0, kin.sense)
+        tip = (Jet((0.0, 0.0, down)).turned((1.0, 0.0, 0.0), ZERO, tilt) + place).turned(about, ZERO, turn)
+        return tip, Jet(list(_Z)).turned((1.0, 0.0, 0.0), ZERO, tilt).turned(about, ZERO, turn)
+    if not isinstance(kin, H4SpindleAxis):
+        raise TypeError(f"{type(kin).__name__} has no bound for straight joint moves")
+    axis = Jet(list(_Z)).turned((0.0, kin.sense, 0.0), ZERO, turn)
+    reach = Jet((0.0, 0.0, down)).turned((0.0, kin.sense, 0.0), ZERO, turn) + Jet(columns.of_one(kin.pivot))
+    return (reach.turned((1.0, 0.0, 0.0), ZERO, tilt) + place, axis.turned((1.0, 0.0, 0.0), ZERO, tilt))
+
+
+@dataclass(frozen=True)
+class _Loop:
+    """The closed loops of a platform along straight slide moves.
+
+    With r_k the rods (from carriage to platform joint), b_k the arms (from the reference point C to the joint, turned),
+    e_k = x x b_k and the tilt T about x, the rods' lengths stay: r.r = L^2, with r = C + b - A and the carriages A
+    moving evenly. Differentiated once, twice and three times (II-15 to II-18 and V-23 of Company 2000 carried on):
+
+        r.r' = 0,   r.r'' = -r'^2,   r.r''' = -3 r'.r'',
+        r' = C' + T'e - A',   r'' = C'' + T''e - T'^2 f,   r''' = C''' + T'''e - 3 T'T''f - T'^3 e,   f = b across x,
+
+    linear systems with the matrix Jx = (r, r.e) for C and T at each order. Over the whole move everything on the right
+    is bounded by norms; Jx differs from its value in the middle by at most what its rows can change in half the move,
+    which bounds its least singular value from below. The bounds assume a largest |r'| and a largest T', and hold if
+    they come out smaller: by continuity no rod can then leave them (as in Kantorovich's theorem).
+
+    Attributes:
+        rods, arms: (N, K, 3) mm in the middle
+        step: (N, K) mm of the slides
+        tilts: False for a platform that only translates
+    """
+
+    rods: Floats
+    arms: Floats
+    legs: Legs
+    step: Floats
+    tilts: bool
+
+    def jets(self, place: Floats, tilt: Floats) -> tuple[Jet, Angle]:
+        """(C, tilt) along the move from their values (N, 3), (N,) in the middle."""
+        first, rate, rod_rates = self._first()
+        second = self._solved(-np.einsum("nki,nki->nk", rod_rates, rod_rates)
+                              + rate[:, None] ** 2 * np.einsum("nki,nki->nk", self.rods, self._across))
+        third = self._third(first, rate, rod_rates)
+        c2, t2 = second[:, :3], second[:, 3] / self._lever if self.tilts else np.zeros(len(tilt))
+        return (Jet(_columns(place), _columns(first), _columns(c2), third),
+                Angle(tilt, rate, t2, third / self._lever if self.tilts else 0.0))
+
+    @property
+    def _across(self) -> Floats:
+        """f: the arms' part across x."""
+        result: Floats = self.arms * np.array([0.0, 1.0, 1.0])
+        return result
+
+    @property
+    def _along(self) -> Floats:
+        """e = x x b."""
+        return np.stack([np.zeros_like(self.arms[..., 0]), -self.arms[..., 2], self.arms[..., 1]], axis=-1)
+
+    @property
+    def _reach(self) -> Floats:
+        """(K,) mm: |e| of each leg, the same at every tilt."""
+        if not len(self.arms):
+            return np.zeros(self.arms.shape[1])
+        return np.asarray(np.linalg.norm(self._along, axis=2).max(axis=0), dtype=np.float64)
+
+    @property
+    def _lever(self) -> float:
+        """mm per rad that makes the tilt a length, so that norms mean something."""
+        return max(float(self._reach.max(initial=0.0)), 1.0)
+
+    @property
+    def _jx(self) -> Floats:
+        if not self.tilts:
+            return self.rods
+        moment = np.einsum("nki,nki->nk", self.rods, self._along) / self._lever
+        return np.concatenate([self.rods, moment[..., None]], axis=2)
+
+    def _solved(self, right: Floats) -> Floats:
+        jx = self._jx
+        bad = ~(np.abs(np.linalg.det(np.nan_to_num(jx))) > 0.0) | ~np.isfinite(right).all(axis=1)
+        safe = np.where(bad[:, None, None], np.eye(jx.shape[1]), jx)
+        result: Floats = np.asarray(np.linalg.solve(safe, np.nan_to_num(right)[..., None])[..., 0], dtype=np.float64)
+        result[bad] = np.nan
+        return result
+
+    def _first(self) -> tuple[Floats, Floats, Floats]:
+        """(C' (N, 3), T' (N,), r' (N, K, 3)) in the middle."""
+        moved = self.step[..., None] * self.legs.directions
+        x = self._solved(np.einsum("nki,nki->nk", self.rods, moved))
+        rate = x[:, 3] / self._lever if self.tilts else np.zeros(len(x))
+        return x[:, :3], rate, x[:, None, :3] + rate[:, None, None] * self._along - moved
+
+    def _third(self, first: Floats, rate: Floats, rod_rates: Floats) -> Floats:
+        """Bound (N,) of |(C''', lever T''')| over the move; UNBOUNDED where the loops cannot be."""
+        at_middle: Floats = np.asarray(np.linalg.norm(rod_rates, axis=2), dtype=np.float64)
+        speed: Floats = at_middle * _GROWTH
+        turn = np.abs(rate) * _GROWTH
+        least = np.linalg.svd(np.nan_to_num(self._jx), compute_uv=False)[:, -1]
+        result = np.full(len(rate), UNBOUNDED)
+        for _ in range(_ROUNDS):
+            bend, rod_bend, grip = self._bounds(speed, turn, least)
+            new_speed, new_turn = at_middle + 0.5 * rod_bend, np.abs(rate) + 0.5 * bend / self._lever
+            held = (new_speed <= speed).all(axis=1) & (new_turn <= turn)
+            result[held] = np.minimum(result[held], self._third_of(speed, turn, bend, rod_bend, grip)[held])
+            speed = np.asarray(new_speed * _GROWTH)
+            turn = new_turn * _GROWTH
+        return result
+
+    def _bounds(self, speed: Floats, turn: Floats, least: Floats) -> tuple[Floats, Floats, Floats]:
+        """(|(C'', lever T'')| (N,), |r''| (N, K), 1 / least singular value of Jx (N,)) while |r'| <= speed, |T'| <= turn.
+
+        NaN where Jx might become singular."""
+        reach, lengths, t = self._reach, self.legs.lengths, turn[:, None]
+        rows = np.hypot(speed, (reach * speed + t * reach * lengths) / self._lever if self.tilts else 0.0)
+        left = least - 0.5 * np.sqrt((rows**2).sum(axis=1))
+        grip = 1.0 / np.where(left > 0.0, left, np.nan)
+        bend = grip * np.sqrt(((speed**2 + t**2 * reach * lengths) ** 2).sum(axis=1))
+        tilt = bend[:, None] * reach / self._lever if self.tilts else 0.0
+        return bend, bend[:, None] + tilt + t**2 * reach, grip
+
+    def _third_of(self, speed: Floats, turn: Floats, bend: Floats, rod_bend: Floats, grip: Floats) -> Floats:
+        reach, lengths, t = self._reach, self.legs.lengths, turn[:, None]
+        tilt_bend = bend[:, None] / self._lever if self.tilts else 0.0 * bend[:, None]
+        right = 3.0 * speed * rod_bend + (3.0 * t * tilt_bend + t**3) * reach * lengths
+        return np.asarray(grip * np.sqrt((right**2).sum(axis=1)), dtype=np.float64)
+
+
+def _columns(rows: Floats) -> list[Floats | float]:
+    return list(rows.T)
+
+
+def tip_rule_jets(kin: Kinematics, q0: Floats, q1: Floats, tip0: Floats, tip1: Floats) -> tuple[Jet, Jet]:
+    """(tip, tool axis) where the control runs the kinematics: tips straight, rotary joints even.
+
+    The slides then follow from the tip; of the joints only the rotary ones count.
+    """
+    tip = straight(_columns(tip0), _columns(tip1))
+    if not any(kin.rotary):
+        _, axis = kin.forward(q0)
+        return tip, Jet(_columns(axis))
+    return tip, pose_jets(kin, q0, q1)[1]
+
+
+def in_blocks(n: int) -> Iterator[slice]:
+    """Slices that keep the columns in the processor's cache."""
+    return columns.blocks(n)
