@@ -1,0 +1,165 @@
+"""The motion of a program as the models of controls take it: arrays of blocks, and the pauses between them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, fields, replace
+from enum import IntEnum
+
+import numpy as np
+
+from machines.machine import Machine
+from toolpaths.arrays import Array, Bools, Floats, Ints, frozen
+
+
+class Path(IntEnum):
+    """What a control does where two blocks meet."""
+
+    STOP = 0
+    """rest at the end of every block (G61.1, G9)"""
+    EXACT = 1
+    """on the path; through corners that are tangent without a stop (G61)"""
+    BLEND = 2
+    """corners may be rounded off within the tolerance (G64)"""
+
+
+class Cause(IntEnum):
+    """Why a machine rests by command."""
+
+    DWELL = 0
+    TOOL_CHANGE = 1
+    SPINDLE = 2
+    INDEXING = 3
+    OTHER = 4
+    """a command that the control carries out at rest, such as coolant or an offset: no time of its own"""
+
+
+@dataclass(frozen=True)
+class Axes:
+    """What the columns of a program may do.
+
+    Attributes:
+        letters: of the columns; rotary (A,): True for turning axes
+        velocity, acceleration, jerk (A,): largest magnitudes, mm or rad per s, s2, s3
+        xyz (3,): columns of X, Y, Z, -1 where there is none
+    """
+
+    letters: tuple[str, ...]
+    rotary: Bools
+    velocity: Floats
+    acceleration: Floats
+    jerk: Floats
+    xyz: Ints
+
+    @staticmethod
+    def of(machine: Machine) -> Axes:
+        """The axes of a machine; tip coordinates of a control that runs the kinematics have the limits of the joint of
+        the same letter, as LinuxCNC's axis sections do."""
+        names, limits = machine.axis_names, machine.limits
+        return Axes(names, np.array(machine.rotary), limits.velocity, limits.acceleration, limits.jerk,
+                    np.array([names.index(k) if k in names else -1 for k in "XYZ"]))
+
+    def group(self, letters: str) -> Ints:
+        """Columns whose letter is one of `letters`."""
+        return np.array([j for j, name in enumerate(self.letters) if name in letters], dtype=np.int64)
+
+
+@dataclass(frozen=True)
+class Pauses:
+    """P times at rest, in order.
+
+    Attributes:
+        block (P,): the block at whose end the machine rests, -1 before the first
+        cause (P,): Cause; seconds (P,): commanded or of the machine; line (P,): line of the program
+    """
+
+    block: Ints
+    cause: Array
+    seconds: Floats
+    line: Ints
+
+    def __post_init__(self) -> None:
+        n = len(self.block)
+        for name, kind in (("block", np.int64), ("cause", np.int8), ("seconds", np.float64), ("line", np.int64)):
+            object.__setattr__(self, name, frozen(getattr(self, name), kind, (n,), f"Pauses.{name}"))
+
+    @staticmethod
+    def none() -> Pauses:
+        """No pause at all."""
+        return Pauses(np.zeros(0), np.zeros(0), np.zeros(0), np.zeros(0))
+
+    def __len__(self) -> int:
+        return len(self.block)
+
+
+_COLUMNS: dict[str, tuple[type, tuple[int, ...]]] = {
+    "line": (np.int64, ()), "rapid": (np.bool_, ()), "arc": (np.bool_, ()), "center": (np.float64, (3,)),
+    "normal": (np.float64, (3,)), "sweep": (np.float64, ()), "speed": (np.float64, ()), "path": (np.int8, ()),
+    "tolerance": (np.float64, ()), "chain": (np.float64, ()), "operation": (np.int64, ()),
+}
+
+
+@dataclass(frozen=True)
+class Blocks:
+    """E blocks that move, in mm, rad and s.
+
+    Attributes:
+        axes: of the columns
+        start, end (E, A): where the block begins and ends
+        line (E,): line of the program
+        rapid, arc (E,): kind; neither is a straight feed
+        center, normal (E, 3), sweep (E,): of arcs in X, Y, Z: counter-clockwise about `normal` by `sweep` rad
+        speed (E,): what the feed word asks for along `length`, inf for rapids
+        path (E,): Path that holds at the block; tolerance (E,): mm of its blends, inf without a limit, NaN where the
+            program does not say; chain (E,): mm within which short lines may be merged, 0 for not
+        operation (E,): index into `operations`
+        pauses: rests by command
+        cl_line (E,): line of the CL file that the block comes from, -1 where that is not known
+    """
+
+    axes: Axes
+    start: Floats
+    end: Floats
+    line: Ints
+    rapid: Bools
+    arc: Bools
+    center: Floats
+    normal: Floats
+    sweep: Floats
+    speed: Floats
+    path: Array
+    tolerance: Floats
+    chain: Floats
+    operation: Ints
+    operations: tuple[str, ...] = ("",)
+    pauses: Pauses = field(default_factory=Pauses.none)
+    cl_line: Ints | None = None
+
+    def __post_init__(self) -> None:
+        n, a = len(self.line), len(self.axes.letters)
+        for name in ("start", "end"):
+            object.__setattr__(self, name, frozen(getattr(self, name), np.float64, (n, a), f"Blocks.{name}"))
+        for name, (kind, tail) in _COLUMNS.items():
+            object.__setattr__(self, name, frozen(getattr(self, name), kind, (n, *tail), f"Blocks.{name}"))
+
+    def __len__(self) -> int:
+        return len(self.line)
+
+    def take(self, rows: Ints | Bools) -> Blocks:
+        """Some of the blocks; the pauses stay with the last block that is left before them."""
+        rows = np.arange(len(self))[rows]
+        moved = replace(self.pauses, block=np.searchsorted(rows, self.pauses.block, side="right") - 1)
+        return replace(self, pauses=moved, **{f.name: getattr(self, f.name)[rows] for f in fields(self)
+                                              if isinstance(getattr(self, f.name), np.ndarray)})
+
+    @property
+    def xyz(self) -> Floats:
+        """(E + 1, 3) X, Y, Z at the block ends, the first start first; 0 where there is no such axis."""
+        points = np.concatenate([self.start[:1], self.end])
+        return np.where(self.axes.xyz >= 0, points[:, self.axes.xyz], 0.0)
+
+    @property
+    def forced(self) -> Bools:
+        """(E,) True where a command makes the machine rest at the end of the block."""
+        result = np.zeros(len(self), dtype=bool)
+        result[self.pauses.block[self.pauses.block >= 0]] = True
+        return result

@@ -1,0 +1,291 @@
+"""LinuxCNC's trajectory planner (2.9, no jerk limit): how long it takes over a program.
+
+Segments come from `linuxcnc_segments`, what happens where they meet from `linuxcnc_corners`; here they are put in a row,
+the look-ahead gives each its speeds, and ramps give the times. Described from src/emc/tp/tp.c of LinuxCNC 2.9
+(`tpRunOptimization`, `tpComputeOptimalVelocity`, `tpCalculateTrapezoidalAccel`, `tpActivateSegment`, `tcIsBlending`),
+src/emc/tp/tc.c (`tcGetOverallMaxAccel`) and src/emc/task/emctaskmain.cc; stop and command times are measured on the
+simulator.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from postproc.cycle_time.blocks import Blocks, Cause, Path
+from postproc.cycle_time.linuxcnc_corners import KINK, QUARTER, Blends, Corners, blends, corners
+from postproc.cycle_time.linuxcnc_kernels import speeds, timeline
+from postproc.cycle_time.linuxcnc_segments import KERNEL_FROM, NORMAL_SHARE, Segments, clamped, segments
+from postproc.cycle_time.phases import Timed, ramps, summed
+from postproc.cycle_time.shape import NOTHING, shape
+from postproc.feedrate.compiled import compiled
+from toolpaths.arrays import Array, Bools, Floats, Ints
+
+STOP, TANGENT, OVERLAP = 0, 2, 3
+"""How a segment of the row ends; OVERLAP: the next one starts while this one slows down (parabolic blend)"""
+LEAST_CYCLES = 1.02
+"""servo cycles that a segment lasts at least where the look-ahead runs through it (TP_MIN_SEGMENT_CYCLES)"""
+TANGENTIAL = 0.5
+"""share of the acceleration along a circle where the rest may point to its centre (BLEND_ACC_RATIO_TANGENTIAL)"""
+RAMP_TIME = 0.01
+"""s below which a segment has one constant acceleration ([TRAJ] ARC_BLEND_RAMP_FREQ 100)"""
+GAP_CYCLES = 4.0
+"""servo cycles below which what blends leave of a line goes to the blend ([TRAJ] ARC_BLEND_GAP_CYCLES)"""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Of the controller's INI file: servo cycle, s; depth of the look-ahead in segments ([TRAJ]
+    ARC_BLEND_OPTIMIZATION_DEPTH). `stop_cycles`: servo cycles that a stop costs over the ramps; `command`: s between
+    two motions with a command that waits for rest; both as measured."""
+
+    cycle: float = 0.001
+    depth: int = 50
+    stop_cycles: float = 0.5
+    command: float = 0.010
+
+
+@dataclass(frozen=True)
+class Row:
+    """M segments and blend arcs in the order of motion; fields as in `Segments`."""
+
+    owner: Ints
+    length: Floats
+    asked: Floats
+    most: Floats
+    rate: Floats
+    ends: Array
+    kink: Floats
+    fresh: Bools
+    traverse: Bools
+    overlap_speed: Floats
+
+
+def linuxcnc(blocks: Blocks, settings: Settings | None = None) -> Timed:
+    """How long LinuxCNC takes over each block."""
+    settings = settings or Settings()
+    s = segments(blocks)
+    row = in_a_row(s, settings.cycle)
+    return _timed(blocks, s, row, settings)
+
+
+def in_a_row(s: Segments, cycle: float) -> Row:
+    """Every corner decided, blend arcs put in, lengths trimmed, accelerations shared out."""
+    count = len(s)
+    ends = np.where(s.blocks.path == Path.BLEND, OVERLAP, STOP)
+    joined = ~s.fresh[1:]
+    change = joined & (s.blocks.rapid[1:] != s.blocks.rapid[:-1])
+    ends[:-1][change] = STOP
+    free = joined & ~change & (s.blocks.path[:-1] != Path.STOP)
+    c = corners(s, free, cycle)
+    ends[:-1][c.back] = STOP
+    ends[:-1][c.tangent] = TANGENT
+    at = np.flatnonzero(c.kinked & (ends[:-1] == OVERLAP))
+    arcs = blends(s, at, cycle)
+    blended, tangent = _choice(s, c, at, arcs, cycle)
+    ends[at[blended | tangent]] = TANGENT
+    return _put_together(s, c, ends, at, arcs, blended, tangent, joined, count, cycle)
+
+
+def _choice(s: Segments, c: Corners, at: Ints, arcs: Blends, cycle: float) -> tuple[Bools, Bools]:
+    """(K,) where the blend arc, where passing as tangent wins; else two ramps overlap (`tpChooseBestBlend`)."""
+    most = clamped(s.length, s.most, cycle)
+    trimmed = s.length.copy()
+    better = arcs.good & (arcs.most > c.speed[at])
+    for _ in range(2):
+        trimmed[:] = s.length
+        trimmed[at[better] + 1] -= arcs.trim[better, 1]
+        trimmed = np.maximum(trimmed, NOTHING)
+        net = _overlap(s, at, at + 1, trimmed, most, np.full(len(s), 0.5 * (1.0 - KINK)), half_lengths=True)[1] / 2.0
+        arc_speed = np.where(arcs.good, arcs.most, 0.0)
+        better = (arc_speed > c.speed[at]) & (arc_speed > net)
+    return better, ~better & (c.speed[at] > net)
+
+
+def _overlap(s: Segments, one: Ints, two: Ints, length: Floats, most: Floats, share: Floats,
+             half_lengths: bool = False) -> tuple[Floats, Floats]:
+    """(speed below which the next begins, speed along the blend) (K,) of overlapping ramps (`tpComputeBlendVelocity`)."""
+    rate = s.acceleration * share * np.where(s.blocks.arc, TANGENTIAL, 1.0)
+    target = np.minimum(s.asked, most)
+    fraction = 0.5 if half_lengths else 1.0
+    reach = np.minimum(np.sqrt(rate * length * fraction), target)
+    longest = np.minimum(length[one] / reach[one], length[two] / reach[two])
+    seconds = np.minimum(longest, np.maximum(reach[one] / rate[one], reach[two] / rate[two]))
+    speed, following = (np.minimum(reach[k], seconds * rate[k]) for k in (one, two))
+    theta = np.arccos(np.clip(-(_or_x(s.shape.last[one]) * _pull(s, two, share)).sum(axis=1), -1.0, 1.0)) / 2.0
+    tolerance = s.blocks.tolerance[one]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        limit = np.where((np.cos(theta) > 1e-3) & np.isfinite(tolerance),
+                         2.0 * np.sqrt(rate[one] * tolerance / np.cos(theta)), np.inf)
+    speed, following = np.minimum(speed, limit), np.minimum(following, limit)
+    return speed, np.sin(theta) * (speed + following) / 2.0
+
+
+def _pull(s: Segments, rows: Ints, share: Floats) -> Floats:
+    """(K, 3) unit direction of the acceleration at the begin of segments: that of the tangent, on arcs with half the
+    asked speed's centripetal part (`tcCircleStartAccelUnitVector`)."""
+    tangent = _or_x(s.shape.first[rows])
+    radius = np.where(s.blocks.arc[rows], s.shape.radius[rows], 1.0)
+    spoke = s.blocks.xyz[rows] - s.blocks.center[rows]
+    inward = -spoke / np.maximum(np.linalg.norm(spoke, axis=1, keepdims=True), 1e-300)
+    normal = np.where(s.blocks.arc[rows], (0.5 * s.asked[rows]) ** 2 / radius, 0.0)
+    pull = tangent * (s.acceleration * share)[rows][:, None] + inward * normal[:, None]
+    return np.asarray(pull / np.maximum(np.linalg.norm(pull, axis=1, keepdims=True), 1e-300))
+
+
+def _or_x(tangent: Floats) -> Floats:
+    """Directions (K, 3); along X where X, Y, Z stand still, as LinuxCNC has it for a line without length."""
+    return np.where((tangent == 0.0).all(axis=1)[:, None], np.array([1.0, 0.0, 0.0]), tangent)
+
+
+def _put_together(s: Segments, c: Corners, ends: Array, at: Ints, arcs: Blends, blended: Bools, tangent: Bools,
+                  joined: Bools, count: int, cycle: float) -> Row:
+    """Segments and blend arcs as one row."""
+    arc_at, arc = at[blended], np.flatnonzero(blended)
+    length = s.length.copy()
+    length[arc_at] -= arcs.trim[arc, 0]
+    length[arc_at + 1] -= arcs.trim[arc, 1]
+    length = np.maximum(length, NOTHING)
+    load = c.load.copy()
+    load[at[~tangent]] = 0.0
+    load[at] = np.where(tangent, load[at], 0.0)
+    reduce = np.maximum(np.append(load, 0.0), np.concatenate([[0.0], load]))
+    halved = (ends == OVERLAP) | np.concatenate([[False], (ends[:-1] == OVERLAP) & c.straight])
+    share = (1.0 - reduce) * np.where(halved, 0.5, 1.0)
+    most = np.where(np.append(joined, False), clamped(length, clamped(s.length, s.most, cycle), cycle),
+                    clamped(s.length, s.most, cycle))
+    rate, most = _along_arcs(s, s.acceleration * share, most, np.append(joined, False))
+    used = (length[arc_at] < GAP_CYCLES * cycle * arcs.most[arc]) & ~s.blocks.arc[arc_at]
+    used &= ~np.concatenate([[False], halved_before(ends, c)])[arc_at]
+    keep = np.ones(count, dtype=bool)
+    keep[arc_at[used]] = False
+    blend_length = arcs.length[arc] + np.where(used, length[arc_at], 0.0)
+    order = np.argsort(np.concatenate([2 * np.flatnonzero(keep), 2 * arc_at + 1]), kind="stable")
+
+    def both(segment: Array, blend: Array) -> Array:
+        return np.concatenate([segment[keep], blend])[order]
+    kink = np.where(ends == TANGENT, np.append(np.where(c.tangent | _mask(at[tangent], count - 1), c.speed, np.inf), np.inf),
+                    np.inf)
+    here = np.flatnonzero((ends[:-1] == OVERLAP) & joined)
+    overlap = np.zeros(count)
+    overlap[here] = _overlap(s, here, here + 1, length, most, share)[0]
+    fresh = s.fresh.copy()
+    fresh_blend = fresh[arc_at] & used
+    return Row(both(np.arange(count), arc_at), both(length, blend_length), both(s.asked, arcs.asked[arc]),
+               both(most, clamped(blend_length, arcs.most[arc], cycle)),
+               both(rate, TANGENTIAL * arcs.acceleration[arc]), both(ends, np.full(len(arc), TANGENT)),
+               both(kink, np.full(len(arc), np.inf)), both(fresh, fresh_blend),
+               both(s.blocks.rapid, s.blocks.rapid[arc_at]), both(overlap, np.zeros(len(arc))))
+
+
+def halved_before(ends: Array, c: Corners) -> Bools:
+    """(N-1,) where the segment behind shares a parabolic blend that was chosen for its corner."""
+    return np.asarray((ends[:-1] == OVERLAP) & c.straight)
+
+
+def _mask(rows: Ints, count: int) -> Bools:
+    result = np.zeros(count, dtype=bool)
+    result[rows] = True
+    return result
+
+
+def _along_arcs(s: Segments, rate: Floats, most: Floats, finished: Bools) -> tuple[Floats, Floats]:
+    """Rate along arcs and their largest speed: what centripetal acceleration leaves (`pmCircleActualMaxVel`)."""
+    arc = s.blocks.arc
+    if not arc.any():
+        return rate, most
+    radius = np.where(arc, s.shape.radius, 1.0)
+    climb = np.where(arc, s.shape.climb / np.where(arc, s.blocks.sweep, 1.0), 0.0)
+    radius = radius + climb**2 * s.blocks.sweep**2 / radius
+    inward = most**2 / radius
+    with np.errstate(invalid="ignore"):
+        part = np.where(inward > NORMAL_SHARE * rate, TANGENTIAL, np.sqrt(np.maximum(1.0 - (inward / rate) ** 2, 0.0)))
+    part = np.where(finished, part, TANGENTIAL)
+    slower = np.where(arc & finished, np.minimum(most, np.sqrt(NORMAL_SHARE * rate * radius)), most)
+    return np.where(arc, rate * part, rate), slower
+
+
+def _timed(blocks: Blocks, s: Segments, row: Row, settings: Settings) -> Timed:
+    """Speeds by look-ahead, ramps, and everything put on the clock."""
+    count, big = len(row.length), len(row.length) >= KERNEL_FROM
+    through = (row.ends == TANGENT) & ~np.append(row.fresh[1:], True)
+    behind = np.concatenate([[False], through[:-1]])
+    inside = behind & ~np.append(row.fresh[1:], True)
+    most = np.where(inside, clamped(row.length, row.most, LEAST_CYCLES * settings.cycle), row.most)
+    target = np.minimum(row.asked, most)
+    ahead = _ahead(row, settings.depth)
+    loop = compiled(speeds) if big else speeds
+    first, last = loop(row.length, target, most, row.rate, through, row.kink, ahead)
+    gentle = through & ~row.traverse & (2.0 * row.length < RAMP_TIME * (first + np.minimum(last, target))) & (last > 0.0)
+    r = ramps(row.length, first, last, target, row.rate, gentle)
+    stops = ~through
+    seconds = r.seconds + np.where(stops, 0.0, 0.0)
+    overlap = np.where(row.ends == OVERLAP, np.minimum(row.overlap_speed / row.rate, r.down), 0.0)
+    rest = np.where(stops & (overlap == 0.0), settings.stop_cycles * settings.cycle, 0.0)
+    pause, resting = _pauses(blocks, s, row, settings)
+    rest += resting
+    clock = compiled(timeline) if big else timeline
+    begin, end = clock(seconds, overlap, rest, row.fresh)
+    return _by_block(blocks, s, row, r.up + r.down, r.steady, begin, end, pause, stops, first, last, r.peak)
+
+
+def _ahead(row: Row, depth: int) -> Floats:
+    """(M,) speed at the end of each segment from which the next `depth` segments can stop (`tpRunOptimization`)."""
+    gained = np.concatenate([[0.0], np.cumsum(2.0 * row.rate * row.length)])
+    count = len(row.length)
+    k = np.arange(count)
+    stop = np.minimum(k + depth, count - 1)
+    window = gained[stop] - gained[np.minimum(k + 1, count)] + row.rate[stop] * row.length[stop]
+    return np.asarray(np.sqrt(np.maximum(window, 0.0)))
+
+
+def _pauses(blocks: Blocks, s: Segments, row: Row, settings: Settings) -> tuple[Floats, Floats]:
+    """(P,) s of each pause, and (M,) s of rest behind each segment of the row."""
+    p = blocks.pauses
+    rest = np.zeros(len(row.length))
+    if not len(p):
+        return np.zeros(0), rest
+    segment = np.searchsorted(s.block, p.block)
+    position = np.searchsorted(row.owner, np.minimum(segment, len(s) - 1), side="right") - 1
+    seconds = p.seconds + np.where(np.isin(p.cause, (Cause.DWELL,)), 0.0, 0.0)
+    leading = np.append(True, np.diff(p.block) > 0)
+    seconds = seconds + np.where(leading & (p.block >= 0) & (segment < len(s)), settings.command, 0.0)
+    inside = p.block >= 0
+    np.add.at(rest, position[inside], seconds[inside])
+    return seconds, rest
+
+
+def _by_block(blocks: Blocks, s: Segments, row: Row, ramp: Floats, steady: Floats, begin: Floats, end: Floats,
+              pause: Floats, stops: Bools, first: Floats, last: Floats, peak: Floats) -> Timed:
+    """Segments' times shared out to the blocks that they stand for, by length."""
+    count = len(blocks)
+    merged_end = np.zeros(len(s))
+    np.maximum.at(merged_end, row.owner, end)
+    merged_begin = np.full(len(s), np.inf)
+    np.minimum.at(merged_begin, row.owner, begin)
+    missing = ~np.isfinite(merged_begin)
+    merged_begin[missing] = merged_end[missing] = 0.0
+    owner = np.searchsorted(s.block, np.arange(count))
+    own = shape(blocks).length
+    total = summed(own, owner, len(s))
+    part = own / np.where(total[owner] > 0.0, total[owner], 1.0)
+    cumulative = np.cumsum(part) - np.concatenate([[0.0], np.cumsum(np.bincount(owner, weights=part, minlength=len(s)))])[owner]
+    span = merged_end - merged_begin
+    finish = merged_begin[owner] + cumulative * span[owner]
+    start = finish - part * span[owner]
+    loss_first, loss_last = ((peak - v) ** 2 / (2.0 * row.rate * np.maximum(peak, 1e-300)) for v in (first, last))
+    stopped_before = np.concatenate([[True], stops[:-1]])
+    lost_stop = np.where(stopped_before, loss_first, 0.0) + np.where(stops, loss_last, 0.0)
+    lost_corner = np.where(stopped_before, 0.0, loss_first) + np.where(stops, 0.0, loss_last)
+
+    def shared(values: Floats) -> Floats:
+        return summed(values, row.owner, len(s))[owner] * part
+    return Timed(start, finish, shared(ramp), shared(steady), np.zeros(count), _peak(row, peak, len(s))[owner],
+                 shared(lost_stop), shared(lost_corner), pause)
+
+
+def _peak(row: Row, peak: Floats, count: int) -> Floats:
+    result = np.zeros(count)
+    np.maximum.at(result, row.owner, peak)
+    return result

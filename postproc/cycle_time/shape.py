@@ -1,0 +1,90 @@
+"""Lengths, directions and limits along each block."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from postproc.cycle_time.blocks import Axes, Blocks
+from toolpaths.arrays import Bools, Floats
+
+NOTHING = 1e-9
+"""mm or rad below which an axis does not move (LinuxCNC: 1e-8 of its units)"""
+
+
+@dataclass(frozen=True)
+class Shape:
+    """What the geometry of E blocks is.
+
+    Attributes:
+        length (E,): that the feed refers to: of X, Y, Z where any moves, else of U, V, W, else of A, B, C
+        turns (E,): True where an axis other than X, Y, Z moves
+        radius, climb (E,): of arcs: radius in the plane, way along the normal; 0 elsewhere
+        first, last (E, 3): unit tangents in X, Y, Z at both ends; 0 where X, Y, Z stand
+        share (E, A): largest way of each axis per unit of `length` (of an arc: at its worst point)
+    """
+
+    length: Floats
+    turns: Bools
+    radius: Floats
+    climb: Floats
+    first: Floats
+    last: Floats
+    share: Floats
+
+
+def unit(vectors: Floats) -> Floats:
+    """Rows (N, 3) as unit vectors, 0 where there is nothing."""
+    size = np.linalg.norm(vectors, axis=1, keepdims=True)
+    return np.asarray(vectors / np.where(size > 0.0, size, 1.0))
+
+
+def feed_length(step: Floats, axes: Axes) -> Floats:
+    """(E,) length of steps (E, A) that a feed refers to (LinuxCNC `find_straight_length`; NIST RS274/NGC 2.1.2.5)."""
+    result = np.zeros(len(step))
+    for letters in ("ABC", "UVW", "XYZ"):
+        length = np.linalg.norm(step[:, axes.group(letters)], axis=1)
+        result = np.where(length > NOTHING, length, result)
+    return result
+
+
+def shape(blocks: Blocks) -> Shape:
+    """The geometry of every block."""
+    axes, step = blocks.axes, blocks.end - blocks.start
+    step = np.where(np.abs(step) > NOTHING, step, 0.0)
+    xyz = np.where(axes.xyz >= 0, step[:, axes.xyz], 0.0)
+    length, direction = feed_length(step, axes), unit(xyz)
+    others = np.setdiff1d(np.arange(step.shape[1]), axes.xyz)
+    turns = (step[:, others] != 0.0).any(axis=1)
+    radius, climb = np.zeros(len(step)), np.zeros(len(step))
+    first, last = direction, direction.copy()
+    share = np.abs(step)
+    if blocks.arc.any():
+        first = direction.copy()
+        _arcs(blocks, length, radius, climb, first, last, share)
+    return Shape(length, turns, radius, climb, first, last, share / np.where(length > 0.0, length, 1.0)[:, None])
+
+
+def _arcs(blocks: Blocks, length: Floats, radius: Floats, climb: Floats, first: Floats, last: Floats, share: Floats) -> None:
+    """Fill the rows of arcs: circle of the start's radius, helix along the normal."""
+    at, axes = np.flatnonzero(blocks.arc), blocks.axes
+    normal, sweep = blocks.normal[at], blocks.sweep[at]
+    ends = [np.where(axes.xyz >= 0, points[at][:, axes.xyz], 0.0) - blocks.center[at]
+            for points in (blocks.start, blocks.end)]
+    rise = ((ends[1] - ends[0]) * normal).sum(axis=1)
+    spokes = [spoke - (spoke * normal).sum(axis=1)[:, None] * normal for spoke in ends]
+    radius[at] = np.linalg.norm(spokes[0], axis=1)
+    climb[at] = rise
+    length[at] = np.hypot(radius[at] * sweep, rise)
+    for spoke, tangent in zip(spokes, (first, last), strict=True):
+        tangent[at] = unit(np.cross(normal, spoke) * sweep[:, None] + rise[:, None] * normal)
+    plane = np.sqrt(np.maximum(1.0 - normal**2, 0.0)) * (radius[at] * sweep)[:, None] + np.abs(normal * rise[:, None])
+    for k in np.flatnonzero(axes.xyz >= 0):
+        share[at, axes.xyz[k]] = plane[:, k]
+
+
+def axis_limit(share: Floats, limit: Floats) -> Floats:
+    """(E,) largest rate along the length that keeps every axis within its limit (A,); inf where nothing moves."""
+    with np.errstate(divide="ignore"):
+        return np.asarray((limit / share).min(axis=1))
