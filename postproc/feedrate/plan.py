@@ -26,6 +26,8 @@ from toolpaths.arrays import Floats
 Feed = float | Callable[[Floats], Floats]
 """Largest ds/dt: one number, or a function of s (N,) that returns (N,). The tip's feed, if s is the length of its path."""
 ROUNDS = 12
+FITS = 0.9995
+"""Ratio, as a factor on time, from which a strict plan is fast enough at first sight."""
 
 
 @dataclass(frozen=True)
@@ -69,17 +71,16 @@ def plan(path: Path, limits: JointLimits, feed: Feed = np.inf, stops: Sequence[f
     allowed = _as_function(feed, options.override)
     if knots is not None and len(stops):
         raise ValueError("knots are for a motion without stops")
-    pieces, reports = [], []
+    pieces, reports, guess = [], [], []
     for eased in _stretches(path, stops, options.ease):
         sigma = knots if knots is not None else _mesh(eased, limits, allowed, options.knots)
-        grid, report = _solve(Knots(eased, sigma, limits, allowed), options)
-        profile = _profile(grid, report.c)
-        joints = len(limits.velocity)
-        pieces.append(Piece(eased, profile, shares(report.weights, joints, float(profile.times[-1]))))
+        profile, report, slower = _solve(Knots(eased, sigma, limits, allowed), options)
+        pieces.append(Piece(eased, profile, shares(report.weights, len(limits.velocity), float(profile.times[-1]))))
         reports.append(report)
+        guess.append(slower)
     made = Plan(tuple(pieces), limits, allowed, options.step, max(r.iterations for r in reports),
                 max(r.mismatch for r in reports), all(r.solved for r in reports))
-    return _within(made) if options.strict else made
+    return _within(made, np.array(guess)) if options.strict else made
 
 
 def plan_second_order(path: Path, limits: JointLimits, feed: Feed = np.inf, stops: Sequence[float] = (),
@@ -124,16 +125,21 @@ def _stretches(path: Path, stops: Sequence[float], ease: float) -> list[Eased]:
     return [Eased.between(path, first, last, ease) for first, last in pairwise(ends)]
 
 
-def _solve(grid: Knots, options: Options) -> tuple[Knots, Solved]:
-    """One solve; in strict mode again with tightened limits where they are exceeded between the knots."""
+def _solve(grid: Knots, options: Options) -> tuple[Profile, Solved, float]:
+    """One solve; in strict mode again with tightened limits where they are exceeded between the knots.
+
+    Also the factor on time that the last one still needs there, 1 in fast mode.
+    """
     report = solved(grid, options.method)
-    for _ in range(options.passes if options.strict else 0):
-        tight = tightened(grid, _profile(grid, report.c))
-        if tight is None:
+    profile, slower = _profile(grid, report.c), 1.0
+    for left in reversed(range(options.passes + 1 if options.strict else 0)):
+        slower, tight = tightened(grid, profile)
+        if tight is None or not left:
             break
         grid = replace(grid, tight=tight)
         report = solved(grid, options.method)
-    return grid, report
+        profile = _profile(grid, report.c)
+    return profile, report, slower
 
 
 def _profile(grid: Knots, c: Floats) -> Profile:
@@ -148,21 +154,29 @@ def _profile(grid: Knots, c: Floats) -> Profile:
     return Profile(grid.sigma, np.concatenate(parts, axis=1))
 
 
-def _within(made: Plan) -> Plan:
-    """Slow each piece down until nothing is exceeded in the samples that are delivered.
+def _within(made: Plan, guess: Floats) -> Plan:
+    """Slow each piece down until nothing is exceeded in the samples that are delivered, first by `guess`.
 
     All limits are homogeneous in time, so that x/g^2 divides velocity by g, acceleration by g^2 and jerk by g^3.
     Samples of the slower motion fall elsewhere, so it is measured again.
     """
-    factor = np.ones(len(made.pieces))
+    factor = guess
     for turn in range(ROUNDS):
-        factor[:] = 0.0
-        for chunk, own in made.chunks():
-            which = np.minimum(np.searchsorted(made.ends, chunk.t[own], side="right"), len(factor) - 1)
-            np.maximum.at(factor, which, chunk.worst_slowdown(made.limits)[own])
-        if factor.max() <= 1.0 and turn:
-            return made
-        factor = np.maximum(factor, 1.0 if turn else 1e-3) * np.where(factor > 1.0, 1.0 + 1e-7 * 4.0**turn, 1.0)
-        pieces = tuple(piece.slower(g) for piece, g in zip(made.pieces, factor.tolist(), strict=True))
+        pieces = tuple(piece if g == 1.0 else piece.slower(g)
+                       for piece, g in zip(made.pieces, factor.tolist(), strict=True))
         made = replace(made, pieces=pieces)
-    raise ArithmeticError(f"limits still exceeded by {factor.max() - 1.0:.2g} after slowing down {ROUNDS} times")
+        needed = _needed(made)
+        fits = (needed <= 1.0) & (needed > (FITS if turn == 0 else 0.0))
+        if fits.all():
+            return made
+        factor = np.where(fits, 1.0, needed * (1.0 + 1e-6 * 4.0**turn))
+    raise ArithmeticError(f"limits still exceeded by {needed.max() - 1.0:.2g} after slowing down {ROUNDS} times")
+
+
+def _needed(made: Plan) -> Floats:
+    """Factor on the time of each piece that its samples ask for."""
+    needed = np.zeros(len(made.pieces))
+    for chunk, own in made.chunks():
+        which = np.minimum(np.searchsorted(made.ends, chunk.t[own], side="right"), len(needed) - 1)
+        np.maximum.at(needed, which, chunk.worst_slowdown(made.limits)[own])
+    return needed

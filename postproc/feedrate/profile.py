@@ -33,7 +33,7 @@ class Profile:
     @cached_property
     def times(self) -> Floats:
         """Time at the knots (K,): integral of x^-1/2; in closed form where x is linear, as it may then reach 0."""
-        return np.append(0.0, np.cumsum(self._spent(np.arange(len(self.sigma) - 1), np.diff(self.sigma))))
+        return np.append(0.0, np.cumsum(self._spent(self.pieces, np.diff(self.sigma))))
 
     def slower(self, factor: float) -> Profile:
         """The same motion, `factor` times as long: velocities fall by it, accelerations by its square, jerks by its cube."""
@@ -41,45 +41,52 @@ class Profile:
 
     def squared(self, k: Ints, way: Floats) -> tuple[Floats, Floats, Floats]:
         """x, x', x'' at `way` behind knots k."""
-        a, b, c, d = self.pieces[:, k]
-        return (a + way * (b + way * (c + way * d)), b + way * (2.0 * c + 3.0 * d * way), 2.0 * c + 6.0 * d * way)
+        return _cubic(self.pieces[:, k], way)
 
+    @cached_property
     def _linear(self) -> bool:
         return not np.any(self.pieces[2:])
 
-    def _spent(self, k: Ints, way: Floats) -> Floats:
-        """Time from knots k to `way` behind them."""
-        if self._linear():
-            end = np.maximum(self.squared(k, way)[0], 0.0)
-            return np.asarray(2.0 * way / np.maximum(np.sqrt(self.pieces[0, k]) + np.sqrt(end), 1e-300))
-        total = np.zeros(len(k))
+    def _spent(self, pieces: Floats, way: Floats) -> Floats:
+        """Time from the start of pieces (4, N) to `way` behind it."""
+        a, b, c, d = pieces
+        if self._linear:
+            return np.asarray(2.0 * way / np.maximum(np.sqrt(a) + np.sqrt(np.maximum(a + way * b, 0.0)), 1e-300))
+        total = np.zeros(way.shape)
         for node, weight in zip(*_GAUSS, strict=True):
-            total += weight / np.sqrt(self.squared(k, 0.5 * way * (1.0 + node))[0])
+            u = (0.5 + 0.5 * node) * way
+            total += weight / np.sqrt(a + u * (b + u * (c + u * d)))
         return np.asarray(0.5 * way * total)
 
     def at(self, t: Floats) -> Places:
         """Places at times t (N,) within [0, times[-1]]."""
-        times = self.times
-        k = np.clip(np.searchsorted(times, t, side="right") - 1, 0, len(self.sigma) - 2)
-        rest, h = t - times[k], np.diff(self.sigma)[k]
-        if self._linear():
-            way = np.clip(rest * (np.sqrt(self.pieces[0, k]) + 0.25 * self.pieces[1, k] * rest), 0.0, h)
-        else:
-            way = h * rest / (times[k + 1] - times[k])
-            for _ in range(4):
-                way = np.clip(way + (rest - self._spent(k, way)) * np.sqrt(self.squared(k, way)[0]), 0.0, h)
-        return self._places(k, way)
+        k = np.clip(np.searchsorted(self.times, t, side="right") - 1, 0, len(self.sigma) - 2)
+        rest, h, pieces = t - self.times[k], self.sigma[k + 1] - self.sigma[k], self.pieces[:, k]
+        a, b, c, d = pieces
+        # Motion of constant jerk from the knot: exact where x is linear, else the start of Newton's method.
+        speed = np.sqrt(a)
+        way = np.clip(rest * (speed + rest * (0.25 * b + rest * c * speed / 6.0)), 0.0, h)
+        for _ in range(0 if self._linear else 2):
+            x = a + way * (b + way * (c + way * d))
+            way = np.clip(way + (rest - self._spent(pieces, way)) * np.sqrt(x), 0.0, h)
+        return _places(self.sigma[k] + way, *_cubic(pieces, way))
 
     def when(self, sigma: Floats) -> tuple[Floats, Places]:
         """Times (N,) at which places sigma (N,) are passed, and the motion there."""
         k = np.clip(np.searchsorted(self.sigma, sigma, side="right") - 1, 0, len(self.sigma) - 2)
-        way = sigma - self.sigma[k]
-        return self.times[k] + self._spent(k, way), self._places(k, way)
+        way, pieces = sigma - self.sigma[k], self.pieces[:, k]
+        return self.times[k] + self._spent(pieces, way), _places(sigma, *_cubic(pieces, way))
 
-    def _places(self, k: Ints, way: Floats) -> Places:
-        x, x1, x2 = self.squared(k, way)
-        speed = np.sqrt(np.maximum(x, 0.0))
-        return Places(self.sigma[k] + way, speed, 0.5 * x1, 0.5 * x2 * speed)
+
+def _cubic(pieces: Floats, way: Floats) -> tuple[Floats, Floats, Floats]:
+    """x, x', x'' at `way` behind the start of pieces (4, N)."""
+    a, b, c, d = pieces
+    return (a + way * (b + way * (c + way * d)), b + way * (2.0 * c + 3.0 * d * way), 2.0 * c + 6.0 * d * way)
+
+
+def _places(sigma: Floats, x: Floats, x1: Floats, x2: Floats) -> Places:
+    speed = np.sqrt(np.maximum(x, 0.0))
+    return Places(sigma, speed, 0.5 * x1, 0.5 * x2 * speed)
 
 
 def spline_profile(sigma: Floats, basis: Basis, c: Floats) -> Profile:

@@ -18,22 +18,28 @@ BETWEEN = (0.25, 0.5, 0.75)
 CHUNK = 16384
 
 
-def tightened(grid: Knots, profile: Profile) -> Floats | None:
-    """New factors (3, K) on velocity, acceleration and jerk; None where nothing is exceeded by more than ENOUGH."""
-    excess = np.ones((3, len(grid.sigma) - 1))
+def tightened(grid: Knots, profile: Profile) -> tuple[float, Floats | None]:
+    """Factor on time that brings what is seen between the knots to 1; new factors (3, K) on velocity, acceleration, jerk.
+
+    The latter None where nothing is exceeded by more than ENOUGH.
+    """
+    excess = np.empty((3, len(grid.sigma) - 1))
     for first in range(0, excess.shape[1], CHUNK):
         here = np.arange(first, min(first + CHUNK, excess.shape[1]))
-        excess[:, here] = np.max([_ratios(grid, profile, here, share) for share in BETWEEN], axis=0)
-    if excess.max() <= ENOUGH:
-        return None
+        excess[:, here] = _ratios(grid, profile, here)
+    velocity, acceleration, jerk = excess.max(axis=1).tolist()
+    slower = max(velocity, acceleration**0.5, jerk ** (1.0 / 3.0))
+    if max(velocity, acceleration, jerk) <= ENOUGH:
+        return slower, None
     excess = np.maximum(excess, 1.0) ** MORE
     at_knots = np.maximum(np.pad(excess, ((0, 0), (1, 0)), mode="edge"), np.pad(excess, ((0, 0), (0, 1)), mode="edge"))
-    return at_knots if grid.tight is None else grid.tight * at_knots
+    return slower, at_knots if grid.tight is None else grid.tight * at_knots
 
 
-def _ratios(grid: Knots, profile: Profile, k: Ints, share: float) -> Floats:
-    """Velocity (feed included), acceleration and jerk over their limits, (3, N), at `share` of intervals k."""
-    way = share * (grid.sigma[k + 1] - grid.sigma[k])
+def _ratios(grid: Knots, profile: Profile, k: Ints) -> Floats:
+    """Velocity (feed included), acceleration and jerk over their limits, (3, N), the worst BETWEEN the ends of intervals k."""
+    way = ((grid.sigma[k + 1] - grid.sigma[k])[:, None] * BETWEEN).ravel()
+    k = np.repeat(k, len(BETWEEN))
     sigma = grid.sigma[k] + way
     s = grid.eased.parameter(sigma)
     at = grid.eased.chained(sigma, s, grid.eased.path.derivatives(grid.eased.inside(s[0])))
@@ -49,7 +55,7 @@ def _ratios(grid: Knots, profile: Profile, k: Ints, share: float) -> Floats:
         velocity = np.maximum(velocity, known.tilt * speed / limits.tool.tilt_rate)
         acceleration = np.maximum(acceleration, bend / limits.tool.acceleration)
         jerk = np.maximum(jerk, snap / limits.tool.jerk)
-    return np.array([velocity, acceleration, jerk])
+    return np.array([velocity, acceleration, jerk]).reshape(3, -1, len(BETWEEN)).max(axis=2)
 
 
 def _in_time(at: Derivatives, x: tuple[Floats, Floats, Floats]) -> tuple[Floats, Floats, Floats]:
