@@ -7,16 +7,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from machines.geometric_error.names import SPINDLE
+from machines.geometric_error.names import SPINDLE, ErrorName
 from machines.geometric_error.serial_errors import SerialErrors
 from machines.geometric_error.transforms import homogeneous
 from machines.kinematics import columns
+from machines.kinematics.base import Kinematics
 from machines.kinematics.columns import Columns
 from machines.kinematics.frames import reference_x
-from machines.kinematics.serial import Joint
+from machines.kinematics.serial import Joint, Serial
 from toolpaths.arrays import Floats
 
 X, Y, Z = np.eye(3)
+ALONG = 1e-9
+"""sine below which a direction lies along an axis"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,3 +79,17 @@ def displaced(torsor: list[Floats | float], centre: Floats, carried_along: Seque
         cos, sin = np.cos(angle), np.sin(angle)
         turned = [columns.turn(axis, cos, sin, v) for v in turned]
     return [columns.plus(columns.plus(turned[0], place), torsor[:3]), *turned[1:]]
+
+
+def effect(name: ErrorName, kinematics: Kinematics) -> bool:
+    """False where a location error moves nothing: shift of a slide, shift along or turn about an axis's own line."""
+    unit = np.eye(3)[name.part % 3]
+    if name.axis == SPINDLE:
+        along = kinematics.tool_axis if isinstance(kinematics, Serial) else np.array([0.0, 0.0, 1.0])
+        return not name.angular or float(np.linalg.norm(np.cross(unit, along))) > ALONG
+    if isinstance(kinematics, Serial):
+        joint = next(joint for joint in kinematics.chain if joint.name == name.axis)
+        direction, rotary = joint.direction, joint.rotary
+    else:
+        direction, rotary = np.eye(3)["ABC".index(name.axis)], True
+    return (rotary or name.angular) and float(np.linalg.norm(np.cross(unit, direction))) > ALONG

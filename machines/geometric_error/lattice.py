@@ -128,7 +128,7 @@ class ActualByMap(Actual):
         tip, axis, side = self.nominal.place(w)
         error = self.map.at(self.lattice_places(w))
         arm = -self.kinematics.tool_length * axis
-        return (tip - arm + error[:, :3] + spun(arm, error[:, 3:]), spun(axis, error[:, 3:]), spun(side, error[:, 3:]))
+        return (tip + error[:, :3] + (spun(arm, error[:, 3:]) - arm), spun(axis, error[:, 3:]), spun(side, error[:, 3:]))
 
     def sensitivity(self, w: Floats, direction: Floats | None = None) -> Floats:
         """See the base class."""
@@ -173,7 +173,8 @@ def rotation_vector(before: tuple[Floats, Floats], after: tuple[Floats, Floats])
     """Rotation vectors (N, 3) of the small turn that takes (axis, x), each (N, 3), from `before` to `after`."""
     one, two = (np.stack([x, np.cross(axis, x), axis], axis=2) for axis, x in (before, after))
     turn = two @ np.swapaxes(one, 1, 2)
-    sine = 0.5 * np.stack([turn[:, 2, 1] - turn[:, 1, 2], turn[:, 0, 2] - turn[:, 2, 0], turn[:, 1, 0] - turn[:, 0, 1]], axis=1)
+    pairs = ((2, 1), (0, 2), (1, 0))
+    sine = 0.5 * np.stack([turn[:, i, j] - turn[:, j, i] for i, j in pairs], axis=1)
     size = np.linalg.norm(sine, axis=1)
     angle = np.arctan2(size, 0.5 * (np.trace(turn, axis1=1, axis2=2) - 1.0))
     result: Floats = sine * np.where(size > 0.0, angle / np.where(size > 0.0, size, 1.0), 1.0)[:, None]

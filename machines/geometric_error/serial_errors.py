@@ -76,6 +76,11 @@ class SerialErrors:
         return replace(self, components=components,
                        constants=dict(zip(self.constants, parts[-1].tolist(), strict=True)))
 
+    @property
+    def axes(self) -> set[str]:
+        """Letters that any error is of."""
+        return {c.name.axis for c in self.components} | {text[-1] for text in self.constants}
+
     # ---- evaluation ------------------------------------------------------------------------------------------------
 
     def torsors(self, axis: str, x: Floats, direction: Floats | float = 0.0) -> list[Floats | float]:

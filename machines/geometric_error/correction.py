@@ -1,0 +1,191 @@
+"""Commands that put the tool of a machine with errors where the nominal one would have it.
+
+Chord (Newton) iteration on the exact model in the coordinates w of `actual`, with the rates of the nominal machine: errors
+of 1e-4 leave 1e-4 of themselves at each step. The tip is always corrected in full: the three displacements can do it at
+any turn. The axis is corrected by the R turns, along the two principal directions of the axis's rates:
+
+- where a turn moves the axis well, in full;
+- near a pole, where it moves it ever less: the share (s / POLE)^2 of the error at rate s, and more only where less would
+  leave the axis tolerance, by no more than MOST_TURN. So the rotary motion stays bounded and fades at the pole, where the
+  tip alone is corrected;
+- directions that the machine does not have (3 and 4 axes, tilt of a Delta) are left: they are the residual.
+
+Points of one group (3+2, cycles, arcs) get one and the same turn, that of their mean error.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from machines.geometric_error.actual import Actual
+from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.units import DEG
+
+POLE = 0.0175
+"""axis rates (rad per rad, sine of the angle from a rotary axis) below which the axis is corrected in part; 1 degree"""
+MOST_TURN = 0.1
+"""rad that a rotary axis is moved at most near a pole"""
+AXIS_TOLERANCE = 0.05 * DEG
+"""rad, unless another is given"""
+BLIND = 1e-9
+"""axis rate below which a turn does not move the axis"""
+CLOSED = 1e-7
+"""mm and rad: a step that small is the last; it leaves less than a hundredth of itself"""
+STEPS = 8
+BEYOND = 1e-3
+"""mm and rad by which corrected joints may pass the measured range that the nominal ones keep"""
+
+
+@dataclass(frozen=True)
+class Corrected:
+    """Corrected commands and what they do on the machine with errors.
+
+    Attributes:
+        q: (N, J) joints, NaN where there is no correction (out of reach or of the measured range)
+        tip_before, axis_before: (N,) mm and rad, deviation of the nominal joints
+        tip_after, axis_after: (N,) mm and rad, what is left: the residual field
+        tip_residual, axis_residual: (N, 3) actual less wanted, after
+        partial: (N,) True near a pole, where the axis is corrected in part
+        unmeasured: (N, J) joints outside the measured range
+        steps: iterations taken
+    """
+
+    q: Floats
+    tip_before: Floats
+    axis_before: Floats
+    tip_after: Floats
+    axis_after: Floats
+    tip_residual: Floats
+    axis_residual: Floats
+    partial: Bools
+    unmeasured: Bools
+    steps: int
+
+
+def correct(actual: Actual, q: Floats, tip: Floats, axis: Floats, *, group: Ints | None = None,
+            direction: Floats | None = None, axis_tolerance: float = AXIS_TOLERANCE, turn: bool = True,
+            beyond: bool = False) -> Corrected:
+    """Joints near the nominal q (N, J) at which the machine with errors has its tool at tip and axis (N, 3).
+
+    Args:
+        q: nominal joints of those poses, branch and winding as wanted
+        group: (N,) points with the same number >= 0 get the same turn; -1 turns freely
+        direction: (N, J) sign of each joint's last motion, see `approach`
+        axis_tolerance: rad, what the axis may keep near a pole
+        turn: False leaves the rotary axes as they are
+        beyond: True corrects outside the measured range too, with the error at its end
+    """
+    nominal = actual.coordinates(q, np.concatenate([tip, axis], axis=1))
+    unmeasured = actual.outside(nominal)
+    w = nominal if beyond else np.where(np.any(unmeasured, axis=1, keepdims=True), np.nan, nominal)
+    placed, steps = actual.place(w, direction), 0
+    before = _deviation(placed[0], placed[1], tip, axis)
+    rates = actual.rates(nominal)
+    turns = _Turns(rates[:, 3:, 3:], w, group) if turn and actual.turns else None
+    while steps < STEPS:
+        turned = np.zeros((len(q), actual.turns)) if turns is None else turns.to(axis - placed[1])
+        if turns is not None and steps == 0:
+            turned += turns.near_pole(axis - placed[1], axis_tolerance)
+        gap = tip - placed[0] - np.einsum("nij,nj->ni", rates[:, :3, 3:], turned)
+        step = np.concatenate([_displacements(rates[:, :3, :3], gap), turned], axis=1)
+        w, steps = w + step, steps + 1
+        placed = actual.place(w, direction)
+        if not np.nanmax(np.abs(step), initial=0.0) > CLOSED:
+            break
+    partial = np.zeros(len(q), dtype=np.bool_) if turns is None else np.asarray(np.any(turns.weak, axis=1))
+    after = _deviation(placed[0], placed[1], tip, axis)
+    return Corrected(_wound(actual, w, q), *before, *after, placed[0] - tip, placed[1] - axis, partial, unmeasured, steps)
+
+
+def _wound(actual: Actual, w: Floats, q: Floats) -> Floats:
+    """Joints of w; every joint of a row is NaN where one is."""
+    joints = actual.joints(w)
+    result: Floats = np.where(np.isnan(joints).any(axis=1, keepdims=True) | np.isnan(w).any(axis=1, keepdims=True), np.nan,
+                              joints)
+    return result
+
+
+def _deviation(tip: Floats, axis: Floats, wanted_tip: Floats, wanted_axis: Floats) -> tuple[Floats, Floats]:
+    """(mm, rad), each (N,); the angle from the chord, which keeps its digits."""
+    chord = np.linalg.norm(axis - wanted_axis, axis=1)
+    return np.linalg.norm(tip - wanted_tip, axis=1), 2.0 * np.arcsin(np.minimum(0.5 * chord, 1.0))
+
+
+def _displacements(rates: Floats, gap: Floats) -> Floats:
+    """x of rates (N, 3, 3) x = gap (N, 3), Cramer's rule; NaN where the slides depend."""
+    a, b, c = rates[:, :, 0], rates[:, :, 1], rates[:, :, 2]
+    sides = np.cross(b, c), np.cross(c, a), np.cross(a, b)
+    volume = np.einsum("ni,ni->n", a, sides[0])
+    volume = np.where(np.abs(volume) > BLIND, volume, np.nan)
+    result: Floats = np.stack([np.einsum("ni,ni->n", gap, side) for side in sides], axis=1) / volume[:, None]
+    return result
+
+
+class _Turns:
+    """The turns (N, R) that move the axis by given differences: principal directions of the axis's rates."""
+
+    def __init__(self, rates: Floats, live: Floats, group: Ints | None) -> None:
+        self.rates = rates
+        normal = np.einsum("nik,nil->nkl", rates, rates)
+        self.member = None if group is None else _members(group)
+        self.weight = np.where(np.isnan(live).any(axis=1), 0.0, 1.0)
+        square, self.vectors = _principal(self._mean(normal))
+        self.rate = np.sqrt(np.maximum(square, 0.0))
+        self.weak: Bools = np.asarray(self.rate < POLE)
+
+    def _mean(self, values: Floats) -> Floats:
+        """Means over the groups, spread back to their points."""
+        if self.member is None:
+            return values
+        flat = np.nan_to_num(values.reshape(len(values), -1)) * self.weight[:, None]
+        count = np.bincount(self.member, self.weight)
+        sums = np.stack([np.bincount(self.member, column) for column in flat.T], axis=1)
+        means = sums / np.where(count > 0.0, count, 1.0)[:, None]
+        result: Floats = means[self.member].reshape(values.shape)
+        return result
+
+    def _parts(self, difference: Floats) -> Floats:
+        """A^T e along the principal directions (N, R)."""
+        right = self._mean(np.einsum("nik,ni->nk", self.rates, difference))
+        result: Floats = np.einsum("nkr,nk->nr", self.vectors, right)
+        return result
+
+    def to(self, difference: Floats) -> Floats:
+        """The turns (N, R) that change the axis by `difference` (N, 3), as far as strong directions do."""
+        return self._turns(np.where(self.weak, 0.0, self._parts(difference) / np.where(self.weak, 1.0, self.rate) ** 2))
+
+    def near_pole(self, difference: Floats, tolerance: float) -> Floats:
+        """The turns (N, R) along the weak directions: see the head of this file."""
+        rate = np.where(self.rate > BLIND, self.rate, np.inf)
+        error = np.where(self.weak, self._parts(difference) / rate, 0.0)
+        size = np.where(error != 0.0, np.abs(error), 1.0)
+        gain = np.maximum((self.rate / POLE) ** 2, 1.0 - tolerance / size)
+        return self._turns(error / rate * np.minimum(gain, MOST_TURN * rate / size))
+
+    def _turns(self, along: Floats) -> Floats:
+        """(N, R) from amounts (N, R) along the principal directions."""
+        result: Floats = np.einsum("nkr,nr->nk", self.vectors, along)
+        return result
+
+
+def _principal(normal: Floats) -> tuple[Floats, Floats]:
+    """Eigenvalues (N, R) and vectors (N, R, R) of symmetric matrices (N, R, R), R = 1 or 2, in closed form."""
+    if normal.shape[1] == 1:
+        return normal[:, :, 0], np.ones_like(normal)
+    a, b, c = normal[:, 0, 0], normal[:, 0, 1], normal[:, 1, 1]
+    angle = 0.5 * np.arctan2(2.0 * b, a - c)
+    cos, sin = np.cos(angle), np.sin(angle)
+    large, apart = 0.5 * (a + c), np.hypot(0.5 * (a - c), b)
+    small = np.maximum(a * c - b * b, 0.0) / np.where(large + apart > 0.0, large + apart, 1.0)
+    return (np.stack([large + apart, small], axis=1),
+            np.stack([np.stack([cos, sin], axis=1), np.stack([-sin, cos], axis=1)], axis=2))
+
+
+def _members(group: Ints) -> Ints:
+    """Group numbers (N,) without gaps; every -1 becomes a group of its own."""
+    alone = group < 0
+    own = np.where(alone, np.arange(len(group)) + (group.max(initial=0) + 1), group)
+    result: Ints = np.unique(own, return_inverse=True)[1].astype(np.int64)
+    return result

@@ -1,0 +1,147 @@
+"""The error model file: what each key may hold.
+
+Lengths of errors are in `length_unit`, angles in `angle_unit`; positions (points, ranges, periods) in mm and degrees. All
+errors are actual less commanded, of the tool's side relative to the part's side, along and about x, y, z of the machine.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from machines.geometric_error.names import parse
+from machines.models import Positive, Vector
+from machines.slider_models import Span
+from machines.user_file import UserModel
+
+Rows = tuple[Vector, ...]
+
+
+class CurveModel(UserModel):
+    """`[components.NAME]`: one of `table`, `polynomial`, or `mean` / `cosine` / `sine`."""
+
+    table: str | None = None
+    """CSV file beside this one: a column of positions named as the axis, e.g. X [mm], and one of values named as the
+    component, EXX [um]; or two for both ways of approach, EXX+ and EXX-"""
+    interpolation: Literal["linear", "spline"] = "linear"
+    """between the rows of the table"""
+    repeats: Positive | None = None
+    """table or series: mm or degrees after which it repeats; series of a rotary axis: 360 without it"""
+    polynomial: tuple[float, ...] = ()
+    """coefficients of ((position - origin) / scale)^0, ^1, ..."""
+    mean: float | None = None
+    """series: constant part"""
+    cosine: tuple[float, ...] = ()
+    """series: amplitudes of cos k phase, k = 1, 2, ...; phase is 0 at `origin`"""
+    sine: tuple[float, ...] = ()
+    """series: amplitudes of sin k phase"""
+    origin: float = 0.0
+    """mm or degrees"""
+    scale: Positive = 1.0
+    """polynomial: mm or degrees"""
+    range: Span | None = None
+    """positions that were measured, mm or degrees; a table has its own, a series of a rotary axis needs none"""
+    sign: Literal[1, -1] = 1
+    """-1 where the numbers say how the part moves relative to the tool"""
+
+    @property
+    def kind(self) -> str:
+        """table, polynomial or series."""
+        return "table" if self.table is not None else "polynomial" if self.polynomial else "series"
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> CurveModel:
+        given = [self.table is not None, bool(self.polynomial), self.mean is not None or bool(self.cosine or self.sine)]
+        if sum(given) != 1:
+            raise ValueError("give one of table, polynomial, or mean / cosine / sine")
+        if self.kind == "polynomial" and self.range is None:
+            raise ValueError("a polynomial needs range = [lower, upper], the positions it was measured at")
+        if len(self.cosine) != len(self.sine) and self.cosine and self.sine:
+            raise ValueError(f"{len(self.cosine)} cosines and {len(self.sine)} sines; give as many of each")
+        return self
+
+
+class ReferenceModel(UserModel):
+    """`[reference.LETTER]`: what the turns of an axis act about."""
+
+    point: Vector | None = None
+    """mm in machine coordinates at zero; for slides it travels along. Default: machine origin; point of a rotary axis"""
+    frame: Literal["fixed", "moving"] = "fixed"
+    """rotary axes: directions of the errors before the axis turns (ISO 230-7), or turning with it"""
+
+
+class LegModel(UserModel):
+    """`[legs.LETTER]` of a parallel machine: dimensional errors of a slide and its rods (Company 2000, annex E)."""
+
+    rail: Vector = (0.0, 0.0, 0.0)
+    """place of the rail's point, machine frame"""
+    guide: Vector = (0.0, 0.0, 0.0)
+    """turns of the slide about x, y, z of the machine frame"""
+    carriage: Rows = ()
+    """per rod: joint on the carriage, guide frame (z along the slide, x from the rail to the joint)"""
+    platform: Rows = ()
+    """per rod: joint on the platform, platform frame"""
+    length: tuple[float, ...] = ()
+    """per rod"""
+
+
+class MapModel(UserModel):
+    """`[map]`: an error map."""
+
+    table: str
+    """CSV file: coordinates X [mm] ... C [deg] of axes, or x y z of the gauge point; dx dy dz, and rx ry rz if measured"""
+
+
+class CovarianceModel(UserModel):
+    """`[covariance]`: of the parameters, by their names as `postproc` prints them."""
+
+    table: str
+    """CSV file: first row and first column the parameters, in the units of this file; square"""
+
+
+class ErrorFileModel(UserModel):
+    """An error model file."""
+
+    description: str = ""
+    """one line"""
+    machine: str = ""
+    """machine that it was measured on; another one is then refused"""
+    corrected_by: Literal["post", "control"] = "post"
+    """who corrects: the post-processor, or the control with tables of its own; never both"""
+    length_unit: Literal["um", "mm"] = "um"
+    """of the numbers in this file; CSV tables have units in their headers"""
+    angle_unit: Literal["arcsec", "urad", "deg"] = "arcsec"
+    """of the numbers in this file"""
+    components: dict[str, CurveModel] = Field(default_factory=dict)
+    """component errors by ISO 230-1 name, EXX, EYX, ... ECC"""
+    location: dict[str, float] = Field(default_factory=dict)
+    """location errors: EC0Y, EX0C, ... and of the spindle EX0S, EA0S, ..."""
+    reference: dict[str, ReferenceModel] = Field(default_factory=dict)
+    """by axis letter"""
+    legs: dict[str, LegModel] = Field(default_factory=dict)
+    """parallel machines, by axis letter"""
+    map: MapModel | None = None
+    """instead of all others"""
+    sigma: dict[str, Annotated[float, Field(ge=0)]] = Field(default_factory=dict)
+    """standard deviation of all parameters whose names begin with this; they count as independent"""
+    covariance: CovarianceModel | None = None
+    """instead of sigma"""
+
+    @model_validator(mode="after")
+    def _fits(self) -> ErrorFileModel:
+        if self.map is not None and (self.components or self.location or self.legs):
+            raise ValueError("[map] stands alone; take out components, location and legs")
+        for name in self.components:
+            _named(name, "components", location=False)
+        for name in self.location:
+            _named(name, "location", location=True)
+        return self
+
+
+def _named(name: str, table: str, location: bool) -> None:
+    parts = parse(name)
+    if parts is None or parts.location != location or (parts.axis == "S" and not location):
+        wanted = "E + direction X Y Z A B C + 0 + axis or S, e.g. EC0Y" if location else \
+            "E + direction X Y Z A B C + axis, e.g. EXX"
+        raise ValueError(f"[{table}] {name!r} is no ISO 230-1 name; write {wanted}")

@@ -1,0 +1,248 @@
+"""From an error model file (TOML with CSV tables beside it) to an ErrorModel in mm and rad, or what is wrong with it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from machines.geometric_error.axis_motion import effect
+from machines.geometric_error.covariance import covariance_of
+from machines.geometric_error.csv_table import ANGLES, LENGTHS, UNITS, CsvTable, read_csv
+from machines.geometric_error.curves import EVERYWHERE, Curve, Fourier, Polynomial, Table
+from machines.geometric_error.file_models import CurveModel, ErrorFileModel
+from machines.geometric_error.lattice import ErrorMap
+from machines.geometric_error.lattice_file import map_from_csv
+from machines.geometric_error.model import ErrorModel
+from machines.geometric_error.names import ErrorName, parse
+from machines.geometric_error.rods import RodErrors, rod_frame, rod_names
+from machines.geometric_error.serial_errors import Component, SerialErrors
+from machines.kinematics.h4_linear import H4Linear
+from machines.kinematics.linear_delta import LinearDelta
+from machines.kinematics.serial import Serial
+from machines.machine import Machine
+from machines.user_file import UserFile, nearest, read_toml, schema, validate
+from toolpaths.arrays import Floats, Ints
+from toolpaths.diagnostics import Diagnostic, has_errors, require
+from toolpaths.units import DEG
+
+KIND = "error model"
+ROTARY = "ABC"
+CLOSES = 1e-6
+"""share of a period, and part of a unit, that counts as nothing"""
+
+
+def load(source: str | Path, machine: Machine) -> ErrorModel:
+    """The error model of a file.
+
+    Raises:
+        DiagnosticError: where the file has errors or is not for this machine; carries all of them.
+    """
+    model, diagnostics = load_checked(source, machine)
+    require(diagnostics)
+    assert model is not None
+    return model
+
+
+def load_checked(source: str | Path, machine: Machine) -> tuple[ErrorModel | None, list[Diagnostic]]:
+    """The error model of a file, or None and every fault of it and of its tables."""
+    file, diagnostics = read_toml(source, None, KIND)
+    if file is None:
+        return None, diagnostics
+    checked, diagnostics = validate(file, ErrorFileModel)
+    if checked is None:
+        return None, diagnostics
+    return _Loader(file, checked, machine).model()
+
+
+def error_model_schema() -> dict[str, object]:
+    """The JSON schema of an error model file."""
+    return schema(ErrorFileModel)
+
+
+class _Loader:
+    """One file being made a model; collects what is wrong."""
+
+    def __init__(self, file: UserFile, checked: ErrorFileModel, machine: Machine) -> None:
+        self.file, self.checked, self.machine = file, checked, machine
+        self.found: list[Diagnostic] = []
+        self.tables: dict[str, CsvTable | None] = {}
+        self.length, self.angle = UNITS[checked.length_unit], UNITS[checked.angle_unit]
+
+    def model(self) -> tuple[ErrorModel | None, list[Diagnostic]]:
+        """The model, or None and the faults."""
+        self._check_machine()
+        axes, rods, error_map = self._axes(), self._rods(), self._map()
+        if has_errors(self.found):
+            return None, self.found
+        model = ErrorModel(axes, rods, error_map, None, self.checked.corrected_by, self.file.name, self.checked.machine)
+        try:
+            model.on(self.machine.kinematics)
+        except ValueError as fault:
+            self._problem("error-model.machine", (), str(fault), f"this machine is {self.machine.name}")
+            return None, self.found
+        self._check_effects()
+        model, faults = covariance_of(model, self.file, self.checked)
+        self.found += faults
+        return (None if has_errors(self.found) else model), self.found
+
+    def _problem(self, code: str, path: tuple[str | int, ...], message: str, hint: str = "") -> None:
+        self.found.append(self.file.problem(code, path, message, hint))
+
+    def _check_machine(self) -> None:
+        wanted = self.checked.machine
+        if wanted and wanted != self.machine.name:
+            self._problem("error-model.machine", ("machine",), f"the model was made for machine {wanted!r}, this is "
+                          f"{self.machine.name!r}", "take the right file, or the key out where the machine is a copy")
+
+    # ---- axes ------------------------------------------------------------------------------------------------------
+
+    def _axes(self) -> SerialErrors:
+        components = tuple(Component(name, curve) for text, given in self.checked.components.items()
+                           if (name := parse(text)) and (curve := self._curve(name, given)) is not None)
+        constants = {text: value * self._unit(parse(text)) for text, value in self.checked.location.items()}
+        reference = {k: np.array(v.point) for k, v in self.checked.reference.items() if v.point is not None}
+        for letter, given in self.checked.reference.items():
+            if letter not in self.machine.axis_names:
+                self._problem("error-model.axis", ("reference", letter), f"{self.machine.name} has no axis {letter!r}",
+                              nearest(letter, self.machine.axis_names))
+            elif letter not in ROTARY and "frame" in given.model_fields_set:
+                self._problem("error-model.axis", ("reference", letter, "frame"), f"{letter} is a slide, its frame does "
+                              "not turn", "take frame out")
+        return SerialErrors(components, constants, reference, {k: v.frame for k, v in self.checked.reference.items()})
+
+    def _unit(self, name: ErrorName | None) -> float:
+        return self.angle if name is not None and name.angular else self.length
+
+    def _curve(self, name: ErrorName, given: CurveModel) -> Curve | None:
+        position, unit = (DEG if name.axis in ROTARY else 1.0), self._unit(name) * given.sign
+        span = EVERYWHERE if given.range is None else (given.range[0] * position, given.range[1] * position)
+        if given.kind == "table":
+            return self._table(name, given, position)
+        if given.kind == "polynomial":
+            return Polynomial(np.array(given.polynomial) * unit, span, given.origin * position, given.scale * position)
+        if name.axis not in ROTARY and (given.repeats is None or given.range is None):
+            self._problem("error-model.series", ("components", str(name)), f"a series of slide {name.axis} needs repeats "
+                          "and range", "write repeats = pitch in mm and range = [lower, upper]")
+            return None
+        count = max(len(given.cosine), len(given.sine))
+        waves = [np.array(part or (0.0,) * count) for part in (given.cosine, given.sine)]
+        period = 2.0 * np.pi if given.repeats is None else given.repeats * position
+        return Fourier(np.concatenate([[given.mean or 0.0], *waves]) * unit, period, given.origin * position, span)
+
+    def _table(self, name: ErrorName, given: CurveModel, position: float) -> Curve | None:
+        path = ("components", str(name), "table")
+        table = self._csv(str(given.table), path)
+        if table is None:
+            return None
+        columns = self._columns(name, table, path)
+        if not columns or not self._ascending(table, name.axis, path):
+            return None
+        x, values = table.columns[name.axis], [table.columns[c] * given.sign for c in columns]
+        period = 0.0 if given.repeats is None else given.repeats * position
+        if period:
+            fault = _period_fault(x / position, values, period / position, self._unit(name))
+            if fault:
+                self._problem("error-model.period", path, *fault)
+                return None
+            inside = x < x[0] + period * (1.0 - CLOSES)
+            x, values = x[inside], [v[inside] for v in values]
+        if given.interpolation == "spline" and len(x) < 4:
+            self._problem("error-model.spline", path, f"a spline needs 4 rows, the table has {len(x)}", "write linear")
+            return None
+        return Table(x, np.concatenate(values), given.interpolation, len(values) == 2, period)
+
+    def _columns(self, name: ErrorName, table: CsvTable, path: tuple[str, ...]) -> list[str]:
+        both = [f"{name}+", f"{name}-"]
+        wanted = both if both[0] in table.columns else [str(name)]
+        for column in (name.axis, *wanted):
+            if column not in table.columns:
+                self._problem("error-model.column", path, f"{Path(table.file).name} has no column {column!r}",
+                              "it has " + ", ".join(table.columns))
+                return []
+            angular = (column == name.axis and name.axis in ROTARY) or (column != name.axis and name.angular)
+            known = ANGLES if angular else LENGTHS
+            if table.unit[column] not in known:
+                self._problem("error-model.unit", path, f"column {column!r} of {Path(table.file).name} has unit "
+                              f"{table.unit[column]!r}", f"write {column} [unit] with one of " + ", ".join(known))
+                return []
+        return wanted
+
+    def _ascending(self, table: CsvTable, column: str, path: tuple[str, ...]) -> bool:
+        down = np.flatnonzero(np.diff(table.columns[column]) <= 0.0)
+        if len(down):
+            line = table.lines[int(down[0]) + 1]
+            self._problem("error-model.order", path, f"{Path(table.file).name}, line {line}: positions of {column} do not "
+                          "ascend", "sort the rows, each position once")
+        return not len(down)
+
+    def _csv(self, name: str, path: tuple[str, ...]) -> CsvTable | None:
+        if name not in self.tables:
+            origin = self.file.origin(path)
+            self.tables[name], found = read_csv(Path(origin.file).parent / name, (origin.file, origin.line))
+            self.found += found
+        return self.tables[name]
+
+    def _check_effects(self) -> None:
+        """Location errors that move nothing: a shift of a slide, a turn about an axis of its own."""
+        for text in self.checked.location:
+            name = parse(text)
+            if name is not None and not effect(name, self.machine.kinematics):
+                self._problem("error-model.no-effect", ("location", text), f"{text} moves nothing: it shifts or turns the "
+                              "axis along itself", "a zero error belongs into the component error of that direction")
+
+    # ---- parallel machines, maps -----------------------------------------------------------------------------------
+
+    def _rods(self) -> RodErrors | None:
+        kinematics = self.machine.kinematics
+        if isinstance(kinematics, Serial) or not isinstance(kinematics, LinearDelta | H4Linear):
+            for letter in self.checked.legs:
+                self._problem("error-model.legs", ("legs", letter), f"{self.machine.name} has no legs", "take [legs] out")
+            return None
+        slides = kinematics.axis_names[: len(kinematics.legs.points)]
+        frame = rod_frame(kinematics)
+        zero = RodErrors.none(slides, rod_names(frame, slides))
+        parts = {what: np.array(getattr(zero, what)) for what in ("rail", "guide", "carriage", "platform", "length")}
+        for letter, given in self.checked.legs.items():
+            if letter not in slides:
+                self._problem("error-model.legs", ("legs", letter), f"{self.machine.name} has no leg {letter!r}",
+                              "its legs are " + ", ".join(slides))
+                continue
+            leg = slides.index(letter)
+            mine = np.flatnonzero(frame.leg == leg)
+            parts["rail"][leg] = np.multiply(given.rail, self.length)
+            parts["guide"][leg] = np.multiply(given.guide, self.angle)
+            for what in ("carriage", "platform", "length"):
+                self._per_rod(letter, what, getattr(given, what), parts[what], mine)
+        return RodErrors(**parts, legs=slides, rods=zero.rods)
+
+    def _per_rod(self, letter: str, what: str, given: tuple[object, ...], into: Floats, rods: Ints) -> None:
+        if given and len(given) != len(rods):
+            self._problem("error-model.legs", ("legs", letter, what), f"{len(given)} entries for {len(rods)} rods",
+                          "write one per rod, in the order of the machine file")
+        elif given:
+            into[rods] = np.array(given) * self.length
+
+    def _map(self) -> ErrorMap | None:
+        if self.checked.map is None:
+            return None
+        table = self._csv(self.checked.map.table, ("map", "table"))
+        if table is None:
+            return None
+        result, found = map_from_csv(table)
+        self.found += found
+        return result
+
+
+
+
+def _period_fault(x: Floats, values: list[Floats], period: float, unit: float) -> tuple[str, str] | None:
+    """What keeps a table at x (file's units) from repeating: (message, hint)."""
+    span = float(x[-1] - x[0])
+    if span > period * (1.0 + CLOSES):
+        return f"the table spans {span:g}, more than its period {period:g}", "give one period"
+    apart = max(abs(float(v[0] - v[-1])) for v in values) / unit
+    if span > period * (1.0 - CLOSES) and apart > CLOSES:
+        return (f"first and last row are one place, but their values differ by {apart:.6g}",
+                "close the table: write the same values in both")
+    return None

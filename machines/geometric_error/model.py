@@ -1,0 +1,157 @@
+"""The error model of a machine: its parameters, what is known of their doubt, and the machine that they make."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Literal, Self
+
+import numpy as np
+
+from machines.geometric_error.actual import Actual
+from machines.geometric_error.actual_rods import ActualDelta, ActualH4
+from machines.geometric_error.actual_serial import ActualSerial
+from machines.geometric_error.lattice import ActualByMap, ErrorMap
+from machines.geometric_error.rods import RodErrors, rod_frame, rod_names
+from machines.geometric_error.serial_errors import SerialErrors
+from machines.kinematics.base import Kinematics
+from machines.kinematics.h4_linear import H4Linear
+from machines.kinematics.linear_delta import LinearDelta
+from machines.kinematics.serial import Serial
+from toolpaths.arrays import Floats, frozen
+
+Place = Literal["post", "control"]
+BLOCK = 2048
+"""points at a time where a matrix per point and parameter is needed"""
+
+
+@dataclass(frozen=True, eq=False)
+class ErrorModel:
+    """Errors of one machine. Zero parameters give exactly the nominal machine.
+
+    Attributes:
+        axes: errors of axes and spindle
+        rods: dimensions of a parallel machine, where it is one
+        map: error map; then `axes` and `rods` are empty
+        covariance: (P, P) of `values`, mm and rad; None where nothing is known
+        corrected_by: who corrects, the post-processor or the control; never both
+        name, machine: of the file, and the machine it was made for ("" any)
+    """
+
+    axes: SerialErrors = field(default_factory=SerialErrors)
+    rods: RodErrors | None = None
+    map: ErrorMap | None = None
+    covariance: Floats | None = None
+    corrected_by: Place = "post"
+    name: str = ""
+    machine: str = ""
+
+    def __post_init__(self) -> None:
+        if self.covariance is not None:
+            p = len(self.names)
+            object.__setattr__(self, "covariance", frozen(self.covariance, np.float64, (p, p), "ErrorModel.covariance"))
+
+    @property
+    def names(self) -> list[str]:
+        """P parameters, in the order that `Actual.sensitivity` has them."""
+        if self.map is not None:
+            return self.map.names
+        return ([] if self.rods is None else self.rods.names) + self.axes.names
+
+    @property
+    def values(self) -> Floats:
+        """(P,) mm and rad"""
+        if self.map is not None:
+            return self.map.values
+        return np.concatenate([[] if self.rods is None else self.rods.values, self.axes.values])
+
+    def with_values(self, values: Floats) -> Self:
+        """The same model with other parameters (P,); the covariance stays."""
+        if self.map is not None:
+            return replace(self, map=self.map.with_values(values))
+        if self.rods is None:
+            return replace(self, axes=self.axes.with_values(values))
+        split = len(self.rods.values)
+        return replace(self, rods=self.rods.with_values(values[:split]), axes=self.axes.with_values(values[split:]))
+
+    def zero(self) -> Self:
+        """The same parameters, all 0."""
+        return self.with_values(np.zeros(len(self.names)))
+
+    def on(self, kinematics: Kinematics) -> Actual:
+        """The machine with these errors, at the tip of the kinematics' tool.
+
+        Raises:
+            ValueError: where the model is not one for this kind of machine; the message says why.
+        """
+        nominal = _actual(kinematics, self.axes, self.rods)
+        if self.map is None:
+            return nominal
+        unknown = [x for x in self.map.letters if x not in (*kinematics.axis_names, "x", "y", "z")]
+        if unknown:
+            raise ValueError(f"the map's coordinate {unknown[0]!r} is no axis of this machine; it has "
+                             f"{', '.join(kinematics.axis_names)}, and x y z of the gauge point")
+        return ActualByMap(nominal, self.map)
+
+
+def _actual(kinematics: Kinematics, axes: SerialErrors, rods: RodErrors | None) -> Actual:
+    _check_axes(kinematics, axes)
+    if isinstance(kinematics, Serial):
+        if rods is not None:
+            raise ValueError("the model has dimensions of legs, this machine has none")
+        return ActualSerial(kinematics, axes)
+    if not isinstance(kinematics, LinearDelta | H4Linear):
+        raise ValueError(f"errors of {type(kinematics).__name__} machines cannot be modelled")
+    slides = kinematics.axis_names[: len(kinematics.legs.points)]
+    own = rod_names(rod_frame(kinematics), slides)
+    rods = RodErrors.none(slides, own) if rods is None else rods
+    if rods.legs != slides or rods.rods != own:
+        raise ValueError(f"the model's legs are {', '.join(rods.legs)}, those of this machine {', '.join(slides)}")
+    if isinstance(kinematics, LinearDelta):
+        return ActualDelta(rods, axes, kinematics=kinematics)
+    return ActualH4(rods, axes, kinematics=kinematics)
+
+
+def _check_axes(kinematics: Kinematics, axes: SerialErrors) -> None:
+    serial = isinstance(kinematics, Serial)
+    turning = [name for name, rotary in zip(kinematics.axis_names, kinematics.rotary, strict=True) if rotary]
+    known = list(kinematics.axis_names) if serial else turning
+    for letter in sorted(axes.axes - {*known, "S"}):
+        kind = "axis" if serial else "rotary axis"
+        raise ValueError(f"the model has errors of {letter}, which is no {kind} of this machine; "
+                         f"it has {', '.join(known) or 'none'}")
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """Standard deviations that the covariance of a model gives at places of a path.
+
+    Attributes:
+        tip: (N, 3) mm along x, y, z of the table frame
+        tip_worst: (N,) mm in the direction of most doubt
+        axis: (N,) rad of the tool axis, in the direction of most doubt
+    """
+
+    tip: Floats
+    tip_worst: Floats
+    axis: Floats
+
+
+def doubt(model: ErrorModel, actual: Actual, w: Floats, direction: Floats | None = None) -> Doubt:
+    """Predicted doubt (one standard deviation) of tip and axis at w (N, 3 + R): J Sigma J^T, first order.
+
+    Raises:
+        ValueError: where the model has no covariance.
+    """
+    if model.covariance is None:
+        raise ValueError("the error model has no covariance")
+    tip, worst, axis = np.empty((len(w), 3)), np.empty(len(w)), np.empty(len(w))
+    for first in range(0, len(w), BLOCK):
+        part = slice(first, first + BLOCK)
+        rows = actual.sensitivity(w[part], None if direction is None else direction[part])
+        spread = rows @ model.covariance @ np.swapaxes(rows, 1, 2)
+        tip[part] = np.sqrt(np.diagonal(spread[:, :3, :3], axis1=1, axis2=2))
+        worst[part] = np.sqrt(np.linalg.eigvalsh(spread[:, :3, :3])[:, -1])
+        _, along, _ = actual.place(w[part])
+        across = np.eye(3) - along[:, :, None] * along[:, None, :]
+        axis[part] = np.sqrt(np.linalg.eigvalsh(across @ spread[:, 3:, 3:] @ across)[:, -1])
+    return Doubt(tip, worst, axis)
