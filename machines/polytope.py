@@ -1,0 +1,140 @@
+"""What the joints allow at the tip: polytopes of velocity, acceleration and jerk, and the rotary angles that aim a vertex.
+
+In positioned (3+2) machining the rotary joints stand and the tool axis is kept, so that joint rates follow the tip's
+linearly, dq = G v, and each limit |dq_j| <= l_j is a pair of half-spaces of the tip's rate v (Grandguillaume, Lavernhe,
+Tournier 2017, equations 1, 2 and 6). The same G serves velocity, acceleration and jerk.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import HalfspaceIntersection, QhullError
+
+from machines.kinematics.base import Kinematics
+from toolpaths.arrays import Array, Bools, Floats, Ints
+
+_SMALL = 1e-12
+_HELD = 1e-9
+"""largest change of the axis, rad per mm, that counts as none"""
+
+
+@dataclass(frozen=True)
+class Polytope:
+    """Rates v of the tip with `normals @ v <= offsets` at N poses: the image of a box of joint rates, the axis kept.
+
+    Attributes:
+        normals (N, H, 3), offsets (N, H): half-spaces; row h and row h + H/2 bound the joint joint[h] from both sides
+        joint (H,): the joint that each half-space belongs to
+    """
+
+    normals: Floats
+    offsets: Floats
+    joint: Ints
+
+    def __len__(self) -> int:
+        return len(self.normals)
+
+    def reach(self, direction: Floats) -> Floats:
+        """Largest rate (N,) along directions (N, 3) or (3,) of unit length; NaN where the pose has no polytope."""
+        reach: Floats = self._reach(direction).min(axis=1)
+        return reach
+
+    def binding(self, direction: Floats) -> Ints:
+        """The joint (N,) that ends the reach along the directions; -1 where the pose has no polytope."""
+        reach = self._reach(direction)
+        joint: Ints = self.joint[np.nan_to_num(reach, nan=np.inf).argmin(axis=1)]
+        return np.where(np.isnan(reach).any(axis=1), -1, joint)
+
+    def _reach(self, direction: Floats) -> Floats:
+        along = np.einsum("nhi,ni->nh", self.normals, np.broadcast_to(direction, (len(self), 3)))
+        free = along <= _SMALL * np.linalg.norm(self.normals, axis=2)
+        result: Floats = np.where(free, np.inf, self.offsets / np.where(free, 1.0, along))
+        result[np.isnan(along)] = np.nan
+        return result
+
+    def vertices(self, at: int = 0) -> Floats:
+        """Corners (V, 3) of the polytope of pose `at`, in no set order.
+
+        Raises:
+            ValueError: where the pose has no polytope, or it is flat or unbounded.
+        """
+        normals, offsets = self.normals[at], self.offsets[at]
+        if not np.isfinite(normals).all() or np.linalg.matrix_rank(normals) < 3:
+            raise ValueError("no bounded polytope at this pose")
+        scale = offsets.min() / np.linalg.norm(normals, axis=1).max()
+        try:
+            found = HalfspaceIntersection(np.column_stack([normals * scale, -offsets]), np.zeros(3)).intersections
+        except QhullError as fault:
+            raise ValueError(f"the half-spaces cannot be intersected: {fault}") from fault
+        return _distinct(found * scale)
+
+
+def _distinct(points: Floats) -> Floats:
+    """Points (V, 3) without those that repeat another within 1e-9 of the largest."""
+    grain = 1e-9 * np.abs(points).max()
+    _, first = np.unique(np.round(points / grain).astype(np.int64), axis=0, return_index=True)
+    apart: Bools = np.asarray(np.abs(points[first][:, None] - points[first][None]).max(axis=2) >= 4 * grain)
+    new = [n for n in range(len(first)) if bool(np.all(apart[n, :n]))]
+    return np.asarray(points[first][new])
+
+
+def held_axis_rates(kin: Kinematics, q: Floats, near: Floats | None = None) -> Floats:
+    """G (N, J, 3): joint rates per rate of the tip, rotary joints at rest and the tool axis kept.
+
+    NaN where the linear joints cannot move the tip in every direction without turning the axis.
+    """
+    linear = np.flatnonzero(~np.array(kin.rotary))
+    jacobian = kin.jacobian(q, near)[:, :, linear]
+    good = np.isfinite(jacobian).all(axis=(1, 2)) & np.isfinite(q).all(axis=1)
+    result = np.full((len(q), kin.joints, 3), np.nan)
+    inverse = np.linalg.pinv(np.where(good[:, None, None], jacobian, 0.0), rcond=1e-10)[:, :, :3]
+    made = jacobian @ inverse
+    good &= np.abs(np.nan_to_num(made) - np.vstack([np.eye(3), np.zeros((3, 3))])).max(axis=(1, 2)) < _HELD
+    rows = np.flatnonzero(good)
+    result[rows] = 0.0
+    result[np.ix_(rows, linear)] = inverse[rows]
+    return result
+
+
+def held_axis_polytope(kin: Kinematics, q: Floats, limit: Floats, near: Floats | None = None) -> Polytope:
+    """Polytope of tip rates at joints q (N, J) under joint rates within +-`limit` (J,), the axis kept (equations 1, 2).
+
+    `limit` in mm and rad per s, s2 or s3; infinite entries bound nothing.
+    """
+    rates = held_axis_rates(kin, q, near)
+    joints = np.flatnonzero(np.isfinite(limit) & ~np.array(kin.rotary))
+    normals = np.concatenate([rates[:, joints], -rates[:, joints]], axis=1)
+    offsets = np.tile(np.concatenate([limit[joints], limit[joints]]), (len(q), 1))
+    return Polytope(normals, offsets, np.concatenate([joints, joints]))
+
+
+def aim_table_ac(direction: Floats, vertex: Floats) -> Floats:
+    """Angles (A, C) (S, 2) in rad that turn vertex (3,) of the slides' polytope into the feed direction (3,).
+
+    For a table C on a table A, J = Rz(C) Rx(A): the third line of equation 7 gives A, the others C (closed form in the
+    corrections to the paper). A over a full turn: two solutions, one where they fall together, none where the direction
+    rises more steeply than the vertex can be turned; principal values.
+    """
+    f, v = direction / np.linalg.norm(direction), vertex / np.linalg.norm(vertex)
+    size = float(np.hypot(v[1], v[2]))
+    if size < _SMALL or abs(f[2]) > size * (1.0 + 1e-12):
+        return np.zeros((0, 2))
+    rise, lean = np.arcsin(np.clip(f[2] / size, -1.0, 1.0)), np.arctan2(v[2], v[1])
+    tilt = np.array([rise, np.pi - rise]) if abs(f[2]) < size * (1.0 - 1e-15) else np.array([rise])
+    tilt = tilt - lean
+    across = np.cos(tilt) * v[1] - np.sin(tilt) * v[2]
+    turn = np.arctan2(f[1], f[0]) - np.arctan2(across, v[0])
+    return np.asarray(_principal(np.column_stack([tilt, turn])))
+
+
+def _principal(angle: Array) -> Array:
+    result: Array = -(np.mod(-angle + np.pi, 2.0 * np.pi) - np.pi)
+    return result
+
+
+def box_vertices(limit: Floats) -> Floats:
+    """The 2^J corners (2^J, J) of the box |q_j| <= limit_j."""
+    signs = np.array(np.meshgrid(*[[-1.0, 1.0]] * len(limit), indexing="ij")).reshape(len(limit), -1).T
+    return np.asarray(signs * limit)

@@ -1,0 +1,139 @@
+"""Polytopes of tip rates: half-spaces against vertices, all machines, and the angles printed in the paper."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+
+import machines
+from machines.loader import names
+from machines.machine import Machine
+from machines.polytope import aim_table_ac, box_vertices, held_axis_polytope, held_axis_rates
+from toolpaths.arrays import Floats
+
+NAMES = names()
+RNG = np.random.default_rng(9)
+
+
+def _poses(machine: Machine, count: int = 12) -> Floats:
+    """Joints near home that the machine can stand at."""
+    span = np.where(machine.rotary, 0.4, 20.0)
+    q = machine.home + RNG.uniform(-1.0, 1.0, (count, len(span))) * span
+    tip, axis = machine.kinematics.forward(machine.home[None, :])
+    if machine.kinematics.slides_affine:
+        return q
+    tips = tip + RNG.uniform(-20.0, 20.0, (count, 3))
+    solved = machine.kinematics.inverse(tips, np.tile(axis, (count, 1)))[0]
+    return np.asarray(solved[np.isfinite(solved).all(axis=1)])
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_rates_move_the_tip_and_hold_the_axis(name: str) -> None:
+    machine = machines.load(name)
+    q = _poses(machine)
+    rates = held_axis_rates(machine.kinematics, q)
+    assert np.isfinite(rates).all()
+    assert not rates[:, np.array(machine.rotary)].any()
+    step = 1e-5
+    for i in range(3):
+        here, there = (machine.kinematics.forward(q + s * step * rates[:, :, i]) for s in (-0.5, 0.5))
+        assert np.abs((there[0] - here[0]) / step - np.eye(3)[i]).max() < 1e-6
+        assert np.abs(there[1] - here[1]).max() < 1e-12
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_reach_is_where_a_joint_meets_its_limit(name: str) -> None:
+    machine = machines.load(name)
+    q = _poses(machine)
+    direction = RNG.normal(size=(len(q), 3))
+    direction /= np.linalg.norm(direction, axis=1)[:, None]
+    for limit in (machine.limits.velocity, machine.limits.acceleration, machine.limits.jerk):
+        polytope = held_axis_polytope(machine.kinematics, q, limit)
+        reach = polytope.reach(direction)
+        rates = np.einsum("nji,ni->nj", held_axis_rates(machine.kinematics, q), direction) * reach[:, None]
+        use = np.abs(rates) / limit
+        assert use.max(axis=1) == pytest.approx(np.ones(len(q)), rel=1e-12)
+        assert (use.argmax(axis=1) == polytope.binding(direction)).all()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_vertices_are_the_corners_of_the_half_spaces(name: str) -> None:
+    """Brute force: each three planes meet in a point; those inside all half-spaces are the corners."""
+    machine = machines.load(name)
+    q = _poses(machine)[:3]
+    polytope = held_axis_polytope(machine.kinematics, q, machine.limits.jerk)
+    for k in range(len(q)):
+        normals, offsets = polytope.normals[k], polytope.offsets[k]
+        corners = []
+        for rows in itertools.combinations(range(len(offsets)), 3):
+            a = normals[list(rows)]
+            if abs(np.linalg.det(a)) > 1e-9:
+                point = np.linalg.solve(a, offsets[list(rows)])
+                if (normals @ point <= offsets * (1.0 + 1e-9)).all():
+                    corners.append(point)
+        found = polytope.vertices(k)
+        far = np.linalg.norm(found[:, None] - np.array(corners)[None], axis=2)
+        assert far.min(axis=1).max() < 1e-5 * np.abs(found).max()
+        assert far.min(axis=0).max() < 1e-5 * np.abs(found).max()
+
+
+def test_serial_vertices_are_the_turned_box() -> None:
+    machine = machines.load("mikron-ucp710")
+    q = np.array([[10.0, 20.0, 30.0, 0.7, -1.1]])
+    found = held_axis_polytope(machine.kinematics, q, machine.limits.jerk).vertices()
+    turned = box_vertices(machine.limits.jerk[:3]) @ machine.kinematics.jacobian(q)[0, :3, :3].T
+    assert len(found) == 8
+    assert np.linalg.norm(found[:, None] - turned[None], axis=2).min(axis=1).max() < 1e-6
+
+
+def test_angles_printed_in_the_paper() -> None:
+    """f = (-1, 0, 0), equal limits: A in +-45, C in +-54.736, +-125.264 degrees."""
+    angles = np.degrees(np.concatenate([aim_table_ac(np.array([-1.0, 0.0, 0.0]), v) for v in box_vertices(np.ones(3))]))
+    assert len(angles) == 16
+    small = angles[np.abs(angles[:, 0]) <= 90.0]
+    assert len(small) == 8
+    assert np.abs(np.abs(small[:, 0]) - 45.0).max() < 1e-9
+    assert sorted(np.round(small[:, 1], 3)) == [-125.264, -125.264, -54.736, -54.736, 54.736, 54.736, 125.264, 125.264]
+
+
+def test_aimed_vertices_lie_along_the_feed_direction_on_the_machine() -> None:
+    machine = machines.load("mikron-ucp710")
+    limit = machine.limits.jerk
+    for _ in range(50):
+        f = RNG.normal(size=3)
+        f /= np.linalg.norm(f)
+        for vertex in box_vertices(limit[:3]):
+            angles = aim_table_ac(f, vertex)
+            assert len(angles) == (2 if abs(f[2]) < np.hypot(*vertex[1:]) / np.linalg.norm(vertex) else 0)
+            for a, c in angles:
+                q = np.array([[0.0, 0.0, 0.0, a, c]])
+                reach = held_axis_polytope(machine.kinematics, q, limit).reach(f)
+                assert reach[0] == pytest.approx(np.linalg.norm(vertex), rel=1e-9)
+
+
+def test_nothing_reaches_farther_than_an_aimed_vertex() -> None:
+    machine = machines.load("mikron-ucp710")
+    q = np.zeros((2000, 5))
+    q[:, 3:] = RNG.uniform(-np.pi, np.pi, (2000, 2))
+    reach = held_axis_polytope(machine.kinematics, q, machine.limits.jerk).reach(np.array([0.6, -0.48, 0.64]))
+    assert reach.max() <= np.linalg.norm(machine.limits.jerk[:3]) * (1.0 + 1e-12)
+
+
+def test_steep_directions_have_no_vertex_to_aim() -> None:
+    limit = np.sqrt(2.0 / 3.0)
+    for rise, count in ((limit - 1e-6, 2), (limit + 1e-6, 0)):
+        f = np.array([np.sqrt(1.0 - rise**2), 0.0, rise])
+        assert len(aim_table_ac(f, np.ones(3))) == count
+
+
+def test_unbounded_and_missing_poses() -> None:
+    machine = machines.load("mill-3axis")
+    q = np.vstack([machine.home, np.full(3, np.nan)])
+    polytope = held_axis_polytope(machine.kinematics, q, np.array([1.0, 2.0, np.inf]))
+    assert polytope.reach(np.array([0.0, 0.0, 1.0]))[0] == np.inf
+    assert np.isnan(polytope.reach(np.array([1.0, 0.0, 0.0]))[1])
+    assert polytope.binding(np.array([0.0, 1.0, 0.0])).tolist() == [1, -1]
+    with pytest.raises(ValueError, match="no bounded polytope"):
+        polytope.vertices(0)
