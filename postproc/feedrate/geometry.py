@@ -1,0 +1,129 @@
+"""The path that the machine is planned to take: a joint-space spline along a smoothed path, its deviation bounded.
+
+The joints of the smoothed tip and axis are exact at the sites, and a quintic spline through them is what is planned, so
+that its derivatives are exact to every order. Between sites it is compared with the smoothed path in the part frame,
+and sites are added where it is off by more than a small share of the tolerance. Serial and parallel machines alike.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.interpolate import make_interp_spline
+
+from machines.kinematics.base import Kinematics
+from postproc.feedrate.geometry_sites import sites
+from postproc.feedrate.paths import Derivatives, SplinePath
+from postproc.joint_path import nearest_solution
+from toolpaths.arrays import Floats
+from toolpaths.rotations import angle_between
+from toolpaths.smoothing.smooth import Smooth
+
+DEGREE = 5
+SHARE = 0.05
+"""of the tolerance that the joint spline may use"""
+ROUNDS = 6
+Near = Callable[[Floats], Floats]
+"""Joints (N, J) at s (N,) that the solution must be nearest to: its branch and winding."""
+
+
+@dataclass(frozen=True)
+class MachinePath:
+    """Joints along s between two stops, three times continuously differentiable; a `feedrate.paths.ToolPath`.
+
+    Attributes:
+        s (N,): the sites
+        values (N, J + 6): joints, tip and axis there
+        worst: largest deviation from the smoothed path between sites, over the tolerance
+    """
+
+    s: Floats
+    values: Floats
+    worst: float
+
+    @property
+    def joints(self) -> int:
+        """J"""
+        return int(self.values.shape[1]) - 6
+
+    @property
+    def start(self) -> float:
+        return float(self.s[0])
+
+    @property
+    def end(self) -> float:
+        return float(self.s[-1])
+
+    @property
+    def breaks(self) -> Floats:
+        """Knots of the spline."""
+        return self.spline.breaks
+
+    @cached_property
+    def spline(self) -> SplinePath:
+        """of the joints"""
+        return self._through(self.values[:, :self.joints])
+
+    @cached_property
+    def tool(self) -> SplinePath:
+        """of tip and axis, for limits at the tool"""
+        return self._through(self.values[:, self.joints:])
+
+    def _through(self, values: Floats) -> SplinePath:
+        found = make_interp_spline(self.s, values, k=DEGREE)
+        return SplinePath(found.t, found.c, DEGREE)
+
+    def derivatives(self, s: Floats) -> Derivatives:
+        """Joints at s (N,)."""
+        return self.spline.derivatives(s)
+
+    def tip(self, s: Floats) -> Derivatives:
+        """Tip at s (N,), mm, each (N, 3)."""
+        return Derivatives(*(order[:, :3] for order in self.tool.derivatives(s)))
+
+    def axis(self, s: Floats) -> Derivatives:
+        """Tool axis at s (N,), each (N, 3)."""
+        return Derivatives(*(order[:, 3:] for order in self.tool.derivatives(s)))
+
+
+def machine_path(path: Smooth, first: float, last: float, kin: Kinematics, near: Near) -> MachinePath:
+    """The joints' spline along `path` from s = first to last, without a stop between.
+
+    Raises:
+        ArithmeticError: where the machine has no solution, with the s of the first such place.
+    """
+    s = sites(path, first, last)
+    for turn in range(ROUNDS + 1):
+        made = _interpolated(path, s, kin, near)
+        off = _off(made, path, kin)
+        worst = float(off.max())
+        bad = off > SHARE
+        if turn == ROUNDS or not bad.any():
+            break
+        bad[1:] |= bad[:-1]
+        bad[:-1] |= bad[1:]
+        s = np.sort(np.concatenate((s, 0.5 * (s[:-1] + s[1:])[bad])))
+    return MachinePath(made.s, made.values, worst)
+
+
+def _interpolated(path: Smooth, s: Floats, kin: Kinematics, near: Near) -> MachinePath:
+    tip, axis = path.at(s)
+    axis = kin.nearest_axis(axis)
+    q = nearest_solution(kin, tip, axis, near(s))
+    good = np.asarray(np.isfinite(q).all(axis=1))
+    if not good.all():
+        raise ArithmeticError(f"no joints at s = {s[int(np.argmin(good))]:.6g} mm of the smoothed path")
+    return MachinePath(s, np.hstack((q, tip, axis)), 0.0)
+
+
+def _off(made: MachinePath, path: Smooth, kin: Kinematics) -> Floats:
+    """(N - 1,) deviation of the joint spline from the smoothed path amid the sites, over the tolerance."""
+    middle = 0.5 * (made.s[:-1] + made.s[1:])
+    tip, axis = path.at(middle)
+    found_tip, found_axis = kin.forward(made.derivatives(middle).q, near=np.hstack((tip, axis)))
+    off = np.maximum(np.linalg.norm(found_tip - tip, axis=1) / path.tolerance.tip,
+                     angle_between(found_axis, kin.nearest_axis(axis)) / path.tolerance.axis)
+    return np.asarray(np.nan_to_num(off, nan=np.inf))

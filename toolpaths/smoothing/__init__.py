@@ -1,0 +1,1 @@
+"""Smoothing of CL points within a tolerance of tip and axis."""
