@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial import HalfspaceIntersection, QhullError
 
 from machines.kinematics.base import Kinematics
-from toolpaths.arrays import Array, Bools, Floats, Ints
+from toolpaths.arrays import Array, Floats, Ints
 
 _SMALL = 1e-12
 _HELD = 1e-9
@@ -75,9 +75,11 @@ def _distinct(points: Floats) -> Floats:
     """Points (V, 3) without those that repeat another within 1e-9 of the largest."""
     grain = 1e-9 * np.abs(points).max()
     _, first = np.unique(np.round(points / grain).astype(np.int64), axis=0, return_index=True)
-    apart: Bools = np.asarray(np.abs(points[first][:, None] - points[first][None]).max(axis=2) >= 4 * grain)
-    new = [n for n in range(len(first)) if bool(np.all(apart[n, :n]))]
-    return np.asarray(points[first][new])
+    kept: list[Floats] = []
+    for point in points[first]:
+        if all(np.abs(point - other).max() >= 4.0 * grain for other in kept):
+            kept.append(point)
+    return np.array(kept)
 
 
 def held_axis_rates(kin: Kinematics, q: Floats, near: Floats | None = None) -> Floats:
