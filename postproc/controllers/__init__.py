@@ -10,6 +10,9 @@ if TYPE_CHECKING:
     from postproc.program import Program
     from toolpaths.toolpath import Cycle
 
+_CLASSES = {"iso": "IsoWriter", "linuxcnc": "LinuxcncWriter", "fanuc": "FanucWriter", "haas": "HaasWriter",
+            "siemens": "SiemensWriter", "heidenhain": "KlartextWriter"}
+
 
 def writer_for(controller: ControllerFile, program: Program, cycles: tuple[Cycle, ...], length_offsets: bool,
                smoothing: float, work_offset: str = "G54", axis_smoothing: float = 0.0, name: str = "") -> Writer:
@@ -21,8 +24,8 @@ def writer_for(controller: ControllerFile, program: Program, cycles: tuple[Cycle
         work_offset: the set-up's code, G54 to G59.3
         name: of the program, where the controller's programs hold one
     """
-    from postproc.controllers.iso import IsoWriter
-    from postproc.controllers.linuxcnc import LinuxcncWriter
+    from importlib import import_module
 
-    writer = {"iso": IsoWriter, "linuxcnc": LinuxcncWriter}[controller.writer]
-    return writer(controller, program, cycles, length_offsets, smoothing, work_offset, axis_smoothing, name)
+    writer = getattr(import_module(f"postproc.controllers.{controller.writer}"), _CLASSES[controller.writer])
+    made: Writer = writer(controller, program, cycles, length_offsets, smoothing, work_offset, axis_smoothing, name)
+    return made

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from postproc.controllers.model import CannedCycle
-from postproc.controllers.writer import Writer
+from postproc.controllers.writer import Writer, peck_of
 from postproc.program import INVERSE, Hole
 from postproc.word_arcs import PLANE_AXIS
 from toolpaths.arrays import Array, Bools
@@ -78,7 +78,7 @@ class IsoWriter(Writer):
     def add_length(self, heads: list[str], first: int, last: int) -> None:
         """The waiting length register into the first block that states Z in the work offset."""
         p = self.program
-        if not self.length_off or not self.register or not (self.length_offsets or self.law == "tilted") or "Z" not in p.letters:
+        if not self.length_waits or "Z" not in p.letters:
             return
         rows = np.flatnonzero(p.write[first:last, p.letters.index("Z")] & ~p.home[first:last])
         if len(rows):
@@ -131,7 +131,7 @@ class IsoWriter(Writer):
     def hole(self, hole: Hole) -> Iterator[str]:
         """A canned cycle: in full where anything but the place of the hole changes, else the place alone."""
         cycle = self.cycles[hole.cycle]
-        spec = self.cycle_of(hole, cycle)
+        spec = self.cycle_of(hole)
         yield from self.before_cycle(hole)
         text = self._cycle_text(hole, cycle, spec, self.hole_feed(hole))
         place = self.place(hole)
@@ -145,11 +145,6 @@ class IsoWriter(Writer):
         head, _, tail = text.partition("|")
         yield f"{head}{place}{tail}"
 
-    def cycle_of(self, hole: Hole, cycle: Cycle) -> CannedCycle:
-        """The controller's cycle for a hole."""
-        cycles = self.controller.cycles
-        return (cycles.with_dwell if cycle.dwell > 0.0 else cycles.table)[hole.key]
-
     def before_cycle(self, hole: Hole) -> Iterator[str]:
         """Feed per minute, and the XY plane, where they do not stand."""
         if self.mode == INVERSE:
@@ -158,11 +153,6 @@ class IsoWriter(Writer):
         if self.plane != 17:
             yield self.controller.codes.planes["17"]
             self.plane = 17
-
-    def hole_feed(self, hole: Hole) -> float:
-        """Feed of the way down, mm/min."""
-        p = self.program
-        return float(p.feed[next(k for k in range(hole.first, hole.last + 1) if p.code[k] > 0)])
 
     def place(self, hole: Hole) -> str:
         """X and Y of a hole."""
@@ -187,7 +177,3 @@ class IsoWriter(Writer):
         tail = f"{self.space}Z{z}{self.space}R{r}{extra}{self.space}F{self.feed}"
         return f"{out}{self.space}{spec.code}|{tail}"
 
-
-def peck_of(cycle: Cycle) -> float:
-    """Depth of a peck, mm: the whole way down where the cycle names none."""
-    return cycle.steps[0] if cycle.steps else cycle.depth + cycle.clearance

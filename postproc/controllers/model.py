@@ -4,12 +4,20 @@ from __future__ import annotations
 
 from importlib import resources
 from pathlib import Path
-from string import Formatter
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, Field
+from pydantic import Field
 
 from machines.user_file import UserModel, load_toml
+from postproc.controllers.texts import (
+    CYCLE_VALUES,
+    Named,
+    Numbered,
+    Registered,
+    Timed,
+    WorkOffsets,
+    placeholders,
+)
 from toolpaths.diagnostics import Diagnostic
 
 
@@ -44,35 +52,6 @@ class Comment(UserModel):
     """characters that a comment must not hold"""
 
 
-def _placeholders(*allowed: str) -> AfterValidator:
-    """Only the names `allowed` may stand in braces."""
-    def check(text: str) -> str:
-        found = {name for _, name, _, _ in Formatter().parse(text) if name is not None}
-        if found - set(allowed):
-            wrong = ", ".join("{" + str(name) + "}" for name in sorted(found - set(allowed)))
-            raise ValueError(f"unknown placeholder {wrong}; allowed is {', '.join('{' + a + '}' for a in allowed)}")
-        return text
-    return AfterValidator(check)
-
-
-def _all_offsets(offsets: dict[str, str]) -> dict[str, str]:
-    missing = [code for code in WORK_OFFSETS if code not in offsets]
-    if offsets and (missing or len(offsets) > len(WORK_OFFSETS)):
-        strange = sorted(set(offsets) - set(WORK_OFFSETS))
-        raise ValueError(f"needs one entry for each of {', '.join(WORK_OFFSETS)}; missing: {', '.join(missing) or 'none'}, "
-                         f"unknown: {', '.join(strange) or 'none'}")
-    return offsets
-
-
-WORK_OFFSETS = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
-"""the codes that a set-up may name"""
-WorkOffsets = Annotated[dict[str, str], AfterValidator(_all_offsets)]
-Named = Annotated[str, _placeholders("name", "number")]
-Numbered = Annotated[str, _placeholders("number")]
-Registered = Annotated[str, _placeholders("register")]
-Timed = Annotated[str, _placeholders("seconds", "milliseconds")]
-
-
 class Frame(UserModel):
     """Blocks that stand around every program."""
 
@@ -80,13 +59,13 @@ class Frame(UserModel):
     """{name} is the program's name, {number} its number in four digits"""
     number: int = Field(default=1, ge=1, le=9999)
     """of the program, where the controller has numbers"""
-    preamble: tuple[Annotated[str, _placeholders("work_offset")], ...] = ()
+    preamble: tuple[Annotated[str, placeholders("work_offset")], ...] = ()
     """safe start: units, modes and planes that the program relies on; {work_offset} is the set-up's code"""
-    work_offsets: WorkOffsets = {}
+    work_offsets: WorkOffsets = Field(default_factory=dict)
     """what the controller writes for G54 to G59 and G59.1 to G59.3; empty: those codes themselves"""
     passive: tuple[Annotated[str, Field(pattern=r"^[GM][0-9]+(\.[0-9]+)?$")], ...] = ()
     """codes of the shop's own blocks that move nothing: read back without being executed"""
-    path_tolerance: tuple[Annotated[str, _placeholders("tolerance", "chain", "axis")], ...] = ()
+    path_tolerance: tuple[Annotated[str, placeholders("tolerance", "chain", "axis")], ...] = ()
     """blocks that set the control's own smoothing; {tolerance} and {chain} in mm, {axis} in degrees"""
     ending: tuple[str, ...] = ("M30",)
     end: tuple[Named, ...] = ("%",)
@@ -119,7 +98,7 @@ class Codes(UserModel):
     length_offset: Registered = "G43 H{register}"
     length_cancel: str = "G49"
     dwell: Timed = "G4 P{seconds}"
-    rigid_tap: Annotated[str, _placeholders("speed")] = ""
+    rigid_tap: Annotated[str, placeholders("speed")] = ""
     """block before a tapping cycle that couples feed and spindle"""
     compensation_left: Registered = "G41 D{register}"
     compensation_right: Registered = "G42 D{register}"
@@ -147,17 +126,10 @@ class Arcs(UserModel):
     """planes in which an arc may move along the third axis too"""
 
 
-CYCLE_VALUES = ("retract", "surface", "clearance", "bottom", "depth", "step", "breaks", "dwell", "feed", "pitch", "speed",
-                "second")
-"""what a cycle's text may name: retract level, surface and bottom (mm on the tool's axis), clearance above the surface,
-depth below it, peck, number of pecks, dwell in s, feed in mm/min, pitch in mm (negative: left-hand), speed in 1/min, retract
-level above the surface"""
-
-
 class CannedCycle(UserModel):
     """One drilling cycle of the controller."""
 
-    code: Annotated[str, _placeholders(*CYCLE_VALUES)]
+    code: Annotated[str, placeholders(*CYCLE_VALUES)]
     """its code, or its whole text with values in braces (`CYCLE_VALUES`), a line each"""
     peck: str = ""
     """word of the peck depth"""
@@ -225,6 +197,10 @@ class Kinematics(UserModel):
 class Mode(UserModel):
     """How a mode is switched on and off, and what may stand in it."""
 
+    enter: tuple[str, ...]
+    """blocks that switch it on"""
+    leave: tuple[str, ...]
+    """blocks that switch it off"""
     start: tuple[str, ...] = ()
     """blocks of the safe start, in programs that use the mode"""
     length: Literal["any", "off", "on"] = "any"
@@ -240,9 +216,9 @@ class Mode(UserModel):
 class TcpMode(Mode):
     """Tool-centre-point mode: X, Y, Z are the tip in the work offset, fixed to the part; F is the speed of the tip."""
 
-    enter: tuple[Annotated[str, _placeholders("register", "work_offset")], ...]
+    enter: tuple[Annotated[str, placeholders("register", "work_offset")], ...]
     """blocks that switch it on; {register} is the length register in force"""
-    leave: tuple[Annotated[str, _placeholders("register", "work_offset")], ...]
+    leave: tuple[Annotated[str, placeholders("register", "work_offset")], ...]
     """blocks that switch it off"""
     cycles: bool = False
     compensation: bool = False
@@ -251,10 +227,10 @@ class TcpMode(Mode):
 class TiltedMode(Mode):
     """Tilted working plane: rotary axes stand still, X, Y, Z are the tip in a turned frame at the work offset's zero."""
 
-    enter: tuple[Annotated[str, _placeholders("first", "second", "third", "direction", "work_offset")], ...]
+    enter: tuple[Annotated[str, placeholders("first", "second", "third", "direction", "work_offset")], ...]
     """blocks that state the plane; {first}, {second}, {third} are the angles in the order of `angles`, {direction} is 1,
     or -1 where the first rotary axis that tilts the tool stands at a negative angle"""
-    leave: tuple[Annotated[str, _placeholders("work_offset")], ...]
+    leave: tuple[Annotated[str, placeholders("work_offset")], ...]
     """blocks that end it"""
     angles: Literal["ZXZ", "ZYX", "XYZ", "rotary"]
     """turns about the axes of the moving frame, in order; "rotary": the frame is that of the rotary axes themselves"""

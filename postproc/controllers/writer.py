@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
 
-from postproc.controllers.model import ControllerFile, Mode
+from postproc.controllers.model import CannedCycle, ControllerFile, Mode
+from postproc.controllers.texts import blocks_of
 from postproc.program import Command, Hole, Program, Section
 from toolpaths.arrays import Floats
 from toolpaths.toolpath import Cycle
@@ -58,7 +60,7 @@ class Writer:
             if mode is not None and law in laws:
                 yield from mode.start
         for block in self.controller.program.preamble:
-            yield from block.replace("{work_offset}", self.work_offset).split("\n")
+            yield from blocks_of(block.replace("{work_offset}", self.work_offset))
 
     def smoothing_blocks(self) -> list[str]:
         """Blocks that set the control's own smoothing, where something is left to it."""
@@ -133,6 +135,26 @@ class Writer:
         texts = [t.replace("-0", zero) if t.strip("-0.") == "" and t.startswith("-") else t for t in texts]
         return texts
 
+    def hole_feed(self, hole: Hole) -> float:
+        """Feed of a hole's way down, mm/min."""
+        p = self.program
+        return float(p.feed[next(k for k in range(hole.first, hole.last + 1) if p.code[k] > 0)])
+
+    def cycle_of(self, hole: Hole) -> CannedCycle:
+        """The controller's cycle for a hole."""
+        cycles = self.controller.cycles
+        return (cycles.with_dwell if self.cycles[hole.cycle].dwell > 0.0 else cycles.table)[hole.key]
+
+    def cycle_values(self, hole: Hole) -> dict[str, float]:
+        """The values that the text of a cycle may name (`CYCLE_VALUES`)."""
+        cycle, feed = self.cycles[hole.cycle], self.hole_feed(hole)
+        surface = hole.plane_level - cycle.clearance
+        depth, step = surface - hole.bottom, min(peck_of(cycle), surface - hole.bottom)
+        return {"retract": hole.retract, "surface": surface, "clearance": cycle.clearance, "bottom": hole.bottom,
+                "depth": depth, "level": -depth, "step": step, "breaks": float(math.ceil(depth / step)),
+                "dwell": cycle.dwell, "feed": feed, "pitch": feed / self.speed if self.speed else 0.0,
+                "speed": abs(self.speed), "second": hole.retract - surface}
+
     @staticmethod
     def plain(value: float | str) -> str:
         """A number without an exponent or needless zeros."""
@@ -182,12 +204,18 @@ class Writer:
             yield codes.length_offset.format(register=self.register)
             self.length_off = False
 
+    @property
+    def length_waits(self) -> bool:
+        """True where the next block that states Z has to put the length register in force."""
+        return self.length_off and bool(self.register) and (self.length_offsets or self.law == "tilted")
+
     def section_values(self, section: Section) -> dict[str, str]:
         """What the text of a mode may name."""
         places = self.controller.modes.tilted.decimals if self.controller.modes.tilted else 0
         angles = dict(zip(("first", "second", "third"), self.number_text(np.array(section.angles), places), strict=False))
         tilt = next((angle for letter, angle in section.rotary if letter in "AB"), 0.0)
-        return {"register": self.register, "work_offset": self.work_offset, "direction": "-1" if tilt < 0.0 else "1", **angles}
+        direction = "-1" if tilt < 0.0 else "1"
+        return {"register": self.register, "work_offset": self.work_offset, "direction": direction, **angles}
 
     # ---- commands -----------------------------------------------------------------------------------------------
 
@@ -231,7 +259,7 @@ class Writer:
             yield from self.use_length(value)
         elif command.name == "DWELL":
             seconds = float(args[0])
-            yield from codes.dwell.format(seconds=self.plain(seconds), milliseconds=round(seconds * 1000.0)).split("\n")
+            yield from blocks_of(codes.dwell.format(seconds=self.plain(seconds), milliseconds=round(seconds * 1000.0)))
         elif command.name.startswith("CUTTER_COMPENSATION"):
             code = codes.compensation_left if command.name.endswith("LEFT") else codes.compensation_right
             yield code.format(register=value) if value else code.split(" ")[0]
@@ -243,7 +271,7 @@ class Writer:
         codes = self.controller.codes
         if self.length_offsets and codes.length_cancel and not self.length_off:
             yield codes.length_cancel
-        yield from codes.tool_change.format(number=number).split("\n")
+        yield from blocks_of(codes.tool_change.format(number=number))
         self.motion, self.register = "", ""
 
     def use_length(self, register: str) -> Iterator[str]:
@@ -252,3 +280,8 @@ class Writer:
         self.length_off = self.controller.tools.length_with_z
         if not self.length_off and self.length_offsets and self.controller.codes.length_offset:
             yield self.controller.codes.length_offset.format(register=register)
+
+
+def peck_of(cycle: Cycle) -> float:
+    """Depth of a peck, mm: the whole way down where the cycle names none."""
+    return cycle.steps[0] if cycle.steps else cycle.depth + cycle.clearance

@@ -1,0 +1,150 @@
+"""Klartext, the block format of Heidenhain TNC controls."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from postproc.controllers.iso import CHUNK
+from postproc.controllers.writer import Writer
+from postproc.program import Command, Hole
+from postproc.word_arcs import PLANE_AXIS
+from toolpaths.arrays import Floats
+from toolpaths.units import DEG
+
+
+class KlartextWriter(Writer):
+    """Blocks L, CC, C, CP; FMAX for rapids, R0, RL, RR where it changes, M91 for machine coordinates, M99 for cycles.
+
+    `side` is the radius compensation in force, `asked` the one that the next line takes up.
+    """
+
+    side, asked = "", "R0"
+    called = 0.0
+    """spindle speed of the last TOOL CALL, 1/min"""
+    number = -1
+
+    def numbered(self, block: str) -> str:
+        """The block with its number; comments are blocks too."""
+        self.number += 1
+        return f"{self.number} {block}"
+
+    def lines(self, header: list[str]) -> Iterator[str]:
+        """The blocks of the whole program, numbered from 0."""
+        frame = self.controller.program
+        for block in frame.begin:
+            yield self.numbered(block.format(name=self.name, number=frame.number))
+        yield from map(self.numbered, map(self.comment, header))
+        yield from map(self.numbered, (*self.start(), *self.smoothing_blocks()))
+        yield from map(self.numbered, self.body())
+        yield from map(self.numbered, frame.ending)
+        for block in frame.end:
+            yield self.numbered(block.format(name=self.name, number=frame.number))
+
+    # ---- motion -------------------------------------------------------------------------------------------------
+
+    def word_columns(self, at: int, stop: int) -> list[list[str]]:
+        """The axis words of blocks at..stop by letter, '' where a block does not state one."""
+        p = self.program
+        columns = []
+        for j, letter in enumerate(p.letters):
+            rows = np.flatnonzero(p.write[at:stop, j])
+            column = [""] * (stop - at)
+            for row, text in zip(rows.tolist(), self.number_text(p.words[at + rows, j], int(p.decimals[j])), strict=True):
+                column[row] = f" {letter}{text}"
+            columns.append(column)
+        return columns
+
+    def blocks(self, at: int, stop: int) -> Iterator[str]:
+        """Motion blocks at..stop."""
+        for first in range(at, stop, CHUNK):
+            last = min(first + CHUNK, stop)
+            words = ["".join(row) for row in zip(*self.word_columns(first, last), strict=True)]
+            p = self.program
+            for k, text, code, feed, home in zip(range(first, last), words, p.code[first:last].tolist(),
+                                                 self.feeds(first, last), p.home[first:last].tolist(), strict=True):
+                if code == 2:
+                    yield from self.arc(k, text, feed)
+                else:
+                    side = "" if self.side == self.asked else " " + self.asked
+                    self.side = self.asked
+                    yield f"L{text}{side}{feed}{' M91' if home else ''}"
+
+    def feeds(self, first: int, last: int) -> list[str]:
+        """FMAX, which holds in its block alone, and F where it changes."""
+        p, result = self.program, []
+        for value, code in zip(p.feed[first:last].tolist(), p.code[first:last].tolist(), strict=True):
+            text = " FMAX" if code == 0 else f" F{value:.{self.controller.format.feed_decimals}f}"
+            if code == 0:
+                result.append(text)
+                continue
+            text = text.rstrip("0").rstrip(".") if "." in text else text
+            result.append("" if text == self.feed else text)
+            self.feed = text
+        return result
+
+    def arc(self, k: int, text: str, feed: str) -> Iterator[str]:
+        """CC with the centre, then C, or CP with the angle where the arc climbs (in the XY plane only)."""
+        p = self.program
+        third = PLANE_AXIS[int(p.plane[k])]
+        columns = [p.letters.index(letter) for letter in "XYZ"]
+        start, end = p.words[k - 1, columns], p.words[k, columns]
+        centre = self.number_text(start + p.center[k], self.controller.format.linear_decimals)
+        sense = "DR+" if p.ccw[k] else "DR-"
+        yield "CC" + "".join(f" {'XYZ'[i]}{centre[i]}" for i in range(3) if i != third)
+        if end[third] == start[third]:
+            yield f"C{text} {sense}{feed}"
+            return
+        centre_xy = (start + p.center[k])[:2]
+        angle = sweep(start[:2] - centre_xy, end[:2] - centre_xy, bool(p.ccw[k])) * (1.0 if p.ccw[k] else -1.0)
+        turned, climbed = self.number_text(np.array([angle, end[2] - start[2]]), self.controller.format.linear_decimals)
+        yield f"CP IPA{turned} IZ{climbed} {sense}{feed}"
+
+    def hole(self, hole: Hole) -> Iterator[str]:
+        """CYCL DEF where anything but the place of the hole changes, then the place with M99."""
+        values = self.cycle_values(hole)
+        numbers = self.number_text(np.array(list(values.values())), self.controller.format.linear_decimals)
+        text = self.cycle_of(hole).code.format(**dict(zip(values, numbers, strict=True)))
+        if text != self.cycle_text:
+            yield text
+        self.cycle_text, self.side, self.asked = text, "R0", "R0"
+        p = self.program
+        place = "".join(f" {letter}{self.number_text(p.words[hole.last, j:j + 1], int(p.decimals[j]))[0]}"
+                        for j, letter in enumerate(p.letters) if letter in "XY")
+        yield f"L{place} R0 FMAX M99"
+
+    # ---- commands -----------------------------------------------------------------------------------------------
+
+    def command(self, command: Command) -> Iterator[str]:
+        """The blocks of one canonical command; radius compensation waits for the next line."""
+        if command.name.startswith("CUTTER_COMPENSATION"):
+            self.asked = {"LEFT": "RL", "RIGHT": "RR"}.get(command.name.rsplit("_", 1)[1], "R0")
+        elif command.name == "CHANGE_TOOL":
+            speed = self.speed_after(command)
+            self.called = speed or self.called
+            yield f"TOOL CALL {self.plain(command.args[0])} Z" + (f" S{self.plain(speed)}" if speed else "")
+        else:
+            yield from super().command(command)
+
+    def speed_after(self, change: Command) -> float:
+        """Spindle speed that a command of the same place, after the tool change, sets; 0 for none."""
+        group = next(g for g in self.program.commands.values() if any(c is change for c in g))
+        after = group[next(i for i, c in enumerate(group) if c is change):]
+        return next((float(c.args[0]) for c in after if c.name.startswith("START_SPINDLE") and c.args), 0.0)
+
+    def spindle(self, command: Command) -> Iterator[str]:
+        """TOOL CALL with the speed where it is another, then M3 or M4."""
+        *speed, start = (block for block in super().spindle(command) for block in block.split(" "))
+        if speed and abs(self.speed) != self.called:
+            self.called = abs(self.speed)
+            yield f"TOOL CALL S{self.plain(self.called)}"
+        yield start
+
+
+def sweep(start: Floats, end: Floats, ccw: bool) -> float:
+    """Angle of an arc in degrees, more than 0 up to 360, from the vectors (2,) centre to start and to end."""
+    turn = math.atan2(end[1], end[0]) - math.atan2(start[1], start[0])
+    turn = (turn if ccw else -turn) % (2.0 * math.pi)
+    return (turn if turn > 1e-9 else 2.0 * math.pi) / DEG

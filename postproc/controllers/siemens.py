@@ -1,0 +1,40 @@
+"""What Siemens 840D sl needs beyond its data."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from postproc.controllers.iso import IsoWriter
+from postproc.program import Hole
+
+
+class SiemensWriter(IsoWriter):
+    """Siemens: cycles are modal calls (MCALL), each block that moves calls them; F of a cycle is the feed in force."""
+
+    def smoothing_blocks(self) -> list[str]:
+        """CYCLE832: its third parameter must be given, and is 1 on machines without rotary axes."""
+        self.axis_smoothing = self.axis_smoothing or 1.0
+        return super().smoothing_blocks()
+
+    def hole(self, hole: Hole) -> Iterator[str]:
+        """MCALL where anything but the place of the hole changes, then the place at rapid."""
+        yield from self.before_cycle(hole)
+        text = self.call(hole)
+        if not self.in_cycle or text != self.cycle_text:
+            feed = self.feed_text(self.hole_feed(hole))
+            if feed != self.feed:
+                yield f"F{feed}"
+            self.cycle_text, self.feed, self.motion = text, feed, ""
+            yield text
+        head = "" if self.motion == self.controller.codes.traverse else self.controller.codes.traverse
+        self.motion = self.controller.codes.traverse
+        yield f"{head}{self.place(hole)}".removeprefix(" ")
+
+    def call(self, hole: Hole) -> str:
+        """The text of a cycle with its values."""
+        places = self.controller.format.linear_decimals
+        values = self.cycle_values(hole)
+        texts = dict(zip(values, self.number_text(np.array(list(values.values())), places), strict=True))
+        return self.cycle_of(hole).code.format(**texts)
