@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -54,6 +55,8 @@ def options_of_all(version: Annotated[bool, typer.Option("--version", is_eager=T
 def convert(file: ClFile, machine: MachineName, controller: ControllerName,
             output: Annotated[Path, typer.Option("-o", "--output", metavar="OUT", help="G-code file to write")],
             feed_mode: Annotated[str, typer.Option("--feed-mode", help="auto, per-minute or inverse-time")] = "auto",
+            output_mode: Annotated[str, typer.Option("--output-mode", help="auto, axes (axis positions), tcp (the control "
+                                                     "runs the kinematics) or tilted (turned plane)")] = "auto",
             orient: Annotated[str, typer.Option("--orient", help="keep: the tool axes of the CL file")] = "keep",
             feed: Annotated[str, typer.Option("--feed", help="programmed: the feeds of the CL file")] = "programmed",
             setup: Setup = "", tolerance: Tolerance = 0.01, axis_tolerance: AxisTolerance = 0.05, units: Units = "",
@@ -61,7 +64,9 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
     """Convert a CL file to G-code, read it back and prove it; nothing is written where a proof fails."""
     _choice("--orient", orient, ("keep",))
     _choice("--feed", feed, ("programmed",))
-    options = _options(tolerance, axis_tolerance, feed_mode, setup, units, dialect, allow_unknown)
+    _choice("--output-mode", output_mode, ("auto", "axes", "tcp", "tilted"))
+    options = replace(_options(tolerance, axis_tolerance, feed_mode, setup, units, dialect, allow_unknown),
+                      output=output_mode)  # type: ignore[arg-type]
     refuse_overwriting({"-o": str(output), "--json": json}, {"the CL file": str(file), "the set-up": setup})
     from postproc import summary
     from postproc.files import write_atomically

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from postproc.controllers.model import ControllerFile
+from postproc.controllers.model import ControllerFile, Modes
 from postproc.events import (
     Spindle,
     ToolChange,
@@ -39,7 +39,7 @@ def commands_of(toolpath: Toolpath, moves: Moves, path: Path, controller: Contro
     changes = {(c.index, c.line): c for c in tool_changes(toolpath)}
     registers = {(c.index, c.line): c for c in register_changes(toolpath)}
     spindle, state = Spindle(), _Written()
-    compensation = _Compensation(moves, path, result)
+    compensation = _Compensation(moves, path, result, controller.modes)
     lost: dict[str, list[int]] = {}
     for at, event in enumerate(toolpath.events):
         move = int(first_move[event.index])
@@ -177,7 +177,7 @@ class _Compensation:
     The points are written as the file has them; what the control adds depends on its register.
     """
 
-    def __init__(self, moves: Moves, path: Path, commands: dict[int, list[Command]]) -> None:
+    def __init__(self, moves: Moves, path: Path, commands: dict[int, list[Command]], modes: Modes) -> None:
         self.moves, self.path, self.out = moves, path, commands
         self.active, self.since = "", 0
         self.written: list[int] = []
@@ -186,6 +186,9 @@ class _Compensation:
         self.own = np.isnan(path.u) | (moves.hole[path.move] >= 0)
         """(K,) blocks that compensation must not touch"""
         self.breaks = np.flatnonzero(self.own & ~np.concatenate([[False], self.own[:-1]]))
+        tcp, tilted = modes.tcp, modes.tilted
+        self.in_tcp = path.frames[0].control.tip_law or (tcp is not None and tcp.compensation)
+        self.in_plane = tilted is not None and tilted.compensation
         self.cut = np.append(np.flatnonzero((moves.kind != Kind.RAPID) & (moves.hole < 0)), len(moves))
 
     def off_before(self, move: int) -> None:
@@ -211,14 +214,21 @@ class _Compensation:
         self.out.setdefault(block, []).extend(self.off(event.line))
         if side == "OFF":
             return
-        if move >= len(self.moves) or abs(self.moves.axis[move, 2]) < 1.0 - 1e-9:
+        block += int(np.argmin(np.append(self.own[block:], False)))
+        if move >= len(self.moves) or not self._possible(min(block, len(self.path) - 1), move):
             self.tilted.append(event.line)
             return
-        block += int(np.argmin(np.append(self.own[block:], False)))
         self.active, self.since = side, block
         self.written.append(event.line)
         command = Command(f"CUTTER_COMPENSATION_{side}", tuple(numbers(event)[:1]), event.line)
         self.out.setdefault(block, []).append(command)
+
+    def _possible(self, block: int, move: int) -> bool:
+        """True where the control can compensate square to the tool: in a tilted plane, or with the tool along Z."""
+        law = self.path.frames[int(self.path.frame[block])].control.law
+        if law == "tilted":
+            return self.in_plane
+        return (law == "axes" or self.in_tcp) and bool(abs(self.moves.axis[move, 2]) > 1.0 - 1e-9)
 
     def off(self, line: int = 0) -> list[Command]:
         """The command that ends it, where it is on."""
@@ -241,7 +251,8 @@ class _Compensation:
                                 hint="write CUTCOM/OFF before the retract and CUTCOM/LEFT or RIGHT after the approach"))
         if self.tilted:
             result.append(warning("cutcom.tilted", "CUTCOM while the tool axis is tilted is not carried out", file=file,
-                                  lines=self.tilted[:6], count=len(self.tilted)))
+                                  lines=self.tilted[:6], count=len(self.tilted),
+                                  hint="it needs a tilted plane (--output-mode tilted, where the controller has it)"))
         return result
 
 

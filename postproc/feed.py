@@ -7,8 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from postproc.control import Control
+from postproc.controllers.model import Feed as FeedRules
 from postproc.path import ARC, Path
 from postproc.program import INVERSE, PER_MINUTE
+from postproc.word_arcs import PLANE_COLUMNS
 from toolpaths.arrays import Array, Bools, Floats, Ints
 
 
@@ -22,47 +24,78 @@ class Feeds:
     slowed: Bools
 
 
-def plan_feeds(path: Path, control: Control, words: Floats, asked: Floats, passes: Ints, native: Bools,
-               feed_mode: str, least_rate: float) -> Feeds:
+def plan_feeds(path: Path, control: Control, step: Floats, asked: Floats, passes: Ints, native: Bools,
+               feed_mode: str, rules: FeedRules) -> Feeds:
     """Feed words for the blocks of a path.
 
     Args:
-        words: program words (K, J); asked: tip feed (K,) mm/s, NaN where a time was asked for
+        step: of the program words (K, J) in each block; asked: tip feed (K,) mm/s, NaN where a time was asked for
         passes: pass (K,) of each block: a pass keeps one mode
         native (K,): blocks of canned cycles, which need a feed per minute
         feed_mode: "auto", "per-minute" or "inverse-time"
-        least_rate: where inverse time would come to less than this (mm/min or degrees/min) the control runs faster
-            than asked, so that such blocks are written per minute (0: no such rule)
+        rules: of the controller
     """
+    mode = _modes(path, control, step, passes, native, feed_mode, rules)
+    return feed_words(path, control, step, asked, least_seconds(path, control, asked), mode, rules)
+
+
+def least_seconds(path: Path, control: Control, asked: Floats) -> Floats:
+    """(K,) s that the velocities of the axes ask of each block."""
     joints = np.concatenate([control.machine.home[None, :], path.q[:-1]])
     velocity = control.machine.limits.velocity
     needed = (np.abs(path.q - joints) / velocity).max(axis=1)
-    cutting = path.code != 0
-    wanted = np.where(cutting, np.nan_to_num(path.seconds), np.nan)
-    arc = path.code == ARC
-    if arc.any() and not control.tip_law:
+    arc = (path.code == ARC) & ~_control_bends(path)
+    if arc.any():
         top = asked / velocity[control.xyz].min()
-        needed = np.where(arc & np.isfinite(top), wanted * top, needed)
+        needed = np.where(arc & np.isfinite(top), np.nan_to_num(path.seconds) * top, needed)
+    return np.asarray(needed)
+
+
+def _control_bends(path: Path) -> Bools:
+    """(K,) blocks whose joints bend between their ends, so that their speed is not known from the tip's."""
+    tip_law = np.array([f.control.tip_law for f in path.frames])
+    return np.asarray(tip_law[path.frame])
+
+
+def feed_words(path: Path, control: Control, step: Floats, asked: Floats, needed: Floats, mode: Array,
+               rules: FeedRules) -> Feeds:
+    """The words of blocks that take the time asked for, or the time (K,) s needed where that is longer, in the feed mode
+    (K,) and under the law of each."""
+    cutting, arc = path.code != 0, path.code == ARC
+    wanted = np.where(cutting, np.nan_to_num(path.seconds), np.nan)
     seconds = np.fmax(wanted, needed)
     slowed = cutting & (needed > wanted * (1.0 + 1e-9)) & (wanted > 0.0)
-    before = np.concatenate([words[:1], words[:-1]])
-    turned = np.abs(words - before)[:, control.rotary].sum(axis=1)
-    length = np.where(arc & np.isfinite(asked), wanted * asked, control.feed_length(words - before))
+    turned = np.abs(step)[:, control.rotary].sum(axis=1)
+    length = np.zeros(len(path))
+    for law, k in path.by_control():
+        length[k] = law.feed_length(step[k])
+    length = np.where(arc & np.isfinite(asked), wanted * asked, length)
     with np.errstate(divide="ignore", invalid="ignore"):
         per_minute = 60.0 * length / seconds
         inverse = 60.0 / seconds
         rate = np.nan_to_num(inverse * length)
-    words_are_tip = control.tip_law or control.machine.kinematics.slides_affine
-    same = cutting & ~slowed & np.isfinite(asked) & (turned == 0.0) & words_are_tip
-    if control.tip_law:
-        near = np.abs(length - wanted * asked) <= _ROUNDING * length
-        same |= cutting & near & (needed <= (1.0 - _ROUNDING) * wanted) & _moves_tip(words - before, control)
+    same = cutting & ~slowed & np.isfinite(asked) & (turned == 0.0)
+    for law, k in path.by_control():
+        same[k] &= law.tips_straight
+        if law.tip_law:
+            near = np.abs(length[k] - wanted[k] * asked[k]) <= _ROUNDING * length[k]
+            same[k] |= cutting[k] & near & (needed[k] <= (1.0 - _ROUNDING) * wanted[k]) & _moves_tip(step[k], law)
     per_minute = np.where(same, 60.0 * asked, per_minute)
-    mode = np.where(native, PER_MINUTE, _modes(path, control, turned, cutting, passes, feed_mode))
-    if least_rate > 0.0:
-        mode = np.where((mode == INVERSE) & (length > 0.0) & (rate < least_rate), PER_MINUTE, mode)
+    if rules.least_inverse_rate > 0.0:
+        mode = np.where((mode == INVERSE) & (length > 0.0) & (rate < rules.least_inverse_rate), PER_MINUTE, mode)
+    if arc.any() and rules.arc_inverse == "radius":
+        inverse = np.where(arc, inverse * length / _radius(path), inverse)
     feed = np.where(cutting, np.where(mode == INVERSE, inverse, per_minute), np.nan)
     return Feeds(feed, mode.astype(np.int8), np.where(cutting, seconds, np.nan), slowed)
+
+
+def _radius(path: Path) -> Floats:
+    """(K,) radius of the arc blocks, mm, 1 for others."""
+    result = np.ones(len(path))
+    for plane, columns in PLANE_COLUMNS.items():
+        k = np.flatnonzero((path.code == ARC) & (path.plane == plane))
+        result[k] = np.hypot(*path.center[k][:, columns].T)
+    return result
 
 
 _ROUNDING = 0.005
@@ -74,15 +107,21 @@ def _moves_tip(step: Floats, control: Control) -> Bools:
     return np.asarray((step[:, control.xyz] != 0.0).any(axis=1))
 
 
-def _modes(path: Path, control: Control, turned: Floats, cutting: Bools, passes: Ints, feed_mode: str) -> Array:
-    """Inverse time for passes that move rotary axes while cutting, where X, Y, Z words are joints."""
-    n = len(path)
-    if feed_mode == "per-minute" or (feed_mode == "auto" and control.tip_law):
-        return np.full(n, PER_MINUTE)
-    if feed_mode == "inverse-time":
-        return np.where(cutting, INVERSE, PER_MINUTE)
-    joints_only = not control.machine.kinematics.slides_affine
-    turning = cutting & ((turned > 0.0) | joints_only)
-    chosen = np.zeros(int(passes.max(initial=0)) + 1, dtype=bool)
-    chosen[passes[turning]] = True
-    return np.where(cutting & chosen[passes], INVERSE, PER_MINUTE)
+def _modes(path: Path, control: Control, step: Floats, passes: Ints, native: Bools, feed_mode: str,
+           rules: FeedRules) -> Array:
+    """(K,) inverse time for passes that move rotary axes while cutting, where X, Y, Z words are joints."""
+    cutting = path.code != 0
+    axes = ~_control_bends(path)
+    if feed_mode == "per-minute" or not rules.inverse_time:
+        chosen = np.zeros(len(path), dtype=bool)
+    elif feed_mode == "inverse-time":
+        chosen = cutting
+    else:
+        turned = (step[:, control.rotary] != 0.0).any(axis=1) if len(control.rotary) else np.zeros(len(path), dtype=bool)
+        turning = cutting & axes & (turned | (not control.machine.kinematics.slides_affine))
+        of_pass = np.zeros(int(passes.max(initial=0)) + 1, dtype=bool)
+        of_pass[passes[turning]] = True
+        chosen = cutting & axes & of_pass[passes]
+    if rules.arc_inverse == "refuse":
+        chosen = chosen & (path.code != ARC)
+    return np.where(chosen & ~native, INVERSE, PER_MINUTE)

@@ -13,11 +13,14 @@ from postproc.control import Control, Law
 from postproc.controllers.model import ControllerFile
 from postproc.events import register_changes, tool_changes
 from postproc.links import SafeSpace, safe_space
+from postproc.modes import OutputModes, output_modes
 from postproc.moves import Moves, build_moves
 from postproc.options import Options
+from postproc.pivots import control_kinematics
 from postproc.records import plain_records
+from postproc.rounding import decimals
 from postproc.setup import Placement, SetupFile, part_placement, work_frame
-from toolpaths.arrays import Floats
+from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error, has_errors, info, warning
 from toolpaths.toolpath import Role, Toolpath
 from toolpaths.units import DEG
@@ -36,6 +39,7 @@ class Job:
     control: Control
     moves: Moves
     space: SafeSpace
+    modes: OutputModes
 
     @property
     def axis_tolerance(self) -> float:
@@ -79,7 +83,18 @@ class Job:
         """Moves whose link goes by home: the first, and those after a tool change or GOHOME."""
         first = np.searchsorted(self.moves.row, [e.index for e in self.toolpath.events if e.word == "GOHOME"]
                                 + [c.index for c in tool_changes(self.toolpath)])
-        return frozenset({0, *first.tolist()})
+        restart = self.operation_starts() if self.setup.output.restart else []
+        return frozenset({0, *first.tolist(), *restart})
+
+    @cached_property
+    def operation(self) -> Ints:
+        """(M,) operation of each move."""
+        return self.toolpath.operation[self.moves.row].astype(np.int64)
+
+    def operation_starts(self) -> list[int]:
+        """The linked moves that operations begin with."""
+        begins = np.concatenate([[True], np.diff(self.operation) != 0])
+        return [int(k) for k in np.flatnonzero(begins & self.moves.link)]
 
 
 def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, setup: SetupFile,
@@ -101,8 +116,14 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
     origin = placement.points(np.array([frame.origin]))[0]
     largest = controller.arcs.largest_radius if controller.arcs.enabled else 0.0
     law: Law = "tcp" if tip_law else "axes"
-    control = Control(machine, law, origin, largest, law)
-    job = Job(toolpath, machine, controller, setup, options, placement, control, moves, safe_space(moves, setup, placement))
+    own, found = control_kinematics(machine, setup, options)
+    diagnostics += found
+    control = Control(machine, law, origin, largest, law, rapids=controller.kinematics.rapids,
+                      feed_rule=controller.feed.length, own_kinematics=own)
+    modes, found = output_modes(control, controller, setup, options, toolpath, decimals(control, controller))
+    diagnostics += found
+    job = Job(toolpath, machine, controller, setup, options, placement, control, moves, safe_space(moves, setup, placement),
+              modes)
     return job, diagnostics + _tool_lengths(job) + _unused_tools(job)
 
 

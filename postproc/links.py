@@ -99,17 +99,19 @@ class Link:
 
 @dataclass(frozen=True)
 class Pose:
-    """A pose with its joints."""
+    """A pose with its joints; `law` is the control under which the tool leaves it or comes to it along its axis."""
 
     tip: Floats
     axis: Floats
     q: Floats
+    law: Control | None = None
 
 
 def plan_link(control: Control, kin0: Kinematics, kin1: Kinematics, space: SafeSpace, before: Pose | None,
               after: Pose | None, by_home: bool) -> Link:
     """The way from pose `before` (None: at home) to above pose `after` (None: home), with the tools of kin0, kin1.
 
+    `control` is under the law of the way between the safe planes; retract and approach go by the law of their pose.
     Where travel is too short for any, the first is returned: the travel check then names the axis and the value.
     """
     turning = before is None or after is None or bool(angle_between(before.axis, after.axis) > 1e-9)
@@ -141,8 +143,8 @@ def _link(control: Control, kin0: Kinematics, kin1: Kinematics, space: SafeSpace
     none = np.zeros((0, kin0.joints))
     up0 = _above(kin0, space, before, turning, share) if before is not None else None
     up1 = _above(kin1, space, after, turning, share) if after is not None else None
-    retract = none if before is None or up0 is None else _leg(control, kin0, before, up0)
-    approach = none if after is None or up1 is None else _leg(control, kin1, up1, after)
+    retract = none if before is None or up0 is None else _leg(before.law or control, kin0, before, up0)
+    approach = none if after is None or up1 is None else _leg(after.law or control, kin1, up1, after)
     slack = 0.5 * share * space.margin
     home, home_state, way = none, none > 0.0, True
     if by_home and _has_retract_axis(control):
@@ -166,8 +168,11 @@ def _above(kin: Kinematics, space: SafeSpace, pose: Pose, turning: bool, share: 
     rise = _RISE if turning else 0.0
     lift = space.plane(pose.axis, turning, share) + rise - float(pose.axis @ (pose.tip - space.centre))
     tip = pose.tip + max(lift, 0.0) * pose.axis
-    q = nearest_solution(kin, tip[None, :], pose.axis[None, :], pose.q[None, :])[0]
-    return Pose(tip, pose.axis, q)
+    if pose.law is not None and pose.law.law == "tilted":
+        q = pose.law.slides_for(kin, tip[None, :], pose.q[None, :])[0]
+    else:
+        q = nearest_solution(kin, tip[None, :], pose.axis[None, :], pose.q[None, :])[0]
+    return Pose(tip, pose.axis, q, pose.law)
 
 
 def _leg(control: Control, kin: Kinematics, start: Pose, end: Pose) -> Floats:
@@ -246,7 +251,7 @@ def _lifted(kin: Kinematics, space: SafeSpace, q: Floats, floor: float, slack: f
 
 def _stays_clear(control: Control, kin: Kinematics, space: SafeSpace, q: Floats, slack: float) -> bool:
     for t in np.linspace(0.0, 1.0, _SAMPLES):
-        tip, axis, _ = control.between(q[:-1], q[1:], np.full(len(q) - 1, t), kin)
+        tip, axis, _ = control.between(q[:-1], q[1:], np.full(len(q) - 1, t), kin, np.ones(len(q) - 1, dtype=bool))
         if not bool(space.clear(tip, axis, slack).all()):
             return False
     return True

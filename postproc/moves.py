@@ -90,8 +90,9 @@ def link_rows(toolpath: Toolpath, setup: SetupFile, axis_tolerance: float) -> Bo
     """Rows (N,) that are reached by a linking move.
 
     The first motion, the first after a tool change, a bare GOHOME or a FROM elsewhere, the first of an operation whose
-    tool axis differs from the last one's by more than `axis_tolerance` (rad), and rapids that turn the axis by more than
-    the set-up's link_angle. Where such a row cuts, `build_moves` puts a linked row before it.
+    tool axis differs from the last one's by more than `axis_tolerance` (rad), rapids that turn the axis by more than the
+    set-up's link_angle, and the first of an operation that begins anew (`begins_anew`). Where such a row cuts,
+    `build_moves` puts a linked row before it.
     """
     n = len(toolpath)
     link = np.zeros(n, dtype=bool)
@@ -106,6 +107,7 @@ def link_rows(toolpath: Toolpath, setup: SetupFile, axis_tolerance: float) -> Bo
     rapid = toolpath.kind[moving] == Kind.RAPID
     linked = rapid & ((boundary & (turn > axis_tolerance)) | (turn > setup.clearance.link_angle * DEG))
     linked[0] = True
+    linked |= boundary & begins_anew(toolpath, setup)[toolpath.operation[moving]]
     stops = [e.index for e in toolpath.events if e.word == "GOHOME"] + [c.index for c in tool_changes(toolpath)]
     for index in [*stops, *_starts_elsewhere(toolpath)]:
         at = int(np.searchsorted(moving, index))
@@ -113,6 +115,13 @@ def link_rows(toolpath: Toolpath, setup: SetupFile, axis_tolerance: float) -> Bo
             linked[at] = True
     link[moving] = linked
     return link
+
+
+def begins_anew(toolpath: Toolpath, setup: SetupFile) -> Bools:
+    """(operations,) True where an operation is reached from the safe planes, whatever its axis: where it can be a restart
+    point, and where the set-up gives it, or the one before it, an output mode of its own."""
+    own = np.array([op.name in setup.output.operations for op in toolpath.operations])
+    return np.asarray(own | np.concatenate([[False], own[:-1]]) | setup.output.restart)
 
 
 def _starts_elsewhere(toolpath: Toolpath) -> list[int]:

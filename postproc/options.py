@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 FeedMode = Literal["auto", "per-minute", "inverse-time"]
+OutputMode = Literal["auto", "axes", "tcp", "tilted"]
 
 
 @dataclass(frozen=True)
@@ -19,11 +20,14 @@ class Options:
     units: str = ""
     dialect: str = ""
     allow_unknown: tuple[str, ...] = ()
+    output: OutputMode = "auto"
 
     def header(self) -> list[str]:
         """The options as comment lines of an output file."""
         lines = [f"tolerance {self.tolerance:g} mm, axis tolerance {self.axis_tolerance:g} degrees",
                  f"feed mode {self.feed_mode}"]
+        if self.output != "auto":
+            lines.append(f"output mode {self.output}")
         for name in ("setup", "units", "dialect"):
             if getattr(self, name):
                 lines.append(f"{name} {getattr(self, name)}")

@@ -12,7 +12,7 @@ import machines
 import toolpaths
 from machines.machine import Machine
 from postproc import VERSION
-from postproc.compile import compile_program, decimals, rounding_bound, rounding_problem
+from postproc.compile import compile_program
 from postproc.controllers import writer_for
 from postproc.controllers.model import ControllerFile, load_controller
 from postproc.feed import Feeds
@@ -23,6 +23,7 @@ from postproc.program import Program
 from postproc.reach import check_reach
 from postproc.readback.compare import Comparison
 from postproc.readback.verify import read_back
+from postproc.rounding import decimals, rounding_bound, rounding_problem
 from postproc.setup import SetupFile, load_setup
 from postproc.travel import check_travel
 from toolpaths.diagnostics import Diagnostic, DiagnosticError, error, has_errors
@@ -111,8 +112,8 @@ def _stages(result: PostResult, progress: Progress | None) -> PostResult:
     result = _with(result, found, shares=shares)
     if not result.ok:
         return result
-    path, found = build_path(job.control, job.kinematics, job.moves, job.space, job.home_rows(), shares["linearising"],
-                             shares["axis_linearising"] * DEG, file, progress)
+    path, found = build_path(job.modes, job.kinematics, job.moves, job.space, job.home_rows(), job.operation,
+                             shares["linearising"], shares["axis_linearising"] * DEG, file, progress)
     result = _with(result, found, path=path)
     if path is None:
         return result
@@ -142,7 +143,7 @@ def tolerance_shares(job: Job) -> tuple[dict[str, float], list[Diagnostic]]:
     """Where the tolerance goes (mm; axis_ in degrees): what the control's smoothing and rounding leave is linearising."""
     tolerance, axis = job.options.tolerance, job.options.axis_tolerance
     bound = rounding_bound(job.control, job.kinematics(int(job.moves.tool[0])), job.moves,
-                           decimals(job.control, job.controller))
+                           decimals(job.control, job.controller), job.modes.cutting_laws())
     smoothing = job.controller.kinematics.smoothing_share * tolerance
     shares = {"smoothing": smoothing, "rounding": bound.tip, "axis_rounding": bound.axis / DEG,
               "linearising": MARGIN * (tolerance - smoothing - bound.tip),

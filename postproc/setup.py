@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field
@@ -48,6 +48,28 @@ class ToolSetup(UserModel):
     """from the gauge point of the spindle to the tip, mm"""
 
 
+Asked = Literal["auto", "axes", "tcp", "tilted"]
+
+
+class Output(UserModel):
+    """What the words of the program mean, and how it is divided."""
+
+    default: Asked = "auto"
+    """axes: axis positions; tcp: the tip, the control runs the kinematics; tilted: the tip in a turned plane, rotary axes
+    standing still; auto: the best that controller and machine can. --output-mode goes before it"""
+    operations: dict[str, Asked] = Field(default_factory=dict)
+    """by name of the operation"""
+    restart: bool = False
+    """every operation begins at home with everything restated, so that the program can be taken up there"""
+
+
+class Pivot(UserModel):
+    """A rotary axis as the control's kinematics holds it."""
+
+    point: Vector
+    """a point of its line when all axes stand at 0, in machine coordinates, mm"""
+
+
 class SetupFile(UserModel):
     """A set-up. Everything has a default: part frame on the table frame, first system of the file as work offset."""
 
@@ -60,6 +82,9 @@ class SetupFile(UserModel):
     clearance: Clearance = Clearance()
     tools: dict[Annotated[str, Field(pattern=r"^(0|[1-9][0-9]*)$")], ToolSetup] = Field(default_factory=dict)
     """by tool number without leading zeros, e.g. [tools.1]"""
+    output: Output = Output()
+    control_pivots: dict[Annotated[str, Field(pattern="^[ABC]$")], Pivot] = Field(default_factory=dict)
+    """by rotary axis, e.g. [control_pivots.A]: what the control's parameters say; default: as the machine file"""
 
 
 @dataclass(frozen=True)

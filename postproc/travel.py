@@ -17,35 +17,36 @@ from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.units import DEG
 
 
-def arc_extremes(path: Path, control: Control) -> tuple[Floats, Floats]:
-    """(lowest, highest) joints (K, J) inside each block: its ends, and on arcs the quadrant points between."""
-    before = np.concatenate([control.machine.home[None, :], path.q[:-1]])
-    low, high = np.minimum(before, path.q), np.maximum(before, path.q)
-    rows = np.flatnonzero(path.code == ARC)
+def _arc_extremes(path: Path, law: Control, before: Floats, k: Ints, low: Floats, high: Floats) -> None:
+    """Widen the joints `low`, `high` (K, J) of the arc blocks k to where they are extreme between the ends.
+
+    Rotary joints stand still, so that the slides are a linear function of the words X, Y, Z. On the circle first cos a +
+    across sin a of the plane each is extreme where its derivative vanishes; what runs along the axis of the arc is added
+    whole.
+    """
+    kin, slides = law.machine.kinematics, law.slides
+    q0 = before[k][:, slides]
+    slides_of = np.linalg.inv(kin.jacobian(before[k])[:, :3][:, :, slides]) @ np.linalg.inv(law.tip_to_words(kin, before[k]))
+    step = np.linalg.solve(slides_of, (path.q[k][:, slides] - q0)[..., None])[..., 0]
     for plane, (i, j) in PLANE_COLUMNS.items():
-        k = rows[path.plane[rows] == plane]
-        if len(k):
-            _widen(path, control, before, k, int(control.xyz[i]), int(control.xyz[j]), (i, j), low, high)
-    return low, high
-
-
-def _widen(path: Path, control: Control, before: Floats, k: Ints, a: int, b: int, plane: tuple[int, int],
-           low: Floats, high: Floats) -> None:
-    """Quadrant points of arcs in the plane of joints a, b (slides run as the words do, so centres add)."""
-    offset = path.center[k][:, plane]
-    radius = np.hypot(offset[:, 0], offset[:, 1])
-    center = before[k][:, [a, b]] + offset
-    first = np.arctan2(-offset[:, 1], -offset[:, 0])
-    last = np.arctan2(path.q[k, b] - center[:, 1], path.q[k, a] - center[:, 0])
-    sense = np.where(path.ccw[k], 1.0, -1.0)
-    sweep = np.mod(sense * (last - first), 2.0 * np.pi)
-    sweep = np.where(sweep < 1e-9, 2.0 * np.pi, sweep)
-    for quadrant, (axis, sign) in enumerate(((a, 1.0), (b, 1.0), (a, -1.0), (b, -1.0))):
-        passed = np.mod(sense * (quadrant * np.pi / 2.0 - first), 2.0 * np.pi) <= sweep
-        value = center[:, 0 if axis == a else 1] + sign * radius
-        rows = k[passed]
-        low[rows, axis] = np.minimum(low[rows, axis], value[passed])
-        high[rows, axis] = np.maximum(high[rows, axis], value[passed])
+        rows = np.flatnonzero(path.plane[k] == plane)
+        if not len(rows):
+            continue
+        first = -path.center[k[rows]][:, (i, j)]
+        sense = np.where(path.ccw[k[rows]], 1.0, -1.0)
+        across = sense[:, None] * np.stack([-first[:, 1], first[:, 0]], axis=1)
+        last = first + step[rows][:, (i, j)]
+        sweep = np.mod(sense * (np.arctan2(last[:, 1], last[:, 0]) - np.arctan2(first[:, 1], first[:, 0])), 2.0 * np.pi)
+        sweep = np.where(sweep < 1e-9, 2.0 * np.pi, sweep)
+        p, s = (np.einsum("kab,kb->ka", slides_of[rows][:, :, (i, j)], v) for v in (first, across))
+        rise = slides_of[rows][:, :, 3 - i - j] * step[rows, 3 - i - j][:, None]
+        for extra in (0.0, np.pi):
+            angle = np.mod(np.arctan2(s, p) + extra, 2.0 * np.pi)
+            value = q0[rows] + p * (np.cos(angle) - 1.0) + s * np.sin(angle)
+            passed = (angle <= sweep[:, None]) & (np.hypot(p, s) > 0.0)
+            at = np.ix_(k[rows], slides)
+            low[at] = np.where(passed, np.minimum(low[at], value + np.minimum(rise, 0.0)), low[at])
+            high[at] = np.where(passed, np.maximum(high[at], value + np.maximum(rise, 0.0)), high[at])
 
 
 def check_travel(path: Path, moves: Moves, control: Control, kinematics: Callable[[int], Kinematics],
@@ -68,19 +69,21 @@ def extremes(path: Path, moves: Moves, control: Control,
              kinematics: Callable[[int], Kinematics]) -> tuple[Floats, Floats]:
     """(lowest, highest) joints (K, J) of each block.
 
-    Straight joints are extreme at their ends and at the quadrants of arcs. Where the control runs the kinematics
-    joints bend between the ends: there the blocks are sampled.
+    Straight joints are extreme at their ends and in arcs. Where the control runs the kinematics joints bend between the
+    ends: there the blocks are sampled.
     """
-    if not control.tip_law:
-        return arc_extremes(path, control)
     before = np.concatenate([control.machine.home[None, :], path.q[:-1]])
     low, high = np.minimum(before, path.q), np.maximum(before, path.q)
     tool = moves.tool[path.move]
-    for index in np.unique(tool):
-        kin, k = kinematics(int(index)), np.flatnonzero(tool == index)
-        for t in np.linspace(0.1, 0.9, 9):
-            _, _, q = control.between(before[k], path.q[k], np.full(len(k), t), kin)
-            low[k], high[k] = np.fmin(low[k], q), np.fmax(high[k], q)
+    for law, k in path.by_control():
+        arcs = k[path.code[k] == ARC]
+        if len(arcs) and law.machine.kinematics.slides_affine:
+            _arc_extremes(path, law, before, arcs, low, high)
+        for index in np.unique(tool[k]) if law.tip_law else ():
+            kin, part = kinematics(int(index)), k[tool[k] == index]
+            for t in np.linspace(0.1, 0.9, 9):
+                _, _, q = law.between(before[part], path.q[part], np.full(len(part), t), kin)
+                low[part], high[part] = np.fmin(low[part], q), np.fmax(high[part], q)
     return low, high
 
 

@@ -16,6 +16,9 @@ PLANE_COLUMNS = {17: (0, 1), 18: (2, 0), 19: (1, 2)}
 PLANE_AXIS = {plane: 3 - i - j for plane, (i, j) in PLANE_COLUMNS.items()}
 """number of the axis square to the plane"""
 _SQUARE = 1e-7
+"""rad that the axis of an arc may be off the axis of the plane"""
+_FLAT = 0.0002
+"""mm by which an arc may leave a tilted plane, whose printed angles are rounded"""
 _SHORTEST = 0.01
 _RADIUS_SLACK = 0.002
 
@@ -50,7 +53,10 @@ def word_arcs(control: Control, kin: Kinematics, curves: Curves, q0: Floats, q1:
         normal = np.asarray(np.einsum("nij,nj->ni", to_words, arc.normal)) * turn[:, None]
         third = np.abs(normal).argmax(axis=1)
         along = np.take_along_axis(normal, third[:, None], axis=1)[:, 0]
-        keep[rows] = fixed & square & (np.abs(along) > 1.0 - _SQUARE**2 / 2) & _well_shaped(arc)
+        radius = np.linalg.norm(arc.start - arc.center, axis=1)
+        off = np.linalg.norm(normal - along[:, None] * np.eye(3)[third], axis=1)
+        allowed = _SQUARE if control.law != "tilted" else np.maximum(_SQUARE, np.minimum(1e-4, _FLAT / radius))
+        keep[rows] = fixed & square & (off <= allowed) & _well_shaped(arc)
         plane[rows] = np.array([19, 18, 17], dtype=np.int8)[third]
         ccw[rows] = along > 0.0
         center[rows] = np.einsum("nij,nj->ni", to_words, arc.center - arc.start)

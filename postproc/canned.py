@@ -1,0 +1,116 @@
+"""Holes that the controller can drill by itself, as canned cycles."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from postproc.control import Control
+from postproc.controllers.model import ControllerFile
+from postproc.events import spindle_states
+from postproc.moves import Moves, Phase
+from postproc.path import Path
+from postproc.program import Hole
+from postproc.word_rows import WordRows
+from toolpaths.arrays import Bools
+from toolpaths.diagnostics import Diagnostic, error
+from toolpaths.toolpath import Toolpath
+
+SINGLE_MOVES = frozenset({"DRILL", "THRU", "CSINK", "FACE", "DEEP", "BRKCHP", "BORE", "REAM"})
+"""kinds of cycles that rapids, feeds and dwells replace"""
+
+
+def holes_of(toolpath: Toolpath, moves: Moves, path: Path, words: WordRows, control: Control,
+             controller: ControllerFile) -> tuple[Bools, list[Hole]]:
+    """Blocks of holes that the controller can drill by itself, and the holes.
+
+    Native where the tool stands along Z of the words, the kind is in the controller's table and the way out ends at
+    the clearance plane or at the level that the tool came from.
+    """
+    native = np.zeros(len(path), dtype=bool)
+    holes: list[Hole] = []
+    z = int(control.xyz[2])
+    if not controller.cycles.enabled or 17 not in controller.cycles.planes or z < 0 or not (moves.hole >= 0).any():
+        return native, holes
+    allowed = np.array([may_cycle(f.control, controller) for f in path.frames])[path.frame]
+    hole = np.where(np.isnan(path.u), -1, moves.hole[path.move])
+    turning = spindle_states(toolpath)[0]
+    change = np.flatnonzero(np.diff(hole)) + 1
+    before_initial = 0.0
+    previous_last = -2
+    for first, last in zip([0, *change], [*(change - 1), len(path) - 1], strict=True):
+        if hole[first] < 0:
+            continue
+        first += _rises_first(words, z, int(first), int(last))
+        level = float(words.start[first, z]) if first > 0 else np.inf
+        initial = before_initial if previous_last == first - 1 else level
+        before_initial, previous_last = initial, last
+        key = _key(toolpath.cycles[int(moves.cycle[path.move[first]])].kind, int(turning[moves.row[path.move[first]]]))
+        found = _hole(toolpath, moves, path, words, control, controller, int(first), int(last), initial, key)
+        if found is not None and allowed[first]:
+            holes.append(found)
+            native[first:last + 1] = True
+    return native, holes
+
+
+def may_cycle(control: Control, controller: ControllerFile) -> bool:
+    """True where canned cycles may stand under the law of a control."""
+    modes = controller.modes
+    if control.law == "axes" or control.base == control.law:
+        return True
+    mode = modes.tcp if control.law == "tcp" else modes.tilted
+    return mode is not None and mode.cycles
+
+
+def _rises_first(words: WordRows, z: int, first: int, last: int) -> bool:
+    """True where block `first` only lifts the tool to the clearance plane.
+
+    It stays a block of its own: inside a sequence of cycles LinuxCNC goes aslant to a higher plane under G99, others
+    cross over before they rise.
+    """
+    step = words.end[first] - words.start[first]
+    return 0 < first < last and bool(step[z] > 0.0) and not np.delete(step, z).any()
+
+
+def _hole(toolpath: Toolpath, moves: Moves, path: Path, rows: WordRows, control: Control, controller: ControllerFile,
+          first: int, last: int, initial: float, key: str) -> Hole | None:
+    cycle = toolpath.cycles[int(moves.cycle[path.move[first]])]
+    spec = controller.cycles.with_dwell if cycle.dwell > 0.0 else controller.cycles.table
+    phases = moves.phase[path.move[first:last + 1]]
+    bottom = first + int(np.flatnonzero(phases == Phase.DRILL)[-1])
+    z = int(control.xyz[2])
+    words = np.concatenate([rows.start[first:first + 1], rows.end[first:last + 1]])
+    start = int(np.flatnonzero(phases <= Phase.APPROACH)[-1]) + 1 if (phases <= Phase.APPROACH).any() else 0
+    along = bool((np.delete(words[start:], z, axis=1) == np.delete(words[start], z)).all())
+    plane, out, deepest = float(words[start, z]), float(words[-1, z]), float(words[bottom - first + 1, z])
+    if key not in spec or not along or deepest >= plane or len(set(cycle.steps)) > 1:
+        return None
+    if abs(out - plane) > 1e-9 and abs(out - initial) > 1e-9:
+        return None
+    return Hole(first, last, int(moves.cycle[path.move[first]]), plane, deepest, out, initial, key)
+
+
+def _key(kind: str, turning: int) -> str:
+    """The controller's table tells taps that turn anti-clockwise from the others; a tap that stands has no entry."""
+    return kind if kind != "TAP" else {1: "TAP", -1: "TAP_LEFT"}.get(turning, "")
+
+
+def not_native(toolpath: Toolpath, moves: Moves, path: Path, native: Bools, controller: ControllerFile) -> list[Diagnostic]:
+    """Cycles that single moves do not replace and that could not be written as canned cycles."""
+    only = np.array([c.kind not in SINGLE_MOVES or c.kind in controller.cycles.rigid_only for c in toolpath.cycles],
+                    dtype=bool)
+    rows = np.flatnonzero((moves.phase == Phase.DRILL) & (moves.cycle >= 0))
+    rows = rows[only[moves.cycle[rows]]] if len(only) else rows[:0]
+    rows = rows[~native[np.minimum(path.begin[rows], len(native) - 1)]]
+    turning = spindle_states(toolpath)[0][moves.row[rows]]
+    keys = np.array([_key(toolpath.cycles[int(moves.cycle[m])].kind, int(t)) or "TAP without a turning spindle"
+                     for m, t in zip(rows, turning, strict=True)], dtype=str)
+    result = []
+    for key in np.unique(keys):
+        lines = moves.line[rows[keys == key]]
+        known = str(key) in controller.cycles.table or str(key) in controller.cycles.with_dwell
+        hint = "the tool must stand along the machine's Z, the retract level must be the clearance plane or the level the " \
+            "tool comes from, a dwell needs an entry in cycles.with_dwell" if known else \
+            f"the controller's cycles.table has no {key}; take another cycle in the CAM system"
+        result.append(error("cycle.not_native", f"a cycle {key} cannot be written as single moves, and this one not as a "
+                            "canned cycle", file=toolpath.file, lines=lines[:6].tolist(), count=len(lines), hint=hint))
+    return result

@@ -1,0 +1,142 @@
+"""The output mode of each run: axis positions, tool-centre-point mode or tilted plane; by rule or as asked for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from machines.kinematics.base import Kinematics
+from postproc.control import Control, Law, tool_frames
+from postproc.controllers.model import ControllerFile
+from postproc.options import Options
+from postproc.planes import Plane, stated
+from postproc.setup import SetupFile
+from toolpaths.arrays import Array, Floats, Ints
+from toolpaths.diagnostics import Diagnostic, error
+from toolpaths.rotations import angle_between
+from toolpaths.toolpath import Toolpath
+
+ASKED = ("auto", "axes", "tcp", "tilted")
+CONSTANT = 0.1
+"""share of the axis tolerance within which the tool axis of a run counts as standing still"""
+
+
+@dataclass(frozen=True, eq=False)
+class WordFrame:
+    """A control under one law, with what a tilted plane states: printed angles, and rotary words by letter (degrees)."""
+
+    control: Control
+    angles: tuple[float, ...] = ()
+    rotary: tuple[tuple[str, float], ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class OutputModes:
+    """What controller and machine can do, and what is asked for each operation.
+
+    Attributes:
+        control: under its base law
+        asked (operations,): index into ASKED
+        decimals (J,): of the axis words
+    """
+
+    control: Control
+    controller: ControllerFile
+    asked: Array
+    decimals: Ints
+
+    @cached_property
+    def lacking(self) -> dict[Law, str]:
+        """Why a law cannot be had, "" where it can."""
+        control, modes, name = self.control, self.controller.modes, self.control.machine.name
+        if control.base == "tcp":
+            own = "the control runs the kinematics of this machine for the whole program"
+            return {"axes": own, "tcp": "", "tilted": own}
+        machine = "" if control.has_tip_modes else f"{name} is no serial machine with slides X, Y, Z along its axes and a " \
+            "rotary axis"
+        tables = modes.tilted is not None and modes.tilted.tables_only and not control.has_rotary_tables_only
+        return {"axes": "",
+                "tcp": machine or ("" if modes.tcp else "the controller has no tool-centre-point mode ([modes.tcp])"),
+                "tilted": machine or ("" if modes.tilted else "the controller has no tilted plane ([modes.tilted])")
+                or (f"the controller's plane is for rotary tables only, {name} has a rotary head" if tables else "")}
+
+    @cached_property
+    def tcp(self) -> WordFrame:
+        """The frame of the law "tcp", the same for all runs."""
+        if self.control.base == "tcp":
+            return self.base
+        control = self.control.under("tcp")
+        mode = self.controller.modes.tcp
+        return WordFrame(control if mode is None or mode.arcs else replace(control, arc_limit=0.0))
+
+    @cached_property
+    def base(self) -> WordFrame:
+        """The frame that programs begin in, and that home and indexing moves are made in."""
+        return WordFrame(self.control)
+
+    def law(self, asked: int, constant: bool) -> Law:
+        """The law of a run, `constant` where its tool axis stands still."""
+        if ASKED[asked] != "auto":
+            return ASKED[asked]  # type: ignore[return-value]
+        wanted: tuple[Law, ...] = ("tilted", "axes", "tcp") if constant else ("tcp", "axes")
+        return next(law for law in wanted if not self.lacking[law])
+
+    def cutting_laws(self) -> set[Law]:
+        """The laws that runs may come to have."""
+        return {self.law(int(asked), constant) for asked in np.unique(self.asked) for constant in (True, False)}
+
+    def plane(self, kin: Kinematics, q: Floats) -> tuple[WordFrame, Floats]:
+        """(the tilted frame for joints q (J,), q with its rotary joints as the words state them).
+
+        The frame is that of the tool at the rounded rotary words; its own printed angles are rounded too, and used so.
+        """
+        mode, control = self.controller.modes.tilted, self.control
+        assert mode is not None
+        words = np.round(q * control.unit, 12)
+        words[control.rotary] = [round(float(words[j]), int(self.decimals[j])) + 0.0 for j in control.rotary]
+        at = words / control.unit
+        rotary = tuple((control.machine.axis_names[j], float(words[j])) for j in control.rotary)
+        angles, rotation = stated(mode.angles, tool_frames(kin, at[None])[0], tuple(v for _, v in rotary), mode.decimals)
+        return WordFrame(control.under("tilted", Plane(rotation, control.origin)), angles, rotary), at
+
+
+def output_modes(control: Control, controller: ControllerFile, setup: SetupFile, options: Options, toolpath: Toolpath,
+                 decimals: Ints) -> tuple[OutputModes, list[Diagnostic]]:
+    """The modes of a job, and what is asked for but cannot be had."""
+    default = setup.output.default if options.output == "auto" else options.output
+    names = [setup.output.operations.get(op.name, default) for op in toolpath.operations]
+    modes = OutputModes(control, controller, np.array([ASKED.index(name) for name in names], dtype=np.int8), decimals)
+    return modes, _not_available(modes, toolpath) + _unknown_operations(setup, options, toolpath)
+
+
+def _not_available(modes: OutputModes, toolpath: Toolpath) -> list[Diagnostic]:
+    result = []
+    can = ", ".join(law for law, why in modes.lacking.items() if not why)
+    for asked in np.unique(modes.asked).tolist():
+        why = modes.lacking.get(ASKED[asked], "")  # type: ignore[call-overload]
+        if why:
+            lines = [op.line for op, a in zip(toolpath.operations, modes.asked, strict=True) if a == asked and op.line]
+            result.append(error("output.mode", f"output mode {ASKED[asked]} cannot be had: {why}", file=toolpath.file,
+                                lines=lines[:6], count=max(len(lines), 1), hint=f"this controller and machine have: {can}"))
+    return result
+
+
+def _unknown_operations(setup: SetupFile, options: Options, toolpath: Toolpath) -> list[Diagnostic]:
+    names = {op.name for op in toolpath.operations}
+    known = ", ".join(sorted(n for n in names if n)) or "no named operation"
+    return [error("setup.operation", f"[output.operations] names {name!r}, which is no operation of the CL file",
+                  file=options.setup, hint=f"it has: {known}")
+            for name in setup.output.operations if name not in names]
+
+
+def stands_still(axis: Floats, axis_tolerance: float) -> bool:
+    """True where tool axes (N, 3) are one within a share of the tolerance (rad)."""
+    return bool((angle_between(axis, np.broadcast_to(axis[:1], axis.shape)) <= CONSTANT * axis_tolerance).all())
+
+
+def turning_run(lines: list[int], file: str) -> Diagnostic:
+    """A run that turns the tool while it is to be written in a tilted plane."""
+    return error("output.turning", "output mode tilted for a run that turns the tool axis", file=file, lines=lines[:6],
+                 count=len(lines), hint="use auto or tcp for this operation")

@@ -1,0 +1,47 @@
+"""The pivots that the control's own kinematics holds, beside those of the machine."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from machines.kinematics.base import Kinematics
+from machines.kinematics.serial import Serial
+from machines.machine import Machine
+from postproc.options import Options
+from postproc.setup import SetupFile
+from toolpaths.diagnostics import Diagnostic, error
+
+ALLOWED = 0.1
+"""share of the tip tolerance that a pivot may be off by"""
+
+
+def control_kinematics(machine: Machine, setup: SetupFile, options: Options) -> tuple[Kinematics | None, list[Diagnostic]]:
+    """(the kinematics with the set-up's [control_pivots], None where it states none; pivots that differ from the
+    machine's).
+
+    Of a pivot's point only what is square to its axis counts.
+    """
+    if not setup.control_pivots:
+        return None, []
+    kin = machine.kinematics
+    letters = [j.name for j in kin.chain if j.rotary] if isinstance(kin, Serial) else []
+    unknown = [k for k in setup.control_pivots if k not in letters]
+    if not isinstance(kin, Serial) or unknown:
+        return None, [error("setup.pivot", f"[control_pivots.{k}]: {machine.name} has no such rotary axis",
+                            file=options.setup, hint=f"its rotary axes are {', '.join(letters) or 'none'}")
+                      for k in unknown or setup.control_pivots]
+    points = {k: np.array(v.point) for k, v in setup.control_pivots.items()}
+    chain = tuple(replace(j, point=points[j.name]) if j.name in points else j for j in kin.chain)
+    result = []
+    allowed = ALLOWED * options.tolerance
+    for joint, own in zip(kin.chain, chain, strict=True):
+        offset = own.point - joint.point
+        off = float(np.linalg.norm(offset - (offset @ joint.direction) * joint.direction))
+        if off > allowed:
+            held, true = (", ".join(f"{v:.4f}" for v in j.point) for j in (own, joint))
+            result.append(error("pivot.mismatch", f"the control holds the pivot of {joint.name} at ({held}), the machine "
+                                f"file at ({true}): {off:.4f} mm apart, allowed {allowed:.4f} mm", file=options.setup,
+                                hint="correct the control's parameters, the machine file, or the set-up's [control_pivots]"))
+    return replace(kin, chain=chain), result

@@ -1,0 +1,62 @@
+"""What the rounding of the words may cost, before any is written."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+
+import numpy as np
+
+from machines.kinematics.base import Kinematics
+from postproc.control import Control, Law
+from postproc.controllers.model import ControllerFile
+from postproc.moves import Moves
+from toolpaths.arrays import Ints
+from toolpaths.diagnostics import Diagnostic, error
+from toolpaths.units import DEG
+
+
+@dataclass(frozen=True)
+class Rounding:
+    """Largest deviation that the rounding of words can make: tip in mm, axis in rad."""
+
+    tip: float
+    axis: float
+
+
+def decimals(control: Control, controller: ControllerFile) -> Ints:
+    """(J,) decimals of the axis words."""
+    f = controller.format
+    return np.where(control.machine.rotary, f.rotary_decimals, f.linear_decimals).astype(np.int64)
+
+
+def rounding_bound(control: Control, kin: Kinematics, moves: Moves, places: Ints,
+                   laws: Collection[Law]) -> Rounding:
+    """Worst case of half a last decimal in every word, to first order (Jacobian), at up to 500 of the poses.
+
+    `laws` are those that the words may have. Where X, Y, Z are the tip, rotary words turn the tool about it.
+    """
+    rows = np.unique(np.linspace(0, len(moves) - 1, min(len(moves), 500)).astype(int))
+    some = kin.inverse(moves.tip[rows], kin.nearest_axis(moves.axis[rows]))[0]
+    some = some[np.isfinite(some).all(axis=1)]
+    if not len(some):
+        return Rounding(0.0, 0.0)
+    step = 0.5 * 10.0 ** -places / control.unit
+    jacobian = kin.jacobian(some)
+    axis = np.linalg.norm(jacobian[:, 3:], axis=1) @ step
+    if "axes" not in laws:
+        return Rounding(float(np.linalg.norm(step[control.slides])), float(axis.max()))
+    slides, rotary = control.slides, control.rotary
+    tip = np.linalg.norm(jacobian[:, :3], axis=1)
+    linear = np.linalg.norm(tip[:, slides] * step[slides], axis=1)
+    return Rounding(float((linear + tip[:, rotary] @ step[rotary]).max()), float(axis.max()))
+
+
+def rounding_problem(bound: Rounding, tolerance: float, axis_tolerance: float) -> list[Diagnostic]:
+    """Rounding of the words may take a half of the tolerances at most: the rest is for the path."""
+    if bound.tip <= tolerance / 2.0 and bound.axis <= axis_tolerance / 2.0:
+        return []
+    return [error("tolerance.rounding", f"rounding of the words alone may move the tip by {bound.tip:.6f} mm and the axis "
+                  f"by {bound.axis / DEG:.6f} degrees, of {tolerance:g} mm and {axis_tolerance / DEG:g} degrees that are "
+                  "allowed beside the control's own smoothing", hint="more decimals in the controller's [format], or a "
+                  "wider --tolerance, --axis-tolerance")]

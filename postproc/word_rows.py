@@ -1,0 +1,110 @@
+"""The words of a path: each block's under its own law and tool, rounded, and which of them it states."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from machines.kinematics.base import Kinematics
+from postproc.control import Control
+from postproc.moves import Moves
+from postproc.path import ARC, FEED, Path
+from postproc.word_arcs import PLANE_AXIS
+from toolpaths.arrays import Bools, Floats, Ints
+
+SNAP = 2.5
+"""X, Y, Z residues beside a rotary move, in units of the last decimal, that are not written"""
+
+
+@dataclass(frozen=True)
+class WordRows:
+    """Words (K, J) at the end and, in the same meaning, at the start of each block, rounded; `write` those it states."""
+
+    end: Floats
+    start: Floats
+    write: Bools
+
+
+def word_rows(path: Path, moves: Moves, control: Control, kinematics: Callable[[int], Kinematics],
+              lengths: Callable[[int], float], places: Ints) -> WordRows:
+    """The words of all blocks; `lengths` gives the gauge length of the tool of an index, `places` (J,) the decimals."""
+    begins = np.flatnonzero(np.diff(path.frame)) + 1
+    tool = _tools(path, moves)
+    exact = _words(path, path.q, np.arange(len(path)), tool, kinematics, lengths)
+    end = _rounded(_snapped(_rounded(exact, places), path, control, places), places)
+    start = np.concatenate([end[:1], end[:-1]])
+    start[begins] = _rounded(_words(path, path.q[begins - 1], begins, tool, kinematics, lengths), places)
+    return WordRows(end, start, _written(end, start, begins, path, control))
+
+
+def _rounded(words: Floats, places: Ints) -> Floats:
+    grain = 10.0 ** -places
+    return np.asarray(np.round(np.round(words / grain) * grain, int(places.max())))
+
+
+def _tools(path: Path, moves: Moves) -> Ints:
+    """(K,) tool of each block; blocks before a tool change still carry the tool that leaves, none before the first."""
+    leaving = np.arange(len(path)) < path.begin[path.move]
+    before = np.where(path.move > 0, moves.tool[np.maximum(path.move - 1, 0)], -1)
+    return np.asarray(np.where(leaving, before, moves.tool[path.move]))
+
+
+def _words(path: Path, q: Floats, rows: Ints, tool: Ints, kinematics: Callable[[int], Kinematics],
+           lengths: Callable[[int], float]) -> Floats:
+    """Unrounded words of joints q (K, J) under the law and with the tool of the blocks `rows` (K,)."""
+    words = np.empty_like(q)
+    frame, used = path.frame[rows], tool[rows]
+    for number, index in np.unique(np.stack([frame, used], axis=1), axis=0).tolist():
+        k = np.flatnonzero((frame == number) & (used == index))
+        words[k] = path.frames[number].control.words(q[k], kinematics(index), lengths(index))
+    return words
+
+
+def _snapped(words: Floats, path: Path, control: Control, places: Ints) -> Floats:
+    """Words (rounded) without tiny X, Y, Z residues beside a rotary move.
+
+    Under inverse time LinuxCNC takes the length of X, Y, Z alone where any of them moves, so that a residue of
+    rounding would set the speed of the whole block. What is left out is at most SNAP last decimals, and never adds up:
+    each block is compared with the last written position.
+    """
+    slides, rotary = control.slides, control.rotary
+    if not len(rotary) or len(words) < 2:
+        return words
+    snap = SNAP * 10.0 ** -places[slides]
+    turning = (words[1:, rotary] != words[:-1, rotary]).any(axis=1) & (path.code[1:] == FEED)
+    turning &= path.frame[1:] == path.frame[:-1]
+    step = np.abs(words[1:, slides] - words[:-1, slides])
+    rows = np.flatnonzero(turning & (step <= snap).all(axis=1) & (step > 0.0).any(axis=1)) + 1
+    wanted = words.copy()
+    todo = set(rows.tolist())
+    for k in rows.tolist():
+        while k in todo or (k < len(words) and (words[k - 1, slides] != wanted[k - 1, slides]).any()):
+            todo.discard(k)
+            if not turning[k - 1] or (np.abs(wanted[k, slides] - words[k - 1, slides]) > snap).any():
+                break
+            words[k, slides] = words[k - 1, slides]
+            k += 1
+            if k >= len(words):
+                break
+    return words
+
+
+def _written(end: Floats, start: Floats, begins: Ints, path: Path, control: Control) -> Bools:
+    """Words (K, J) that a block states: those it names, else those that change; both plane words of an arc.
+
+    The first block under another law states all; in a tilted plane the rotary axes have no words.
+    """
+    names = path.state.any(axis=1)
+    first = np.zeros(len(path), dtype=bool)
+    first[begins] = True
+    changed: Bools = (end != start) | first[:, None]
+    write = np.array(np.where(names[:, None], path.state, changed), dtype=bool)
+    for row in np.flatnonzero(path.code == ARC).tolist():
+        third = PLANE_AXIS[int(path.plane[row])]
+        write[row, [c for i, c in enumerate(control.xyz) if i != third]] = True
+    for law, k in path.by_control():
+        if law.law == "tilted":
+            write[np.ix_(k, control.rotary)] = False
+    return write
