@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
+from importlib.util import find_spec
 from typing import Any, cast
 
 
@@ -21,3 +22,14 @@ def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
         return cast(Callable[..., Any], njit(function, cache=True, **options))
     except RuntimeError:
         return cast(Callable[..., Any], njit(function, **options))
+
+
+@cache
+def available() -> bool:
+    """Whether there is a compiler at all; without one everything runs on numpy."""
+    return find_spec("numba") is not None
+
+
+def wanted(size: int, enough: int) -> bool:
+    """Whether compiled code pays: work of `enough` or more, or the compiler is loaded anyway."""
+    return (size >= enough or compiled.cache_info().currsize > 0) and available()

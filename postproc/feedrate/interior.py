@@ -67,13 +67,13 @@ class Steps(Protocol):
         ...
 
 
-def solve(steps: Steps, rows: int, seconds: float, tolerance: float = TOLERANCE, most: int = MOST) -> Solution:
-    """Drive `steps` until the gap is below tolerance x time.
+def solve(steps: Steps, rows: int, gap: float, tolerance: float = TOLERANCE, most: int = MOST) -> Solution:
+    """Drive `steps` from a first `gap` until it is below tolerance x time.
 
     Any iterate respects the limits, so that a solution that is not `solved` is slow, not wrong.
     """
-    mu, primal, dual = 5.0 * seconds / rows, 0.0, 0.0
-    gap, time = np.inf, seconds
+    mu, primal, dual = gap / rows, 0.0, 0.0
+    time = np.inf
     for iteration in range(most):
         gap, time = steps.assemble(mu, primal, dual)
         if gap < tolerance * time:

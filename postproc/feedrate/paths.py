@@ -14,8 +14,12 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from scipy.interpolate import BSpline
 
+from postproc.feedrate.compiled import compiled, wanted
+from postproc.feedrate.spline_kernel import spline
 from toolpaths.arrays import Floats
 
+KERNEL_FROM = 200_000
+"""Places at once from which compiling the evaluation of a spline pays."""
 ROOM = 0.8
 """Largest share of a path's length that the change of parameter may take as d; 0.6 d at each end must fit."""
 
@@ -66,14 +70,21 @@ class SplinePath:
     def __init__(self, knots: Floats, coefficients: Floats, degree: int = 5) -> None:
         if degree < 4:
             raise ValueError(f"degree {degree}: the third derivative must be continuous, which takes degree 4 or more")
-        self._orders = [BSpline(knots, coefficients, degree)]
+        self._orders = [BSpline(np.ascontiguousarray(knots, dtype=np.float64), np.asarray(coefficients, np.float64), degree)]
         for _ in range(3):
             self._orders.append(self._orders[-1].derivative())
+        self._coefficients = [np.ascontiguousarray(order.c) for order in self._orders]
         self.start, self.end = float(knots[degree]), float(knots[-degree - 1])
         self.breaks: Floats = np.unique(knots[degree:len(knots) - degree])
 
     def derivatives(self, s: Floats) -> Derivatives:
         """See `Path`."""
+        if wanted(len(s), KERNEL_FROM):
+            first = self._orders[0]
+            out = np.empty((4, len(s), self._coefficients[0].shape[1]))
+            at = np.ascontiguousarray(s, dtype=np.float64)
+            compiled(spline)(first.t, first.k, *self._coefficients, at, out)
+            return Derivatives(*out)
         return Derivatives(*(np.asarray(order(s), dtype=np.float64) for order in self._orders))
 
 

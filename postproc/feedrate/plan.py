@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from postproc.feedrate.limits import JointLimits, squared_speed
-from postproc.feedrate.mesh import Spacing, mesh, ramp_time
+from postproc.feedrate.mesh import FEWEST, Spacing, mesh, ramp_time
 from postproc.feedrate.motion import CHUNK, SAMPLE, Piece, Plan
 from postproc.feedrate.paths import Eased, Path
 from postproc.feedrate.problem import Knots
@@ -72,7 +72,10 @@ def plan(path: Path, limits: JointLimits, feed: Feed = np.inf, stops: Sequence[f
     if knots is not None and len(stops):
         raise ValueError("knots are for a motion without stops")
     pieces, reports, guess = [], [], []
-    for eased in _stretches(path, stops, options.ease):
+    stretches = _stretches(path, stops, options.ease)
+    knots_about = sum(max(FEWEST, (eased.last - eased.first) / options.knots.longest) for eased in stretches)
+    options = replace(options, method=options.method.settled(int(knots_about)))
+    for eased in stretches:
         sigma = knots if knots is not None else _mesh(eased, limits, allowed, options.knots)
         profile, report, slower = _solve(Knots(eased, sigma, limits, allowed), options)
         pieces.append(Piece(eased, profile, shares(report.weights, len(limits.velocity), float(profile.times[-1]))))
@@ -133,11 +136,11 @@ def _solve(grid: Knots, options: Options) -> tuple[Profile, Solved, float]:
     report = solved(grid, options.method)
     profile, slower = _profile(grid, report.c), 1.0
     for left in reversed(range(options.passes + 1 if options.strict else 0)):
-        slower, tight = tightened(grid, profile)
+        slower, tight = tightened(grid, profile, bool(options.method.kernel))
         if tight is None or not left:
             break
         grid = replace(grid, tight=tight)
-        report = solved(grid, options.method)
+        report = solved(grid, options.method, report.c)
         profile = _profile(grid, report.c)
     return profile, report, slower
 

@@ -52,14 +52,17 @@ class Problem:
 
     def start(self) -> Floats:
         """Equal coefficients (K + 2,), 0.9 of the largest that keep every limit."""
-        ones = np.ones(self.basis.knots + 2)
+        return self.slowed(np.ones(self.basis.knots + 2), 0.9)
+
+    def slowed(self, c: Floats, share: float = 0.98) -> Floats:
+        """Coefficients c (K + 2,), times `share` of the largest factor that keeps every limit."""
         with np.errstate(divide="ignore"):
-            most = np.max(self.ratios(ones) * np.stack((np.ones_like(self.cap), *self.tight)), axis=1)
+            most = np.max(self.ratios(c) * np.stack((np.ones_like(self.cap), *self.tight)), axis=1)
             velocity, acceleration, jerk = (1.0 / most).tolist()
-        low = 0.9 * min(velocity**2, acceleration, jerk ** (2.0 / 3.0))
-        if not (0.0 < low < np.inf):
+        factor = share * min(velocity**2, acceleration, jerk ** (2.0 / 3.0))
+        if not (0.0 < factor < np.inf):
             raise ArithmeticError("no slow motion respects the limits: the derivatives of the path are not finite")
-        return np.asarray(low * ones)
+        return np.asarray(factor * c)
 
     def ratios(self, c: Floats) -> Floats:
         """Velocity, acceleration and jerk over their limits at the knots, the worst joint, tightening left out, (3, K)."""

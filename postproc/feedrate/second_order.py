@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from postproc.feedrate.compiled import compiled
+from postproc.feedrate.compiled import compiled, wanted
 from postproc.feedrate.second_order_kernel import sweep
 from toolpaths.arrays import Floats
 
@@ -36,7 +36,7 @@ def second_order(sigma: Floats, dq: Floats, d2q: Floats, acceleration: Floats, c
     bound[0] = bound[-1] = 0.0
     bound[np.isinf(bound)] = 1e300
     if kernel is None:
-        kernel = len(sigma) >= KERNEL_FROM
+        kernel = wanted(len(sigma), KERNEL_FROM)
     if kernel:
         rows = (np.ascontiguousarray(order / acceleration) for order in (dq, d2q))
         compiled(sweep)(np.diff(sigma), *rows, bound)

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from postproc.feedrate.compiled import compiled
+from postproc.feedrate.limits import JointLimits
 from postproc.feedrate.paths import Derivatives
 from postproc.feedrate.problem import Knots
 from postproc.feedrate.profile import Profile
 from postproc.feedrate.rows import tool
+from postproc.feedrate.tightening_kernel import worst
 from toolpaths.arrays import Floats, Ints
 
 ENOUGH = 1.002
@@ -18,7 +21,7 @@ BETWEEN = (0.25, 0.5, 0.75)
 CHUNK = 16384
 
 
-def tightened(grid: Knots, profile: Profile) -> tuple[float, Floats | None]:
+def tightened(grid: Knots, profile: Profile, kernel: bool = False) -> tuple[float, Floats | None]:
     """Factor on time that brings what is seen between the knots to 1; new factors (3, K) on velocity, acceleration, jerk.
 
     The latter None where nothing is exceeded by more than ENOUGH.
@@ -26,7 +29,7 @@ def tightened(grid: Knots, profile: Profile) -> tuple[float, Floats | None]:
     excess = np.empty((3, len(grid.sigma) - 1))
     for first in range(0, excess.shape[1], CHUNK):
         here = np.arange(first, min(first + CHUNK, excess.shape[1]))
-        excess[:, here] = _ratios(grid, profile, here)
+        excess[:, here] = _ratios(grid, profile, here, kernel)
     velocity, acceleration, jerk = excess.max(axis=1).tolist()
     slower = max(velocity, acceleration**0.5, jerk ** (1.0 / 3.0))
     if max(velocity, acceleration, jerk) <= ENOUGH:
@@ -36,30 +39,37 @@ def tightened(grid: Knots, profile: Profile) -> tuple[float, Floats | None]:
     return slower, at_knots if grid.tight is None else grid.tight * at_knots
 
 
-def _ratios(grid: Knots, profile: Profile, k: Ints) -> Floats:
-    """Velocity (feed included), acceleration and jerk over their limits, (3, N), the worst BETWEEN the ends of intervals k."""
+def _ratios(grid: Knots, profile: Profile, k: Ints, kernel: bool) -> Floats:
+    """Velocity (feed included), acceleration and jerk over their limits, (3, N), the worst BETWEEN ends of intervals k."""
     way = ((grid.sigma[k + 1] - grid.sigma[k])[:, None] * BETWEEN).ravel()
     k = np.repeat(k, len(BETWEEN))
     sigma = grid.sigma[k] + way
     s = grid.eased.parameter(sigma)
     at = grid.eased.chained(sigma, s, grid.eased.path.derivatives(grid.eased.inside(s[0])))
-    x = profile.squared(k, way)
+    x = np.array(profile.squared(k, way))
     limits, speed = grid.limits, np.sqrt(x[0])
-    velocity, acceleration, jerk = (
-        (np.abs(rate) / limit).max(axis=1) for rate, limit in
-        zip(_in_time(at, x), (limits.velocity, limits.acceleration, limits.jerk), strict=True))
-    velocity = np.maximum(velocity, s[1] * speed / grid.feed(s[0]))
+    ratios = worst_ratios(at, x, limits, kernel)
+    ratios[0] = np.maximum(ratios[0], s[1] * speed / grid.feed(s[0]))
     if limits.tool is not None:
         known = tool(grid.eased, sigma, s)
         _, bend, snap = (np.linalg.norm(rate, axis=1) for rate in _in_time(known.tip, x))
-        velocity = np.maximum(velocity, known.tilt * speed / limits.tool.tilt_rate)
-        acceleration = np.maximum(acceleration, bend / limits.tool.acceleration)
-        jerk = np.maximum(jerk, snap / limits.tool.jerk)
-    return np.array([velocity, acceleration, jerk]).reshape(3, -1, len(BETWEEN)).max(axis=2)
+        most = limits.tool
+        ratios = np.maximum(ratios, (known.tilt * speed / most.tilt_rate, bend / most.acceleration, snap / most.jerk))
+    return np.asarray(ratios.reshape(3, -1, len(BETWEEN)).max(axis=2))
 
 
-def _in_time(at: Derivatives, x: tuple[Floats, Floats, Floats]) -> tuple[Floats, Floats, Floats]:
-    """Velocity, acceleration, jerk (N, J) at squared speed x and its derivatives."""
-    x0, x1, x2 = (value[:, None] for value in x)
+def worst_ratios(at: Derivatives, x: Floats, limits: JointLimits, kernel: bool) -> Floats:
+    """Velocity, acceleration and jerk of the joints over their limits, the worst joint, (3, N); x (3, N) and derivatives."""
+    most = (limits.velocity, limits.acceleration, limits.jerk)
+    if not kernel:
+        return np.array([(np.abs(rate) / limit).max(axis=1) for rate, limit in zip(_in_time(at, x), most, strict=True)])
+    out = np.empty((3, len(at.q)))
+    compiled(worst)(at.dq, at.d2q, at.d3q, x, 1.0 / np.array(most), out)
+    return out
+
+
+def _in_time(at: Derivatives, x: Floats) -> tuple[Floats, Floats, Floats]:
+    """Velocity, acceleration, jerk (N, J) at squared speed x (3, N) and its derivatives."""
+    x0, x1, x2 = x[:, :, None]
     root = np.sqrt(x0)
     return at.dq * root, at.d2q * x0 + 0.5 * at.dq * x1, (at.d3q * x0 + 1.5 * at.d2q * x1 + 0.5 * at.dq * x2) * root

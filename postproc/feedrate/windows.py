@@ -9,12 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
+from postproc.feedrate.compiled import wanted
 from postproc.feedrate.interior import NumpySteps, Solution, Steps, solve
 from postproc.feedrate.problem import Knots, Problem
 from postproc.feedrate.shares import weigh
@@ -28,6 +29,10 @@ KERNEL_FROM = 20_000
 """Knots from which compiling pays."""
 
 
+COLD, WARM = 5.0, 0.03
+"""First gap over time, from a slow start and from a similar motion."""
+
+
 @dataclass(frozen=True)
 class Method:
     """How to solve: compiled loops or numpy (None: by size), threads, window and overlap in knots."""
@@ -37,9 +42,14 @@ class Method:
     window: int = WINDOW
     overlap: int = OVERLAP
 
-    def steps(self, knots: int) -> Callable[[Problem, Floats], Steps]:
-        """What makes one linearisation for a motion of so many knots."""
-        if self.kernel or (self.kernel is None and knots >= KERNEL_FROM):
+    def settled(self, knots: int) -> Method:
+        """With `kernel` decided for so many knots in all."""
+        return self if self.kernel is not None else replace(self, kernel=wanted(knots, KERNEL_FROM))
+
+    @property
+    def steps(self) -> Callable[[Problem, Floats], Steps]:
+        """What makes one linearisation; numpy unless `kernel` is true."""
+        if self.kernel:
             from postproc.feedrate.interior_packed import PackedSteps
 
             return PackedSteps
@@ -68,17 +78,17 @@ class Found(NamedTuple):
     weights: Floats
 
 
-def solved(knots: Knots, method: Method) -> Solved:
-    """Least time on the knots."""
+def solved(knots: Knots, method: Method, near: Floats | None = None) -> Solved:
+    """Least time on the knots; `near`: coefficients (K + 2,) of a similar motion to start from."""
     count = len(knots.sigma)
-    make = method.steps(count)
+    make = method.settled(count).steps
     inner = np.linspace(0, count, max(1, round(count / method.window)) + 1).astype(int).tolist()
     windows = list(pairwise(inner))
     wide = [method.overlap] * len(windows)
     found = [Found(0, np.empty(0), 0, False, np.empty(0))] * len(windows)
     again = list(range(len(windows)))
     while again:
-        _solve_some(knots, windows, wide, again, found, make, method.threads)
+        _solve_some(knots, windows, wide, again, found, make, method.threads, near)
         c, bad, worst = _stitched(knots, inner, [min(pair) for pair in pairwise(wide)], found)
         again = sorted({i for j in bad for i in (j, j + 1) if wide[i] < count})
         for i in again:
@@ -88,13 +98,13 @@ def solved(knots: Knots, method: Method) -> Solved:
 
 
 def _solve_some(knots: Knots, windows: Sequence[tuple[int, int]], wide: Sequence[int], which: Sequence[int],
-                found: list[Found], make: Callable[[Problem, Floats], Steps], threads: int) -> None:
+                found: list[Found], make: Callable[[Problem, Floats], Steps], threads: int, near: Floats | None) -> None:
     def one(i: int) -> None:
         first, last = max(windows[i][0] - wide[i], 0), min(windows[i][1] + wide[i], len(knots.sigma))
         # A tied end needs its knots in one window.
         first, last = (0 if first < 16 else first), (len(knots.sigma) if last > len(knots.sigma) - 16 else last)
         problem = knots.problem(first, last)
-        one = solve_problem(problem, make)
+        one = solve_problem(problem, make, None if near is None else near[first:last + 2])
         weights = weigh(problem, one.c, one.multipliers, windows[i][0] - first, windows[i][1] - first)
         found[i] = Found(first, one.c, one.iterations, one.solved, weights)
 
@@ -106,11 +116,11 @@ def _solve_some(knots: Knots, windows: Sequence[tuple[int, int]], wide: Sequence
             one(i)
 
 
-def solve_problem(problem: Problem, make: Callable[[Problem, Floats], Steps]) -> Solution:
-    """One problem from its slow start."""
-    start = problem.start()
+def solve_problem(problem: Problem, make: Callable[[Problem, Floats], Steps], near: Floats | None = None) -> Solution:
+    """One problem from its slow start, or from coefficients `near` slowed until they respect its limits."""
+    start = problem.start() if near is None else problem.slowed(near)
     seconds = float(np.sum(problem.weight * problem.basis.values(start)[0] ** -0.5))
-    return solve(make(problem, start), problem.rows, seconds)
+    return solve(make(problem, start), problem.rows, (COLD if near is None else WARM) * seconds)
 
 
 def _stitched(knots: Knots, inner: Sequence[int], wide: Sequence[int],

@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from postproc.feedrate.compiled import compiled
 from postproc.feedrate.limits import JointLimits, squared_speed, steady_cap
 from postproc.feedrate.mesh import FEWEST, Spacing, mesh
 from postproc.feedrate.paths import Eased, SplinePath
+from postproc.feedrate.spline_kernel import spline
 from tests.postproc.feedrate_kit import MIKRON, PolynomialPath, random_path
 
 
@@ -68,3 +70,20 @@ def test_bad_values_are_refused() -> None:
         JointLimits(np.array([1.0]), np.array([0.0]), np.array([1.0]))
     with pytest.raises(ValueError, match="shape"):
         JointLimits(np.ones(2), np.ones(3), np.ones(2))
+
+
+@pytest.mark.parametrize("degree", [4, 5, 6])
+def test_compiled_spline_equals_scipys(degree: int) -> None:
+    """Rising places, any order, both ends, repeated knots, joints in columns."""
+    rng = np.random.default_rng(degree)
+    inner = np.sort(rng.uniform(0.0, 50.0, 40))
+    inner[7:7 + degree - 3] = inner[7]
+    knots = np.concatenate((np.zeros(degree + 1), inner, np.full(degree + 1, 50.0)))
+    path = SplinePath(knots, rng.normal(size=(len(knots) - degree - 1, 3)), degree)
+    rising = np.concatenate((np.linspace(0.0, 50.0, 301), inner))
+    for s in (np.sort(rising), rng.permutation(rising)):
+        plain = [order(s) for order in path._orders]
+        out = np.empty((4, len(s), 3))
+        compiled(spline)(path._orders[0].t, degree, *path._coefficients, s, out)
+        for order, other in zip(plain, out, strict=True):
+            np.testing.assert_allclose(other, order, rtol=1e-10, atol=1e-9 * np.abs(order).max())

@@ -1,0 +1,63 @@
+"""Strict mode: what is seen between knots, compiled against numpy, and what tightening and a warm start do."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from postproc.feedrate.interior import NumpySteps
+from postproc.feedrate.limits import ToolLimits
+from postproc.feedrate.plan import Options, plan
+from postproc.feedrate.profile import spline_profile
+from postproc.feedrate.spline import rest_basis
+from postproc.feedrate.tightening import BETWEEN, tightened, worst_ratios
+from postproc.feedrate.windows import solve_problem
+from tests.postproc.feedrate_kit import MIKRON, random_path, uniform
+
+
+def test_compiled_ratios_equal_numpy() -> None:
+    rng = np.random.default_rng(7)
+    at = random_path(1).derivatives(rng.uniform(0.0, 100.0, 50))
+    x = rng.normal(size=(3, 50)) * 1000.0
+    x[0] = np.abs(x[0])
+    np.testing.assert_allclose(worst_ratios(at, x, MIKRON, True), worst_ratios(at, x, MIKRON, False), rtol=1e-12)
+
+
+def test_tightening_lowers_what_is_seen_between_knots() -> None:
+    grid = uniform(random_path(8, bend=3.0), 400)
+    found, slower = None, []
+    for _ in range(3):
+        found = solve_problem(grid.problem(), NumpySteps, found)
+        factor, tight = tightened(grid, spline_profile(grid.sigma, rest_basis(grid.sigma, grid.eased.ease), found.c))
+        slower.append(factor)
+        found = found.c
+        if tight is None:
+            break
+        grid = replace(grid, tight=tight)
+    assert slower[0] > 1.03 and slower[-1] - 1.0 < 0.4 * (slower[0] - 1.0)
+    assert len(BETWEEN) == 3 and np.all(np.diff(BETWEEN) == 0.25)
+
+
+def test_a_warm_start_finds_the_same_in_fewer_steps() -> None:
+    grid = uniform(random_path(3), 500)
+    first = solve_problem(grid.problem(), NumpySteps)
+    rng = np.random.default_rng(1)
+    tight = 1.0 + 0.1 * rng.random((3, 501)) * (rng.random((3, 501)) < 0.1)
+    problem = replace(grid, tight=tight).problem()
+    cold, warm = solve_problem(problem, NumpySteps), solve_problem(problem, NumpySteps, first.c)
+    assert warm.solved and warm.iterations <= 0.75 * cold.iterations
+    times = [float(np.sum(problem.weight * problem.basis.values(one.c)[0] ** -0.5)) for one in (cold, warm)]
+    assert times[1] == pytest.approx(times[0], rel=1e-4)
+    assert problem.ratios(warm.c).max() < 1.0
+
+
+def test_limits_at_the_tool_are_tightened_too() -> None:
+    """Joints of the random walk taken as the tip: its acceleration and jerk hold in the samples, at little cost."""
+    from tests.postproc.test_feedrate_motion import Circle
+
+    limits = replace(MIKRON, velocity=np.full(3, 1e4), acceleration=np.full(3, 1e6), jerk=np.full(3, 1e7),
+                     tool=ToolLimits(acceleration=800.0, jerk=9000.0))
+    fast, strict = (plan(Circle(5.0), limits, options=Options(strict=mode)) for mode in (False, True))
+    assert strict.usage().worst <= 1.0 and strict.seconds < 1.01 * fast.seconds
