@@ -24,7 +24,6 @@ class KlartextWriter(Writer):
     side, asked = "", "R0"
     called = 0.0
     """spindle speed of the last TOOL CALL, 1/min"""
-    number = -1
 
     def numbered(self, block: str) -> str:
         """The block with its number; comments are blocks too."""
@@ -33,7 +32,7 @@ class KlartextWriter(Writer):
 
     def lines(self, header: list[str]) -> Iterator[str]:
         """The blocks of the whole program, numbered from 0."""
-        frame = self.controller.program
+        frame, self.number = self.controller.program, -1
         for block in frame.begin:
             yield self.numbered(block.format(name=self.name, number=frame.number))
         yield from map(self.numbered, map(self.comment, header))

@@ -112,6 +112,8 @@ class Tools(UserModel):
     """the next tool is selected right after a change"""
     length_with_z: bool = False
     """the length register stands in the first block that states Z, not in a block of its own"""
+    length_automatic: bool = False
+    """a tool change puts the tool's length in force by itself; with an empty `length_cancel` it cannot be taken back"""
     home_without_length: bool = False
     """blocks in machine coordinates switch the length register off"""
 

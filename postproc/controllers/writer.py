@@ -272,6 +272,9 @@ class Writer:
         if self.length_offsets and codes.length_cancel and not self.length_off:
             yield codes.length_cancel
         yield from blocks_of(codes.tool_change.format(number=number))
+        if self.controller.tools.length_automatic and not self.length_offsets and codes.length_cancel:
+            yield codes.length_cancel
+            self.length_off = True
         self.motion, self.register = "", ""
 
     def use_length(self, register: str) -> Iterator[str]:

@@ -19,7 +19,8 @@ TEXTS = {"description", "sources"}
 ONE_VALUE = {"kinematics.linear"}
 """statements of the file that have one allowed value so far"""
 OTHERS = {"kinematics.rapids", "feed.length", "feed.arc_inverse", "modes.tcp", "modes.tilted", "arcs.helix_planes",
-          "kinematics.smoothing_fixed", "kinematics.axis_smoothing_share", "tools.preload"}
+          "kinematics.smoothing_fixed", "kinematics.axis_smoothing_share", "tools.preload",
+          "tools.length_automatic"}
 """keys of what LinuxCNC has not: test_controllers_*.py and test_output_modes*.py show what they do"""
 READ_BACK = {"cycles.peck_relief"}
 """how the control moves inside a canned cycle, which the read-back follows and no block states"""
@@ -45,7 +46,8 @@ FLAT = ["PPRINT/NOTE A LONG TEXT FOR PEOPLE", "COOLNT/FLOOD", "RAPID", "GOTO/0,0
         "SELECT/TOOL,2",
         "COOLNT/THRU", "SPINDL/RPM,900,CCLW", "GOTO/40,0,5", "SPINDL/OFF", "COOLNT/OFF", "SPINDL/RPM,700,CLW",
         "CYCLE/DRILL,DEPTH,5,MMPM,100,CLEAR,3", "GOTO/40,0,0", "CYCLE/DRILL,DEPTH,5,MMPM,100,CLEAR,3,DWELL,1", "GOTO/50,0,0",
-        "CYCLE/DRILL,DEPTH,5,MMPM,100,RAPTO,3,RTRCTO,AUTO", "GOTO/60,0,0", "CYCLE/TAP,DEPTH,5,MMPM,700,CLEAR,3", "GOTO/70,0,0",
+        "CYCLE/DRILL,DEPTH,5,MMPM,100,RAPTO,3,RTRCTO,AUTO", "GOTO/60,0,0",
+        "CYCLE/TAP,DEPTH,5,MMPM,700,CLEAR,3", "GOTO/70,0,0",
         "CYCLE/OFF", "RAPID", "GOTO/60,0,50", "LOADTL/2",
         "RAPID", "GOTO/0,0,5", "GOTO/1,0,5"]
 PECK = ["RAPID", "GOTO/0,0,50", "CYCLE/DEEP,DEPTH,5,STEP,2,MMPM,100,RAPTO,3,RTRCTO,20", "GOTO/40,0,0", "CYCLE/OFF"]
