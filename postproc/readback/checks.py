@@ -12,7 +12,7 @@ from postproc.links import SafeSpace
 from postproc.moves import Moves
 from postproc.readback.execute import Motion
 from postproc.readback.faults import Faults
-from postproc.readback.poses import SAMPLES, Executed, arc_sweeps
+from postproc.readback.poses import Executed, arc_sweeps, coordinates
 from postproc.word_arcs import PLANE_COLUMNS
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.diagnostics import Diagnostic
@@ -26,14 +26,17 @@ ROUNDING_SLACK = 1e-3
 """mm or degrees by which rounded words may pass a limit that the exact ones keep"""
 
 
-def check_kinds(motion: Motion, moves: Moves, owner: Ints, tip: Floats, faults: Faults) -> list[Diagnostic]:
-    """Rapids where the CL file cuts, cuts where it moves rapidly; pecks may return rapidly above what is drilled."""
+def check_kinds(motion: Motion, moves: Moves, owner: Ints, tip: Floats, bent: bool, faults: Faults) -> list[Diagnostic]:
+    """Rapids where the CL file cuts, cuts where it moves rapidly; pecks may return rapidly above what is drilled.
+
+    Where rapids are dog-legs (`bent`) a feed move may stand for one that must be straight.
+    """
     rows = np.flatnonzero(owner < len(moves))
     m = owner[rows]
     cutting = (moves.kind[m] != Kind.RAPID) & ~moves.link[m]
     rapid = motion.code[rows] == 0
-    wrong = np.flatnonzero((cutting & rapid & ~_above_drilled(motion, moves, rows, m, tip))
-                           | (~cutting & ~rapid & ~moves.link[m]))
+    fed = ~cutting & ~rapid & ~moves.link[m] & (not bent)
+    wrong = np.flatnonzero((cutting & rapid & ~_above_drilled(motion, moves, rows, m, tip)) | fed)
     diagnostics = []
     if len(wrong):
         k = wrong[0]
@@ -137,7 +140,7 @@ def check_travel(motion: Motion, executed: Executed, moves: Moves, owner: Ints, 
     limits, machine = executed.control.machine.limits, executed.control.machine
     rows = np.arange(len(motion))
     worst = np.full((len(rows), len(machine.axis_names)), -np.inf)
-    for t in SAMPLES:
+    for t in executed.times(motion, rows):
         q = executed.joints(motion, rows, t)
         worst = np.fmax(worst, np.maximum(limits.lower - q, q - limits.upper))
     result = []
@@ -170,10 +173,10 @@ def check_smoothing(motion: Motion, job: Job, moves: Moves, owner: Ints, faults:
                          "G61")]
 
 
-def check_speeds(motion: Motion, control: Control, moves: Moves, curves: Curves, owner: Ints, match: Ints,
-            faults: Faults) -> list[Diagnostic]:
+def check_speeds(motion: Motion, control: Control, moves: Moves, curves: Curves, owner: Ints, match: Ints, by_radius: bool,
+                 faults: Faults) -> list[Diagnostic]:
     """Moves that the F words run faster than programmed, over the whole move."""
-    seconds = block_seconds(motion, control)
+    seconds = block_seconds(motion, control, by_radius)
     cutting = (owner < len(moves)) & (motion.code > 0)
     total = np.bincount(owner[cutting], weights=seconds[cutting], minlength=len(moves) + 1)[:len(moves)]
     length = curves.length()
@@ -188,14 +191,19 @@ def check_speeds(motion: Motion, control: Control, moves: Moves, curves: Curves,
                          int(moves.line[k]), int(motion.line[match[k]]), len(fast))]
 
 
-def block_seconds(motion: Motion, control: Control) -> Floats:
+def block_seconds(motion: Motion, control: Control, by_radius: bool = False) -> Floats:
     """(E,) time of each cutting block at constant feed, s.
 
-    Per minute the length is `Control.feed_length`, that of arcs along the arc.
+    Per minute the length is `Control.feed_length` under the law of the block, that of arcs along the arc. Inverse time
+    counts whole blocks, in arcs 1/(minutes per radian) where the control has it so (`by_radius`).
     """
-    before = np.concatenate([motion.start[None, :], motion.end[:-1]])
-    step = motion.end - before
+    rows = np.arange(len(motion))
+    before, end = coordinates(motion, rows)
+    step = end - before
     length = control.feed_length(step)
+    tips = np.flatnonzero(motion.frame > 0)
+    if len(tips):
+        length[tips] = control.under("tcp").feed_length(step[tips])
     sweep = arc_sweeps(motion, control)
     for plane, (i, j) in PLANE_COLUMNS.items():
         k = np.flatnonzero(np.isfinite(sweep) & (motion.plane == plane))
@@ -204,8 +212,9 @@ def block_seconds(motion: Motion, control: Control) -> Floats:
             radius = np.linalg.norm(before[k][:, columns] - motion.center[k][:, (i, j)], axis=1)
             rise = step[k, int(control.xyz[3 - i - j])]
             length[k] = np.hypot(radius * sweep[k], rise)
+    share = np.where(np.isfinite(sweep), sweep, 1.0) if by_radius else 1.0
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray(np.where(motion.inverse, 60.0 / motion.feed, 60.0 * length / motion.feed))
+        return np.asarray(np.where(motion.inverse, 60.0 * share / motion.feed, 60.0 * length / motion.feed))
 
 
 def check_links(motion: Motion, executed: Executed, moves: Moves, owner: Ints, space: SafeSpace, tolerance: float,
@@ -218,7 +227,7 @@ def check_links(motion: Motion, executed: Executed, moves: Moves, owner: Ints, s
     m = owner[rows]
     ends = m >= len(moves)
     to = np.minimum(m, len(moves) - 1)
-    for t in SAMPLES:
+    for t in executed.times(motion, rows):
         tip, axis = executed.poses(motion, rows, t)
         low = ~space.clear(tip, axis, -tolerance)
         approach = (_off_line(tip, moves.tip[to], moves.axis[to]) <= tolerance) & ~ends

@@ -70,10 +70,11 @@ def compare(motion: Motion, job: Job, executed: Executed, gcode: str = "") -> Co
     worst_axis, axis_line = _worst((axis_off, tilt), (owner[rows], done), (rows, match[done]), moves, motion)
     diagnostics += _beyond("tip", "mm", worst_tip, tolerance, tip_line, faults)
     diagnostics += _beyond("axis", "degrees", worst_axis / DEG, axis_tolerance / DEG, axis_line, faults)
-    diagnostics += check_kinds(motion, moves, owner, tip, faults)
+    diagnostics += check_kinds(motion, moves, owner, tip, executed.control.rapids == "dog-leg", faults)
     diagnostics += check_states(motion, job, moves, owner, faults)
     diagnostics += check_holes(motion, job, moves, tip, owner, faults)
-    diagnostics += check_speeds(motion, executed.control, moves, curves, owner, match, faults)
+    diagnostics += check_speeds(motion, executed.control, moves, curves, owner, match,
+                                job.controller.feed.arc_inverse == "radius", faults)
     diagnostics += check_links(motion, executed, moves, owner, job.space, tolerance, faults)
     diagnostics += check_travel(motion, executed, moves, owner, faults)
     diagnostics += check_smoothing(motion, job, moves, owner, faults)

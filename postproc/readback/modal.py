@@ -1,4 +1,4 @@
-"""Modal state line by line: G groups, offsets, tool, spindle, coolant, each carried on to the lines that follow."""
+"""Modal state block by block: groups, offsets, tool, spindle, coolant, each carried on to the blocks that follow."""
 
 from __future__ import annotations
 
@@ -6,28 +6,31 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from postproc.readback.canonical import LOADED, OFFSET, REGISTER, SMOOTH
 from postproc.readback.words import Words
 from toolpaths.arrays import Array, Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
 
 MOTION = (0, 1, 2, 3, 73, 74, 80, 81, 82, 83, 84, 85, 86, 89)
 CYCLES = (73, 74, 81, 82, 83, 84, 85, 86, 89)
-GROUPS: dict[str, tuple[float, ...]] = {
-    "motion": MOTION, "plane": (17, 18, 19), "distance": (90,), "feed_mode": (93, 94), "units": (20, 21),
+Groups = dict[str, tuple[float, ...]]
+GROUPS: Groups = {
+    "motion": MOTION, "plane": (17, 18, 19), "distance": (90, 91), "feed_mode": (93, 94, 95), "units": (20, 21),
     "offset": (54, 55, 56, 57, 58, 59, 59.1, 59.2, 59.3), "length": (43, 49), "level": (98, 99),
-    "compensation": (40, 41, 42), "path": (61, 61.1, 64), "once": (4, 53), "arc_distance": (91.1,),
+    "compensation": (40, 41, 42), "path": (61, 61.1, 64), "once": (4, 53), "arc_distance": (90.1, 91.1),
 }
-M_CODES = (0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 30)
-_GROUP_OF = {code: name for name, codes in GROUPS.items() for code in codes}
+"""of NIST RS274/NGC and LinuxCNC; a dialect adds its own"""
 
 
 @dataclass(frozen=True)
 class Modal:
-    """State at every line (index 0 is before line 1; L + 1 entries)."""
+    """State at every block (index 0 is before block 1; B + 1 entries)."""
 
     motion: Array
     plane: Array
     inverse: Array
+    per_turn: Array
+    """feed per revolution"""
     inch: Array
     level: Array
     length_register: Ints
@@ -39,19 +42,17 @@ class Modal:
     flood: Array
     mist: Array
     machine: Array
-    """G53 in this line"""
-    dwell: Array
-    """G4 in this line"""
+    """G53 in this block"""
     compensation: Array
     """G40, 41, 42"""
     offset: Floats
-    """work offset code, 54 and on"""
+    """work offset, by `offset_number`"""
     blend: Floats
     """mm that the control's smoothing may take: 0 exact path, inf without a limit, NaN where none was stated"""
 
 
 def fill(lines: Array, values: Array, count: int, initial: float) -> Floats:
-    """(count + 1,) the value stated last at or before each line."""
+    """(count + 1,) the value stated last at or before each block."""
     result = np.full(count + 1, np.nan)
     result[0] = initial
     result[lines] = values
@@ -68,101 +69,83 @@ def fill_values(lines: Ints, values: Floats, count: int) -> Floats:
     return filled
 
 
-def _g(words: Words, group: str) -> tuple[Ints, Floats]:
-    pick = (words.letter == ord("G")) & np.isin(words.value, GROUPS[group])
+def codes(words: Words, letter: str, numbers: tuple[float, ...]) -> tuple[Ints, Floats]:
+    """(blocks, numbers) of those G or M codes."""
+    pick = (words.letter == ord(letter)) & np.isin(words.value, numbers)
     return words.line[pick], words.value[pick]
 
 
-def _m(words: Words, codes: tuple[int, ...]) -> tuple[Ints, Floats]:
-    pick = (words.letter == ord("M")) & np.isin(words.value, codes)
-    return words.line[pick], words.value[pick]
+def number_of(words: Words, letter: str) -> Floats:
+    """(B + 1,) the number last stated with a letter, NaN before the first."""
+    return fill(*words.pick(letter), words.lines, np.nan)
 
 
-def _number_of(words: Words, letter: str, count: int) -> Floats:
-    pick = words.letter == ord(letter)
-    return fill(words.line[pick], words.value[pick], count, np.nan)
-
-
-def modal_state(words: Words) -> Modal:
-    """The state that the program itself sets up, line by line."""
-    n = words.lines
-
-    def group(name: str, initial: float) -> Floats:
-        return fill(*_g(words, name), n, initial)
-
-    once_line, once = _g(words, "once")
-    machine, dwell = np.zeros(n + 1, dtype=bool), np.zeros(n + 1, dtype=bool)
-    machine[once_line[once == 53]] = True
-    dwell[once_line[once == 4]] = True
-    h = _number_of(words, "H", n)
-    tool = _number_of(words, "T", n)
-    length_line, length = _g(words, "length")
-    register = fill(length_line, np.where(length == 43, h[length_line], -1.0), n, -1.0)
-    change_line, _ = _m(words, (6,))
-    loaded = fill(change_line, np.nan_to_num(tool[change_line], nan=-1.0), n, -1.0)
-    turn_line, turn = _m(words, (3, 4, 5, 6))
-    order = np.lexsort((turn != 6, turn_line))
-    spindle = fill(turn_line[order], np.where(turn == 3, 1, np.where(turn == 4, -1, 0))[order], n, 0.0)
-    coolant_line, coolant = _m(words, (7, 8, 9))
-    return Modal(group("motion", 1).astype(np.int16), group("plane", 17).astype(np.int8),
-                 group("feed_mode", 94) == 93, group("units", 21) == 20, group("level", 98).astype(np.int8),
-                 register.astype(np.int64), loaded.astype(np.int64), spindle.astype(np.int8), _number_of(words, "S", n),
-                 fill(coolant_line, coolant == 8, n, 0.0) > 0.5, fill(coolant_line, coolant == 7, n, 0.0) > 0.5,
-                 machine, dwell, group("compensation", 40).astype(np.int8), group("offset", np.nan), _blend(words))
-
-
-def _blend(words: Words) -> Floats:
-    """Smoothing in force: G61 none, G64 P blends within P and merges short lines within Q (P where it is not stated)."""
-    line, code = _g(words, "path")
-    value = np.where(code == 64, np.inf, 0.0)
-    for k, n in enumerate(line.tolist()):
-        here = words.line == n
-        p, q = (words.value[here & (words.letter == ord(letter))] for letter in "PQ")
-        if code[k] == 64 and len(p):
-            value[k] = p[0] + (q[0] if len(q) else p[0])
-    return fill_values(line, value, words.lines)
-
-
-def dwells(words: Words) -> Floats:
-    """(L + 1,) seconds that a line dwells by G4 P, 0 elsewhere, NaN where P is missing."""
-    lines = words.line[(words.letter == ord("G")) & (words.value == 4)]
-    p = words.letter == ord("P")
-    stated = np.full(words.lines + 1, np.nan)
-    stated[words.line[p]] = words.value[p]
-    result = np.zeros(words.lines + 1)
-    result[lines] = stated[lines]
+def columns(words: Words, letters: str | tuple[str, ...]) -> Floats:
+    """(B + 1, len(letters)) numbers by block, NaN where a block does not state the word."""
+    result = np.full((words.lines + 1, len(letters)), np.nan)
+    for j, letter in enumerate(letters):
+        line, value = words.pick(letter)
+        result[line, j] = value
     return result
 
 
+def modal_state(words: Words) -> Modal:
+    """The state that the program itself sets up, block by block, from canonical words."""
+    n = words.lines
+
+    def group(name: str, initial: float) -> Floats:
+        return fill(*codes(words, "G", GROUPS[name]), n, initial)
+
+    machine = np.zeros(n + 1, dtype=bool)
+    machine[codes(words, "G", (53,))[0]] = True
+    feed_mode = group("feed_mode", 94)
+    change, tool = words.pick(LOADED)
+    turn_line, turn = codes(words, "M", (3, 4, 5))
+    turn_line, turn = np.concatenate([change, turn_line]), np.concatenate([np.full(len(change), 5.0), turn])
+    order = np.argsort(turn_line, kind="stable")
+    spindle = fill(turn_line[order], np.where(turn == 3, 1, np.where(turn == 4, -1, 0))[order], n, 0.0)
+    coolant_line, coolant = codes(words, "M", (7, 8, 9))
+    return Modal(group("motion", 1).astype(np.int16), group("plane", 17).astype(np.int8), feed_mode == 93, feed_mode == 95,
+                 group("units", 21) == 20, group("level", 98).astype(np.int8),
+                 fill(*words.pick(REGISTER), n, -1.0).astype(np.int64), fill(change, tool, n, -1.0).astype(np.int64),
+                 spindle.astype(np.int8), number_of(words, "S"), fill(coolant_line, coolant == 8, n, 0.0) > 0.5,
+                 fill(coolant_line, coolant == 7, n, 0.0) > 0.5, machine, group("compensation", 40).astype(np.int8),
+                 fill_values(*words.pick(OFFSET), n), fill_values(*words.pick(SMOOTH), n))
+
+
 def drop_passive(words: Words, passive: tuple[str, ...]) -> Words:
-    """Words without the blocks that hold a code the controller file calls passive, and without program numbers (O)."""
-    drop = words.letter == ord("O")
+    """Words without the blocks that hold a code the controller file calls passive."""
+    drop = np.zeros(len(words.letter), dtype=bool)
     for code in passive:
         lines = words.line[(words.letter == ord(code[0])) & (words.value == float(code[1:]))]
         drop |= np.isin(words.line, lines)
-    return Words(words.letter[~drop], words.value[~drop], words.line[~drop], words.lines)
+    return words.take(~drop) if passive else words
 
 
-def check_end(words: Words, file: str) -> list[Diagnostic]:
-    """A program ends with M2 or M30, and holds nothing behind it."""
-    ends = words.line[(words.letter == ord("M")) & np.isin(words.value, (2, 30))]
+def check_end(words: Words, file: str, called: tuple[tuple[int, int], ...] = ()) -> list[Diagnostic]:
+    """A program ends with M2 or M30, and holds nothing behind it but the subprograms at the lines of `called`."""
+    outside = np.ones(len(words.line), dtype=bool)
+    for first, last in called:
+        outside &= (words.line < first) | (words.line > last)
+    ends = words.line[outside & (words.letter == ord("M")) & np.isin(words.value, (2, 30))]
     if not len(ends):
         return [error("gcode.no_end", "the program has no end (M2 or M30)", file=file, lines=[words.lines],
                       hint="it may have been cut off")]
-    after = np.unique(words.line[words.line > ends.min()])
+    after = np.unique(words.line[outside & (words.line > ends.min())])
     if not len(after):
         return []
     return [error("gcode.after_end", f"blocks behind the end of the program in line {int(ends.min())}: the control never "
                   "reaches them", file=file, lines=after[:6].tolist(), count=len(after), hint="take the early end out")]
 
 
-def check_codes(words: Words, letters: tuple[str, ...], file: str) -> list[Diagnostic]:
+def check_codes(words: Words, groups: Groups, m_codes: tuple[float, ...], letters: str, axes: tuple[str, ...],
+                file: str) -> list[Diagnostic]:
     """Codes and words that this reader cannot execute, as errors: nothing is skipped in silence."""
     diagnostics = []
-    g = words.letter == ord("G")
-    bad = g & ~np.isin(words.value, list(_GROUP_OF))
-    m = (words.letter == ord("M")) & ~np.isin(words.value, M_CODES)
-    known = np.isin(words.letter, [ord(c) for c in (*letters, *"GMFSTHDNIJKRPQL")])
+    known_g = [code for numbers in groups.values() for code in numbers]
+    bad = (words.letter == ord("G")) & ~np.isin(words.value, known_g)
+    m = (words.letter == ord("M")) & ~np.isin(words.value, m_codes)
+    known = np.isin(words.letter, [ord(c) for c in (*axes, *letters)])
     for pick, what in ((bad, "G"), (m, "M")):
         for value in np.unique(words.value[pick]):
             lines = words.line[pick & (words.value == value)]
@@ -172,18 +155,18 @@ def check_codes(words: Words, letters: tuple[str, ...], file: str) -> list[Diagn
     for code in np.unique(words.letter[~known]):
         lines = words.line[words.letter == code]
         diagnostics.append(error("gcode.unknown_word", f"word {chr(code)}: the machine has no such axis", file=file,
-                                 lines=lines[:6].tolist(), count=len(lines), hint=f"its axes are {', '.join(letters)}"))
-    return diagnostics + _repeated(words, file)
+                                 lines=lines[:6].tolist(), count=len(lines), hint=f"its axes are {', '.join(axes)}"))
+    return diagnostics + _repeated(words, groups, file)
 
 
-def _repeated(words: Words, file: str) -> list[Diagnostic]:
+def _repeated(words: Words, groups: Groups, file: str) -> list[Diagnostic]:
     """A word stated twice in a block, or two codes of one group."""
     group = np.zeros(len(words.letter), dtype=np.int64)
-    names = list(GROUPS)
-    for k in np.flatnonzero(words.letter == ord("G")):
-        group[k] = names.index(_GROUP_OF.get(float(words.value[k]), "once")) + 1
+    is_g = words.letter == ord("G")
+    for k, numbers in enumerate(groups.values(), 1):
+        group[is_g & np.isin(words.value, numbers)] = k
     single = words.letter != ord("M")
-    key = (words.line[single] * 128 + words.letter[single]) * 32 + group[single]
+    key = (words.line[single] * 256 + words.letter[single]) * 64 + group[single]
     order = np.argsort(key, kind="stable")
     twice = np.flatnonzero(np.diff(key[order]) == 0)
     if not len(twice):

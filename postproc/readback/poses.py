@@ -30,7 +30,7 @@ class Executed:
     lengths: dict[int, float]
     before: Floats | None = None
 
-    def poses(self, motion: Motion, rows: Ints, t: float) -> tuple[Floats, Floats]:
+    def poses(self, motion: Motion, rows: Ints, t: float | Floats) -> tuple[Floats, Floats]:
         """(tip, axis) (K, 3) of the blocks `rows` at fraction t."""
         position = positions(motion, self.control, rows, t)
         tip, axis = np.empty((len(rows), 3)), np.empty((len(rows), 3))
@@ -44,16 +44,27 @@ class Executed:
                 tip[k], axis[k] = self._followed(motion, rows[k], position[k], kin)
         return tip, axis
 
-    def joints(self, motion: Motion, rows: Ints, t: float) -> Floats:
+    def joints(self, motion: Motion, rows: Ints, t: float | Floats) -> Floats:
         """Joints (K, J) of the blocks `rows` at fraction t."""
         position = positions(motion, self.control, rows, t)
-        if not self.control.tip_law:
+        if self.control.base != "tcp":
             return np.asarray(position / self.control.unit)
         q = np.empty_like(position)
         for h in np.unique(motion.register[rows]).tolist():
             k = np.flatnonzero(motion.register[rows] == h)
             q[k] = self._held(position[k], self.lengths.get(h, 0.0) if h >= 0 else 0.0)
         return q
+
+    def times(self, motion: Motion, rows: Ints) -> list[float | Floats]:
+        """Fractions at which blocks are looked at: SAMPLES, and the corners of dog-legs, (K,) each."""
+        if self.control.rapids != "dog-leg":
+            return list(SAMPLES)
+        step = motion.end[rows] - begins(motion, rows)
+        own = np.abs(step) / (self.control.machine.limits.velocity * self.control.unit)
+        longest = own.max(axis=1, initial=0.0)
+        bent = _bent(motion, self.control, rows) & (longest > 0.0)
+        corners = np.where(bent[:, None], own / np.where(longest > 0.0, longest, 1.0)[:, None], 1.0)
+        return [*SAMPLES, *corners.T]
 
     def _held(self, position: Floats, offset: float) -> Floats:
         """Joints that a control with its own kinematics takes under a tool length offset."""
@@ -62,7 +73,7 @@ class Executed:
         return self.control.joints(words, self.control.machine.kinematics.with_tool(offset), offset)
 
     def _pose(self, position: Floats, kin: Kinematics, offset: float) -> tuple[Floats, Floats]:
-        if not self.control.tip_law:
+        if self.control.base != "tcp":
             return kin.forward(position / self.control.unit)
         return kin.forward(self._held(position, offset))
 
@@ -78,7 +89,7 @@ class Executed:
 def poses_before(motion: Motion, control: Control) -> Floats | None:
     """`Executed.before` of a program; None where the joints alone tell the pose."""
     kin = control.machine.kinematics
-    if control.tip_law or kin.slides_affine:
+    if control.base == "tcp" or kin.slides_affine:
         return None
     home = motion.start / control.unit
     ends = assembly.ends(kin, motion.end / control.unit, home)
@@ -91,21 +102,54 @@ def begins(motion: Motion, rows: Ints) -> Floats:
     return result
 
 
-def positions(motion: Motion, control: Control, rows: Ints, t: float) -> Floats:
-    """Machine coordinates (K, J) of blocks at fraction t: straight, or on the arc in its plane."""
+def positions(motion: Motion, control: Control, rows: Ints, t: float | Floats) -> Floats:
+    """Machine coordinates (K, J) of blocks at fraction t, one or (K,): as the law of each block has it."""
     end = motion.end[rows]
-    before = begins(motion, rows)
-    if t == 1.0:
+    if isinstance(t, float) and t == 1.0:
         return end
-    result = before + t * (end - before)
+    before, share = begins(motion, rows), np.broadcast_to(np.asarray(t), len(rows))
+    result = np.empty_like(end)
+    numbers = motion.frame[rows]
+    for number in np.unique(numbers).tolist():
+        k, frame = np.flatnonzero(numbers == number), motion.frames[number]
+        first, last = frame.coordinates(before[k]), frame.coordinates(end[k])
+        result[k] = frame.position(_along(motion, control.xyz, rows[k], first, last, share[k]))
+    k = np.flatnonzero(_bent(motion, control, rows))
+    if len(k):
+        result[k] = _dog_leg(before[k], end[k], share[k], control.machine.limits.velocity * control.unit)
+    return result
+
+
+def _bent(motion: Motion, control: Control, rows: Ints) -> Bools:
+    """(K,) rapids in which each axis runs for itself: not where the control keeps the tip straight."""
+    if control.rapids != "dog-leg":
+        return np.zeros(len(rows), dtype=bool)
+    straight = np.array([frame.law == "tcp" for frame in motion.frames])
+    return np.asarray((motion.code[rows] == 0) & ~straight[motion.frame[rows]])
+
+
+def _dog_leg(before: Floats, end: Floats, t: Floats, speed: Floats) -> Floats:
+    """Positions (K, J) at fraction t (K,) of the time: each axis at its rapid speed (J,) until it is there."""
+    step = end - before
+    own = np.abs(step) / speed
+    longest = own.max(axis=1, keepdims=True)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = np.where(own > 0.0, np.minimum(t[:, None] * longest / own, 1.0), 1.0)
+    result: Floats = before + share * step
+    return result
+
+
+def _along(motion: Motion, xyz: Ints, rows: Ints, before: Floats, end: Floats, t: Floats) -> Floats:
+    """Coordinates (K, J) at fraction t (K,): straight, or on the arc in its plane."""
+    result = before + t[:, None] * (end - before)
     for plane, (i, j) in PLANE_COLUMNS.items():
         k = np.flatnonzero((motion.code[rows] == 2) & (motion.plane[rows] == plane))
         if len(k):
-            a, b = int(control.xyz[i]), int(control.xyz[j])
+            a, b = int(xyz[i]), int(xyz[j])
             center = motion.center[rows[k]][:, (i, j)]
             first, last = before[k][:, (a, b)] - center, end[k][:, (a, b)] - center
-            angle = np.arctan2(first[:, 1], first[:, 0]) + t * signed_sweep(first, last, motion.ccw[rows[k]])
-            radius = (1.0 - t) * np.hypot(*first.T) + t * np.hypot(*last.T)
+            angle = np.arctan2(first[:, 1], first[:, 0]) + t[k] * signed_sweep(first, last, motion.ccw[rows[k]])
+            radius = (1.0 - t[k]) * np.hypot(*first.T) + t[k] * np.hypot(*last.T)
             result[k, a], result[k, b] = center[:, 0] + radius * np.cos(angle), center[:, 1] + radius * np.sin(angle)
     return result
 
@@ -120,15 +164,26 @@ def signed_sweep(first: Floats, last: Floats, ccw: Bools) -> Floats:
     return np.where(ccw, forward, backward)
 
 
+def coordinates(motion: Motion, rows: Ints) -> tuple[Floats, Floats]:
+    """Coordinates (K, J) where blocks begin and end, each in the frame of its block."""
+    before, end = begins(motion, rows), motion.end[rows]
+    numbers = motion.frame[rows]
+    for number in np.unique(numbers[numbers > 0]).tolist():
+        k, frame = np.flatnonzero(numbers == number), motion.frames[number]
+        before[k], end[k] = frame.coordinates(before[k]), frame.coordinates(end[k])
+    return before, end
+
+
 def arc_sweeps(motion: Motion, control: Control) -> Floats:
     """(E,) sweep of arc blocks, rad, positive; NaN for others."""
     result = np.full(len(motion), np.nan)
-    before = np.concatenate([motion.start[None, :], motion.end[:-1]])
+    arcs = np.flatnonzero(motion.code == 2)
+    before, end = coordinates(motion, arcs)
     for plane, (i, j) in PLANE_COLUMNS.items():
-        k = np.flatnonzero((motion.code == 2) & (motion.plane == plane))
+        k = np.flatnonzero(motion.plane[arcs] == plane)
         if len(k):
             columns = [int(control.xyz[i]), int(control.xyz[j])]
-            center = motion.center[k][:, (i, j)]
-            result[k] = np.abs(signed_sweep(before[k][:, columns] - center, motion.end[k][:, columns] - center,
-                                            motion.ccw[k]))
+            center = motion.center[arcs[k]][:, (i, j)]
+            result[arcs[k]] = np.abs(signed_sweep(before[k][:, columns] - center, end[k][:, columns] - center,
+                                                  motion.ccw[arcs[k]]))
     return result

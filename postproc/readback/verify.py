@@ -2,33 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
 from postproc.job import Job
 from postproc.readback.compare import Comparison, compare
-from postproc.readback.execute import Offsets, execute
-from postproc.readback.modal import check_end, drop_passive
+from postproc.readback.dialects import reader_for
+from postproc.readback.execute import Offsets, run
 from postproc.readback.poses import Executed, poses_before
-from postproc.readback.words import tokenise
 from toolpaths.diagnostics import Diagnostic, error, has_errors
 
 
-def read_back(data: bytes, job: Job, file: str,
-              progress: Callable[[str, int, int], None] | None = None,
-              gcode: str = "") -> tuple[Comparison | None, list[Diagnostic]]:
-    """Execute a program on the job's machine and compare its motion with the job's CL file."""
+def read_back(data: bytes, job: Job, file: str, progress: Callable[[str, int, int], None] | None = None, gcode: str = "",
+              others: Mapping[str, bytes] | None = None) -> tuple[Comparison | None, list[Diagnostic]]:
+    """Execute a program on the job's machine and compare its motion with the job's CL file.
+
+    `others`: files of its subprograms, by the names that the program calls them by.
+    """
     machine, control = job.machine, job.control
-    words, diagnostics = tokenise(data, gcode)
-    if has_errors(diagnostics):
-        return None, diagnostics
     home = control.words(machine.home[None, :], machine.kinematics, 0.0)[0] + control.work_offset
+    reader = reader_for(job.controller, machine.axis_names, home)
+    code, diagnostics = reader.read(data, gcode, others)
+    if code is None or has_errors(diagnostics):
+        return None, diagnostics
     offsets = Offsets(control.work_offset, control.xyz, job.register_lengths(), home, control.length_on_z,
-                      job.controller.cycles.peck_relief)
-    words = drop_passive(words, job.controller.program.passive)
-    diagnostics += check_end(words, gcode)
-    motion, found = execute(words, machine.axis_names, offsets, gcode)
+                      job.controller.cycles.peck_relief, control, reader.rises_first, reader.arc_slack)
+    motion, found = run(code, machine.axis_names, offsets, gcode)
     diagnostics += found
     if has_errors(diagnostics):
         return None, diagnostics

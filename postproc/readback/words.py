@@ -7,12 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from toolpaths.arrays import Array, Floats, Ints
-from toolpaths.diagnostics import Diagnostic, error
+from toolpaths.arrays import Array, Bools, Floats, Ints
+from toolpaths.diagnostics import Diagnostic, error, warning
 
 _COMMENTS = re.compile(rb"\([^()\n]*\)|;[^\n]*")
-_WORD = re.compile(rb"\s*([A-Z])\s*([-+]?(?:\d+\.?\d*|\.\d+))\s*")
-_BLANKS = bytes.maketrans(b"ABCDEFGHIJKLMNOPQRSTUVWXYZ\n", b" " * 27)
+_WORD = re.compile(rb"\s*([A-Za-z])\s*([-+]?(?:\d+\.?\d*|\.\d+))\s*")
+_LETTERS = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz"
+_BLANKS = bytes.maketrans(_LETTERS + b"\n", b" " * 53)
 _NUMBER = np.zeros(256, dtype=bool)
 _NUMBER[list(b"0123456789.+- \t\n")] = True
 
@@ -22,35 +23,68 @@ class Words:
     """W words in file order.
 
     Attributes:
-        letter (W,): ASCII codes, upper case; value (W,): numbers; line (W,): 1-based lines; lines: how many there are
+        letter (W,): ASCII codes; value (W,): numbers; line (W,): 1-based lines; lines: how many there are
+        point (W,): True where the number is written with a decimal point; absent where nothing asks for it
     """
 
     letter: Array
     value: Floats
     line: Ints
     lines: int
+    point: Bools | None = None
+
+    def take(self, keep: Bools | Ints) -> Words:
+        """Some of the words, in the order asked for."""
+        point = None if self.point is None else self.point[keep]
+        return Words(self.letter[keep], self.value[keep], self.line[keep], self.lines, point)
+
+    def pick(self, letter: str) -> tuple[Ints, Floats]:
+        """(lines, values) of one letter."""
+        here = self.letter == ord(letter)
+        return self.line[here], self.value[here]
 
 
 def tokenise(data: bytes, file: str = "") -> tuple[Words, list[Diagnostic]]:
-    """The words of a program. Comments and % lines are taken out; block-delete signs and what is no word are errors."""
-    text = _COMMENTS.sub(b"", data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")).upper()
+    """The words of a program in letters and numbers.
+
+    Comments and % lines are taken out; what is no word is an error. Blocks with "/" are words like others, with a
+    warning: the switch at the control that leaves them out counts as off.
+    """
+    text = plain(data).upper()
     ends = _tape_marks(text)
     text = re.sub(rb"(?m)^[ \t]*%[^\n]*", b"", text)
-    skipped = [text.count(b"\n", 0, m.start()) + 1 for m in re.finditer(rb"(?m)^[ \t]*/", text)]
-    text = re.sub(rb"(?m)^[ \t]*/", b"", text)
+    text, found = block_delete(text, file)
+    words, more = read_words(text, file)
+    return words, [*more, *found, *_early_end(ends, file)]
+
+
+def plain(data: bytes, comments: re.Pattern[bytes] = _COMMENTS) -> bytes:
+    """Text with line feeds alone and without comments."""
+    return comments.sub(b"", data.replace(b"\r\n", b"\n").replace(b"\r", b"\n"))
+
+
+def read_words(text: bytes, file: str = "") -> tuple[Words, list[Diagnostic]]:
+    """The words of text that holds nothing but letters, each with a number."""
     if not text.endswith(b"\n"):
         text += b"\n"
     codes = np.frombuffer(text, dtype=np.uint8)
-    is_letter = (codes >= 65) & (codes <= 90)
-    strange = np.flatnonzero(~is_letter & ~_NUMBER[codes])
+    folded = codes & 0xDF
+    is_letter = (folded >= 65) & (folded <= 90)
+    strange = bool((~is_letter & ~_NUMBER[codes]).any())
     newline = codes == 10
     where = np.flatnonzero(is_letter)
     line = (np.cumsum(newline) + 1)[where]
-    values = _numbers(text) if not len(strange) else None
+    values = _numbers(text) if not strange else None
     if values is None or len(values) != len(where) or not _each_has_number(codes, where):
-        words, found = _slowly(text, file)
-        return words, found + _block_delete(skipped, file) + _early_end(ends, file)
-    return Words(codes[where], values, line, int(newline.sum())), _block_delete(skipped, file) + _early_end(ends, file)
+        return _slowly(text, file)
+    return Words(codes[where], values, line, int(newline.sum()), _points(codes, where)), []
+
+
+def _points(codes: Array, where: Ints) -> Bools:
+    """(W,) True where a point stands between a letter and the next."""
+    points = np.zeros(len(where), dtype=bool)
+    points[np.searchsorted(where, np.flatnonzero(codes == 46), side="right") - 1] = True
+    return points
 
 
 def _tape_marks(text: bytes) -> list[int]:
@@ -67,11 +101,15 @@ def _early_end(lines: list[int], file: str) -> list[Diagnostic]:
                   count=len(lines), hint="% may only be the first and the last line")]
 
 
-def _block_delete(lines: list[int], file: str) -> list[Diagnostic]:
+def block_delete(text: bytes, file: str) -> tuple[bytes, list[Diagnostic]]:
+    """Text without the "/" that begin blocks, and a warning where there are any."""
+    mark = re.compile(rb"(?m)^([ \t]*(?:N?[ \t]*\d+[ \t]*)?)/\d?(?=[ \t]*[A-Z\n])")
+    lines = [text.count(b"\n", 0, m.start(1)) + 1 for m in mark.finditer(text)] if b"/" in text else []
     if not lines:
-        return []
-    return [error("gcode.block_delete", "a block that a switch at the control leaves out (/)", file=file, lines=lines[:6],
-                  count=len(lines), hint="take the / away: what is proved must not depend on a switch")]
+        return text, []
+    return mark.sub(rb"\1", text), [warning(
+        "gcode.block_delete", "a block that a switch at the control leaves out (/)", file=file, lines=lines[:6],
+        count=len(lines), hint="what is proved holds with that switch off: these blocks are run")]
 
 
 def _numbers(text: bytes) -> Floats | None:
@@ -111,6 +149,7 @@ def _slowly(text: bytes, file: str) -> tuple[Words, list[Diagnostic]]:
     letters: list[int] = []
     values: list[float] = []
     lines: list[int] = []
+    points: list[bool] = []
     diagnostics: list[Diagnostic] = []
     rows = text.split(b"\n")[:-1]
     for number, row in enumerate(rows, 1):
@@ -125,7 +164,8 @@ def _slowly(text: bytes, file: str) -> tuple[Words, list[Diagnostic]]:
             letters.append(match[1][0])
             values.append(float(match[2]))
             lines.append(number)
+            points.append(b"." in match[2])
             at = match.end()
     words = Words(np.array(letters, dtype=np.uint8), np.array(values, dtype=np.float64),
-                  np.array(lines, dtype=np.int64), len(rows))
+                  np.array(lines, dtype=np.int64), len(rows), np.array(points, dtype=bool))
     return words, diagnostics

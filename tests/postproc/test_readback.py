@@ -184,7 +184,7 @@ def test_random_programs_as_the_own_executor_runs_them(seed: int) -> None:
 
 
 @pytest.mark.parametrize(("text", "code"), [
-    ("G0 X1\nG68.2 X1\n", "gcode.unknown_code"), ("G91 G1 X1 F9\n", "gcode.unknown_code"),
+    ("G0 X1\nG68.2 X1\n", "gcode.unknown_code"), ("G92 X1\n", "gcode.unknown_code"),
     ("G58.1 X1\n", "gcode.unknown_code"), ("M98 P2\n", "gcode.unknown_code"),
     ("G0 B5\n", "gcode.unknown_word"), ("G0 U5\n", "gcode.unknown_word"),
     ("G0 X1 X2\n", "gcode.repeated"), ("G0 G1 X1 F9\n", "gcode.repeated"), ("G17 G18 G0 X1\n", "gcode.repeated"),
@@ -201,7 +201,7 @@ def test_what_it_cannot_execute_is_an_error_with_the_line(text: str, code: str) 
     assert code in codes(found)
     d = next(d for d in found if d.code == code)
     assert d.lines and d.lines[0] == next(i for i, n in enumerate(text.splitlines(), 1) if re.search(
-        r"^/|G68|G91|G58|M98|B5|U5|X1 X2|G0 G1|G17 G18|#|\[|SUB|1e3|,|X$|--|\(open|G81 X1 Y1|G83", n))
+        r"^/|G68|G92|G58|M98|B5|U5|X1 X2|G0 G1|G17 G18|#|\[|SUB|1e3|,|X$|--|\(open|G81 X1 Y1|G83", n))
 
 
 def test_nothing_at_all() -> None:

@@ -1,0 +1,143 @@
+"""The canonical text that every dialect is translated into: words in letters and numbers, laws and cycles as objects.
+
+Capitals are absolute axis words, small letters the same words counted from where the block begins; I, J, K are centres
+in the coordinates of the block, i, j, k from its start. G and M numbers are those of NIST RS274/NGC; what NIST has no
+number for has a sign of its own:
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from postproc.readback.words import Words
+from toolpaths.arrays import Bools, Floats, Ints
+
+REGISTER = "@"
+"""length register in force from this block on, -1 for none"""
+LOADED = "$"
+"""tool that this block puts into the spindle"""
+REST = "="
+"""s that the block rests"""
+SMOOTH = "!"
+"""mm that the control's own smoothing may take from this block on, inf without a limit"""
+OFFSET = "#"
+"""work offset register, numbered by `offset_number`"""
+LAW = "&"
+"""index into Canonical.laws: from this block on"""
+CALL = "*"
+"""index into Canonical.drills: at the end of this block"""
+TURNS = "~"
+"""full turns of an arc, more than the one to its end"""
+STATEMENT = "?"
+"""index into Text.statements: what is not letters with numbers"""
+
+INCREMENTAL = 32
+"""between the codes of a capital and its small letter"""
+EXTENDED_OFFSETS = 1000.0
+"""G54.1 P1 and its like are numbered from here"""
+
+
+@dataclass(frozen=True)
+class Statement:
+    """What a dialect writes in words of its own, e.g. ("CYCLE81", (50.0, 0.0, ...))."""
+
+    name: str
+    args: tuple[float | str | None, ...] = ()
+    keys: dict[str, float] = field(default_factory=dict)
+
+    def number(self, index: int, default: float = float("nan")) -> float:
+        """Argument `index` as a number, `default` where it is not given."""
+        value = self.args[index] if index < len(self.args) else None
+        return value if isinstance(value, float) else default
+
+
+@dataclass(frozen=True)
+class Text:
+    """One file in words, statements among them by their index."""
+
+    words: Words
+    statements: tuple[Statement, ...] = ()
+
+
+LawName = Literal["axes", "tcp", "tilted"]
+Choice = Literal["nearest", "+", "-", "stand"]
+
+
+@dataclass(frozen=True)
+class Law:
+    """What words mean from a block on.
+
+    Attributes:
+        name: "axes", "tcp" or "tilted"; code: as the program writes it
+        rotation (3, 3), shift (3,): of a tilted plane; columns are X', Y', Z' seen from the table, shift from the work
+            offset's zero, mm; rotation None: the tool's frame where the rotary axes stand
+        choice: how the control picks the rotary positions: the nearest, those with the first axis at + or -, or
+            the angles stated are those of the axes themselves ("stand": rotary (K,) degrees)
+    """
+
+    name: LawName
+    code: str
+    rotation: Floats | None = None
+    shift: Floats = field(default_factory=lambda: np.zeros(3))
+    choice: Choice = "nearest"
+    rotary: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class Drill:
+    """A drilling cycle with its levels as words on the tool's axis, mm.
+
+    Attributes:
+        plane: where feed begins; bottom; out: where the cycle leaves the tool
+        bottoms: of each peck, the last one is `bottom`
+        style: "drill"; "break": between pecks it lifts by `relief`; "peck": out to the plane, rapidly back to `relief`
+            before the last depth; "feed_out": out to the plane at feed
+        relief: mm; dwell: s at the bottom; feed, feed_out: mm/min, NaN: the F word in force
+    """
+
+    plane: float
+    bottom: float
+    out: float
+    bottoms: tuple[float, ...]
+    style: Literal["drill", "break", "peck", "feed_out"] = "drill"
+    relief: float = 0.0
+    dwell: float = 0.0
+    feed: float = float("nan")
+    feed_out: float = float("nan")
+
+
+@dataclass(frozen=True)
+class Canonical:
+    """B blocks in the order in which the control runs them; words count blocks from 1.
+
+    `line` (B + 1,) is the line of the file that a block stands in, `file` (B + 1,) the number of its file in `files`.
+    """
+
+    words: Words
+    line: Ints
+    laws: tuple[Law, ...] = ()
+    drills: tuple[Drill, ...] = ()
+
+
+def added(words: Words, new: list[tuple[int, str, float]], drop: Bools | None = None) -> Words:
+    """Words with others (block, letter, value) put behind those of their block, and some taken out."""
+    kept = words if drop is None else words.take(~drop)
+    if not new:
+        return kept
+    letter = np.concatenate([kept.letter, np.array([ord(n[1]) for n in new], dtype=np.uint8)])
+    value = np.concatenate([kept.value, np.array([n[2] for n in new])])
+    line = np.concatenate([kept.line, np.array([n[0] for n in new], dtype=np.int64)])
+    order = np.argsort(line, kind="stable")
+    return Words(letter[order], value[order], line[order], words.lines)
+
+
+def offset_number(code: str) -> float:
+    """The number of a work offset as a set-up names it: G54 is 54, G54.1 P3 is 1003; NaN where it names none."""
+    head, _, extended = code.upper().replace("G154", "G54.1").partition("P")
+    try:
+        return EXTENDED_OFFSETS + float(extended) if extended else float(head.strip().removeprefix("G"))
+    except ValueError:
+        return float("nan")

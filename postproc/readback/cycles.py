@@ -1,0 +1,122 @@
+"""Canned cycles leg by leg, in the coordinates of the law in force."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from postproc.readback.canonical import Drill
+from toolpaths.arrays import Floats
+from toolpaths.diagnostics import Diagnostic, error
+
+Leg = tuple[int, Floats, float, float]
+"""code, end, feed (NaN: the F word in force), rest at the end (s) of one leg"""
+EPSILON = 1e-9
+
+
+Rise = Literal["before", "aslant", "after"]
+"""when a tool below the plane rises to it: before it travels to the hole, on the way, or above the hole"""
+
+
+def legs(drill: Drill, start: Floats, target: Floats, z: int, rise: Rise = "after") -> list[Leg]:
+    """The legs from `start` (J,) over the hole, whose place is that of `target` (J,), to the level where the cycle ends.
+
+    `z` is the column of the tool's axis.
+    """
+    level, result, nothing = float(start[z]), [], float("nan")
+    if level < drill.plane - EPSILON and rise == "before":
+        result.append((0, _at(start, z, drill.plane), nothing, 0.0))
+    if level < drill.plane and rise != "after":
+        level = drill.plane
+    over = _at(target, z, level)
+    if (over != (result[-1][1] if result else start)).any():
+        result.append((0, over, nothing, 0.0))
+    if abs(level - drill.plane) > EPSILON:
+        result.append((0, _at(target, z, drill.plane), nothing, 0.0))
+    return result + _down(drill, target, z) + _out(drill, target, z)
+
+
+def _at(base: Floats, z: int, height: float) -> Floats:
+    point: Floats = base.copy()
+    point[z] = height
+    return point
+
+
+def _down(drill: Drill, target: Floats, z: int) -> list[Leg]:
+    """From the plane to the bottom, peck by peck."""
+    result: list[Leg] = []
+    nothing = float("nan")
+    for depth in drill.bottoms[:-1]:
+        result.append((1, _at(target, z, depth), drill.feed, 0.0))
+        if drill.style == "peck":
+            result.append((0, _at(target, z, drill.plane), nothing, 0.0))
+        if drill.relief > 0.0:
+            result.append((0, _at(target, z, min(depth + drill.relief, drill.plane)), nothing, 0.0))
+    return [*result, (1, _at(target, z, drill.bottom), drill.feed, drill.dwell)]
+
+
+def _out(drill: Drill, target: Floats, z: int) -> list[Leg]:
+    result: list[Leg] = []
+    nothing = float("nan")
+    if drill.style == "feed_out":
+        result.append((1, _at(target, z, drill.plane), drill.feed_out, 0.0))
+        if abs(drill.out - drill.plane) > EPSILON:
+            result.append((0, _at(target, z, drill.out), nothing, 0.0))
+        return result
+    if drill.feed_out > 0.0:
+        return [(1, _at(target, z, drill.out), drill.feed_out, 0.0)]
+    return [(0, _at(target, z, drill.out), nothing, 0.0)]
+
+
+def pecks(plane: float, bottom: float, first: float, less: float = 0.0, least: float = 0.0) -> tuple[float, ...]:
+    """Depths of pecks below `plane`: `first` mm, then each by `less` mm less, `least` mm at least; the last is `bottom`."""
+    depths, depth, step = [], plane - first, first
+    while depth > bottom + EPSILON:
+        depths.append(depth)
+        step = max(step - less, least, EPSILON * 10.0) if less > 0.0 else step
+        depth -= step
+    return (*depths, bottom)
+
+
+@dataclass
+class Sticky:
+    """What a canned cycle of RS274/NGC kind holds from block to block: Z, R, Q, P, I, J, K and its first level."""
+
+    values: Floats
+    code: int = 0
+    initial: float = float("nan")
+    relief: float = 0.0
+
+    def enter(self, level: float) -> None:
+        """A sequence of cycles begins with the tool at a level."""
+        self.initial, self.code = level, 0
+
+    def drill(self, code: int, stated: Floats, scale: float, shift: float, to_plane: bool, relative: bool, file: str,
+              line: int, found: list[Diagnostic]) -> Drill | None:
+        """The cycle of one block that states Z, R, Q, P (s), I, J, K (7,); None where it lacks something.
+
+        Relative (G91): R counts from the first level, Z from R (RS274/NGC 3.5.16.1, Fanuc B-64484EN 5.1).
+        """
+        if code != self.code:
+            self.values[:] = np.nan
+        self.code = code
+        self.values = np.where(np.isfinite(stated), stated, self.values)
+        z, r, q, dwell, first, less, least = self.values.tolist()
+        tapered = code in (73, 83) and first > 0.0
+        if not np.isfinite([z, r]).all() or (code in (73, 83) and not (q > 0.0 or tapered)):
+            lacks = "Q" if np.isfinite([z, r]).all() else "Z or R"
+            found.append(error("gcode.cycle", f"G{code} lacks {lacks}", file=file, lines=[line],
+                               hint="state Z and R, and Q for pecking, with the code"))
+            return None
+        plane = self.initial + r * scale if relative else r * scale + shift
+        bottom = plane + z * scale if relative else z * scale + shift
+        out = plane if to_plane else max(plane, self.initial)
+        if tapered:
+            bottoms = pecks(plane, bottom, first * scale, np.nan_to_num(less) * scale, np.nan_to_num(least) * scale)
+        else:
+            bottoms = pecks(plane, bottom, q * scale) if code in (73, 83) else (bottom,)
+        style = {73: "break", 83: "peck", 74: "feed_out", 84: "feed_out", 85: "feed_out", 89: "feed_out"}.get(code, "drill")
+        rest = dwell if code in (82, 89) and np.isfinite(dwell) else 0.0
+        return Drill(plane, bottom, out, bottoms, style, self.relief if code in (73, 83) else 0.0, rest)  # type: ignore[arg-type]

@@ -1,0 +1,20 @@
+"""One class per dialect: text to canonical words."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from postproc.controllers.model import ControllerFile
+    from postproc.readback.dialects.base import Reader
+    from toolpaths.arrays import Floats
+
+
+def reader_for(controller: ControllerFile, letters: tuple[str, ...], home: Floats | None = None) -> Reader:
+    """The reader of the dialect that the controller file's writer writes; `home` (J,): machine coordinates, mm, degrees."""
+    from postproc.readback.dialects.fanuc import FanucReader
+    from postproc.readback.dialects.haas import HaasReader
+    from postproc.readback.dialects.iso import IsoReader
+
+    readers: dict[str, type[Reader]] = {"iso": IsoReader, "linuxcnc": IsoReader, "fanuc": FanucReader, "haas": HaasReader}
+    return readers[controller.writer](letters, controller, home)

@@ -1,0 +1,80 @@
+"""What every dialect does: text to words, words to blocks in running order, blocks to canonical words."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+
+from postproc.controllers.model import ControllerFile
+from postproc.readback.canonical import Canonical, Text
+from postproc.readback.flow import Structure, expand
+from postproc.readback.modal import GROUPS, Groups, check_codes, check_end, drop_passive
+from postproc.readback.words import Words
+from toolpaths.arrays import Floats, Ints
+from toolpaths.diagnostics import Diagnostic, has_errors
+
+M_CODES = (0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 30.0)
+
+
+class Reader(ABC):
+    """Reads the programs of one dialect; the numbers of its codes are data of the class.
+
+    Attributes:
+        groups: G codes that it executes, by group; m_codes; letters: words that are no axes
+        rises_first: canned cycles as RS274/NGC has them, see `Offsets`
+        arc_slack: mm by which the radius may differ between the ends of an arc
+    """
+
+    groups: Groups = GROUPS
+    m_codes: tuple[float, ...] = M_CODES
+    letters = "GMFSTHDNIJKRPQLO"
+    rises_first = False
+    arc_slack = float("inf")
+
+    def __init__(self, axes: tuple[str, ...], controller: ControllerFile | None = None, home: Floats | None = None) -> None:
+        self.axes, self.controller, self.home = axes, controller, home
+
+    @abstractmethod
+    def tokens(self, data: bytes, file: str) -> tuple[Text, list[Diagnostic]]:
+        """The words of one file."""
+
+    @abstractmethod
+    def structure(self, text: Text, file: str) -> tuple[Structure, list[Diagnostic]]:
+        """Its programs, and what they call."""
+
+    @abstractmethod
+    def canonical(self, text: Text, line: Ints, file: str) -> tuple[Canonical, list[Diagnostic]]:
+        """Canonical words of blocks that stand in running order."""
+
+    def check(self, words: Words, file: str) -> list[Diagnostic]:
+        """Codes and words that cannot be executed, as errors."""
+        return check_codes(words, self.groups, self.m_codes, self.letters, self.axes, file)
+
+    def read(self, data: bytes, file: str = "", others: Mapping[str, bytes] | None = None,
+             ) -> tuple[Canonical | None, list[Diagnostic]]:
+        """A program, with the files of its subprograms by name, as canonical words; None where it cannot be read."""
+        texts, structures, found = [], [], []
+        for name, content in {file: data, **(others or {})}.items():
+            text, more = self.tokens(content, name)
+            found += more
+            if has_errors(found):
+                return None, found
+            if self.controller is not None:
+                text = Text(drop_passive(text.words, self.controller.program.passive), text.statements)
+            structure, more = self.structure(text, name)
+            found += [*more, *self.check(text.words, name)]
+            if name == file:
+                found += check_end(text.words, file, tuple(structure.subprograms.values()))
+            texts.append(text)
+            structures.append(structure)
+        text, line, more = expand(texts, structures, file)
+        found += more
+        if has_errors(more):
+            return None, found
+        code, more = self.canonical(text, line, file)
+        return code, [*found, *more]
+
+
+def whole(text: Text) -> Structure:
+    """A file that is one program without subprograms."""
+    return Structure((1, text.words.lines))

@@ -1,0 +1,248 @@
+"""Fanuc Series 30i, machining centre system, and what Haas shares with it.
+
+Rules beyond RS274/NGC, from the user's manual B-64484EN (functions by their names there). Dwell: P in ms or X in s. Decimal
+point programming: what a number without a point means is a parameter; it is refused. Canned cycles: over the hole first,
+then to R; K repeats, P in ms. Subprogram call: M98 P L, M99. Tool center point control: G43.4 H, left by G49. Tilted working
+plane command: G68.2 X Y Z I J K, Euler angles about Z, the new X, the new Z; G53.1 aligns the tool; left by G69. AI contour
+control: G5.1 Q1, whose tolerance is a parameter. Reference position: G28.
+"""
+
+from __future__ import annotations
+
+from pathlib import PurePath
+from typing import ClassVar
+
+import numpy as np
+
+from postproc.readback.canonical import LAW, OFFSET, REGISTER, SMOOTH, Canonical, Law, Text, offset_number
+from postproc.readback.dialects.base import M_CODES
+from postproc.readback.dialects.iso import IsoReader, New, motion_of
+from postproc.readback.flow import Call, Structure
+from postproc.readback.modal import CYCLES, GROUPS, Groups, codes, number_of
+from postproc.readback.turns import turned
+from postproc.readback.words import Words, tokenise
+from toolpaths.arrays import Bools, Ints
+from toolpaths.diagnostics import Diagnostic, error
+
+MILLISECONDS = 1e-3
+_LAWS = (43.0, 43.4, 49.0, 53.1, 68.2, 69.0)
+
+
+class FanucReader(IsoReader):
+    """G-code of the Fanuc kind."""
+
+    groups: Groups = GROUPS | {
+        "offset": (54, 55, 56, 57, 58, 59, 54.1), "length": (43, 43.4, 49), "path": (5.1, 61, 64), "tilt": (68.2, 69),
+        "once": (4, 28, 53, 53.1), "arc_distance": ()}
+    m_codes = (*M_CODES, 29.0, 98.0, 99.0)
+    letters = "GMFSTHDNIJKRPQLO"
+    rises_first = False
+    laws: ClassVar[tuple[float, ...]] = _LAWS
+    tcp_code = 43.4
+    extended_offset = 54.1
+    repeats = "K"
+
+    def tokens(self, data: bytes, file: str) -> tuple[Text, list[Diagnostic]]:
+        """The words of one file, program numbers among them."""
+        words, found = tokenise(data, file)
+        return Text(words), found
+
+    def structure(self, text: Text, file: str) -> tuple[Structure, list[Diagnostic]]:
+        """Programs begin at O numbers and return at M99; M98 P runs one, L times."""
+        words = text.words
+        starts, numbers = words.pick("O")
+        back, _ = codes(words, "M", (99,))
+        ends = [*(starts[1:] - 1).tolist(), words.lines]
+        spans = {f"O{int(n)}": (int(a), int(b)) for n, a, b in zip(numbers, starts, ends, strict=True)}
+        main = (1, ends[0] if len(starts) else words.lines)
+        named = {name: _returns(span, back) for name, span in spans.items() if _returns(span, back)[1]}
+        subprograms = {name: (a, b) for name, (a, b) in named.items()}
+        own = PurePath(file).stem.upper()
+        if len(starts) < 2 and len(back) and own and own not in subprograms:
+            subprograms[own] = (1, int(back[0]))
+        return Structure(main, subprograms, self.calls(words)), []
+
+    def calls(self, words: Words) -> dict[int, Call]:
+        """M98 P of four digits L, or P with the number of times before the last four."""
+        result = {}
+        for b in codes(words, "M", (98,))[0].tolist():
+            stated = block(words, b)
+            number, times = int(stated.get("P", -1.0)), int(stated.get("L", 1.0))
+            if number > 9999 and "L" not in stated:
+                number, times = number % 10000, number // 10000
+            result[b] = Call(b, f"O{number}", times)
+        return result
+
+    def canonical(self, text: Text, line: Ints, file: str) -> tuple[Canonical, list[Diagnostic]]:
+        """Canonical words; laws in order."""
+        self.held: list[Law] = []
+        code, found = super().canonical(text, line, file)
+        return Canonical(code.words, line, tuple(self.held)), found
+
+    def numbers(self, words: Words, line: Ints, file: str) -> list[Diagnostic]:
+        """Lengths and angles without a decimal point: what they mean is a parameter of the control."""
+        if words.point is None:
+            return []
+        meant = "".join(self.axes) + "IJKRQ"
+        bare = ~words.point & (words.value != 0.0) & np.isin(words.letter, [ord(a) for a in meant + meant.lower()])
+        blocks = words.line[bare]
+        if not len(blocks):
+            return []
+        k = int(np.flatnonzero(bare)[0])
+        return [error("gcode.decimal_point", f"{chr(words.letter[k]).upper()}{words.value[k]:g} has no decimal point: "
+                      f"{words.value[k]:g} or {words.value[k] * MILLISECONDS:g}, as a parameter of the control has it",
+                      file=file, lines=line[blocks][:6].tolist(), count=len(blocks), hint="write the point")]
+
+    def arcs(self, words: Words, new: New, drop: Bools) -> Words:
+        """Centres from the start; P and K of canned cycles as RS274/NGC has them."""
+        words = super().arcs(words, [], drop)
+        cycle = np.isin(motion_of(words), CYCLES)[words.line]
+        letter, value = words.letter.copy(), words.value.copy()
+        letter[cycle & (letter == ord(self.repeats))] = ord("L")
+        rest = np.flatnonzero(cycle & (letter == ord("P")))
+        value[rest] = [self.time(words, int(k)) for k in rest]
+        return Words(letter, value, words.line, words.lines, words.point)
+
+    dwell_hint = "G4 P500 (ms)"
+
+    def time(self, words: Words, k: int) -> float:
+        """s of a P word."""
+        return float(words.value[k]) * MILLISECONDS
+
+    def seconds(self, words: Words, low: int, high: int) -> float | None:
+        """P in ms; X in s, in ms without a point."""
+        for k in range(low, high):
+            if words.letter[k] == ord("P"):
+                return self.time(words, k)
+            if words.letter[k] in (ord("X"), ord("U")):
+                point = words.point is None or bool(words.point[k])
+                return float(words.value[k]) * (1.0 if point else MILLISECONDS)
+        return None
+
+    def paths(self, words: Words, new: New) -> None:
+        """G5.1 Q1: as much as the controller file says that its parameters allow; Q0, G61: none."""
+        fixed = self.controller.kinematics.smoothing_fixed if self.controller is not None else None
+        for b, c in zip(*codes(words, "G", (5.1, 61)), strict=True):
+            on = c == 5.1 and block(words, int(b)).get("Q", 0.0) == 1.0
+            new.append((int(b), SMOOTH, (float("inf") if fixed is None else fixed) if on else 0.0))
+
+    def others(self, words: Words, new: New, drop: Bools, line: Ints, file: str, found: list[Diagnostic]) -> None:
+        """Laws, extended work offsets, the reference position, coolant through the tool."""
+        for b in codes(words, "G", (self.extended_offset,))[0].tolist():
+            new.append((b, OFFSET, offset_number(f"G54.1 P{block(words, b).get('P', 0.0):g}")))
+        for b in codes(words, "G", (5.1,))[0].tolist():
+            take(words, drop, b, "Q")
+        self.modes(words, new, drop, line, file, found)
+        self.reference(words, new, drop, line, file, found)
+        self.machine_moves(words, line, file, found)
+
+    def modes(self, words: Words, new: New, drop: Bools, line: Ints, file: str, found: list[Diagnostic]) -> None:
+        """The laws, code by code in running order."""
+        register = number_of(words, "H")
+        state, begun, length = "axes", -1, -1.0
+        for b, c in zip(*codes(words, "G", self.laws), strict=True):
+            here, code = int(b), f"G{c:g}"
+            wrong = self.wrong(float(c), state, length)
+            if wrong:
+                found.append(error("gcode.mode", f"{code} {wrong}", file=file, lines=[int(line[here])],
+                                   hint="leave the mode that is on first"))
+                continue
+            if c in (43, self.tcp_code):
+                length = float(np.nan_to_num(register[here], nan=-1.0))
+                new.append((here, REGISTER, length))
+            if c == self.tcp_code:
+                state = self.hold(new, here, Law("tcp", code), "tcp")
+            elif c == 49:
+                length = -1.0
+                state = self.hold(new, here, Law("axes", code), "axes") if state == "tcp" else state
+            elif c in (69, 255):
+                state = self.hold(new, here, Law("axes", code), "axes")
+            elif c == 254:
+                state = self.hold(new, here, Law("tilted", code), "tilted")
+            elif c == 68.2:
+                plane, state, begun = self.plane(words, drop, here, line, file, found), "pending", here
+            elif c == 53.1:
+                state = self.hold(new, here, plane, "tilted")
+                self.unmoved(words, begun, here, line, file, found)
+
+    def wrong(self, code: float, state: str, length: float) -> str:
+        """Why a law's code cannot stand here, "" where it can."""
+        if code == 53.1:
+            return "" if state == "pending" else "without G68.2 before it"
+        if code == 68.2 and length >= 0.0:
+            return "while a length offset is in force"
+        if code in (68.2, 254, self.tcp_code) and state != "axes":
+            return "while another mode is on"
+        return "between G68.2 and G53.1" if state == "pending" and code != 69 else ""
+
+    def hold(self, new: New, b: int, law: Law, state: str) -> str:
+        """The law in force from block b on."""
+        new.append((b, LAW, float(len(self.held))))
+        self.held.append(law)
+        return state
+
+    def plane(self, words: Words, drop: Bools, b: int, line: Ints, file: str, found: list[Diagnostic]) -> Law:
+        """G68.2 X Y Z I J K: zero of the plane, Euler angles."""
+        stated = take(words, drop, b, "XYZIJKPQR")
+        if set(stated) & set("PQR"):
+            found.append(error("gcode.mode", "G68.2 by other than Euler angles is not executed by this reader", file=file,
+                               lines=[int(line[b])], hint="G68.2 X Y Z I J K"))
+        shift = np.array([stated.get(a, 0.0) for a in "XYZ"])
+        return Law("tilted", "G68.2", turned("ZXZ", [stated.get(a, 0.0) for a in "IJK"]), shift)
+
+    def unmoved(self, words: Words, first: int, last: int, line: Ints, file: str, found: list[Diagnostic]) -> None:
+        """Nothing moves between the plane and the tool's alignment; G53.1 P picks another solution."""
+        low, high = np.searchsorted(words.line, [first + 1, last + 1])
+        bad = np.isin(words.letter[low:high], [ord(a) for a in (*self.axes, "P")]) & (words.value[low:high] != 0.0)
+        if bad.any():
+            found.append(error("gcode.mode", "motion or a choice of solution between G68.2 and G53.1 is not executed by "
+                               "this reader", file=file, lines=[int(line[words.line[low:high][bad][0]])],
+                               hint="G53.1 alone, right behind G68.2"))
+
+    def reference(self, words: Words, new: New, drop: Bools, line: Ints, file: str, found: list[Diagnostic]) -> None:
+        """G91 G28 Z0.: rapidly to the reference position, which is the machine's home; by way of a point is refused."""
+        blocks, mode = codes(words, "G", (90, 91))
+        motions, motion = codes(words, "G", self.groups["motion"])
+        for b in codes(words, "G", (28,))[0].tolist():
+            at = int(np.searchsorted(blocks, b, side="right")) - 1
+            stated = take(words, drop, b, "".join(self.axes))
+            if at < 0 or mode[at] != 91 or any(stated.values()) or self.home is None:
+                found.append(error("gcode.reference", "G28 by way of a point", file=file, lines=[int(line[b])],
+                                   hint="G91 G28 Z0."))
+                continue
+            new += [(b, "G", 53.0), (b, "G", 0.0)]
+            new += [(b, a, float(self.home[self.axes.index(a)])) for a in stated]
+            k = int(np.searchsorted(motions, b, side="right")) - 1
+            if b + 1 not in motions and k >= 0 and b < words.lines:
+                new.append((b + 1, "G", float(motion[k])))
+
+    def machine_moves(self, words: Words, line: Ints, file: str, found: list[Diagnostic]) -> None:
+        """G53 runs rapidly whatever the code of motion."""
+        motion = motion_of(words)
+        blocks = codes(words, "G", (53,))[0]
+        bad = blocks[motion[blocks] != 0]
+        if len(bad):
+            found.append(error("gcode.machine_position", "G53 while G0 is not in force", file=file,
+                               lines=line[bad][:6].tolist(), count=len(bad), hint="G53 G0, in this order"))
+
+
+def block(words: Words, b: int) -> dict[str, float]:
+    """The words of a block by letter, the last of each."""
+    low, high = np.searchsorted(words.line, [b, b + 1])
+    return {chr(a): float(v) for a, v in zip(words.letter[low:high], words.value[low:high], strict=True)}
+
+
+def take(words: Words, drop: Bools, b: int, letters: str) -> dict[str, float]:
+    """Words of a block that belong to one of its codes: they are no others' any more."""
+    low, high = np.searchsorted(words.line, [b, b + 1])
+    mine = np.isin(words.letter[low:high], [ord(a) for a in letters])
+    drop[low:high] |= mine
+    return {chr(a): float(v) for a, v in zip(words.letter[low:high][mine], words.value[low:high][mine], strict=True)}
+
+
+def _returns(span: tuple[int, int], back: Ints) -> tuple[int, int]:
+    """A program's lines to its M99, (first, 0) where it has none."""
+    inside = back[(back >= span[0]) & (back <= span[1])]
+    return span[0], int(inside[0]) if len(inside) else 0
+
+

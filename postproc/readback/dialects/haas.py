@@ -1,0 +1,73 @@
+"""Haas mill (NGC): Fanuc's kind, with what the mill operator's manual (96-8210) has of its own.
+
+P of a dwell is ms, or s with a point; L repeats a cycle; I, J, K of G73 and G83 are the first peck, what each next one is
+less by, and the least; G154 P work offsets; M97 P runs a subprogram of the same program from its N; G234 tool centre point
+control, left by G49; G254 dynamic work offset, left by G255: X, Y, Z stay along the machine's axes while the offset follows
+the rotary tables; G187 P E, rounding of corners in mm.
+"""
+
+from __future__ import annotations
+
+from postproc.readback.canonical import SMOOTH, Text
+from postproc.readback.dialects.base import M_CODES
+from postproc.readback.dialects.fanuc import MILLISECONDS, FanucReader, block, take
+from postproc.readback.dialects.iso import New
+from postproc.readback.flow import Call, Structure
+from postproc.readback.modal import GROUPS, Groups, codes
+from postproc.readback.words import Words
+from toolpaths.arrays import Bools, Ints
+from toolpaths.diagnostics import Diagnostic
+
+
+class HaasReader(FanucReader):
+    """G-code of Haas mills."""
+
+    groups: Groups = GROUPS | {
+        "offset": (54, 55, 56, 57, 58, 59, 154), "length": (43, 49, 234), "path": (61, 64, 187), "tilt": (254, 255),
+        "once": (4, 28, 53), "arc_distance": ()}
+    m_codes = (*M_CODES, 97.0, 98.0, 99.0)
+    letters = "GMFSTHDNIJKRPQLOE"
+    laws = (43.0, 49.0, 234.0, 254.0, 255.0)
+    tcp_code = 234.0
+    extended_offset = 154.0
+    repeats = "L"
+
+    def time(self, words: Words, k: int) -> float:
+        """s of a P word: ms, or s with a point."""
+        point = words.point is not None and bool(words.point[k])
+        return float(words.value[k]) * (1.0 if point else MILLISECONDS)
+
+    def structure(self, text: Text, file: str) -> tuple[Structure, list[Diagnostic]]:
+        """Besides programs, what M97 runs: from its N to the next M99."""
+        structure, found = super().structure(text, file)
+        lines, numbers = text.words.pick("N")
+        back, _ = codes(text.words, "M", (99,))
+        for call in structure.calls.values():
+            for line in lines[numbers == float(call.name[1:])][:1] if call.name.startswith("N") else []:
+                last = back[back >= line]
+                structure.subprograms[call.name] = (int(line), int(last[0]) if len(last) else text.words.lines)
+        return structure, found
+
+    def calls(self, words: Words) -> dict[int, Call]:
+        """M98 P L, and M97 P L."""
+        result = {}
+        for b, m in zip(*codes(words, "M", (97, 98)), strict=True):
+            stated = block(words, int(b))
+            result[int(b)] = Call(int(b), f"{'N' if m == 97 else 'O'}{stated.get('P', -1.0):g}", int(stated.get("L", 1.0)))
+        return result
+
+    def paths(self, words: Words, new: New) -> None:
+        """G187 P E: corners rounded by E mm; without words, or without E, as a setting of the control has it."""
+        for b in codes(words, "G", (187,))[0].tolist():
+            stated = block(words, b)
+            new.append((b, SMOOTH, stated.get("E", float("inf"))))
+        for b in codes(words, "G", (61,))[0].tolist():
+            new.append((b, SMOOTH, 0.0))
+
+    def others(self, words: Words, new: New, drop: Bools, line: Ints, file: str, found: list[Diagnostic]) -> None:
+        """Besides what Fanuc has: the words of G187."""
+        for b in codes(words, "G", (187,))[0].tolist():
+            take(words, drop, b, "PE")
+        super().others(words, new, drop, line, file, found)
+
+

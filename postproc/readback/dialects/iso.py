@@ -1,0 +1,141 @@
+"""Plain G-code: NIST RS274/NGC as LinuxCNC and generic ISO 6983 controls read it, and what Fanuc and Haas build on."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from postproc.readback.canonical import (
+    INCREMENTAL,
+    LOADED,
+    OFFSET,
+    REGISTER,
+    REST,
+    SMOOTH,
+    TURNS,
+    Canonical,
+    Text,
+    added,
+)
+from postproc.readback.dialects.base import Reader, whole
+from postproc.readback.flow import Structure
+from postproc.readback.modal import CYCLES, GROUPS, codes, fill, number_of
+from postproc.readback.words import Words, tokenise
+from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.diagnostics import Diagnostic, error
+
+New = list[tuple[int, str, float]]
+"""words to add: block, letter, value"""
+
+
+class IsoReader(Reader):
+    """Letters and numbers; rests in seconds (P), registers by H."""
+
+    rises_first = True
+    millimetres = 25.4
+    """mm of smoothing per unit under G20"""
+
+    def tokens(self, data: bytes, file: str) -> tuple[Text, list[Diagnostic]]:
+        """The words of one file; O numbers name it and do nothing."""
+        words, found = tokenise(data, file)
+        return Text(words.take(words.letter != ord("O"))), found
+
+    def structure(self, text: Text, file: str) -> tuple[Structure, list[Diagnostic]]:
+        """One program."""
+        return whole(text), []
+
+    def canonical(self, text: Text, line: Ints, file: str) -> tuple[Canonical, list[Diagnostic]]:
+        """Canonical words."""
+        words, found = text.words, list[Diagnostic]()
+        new: New = []
+        drop = np.zeros(len(words.letter), dtype=bool)
+        self.tools(words, new, line, file, found)
+        self.rests(words, new, drop, line, file, found)
+        self.paths(words, new)
+        self.others(words, new, drop, line, file, found)
+        blocks, value = codes(words, "G", self.groups["offset"])
+        new += [(int(b), OFFSET, float(v)) for b, v in zip(blocks, value, strict=True)]
+        words = self.arcs(relative_words(words, self.axes), new, drop)
+        found += self.numbers(words.take(~drop), line, file)
+        return Canonical(added(words, new, drop), line), found
+
+    def tools(self, words: Words, new: New, line: Ints, file: str, found: list[Diagnostic]) -> None:
+        """Tools that M6 loads, and length registers by G43 H and G49."""
+        tool, register = number_of(words, "T"), number_of(words, "H")
+        change, _ = codes(words, "M", (6,))
+        new += [(int(b), LOADED, float(tool[b])) for b in change if tool[b] >= 0]
+        lost = change[~(tool[change] >= 0)]
+        if len(lost):
+            found.append(error("gcode.tool", "M6 without a tool number", file=file, lines=line[lost][:6].tolist(),
+                               count=len(lost)))
+        blocks, code = codes(words, "G", (43, 49))
+        new += [(int(b), REGISTER, float(np.nan_to_num(register[b], nan=-1.0)) if c == 43 else -1.0)
+                for b, c in zip(blocks, code, strict=True)]
+
+    def rests(self, words: Words, new: New, drop: Bools, line: Ints, file: str, found: list[Diagnostic]) -> None:
+        """G4: its word is no axis word, and counts as seconds."""
+        for b in codes(words, "G", (4,))[0].tolist():
+            low, high = np.searchsorted(words.line, [b, b + 1])
+            drop[low:high] |= np.isin(words.letter[low:high], [ord(a) for a in ("P", "X", "U")])
+            seconds = self.seconds(words, low, high)
+            if seconds is None:
+                found.append(error("gcode.dwell", "G4 lacks P", file=file, lines=[int(line[b])],
+                                   hint="state the time: " + self.dwell_hint))
+            else:
+                new.append((b, REST, seconds))
+
+    dwell_hint = "G4 P0.5 (seconds)"
+
+    def seconds(self, words: Words, low: int, high: int) -> float | None:
+        """s of the dwell whose words are low..high; None where it states none."""
+        here = np.flatnonzero(words.letter[low:high] == ord("P"))
+        return float(words.value[low + here[0]]) if len(here) else None
+
+    def paths(self, words: Words, new: New) -> None:
+        """G61 none; G64 P blends within P and merges short lines within Q (P where it is not stated)."""
+        blocks, code = codes(words, "G", (61, 61.1, 64))
+        units = fill(*codes(words, "G", (20, 21)), words.lines, 21.0)
+        for b, c in zip(blocks.tolist(), code.tolist(), strict=True):
+            low, high = np.searchsorted(words.line, [b, b + 1])
+            stated = {chr(a): float(v) for a, v in zip(words.letter[low:high], words.value[low:high], strict=True)}
+            value = 0.0 if c != 64 else float("inf")
+            if c == 64 and "P" in stated:
+                value = stated["P"] + stated.get("Q", stated["P"])
+            new.append((b, SMOOTH, value * (self.millimetres if units[b] == 20 else 1.0)))
+
+    def others(self, words: Words, new: New, drop: Bools, line: Ints, file: str, found: list[Diagnostic]) -> None:
+        """What a dialect has besides."""
+
+    def numbers(self, words: Words, line: Ints, file: str) -> list[Diagnostic]:
+        """Faults of the numbers of the words that are left."""
+        return []
+
+    def arcs(self, words: Words, new: New, drop: Bools) -> Words:
+        """I, J, K count from the start unless G90.1 holds; P of an arc is the number of its turns."""
+        motion = motion_of(words)
+        absolute = fill(*codes(words, "G", (90.1, 91.1)), words.lines, 91.1) == 90.1
+        center = np.isin(words.letter, [ord(c) for c in "IJK"]) & ~np.isin(motion, CYCLES)[words.line]
+        letter = words.letter.copy()
+        letter[center & ~absolute[words.line]] += INCREMENTAL
+        turns = np.isin(motion, (2, 3))[words.line] & (words.letter == ord("P"))
+        new += [(int(b), TURNS, float(v) - 1.0) for b, v in zip(words.line[turns], words.value[turns], strict=True)]
+        return Words(letter, words.value, words.line, words.lines, words.point)
+
+
+def motion_of(words: Words) -> Floats:
+    """(B + 1,) code of motion in force."""
+    return fill(*codes(words, "G", GROUPS["motion"]), words.lines, 1.0)
+
+
+def relative_words(words: Words, axes: tuple[str, ...]) -> Words:
+    """Words with axis words, and R of cycles, in small letters where G91 holds."""
+    blocks, code = codes(words, "G", (90, 91))
+    if not (code == 91).any():
+        return words
+    relative = fill(blocks, code, words.lines, 90.0) == 91
+    machine = np.zeros(words.lines + 1, dtype=bool)
+    machine[codes(words, "G", (53,))[0]] = True
+    cycle = np.isin(motion_of(words), CYCLES)
+    axis = np.isin(words.letter, [ord(a) for a in axes]) | (cycle[words.line] & (words.letter == ord("R")))
+    letter = words.letter.copy()
+    letter[axis & (relative & ~machine)[words.line]] += INCREMENTAL
+    return Words(letter, words.value, words.line, words.lines, words.point)

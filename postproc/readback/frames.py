@@ -1,0 +1,181 @@
+"""Coordinates that the words of a block are in, and the machine position that the control makes of them.
+
+Under "axes" both are the same. Under "tcp" X, Y, Z are the tip in the work offset fixed to the table, under "tilted" the
+tip in the frame of a plane; rotary words are rotary positions under every law.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from machines.kinematics.base import Kinematics
+from postproc.control import Control
+from postproc.readback.canonical import Law, LawName
+from toolpaths.arrays import Floats
+from toolpaths.diagnostics import Diagnostic, error
+from toolpaths.rotations import angle_between
+from toolpaths.units import DEG
+
+ANGLE_SLACK = 0.01
+"""degrees by which the rotary axes may stand off the plane, or off the control's own choice: rounding of the angles"""
+_CHUNK = 50_000
+_TURN = 360.0
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """One law in force: its plane, and the kinematics at the tip of the tool that the control reckons with."""
+
+    law: LawName
+    control: Control | None = None
+    kinematics: Kinematics | None = None
+    rotation: Floats = field(default_factory=lambda: np.eye(3))
+    origin: Floats = field(default_factory=lambda: np.zeros(3))
+
+    def coordinates(self, position: Floats) -> Floats:
+        """(N, J) what the words would say at machine positions (N, J) (mm, degrees)."""
+        if self.control is None or self.kinematics is None:
+            return position
+        result = np.array(position)
+        for at in range(0, len(position), _CHUNK):
+            part = slice(at, at + _CHUNK)
+            tip, _ = self.kinematics.forward(position[part] / self.control.unit)
+            result[part, self.control.xyz] = (tip - self.origin) @ self.rotation
+        return result
+
+    def position(self, coordinates: Floats) -> Floats:
+        """(N, J) machine positions of coordinates (N, J): the slides that bring the tip there at the rotary positions.
+
+        The tip is an affine function of the slides, t = t0(rotaries) + D(rotaries) s, solved for s.
+        """
+        control, kin = self.control, self.kinematics
+        if control is None or kin is None:
+            return coordinates
+        result = np.array(coordinates)
+        for at in range(0, len(coordinates), _CHUNK):
+            part = slice(at, at + _CHUNK)
+            q = coordinates[part] / control.unit
+            q[:, control.slides] = 0.0
+            tip = coordinates[part][:, control.xyz] @ self.rotation.T + self.origin
+            rest = tip - kin.forward(q)[0]
+            slopes = kin.jacobian(q)[:, :3][:, :, control.slides]
+            result[part, control.slides] = np.linalg.solve(slopes, rest[:, :, None])[:, :, 0]
+        return result
+
+
+AXES = Frame("axes")
+
+
+def tool_frame(kin: Kinematics, q: Floats) -> Floats:
+    """(3, 3) columns are the tool's x, y, z seen from the table at joints q (J,).
+
+    The x direction at spin 0 is the table's x carried by the least rotation that takes z to the axis (Rodrigues), which
+    is what `Kinematics.pose` counts spin from.
+    """
+    _, axis, spin = kin.pose(q[None, :])
+    a = axis[0]
+    if a[2] < -1.0 + 1e-12:
+        least = np.diag([1.0, -1.0, -1.0])
+    else:
+        v = np.array([-a[1], a[0], 0.0])
+        cross = np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
+        least = np.eye(3) + cross + cross @ cross / (1.0 + a[2])
+    c, s = np.cos(spin[0]), np.sin(spin[0])
+    return np.asarray(least @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]))
+
+
+def frame_of(law: Law, control: Control | None, length: float, position: Floats, at: tuple[str, int],
+             found: list[Diagnostic]) -> Frame:
+    """The frame of a law entered at machine position (J,), with a tool of that length; `at` is file and line.
+
+    A law that the machine cannot have, and rotary axes that do not stand as the control would put them, are errors.
+    """
+    file, line = at
+    if law.name == "axes":
+        return AXES
+    kin = control.kinematics if control is not None else None
+    if control is None or kin is None or not kin.slides_affine or (control.xyz < 0).any():
+        found.append(error("gcode.mode", f"{law.code}: the control does not own the kinematics of this machine", file=file,
+                           lines=[line], hint="axis positions are all that it can run"))
+        return AXES
+    kin = kin.with_tool(length)
+    if law.name == "tcp":
+        return Frame("tcp", control, kin, np.eye(3), control.origin)
+    q = position / control.unit
+    rotation = tool_frame(kin, q) if law.rotation is None else law.rotation
+    if law.choice == "stand":
+        found += _not_standing(law, control, position, file, line)
+        rotation = tool_frame(kin, q)
+    elif law.rotation is not None:
+        found += _wrong_pose(law, control, kin, q, file, line)
+    return Frame("tilted", control, kin, rotation, control.origin + law.shift)
+
+
+def _not_standing(law: Law, control: Control, position: Floats, file: str, line: int) -> list[Diagnostic]:
+    """Rotary positions stated with the plane itself against those in force."""
+    stands = position[control.rotary]
+    off = np.abs(stands - np.array(law.rotary[:len(stands)]))
+    if (off <= ANGLE_SLACK).all():
+        return []
+    return [_pose_error(law, control, stands, np.array(law.rotary[:len(stands)]), file, line)]
+
+
+def _wrong_pose(law: Law, control: Control, kin: Kinematics, q: Floats, file: str, line: int) -> list[Diagnostic]:
+    """The rotary positions that the control picks for the plane against those in force."""
+    assert law.rotation is not None
+    names = control.machine.axis_names
+    stands = q[control.rotary] / DEG
+    picked = _picked(law, control, kin, q)
+    if picked is None:
+        return [error("gcode.plane", f"{law.code}: no position of {', '.join(names[j] for j in control.rotary)} brings the "
+                      "tool square to the plane", file=file, lines=[line], hint="the machine cannot take this plane")]
+    if (np.abs(picked - stands) > ANGLE_SLACK).any():
+        return [_pose_error(law, control, stands, picked, file, line)]
+    spin = angle_between(tool_frame(kin, q)[:, :1].T, law.rotation[:, :1].T)[0] / DEG
+    if bool(kin.singular(q[None, :])[0]) and spin > ANGLE_SLACK:
+        return [error("gcode.plane_pose", f"{law.code}: the plane's X stands {spin:.4f} degrees off the machine's at the "
+                      "rotary position in force, where the tool lies along a rotary axis", file=file, lines=[line],
+                      hint="state the plane by the position of that axis")]
+    return []
+
+
+def _picked(law: Law, control: Control, kin: Kinematics, q: Floats) -> Floats | None:
+    """Rotary positions (R,), degrees, that the control takes for the plane's Z; None where there are none."""
+    assert law.rotation is not None
+    tip, _ = kin.forward(q[None, :])
+    branches = kin.inverse(tip, law.rotation[:, 2][None, :], near=q[None, :])[:, 0][:, control.rotary] / DEG
+    branches = branches[np.isfinite(branches).all(axis=1)]
+    here = q[control.rotary] / DEG
+    branches = branches + _TURN * np.round((here - branches) / _TURN)
+    lower = control.machine.limits.lower[control.rotary] / DEG - ANGLE_SLACK
+    upper = control.machine.limits.upper[control.rotary] / DEG + ANGLE_SLACK
+    branches = branches + _TURN * ((branches < lower) & (branches + _TURN <= upper))
+    branches = branches - _TURN * ((branches > upper) & (branches - _TURN >= lower))
+    inside = branches[((branches >= lower) & (branches <= upper)).all(axis=1)]
+    if law.choice in ("+", "-") and len(inside) > 1:
+        lead = _lead(inside, control)
+        sign = 1.0 if law.choice == "+" else -1.0
+        asked = inside[sign * inside[:, lead] >= -ANGLE_SLACK]
+        inside = asked if len(asked) else inside
+    if not len(inside):
+        return None
+    nearest: Floats = inside[np.abs(inside - here).sum(axis=1).argmin()]
+    return nearest
+
+
+def _lead(branches: Floats, control: Control) -> int:
+    """The rotary axis whose sign tells the solutions apart: the one that does not turn without end, else the first."""
+    span = (control.machine.limits.upper - control.machine.limits.lower)[control.rotary]
+    return int(span.argmin()) if len(span) > 1 else 0
+
+
+def _pose_error(law: Law, control: Control, stands: Floats, picked: Floats, file: str, line: int) -> Diagnostic:
+    letters = [control.machine.axis_names[j] for j in control.rotary]
+
+    def text(values: Floats) -> str:
+        return " ".join(f"{a}{v:.4f}" for a, v in zip(letters, values, strict=False))
+    return error("gcode.plane_pose", f"{law.code}: the control takes {text(picked)} for this plane, the axes stand at "
+                 f"{text(stands)}", file=file, lines=[line], hint=f"allowed is a difference of {ANGLE_SLACK:g} degrees: "
+                 "index to the position of the plane before it is entered")
