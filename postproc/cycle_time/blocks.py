@@ -85,7 +85,8 @@ class Pauses:
     @staticmethod
     def none() -> Pauses:
         """No pause at all."""
-        return Pauses(np.zeros(0), np.zeros(0), np.zeros(0), np.zeros(0))
+        none = np.zeros(0, dtype=np.int64)
+        return Pauses(none, none, np.zeros(0), none)
 
     def __len__(self) -> int:
         return len(self.block)

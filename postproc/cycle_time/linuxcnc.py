@@ -34,16 +34,24 @@ GAP_CYCLES = 4.0
 """servo cycles below which what blends leave of a line goes to the blend ([TRAJ] ARC_BLEND_GAP_CYCLES)"""
 
 
+COMMAND = {Cause.DWELL: 0.004, Cause.TOOL_CHANGE: 0.038, Cause.SPINDLE: 0.005, Cause.OTHER: 0.007, Cause.INDEXING: 0.0}
+"""s that a command takes beside its own time, measured: the task's cycle is 1 ms, that of tool changes (io) 10 ms"""
+SETTLED = 0.003
+"""s from the planner's end to the joints' (cubic interpolation of motion's control.c, measured)"""
+
+
 @dataclass(frozen=True)
 class Settings:
-    """Of the controller's INI file: servo cycle, s; depth of the look-ahead in segments ([TRAJ]
-    ARC_BLEND_OPTIMIZATION_DEPTH). `stop_cycles`: servo cycles that a stop costs over the ramps; `command`: s between
-    two motions with a command that waits for rest; both as measured."""
+    """Of the controller: servo cycle, s; depth of the look-ahead in segments ([TRAJ] ARC_BLEND_OPTIMIZATION_DEPTH).
+
+    `stop_cycles`: servo cycles that a stop costs over the ramps (measured); `override`: of feeds; `rapid`: of rapids.
+    """
 
     cycle: float = 0.001
     depth: int = 50
     stop_cycles: float = 0.5
-    command: float = 0.010
+    override: float = 1.0
+    rapid: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -65,7 +73,7 @@ class Row:
 def linuxcnc(blocks: Blocks, settings: Settings | None = None) -> Timed:
     """How long LinuxCNC takes over each block."""
     settings = settings or Settings()
-    s = segments(blocks)
+    s = segments(blocks, settings.override, settings.rapid)
     row = in_a_row(s, settings.cycle)
     return _timed(blocks, s, row, settings)
 
@@ -208,7 +216,7 @@ def _along_arcs(s: Segments, rate: Floats, most: Floats, finished: Bools) -> tup
 
 def _timed(blocks: Blocks, s: Segments, row: Row, settings: Settings) -> Timed:
     """Speeds by look-ahead, ramps, and everything put on the clock."""
-    count, big = len(row.length), len(row.length) >= KERNEL_FROM
+    big = len(row.length) >= KERNEL_FROM
     through = (row.ends == TANGENT) & ~np.append(row.fresh[1:], True)
     behind = np.concatenate([[False], through[:-1]])
     inside = behind & ~np.append(row.fresh[1:], True)
@@ -220,13 +228,12 @@ def _timed(blocks: Blocks, s: Segments, row: Row, settings: Settings) -> Timed:
     gentle = through & ~row.traverse & (2.0 * row.length < RAMP_TIME * (first + np.minimum(last, target))) & (last > 0.0)
     r = ramps(row.length, first, last, target, row.rate, gentle)
     stops = ~through
-    seconds = r.seconds + np.where(stops, 0.0, 0.0)
     overlap = np.where(row.ends == OVERLAP, np.minimum(row.overlap_speed / row.rate, r.down), 0.0)
-    rest = np.where(stops & (overlap == 0.0), settings.stop_cycles * settings.cycle, 0.0)
-    pause, resting = _pauses(blocks, s, row, settings)
-    rest += resting
+    settling = np.where(stops & (overlap == 0.0), settings.stop_cycles * settings.cycle, 0.0)
+    pause, resting = _pauses(blocks, s, row)
     clock = compiled(timeline) if big else timeline
-    begin, end = clock(seconds, overlap, rest, row.fresh)
+    begin, end = clock(r.seconds + settling, overlap, resting, row.fresh)
+    end[-1:] += SETTLED
     return _by_block(blocks, s, row, r.up + r.down, r.steady, begin, end, pause, stops, first, last, r.peak)
 
 
@@ -240,26 +247,21 @@ def _ahead(row: Row, depth: int) -> Floats:
     return np.asarray(np.sqrt(np.maximum(window, 0.0)))
 
 
-def _pauses(blocks: Blocks, s: Segments, row: Row, settings: Settings) -> tuple[Floats, Floats]:
+def _pauses(blocks: Blocks, s: Segments, row: Row) -> tuple[Floats, Floats]:
     """(P,) s of each pause, and (M,) s of rest behind each segment of the row."""
     p = blocks.pauses
-    rest = np.zeros(len(row.length))
-    if not len(p):
-        return np.zeros(0), rest
-    segment = np.searchsorted(s.block, p.block)
-    position = np.searchsorted(row.owner, np.minimum(segment, len(s) - 1), side="right") - 1
-    seconds = p.seconds + np.where(np.isin(p.cause, (Cause.DWELL,)), 0.0, 0.0)
-    leading = np.append(True, np.diff(p.block) > 0)
-    seconds = seconds + np.where(leading & (p.block >= 0) & (segment < len(s)), settings.command, 0.0)
+    seconds = p.seconds + np.array([COMMAND[Cause(k)] for k in range(len(Cause))])[p.cause]
+    segment = np.minimum(np.searchsorted(s.block, np.maximum(p.block, 0)), len(s) - 1)
+    position = np.searchsorted(row.owner, segment, side="right") - 1
     inside = p.block >= 0
-    np.add.at(rest, position[inside], seconds[inside])
-    return seconds, rest
+    return seconds, summed(seconds[inside], position[inside], len(row.length))
 
 
 def _by_block(blocks: Blocks, s: Segments, row: Row, ramp: Floats, steady: Floats, begin: Floats, end: Floats,
               pause: Floats, stops: Bools, first: Floats, last: Floats, peak: Floats) -> Timed:
     """Segments' times shared out to the blocks that they stand for, by length."""
     count = len(blocks)
+    begin, end, ramp, steady = _apart(begin, end, ramp, steady)
     merged_end = np.zeros(len(s))
     np.maximum.at(merged_end, row.owner, end)
     merged_begin = np.full(len(s), np.inf)
@@ -270,9 +272,11 @@ def _by_block(blocks: Blocks, s: Segments, row: Row, ramp: Floats, steady: Float
     own = shape(blocks).length
     total = summed(own, owner, len(s))
     part = own / np.where(total[owner] > 0.0, total[owner], 1.0)
-    cumulative = np.cumsum(part) - np.concatenate([[0.0], np.cumsum(np.bincount(owner, weights=part, minlength=len(s)))])[owner]
+    done = np.cumsum(part)
+    first_of = np.searchsorted(owner, np.arange(len(s)))
+    done -= (done - part)[first_of][owner]
     span = merged_end - merged_begin
-    finish = merged_begin[owner] + cumulative * span[owner]
+    finish = merged_begin[owner] + done * span[owner]
     start = finish - part * span[owner]
     loss_first, loss_last = ((peak - v) ** 2 / (2.0 * row.rate * np.maximum(peak, 1e-300)) for v in (first, last))
     stopped_before = np.concatenate([[True], stops[:-1]])
@@ -283,6 +287,16 @@ def _by_block(blocks: Blocks, s: Segments, row: Row, ramp: Floats, steady: Float
         return summed(values, row.owner, len(s))[owner] * part
     return Timed(start, finish, shared(ramp), shared(steady), np.zeros(count), _peak(row, peak, len(s))[owner],
                  shared(lost_stop), shared(lost_corner), pause)
+
+
+def _apart(begin: Floats, end: Floats, ramp: Floats, steady: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+    """Begins and ends where overlapping segments share the time between them, and their phases shortened alike."""
+    begin, end = begin.copy(), end.copy()
+    over = np.flatnonzero(begin[1:] < end[:-1])
+    middle = (begin[over + 1] + end[over]) / 2.0
+    begin[over + 1], end[over] = middle, middle
+    scale = np.minimum(1.0, (end - begin) / np.maximum(ramp + steady, 1e-300))
+    return begin, end, ramp * scale, steady * scale
 
 
 def _peak(row: Row, peak: Floats, count: int) -> Floats:

@@ -215,18 +215,18 @@ def _meet(a: Locus, b: Locus, point: Floats, binormal: Floats) -> tuple[Floats, 
     root = np.sqrt(np.maximum(height2, 0.0))
     options = [origin + (middle + sign * root)[:, None] * direction for sign in (1.0, -1.0)]
     near = [((option - point) ** 2).sum(axis=1) for option in options]
-    return np.where((near[0] <= near[1])[:, None], options[0], options[1]), height2 >= 0.0
+    return np.asarray(np.where((near[0] <= near[1])[:, None], options[0], options[1])), height2 >= 0.0
 
 
 def _taken(k: Ints, side: _Side, u: Floats, point: Floats, center: Floats, before: bool) -> Floats:
     """(K,) what the blend takes of a side: mm of a line, rad of an arc."""
     along = np.abs(((center - point[k]) * u[k]).sum(axis=1))
     angle = np.arccos(np.clip((_unit(point[k] - side.center[k]) * _unit(center - side.center[k])).sum(axis=1), -1.0, 1.0))
-    return np.where(side.arc[k], angle, along)
+    return np.asarray(np.where(side.arc[k], angle, along))
 
 
 def _touch(k: Ints, side: _Side, u: Floats, point: Floats, center: Floats, r: Floats) -> Floats:
     """(K, 3) where the blend touches a side."""
     on_line = point[k] + ((center - point[k]) * u[k]).sum(axis=1)[:, None] * u[k]
     on_arc = side.center[k] + side.radius[k][:, None] * _unit(center - side.center[k])
-    return np.where(side.arc[k][:, None], on_arc, on_line)
+    return np.asarray(np.where(side.arc[k][:, None], on_arc, on_line))

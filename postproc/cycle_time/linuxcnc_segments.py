@@ -45,15 +45,16 @@ class Segments:
         return len(self.length)
 
 
-def segments(blocks: Blocks) -> Segments:
-    """The segments that the planner is given."""
+def segments(blocks: Blocks, override: float = 1.0, rapid: float = 1.0) -> Segments:
+    """The segments that the planner is given; feeds and rapids times their overrides."""
     merged, block = merge(blocks)
     form, axes = shape(merged), merged.axes
     most, acceleration = axis_limit(form.share, axes.velocity), axis_limit(form.share, axes.acceleration)
     if merged.arc.any():
         _arc_limits(merged, form, most, acceleration)
     fresh = np.concatenate([[True], merged.forced[:-1]])
-    return Segments(block, fresh, form.length, np.minimum(merged.speed, most), most, acceleration, form, merged)
+    asked = np.where(merged.rapid, most * rapid, merged.speed * override)
+    return Segments(block, fresh, form.length, np.minimum(asked, most), most, acceleration, form, merged)
 
 
 def _arc_limits(blocks: Blocks, form: Shape, most: Floats, acceleration: Floats) -> None:
@@ -121,7 +122,10 @@ def clamped(length: Floats, speed: Floats, cycle: float) -> Floats:
 
 
 def plane_limit(binormal: Floats, axes: Axes, limit: Floats) -> Floats:
-    """(K,) largest magnitude in the plane of unit `binormal` (K, 3) for any direction there (`calculateInscribedDiameter`)."""
+    """(K,) largest magnitude for any direction in the plane across unit `binormal` (K, 3).
+
+    LinuxCNC `calculateInscribedDiameter`.
+    """
     across = np.sqrt(np.maximum(1.0 - binormal**2, 1e-12))
     here = axes.xyz >= 0
     bounds = np.where(here, limit[axes.xyz], np.inf)

@@ -1,0 +1,55 @@
+"""No control can be faster: velocity, feed and acceleration only, every corner at full speed, rest where it is forced.
+
+The second-order bound (`postproc.feedrate.second_order`) of a path whose blocks are straight in the axes: between two
+grid points d2q is 0, so that one backward and one forward pass over the blocks give the greatest x = v^2. Corners cost
+nothing, and what a control may cut off at them within its tolerance is taken off the lengths. On arcs each axis may give
+all it has in every direction.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from postproc.cycle_time.blocks import Blocks, Path
+from postproc.cycle_time.linuxcnc_kernels import speeds
+from postproc.cycle_time.linuxcnc_segments import KERNEL_FROM, merge
+from postproc.cycle_time.model import CycleTimeModel
+from postproc.cycle_time.phases import ramps
+from postproc.cycle_time.shape import Shape, axis_limit, shape
+from postproc.feedrate.compiled import compiled
+from toolpaths.arrays import Floats
+
+
+def lower_bound(blocks: Blocks, model: CycleTimeModel) -> float:
+    """s below which no control can be on this path with these limits, dwells and tool changes included."""
+    merged = merge(blocks)[0] if model.kind == "linuxcnc" else blocks
+    form, axes = shape(merged), merged.axes
+    length = form.length - cut_off(merged, form, model)
+    velocity, rate = (axis_limit(form.share, limit) for limit in (axes.velocity, axes.acceleration))
+    if merged.arc.any():
+        both = merged.arc & (axes.xyz >= 0).all()
+        velocity, rate = (np.where(both, np.linalg.norm(limit[axes.xyz]), value)
+                          for limit, value in ((axes.velocity, velocity), (axes.acceleration, rate)))
+    target = np.minimum(np.where(merged.rapid, np.inf, merged.speed * max(model.override, 1.0)), velocity)
+    through = ~merged.forced
+    free = np.full(len(merged), np.inf)
+    loop = compiled(speeds) if len(merged) >= KERNEL_FROM else speeds
+    first, last = loop(length, target, target, rate, through, free, free)
+    return float(ramps(length, first, last, target, rate).seconds.sum() + blocks.pauses.seconds.sum())
+
+
+def cut_off(blocks: Blocks, form: Shape, model: CycleTimeModel) -> Floats:
+    """(E,) mm by which blends can make each block shorter.
+
+    The chord that takes d off both sides of a corner of turning angle phi lies d sin(phi/2) from it and is 2 d
+    (1 - cos(phi/2)) shorter; d is at most half a block. Where the limit is a tolerance e, d <= e/sin(phi/2).
+    """
+    dot = np.clip((form.last[:-1] * form.first[1:]).sum(axis=1), -1.0, 1.0)
+    sine, cosine = np.sqrt((1.0 - dot) / 2.0), np.sqrt((1.0 + dot) / 2.0)
+    stated = blocks.tolerance[:-1]
+    unlimited = model.kind == "linuxcnc"
+    tolerance = np.where(np.isnan(stated) | (np.isinf(stated) & (not unlimited)), model.corner_tolerance, stated)
+    with np.errstate(divide="ignore"):
+        reach = np.minimum(np.minimum(form.length[:-1], form.length[1:]) / 2.0, tolerance / sine)
+    spared = np.where((blocks.path[:-1] == Path.BLEND) & ~blocks.forced[:-1], reach * (1.0 - cosine), 0.0)
+    return np.asarray(np.append(spared, 0.0) + np.concatenate([[0.0], spared]))

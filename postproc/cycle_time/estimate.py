@@ -1,0 +1,134 @@
+"""One program under one model: times, bound, band."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from machines.machine import Machine
+from postproc.cycle_time.blocks import Axes, Blocks, Cause
+from postproc.cycle_time.bound import lower_bound
+from postproc.cycle_time.linuxcnc import Settings, linuxcnc
+from postproc.cycle_time.lookahead import lookahead
+from postproc.cycle_time.model import ASSUMED, PARAMETERS, CycleTimeModel
+from postproc.cycle_time.phases import Timed
+from toolpaths.arrays import Floats
+
+COVERAGE = 1.96
+"""standard deviations on both sides that hold 95 % of a normal distribution"""
+_LIMITS = ("velocity", "acceleration", "jerk")
+_TIMING = {"tool_change": Cause.TOOL_CHANGE, "clamp": Cause.INDEXING, "unclamp": Cause.INDEXING}
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """How long a program takes.
+
+    Attributes:
+        seconds: the model's time; lower_bound: no control is faster; band: 95 % of machines as described lie in it
+        doubts: standard deviation of the time by what it comes from, s
+    """
+
+    blocks: Blocks
+    model: CycleTimeModel
+    timed: Timed
+    seconds: float
+    lower_bound: float
+    band: tuple[float, float]
+    doubts: dict[str, float]
+
+
+def timed(blocks: Blocks, model: CycleTimeModel) -> Timed:
+    """The blocks under a model."""
+    if model.kind == "linuxcnc":
+        return linuxcnc(blocks, Settings(cycle=model.servo_cycle, override=model.override, rapid=model.rapid))
+    return lookahead(blocks, model)
+
+
+def total(blocks: Blocks, times: Timed) -> float:
+    """s of the whole program, pauses before the first and behind the last block included."""
+    outside = (blocks.pauses.block < 0) | (blocks.pauses.block == len(blocks) - 1)
+    moving = float(times.end.max() - times.begin.min()) if len(blocks) else 0.0
+    return moving + float(times.pause[outside].sum())
+
+
+def estimate(blocks: Blocks, machine: Machine, model: CycleTimeModel, with_band: bool = True) -> Estimate:
+    """Time, bound and band of a program.
+
+    Args:
+        with_band: False leaves the band at the time itself, for many programs in a row
+    """
+    times = timed(blocks, model)
+    seconds = total(blocks, times)
+    bound = lower_bound(blocks, model)
+    if not with_band:
+        return Estimate(blocks, model, times, seconds, bound, (seconds, seconds), {})
+    down, up, doubts = _doubts(blocks, machine, model, seconds)
+    low = seconds - down if machine.limits.assumed else max(seconds - down, min(bound, seconds))
+    return Estimate(blocks, model, times, seconds, bound, (max(low, 0.0), seconds + up), doubts)
+
+
+def _doubts(blocks: Blocks, machine: Machine, model: CycleTimeModel, seconds: float) -> tuple[float, float, dict[str, float]]:
+    """(s below, s above, standard deviation by origin): every doubtful value is moved by one standard deviation."""
+    own = model.calibration.relative if model.calibration else model.own_share
+    low = high = (COVERAGE * own * seconds) ** 2
+    doubts = {"the model itself": own * seconds}
+    for name, changed in _changes(blocks, machine, model):
+        moved = sorted(total(b, timed(b, m)) - seconds for b, m in changed)
+        low += (COVERAGE * min(moved[0], 0.0)) ** 2
+        high += (COVERAGE * max(moved[-1], 0.0)) ** 2
+        doubts[name] = (moved[-1] - moved[0]) / 2.0
+    return float(np.sqrt(low)), float(np.sqrt(high)), doubts
+
+
+Change = tuple[Blocks, CycleTimeModel]
+
+
+def _changes(blocks: Blocks, machine: Machine, model: CycleTimeModel) -> list[tuple[str, list[Change]]]:
+    """What may be otherwise: name, and the program and model with it lower and higher by one standard deviation."""
+    result: list[tuple[str, list[Change]]] = []
+    for limit in _LIMITS:
+        if (limit != "jerk" or (model.kind != "linuxcnc" and model.jerk)) and not model.calibration:
+            which = np.array([f"{name}.{limit}" in machine.limits.assumed for name in machine.axis_names])
+            if which.any():
+                result.append((f"assumed {limit}", [(_scaled(blocks, limit, which, sign), model) for sign in (-1, 1)]))
+    for name, cause in _TIMING.items():
+        here = (blocks.pauses.cause == cause) & (blocks.pauses.seconds > 0.0)
+        if name in machine.timing.assumed and here.any():
+            own = getattr(machine.timing, name)
+            result.append((f"assumed {name}", [(_longer(blocks, here, own * sign * ASSUMED[name]), model)
+                                               for sign in (-1, 1)]))
+    return result + _parameter_changes(blocks, model)
+
+
+def _parameter_changes(blocks: Blocks, model: CycleTimeModel) -> list[tuple[str, list[Change]]]:
+    """The model's own parameters: assumed ones alone, fitted ones along the principal axes of their covariance."""
+    if model.calibration is None:
+        return [(f"assumed {name}", [(blocks, with_values(model, {name: sign * ASSUMED[name]})) for sign in (-1, 1)])
+                for name in model.assumed]
+    values, vectors = np.linalg.eigh(np.array(model.calibration.covariance))
+    result = []
+    for k, (size, direction) in enumerate(zip(np.sqrt(np.maximum(values, 0.0)), vectors.T, strict=True)):
+        moves = [dict(zip(PARAMETERS, sign * size * direction, strict=True)) for sign in (-1, 1)]
+        result.append((f"fit {k + 1}", [(blocks, with_values(model, move)) for move in moves]))
+    return result
+
+
+def with_values(model: CycleTimeModel, logarithms: dict[str, float]) -> CycleTimeModel:
+    """The model with parameters moved by differences of their logarithms."""
+    moved = {name: float(getattr(model, name) * np.exp(change)) for name, change in logarithms.items()}
+    return model.model_copy(update=moved)
+
+
+def _scaled(blocks: Blocks, limit: str, which: Floats, sign: int) -> Blocks:
+    axes = blocks.axes
+    factor = np.where(which, np.exp(sign * ASSUMED[limit]), 1.0)
+    scaled = {name: getattr(axes, name) for name in _LIMITS} | {limit: getattr(axes, limit) * factor}
+    return replace(blocks, axes=Axes(axes.letters, axes.rotary, scaled["velocity"], scaled["acceleration"],
+                                     scaled["jerk"], axes.xyz))
+
+
+def _longer(blocks: Blocks, which: Floats, seconds: float) -> Blocks:
+    p = blocks.pauses
+    return replace(blocks, pauses=replace(p, seconds=np.maximum(p.seconds + np.where(which, seconds, 0.0), 0.0)))

@@ -1,0 +1,91 @@
+"""The model of a control as a file: which planner, its parameters, how sure each is."""
+
+from __future__ import annotations
+
+from importlib import resources
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from pydantic import Field
+
+from machines.user_file import UserModel, load_toml
+from toolpaths.arrays import Floats
+from toolpaths.diagnostics import Diagnostic
+
+PARAMETERS = ("corner_tolerance", "block_time", "rapid", "override", "stop_time")
+"""what a log can tell, in the order of `Calibration.covariance`"""
+ASSUMED = {"corner_tolerance": 0.7, "block_time": 0.7, "rapid": 0.05, "override": 0.02, "stop_time": 0.7,
+           "velocity": 0.15, "acceleration": 0.3, "jerk": 0.5, "tool_change": 0.3, "clamp": 0.3, "unclamp": 0.3}
+"""standard deviation of the logarithm of a value that no document states"""
+
+
+class Calibration(UserModel):
+    """Where the parameters of a calibrated model come from."""
+
+    log: str
+    """file of the measured run"""
+    samples: int = Field(ge=1)
+    machine: str = ""
+    rms_before: float = Field(ge=0.0)
+    """s, of the sections' times with the model that the fit began with"""
+    rms_after: float = Field(ge=0.0)
+    """s, of the sections' times with the fitted model"""
+    relative: float = Field(ge=0.0)
+    """standard deviation of the whole time over the model's that the sections leave, as a share"""
+    covariance: tuple[tuple[float, ...], ...]
+    """of the logarithms of the five parameters"""
+    not_identifiable: tuple[str, ...] = ()
+    """parameters that the run says nothing about; they keep their assumed doubt"""
+
+
+class CycleTimeModel(UserModel):
+    """How a control plans."""
+
+    description: str = ""
+    kind: Literal["ideal", "lookahead", "linuxcnc"] = "lookahead"
+    """ideal: as fast as the limits allow inside the corner tolerance; lookahead: a control that sees a number of blocks;
+    linuxcnc: LinuxCNC's planner"""
+    corner_tolerance: float = Field(default=0.01, gt=0.0, le=10.0)
+    """mm that corners may be rounded off where the program does not say"""
+    block_time: float = Field(default=0.001, ge=0.0, le=1.0)
+    """s that the control takes for a block at least"""
+    lookahead: int = Field(default=200, ge=1)
+    """blocks that it sees"""
+    jerk: bool = True
+    """the machine's jerk limits hold"""
+    rapid: float = Field(default=1.0, gt=0.0, le=2.0)
+    """share of the axes' velocity that rapids reach"""
+    override: float = Field(default=1.0, gt=0.0, le=3.0)
+    """of feeds"""
+    stop_time: float = Field(default=0.005, ge=0.0, le=10.0)
+    """s in position before motion goes on after a stop"""
+    servo_cycle: float = Field(default=0.001, gt=0.0, le=0.1)
+    """s, of LinuxCNC"""
+    own_share: float = Field(default=0.03, ge=0.0, le=1.0)
+    """standard deviation of the time over the model's own, as a share, where every parameter is known"""
+    assumed: tuple[str, ...] = ()
+    """parameters that no document states and no run has shown"""
+    calibration: Calibration | None = None
+
+    def values(self) -> Floats:
+        """(5,) logarithms of PARAMETERS."""
+        return np.log(np.maximum([getattr(self, name) for name in PARAMETERS], 1e-6))
+
+
+def builtin_files() -> dict[str, Path]:
+    """Model files of the product by name."""
+    folder = Path(str(resources.files("postproc.cycle_time")))
+    return {p.stem: p for p in sorted(folder.glob("*.toml"))}
+
+
+def load_model(source: str | Path) -> tuple[CycleTimeModel | None, list[Diagnostic]]:
+    """The model of a built-in name or a path."""
+    return load_toml(source, CycleTimeModel, builtin=builtin_files(), kind="cycle-time model")
+
+
+def model_name(controller: str, writer: str) -> str:
+    """The built-in model of a controller: its own where there is one, LinuxCNC's for its dialects, else "lookahead"."""
+    known = builtin_files()
+    stem = Path(controller).stem
+    return stem if stem in known else writer if writer in known else "lookahead"
