@@ -70,15 +70,19 @@ def moved(line: Line, x: Floats, carried_along: Sequence[Columns]) -> list[Colum
 
 
 def displaced(torsor: list[Floats | float], centre: Floats, carried_along: Sequence[Columns]) -> list[Columns]:
-    """A point and directions by one small transform about `centre`: turned about z, y, x, then displaced (C 1.14)."""
-    place = columns.of_one(centre)
-    turned: list[Columns] = [columns.minus(carried_along[0], place), *carried_along[1:]]
+    """A point and directions by one small transform about `centre`: turned about z, y, x, then displaced (C 1.14).
+
+    The point gets what its arm changes by, so that zero angles leave it to the last digit.
+    """
+    arm = columns.minus(carried_along[0], columns.of_one(centre))
+    turned: list[Columns] = [arm, *carried_along[1:]]
     for axis, angle in ((Z, torsor[5]), (Y, torsor[4]), (X, torsor[3])):
         if isinstance(angle, float):
             continue
         cos, sin = np.cos(angle), np.sin(angle)
         turned = [columns.turn(axis, cos, sin, v) for v in turned]
-    return [columns.plus(columns.plus(turned[0], place), torsor[:3]), *turned[1:]]
+    point = columns.plus(carried_along[0], columns.minus(turned[0], arm))
+    return [columns.plus(point, torsor[:3]), *turned[1:]]
 
 
 def effect(name: ErrorName, kinematics: Kinematics) -> bool:

@@ -1,0 +1,79 @@
+"""Realistic error models of any machine for the tests: 10 to 50 um and 5 to 20 arcsec, fixed seeds."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from machines.geometric_error.curves import Fourier, Polynomial, Table
+from machines.geometric_error.model import ErrorModel
+from machines.geometric_error.names import DIRECTIONS, parse
+from machines.geometric_error.rods import RodErrors, rod_frame, rod_names
+from machines.geometric_error.serial_errors import Component, SerialErrors
+from machines.kinematics.base import Kinematics
+from machines.kinematics.serial import Serial
+from toolpaths.arrays import Floats
+from toolpaths.units import DEG
+
+ARCSEC = DEG / 3600.0
+REACH = 900.0
+"""mm, positions that the slides' errors are known for"""
+
+
+def serial_errors(kinematics: Kinematics, seed: int = 0, length: float = 0.01, angle: float = 3.0 * ARCSEC,
+                  moving: str = "C") -> SerialErrors:
+    """Every component of every axis, location and spindle; tables, splines, polynomials and series by turns."""
+    rng = np.random.default_rng(seed)
+    components, constants = [], {}
+    for letter, rotary in zip(kinematics.axis_names, kinematics.rotary, strict=True):
+        for k, direction in enumerate(DIRECTIONS):
+            size = angle if k >= 3 else length
+            components.append(Component(parse(f"E{direction}{letter}"), _curve(rng, rotary, k, size)))
+            if rotary or (k >= 3 and direction != "XYZ"[(k + 3) % 3]):
+                constants[f"E{direction}0{letter}"] = float(rng.normal() * size)
+    for k, direction in enumerate(DIRECTIONS[:5]):
+        constants[f"E{direction}0S"] = float(rng.normal() * (angle if k >= 3 else length))
+    reference = {kinematics.axis_names[0]: np.array([30.0, -20.0, 100.0])}
+    return SerialErrors(tuple(components), constants, reference, {moving: "moving"})
+
+
+def _curve(rng: np.random.Generator, rotary: bool, k: int, size: float) -> Table | Fourier | Polynomial:
+    if rotary:
+        return Fourier(rng.normal(size=7) * size / 2.0)
+    if k == 1:
+        return Polynomial(rng.normal(size=4) * size / 2.0, (-REACH, REACH), 20.0, REACH)
+    x = np.linspace(-REACH, REACH, 13)
+    return Table(x, rng.normal(size=13) * size, "spline" if k == 2 else "linear")
+
+
+def rod_errors(kinematics: Kinematics, seed: int = 0, length: float = 0.01, angle: float = 3.0 * ARCSEC) -> RodErrors:
+    """All dimensions of a machine on rods."""
+    rng = np.random.default_rng(seed)
+    frame = rod_frame(kinematics)
+    slides = kinematics.axis_names[: len(frame.rail)]
+    zero = RodErrors.none(slides, rod_names(frame, slides))
+    return zero.with_values(rng.normal(size=len(zero.names)) * [angle if ".guide." in n else length for n in zero.names])
+
+
+def model(kinematics: Kinematics, seed: int = 0) -> ErrorModel:
+    """For any machine; parallel ones with a rotary axis get errors of that axis too."""
+    if isinstance(kinematics, Serial):
+        return ErrorModel(serial_errors(kinematics, seed))
+    rng, chain = np.random.default_rng(seed), SerialErrors(constants={"EA0S": 4.0 * ARCSEC, "EX0S": 0.02})
+    if any(kinematics.rotary):
+        letter = kinematics.axis_names[-1]
+        parts = tuple(Component(parse(f"E{d}{letter}"), _curve(rng, True, k, 3.0 * ARCSEC if k >= 3 else 0.01))
+                      for k, d in enumerate(DIRECTIONS))
+        chain = SerialErrors(parts, {**chain.constants, f"EX0{letter}": 0.02, f"EA0{letter}": 5.0 * ARCSEC})
+    return ErrorModel(chain, rod_errors(kinematics, seed))
+
+
+def joints(kinematics: Kinematics, n: int, seed: int = 0) -> Floats:
+    """Joints (n, J) in the middle of the travel, rotary axes up to 2 rad; places of the workspace of parallel machines."""
+    rng = np.random.default_rng(seed)
+    if isinstance(kinematics, Serial):
+        q = rng.uniform(-150.0, 150.0, (n, kinematics.joints))
+        turning = np.array(kinematics.rotary)
+        q[:, turning] = rng.uniform(-2.0, 2.0, (n, int(turning.sum())))
+        return q
+    slides = kinematics.random_slides(rng, n)
+    return slides if not any(kinematics.rotary) else np.column_stack([slides, rng.uniform(-1.0, 1.0, n)])

@@ -1,0 +1,70 @@
+"""Curves of component errors: known values, linear in their parameters, ranges, both ways of approach."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.interpolate import CubicSpline
+
+from machines.geometric_error.actual import approach
+from machines.geometric_error.curves import Curve, Fourier, Polynomial, Table
+
+X = np.array([-100.0, 0.0, 50.0, 120.0])
+V = np.array([0.01, -0.02, 0.03, 0.0])
+CURVES = [Table(X, V), Table(X, V, "spline"), Table(X, np.concatenate([V, 2.0 * V]), both=True),
+          Table(X, V, "linear", period=300.0), Table(X, V, "spline", period=300.0), Table(X[:1], V[:1]),
+          Fourier(np.array([0.1, 0.2, 0.3, -0.1, 0.05]), 240.0, 10.0), Polynomial(V, (-100.0, 120.0), 10.0, 50.0)]
+
+
+def test_table_is_linear_between_its_rows() -> None:
+    assert Table(X, V).at(np.array([-100.0, -50.0, 25.0, 120.0])) == pytest.approx([0.01, -0.005, 0.005, 0.0], abs=1e-15)
+
+
+def test_spline_is_the_cubic_through_the_rows() -> None:
+    x = np.linspace(-100.0, 120.0, 50)
+    assert Table(X, V, "spline").at(x) == pytest.approx(CubicSpline(X, V)(x), abs=1e-15)
+
+
+def test_series_and_polynomial_are_what_they_say() -> None:
+    x = np.array([-30.0, 77.0])
+    phase = 2.0 * np.pi * (x - 10.0) / 240.0
+    assert CURVES[6].at(x) == pytest.approx(0.1 + 0.2 * np.cos(phase) + 0.3 * np.cos(2 * phase) - 0.1 * np.sin(phase)
+                                            + 0.05 * np.sin(2 * phase), abs=1e-15)
+    t = (x - 10.0) / 50.0
+    assert CURVES[7].at(x) == pytest.approx(V[0] + V[1] * t + V[2] * t**2, abs=1e-15)
+
+
+@pytest.mark.parametrize("rule", ["linear", "spline"])
+def test_a_period_joins_the_ends(rule: str) -> None:
+    curve = Table(X, V, rule, period=300.0)  # type: ignore[arg-type]
+    x = np.linspace(-100.0, 200.0, 31)
+    assert curve.at(x + 900.0) == pytest.approx(curve.at(x), abs=1e-14)
+    assert curve.at(np.array([200.0 - 1e-9]))[0] == pytest.approx(V[0], abs=1e-11)
+    assert not curve.outside(x + 1e6).any()
+
+
+def test_each_way_has_its_own_values() -> None:
+    curve, x = CURVES[2], np.full(3, 50.0)
+    assert curve.at(x, np.array([1.0, -1.0, 0.0])) == pytest.approx([0.03, 0.06, 0.045])
+
+
+@pytest.mark.parametrize("curve", CURVES, ids=lambda c: type(c).__name__)
+def test_value_is_basis_times_parameters(curve: Curve) -> None:
+    x, way = np.linspace(-150.0, 150.0, 61), np.resize([1.0, -1.0, 0.0], 61)
+    basis = curve.basis(x, way)
+    assert basis.shape == (61, len(curve.labels())) == (61, len(curve.values))
+    assert curve.at(x, way) == pytest.approx(basis @ curve.values, abs=1e-13)
+    other = curve.with_values(np.arange(1.0, len(curve.values) + 1.0))
+    assert other.at(x, way) == pytest.approx(basis @ other.values, abs=1e-12)
+
+
+def test_outside_tells_and_keeps_the_end_value() -> None:
+    curve, x = Table(X, V), np.array([-101.0, -100.0, 120.0, 121.0])
+    assert curve.outside(x).tolist() == [True, False, False, True]
+    assert not curve.outside(x, 2.0).any()
+    assert curve.at(x).tolist() == [0.01, 0.01, 0.0, 0.0]
+
+
+def test_approach_remembers_the_last_motion() -> None:
+    q = np.array([[0.0, 5.0], [0.0, 4.0], [1.0, 4.0], [1.0, 4.0], [0.5, 6.0]])
+    assert approach(q).tolist() == [[0, 0], [0, -1], [1, -1], [1, -1], [-1, 1]]

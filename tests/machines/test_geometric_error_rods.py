@@ -1,0 +1,155 @@
+"""Machines on rods with dimensional errors: sensitivity matrix, exact closure, second order, zero."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.optimize import root
+from scipy.spatial.transform import Rotation
+
+import machines
+from machines.geometric_error.actual_rods import ActualDelta, ActualH4
+from machines.geometric_error.model import ErrorModel
+from machines.geometric_error.rods import RodErrors, RodFrame, platform_turn, rod_frame
+from machines.kinematics.h4_linear import H4Linear
+from machines.kinematics.linear_delta import LinearDelta
+from tests.machines.error_models import joints, model, rod_errors
+from toolpaths.arrays import Floats
+
+NAMES = ("uranesx", "h4a-c-table", "h4a-spindle-axis")
+TOOL = 70.0
+
+
+def kinematics(name: str) -> LinearDelta | H4Linear:
+    found = machines.load(name).kinematics.with_tool(TOOL)
+    assert isinstance(found, LinearDelta | H4Linear)
+    return found
+
+
+def platform(kin: LinearDelta | H4Linear, n: int) -> tuple[Floats, Floats, Floats]:
+    """(slides, place, turn) of random nominal platforms."""
+    rng = np.random.default_rng(1)
+    place, tilt = kin.workspace.random(rng, n)
+    if isinstance(kin, LinearDelta):
+        return kin.legs.inverse(place[:, None, :] + kin.platform), place, platform_turn(np.zeros(n))
+    return kin.platform.inverse(np.column_stack([place, tilt])), place, platform_turn(tilt)
+
+
+def closure(frame: RodFrame, slides: Floats, place: Floats, turned: Floats, errors: RodErrors) -> Floats:
+    """(N, 6) half (|AB|^2 - (L + dl)^2), E-9, written out rod by rod."""
+    rows = []
+    for r, leg in enumerate(frame.leg):
+        spun = Rotation.from_euler("XYZ", errors.guide[leg]).as_matrix()
+        a = frame.rail[leg] + errors.rail[leg] + (slides[:, leg, None] * frame.direction[leg] + frame.arm[r]) @ spun.T \
+            + frame.guide[leg] @ errors.carriage[r]
+        rod = place + turned @ (frame.joint[r] + errors.platform[r]) - a
+        rows.append(0.5 * (np.sum(rod**2, axis=1) - (frame.length[r] + errors.length[r]) ** 2))
+    return np.stack(rows, axis=1)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_sensitivity_matrix_is_the_derivative_of_the_closure(name: str) -> None:
+    """Acceptance 12: S of E-15 (60 parameters of a Delta, 66 of an H4) against finite differences."""
+    kin = kinematics(name)
+    frame, zero, (slides, place, turned) = rod_frame(kin), rod_errors(kin).with_values, platform(kin, 20)
+    count = len(rod_errors(kin).names)
+    assert count == (60 if isinstance(kin, LinearDelta) else 66)
+    s, step = frame.sensitivity(slides, place, turned), 1e-3
+    for k in range(count):
+        unit = np.eye(count)[k] * step
+        up, down = (closure(frame, slides, place, turned, zero(sign * unit)) for sign in (1.0, -1.0))
+        size = np.abs(s[:, :, k]).max()
+        assert -(up - down) / (2.0 * step) == pytest.approx(s[:, :, k], abs=1e-6 * size)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_platform_moves_as_the_sensitivity_says(name: str) -> None:
+    """T^-1 S against finite differences of the solved loop, every parameter, 1e-7 of the largest effect."""
+    kin = kinematics(name)
+    frame, (slides, place, turned) = rod_frame(kin), platform(kin, 10)
+    errors = rod_errors(kin)
+    rates = frame.platform_sensitivity(slides, place, turned)
+    for k, label in enumerate(errors.names):
+        step = 2e-5 if ".guide." in label else 2e-2
+        unit = np.eye(len(errors.names))[k] * step
+        up, down = (frame.solve(slides, place, turned, errors.with_values(sign * unit)) for sign in (1.0, -1.0))
+        size = np.abs(rates[:, :3, k]).max()
+        assert (up[0] - down[0]) / (2.0 * step) == pytest.approx(rates[:, :3, k], abs=1e-7 * size), label
+        twist = Rotation.from_matrix(up[1] @ np.swapaxes(down[1], 1, 2)).as_rotvec() / (2.0 * step)
+        assert twist == pytest.approx(rates[:, 3:, k], abs=1e-7 * np.abs(rates[:, 3:, k]).max() + 1e-10), label
+
+
+def test_first_columns_are_those_of_annex_e() -> None:
+    """E-18: a displaced rail acts as AB on both rods of its leg and on no other; E-31: +L."""
+    kin = kinematics("uranesx")
+    frame, (slides, place, turned) = rod_frame(kin), platform(kin, 3)
+    s, rods = frame.sensitivity(slides, place, turned), place[:, None] + frame.joint - frame.carriage_joints(slides)
+    assert s[:, :2, :3] == pytest.approx(rods[:, :2], abs=1e-12)
+    assert np.abs(s[:, 2:, :3]).max() == 0.0
+    assert s[:, :, 54:] == pytest.approx(np.broadcast_to(1300.0 * np.eye(6), (3, 6, 6)))
+    cos, sin = np.cos(2.0 * np.pi / 3.0), np.sin(2.0 * np.pi / 3.0)  # E-24, leg 2 at 120 degrees, x and y of dA
+    assert s[:, 2, 24] == pytest.approx(-rods[:, 2, 0] * cos - rods[:, 2, 1] * sin, abs=1e-9)
+    assert s[:, 2, 25] == pytest.approx(rods[:, 2, 0] * sin - rods[:, 2, 1] * cos, abs=1e-9)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_second_solution_of_the_loop_agrees(name: str) -> None:
+    """scipy's root on place and rotation vector, from the nominal platform."""
+    kin = kinematics(name)
+    frame, errors, (slides, place, turned) = rod_frame(kin), rod_errors(kin, 2, 0.05), platform(kin, 6)
+    found, spun = frame.solve(slides, place, turned, errors)
+    for k in range(6):
+        one = slice(k, k + 1)
+
+        def gaps(x: Floats, one: slice = one) -> Floats:
+            turn = Rotation.from_rotvec(x[3:]).as_matrix() @ turned[one]
+            return closure(frame, slides[one], x[None, :3], turn, errors)[0]
+
+        solved = root(gaps, np.append(place[k], [0.0, 0.0, 0.0]), tol=1e-13).x
+        assert found[k] == pytest.approx(solved[:3], abs=1e-8)
+        assert spun[k] == pytest.approx(Rotation.from_rotvec(solved[3:]).as_matrix() @ turned[k], abs=1e-10)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_zero_is_exact_and_first_order_is_to_second_order(name: str) -> None:
+    kin = kinematics(name)
+    full = model(kin, 4)
+    nominal = full.zero().on(kin)
+    assert isinstance(nominal, ActualDelta | ActualH4)
+    w = nominal.coordinates(joints(kin, 100))
+    tip, axis, _ = nominal.place(w)
+    expected = (w, np.tile([0.0, 0.0, 1.0], (100, 1))) if isinstance(kin, LinearDelta) else kin.place(w[:, :4], w[:, 4])[:2]
+    assert np.array_equal(tip, expected[0]) and np.array_equal(axis, expected[1])
+    left = []
+    for size in (8.0, 4.0):
+        actual = full.with_values(size * full.values).on(kin)
+        moved, (t, a, _) = actual.deviation(w, size * full.values), actual.place(w)
+        left.append([np.abs(t - tip - moved[:, :3]).max(), np.abs(a - axis - np.cross(moved[:, 3:], axis)).max()])
+    assert np.array(left[0]) / left[1] == pytest.approx([4.0, 4.0], rel=0.02)
+    assert left[1][0] < 2e-3
+
+
+@pytest.mark.parametrize("name", ["h4a-c-table", "h4a-spindle-axis"])
+def test_errors_of_the_rotary_axis_alone(name: str) -> None:
+    """With perfect rods the H4 is a chain: its axis errors do what those of a serial machine do, at every tilt."""
+    kin = kinematics(name)
+    assert isinstance(kin, H4Linear)
+    axes = model(kin, 4).axes
+    actual = ErrorModel(axes).on(kin)
+    w = actual.coordinates(joints(kin, 50))
+    tip, _, _ = actual.place(w)
+    moved = actual.deviation(w, np.concatenate([np.zeros(66), axes.values]))
+    assert tip - kin.place(w[:, :4], w[:, 4])[0] == pytest.approx(moved[:, :3], abs=2e-5)
+    assert np.abs(tip - kin.place(w[:, :4], w[:, 4])[0]).max() > 0.01
+
+
+@pytest.mark.parametrize("name", ["uranesx", "h4a-c-table", "h4a-spindle-axis"])
+def test_rates_are_derivatives_of_the_nominal_place(name: str) -> None:
+    kin = kinematics(name)
+    actual = model(kin).zero().on(kin)
+    w = actual.coordinates(joints(kin, 20))
+    rates = actual.rates(w)
+    for k in range(w.shape[1]):
+        step = 1e-5 * np.eye(w.shape[1])[k]
+        up, down = (np.concatenate(actual.place(w + sign * step)[:2], axis=1) for sign in (1.0, -1.0))
+        assert (up - down) / 2e-5 == pytest.approx(rates[:, :, k], abs=1e-6)
