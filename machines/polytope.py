@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial import HalfspaceIntersection, QhullError
 
 from machines.kinematics.base import Kinematics
-from toolpaths.arrays import Array, Floats, Ints
+from toolpaths.arrays import Array, Bools, Floats, Ints
 
 _SMALL = 1e-12
 _HELD = 1e-9
@@ -89,7 +89,7 @@ def held_axis_rates(kin: Kinematics, q: Floats, near: Floats | None = None) -> F
     """
     linear = np.flatnonzero(~np.array(kin.rotary))
     jacobian = kin.jacobian(q, near)[:, :, linear]
-    good = np.isfinite(jacobian).all(axis=(1, 2)) & np.isfinite(q).all(axis=1)
+    good: Bools = np.asarray(np.isfinite(jacobian).all(axis=(1, 2)) & np.isfinite(q).all(axis=1))
     result = np.full((len(q), kin.joints, 3), np.nan)
     inverse = np.linalg.pinv(np.where(good[:, None, None], jacobian, 0.0), rcond=1e-10)[:, :, :3]
     made = jacobian @ inverse
