@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.interpolate import make_interp_spline
+from scipy.interpolate import BSpline, make_interp_spline
 
 from machines.kinematics.base import Kinematics
 from postproc.feedrate.geometry_sites import sites
@@ -63,17 +63,19 @@ class MachinePath:
         return self.spline.breaks
 
     @cached_property
+    def fitted(self) -> BSpline:
+        """The joints as scipy's spline, for its coefficients."""
+        return make_interp_spline(self.s, self.values[:, :self.joints], k=DEGREE)
+
+    @cached_property
     def spline(self) -> SplinePath:
         """of the joints"""
-        return self._through(self.values[:, :self.joints])
+        return SplinePath(self.fitted.t, self.fitted.c, DEGREE)
 
     @cached_property
     def tool(self) -> SplinePath:
         """of tip and axis, for limits at the tool"""
-        return self._through(self.values[:, self.joints:])
-
-    def _through(self, values: Floats) -> SplinePath:
-        found = make_interp_spline(self.s, values, k=DEGREE)
+        found = make_interp_spline(self.s, self.values[:, self.joints:], k=DEGREE)
         return SplinePath(found.t, found.c, DEGREE)
 
     def derivatives(self, s: Floats) -> Derivatives:

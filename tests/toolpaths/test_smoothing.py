@@ -136,7 +136,7 @@ def test_motion_stops_where_it_turns_back_and_where_it_is_told_to() -> None:
     back = smooth(chain(np.array([[0.0, 0, 0], [10, 0, 0], [0, 0.5, 0]])), TOLERANCE)
     assert back is not None and back.stops.tolist() == [10.0]
     square = chain(np.array([[0.0, 0, 0], [10, 0, 0], [10, 10, 0]]))
-    told = smooth(square, TOLERANCE, stop_at_corners=True)
+    told = smooth(square, TOLERANCE, sharpest=0.2)
     assert told is not None and told.stops.tolist() == [10.0]
     assert off(told, square, 101)[0] < 1e-13
 

@@ -19,9 +19,7 @@ HIGHEST = 5.0 / 32.0
 ROOM = 0.45
 """Part of a segment that the blend at one of its ends may take."""
 SHARPEST = 2.4
-"""rad: the motion stops where it turns by more"""
-CORNER = 0.01
-"""rad: less is no corner, and blended even where corners are stops"""
+"""rad: a blend that turns by more would nearly stand still"""
 FILL = 0.98
 """Part of the tolerance that blends use."""
 _ROUNDS = 60
@@ -38,11 +36,12 @@ def ramp(u: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class Blends:
-    """The G - 1 joints between segments: parameter, half length a (0 at stops), and which are stops."""
+    """The G - 1 joints between segments: parameter, half length a (0 at stops), which are stops, and the turn in rad."""
 
     s: Floats
     half: Floats
     stop: Bools
+    turn: Floats
 
     def zones(self) -> Floats:
         """(n, 2) from where to where the path is neither of its segments."""
@@ -68,16 +67,17 @@ class Blends:
         return np.asarray(members.at(joint, s) + members.at(joint + 1, there) - members.at(joint, there))
 
 
-def chosen(members: Members, turn: Floats, tolerance: float, beside_splines: float, stop_at_corners: bool) -> Blends:
+def chosen(members: Members, turn: Floats, tolerance: float, beside_splines: float, sharpest: float) -> Blends:
     """Blends as long as room and tolerance allow.
 
     Args:
         turn (G - 1,): rad by which the direction changes at the joints
         tolerance: mm (tip, and scaled axis) for joints of lines and arcs
         beside_splines: the same where one of the two is a spline
+        sharpest: rad; the motion stops where it turns by more
     """
     s, size, reach = members.s[1:-1], np.diff(members.s), members.reach()
-    stop = (turn > SHARPEST) | (stop_at_corners & (turn > CORNER))
+    stop = turn > sharpest
     half = np.minimum(np.minimum(ROOM * size[:-1], ROOM * size[1:]), reach[:-1])
     allowed = FILL * np.where(members.spline[:-1] | members.spline[1:], beside_splines, tolerance)
     joint = np.arange(len(s))
@@ -89,7 +89,7 @@ def chosen(members: Members, turn: Floats, tolerance: float, beside_splines: flo
         joint, off = joint[wide], off[wide]
         half[joint] *= np.maximum(0.999 * allowed[joint] / off, 0.5)
     half[stop] = 0.0
-    return Blends(s, half, stop)
+    return Blends(s, half, stop, turn)
 
 
 def _off(members: Members, joint: Ints, s: Floats, half: Floats) -> Floats:

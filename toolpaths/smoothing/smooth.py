@@ -15,7 +15,7 @@ import numpy as np
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.rotations import angle_between
 from toolpaths.shape import Curves
-from toolpaths.smoothing.blend import Blends, chosen
+from toolpaths.smoothing.blend import SHARPEST, Blends, chosen
 from toolpaths.smoothing.fit import Fit, fit
 from toolpaths.smoothing.members import Members
 from toolpaths.smoothing.stretches import Segments, corners, segments
@@ -74,11 +74,11 @@ class Smooth:
         return values[:, :3], axis / np.linalg.norm(axis, axis=1, keepdims=True)
 
 
-def smooth(curves: Curves, tolerance: Tolerance, stop_at_corners: bool = False) -> Smooth | None:
+def smooth(curves: Curves, tolerance: Tolerance, sharpest: float = SHARPEST) -> Smooth | None:
     """The smoothed motion along a chain of curves, each beginning where the one before ends; None where nothing moves.
 
     Args:
-        stop_at_corners: stop at corners instead of blending them
+        sharpest: rad; the motion stops where tip and axis together turn by more in one joint
     """
     way = lengths(curves, tolerance.scale)
     moving = way > STILL
@@ -92,7 +92,7 @@ def smooth(curves: Curves, tolerance: Tolerance, stop_at_corners: bool = False) 
     parts, found = _fitted(kept, ends, way[moving], turn, tolerance)
     members = Members(kept, ends, parts.first, parts.spline, tolerance.scale, found)
     joint_turn = turn[parts.first[1:-1] - 1]
-    blends = chosen(members, joint_turn, tolerance.tip, (1.0 - SHARE) * tolerance.tip, stop_at_corners)
+    blends = chosen(members, joint_turn, tolerance.tip, (1.0 - SHARE) * tolerance.tip, min(sharpest, SHARPEST))
     worst = SHARE * float(found.ratio.max(initial=0.0)) if found is not None else 0.0
     return Smooth(s, members, blends, worst, tolerance)
 

@@ -14,6 +14,8 @@ LONG = 6.0
 """A chord so many times longer than those around it is a line of its own."""
 HIGH = 1.6
 """Height of a curve over its chord, over the tolerance, that no smooth curve can share between points and chord."""
+ALONE = 3.0
+"""Times the turns beside it that a turn must be to be a corner for that."""
 ROUND = 0.15
 """Part of the knot's distance, times the turn, by which a spline rounds a corner."""
 TURN_SPAN = 2.0
@@ -40,15 +42,15 @@ def corners(length: Floats, turn: Floats, is_arc: Bools, tolerance: float) -> Bo
     """(M - 1,) joints between M moves that no spline may cross.
 
     Beside arcs and long chords; where the polyline turns by more than a curve within the tolerance of its chords
-    could, and where it turns much more than next to the joint.
+    could, and where it turns much more than beside the joint.
     """
     long = _long(length) | is_arc
     apart = long[1:] | long[:-1]
     shorter = np.minimum(length[1:], length[:-1])
     sharp = shorter * turn / 8.0 > HIGH * tolerance
     beside = np.concatenate(([0.0], turn, [0.0]))
-    excess = turn - np.maximum(beside[:-2], beside[2:])
-    alone = excess * TURN_SPAN * np.maximum(length[1:], length[:-1]) * ROUND > tolerance
+    alone = turn > ALONE * np.maximum(beside[:-2], beside[2:])
+    alone &= turn * TURN_SPAN * np.maximum(length[1:], length[:-1]) * ROUND > tolerance
     return np.asarray(apart | sharp | alone)
 
 

@@ -1,0 +1,56 @@
+"""The highest constant speed of each block at which no axis exceeds velocity, acceleration or jerk anywhere in it.
+
+At a constant rate v of the path parameter the joints move with q' v, q'' v^2 and q''' v^3. The passes must stop at corners
+(`CORNER`): there no feed of a block keeps the limits, and the control slows down by itself.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from postproc.feedrate.geometry import DEGREE, MachinePath
+from postproc.feedrate.limits import JointLimits
+from postproc.pass_geometry import PassGeometry
+from toolpaths.arrays import Floats
+
+CORNER = 0.2
+"""rad: the largest turn in one joint of the path that is meant to be passed at the feed of a block"""
+ROUNDING = 1e-3
+"""Part of the speed that rounding of feed words may take"""
+
+
+def steady_seconds(passes: list[PassGeometry], limits: JointLimits, count: int) -> Floats:
+    """(count,) least seconds of each block of a Path at a constant feed; 0 where no limit binds."""
+    seconds = np.zeros(count)
+    for one in passes:
+        way = one.ends - one.begin
+        with np.errstate(divide="ignore", invalid="ignore"):
+            needed = way / ((1.0 - ROUNDING) * steady_speed(one, limits))
+        np.maximum.at(seconds, one.block, np.where(way > 0.0, needed, 0.0))
+    return seconds
+
+
+def steady_speed(one: PassGeometry, limits: JointLimits) -> Floats:
+    """(k,) largest constant ds/dt in each block of a pass."""
+    breaks = np.concatenate([path.breaks[:-1] for path in one.paths] + [one.paths[-1].breaks[-1:]])
+    speed = np.concatenate([span_speed(path, limits) for path in one.paths])
+    low = np.clip(np.searchsorted(breaks, one.begin, side="right") - 1, 0, len(speed) - 1)
+    high = np.clip(np.searchsorted(breaks, one.ends, side="left"), low + 1, len(speed))
+    return np.asarray(np.minimum.reduceat(np.append(speed, np.inf), np.stack((low, high), axis=1).ravel())[::2])
+
+
+def span_speed(path: MachinePath, limits: JointLimits) -> Floats:
+    """(S,) largest constant ds/dt on each span between knots, from below: derivatives stay within the hull of their
+    B-spline coefficients (de Boor, A Practical Guide to Splines, XI)."""
+    with np.errstate(divide="ignore"):
+        caps = [np.min(limit / _hull(path, order), axis=1) ** (1.0 / order) for order, limit in
+                enumerate((limits.velocity, limits.acceleration, limits.jerk), start=1)]
+    return np.asarray(np.min(caps, axis=0))
+
+
+def _hull(path: MachinePath, order: int) -> Floats:
+    """(S, J) largest coefficient of that derivative on each span."""
+    derivative = path.fitted.derivative(order)
+    size = np.abs(derivative.c[:len(path.s) - order])
+    spans = len(path.s) - DEGREE
+    return np.asarray(np.max([size[k:k + spans] for k in range(DEGREE - order + 1)], axis=0))
