@@ -66,9 +66,6 @@ class IsoWriter(Writer):
                 self.plane = plane
             if home:
                 words.append(codes.machine_coordinates)
-                if self.controller.tools.home_without_length:
-                    words.append(codes.length_cancel)
-                    self.length_off = True
             if home or names[code] != self.motion:
                 words.append(names[code])
                 self.motion = names[code]
@@ -76,14 +73,24 @@ class IsoWriter(Writer):
         return result
 
     def add_length(self, heads: list[str], first: int, last: int) -> None:
-        """The waiting length register into the first block that states Z in the work offset."""
-        p = self.program
-        if not self.length_waits or "Z" not in p.letters:
+        """The length register off in machine coordinates, and in force with the first block that states Z after that."""
+        p, codes = self.program, self.controller.codes
+        if "Z" not in p.letters:
             return
-        rows = np.flatnonzero(p.write[first:last, p.letters.index("Z")] & ~p.home[first:last])
-        if len(rows):
-            heads[int(rows[0])] += self.space + self.controller.codes.length_offset.format(register=self.register)
-            self.length_off = bool(p.home[first + rows[0]:last].any()) and self.controller.tools.home_without_length
+        homes = np.flatnonzero(p.home[first:last] & self.controller.tools.home_without_length)
+        heights = np.flatnonzero(p.write[first:last, p.letters.index("Z")] & ~p.home[first:last])
+        at = 0
+        while True:
+            if self.length_off and not self.length_waits:
+                return
+            rows = heights if self.length_off else homes
+            found = int(np.searchsorted(rows, at))
+            if found == len(rows):
+                return
+            at = int(rows[found])
+            code = codes.length_offset.format(register=self.register) if self.length_off else codes.length_cancel
+            heads[at] += self.space + code
+            self.length_off = not self.length_off
 
     def feed_text(self, value: float) -> str:
         """The number of a feed word: the controller's decimals, more for feeds below 1."""

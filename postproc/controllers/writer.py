@@ -150,9 +150,10 @@ class Writer:
         cycle, feed = self.cycles[hole.cycle], self.hole_feed(hole)
         surface = hole.plane_level - cycle.clearance
         depth, step = surface - hole.bottom, min(peck_of(cycle), surface - hole.bottom)
+        pitch = cycle.pitch or (feed / abs(self.speed) if self.speed else 0.0)
         return {"retract": hole.retract, "surface": surface, "clearance": cycle.clearance, "bottom": hole.bottom,
                 "depth": depth, "level": -depth, "step": step, "breaks": float(math.ceil(depth / step)),
-                "dwell": cycle.dwell, "feed": feed, "pitch": feed / self.speed if self.speed else 0.0,
+                "dwell": cycle.dwell, "feed": feed, "pitch": -pitch if hole.key == "TAP_LEFT" else pitch,
                 "speed": abs(self.speed), "second": hole.retract - surface}
 
     @staticmethod
