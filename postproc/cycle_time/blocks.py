@@ -115,6 +115,8 @@ class Blocks:
         operation (E,): index into `operations`
         pauses: rests by command
         cl_line (E,): line of the CL file that the block comes from, -1 where that is not known
+        given (E,): way that the feed refers to where the columns do not tell it (the tip's, under a control's own
+            kinematics), NaN elsewhere
     """
 
     axes: Axes
@@ -134,6 +136,7 @@ class Blocks:
     operations: tuple[str, ...] = ("",)
     pauses: Pauses = field(default_factory=Pauses.none)
     cl_line: Ints | None = None
+    given: Floats | None = None
 
     def __post_init__(self) -> None:
         n, a = len(self.line), len(self.axes.letters)

@@ -1,156 +1,202 @@
-"""From the words of a program and their motion (the reader's) to blocks and pauses."""
+"""From the canonical words of a program and their motion (the reader's) to blocks and pauses."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from machines.machine import Machine
 from postproc.control import Control
 from postproc.cycle_time.blocks import Axes, Blocks, Cause, Path, Pauses
-from postproc.cycle_time.shape import NOTHING, feed_length
+from postproc.cycle_time.shape import NOTHING, shape
+from postproc.readback.canonical import LOADED, OFFSET, REGISTER, SMOOTH, Canonical
 from postproc.readback.execute import Motion
-from postproc.readback.modal import modal_state
+from postproc.readback.modal import columns, fill_values, modal_state
+from postproc.readback.poses import arc_sweeps, coordinates, positions
 from postproc.readback.words import Words
 from toolpaths.arrays import Array, Bools, Floats, Ints
 from toolpaths.units import DEG
 
-RESTING_M = (0, 1, 3, 4, 5, 6, 7, 8, 9)
-RESTING_G = (43, 43.1, 43.2, 49, 54, 55, 56, 57, 58, 59, 59.1, 59.2, 59.3)
-"""Codes that are carried out at rest; LinuxCNC waits for motion before each (task, preconditions of commands)."""
+RESTING_M = (0.0, 1.0, 3.0, 4.0, 5.0, 7.0, 8.0, 9.0)
+"""Codes that are carried out at rest; LinuxCNC waits for motion before each (emctaskmain.cc, preconditions)."""
 LEAST_RATE = 0.1
-"""mm or degrees per min: slower inverse-time feeds run at this (LinuxCNC `inverse_time_rate`)"""
-TURN = 2.0 * np.pi
+"""mm or degrees per min: slower inverse-time feeds run at this (LinuxCNC interp_inverse.cc)"""
+CHORD = 0.1
+"""rad of an arc that one straight piece stands for where the control bends it through its kinematics"""
+INCH = 25.4
 
 
-def blocks_of(words: Words, motion: Motion, machine: Machine, control: Control, own_path: bool) -> Blocks:
+@dataclass(frozen=True)
+class Origin:
+    """Where motion blocks come from: operation (E,) of `names`, CL line (E,) or None."""
+
+    operation: Ints
+    names: tuple[str, ...]
+    cl_line: Ints | None = None
+
+    @staticmethod
+    def by_tool(motion: Motion) -> Origin:
+        """One operation from tool change to tool change."""
+        change = np.concatenate([[False], np.diff(motion.tool) != 0])
+        number = np.cumsum(change)
+        first = np.unique(number, return_index=True)[1]
+        return Origin(number, tuple(f"T{t}" if t >= 0 else "" for t in motion.tool[first].tolist()) or ("",))
+
+
+def blocks_of(code: Canonical, motion: Motion, machine: Machine, control: Control, origin: Origin | None = None,
+              own_path: bool = True, by_radius: bool = False) -> Blocks:
     """The blocks that move, with their pauses.
 
     Args:
-        words: of the program; motion: what executing them gave
+        code: what the reader makes of the text; motion: what executing it gave
+        origin: operations and CL lines; by tool where it is left out
         own_path: True where a program without a path mode blends without a limit (LinuxCNC), else it is the control's
+        by_radius: inverse time of arcs counts radians
     """
-    unit = np.where(machine.rotary, DEG, 1.0)
+    origin = origin or Origin.by_tool(motion)
+    block = _block_of(code, motion)
+    words, unit = code.words, np.where(machine.rotary, DEG, 1.0)
     end = motion.end * unit
     start = np.concatenate([motion.start[None] * unit, end[:-1]])
-    axes = Axes.of(machine)
     arc = motion.code == 2
-    normal, sweep, center = _arcs(motion, start, end, axes, arc)
+    normal, sweep = _arcs(motion, control, arc)
     path, tolerance, chain = _path_modes(words, own_path)
-    exact = np.where(motion.hole, Path.EXACT, path[motion.line])
-    all_blocks = Blocks(axes, start, end, motion.line, motion.code == 0, arc, center, normal, sweep,
-                        np.full(len(end), np.inf), exact, tolerance[motion.line], chain[motion.line],
-                        np.zeros(len(end), dtype=np.int64), pauses=_pauses(words, motion, machine))
+    path = np.where(motion.hole, Path.EXACT, path[block])
+    blocks = Blocks(Axes.of(machine), start, end, motion.line, motion.code == 0, arc,
+                    np.where(arc[:, None], motion.center, 0.0), normal, sweep, np.full(len(end), np.inf), path,
+                    tolerance[block], chain[block], origin.operation, origin.names, _pauses(words, block, code.line, motion,
+                                                                                          machine),
+                    origin.cl_line, _tip_lengths(motion, control))
+    blocks = replace(blocks, speed=_speeds(words, block, motion, blocks, by_radius))
     moving = (np.abs(end - start) > NOTHING).any(axis=1) | arc
-    blocks = all_blocks.take(moving)
-    blocks = replace(blocks, speed=_speeds(words, motion, moving, blocks))
+    blocks = _unrolled(blocks, motion, control, unit) if (arc & (motion.frame > 0)).any() else blocks.take(moving)
     return replace(blocks, pauses=_with_indexing(blocks, machine))
 
 
-def _arcs(motion: Motion, start: Floats, end: Floats, axes: Axes, arc: Bools) -> tuple[Floats, Floats, Floats]:
-    """normal (E, 3), sweep (E,) and center (E, 3) of arcs; a start that is also the end is a whole turn."""
-    normal, sweep = np.zeros((len(end), 3)), np.zeros(len(end))
-    at = np.flatnonzero(arc)
+def _block_of(code: Canonical, motion: Motion) -> Ints:
+    """(E,) the canonical block of each row of motion.
+
+    Blocks and rows stand in running order; where lines come back (subprograms) each row takes the next block of its line.
+    """
+    line = code.line
+    if (np.diff(line) >= 0).all():
+        return np.searchsorted(line[1:], motion.line) + 1
+    result, at = np.empty(len(motion), dtype=np.int64), 1
+    for k, wanted in enumerate(motion.line.tolist()):
+        while at < len(line) - 1 and line[at] != wanted:
+            at += 1
+        result[k] = at
+    return result
+
+
+def _arcs(motion: Motion, control: Control, arc: Bools) -> tuple[Floats, Floats]:
+    """normal (E, 3) and sweep (E,) of arcs."""
+    normal, at = np.zeros((len(motion), 3)), np.flatnonzero(arc)
     if not len(at):
-        return normal, sweep, np.zeros((len(end), 3))
-    index = np.array([2, 1, 0])[motion.plane[at] - 17]
-    normal[at, index] = np.where(motion.ccw[at], 1.0, -1.0)
-    spokes = [points[at][:, axes.xyz] - motion.center[at] for points in (start, end)]
-    across, along = np.cross(normal[at], spokes[0]), (spokes[0] * spokes[1]).sum(axis=1)
-    rise = (spokes[0] * normal[at]).sum(axis=1) * (spokes[1] * normal[at]).sum(axis=1)
-    angle = np.arctan2((across * spokes[1]).sum(axis=1), along - rise)
-    sweep[at] = np.where(angle > 1e-9, angle, angle + TURN)
-    return normal, sweep, np.where(arc[:, None], motion.center, 0.0)
+        return normal, np.zeros(len(motion))
+    normal[at, np.array([2, 1, 0])[motion.plane[at] - 17]] = np.where(motion.ccw[at], 1.0, -1.0)
+    return normal, np.nan_to_num(arc_sweeps(motion, control))
+
+
+def _tip_lengths(motion: Motion, control: Control) -> Floats:
+    """(E,) way of the tip where X, Y, Z are the tip and the joints follow; NaN elsewhere."""
+    result = np.full(len(motion), np.nan)
+    rows = np.flatnonzero(motion.frame > 0)
+    if len(rows):
+        before, end = coordinates(motion, rows)
+        result[rows] = control.under("tcp").feed_length(end - before)
+        turning = np.linalg.norm((end - before)[:, control.xyz], axis=1) <= NOTHING
+        result[rows[turning]] *= DEG
+    return result
+
+
+def _unrolled(blocks: Blocks, motion: Motion, control: Control, unit: Floats) -> Blocks:
+    """Arcs that the control bends through its kinematics as short straight pieces; blocks that do not move left out."""
+    bent = blocks.arc & (motion.frame > 0)
+    count = np.where(bent, np.ceil(blocks.sweep / CHORD).astype(np.int64), 1)
+    row = np.repeat(np.arange(len(blocks)), count)
+    part = (np.arange(len(row)) - (np.cumsum(count) - count)[row] + 1.0) / count[row]
+    wide = blocks.take(row)
+    end = wide.end.copy()
+    inner = np.flatnonzero(bent[row])
+    end[inner] = positions(motion, control, row[inner], part[inner]) * unit
+    start = np.concatenate([blocks.start[:1], end[:-1]])
+    pauses = replace(blocks.pauses, block=np.where(blocks.pauses.block >= 0, np.searchsorted(
+        row, blocks.pauses.block, side="right") - 1, -1))
+    wide = replace(wide, start=start, end=end, arc=wide.arc & ~bent[row], pauses=pauses,
+                   given=wide.given / count[row] if wide.given is not None else None)
+    return wide.take((np.abs(end - start) > NOTHING).any(axis=1) | wide.arc)
 
 
 def _path_modes(words: Words, own_path: bool) -> tuple[Array, Floats, Floats]:
-    """(L + 1,) Path, tolerance and chain in force at each line: G61, G61.1, G64 P Q (LinuxCNC G-code reference)."""
-    lines, codes = _pick(words, "G")
-    keep = np.isin(codes, (61, 61.1, 64))
-    lines, codes = lines[keep], codes[keep]
-    inch = modal_state(words).inch[lines]
-    p, q = (_stated(words, letter, lines) * np.where(inch, 25.4, 1.0) for letter in "PQ")
-    blend = codes == 64
-    path = np.where(blend, Path.BLEND, np.where(codes == 61, Path.EXACT, Path.STOP))
+    """(B + 1,) Path, tolerance and chain in force at each block: G61, G61.1, G64 P Q (LinuxCNC G-code reference), else
+    what the reader says of the control's smoothing."""
+    at, codes = words.pick("G")
+    keep = np.isin(codes, (61.0, 61.1, 64.0))
+    at, codes = at[keep], codes[keep]
+    scale = np.where(modal_state(words).inch, INCH, 1.0)[at]
+    p, q = (columns(words, letter)[at, 0] * scale for letter in "PQ")
+    blend = codes == 64.0
+    path = np.where(blend, Path.BLEND, np.where(codes == 61.0, Path.EXACT, Path.STOP))
     tolerance = np.where(p > 0.0, p, np.inf)
     chain = np.where(blend, np.where(np.isfinite(q), q, np.where(np.isfinite(p), p, 0.0)), 0.0)
-    initial = np.inf if own_path else np.nan
-    return (_carried(lines, path, words.lines, Path.BLEND).astype(np.int8),
-            _carried(lines, tolerance, words.lines, initial), _carried(lines, chain, words.lines, 0.0))
+    smooth = fill_values(*words.pick(SMOOTH), words.lines)
+    stated = np.where(smooth == 0.0, np.nan, smooth) if not own_path else np.full(words.lines + 1, np.inf)
+    stated[at[0] if len(at) else words.lines + 1:] = np.nan
+    own = _carried(at, tolerance, words.lines)
+    return (np.nan_to_num(_carried(at, path.astype(np.float64), words.lines), nan=float(Path.BLEND)).astype(np.int8),
+            np.where(np.isnan(own), stated, own), np.nan_to_num(_carried(at, chain, words.lines)))
 
 
-def _pick(words: Words, letter: str) -> tuple[Ints, Floats]:
-    """(lines, numbers) of the words of a letter."""
-    here = words.letter == ord(letter)
-    return words.line[here], words.value[here]
+def _carried(at: Ints, values: Floats, count: int) -> Floats:
+    """(count + 1,) the value stated last at or before each block, NaN before the first."""
+    return fill_values(at, values, count)
 
 
-def _stated(words: Words, letter: str, lines: Ints) -> Floats:
-    """(K,) the number of a letter in each of some lines, NaN where it is not stated."""
-    result = np.full(words.lines + 1, np.nan)
-    at, values = _pick(words, letter)
-    result[at] = values
-    return result[lines]
-
-
-def _carried(lines: Ints, values: Array, count: int, initial: float) -> Floats:
-    """(count + 1,) the value stated last at or before each line."""
-    index = np.zeros(count + 1, dtype=np.int64)
-    index[lines] = np.arange(1, len(lines) + 1)
-    return np.concatenate([[initial], values])[np.maximum.accumulate(index)].astype(np.float64)
-
-
-def _speeds(words: Words, motion: Motion, moving: Bools, blocks: Blocks) -> Floats:
+def _speeds(words: Words, block: Ints, motion: Motion, blocks: Blocks, by_radius: bool) -> Floats:
     """(E,) mm/s or rad/s that the feed word asks for."""
-    from postproc.cycle_time.shape import shape
-
-    feed, inverse = motion.feed[moving], motion.inverse[moving]
-    inch = modal_state(words).inch[blocks.line]
-    length = shape(blocks).length
-    linear = feed_length(np.where(blocks.axes.rotary, 0.0, blocks.end - blocks.start), blocks.axes) > NOTHING
-    linear |= blocks.arc
-    per_minute = feed * np.where(linear, np.where(inch, 25.4, 1.0), DEG)
+    inch = modal_state(words).inch[block]
+    form = shape(blocks)
+    linear = (form.first != 0.0).any(axis=1) | blocks.arc
+    per_minute = motion.feed * np.where(linear, np.where(inch, INCH, 1.0), DEG)
     least = LEAST_RATE * np.where(linear, 1.0, DEG)
-    asked = np.where(inverse, np.maximum(feed * length, least), per_minute) / 60.0
+    around = np.where(blocks.arc & by_radius, blocks.sweep, 1.0)
+    rate = motion.feed * form.length / np.where(around > 0.0, around, 1.0)
+    asked = np.where(motion.inverse, np.maximum(rate, least), per_minute) / 60.0
     return np.where(blocks.rapid, np.inf, asked)
 
 
-def _pauses(words: Words, motion: Motion, machine: Machine) -> Pauses:
-    """Rests by the codes of the program; dwells stand with the block that they follow."""
-    m_lines, m = _pick(words, "M")
-    g_lines, g = _pick(words, "G")
-    s_lines, _ = _pick(words, "S")
-    keep_m, keep_g = np.isin(m, RESTING_M), np.isin(g, RESTING_G)
-    m, m_lines = m[keep_m], m_lines[keep_m]
-    spindle, change = np.isin(m, (3, 4)), m == 6
-    cause = np.where(change, Cause.TOOL_CHANGE, np.where(spindle, Cause.SPINDLE, Cause.OTHER))
+def _pauses(words: Words, block: Ints, line: Ints, motion: Motion, machine: Machine) -> Pauses:
+    """Rests by the codes of the program; dwells stand with the row that they follow."""
+    at, codes = words.pick("M")
+    at, codes = at[np.isin(codes, RESTING_M)], codes[np.isin(codes, RESTING_M)]
+    changes, other = words.pick(LOADED)[0], np.concatenate([words.pick(sign)[0] for sign in (REGISTER, OFFSET, "S")])
     rests = np.flatnonzero(motion.dwell > 0.0)
-    line = np.concatenate([m_lines, g_lines[keep_g], s_lines, motion.line[rests]])
-    block = np.searchsorted(motion.line, line) - 1
-    block[len(line) - len(rests):] = rests
-    seconds = np.zeros(len(line))
-    seconds[:len(m)] = np.where(change, machine.timing.tool_change, 0.0)
-    seconds[len(line) - len(rests):] = motion.dwell[rests]
-    causes = np.concatenate([cause, np.full(int(keep_g.sum()) + len(s_lines), Cause.OTHER),
-                             np.full(len(rests), Cause.DWELL)])
-    order = np.lexsort((line, block))
-    return Pauses(block[order], causes[order], seconds[order], line[order])
+    where = np.concatenate([at, changes, other, block[rests]])
+    row = np.searchsorted(block, where) - 1
+    row[len(where) - len(rests):] = rests
+    cause = np.concatenate([np.where(np.isin(codes, (3.0, 4.0)), Cause.SPINDLE, Cause.OTHER),
+                            np.full(len(changes), Cause.TOOL_CHANGE), np.full(len(other), Cause.OTHER),
+                            np.full(len(rests), Cause.DWELL)])
+    seconds = np.where(cause == Cause.TOOL_CHANGE, machine.timing.tool_change, 0.0)
+    seconds[len(where) - len(rests):] = motion.dwell[rests]
+    order = np.lexsort((where, row))
+    return Pauses(row[order], cause[order], seconds[order], line[where[order]])
 
 
 def _with_indexing(blocks: Blocks, machine: Machine) -> Pauses:
     """The pauses with clamp and unclamp: where a run of rapids turns axes that the cut behind it leaves at rest."""
     timing, pauses = machine.timing, blocks.pauses
     seconds = timing.clamp + timing.unclamp
-    if seconds <= 0.0:
+    if seconds <= 0.0 or not len(blocks):
         return pauses
     turned = np.abs((blocks.end - blocks.start)[:, blocks.axes.rotary]).max(axis=1, initial=0.0) > NOTHING
     cuts = np.flatnonzero(~blocks.rapid)
     following = np.searchsorted(cuts, np.arange(len(blocks)))
     moves_on = np.append(turned[cuts], True)[following]
     index = np.flatnonzero(blocks.rapid & turned & ~moves_on)
-    if len(index):
-        index = index[np.append(np.diff(following[index]) > 0, True)]
+    index = index[np.append(np.diff(following[index]) > 0, True)[:len(index)]]
     block = np.concatenate([pauses.block, index])
     order = np.argsort(block, kind="stable")
     return Pauses(block[order], np.concatenate([pauses.cause, np.full(len(index), Cause.INDEXING)])[order],

@@ -55,6 +55,8 @@ def shape(blocks: Blocks) -> Shape:
     step = np.where(np.abs(step) > NOTHING, step, 0.0)
     xyz = np.where(axes.xyz >= 0, step[:, axes.xyz], 0.0)
     length, direction = feed_length(step, axes), unit(xyz)
+    if blocks.given is not None:
+        length = np.where(blocks.given > NOTHING, blocks.given, length)
     others = np.setdiff1d(np.arange(step.shape[1]), axes.xyz)
     turns = (step[:, others] != 0.0).any(axis=1)
     radius, climb = np.zeros(len(step)), np.zeros(len(step))

@@ -1,0 +1,114 @@
+"""Blocks of a CL file, through its conversion, or of a G-code file, through the reader of its controller."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from machines.machine import Machine
+from postproc.control import Control, Law
+from postproc.controllers.model import ControllerFile
+from postproc.cycle_time.blocks import Blocks
+from postproc.cycle_time.program import Origin, blocks_of
+from postproc.pipeline import PostResult
+from postproc.readback.canonical import Canonical
+from postproc.readback.dialects import reader_for
+from postproc.readback.execute import Motion, Offsets, run
+from postproc.setup import SetupFile, part_placement
+from toolpaths.diagnostics import Diagnostic, DiagnosticError, error, has_errors
+
+
+def from_conversion(result: PostResult) -> Blocks:
+    """The blocks of a conversion that has succeeded, with operations and lines of its CL file."""
+    assert result.job is not None and result.comparison is not None and result.ok
+    job = result.job
+    lengths = job.register_lengths()
+    code, motion, found = _executed(result.text.encode(), result.controller, job.control, lengths, "")
+    assert code is not None and motion is not None, found
+    moves, path = job.moves.without_pecks(), job.toolpath
+    owner = np.clip(result.comparison.owner, 0, len(moves) - 1)
+    names = tuple(op.name or f"operation {k + 1}" for k, op in enumerate(path.operations))
+    inside = (result.comparison.owner >= 0) & (result.comparison.owner < len(moves))
+    origin = Origin(path.operation[moves.row[owner]].astype(np.int64), names,
+                    np.where(inside, moves.line[owner], -1).astype(np.int64))
+    return _blocks(code, motion, result.machine, job.control, result.controller, origin)
+
+
+def from_gcode(data: bytes, machine: Machine, controller: ControllerFile, setup: SetupFile, file: str = "",
+               others: Mapping[str, bytes] | None = None) -> tuple[Blocks | None, list[Diagnostic]]:
+    """The blocks of a program, from the machine's home; None and why where it cannot be executed.
+
+    Tool lengths come from the set-up, by length register as by tool number; the work offset stands where the set-up puts
+    the part. `others`: files of subprograms by name.
+    """
+    placement, found = part_placement(setup)
+    if placement is None:
+        return None, found
+    tip_law = machine.control_kinematics is not None and controller.kinematics.modules
+    law: Law = "tcp" if tip_law else "axes"
+    control = Control(machine, law, placement.points(np.zeros((1, 3)))[0], base=law, rapids=controller.kinematics.rapids,
+                      feed_rule=controller.feed.length)
+    lengths = {int(number): tool.gauge_length for number, tool in setup.tools.items()}
+    code, motion, more = _executed(data, controller, control, lengths, file, others)
+    found += more
+    if code is None or motion is None or has_errors(found):
+        return None, found
+    missing = motion.missing_feed
+    if missing.any():
+        found.append(error("gcode.feed", "cutting blocks without a feed in force", file=file,
+                           lines=motion.line[missing][:6].tolist(), count=int(missing.sum()), hint="state F before them"))
+        return None, found
+    blocks = _blocks(code, motion, machine, control, controller, None)
+    if not len(blocks):
+        return None, [*found, error("gcode.no_motion", "the program moves nothing", file=file,
+                                    hint="there is no time to estimate")]
+    return blocks, found
+
+
+def _executed(data: bytes, controller: ControllerFile, control: Control, lengths: dict[int, float], file: str,
+              others: Mapping[str, bytes] | None = None) -> tuple[Canonical | None, Motion | None, list[Diagnostic]]:
+    """Text to canonical words to motion."""
+    machine = control.machine
+    home = control.words(machine.home[None, :], machine.kinematics, 0.0)[0] + control.work_offset
+    reader = reader_for(controller, machine.axis_names, home)
+    code, found = reader.read(data, file, others)
+    if code is None or has_errors(found):
+        return None, None, found
+    offsets = Offsets(control.work_offset, control.xyz, lengths, home, control.length_on_z, controller.cycles.peck_relief,
+                      control, reader.rises_first, reader.arc_slack)
+    motion, more = run(code, machine.axis_names, offsets, file)
+    return code, motion, [*found, *more]
+
+
+def _blocks(code: Canonical, motion: Motion, machine: Machine, control: Control, controller: ControllerFile,
+            origin: Origin | None) -> Blocks:
+    return blocks_of(code, motion, machine, control, origin, own_path=controller.writer == "linuxcnc",
+                     by_radius=controller.feed.arc_inverse == "radius")
+
+
+def looks_like_gcode(data: bytes) -> bool:
+    """True for a program of a control: a % or O line, or blocks of words, in what comes before any APT record."""
+    for raw in data[:20_000].splitlines():
+        line = raw.strip().upper()
+        if not line or line.startswith((b"(", b";", b"$$")):
+            continue
+        if line.startswith((b"%", b"O", b"BEGIN PGM")) and b"/" not in line.split(b"(")[0]:
+            return True
+        head = line.lstrip(b"/N0123456789 :")
+        return head[:1] in b"GMTXYZABCSF" and head[1:2].isdigit() if b"/" not in line[1:] else False
+    return False
+
+
+def read_file(file: str | Path) -> bytes:
+    """The bytes of a file.
+
+    Raises:
+        DiagnosticError: where it cannot be read.
+    """
+    try:
+        return Path(file).read_bytes()
+    except OSError as fault:
+        raise DiagnosticError([error("time.open", f"cannot be read: {fault.strerror}", file=str(file),
+                                     hint="a CL file, or a program of the controller")]) from fault
