@@ -11,9 +11,9 @@ from postproc.control import Control
 from postproc.joint_path import nearest_solution
 from postproc.linearise import family_turns, linearise
 from postproc.modes import WordFrame
-from postproc.moves import Moves
+from postproc.moves import Moves, Phase
 from postproc.word_arcs import PLANE_COLUMNS, WordArcs, word_arcs
-from toolpaths.arrays import Array, Floats, Ints
+from toolpaths.arrays import Array, Bools, Floats, Ints
 from toolpaths.rotations import angle_between
 from toolpaths.shape import Curves
 from toolpaths.toolpath import Kind
@@ -30,15 +30,11 @@ class Builder:
         self.columns: dict[str, list[Array]] = {k: [] for k in COLUMNS}
         self.begin = np.zeros(len(moves) + 1, dtype=np.int64)
         self.count = 0
-        self.frames: list[WordFrame] = []
+        self.frames: dict[WordFrame, int] = {}
 
     def frame(self, frame: WordFrame) -> int:
-        """The number of a frame; a frame that states the same as the last one is that one."""
-        for k, known in enumerate(self.frames):
-            if known.control is frame.control and known.angles == frame.angles and known.rotary == frame.rotary:
-                return k
-        self.frames.append(frame)
-        return len(self.frames) - 1
+        """The number of a frame."""
+        return self.frames.setdefault(frame, len(self.frames))
 
     def add(self, frame: WordFrame, q: Floats, move: Ints, u: Floats, code: Array, seconds: Floats, home: bool = False,
             plane: Array | None = None, ccw: Array | None = None, center: Floats | None = None,
@@ -70,10 +66,11 @@ class Builder:
 
 
 def rapid_codes(control: Control, kin: Kinematics, q0: Floats, q1: Floats, tolerance: float,
-                axis_tolerance: float) -> Array:
+                axis_tolerance: float, level: Bools | None = None) -> Array:
     """(K,) TRAVERSE where a rapid from q0 to q1 (K, J) stays on its straight line, else FEED (at the axes' limits).
 
-    A dog-leg is piecewise straight in the joints; its corners are where an axis arrives.
+    A dog-leg is piecewise straight in the joints; its corners are where an axis arrives. Rapids of `level` (K,) lead from
+    hole to hole: there only the height along the tool axis counts, as in the controls' own cycles.
     """
     own = np.abs(q1 - q0) / control.machine.limits.velocity
     total = own.max(axis=1, initial=0.0)
@@ -85,7 +82,10 @@ def rapid_codes(control: Control, kin: Kinematics, q0: Floats, q1: Floats, toler
             tip, axis, _ = control.between(q0[rows], q1[rows], t, kin, np.ones(len(rows), dtype=bool))
             begin, end = kin.forward(q0[rows])[0], kin.forward(q1[rows])[0]
             straight = kin.forward(q0[rows] + t[:, None] * (q1 - q0)[rows])[1]
-            leaves[rows] |= (_off(tip, begin, end) > tolerance) | (angle_between(axis, straight) > axis_tolerance)
+            off = _off(tip, begin, end)
+            if level is not None:
+                off = np.where(level[rows], np.abs(((tip - begin) * straight).sum(axis=1)), off)
+            leaves[rows] |= (off > tolerance) | (angle_between(axis, straight) > axis_tolerance)
     return np.where(leaves, FEED, TRAVERSE).astype(np.int8)
 
 
@@ -144,8 +144,9 @@ def _emit(out: Builder, frame: WordFrame, moves: Moves, rows: Ints, kin: Kinemat
     keep = arcs.keep[curve]
     code = np.where(keep, ARC, np.where(cutting, FEED, TRAVERSE)).astype(np.int8)
     rapid = code == TRAVERSE
+    level = moves.phase[row] == Phase.POSITION
     code[rapid] = rapid_codes(frame.control, kin, np.concatenate([begin[None], q[:-1]])[rapid], q[rapid], tolerance,
-                              axis_tolerance)
+                              axis_tolerance, level[rapid])
     seconds = np.where(cutting, seconds, np.where(code == TRAVERSE, np.nan, 0.0))
     turned = np.where(keep & ~first, np.concatenate([[0.0], u[:-1]]) * curves.sweep[curve], 0.0)
     center = _turned_centers(arcs, curve, turned)

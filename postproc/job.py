@@ -119,7 +119,8 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
     own, found = control_kinematics(machine, setup, options)
     diagnostics += found
     control = Control(machine, law, origin, largest, law, rapids=controller.kinematics.rapids,
-                      feed_rule=controller.feed.length, own_kinematics=own)
+                      feed_rule=controller.feed.length, own_kinematics=own,
+                      helix_planes=controller.arcs.helix_planes)
     modes, found = output_modes(control, controller, setup, options, toolpath, decimals(control, controller))
     diagnostics += found
     job = Job(toolpath, machine, controller, setup, options, placement, control, moves, safe_space(moves, setup, placement),

@@ -98,8 +98,17 @@ class OutputModes:
         words[control.rotary] = [round(float(words[j]), int(self.decimals[j])) + 0.0 for j in control.rotary]
         at = words / control.unit
         rotary = tuple((control.machine.axis_names[j], float(words[j])) for j in control.rotary)
+        if rotary in self._planes:
+            return self._planes[rotary], at
         angles, rotation = stated(mode.angles, tool_frames(kin, at[None])[0], tuple(v for _, v in rotary), mode.decimals)
-        return WordFrame(control.under("tilted", Plane(rotation, control.origin)), angles, rotary), at
+        tilted = control.under("tilted", Plane(rotation, control.origin))
+        frame = WordFrame(tilted if mode.arcs else replace(tilted, arc_limit=0.0), angles, rotary)
+        self._planes[rotary] = frame
+        return frame, at
+
+    @cached_property
+    def _planes(self) -> dict[tuple[tuple[str, float], ...], WordFrame]:
+        return {}
 
 
 def output_modes(control: Control, controller: ControllerFile, setup: SetupFile, options: Options, toolpath: Toolpath,

@@ -14,6 +14,7 @@ from postproc.blocks import FEED as FEED
 from postproc.blocks import TRAVERSE as TRAVERSE
 from postproc.blocks import Builder, add_run, rapid_codes
 from postproc.control import Control
+from postproc.groups import groups
 from postproc.joint_path import reachable_axes, solve
 from postproc.links import Link, Pose, SafeSpace, plan_link
 from postproc.modes import OutputModes, WordFrame, stands_still, turning_run
@@ -72,7 +73,7 @@ class Path:
 
     def by_control(self) -> list[tuple[Control, Ints]]:
         """Each control with the numbers of its blocks, in order."""
-        return [(frame.control, np.flatnonzero(self.frame == k)) for k, frame in enumerate(self.frames)]
+        return [(self.frames[int(self.frame[k[0]])].control, k) for k in groups(self.frame)]
 
 
 @dataclass(frozen=True)
@@ -213,7 +214,7 @@ def _add_link(out: Builder, moves: Moves, row: int, link: Link, legs: _Legs) -> 
     out.link(legs.way, link.home, row, not legs.way.control.tip_law, link.home_state)
     out.begin[row] = out.count
     state = link.index_state.copy()
-    if len(state) and legs.after is not legs.way:
+    if len(state) and legs.after is not legs.way and not state[:, legs.way.control.rotary].any(axis=0).all():
         state[-1] = True
     out.link(legs.way, link.index, row, False, state)
     if not len(link.approach):

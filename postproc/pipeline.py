@@ -144,11 +144,19 @@ def tolerance_shares(job: Job) -> tuple[dict[str, float], list[Diagnostic]]:
     tolerance, axis = job.options.tolerance, job.options.axis_tolerance
     bound = rounding_bound(job.control, job.kinematics(int(job.moves.tool[0])), job.moves,
                            decimals(job.control, job.controller), job.modes.cutting_laws())
-    smoothing = job.controller.kinematics.smoothing_share * tolerance
-    shares = {"smoothing": smoothing, "rounding": bound.tip, "axis_rounding": bound.axis / DEG,
+    kinematics = job.controller.kinematics
+    fixed = kinematics.smoothing_fixed
+    smoothing = kinematics.smoothing_share * tolerance if fixed is None else fixed
+    axis_smoothing = kinematics.axis_smoothing_share * axis
+    shares = {"smoothing": smoothing, "axis_smoothing": axis_smoothing,
+              "rounding": bound.tip, "axis_rounding": bound.axis / DEG,
               "linearising": MARGIN * (tolerance - smoothing - bound.tip),
-              "axis_linearising": MARGIN * (axis - bound.axis / DEG)}
-    return shares, rounding_problem(bound, tolerance - smoothing, job.axis_tolerance)
+              "axis_linearising": MARGIN * (axis - axis_smoothing - bound.axis / DEG)}
+    if smoothing >= tolerance:
+        return shares, [error("tolerance.smoothing", f"the control's own smoothing takes {smoothing:g} mm, the tolerance is "
+                              f"{tolerance:g} mm", hint="a wider --tolerance, or a smaller kinematics.smoothing_fixed in "
+                              "the controller file")]
+    return shares, rounding_problem(bound, tolerance - smoothing, job.axis_tolerance - axis_smoothing * DEG)
 
 
 def write_text(result: PostResult) -> str:
@@ -159,13 +167,22 @@ def write_text(result: PostResult) -> str:
     offset = " ".join(f"{k}{v:.4f}" for k, v in letters)
     header = [f"postproc {VERSION}", f"source {FilePath(result.toolpath.file).name}", f"machine {machine.name}",
               f"controller {result.controller_name}", *result.options.header(),
-              f"words: {'tip in the work offset' if job.control.tip_law else 'axis positions'}",
+              f"words: {_meanings(result.program)}",
               f"work offset {result.setup.work_offset_code} in machine coordinates: {offset}"]
     if result.toolpath.name:
         header.insert(1, f"part {result.toolpath.name}")
+    shares = result.shares or {}
     writer = writer_for(result.controller, result.program, result.toolpath.cycles, job.control.length_on_z,
-                        (result.shares or {})["smoothing"], result.setup.work_offset_code)
+                        shares["smoothing"], result.setup.work_offset_code, axis_smoothing=shares["axis_smoothing"],
+                        name=FilePath(result.toolpath.file).stem)
     return "\n".join(writer.lines(header)) + "\n"
+
+
+def _meanings(program: Program) -> str:
+    """What the words of a program mean, in order of first use."""
+    names = {"axes": "axis positions", "tcp": "tip in the work offset", "tilted": "tip in tilted planes"}
+    laws = list(dict.fromkeys(section.law for section in program.sections))
+    return ", ".join(names[law] for law in laws)
 
 
 def long_blocks(text: str, most: int, file: str) -> list[Diagnostic]:

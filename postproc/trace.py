@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from postproc.controllers import writer_for
 from postproc.pipeline import PostResult
+from postproc.word_arcs import PLANE_AXIS
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.toolpath import Kind, Role
@@ -95,17 +95,25 @@ def _finite(value: float) -> float | None:
 
 
 def _texts(result: PostResult, blocks: Ints) -> list[str]:
-    """The words of blocks, each stated in full as a block of its own."""
+    """The words of blocks, each stated in full, whatever the controller makes of them."""
     program = result.program
-    assert program is not None and result.toolpath is not None and result.job is not None
-    writer = writer_for(result.controller, program, result.toolpath.cycles, result.job.control.length_on_z, 0.0)
+    assert program is not None
     texts = []
     for k in blocks.tolist():
-        words = "".join(column[0] for column in writer.word_columns(k, k + 1))
-        feed = writer.feed_text(float(program.feed[k])) if np.isfinite(program.feed[k]) else ""
         head = ("traverse", "feed", "arc")[int(program.code[k])]
-        texts.append(f"{head}{words}{writer.arc_words(k, k + 1)[0]}" + (f" F{feed}" if feed else ""))
+        stated = [(letter, program.words[k, j], int(program.decimals[j])) for j, letter in enumerate(program.letters)
+                  if program.write[k, j]]
+        third = PLANE_AXIS[int(program.plane[k])]
+        places = int(program.decimals.max())
+        centre = [("IJK"[i], program.center[k, i], places) for i in range(3) if i != third and program.code[k] == 2]
+        feed = [("F", program.feed[k], 4)] if np.isfinite(program.feed[k]) else []
+        texts.append(" ".join([head, *(f"{letter}{_trimmed(value, n)}" for letter, value, n in (*stated, *centre, *feed))]))
     return texts
+
+
+def _trimmed(value: float, places: int) -> str:
+    text = f"{round(value, places) + 0.0:.{places}f}"
+    return text.rstrip("0").rstrip(".") if places else text
 
 
 def as_text(stages: dict[str, Any]) -> str:

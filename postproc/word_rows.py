@@ -9,6 +9,7 @@ import numpy as np
 
 from machines.kinematics.base import Kinematics
 from postproc.control import Control
+from postproc.groups import groups
 from postproc.moves import Moves
 from postproc.path import ARC, FEED, Path
 from postproc.word_arcs import PLANE_AXIS
@@ -55,10 +56,9 @@ def _words(path: Path, q: Floats, rows: Ints, tool: Ints, kinematics: Callable[[
            lengths: Callable[[int], float]) -> Floats:
     """Unrounded words of joints q (K, J) under the law and with the tool of the blocks `rows` (K,)."""
     words = np.empty_like(q)
-    frame, used = path.frame[rows], tool[rows]
-    for number, index in np.unique(np.stack([frame, used], axis=1), axis=0).tolist():
-        k = np.flatnonzero((frame == number) & (used == index))
-        words[k] = path.frames[number].control.words(q[k], kinematics(index), lengths(index))
+    for k in groups(path.frame[rows], tool[rows]):
+        index = int(tool[rows[k[0]]])
+        words[k] = path.frames[int(path.frame[rows[k[0]]])].control.words(q[k], kinematics(index), lengths(index))
     return words
 
 
@@ -96,11 +96,11 @@ def _written(end: Floats, start: Floats, begins: Ints, path: Path, control: Cont
 
     The first block under another law states all; in a tilted plane the rotary axes have no words.
     """
-    names = path.state.any(axis=1)
+    names = np.asarray(path.state.any(axis=1))
     first = np.zeros(len(path), dtype=bool)
     first[begins] = True
     changed: Bools = (end != start) | first[:, None]
-    write = np.array(np.where(names[:, None], path.state, changed), dtype=bool)
+    write: Bools = np.asarray(np.where(names[:, None], path.state, changed))
     for row in np.flatnonzero(path.code == ARC).tolist():
         third = PLANE_AXIS[int(path.plane[row])]
         write[row, [c for i, c in enumerate(control.xyz) if i != third]] = True
