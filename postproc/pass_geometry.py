@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -101,10 +102,10 @@ def _pass(path: Path, first: int, last: int, block: Ints, found: Smooth, kin: Ki
     jump = np.flatnonzero(np.diff(block) > 1) + 1
     cuts = np.unique(np.concatenate(([0.0], found.stops, ends[jump - 1], found.s[-1:])))
     paths = []
-    for low, high in zip(cuts[:-1], cuts[1:], strict=True):
+    for low, high in pairwise(cuts.tolist()):
         own = np.flatnonzero((ends > low) & (begin < high))
         near = _Near(np.append(begin[own[:1]], ends[own]), path.q[np.append(block[own[:1]] - 1, block[own])])
-        paths.append(machine_path(found, float(low), float(high), kin, near))
+        paths.append(machine_path(found, low, high, kin, near))
     return PassGeometry(first, last, block, begin, ends, found, tuple(paths))
 
 

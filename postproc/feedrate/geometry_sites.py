@@ -19,6 +19,8 @@ LONGEST = 0.125
 """Part of a line or arc between places."""
 SLOPE = 0.3
 """Change of the distance of places per way."""
+ENDS = 8.0
+"""Times denser at both ends: a spline through points is least exact there."""
 FEWEST = 12
 """Intervals between two stops."""
 
@@ -34,6 +36,7 @@ def sites(path: Smooth, first: float, last: float) -> Floats:
     most = np.minimum(_coarsest(path, 0.5 * (at[:-1] + at[1:])), coarse)
     wanted = np.minimum.reduceat(wanted, keep)
     wanted = np.minimum(wanted, np.maximum(np.append(most, most[-1]), np.append(most[0], most)))
+    wanted[[0, -1]] /= ENDS
     return place(*_between(at, gentle(at, wanted, SLOPE), most))
 
 

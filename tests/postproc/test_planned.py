@@ -1,0 +1,191 @@
+"""Paths of the machine along smoothed passes, feeds that keep the limits, and the plan of a program's passes."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from machines.machine import Machine
+from postproc.feedrate.limits import JointLimits
+from postproc.feedrate.plan import Options
+from postproc.pass_geometry import PassGeometry, chains, pass_geometry, stops_of
+from postproc.pipeline import PostResult
+from postproc.planned import PlannedMotion, joint_limits, plan_pass, planned_motion
+from postproc.setup import load_setup
+from postproc.steady_feed import CORNER, steady_speed
+from tests.postproc.kit import SAMPLES, convert, good, goto, machine, toolpath
+from toolpaths import read
+from toolpaths.arrays import Floats
+from toolpaths.rotations import angle_between
+from toolpaths.smoothing.smooth import Tolerance
+
+TOLERANCE = Tolerance(0.01, np.radians(0.05))
+
+
+def wave(count: int) -> list[str]:
+    """GOTOs along a smooth curve with a swinging axis, rounded as CAM systems do."""
+    s = np.linspace(0.0, 1.0, count)
+    tip = np.stack((40.0 * s, 4.0 * np.sin(5.0 * s), 2.0 * np.cos(7.0 * s)), axis=1)
+    axis = np.stack((0.3 + 0.1 * np.sin(4.0 * s), 0.2 * np.cos(3.0 * s), np.ones(count)), axis=1)
+    axis = np.round(axis / np.linalg.norm(axis, axis=1, keepdims=True), 6)
+    return goto(np.round(tip, 4), axis / np.linalg.norm(axis, axis=1, keepdims=True))
+
+
+@cache
+def waves(name: str) -> PostResult:
+    setup, _ = load_setup(SAMPLES / ("h4a.setup.toml" if name.startswith("h4a") else "tools.setup.toml"))
+    lines = wave(160)
+    return good(convert(toolpath("RAPID", lines[0], "FEDRAT/MMPM,1500", *lines[1:]), name, setup=setup))
+
+
+@cache
+def dome() -> PostResult:
+    setup, _ = load_setup(SAMPLES / "h4a.setup.toml")
+    return good(convert(read(SAMPLES / "h4a_dome.cls")[0], "h4a-c-table", setup=setup))
+
+
+def geometry(result: PostResult, sharpest: float = 2.4) -> list[PassGeometry]:
+    assert result.job is not None and result.path is not None
+    job = result.job
+    found, diagnostics = pass_geometry(result.path, job.moves, job.kinematics, TOLERANCE, stops_of(job.toolpath, job.moves),
+                                       sharpest)
+    assert not diagnostics
+    return found
+
+
+def motion(result: PostResult) -> PlannedMotion:
+    assert result.job is not None and result.path is not None
+    job = result.job
+    made, diagnostics = planned_motion(result.path, job.moves, job.kinematics, job.machine.limits, job.machine.axis_names,
+                                       TOLERANCE, stops_of(job.toolpath, job.moves))
+    assert made is not None and not diagnostics
+    return made
+
+
+def limits_of(made: Machine) -> JointLimits:
+    return joint_limits(made.limits)
+
+
+CASES = {"mikron-ucp710": waves, "fork-head-ab": waves, "nutating-head": waves, "h4a-c-table": lambda _: dome()}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_joints_follow_the_smoothed_tool(name: str) -> None:
+    result = CASES[name](name)
+    assert result.job is not None
+    for one in geometry(result):
+        kin = result.job.kinematics(int(result.job.moves.tool[one.first]))
+        for path in one.paths:
+            s = np.linspace(path.start, path.end, 3001)
+            tip, axis = one.smooth.at(s)
+            found_tip, found_axis = kin.forward(path.derivatives(s).q, near=np.hstack((tip, axis)))
+            assert np.linalg.norm(found_tip - tip, axis=1).max() < 0.1 * TOLERANCE.tip
+            assert angle_between(found_axis, axis).max() < 0.1 * TOLERANCE.axis
+            np.testing.assert_allclose(path.tip(s).q, tip, atol=0.1 * TOLERANCE.tip)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_joints_stay_near_the_written_blocks(name: str) -> None:
+    result = CASES[name](name)
+    assert result.path is not None
+    for one in geometry(result):
+        assert (np.diff(one.ends) >= 0.0).all() and one.ends[-1] == one.smooth.s[-1]
+        for path in one.paths:
+            own = (one.ends > path.start) & (one.ends <= path.end)
+            gap = np.abs(path.derivatives(one.ends[own]).q - result.path.q[one.block[own]])
+            assert gap.max() < 0.3
+
+
+def test_derivatives_are_those_of_the_path() -> None:
+    path = geometry(waves("mikron-ucp710"))[0].paths[0]
+    s, h = np.linspace(path.start + 1.0, path.end - 1.0, 400), 1e-4
+    low, high = path.derivatives(s - h), path.derivatives(s + h)
+    at = path.derivatives(s)
+    for below, above, wanted in zip(low[:3], high[:3], at[1:], strict=True):
+        np.testing.assert_allclose((above - below) / (2.0 * h), wanted, atol=1e-4 * np.abs(wanted).max())
+
+
+def exceeded(one: PassGeometry, result: PostResult, limits: JointLimits, speed: Floats) -> Floats:
+    """(k,) worst ratio to any limit in each block at constant ds/dt, by differences of the exact inverse."""
+    assert result.job is not None
+    kin = result.job.kinematics(int(result.job.moves.tool[one.first]))
+    worst = np.zeros(len(one.block))
+    h = 0.02
+    for k, (low, high) in enumerate(zip(one.begin, one.ends, strict=True)):
+        path = next(p for p in one.paths if p.start <= 0.5 * (low + high) <= p.end)
+        s = np.linspace(max(low, path.start + 1.5 * h), min(high, path.end - 1.5 * h), 9)
+        places = s[:, None] + h * np.array([-1.5, -0.5, 0.5, 1.5])
+        tip, axis = one.smooth.at(places.ravel())
+        near = path.derivatives(places.ravel()).q
+        branches = kin.inverse(tip, axis, near=near)
+        q = branches[np.abs(branches - near).sum(axis=2).argmin(axis=0), np.arange(len(near))].reshape(9, 4, -1)
+        steps = [np.abs(q[:, 2] - q[:, 1]) / h, np.abs(q[:, 3] - q[:, 2] - q[:, 1] + q[:, 0]) / (2.0 * h**2),
+                 np.abs(q[:, 3] - 3.0 * q[:, 2] + 3.0 * q[:, 1] - q[:, 0]) / h**3]
+        worst[k] = max(float((d * speed[k] ** order / limit).max()) for order, (d, limit) in
+                       enumerate(zip(steps, (limits.velocity, limits.acceleration, limits.jerk), strict=True), start=1))
+    return worst
+
+
+def test_steady_feed_keeps_every_limit_in_the_block_and_uses_one() -> None:
+    result = waves("mikron-ucp710")
+    limits = limits_of(machine("mikron-ucp710"))
+    one, = geometry(result, CORNER)
+    speed = steady_speed(one, limits)
+    ratio = exceeded(one, result, limits, speed)
+    assert ratio.max() < 1.01
+    assert np.median(ratio) > 0.6 and ratio.max() > 0.9
+
+
+def test_steady_feed_is_that_of_the_slowest_place_of_a_block() -> None:
+    result = good(convert(toolpath("RAPID", "GOTO/0,0,50", "FEDRAT/MMPM,6000", "GOTO/50,0,50",
+                                   "MOVARC/50,1,50,0,0,1,1,ANGLE,90", "GOTO/51,1,50", "GOTO/51,60,50"), "mill-3axis"))
+    made = motion(result)
+    assert result.path is not None
+    limits = limits_of(machine("mill-3axis"))
+    arc = np.flatnonzero(result.path.code == 2)
+    radius = 1.0
+    bound = min((limits.jerk[:2].min() * radius**2) ** (1.0 / 3.0), (limits.acceleration[:2].min() * radius) ** 0.5)
+    assert len(arc) == 1 and made.needed[arc[0]] >= 0.99 * 0.5 * np.pi * radius / bound
+
+
+def test_plan_keeps_limits_and_feed_and_rests_at_both_ends() -> None:
+    result = waves("mikron-ucp710")
+    assert result.job is not None
+    one, = geometry(result)
+    made = plan_pass(one, result.job.moves, limits_of(machine("mikron-ucp710")), Options(strict=True))
+    assert made.usage().worst <= 1.0 + 1e-9
+    run = made.trajectory()
+    tip = one.smooth.at(run.s)[0]
+    assert (np.linalg.norm(np.diff(tip, axis=0), axis=1) / 1e-3).max() <= 25.0 * 1.001
+    assert not run.qd[0].any() and not run.qd[-1].any()
+    way = np.linalg.norm(np.diff(tip, axis=0), axis=1).sum()
+    assert made.seconds > way / 25.0
+
+
+def test_motion_stops_at_a_dwell_and_not_at_a_comment() -> None:
+    ways = ["GOTO/20,0,50", "GOTO/40,0,50", "GOTO/60,0,50"]
+    for record, stops in (("DELAY/1.0", True), ("PPRINT/half way", False)):
+        lines = ["RAPID", "GOTO/0,0,50", "FEDRAT/MMPM,1200", ways[0], record, *ways[1:]]
+        result = good(convert(toolpath(*lines), "mill-3axis"))
+        made = motion(result)
+        assert (len(made.passes) == 2) is stops
+        assert len(made.trajectories()) == len(made.passes)
+        assert made.seconds > 60.0 / 20.0
+        limiting = made.limiting()
+        assert set(limiting) == {"X", "Y", "Z"} and limiting["X"]["jerk_s"] > 0.0
+        assert made.shares is not None and made.shares.seconds == pytest.approx(made.seconds)
+
+
+def test_chains_leave_rapids_links_and_holes_out() -> None:
+    result = good(convert(toolpath("RAPID", "GOTO/0,0,50", "GOTO/10,0,50", "GOTO/20,0,50", "RAPID", "GOTO/20,0,60",
+                                   "CYCLE/DRILL,FEDTO,5,MMPM,200,CLEAR,2", "GOTO/30,0,50", "CYCLE/OFF", "RAPID",
+                                   "GOTO/30,0,60", "GOTO/40,0,50"), "mill-3axis"))
+    assert result.job is not None
+    moves = result.job.moves
+    found = chains(moves, np.zeros(0, dtype=np.int64))
+    rows = np.concatenate([np.arange(*one) for one in found])
+    assert len(found) == 2 and (moves.kind[rows] != 0).all() and (moves.hole[rows] < 0).all()
+    tips = moves.tip[rows]
+    assert tips[:, 0].tolist() == [10.0, 20.0, 40.0]
