@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -65,22 +67,27 @@ def controller_values(source: str) -> tuple[dict[str, Any], dict[str, str]]:
     file, _ = read_toml(source, builtin=builtin_files(), kind="controller")
     if spec is None or file is None:
         raise DiagnosticError(found)
-    values = _flat(spec.model_dump(), "")
-    origins = {}
-    for key in values:
-        origin = file.origins.get(tuple(key.split(".")))
-        origins[key] = f"{Path(origin.file).name}:{origin.line}" if origin else "default"
+    values, origins = {}, {}
+    for path, value in _flat(spec.model_dump(), ()):
+        origin = file.origins.get(path)
+        values[".".join(path)] = value
+        origins[".".join(path)] = f"{Path(origin.file).name}:{origin.line}" if origin else "default"
     return values, origins
 
 
-def _flat(values: dict[str, Any], prefix: str) -> dict[str, Any]:
-    result: dict[str, Any] = {}
+def _flat(values: dict[str, Any], above: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], Any]]:
+    """Each value with the keys that lead to it."""
     for key, value in values.items():
         if isinstance(value, dict) and value:
-            result |= _flat(value, f"{prefix}{key}.")
+            yield from _flat(value, (*above, key))
         else:
-            result[prefix + key] = value
-    return result
+            yield (*above, key), value
+
+
+def controller_text(values: dict[str, Any], origins: dict[str, str]) -> str:
+    """The same for people: a value a line, where it comes from in a column of its own."""
+    width = max(map(len, origins.values()))
+    return "\n".join(f"{origins[key]:{width}}  {key} = {json.dumps(value)}" for key, value in values.items())
 
 
 def analysis_text(figures: dict[str, Any], indent: str = "") -> str:

@@ -103,17 +103,18 @@ def controller_list(json: Json = "") -> None:
 
     found = {name: controller_file(name) for name in builtin_files()}
     rows = [{"name": name, "description": spec.description} for name, spec in found.items()]
-    report((), json, {"controllers": rows}, "\n".join(f"{r['name']:12}  {r['description']}" for r in rows))
+    width = max(map(len, found))
+    report((), json, {"controllers": rows}, "\n".join(f"{r['name']:{width}}  {r['description']}" for r in rows))
 
 
 @controller_app.command("show")
 def controller_show(name: Annotated[str, typer.Argument(help="name or TOML file")], json: Json = "") -> None:
-    """Show every value of a controller file, and which file it comes from."""
-    from postproc.catalogue import controller_values
+    """Show every value of a controller with its bases merged in, and the file and line that it comes from."""
+    from postproc.catalogue import controller_text, controller_values
 
     with shown_errors(json):
         values, origins = controller_values(controller_of(name))
-    text = "\n".join(f"{key} = {value!r}  ({origins[key]})" for key, value in values.items())
+    text = controller_text(values, origins)
     report((), json, {"values": values, "origins": origins}, text)
 
 

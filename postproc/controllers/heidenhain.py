@@ -58,6 +58,7 @@ class KlartextWriter(Writer):
 
     def blocks(self, at: int, stop: int) -> Iterator[str]:
         """Motion blocks at..stop."""
+        machine = " " + self.controller.codes.machine_coordinates
         for first in range(at, stop, CHUNK):
             last = min(first + CHUNK, stop)
             words = ["".join(row) for row in zip(*self.word_columns(first, last), strict=True)]
@@ -69,7 +70,7 @@ class KlartextWriter(Writer):
                 else:
                     side = "" if self.side == self.asked else " " + self.asked
                     self.side = self.asked
-                    yield f"L{text}{side}{feed}{' M91' if home else ''}"
+                    yield f"L{text}{side}{feed}{machine if home else ''}"
 
     def feeds(self, first: int, last: int) -> list[str]:
         """FMAX, which holds in its block alone, and F where it changes."""
@@ -119,7 +120,9 @@ class KlartextWriter(Writer):
     def command(self, command: Command) -> Iterator[str]:
         """The blocks of one canonical command; radius compensation waits for the next line."""
         if command.name.startswith("CUTTER_COMPENSATION"):
-            self.asked = {"LEFT": "RL", "RIGHT": "RR"}.get(command.name.rsplit("_", 1)[1], "R0")
+            codes = self.controller.codes
+            sides = {"LEFT": codes.compensation_left, "RIGHT": codes.compensation_right}
+            self.asked = sides.get(command.name.rsplit("_", 1)[1], codes.compensation_off)
         elif command.name == "CHANGE_TOOL":
             speed = self.speed_after(command)
             self.called = speed or self.called

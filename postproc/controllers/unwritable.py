@@ -1,0 +1,70 @@
+"""What a controller's language has no words for: said before the text is written, never left out in silence."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from postproc.controllers.model import ControllerFile
+from postproc.program import Command, Program
+from toolpaths.diagnostics import Diagnostic, error, warning
+from toolpaths.toolpath import Cycle
+
+
+def unwritable(controller: ControllerFile, program: Program, cycles: tuple[Cycle, ...], file: str) -> list[Diagnostic]:
+    """Commands and cycles that the controller's texts cannot say in full."""
+    return [*_length_registers(controller, program, file), *_radius_registers(controller, program, file),
+            *_pitches(controller, program, cycles, file)]
+
+
+def _commands(program: Program) -> Iterator[tuple[int, Command]]:
+    for block, group in sorted(program.commands.items()):
+        for command in group:
+            yield block, command
+
+
+def _length_registers(controller: ControllerFile, program: Program, file: str) -> list[Diagnostic]:
+    """Another length register than the tool's, where a tool brings its own."""
+    if "{register}" in controller.codes.length_offset:
+        return []
+    tool, lines, example = 0.0, [], ""
+    for _, command in _commands(program):
+        if command.name == "CHANGE_TOOL":
+            tool = float(command.args[0])
+        elif command.name == "USE_TOOL_LENGTH_OFFSET" and float(command.args[0]) != tool:
+            lines.append(command.line)
+            example = f"T{tool:g} with length register {float(command.args[0]):g}"
+    if not lines:
+        return []
+    return [error("tool.register", f"{example}: this controller takes the length of the tool itself, there is no other "
+                  "register", file=file, lines=lines[:6], count=len(lines),
+                  hint="state no ADJUST, or the tool's number, in LOADTL")]
+
+
+def _radius_registers(controller: ControllerFile, program: Program, file: str) -> list[Diagnostic]:
+    """A radius register, where the tool brings its own."""
+    codes = {"LEFT": controller.codes.compensation_left, "RIGHT": controller.codes.compensation_right}
+    lines = [command.line for _, command in _commands(program)
+             if command.name.startswith("CUTTER_COMPENSATION") and command.args
+             and "{register}" not in codes[command.name.rsplit("_", 1)[1]]]
+    if not lines:
+        return []
+    return [warning("cutcom.own_register", "the register of CUTCOM is not written: this controller takes the radius of the "
+                    "tool in the spindle", file=file, lines=lines[:6], count=len(lines),
+                    hint="put what the register would hold into the tool's own data")]
+
+
+def _pitches(controller: ControllerFile, program: Program, cycles: tuple[Cycle, ...], file: str) -> list[Diagnostic]:
+    """Taps without a pitch, where the controller's cycle states it."""
+    tables = controller.cycles.table, controller.cycles.with_dwell
+    stating = {key for table in tables for key, spec in table.items() if "{pitch}" in spec.code}
+    if not stating:
+        return []
+    starts = [block for block, command in _commands(program) if command.name.startswith("START_SPINDLE") and command.args]
+    first = min(starts, default=len(program) + 1)
+    lines = [cycles[hole.cycle].line for hole in program.holes
+             if hole.key in stating and not cycles[hole.cycle].pitch and first > hole.first]
+    if not lines:
+        return []
+    return [error("cycle.pitch", "a tap without pitch or spindle speed: this controller's cycle states the pitch", file=file,
+                  lines=sorted(set(lines))[:6], count=len(lines),
+                  hint="state the pitch in CYCLE/TAP, or SPINDL/RPM before it")]
