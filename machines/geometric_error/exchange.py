@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from machines.geometric_error.covariance import write_covariance
+from machines.geometric_error.covariance import angular, write_covariance
 from machines.geometric_error.csv_table import UNITS, write_csv
 from machines.geometric_error.curves import EVERYWHERE, Curve, Fourier, Polynomial, Table
 from machines.geometric_error.lattice_file import map_to_csv
@@ -38,9 +38,7 @@ def write_model(model: ErrorModel, description: str = "") -> dict[str, str]:
     if model.map is not None:
         files[f"{stem}-map.csv"] = map_to_csv(model.map)
         body += ["", "[map]", f'table = "{stem}-map.csv"']
-    if model.covariance is not None:
-        files[f"{stem}-covariance.csv"] = write_covariance(model)
-        body += ["", "[covariance]", f'table = "{stem}-covariance.csv"']
+    body += _doubt_lines(model, stem, files)
     return {f"{stem}.toml": "\n".join([*head, *body, ""])} | files
 
 
@@ -57,47 +55,80 @@ def _quoted(text: str) -> str:
     return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'
 
 
+def _doubt_lines(model: ErrorModel, stem: str, files: dict[str, str]) -> list[str]:
+    """Independent parameters as [sigma], one line per component where it is one number; else a covariance table."""
+    if model.covariance is None:
+        return []
+    variance = np.diag(model.covariance)
+    if np.count_nonzero(model.covariance - np.diag(variance)):
+        files[f"{stem}-covariance.csv"] = write_covariance(model)
+        return ["", "[covariance]", f'table = "{stem}-covariance.csv"']
+    groups: dict[str, dict[str, float]] = {}
+    for name, value in zip(model.names, np.sqrt(variance), strict=True):
+        whole = name if model.axes.names == [] or name in model.axes.constants else name.split("[")[0].split(".")[0]
+        groups.setdefault(whole, {})[name] = float(value / UNITS[ANGLE if angular(name) else LENGTH])
+    lines = ["", "[sigma]"]
+    for whole, given in groups.items():
+        one = {whole: next(iter(given.values()))} if np.ptp(list(given.values())) <= 1e-12 else given
+        lines += [f"{_quoted(name)} = {value:.12g}" for name, value in one.items() if value > 0.0]
+    return lines if len(lines) > 2 else []
+
+
 def _component_lines(axes: SerialErrors, stem: str, files: dict[str, str]) -> list[str]:
     lines: list[str] = []
+    tables: dict[tuple[str, bytes], str] = {}
     for component in axes.components:
-        lines += ["", f"[components.{component.name}]", *_curve_lines(component, stem, files)]
+        name, curve = component.name, component.curve
+        lines += ["", f"[components.{name}]"]
+        if not isinstance(curve, Table):
+            lines += _curve_lines(component)
+            continue
+        key = (name.axis, curve.x.tobytes())
+        if key not in tables:
+            more = sum(axis == name.axis for axis, _ in tables)
+            tables[key] = f"{stem}-{name.axis}{more + 1 if more else ''}.csv"
+            same = [c for c in axes.components if c.name.axis == name.axis and isinstance(c.curve, Table)
+                    and c.curve.x.tobytes() == key[1]]
+            files[tables[key]] = table_to_csv(same)
+        period = [f"repeats = {curve.period / _scales(name)[0]:.15g}"] if curve.period else []
+        lines += [f'table = "{tables[key]}"', f'interpolation = "{curve.rule}"', *period]
     return lines
 
 
-def _curve_lines(component: Component, stem: str, files: dict[str, str]) -> list[str]:
-    name, curve = component.name, component.curve
-    position, unit = _scales(name)
-    if isinstance(curve, Table):
-        file = f"{stem}-{name}.csv"
-        files[file] = table_to_csv(name, curve)
-        period = [f"repeats = {curve.period / position:.15g}"] if curve.period else []
-        return [f'table = "{file}"', f'interpolation = "{curve.rule}"', *period]
+def _curve_lines(component: Component) -> list[str]:
+    curve, (position, unit) = component.curve, _scales(component.name)
     span = [] if curve.range == EVERYWHERE else [f"range = {_list(np.array(curve.range) / position)}"]
     if isinstance(curve, Polynomial):
         return [f"polynomial = {_list(curve.values / unit)}", f"origin = {curve.origin / position!r}",
                 f"scale = {curve.scale / position!r}", *span]
     assert isinstance(curve, Fourier)
     mean, cosine, sine = np.split(curve.values / unit, [1, 1 + len(curve.values) // 2])
-    return [f"mean = {float(mean[0])!r}", f"cosine = {_list(cosine)}",
-            f"sine = {_list(sine)}", f"origin = {curve.origin / position!r}", f"repeats = {curve.period / position:.15g}",
-            *span]
+    return [f"mean = {_number(mean[0])}", f"cosine = {_list(cosine)}", f"sine = {_list(sine)}",
+            f"origin = {curve.origin / position!r}", f"repeats = {curve.period / position:.15g}", *span]
 
 
-def table_to_csv(name: ErrorName, table: Table) -> str:
-    """A table of one component with its axis's positions, both ways where it has them."""
-    unit = ANGLE if name.angular else LENGTH
-    ways = np.split(table.values, 2) if table.both else [table.values]
-    labels = [f"{name}+", f"{name}-"] if table.both else [str(name)]
-    columns = {name.axis: ("deg" if name.axis in ROTARY else "mm", table.x)}
-    columns |= {label: (unit, values) for label, values in zip(labels, ways, strict=True)}
-    return write_csv(columns, [f"{name}: actual less commanded, tool relative to part"])
+def table_to_csv(components: Sequence[Component]) -> str:
+    """Tables of one axis at the same positions under their ISO 230-1 names, both ways where they have them."""
+    axis, x = components[0].name.axis, _table_of(components[0]).x
+    columns = {axis: ("deg" if axis in ROTARY else "mm", x)}
+    for component in components:
+        table, name = _table_of(component), component.name
+        ways = np.split(table.values, 2) if table.both else [table.values]
+        labels = [f"{name}+", f"{name}-"] if table.both else [str(name)]
+        columns |= {label: (ANGLE if name.angular else LENGTH, v) for label, v in zip(labels, ways, strict=True)}
+    return write_csv(columns, [f"errors of {axis}: actual less commanded, tool relative to part"])
+
+
+def _table_of(component: Component) -> Table:
+    assert isinstance(component.curve, Table)
+    return component.curve
 
 
 def _constant_lines(axes: SerialErrors) -> list[str]:
     if not axes.constants:
         return []
     scale = {text: UNITS[ANGLE if text[1] in ROTARY else LENGTH] for text in axes.constants}
-    return ["", "[location]", *(f"{text} = {float(value / scale[text])!r}" for text, value in axes.constants.items())]
+    return ["", "[location]", *(f"{text} = {_number(value / scale[text])}" for text, value in axes.constants.items())]
 
 
 def _reference_lines(axes: SerialErrors) -> list[str]:
@@ -122,7 +153,13 @@ def _leg_lines(rods: RodErrors) -> list[str]:
 
 
 def _list(values: Floats | Sequence[float]) -> str:
-    return "[" + ", ".join(repr(float(v)) for v in values) + "]"
+    return "[" + ", ".join(_number(v) for v in values) + "]"
+
+
+def _number(value: float) -> str:
+    """Twelve digits: far below what a length or angle can be known to."""
+    text = f"{float(value):.12g}"
+    return text if any(mark in text for mark in ".e") else text + ".0"
 
 
 def _scales(name: ErrorName) -> tuple[float, float]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from machines.geometric_error.axis_motion import effect
 from machines.geometric_error.curves import Fourier, Polynomial, Table
 from machines.geometric_error.model import ErrorModel
 from machines.geometric_error.names import DIRECTIONS, parse
@@ -28,7 +29,7 @@ def serial_errors(kinematics: Kinematics, seed: int = 0, length: float = 0.01, a
         for k, direction in enumerate(DIRECTIONS):
             size = angle if k >= 3 else length
             components.append(Component(parse(f"E{direction}{letter}"), _curve(rng, rotary, k, size)))
-            if rotary or (k >= 3 and direction != "XYZ"[(k + 3) % 3]):
+            if effect(parse(f"E{direction}0{letter}"), kinematics):
                 constants[f"E{direction}0{letter}"] = float(rng.normal() * size)
     for k, direction in enumerate(DIRECTIONS[:5]):
         constants[f"E{direction}0S"] = float(rng.normal() * (angle if k >= 3 else length))

@@ -1,0 +1,82 @@
+"""Write the sample error models of this folder: `python samples/errors/make_errors.py [FOLDER]`. Figures are invented."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+import machines
+from machines.geometric_error.covariance import angular
+from machines.geometric_error.curves import Curve, Fourier, Table
+from machines.geometric_error.exchange import save
+from machines.geometric_error.model import ErrorModel
+from machines.geometric_error.names import DIRECTIONS, parse
+from machines.geometric_error.rods import RodErrors, rod_frame, rod_names
+from machines.geometric_error.serial_errors import Component, SerialErrors
+from toolpaths.units import DEG
+
+ARCSEC = DEG / 3600.0
+DOUBT = {False: 0.0005, True: 0.3 * ARCSEC}
+"""standard deviation of every parameter: mm, rad"""
+
+
+def slide(rng: np.random.Generator, travel: tuple[float, float], part: int, both: bool) -> Curve:
+    """A smooth table over the travel, worst about 15 um or 6 arcsec; positioning with 3 um of lost motion."""
+    x = np.linspace(*travel, 1 + round((travel[1] - travel[0]) / 50.0))
+    t = (x - travel[0]) / (travel[1] - travel[0])
+    shape = rng.normal() * t + 0.6 * rng.normal() * np.sin(np.pi * t) + 0.3 * rng.normal() * np.sin(3.0 * np.pi * t)
+    values = np.round(10.0 * shape, 2) * (0.4 * ARCSEC if part >= 3 else 1e-3)
+    return Table(x, np.concatenate([values, values + 0.003]), both=True) if both else Table(x, values)
+
+
+def serial(name: str, seed: int) -> ErrorModel:
+    """A five-axis machine: all component errors, squareness, places of the rotary axes, spindle."""
+    machine, rng = machines.load(name), np.random.default_rng(seed)
+    components = []
+    for j, letter in enumerate(machine.axis_names):
+        for part, direction in enumerate(DIRECTIONS):
+            found = parse(f"E{direction}{letter}")
+            assert found is not None
+            if machine.rotary[j]:
+                waves = np.round(rng.normal(size=5) * [0.0, 5.0, 2.0, 5.0, 2.0], 2)
+                curve: Curve = Fourier(waves * (0.4 * ARCSEC if part >= 3 else 1e-3))
+            else:
+                lower, upper = float(machine.limits.lower[j]), float(machine.limits.upper[j])
+                curve = slide(rng, (lower, upper), part, both=part == j)
+            components.append(Component(found, curve))
+    constants = {"EC0Y": 6 * ARCSEC, "EB0Z": -4 * ARCSEC, "EA0Z": 5 * ARCSEC, "EY0A": 0.012, "EZ0A": -0.018,
+                 "EB0A": 4 * ARCSEC, "EC0A": -5 * ARCSEC, "EX0C": 0.015, "EY0C": -0.010, "EA0C": 6 * ARCSEC,
+                 "EB0C": -3 * ARCSEC, "EA0S": 5 * ARCSEC, "EB0S": -6 * ARCSEC}
+    return with_doubt(ErrorModel(SerialErrors(tuple(components), constants), name=name, machine=name))
+
+
+def parallel(name: str, seed: int) -> ErrorModel:
+    """A machine on rods: every dimension off by some 10 um, guides by some 5 arcsec."""
+    kinematics, rng = machines.load(name).kinematics, np.random.default_rng(seed)
+    frame = rod_frame(kinematics)  # type: ignore[arg-type]
+    slides = kinematics.axis_names[: len(frame.rail)]
+    zero = RodErrors.none(slides, rod_names(frame, slides))
+    size = [5 * ARCSEC if angular(n) else 0.008 for n in zero.names]
+    unit = [ARCSEC if angular(n) else 0.001 for n in zero.names]
+    values = np.round(rng.normal(size=len(size)) * np.divide(size, unit), 1) * unit
+    return with_doubt(ErrorModel(rods=zero.with_values(values), name=name, machine=name))
+
+
+def with_doubt(model: ErrorModel) -> ErrorModel:
+    """The model with the standard deviations of DOUBT."""
+    return replace(model, covariance=np.diag([DOUBT[angular(name)] ** 2 for name in model.names]))
+
+
+def main() -> None:
+    """Write all."""
+    folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent
+    for made in (serial("mikron-ucp710", 1), serial("linuxcnc-xyzac-trt", 2), parallel("uranesx", 3),
+                 parallel("h4a-c-table", 4)):
+        save(made, folder, f"invented errors of {made.machine}, 10 to 50 um and 5 to 20 arcsec")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,76 @@
+"""LinuxCNC with a screw compensation table of ours: its motors move by the table's value, each way its own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import machines
+from machines.geometric_error.curves import Table
+from machines.geometric_error.exchange import to_linuxcnc
+from machines.geometric_error.names import parse
+from tests.linuxcnc import config
+from toolpaths.arrays import Floats
+
+STOPS = (-60.0, -13.0, 40.0, 71.0, 5.0, -40.0, -58.5)
+"""mm, X: forwards four times, then backwards"""
+TABLE = Table(np.array([-80.0, -50.0, 0.0, 30.0, 80.0]),
+              np.array([0.010, -0.020, 0.005, 0.030, 0.015, 0.014, -0.012, 0.011, 0.041, 0.022]), both=True)
+
+
+@pytest.fixture
+def compensated(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[[bool], None]:
+    """Switch the table of the X joint on, and have its motor's command sampled instead of the joint's."""
+    write = config.write
+    name = parse("EXX")
+    assert name is not None
+    (tmp_path / "x.comp").write_text(to_linuxcnc(name, TABLE))
+    (tmp_path / "x.comp").chmod(0o644)
+    tmp_path.chmod(0o755)
+
+    def choose(on: bool) -> None:
+        def both(folder: Path, *arguments: object) -> None:
+            write(folder, *arguments)  # type: ignore[arg-type]
+            hal, ini = folder / "sim.hal", folder / "sim.ini"
+            hal.write_text(hal.read_text().replace("net sample0 joint.0.pos-cmd =>", "net feedback0 =>"))
+            if on:
+                (folder / "x.comp").write_bytes((tmp_path / "x.comp").read_bytes())
+                ini.write_text(ini.read_text().replace("[JOINT_0]", f"[JOINT_0]\nCOMP_FILE = {folder}/x.comp\n"
+                                                       "COMP_FILE_TYPE = 0"))
+
+        monkeypatch.setattr(config, "write", both)
+
+    return choose
+
+
+def at_rest(run_joints: Floats, stops: tuple[float, ...]) -> Floats:
+    """X of the motor where it last stands within 0.2 mm of each stop, in order."""
+    still = np.flatnonzero(np.all(np.abs(np.diff(run_joints, axis=0)) < 1e-12, axis=1))
+    found, first = [], 0
+    for stop in stops:
+        near = still[(still >= first) & (np.abs(run_joints[still, 0] - stop) < 0.2)]
+        runs = np.split(near, np.flatnonzero(np.diff(near) > 1) + 1)
+        longest = max(runs, key=len)
+        found.append(run_joints[longest[-1], 0])
+        first = int(longest[-1])
+    return np.array(found)
+
+
+def test_the_motor_moves_by_the_tables_value(simulate, tmp_path: Path, compensated: Callable[[bool], None]) -> None:
+    machine = machines.load("mill-3axis")
+    program = tmp_path / "x.ngc"
+    moves = "\n".join(f"G1 X{x} F3000\nG4 P0.3" for x in STOPS)
+    program.write_text(f"G21 G90 G61 G94\nG53 G0 X-75\n{moves}\nM2\n")
+    stands = {}
+    for on in (False, True):
+        compensated(on)
+        run = simulate(machine, program)
+        assert run.errors == ()
+        stands[on] = at_rest(run.joints, STOPS)
+    assert stands[False] == pytest.approx(STOPS, abs=1e-9)
+    way = np.sign(np.diff((-75.0, *STOPS)))
+    assert way.tolist() == [1, 1, 1, 1, -1, -1, -1]
+    assert stands[True] - stands[False] == pytest.approx(-TABLE.at(np.array(STOPS), way), abs=5e-7)
