@@ -1,0 +1,1 @@
+"""Joints of whole programs: branches, windings, rewinds, singular directions."""

@@ -1,0 +1,148 @@
+"""The cheapest sequence of states of a run: backwards over its segments (Bellman), exact.
+
+Inside a segment travel admits the same states everywhere and no branch changes, so one rewind there is enough: two could
+be replaced by one that goes all the way. It is made at the cheapest pose.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from postproc.joints.lattice import Lattice
+from postproc.joints.states import (
+    BAD,
+    CUTS,
+    NEVER,
+    REWINDS,
+    SECONDS,
+    WRONG,
+    Segment,
+    State,
+    leading,
+    least_of,
+    staying,
+)
+from toolpaths.arrays import Bools, Floats, Ints
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What is done in a segment from each state: a rewind to state `to` (S,) at pose `at` (S,), -1 for none; then the state
+    `next` (S,) of the segment after."""
+
+    to: Ints
+    at: Ints
+    next: Ints
+
+
+@dataclass(frozen=True)
+class Piece:
+    """Poses first..last of a run in one state; a rewind to the next piece's state follows where `rewind`."""
+
+    first: int
+    last: int
+    state: State
+    rewind: bool
+
+
+def cheapest(lattice: Lattice, segments: list[Segment], end: Floats, rewinds: bool,
+             wrong: Floats) -> tuple[Floats, list[Choice]]:
+    """(cost (S, 5) to the end from each state of the first segment, what is done in each segment).
+
+    Args:
+        end: (S, 5) cost of ending in each state of the last segment
+        rewinds: False where the tool may not draw back
+        wrong: (B, N + 1) poses on the wrong side up to each pose
+    """
+    choices: list[Choice] = []
+    value, after = end, None
+    for segment in reversed(segments):
+        out, following = (value, np.zeros(len(segment), dtype=np.int64)) if after is None else _onwards(
+            lattice, segment, after, value)
+        stay = staying(lattice, segment, wrong)
+        value, to, at = stay + out, np.full(len(segment), -1), np.full(len(segment), -1)
+        if rewinds and len(segment) > 1:
+            turned, places = _rewinding(lattice, segment, wrong)
+            every = turned + out[None]
+            best = least_of(every)
+            cost = every[np.arange(len(segment)), best]
+            better = least_of(np.stack([value, cost], axis=1)) == 1
+            value = np.where(better[:, None], cost, value)
+            to, at = np.where(better, best, -1), np.where(better, places[np.arange(len(segment)), best], -1)
+        choices.append(Choice(to, at, following))
+        after = segment
+    return value, choices[::-1]
+
+
+def _onwards(lattice: Lattice, segment: Segment, after: Segment, value: Floats) -> tuple[Floats, Ints]:
+    """(cost (S, 5) from the end of a segment on, state of the next segment (S,))."""
+    out, following = np.tile(NEVER, (len(segment), 1)), np.full(len(segment), -1)
+    for s, ways in enumerate(leading(lattice, segment, after)):
+        if ways:
+            costs = np.stack([cost + value[k] for k, cost in ways])
+            best = int(least_of(costs))
+            out[s], following[s] = costs[best], ways[best][0]
+    return out, following
+
+
+def _rewinding(lattice: Lattice, segment: Segment, wrong: Floats) -> tuple[Floats, Ints]:
+    """(cost (S, S, 5) of going through a segment with a rewind from one state to another, pose (S, S) of the rewind)."""
+    count = len(segment)
+    costs, places = np.tile(NEVER, (count, count, 1)), np.full((count, count), -1)
+    for s in range(count):
+        for t in range(count):
+            if s != t:
+                costs[s, t], places[s, t] = _rewind(lattice, segment, s, t, wrong)
+    return costs, places
+
+
+def _rewind(lattice: Lattice, segment: Segment, s: int, t: int, wrong: Floats) -> tuple[Floats, int]:
+    """The cheapest rewind from state s to state t in a segment."""
+    (b, turns), (c, others) = segment.states[s], segment.states[t]
+    first, last = segment.first, segment.last
+    # Outside travel nothing is gained by waiting: the rewind is made at once, or as late as can be.
+    only = first if segment.bad[s] else last if segment.bad[t] else -1
+    rows = np.array([only]) if only >= 0 else np.arange(first, last + 1)
+    way = lattice.between(lattice.values[b, rows], turns, lattice.values[c, rows], others)
+    cost = np.zeros((len(rows), 5))
+    cost[:, BAD] = (rows - first + 1) * (segment.bad[s] > 0) + (last - rows + 1) * (segment.bad[t] > 0)
+    cost[:, REWINDS] = 1.0
+    cost[:, CUTS] = ~lattice.rest[rows]
+    cost[:, WRONG] = wrong[b, rows + 1] - wrong[b, first] + wrong[c, last + 1] - wrong[c, rows]
+    clock = lattice.clock
+    cost[:, SECONDS] = (clock[b, rows] - clock[b, first] + clock[c, last] - clock[c, rows] + lattice.away[rows]
+                        + lattice.seconds(way))
+    best = int(least_of(cost))
+    return cost[best], int(rows[best])
+
+
+def pieces(segments: list[Segment], choices: list[Choice], start: int) -> list[Piece]:
+    """The states taken from state `start` of the first segment on, neighbours of the same state joined."""
+    result: list[Piece] = []
+    state = start
+    for segment, choice in zip(segments, choices, strict=True):
+        first = segment.first
+        if choice.to[state] >= 0:
+            at = int(choice.at[state])
+            _append(result, Piece(first, at, segment.states[state], True))
+            state, first = int(choice.to[state]), at + 1
+        if first <= segment.last:
+            _append(result, Piece(first, segment.last, segment.states[state], False))
+        state = int(choice.next[state])
+    return result
+
+
+def _append(result: list[Piece], piece: Piece) -> None:
+    if result and not result[-1].rewind and result[-1].state == piece.state:
+        piece = Piece(result.pop().first, piece.last, piece.state, piece.rewind)
+    result.append(piece)
+
+
+def wrong_side(lattice: Lattice, side: dict[int, int]) -> Floats:
+    """(B, N + 1): poses up to each where a joint stands on the other side of 0 than `side` (joint: +1 or -1) prefers."""
+    off: Bools = np.zeros(lattice.values.shape[:2], dtype=np.bool_)
+    for joint, sign in side.items():
+        off |= lattice.values[:, :, joint] * sign < -1e-9
+    return np.concatenate([np.zeros((len(off), 1)), np.cumsum(off, axis=1)], axis=1).astype(np.float64)
