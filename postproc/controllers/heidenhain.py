@@ -35,7 +35,7 @@ class KlartextWriter(Writer):
         frame, self.number = self.controller.program, -1
         for block in frame.begin:
             yield self.numbered(block.format(name=self.name, number=frame.number))
-        yield from map(self.numbered, map(self.comment, header))
+        yield from map(self.numbered, map(self.comment, (*header, *self.relies_on())))
         yield from map(self.numbered, (*self.start(), *self.smoothing_blocks()))
         yield from map(self.numbered, self.body())
         yield from map(self.numbered, frame.ending)

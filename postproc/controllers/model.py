@@ -205,6 +205,8 @@ class Mode(UserModel):
     """blocks that switch it off"""
     start: tuple[str, ...] = ()
     """blocks of the safe start, in programs that use the mode"""
+    relies_on: tuple[str, ...] = ()
+    """settings of the control that the mode needs: comments at the head of programs that use it"""
     length: Literal["any", "off", "on"] = "any"
     """how the length register must stand where the mode is entered, and where its `leave` blocks begin"""
     arcs: bool = True

@@ -45,7 +45,7 @@ class Writer:
         frame = self.controller.program
         named = {"name": self.name, "number": f"{frame.number:04d}"}
         yield from (block.format(**named) for block in frame.begin)
-        yield from (self.comment(text) for text in header)
+        yield from map(self.comment, (*header, *self.relies_on()))
         for block in (*self.start(), *self.smoothing_blocks()):
             yield self.numbered(block)
         yield from map(self.numbered, self.body())
@@ -55,12 +55,20 @@ class Writer:
 
     def start(self) -> Iterator[str]:
         """Safe start: modes that the program uses off, then the preamble."""
-        laws = {section.law for section in self.program.sections}
-        for law, mode in (("tcp", self.controller.modes.tcp), ("tilted", self.controller.modes.tilted)):
-            if mode is not None and law in laws:
-                yield from mode.start
+        for mode in self.used_modes():
+            yield from mode.start
         for block in self.controller.program.preamble:
             yield from blocks_of(block.replace("{work_offset}", self.work_offset))
+
+    def used_modes(self) -> list[Mode]:
+        """The modes of the program's sections."""
+        laws = {section.law for section in self.program.sections}
+        modes = {"tcp": self.controller.modes.tcp, "tilted": self.controller.modes.tilted}
+        return [mode for law, mode in modes.items() if mode is not None and law in laws]
+
+    def relies_on(self) -> list[str]:
+        """Settings of the control that the program needs, each once."""
+        return list(dict.fromkeys(f"needs {text}" for mode in self.used_modes() for text in mode.relies_on))
 
     def smoothing_blocks(self) -> list[str]:
         """Blocks that set the control's own smoothing, where something is left to it."""
