@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from postproc.cli_catalogue import controller_app, machine_app, setup_app
+from postproc.cli_time import time
 from postproc.console import Json, controller_of, machine_of, progress_bar, refuse_overwriting, report, shown_errors
 from postproc.console import rounded as rounded
 
@@ -23,6 +24,7 @@ app = typer.Typer(name="postproc", no_args_is_help=True, add_completion=False, r
 app.add_typer(machine_app, name="machine")
 app.add_typer(setup_app, name="setup")
 app.add_typer(controller_app, name="controller")
+app.command(epilog="Example: postproc time part.cls -m mikron-ucp710 -c linuxcnc")(time)
 
 ClFile = Annotated[Path, typer.Argument(metavar="FILE", help="CL file (APT text)")]
 MachineName = Annotated[str, typer.Option("-m", "--machine", help="machine: a name from the list, or a TOML file")]
@@ -58,15 +60,20 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
             output_mode: Annotated[str, typer.Option("--output-mode", help="auto, axes (axis positions), tcp (the control "
                                                      "runs the kinematics) or tilted (turned plane)")] = "auto",
             orient: Annotated[str, typer.Option("--orient", help="keep: the tool axes of the CL file")] = "keep",
-            feed: Annotated[str, typer.Option("--feed", help="programmed: the feeds of the CL file")] = "programmed",
+            feed: Annotated[str, typer.Option("--feed", help="programmed: the feeds of the CL file; planned: reduced where "
+                                                     "an axis would exceed velocity, acceleration or jerk")] = "programmed",
+            merge_feeds: Annotated[float, typer.Option("--merge-feeds", metavar="PERCENT", min=0.0, max=50.0, help="planned "
+                                                       "feeds may be so much lower that neighbours share one")] = 0.0,
+            smooth: Annotated[bool, typer.Option("--smooth", help="move points onto smooth curves inside the "
+                                                 "tolerance")] = False,
             setup: Setup = "", tolerance: Tolerance = 0.01, axis_tolerance: AxisTolerance = 0.05, units: Units = "",
             dialect: Dialect = "", allow_unknown: Allow = None, json: Json = "") -> None:
     """Convert a CL file to G-code, read it back and prove it; nothing is written where a proof fails."""
     _choice("--orient", orient, ("keep",))
-    _choice("--feed", feed, ("programmed",))
+    _choice("--feed", feed, ("programmed", "planned"))
     _choice("--output-mode", output_mode, ("auto", "axes", "tcp", "tilted"))
     options = replace(_options(tolerance, axis_tolerance, feed_mode, setup, units, dialect, allow_unknown),
-                      output=output_mode)  # type: ignore[arg-type]
+                      output=output_mode, feed=feed, merge_feeds=merge_feeds / 100.0, smooth=smooth)  # type: ignore[arg-type]
     refuse_overwriting({"-o": str(output), "--json": json}, {"the CL file": str(file), "the set-up": setup})
     from postproc import summary
     from postproc.files import write_atomically

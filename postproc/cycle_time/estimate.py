@@ -69,7 +69,8 @@ def estimate(blocks: Blocks, machine: Machine, model: CycleTimeModel, with_band:
     return Estimate(blocks, model, times, seconds, bound, (max(low, 0.0), seconds + up), doubts)
 
 
-def _doubts(blocks: Blocks, machine: Machine, model: CycleTimeModel, seconds: float) -> tuple[float, float, dict[str, float]]:
+def _doubts(blocks: Blocks, machine: Machine, model: CycleTimeModel,
+            seconds: float) -> tuple[float, float, dict[str, float]]:
     """(s below, s above, standard deviation by origin): every doubtful value is moved by one standard deviation."""
     own = model.calibration.relative if model.calibration else model.own_share
     low = high = (COVERAGE * own * seconds) ** 2

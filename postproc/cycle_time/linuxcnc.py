@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from postproc.cycle_time.blocks import Blocks, Cause, Path
-from postproc.cycle_time.linuxcnc_corners import KINK, QUARTER, Blends, Corners, blends, corners
+from postproc.cycle_time.linuxcnc_corners import KINK, Blends, Corners, blends, corners
 from postproc.cycle_time.linuxcnc_kernels import speeds, timeline
 from postproc.cycle_time.linuxcnc_segments import KERNEL_FROM, NORMAL_SHARE, Segments, clamped, segments
 from postproc.cycle_time.phases import Timed, ramps, summed

@@ -1,0 +1,115 @@
+"""The command `postproc time`. Heavy packages are imported inside, so that --help is instant."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from postproc.console import Json, machine_of, progress_bar, refuse_overwriting, report, shown_errors
+
+if TYPE_CHECKING:
+    from machines.machine import Machine
+    from postproc.cycle_time.blocks import Blocks
+    from postproc.cycle_time.model import CycleTimeModel
+    from postproc.options import Options
+    from toolpaths.diagnostics import Diagnostic
+
+
+def time(file: Annotated[Path, typer.Argument(metavar="FILE", help="CL file, or G-code file of the controller")],
+         machine: Annotated[str, typer.Option("-m", "--machine", help="machine: a name from the list, or a TOML file")],
+         controller: Annotated[str, typer.Option("-c", "--controller", help="controller: name or TOML file")] = "linuxcnc",
+         model: Annotated[str, typer.Option("--model", help="model of the control: ideal, lookahead, linuxcnc, or a TOML "
+                                            "file; default: the controller's")] = "",
+         calibrate: Annotated[str, typer.Option("--calibrate", metavar="LOG.csv", help="fit the model to a measured run of "
+                                                "FILE: columns nc_line, time_s")] = "",
+         output: Annotated[str, typer.Option("-o", "--output", metavar="MODEL.toml", help="write the fitted model")] = "",
+         setup: Annotated[str, typer.Option("--setup", metavar="S.toml", help="set-up file: placement, tools")] = "",
+         tolerance: Annotated[float, typer.Option("--tolerance", metavar="MM", min=1e-6, max=10.0)] = 0.01,
+         axis_tolerance: Annotated[float, typer.Option("--axis-tolerance", metavar="DEG", min=1e-6, max=10.0)] = 0.05,
+         units: Annotated[str, typer.Option("--units", help="units of a CL file that states none: mm or inch")] = "",
+         dialect: Annotated[str, typer.Option("--dialect", help="read the CL file as this dialect")] = "",
+         json: Json = "") -> None:
+    """Estimate how long a program takes, with a band, and where the time goes."""
+    _check(output, calibrate, units, dialect)
+    refuse_overwriting({"-o": output, "--json": json}, {"the file": str(file), "the set-up": setup, "the log": calibrate,
+                                                        "the model": model if Path(model).suffix else ""})
+    from postproc.cycle_time import report as figures
+    from postproc.cycle_time.estimate import estimate
+    from postproc.options import Options
+
+    options = Options(tolerance, axis_tolerance, "auto", setup, units, dialect)
+    values: dict[str, Any] = {}
+    text = ""
+    with shown_errors(json), progress_bar() as progress:
+        m = machine_of(machine)
+        blocks, planner, found = _blocks(file, m, controller, model, options, progress)
+        if blocks is not None and calibrate:
+            planner, values, more = _calibrated(blocks, m, planner, calibrate, output)
+            found += more
+        if blocks is not None and planner is not None:
+            e = estimate(blocks, m, planner)
+            values, text = figures.as_dict(e) | values, figures.as_text(e, file.name)
+    report(tuple(found), json, values | {"diagnostics": [d.as_dict() for d in found]}, text)
+
+
+def _check(output: str, calibrate: str, units: str, dialect: str) -> None:
+    if output and not calibrate:
+        raise typer.BadParameter("there is no calibrated model without --calibrate", param_hint="-o")
+    if units and units not in ("mm", "inch"):
+        raise typer.BadParameter(f"{units!r} is not available; choose from mm, inch", param_hint="--units")
+    if dialect:
+        from toolpaths.cl.dialects import DIALECTS
+
+        if dialect not in DIALECTS:
+            raise typer.BadParameter(f"{dialect!r} is not available; choose from {', '.join(DIALECTS)}",
+                                     param_hint="--dialect")
+
+
+def _blocks(file: Path, machine: Machine, controller: str, model: str, options: Options,
+            progress: Any) -> tuple[Blocks | None, CycleTimeModel | None, list[Diagnostic]]:
+    """The blocks of a CL file (converted first) or of a program, and the model of the control."""
+    from postproc.controllers.model import load_controller
+    from postproc.cycle_time.model import load_model, model_name
+    from postproc.cycle_time.source import from_conversion, from_gcode, looks_like_gcode, read_file
+    from postproc.setup import load_setup
+    from toolpaths.diagnostics import require
+
+    spec, found = load_controller(controller)
+    require(found)
+    assert spec is not None
+    planner, found = load_model(model or model_name(controller, spec.writer))
+    require(found)
+    data = read_file(file)
+    if looks_like_gcode(data):
+        setup, found = load_setup(options.setup or None)
+        require(found)
+        assert setup is not None
+        blocks, found = from_gcode(data, machine, spec, setup, str(file))
+        return blocks, planner, found
+    import toolpaths
+    from postproc.pipeline import convert
+
+    path, found = toolpaths.read(file, units=options.units or None, dialect=options.dialect or None)
+    result = convert(path, machine, controller, options=options, diagnostics=found, progress=progress)
+    return (from_conversion(result) if result.ok else None), planner, list(result.diagnostics)
+
+
+def _calibrated(blocks: Blocks, machine: Machine, planner: CycleTimeModel | None, log: str,
+                output: str) -> tuple[CycleTimeModel | None, dict[str, Any], list[Diagnostic]]:
+    """The model fitted to a log, its figures, and the file where one was asked for."""
+    from postproc.cycle_time.calibrate import as_dict, as_toml, calibrate
+    from postproc.cycle_time.log import read_log
+    from postproc.files import write_atomically
+
+    assert planner is not None
+    read, found = read_log(log, machine.axis_names)
+    if read is None:
+        return None, {}, found
+    fit, found = calibrate(blocks, read, planner, log, machine)
+    if fit is None:
+        return None, {}, found
+    if output:
+        write_atomically(Path(output), as_toml(fit.model))
+    return fit.model, {"calibration": as_dict(fit)}, found

@@ -1,0 +1,205 @@
+"""The parameters of a control's model from a measured run, and how sure they are.
+
+Least squares on the times of sections of the run, over the logarithms of the parameters, with a wide normal prior about
+the model that the fit begins with, so that what the run does not show stays where it was and keeps its doubt (maximum a
+posteriori; the covariance is the inverse of J'J/s^2 + prior, J the derivatives of the sections' times; e.g. A. Tarantola,
+Inverse Problem Theory, 2005, section 3.2).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import product
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from postproc.cycle_time.blocks import Blocks
+from postproc.cycle_time.estimate import timed
+from postproc.cycle_time.log import Log, matched
+from postproc.cycle_time.model import PARAMETERS, Calibration, CycleTimeModel
+from toolpaths.arrays import Floats
+from toolpaths.diagnostics import Diagnostic, warning
+
+if TYPE_CHECKING:
+    from machines.machine import Machine
+
+PRIOR = {"corner_tolerance": 2.0, "block_time": 2.0, "rapid": 0.5, "override": 0.3, "stop_time": 2.0}
+"""standard deviation of each logarithm before the run is looked at"""
+FREE = {"lookahead": PARAMETERS, "ideal": ("corner_tolerance", "rapid", "override", "stop_time"),
+        "linuxcnc": ("rapid", "override")}
+Modelled = Callable[[Floats], Floats]
+"""from parameters, in prior deviations about the begin, to the times of the sections"""
+SECTIONS = 300
+"""stretches of the run whose times are compared, at most"""
+STARTS = {"block_time": 1e-4, "stop_time": 1e-3}
+"""where a fit begins with a value that is 0"""
+CLOCK = 1e-3
+"""s of doubt in any section: the clock of the log"""
+NEAR, FAR = 0.02, 0.35
+"""steps in prior deviations at which derivatives are taken"""
+SEEN = 0.5
+"""share of its prior doubt below which a parameter counts as found"""
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A calibrated model and how well it fits.
+
+    Attributes:
+        measured, modelled (K,): s of the sections; values: parameter to (value, standard deviation of its logarithm)
+    """
+
+    model: CycleTimeModel
+    measured: Floats
+    modelled: Floats
+    values: dict[str, tuple[float, float]]
+
+
+def calibrate(blocks: Blocks, log: Log, model: CycleTimeModel, file: str = "",
+              machine: Machine | None = None) -> tuple[Fit | None, list[Diagnostic]]:
+    """The model fitted to a log; None and why where the log does not fit the program."""
+    from scipy.optimize import least_squares
+
+    samples, rows, found = matched(log, blocks, file)
+    if found:
+        return None, found
+    cuts = np.unique(np.linspace(0, len(rows) - 1, min(SECTIONS, len(rows) - 1) + 1).astype(int))
+    rows, measured = rows[cuts], np.diff(log.time[samples[cuts]])
+    begin = model.model_copy(update={k: max(getattr(model, k), v) for k, v in STARTS.items()})
+    free = [k for k, name in enumerate(PARAMETERS) if name in FREE[model.kind]]
+    start, prior = begin.values(), np.array([PRIOR[name] for name in PARAMETERS])
+
+    def modelled(x: Floats) -> Floats:
+        values = start.copy()
+        values[free] += x * prior[free]
+        return np.diff(timed(blocks, _with(begin, values)).begin[rows])
+    before = np.diff(timed(blocks, model).begin[rows])
+    scale = _scatter(measured - before, measured)
+    x = _start(modelled, measured, free)
+    for _ in range(3):
+        doubt = np.hypot(CLOCK, scale * np.sqrt(np.maximum(measured, 0.0) * measured.mean()))
+
+        def residual(x: Floats, doubt: Floats = doubt) -> Floats:
+            return np.concatenate([(modelled(x) - measured) / doubt, x])
+        result = least_squares(residual, x, loss="soft_l1", diff_step=[1e-3] * len(x), max_nfev=60, f_scale=3.0)
+        x = result.x
+        scale = max(_scatter(measured - modelled(x), measured), 1e-5)
+    after, values = modelled(x), start.copy()
+    values[free] += x * prior[free]
+    jacobian = _slopes(modelled, x)
+    doubt = np.hypot(CLOCK, scale * np.sqrt(np.maximum(measured, 0.0) * measured.mean()))
+    covariance = _covariance(jacobian / doubt[:, None], free, prior)
+    fit = _fit(model, _with(begin, values), covariance, free, prior, measured, before, after, file, machine)
+    return fit, _warnings(fit, file)
+
+
+def _with(model: CycleTimeModel, logarithms: Floats) -> CycleTimeModel:
+    return model.model_copy(update={name: float(np.exp(v)) for name, v in zip(PARAMETERS, logarithms, strict=True)})
+
+
+def _scatter(residual: Floats, measured: Floats) -> float:
+    """Standard deviation of a section's time as a share, for sections of the mean length, by the median."""
+    weight = np.sqrt(np.maximum(measured, CLOCK) * measured.mean())
+    return float(1.4826 * np.median(np.abs(residual) / weight))
+
+
+def _start(modelled: Modelled, measured: Floats, free: list[int]) -> Floats:
+    """Where the fit begins: the best of a coarse grid over block time and rapids, which a fit cannot feel from where
+    they hold nothing."""
+    grid = {"block_time": (0.0, 0.35, 0.55, 0.8, 1.05), "rapid": (0.0, -0.6)}
+    names = [PARAMETERS[k] for k in free]
+    axes = [grid.get(name, (0.0,)) for name in names]
+    options = [np.array(x) for x in product(*axes)]
+    return min(options, key=lambda x: float(np.abs(modelled(x) - measured).sum()))
+
+
+def _slopes(modelled: Modelled, x: Floats) -> Floats:
+    """(K, F) derivatives by central differences; where a parameter holds nothing here, what moving it far would show."""
+    here, columns = modelled(x), []
+    for k in range(len(x)):
+        move = np.zeros(len(x))
+        move[k] = 1.0
+        near = (modelled(x + NEAR * move) - modelled(x - NEAR * move)) / (2.0 * NEAR)
+        far = max(((modelled(x + step * move) - here) / step for step in (FAR, -FAR)), key=lambda v: float(v @ v))
+        columns.append(far if far @ far > 10.0 * (near @ near) else near)
+    return np.stack(columns, axis=1)
+
+
+def _covariance(weighted: Floats, free: list[int], prior: Floats) -> Floats:
+    """(5, 5) of the logarithms; parameters that do not take part have none."""
+    inner = np.linalg.inv(weighted.T @ weighted + np.eye(len(free)))
+    result = np.zeros((len(PARAMETERS), len(PARAMETERS)))
+    result[np.ix_(free, free)] = inner * np.outer(prior[free], prior[free])
+    return result
+
+
+def _fit(model: CycleTimeModel, fitted: CycleTimeModel, covariance: Floats, free: list[int], prior: Floats,
+         measured: Floats, before: Floats, after: Floats, file: str, machine: Machine | None) -> Fit:
+    sigma = np.sqrt(np.diag(covariance))
+    hidden = tuple(PARAMETERS[k] for k in free if sigma[k] > SEEN * prior[k])
+    relative = _relative(measured, after)
+    calibration = Calibration(
+        log=file, samples=len(measured), machine=machine.name if machine is not None else "",
+        rms_before=_rms(before - measured), rms_after=_rms(after - measured), relative=relative,
+        covariance=tuple(tuple(float(v) for v in row) for row in covariance), not_identifiable=hidden)
+    result = fitted.model_copy(update={"calibration": calibration, "assumed": hidden,
+                                       "description": f"{model.description}, calibrated"})
+    values = {PARAMETERS[k]: (float(getattr(result, PARAMETERS[k])), float(sigma[k])) for k in free}
+    return Fit(result, measured, after, values)
+
+
+def _rms(values: Floats) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def _relative(measured: Floats, modelled: Floats) -> float:
+    """Standard deviation of a whole program's time as a share, from how blocks of sections scatter.
+
+    Neighbouring sections err alike (the same cutter path, the same kind of corner), so the run is cut into ten parts, and
+    what those scatter counts in full for another program; half a per cent is left to what no log shows.
+    """
+    parts = np.array_split(np.arange(len(measured)), min(10, len(measured)))
+    errors = np.array([(modelled[p].sum() - measured[p].sum()) / max(measured[p].sum(), CLOCK) for p in parts])
+    weight = np.array([measured[p].sum() for p in parts])
+    return float(np.hypot(0.005, np.sqrt(np.average(errors**2, weights=np.maximum(weight, CLOCK)))))
+
+
+def _warnings(fit: Fit, file: str) -> list[Diagnostic]:
+    calibration = fit.model.calibration
+    assert calibration is not None
+    if calibration.relative <= 0.1:
+        return []
+    return [warning("log.fit", f"the model is {100 * calibration.relative:.0f} % off in parts of the run", file=file,
+                    hint="is it this program, this machine, without a feed hold?")]
+
+
+def as_toml(model: CycleTimeModel) -> str:
+    """The model as a file that `load_model` reads."""
+    lines = []
+    for name, value in model.model_dump(exclude={"calibration"}).items():
+        lines.append(f"{name} = {_toml(value)}")
+    if model.calibration is not None:
+        lines += ["", "[calibration]"]
+        lines += [f"{name} = {_toml(value)}" for name, value in model.calibration.model_dump().items()]
+    return "\n".join(lines) + "\n"
+
+
+def _toml(value: object) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, str):
+        return '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
+    if isinstance(value, (tuple, list)):
+        return "[" + ", ".join(_toml(v) for v in value) + "]"
+    return repr(value)
+
+
+def as_dict(fit: Fit) -> dict[str, object]:
+    """The figures of a calibration."""
+    c = fit.model.calibration
+    assert c is not None
+    return {"parameters": {name: {"value": value, "relative_sigma": sigma} for name, (value, sigma) in fit.values.items()},
+            "sections": len(fit.measured), "rms_before_s": c.rms_before, "rms_after_s": c.rms_after,
+            "relative": c.relative, "not_identifiable": list(c.not_identifiable)}

@@ -1,0 +1,76 @@
+"""The figures of an estimate, as JSON and for people."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from postproc.cycle_time.estimate import Estimate
+from postproc.cycle_time.shares import Shares, most_expensive, operations, shares
+
+COVERS = ("95 % of runs on a machine as the files describe it: the model's own deviation, and parameters of the control and "
+          "limits of the machine that no document states")
+
+
+def as_dict(e: Estimate) -> dict[str, Any]:
+    """The keys of `time --json`; s."""
+    s = shares(e)
+    cause = {f"{name}_s": float(values.sum()) for name, values in s.by_cause.items()}
+    return {
+        "cycle_time_s": e.seconds,
+        "lower_bound_s": e.lower_bound,
+        "band_s": list(e.band),
+        "band_covers": COVERS,
+        "model": e.model.kind,
+        "model_description": e.model.description,
+        "assumed": list(e.model.assumed),
+        "doubts_s": e.doubts,
+        "blocks": len(e.blocks),
+        "cutting_s": _cutting(cause),
+        "rapids_s": cause["rapids_s"],
+        "causes": cause,
+        "feed_s": s.feed,
+        "limiting": {letter: {"velocity_s": v, "acceleration_s": a, "jerk_s": j}
+                     for letter, (v, a, j) in s.limiting.items()},
+        "operations": [{**op, "cutting_s": _cutting(op)} for op in operations(e, s)],
+        "most_expensive": most_expensive(e, s),
+    }
+
+
+def _cutting(cause: dict[str, Any]) -> float:
+    """s of blocks at feed, with what corners, stops and limits cost them."""
+    return float(sum(cause[f"{name}_s"] for name in ("feed", "limits", "corners", "stops")))
+
+
+def as_text(e: Estimate, name: str) -> str:
+    """The same for people."""
+    d, s = as_dict(e), shares(e)
+    lines = [f"{name}: {clock(e.seconds)} ({e.seconds:.2f} s), 95 % between {clock(e.band[0])} and {clock(e.band[1])}; "
+             f"no control is below {clock(e.lower_bound)}",
+             f"model {e.model.kind}: {e.model.description}"]
+    if e.model.assumed:
+        lines.append(f"assumed, not documented: {', '.join(e.model.assumed)}")
+    lines.append("goes to: " + ", ".join(f"{key.removesuffix('_s').replace('_', ' ')} {value:.2f} s"
+                                         for key, value in d["causes"].items() if value >= 0.005))
+    lines += _limits(s, d["feed_s"])
+    if len(d["operations"]) > 1:
+        lines += [f"  {op['operation'] or 'without a name':40} {clock(op['time_s']):>12}" for op in d["operations"]]
+    if d["most_expensive"]:
+        lines.append("most expensive beyond the feed:")
+        for place in d["most_expensive"]:
+            cl = f", CL line {place['cl_line']}" if place["cl_line"] is not None else ""
+            lines.append(f"  NC line {place['nc_line']}{cl}: {place['lost_s']:.3f} s, {place['cause'].replace('_', ' ')}")
+    return "\n".join(lines)
+
+
+def _limits(s: Shares, feed: float) -> list[str]:
+    rows = [f"  {letter}: velocity {v:.2f} s, acceleration {a:.2f} s, jerk {j:.2f} s"
+            for letter, (v, a, j) in s.limiting.items() if v + a + j >= 0.005]
+    return [f"held by the feed {feed:.2f} s, by axes:", *rows] if rows else []
+
+
+def clock(seconds: float) -> str:
+    """h:mm:ss, or s below a minute."""
+    if seconds < 60.0:
+        return f"{seconds:.2f} s"
+    whole = round(seconds)
+    return f"{whole // 3600}:{whole // 60 % 60:02d}:{whole % 60:02d}"
