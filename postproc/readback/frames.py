@@ -155,7 +155,7 @@ def _picked(law: Law, control: Control, kin: Kinematics, q: Floats) -> Floats | 
     branches = branches - _TURN * ((branches > upper) & (branches - _TURN >= lower))
     inside = branches[((branches >= lower) & (branches <= upper)).all(axis=1)]
     if law.choice in ("+", "-") and len(inside) > 1:
-        lead = _lead(inside, control)
+        lead = _lead(control)
         sign = 1.0 if law.choice == "+" else -1.0
         asked = inside[sign * inside[:, lead] >= -ANGLE_SLACK]
         inside = asked if len(asked) else inside
@@ -165,10 +165,11 @@ def _picked(law: Law, control: Control, kin: Kinematics, q: Floats) -> Floats | 
     return nearest
 
 
-def _lead(branches: Floats, control: Control) -> int:
-    """The rotary axis whose sign tells the solutions apart: the one that does not turn without end, else the first."""
-    span = (control.machine.limits.upper - control.machine.limits.lower)[control.rotary]
-    return int(span.argmin()) if len(span) > 1 else 0
+def _lead(control: Control) -> int:
+    """The rotary axis whose sign tells the solutions apart: the first that tilts the tool at the zero position."""
+    kin = control.machine.kinematics
+    tilts = np.abs(kin.jacobian(np.zeros((1, kin.joints)))[0, 3:6][:, control.rotary]).max(axis=0) > 1e-9
+    return int(tilts.argmax())
 
 
 def _pose_error(law: Law, control: Control, stands: Floats, picked: Floats, file: str, line: int) -> Diagnostic:

@@ -15,6 +15,9 @@ def reader_for(controller: ControllerFile, letters: tuple[str, ...], home: Float
     from postproc.readback.dialects.fanuc import FanucReader
     from postproc.readback.dialects.haas import HaasReader
     from postproc.readback.dialects.iso import IsoReader
+    from postproc.readback.dialects.klartext import KlartextReader
+    from postproc.readback.dialects.siemens import SiemensReader
 
-    readers: dict[str, type[Reader]] = {"iso": IsoReader, "linuxcnc": IsoReader, "fanuc": FanucReader, "haas": HaasReader}
+    readers: dict[str, type[Reader]] = {"iso": IsoReader, "linuxcnc": IsoReader, "fanuc": FanucReader, "haas": HaasReader,
+                                        "siemens": SiemensReader, "heidenhain": KlartextReader}
     return readers[controller.writer](letters, controller, home)

@@ -46,6 +46,10 @@ class Reader(ABC):
     def canonical(self, text: Text, line: Ints, file: str) -> tuple[Canonical, list[Diagnostic]]:
         """Canonical words of blocks that stand in running order."""
 
+    def behind_end(self, structure: Structure) -> tuple[tuple[int, int], ...]:
+        """Lines that may stand behind the end of the program: those of subprograms."""
+        return tuple(structure.subprograms.values())
+
     def check(self, words: Words, file: str) -> list[Diagnostic]:
         """Codes and words that cannot be executed, as errors."""
         return check_codes(words, self.groups, self.m_codes, self.letters, self.axes, file)
@@ -64,7 +68,7 @@ class Reader(ABC):
             structure, more = self.structure(text, name)
             found += [*more, *self.check(text.words, name)]
             if name == file:
-                found += check_end(text.words, file, tuple(structure.subprograms.values()))
+                found += check_end(text.words, file, self.behind_end(structure))
             texts.append(text)
             structures.append(structure)
         text, line, more = expand(texts, structures, file)

@@ -1,0 +1,103 @@
+"""Drilling cycles of TNC 640 (Cycle Programming 34059x): Q parameters to levels.
+
+Q200 set-up clearance above Q203 the surface, Q201 depth (negative), Q204 second set-up clearance. Rapidly to Q203 + Q200,
+feed Q206 to Q203 + Q201, out to the second set-up clearance where it is the higher one. Pecks of Q202 count from the
+surface.
+"""
+
+from __future__ import annotations
+
+import math
+
+from postproc.readback.canonical import Drill
+from postproc.readback.cycles import pecks
+
+RAPID = 99999.0
+"""mm/min and more: FMAX"""
+APPROACH = 0.2
+"""mm before the last depth to which cycles 200 and 203 come back rapidly"""
+Q = dict[str, float]
+Made = tuple[Drill | None, str]
+
+
+def drill_of(number: int, q: Q, speed: float) -> Made:
+    """(cycle, "") or (None, what is missing or not modelled); `speed` of the spindle, 1/min."""
+    kinds = {200: _drill, 201: _ream, 203: _universal, 205: _deep, 206: _tap, 207: _tap, 240: _centre}
+    if number not in kinds:
+        return None, "is not executed by this reader"
+    missing = [k for k in ("Q200", "Q201", "Q203") if k not in q]
+    if missing:
+        return None, f"lacks {missing[0]}"
+    if q.get("Q395", 0.0) != 0.0 or q["Q201"] >= 0.0:
+        return None, "with Q395, or with a depth that is not negative, is not executed by this reader"
+    return kinds[number](q, speed)
+
+
+def _levels(q: Q) -> tuple[float, float, float]:
+    """Plane, bottom, level where the cycle ends."""
+    return q["Q203"] + q["Q200"], q["Q203"] + q["Q201"], q["Q203"] + max(q["Q200"], q.get("Q204", 0.0))
+
+
+def _feed(value: float) -> float:
+    return value if 0.0 < value < RAPID else math.nan
+
+
+def _drill(q: Q, speed: float) -> Made:
+    plane, bottom, out = _levels(q)
+    if q.get("Q210", 0.0) != 0.0:
+        return None, "with Q210 is not executed by this reader"
+    step = q.get("Q202", -q["Q201"])
+    if not step > 0.0:
+        return None, "lacks Q202"
+    return Drill(plane, bottom, out, pecks(q["Q203"], bottom, step), "peck", APPROACH, q.get("Q211", 0.0),
+                 _feed(q.get("Q206", 0.0))), ""
+
+
+def _centre(q: Q, speed: float) -> Made:
+    plane, bottom, out = _levels(q)
+    if q.get("Q343", 0.0) != 0.0:
+        return None, "by diameter (Q343) is not executed by this reader"
+    return Drill(plane, bottom, out, (bottom,), dwell=q.get("Q211", 0.0), feed=_feed(q.get("Q206", 0.0))), ""
+
+
+def _ream(q: Q, speed: float) -> Made:
+    """Q208 0: out at the feed of the way in."""
+    plane, bottom, out = _levels(q)
+    feed = _feed(q.get("Q206", 0.0))
+    back = q.get("Q208", 0.0)
+    return Drill(plane, bottom, out, (bottom,), "feed_out", 0.0, q.get("Q211", 0.0), feed, feed if back == 0.0 else back), ""
+
+
+def _universal(q: Q, speed: float) -> Made:
+    """Q213 breaks of Q256 mm before the tool leaves the hole, Q212 less per peck down to Q205, Q208 out."""
+    plane, bottom, out = _levels(q)
+    if q.get("Q210", 0.0) != 0.0 or not q.get("Q202", 0.0) > 0.0:
+        return None, "with Q210, or without Q202, is not executed by this reader"
+    bottoms = pecks(q["Q203"], bottom, q["Q202"], q.get("Q212", 0.0), q.get("Q205", 0.0))
+    breaks = q.get("Q213", 0.0)
+    if 0.0 < breaks < len(bottoms) - 1:
+        return None, "with fewer breaks (Q213) than pecks is not executed by this reader"
+    style, relief = ("break", q.get("Q256", APPROACH)) if breaks else ("peck", APPROACH)
+    return Drill(plane, bottom, out, bottoms, style, relief, q.get("Q211", 0.0), _feed(q.get("Q206", 0.0)),  # type: ignore[arg-type]
+                 _feed(q.get("Q208", 0.0))), ""
+
+
+def _deep(q: Q, speed: float) -> Made:
+    """Q258 advanced stop above the last depth, Q257 depth between chip breaks, Q379 starting point."""
+    plane, bottom, out = _levels(q)
+    if any(q.get(k, 0.0) != 0.0 for k in ("Q257", "Q379")) or q.get("Q258", 0.0) != q.get("Q259", q.get("Q258", 0.0)):
+        return None, "with Q257, Q379, or Q259 other than Q258 is not executed by this reader"
+    if not q.get("Q202", 0.0) > 0.0:
+        return None, "lacks Q202"
+    bottoms = pecks(q["Q203"], bottom, q["Q202"], q.get("Q212", 0.0), q.get("Q205", 0.0))
+    return Drill(plane, bottom, out, bottoms, "peck", q.get("Q258", APPROACH), q.get("Q211", 0.0), _feed(q.get("Q206", 0.0)),
+                 _feed(q.get("Q208", 0.0))), ""
+
+
+def _tap(q: Q, speed: float) -> Made:
+    """206 at the feed Q206, 207 at the pitch Q239 times the speed; out as it came in."""
+    plane, bottom, out = _levels(q)
+    feed = abs(q["Q239"]) * speed if "Q239" in q else q.get("Q206", 0.0)
+    if not feed > 0.0:
+        return None, "lacks its pitch, feed or speed"
+    return Drill(plane, bottom, out, (bottom,), "feed_out", 0.0, q.get("Q211", 0.0), feed, feed), ""

@@ -1,0 +1,289 @@
+"""The statements of a Klartext program in running order: poles, circles, polar blocks, tools, cycles, laws."""
+
+from __future__ import annotations
+
+import math
+import re
+
+import numpy as np
+
+from postproc.readback.canonical import (
+    CALL,
+    LAW,
+    LOADED,
+    OFFSET,
+    REGISTER,
+    REST,
+    SMOOTH,
+    STATEMENT,
+    TURNS,
+    Canonical,
+    Drill,
+    Law,
+    Statement,
+    Text,
+    added,
+)
+from postproc.readback.dialects.iso import New
+from postproc.readback.dialects.klartext_cycles import drill_of
+from postproc.readback.dialects.track import Track
+from postproc.readback.modal import codes, number_of
+from postproc.readback.turns import turned
+from toolpaths.arrays import Ints
+from toolpaths.diagnostics import Diagnostic, error
+
+PLANES = {frozenset("XY"): ("X", "Y", 17), frozenset("XZ"): ("Z", "X", 18), frozenset("YZ"): ("Y", "Z", 19)}
+"""axes of a circle, the first turns to the second for DR+"""
+_TCPM = {"F", "TCP", "AXIS", "POS", "PATHCTRL", "REFPNT", "TIP-TIP"}
+_PLANE = {"TURN", "MOVE", "STAY", "FMAX", "F", "MAX", "TABLE", "COORD", "ROT", "SYM+", "SYM-", "SEQ+", "SEQ-"}
+
+
+class Run:
+    """One pass over the statements; what it puts in force goes into `new` words."""
+
+    def __init__(self, text: Text, line: Ints, file: str, axes: tuple[str, ...]) -> None:
+        self.text, self.words, self.line, self.file, self.axes = text, text.words, line, file, axes
+        self.new: New = []
+        self.found: list[Diagnostic] = []
+        self.laws: list[Law] = []
+        self.drills: list[Drill] = []
+        self.pole: dict[str, float] = {}
+        self.track = Track(text.words)
+        self.state, self.cycle = "axes", -1
+        self.speed = number_of(text.words, "S")
+
+    def fault(self, code: str, b: int, message: str, hint: str) -> None:
+        """An ERROR at a block."""
+        self.found.append(error(code, message, file=self.file, lines=[int(self.line[b])], hint=hint))
+
+    def canonical(self) -> Canonical:
+        """Canonical words of the whole program."""
+        words = self.words
+        where, index = words.pick(STATEMENT)
+        events = [(int(b), 0, self.text.statements[int(k)]) for b, k in zip(where, index, strict=True)]
+        events += [(int(b), 1, Statement(f"M{int(m)}")) for b, m in zip(*codes(words, "M", (91, 99, 128, 129)), strict=True)]
+        for b, _, s in sorted(events, key=lambda e: e[:2]):
+            self.one(b, s)
+        both = {13.0: (3.0, 8.0), 14.0: (4.0, 8.0)}
+        for b, m in zip(*codes(words, "M", (13, 14)), strict=True):
+            self.new += [(int(b), "M", v) for v in both[float(m)]]
+        drop = (words.letter == ord(STATEMENT)) | ((words.letter == ord("M")) & np.isin(words.value, (13, 14, 91, 99, 127,
+                                                                                                128, 129)))
+        return Canonical(added(words, self.new, drop), self.line, tuple(self.laws), tuple(self.drills))
+
+    def one(self, b: int, s: Statement) -> None:
+        """One statement of block b."""
+        steps = {"CC": self.centre, "C": self.circle, "CR": self.radius, "CP": self.polar_arc, "LP": self.polar_line,
+                 "TOOL CALL": self.tool, "CYCL DEF": self.define, "CYCL CALL": self.call, "M99": self.call,
+                 "CYCL CALL POS": self.call, "PLANE SPATIAL": self.plane, "FUNCTION TCPM": self.tcpm}
+        if s.name in steps:
+            steps[s.name](b, s)
+        elif s.name == "M91":
+            self.new.append((b, "G", 53.0))
+            self.track.lost(b, "XYZ")
+        elif s.name == "M128":
+            self.enter(b, "tcp", Law("tcp", s.name))
+        elif s.name in ("M129", "FUNCTION RESET TCPM"):
+            self.enter(b, "axes" if self.state == "tcp" else self.state, Law("axes", s.name))
+        elif s.name == "PLANE RESET":
+            self.reset(b, s)
+        elif s.name == "STOP":
+            self.new.append((b, "M", 0.0))
+
+    # ---- contours -----------------------------------------------------------------------------------------------
+
+    def place(self, b: int, keys: dict[str, float]) -> dict[str, float] | None:
+        """Coordinates in keys, those with I counted from the last position."""
+        result = {}
+        for key, value in keys.items():
+            if key in self.axes:
+                result[key] = value
+            elif key[0] == "I" and key[1:] in self.axes:
+                here = self.track.at(b, key[1:])
+                if here is None:
+                    self.fault("gcode.pole", b, f"{key} before {key[1:]} was stated in this mode",
+                               "state it absolutely first")
+                    return None
+                result[key[1:]] = here + value
+        return result
+
+    def centre(self, b: int, s: Statement) -> None:
+        """CC: the pole; without coordinates the last position."""
+        keys = s.keys or {"IX": 0.0, "IY": 0.0}
+        pole = self.place(b, keys)
+        if pole is None:
+            return
+        if len(pole) == 1:
+            pole = {**{k: v for k, v in self.pole.items() if k in ("X", "Y")}, **pole}
+        if frozenset(pole) not in PLANES:
+            self.fault("gcode.pole", b, f"CC with {', '.join(pole) or 'nothing'}", "two of X, Y, Z")
+            return
+        self.pole = pole
+
+    def circle(self, b: int, s: Statement) -> None:
+        """C: from where the tool is to X, Y about the pole, a full circle where both are one."""
+        end = self.place(b, s.keys)
+        if end is None or not self.about_pole(b, s):
+            return
+        if not set(end) <= set(self.pole):
+            self.fault("gcode.arc", b, "C out of the plane of its CC", "CP with IZ for a helix")
+            return
+        self.states(b, end)
+
+    def about_pole(self, b: int, s: Statement) -> bool:
+        """The codes of an arc about the pole."""
+        sense = s.number(0, 0.0)
+        if not self.pole or sense == 0.0:
+            self.fault("gcode.pole", b, f"{s.name} without CC or DR", "CC before it, DR+ or DR- in it")
+            return False
+        first, second, code = PLANES[frozenset(self.pole)]
+        self.new += [(b, "G", 3.0 if sense > 0.0 else 2.0), (b, "G", float(code))]
+        self.new += [(b, {"X": "I", "Y": "J", "Z": "K"}[a], self.pole[a]) for a in (first, second)]
+        return True
+
+    def states(self, b: int, end: dict[str, float]) -> None:
+        """Absolute words of block b that a statement works out."""
+        for letter, value in end.items():
+            self.new.append((b, letter, value))
+            self.track.put(b, letter, value)
+
+    def radius(self, b: int, s: Statement) -> None:
+        """CR: X, Y, R, DR."""
+        end = self.place(b, {k: v for k, v in s.keys.items() if k != "R"})
+        sense = s.number(0, 0.0)
+        if end is None:
+            return
+        if "R" not in s.keys or sense == 0.0:
+            self.fault("gcode.arc", b, "CR without R or DR", "R+ up to half a turn, R- for more; DR+ or DR-")
+            return
+        plane = PLANES.get(frozenset(end), ("X", "Y", 17))[2]
+        self.new += [(b, "G", 3.0 if sense > 0.0 else 2.0), (b, "G", float(plane)), (b, "R", s.keys["R"])]
+        self.states(b, end)
+
+    def polar(self, b: int) -> tuple[float, float] | None:
+        """(radius, angle in degrees) of the last position about a pole in X and Y."""
+        here = self.track.at(b, "X"), self.track.at(b, "Y")
+        if set(self.pole) != {"X", "Y"} or None in here:
+            self.fault("gcode.pole", b, "polar coordinates without CC X Y, or before X and Y were stated in this mode",
+                       "CC X Y, and an L with X and Y, before it")
+            return None
+        x, y = float(here[0] or 0.0) - self.pole["X"], float(here[1] or 0.0) - self.pole["Y"]
+        return math.hypot(x, y), math.degrees(math.atan2(y, x))
+
+    def polar_arc(self, b: int, s: Statement) -> None:
+        """CP: about the pole to PA, or by IPA, which may be more than a turn; Z besides makes a helix."""
+        now, sense = self.polar(b), s.number(0, 0.0)
+        rise = self.place(b, {k: v for k, v in s.keys.items() if k not in ("PA", "IPA")})
+        if now is None or rise is None or not self.about_pole(b, s):
+            return
+        to_angle = sense * ((sense * (s.keys.get("PA", now[1]) - now[1])) % 360.0 or 360.0)
+        angle = s.keys.get("IPA", to_angle)
+        if angle * sense <= 0.0:
+            self.fault("gcode.arc", b, f"CP IPA{angle:+g} against its DR", "the same sign in both")
+            return
+        turn = now[1] + angle
+        self.states(b, {"X": self.pole["X"] + now[0] * math.cos(math.radians(turn)),
+                        "Y": self.pole["Y"] + now[0] * math.sin(math.radians(turn)), **rise})
+        self.new.append((b, TURNS, float(math.ceil(abs(angle) / 360.0 - 1e-9) - 1)))
+
+    def polar_line(self, b: int, s: Statement) -> None:
+        """LP: straight to PR, PA."""
+        now = self.polar(b) if {"IPR", "IPA"} & set(s.keys) or len({"PR", "PA"} & set(s.keys)) < 2 else (0.0, 0.0)
+        rest = self.place(b, {k: v for k, v in s.keys.items() if k not in ("PR", "PA", "IPR", "IPA")})
+        if now is None or rest is None or set(self.pole) != {"X", "Y"}:
+            return
+        r = s.keys.get("PR", now[0] + s.keys.get("IPR", 0.0))
+        angle = math.radians(s.keys.get("PA", now[1] + s.keys.get("IPA", 0.0)))
+        self.states(b, {"X": self.pole["X"] + r * math.cos(angle), "Y": self.pole["Y"] + r * math.sin(angle), **rest})
+
+    # ---- tools and cycles ---------------------------------------------------------------------------------------
+
+    def tool(self, b: int, s: Statement) -> None:
+        """TOOL CALL n Z S: the tool, its length and its speed; without n the speed alone."""
+        number = s.number(0)
+        if s.args[1] not in (None, "Z") or any(s.keys.get(k, 0.0) != 0.0 for k in ("DL", "DR", "DR2")):
+            self.fault("gcode.tool", b, "TOOL CALL with another axis than Z, or with DL or DR", "TOOL CALL n Z S")
+        if "S" in s.keys:
+            self.new.append((b, "S", s.keys["S"]))
+            self.speed[b:] = s.keys["S"]
+        if not math.isnan(number):
+            self.new += [(b, LOADED, number), (b, REGISTER, number)]
+
+    def define(self, b: int, s: Statement) -> None:
+        """CYCL DEF: what holds from here on, or a cycle to be called."""
+        number, part = s.number(0), s.number(1)
+        if number == 247.0:
+            self.new.append((b, OFFSET, s.keys.get("Q339", math.nan)))
+            self.track.lost(b, "XYZ")
+        elif number == 9.0:
+            seconds = re.search(r"([-+]?\d+\.?\d*)\s*$", str(s.args[2])) if part == 1.0 else None
+            self.new += [(b, REST, float(seconds[1]))] if seconds else []
+            if part == 1.0 and not seconds:
+                self.fault("gcode.dwell", b, "CYCL DEF 9.1 lacks its time", "CYCL DEF 9.1 DWELL 0.5 (seconds)")
+        elif number == 32.0:
+            self.new += [(b, SMOOTH, s.keys.get("T", math.inf))] if part == 1.0 else []
+        else:
+            drill, why = drill_of(int(number), s.keys, float(self.speed[b]))
+            if drill is None:
+                self.fault("gcode.cycle", b, f"CYCL DEF {number:g} {why}",
+                           "200, 201, 203, 205, 206, 207, 240, 247, 9 and 32 are executed")
+                return
+            self.drills.append(drill)
+            self.cycle = len(self.drills) - 1
+
+    def call(self, b: int, s: Statement) -> None:
+        """M99, CYCL CALL, CYCL CALL POS X Y Z+0 F: the cycle defined last."""
+        if self.cycle < 0:
+            self.fault("gcode.cycle", b, f"{s.name} without a cycle", "CYCL DEF before it")
+            return
+        rest = str(s.args[0]) if s.args else ""
+        if s.name == "CYCL CALL POS":
+            place = {a: float(v) for a, v in re.findall(r"([XYZ])\s*([-+]?\d*\.?\d+)", rest)}
+            if place.pop("Z", 0.0) != 0.0:
+                self.fault("gcode.cycle", b, "CYCL CALL POS with Z shifts the datum", "Z+0")
+            fast = bool(re.search(r"F ?MAX", rest))
+            feed = re.search(r"F\s*(\d+\.?\d*)", rest)
+            self.new += [(b, "G", 0.0 if fast else 1.0), *([(b, "F", float(feed[1]))] if feed and not fast else [])]
+            self.states(b, place)
+        self.new += [(b, "M", float(m)) for m in re.findall(r"M(\d+)", rest)]
+        self.new.append((b, CALL, float(self.cycle)))
+        self.track.lost(b, "Z")
+
+    # ---- laws ---------------------------------------------------------------------------------------------------
+
+    def enter(self, b: int, state: str, law: Law) -> None:
+        """A law in force from block b on."""
+        if state != "axes" and self.state != "axes" and law.name != "axes":
+            self.fault("gcode.mode", b, f"{law.code} while another mode is on", "leave the mode that is on first")
+        if law.name == "axes" and state == "tilted":
+            return
+        self.state = state
+        self.track.lost(b, "XYZ")
+        self.new.append((b, LAW, float(len(self.laws))))
+        self.laws.append(law)
+
+    def tcpm(self, b: int, s: Statement) -> None:
+        """FUNCTION TCPM F TCP AXIS POS PATHCTRL AXIS: F at the tip, rotary positions linear."""
+        strange = set(s.args) - _TCPM
+        if strange or s.args[:4] != ("F", "TCP", "AXIS", "POS") or s.args[4:6] != ("PATHCTRL", "AXIS"):
+            self.fault("gcode.mode", b, "FUNCTION TCPM of another kind", "FUNCTION TCPM F TCP AXIS POS PATHCTRL AXIS")
+        self.enter(b, "tcp", Law("tcp", s.name))
+
+    def plane(self, b: int, s: Statement) -> None:
+        """PLANE SPATIAL SPA SPB SPC."""
+        strange = {str(a) for a in s.args if not re.match(r"(SP[ABC]|DIST|ABST|F)[-+]?\d", str(a))} - _PLANE
+        if strange or not {"SPA", "SPB", "SPC"} <= set(s.keys) or s.keys.get("DIST", 0.0) != 0.0:
+            what = ", ".join(sorted(strange)) or "a part of its angles, or DIST"
+            self.fault("gcode.mode", b, f"PLANE SPATIAL with {what}", "PLANE SPATIAL SPA SPB SPC TURN FMAX TABLE ROT")
+            return
+        rotation = turned("XYZ", [s.keys[k] for k in ("SPA", "SPB", "SPC")], fixed=True)
+        asked = next((str(a)[3:] for a in s.args if str(a)[:3] in ("SYM", "SEQ")), "nearest")
+        self.enter(b, "tilted", Law("tilted", s.name, rotation, choice=asked))  # type: ignore[arg-type]
+
+    def reset(self, b: int, s: Statement) -> None:
+        """PLANE RESET STAY: the rotary axes stand."""
+        if s.args != ("STAY",):
+            self.fault("gcode.mode", b, "PLANE RESET that may move the rotary axes", "PLANE RESET STAY")
+        self.enter(b, "tcp" if self.state == "tcp" else "axes", Law("axes", s.name))
+
+

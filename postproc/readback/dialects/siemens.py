@@ -1,0 +1,346 @@
+"""Siemens SINUMERIK 840D sl, milling.
+
+From the programming manuals Fundamentals, Job Planning and Cycles: X=IC(), X=AC(), CR=, I=AC(), TURN=; G54 to G57, G505 to
+G599; T, M6 and D; SUPA; G4 F; MCALL with CYCLE81 to CYCLE86; TRAORI with ORIAXES, left by TRAFOOF; CYCLE800 with turns
+about X, Y, Z as _MODE orders them; CYCLE832; subprograms by their names or L numbers, M17, RET.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import PurePath
+
+import numpy as np
+
+from postproc.readback.canonical import (
+    CALL,
+    LAW,
+    LOADED,
+    OFFSET,
+    REGISTER,
+    REST,
+    SMOOTH,
+    STATEMENT,
+    TURNS,
+    Canonical,
+    Drill,
+    Law,
+    Statement,
+    Text,
+    added,
+)
+from postproc.readback.dialects.base import M_CODES, Reader
+from postproc.readback.dialects.iso import New, relative_words
+from postproc.readback.dialects.siemens_cycles import CYCLES, drill_of
+from postproc.readback.flow import Call, Structure
+from postproc.readback.modal import GROUPS, Groups, codes, fill, number_of
+from postproc.readback.turns import turned
+from postproc.readback.words import Words, block_delete, read_words
+from toolpaths.arrays import Bools, Ints
+from toolpaths.diagnostics import Diagnostic, error
+
+FORCED = 128
+"""added to the letter of a word that is absolute whatever holds"""
+_COMMENT = re.compile(rb'("[^"\n]*")|;[^\n]*')
+_SPECIAL = re.compile(rb"(?m)^[^\n]*(?:[A-Z_$][A-Z_$]|[=(\"\[:@])[^\n]*$")
+_TOKEN = re.compile(
+    r"\s*(?:(?P<call>[A-Z_$][A-Z_$0-9]+)\s*\((?P<args>(?:\"[^\"]*\"|[^()\"])*)\)"
+    r"|(?P<key>[A-Z]+\d*)\s*=\s*(?:(?P<how>[A-Z]+)\s*\(\s*(?P<within>[-+]?(?:\d+\.?\d*|\.\d+))\s*\)"
+    r"|(?P<value>[-+]?(?:\d+\.?\d*|\.\d+)))"
+    r"|(?P<letter>[A-Z])\s*(?P<number>[-+]?(?:\d+\.?\d*|\.\d+))(?![A-Z_=(])"
+    r"|(?P<name>[A-Z_$][A-Z_$0-9]+)|\"(?P<text>[^\"]*)\")\s*")
+_PROGRAM = re.compile(rb"(?m)^[ \t]*%_N_([A-Z0-9_]+)_([MS]PF)[^\n]*$")
+PASSIVE = frozenset({"MSG", "SOFT", "BRISK", "FFWON", "FFWOF", "CFTCP", "CFC", "CFIN", "RTLION", "STOPRE", "NORM", "DIAMOF",
+                     "WORKPIECE", "ORIMKS", "PROC", "COMPOF"})
+"""names that change nothing of what is read back here"""
+KNOWN = PASSIVE.union(CYCLES, ("SUPA", "TRAORI", "TRAFOOF", "ORIAXES", "CYCLE800", "CYCLE832", "MCALL", "RET", "CALL"))
+_SEQUENCE = {1: "X", 2: "Y", 3: "Z"}
+
+
+class SiemensReader(Reader):
+    """Programs of SINUMERIK; words like `SUPA` and calls are statements of their block."""
+
+    groups: Groups = GROUPS | {
+        "motion": (0, 1, 2, 3), "units": (70, 71, 700, 710), "offset": (54, 55, 56, 57, 500, *range(505, 600)),
+        "path": (9, 60, 64), "once": (4,), "length": (), "level": (), "arc_distance": ()}
+    m_codes = (*M_CODES, 17.0)
+    letters = "GMFSTDNIJKRLP?~"
+    arc_slack = 0.01
+    """MD21000 CIRCLE_ERROR_CONST, its default"""
+
+    def read(self, data: bytes, file: str = "", others: Mapping[str, bytes] | None = None,
+             ) -> tuple[Canonical | None, list[Diagnostic]]:
+        """As every dialect; names of other files are names of subprograms."""
+        self.names = {PurePath(name).stem.upper().removesuffix("_SPF").removeprefix("_N_") for name in others or {}}
+        self.names |= {m[1].decode() for m in _PROGRAM.finditer(data.upper())}
+        return super().read(data, file, others)
+
+    def tokens(self, data: bytes, file: str) -> tuple[Text, list[Diagnostic]]:
+        """Blocks of plain words at once; those with names, calls and = one by one."""
+        text = _COMMENT.sub(lambda m: m[1] or b"", data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")).upper()
+        self.programs = [(text.count(b"\n", 0, m.start()) + 1, m[1].decode()) for m in _PROGRAM.finditer(text)]
+        text, found = block_delete(_PROGRAM.sub(b"", text), file)
+        special: list[tuple[int, str]] = []
+
+        def cut(match: re.Match[bytes]) -> bytes:
+            special.append((match.start(), match[0].decode("ascii", "replace")))
+            return b""
+        ends = np.flatnonzero(np.frombuffer(text, dtype=np.uint8) == 10)
+        words, more = read_words(_SPECIAL.sub(cut, text), file)
+        new: New = []
+        statements: list[Statement] = []
+        for start, row in special:
+            more += _parse(row, int(np.searchsorted(ends, start)) + 1, new, statements, file)
+        point = words.point
+        words = added(Words(words.letter, words.value, words.line, words.lines), new)
+        return Text(words if new else Words(words.letter, words.value, words.line, words.lines, point),
+                    tuple(statements)), found + more
+
+    def check(self, words: Words, file: str) -> list[Diagnostic]:
+        """Codes and words; relative and forced ones count as plain."""
+        letter = words.letter & 127
+        small = (letter >= 97) & (letter <= 122)
+        plain = Words(np.where(small, letter - 32, letter).astype(np.uint8), words.value, words.line, words.lines)
+        return super().check(plain.take(plain.letter != ord(STATEMENT)), file)
+
+    def structure(self, text: Text, file: str) -> tuple[Structure, list[Diagnostic]]:
+        """Programs begin at %_N_ lines; a name or an L number that is one's calls it, P times."""
+        words, lines = text.words, text.words.lines
+        starts = [*self.programs, (lines + 1, "")]
+        spans = {name: (a, starts[k + 1][0] - 1) for k, (a, name) in enumerate(starts[:-1])}
+        main = next(iter(spans.values()), (1, lines)) if len(spans) > 1 else (1, lines)
+        back = set(codes(words, "M", (17,))[0].tolist())
+        where, index = words.pick(STATEMENT)
+        named = [(int(b), text.statements[int(k)]) for b, k in zip(where, index, strict=True)]
+        back |= {b for b, s in named if s.name == "RET"}
+        spans = {name: (a, min([n for n in back if a <= n <= b], default=b)) for name, (a, b) in spans.items()}
+        own = PurePath(file).stem.upper().removesuffix("_SPF").removeprefix("_N_")
+        subprograms = {name: span for name, span in spans.items() if span[0] != main[0]}
+        if own in self.names:
+            subprograms[own] = (1, min(back, default=lines))
+        times = dict(zip(*(a.tolist() for a in words.pick("P")), strict=True))
+        calls = {b: Call(b, s.name, int(times.get(b, 1.0))) for b, s in named if s.name not in KNOWN}
+        calls |= {int(b): Call(int(b), f"L{int(n)}", int(times.get(b, 1.0)))
+                  for b, n in zip(*(a.tolist() for a in words.pick("L")), strict=True)}
+        unknown = [c for c in calls.values() if c.name not in self.names | set(spans) and not c.name.startswith("L")]
+        return Structure(main, subprograms, calls), [
+            error("gcode.unknown_word", f"{c.name} is not executed by this reader", file=file, lines=[c.line],
+                  hint="neither a function that it knows nor the name of a subprogram") for c in unknown]
+
+    def canonical(self, text: Text, line: Ints, file: str) -> tuple[Canonical, list[Diagnostic]]:
+        """Canonical words."""
+        words, found = text.words, list[Diagnostic]()
+        new: New = []
+        drop = np.zeros(len(words.letter), dtype=bool)
+        run = _Run(words, text, line, file, found, new, self.axes)
+        self._plain(words, new, drop, run)
+        laws, drills = run.statements()
+        words = relative_words(words, self.axes)
+        letter = words.letter.copy()
+        center = np.isin(letter, [ord(a) for a in "IJK"])
+        letter[center] += 32
+        letter[letter >= FORCED] -= FORCED
+        value = words.value.copy()
+        units = (letter == ord("G")) & np.isin(value, (70, 71, 700, 710))
+        value[units] = np.where(np.isin(value[units], (70, 700)), 20.0, 21.0)
+        drop |= (letter == ord(STATEMENT)) | np.isin(letter, [ord(a) for a in "LP"])
+        return Canonical(added(Words(letter, value, words.line, words.lines), new, drop), line, laws, drills), found
+
+    def _plain(self, words: Words, new: New, drop: Bools, run: _Run) -> None:
+        """What codes without names set: tools, length, offsets, rests, exact stop."""
+        for b in codes(words, "G", (4,))[0].tolist():
+            low, high = np.searchsorted(words.line, [b, b + 1])
+            here = low + np.flatnonzero(words.letter[low:high] == ord("F"))
+            drop[here] = True
+            if not len(here):
+                run.fault("gcode.dwell", b, "G4 lacks F", "state the seconds: G4 F0.5")
+            new += [(b, REST, float(words.value[k])) for k in here]
+        for b, g in zip(*codes(words, "G", self.groups["offset"]), strict=True):
+            new.append((int(b), OFFSET, float(g)))
+        for b, g in zip(*codes(words, "G", (60, 64)), strict=True):
+            new.append((int(b), SMOOTH, 0.0 if g == 60 else float("inf")))
+        tool, edge = number_of(words, "T"), words.pick("D")
+        change = codes(words, "M", (6,))[0]
+        events = sorted([(int(b), 0, 0.0) for b in change] + [(int(b), 1, float(d)) for b, d in zip(*edge, strict=True)])
+        loaded = -1.0
+        for b, kind, d in events:
+            if kind == 0:
+                loaded = float(np.nan_to_num(tool[b], nan=-1.0))
+                new.append((b, LOADED, loaded))
+                if loaded < 0.0:
+                    run.fault("gcode.tool", b, "M6 without a tool number", "")
+            if d > 1.0:
+                run.fault("gcode.tool", b, f"D{d:g}: the length of a second cutting edge is not known", "D1 or D0")
+            run.length.append((b, -1.0 if kind and d == 0.0 else loaded))
+            new.append((b, REGISTER, run.length[-1][1]))
+
+
+class _Run:
+    """The statements of a program in running order."""
+
+    def __init__(self, words: Words, text: Text, line: Ints, file: str, found: list[Diagnostic], new: New,
+                 axes: tuple[str, ...]) -> None:
+        self.words, self.text, self.line, self.file, self.found, self.new = words, text, line, file, found, new
+        self.axes = axes
+        self.length: list[tuple[int, float]] = []
+        self.laws: list[Law] = []
+        self.drills: list[Drill] = []
+        self.state, self.called, self.oriented = "axes", -1, False
+
+    def fault(self, code: str, b: int, message: str, hint: str) -> None:
+        """An ERROR at a block."""
+        self.found.append(error(code, message, file=self.file, lines=[int(self.line[b])], hint=hint))
+
+    def statements(self) -> tuple[tuple[Law, ...], tuple[Drill, ...]]:
+        """Laws and cycles, with the words that put them in force."""
+        where, index = self.words.pick(STATEMENT)
+        blocks: dict[int, list[Statement]] = {}
+        for b, k in zip(where.tolist(), index.tolist(), strict=True):
+            blocks.setdefault(b, []).append(self.text.statements[int(k)])
+        modal: list[tuple[int, int]] = []
+        for b, all_here in sorted(blocks.items()):
+            names = [s.name for s in all_here]
+            if "MCALL" in names:
+                modal.append((b, -1))
+            for s in all_here:
+                self.one(b, s, modal, "MCALL" in names)
+        self.modal_calls(modal)
+        return tuple(self.laws), tuple(self.drills)
+
+    def one(self, b: int, s: Statement, modal: list[tuple[int, int]], is_modal: bool) -> None:
+        """One statement of block b."""
+        if s.name == "SUPA":
+            self.machine_move(b)
+        elif s.name == "TRAORI":
+            self.enter(b, "tcp", Law("tcp", "TRAORI"))
+        elif s.name == "TRAFOOF":
+            self.enter(b, "axes", Law("axes", s.name))
+        elif s.name == "CYCLE800":
+            self.swivel(b, s)
+        elif s.name == "ORIAXES":
+            self.oriented = True
+        elif s.name == "CYCLE832":
+            off = "_OFF" in s.args or s.number(0, 0.0) <= 0.0
+            self.new.append((b, SMOOTH, float("inf") if off else s.number(0)))
+        elif s.name in CYCLES:
+            drill, why = drill_of(s, float(number_of(self.words, "S")[b]))
+            if drill is None:
+                self.fault("gcode.cycle", b, f"{s.name} {why}", "as the post writes it")
+                return
+            self.drills.append(drill)
+            if is_modal:
+                modal[-1] = b, len(self.drills) - 1
+            else:
+                self.new.append((b, CALL, float(len(self.drills) - 1)))
+
+    def enter(self, b: int, state: str, law: Law) -> None:
+        """A law in force from block b on."""
+        if state != "axes" and self.state != "axes":
+            self.fault("gcode.mode", b, f"{law.code} while another mode is on", "leave the mode that is on first")
+        if state == "tcp" and self.turning_without_axes(b):
+            self.fault("gcode.mode", b, "TRAORI with rotary words, but without ORIAXES",
+                       "state ORIMKS ORIAXES: rotary axes linear")
+        self.state = state
+        self.new.append((b, LAW, float(len(self.laws))))
+        self.laws.append(law)
+
+    def turning_without_axes(self, b: int) -> bool:
+        """True where rotary words follow block b and ORIAXES does not come before them."""
+        rotary = np.isin(self.words.letter & 95, [ord(a) for a in self.axes if a in "ABC"]) & (self.words.line > b)
+        first = int(self.words.line[rotary].min(initial=self.words.lines + 1))
+        where, index = self.words.pick(STATEMENT)
+        names = [self.text.statements[int(k)].name for k in index]
+        stated = [int(w) for w, name in zip(where, names, strict=True) if name == "ORIAXES"]
+        return first <= self.words.lines and not any(w <= first for w in stated)
+
+    def machine_move(self, b: int) -> None:
+        """SUPA: machine coordinates in this block; the tool length must be off."""
+        self.new.append((b, "G", 53.0))
+        length = [value for at, value in self.length if at <= b]
+        low, high = np.searchsorted(self.words.line, [b, b + 1])
+        if length and length[-1] >= 0.0 and ord("Z") in self.words.letter[low:high]:
+            self.fault("gcode.machine_position", b, "SUPA with a tool length in force", "write D0 beside SUPA")
+
+    def swivel(self, b: int, s: Statement) -> None:
+        """CYCLE800(_FR, _TC, _ST, _MODE, _X0, _Y0, _Z0, _A, _B, _C, _X1, _Y1, _Z1, _DIR, _FR_I, _DMODE)."""
+        if not any(isinstance(a, float) for a in s.args):
+            self.enter(b, "axes", Law("axes", s.name))
+            return
+        mode = int(s.number(3, 0.0))
+        if s.number(0, 0.0) != 0.0 or s.number(2, 0.0) != 0.0 or mode >> 6:
+            self.fault("gcode.mode", b, "CYCLE800 with a retraction, an added plane, or angles other than turns axis by axis",
+                       "_FR 0, _ST 0, _MODE 57")
+            return
+        axes = [_SEQUENCE.get(mode >> shift & 3, "") for shift in (0, 2, 4)]
+        if "" in axes:
+            self.fault("gcode.mode", b, f"CYCLE800 with _MODE {mode}: no order of turns", "_MODE 57: X, then Y, then Z")
+            return
+        rotation = turned("".join(axes), [s.number(k, 0.0) for k in (7, 8, 9)])
+        shift = np.array([s.number(k, 0.0) for k in (4, 5, 6)])
+        shift = shift + rotation @ np.array([s.number(k, 0.0) for k in (10, 11, 12)])
+        direction = s.number(13, 0.0)
+        choice = "+" if direction > 0.0 else "-" if direction < 0.0 else "nearest"
+        self.enter(b, "tilted", Law("tilted", s.name, rotation, shift, choice))  # type: ignore[arg-type]
+
+    def modal_calls(self, modal: list[tuple[int, int]]) -> None:
+        """Each block that moves calls the cycle of the MCALL in force, but not the blocks of MCALL themselves."""
+        if not modal:
+            return
+        held = fill(np.array([m[0] for m in modal]), np.array([float(m[1]) for m in modal]), self.words.lines, -1.0)
+        moves = np.unique(self.words.line[np.isin(self.words.letter & 95, [ord(a) for a in self.axes])])
+        calls = moves[(held[moves] >= 0.0) & ~np.isin(moves, [m[0] for m in modal])]
+        self.new += [(int(b), CALL, float(held[b])) for b in calls]
+
+
+def _parse(row: str, line: int, new: New, statements: list[Statement], file: str) -> list[Diagnostic]:
+    """The words and statements of one block."""
+    at = 0
+    while at < len(row.rstrip()):
+        match = _TOKEN.match(row, at)
+        if match is None or not _token(match, line, new, statements):
+            return [error("gcode.syntax", f"not a block of words: {row.strip()[:60]!r}", file=file, lines=[line],
+                          hint="variables, jumps and expressions are not read")]
+        at = match.end()
+    return []
+
+
+def _token(match: re.Match[str], line: int, new: New, statements: list[Statement]) -> bool:
+    """One word or statement; False where it is not read."""
+    if match["letter"]:
+        new.append((line, match["letter"], float(match["number"])))
+    elif match["key"]:
+        return _assigned(match, line, new)
+    elif match["call"] or match["name"]:
+        args = _arguments(match["args"]) if match["call"] else ()
+        new.append((line, STATEMENT, float(len(statements))))
+        statements.append(Statement(match["call"] or match["name"], args))
+    elif match["text"] is not None and statements and statements[-1].name == "CALL":
+        statements[-1] = Statement(match["text"])
+    return True
+
+
+def _assigned(match: re.Match[str], line: int, new: New) -> bool:
+    """X=IC(1), X=AC(1), I=AC(1), X=1, CR=, TURN=."""
+    key, how = match["key"], match["how"]
+    value = float(match["within"] or match["value"])
+    if key in ("CR", "TURN") and how is None:
+        new.append((line, "R" if key == "CR" else TURNS, value))
+    elif len(key) == 1 and how in (None, "AC", "IC"):
+        code = ord(key) + (0 if how is None else FORCED if how == "AC" else 32)
+        new.append((line, chr(code), value))
+    else:
+        return False
+    return True
+
+
+def _arguments(text: str) -> tuple[float | str | None, ...]:
+    """Numbers, names and strings between commas; None where nothing stands."""
+    result: list[float | str | None] = []
+    for part in re.findall(r'(?:"[^"]*"|[^,])+|(?<=,)(?=,)|^(?=,)|(?<=,)$', text) if text.strip() else []:
+        part = part.strip()
+        try:
+            result.append(float(part) if part else None)
+        except ValueError:
+            result.append(part.strip('"'))
+    return tuple(result)

@@ -1,0 +1,73 @@
+"""CYCLE81 to CYCLE86 of SINUMERIK (Programming Manual Cycles): parameters by their place.
+
+All begin with RTP (retraction), RFP (reference), SDIS (safety), DP (depth) or DPR (depth below RFP). The tool goes rapidly
+to RFP + SDIS, feeds to the depth and leaves for RTP. CYCLE83: FDEP or FDPR first peck, DAM less for each next, DTB, DTS,
+FRF, VARI (0 breaks chips: up by VRT, 1 mm by default; 1 leaves the hole, then stops DIS1 before the last depth: 0.6 mm down
+to 30 mm depth, a fiftieth of the depth, 7 mm at the most, beyond).
+"""
+
+from __future__ import annotations
+
+import math
+
+from postproc.readback.canonical import Drill, Statement
+from postproc.readback.cycles import pecks
+
+CYCLES = ("CYCLE81", "CYCLE82", "CYCLE83", "CYCLE84", "CYCLE840", "CYCLE85", "CYCLE86")
+_SHALLOW, _LEAD, _MOST = 30.0, 0.6, 7.0
+
+
+def drill_of(s: Statement, speed: float) -> tuple[Drill | None, str]:
+    """(cycle, "") or (None, what is missing or not modelled); `speed` of the spindle, 1/min."""
+    out, surface, safety, depth = (s.number(k) for k in range(4))
+    if math.isnan(depth):
+        depth = surface - s.number(4)
+    elif not math.isnan(s.number(4)) and s.number(4) != surface - depth:
+        return None, "has DP and DPR"
+    if math.isnan(out + surface + depth):
+        return None, "lacks RTP, RFP or DP"
+    plane = surface + (0.0 if math.isnan(safety) else safety)
+    dwell = s.number(8 if s.name == "CYCLE83" else 5, 0.0)
+    if dwell < 0.0:
+        return None, "dwells in turns of the spindle"
+    plain = Drill(plane, depth, out, (depth,), dwell=0.0 if s.name == "CYCLE81" else dwell)
+    kinds = {"CYCLE83": _deep, "CYCLE84": _tap, "CYCLE840": _tap, "CYCLE85": _bore, "CYCLE86": _fine}
+    return kinds[s.name](s, plain, surface, speed) if s.name in kinds else (plain, "")
+
+
+def _deep(s: Statement, plain: Drill, surface: float, speed: float) -> tuple[Drill | None, str]:
+    first = surface - s.number(5) if not math.isnan(s.number(5)) else s.number(6)
+    less, breaks = s.number(7, 0.0), s.number(11, 0.0) == 0.0
+    if not first > 0.0:
+        return None, "lacks FDEP or FDPR"
+    if less != 0.0 or s.number(9, 0.0) != 0.0 or s.number(10, 1.0) not in (0.0, 1.0):
+        return None, "with DAM, DTS or FRF is not executed by this reader"
+    depth = surface - plain.bottom
+    lead = _LEAD if depth <= _SHALLOW else min(depth / 50.0, _MOST)
+    relief = s.number(14, 1.0) if breaks else s.number(16, lead)
+    return Drill(plain.plane, plain.bottom, plain.out, pecks(surface, plain.bottom, first), "break" if breaks else "peck",
+                 relief, plain.dwell), ""
+
+
+def _tap(s: Statement, plain: Drill, surface: float, speed: float) -> tuple[Drill | None, str]:
+    """CYCLE84(..., DTB, SDAC, MPIT, PIT, POSS, SST, SST1), CYCLE840(..., DTB, SDR, SDAC, ENC, MPIT, PIT)."""
+    pitch = abs(s.number(8 if s.name == "CYCLE84" else 10))
+    turning = s.number(10) if s.name == "CYCLE84" else speed
+    back = s.number(11, 0.0) if s.name == "CYCLE84" else 0.0
+    if not pitch * turning > 0.0:
+        return None, "lacks its pitch or speed"
+    return Drill(plain.plane, plain.bottom, plain.out, plain.bottoms, "feed_out", 0.0, plain.dwell, pitch * turning,
+                 pitch * (back if back > 0.0 else turning)), ""
+
+
+def _bore(s: Statement, plain: Drill, surface: float, speed: float) -> tuple[Drill | None, str]:
+    """CYCLE85(..., DTB, FFR, RFF): in and out at feeds of its own."""
+    return Drill(plain.plane, plain.bottom, plain.out, plain.bottoms, "feed_out", 0.0, plain.dwell, s.number(6),
+                 s.number(7)), ""
+
+
+def _fine(s: Statement, plain: Drill, surface: float, speed: float) -> tuple[Drill | None, str]:
+    """CYCLE86(..., DTB, SDIR, RPA, RPO, RPAP, POSS): the tool is lifted off the wall by RPA, RPO."""
+    if any(s.number(k, 0.0) != 0.0 for k in (7, 8, 9)):
+        return None, "with RPA, RPO or RPAP is not executed by this reader"
+    return plain, ""
