@@ -1,0 +1,217 @@
+"""Axis positions, tool-centre-point mode and tilted planes: the same part by each of them, entered and left safely."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import toolpaths
+from postproc.planes import angles_of, rotation_of, stated
+from tests.postproc.kit import SAMPLES, angle, codes, convert, goto, tilted, toolpath
+from tests.postproc.modes_kit import TCP, TILTED, made, run, shop
+
+GOLDEN = Path(__file__).parents[1] / "golden"
+FOUR = ["mikron-ucp710", "trunnion-bc", "head-table", "fork-head-ab"]
+FIRST, THEN = tilted(25.0, 40.0), tilted(31.0, 65.0)
+
+
+def rows(tips: list[list[float]], axis: np.ndarray) -> list[str]:
+    return goto(np.array(tips, dtype=float), np.tile(axis, (len(tips), 1)))
+
+
+def indexed() -> list[str]:
+    """Two poses, each with cuts to and fro square to the tool, and a pose with the tool upright."""
+    lines = []
+    for axis in (FIRST, THEN, np.array([0, 0, 1.0])):
+        side = np.cross(axis, [0.0, 1.0, 0.0])
+        side /= np.linalg.norm(side)
+        at = 20 * axis
+        lines += ["RAPID", *rows([at + 30 * axis], axis), "FEDRAT/MMPM,600",
+                  *rows([at, at + 10 * side, at + 10 * side + 5 * np.cross(axis, side)], axis), "RAPID",
+                  *rows([at + 30 * axis], axis)]
+    return lines
+
+
+def turning() -> list[str]:
+    """A cut that turns the tool all along."""
+    t = np.linspace(0.0, 1.0, 9)
+    axes = np.array([tilted(10 + 20 * u, 30 + 80 * u) for u in t])
+    tips = np.stack([30 * t, 10 * np.sin(3 * t), 5 * t], axis=1)
+    first = goto(tips[:1] + 20 * axes[:1], axes[:1])
+    return ["RAPID", *first, "FEDRAT/MMPM,500", *goto(tips, axes), "RAPID", *goto(tips[-1:] + 20 * axes[-1:], axes[-1:])]
+
+
+def follows(result: object, within: float = 0.0101, axis_within: float = 9e-4) -> None:
+    """Every CL point is met in order, and nothing that cuts is off the lines between them."""
+    path = result.toolpath
+    blocks = [b for b in run(result) if b.code > 0]
+    tips, axes = np.concatenate([b.tip for b in blocks]), np.concatenate([b.axis for b in blocks])
+    cut = np.flatnonzero((path.kind == 1) & (path.role == 0))
+    at = 0
+    for row in cut.tolist():
+        near = (np.linalg.norm(tips[at:] - path.tip[row], axis=1) < 2e-3) & (angle(axes[at:], path.axis[row][None]) < 5e-5)
+        assert near.any(), f"CL line {path.line[row]} is not met"
+        at += int(np.flatnonzero(near)[0])
+    joined = cut[cut > 0]
+    p, d = path.tip[joined - 1], path.tip[joined] - path.tip[joined - 1]
+    u = np.clip(np.einsum("kmi,mi->km", tips[:, None] - p, d) / np.maximum((d**2).sum(axis=1), 1e-12), 0.0, 1.0)
+    gap = np.linalg.norm(tips[:, None] - p - u[..., None] * d, axis=2)
+    assert gap.min(axis=1).max() < within
+    e0, e1 = path.axis[joined - 1], path.axis[joined]
+    mixed = e0 + u[..., None] * (e1 - e0)
+    mixed /= np.linalg.norm(mixed, axis=2, keepdims=True)
+    off = np.where(gap < within, angle(mixed, axes[:, None]), np.inf)
+    assert off.min(axis=1).max() < axis_within + 5e-4
+
+
+@pytest.mark.parametrize("output", ["axes", "tcp", "tilted", "auto"])
+@pytest.mark.parametrize("name", FOUR)
+def test_indexed_work_is_the_same_by_every_mode(name: str, output: str, tmp_path: Path) -> None:
+    result = made(tmp_path, indexed(), name, output)
+    follows(result)
+    laws = {b.law for b in run(result) if b.code > 0}
+    assert laws == {"tilted" if output == "auto" else output}
+
+
+@pytest.mark.parametrize("output", ["axes", "tcp", "auto"])
+@pytest.mark.parametrize("name", FOUR)
+def test_turning_work_is_the_same_by_every_mode(name: str, output: str, tmp_path: Path) -> None:
+    result = made(tmp_path, turning(), name, output)
+    follows(result)
+    assert {b.law for b in run(result) if b.code > 0} == {"tcp" if output == "auto" else output}
+
+
+@pytest.mark.parametrize("convention", ["ZXZ", "ZYX", "XYZ", "rotary"])
+@pytest.mark.parametrize("name", ["mikron-ucp710", "trunnion-bc"])
+def test_every_convention_of_angles_gives_the_same_part(name: str, convention: str, tmp_path: Path) -> None:
+    mode = TILTED.replace("ZXZ", convention)
+    if convention == "rotary":
+        mode = '[modes.tilted]\nenter = ["G254"]\nleave = ["G255"]\nangles = "rotary"\n'
+    follows(made(tmp_path, indexed(), name, "tilted", mode))
+
+
+def test_coarse_angles_move_the_axis_and_not_the_tip(tmp_path: Path) -> None:
+    """Angles of one decimal: the plane is what is printed, so that the tip stays where it should be."""
+    result = made(tmp_path, indexed(), "fork-head-ab", "tilted", TILTED + "decimals = 1\n")
+    follows(result)
+    for section in result.program.sections:
+        assert all(abs(10 * a - round(10 * a)) < 1e-9 for a in section.angles)
+
+
+@pytest.mark.parametrize(("file", "name", "laws"), [
+    ("five_faces.cls", "mikron-ucp710", {"tilted"}), ("five_tilted.cls", "head-table", {"tilted"}),
+    ("indexed_4axis.cls", "mill-4axis", {"tilted", "tcp"})])
+def test_samples_by_the_rule(file: str, name: str, laws: set[str], tmp_path: Path) -> None:
+    """Standing tools in planes, turning ones by their tip."""
+    path, _ = toolpaths.read(SAMPLES / file)
+    result = convert(path, name, shop(tmp_path))
+    assert {b.law for b in run(result) if b.code > 0} == laws
+
+
+def test_the_golden_five_axis_piece_by_tip(tmp_path: Path) -> None:
+    path, _ = toolpaths.read(GOLDEN / "short_five_axis.apt")
+    follows(convert(path, "head-table", shop(tmp_path)), axis_within=9e-4)
+
+
+# ---- sections ----------------------------------------------------------------------------------------------------
+
+
+def names(result: object, k: int) -> list[str]:
+    return [c.name for c in result.program.commands.get(k, ())]
+
+
+def test_every_pose_is_stated_the_upright_one_too(tmp_path: Path) -> None:
+    program = made(tmp_path, indexed(), "mikron-ucp710").program
+    laws = [s.law for s in program.sections]
+    assert laws == ["axes", "tilted", "axes", "tilted", "axes", "tilted", "axes"]
+    assert program.sections[5].angles[1] == 0.0 and np.allclose(program.sections[5].plane.rotation[:, 2], [0, 0, 1])
+
+
+def test_sections_begin_where_the_commands_enter_them(tmp_path: Path) -> None:
+    program = made(tmp_path, indexed(), "trunnion-bc").program
+    for i, section in enumerate(program.sections):
+        entered = [k for k, group in program.commands.items() for c in group
+                   if c.name == "ENTER_SECTION" and c.args == (float(i),)]
+        assert entered == ([section.first] if section.law != "axes" else [])
+
+
+def test_two_turning_runs_stay_in_the_mode(tmp_path: Path) -> None:
+    """Between them the tool is retracted and indexed in the mode itself."""
+    program = made(tmp_path, [*turning(), *turning()], "mikron-ucp710").program
+    assert [s.law for s in program.sections] == ["axes", "tcp", "axes"]
+
+
+def test_a_tool_change_leaves_the_mode(tmp_path: Path) -> None:
+    result = made(tmp_path, [*turning(), "LOADTL/2", "SPINDL/RPM,900,CLW", *turning()], "mikron-ucp710")
+    assert [s.law for s in result.program.sections] == ["axes", "tcp", "axes", "tcp", "axes"]
+    follows(result)
+
+
+def test_compensation_ends_inside_its_plane(tmp_path: Path) -> None:
+    """The retract is left out where the tool is above the safe plane already: G40 still stands before the mode ends."""
+    axis = FIRST
+    side = np.cross(axis, [0.0, 1.0, 0.0]) / np.linalg.norm(np.cross(axis, [0.0, 1.0, 0.0]))
+    lines = ["RAPID", *rows([30 * axis], axis), "CUTCOM/LEFT,1", *rows([0 * axis, 10 * side], axis), "CUTCOM/OFF",
+             "RAPID", *rows([125 * axis], axis), *indexed()]
+    result = made(tmp_path, lines, "mikron-ucp710")
+    assert "cutcom.tilted" not in codes(result.diagnostics)
+    assert any(b.compensation == "LEFT" and b.law == "tilted" and b.code > 0 for b in run(result))
+    lost = made(tmp_path, lines, "mikron-ucp710", "axes")
+    assert "cutcom.tilted" in codes(lost.diagnostics)
+
+
+# ---- asked for ---------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("name", "output", "more", "word"), [
+    ("mikron-ucp710", "tcp", TILTED, "[modes.tcp]"), ("mikron-ucp710", "tilted", TCP, "[modes.tilted]"),
+    ("mill-3axis", "tilted", TCP + TILTED, "mill-3axis"), ("linuxcnc-lineardelta", "tcp", TCP, "linuxcnc-lineardelta"),
+    ("head-table", "tilted", TILTED + "tables_only = true\n", "rotary head")])
+def test_what_cannot_be_had_is_refused(name: str, output: str, more: str, word: str, tmp_path: Path) -> None:
+    result = made(tmp_path, ["RAPID", "GOTO/0,0,50", "GOTO/0,0,5"], name, output, more)
+    found = [d for d in result.diagnostics if d.code == "output.mode"]
+    assert len(found) == 1 and not result.text
+    assert word in found[0].message and "have: axes" in found[0].hint
+
+
+def test_the_controls_own_kinematics_cannot_be_left() -> None:
+    path = toolpath("RAPID", "GOTO/0,0,50", "GOTO/0,0,5")
+    assert convert(path, "linuxcnc-xyzac-trt", output="tcp").ok
+    assert "output.mode" in codes(convert(path, "linuxcnc-xyzac-trt", output="axes").diagnostics)
+
+
+def test_a_plane_cannot_turn(tmp_path: Path) -> None:
+    result = made(tmp_path, turning(), "mikron-ucp710", "tilted")
+    assert "output.turning" in codes(result.diagnostics) and result.program is None
+
+
+def test_a_controller_without_modes_writes_axis_positions() -> None:
+    result = convert(toolpath(*indexed()), "mikron-ucp710", "generic-iso")
+    assert result.ok and [s.law for s in result.program.sections] == ["axes"]
+
+
+# ---- angles ------------------------------------------------------------------------------------------------------
+
+
+def test_angles_of_known_frames() -> None:
+    """C 30 then A 40 on a table: the frame is Rz(30) Rx(40), Euler angles 30, 40, 0; fixed angles by hand."""
+    c, s = np.cos(np.radians([30, 40])), np.sin(np.radians([30, 40]))
+    frame = np.array([[c[0], -s[0], 0], [s[0], c[0], 0], [0, 0, 1.0]]) @ np.array(
+        [[1.0, 0, 0], [0, c[1], -s[1]], [0, s[1], c[1]]])
+    assert np.allclose(angles_of("ZXZ", frame), (30, 40, 0), atol=1e-12)
+    assert np.allclose(angles_of("ZYX", frame), (30, 0, 40), atol=1e-12)
+    assert stated("rotary", frame, (1.0, 2.0), 3)[0] == (1.0, 2.0)
+
+
+@pytest.mark.parametrize("convention", ["ZXZ", "ZYX", "XYZ"])
+def test_angles_name_the_rotation_again(convention: str) -> None:
+    rng = np.random.default_rng(5)
+    for k in range(300):
+        angles = tuple(rng.uniform(-180, 180, 3))
+        if k % 3 == 0:
+            angles = (angles[0], float(rng.choice([0.0, 90.0, -90.0, 180.0])), angles[2])
+        frame = rotation_of(convention, angles)
+        assert np.abs(frame @ frame.T - np.eye(3)).max() < 1e-12 and np.linalg.det(frame) > 0
+        assert np.abs(rotation_of(convention, angles_of(convention, frame)) - frame).max() < 1e-9
