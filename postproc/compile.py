@@ -11,7 +11,7 @@ from postproc.canned import holes_of, not_native
 from postproc.commands import Commands, commands_of
 from postproc.control import Control
 from postproc.controllers.model import ControllerFile
-from postproc.feed import Feeds, plan_feeds
+from postproc.feed import Feeds, Planned, plan_feeds
 from postproc.moves import Moves
 from postproc.path import ARC, Path
 from postproc.program import Command, Hole, Program
@@ -25,13 +25,14 @@ from toolpaths.toolpath import Toolpath
 
 def compile_program(toolpath: Toolpath, moves: Moves, path: Path, control: Control, controller: ControllerFile,
                     kinematics: Callable[[int], Kinematics], lengths: Callable[[int], float],
-                    feed_mode: str) -> tuple[Program, Feeds, list[Diagnostic]]:
-    """The canonical program of a path; `lengths` gives the gauge length of the tool of an index."""
+                    feed_mode: str, planned: Planned | None = None) -> tuple[Program, Feeds, list[Diagnostic]]:
+    """The canonical program of a path; `lengths` gives the gauge length of the tool of an index, `planned` the feeds
+    that the plan allows."""
     places = decimals(control, controller)
     words = word_rows(path, moves, control, kinematics, lengths, places)
     native, holes = holes_of(toolpath, moves, path, words, control, controller)
     feeds = plan_feeds(path, control, words.end - words.start, moves.feed[path.move],
-                       toolpath.pass_[moves.row[path.move]], native, feed_mode, controller.feed)
+                       toolpath.pass_[moves.row[path.move]], native, feed_mode, controller.feed, planned)
     commands, diagnostics = commands_of(toolpath, moves, path, controller, native)
     keep = words.write.any(axis=1) | (path.code == ARC)
     new = np.concatenate([[0], np.cumsum(keep)])

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from postproc.control import Control
 from postproc.controllers.model import Feed as FeedRules
+from postproc.merged_feeds import merged
 from postproc.path import ARC, Path
 from postproc.program import INVERSE, PER_MINUTE
 from postproc.word_arcs import PLANE_COLUMNS
@@ -24,8 +25,16 @@ class Feeds:
     slowed: Bools
 
 
+@dataclass(frozen=True)
+class Planned:
+    """Least seconds (K,) of each block that keep the limits of the axes, and the part by which feeds may be merged."""
+
+    needed: Floats
+    merge: float = 0.0
+
+
 def plan_feeds(path: Path, control: Control, step: Floats, asked: Floats, passes: Ints, native: Bools,
-               feed_mode: str, rules: FeedRules) -> Feeds:
+               feed_mode: str, rules: FeedRules, planned: Planned | None = None) -> Feeds:
     """Feed words for the blocks of a path.
 
     Args:
@@ -34,9 +43,17 @@ def plan_feeds(path: Path, control: Control, step: Floats, asked: Floats, passes
         native (K,): blocks of canned cycles, which need a feed per minute
         feed_mode: "auto", "per-minute" or "inverse-time"
         rules: of the controller
+        planned: feeds that keep acceleration and jerk, too; velocities only without it
     """
     mode = _modes(path, control, step, passes, native, feed_mode, rules)
-    return feed_words(path, control, step, asked, least_seconds(path, control, asked), mode, rules)
+    needed = least_seconds(path, control, asked)
+    if planned is None:
+        return feed_words(path, control, step, asked, needed, mode, rules)
+    feeds = feed_words(path, control, step, asked, np.fmax(needed, planned.needed), mode, rules)
+    open_to_it = (feeds.mode == PER_MINUTE) & (path.code != 0) & ~native & (feeds.feed > 0.0)
+    feed = merged(feeds.feed, open_to_it, passes, planned.merge)
+    factor = np.where(open_to_it, feeds.feed / np.where(open_to_it, feed, 1.0), 1.0)
+    return replace(feeds, feed=feed, seconds=feeds.seconds * factor, slowed=feeds.slowed | (factor > 1.0 + 1e-9))
 
 
 def least_seconds(path: Path, control: Control, asked: Floats) -> Floats:

@@ -7,6 +7,7 @@ from typing import Literal
 
 FeedMode = Literal["auto", "per-minute", "inverse-time"]
 OutputMode = Literal["auto", "axes", "tcp", "tilted"]
+FeedSource = Literal["programmed", "planned"]
 
 
 @dataclass(frozen=True)
@@ -21,6 +22,10 @@ class Options:
     dialect: str = ""
     allow_unknown: tuple[str, ...] = ()
     output: OutputMode = "auto"
+    feed: FeedSource = "programmed"
+    merge_feeds: float = 0.0
+    """part by which a planned feed may be lowered so that neighbouring blocks share one"""
+    smooth: bool = False
 
     def header(self) -> list[str]:
         """The options as comment lines of an output file."""
@@ -28,6 +33,10 @@ class Options:
                  f"feed mode {self.feed_mode}"]
         if self.output != "auto":
             lines.append(f"output mode {self.output}")
+        if self.feed != "programmed":
+            lines.append(f"feed {self.feed}, merged within {100.0 * self.merge_feeds:g} %")
+        if self.smooth:
+            lines.append("points smoothed")
         for name in ("setup", "units", "dialect"):
             if getattr(self, name):
                 lines.append(f"{name} {getattr(self, name)}")

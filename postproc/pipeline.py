@@ -15,24 +15,31 @@ from postproc import VERSION
 from postproc.compile import compile_program
 from postproc.controllers import writer_for
 from postproc.controllers.model import ControllerFile, load_controller
-from postproc.feed import Feeds
+from postproc.feed import Feeds, Planned
 from postproc.job import Job, prepare
+from postproc.moves import Moves
 from postproc.options import Options
+from postproc.pass_geometry import stops_of
 from postproc.path import Path, build_path
+from postproc.planned import PlannedMotion, planned_motion
 from postproc.program import Program
 from postproc.reach import check_reach
 from postproc.readback.compare import Comparison
 from postproc.readback.verify import read_back
 from postproc.rounding import decimals, rounding_bound, rounding_problem
 from postproc.setup import SetupFile, load_setup
+from postproc.smoothed_moves import smoothed_moves
 from postproc.travel import check_travel
 from toolpaths.diagnostics import Diagnostic, DiagnosticError, error, has_errors
+from toolpaths.smoothing.smooth import Tolerance
 from toolpaths.toolpath import Toolpath
 from toolpaths.units import DEG
 
 Progress = Callable[[str, int, int], None]
 MARGIN = 0.85
 """of what is left for linearising: deviations are looked at in samples, the read-back looks at others"""
+POINTS = 0.5
+"""of the share for linearising that --smooth may move points by"""
 
 
 @dataclass(frozen=True)
@@ -51,6 +58,7 @@ class PostResult:
     path: Path | None = None
     program: Program | None = None
     feeds: Feeds | None = None
+    motion: PlannedMotion | None = None
     comparison: Comparison | None = None
     extents: dict[str, tuple[float, float]] | None = None
     shares: dict[str, float] | None = None
@@ -112,7 +120,8 @@ def _stages(result: PostResult, progress: Progress | None) -> PostResult:
     result = _with(result, found, shares=shares)
     if not result.ok:
         return result
-    path, found = build_path(job.modes, job.kinematics, job.moves, job.space, job.home_rows(), job.operation,
+    moves = written_moves(job, shares)
+    path, found = build_path(job.modes, job.kinematics, moves, job.space, job.home_rows(), job.operation,
                              shares["linearising"], shares["axis_linearising"] * DEG, file, progress)
     result = _with(result, found, path=path)
     if path is None:
@@ -121,8 +130,13 @@ def _stages(result: PostResult, progress: Progress | None) -> PostResult:
     result = _with(result, [*found, *check_reach(path, job.moves, job.control, file)], extents=extents)
     if not result.ok:
         return result
-    program, feeds, found = compile_program(toolpath, job.moves, path, job.control, result.controller,
-                                            job.kinematics, job.gauge_length, options.feed_mode)
+    motion, found = plan_motion(job, moves, path)
+    result = _with(result, found, motion=motion)
+    if not result.ok:
+        return result
+    planned = None if motion is None else Planned(motion.needed, options.merge_feeds)
+    program, feeds, found = compile_program(toolpath, moves, path, job.control, result.controller, job.kinematics,
+                                            job.gauge_length, options.feed_mode, planned)
     result = _with(result, found, program=program, feeds=feeds)
     if not result.ok:
         return result
@@ -152,11 +166,32 @@ def tolerance_shares(job: Job) -> tuple[dict[str, float], list[Diagnostic]]:
               "rounding": bound.tip, "axis_rounding": bound.axis / DEG,
               "linearising": MARGIN * (tolerance - smoothing - bound.tip),
               "axis_linearising": MARGIN * (axis - axis_smoothing - bound.axis / DEG)}
+    if job.options.smooth:
+        for name in ("linearising", "axis_linearising"):
+            shares[name.replace("linearising", "points")] = POINTS * shares[name]
+            shares[name] *= 1.0 - POINTS
     if smoothing >= tolerance:
         return shares, [error("tolerance.smoothing", f"the control's own smoothing takes {smoothing:g} mm, the tolerance is "
                               f"{tolerance:g} mm", hint="a wider --tolerance, or a smaller kinematics.smoothing_fixed in "
                               "the controller file")]
     return shares, rounding_problem(bound, tolerance - smoothing, job.axis_tolerance - axis_smoothing * DEG)
+
+
+def written_moves(job: Job, shares: dict[str, float]) -> Moves:
+    """The moves that are written: those of the CL file, with --smooth moved within their share of the tolerance."""
+    if not job.options.smooth:
+        return job.moves
+    return smoothed_moves(job.moves, Tolerance(shares["points"], shares["axis_points"] * DEG),
+                          stops_of(job.toolpath, job.moves))
+
+
+def plan_motion(job: Job, moves: Moves, path: Path) -> tuple[PlannedMotion | None, list[Diagnostic]]:
+    """What the passes allow under the limits of the axes, with --feed planned."""
+    if job.options.feed != "planned":
+        return None, []
+    return planned_motion(path, moves, job.kinematics, job.machine.limits, job.machine.axis_names,
+                          Tolerance(job.options.tolerance, job.axis_tolerance), stops_of(job.toolpath, moves),
+                          job.toolpath.file)
 
 
 def write_text(result: PostResult) -> str:
