@@ -21,7 +21,7 @@ from postproc.moves import Moves
 from postproc.options import Options
 from postproc.pass_geometry import stops_of
 from postproc.path import Path, build_path
-from postproc.planned import PlannedMotion, planned_motion
+from postproc.planned import PlannedMotion, Source, planned_motion
 from postproc.program import Program
 from postproc.reach import check_reach
 from postproc.readback.compare import Comparison
@@ -189,9 +189,9 @@ def plan_motion(job: Job, moves: Moves, path: Path) -> tuple[PlannedMotion | Non
     """What the passes allow under the limits of the axes, with --feed planned."""
     if job.options.feed != "planned":
         return None, []
-    return planned_motion(path, moves, job.kinematics, job.machine.limits, job.machine.axis_names,
-                          Tolerance(job.options.tolerance, job.axis_tolerance), stops_of(job.toolpath, moves),
-                          job.toolpath.file)
+    return planned_motion(Source(path, moves, job.machine, job.kinematics,
+                                 Tolerance(job.options.tolerance, job.axis_tolerance), stops_of(job.toolpath, moves),
+                                 job.toolpath.file))
 
 
 def write_text(result: PostResult) -> str:

@@ -10,7 +10,7 @@ from operator import add
 import numpy as np
 
 from machines.kinematics.base import Kinematics
-from machines.machine import Limits
+from machines.machine import Limits, Machine
 from postproc.feedrate.limits import JointLimits
 from postproc.feedrate.motion import Plan
 from postproc.feedrate.plan import Options, plan
@@ -21,7 +21,8 @@ from postproc.pass_geometry import PassGeometry, pass_geometry
 from postproc.path import Path
 from postproc.steady_feed import CORNER, steady_seconds
 from toolpaths.arrays import Floats, Ints
-from toolpaths.diagnostics import Diagnostic
+from toolpaths.diagnostics import Diagnostic, require
+from toolpaths.smoothing.blend import SHARPEST
 from toolpaths.smoothing.smooth import Tolerance
 
 ORDERS = ("velocity", "acceleration", "jerk")
@@ -72,21 +73,28 @@ class PlannedMotion:
     """What is planned of a program: its passes, from rest to rest each.
 
     Attributes:
-        passes: in order
-        moves: the moves they belong to; limits: of the joints
+        source: what the passes are made from
         needed (K,): least seconds of each block of the Path at a constant feed that keeps the limits, 0 where none binds
     """
 
-    passes: tuple[PassGeometry, ...]
-    moves: Moves
-    limits: JointLimits
+    source: Source
     needed: Floats
-    axis_names: tuple[str, ...]
+
+    @cached_property
+    def passes(self) -> tuple[PassGeometry, ...]:
+        """The passes with their corners blended; made when they are first asked for.
+
+        Raises:
+            DiagnosticError: where the smoothed path leaves what the machine can reach.
+        """
+        found, diagnostics = self.source.geometry()
+        require(diagnostics)
+        return tuple(found)
 
     @cached_property
     def plans(self) -> tuple[Plan, ...]:
         """One for each pass; made when they are first asked for."""
-        return tuple(plan_pass(one, self.moves, self.limits) for one in self.passes)
+        return tuple(plan_pass(one, self.source.moves, self.source.bounds) for one in self.passes)
 
     @property
     def seconds(self) -> float:
@@ -108,23 +116,40 @@ class PlannedMotion:
         if shares is None:
             return {}
         return {name: {f"{order}_s": float(shares.limits[k, j]) for k, order in enumerate(ORDERS)}
-                for j, name in enumerate(self.axis_names)}
+                for j, name in enumerate(self.source.machine.axis_names)}
 
 
-def planned_motion(path: Path, moves: Moves, kinematics: Callable[[int], Kinematics], limits: Limits,
-                   axis_names: tuple[str, ...], tolerance: Tolerance, stops: Ints,
-                   file: str = "") -> tuple[PlannedMotion | None, list[Diagnostic]]:
-    """Geometry of all passes of a path, smoothed within `tolerance`, and the feeds that keep the limits.
+@dataclass(frozen=True)
+class Source:
+    """What passes are made from: blocks, moves, machine, kinematics by tool, tolerance, rows before which it stops."""
+
+    path: Path
+    moves: Moves
+    machine: Machine
+    kinematics: Callable[[int], Kinematics]
+    tolerance: Tolerance
+    stops: Ints
+    file: str = ""
+
+    @property
+    def bounds(self) -> JointLimits:
+        """Limits of the joints."""
+        return joint_limits(self.machine.limits)
+
+    def geometry(self, sharpest: float = SHARPEST) -> tuple[list[PassGeometry], list[Diagnostic]]:
+        """See `pass_geometry`."""
+        return pass_geometry(self.path, self.moves, self.kinematics, self.tolerance, self.stops, sharpest, self.file)
+
+
+def planned_motion(source: Source) -> tuple[PlannedMotion | None, list[Diagnostic]]:
+    """Feeds of blocks that keep the limits, and the planned motion when it is asked for.
 
     Feeds of blocks are for motion that stops at corners; the planned motion blends them (see `steady_feed`).
     """
-    bounds = joint_limits(limits)
-    blended, diagnostics = pass_geometry(path, moves, kinematics, tolerance, stops, file=file)
-    stopping, more = pass_geometry(path, moves, kinematics, tolerance, stops, CORNER, file)
-    if diagnostics or more:
-        return None, diagnostics or more
-    needed = steady_seconds(stopping, bounds, len(path))
-    return PlannedMotion(tuple(blended), moves, bounds, needed, axis_names), []
+    stopping, diagnostics = source.geometry(CORNER)
+    if diagnostics:
+        return None, diagnostics
+    return PlannedMotion(source, steady_seconds(stopping, source.bounds, len(source.path))), []
 
 
 def plan_pass(one: PassGeometry, moves: Moves, limits: JointLimits, options: Options | None = None) -> Plan:

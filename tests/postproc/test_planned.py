@@ -12,7 +12,7 @@ from postproc.feedrate.limits import JointLimits
 from postproc.feedrate.plan import Options
 from postproc.pass_geometry import PassGeometry, chains, pass_geometry, stops_of
 from postproc.pipeline import PostResult
-from postproc.planned import PlannedMotion, joint_limits, plan_pass, planned_motion
+from postproc.planned import PlannedMotion, Source, joint_limits, plan_pass, planned_motion
 from postproc.setup import load_setup
 from postproc.steady_feed import CORNER, steady_speed
 from tests.postproc.kit import SAMPLES, convert, good, goto, machine, toolpath
@@ -58,8 +58,8 @@ def geometry(result: PostResult, sharpest: float = 2.4) -> list[PassGeometry]:
 def motion(result: PostResult) -> PlannedMotion:
     assert result.job is not None and result.path is not None
     job = result.job
-    made, diagnostics = planned_motion(result.path, job.moves, job.kinematics, job.machine.limits, job.machine.axis_names,
-                                       TOLERANCE, stops_of(job.toolpath, job.moves))
+    made, diagnostics = planned_motion(Source(result.path, job.moves, job.machine, job.kinematics, TOLERANCE,
+                                              stops_of(job.toolpath, job.moves)))
     assert made is not None and not diagnostics
     return made
 
