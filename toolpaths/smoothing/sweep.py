@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from functools import cache
 from typing import Any, NamedTuple, cast
@@ -24,7 +25,7 @@ COMPILE = 30_000
 
 
 class Data(NamedTuple):
-    """N places: parameter, value (N, 6), first knot and first coefficient of the six basis functions."""
+    """N places: parameter, value (N, 6), knot of the span and first coefficient of its six basis functions, rising."""
 
     s: Floats
     p: Floats
@@ -56,12 +57,14 @@ def sweep(t: Floats, data: Data, c: Floats, weight: Floats, tolerance: float, ra
         off = off + values[j][:, None] * c[data.first + j]
     ratio[:] = np.sqrt(np.maximum((off[:, :3] ** 2).sum(axis=1), (off[:, 3:] ** 2).sum(axis=1))) / tolerance
     weight[:] = np.where(ratio > AIM, np.minimum(weight * (ratio / AIM) ** 2, STRONGEST), weight)
+    start = np.flatnonzero(np.diff(data.first, prepend=-1))
+    first, part = data.first[start], weight * values
+    squares = np.add.reduceat(part[:, None] * values, start, axis=2)
+    right = np.add.reduceat(part[:, None] * data.p.T, start, axis=2)
     for i in range(ORDER):
-        part = weight * values[i]
+        normal.right[first + i] += right[i].T
         for j in range(i, ORDER):
-            normal.bands[j - i] += np.bincount(data.first + i, part * values[j], minlength=len(c))
-        for column in range(WIDTH):
-            normal.right[:, column] += np.bincount(data.first + i, part * data.p[:, column], minlength=len(c))
+            normal.bands[j - i, first + i] += squares[i, j]
 
 
 def _loop(t: Floats, s: Floats, p: Floats, k: Ints, first: Ints, c: Floats, weight: Floats, tolerance: float,
@@ -120,5 +123,5 @@ def compiled_sweep(t: Floats, data: Data, c: Floats, weight: Floats, tolerance: 
 
 
 def sweep_for(count: int) -> Callable[..., None]:
-    """The one that is sooner done with so many places."""
-    return compiled_sweep if count >= COMPILE else sweep
+    """The one that is sooner done with so many places; a compiler that is loaded already is used."""
+    return compiled_sweep if count >= COMPILE or "numba" in sys.modules else sweep
