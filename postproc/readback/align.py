@@ -113,7 +113,7 @@ def _walk(tip: Any, axis: Any, swept: Any, start: Any, end: Any, axis0: Any, axi
                 before = start[i] if k == j + 1 else tip[k - 1]
                 step = swept[k] if swept[k] > 0.0 else _turned(before, tip[k], center[i], normal[i])
                 angle += step
-                slack = 2.0 * tol / max(_apart(start[i], center[i]), tol)
+                slack = max(0.5 * tol, grain) / max(_apart(start[i], center[i]), tol)
                 done = angle >= sweep[i] - slack and _angle(axis[k], axis1[i]) <= 2.0 * axis_tol
             else:
                 done = _line_done(tip[k], axis[k], start[i], end[i], axis0[i], axis1[i], tol, axis_tol)

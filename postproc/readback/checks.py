@@ -10,6 +10,7 @@ from postproc.holes import PECKING, Phase
 from postproc.job import Job
 from postproc.links import SafeSpace
 from postproc.moves import Moves
+from postproc.readback.dialects import reader_for
 from postproc.readback.execute import Motion
 from postproc.readback.faults import Faults
 from postproc.readback.poses import Executed, arc_sweeps, coordinates
@@ -63,7 +64,7 @@ def _above_drilled(motion: Motion, moves: Moves, rows: Ints, m: Ints, tip: Float
 
 
 def check_holes(motion: Motion, job: Job, moves: Moves, tip: Floats, owner: Ints, faults: Faults) -> list[Diagnostic]:
-    """Pecks no deeper than the CL file's, and its dwell at the bottom, hole by hole."""
+    """Pecks no deeper into the part than the CL file's, and its dwell at the bottom, hole by hole."""
     drill = (owner < len(moves)) & (moves.phase[np.minimum(owner, len(moves) - 1)] == Phase.DRILL)
     rows = np.flatnonzero(drill)
     if not len(rows):
@@ -80,7 +81,7 @@ def check_holes(motion: Motion, job: Job, moves: Moves, tip: Floats, owner: Ints
             depth = (moves.tip[m[at]] - tip[part]) @ moves.axis[m[at]]
             total, feeding = cycle.depth + cycle.clearance, motion.code[part] > 0
             pecks = feeding & ~np.append(feeding[1:], False)
-            deepest = np.maximum.accumulate(np.concatenate([[-total], depth[pecks]]))
+            deepest = np.maximum.accumulate(np.concatenate([[-cycle.depth], depth[pecks]]))
             out = int((~feeding & (depth <= 0.01 - total)).sum())
             if np.diff(deepest).max(initial=0.0) > max(cycle.steps) + 0.01:
                 bad_peck.append(part[0])
@@ -111,7 +112,10 @@ def check_states(motion: Motion, job: Job, moves: Moves, owner: Ints, faults: Fa
     side, tilted = compensation_states(job.toolpath)[row], np.abs(moves.axis[owner[rows], 2]) < 1.0 - 1e-9
     same_speed = (np.abs(motion.rpm[rows] - rpm) <= 0.5) | np.isnan(rpm) | (direction == 0)
     given = motion.compensation[rows]
-    code = np.full(len(rows), float(job.setup.work_offset_code[1:]))
+    offset = reader_for(job.controller, job.machine.axis_names).offset_of(
+        job.controller.program.work_offsets.get(job.setup.work_offset_code, job.setup.work_offset_code))
+    code = np.full(len(rows), offset)
+    dropped = tilted & (given == 40) & (motion.frame[rows] == 0)
 
     def number(value: float) -> str:
         return f"{value:g}" if np.isfinite(value) and value >= 0 else "none"
@@ -123,7 +127,7 @@ def check_states(motion: Motion, job: Job, moves: Moves, owner: Ints, faults: Fa
             ("coolant", coolant == cooled, coolant, cooled, lambda on: "on" if on else "off"),
             ("length register", (motion.register[rows] == register) | ~job.control.length_on_z, motion.register[rows],
              register, number),
-            ("cutter compensation", (given == side) | (tilted & (given == 40)), given, side, _COMPENSATION.__getitem__),
+            ("cutter compensation", (given == side) | dropped, given, side, _COMPENSATION.__getitem__),
             ("work offset", motion.offset[rows] == code, motion.offset[rows], code,
              lambda g: f"G{g:g}" if np.isfinite(g) else "not stated")):
         bad = np.flatnonzero(~np.asarray(good))
@@ -160,7 +164,8 @@ def check_smoothing(motion: Motion, job: Job, moves: Moves, owner: Ints, faults:
     """The control's own smoothing while cutting: stated where the controller has it, and inside its share."""
     if not job.controller.program.path_tolerance:
         return []
-    share = job.controller.kinematics.smoothing_share * job.options.tolerance
+    rules = job.controller.kinematics
+    share = rules.smoothing_share * job.options.tolerance if rules.smoothing_fixed is None else rules.smoothing_fixed
     rows = np.flatnonzero((owner < len(moves)) & (motion.code > 0))
     bad = rows[~(motion.blend[rows] <= share * (1.0 + 1e-6))]
     if not len(bad):

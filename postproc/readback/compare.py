@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from postproc.job import Job
-from postproc.moves import Moves
+from postproc.moves import Moves, Phase
 from postproc.readback.align import align, unreached
 from postproc.readback.checks import (
     check_holes,
@@ -62,7 +62,7 @@ def compare(motion: Motion, job: Job, executed: Executed, gcode: str = "") -> Co
     lost = unreached(match)
     diagnostics = [] if lost < 0 else [_not_reached(motion, moves, match, lost, faults)]
     rows = np.flatnonzero((owner < len(moves)) & ~moves.link[np.minimum(owner, len(moves) - 1)])
-    tip_off, axis_off = _deviations(motion, executed, curves, rows, owner)
+    tip_off, axis_off = _deviations(motion, executed, moves, curves, rows, owner)
     done = np.flatnonzero(match >= 0)
     visit = np.linalg.norm(tip[match[done]] - moves.tip[done], axis=1)
     tilt = angle_between(axis[match[done]], moves.axis[done])
@@ -89,13 +89,23 @@ def _not_reached(motion: Motion, moves: Moves, match: Ints, lost: int, faults: F
                         "the program is not made from this CL file with this machine, set-up and tools")
 
 
-def _deviations(motion: Motion, executed: Executed, curves: Curves, rows: Ints,
+def _off_level(curve: Curves, tip: Floats) -> Floats:
+    """How far (K,) mm tips are above or below the stretch between the ends of curves, along the tool's axis."""
+    height, first, last = ((p * curve.axis1).sum(axis=1) for p in (tip, curve.start, curve.end))
+    return np.asarray(np.maximum(np.maximum(np.minimum(first, last) - height, height - np.maximum(first, last)), 0.0))
+
+
+def _deviations(motion: Motion, executed: Executed, moves: Moves, curves: Curves, rows: Ints,
                 owner: Ints) -> tuple[Floats, Floats]:
-    """Worst (tip, axis) deviation (K,) over samples of each block from the curve of its move."""
+    """Worst (tip, axis) deviation (K,) over samples of each block from the curve of its move.
+
+    Where rapids are dog-legs, those from hole to hole only keep their height.
+    """
     tip_off, axis_off = np.zeros(len(rows)), np.zeros(len(rows))
     if not len(rows):
         return tip_off, axis_off
     first, blocks = _place(rows, owner)
+    level = (moves.phase[owner[rows]] == Phase.POSITION) & executed.bent(motion, rows)
     for at in range(0, len(rows), CHUNK):
         part = slice(at, at + CHUNK)
         curve = curves.take(owner[rows[part]])
@@ -103,6 +113,7 @@ def _deviations(motion: Motion, executed: Executed, curves: Curves, rows: Ints,
             tip, axis = executed.poses(motion, rows[part], t)
             guess = _turned_so_far(curve, axis, np.minimum((first[part] + t) / blocks[part], 1.0))
             d, e, _ = curve.deviation(tip, axis, guess)
+            d = np.where(level[part], _off_level(curve, tip), d)
             tip_off[part] = np.fmax(tip_off[part], np.nan_to_num(d, nan=np.inf))
             axis_off[part] = np.fmax(axis_off[part], np.nan_to_num(e, nan=np.inf))
     return tip_off, axis_off

@@ -55,6 +55,10 @@ class Executed:
             q[k] = self._held(position[k], self.lengths.get(h, 0.0) if h >= 0 else 0.0)
         return q
 
+    def bent(self, motion: Motion, rows: Ints) -> Bools:
+        """(K,) True for rapids that are dog-legs."""
+        return _bent(motion, self.control, rows)
+
     def times(self, motion: Motion, rows: Ints) -> list[float | Floats]:
         """Fractions at which blocks are looked at: SAMPLES, and the corners of dog-legs, (K,) each."""
         if self.control.rapids != "dog-leg":

@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 
 from postproc.controllers.model import ControllerFile
-from postproc.readback.canonical import Canonical, Text
+from postproc.readback.canonical import Canonical, Text, offset_number
 from postproc.readback.flow import Structure, expand
 from postproc.readback.modal import GROUPS, Groups, check_codes, check_end, drop_passive
 from postproc.readback.words import Words
@@ -45,6 +45,10 @@ class Reader(ABC):
     @abstractmethod
     def canonical(self, text: Text, line: Ints, file: str) -> tuple[Canonical, list[Diagnostic]]:
         """Canonical words of blocks that stand in running order."""
+
+    def offset_of(self, text: str) -> float:
+        """The number of a work offset as the controller writes it."""
+        return offset_number(text)
 
     def behind_end(self, structure: Structure) -> tuple[tuple[int, int], ...]:
         """Lines that may stand behind the end of the program: those of subprograms."""

@@ -122,6 +122,10 @@ class KlartextReader(Reader):
         subprograms = {k: v for k, v in subprograms.items() if v != (1, text.words.lines) or calls or k.startswith("PGM")}
         return Structure((1, text.words.lines), subprograms, calls), found + _frame(here, file, text.words.lines)
 
+    def offset_of(self, text: str) -> float:
+        """Number of the preset that CYCL DEF 247 takes."""
+        return float(dict(_QWORD.findall(text)).get("339", "nan"))
+
     def behind_end(self, structure: Structure) -> tuple[tuple[int, int], ...]:
         """Lines that may stand behind the end: those of labels."""
         ends = tuple((b, b) for b in self.ends)

@@ -269,7 +269,7 @@ class _Run:
             return
         mode = int(s.number(3, 0.0))
         if s.number(0, 0.0) != 0.0 or s.number(2, 0.0) != 0.0 or mode >> 6:
-            self.fault("gcode.mode", b, "CYCLE800 with a retraction, an added plane, or angles other than turns axis by axis",
+            self.fault("gcode.mode", b, "CYCLE800 that retracts, adds to a plane, or turns otherwise than axis by axis",
                        "_FR 0, _ST 0, _MODE 57")
             return
         axes = [_SEQUENCE.get(mode >> shift & 3, "") for shift in (0, 2, 4)]
