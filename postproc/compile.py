@@ -25,11 +25,12 @@ from toolpaths.toolpath import Toolpath
 
 def compile_program(toolpath: Toolpath, moves: Moves, path: Path, control: Control, controller: ControllerFile,
                     kinematics: Callable[[int], Kinematics], lengths: Callable[[int], float],
-                    feed_mode: str, planned: Planned | None = None) -> tuple[Program, Feeds, list[Diagnostic]]:
+                    feed_mode: str, planned: Planned | None = None,
+                    made_up: bool = False) -> tuple[Program, Feeds, list[Diagnostic]]:
     """The canonical program of a path; `lengths` gives the gauge length of the tool of an index, `planned` the feeds
-    that the plan allows."""
+    that the plan allows, `made_up` as in `Rounding`."""
     places = decimals(control, controller)
-    words = word_rows(path, moves, control, kinematics, lengths, places)
+    words = word_rows(path, moves, control, kinematics, lengths, places, made_up)
     native, holes = holes_of(toolpath, moves, path, words, control, controller)
     feeds = plan_feeds(path, control, words.end - words.start, moves.feed[path.move],
                        toolpath.pass_[moves.row[path.move]], native, feed_mode, controller.feed, planned)

@@ -91,6 +91,7 @@ def feed_words(path: Path, control: Control, step: Floats, asked: Floats, needed
         per_minute = 60.0 * length / seconds
         inverse = 60.0 / seconds
         rate = np.nan_to_num(inverse * length)
+        by_radius = inverse * length / _radius(path) if arc.any() and rules.arc_inverse == "radius" else inverse
     same = cutting & ~slowed & np.isfinite(asked) & (turned == 0.0)
     for law, k in path.by_control():
         same[k] &= law.tips_straight
@@ -100,8 +101,7 @@ def feed_words(path: Path, control: Control, step: Floats, asked: Floats, needed
     per_minute = np.where(same, 60.0 * asked, per_minute)
     if rules.least_inverse_rate > 0.0:
         mode = np.where((mode == INVERSE) & (length > 0.0) & (rate < rules.least_inverse_rate), PER_MINUTE, mode)
-    if arc.any() and rules.arc_inverse == "radius":
-        inverse = np.where(arc, inverse * length / _radius(path), inverse)
+    inverse = np.where(arc, by_radius, inverse)
     feed = np.where(cutting, np.where(mode == INVERSE, inverse, per_minute), np.nan)
     return Feeds(feed, mode.astype(np.int8), np.where(cutting, seconds, np.nan), slowed)
 

@@ -18,7 +18,7 @@ from postproc.moves import Moves, build_moves
 from postproc.options import Options
 from postproc.pivots import control_kinematics
 from postproc.records import plain_records
-from postproc.rounding import decimals
+from postproc.rounding import Rounding, decimals, rounding_bound
 from postproc.setup import Placement, SetupFile, part_placement, work_frame
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error, has_errors, info, warning
@@ -85,6 +85,12 @@ class Job:
                                 + [c.index for c in tool_changes(self.toolpath)])
         restart = self.operation_starts() if self.setup.output.restart else []
         return frozenset({0, *first.tolist(), *restart})
+
+    @cached_property
+    def rounding(self) -> Rounding:
+        """What the rounding of the words may cost."""
+        return rounding_bound(self.control, self.kinematics(int(self.moves.tool[0])), self.moves,
+                              decimals(self.control, self.controller), self.modes.cutting_laws(), self.options.tolerance)
 
     @cached_property
     def operation(self) -> Ints:

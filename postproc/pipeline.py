@@ -26,7 +26,7 @@ from postproc.program import Program
 from postproc.reach import check_reach
 from postproc.readback.compare import Comparison
 from postproc.readback.verify import read_back
-from postproc.rounding import decimals, rounding_bound, rounding_problem
+from postproc.rounding import rounding_problem
 from postproc.setup import SetupFile, load_setup
 from postproc.smoothed_moves import smoothed_moves
 from postproc.travel import check_travel
@@ -136,7 +136,7 @@ def _stages(result: PostResult, progress: Progress | None) -> PostResult:
         return result
     planned = None if motion is None else Planned(motion.needed, options.merge_feeds)
     program, feeds, found = compile_program(toolpath, moves, path, job.control, result.controller, job.kinematics,
-                                            job.gauge_length, options.feed_mode, planned)
+                                            job.gauge_length, options.feed_mode, planned, job.rounding.made_up)
     result = _with(result, found, program=program, feeds=feeds)
     if not result.ok:
         return result
@@ -156,8 +156,7 @@ def _with(result: PostResult, diagnostics: list[Diagnostic], **values: object) -
 def tolerance_shares(job: Job) -> tuple[dict[str, float], list[Diagnostic]]:
     """Where the tolerance goes (mm; axis_ in degrees): what the control's smoothing and rounding leave is linearising."""
     tolerance, axis = job.options.tolerance, job.options.axis_tolerance
-    bound = rounding_bound(job.control, job.kinematics(int(job.moves.tool[0])), job.moves,
-                           decimals(job.control, job.controller), job.modes.cutting_laws())
+    bound = job.rounding
     kinematics = job.controller.kinematics
     fixed = kinematics.smoothing_fixed
     smoothing = kinematics.smoothing_share * tolerance if fixed is None else fixed

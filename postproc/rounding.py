@@ -15,13 +15,21 @@ from toolpaths.arrays import Ints
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.units import DEG
 
+LEVER = 0.1
+"""share of the tip tolerance above which the slides make up for what rounded rotary words do to the tip"""
+
 
 @dataclass(frozen=True)
 class Rounding:
-    """Largest deviation that the rounding of words can make: tip in mm, axis in rad."""
+    """Largest deviation that the rounding of words can make: tip in mm, axis in rad.
+
+    `made_up` is True where axis positions of the slides are those for the rounded rotary words, so that these move the
+    tip no more.
+    """
 
     tip: float
     axis: float
+    made_up: bool = False
 
 
 def decimals(control: Control, controller: ControllerFile) -> Ints:
@@ -31,7 +39,7 @@ def decimals(control: Control, controller: ControllerFile) -> Ints:
 
 
 def rounding_bound(control: Control, kin: Kinematics, moves: Moves, places: Ints,
-                   laws: Collection[Law]) -> Rounding:
+                   laws: Collection[Law], tolerance: float) -> Rounding:
     """Worst case of half a last decimal in every word, to first order (Jacobian), at up to 500 of the poses.
 
     `laws` are those that the words may have. Where X, Y, Z are the tip, rotary words turn the tool about it.
@@ -49,7 +57,10 @@ def rounding_bound(control: Control, kin: Kinematics, moves: Moves, places: Ints
     slides, rotary = control.slides, control.rotary
     tip = np.linalg.norm(jacobian[:, :3], axis=1)
     linear = np.linalg.norm(tip[:, slides] * step[slides], axis=1)
-    return Rounding(float((linear + tip[:, rotary] @ step[rotary]).max()), float(axis.max()))
+    lever = tip[:, rotary] @ step[rotary]
+    if kin.slides_affine and lever.max() > LEVER * tolerance:
+        return Rounding(float(linear.max()), float(axis.max()), True)
+    return Rounding(float((linear + lever).max()), float(axis.max()))
 
 
 def rounding_problem(bound: Rounding, tolerance: float, axis_tolerance: float) -> list[Diagnostic]:

@@ -29,14 +29,16 @@ class WordRows:
 
 
 def word_rows(path: Path, moves: Moves, control: Control, kinematics: Callable[[int], Kinematics],
-              lengths: Callable[[int], float], places: Ints) -> WordRows:
-    """The words of all blocks; `lengths` gives the gauge length of the tool of an index, `places` (J,) the decimals."""
+              lengths: Callable[[int], float], places: Ints, made_up: bool = False) -> WordRows:
+    """The words of all blocks; `lengths` gives the gauge length of the tool of an index, `places` (J,) the decimals,
+    `made_up` as in `Rounding`."""
     begins = np.flatnonzero(np.diff(path.frame)) + 1
     tool = _tools(path, moves)
-    exact = _words(path, path.q, np.arange(len(path)), tool, kinematics, lengths)
+    rounds = places if made_up else None
+    exact = _words(path, path.q, np.arange(len(path)), tool, kinematics, lengths, rounds)
     end = _rounded(_snapped(_rounded(exact, places), path, control, places), places)
     start = np.concatenate([end[:1], end[:-1]])
-    start[begins] = _rounded(_words(path, path.q[begins - 1], begins, tool, kinematics, lengths), places)
+    start[begins] = _rounded(_words(path, path.q[begins - 1], begins, tool, kinematics, lengths, rounds), places)
     return WordRows(end, start, _written(end, start, begins, path, control))
 
 
@@ -53,13 +55,28 @@ def _tools(path: Path, moves: Moves) -> Ints:
 
 
 def _words(path: Path, q: Floats, rows: Ints, tool: Ints, kinematics: Callable[[int], Kinematics],
-           lengths: Callable[[int], float]) -> Floats:
-    """Unrounded words of joints q (K, J) under the law and with the tool of the blocks `rows` (K,)."""
+           lengths: Callable[[int], float], rounds: Ints | None) -> Floats:
+    """Unrounded words of joints q (K, J) under the law and with the tool of the blocks `rows` (K,).
+
+    With `rounds` (decimals) rotary words are rounded first where words are axis positions, and the slides are those that
+    then bring the tip to its place.
+    """
     words = np.empty_like(q)
     for k in groups(path.frame[rows], tool[rows]):
         index = int(tool[rows[k[0]]])
-        words[k] = path.frames[int(path.frame[rows[k[0]]])].control.words(q[k], kinematics(index), lengths(index))
+        law, kin = path.frames[int(path.frame[rows[k[0]]])].control, kinematics(index)
+        at = q[k] if rounds is None or law.law != "axes" else _made_up(q[k], law, kin, rounds)
+        words[k] = law.words(at, kin, lengths(index))
     return words
+
+
+def _made_up(q: Floats, law: Control, kin: Kinematics, places: Ints) -> Floats:
+    """Joints with rounded rotary words and the tip of q (K, J)."""
+    turned, rotary = q.copy(), law.rotary
+    turned[:, rotary] = _rounded(q * law.unit, places)[:, rotary] / law.unit[rotary]
+    moved = np.flatnonzero((turned != q).any(axis=1))
+    turned[moved] = law.slides_for(kin, kin.forward(q[moved])[0], turned[moved])
+    return turned
 
 
 def _snapped(words: Floats, path: Path, control: Control, places: Ints) -> Floats:
