@@ -15,7 +15,8 @@ _CLASSES = {"iso": "IsoWriter", "linuxcnc": "LinuxcncWriter", "fanuc": "FanucWri
 
 
 def writer_for(controller: ControllerFile, program: Program, cycles: tuple[Cycle, ...], length_offsets: bool,
-               smoothing: float, work_offset: str = "G54", axis_smoothing: float = 0.0, name: str = "") -> Writer:
+               smoothing: float, work_offset: str = "G54", axis_smoothing: float = 0.0, name: str = "",
+               subprograms: bool = False) -> Writer:
     """The writer that the controller file names.
 
     Args:
@@ -23,9 +24,11 @@ def writer_for(controller: ControllerFile, program: Program, cycles: tuple[Cycle
         smoothing, axis_smoothing: mm and degrees left to the controller's own smoothing
         work_offset: the set-up's code, G54 to G59.3
         name: of the program, where the controller's programs hold one
+        subprograms: each operation becomes a subprogram of the file, where the controller has such
     """
     from importlib import import_module
 
     writer = getattr(import_module(f"postproc.controllers.{controller.writer}"), _CLASSES[controller.writer])
-    made: Writer = writer(controller, program, cycles, length_offsets, smoothing, work_offset, axis_smoothing, name)
+    made: Writer = writer(controller, program, cycles, length_offsets, smoothing, work_offset, axis_smoothing, name,
+                          subprograms)
     return made

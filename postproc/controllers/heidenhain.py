@@ -24,23 +24,16 @@ class KlartextWriter(Writer):
     side, asked = "", "R0"
     called = 0.0
     """spindle speed of the last TOOL CALL, 1/min"""
+    count = -1
 
     def numbered(self, block: str) -> str:
         """The block with its number; comments are blocks too."""
-        self.number += 1
-        return f"{self.number} {block}"
+        self.count += 1
+        return f"{self.count} {block}"
 
-    def lines(self, header: list[str]) -> Iterator[str]:
-        """The blocks of the whole program, numbered from 0."""
-        frame, self.number = self.controller.program, -1
-        for block in frame.begin:
-            yield self.numbered(block.format(name=self.name, number=frame.number))
-        yield from map(self.numbered, map(self.comment, (*header, *self.relies_on())))
-        yield from map(self.numbered, (*self.start(), *self.smoothing_blocks()))
-        yield from map(self.numbered, self.body())
-        yield from map(self.numbered, frame.ending)
-        for block in frame.end:
-            yield self.numbered(block.format(name=self.name, number=frame.number))
+    def framed(self, block: str) -> str:
+        """Blocks of the frame, and comments, are numbered too."""
+        return self.numbered(block)
 
     # ---- motion -------------------------------------------------------------------------------------------------
 

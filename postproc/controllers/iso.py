@@ -8,7 +8,8 @@ from functools import cached_property
 import numpy as np
 
 from postproc.controllers.model import CannedCycle
-from postproc.controllers.writer import Writer, peck_of
+from postproc.controllers.state import peck_of
+from postproc.controllers.writer import Writer
 from postproc.program import INVERSE, Hole
 from postproc.word_arcs import PLANE_AXIS
 from toolpaths.arrays import Array, Bools

@@ -63,6 +63,9 @@ class Frame(UserModel):
     """safe start: units, modes and planes that the program relies on; {work_offset} is the set-up's code"""
     work_offsets: WorkOffsets = Field(default_factory=dict)
     """what the controller writes for G54 to G59 and G59.1 to G59.3; empty: those codes themselves"""
+    operation: tuple[Annotated[str, placeholders("comment", "name", "number")], ...] = ()
+    """blocks at the start of each operation, from where a program can be taken up: {name} of the operation, {comment} with
+    it, {number} 100, 200, ..."""
     passive: tuple[Annotated[str, Field(pattern=r"^[GM][0-9]+(\.[0-9]+)?$")], ...] = ()
     """codes of the shop's own blocks that move nothing: read back without being executed"""
     path_tolerance: tuple[Annotated[str, placeholders("tolerance", "chain", "axis")], ...] = ()
@@ -116,6 +119,17 @@ class Tools(UserModel):
     """a tool change puts the tool's length in force by itself; with an empty `length_cancel` it cannot be taken back"""
     home_without_length: bool = False
     """blocks in machine coordinates switch the length register off"""
+
+
+class Subprograms(UserModel):
+    """Operations as subprograms in the same file."""
+
+    call: Annotated[str, placeholders("number")] = ""
+    """block that calls one; empty: the controller has none in a file. Numbers are 1001, 1002, ..."""
+    begin: tuple[Annotated[str, placeholders("number")], ...] = ()
+    end: tuple[Annotated[str, placeholders("number")], ...] = ()
+    place: Literal["before", "after"] = "after"
+    """before the main program's first block, or behind its end"""
 
 
 class Arcs(UserModel):
@@ -264,6 +278,7 @@ class ControllerFile(UserModel):
     program: Frame = Frame()
     codes: Codes = Codes()
     tools: Tools = Tools()
+    subprograms: Subprograms = Subprograms()
     arcs: Arcs = Arcs()
     cycles: Cycles = Cycles()
     feed: Feed = Feed()

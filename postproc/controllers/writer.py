@@ -1,57 +1,62 @@
-"""What every writer does: the frame of the program, commands, sections, tool lengths, numbers."""
+"""What every writer does: the frame of the program, operations, commands."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator
+import re
+from collections.abc import Iterable, Iterator
+from itertools import chain
 
-import numpy as np
-
-from postproc.controllers.model import CannedCycle, ControllerFile, Mode
+from postproc.controllers.model import Mode
+from postproc.controllers.state import WriterState
 from postproc.controllers.texts import blocks_of
-from postproc.program import Command, Hole, Program, Section
-from toolpaths.arrays import Floats
-from toolpaths.toolpath import Cycle
+from postproc.program import Command, Hole
+
+_LABEL = re.compile(r"%|[NO]\d")
+"""blocks that carry a number of their own"""
+MARK = "\0"
+"""stands in the body where an operation begins"""
 
 
-class Writer:
-    """Writes one program; the state is what the controller holds while it reads.
-
-    `law` is that of the words; `register` the length register of the tool in the spindle; `length_off` is True where the
-    register is not in force and waits for the next block that states Z; `speed` is the spindle's (1/min, negative:
-    anti-clockwise, 0 unknown).
-    """
-
-    def __init__(self, controller: ControllerFile, program: Program, cycles: tuple[Cycle, ...], length_offsets: bool,
-                 smoothing: float, work_offset: str = "G54", axis_smoothing: float = 0.0, name: str = "") -> None:
-        self.controller, self.program, self.cycles = controller, program, cycles
-        self.length_offsets, self.smoothing, self.axis_smoothing = length_offsets, smoothing, axis_smoothing
-        self.work_offset = controller.program.work_offsets.get(work_offset, work_offset)
-        self.name = "".join(c if c.isascii() and c.isalnum() else "_" for c in name).upper()[:24] or "PROGRAM"
-        self.space = " " if controller.format.space else ""
-        self.number = 0
-        self.law, self.register, self.length_off, self.speed = program.sections[0].law, "", False, 0.0
-        self.in_cycle, self.cycle_text = False, ""
-        self.restate()
-
-    def restate(self) -> None:
-        """Forget the modal codes: the next block states them anew."""
-        self.motion, self.plane, self.mode, self.feed = "", 17, 0, ""
-
-    # ---- the program --------------------------------------------------------------------------------------------
+class Writer(WriterState):
+    """Writes one program."""
 
     def lines(self, header: list[str]) -> Iterator[str]:
         """The blocks of the whole program, without line ends."""
         frame = self.controller.program
         named = {"name": self.name, "number": f"{frame.number:04d}"}
-        yield from (block.format(**named) for block in frame.begin)
-        yield from map(self.comment, (*header, *self.relies_on()))
-        for block in (*self.start(), *self.smoothing_blocks()):
-            yield self.numbered(block)
-        yield from map(self.numbered, self.body())
-        for block in frame.ending:
-            yield self.numbered(block)
-        yield from (block.format(**named) for block in frame.end)
+        main, subs = self.sorted_blocks()
+        before = self.controller.subprograms.place == "before"
+        yield from (self.framed(block.format(**named)) for block in frame.begin)
+        yield from map(self.framed, map(self.comment, (*header, *self.relies_on())))
+        yield from map(self.numbered, subs if before else [])
+        yield from map(self.numbered, main)
+        yield from map(self.numbered, frame.ending)
+        yield from map(self.numbered, [] if before else subs)
+        yield from (self.framed(block.format(**named)) for block in frame.end)
+
+    def sorted_blocks(self) -> tuple[Iterable[str], list[str]]:
+        """Blocks of the main program up to its ending, and those of the subprograms, one for each operation."""
+        start = chain(self.start(), self.smoothing_blocks())
+        spec, number = self.controller.subprograms, 1000
+        if not self.subprograms:
+            return chain(start, (block for block in self.body() if block != MARK)), []
+        main, subs = list(start), list[str]()
+        into = main
+        for block in chain(self.body(), [MARK]):
+            if block != MARK:
+                into.append(block)
+                continue
+            if into is subs:
+                subs += [text.format(number=number) for text in spec.end]
+            into, number = subs, number + 1
+            main.append(spec.call.format(number=number))
+            subs += [text.format(number=number) for text in spec.begin]
+        del main[-1], subs[len(subs) - len(spec.begin):]
+        return main, subs
+
+    def framed(self, block: str) -> str:
+        """A block of the frame, or a comment at the head, as the file holds it."""
+        return block
 
     def start(self) -> Iterator[str]:
         """Safe start: modes that the program uses off, then the preamble."""
@@ -81,17 +86,10 @@ class Writer:
     def numbered(self, block: str) -> str:
         """The block with its number where the controller numbers blocks."""
         style = self.controller.format
-        if not style.sequence_step or block.startswith(self.controller.comment.open):
+        if not style.sequence_step or block.startswith(self.controller.comment.open) or _LABEL.match(block):
             return block
         self.number += style.sequence_step
         return f"{style.sequence_prefix}{self.number}{self.space}{block}"
-
-    def comment(self, text: str) -> str:
-        """One comment block, without characters that would end it, cut to the line length."""
-        style = self.controller.comment
-        clean = "".join(" " if c in style.forbidden or not 32 <= ord(c) < 127 else c for c in text)
-        room = self.controller.format.line_length - len(style.open) - len(style.close) - 12
-        return f"{style.open}{clean[:room]}{style.close}"
 
     def body(self) -> Iterator[str]:
         """Blocks between preamble and ending: stretches of plain motion at once, all else one by one."""
@@ -128,104 +126,6 @@ class Writer:
         """A canned cycle: in full where anything but the place of the hole changes, else the place alone."""
         raise NotImplementedError
 
-    # ---- numbers ------------------------------------------------------------------------------------------------
-
-    def number_text(self, values: Floats, places: int) -> list[str]:
-        """Numbers as text, rounded to `places`, -0 as 0."""
-        style = self.controller.format
-        sign = "+" if style.plus_sign else ""
-        texts = [f"{v:{sign}.{places}f}" for v in (values + 0.0).tolist()]
-        if style.trim_zeros and places:
-            texts = [t.rstrip("0").rstrip("." if not style.decimal_point else "\0") for t in texts]
-        elif style.decimal_point and not places:
-            texts = [t + "." for t in texts]
-        zero = sign + "0"
-        texts = [t.replace("-0", zero) if t.strip("-0.") == "" and t.startswith("-") else t for t in texts]
-        return texts
-
-    def hole_feed(self, hole: Hole) -> float:
-        """Feed of a hole's way down, mm/min."""
-        p = self.program
-        return float(p.feed[next(k for k in range(hole.first, hole.last + 1) if p.code[k] > 0)])
-
-    def cycle_of(self, hole: Hole) -> CannedCycle:
-        """The controller's cycle for a hole."""
-        cycles = self.controller.cycles
-        return (cycles.with_dwell if self.cycles[hole.cycle].dwell > 0.0 else cycles.table)[hole.key]
-
-    def cycle_values(self, hole: Hole) -> dict[str, float]:
-        """The values that the text of a cycle may name (`CYCLE_VALUES`)."""
-        cycle, feed = self.cycles[hole.cycle], self.hole_feed(hole)
-        surface = hole.plane_level - cycle.clearance
-        depth, step = surface - hole.bottom, min(peck_of(cycle), surface - hole.bottom)
-        pitch = cycle.pitch or (feed / abs(self.speed) if self.speed else 0.0)
-        return {"retract": hole.retract, "surface": surface, "clearance": cycle.clearance, "bottom": hole.bottom,
-                "depth": depth, "level": -depth, "step": step, "breaks": float(math.ceil(depth / step)),
-                "dwell": cycle.dwell, "feed": feed, "pitch": -pitch if hole.key == "TAP_LEFT" else pitch,
-                "speed": abs(self.speed), "second": hole.retract - surface}
-
-    @staticmethod
-    def plain(value: float | str) -> str:
-        """A number without an exponent or needless zeros."""
-        return f"{float(value):.6f}".rstrip("0").rstrip(".")
-
-    # ---- sections -----------------------------------------------------------------------------------------------
-
-    def mode_of(self, section: Section) -> Mode | None:
-        """The controller's mode for the law of a section."""
-        return getattr(self.controller.modes, section.law) if section.law != "axes" else None
-
-    def enter(self, section: Section) -> Iterator[str]:
-        """Blocks that switch the mode of a section on."""
-        self.law = section.law
-        mode = self.mode_of(section)
-        if mode is None:
-            return
-        yield from self._length(mode.length)
-        values = self.section_values(section)
-        for block in mode.enter:
-            if "{register}" in block:
-                self.length_off = False
-            yield block.format(**values)
-        self.restate()
-
-    def leave(self, section: Section) -> Iterator[str]:
-        """Blocks that switch it off."""
-        mode = self.mode_of(section)
-        self.law = "axes"
-        if mode is None:
-            return
-        holds = any("{register}" in block for block in mode.enter)
-        if not holds:
-            yield from self._length(mode.length)
-        for block in mode.leave:
-            yield block.format(**self.section_values(section))
-        self.length_off |= holds
-        self.restate()
-
-    def _length(self, wanted: str) -> Iterator[str]:
-        """The length register off or on, where it is not."""
-        codes = self.controller.codes
-        if wanted == "off" and self.register and not self.length_off:
-            yield codes.length_cancel
-            self.length_off = True
-        elif wanted == "on" and self.register and self.length_off:
-            yield codes.length_offset.format(register=self.register)
-            self.length_off = False
-
-    @property
-    def length_waits(self) -> bool:
-        """True where the next block that states Z has to put the length register in force."""
-        return self.length_off and bool(self.register) and (self.length_offsets or self.law == "tilted")
-
-    def section_values(self, section: Section) -> dict[str, str]:
-        """What the text of a mode may name."""
-        places = self.controller.modes.tilted.decimals if self.controller.modes.tilted else 0
-        angles = dict(zip(("first", "second", "third"), self.number_text(np.array(section.angles), places), strict=False))
-        tilt = next((angle for letter, angle in section.rotary if letter in "AB"), 0.0)
-        direction = "-1" if tilt < 0.0 else "1"
-        return {"register": self.register, "work_offset": self.work_offset, "direction": direction, **angles}
-
     # ---- commands -----------------------------------------------------------------------------------------------
 
     def command(self, command: Command) -> Iterator[str]:
@@ -241,12 +141,24 @@ class Writer:
             yield from self.enter(section) if command.name == "ENTER_SECTION" else self.leave(section)
         elif command.name.startswith("START_SPINDLE"):
             yield from self.spindle(command)
+        elif command.name == "OPERATION_START":
+            yield from self.operation(str(command.args[0]))
         elif command.name == "COMMENT":
             yield self.comment(str(command.args[0]))
         elif command.name == "INSERT":
             yield str(command.args[0])
         else:
             yield from self.numbered_command(command)
+
+    def operation(self, name: str) -> Iterator[str]:
+        """The start of an operation: its blocks, and every modal code stated anew behind them."""
+        self.operations += 1
+        yield MARK
+        values = {"name": name, "comment": self.comment(name), "number": 100 * self.operations}
+        for block in self.controller.program.operation:
+            yield block.format(**values)
+        if self.controller.program.operation:
+            self.restate()
 
     def spindle(self, command: Command) -> Iterator[str]:
         """The spindle's start, with its speed where one is given."""
@@ -292,8 +204,3 @@ class Writer:
         self.length_off = self.controller.tools.length_with_z
         if not self.length_off and self.length_offsets and self.controller.codes.length_offset:
             yield self.controller.codes.length_offset.format(register=register)
-
-
-def peck_of(cycle: Cycle) -> float:
-    """Depth of a peck, mm: the whole way down where the cycle names none."""
-    return cycle.steps[0] if cycle.steps else cycle.depth + cycle.clearance

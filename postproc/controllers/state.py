@@ -1,0 +1,150 @@
+"""What writers stand on: the state of the control, numbers and comments, modes and length registers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from postproc.controllers.model import CannedCycle, ControllerFile, Mode
+from postproc.program import Hole, Program, Section
+from toolpaths.arrays import Floats
+from toolpaths.toolpath import Cycle
+
+
+class WriterState:
+    """One program on its way to text; the state is what the controller holds while it reads.
+
+    `law` is that of the words; `register` the length register of the tool in the spindle; `length_off` is True where the
+    register is not in force and waits for the next block that states Z; `speed` is the spindle's (1/min, negative:
+    anti-clockwise, 0 unknown).
+    """
+
+    def __init__(self, controller: ControllerFile, program: Program, cycles: tuple[Cycle, ...], length_offsets: bool,
+                 smoothing: float, work_offset: str = "G54", axis_smoothing: float = 0.0, name: str = "",
+                 subprograms: bool = False) -> None:
+        self.controller, self.program, self.cycles = controller, program, cycles
+        self.length_offsets, self.smoothing, self.axis_smoothing = length_offsets, smoothing, axis_smoothing
+        self.work_offset = controller.program.work_offsets.get(work_offset, work_offset)
+        self.name = "".join(c if c.isascii() and c.isalnum() else "_" for c in name).upper()[:24] or "PROGRAM"
+        self.subprograms = subprograms and bool(controller.subprograms.call)
+        self.space = " " if controller.format.space else ""
+        self.number = 0
+        self.law, self.register, self.length_off, self.speed = program.sections[0].law, "", False, 0.0
+        self.in_cycle, self.cycle_text, self.operations = False, "", 0
+        self.restate()
+
+    def restate(self) -> None:
+        """Forget the modal codes: the next block states them anew."""
+        self.motion, self.plane, self.mode, self.feed = "", 17, 0, ""
+
+    def comment(self, text: str) -> str:
+        """One comment block, without characters that would end it, cut to the line length."""
+        style = self.controller.comment
+        clean = "".join(" " if c in style.forbidden or not 32 <= ord(c) < 127 else c for c in text)
+        room = self.controller.format.line_length - len(style.open) - len(style.close) - 12
+        return f"{style.open}{clean[:room]}{style.close}"
+
+    # ---- numbers ------------------------------------------------------------------------------------------------
+
+    def number_text(self, values: Floats, places: int) -> list[str]:
+        """Numbers as text, rounded to `places`, -0 as 0."""
+        style = self.controller.format
+        sign = "+" if style.plus_sign else ""
+        texts = [f"{v:{sign}.{places}f}" for v in (values + 0.0).tolist()]
+        if style.trim_zeros and places:
+            texts = [t.rstrip("0").rstrip("." if not style.decimal_point else "\0") for t in texts]
+        elif style.decimal_point and not places:
+            texts = [t + "." for t in texts]
+        zero = sign + "0"
+        texts = [t.replace("-0", zero) if t.strip("-0.") == "" and t.startswith("-") else t for t in texts]
+        return texts
+
+    def hole_feed(self, hole: Hole) -> float:
+        """Feed of a hole's way down, mm/min."""
+        p = self.program
+        return float(p.feed[next(k for k in range(hole.first, hole.last + 1) if p.code[k] > 0)])
+
+    def cycle_of(self, hole: Hole) -> CannedCycle:
+        """The controller's cycle for a hole."""
+        cycles = self.controller.cycles
+        return (cycles.with_dwell if self.cycles[hole.cycle].dwell > 0.0 else cycles.table)[hole.key]
+
+    def cycle_values(self, hole: Hole) -> dict[str, float]:
+        """The values that the text of a cycle may name (`CYCLE_VALUES`)."""
+        cycle, feed = self.cycles[hole.cycle], self.hole_feed(hole)
+        surface = hole.plane_level - cycle.clearance
+        depth, step = surface - hole.bottom, min(peck_of(cycle), surface - hole.bottom)
+        pitch = cycle.pitch or (feed / abs(self.speed) if self.speed else 0.0)
+        return {"retract": hole.retract, "surface": surface, "clearance": cycle.clearance, "bottom": hole.bottom,
+                "depth": depth, "level": -depth, "step": step, "breaks": float(math.ceil(depth / step)),
+                "dwell": cycle.dwell, "feed": feed, "pitch": -pitch if hole.key == "TAP_LEFT" else pitch,
+                "speed": abs(self.speed), "second": hole.retract - surface}
+
+    @staticmethod
+    def plain(value: float | str) -> str:
+        """A number without an exponent or needless zeros."""
+        return f"{float(value):.6f}".rstrip("0").rstrip(".")
+
+    # ---- sections -----------------------------------------------------------------------------------------------
+
+    def mode_of(self, section: Section) -> Mode | None:
+        """The controller's mode for the law of a section."""
+        return getattr(self.controller.modes, section.law) if section.law != "axes" else None
+
+    def enter(self, section: Section) -> Iterator[str]:
+        """Blocks that switch the mode of a section on."""
+        self.law = section.law
+        mode = self.mode_of(section)
+        if mode is None:
+            return
+        yield from self._length(mode.length)
+        values = self.section_values(section)
+        for block in mode.enter:
+            if "{register}" in block:
+                self.length_off = False
+            yield block.format(**values)
+        self.restate()
+
+    def leave(self, section: Section) -> Iterator[str]:
+        """Blocks that switch it off."""
+        mode = self.mode_of(section)
+        self.law = "axes"
+        if mode is None:
+            return
+        holds = any("{register}" in block for block in mode.enter)
+        if not holds:
+            yield from self._length(mode.length)
+        for block in mode.leave:
+            yield block.format(**self.section_values(section))
+        self.length_off |= holds
+        self.restate()
+
+    def _length(self, wanted: str) -> Iterator[str]:
+        """The length register off or on, where it is not."""
+        codes = self.controller.codes
+        if wanted == "off" and self.register and not self.length_off:
+            yield codes.length_cancel
+            self.length_off = True
+        elif wanted == "on" and self.register and self.length_off:
+            yield codes.length_offset.format(register=self.register)
+            self.length_off = False
+
+    @property
+    def length_waits(self) -> bool:
+        """True where the next block that states Z has to put the length register in force."""
+        return self.length_off and bool(self.register) and (self.length_offsets or self.law == "tilted")
+
+    def section_values(self, section: Section) -> dict[str, str]:
+        """What the text of a mode may name."""
+        places = self.controller.modes.tilted.decimals if self.controller.modes.tilted else 0
+        angles = dict(zip(("first", "second", "third"), self.number_text(np.array(section.angles), places), strict=False))
+        tilt = next((angle for letter, angle in section.rotary if letter in "AB"), 0.0)
+        direction = "-1" if tilt < 0.0 else "1"
+        return {"register": self.register, "work_offset": self.work_offset, "direction": direction, **angles}
+
+
+def peck_of(cycle: Cycle) -> float:
+    """Depth of a peck, mm: the whole way down where the cycle names none."""
+    return cycle.steps[0] if cycle.steps else cycle.depth + cycle.clearance

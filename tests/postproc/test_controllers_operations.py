@@ -1,0 +1,70 @@
+"""Operations in the text: places to take a program up, and subprograms of the same file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from postproc.program import Program
+from tests.postproc.program_kit import LOAD, blocks, command, lines, program, step
+
+
+def two_operations() -> Program:
+    return program([step("rapid", Z=50.0), step("feed", X=1.0, F=100.0), step("feed", X=2.0, F=100.0)],
+                   {0: [command("OPERATION_START", "ROUGH"), *LOAD], 2: [command("OPERATION_START", "finish (2)")]})
+
+
+@pytest.mark.parametrize(("controller", "start", "then"), [
+    ("fanuc-30i", ["(FINISH  2 )", "N200 G17 G40 G80 G90 G94"], "G1 X2. F100."),
+    ("haas-ngc", ["(FINISH  2 )", "N200 G17 G40 G80 G90 G94"], "G1 X2. F100."),
+    ("siemens-840d", ["; finish (2)", "G17 G40 G90 G94"], "G1 X2 F100"),
+    ("heidenhain-tnc640", ["* - finish (2)"], "L X+2 F100")])
+def test_modal_codes_are_stated_anew_at_each_operation(controller: str, start: list[str], then: str) -> None:
+    text = [b for b in blocks(controller, two_operations()) if b != "\0"]
+    assert text[-len(start) - 1:] == [*start, then]
+
+
+def test_linuxcnc_is_written_as_if_there_were_no_operations() -> None:
+    plain = program([step("rapid", Z=50.0), step("feed", X=1.0, F=100.0), step("feed", X=2.0, F=100.0)], {0: LOAD})
+    assert lines("linuxcnc", two_operations()) == lines("linuxcnc", plain)
+
+
+@pytest.mark.parametrize(("controller", "calls", "subs"), [
+    ("fanuc-30i", ["M98 P1001", "M98 P1002"], ["O1001", "M99", "O1002", "M99", "%"]),
+    ("haas-ngc", ["M97 P1001", "M97 P1002"], ["N1001", "M99", "N1002", "M99", "%"]),
+    ("heidenhain-tnc640", ["CALL LBL 1001", "CALL LBL 1002"], ["LBL 1001", "LBL 0", "LBL 1002", "LBL 0"])])
+def test_operations_become_subprograms_behind_the_end(controller: str, calls: list[str], subs: list[str]) -> None:
+    text = [b.split(" ", 1)[1] if controller.startswith("h") and b[0].isdigit() else b
+            for b in lines(controller, two_operations(), subprograms=True)]
+    end = text.index("M30")
+    assert [b for b in text[:end] if b in calls] == calls
+    assert [b for b in text[end:] if b in subs] == subs
+    cut = [b for b in text if "X2" in b or "X+2" in b]
+    assert len(cut) == 1 and text.index(cut[0]) > end
+
+
+def test_the_same_blocks_stand_in_subprograms() -> None:
+    plain, made = (lines("fanuc-30i", two_operations(), subprograms=flag) for flag in (False, True))
+    own = {"M98 P1001", "M98 P1002", "O1001", "O1002", "M99"}
+    assert sorted(b for b in made if b not in own) == sorted(plain)
+
+
+def test_subprograms_before_the_main_program(tmp_path: Path) -> None:
+    shop = tmp_path / "shop.toml"
+    shop.write_text('base = "linuxcnc"\n[subprograms]\ncall = "o{number} call"\nbegin = ["o{number} sub"]\n'
+                    'end = ["o{number} endsub"]\nplace = "before"\n')
+    text = lines(str(shop), two_operations(), subprograms=True)
+    assert text.index("o1001 sub") < text.index("o1002 endsub") < text.index("G54") < text.index("o1001 call")
+
+
+def test_a_controller_without_subprograms_writes_one_program() -> None:
+    assert lines("generic-iso", two_operations(), subprograms=True) == lines("generic-iso", two_operations())
+
+
+def test_blocks_with_a_number_of_their_own_get_no_other(tmp_path: Path) -> None:
+    shop = tmp_path / "shop.toml"
+    shop.write_text('base = "fanuc-30i"\n[format]\nsequence_step = 5\n')
+    text = lines(str(shop), two_operations(), subprograms=True)
+    assert "O1001" in text and "N200 G17 G40 G80 G90 G94" in text and "%" in text
+    assert sum(b.endswith("M98 P1001") and b.startswith("N") for b in text) == 1
