@@ -50,7 +50,7 @@ def plan_feeds(path: Path, control: Control, step: Floats, asked: Floats, passes
     if planned is None:
         return feed_words(path, control, step, asked, needed, mode, rules)
     feeds = feed_words(path, control, step, asked, np.fmax(needed, planned.needed), mode, rules)
-    open_to_it = (feeds.mode == PER_MINUTE) & (path.code != 0) & ~native & (feeds.feed > 0.0)
+    open_to_it = (feeds.mode == PER_MINUTE) & (path.code != 0) & ~native & (feeds.seconds > 0.0) & (feeds.feed > 0.0)
     feed = merged(feeds.feed, open_to_it, passes, planned.merge)
     factor = np.where(open_to_it, feeds.feed / np.where(open_to_it, feed, 1.0), 1.0)
     return replace(feeds, feed=feed, seconds=feeds.seconds * factor, slowed=feeds.slowed | (factor > 1.0 + 1e-9))
