@@ -8,12 +8,12 @@ from postproc.control import Control
 from postproc.controllers.model import ControllerFile
 from postproc.events import spindle_states
 from postproc.moves import Moves, Phase
-from postproc.path import Path
+from postproc.path import FEED, Path
 from postproc.program import Hole
 from postproc.word_rows import WordRows
-from toolpaths.arrays import Bools
+from toolpaths.arrays import Bools, Ints
 from toolpaths.diagnostics import Diagnostic, error
-from toolpaths.toolpath import Toolpath
+from toolpaths.toolpath import Kind, Toolpath
 
 SINGLE_MOVES = frozenset({"DRILL", "THRU", "CSINK", "FACE", "DEEP", "BRKCHP", "BORE", "REAM"})
 """kinds of cycles that rapids, feeds and dwells replace"""
@@ -41,6 +41,7 @@ def holes_of(toolpath: Toolpath, moves: Moves, path: Path, words: WordRows, cont
         if hole[first] < 0:
             continue
         first += _rises_first(words, z, int(first), int(last))
+        first, last = _without_feeding_rapids(moves, path, int(first), int(last))
         level = float(words.start[first, z]) if first > 0 else np.inf
         initial = before_initial if previous_last == first - 1 else level
         before_initial, previous_last = initial, last
@@ -71,6 +72,21 @@ def _rises_first(words: WordRows, z: int, first: int, last: int) -> bool:
     return 0 < first < last and bool(step[z] > 0.0) and not np.delete(step, z).any()
 
 
+def _without_feeding_rapids(moves: Moves, path: Path, first: int, last: int) -> tuple[int, int]:
+    """The blocks of a hole without rapids at its ends that are written at feed (`rapid_codes`).
+
+    They stay blocks of their own: the cycle begins over the hole, or at its clearance plane, and ends there.
+    """
+    own = feeding_rapid(moves, path, np.arange(first, last + 1))
+    inner = np.flatnonzero(~own)
+    return first + int(inner[0]), first + int(inner[-1])
+
+
+def feeding_rapid(moves: Moves, path: Path, blocks: Ints) -> Bools:
+    """(N,) blocks that are rapids of the CL file written at feed."""
+    return np.asarray((path.code[blocks] == FEED) & (moves.kind[path.move[blocks]] == Kind.RAPID))
+
+
 def _hole(toolpath: Toolpath, moves: Moves, path: Path, rows: WordRows, control: Control, controller: ControllerFile,
           first: int, last: int, initial: float, key: str) -> Hole | None:
     cycle = toolpath.cycles[int(moves.cycle[path.move[first]])]
@@ -82,11 +98,13 @@ def _hole(toolpath: Toolpath, moves: Moves, path: Path, rows: WordRows, control:
     start = int(np.flatnonzero(phases <= Phase.APPROACH)[-1]) + 1 if (phases <= Phase.APPROACH).any() else 0
     along = bool((np.delete(words[start:], z, axis=1) == np.delete(words[start], z)).all())
     plane, out, deepest = float(words[start, z]), float(words[-1, z]), float(words[bottom - first + 1, z])
+    if feeding_rapid(moves, path, np.arange(first, last + 1)).any() or phases[-1] == Phase.DRILL:
+        return None
     if key not in spec or not along or deepest >= plane or len(set(cycle.steps)) > 1:
         return None
     if abs(out - plane) > 1e-9 and abs(out - initial) > 1e-9:
         return None
-    return Hole(first, last, int(moves.cycle[path.move[first]]), plane, deepest, out, initial, key)
+    return Hole(first, last, int(moves.cycle[path.move[first]]), plane, deepest, out, initial, key, bottom)
 
 
 def _key(kind: str, turning: int) -> str:

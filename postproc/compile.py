@@ -39,7 +39,7 @@ def compile_program(toolpath: Toolpath, moves: Moves, path: Path, control: Contr
     new = np.concatenate([[0], np.cumsum(keep)])
     sections = sections_of(path, new)
     kept_holes = tuple(Hole(int(new[h.first]), int(new[h.last + 1]) - 1, h.cycle, h.plane_level, h.bottom, h.retract,
-                            h.initial, h.key) for h in holes)
+                            h.initial, h.key, int(new[h.drill])) for h in holes)
     end = np.where(path.home[:, None], np.round(path.q * control.unit, int(places.max())), words.end)
     program = Program(control.machine.axis_names, end[keep], words.write[keep], path.code[keep], feeds.feed[keep],
                       feeds.mode[keep], path.plane[keep], path.ccw[keep], path.center[keep], path.home[keep],

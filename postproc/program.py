@@ -58,6 +58,8 @@ class Hole:
     initial: float
     key: str
     """of the controller's tables"""
+    drill: int
+    """the block that goes to the bottom; its feed is that of the cycle"""
 
 
 @dataclass(frozen=True)

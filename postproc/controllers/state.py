@@ -63,8 +63,7 @@ class WriterState:
 
     def hole_feed(self, hole: Hole) -> float:
         """Feed of a hole's way down, mm/min."""
-        p = self.program
-        return float(p.feed[next(k for k in range(hole.first, hole.last + 1) if p.code[k] > 0)])
+        return float(self.program.feed[hole.drill])
 
     def cycle_of(self, hole: Hole) -> CannedCycle:
         """The controller's cycle for a hole."""
