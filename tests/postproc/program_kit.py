@@ -76,4 +76,4 @@ def drilled(key: str, at: tuple[float, float] = (10.0, 20.0), plane_level: float
     """The blocks of one hole from 20 mm above, and the hole as a canned cycle (blocks 1 to 3)."""
     steps = [step("rapid", X=0.0, Y=0.0, Z=20.0), step("rapid", X=at[0], Y=at[1]), step("feed", Z=bottom, F=feed),
              step("rapid", Z=retract)]
-    return steps, Hole(1, 3, 0, plane_level, bottom, retract, 20.0, key)
+    return steps, Hole(1, 3, 0, plane_level, bottom, retract, 20.0, key, 2)

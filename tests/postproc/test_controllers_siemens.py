@@ -92,6 +92,6 @@ def test_left_hand_taps_have_a_negative_pitch() -> None:
 def test_second_hole_is_its_place_alone() -> None:
     steps, hole = drilled("DRILL")
     steps += [step("rapid", X=30.0), step("feed", Z=-8.0, F=200.0), step("rapid", Z=2.0)]
-    made = program(steps, holes=(hole, replace(hole, first=4, last=6)))
+    made = program(steps, holes=(hole, replace(hole, first=4, last=6, drill=5)))
     assert blocks("siemens-840d", made, (Cycle("DRILL", 8.0, 2.0, 2.0, 200.0),))[1:] == [
         "F200", "MCALL CYCLE81(2,0,2,-8)", "G0 X10 Y20", "X30 Y20", "MCALL"]
