@@ -26,21 +26,25 @@ class Spacing:
     slope: float = 0.15
     probes: float = 1.0
     """first probing spacing over `longest`"""
+    hump: float = 0.1
+    """largest share of a jerk limit by which the path's third derivative may bulge between knots"""
 
 
 def mesh(path: Path, limits: JointLimits, top: Callable[[Floats], Floats], spacing: Spacing,
          ramp: float = np.inf) -> Floats:
     """Knots (K,) from path.start to path.end.
 
-    The limits are probed at the breaks of the path, on both their sides, and between them; `top(sigma)` bounds the
-    speed along sigma; `ramp` is the time of full jerk after rest, into which RAMP knots go.
+    The limits are probed at the breaks of the path and between them; `top(sigma)` bounds the speed along sigma; `ramp`
+    is the time of full jerk after rest, into which RAMP knots go.
     """
     at = _probes(path, spacing)
-    speed = np.concatenate([_speed(path, limits, top, at[i:i + CHUNK]) for i in range(0, len(at), CHUNK)])
+    parts = [_probed(path, limits, top, at[i:i + CHUNK]) for i in range(0, len(at), CHUNK)]
+    speed, jerk = (np.concatenate(column) for column in zip(*parts, strict=True))
     if not np.all(speed > 0.0):
         where = at[np.flatnonzero(~(speed > 0.0))[0]]
         raise ValueError(f"no speed above 0 is allowed at {where:.6g} of {path.end:.6g}: feed 0, or no finite derivatives")
     h = np.minimum(spacing.dt * speed, min(spacing.longest, (path.end - path.start) / FEWEST))
+    h[1:-1] = np.minimum(h[1:-1], np.sqrt(8.0 * spacing.hump / np.maximum(_bend(at, jerk), 1e-300)))
     h[[0, -1]] = np.minimum(h[[0, -1]], ramp / RAMP * speed[[0, -1]])
     h = np.maximum(h, 1e-9 * (path.end - path.start))
     return place(at, gentle(at, h, spacing.slope))
@@ -58,21 +62,35 @@ def ramp_time(dq: Floats, limits: JointLimits, feed: Floats) -> float:
     return float(np.min(np.where(times > 0.0, times, np.inf)))
 
 
-def _speed(path: Path, limits: JointLimits, top: Callable[[Floats], Floats], at: Floats) -> Floats:
-    """Speed along sigma that all limits would allow if it were constant."""
+def _probed(path: Path, limits: JointLimits, top: Callable[[Floats], Floats], at: Floats) -> tuple[Floats, Floats]:
+    """Speed (N,) along sigma that all limits would allow if it were constant; jerk over its limits (N, J) at that speed."""
     found = path.derivatives(at)
     cap = np.minimum(squared_speed(found.dq, limits.velocity), steady_cap(found.d2q, found.d3q, limits))
-    return np.asarray(np.minimum(np.sqrt(cap), top(at)))
+    speed = np.asarray(np.minimum(np.sqrt(cap), top(at)))
+    with np.errstate(invalid="ignore"):
+        return speed, found.d3q * speed[:, None] ** 3 / limits.jerk
+
+
+def _bend(at: Floats, jerk: Floats) -> Floats:
+    """Largest second derivative (N - 2,) of any joint's jerk (N, J) between its places; the speed's own change left out."""
+    step = np.diff(at)[:, None]
+    slope = np.diff(jerk, axis=0) / step
+    return np.asarray(np.abs(2.0 * np.diff(slope, axis=0) / (step[1:] + step[:-1])).max(axis=1))
 
 
 def _probes(path: Path, spacing: Spacing) -> Floats:
-    """Breaks, points just beside them, and a uniform grid."""
+    """Ends, breaks, and equal parts between them, two or more."""
     length = path.end - path.start
-    grid = np.linspace(path.start, path.end, max(FEWEST, int(length / (spacing.probes * spacing.longest))) + 1)
-    inside = np.asarray(path.breaks, dtype=np.float64)
-    beside = 1e-9 * length
-    every = np.unique(np.concatenate((grid, inside, inside - beside, inside + beside)))
-    return np.asarray(every[(every >= path.start) & (every <= path.end)])
+    breaks = np.asarray(path.breaks, dtype=np.float64)
+    inner = breaks[(breaks > path.start) & (breaks < path.end)]
+    edges = np.concatenate(([path.start], inner, [path.end]))
+    edges = edges[np.concatenate((np.diff(edges) > 1e-9 * length, [True]))]
+    edges[0] = path.start
+    cell = np.diff(edges)
+    parts = np.maximum(np.ceil(cell / min(spacing.probes * spacing.longest, length / FEWEST)), 2.0).astype(np.int64)
+    first = np.repeat(np.cumsum(parts) - parts, parts)
+    share = (np.arange(parts.sum()) - first) / np.repeat(parts, parts)
+    return np.append(np.repeat(edges[:-1], parts) + share * np.repeat(cell, parts), path.end)
 
 
 def gentle(at: Floats, h: Floats, slope: float) -> Floats:

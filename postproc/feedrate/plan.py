@@ -27,7 +27,8 @@ Feed = float | Callable[[Floats], Floats]
 """Largest ds/dt: one number, or a function of s (N,) that returns (N,). The tip's feed, if s is the length of its path."""
 ROUNDS = 12
 FITS = 0.9995
-"""Ratio, as a factor on time, from which a strict plan is fast enough at first sight."""
+"""Ratio, as a factor on time, from which a strict plan is fast enough, for the first TRIES looks at its samples."""
+TRIES = 3
 
 
 @dataclass(frozen=True)
@@ -136,11 +137,11 @@ def _solve(grid: Knots, options: Options) -> tuple[Profile, Solved, float]:
     report = solved(grid, options.method)
     profile, slower = _profile(grid, report.c), 1.0
     for left in reversed(range(options.passes + 1 if options.strict else 0)):
-        slower, tight = tightened(grid, profile, bool(options.method.kernel))
-        if tight is None or not left:
+        slower, better = tightened(grid, profile, bool(options.method.kernel))
+        if better is None or not left:
             break
-        grid = replace(grid, tight=tight)
-        report = solved(grid, options.method, report.c)
+        report = solved(better, options.method, report.c if len(better.sigma) == len(grid.sigma) else None)
+        grid = better
         profile = _profile(grid, report.c)
     return profile, report, slower
 
@@ -169,7 +170,7 @@ def _within(made: Plan, guess: Floats) -> Plan:
                        for piece, g in zip(made.pieces, factor.tolist(), strict=True))
         made = replace(made, pieces=pieces)
         needed = _needed(made)
-        fits = (needed <= 1.0) & (needed > (FITS if turn == 0 else 0.0))
+        fits = (needed <= 1.0) & (needed > (FITS if turn < TRIES else 0.0))
         if fits.all():
             return made
         factor = np.where(fits, 1.0, needed * (1.0 + 1e-6 * 4.0**turn))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from postproc.feedrate.compiled import compiled
@@ -11,20 +13,23 @@ from postproc.feedrate.problem import Knots
 from postproc.feedrate.profile import Profile
 from postproc.feedrate.rows import tool
 from postproc.feedrate.tightening_kernel import worst
-from toolpaths.arrays import Floats, Ints
+from toolpaths.arrays import Bools, Floats, Ints
 
 ENOUGH = 1.002
 """Ratio between knots that is left to the final slowing down."""
 MORE = 1.6
 """Power of the excess by which rows are tightened: a peak between knots falls by some 60 % of what its knots do."""
 BETWEEN = (0.25, 0.5, 0.75)
+FIRST_SPLIT, SPLIT = 1.5, 1.02
+"""Ratios between knots from which an interval is halved, before and after a first tightening."""
 CHUNK = 16384
 
 
-def tightened(grid: Knots, profile: Profile, kernel: bool = False) -> tuple[float, Floats | None]:
-    """Factor on time that brings what is seen between the knots to 1; new factors (3, K) on velocity, acceleration, jerk.
+def tightened(grid: Knots, profile: Profile, kernel: bool = False) -> tuple[float, Knots | None]:
+    """Factor on time that brings what is seen between the knots to 1; a better grid, None where nothing is exceeded.
 
-    The latter None where nothing is exceeded by more than ENOUGH.
+    The better grid has tighter rows, and more knots where tightening was in vain: a spline of the path bends there
+    within one interval.
     """
     excess = np.empty((3, len(grid.sigma) - 1))
     for first in range(0, excess.shape[1], CHUNK):
@@ -34,9 +39,21 @@ def tightened(grid: Knots, profile: Profile, kernel: bool = False) -> tuple[floa
     slower = max(velocity, acceleration**0.5, jerk ** (1.0 / 3.0))
     if max(velocity, acceleration, jerk) <= ENOUGH:
         return slower, None
+    split = excess.max(axis=0) > (FIRST_SPLIT if grid.tight is None else SPLIT)
     excess = np.maximum(excess, 1.0) ** MORE
-    at_knots = np.maximum(np.pad(excess, ((0, 0), (1, 0)), mode="edge"), np.pad(excess, ((0, 0), (0, 1)), mode="edge"))
-    return slower, at_knots if grid.tight is None else grid.tight * at_knots
+    tight = np.maximum(np.pad(excess, ((0, 0), (1, 0)), mode="edge"), np.pad(excess, ((0, 0), (0, 1)), mode="edge"))
+    tight = tight if grid.tight is None else grid.tight * tight
+    return slower, _split(replace(grid, tight=tight), split) if split.any() else replace(grid, tight=tight)
+
+
+def _split(grid: Knots, split: Bools) -> Knots:
+    """Intervals `split` (K - 1,) and their neighbours halved; no tightening at the new knots."""
+    wide = np.convolve(split, np.ones(3), mode="same") > 0.0
+    where = np.flatnonzero(wide)
+    assert grid.tight is not None
+    middle = 0.5 * (grid.sigma[where] + grid.sigma[where + 1])
+    sigma, tight = np.insert(grid.sigma, where + 1, middle), np.insert(grid.tight, where + 1, 1.0, axis=1)
+    return replace(grid, sigma=sigma, tight=tight)
 
 
 def _ratios(grid: Knots, profile: Profile, k: Ints, kernel: bool) -> Floats:
