@@ -17,6 +17,11 @@ from tests.postproc.kit import SAMPLES, convert, good
 from toolpaths.diagnostics import has_errors
 
 GOLDEN = Path(__file__).parents[1] / "golden"
+SUFFIX = {"fanuc-30i": "nc", "haas-ngc": "nc", "siemens-840d": "mpf", "heidenhain-tnc640": "h"}
+"""of the files of a controller; ngc elsewhere"""
+LAWS = [("fanuc-30i", "mikron-ucp710"), ("haas-ngc", "trunnion-bc"), ("siemens-840d", "mikron-ucp710"),
+        ("heidenhain-tnc640", "mikron-ucp710")]
+"""three_laws.cls in each output mode: one flat and one tilted operation, one that turns the tool axis"""
 PIECES = [
     (SAMPLES / "pocket.cls", "mill-3axis", "linuxcnc"),
     (SAMPLES / "pocket.cls", "mill-3axis", "generic-iso"),
@@ -27,21 +32,36 @@ PIECES = [
 ]
 
 
-def made(source: Path, machine: str, controller: str) -> PostResult:
+def made(source: Path, machine: str, controller: str, mode: str = "auto") -> PostResult:
     path, found = toolpaths.read(source)
     assert not has_errors(found)
-    return good(convert(path, machine, controller))
+    return good(convert(path, machine, controller, output=mode))
 
 
-@pytest.mark.parametrize("piece", PIECES, ids=lambda p: f"{p[0].stem}-{p[1]}-{p[2]}")
-def test_written_as_reviewed(piece: tuple[Path, str, str]) -> None:
-    source, machine, controller = piece
-    file = GOLDEN / f"{source.stem}-{machine}-{controller}.ngc"
-    text = made(*piece).text
+def name_of(source: Path, machine: str, controller: str, mode: str = "") -> str:
+    parts = [source.stem, machine, controller, mode]
+    return "-".join(part for part in parts if part) + "." + SUFFIX.get(controller, "ngc")
+
+
+def reviewed(file: Path, text: str) -> None:
     if os.environ.get("GOLDEN") == "renew":
         file.write_text(text, encoding="ascii", newline="\n")
     assert file.read_bytes() == text.encode("ascii"), "see the docstring of this file"
 
 
+@pytest.mark.parametrize("piece", PIECES, ids=lambda p: f"{p[0].stem}-{p[1]}-{p[2]}")
+def test_written_as_reviewed(piece: tuple[Path, str, str]) -> None:
+    reviewed(GOLDEN / name_of(*piece), made(*piece).text)
+
+
+@pytest.mark.parametrize("mode", ["auto", "axes", "tcp"])
+@pytest.mark.parametrize(("controller", "machine"), LAWS)
+def test_each_mode_is_written_as_reviewed(controller: str, machine: str, mode: str) -> None:
+    piece = GOLDEN / "three_laws.cls", machine, controller, mode
+    reviewed(GOLDEN / name_of(*piece), made(*piece).text)
+
+
 def test_no_file_is_left_over() -> None:
-    assert {p.name for p in GOLDEN.glob("*.ngc")} == {f"{s.stem}-{m}-{c}.ngc" for s, m, c in PIECES}
+    known = {name_of(*piece) for piece in PIECES}
+    known |= {name_of(GOLDEN / "three_laws.cls", m, c, mode) for c, m in LAWS for mode in ("auto", "axes", "tcp")}
+    assert {p.name for p in GOLDEN.iterdir() if p.suffix not in (".apt", ".cls")} == known
