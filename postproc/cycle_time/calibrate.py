@@ -19,7 +19,7 @@ from postproc.cycle_time.blocks import Blocks
 from postproc.cycle_time.estimate import timed
 from postproc.cycle_time.log import Log, matched
 from postproc.cycle_time.model import PARAMETERS, Calibration, CycleTimeModel
-from toolpaths.arrays import Floats
+from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, warning
 
 if TYPE_CHECKING:
@@ -59,14 +59,28 @@ class Fit:
 
 def calibrate(blocks: Blocks, log: Log, model: CycleTimeModel, file: str = "",
               machine: Machine | None = None) -> tuple[Fit | None, list[Diagnostic]]:
-    """The model fitted to a log; None and why where the log does not fit the program."""
-    from scipy.optimize import least_squares
+    """The model fitted to a log; None and why where the log does not fit the program.
 
+    A model with jerk is also tried without: the better fit is taken.
+    """
     samples, rows, found = matched(log, blocks, file)
     if found:
         return None, found
     cuts = np.unique(np.linspace(0, len(rows) - 1, min(SECTIONS, len(rows) - 1) + 1).astype(int))
     rows, measured = rows[cuts], np.diff(log.time[samples[cuts]])
+    before = np.diff(timed(blocks, model).begin[rows])
+    kinds = [True, False] if model.jerk and model.kind != "linuxcnc" else [model.jerk]
+    fits = [_fitted(blocks, rows, measured, before, model.model_copy(update={"jerk": jerk}), file, machine)
+            for jerk in kinds]
+    fit = min(fits, key=lambda fit: float(np.abs(fit.modelled - fit.measured).sum()))
+    return fit, _warnings(fit, file)
+
+
+def _fitted(blocks: Blocks, rows: Ints, measured: Floats, before: Floats, model: CycleTimeModel, file: str,
+            machine: Machine | None) -> Fit:
+    """The fit of the parameters that the kind of model has."""
+    from scipy.optimize import least_squares
+
     begin = model.model_copy(update={k: max(getattr(model, k), v) for k, v in STARTS.items()})
     free = [k for k, name in enumerate(PARAMETERS) if name in FREE[model.kind]]
     start, prior = begin.values(), np.array([PRIOR[name] for name in PARAMETERS])
@@ -74,10 +88,9 @@ def calibrate(blocks: Blocks, log: Log, model: CycleTimeModel, file: str = "",
     def modelled(x: Floats) -> Floats:
         values = start.copy()
         values[free] += x * prior[free]
-        return np.diff(timed(blocks, _with(begin, values)).begin[rows])
-    before = np.diff(timed(blocks, model).begin[rows])
-    scale = _scatter(measured - before, measured)
+        return np.diff(timed(blocks, begin.with_values(values)).begin[rows])
     x = _start(modelled, measured, free)
+    scale = _scatter(measured - modelled(x), measured)
     for _ in range(3):
         doubt = np.hypot(CLOCK, scale * np.sqrt(np.maximum(measured, 0.0) * measured.mean()))
 
@@ -86,17 +99,11 @@ def calibrate(blocks: Blocks, log: Log, model: CycleTimeModel, file: str = "",
         result = least_squares(residual, x, loss="soft_l1", diff_step=[1e-3] * len(x), max_nfev=60, f_scale=3.0)
         x = result.x
         scale = max(_scatter(measured - modelled(x), measured), 1e-5)
-    after, values = modelled(x), start.copy()
+    values = start.copy()
     values[free] += x * prior[free]
-    jacobian = _slopes(modelled, x)
     doubt = np.hypot(CLOCK, scale * np.sqrt(np.maximum(measured, 0.0) * measured.mean()))
-    covariance = _covariance(jacobian / doubt[:, None], free, prior)
-    fit = _fit(model, _with(begin, values), covariance, free, prior, measured, before, after, file, machine)
-    return fit, _warnings(fit, file)
-
-
-def _with(model: CycleTimeModel, logarithms: Floats) -> CycleTimeModel:
-    return model.model_copy(update={name: float(np.exp(v)) for name, v in zip(PARAMETERS, logarithms, strict=True)})
+    covariance = _covariance(_slopes(modelled, x) / doubt[:, None], free, prior)
+    return _fit(model, begin.with_values(values), covariance, free, prior, measured, before, modelled(x), file, machine)
 
 
 def _scatter(residual: Floats, measured: Floats) -> float:
@@ -108,7 +115,7 @@ def _scatter(residual: Floats, measured: Floats) -> float:
 def _start(modelled: Modelled, measured: Floats, free: list[int]) -> Floats:
     """Where the fit begins: the best of a coarse grid over block time and rapids, which a fit cannot feel from where
     they hold nothing."""
-    grid = {"block_time": (0.0, 0.35, 0.55, 0.8, 1.05), "rapid": (0.0, -0.6)}
+    grid = {"block_time": (0.0, 0.35, 0.55, 0.8, 1.05), "rapid": (0.0, -0.25, -0.6)}
     names = [PARAMETERS[k] for k in free]
     axes = [grid.get(name, (0.0,)) for name in names]
     options = [np.array(x) for x in product(*axes)]
@@ -128,8 +135,11 @@ def _slopes(modelled: Modelled, x: Floats) -> Floats:
 
 
 def _covariance(weighted: Floats, free: list[int], prior: Floats) -> Floats:
-    """(5, 5) of the logarithms; parameters that do not take part have none."""
-    inner = np.linalg.inv(weighted.T @ weighted + np.eye(len(free)))
+    """(5, 5) of the logarithms; parameters that do not take part have none.
+
+    Neighbouring sections share a reading of the clock, so that only half of them count.
+    """
+    inner = np.linalg.inv(0.5 * weighted.T @ weighted + np.eye(len(free)))
     result = np.zeros((len(PARAMETERS), len(PARAMETERS)))
     result[np.ix_(free, free)] = inner * np.outer(prior[free], prior[free])
     return result

@@ -118,8 +118,7 @@ def _parameter_changes(blocks: Blocks, model: CycleTimeModel) -> list[tuple[str,
 
 def with_values(model: CycleTimeModel, logarithms: dict[str, float]) -> CycleTimeModel:
     """The model with parameters moved by differences of their logarithms."""
-    moved = {name: float(getattr(model, name) * np.exp(change)) for name, change in logarithms.items()}
-    return model.model_copy(update=moved)
+    return model.with_values(model.values() + np.array([logarithms.get(name, 0.0) for name in PARAMETERS]))
 
 
 def _scaled(blocks: Blocks, limit: str, which: Floats, sign: int) -> Blocks:

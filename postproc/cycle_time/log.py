@@ -84,7 +84,8 @@ def _faults(log: Log, values: Floats, file: str) -> list[Diagnostic]:
                       hint="log every change of the line number")]
     odd = np.flatnonzero((values[:, 0] != np.round(values[:, 0])) | (values[:, 0] < 1.0))
     if len(odd):
-        return [error("log.line", "nc_line is no line number", file=file, lines=log.row[odd][:6].tolist(), count=len(odd))]
+        return [error("log.line", "nc_line is no line number", file=file, lines=log.row[odd][:6].tolist(), count=len(odd),
+                      hint="lines of the file are whole numbers from 1")]
     back = np.flatnonzero(np.diff(log.time) < 0.0) + 1
     if len(back):
         return [error("log.time", "time_s falls", file=file, lines=log.row[back][:6].tolist(), count=len(back),

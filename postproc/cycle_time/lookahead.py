@@ -80,7 +80,7 @@ def corner_speed(blocks: Blocks, form: Shape, model: CycleTimeModel) -> Floats:
     ways = directions(blocks, form)
     change = np.abs(ways.first[1:] - ways.last[:-1])
     stated = blocks.tolerance[:-1]
-    tolerance = np.where(np.isfinite(stated), stated, model.corner_tolerance)
+    tolerance = np.where(np.isfinite(stated), stated * model.stated_share, model.corner_tolerance)
     bend = np.linalg.norm(np.where(blocks.axes.xyz >= 0, change[:, blocks.axes.xyz], 0.0), axis=1)
     half = np.minimum(form.length[:-1], form.length[1:]) / 2.0
     with np.errstate(divide="ignore"):

@@ -48,6 +48,8 @@ class CycleTimeModel(UserModel):
     linuxcnc: LinuxCNC's planner"""
     corner_tolerance: float = Field(default=0.01, gt=0.0, le=10.0)
     """mm that corners may be rounded off where the program does not say"""
+    stated_share: float = Field(default=1.0, gt=0.0, le=1000.0)
+    """share of a tolerance that the program states which corners use; a fit of the corner tolerance scales both"""
     block_time: float = Field(default=0.001, ge=0.0, le=1.0)
     """s that the control takes for a block at least"""
     lookahead: int = Field(default=200, ge=1)
@@ -71,6 +73,12 @@ class CycleTimeModel(UserModel):
     def values(self) -> Floats:
         """(5,) logarithms of PARAMETERS."""
         return np.log(np.maximum([getattr(self, name) for name in PARAMETERS], 1e-6))
+
+    def with_values(self, logarithms: Floats) -> CycleTimeModel:
+        """The model with other PARAMETERS (5,); the share of stated tolerances goes with the corner tolerance."""
+        new = {name: float(np.exp(v)) for name, v in zip(PARAMETERS, logarithms, strict=True)}
+        share = self.stated_share * new["corner_tolerance"] / self.corner_tolerance
+        return self.model_copy(update={**new, "stated_share": share})
 
 
 def builtin_files() -> dict[str, Path]:

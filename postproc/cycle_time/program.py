@@ -38,7 +38,7 @@ class Origin:
     @staticmethod
     def by_tool(motion: Motion) -> Origin:
         """One operation from tool change to tool change."""
-        change = np.concatenate([[False], np.diff(motion.tool) != 0])
+        change = np.concatenate([[False], np.diff(motion.tool) != 0])[:len(motion)]
         number = np.cumsum(change)
         first = np.unique(number, return_index=True)[1]
         return Origin(number, tuple(f"T{t}" if t >= 0 else "" for t in motion.tool[first].tolist()) or ("",))

@@ -60,8 +60,8 @@ def from_gcode(data: bytes, machine: Machine, controller: ControllerFile, setup:
         found.append(error("gcode.feed", "cutting blocks without a feed in force", file=file,
                            lines=motion.line[missing][:6].tolist(), count=int(missing.sum()), hint="state F before them"))
         return None, found
-    blocks = _blocks(code, motion, machine, control, controller, None)
-    if not len(blocks):
+    blocks = _blocks(code, motion, machine, control, controller, None) if len(motion) else None
+    if blocks is None or not len(blocks):
         return None, [*found, error("gcode.no_motion", "the program moves nothing", file=file,
                                     hint="there is no time to estimate")]
     return blocks, found

@@ -1,0 +1,97 @@
+"""Our estimate of LinuxCNC's time beside the machine time of its simulator."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from machines.machine import Machine
+from postproc.controllers.model import load_controller
+from postproc.cycle_time.blocks import Blocks
+from postproc.cycle_time.calibrate import calibrate
+from postproc.cycle_time.estimate import Estimate, estimate
+from postproc.cycle_time.log import Log
+from postproc.cycle_time.model import load_model
+from postproc.cycle_time.source import from_gcode
+from postproc.setup import SetupFile
+from tests.linuxcnc.simulator import Run
+from tests.linuxcnc.time_programs import END, HEAD, PROGRAMS, machine, random_lines
+
+EACH, MEAN = 0.015, 0.004
+"""shares of the time that an estimate may be off, each and on average"""
+seen: dict[str, float] = {}
+
+
+def blocks(text: str, on: Machine) -> Blocks:
+    spec, _ = load_controller("linuxcnc")
+    assert spec is not None
+    made, found = from_gcode(text.encode(), on, spec, SetupFile())
+    assert made is not None, [str(d) for d in found]
+    return made
+
+
+def estimated(text: str, on: Machine) -> Estimate:
+    model, _ = load_model("linuxcnc")
+    assert model is not None
+    return estimate(blocks(text, on), on, model)
+
+
+def run(simulate: Callable[..., Run], text: str, on: Machine, folder: Path) -> Run:
+    (folder / "program.ngc").write_text(text)
+    result: Run = simulate(on, folder / "program.ngc", {1: (0.0, 6.0), 2: (0.0, 6.0)}, warp=20)
+    assert result.errors == ()
+    return result
+
+
+@pytest.mark.parametrize("name", PROGRAMS)
+def test_estimate_is_the_simulators_time(simulate, tmp_path: Path, name: str) -> None:
+    letters, program = PROGRAMS[name]
+    on, text = machine(letters), program + END
+    measured = run(simulate, text, on, tmp_path).seconds
+    e = estimated(text, on)
+    seen[name] = e.seconds / measured - 1.0
+    assert abs(seen[name]) < EACH
+    assert e.lower_bound <= measured
+    assert e.band[0] <= measured <= e.band[1]
+
+
+def test_mean_of_all_programs() -> None:
+    if len(seen) < len(PROGRAMS):
+        pytest.skip("needs the whole table in one process")
+    assert np.mean(np.abs(list(seen.values()))) < MEAN
+
+
+def test_lines_are_taken_up_when_the_simulator_takes_them_up(simulate, tmp_path: Path) -> None:
+    """Not only the sum is right: every line begins within a few per mille of the run."""
+    on, text = machine("mill-3axis"), f"{HEAD} G64 P0.05 Q0\nG0 Z300\nF3000\n{random_lines(60)}{END}"
+    result = run(simulate, text, on, tmp_path)
+    b = blocks(text, on)
+    begin = estimated(text, on).timed.begin
+    moving = np.flatnonzero(np.any(np.diff(result.joints, axis=0) != 0.0, axis=1))[0]
+    for row in range(5, len(b), 7):
+        measured = result.t[np.flatnonzero(result.line == b.line[row])[0]] - result.t[moving]
+        assert begin[row] == pytest.approx(measured, abs=0.02)
+
+
+def test_a_generic_model_learns_linuxcnc_from_its_log(simulate, tmp_path: Path) -> None:
+    """A look-ahead model fitted to one run foretells another within its band."""
+    on = machine("mill-3axis")
+    texts = [f"{HEAD} G64 P0.01\nG0 Z300\nF{feed}\n{random_lines(count)}G0 X0 Y0 Z300\nG0 X200\n{END}"
+             for feed, count in ((4000, 120), (2500, 80))]
+    runs = [run(simulate, text, on, tmp_path) for text in texts]
+    taught = runs[0]
+    rows = np.concatenate([[0], np.flatnonzero(np.diff(taught.line) != 0) + 1])
+    rows = rows[taught.line[rows] > 0]
+    log = Log(taught.line[rows], taught.t[rows], np.full((len(rows), 3), np.nan), rows)
+    model, _ = load_model("lookahead")
+    assert model is not None
+    fit, found = calibrate(blocks(texts[0], on), log, model, "log.csv", on)
+    assert fit is not None, found
+    e = estimate(blocks(texts[1], on), on, fit.model)
+    wide = estimate(blocks(texts[1], on), on, model)
+    assert e.band[0] <= runs[1].seconds <= e.band[1]
+    assert e.band[1] - e.band[0] < 0.5 * (wide.band[1] - wide.band[0])
+    assert abs(e.seconds / runs[1].seconds - 1.0) < 0.02

@@ -1,0 +1,143 @@
+"""Hidden parameters found from noisy logs; bands that hold; files; logs that do not fit."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from postproc.cycle_time.blocks import Blocks
+from postproc.cycle_time.calibrate import Fit, as_toml, calibrate
+from postproc.cycle_time.estimate import estimate, timed, total
+from postproc.cycle_time.log import Log, read_log
+from postproc.cycle_time.model import CycleTimeModel, load_model
+from tests.postproc.time_kit import blocks, machine, model
+from toolpaths.diagnostics import DiagnosticError
+
+CLOCK = 0.002
+"""s, standard deviation of the time stamps"""
+
+
+@cache
+def finishing(seed: int) -> Blocks:
+    """Waves cut in short lines, with long and short rapids between the passes."""
+    rng = np.random.default_rng(seed)
+    x = np.cumsum(rng.uniform(0.05, 1.2, 500)) - 150.0
+    y = 8.0 * np.sin(x / 9.0) + np.cumsum(rng.normal(0.0, 0.15, 500))
+    text = ["G21 G90 G94 G17", f"G0 X{x[0]:.3f} Y{y[0]:.3f} Z300", "F6000"]
+    for i in range(500):
+        if i % 60 == 59:
+            text += ["G0 Z320", f"G0 X{x[i] - 250 * rng.random():.3f} Y{y[i] + rng.normal(0, 90):.3f}",
+                     f"G0 X{x[i]:.3f} Y{y[i]:.3f}", "G0 Z300"]
+        text.append(f"G1 X{x[i]:.4f} Y{y[i]:.4f} Z{300 - 2 * np.sin(x[i] / 4):.4f}")
+    return blocks("\n".join(text), controller="generic-iso")
+
+
+def hidden(rng: np.random.Generator) -> CycleTimeModel:
+    values = {"corner_tolerance": 0.01 * np.exp(rng.normal(0, 0.7)), "block_time": 0.003 * np.exp(rng.normal(0, 0.5)),
+              "rapid": np.exp(rng.normal(-0.3, 0.15)), "override": np.exp(rng.normal(0, 0.1)),
+              "stop_time": 0.02 * np.exp(rng.normal(0, 0.6))}
+    return model("lookahead").model_copy(update={name: float(v) for name, v in values.items()})
+
+
+def log_of(b: Blocks, truth: CycleTimeModel, rng: np.random.Generator) -> Log:
+    line, first = np.unique(b.line, return_index=True)
+    stamps = np.maximum.accumulate(timed(b, truth).begin[first] + rng.normal(0.0, CLOCK, len(first))) + 17.0
+    return Log(line, stamps, np.full((len(line), 3), np.nan), np.arange(2, len(line) + 2))
+
+
+def fit(truth: CycleTimeModel, rng: np.random.Generator) -> Fit:
+    made, found = calibrate(finishing(0), log_of(finishing(0), truth, rng), model("lookahead"), "log.csv", machine())
+    assert made is not None and not found
+    return made
+
+
+def test_hidden_parameters_are_found_and_bands_hold_on_other_programs() -> None:
+    rng = np.random.default_rng(8)
+    inside, off, narrower = [], [], []
+    for _ in range(14):
+        truth = hidden(rng)
+        made = fit(truth, rng)
+        off.append([abs(np.log(made.values[name][0] / getattr(truth, name))) / made.values[name][1]
+                    for name in ("corner_tolerance", "rapid", "override", "stop_time")])
+        assert made.values["corner_tolerance"][0] == pytest.approx(truth.corner_tolerance, rel=0.1)
+        value, sigma = made.values["override"]
+        assert value == pytest.approx(truth.override, rel=max(0.04, 3.0 * sigma))
+        for seed in (1, 2, 3):
+            other = finishing(seed)
+            e = estimate(other, machine(), made.model)
+            inside.append(e.band[0] <= total(other, timed(other, truth)) <= e.band[1])
+            wide = estimate(other, machine(), model("lookahead"))
+            narrower.append((e.band[1] - e.band[0]) / (wide.band[1] - wide.band[0]))
+    assert np.mean(inside) >= 0.95
+    assert np.median(off) < 1.0
+    assert max(narrower) < 0.5
+
+
+def test_what_a_run_does_not_show_is_said() -> None:
+    """No rapid in the run reaches its speed, no block is short: neither can be known."""
+    b = blocks("G21 G90 G94 G17\nF900\n" + "\n".join(
+        f"G1 X{20 * (i % 2)} Y{3 * i}\nG0 Z{300 + i % 2}" for i in range(1, 30)), controller="generic-iso")
+    rng = np.random.default_rng(2)
+    made, _ = calibrate(b, log_of(b, model("lookahead"), rng), model("lookahead"), "log.csv")
+    assert made is not None and made.model.calibration is not None
+    assert "rapid" in made.model.calibration.not_identifiable
+    assert "override" not in made.model.calibration.not_identifiable
+
+
+def test_a_control_without_jerk_is_recognised() -> None:
+    rng = np.random.default_rng(3)
+    truth = hidden(rng).model_copy(update={"jerk": False})
+    assert not fit(truth, rng).model.jerk
+    assert fit(hidden(rng), rng).model.jerk
+
+
+def test_the_model_is_a_file(tmp_path: Path) -> None:
+    rng = np.random.default_rng(4)
+    made = fit(hidden(rng), rng).model
+    (tmp_path / "shop.toml").write_text(as_toml(made))
+    loaded, found = load_model(tmp_path / "shop.toml")
+    assert not found and loaded == made
+
+
+def test_logs_are_read_with_positions(tmp_path: Path) -> None:
+    rows = "\n".join(f"{n},{0.1 * n},{n}.5,0" for n in range(1, 12))
+    (tmp_path / "log.csv").write_text(f"nc_line,time_s,X,Z\n{rows}\n")
+    log, found = read_log(tmp_path / "log.csv", ("X", "Y", "Z"))
+    assert log is not None and not found
+    assert log.line.tolist() == list(range(1, 12)) and log.time[3] == pytest.approx(0.4)
+    assert log.position[2, 0] == 3.5 and np.isnan(log.position[2, 1])
+
+
+GOOD = "".join(f"{n},{n}\n" for n in range(1, 12))
+
+
+@pytest.mark.parametrize(("text", "code", "lines"), [
+    ("time_s,nc_line\n" + GOOD, "log.columns", (1,)),
+    ("nc_line,time_s,Q\n" + GOOD, "log.columns", (1,)),
+    ("", "log.columns", (1,)),
+    ("nc_line,time_s\n" + GOOD + "12,ten\n13\n", "log.numbers", (13, 14)),
+    ("nc_line,time_s\n" + GOOD + "12,inf\n", "log.numbers", (13,)),
+    ("nc_line,time_s\n1,1\n2,2\n", "log.short", ()),
+    ("nc_line,time_s\n" + GOOD + "12.5,12\n", "log.line", (13,)),
+    ("nc_line,time_s\n" + GOOD + "12,3\n", "log.time", (13,)),
+])
+def test_bad_logs_are_told(tmp_path: Path, text: str, code: str, lines: tuple[int, ...]) -> None:
+    (tmp_path / "log.csv").write_text(text)
+    log, found = read_log(tmp_path / "log.csv", ("X", "Y", "Z"))
+    assert log is None and [d.code for d in found] == [code]
+    assert found[0].lines == lines and found[0].hint and "Traceback" not in str(found[0])
+
+
+def test_a_log_of_another_program_is_refused() -> None:
+    line = np.arange(9000, 9020)
+    log = Log(line, np.arange(20.0), np.full((20, 3), np.nan), line)
+    made, found = calibrate(finishing(0), log, model("lookahead"), "log.csv")
+    assert made is None and [d.code for d in found] == ["log.lines"]
+
+
+def test_a_log_that_is_not_there(tmp_path: Path) -> None:
+    with pytest.raises(DiagnosticError, match=r"time\.open"):
+        read_log(tmp_path / "none.csv", ("X",))
