@@ -9,12 +9,12 @@ if TYPE_CHECKING:
     from machines.geometric_error.actual import Actual, approach
     from machines.geometric_error.actual_kinematics import ActualKinematics
     from machines.geometric_error.correction import Corrected, correct
-    from machines.geometric_error.load import error_model_schema, load, load_checked
+    from machines.geometric_error.loader import error_model_schema, load, load_checked
     from machines.geometric_error.model import Doubt, ErrorModel, doubt
 
 _HOME = {"Actual": "actual", "approach": "actual", "ActualKinematics": "actual_kinematics", "Corrected": "correction",
-         "correct": "correction", "error_model_schema": "load", "load": "load", "load_checked": "load", "Doubt": "model",
-         "ErrorModel": "model", "doubt": "model"}
+         "correct": "correction", "error_model_schema": "loader", "load": "loader", "load_checked": "loader",
+         "Doubt": "model", "ErrorModel": "model", "doubt": "model"}
 __all__ = ["Actual", "ActualKinematics", "Corrected", "Doubt", "ErrorModel", "approach", "correct", "doubt",
            "error_model_schema", "load", "load_checked"]
 

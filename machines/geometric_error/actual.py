@@ -64,7 +64,12 @@ def approach(q: Floats) -> Floats:
     """Sign of each joint's last motion (N, J) along a path q (N, J): +1, -1; 0 before it has first moved."""
     moved = np.zeros(q.shape)
     moved[1:] = np.sign(np.diff(q, axis=0))
-    last = np.where(moved != 0.0, np.arange(len(q))[:, None], 0)
+    return carried_on(moved)
+
+
+def carried_on(way: Floats) -> Floats:
+    """Signs (N, J) with every 0 replaced by the last sign before it."""
+    last = np.where(way != 0.0, np.arange(len(way))[:, None], 0)
     np.maximum.accumulate(last, axis=0, out=last)
-    result: Floats = np.take_along_axis(moved, last, axis=0)
+    result: Floats = np.take_along_axis(way, last, axis=0)
     return result

@@ -17,7 +17,7 @@ from machines.geometric_error.curves import Fourier, Table
 from machines.geometric_error.exchange import from_linuxcnc, sampled, save, table_to_csv, to_linuxcnc, with_component
 from machines.geometric_error.lattice import ActualByMap, ErrorMap, deviations, map_loss, map_of
 from machines.geometric_error.lattice_file import map_from_csv, map_to_csv
-from machines.geometric_error.load import error_model_schema, load, load_checked
+from machines.geometric_error.loader import error_model_schema, load, load_checked
 from machines.geometric_error.model import ErrorModel, doubt
 from machines.geometric_error.names import parse
 from machines.geometric_error.serial_errors import Component, SerialErrors

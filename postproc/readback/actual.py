@@ -1,0 +1,58 @@
+"""Poses of a program's blocks on the machine with its geometric errors: the proof of their correction."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from machines.geometric_error.actual import Actual, carried_on
+from machines.geometric_error.model import ErrorModel
+from postproc.readback.execute import Motion
+from postproc.readback.poses import Executed
+from toolpaths.arrays import Floats, Ints
+
+MOMENT = 1e-3
+"""of a block: how far back the direction of an axis is looked at"""
+STILL = 1e-10
+"""mm or rad: an axis that moves less in that moment rests"""
+
+
+@dataclass(frozen=True)
+class ActualExecuted(Executed):
+    """As `Executed`, but where the tool of the machine with errors is; `motion` is the whole program's."""
+
+    model: ErrorModel = field(kw_only=True)
+    motion: Motion = field(kw_only=True)
+
+    def poses(self, motion: Motion, rows: Ints, t: float | Floats) -> tuple[Floats, Floats]:
+        """(tip, axis) (K, 3) of the blocks `rows` at fraction t, errors in, by the way that each axis last moved."""
+        near = np.concatenate(super().poses(motion, rows, t), axis=1)
+        q, way = self.joints(motion, rows, t), self._way(motion, rows, t)
+        tip, axis = np.empty((len(rows), 3)), np.empty((len(rows), 3))
+        for number in np.unique(motion.tool[rows]).tolist():
+            k = np.flatnonzero(motion.tool[rows] == number)
+            actual = self._actual(number)
+            tip[k], axis[k], _ = actual.place(actual.coordinates(q[k], near[k]), way[k])
+        return tip, axis
+
+    def _actual(self, number: int) -> Actual:
+        return self.model.on(self.kinematics(number))
+
+    def _moving(self, motion: Motion, rows: Ints, t: float | Floats) -> Floats:
+        """(K, J) sign of each joint's motion at fraction t; at the start of a block a moment after it."""
+        before = np.clip(np.broadcast_to(t, len(rows)) - MOMENT, 0.0, 1.0 - MOMENT)
+        step = self.joints(motion, rows, before + MOMENT) - self.joints(motion, rows, before)
+        result: Floats = np.where(np.abs(step) > STILL, np.sign(step), 0.0)
+        return result
+
+    @cached_property
+    def _last(self) -> Floats:
+        """(E, J) sign of each joint's last motion at the ends of all blocks."""
+        every = np.arange(len(self.motion))
+        return carried_on(self._moving(self.motion, every, 1.0))
+
+    def _way(self, motion: Motion, rows: Ints, t: float | Floats) -> Floats:
+        moving = self._moving(motion, rows, t)
+        return np.asarray(np.where(moving != 0.0, moving, self._last[np.maximum(rows - 1, 0)]))
