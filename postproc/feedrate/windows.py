@@ -25,6 +25,8 @@ WINDOW, OVERLAP = 8192, 1024
 """Knots of a window, and on each side beyond it."""
 APART, OVER = 1e-3, 1.002
 """Relative difference of neighbours, and ratio to a limit in the blend, from which the overlap is widened."""
+WIDEST = 16
+"""Times the asked overlap beyond which it is not widened."""
 KERNEL_FROM = 20_000
 """Knots from which compiling pays."""
 
@@ -90,11 +92,21 @@ def solved(knots: Knots, method: Method, near: Floats | None = None) -> Solved:
     while again:
         _solve_some(knots, windows, wide, again, found, make, method.threads, near)
         c, bad, worst = _stitched(knots, inner, [min(pair) for pair in pairwise(wide)], found)
-        again = sorted({i for j in bad for i in (j, j + 1) if wide[i] < count})
+        again = sorted({i for j in bad for i in (j, j + 1) if wide[i] < min(count, WIDEST * method.overlap)})
         for i in again:
             wide[i] *= 2
-    return Solved(c, max(one.iterations for one in found), worst, all(one.solved for one in found),
-                  np.sum([one.weights for one in found], axis=0))
+    return Solved(_held(knots, c, inner) if bad else c, max(one.iterations for one in found), worst,
+                  not bad and all(one.solved for one in found), np.sum([one.weights for one in found], axis=0))
+
+
+def _held(knots: Knots, c: Floats, inner: Sequence[int]) -> Floats:
+    """Where windows do not agree however wide: all slowed until the stitches, too, respect the limits."""
+    share = 1.0
+    for middle in inner[1:-1]:
+        first, last = max(middle - WINDOW, 0), min(middle + WINDOW, len(knots.sigma))
+        here = c[first:last + 2]
+        share = min(share, float(np.min(knots.problem(first, last).slowed(here) / here)))
+    return c * share
 
 
 def _solve_some(knots: Knots, windows: Sequence[tuple[int, int]], wide: Sequence[int], which: Sequence[int],

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 
+from postproc.feedrate import interior, windows
 from postproc.feedrate.limits import JointLimits
 from postproc.feedrate.mesh import Spacing
 from postproc.feedrate.plan import Options, Plan, plan, plan_second_order
@@ -153,6 +155,17 @@ def test_short_overlaps_are_widened() -> None:
     report = solved(grid, Method(window=800, overlap=40))
     assert report.mismatch < 1e-3
     assert grid.problem().ratios(report.c).max() < 1.002
+
+
+def test_windows_that_stop_early_are_slow_not_wrong(monkeypatch: pytest.MonkeyPatch) -> None:
+    """They do not agree then; the motion is slowed as a whole and says so."""
+    monkeypatch.setattr(windows, "solve", partial(interior.solve, most=9))
+    path = zigzag(300.0)
+    grid = uniform(path, 3000)
+    report = solved(grid, Method(window=800, overlap=100))
+    assert not report.solved and report.mismatch > 1e-3
+    assert grid.problem().ratios(report.c).max() < 1.0
+    assert not plan(path, MIKRON, knots=grid.sigma, options=Options(method=Method(window=800, overlap=100))).solved
 
 
 def test_nothing_depends_on_units() -> None:
