@@ -59,10 +59,11 @@ ARCS = ["RAPID", "GOTO/10,0,5,0,0,1", "FEDRAT/MMPM,600", "GOTO/10,0,0", "CIRCLE/
         "END-OF-PATH"]
 FIRST, THEN = "0,0.17513,0.9845447", "0.05,0.3420201433257,0.9383616"
 TURN = ["RAPID", f"GOTO/0,0,5,{FIRST}", "FEDRAT/MMPM,500", f"GOTO/0.0312,0,5,{FIRST}", f"GOTO/9.0312,0,5,{THEN}",
-        f"GOTO/10.0312,0,5,{THEN}", "RAPID", f"GOTO/10,0,50,{THEN}", f"GOTO/20,0,50,{THEN}", "RAPID", f"GOTO/9,0,50,{THEN}",
+        f"GOTO/10.0312,0,5,{THEN}", f"GOTO/11.0312,0,5,{THEN}",
+        "RAPID", f"GOTO/10,0,50,{THEN}", f"GOTO/20,0,50,{THEN}", "RAPID", f"GOTO/9,0,50,{THEN}",
         "CYCLE/DRILL,DEPTH,5,MMPM,100,CLEAR,3", f"GOTO/9,0,0,{THEN}", "CYCLE/OFF", "RAPID", f"GOTO/9,0,50,{THEN}",
         f"GOTO/12,0,50,{THEN}"]
-"""the last block before the rapids takes 1/500 min: F500 as an inverse time and as a feed"""
+"""the last two blocks before the rapids take 1/500 min each: F500 as an inverse time and as a feed"""
 INSERTED = ["RAPID", "GOTO/0,0,5", "INSERT/M19", "GOTO/1,0,5"]
 
 
