@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     from postproc.readback.sections import Rows
 
 _SMALL = 1e-9
+_RADIUS_SLACK = 0.01
+"""mm that a chord may be longer than the diameter, where the control says nothing"""
 
 
 def centres(start: Floats, end: Floats, plane: Array, ccw: Bools, relative: Floats, absolute: Floats, radius: Floats,
@@ -31,7 +33,7 @@ def centres(start: Floats, end: Floats, plane: Array, ccw: Bools, relative: Floa
             first, last = start[k][:, (i, j)], end[k][:, (i, j)]
             center[k[:, None], [i, j]] = _by_radius(first, last, radius[k], ccw[k])
             chord = np.linalg.norm(last - first, axis=1)
-            for n in np.flatnonzero((chord > 2.0 * np.abs(radius[k]) + max(min(slack, 1.0), _SMALL)) | (chord < _SMALL)):
+            for n in np.flatnonzero((chord > 2.0 * np.abs(radius[k]) + min(slack, _RADIUS_SLACK)) | (chord < _SMALL)):
                 bad[int(k[n])] = f"an arc of radius {radius[k][n]:g} cannot span {chord[n]:.4f} mm"
         k = np.flatnonzero((plane == code) & ~np.isfinite(radius))
         if len(k):

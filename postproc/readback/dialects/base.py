@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from postproc.controllers.model import ControllerFile
 from postproc.readback.canonical import Canonical, Text, offset_number
 from postproc.readback.flow import Structure, expand
-from postproc.readback.modal import GROUPS, Groups, check_codes, check_end, drop_passive
+from postproc.readback.modal import GROUPS, Groups, check_codes, check_end, codes, drop_passive
 from postproc.readback.words import Words
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, has_errors
@@ -33,6 +33,7 @@ class Reader(ABC):
 
     def __init__(self, axes: tuple[str, ...], controller: ControllerFile | None = None, home: Floats | None = None) -> None:
         self.axes, self.controller, self.home = axes, controller, home
+        self.main_file = ""
 
     @abstractmethod
     def tokens(self, data: bytes, file: str) -> tuple[Text, list[Diagnostic]]:
@@ -62,6 +63,7 @@ class Reader(ABC):
              ) -> tuple[Canonical | None, list[Diagnostic]]:
         """A program, with the files of its subprograms by name, as canonical words; None where it cannot be read."""
         texts, structures, found = [], [], []
+        self.main_file = file
         for name, content in {file: data, **(others or {})}.items():
             text, more = self.tokens(content, name)
             found += more
@@ -73,6 +75,7 @@ class Reader(ABC):
             found += [*more, *self.check(text.words, name)]
             if name == file:
                 found += check_end(text.words, file, self.behind_end(structure))
+                structure.main = _to_end(text.words, structure.main)
             texts.append(text)
             structures.append(structure)
         text, line, more = expand(texts, structures, file)
@@ -81,6 +84,13 @@ class Reader(ABC):
             return None, found
         code, more = self.canonical(text, line, file)
         return code, [*found, *more]
+
+
+def _to_end(words: Words, main: tuple[int, int]) -> tuple[int, int]:
+    """The lines of a main program to its first M2 or M30."""
+    ends, _ = codes(words, "M", (2, 30))
+    ends = ends[ends >= main[0]]
+    return main if not len(ends) or int(words.line[-1]) == int(ends[0]) else (main[0], min(main[1], int(ends[0])))
 
 
 def whole(text: Text) -> Structure:

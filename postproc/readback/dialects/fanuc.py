@@ -55,12 +55,17 @@ class FanucReader(IsoReader):
         ends = [*(starts[1:] - 1).tolist(), words.lines]
         spans = {f"O{int(n)}": (int(a), int(b)) for n, a, b in zip(numbers, starts, ends, strict=True)}
         main = (1, ends[0] if len(starts) else words.lines)
-        named = {name: _returns(span, back) for name, span in spans.items() if _returns(span, back)[1]}
-        subprograms = {name: (a, b) for name, (a, b) in named.items()}
-        own = PurePath(file).stem.upper()
-        if len(starts) < 2 and len(back) and own and own not in subprograms:
-            subprograms[own] = (1, int(back[0]))
-        return Structure(main, subprograms, self.calls(words)), []
+        own = file == self.main_file
+        if not len(starts) and not own:
+            spans = {PurePath(file).stem.upper(): main}
+        found = [error("gcode.subprogram", "M99 in the main program begins it again", file=file, lines=[int(b)],
+                       hint="M30") for b in back if own and main[0] <= b <= main[1] and not self.local(words, int(b))]
+        subprograms = {name: _returns(span, back) for name, span in spans.items() if not own or span[1] > main[1]}
+        return Structure(main, {k: v for k, v in subprograms.items() if v[1]}, self.calls(words)), found
+
+    def local(self, words: Words, back: int) -> bool:
+        """True where an M99 ends a subprogram inside of the main program."""
+        return False
 
     def calls(self, words: Words) -> dict[int, Call]:
         """M98 P of four digits L, or P with the number of times before the last four."""

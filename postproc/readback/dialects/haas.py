@@ -48,6 +48,11 @@ class HaasReader(FanucReader):
                 structure.subprograms[call.name] = (int(line), int(last[0]) if len(last) else text.words.lines)
         return structure, found
 
+    def local(self, words: Words, back: int) -> bool:
+        """M97 runs what stands behind the end, from an N to M99."""
+        ends = codes(words, "M", (2, 30))[0]
+        return bool(len(codes(words, "M", (97,))[0]) and len(ends) and ends.min() < back)
+
     def calls(self, words: Words) -> dict[int, Call]:
         """M98 P L, and M97 P L."""
         result = {}

@@ -51,9 +51,9 @@ class IsoReader(Reader):
         self.tools(words, new, line, file, found)
         self.rests(words, new, drop, line, file, found)
         self.paths(words, new)
-        self.others(words, new, drop, line, file, found)
         blocks, value = codes(words, "G", self.groups["offset"])
         new += [(int(b), OFFSET, float(v)) for b, v in zip(blocks, value, strict=True)]
+        self.others(words, new, drop, line, file, found)
         words = self.arcs(relative_words(words, self.axes), new, drop)
         found += self.numbers(words.take(~drop), line, file)
         return Canonical(added(words, new, drop), line), found

@@ -105,8 +105,9 @@ class KlartextReader(Reader):
         labels = [(b, str(s.args[0])) for b, s in here if s.name == "LBL"]
         subprograms, calls, found = {}, {}, list[Diagnostic]()
         for b, name in labels:
-            if name != "0":
-                subprograms[f"LBL {name}"] = (b, next((e for e, n in labels if e > b and n == "0"), text.words.lines))
+            last = next((e for e, n in labels if e > b and n == "0"), 0)
+            if name != "0" and last:
+                subprograms[f"LBL {name}"] = (b, last)
         for b, s in here:
             name = str(s.args[0]) if s.args else ""
             if s.name == "CALL LBL" and s.keys.get("REP", 0.0) > 0.0:

@@ -190,7 +190,10 @@ class Run:
         """LP: straight to PR, PA."""
         now = self.polar(b) if {"IPR", "IPA"} & set(s.keys) or len({"PR", "PA"} & set(s.keys)) < 2 else (0.0, 0.0)
         rest = self.place(b, {k: v for k, v in s.keys.items() if k not in ("PR", "PA", "IPR", "IPA")})
-        if now is None or rest is None or set(self.pole) != {"X", "Y"}:
+        if set(self.pole) != {"X", "Y"}:
+            self.fault("gcode.pole", b, "LP without CC X Y", "CC X Y before it")
+            return
+        if now is None or rest is None:
             return
         r = s.keys.get("PR", now[0] + s.keys.get("IPR", 0.0))
         angle = math.radians(s.keys.get("PA", now[1] + s.keys.get("IPA", 0.0)))

@@ -63,7 +63,7 @@ class SiemensReader(Reader):
 
     groups: Groups = GROUPS | {
         "motion": (0, 1, 2, 3), "units": (70, 71, 700, 710), "offset": (54, 55, 56, 57, 500, *range(505, 600)),
-        "path": (9, 60, 64), "once": (4,), "length": (), "level": (), "arc_distance": ()}
+        "path": (9, 60, 64), "once": (4,), "exact_stop": (601, 602, 603), "length": (), "level": (), "arc_distance": ()}
     m_codes = (*M_CODES, 17.0)
     letters = "GMFSTDNIJKRLP?~"
     arc_slack = 0.01
@@ -117,7 +117,7 @@ class SiemensReader(Reader):
         spans = {name: (a, min([n for n in back if a <= n <= b], default=b)) for name, (a, b) in spans.items()}
         own = PurePath(file).stem.upper().removesuffix("_SPF").removeprefix("_N_")
         subprograms = {name: span for name, span in spans.items() if span[0] != main[0]}
-        if own in self.names:
+        if file != self.main_file:
             subprograms[own] = (1, min(back, default=lines))
         times = dict(zip(*(a.tolist() for a in words.pick("P")), strict=True))
         calls = {b: Call(b, s.name, int(times.get(b, 1.0))) for b, s in named if s.name not in KNOWN}

@@ -1,0 +1,74 @@
+"""Hand-written programs of every dialect through the reader, on a machine with a known work offset and known tools."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+
+from machines.kinematics.base import Kinematics
+from postproc.control import Control, Rapids
+from postproc.controllers.model import ControllerFile, load_controller
+from postproc.readback.dialects import reader_for
+from postproc.readback.execute import Motion, Offsets, run
+from postproc.readback.poses import Executed
+from tests.postproc.kit import machine
+from toolpaths.diagnostics import Diagnostic, has_errors
+
+ORIGIN = (10.0, 20.0, 30.0)
+LENGTHS = {1: 100.0, 2: 55.5}
+FANUC, HAAS, SIEMENS, TNC = "fanuc-30i", "haas-ngc", "siemens-840d", "heidenhain-tnc640"
+
+
+@cache
+def controller(name: str) -> ControllerFile:
+    spec, found = load_controller(name)
+    assert spec is not None and not found
+    return spec
+
+
+def control(name: str = "mill-3axis", rapids: Rapids = "straight", own: Kinematics | None = None) -> Control:
+    return Control(machine(name), "axes", np.array(ORIGIN), rapids=rapids, own_kinematics=own)
+
+
+def executed(dialect: str, text: str, on: str = "mill-3axis", others: dict[str, bytes] | None = None,
+             of: Control | None = None) -> tuple[Motion | None, list[Diagnostic]]:
+    """Motion of a program, and what the reader finds."""
+    held = of or control(on)
+    home = held.machine.home * held.unit
+    reader = reader_for(controller(dialect), held.machine.axis_names, home)
+    code, found = reader.read(text.encode(), "MAIN", others)
+    if code is None:
+        return None, found
+    offsets = Offsets(held.work_offset, held.xyz, LENGTHS, home, held.length_on_z, 0.5, held, reader.rises_first,
+                      reader.arc_slack)
+    motion, more = run(code, held.machine.axis_names, offsets, "MAIN")
+    return motion, [*found, *more]
+
+
+def good(dialect: str, text: str, on: str = "mill-3axis", **more: object) -> Motion:
+    """The motion of a program without faults."""
+    motion, found = executed(dialect, text, on, **more)  # type: ignore[arg-type]
+    assert not has_errors(found), [str(d) for d in found]
+    assert motion is not None
+    return motion
+
+
+def words(motion: Motion) -> list[list[float]]:
+    """Ends less the work offset, rounded."""
+    return (motion.end[:, :3] - np.array(ORIGIN)).round(4).tolist()
+
+
+def look(motion: Motion, held: Control) -> Executed:
+    """Poses of the motion on the machine itself."""
+    kin = held.machine.kinematics
+    return Executed(held, lambda number: kin.with_tool(LENGTHS.get(number, 0.0)), LENGTHS)
+
+
+def faults(dialect: str, text: str, on: str = "mill-3axis") -> dict[str, list[int]]:
+    """Codes of the errors with their lines."""
+    result: dict[str, list[int]] = {}
+    for d in executed(dialect, text, on)[1]:
+        if d.severity.name == "ERROR":
+            result.setdefault(d.code, list(d.lines))
+    return result
