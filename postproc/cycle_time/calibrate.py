@@ -37,6 +37,8 @@ STARTS = {"block_time": 1e-4, "stop_time": 1e-3}
 """where a fit begins with a value that is 0"""
 CLOCK = 1e-3
 """s of doubt in any section: the clock of the log"""
+CLEAR = 0.7
+"""share of the misfit that decides for a model without jerk"""
 NEAR, FAR = 0.02, 0.35
 """steps in prior deviations at which derivatives are taken"""
 SEEN = 0.5
@@ -61,7 +63,7 @@ def calibrate(blocks: Blocks, log: Log, model: CycleTimeModel, file: str = "",
               machine: Machine | None = None) -> tuple[Fit | None, list[Diagnostic]]:
     """The model fitted to a log; None and why where the log does not fit the program.
 
-    A model with jerk is also tried without: the better fit is taken.
+    A model with jerk is also tried without, and left so where that is clearly better.
     """
     samples, rows, found = matched(log, blocks, file)
     if found:
@@ -72,7 +74,8 @@ def calibrate(blocks: Blocks, log: Log, model: CycleTimeModel, file: str = "",
     kinds = [True, False] if model.jerk and model.kind != "linuxcnc" else [model.jerk]
     fits = [_fitted(blocks, rows, measured, before, model.model_copy(update={"jerk": jerk}), file, machine)
             for jerk in kinds]
-    fit = min(fits, key=lambda fit: float(np.abs(fit.modelled - fit.measured).sum()))
+    off = [float(np.abs(fit.modelled - fit.measured).sum()) for fit in fits]
+    fit = fits[-1] if off[-1] < CLEAR * off[0] else fits[0]
     return fit, _warnings(fit, file)
 
 

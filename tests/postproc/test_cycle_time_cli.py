@@ -1,0 +1,114 @@
+"""`postproc time` as people and programs call it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner, Result
+
+from postproc.cli import app
+from postproc.cycle_time.estimate import timed
+from tests.postproc.kit import SAMPLES, TOOLS
+from tests.postproc.time_kit import blocks, model
+
+PROGRAM = "G21 G90 G94 G17 G64 P0.01\nG0 X0 Y0 Z300\nF3000\n" + "\n".join(
+    f"G1 X{(i * i) % 17} Y{(3 * i) % 23 + i}" + f" F{1500 + 700 * (i % 5)}" * (i % 9 == 0)
+    for i in range(1, 80)) + "\nG0 Z350\nM2\n"
+
+
+def call(*words: object) -> Result:
+    return CliRunner().invoke(app, ["time", *(str(word) for word in words)])
+
+
+def figures(*words: object) -> dict:
+    result = call(*words, "--json", "-")
+    assert result.exit_code == 0, result.output
+    return json.loads(result.stdout)
+
+
+@pytest.fixture
+def program(tmp_path: Path) -> Path:
+    (tmp_path / "part.ngc").write_text(PROGRAM)
+    return tmp_path / "part.ngc"
+
+
+def check(values: dict) -> None:
+    low, high = values["band_s"]
+    assert 0.0 < values["lower_bound_s"] <= values["cycle_time_s"]
+    assert low < values["cycle_time_s"] < high
+    assert sum(op["time_s"] for op in values["operations"]) == pytest.approx(values["cycle_time_s"], rel=1e-5)
+    held = sum(sum(axis.values()) for axis in values["limiting"].values())
+    assert values["feed_s"] + held <= values["cycle_time_s"]
+    assert all(set(axis) == {"velocity_s", "acceleration_s", "jerk_s"} for axis in values["limiting"].values())
+
+
+def test_a_cl_file(tmp_path: Path) -> None:
+    values = figures(SAMPLES / "pocket.cls", "-m", "mill-3axis", "-c", "linuxcnc", "--setup", TOOLS)
+    check(values)
+    assert [op["operation"] for op in values["operations"]] == ["POCKET", "CONTOUR", "DRILL_CORNERS"]
+    assert any(place["cl_line"] for place in values["most_expensive"])
+    assert values["causes"]["tool_change_s"] >= 10.0 and len(values["most_expensive"]) == 10
+
+
+def test_a_program_under_every_model(program: Path) -> None:
+    times = {}
+    for name in ("linuxcnc", "lookahead", "ideal"):
+        values = figures(program, "-m", "mill-3axis", "--model", name)
+        check(values)
+        times[name] = values["cycle_time_s"]
+    assert times["ideal"] < times["lookahead"]
+    text = call(program, "-m", "mill-3axis").stdout
+    assert "95 % between" in text and "NC line" in text
+
+
+def test_the_same_program_for_another_control(program: Path) -> None:
+    program.write_text(PROGRAM.replace("G64 P0.01", ""))
+    values = figures(program, "-m", "mill-3axis", "-c", "generic-iso")
+    check(values)
+    assert values["model"] == "lookahead" and "corner_tolerance" in values["assumed"]
+
+
+def test_a_log_calibrates_into_a_file(program: Path, tmp_path: Path) -> None:
+    truth = model("lookahead").model_copy(update={"corner_tolerance": 0.004, "stated_share": 0.4, "override": 0.9})
+    b = blocks(PROGRAM.removesuffix("M2\n"))
+    stamps = timed(b, truth).begin + np.random.default_rng(0).normal(0.0, 1e-3, len(b))
+    rows = "".join(f"{n},{t:.4f}\n" for n, t in zip(b.line, np.maximum.accumulate(stamps), strict=True))
+    (tmp_path / "log.csv").write_text(f"nc_line,time_s\n{rows}")
+    shop = tmp_path / "shop.toml"
+    common = (program, "-m", "mill-3axis", "--model", "lookahead")
+    values = figures(*common, "--calibrate", tmp_path / "log.csv", "-o", shop)
+    found = values["calibration"]["parameters"]
+    assert found["corner_tolerance"]["value"] == pytest.approx(0.004, rel=0.1)
+    assert found["override"]["value"] == pytest.approx(0.9, rel=0.02)
+    assert values["calibration"]["rms_after_s"] < 0.2 * values["calibration"]["rms_before_s"]
+    again = figures(program, "-m", "mill-3axis", "--model", shop)
+    assert again["cycle_time_s"] == values["cycle_time_s"] and again["band_s"] == values["band_s"]
+    before = figures(*common)
+    width = [v["band_s"][1] - v["band_s"][0] for v in (again, before)]
+    assert width[0] < 0.5 * width[1]
+
+
+@pytest.mark.parametrize(("words", "code", "message"), [
+    (("none.ngc", "-m", "mill-3axis"), 1, "time.open"),
+    (("{program}", "-m", "mill-99"), 1, "mill-99"),
+    (("{program}", "-m", "mill-3axis", "--model", "crystal-ball"), 1, "crystal-ball"),
+    (("{program}", "-m", "mill-3axis", "--calibrate", "none.csv"), 1, "time.open"),
+    (("{program}", "-m", "mill-3axis", "-o", "x.toml"), 2, "--calibrate"),
+    (("{program}", "-m", "mill-3axis", "--units", "feet"), 2, "feet"),
+    (("{program}", "-m", "mill-3axis", "--json", "{program}"), 2, "would replace"),
+    (("{program}",), 2, "--machine"),
+])
+def test_wrong_use(program: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: tuple[str, ...], code: int,
+                   message: str) -> None:
+    monkeypatch.chdir(tmp_path)
+    result = call(*(word.format(program=program) for word in words))
+    assert result.exit_code == code and message in result.output and "Traceback" not in result.output
+
+
+def test_faults_of_the_program(program: Path) -> None:
+    program.write_text("%\nG21 G90 G94\nG1 X10\nG777 X3\nM2\n%\n")
+    result = call(program, "-m", "mill-3axis", "--json", "-")
+    assert result.exit_code == 1 and "gcode.unknown_code" in result.output
