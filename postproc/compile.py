@@ -26,15 +26,15 @@ from toolpaths.toolpath import Toolpath
 def compile_program(toolpath: Toolpath, moves: Moves, path: Path, control: Control, controller: ControllerFile,
                     kinematics: Callable[[int], Kinematics], lengths: Callable[[int], float],
                     feed_mode: str, planned: Planned | None = None,
-                    made_up: bool = False) -> tuple[Program, Feeds, list[Diagnostic]]:
+                    made_up: bool = False, restart: bool = False) -> tuple[Program, Feeds, list[Diagnostic]]:
     """The canonical program of a path; `lengths` gives the gauge length of the tool of an index, `planned` the feeds
-    that the plan allows, `made_up` as in `Rounding`."""
+    that the plan allows, `made_up` as in `Rounding`; with `restart` every operation restates its tool."""
     places = decimals(control, controller)
     words = word_rows(path, moves, control, kinematics, lengths, places, made_up)
     native, holes = holes_of(toolpath, moves, path, words, control, controller)
     feeds = plan_feeds(path, control, words.end - words.start, moves.feed[path.move],
                        toolpath.pass_[moves.row[path.move]], native, feed_mode, controller.feed, planned)
-    commands, diagnostics = commands_of(toolpath, moves, path, controller, native)
+    commands, diagnostics = commands_of(toolpath, moves, path, controller, native, restart)
     keep = words.write.any(axis=1) | (path.code == ARC)
     new = np.concatenate([[0], np.cumsum(keep)])
     sections = sections_of(path, new)
@@ -45,7 +45,7 @@ def compile_program(toolpath: Toolpath, moves: Moves, path: Path, control: Contr
                       feeds.mode[keep], path.plane[keep], path.ccw[keep], path.center[keep], path.home[keep],
                       np.isnan(path.u[keep]), moves.row[path.move[keep]], moves.line[path.move[keep]],
                       with_sections(_moved(commands, new), sections), kept_holes, places, sections)
-    return program, feeds, diagnostics + _slowed(feeds, moves, path, toolpath.file) + not_native(
+    return program, feeds, diagnostics + _slowed(feeds, moves, path, planned is not None, toolpath.file) + not_native(
         toolpath, moves, path, native, controller)
 
 
@@ -57,11 +57,12 @@ def _moved(commands: Commands, new: Ints) -> Commands:
     return moved
 
 
-def _slowed(feeds: Feeds, moves: Moves, path: Path, file: str) -> list[Diagnostic]:
+def _slowed(feeds: Feeds, moves: Moves, path: Path, planned: bool, file: str) -> list[Diagnostic]:
     rows = np.flatnonzero(feeds.slowed)
     if not len(rows):
         return []
     share = path.seconds[rows] / feeds.seconds[rows]
-    return [info("feed.reduced", f"feed reduced to {100.0 * share.min():.1f} % at the least, where an axis would be "
-                 "faster than its limit", file=file, lines=np.unique(moves.line[path.move[rows]])[:6].tolist(),
+    excess = "exceed its velocity, acceleration or jerk" if planned else "be faster than its limit"
+    return [info("feed.reduced", f"feed reduced to {100.0 * share.min():.1f} % at the least, where an axis would "
+                 f"{excess}", file=file, lines=np.unique(moves.line[path.move[rows]])[:6].tolist(),
                  count=len(rows))]

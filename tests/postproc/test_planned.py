@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
 
 import numpy as np
@@ -68,7 +69,7 @@ def limits_of(made: Machine) -> JointLimits:
     return joint_limits(made.limits)
 
 
-CASES = {"mikron-ucp710": waves, "fork-head-ab": waves, "nutating-head": waves, "h4a-c-table": lambda _: dome()}
+CASES: dict[str, Callable[[str], PostResult]] = {"mikron-ucp710": waves, "fork-head-ab": waves, "nutating-head": waves, "h4a-c-table": lambda _: dome()}
 
 
 @pytest.mark.parametrize("name", CASES)
