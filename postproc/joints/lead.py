@@ -96,11 +96,11 @@ def _lead(pole: Pole, led: Led, seconds: Floats, tolerance: float, velocity: flo
     time = seconds[led.parent] * (led.u1 - led.u0)
     turn = angle_between(curves.axis0, curves.axis1)
     with np.errstate(divide="ignore", invalid="ignore"):
-        fast = passing & (least > _THROUGH) & (turn / np.sin(np.maximum(least, _THROUGH)) > velocity * time)
+        fast = passing & (turn / np.sin(np.maximum(least, _THROUGH)) > velocity * time)
     parts: list[Led] = []
     done = 0
     for first, last in stretches(passing):
-        if fast[first:last + 1].any():
+        if fast[first:last + 1].any() and least[first:last + 1].min() > _THROUGH:
             window = _window(pole, curves.take(np.arange(first, last + 1)), time[first:last + 1], tolerance)
             if window is not None and window.after < window.before:
                 parts.append(_part(led, np.arange(done, first)))
@@ -148,14 +148,18 @@ def _window(pole: Pole, curves: Curves, time: Floats, tolerance: float) -> _Wind
     theta, azimuth = pole.polar(axis)
     at = np.concatenate([[0.0], np.cumsum(time)])[curve] + u * time[curve]
     azimuth = np.unwrap(azimuth)
-    new, string = _led_axes(pole, theta, azimuth, at, _INSIDE * tolerance)
+    new, string = _led_axes(pole, axis, azimuth, at, _INSIDE * tolerance)
     before = float((np.abs(np.diff(azimuth)) / np.diff(at)).max())
     after = float((np.abs(np.diff(string)) / np.diff(at)).max())
     return _Window(curve, u, new, curves, float(theta.min()), float(angle_between(new, axis).max()), before, after)
 
 
-def _led_axes(pole: Pole, theta: Floats, azimuth: Floats, at: Floats, reach: float) -> tuple[Floats, Floats]:
-    """(axes (P, 3), azimuths (P,) of the rotary axis) of the best taut string: on this side of the pole, or through it."""
+def _led_axes(pole: Pole, given: Floats, azimuth: Floats, at: Floats, reach: float) -> tuple[Floats, Floats]:
+    """(axes (P, 3), azimuths (P,) of the rotary axis) of the best taut string: on this side of the pole, or through it.
+
+    `given` (P, 3) are the axes as they are, `azimuth` their azimuths without jumps.
+    """
+    theta = pole.polar(given)[0]
     free = theta <= reach * (1.0 - _CORE)
     free[[0, -1]] = False
     ways = [(azimuth, np.ones(len(azimuth)))]
@@ -168,8 +172,7 @@ def _led_axes(pole: Pole, theta: Floats, azimuth: Floats, at: Floats, reach: flo
     signed = sign * np.maximum(sign * signed, np.where(theta <= 1.1 * reach, _CORE * reach, 0.0))
     signed[_crossings(sign)] = 0.0
     axis = pole.direction(signed, string)
-    ends = [0, -1]
-    axis[ends] = pole.direction(theta[ends], azimuth[ends])
+    axis[[0, -1]] = given[[0, -1]]
     return axis, string
 
 
