@@ -69,7 +69,8 @@ def limits_of(made: Machine) -> JointLimits:
     return joint_limits(made.limits)
 
 
-CASES: dict[str, Callable[[str], PostResult]] = {"mikron-ucp710": waves, "fork-head-ab": waves, "nutating-head": waves, "h4a-c-table": lambda _: dome()}
+CASES: dict[str, Callable[[str], PostResult]] = {
+    "mikron-ucp710": waves, "fork-head-ab": waves, "nutating-head": waves, "h4a-c-table": lambda _: dome()}
 
 
 @pytest.mark.parametrize("name", CASES)
