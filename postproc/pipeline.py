@@ -15,6 +15,7 @@ from postproc import VERSION
 from postproc.compile import compile_program
 from postproc.controllers import writer_for
 from postproc.controllers.model import ControllerFile, load_controller
+from postproc.controllers.unwritable import unwritable
 from postproc.feed import Feeds, Planned
 from postproc.job import Job, prepare
 from postproc.moves import Moves
@@ -136,7 +137,9 @@ def _stages(result: PostResult, progress: Progress | None) -> PostResult:
         return result
     planned = None if motion is None else Planned(motion.needed, options.merge_feeds)
     program, feeds, found = compile_program(toolpath, moves, path, job.control, result.controller, job.kinematics,
-                                            job.gauge_length, options.feed_mode, planned, job.rounding.made_up)
+                                            job.gauge_length, options.feed_mode, planned, job.rounding.made_up,
+                                            job.setup.output.restart)
+    found += unwritable(result.controller, program, toolpath.cycles, file)
     result = _with(result, found, program=program, feeds=feeds)
     if not result.ok:
         return result

@@ -1,0 +1,98 @@
+"""CUTCOM as the control's own cutter compensation."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from postproc.controllers.model import Modes
+from postproc.events import compensation_side, numbers
+from postproc.moves import Moves
+from postproc.path import Path
+from postproc.program import Command
+from toolpaths.diagnostics import Diagnostic, error, warning
+from toolpaths.toolpath import Event, Kind
+
+
+class Compensation:
+    """CUTCOM as the control's cutter compensation: stated when it changes, off before linking moves, holes, tool changes.
+
+    The points are written as the file has them; what the control adds depends on its register.
+    """
+
+    def __init__(self, moves: Moves, path: Path, commands: dict[int, list[Command]], modes: Modes) -> None:
+        self.moves, self.path, self.out = moves, path, commands
+        self.active, self.since = "", 0
+        self.written: list[int] = []
+        self.tilted: list[int] = []
+        self.left_on: list[int] = []
+        self.own = np.isnan(path.u) | (moves.hole[path.move] >= 0)
+        """(K,) blocks that compensation must not touch"""
+        self.breaks = np.flatnonzero(self.own & ~np.concatenate([[False], self.own[:-1]]))
+        tcp, tilted = modes.tcp, modes.tilted
+        self.in_tcp = path.frames[0].control.tip_law or (tcp is not None and tcp.compensation)
+        self.in_plane = tilted is not None and tilted.compensation
+        self.cut = np.append(np.flatnonzero((moves.kind != Kind.RAPID) & (moves.hole < 0)), len(moves))
+
+    def off_before(self, move: int) -> None:
+        """Switch off at the first break before a row of Moves; cutting between the two is not compensated."""
+        if not self.active:
+            return
+        at = int(np.searchsorted(self.breaks, self.since))
+        if at == len(self.breaks) or self.breaks[at] > self.path.begin[move]:
+            return
+        block = int(self.breaks[at])
+        self.out.setdefault(block, []).extend(self.off())
+        served = block > 0 and self.path.move[block - 1] == self.path.move[block]
+        row = int(self.path.move[block]) + int(served)
+        after = int(self.cut[np.searchsorted(self.cut, row)])
+        if after < move:
+            self.left_on.append(int(self.moves.line[after]))
+
+    def begin(self, event: Event, move: int) -> None:
+        """Carry one CUTCOM record out that acts before a row of Moves, or behind the linking move that leads there."""
+        side, block = compensation_side(event), int(self.path.begin[move])
+        if side in ("", self.active) or (side == "OFF" and not self.active):
+            return
+        self.out.setdefault(block, []).extend(self.off(event.line))
+        if side == "OFF":
+            return
+        block += int(np.argmin(np.append(self.own[block:], False)))
+        if move >= len(self.moves) or not self._possible(min(block, len(self.path) - 1), move):
+            self.tilted.append(event.line)
+            return
+        self.active, self.since = side, block
+        self.written.append(event.line)
+        command = Command(f"CUTTER_COMPENSATION_{side}", tuple(numbers(event)[:1]), event.line)
+        self.out.setdefault(block, []).append(command)
+
+    def _possible(self, block: int, move: int) -> bool:
+        """True where the control can compensate square to the tool: in a tilted plane, or with the tool along Z."""
+        law = self.path.frames[int(self.path.frame[block])].control.law
+        if law == "tilted":
+            return self.in_plane
+        return (law == "axes" or self.in_tcp) and bool(abs(self.moves.axis[move, 2]) > 1.0 - 1e-9)
+
+    def off(self, line: int = 0) -> list[Command]:
+        """The command that ends it, where it is on."""
+        if not self.active:
+            return []
+        self.active = ""
+        return [Command("CUTTER_COMPENSATION_OFF", (), line)]
+
+    def diagnostics(self, file: str) -> list[Diagnostic]:
+        """What the operator has to know, and records that could not be carried out."""
+        result = []
+        if self.written:
+            result.append(warning("cutcom.register", "cutter compensation is written and proved as the programmed contour: "
+                                  "the control adds what its register holds", file=file, lines=self.written[:6],
+                                  count=len(self.written), hint="points of the tool centre: the register holds the wear "
+                                  "only; points of the contour: the radius"))
+        if self.left_on:
+            result.append(error("cutcom.left_on", "cutting goes on under CUTCOM after a linking move or a hole, which need "
+                                "it off", file=file, lines=self.left_on[:6], count=len(self.left_on),
+                                hint="write CUTCOM/OFF before the retract and CUTCOM/LEFT or RIGHT after the approach"))
+        if self.tilted:
+            result.append(warning("cutcom.tilted", "CUTCOM while the tool axis is tilted is not carried out", file=file,
+                                  lines=self.tilted[:6], count=len(self.tilted),
+                                  hint="it needs a tilted plane (--output-mode tilted, where the controller has it)"))
+        return result
