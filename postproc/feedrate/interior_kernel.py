@@ -12,6 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from postproc.feedrate.compiled import compiled
+
 _N = np.uint64
 LANES = 32
 COMMON, PER_JOINT = 35, 11
@@ -30,6 +32,73 @@ F1, F2, F3, F4, F5, F6, F7, F8 = (_N(i * LANES) for i in range(1, 9))
 F9, F10, F11 = _N(9 * LANES), _N(10 * LANES), _N(11 * LANES)
 
 
+def _knots(w: Any, c: Any, b: Any, k: Any, mu: Any, dual: Any) -> None:
+    """Block b of w from coefficients c[k:]: x and derivatives, roots, the velocity row, sums of the others at zero."""
+    for i in range(L):
+        p = b + i
+        c0, c1, c2 = c[k + i], c[k + i + _ONE], c[k + i + _TWO]
+        x = w[p] * c0 + w[p + F1] * c1 + w[p + F2] * c2 + w[p + PAD]
+        w[p + X0] = x
+        w[p + X1] = w[p + F3] * c0 + w[p + F4] * c1 + w[p + F5] * c2
+        w[p + X2] = w[p + F6] * c0 + w[p + F7] * c1 + w[p + F8] * c2
+        root = 1.0 / np.sqrt(x)
+        half = 0.5 * root * root * root
+        w[p + ROOT], w[p + HALF] = root, half
+        icap = w[p + ICAP]
+        slack = 1.0 - x * icap
+        over = 1.0 / slack
+        z = w[p + ZV] * (1.0 + dual * w[p + RV])
+        w[p + ZV] = z
+        w[p + GAP] = z * slack
+        w[p + G0], w[p + G1], w[p + G2] = w[p + WEIGHT] * half - mu * over * icap, 0.0, 0.0
+        w[p + H00], w[p + H01], w[p + H02] = z * over * icap * icap, 0.0, 0.0
+        w[p + H11], w[p + H12], w[p + H22] = 0.0, 0.0, 0.0
+        w[p + SUM_Z] = 0.0
+
+
+def _joint(w: Any, v: Any, b: Any, q: Any, ia: Any, ij: Any, mu: Any, dual: Any) -> None:
+    """Add the rows of one joint, block q of v, to block b of w; ia, ij one over its limits of acceleration and jerk."""
+    for i in range(L):
+        p, o = b + i, q + i
+        x, x1, half = w[p + X0], w[p + X1], w[p + HALF]
+        scale = ia * w[p + TIGHT_A]
+        a0, a1 = v[o + F1] * scale, 0.5 * v[o] * scale
+        use = a0 * x + a1 * x1
+        s0, s1 = 1.0 - use, 1.0 + use
+        z0, z1 = v[o + F3] * (1.0 + dual * v[o + F7]), v[o + F4] * (1.0 + dual * v[o + F8])
+        v[o + F3], v[o + F4] = z0, z1
+        over = 1.0 / (s0 * s1)
+        i0, i1 = s1 * over, s0 * over
+        ratio, pull = z0 * i0 + z1 * i1, mu * (i1 - i0)
+        gap = z0 * s0 + z1 * s1
+        g0, g1 = a0 * pull, a1 * pull
+        h00, h01, h11 = ratio * a0 * a0, ratio * a0 * a1, ratio * a1 * a1
+        scale = ij * w[p + TIGHT_J]
+        j0, j1, j2 = v[o + F2] * scale, 1.5 * v[o + F1] * scale, 0.5 * v[o] * scale
+        use = j0 * x + j1 * x1 + j2 * w[p + X2]
+        s0, s1 = w[p + ROOT] - use, w[p + ROOT] + use
+        z0, z1 = v[o + F5] * (1.0 + dual * v[o + F9]), v[o + F6] * (1.0 + dual * v[o + F10])
+        v[o + F5], v[o + F6] = z0, z1
+        over = 1.0 / (s0 * s1)
+        i0, i1 = s1 * over, s0 * over
+        r0, r1 = z0 * i0, z1 * i1
+        ratio, mixed, pull = r0 + r1, half * (r0 - r1), mu * (i1 - i0)
+        w[p + GAP] += gap + z0 * s0 + z1 * s1
+        w[p + SUM_Z] += z0 + z1
+        w[p + G0] += g0 + j0 * pull - half * mu * (i0 + i1)
+        w[p + G1] += g1 + j1 * pull
+        w[p + G2] += j2 * pull
+        w[p + H00] += h00 + ratio * (j0 * j0 + half * half) + 2.0 * mixed * j0
+        w[p + H01] += h01 + (ratio * j0 + mixed) * j1
+        w[p + H02] += (ratio * j0 + mixed) * j2
+        w[p + H11] += h11 + ratio * j1 * j1
+        w[p + H12] += ratio * j1 * j2
+        w[p + H22] += ratio * j2 * j2
+
+
+knots_of_block, joint_of_block = compiled(_knots), compiled(_joint)
+
+
 def assemble(w: Any, v: Any, c: Any, inverse: Any, blocks: Any, mu: Any, dual: Any) -> Any:
     """Update z by the dual step; leave each knot's part of the Newton equations in G and H. Returns gap and time.
 
@@ -39,70 +108,12 @@ def assemble(w: Any, v: Any, c: Any, inverse: Any, blocks: Any, mu: Any, dual: A
     gap, time = 0.0, 0.0
     for block in range(blocks):
         b = block * BLOCK
-        k = block * L
-        for i in range(L):
-            p = b + i
-            c0, c1, c2 = c[k + i], c[k + i + _ONE], c[k + i + _TWO]
-            x = w[p] * c0 + w[p + F1] * c1 + w[p + F2] * c2 + w[p + PAD]
-            w[p + X0] = x
-            w[p + X1] = w[p + F3] * c0 + w[p + F4] * c1 + w[p + F5] * c2
-            w[p + X2] = w[p + F6] * c0 + w[p + F7] * c1 + w[p + F8] * c2
-            root = 1.0 / np.sqrt(x)
-            half = 0.5 * root * root * root
-            w[p + ROOT], w[p + HALF] = root, half
-            icap = w[p + ICAP]
-            slack = 1.0 - x * icap
-            over = 1.0 / slack
-            z = w[p + ZV] * (1.0 + dual * w[p + RV])
-            w[p + ZV] = z
-            w[p + GAP] = z * slack
-            w[p + G0], w[p + G1], w[p + G2] = w[p + WEIGHT] * half - mu * over * icap, 0.0, 0.0
-            w[p + H00], w[p + H01], w[p + H02] = z * over * icap * icap, 0.0, 0.0
-            w[p + H11], w[p + H12], w[p + H22] = 0.0, 0.0, 0.0
-            w[p + SUM_Z] = 0.0
+        knots_of_block(w, c, b, block * L, mu, dual)
         for joint in range(joints):
-            ia, ij = inverse[0, joint], inverse[1, joint]
-            q = (block * joints + joint) * F11
-            for i in range(L):
-                p, o = b + i, q + i
-                x, x1, half = w[p + X0], w[p + X1], w[p + HALF]
-                scale = ia * w[p + TIGHT_A]
-                a0, a1 = v[o + F1] * scale, 0.5 * v[o] * scale
-                use = a0 * x + a1 * x1
-                s0, s1 = 1.0 - use, 1.0 + use
-                z0, z1 = v[o + F3] * (1.0 + dual * v[o + F7]), v[o + F4] * (1.0 + dual * v[o + F8])
-                v[o + F3], v[o + F4] = z0, z1
-                over = 1.0 / (s0 * s1)
-                i0, i1 = s1 * over, s0 * over
-                ratio, pull = z0 * i0 + z1 * i1, mu * (i1 - i0)
-                gap_here = z0 * s0 + z1 * s1
-                g0, g1 = a0 * pull, a1 * pull
-                h00, h01, h11 = ratio * a0 * a0, ratio * a0 * a1, ratio * a1 * a1
-                scale = ij * w[p + TIGHT_J]
-                j0, j1, j2 = v[o + F2] * scale, 1.5 * v[o + F1] * scale, 0.5 * v[o] * scale
-                use = j0 * x + j1 * x1 + j2 * w[p + X2]
-                s0, s1 = w[p + ROOT] - use, w[p + ROOT] + use
-                z0, z1 = v[o + F5] * (1.0 + dual * v[o + F9]), v[o + F6] * (1.0 + dual * v[o + F10])
-                v[o + F5], v[o + F6] = z0, z1
-                over = 1.0 / (s0 * s1)
-                i0, i1 = s1 * over, s0 * over
-                r0, r1 = z0 * i0, z1 * i1
-                ratio, mixed, pull = r0 + r1, half * (r0 - r1), mu * (i1 - i0)
-                w[p + GAP] += gap_here + z0 * s0 + z1 * s1
-                w[p + SUM_Z] += z0 + z1
-                w[p + G0] += g0 + j0 * pull - half * mu * (i0 + i1)
-                w[p + G1] += g1 + j1 * pull
-                w[p + G2] += j2 * pull
-                w[p + H00] += h00 + ratio * (j0 * j0 + half * half) + 2.0 * mixed * j0
-                w[p + H01] += h01 + (ratio * j0 + mixed) * j1
-                w[p + H02] += (ratio * j0 + mixed) * j2
-                w[p + H11] += h11 + ratio * j1 * j1
-                w[p + H12] += ratio * j1 * j2
-                w[p + H22] += ratio * j2 * j2
+            joint_of_block(w, v, b, (block * joints + joint) * F11, inverse[0, joint], inverse[1, joint], mu, dual)
         for i in range(L):
             p = b + i
-            real = 1.0 - w[p + PAD]
-            gap += real * w[p + GAP]
+            gap += (1.0 - w[p + PAD]) * w[p + GAP]
             time += w[p + WEIGHT] * w[p + ROOT]
     return gap, time
 
