@@ -20,8 +20,8 @@ SINGLE_MOVES = frozenset({"DRILL", "THRU", "CSINK", "FACE", "DEEP", "BRKCHP", "B
 
 
 def holes_of(toolpath: Toolpath, moves: Moves, path: Path, words: WordRows, control: Control,
-             controller: ControllerFile) -> tuple[Bools, list[Hole]]:
-    """Blocks of holes that the controller can drill by itself, and the holes.
+             controller: ControllerFile, skip: Bools) -> tuple[Bools, list[Hole]]:
+    """Blocks of holes that the controller can drill by itself, and the holes; not among blocks that a switch may `skip`.
 
     Native where the tool stands along Z of the words, the kind is in the controller's table and the way out ends at
     the clearance plane or at the level that the tool came from.
@@ -31,7 +31,7 @@ def holes_of(toolpath: Toolpath, moves: Moves, path: Path, words: WordRows, cont
     z = int(control.xyz[2])
     if not controller.cycles.enabled or 17 not in controller.cycles.planes or z < 0 or not (moves.hole >= 0).any():
         return native, holes
-    allowed = np.array([may_cycle(f.control, controller) for f in path.frames])[path.frame]
+    allowed = np.array([may_cycle(f.control, controller) for f in path.frames])[path.frame] & ~skip
     hole = np.where(np.isnan(path.u), -1, moves.hole[path.move])
     turning = spindle_states(toolpath)[0]
     change = np.flatnonzero(np.diff(hole)) + 1

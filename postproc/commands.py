@@ -12,15 +12,14 @@ from postproc.cutter_compensation import Compensation
 from postproc.events import Spindle, ToolChange, numbers, register_changes, spindle_after, tool_changes, words
 from postproc.moves import Moves, Phase
 from postproc.path import Path
-from postproc.program import Command
+from postproc.program import Command, Commands
 from postproc.switched import Switched
 from toolpaths.arrays import Bools
 from toolpaths.diagnostics import Diagnostic, warning
 from toolpaths.toolpath import Event, Kind, Toolpath
 from toolpaths.units import PER_MINUTE
 
-Commands = dict[int, tuple[Command, ...]]
-QUIET = frozenset({"GOHOME", "END", "SEQNO", "MODE", "ROTATE", "ROTABL", "ROTHED", "REWIND", "AIR"})
+QUIET = frozenset({"GOHOME", "END", "OPSKIP", "SEQNO", "MODE", "ROTATE", "ROTABL", "ROTHED", "REWIND", "AIR"})
 """Events that need no command: the motion already holds what they say."""
 
 
@@ -61,6 +60,7 @@ class _Writing:
         self.compensation = Compensation(moves, path, self.result, controller.modes)
         self.starts = operation_starts(toolpath, moves)
         self.lost: dict[str, list[int]] = {}
+        self.skipping = False
 
     def at(self, block: int) -> list[Command]:
         """The commands before a block."""
@@ -102,7 +102,10 @@ class _Writing:
         here = self.moves.link[move] if move < len(self.moves) else True
         waits = event.word == "DELAY" and here and not _gone(events, at)
         out = self.at(_behind(self.path, move) if waits else int(self.path.begin[move]))
-        if event.word == "SPINDL":
+        known = len(out)
+        if event.word == "OPSKIP":
+            self.skipping = "OFF" not in words(event)
+        elif event.word == "SPINDL":
             self.spindle = spindle_after(event, self.spindle)
             out += self.state.spindle(_spindle(self.spindle, event), self._loads(at, event))
         elif event.word == "COOLNT":
@@ -116,6 +119,8 @@ class _Writing:
             out.append(command)
         elif event.word not in QUIET:
             self.lost.setdefault(event.word, []).append(event.line)
+        if self.skipping:
+            out[known:] = [replace(c, skip=True) for c in out[known:]]
 
     def _loads(self, at: int, event: Event) -> bool:
         """True where a tool change follows at the same place."""

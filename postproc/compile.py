@@ -2,51 +2,51 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
-from machines.kinematics.base import Kinematics
 from postproc.canned import holes_of, not_native
-from postproc.commands import Commands, commands_of
-from postproc.control import Control
-from postproc.controllers.model import ControllerFile
+from postproc.commands import commands_of
 from postproc.feed import Feeds, Planned, plan_feeds
+from postproc.job import Job
 from postproc.moves import Moves
 from postproc.path import ARC, Path
-from postproc.program import Command, Hole, Program
+from postproc.program import Command, Commands, Hole, Program
 from postproc.rounding import decimals
 from postproc.sections import sections_of, with_sections
+from postproc.skips import after, skipped, with_skips
 from postproc.word_rows import word_rows
 from toolpaths.arrays import Ints
 from toolpaths.diagnostics import Diagnostic, info
-from toolpaths.toolpath import Toolpath
 
 
-def compile_program(toolpath: Toolpath, moves: Moves, path: Path, control: Control, controller: ControllerFile,
-                    kinematics: Callable[[int], Kinematics], lengths: Callable[[int], float],
-                    feed_mode: str, planned: Planned | None = None,
-                    made_up: bool = False, restart: bool = False) -> tuple[Program, Feeds, list[Diagnostic]]:
-    """The canonical program of a path; `lengths` gives the gauge length of the tool of an index, `planned` the feeds
-    that the plan allows, `made_up` as in `Rounding`; with `restart` every operation restates its tool."""
+def compile_program(job: Job, moves: Moves, path: Path,
+                    planned: Planned | None = None) -> tuple[Program, Feeds, list[Diagnostic]]:
+    """The canonical program of a path along `moves`; `planned` are the feeds that the plan allows."""
+    toolpath, control, controller = job.toolpath, job.control, job.controller
     places = decimals(control, controller)
-    words = word_rows(path, moves, control, kinematics, lengths, places, made_up)
-    native, holes = holes_of(toolpath, moves, path, words, control, controller)
+    skip = skipped(toolpath, moves, path)
+    words = word_rows(path, moves, control, job.kinematics, job.gauge_length, places, after(skip),
+                      job.rounding.made_up)
+    native, holes = holes_of(toolpath, moves, path, words, control, controller, skip)
     feeds = plan_feeds(path, control, words.end - words.start, moves.feed[path.move],
-                       toolpath.pass_[moves.row[path.move]], native, feed_mode, controller.feed, planned)
-    commands, diagnostics = commands_of(toolpath, moves, path, controller, native, restart)
+                       toolpath.pass_[moves.row[path.move]], native, job.options.feed_mode, controller.feed,
+                       planned)
+    commands, diagnostics = commands_of(toolpath, moves, path, controller, native, job.setup.output.restart)
     keep = words.write.any(axis=1) | (path.code == ARC)
     new = np.concatenate([[0], np.cumsum(keep)])
     sections = sections_of(path, new)
     kept_holes = tuple(Hole(int(new[h.first]), int(new[h.last + 1]) - 1, h.cycle, h.plane_level, h.bottom, h.retract,
                             h.initial, h.key, int(new[h.drill])) for h in holes)
     end = np.where(path.home[:, None], np.round(path.q * control.unit, int(places.max())), words.end)
+    line = moves.line[path.move[keep]]
+    placed, found = with_skips(with_sections(_moved(commands, new), sections), skip[keep], line, toolpath.file)
     program = Program(control.machine.axis_names, end[keep], words.write[keep], path.code[keep], feeds.feed[keep],
                       feeds.mode[keep], path.plane[keep], path.ccw[keep], path.center[keep], path.home[keep],
-                      np.isnan(path.u[keep]), moves.row[path.move[keep]], moves.line[path.move[keep]],
-                      with_sections(_moved(commands, new), sections), kept_holes, places, sections)
-    return program, feeds, diagnostics + _slowed(feeds, moves, path, planned is not None, toolpath.file) + not_native(
-        toolpath, moves, path, native, controller)
+                      np.isnan(path.u[keep]), moves.row[path.move[keep]], line,
+                      placed, kept_holes, places, sections, skip[keep])
+    return program, feeds, [*diagnostics, *found, *_slowed(feeds, moves, path, planned is not None, toolpath.file),
+                            *_mapped(feeds, moves, path, job),
+                            *not_native(toolpath, moves, path, native, controller)]
 
 
 def _moved(commands: Commands, new: Ints) -> Commands:
@@ -55,6 +55,23 @@ def _moved(commands: Commands, new: Ints) -> Commands:
     for k, group in sorted(commands.items()):
         moved[int(new[k])] = moved.get(int(new[k]), ()) + group
     return moved
+
+
+def _mapped(feeds: Feeds, moves: Moves, path: Path, job: Job) -> list[Diagnostic]:
+    """Cuts that turn rotary axes under axis positions, per minute as the controller has no inverse time."""
+    if job.controller.feed.inverse_time or job.options.feed_mode != "auto" or not len(job.control.rotary):
+        return []
+    axes = np.array([frame.control.law == "axes" for frame in path.frames])[path.frame]
+    turned = np.zeros(len(path), dtype=bool)
+    turned[1:] = (path.q[1:, job.control.rotary] != path.q[:-1, job.control.rotary]).any(axis=1)
+    rows = np.flatnonzero(axes & turned & np.isfinite(feeds.feed))
+    if not len(rows):
+        return []
+    rule = {"xyz-first": "X, Y, Z before rotary axes", "geometry": "X, Y, Z before rotary axes",
+            "all": "the root of the squares of mm and degrees"}[job.controller.feed.length]
+    return [info("feed.no_inverse_time", "the controller has no inverse time: blocks that turn rotary axes are written per "
+                 f"minute by its rule, {rule}", file=job.toolpath.file,
+                 lines=np.unique(moves.line[path.move[rows]])[:6].tolist(), count=len(rows))]
 
 
 def _slowed(feeds: Feeds, moves: Moves, path: Path, planned: bool, file: str) -> list[Diagnostic]:

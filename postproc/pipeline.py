@@ -136,9 +136,7 @@ def _stages(result: PostResult, progress: Progress | None) -> PostResult:
     if not result.ok:
         return result
     planned = None if motion is None else Planned(motion.needed, options.merge_feeds)
-    program, feeds, found = compile_program(toolpath, moves, path, job.control, result.controller, job.kinematics,
-                                            job.gauge_length, options.feed_mode, planned, job.rounding.made_up,
-                                            job.setup.output.restart)
+    program, feeds, found = compile_program(job, moves, path, planned)
     found += unwritable(result.controller, program, toolpath.cycles, file)
     result = _with(result, found, program=program, feeds=feeds)
     if not result.ok:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+
+import numpy as np
 
 from postproc.control import Law
 from postproc.planes import Plane
@@ -15,12 +17,19 @@ PER_MINUTE, INVERSE = 0, 1
 class Command:
     """A canonical function without motion, e.g. ("START_SPINDLE_CLOCKWISE", (1200.0,)); `line` is its CL line.
 
-    ("ENTER_SECTION", (i,)) and ("LEAVE_SECTION", (i,)) stand where a section that needs codes begins and ends.
+    ("ENTER_SECTION", (i,)) and ("LEAVE_SECTION", (i,)) stand where a section that needs codes begins and ends,
+    ("OPERATION_START", (name,)) where the program can be taken up, ("RESTATE",) behind blocks that a switch may leave out:
+    modal codes are stated anew. `skip`: the block switch leaves it out.
     """
 
     name: str
     args: tuple[float | str, ...] = ()
     line: int = 0
+    skip: bool = False
+
+
+Commands = dict[int, tuple[Command, ...]]
+"""commands by the block that they stand before"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +88,7 @@ class Program:
         commands: commands before block k, by k; K holds what follows the last block
         holes: by running number
         decimals (J,): of the words
+        skip (K,): True for blocks that the block switch leaves out ("/")
         sections: in order, the first begins at block 0 in the law that the control starts with
     """
 
@@ -99,6 +109,11 @@ class Program:
     holes: tuple[Hole, ...]
     decimals: Ints
     sections: tuple[Section, ...] = (Section(0, "axes"),)
+    skip: Bools = field(default_factory=lambda: np.zeros(0, dtype=bool))
+
+    def __post_init__(self) -> None:
+        if not len(self.skip):
+            object.__setattr__(self, "skip", np.zeros(len(self), dtype=bool))
 
     def __len__(self) -> int:
         return len(self.words)

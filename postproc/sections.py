@@ -7,10 +7,9 @@ from itertools import pairwise
 import numpy as np
 
 from postproc.path import Path
-from postproc.program import Command, Section
+from postproc.program import Command, Commands, Section
 from toolpaths.arrays import Ints
 
-Commands = dict[int, tuple[Command, ...]]
 _BELONG_BEFORE = frozenset({"CUTTER_COMPENSATION_OFF", "DWELL"})
 """commands that stand before a mode is left"""
 

@@ -29,17 +29,17 @@ class WordRows:
 
 
 def word_rows(path: Path, moves: Moves, control: Control, kinematics: Callable[[int], Kinematics],
-              lengths: Callable[[int], float], places: Ints, made_up: bool = False) -> WordRows:
+              lengths: Callable[[int], float], places: Ints, anew: Ints, made_up: bool = False) -> WordRows:
     """The words of all blocks; `lengths` gives the gauge length of the tool of an index, `places` (J,) the decimals,
-    `made_up` as in `Rounding`."""
+    `anew` the blocks that state every axis, `made_up` as in `Rounding`."""
     begins = np.flatnonzero(np.diff(path.frame)) + 1
-    tool = _tools(path, moves)
+    tool = block_tools(path, moves)
     rounds = places if made_up else None
     exact = _words(path, path.q, np.arange(len(path)), tool, kinematics, lengths, rounds)
     end = _rounded(_snapped(_rounded(exact, places), path, control, places), places)
     start = np.concatenate([end[:1], end[:-1]])
     start[begins] = _rounded(_words(path, path.q[begins - 1], begins, tool, kinematics, lengths, rounds), places)
-    return WordRows(end, start, _written(end, start, begins, path, control))
+    return WordRows(end, start, _written(end, start, np.union1d(begins, anew), path, control))
 
 
 def _rounded(words: Floats, places: Ints) -> Floats:
@@ -47,7 +47,7 @@ def _rounded(words: Floats, places: Ints) -> Floats:
     return np.asarray(np.round(np.round(words / grain) * grain, int(places.max())))
 
 
-def _tools(path: Path, moves: Moves) -> Ints:
+def block_tools(path: Path, moves: Moves) -> Ints:
     """(K,) tool of each block; blocks before a tool change still carry the tool that leaves, none before the first."""
     leaving = np.arange(len(path)) < path.begin[path.move]
     before = np.where(path.move > 0, moves.tool[np.maximum(path.move - 1, 0)], -1)
@@ -108,14 +108,14 @@ def _snapped(words: Floats, path: Path, control: Control, places: Ints) -> Float
     return words
 
 
-def _written(end: Floats, start: Floats, begins: Ints, path: Path, control: Control) -> Bools:
+def _written(end: Floats, start: Floats, anew: Ints, path: Path, control: Control) -> Bools:
     """Words (K, J) that a block states: those it names, else those that change; both plane words of an arc.
 
-    The first block under another law states all; in a tilted plane the rotary axes have no words.
+    The blocks `anew` state all, the first under another law among them; in a tilted plane rotary axes have no words.
     """
     names = np.asarray(path.state.any(axis=1))
     first = np.zeros(len(path), dtype=bool)
-    first[begins] = True
+    first[anew] = True
     changed: Bools = (end != start) | first[:, None]
     write: Bools = np.asarray(np.where(names[:, None], path.state, changed))
     for row in np.flatnonzero(path.code == ARC).tolist():
