@@ -1,11 +1,12 @@
-"""Speed, memory and optimality of the planned motion, beside toppra and Clarabel in one run.
+"""Speed, memory and optimality of the planned motion, beside toppra, Clarabel and copp-py in one run.
 
-    python tests/benchmarks/bench_feedrate.py [speed] [memory] [optimality] [limits]
+    python tests/benchmarks/bench_feedrate.py [speed] [cl] [copp] [memory] [optimality] [corners] [limits] [stops]
 
 speed: points per second against toppra (velocity and acceleration only), path evaluation included, medians of
-interleaved runs.
-memory: growth of the resident set at 10^6 knots, in a process of its own. optimality: 150 random paths against a
-converged sequence of convex problems. limits: worst ratio in the 1 ms samples, fast and strict. Compiled code is warm.
+interleaved runs. cl: the same on smoothed CL points, knots by the mesh. copp: against copp-py's TOPP3-LP, where that is
+installed. memory: growth of the resident set at 10^6 knots, in a process of its own. optimality: 150 random paths
+against a converged sequence of convex problems. corners: strict beside the optimum on polylines with tight blends.
+limits: worst ratio in the 1 ms samples, fast and strict. stops: a stop each 2 mm. Compiled code is warm.
 """
 
 from __future__ import annotations
@@ -20,18 +21,24 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
+from postproc.feedrate.geometry import MachinePath
 from postproc.feedrate.interior import NumpySteps
-from postproc.feedrate.limits import squared_speed
+from postproc.feedrate.limits import JointLimits, squared_speed
+from postproc.feedrate.mesh import Spacing
+from postproc.feedrate.motion import Plan
 from postproc.feedrate.paths import Eased, SplinePath
 from postproc.feedrate.plan import Options, plan, plan_second_order
 from postproc.feedrate.second_order import least_time, second_order
 from postproc.feedrate.windows import Method, solve_problem
+from tests.benchmarks.copp_reference import copp_times
+from tests.benchmarks.feedrate_paths import blended, cl_path
 from tests.postproc.feedrate_kit import MIKRON, bezier, random_path, uniform, zigzag
 from tests.postproc.feedrate_reference import least_jerk_time
 from tests.postproc.test_feedrate_second_order import toppra_time
@@ -96,6 +103,78 @@ def speed() -> None:
               f"strict {motion['strict'] / motion['mesh'] - 1.0:+.2%}")
 
 
+def cl() -> None:
+    """Smoothed CL points on the Mikron UCP 710; toppra on as many equal steps as the mesh has knots."""
+    for points in (5000, 50_000):
+        path, most = cl_path(points)
+        count = len(plan(path, most, options=Options(method=Method(kernel=True))).pieces[0].profile.sigma)
+        plain = np.linspace(path.start, path.end, count)
+
+        def own(strict: bool, path: MachinePath = path, most: JointLimits = most) -> Plan:
+            return plan(path, most, options=Options(method=Method(kernel=True), strict=strict))
+
+        rates: dict[str, list[float]] = {"toppra": [], "fast": [], "strict": []}
+        for _ in range(3):
+            start = time.perf_counter()
+            toppra_time(path.spline, plain)
+            rates["toppra"].append(count / (time.perf_counter() - start))
+            made = {}
+            for name in ("fast", "strict"):
+                start = time.perf_counter()
+                made[name] = own(name == "strict")
+                rates[name].append(len(made[name].pieces[0].profile.sigma) / (time.perf_counter() - start))
+        rate = {name: statistics.median(values) for name, values in rates.items()}
+        print(f"{points} CL points, {path.end:.0f} mm, {count} knots: fast {rate['fast'] / rate['toppra']:.1f}, strict "
+              f"{rate['strict'] / rate['toppra']:.1f} times toppra's points per second ({rate['toppra'] / 1e3:.1f} k/s); "
+              f"worst ratio {made['fast'].usage().worst:.3f}, strict {made['strict'].usage().worst:.9f}; "
+              f"strict {made['strict'].seconds / made['fast'].seconds - 1.0:+.2%}", flush=True)
+
+
+def copp() -> None:
+    """Time to solution and time of motion after 1 to 4 linear programs."""
+    if find_spec("copp_py") is None:
+        print("copp-py is not installed; left out")
+        return
+    for name, path, count, _ in (PATHS[0], PATHS[2], PATHS[3]):
+        run = jerk(path, uniform(path, count).sigma)
+        run()
+        times = []
+        for _ in range(5):
+            start = time.perf_counter()
+            motion, _ = run()
+            times.append(time.perf_counter() - start)
+        own, start = statistics.median(times), time.perf_counter()
+        found = [(time.perf_counter() - start, seconds) for seconds in
+                 copp_times(path, np.linspace(path.start, path.end, count + 1), MIKRON, 4)]
+        print(f"{name} {count}: own {own * 1e3:.1f} ms, motion {motion:.4f} s; TOPP3-LP after 1 to 4 programs: "
+              + ", ".join(f"{spent / own:.0f}x as long, motion {seconds / motion - 1.0:+.2%}" for spent, seconds in found),
+              flush=True)
+
+
+def corners() -> None:
+    """Strict beside one solve on knots three times as dense, which exceeds limits between them but is no slower."""
+    worst = []
+    for seed in range(6):
+        for size in (0.004, 0.015, 0.06):
+            path = blended(seed, size)
+            dense = plan(path, MIKRON, options=Options(spacing=Spacing(dt=8e-4))).seconds
+            strict = plan(path, MIKRON, options=Options(strict=True))
+            assert strict.usage().worst <= 1.0
+            worst.append((strict.seconds / dense - 1.0, size))
+    print(f"18 polylines with blended corners: strict above the dense optimum median "
+          f"{statistics.median(above for above, _ in worst):.2%}, most {max(worst)[0]:.2%} (corner {max(worst)[1]} mm)")
+
+
+def stops() -> None:
+    """500 stops."""
+    path, places = zigzag(1000.0), np.linspace(0.0, 1000.0, 501)[1:-1].tolist()
+    for strict in (False, True):
+        start = time.perf_counter()
+        made = plan(path, MIKRON, stops=places, options=Options(strict=strict, method=Method(kernel=True)))
+        print(f"a stop each 2 mm, {'strict' if strict else 'fast'}: {(time.perf_counter() - start) / 0.5:.1f} ms per stop, "
+              f"{made.seconds:.1f} s of motion")
+
+
 def peak() -> float:
     """Highest resident set since the peak was last forgotten, MB."""
     status = Path("/proc/self/status").read_text().split()
@@ -152,7 +231,7 @@ def limits() -> None:
         path = random_path(seed, bend=(0.3, 1.0, 3.0)[seed % 3])
         made = {strict: plan(path, MIKRON, options=Options(strict=strict)) for strict in (False, True)}
         for strict, one in made.items():
-            worst[strict].append(one.trajectory().usage(MIKRON).worst)
+            worst[strict].append(one.usage().worst)
         price.append(made[True].seconds / made[False].seconds - 1.0)
         bound.append(made[False].seconds / plan_second_order(path, MIKRON).seconds)
     print(f"50 random paths: worst ratio fast median {statistics.median(worst[False]):.3f} most {max(worst[False]):.3f}, "
@@ -164,7 +243,8 @@ def limits() -> None:
 def main() -> None:
     """Run what is named, or all."""
     logging.disable(logging.CRITICAL)
-    parts = {"speed": speed, "memory": memory, "optimality": optimality, "limits": limits}
+    parts = {"speed": speed, "cl": cl, "copp": copp, "memory": memory, "optimality": optimality, "corners": corners,
+             "limits": limits, "stops": stops}
     for name in [arg for arg in sys.argv[1:] if arg in parts] or parts:
         parts[name]()
 
