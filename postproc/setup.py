@@ -61,6 +61,15 @@ class Output(UserModel):
     """by name of the operation"""
     restart: bool = False
     """every operation begins at home with everything restated, so that the program can be taken up there"""
+    subprograms: bool = False
+    """every operation is a subprogram of the same file, where the controller has such; it then begins as with restart"""
+
+    @property
+    def apart(self) -> bool:
+        """True where nothing that holds in one operation may be needed in the next."""
+        return self.restart or self.subprograms
+    subprograms: bool = False
+    """every operation is a subprogram of the same file"""
 
 
 class Pivot(UserModel):

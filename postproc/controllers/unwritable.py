@@ -10,10 +10,18 @@ from toolpaths.diagnostics import Diagnostic, error, warning
 from toolpaths.toolpath import Cycle
 
 
-def unwritable(controller: ControllerFile, program: Program, cycles: tuple[Cycle, ...], file: str) -> list[Diagnostic]:
-    """Commands and cycles that the controller's texts cannot say in full."""
-    return [*_length_registers(controller, program, file), *_radius_registers(controller, program, file),
-            *_pitches(controller, program, cycles, file)]
+def unwritable(controller: ControllerFile, program: Program, cycles: tuple[Cycle, ...], file: str,
+               subprograms: bool = False) -> list[Diagnostic]:
+    """Commands and cycles that the controller's texts cannot say in full, and subprograms where it has none in a file."""
+    return [*_subprograms(controller, subprograms), *_length_registers(controller, program, file),
+            *_radius_registers(controller, program, file), *_pitches(controller, program, cycles, file)]
+
+
+def _subprograms(controller: ControllerFile, wanted: bool) -> list[Diagnostic]:
+    if not wanted or controller.subprograms.call:
+        return []
+    return [error("output.subprograms", "operations as subprograms of the same file: this controller has no such",
+                  hint="take subprograms out of the set-up's [output], or state [subprograms] in the controller file")]
 
 
 def _commands(program: Program) -> Iterator[tuple[int, Command]]:

@@ -6,8 +6,13 @@ from pathlib import Path
 
 import pytest
 
+import toolpaths
 from postproc.program import Program
+from tests.postproc.kit import convert, good, tool_setup
 from tests.postproc.program_kit import LOAD, blocks, command, lines, program, step
+from toolpaths.diagnostics import has_errors
+
+GOLDEN = Path(__file__).parents[1] / "golden"
 
 
 def two_operations() -> Program:
@@ -68,3 +73,25 @@ def test_blocks_with_a_number_of_their_own_get_no_other(tmp_path: Path) -> None:
     text = lines(str(shop), two_operations(), subprograms=True)
     assert "O1001" in text and "N200 G17 G40 G80 G90 G94" in text and "%" in text
     assert sum(b.endswith("M98 P1001") and b.startswith("N") for b in text) == 1
+
+
+@pytest.mark.parametrize(("controller", "machine"), [("fanuc-30i", "mikron-ucp710"), ("haas-ngc", "trunnion-bc"),
+                                                     ("heidenhain-tnc640", "mikron-ucp710")])
+def test_subprograms_read_back_as_the_part(controller: str, machine: str) -> None:
+    path, found = toolpaths.read(GOLDEN / "three_laws.cls")
+    assert not has_errors(found)
+    usual = tool_setup()
+    setup = usual.model_copy(update={"output": usual.output.model_copy(update={"subprograms": True})})
+    result = good(convert(path, machine, controller, setup))
+    plain = good(convert(path, machine, controller))
+    assert result.comparison is not None and plain.comparison is not None
+    assert sum(c in result.text for c in ("P1001", "P1002", "P1003", "LBL 1001\n", "LBL 1002\n", "LBL 1003\n")) == 3
+    assert len(result.text.splitlines()) >= len(plain.text.splitlines()) + 9
+    assert result.comparison.worst_tip == plain.comparison.worst_tip
+
+
+def test_subprograms_are_refused_where_a_file_holds_none() -> None:
+    path, _ = toolpaths.read(GOLDEN / "three_laws.cls")
+    setup = tool_setup().model_copy(update={"output": tool_setup().output.model_copy(update={"subprograms": True})})
+    result = convert(path, "mikron-ucp710", "siemens-840d", setup)
+    assert not result.ok and "output.subprograms" in {d.code for d in result.diagnostics}
