@@ -81,7 +81,7 @@ def _turned(a: Any, b: Any, center: Any, normal: Any) -> Any:
 def _line_done(tip: Any, axis: Any, start: Any, end: Any, axis0: Any, axis1: Any, tol: float, axis_tol: float) -> Any:
     """True where a pose has come to the end of a straight move."""
     length = _apart(start, end)
-    if _angle(axis0, axis1) > axis_tol and _angle(axis, axis1) > 2.0 * axis_tol:
+    if _angle(axis0, axis1) > axis_tol and _angle(axis, axis1) > axis_tol:
         return False
     if length <= tol:
         return _apart(tip, end) <= 2.0 * tol
@@ -114,7 +114,7 @@ def _walk(tip: Any, axis: Any, swept: Any, start: Any, end: Any, axis0: Any, axi
                 step = swept[k] if swept[k] > 0.0 else _turned(before, tip[k], center[i], normal[i])
                 angle += step
                 slack = max(0.5 * tol, grain) / max(_apart(start[i], center[i]), tol)
-                done = angle >= sweep[i] - slack and _angle(axis[k], axis1[i]) <= 2.0 * axis_tol
+                done = angle >= sweep[i] - slack and _angle(axis[k], axis1[i]) <= axis_tol
             else:
                 done = _line_done(tip[k], axis[k], start[i], end[i], axis0[i], axis1[i], tol, axis_tol)
             k += 1
