@@ -68,8 +68,6 @@ class Output(UserModel):
     def apart(self) -> bool:
         """True where nothing that holds in one operation may be needed in the next."""
         return self.restart or self.subprograms
-    subprograms: bool = False
-    """every operation is a subprogram of the same file"""
 
 
 class Pivot(UserModel):
