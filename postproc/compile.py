@@ -31,7 +31,7 @@ def compile_program(job: Job, moves: Moves, path: Path,
     feeds = plan_feeds(path, control, words.end - words.start, moves.feed[path.move],
                        toolpath.pass_[moves.row[path.move]], native, job.options.feed_mode, controller.feed,
                        planned)
-    commands, diagnostics = commands_of(toolpath, moves, path, controller, native, job.setup.output.restart)
+    commands, diagnostics = commands_of(toolpath, moves, path, controller, native, job.setup.output.apart)
     keep = words.write.any(axis=1) | (path.code == ARC)
     new = np.concatenate([[0], np.cumsum(keep)])
     sections = sections_of(path, new)

@@ -83,7 +83,7 @@ class Job:
         """Moves whose link goes by home: the first, and those after a tool change or GOHOME."""
         first = np.searchsorted(self.moves.row, [e.index for e in self.toolpath.events if e.word == "GOHOME"]
                                 + [c.index for c in tool_changes(self.toolpath)])
-        restart = self.operation_starts() if self.setup.output.restart else []
+        restart = self.operation_starts() if self.setup.output.apart else []
         return frozenset({0, *first.tolist(), *restart})
 
     @cached_property

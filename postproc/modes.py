@@ -117,7 +117,8 @@ def output_modes(control: Control, controller: ControllerFile, setup: SetupFile,
     default = setup.output.default if options.output == "auto" else options.output
     names = [setup.output.operations.get(op.name, default) for op in toolpath.operations]
     modes = OutputModes(control, controller, np.array([ASKED.index(name) for name in names], dtype=np.int8), decimals)
-    return modes, _not_available(modes, toolpath) + _unknown_operations(setup, options, toolpath)
+    return modes, [*_not_available(modes, toolpath), *_unknown_operations(setup, options, toolpath),
+                   *_no_subprograms(controller, setup, options)]
 
 
 def _not_available(modes: OutputModes, toolpath: Toolpath) -> list[Diagnostic]:
@@ -130,6 +131,13 @@ def _not_available(modes: OutputModes, toolpath: Toolpath) -> list[Diagnostic]:
             result.append(error("output.mode", f"output mode {ASKED[asked]} cannot be had: {why}", file=toolpath.file,
                                 lines=lines[:6], count=max(len(lines), 1), hint=f"this controller and machine have: {can}"))
     return result
+
+
+def _no_subprograms(controller: ControllerFile, setup: SetupFile, options: Options) -> list[Diagnostic]:
+    if not setup.output.subprograms or controller.subprograms.call:
+        return []
+    return [error("output.subprograms", "[output] subprograms: the controller has none ([subprograms] of its file)",
+                  file=options.setup, hint="restart = true begins every operation afresh in one program")]
 
 
 def _unknown_operations(setup: SetupFile, options: Options, toolpath: Toolpath) -> list[Diagnostic]:

@@ -121,7 +121,7 @@ def begins_anew(toolpath: Toolpath, setup: SetupFile) -> Bools:
     """(operations,) True where an operation is reached from the safe planes, whatever its axis: where it can be a restart
     point, and where the set-up gives it, or the one before it, an output mode of its own."""
     own = np.array([op.name in setup.output.operations for op in toolpath.operations])
-    return np.asarray(own | np.concatenate([[False], own[:-1]]) | setup.output.restart)
+    return np.asarray(own | np.concatenate([[False], own[:-1]]) | setup.output.apart)
 
 
 def _starts_elsewhere(toolpath: Toolpath) -> list[int]:

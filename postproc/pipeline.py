@@ -137,7 +137,7 @@ def _stages(result: PostResult, progress: Progress | None) -> PostResult:
         return result
     planned = None if motion is None else Planned(motion.needed, options.merge_feeds)
     program, feeds, found = compile_program(job, moves, path, planned)
-    found += unwritable(result.controller, program, toolpath.cycles, file)
+    found += unwritable(result.controller, program, toolpath.cycles, file, result.setup.output.subprograms)
     result = _with(result, found, program=program, feeds=feeds)
     if not result.ok:
         return result
@@ -209,7 +209,7 @@ def write_text(result: PostResult) -> str:
     shares = result.shares or {}
     writer = writer_for(result.controller, result.program, result.toolpath.cycles, job.control.length_on_z,
                         shares["smoothing"], result.setup.work_offset_code, axis_smoothing=shares["axis_smoothing"],
-                        name=FilePath(result.toolpath.file).stem)
+                        name=FilePath(result.toolpath.file).stem, subprograms=result.setup.output.subprograms)
     return "\n".join(writer.lines(header)) + "\n"
 
 

@@ -141,6 +141,8 @@ class Writer(WriterState):
             yield from self.enter(section) if command.name == "ENTER_SECTION" else self.leave(section)
         elif command.name.startswith("START_SPINDLE"):
             yield from self.spindle(command)
+        elif command.name == "RESTATE":
+            self.restate()
         elif command.name == "OPERATION_START":
             yield from self.operation(str(command.args[0]))
         elif command.name == "COMMENT":

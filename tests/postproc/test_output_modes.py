@@ -9,7 +9,8 @@ import pytest
 
 import toolpaths
 from postproc.planes import angles_of, rotation_of, stated
-from tests.postproc.kit import SAMPLES, angle, codes, convert, goto, tilted, toolpath
+from postproc.setup import SetupFile, load_setup
+from tests.postproc.kit import SAMPLES, angle, codes, convert, goto, tilted, tool_setup, toolpath
 from tests.postproc.modes_kit import TCP, TILTED, made, run, shop
 
 GOLDEN = Path(__file__).parents[1] / "golden"
@@ -215,3 +216,122 @@ def test_angles_name_the_rotation_again(convention: str) -> None:
         frame = rotation_of(convention, angles)
         assert np.abs(frame @ frame.T - np.eye(3)).max() < 1e-12 and np.linalg.det(frame) > 0
         assert np.abs(rotation_of(convention, angles_of(convention, frame)) - frame).max() < 1e-9
+
+
+# ---- operations --------------------------------------------------------------------------------------------------
+
+
+def operations(*pieces: list[str]) -> toolpaths.toolpath.Toolpath:
+    """NX operations A, B, ... of CL lines, one tool, spindle and coolant stated in the first only."""
+    lines = []
+    for name, piece in zip("ABCD", pieces, strict=False):
+        lines += [f"TOOL PATH/{name},TOOL,T", "MSYS/0,0,0,1,0,0,0,1,0"]
+        lines += ["LOAD/TOOL,1", "SPINDL/RPM,1000,CLW", "COOLNT/FLOOD", "FEDRAT/MMPM,600"] if name == "A" else []
+        lines += [*piece, "END-OF-PATH"]
+    return toolpath(*lines, head=[])
+
+
+def test_an_operation_by_the_mode_that_is_asked_for_it(tmp_path: Path) -> None:
+    """B cuts on where A ended, in another mode: between them the tool goes by the safe planes."""
+    path = operations(indexed()[-8:], indexed()[-8:], turning())
+    own = setup_of(tmp_path, '[output.operations]\nB = "axes"\n')
+    result = convert(path, "mikron-ucp710", shop(tmp_path), own)
+    laws = {path.operations[int(path.operation[result.program.row[b.k]])].name: b.law for b in run(result) if b.code > 0}
+    assert laws == {"A": "tilted", "B": "axes", "C": "tcp"}
+    follows(result)
+
+
+def setup_of(folder: Path, text: str) -> SetupFile:
+    file = folder / "own.toml"
+    file.write_text(text + "".join(f"[tools.{k}]\ngauge_length = {v.gauge_length}\n" for k, v in tool_setup().tools.items()))
+    setup, found = load_setup(file)
+    assert setup is not None and not found, found
+    return setup
+
+
+def test_the_command_line_goes_before_the_set_ups_default(tmp_path: Path) -> None:
+    own = setup_of(tmp_path, '[output]\ndefault = "axes"\n')
+    for output, law in (("auto", "axes"), ("tilted", "tilted")):
+        result = convert(toolpath(*indexed()), "mikron-ucp710", shop(tmp_path), own, output=output)
+        assert {b.law for b in run(result) if b.code > 0} == {law}
+
+
+def test_an_operation_that_is_not_there_is_an_error(tmp_path: Path) -> None:
+    own = setup_of(tmp_path, '[output.operations]\nX = "axes"\n')
+    found = [d for d in convert(operations(indexed()), "mikron-ucp710", shop(tmp_path), own).diagnostics
+             if d.code == "setup.operation"]
+    assert len(found) == 1 and "it has: A" in found[0].hint
+
+
+def test_every_operation_can_be_started_at(tmp_path: Path) -> None:
+    """Home before it; tool, length, speed and coolant behind its start; the axes all stated."""
+    path = operations(indexed()[-8:], indexed()[-8:])
+    result = convert(path, "mikron-ucp710", shop(tmp_path), setup_of(tmp_path, "[output]\nrestart = true\n"))
+    p = result.program
+    starts = {c.args[0]: k for k, group in p.commands.items() for c in group if c.name == "OPERATION_START"}
+    assert list(starts) == ["A", "B"]
+    group = names(result, starts["B"])
+    after = group[group.index("OPERATION_START"):]
+    assert [n for n in after if n != "SELECT_TOOL"] == [
+        "OPERATION_START", "STOP_SPINDLE_TURNING", "COOLANT_OFF", "CHANGE_TOOL", "USE_TOOL_LENGTH_OFFSET",
+        "START_SPINDLE_CLOCKWISE", "FLOOD_ON"]
+    assert p.home[starts["B"] - 1]
+    entered = next(s.first for s in p.sections if s.first > starts["B"] and s.law == "tilted")
+    assert p.write[starts["B"]:entered].any(axis=0).all()
+    follows(result)
+
+
+def test_operations_that_go_on_are_no_places_to_start() -> None:
+    path = operations(indexed()[-8:], indexed()[-8:])
+    p = convert(path, "mikron-ucp710", "generic-iso").program
+    assert [c.args[0] for group in p.commands.values() for c in group if c.name == "OPERATION_START"] == ["A"]
+
+
+def test_the_next_tool_is_made_ready(tmp_path: Path) -> None:
+    lines = [*indexed()[-8:], "LOADTL/2", "SPINDL/RPM,900,CLW", *indexed()[-8:], "LOADTL/1", *indexed()[-8:]]
+    result = made(tmp_path, lines, "mikron-ucp710", more="[tools]\npreload = true\n")
+    said = [(c.name, c.args[0]) for k in sorted(result.program.commands) for c in result.program.commands[k]
+            if c.name in ("CHANGE_TOOL", "SELECT_TOOL")]
+    assert said == [("CHANGE_TOOL", 1.0), ("SELECT_TOOL", 2.0), ("CHANGE_TOOL", 2.0), ("SELECT_TOOL", 1.0),
+                    ("CHANGE_TOOL", 1.0)]
+    own = made(tmp_path, ["SELECT/TOOL,3", *lines], "mikron-ucp710", more="[tools]\npreload = true\n")
+    said = [c.args[0] for group in own.program.commands.values() for c in group if c.name == "SELECT_TOOL"]
+    assert said == [3.0]
+
+
+def test_a_controller_without_subprograms_refuses_them(tmp_path: Path) -> None:
+    own = setup_of(tmp_path, "[output]\nsubprograms = true\n")
+    found = convert(toolpath(*indexed()), "mikron-ucp710", shop(tmp_path), own).diagnostics
+    assert "output.subprograms" in codes(found)
+
+
+# ---- block skip --------------------------------------------------------------------------------------------------
+
+
+def skipping(*inside: str) -> list[str]:
+    return ["RAPID", "GOTO/0,0,50", "GOTO/0,0,5", "FEDRAT/MMPM,300", "GOTO/10,0,5", "OPSKIP/ON", *inside, "OPSKIP/OFF",
+            "GOTO/20,10,5", "GOTO/20,20,5", "RAPID", "GOTO/20,20,50"]
+
+
+def test_skipped_blocks_and_what_follows_them() -> None:
+    result = convert(toolpath(*skipping("GOTO/10,5,5", "STOP", "GOTO/10,10,5", "COOLNT/OFF")), "mill-3axis", "generic-iso")
+    p = result.program
+    rows = np.flatnonzero(p.skip)
+    assert p.words[rows].tolist() == [[10, 5, 5], [10, 10, 5]] or len(rows) == 2
+    behind = int(rows[-1]) + 1
+    assert p.write[behind].all() and names(result, behind)[0] == "RESTATE"
+    flags = {c.name: c.skip for group in p.commands.values() for c in group}
+    assert flags["PROGRAM_STOP"] and not flags["START_SPINDLE_CLOCKWISE"]
+    assert "opskip.proof" in codes(result.diagnostics) and "event.not_carried_out" not in codes(result.diagnostics)
+
+
+def test_a_tool_must_not_change_among_skipped_blocks() -> None:
+    lines = skipping("GOTO/10,5,5", "LOADTL/2", "SPINDL/RPM,900,CLW", "RAPID", "GOTO/10,5,50", "GOTO/10,5,5")
+    assert "opskip.mode" in codes(convert(toolpath(*lines), "mill-3axis", "generic-iso").diagnostics)
+
+
+def test_holes_are_spelt_out_among_skipped_blocks() -> None:
+    hole = ["RAPID", "GOTO/0,0,50", "CYCLE/DRILL,DEPTH,5,MMPM,100,CLEAR,3", "GOTO/10,10,0", "GOTO/20,10,0", "CYCLE/OFF"]
+    plain = convert(toolpath(*hole), "mill-3axis", "generic-iso")
+    skipped = convert(toolpath(*skipping(*hole)), "mill-3axis", "generic-iso")
+    assert len(plain.program.holes) == 2 and not skipped.program.holes
