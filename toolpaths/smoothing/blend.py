@@ -80,15 +80,15 @@ def chosen(members: Members, turn: Floats, tolerance: float, beside_splines: flo
     stop = turn > sharpest
     half = np.minimum(np.minimum(ROOM * size[:-1], ROOM * size[1:]), reach[:-1])
     allowed = FILL * np.where(members.spline[:-1] | members.spline[1:], beside_splines, tolerance)
-    joint = np.arange(len(s))
+    half[stop] = 0.0
+    joint = np.flatnonzero(~stop)
     for _ in range(_ROUNDS):
+        if not len(joint):
+            break
         off = _off(members, joint, s[joint], half[joint])
         wide = off > allowed[joint]
-        if not wide.any():
-            break
         joint, off = joint[wide], off[wide]
         half[joint] *= np.maximum(0.999 * allowed[joint] / off, 0.5)
-    half[stop] = 0.0
     return Blends(s, half, stop, turn)
 
 
