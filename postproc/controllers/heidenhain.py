@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from postproc.controllers.iso import CHUNK
-from postproc.controllers.writer import Writer
+from postproc.controllers.writer import SKIP, Writer
 from postproc.program import Command, Hole
 from postproc.word_arcs import PLANE_AXIS
 from toolpaths.arrays import Floats
@@ -28,6 +28,8 @@ class KlartextWriter(Writer):
 
     def numbered(self, block: str) -> str:
         """The block with its number; comments are blocks too."""
+        if block.startswith(SKIP):
+            return SKIP + self.numbered(block[1:])
         self.count += 1
         return f"{self.count} {block}"
 
@@ -107,6 +109,11 @@ class KlartextWriter(Writer):
         place = "".join(f" {letter}{self.number_text(p.words[hole.last, j:j + 1], int(p.decimals[j]))[0]}"
                         for j, letter in enumerate(p.letters) if letter in "XY")
         yield f"L{place} R0 FMAX M99"
+
+    def forget(self) -> None:
+        """State radius compensation and feed anew too."""
+        super().forget()
+        self.side = ""
 
     # ---- commands -----------------------------------------------------------------------------------------------
 

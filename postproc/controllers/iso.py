@@ -10,7 +10,7 @@ import numpy as np
 from postproc.controllers.model import CannedCycle
 from postproc.controllers.state import peck_of
 from postproc.controllers.writer import Writer
-from postproc.program import INVERSE, Hole
+from postproc.program import INVERSE, PER_MINUTE, Hole
 from postproc.word_arcs import PLANE_AXIS
 from toolpaths.arrays import Array, Bools
 from toolpaths.toolpath import Cycle
@@ -155,9 +155,9 @@ class IsoWriter(Writer):
 
     def before_cycle(self, hole: Hole) -> Iterator[str]:
         """Feed per minute, and the XY plane, where they do not stand."""
-        if self.mode == INVERSE:
+        if self.mode != PER_MINUTE:
             yield self.controller.codes.per_minute
-            self.mode, self.feed = 0, ""
+            self.mode, self.feed = PER_MINUTE, ""
         if self.plane != 17:
             yield self.controller.codes.planes["17"]
             self.plane = 17

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from postproc.controllers.model import CannedCycle, ControllerFile, Mode
-from postproc.program import Hole, Program, Section
+from postproc.program import PER_MINUTE, Hole, Program, Section
 from toolpaths.arrays import Floats
 from toolpaths.toolpath import Cycle
 
@@ -33,11 +33,17 @@ class WriterState:
         self.number = 0
         self.law, self.register, self.length_off, self.speed = program.sections[0].law, "", False, 0.0
         self.in_cycle, self.cycle_text, self.operations = False, "", 0
+        self.plane, self.mode = 17, PER_MINUTE
         self.restate()
 
     def restate(self) -> None:
-        """Forget the modal codes: the next block states them anew."""
-        self.motion, self.plane, self.mode, self.feed = "", 17, 0, ""
+        """State motion code and feed with the next block."""
+        self.motion, self.feed = "", ""
+
+    def forget(self) -> None:
+        """State every modal code anew: nobody knows what came before."""
+        self.restate()
+        self.plane, self.mode = 0, -1
 
     def comment(self, text: str) -> str:
         """One comment block, without characters that would end it, cut to the line length."""

@@ -6,13 +6,17 @@ import re
 from collections.abc import Iterable, Iterator
 from itertools import chain
 
+import numpy as np
+
 from postproc.controllers.model import Mode
 from postproc.controllers.state import WriterState
 from postproc.controllers.texts import blocks_of
-from postproc.program import Command, Hole
+from postproc.program import PER_MINUTE, Command, Hole
 
 _LABEL = re.compile(r"%|[NO]\d")
 """blocks that carry a number of their own"""
+SKIP = "/"
+"""before blocks that a switch at the control leaves out"""
 MARK = "\0"
 """stands in the body where an operation begins"""
 
@@ -84,7 +88,9 @@ class Writer(WriterState):
         return [block.format(**values) for block in blocks]
 
     def numbered(self, block: str) -> str:
-        """The block with its number where the controller numbers blocks."""
+        """The block with its number where the controller numbers blocks; the sign of the block switch stays in front."""
+        if block.startswith(SKIP):
+            return SKIP + self.numbered(block[1:])
         style = self.controller.format
         if not style.sequence_step or block.startswith(self.controller.comment.open) or _LABEL.match(block):
             return block
@@ -94,17 +100,18 @@ class Writer(WriterState):
     def body(self) -> Iterator[str]:
         """Blocks between preamble and ending: stretches of plain motion at once, all else one by one."""
         p = self.program
-        stops = sorted({*p.commands, *(h.first for h in p.holes), *(h.last + 1 for h in p.holes), len(p)})
+        switch = np.flatnonzero(np.diff(p.skip)) + 1
+        stops = sorted({*p.commands, *(h.first for h in p.holes), *(h.last + 1 for h in p.holes), *switch.tolist(), len(p)})
         holes = {h.first: h for h in p.holes}
         at = 0
         for stop in stops:
             if stop > at:
                 yield from self.end_cycle()
-                yield from self.blocks(at, stop)
+                yield from self.blocks(at, stop) if not p.skip[at] else map(SKIP.__add__, self.blocks(at, stop))
                 at = stop
             for command in p.commands.get(stop, ()):
                 yield from self.end_cycle()
-                yield from self.command(command)
+                yield from self.command(command) if not command.skip else map(SKIP.__add__, self.command(command))
             if stop in holes:
                 yield from self.hole(holes[stop])
                 self.in_cycle = True
@@ -142,7 +149,7 @@ class Writer(WriterState):
         elif command.name.startswith("START_SPINDLE"):
             yield from self.spindle(command)
         elif command.name == "RESTATE":
-            self.restate()
+            self.forget()
         elif command.name == "OPERATION_START":
             yield from self.operation(str(command.args[0]))
         elif command.name == "COMMENT":
@@ -157,10 +164,13 @@ class Writer(WriterState):
         self.operations += 1
         yield MARK
         values = {"name": name, "comment": self.comment(name), "number": 100 * self.operations}
-        for block in self.controller.program.operation:
-            yield block.format(**values)
-        if self.controller.program.operation:
-            self.restate()
+        blocks = self.controller.program.operation
+        yield from (block.format(**values) for block in blocks)
+        if blocks:
+            self.forget()
+            stated = {word for block in blocks for word in block.split()}
+            self.plane = 17 if self.controller.codes.planes["17"] in stated else 0
+            self.mode = PER_MINUTE if self.controller.codes.per_minute in stated else -1
 
     def spindle(self, command: Command) -> Iterator[str]:
         """The spindle's start, with its speed where one is given."""

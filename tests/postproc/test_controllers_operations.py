@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import toolpaths
-from postproc.program import Program
+from postproc.program import Command, Program, Section
 from tests.postproc.kit import convert, good, tool_setup
 from tests.postproc.program_kit import LOAD, blocks, command, lines, program, step
 from toolpaths.diagnostics import has_errors
@@ -24,7 +26,7 @@ def two_operations() -> Program:
     ("fanuc-30i", ["(FINISH  2 )", "N200 G17 G40 G80 G90 G94"], "G1 X2. F100."),
     ("haas-ngc", ["(FINISH  2 )", "N200 G17 G40 G80 G90 G94"], "G1 X2. F100."),
     ("siemens-840d", ["; finish (2)", "G17 G40 G90 G94"], "G1 X2 F100"),
-    ("heidenhain-tnc640", ["* - finish (2)"], "L X+2 F100")])
+    ("heidenhain-tnc640", ["* - finish (2)"], "L X+2 R0 F100")])
 def test_modal_codes_are_stated_anew_at_each_operation(controller: str, start: list[str], then: str) -> None:
     text = [b for b in blocks(controller, two_operations()) if b != "\0"]
     assert text[-len(start) - 1:] == [*start, then]
@@ -95,3 +97,29 @@ def test_subprograms_are_refused_where_a_file_holds_none() -> None:
     setup = tool_setup().model_copy(update={"output": tool_setup().output.model_copy(update={"subprograms": True})})
     result = convert(path, "mikron-ucp710", "siemens-840d", setup)
     assert not result.ok and "output.subprograms" in {d.code for d in result.diagnostics}
+
+
+def switched(controller: str) -> list[str]:
+    made = program([step("rapid", X=0.0), step("feed", X=1.0, F=100.0), step("feed", X=2.0, F=100.0),
+                    step("feed", X=3.0, F=100.0), step("feed", X=4.0, F=100.0)],
+                   {2: [Command("FLOOD_ON", skip=True)], 4: [command("RESTATE")]})
+    skip = np.array([False, False, True, True, False])
+    return blocks(controller, replace(made, skip=skip))
+
+
+def test_blocks_that_a_switch_leaves_out_begin_with_a_slash() -> None:
+    assert switched("fanuc-30i") == ["G0 X0.", "G1 X1. F100.", "/M8", "/X2.", "/X3.", "G94 G1 X4. F100."]
+    assert switched("heidenhain-tnc640") == ["L X+0 R0 FMAX", "L X+1 F100", "/M8", "/L X+2", "/L X+3", "L X+4 R0 F100"]
+
+
+def test_the_slash_stands_before_the_number() -> None:
+    made = program([step("rapid", X=0.0)])
+    text = lines("siemens-840d", replace(made, skip=np.array([True])))
+    assert "/N30 G0 X0" in text
+    assert "/3 L X+0 R0 FMAX" in lines("heidenhain-tnc640", replace(made, skip=np.array([True])))
+
+
+def test_a_mode_does_not_hide_the_feed_mode_before_it() -> None:
+    made = program([step("feed", X=1.0, F=2.0, inverse=True), step("feed", X=2.0, F=300.0)],
+                   {1: [command("ENTER_SECTION", 1.0)]}, sections=(Section(0, "axes"), Section(1, "tcp")))
+    assert blocks("siemens-840d", made)[-1] == "G94 G1 X2 F300"
