@@ -1,0 +1,138 @@
+"""Errors of a whole machine from what was measured on it: poses (probe on ball, R-test, tracker), distances (ball-bar),
+displacements along a direction (laser).
+
+The readings are predicted exactly, by the machine with errors; their rates by its first-order sensitivity. What belongs to
+the instrument is identified along: where the ball stands on the table, how far the tool's ball is from where it is thought.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from machines.calibration.problem import CalibrationProblem, CalibrationResult, solve
+from machines.geometric_error.actual import Actual
+from machines.geometric_error.model import ErrorModel
+from machines.kinematics.base import Kinematics
+from toolpaths.arrays import Floats
+
+Kind = Literal["position", "distance", "along"]
+BALL = ("ball.x", "ball.y", "ball.z")
+SETUP = {"position": BALL, "distance": (*BALL, "bar.length"), "along": ("zero",)}
+
+
+@dataclass(frozen=True, eq=False)
+class Measurements:
+    """N poses of the machine with what was read there.
+
+    Attributes:
+        kind: "position": tip less nominal tip, (N, 3) mm in the table frame; "distance": tip to `centre`, (N,) mm;
+            "along": tip less nominal tip along `toward`, (N,) mm
+        q: (N, J) commanded joints
+        read: (N, 3) or (N,)
+        sigma: mm, one or per reading
+        centre: (3,) mm in the table frame, nominal centre of the ball-bar
+        toward: (3,) unit direction in the table frame
+        zeroed: True where the place of the ball (zero of the laser) is not known and is identified along
+    """
+
+    kind: Kind
+    q: Floats
+    read: Floats
+    sigma: float | Floats
+    centre: Floats | None = None
+    toward: Floats | None = None
+    zeroed: bool = True
+
+
+def problem_of(model: ErrorModel, kinematics: Kinematics, measured: Measurements,
+               parameters: Sequence[str] = ()) -> CalibrationProblem:
+    """The identification of `parameters` (names of the model, or beginnings of them; all without) from measurements.
+
+    Raises:
+        ValueError: where a name is none of the model's.
+    """
+    chosen = [name for name in model.names if not parameters or name.startswith(tuple(parameters))]
+    for prefix in parameters:
+        if not any(name.startswith(prefix) for name in model.names):
+            raise ValueError(f"{prefix!r} is no parameter of the error model; it has {', '.join(model.names[:12])} ...")
+    setup = SETUP[measured.kind]
+    names = (*model.names, *setup)
+    free = np.array([*(name in set(chosen) for name in model.names), *(measured.zeroed for _ in setup)])
+    nominal = model.on(kinematics)
+    w = nominal.coordinates(measured.q)
+    count = len(model.names)
+    reader = _Reader(measured, model.zero().on(kinematics).place(w)[0])
+
+    def actual(values: Floats) -> Actual:
+        return model.with_values(values[:count]).on(kinematics)
+
+    def predict(values: Floats) -> Floats:
+        return reader.read(actual(values).place(w)[0], values[count:])
+
+    def jacobian(values: Floats) -> Floats:
+        machine = actual(values)
+        return reader.rates(machine.place(w)[0], machine.sensitivity(w)[:, :3], values[count:])
+
+    read = np.asarray(measured.read, dtype=np.float64).ravel()
+    sigma = np.broadcast_to(measured.sigma, np.shape(measured.read)).ravel()
+    guess = np.concatenate([model.values, np.zeros(len(setup))])
+    return CalibrationProblem(names, guess, free, read, sigma, predict, jacobian)
+
+
+@dataclass(frozen=True, eq=False)
+class _Reader:
+    """Readings (R,) of tips (N, 3), and their rates."""
+
+    measured: Measurements
+    nominal: Floats
+    """(N, 3) tips of the machine without errors"""
+
+    def read(self, tip: Floats, setup: Floats) -> Floats:
+        kind = self.measured.kind
+        if kind == "position":
+            return np.asarray((tip - self.nominal - setup).ravel())
+        if kind == "along":
+            return np.asarray((tip - self.nominal) @ self._toward() - setup[0])
+        return np.asarray(np.linalg.norm(tip - self._centre() - setup[:3], axis=1) - setup[3])
+
+    def rates(self, tip: Floats, moved: Floats, setup: Floats) -> Floats:
+        n, kind = len(tip), self.measured.kind
+        if kind == "position":
+            own = np.tile(-np.eye(3), (n, 1))
+            return np.concatenate([moved.reshape(3 * n, -1), own], axis=1)
+        if kind == "along":
+            return np.column_stack([np.einsum("i,nip->np", self._toward(), moved), -np.ones(n)])
+        bar = tip - self._centre() - setup[:3]
+        unit = bar / np.linalg.norm(bar, axis=1, keepdims=True)
+        return np.column_stack([np.einsum("ni,nip->np", unit, moved), -unit, -np.ones(n)])
+
+    def _toward(self) -> Floats:
+        assert self.measured.toward is not None
+        return self.measured.toward
+
+    def _centre(self) -> Floats:
+        assert self.measured.centre is not None
+        return self.measured.centre
+
+
+@dataclass(frozen=True, eq=False)
+class MachineFit:
+    """The identified model, with its covariance, and the fit that gave it; `setup` values are those of the instrument."""
+
+    model: ErrorModel
+    result: CalibrationResult
+    setup: dict[str, float]
+
+
+def fit(model: ErrorModel, kinematics: Kinematics, measured: Measurements, parameters: Sequence[str] = (),
+        robust: bool = False) -> MachineFit:
+    """Identify; see `problem_of`. Where the data do not tell all, `result.not_identifiable` names it."""
+    result = solve(problem_of(model, kinematics, measured, parameters), robust)
+    count = len(model.names)
+    found = replace(model.with_values(result.values[:count]), covariance=result.covariance[:count, :count])
+    names = result.names[count:]
+    return MachineFit(found, result, dict(zip(names, result.values[count:].tolist(), strict=True)))
