@@ -225,3 +225,18 @@ def test_ramp_is_the_ramp_outside_and_three_times_differentiable() -> None:
         inside = edge - np.sign(edge) * 2.0 * h
         around = ramp(inside + h * np.array([-1.5, -0.5, 0.5, 1.5]))
         assert abs(np.diff(around, 3)[0] / h**3) < 0.1
+
+
+@pytest.mark.parametrize("sharp", [0.97, 0.999])
+def test_dense_points_with_tight_turns_and_uneven_steps_stay_inside(sharp: float) -> None:
+    rng = np.random.default_rng(7)
+    phase = 2.0 * np.pi * np.cumsum(rng.uniform(0.05, 0.25, 3000)) / 25.0
+    tip = np.stack((10.0 / np.pi * np.arcsin(sharp * np.sin(phase)), 0.02 * phase + np.cos(0.5 * phase),
+                    2.0 * np.sin(0.5 * phase + 0.5)), axis=1)
+    axis = np.stack((0.02 * np.sin(phase + 0.3), 0.03 * np.sin(2.0 * phase + 0.4), np.ones(3000)), axis=1)
+    axis = np.round(axis / np.linalg.norm(axis, axis=1, keepdims=True), 6)
+    curves = chain(np.round(tip, 4), axis / np.linalg.norm(axis, axis=1, keepdims=True))
+    path = smooth(curves, TOLERANCE)
+    assert path is not None and path.members.spline.any()
+    worst_tip, worst_axis = off(path, curves, 41)
+    assert worst_tip <= TOLERANCE.tip and worst_axis <= TOLERANCE.axis

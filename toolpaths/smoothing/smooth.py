@@ -9,6 +9,7 @@ the other within a short distance, or the motion stops.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import count
 
 import numpy as np
 
@@ -98,20 +99,24 @@ def smooth(curves: Curves, tolerance: Tolerance, sharpest: float = SHARPEST) -> 
 
 
 def _fitted(curves: Curves, s: Floats, way: Floats, turn: Floats, tolerance: Tolerance) -> tuple[Segments, Fit | None]:
-    """Segments and the splines of those that are splines; chords that no spline keeps to end up between corners."""
+    """Segments and the splines of those that are splines.
+
+    Chords that no spline keeps to end up between corners; after some tries all chords of such a spline do, so that
+    this ends.
+    """
     p = points(curves, tolerance.scale)
     corner = corners(way, turn, curves.is_arc, SHARE * tolerance.tip)
-    for retry in range(RETRIES + 1):
+    for retry in count():
         parts = segments(corner, curves.is_arc)
         rows, first = _rows(parts)
         if not len(rows):
-            return parts, None
+            break
         found = fit(s[rows], p[rows], first, SHARE * tolerance.tip)
         bad = np.flatnonzero(found.ratio > 1.0)
         if not len(bad):
             return parts, found
-        corner = _more_corners(corner, parts, rows[bad], retry == RETRIES - 1)
-    raise ArithmeticError("a chord outside the tolerance of a spline was not taken out of it")
+        corner = _more_corners(corner, parts, rows[bad], retry >= RETRIES)
+    return parts, None
 
 
 def points(curves: Curves, scale: float) -> Floats:

@@ -10,7 +10,7 @@ from toolpaths.arrays import Bools, Floats, Ints
 
 FEWEST = 4
 """Chords that make a spline; fewer stay lines."""
-LONG = 6.0
+LONG = 12.0
 """A chord so many times longer than those around it is a line of its own."""
 HIGH = 1.6
 """Height of a curve over its chord, over the tolerance, that no smooth curve can share between points and chord."""
