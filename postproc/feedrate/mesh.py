@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,6 +14,8 @@ from toolpaths.arrays import Floats
 
 CHUNK = 16384
 RAMP = 32
+GROWTH = 0.04
+"""Growth of the spacing per distance from rest or from a change of the feed, where the feed alone limits."""
 FEWEST = 128
 """Intervals of a motion between stops at least."""
 
@@ -30,14 +33,22 @@ class Spacing:
     """largest share of a jerk limit by which the path's third derivative may bulge between knots"""
 
 
+class Marks(NamedTuple):
+    """Where a feed that is otherwise constant changes: sigma (M,) rising, lesser feed there as sigma_dot (M,)."""
+
+    sigma: Floats
+    speed: Floats
+
+
 def mesh(path: Path, limits: JointLimits, top: Callable[[Floats], Floats], spacing: Spacing,
-         ramp: float = np.inf) -> Floats:
+         ramp: float = np.inf, marks: Marks | None = None) -> Floats:
     """Knots (K,) from path.start to path.end.
 
     The limits are probed at the breaks of the path and between them; `top(sigma)` bounds the speed along sigma; `ramp`
-    is the time of full jerk after rest, into which RAMP knots go.
+    is the time of full jerk after rest, into which RAMP knots go. Under a feed with `marks` knots lie on these and grow
+    from there and from rest, and its cruise, where nothing changes, takes the longest.
     """
-    at = _probes(path, spacing)
+    at = _probes(path, spacing, marks)
     parts = [_probed(path, limits, top, at[i:i + CHUNK]) for i in range(0, len(at), CHUNK)]
     speed, jerk = (np.concatenate(column) for column in zip(*parts, strict=True))
     if not np.all(speed > 0.0):
@@ -45,9 +56,32 @@ def mesh(path: Path, limits: JointLimits, top: Callable[[Floats], Floats], spaci
         raise ValueError(f"no speed above 0 is allowed at {where:.6g} of {path.end:.6g}: feed 0, or no finite derivatives")
     h = np.minimum(spacing.dt * speed, min(spacing.longest, (path.end - path.start) / FEWEST))
     h[1:-1] = np.minimum(h[1:-1], np.sqrt(8.0 * spacing.hump / np.maximum(_bend(at, jerk), 1e-300)))
-    h[[0, -1]] = np.minimum(h[[0, -1]], ramp / RAMP * speed[[0, -1]])
+    with np.errstate(invalid="ignore"):
+        h[[0, -1]] = np.fmin(h[[0, -1]], ramp / RAMP * speed[[0, -1]])
+    if marks is not None:
+        places = np.concatenate((at[:1], marks.sigma, at[-1:]))
+        h = np.minimum(h, _cones(at, places, np.concatenate((h[:1], spacing.dt * marks.speed, h[-1:]))))
     h = np.maximum(h, 1e-9 * (path.end - path.start))
-    return place(at, gentle(at, h, spacing.slope))
+    knots = place(at, gentle(at, h, spacing.slope))
+    return knots if marks is None else _pinned(knots, marks.sigma)
+
+
+def _cones(at: Floats, places: Floats, h: Floats) -> Floats:
+    """Spacing (N,) that grows from `h` (M,) at rising `places` (M,) by GROWTH of the distance."""
+    behind = np.clip(np.searchsorted(places, at, side="right") - 1, 0, len(places) - 1)
+    ahead = np.minimum(behind + 1, len(places) - 1)
+    sides = (h[k] + GROWTH * np.abs(at - places[k]) for k in (behind, ahead))
+    return np.asarray(np.minimum(*sides))
+
+
+def _pinned(knots: Floats, marks: Floats) -> Floats:
+    """The nearest knots inside moved onto `marks`; more knots where two marks have the same one."""
+    middle = 0.5 * (knots[1:-2] + knots[2:-1])
+    nearest = 1 + np.searchsorted(middle, marks)
+    moved, first = np.unique(nearest, return_index=True)
+    made = knots.copy()
+    made[moved] = marks[first]
+    return np.unique(np.concatenate((made, marks)))
 
 
 def ramp_time(dq: Floats, limits: JointLimits, feed: Floats) -> float:
@@ -67,8 +101,8 @@ def _probed(path: Path, limits: JointLimits, top: Callable[[Floats], Floats], at
     found = path.derivatives(at)
     cap = np.minimum(squared_speed(found.dq, limits.velocity), steady_cap(found.d2q, found.d3q, limits))
     speed = np.asarray(np.minimum(np.sqrt(cap), top(at)))
-    with np.errstate(invalid="ignore"):
-        return speed, found.d3q * speed[:, None] ** 3 / limits.jerk
+    with np.errstate(invalid="ignore", over="ignore"):
+        return speed, np.nan_to_num(found.d3q * speed[:, None] ** 3 / limits.jerk)
 
 
 def _bend(at: Floats, jerk: Floats) -> Floats:
@@ -78,10 +112,12 @@ def _bend(at: Floats, jerk: Floats) -> Floats:
     return np.asarray(np.abs(2.0 * np.diff(slope, axis=0) / (step[1:] + step[:-1])).max(axis=1))
 
 
-def _probes(path: Path, spacing: Spacing) -> Floats:
-    """Ends, breaks, and equal parts between them, two or more."""
+def _probes(path: Path, spacing: Spacing, marks: Marks | None) -> Floats:
+    """Ends, breaks, marks, and equal parts between them, two or more."""
     length = path.end - path.start
     breaks = np.asarray(path.breaks, dtype=np.float64)
+    if marks is not None:
+        breaks = np.union1d(breaks, marks.sigma)
     inner = breaks[(breaks > path.start) & (breaks < path.end)]
     edges = np.concatenate(([path.start], inner, [path.end]))
     edges = edges[np.concatenate((np.diff(edges) > 1e-9 * length, [True]))]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property, reduce
 from operator import add
@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from postproc.feedrate.feed import Allowed
 from postproc.feedrate.limits import JointLimits
 from postproc.feedrate.paths import Eased
 from postproc.feedrate.profile import Places, Profile
@@ -63,7 +64,7 @@ class Plan:
 
     pieces: tuple[Piece, ...]
     limits: JointLimits
-    feed: Callable[[Floats], Floats]
+    feed: Allowed
     step: float = SAMPLE
     iterations: int = 0
     mismatch: float = 0.0

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import pairwise
 
 import numpy as np
 
+from postproc.feedrate.feed import Allowed, Feed
 from postproc.feedrate.limits import JointLimits, squared_speed
-from postproc.feedrate.mesh import FEWEST, Spacing, mesh, ramp_time
+from postproc.feedrate.mesh import FEWEST, Marks, Spacing, mesh, ramp_time
 from postproc.feedrate.motion import CHUNK, SAMPLE, Piece, Plan
 from postproc.feedrate.paths import Eased, Path
 from postproc.feedrate.problem import Knots
@@ -23,8 +24,6 @@ from postproc.feedrate.tightening import tightened
 from postproc.feedrate.windows import Method, Solved, solved
 from toolpaths.arrays import Floats
 
-Feed = float | Callable[[Floats], Floats]
-"""Largest ds/dt: one number, or a function of s (N,) that returns (N,). The tip's feed, if s is the length of its path."""
 ROUNDS = 12
 FITS = 0.9995
 """Ratio, as a factor on time, from which a strict plan is fast enough, for the first TRIES looks at its samples."""
@@ -69,7 +68,7 @@ def plan(path: Path, limits: JointLimits, feed: Feed = np.inf, stops: Sequence[f
     options = options or Options()
     if not np.all(np.isfinite(limits.jerk)):
         raise ValueError("a joint without a jerk limit: plan_second_order is for machines that state none")
-    allowed = _as_function(feed, options.override)
+    allowed = Allowed(feed, options.override)
     if knots is not None and len(stops):
         raise ValueError("knots are for a motion without stops")
     pieces, reports, guess = [], [], []
@@ -91,7 +90,7 @@ def plan_second_order(path: Path, limits: JointLimits, feed: Feed = np.inf, stop
                       options: Options | None = None, knots: Floats | None = None) -> Plan:
     """Least time under velocity, acceleration and feed only: a bound, and the plan of machines that state no jerk."""
     options = options or Options()
-    allowed = _as_function(feed, options.override)
+    allowed = Allowed(feed, options.override)
     pieces = []
     for eased in _stretches(path, stops, 0.0):
         sigma = knots if knots is not None else mesh(eased, limits, partial(eased.speed_limit, feed=allowed), options.knots)
@@ -102,22 +101,20 @@ def plan_second_order(path: Path, limits: JointLimits, feed: Feed = np.inf, stop
     return Plan(tuple(pieces), limits, allowed, options.step)
 
 
-def _as_function(feed: Feed, override: float) -> Callable[[Floats], Floats]:
-    if not override > 0.0:
-        raise ValueError(f"an override must be positive, found {override}")
-    return (lambda s: override * feed(s)) if callable(feed) else (lambda s: np.full(len(s), override * feed))
-
-
-def _mesh(eased: Eased, limits: JointLimits, feed: Callable[[Floats], Floats], spacing: Spacing) -> Floats:
-    """Knots between two stops, fine enough beside them."""
+def _mesh(eased: Eased, limits: JointLimits, feed: Allowed, spacing: Spacing) -> Floats:
+    """Knots between two stops, fine enough beside them and where the feed changes."""
     ends = np.array([eased.first, np.nextafter(eased.last, eased.first)])
     ramp = ramp_time(eased.path.derivatives(ends).dq, limits, feed(ends))
-    return mesh(eased, limits, partial(_top, eased, limits, feed), spacing, ramp)
+    marks = None
+    if feed.steady and np.all(np.isfinite(feed(ends))):
+        inside = feed.breaks[(feed.breaks > eased.first) & (feed.breaks < eased.last)]
+        marks = Marks(eased.sigma(inside), eased.speed_limit(eased.sigma(inside), feed))
+    return mesh(eased, limits, partial(_top, eased, limits, None if marks else feed), spacing, ramp, marks)
 
 
-def _top(eased: Eased, limits: JointLimits, feed: Callable[[Floats], Floats], sigma: Floats) -> Floats:
-    """Largest constant sigma_dot (N,) under the feed and the limits at the tool."""
-    allowed = eased.speed_limit(sigma, feed)
+def _top(eased: Eased, limits: JointLimits, feed: Allowed | None, sigma: Floats) -> Floats:
+    """Largest constant sigma_dot (N,) under the feed, unless it has marks of its own, and the limits at the tool."""
+    allowed = np.full(len(sigma), np.inf) if feed is None else eased.speed_limit(sigma, feed)
     return allowed if limits.tool is None else np.minimum(allowed, steady_tool_speed(eased, sigma, limits.tool))
 
 
@@ -132,18 +129,23 @@ def _stretches(path: Path, stops: Sequence[float], ease: float) -> list[Eased]:
 def _solve(grid: Knots, options: Options) -> tuple[Profile, Solved, float]:
     """One solve; in strict mode again with tightened limits where they are exceeded between the knots.
 
-    Also the factor on time that the last one still needs there, 1 in fast mode.
+    The fastest of them with the factor on time that it still needs there; 1 in fast mode.
     """
     report = solved(grid, options.method)
-    profile, slower = _profile(grid, report.c), 1.0
-    for left in reversed(range(options.passes + 1 if options.strict else 0)):
+    profile, best = _profile(grid, report.c), None
+    if not options.strict:
+        return profile, report, 1.0
+    for left in reversed(range(options.passes + 1)):
         slower, better = tightened(grid, profile, bool(options.method.kernel))
+        seconds = slower * float(profile.times[-1])
+        if best is None or seconds < best[0]:
+            best = seconds, (profile, report, slower)
         if better is None or not left:
             break
         report = solved(better, options.method, report.c if len(better.sigma) == len(grid.sigma) else None)
-        grid = better
-        profile = _profile(grid, report.c)
-    return profile, report, slower
+        grid, profile = better, _profile(better, report.c)
+    assert best is not None
+    return best[1]
 
 
 def _profile(grid: Knots, c: Floats) -> Profile:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from postproc.feedrate import interior, windows
+from postproc.feedrate.feed import Allowed, StepFeed
 from postproc.feedrate.limits import JointLimits
 from postproc.feedrate.mesh import Spacing
 from postproc.feedrate.plan import Options, Plan, plan, plan_second_order
@@ -187,3 +188,33 @@ def test_bad_requests_are_refused() -> None:
         plan(path, MIKRON, stops=[50.0], knots=np.linspace(0.0, 1.0, 100))
     with pytest.raises(ValueError, match="no speed above 0"):
         plan(path, MIKRON, feed=lambda s: np.where(s > 50.0, 0.0, 10.0))
+
+
+def test_feeds_of_blocks_cost_nothing_between_them() -> None:
+    """Steps of the feed lie on knots: strict holds them at once, and a slow cruise needs few knots."""
+    rng = np.random.default_rng(3)
+    feed = StepFeed(np.linspace(0.0, 100.0, 51), rng.uniform(5.0, 40.0, 50))
+    fast, strict = (plan(random_path(1), MIKRON, feed=feed, options=Options(strict=mode)) for mode in (False, True))
+    assert fast.usage().feed < 1.04 and strict.usage().worst <= 1.0
+    assert strict.seconds < 1.002 * fast.seconds
+    sigma = strict.pieces[0].profile.sigma
+    assert np.abs(sigma[None, :] - strict.pieces[0].eased.sigma(feed.breaks)[:, None]).min(axis=1).max() < 1e-9
+    slow = plan(random_path(2), MIKRON, feed=0.05)
+    assert slow.seconds == pytest.approx(100.0 / 0.05, rel=1e-3) and len(slow.pieces[0].profile.sigma) < 3000
+
+
+def test_feeds_of_blocks_by_their_edges() -> None:
+    feed = StepFeed(np.array([0.0, 10.0, 20.0, 30.0]), np.array([5.0, 5.0, 9.0]))
+    assert feed.breaks.tolist() == [20.0]
+    assert feed(np.array([-1.0, 9.0, 25.0, 31.0])).tolist() == [5.0, 5.0, 9.0, 9.0]
+    assert Allowed(feed, 2.0)(np.array([19.9, 20.0, 20.1])).tolist() == [10.0, 10.0, 18.0]
+    with pytest.raises(ValueError, match="rise"):
+        StepFeed(np.array([0.0, 0.0]), np.array([5.0]))
+    with pytest.raises(ValueError, match="positive"):
+        StepFeed(np.array([0.0, 1.0]), np.array([0.0]))
+
+
+def test_where_tightening_is_in_vain_the_best_is_kept() -> None:
+    """A jerk so high that the motion is one of second order: strict stays beside V/A + S/V."""
+    made = plan(PolynomialPath([[0.0, 1.0]], 100.0), JointLimits(*np.array([[500.0], [2500.0], [5e8]])), options=STRICT)
+    assert made.usage().worst <= 1.0 and made.seconds < 1.06 * 0.4
