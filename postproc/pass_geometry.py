@@ -18,12 +18,16 @@ from postproc.moves import Moves
 from postproc.path import TRAVERSE, Path
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
+from toolpaths.rotations import angle_between
+from toolpaths.shape import Curves
 from toolpaths.smoothing.blend import SHARPEST
 from toolpaths.smoothing.smooth import Smooth, Tolerance, smooth
 from toolpaths.toolpath import Kind, Toolpath
 
 RUNNING = frozenset({"PPRINT", "FEDRAT", "SEQNO", "MODE", "ROTATE", "SELECT", "INDIRV", "INDIRP", "TLON", "TLAXIS"})
 """Records at which no control stops."""
+LED = 1e-7
+"""rad: axes that differ by less are those of the move"""
 
 
 @dataclass(frozen=True)
@@ -31,14 +35,14 @@ class PassGeometry:
     """One pass.
 
     Attributes:
-        first, last: rows of Moves, [first, last)
-        block (k,): blocks of the Path; ends (k,): parameter s at their ends; begin (k,): at their starts
+        move (C,): row of Moves of each curve that was smoothed; share (C,): how much of that move's way it is
+        block (k,): blocks of the Path; begin, ends (k,): parameter s where they begin and end
         smooth: the smoothed tip and axis
         paths: joints along s, between one stop and the next
     """
 
-    first: int
-    last: int
+    move: Ints
+    share: Floats
     block: Ints
     begin: Floats
     ends: Floats
@@ -76,11 +80,10 @@ def pass_geometry(path: Path, moves: Moves, kinematics: Callable[[int], Kinemati
     reference = moves.curves()
     for first, last in chains(moves, np.union1d(stops, path.turns)):
         block = _blocks(path, first, last)
-        found = smooth(reference.take(np.arange(first, last)), tolerance, sharpest)
-        if found is None or not len(block):
-            continue
+        kin = kinematics(int(moves.tool[first]))
         try:
-            result.append(_pass(path, first, last, block, found, kinematics(int(moves.tool[first]))))
+            found = _pass(path, block, reference, kin, tolerance, sharpest) if len(block) else None
+            result += [found] if found is not None else []
         except ArithmeticError as fault:
             diagnostics.append(error("plan.reach", f"the smoothed path leaves what the machine can reach: {fault}",
                                      file=file, lines=moves.line[[first, last - 1]].tolist(),
@@ -95,9 +98,51 @@ def _blocks(path: Path, first: int, last: int) -> Ints:
     return np.asarray(here[(path.code[here] != TRAVERSE) & (path.u[here] > 0.0)])
 
 
-def _pass(path: Path, first: int, last: int, block: Ints, found: Smooth, kin: Kinematics) -> PassGeometry:
-    local = path.move[block] - first
-    ends = found.s[local] + path.u[block] * np.diff(found.s)[local]
+@dataclass(frozen=True)
+class _Written:
+    """Curves as the blocks follow them: `curve` (k,) of each block, and where on it the block ends, `u` (k,)."""
+
+    curves: Curves
+    move: Ints
+    share: Floats
+    curve: Ints
+    u: Floats
+
+
+def _written(path: Path, block: Ints, reference: Curves, kin: Kinematics) -> _Written:
+    """The moves' curves with the tool axes that are written; moves whose axis is led aside, block by block.
+
+    Axes differ from those of the moves where these are out of reach, or near a singular direction.
+    """
+    move, u = path.move[block], path.u[block]
+    tip, wanted = reference.take(move).at(u)
+    _, axis = kin.forward(path.q[block], near=np.hstack((tip, wanted)))
+    aside = angle_between(axis, wanted) > LED
+    axis = np.where(aside[:, None], axis, wanted)
+    led = np.isin(move, move[aside & (u < 1.0)])
+    cut = (u == 1.0) | led
+    cut[-1] = True
+    curve = np.cumsum(cut) - cut
+    rows = np.flatnonzero(cut)
+    own = reference.take(move[rows])
+    start = np.concatenate((own.start[:1], tip[rows[:-1]]))
+    _, first = kin.forward(path.q[block[:1] - 1], near=np.hstack((own.start[:1], own.axis0[:1])))
+    aside_first = angle_between(first, own.axis0[:1]) > LED
+    axis0 = np.concatenate((first if aside_first[0] else own.axis0[:1], axis[rows[:-1]]))
+    begin = np.concatenate(([0.0], np.where(u[rows[:-1]] < 1.0, u[rows[:-1]], 0.0)))
+    whole = ~led[rows]
+    curves = Curves(start, tip[rows], axis0, axis[rows], own.is_arc & whole, own.center, own.normal, own.sweep)
+    return _Written(curves, move[rows], u[rows] - begin, curve, np.where(led, 1.0, u))
+
+
+def _pass(path: Path, block: Ints, reference: Curves, kin: Kinematics, tolerance: Tolerance,
+          sharpest: float) -> PassGeometry | None:
+    """The geometry of a chain of blocks; None where nothing moves."""
+    written = _written(path, block, reference, kin)
+    found = smooth(written.curves, tolerance, sharpest)
+    if found is None:
+        return None
+    ends = found.s[written.curve] + written.u * np.diff(found.s)[written.curve]
     begin = np.concatenate((found.s[:1], ends[:-1]))
     jump = np.flatnonzero(np.diff(block) > 1) + 1
     cuts = np.unique(np.concatenate(([0.0], found.stops, ends[jump - 1], found.s[-1:])))
@@ -106,7 +151,7 @@ def _pass(path: Path, first: int, last: int, block: Ints, found: Smooth, kin: Ki
         own = np.flatnonzero((ends > low) & (begin < high))
         near = _Near(np.append(begin[own[:1]], ends[own]), path.q[np.append(block[own[:1]] - 1, block[own])])
         paths.append(machine_path(found, low, high, kin, near))
-    return PassGeometry(first, last, block, begin, ends, found, tuple(paths))
+    return PassGeometry(written.move, written.share, block, begin, ends, found, tuple(paths))
 
 
 @dataclass(frozen=True)

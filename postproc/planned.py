@@ -37,7 +37,7 @@ def joint_limits(limits: Limits) -> JointLimits:
 class PassFeed:
     """Largest ds/dt along a pass: the tip at the feed of each move, or the way of a move in its time.
 
-    `s` (M + 1,) ends of the moves; `feed` (M,) mm/s, NaN where `seconds` (M,) counts.
+    `s` (C + 1,) ends of the curves; `feed` (C,) mm/s, NaN where `seconds` (C,) counts.
     """
 
     geometry: PassGeometry
@@ -154,8 +154,7 @@ def planned_motion(source: Source) -> tuple[PlannedMotion | None, list[Diagnosti
 
 def plan_pass(one: PassGeometry, moves: Moves, limits: JointLimits, options: Options | None = None) -> Plan:
     """The motion of least time along a pass, from rest to rest, stopping where its geometry does."""
-    rows = slice(one.first, one.last)
-    feed = PassFeed(one, one.smooth.s, moves.feed[rows], moves.seconds[rows])
+    feed = PassFeed(one, one.smooth.s, moves.feed[one.move], moves.seconds[one.move] * one.share)
     made = [plan(path, limits, feed, options=options) for path in one.paths]
     return replace(made[0], pieces=tuple(piece for each in made for piece in each.pieces),
                    iterations=max(each.iterations for each in made), mismatch=max(each.mismatch for each in made),

@@ -78,7 +78,7 @@ def test_joints_follow_the_smoothed_tool(name: str) -> None:
     result = CASES[name](name)
     assert result.job is not None
     for one in geometry(result):
-        kin = result.job.kinematics(int(result.job.moves.tool[one.first]))
+        kin = result.job.kinematics(int(result.job.moves.tool[one.move[0]]))
         for path in one.paths:
             s = np.linspace(path.start, path.end, 3001)
             tip, axis = one.smooth.at(s)
@@ -112,7 +112,7 @@ def test_derivatives_are_those_of_the_path() -> None:
 def exceeded(one: PassGeometry, result: PostResult, limits: JointLimits, speed: Floats) -> Floats:
     """(k,) worst ratio to any limit in each block at constant ds/dt, by differences of the exact inverse."""
     assert result.job is not None
-    kin = result.job.kinematics(int(result.job.moves.tool[one.first]))
+    kin = result.job.kinematics(int(result.job.moves.tool[one.move[0]]))
     worst = np.zeros(len(one.block))
     h = 0.02
     for k, (low, high) in enumerate(zip(one.begin, one.ends, strict=True)):

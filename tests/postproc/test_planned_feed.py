@@ -83,7 +83,7 @@ def test_words_keep_every_limit_anywhere_in_their_block(mode: str) -> None:
     first = execute(result)
     before = first[first.index(next(s for s in first if s.kind == "feed")) - 1].end
     speed = (one.ends - one.begin) / seconds(steps, before)
-    kin = job.kinematics(int(job.moves.tool[one.first]))
+    kin = job.kinematics(int(job.moves.tool[one.move[0]]))
     worst = np.zeros(len(steps))
     for part in np.linspace(0.0, 1.0, 9):
         s = np.clip(one.begin + part * (one.ends - one.begin), 2.0 * STENCIL, one.smooth.s[-1] - 2.0 * STENCIL)
