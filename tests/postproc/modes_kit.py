@@ -13,7 +13,7 @@ import numpy as np
 
 from postproc.pipeline import PostResult
 from postproc.program import Section
-from tests.postproc.kit import convert, machine, pose_of, toolpath
+from tests.postproc.kit import convert, pose_of, toolpath
 
 TCP = '[modes.tcp]\nenter = ["G43.4 H{register}"]\nleave = ["G49"]\n'
 TILTED = '[modes.tilted]\nenter = ["G68.2 X0 Y0 Z0 I{first} J{second} K{third}", "G53.1"]\nleave = ["G69"]\nangles = "ZXZ"\n'
@@ -40,6 +40,14 @@ class Block:
     compensation: str
 
 
+def turned(letter: str, degrees: float) -> np.ndarray:
+    """Right-hand turn about X, Y or Z."""
+    a = math.radians(degrees)
+    k = {"X": [[0, 0, 0], [0, 0, -1], [0, 1, 0]], "Y": [[0, 0, 1], [0, 0, 0], [-1, 0, 0]],
+         "Z": [[0, -1, 0], [1, 0, 0], [0, 0, 0]]}[letter]
+    return np.eye(3) + math.sin(a) * np.array(k) + (1 - math.cos(a)) * (np.array(k) @ np.array(k))
+
+
 class Reader:
     """The state of the control while it runs a Program."""
 
@@ -59,6 +67,9 @@ class Reader:
         self.compensation = ""
         self.blocks: list[Block] = []
         self.entered: list[int] = []
+        self.stated = np.zeros(len(self.at), dtype=bool)
+        mode = result.controller.modes.tilted
+        self.convention = "" if mode is None else str(mode.angles)
 
     def run(self) -> list[Block]:
         for k in range(len(self.program) + 1):
@@ -78,10 +89,12 @@ class Reader:
         elif name == "LEAVE_SECTION":
             assert self.program.sections[int(args[0])] is self.section and not self.compensation
             self.section, self.words = self.program.sections[0], np.full(len(self.at), np.nan)
+            self.stated[:] = False
         elif name == "ENTER_SECTION":
             assert self.section.law == "axes"
             self.section, self.words = self.program.sections[int(args[0])], np.full(len(self.at), np.nan)
             assert self.section.first == k
+            assert self.stated[self.rotary].all(), "rotary axes are not stated before the mode"
             self.entered.append(k)
             for letter, value in self.section.rotary:
                 assert abs(self.at[self.m.axis_names.index(letter)] - value) < 1e-9, "the rotary axes stand elsewhere"
@@ -94,18 +107,28 @@ class Reader:
             position = words + self.work
             position[:, 2] += self.offset
             return pose_of(self.name, position, self.length)
-        turned = np.where(np.isin(np.arange(words.shape[1]), self.rotary), words, 0.0)
+        still = np.where(np.isin(np.arange(words.shape[1]), self.rotary), words, 0.0)
         if self.section.law == "tilted":
             for letter, value in self.section.rotary:
-                turned[:, self.m.axis_names.index(letter)] = value
-        axis = pose_of(self.name, turned, 0.0)[1]
-        plane = self.section.plane
-        if plane is None:
+                still[:, self.m.axis_names.index(letter)] = value
+        axis = pose_of(self.name, still, 0.0)[1]
+        if self.section.plane is None:
             return words[:, :3] + self.zero, axis
-        return np.asarray(plane.origin) + words[:, :3] @ np.asarray(plane.rotation).T, axis
+        return self.zero + words[:, :3] @ self.frame(still[0]).T, axis
+
+    def frame(self, position: np.ndarray) -> np.ndarray:
+        """The plane's X', Y', Z' as columns: of the printed angles, or how the slides run at the rotary position."""
+        if self.convention != "rotary":
+            a, b, c = (turned(letter, v) for letter, v in zip(self.convention, self.section.angles, strict=True))
+            return a @ b @ c
+        at = np.tile(position, (4, 1))
+        at[1:, :3] += np.eye(3)
+        tip = pose_of(self.name, at, 0.0)[0]
+        return (tip[1:] - tip[0]).T
 
     def block(self, k: int) -> None:
         p = self.program
+        self.stated |= p.write[k]
         if p.home[k]:
             assert self.section.law == "axes" and p.code[k] == 0
             self.at = np.where(p.write[k], p.words[k], self.at)
@@ -162,7 +185,3 @@ def made(folder: Path, lines: list[str], name: str, output: str = "auto", more: 
          **options: object) -> PostResult:
     """CL lines after the usual head, converted for a shop's controller."""
     return convert(toolpath(*lines), name, shop(folder, more), output=output, **options)
-
-
-def letters(name: str) -> tuple[str, ...]:
-    return machine(name).axis_names

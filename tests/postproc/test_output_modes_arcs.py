@@ -61,6 +61,17 @@ def test_arcs_stay_arcs_in_every_plane_of_a_tilted_frame(name: str, plane: int, 
         assert np.abs(arcs[0].tip - want).max() < 5e-4 and angle(arcs[0].axis, AXIS[None]).max() < 5e-5
 
 
+@pytest.mark.parametrize("name", FRAMES)
+def test_an_arc_square_to_the_tool_stays_one_beside_rounded_angles(name: str, tmp_path: Path) -> None:
+    """The printed plane is up to half a last decimal off the tool of the CL file."""
+    axis = tilted(30.123456, 50.987654)
+    first = np.cross([0.0, 1.0, 0.0], axis) / np.linalg.norm(np.cross([0.0, 1.0, 0.0], axis))
+    result = convert(toolpath(*circle(axis, first, 2.0, axis=axis), head=[]), name, shop(tmp_path))
+    arcs = [b for b in run(result) if b.code == 2]
+    assert len(arcs) == 1 and np.abs(np.linalg.norm(arcs[0].tip, axis=1) - 12.0).max() < 5e-4
+    assert np.abs(arcs[0].tip @ axis).max() < 5e-4
+
+
 @pytest.mark.parametrize(("planes", "kept"), [("[17, 18, 19]", True), ("[17]", True), ("[18, 19]", False)])
 def test_a_helix_is_an_arc_where_the_controller_has_it(planes: str, kept: bool, tmp_path: Path) -> None:
     frame = frame_of("mikron-ucp710", tmp_path)
