@@ -33,6 +33,10 @@ Setup = Annotated[str, typer.Option("--setup", metavar="S.toml", help="set-up fi
 Tolerance = Annotated[float, typer.Option("--tolerance", metavar="MM", min=1e-6, max=10.0, help="tolerance of the tip")]
 AxisTolerance = Annotated[float, typer.Option("--axis-tolerance", metavar="DEG", min=1e-6, max=10.0,
                                                help="tolerance of the axis")]
+Errors = Annotated[str, typer.Option("--error-model", metavar="E.toml", help="file of the machine's geometric errors: "
+                                     "corrected, and proved on the machine with them")]
+Beyond = Annotated[bool, typer.Option("--error-model-beyond", help="outside the range that was measured, take the error at "
+                                      "its end")]
 Units = Annotated[str, typer.Option("--units", help="units of a CL file that states none: mm or inch")]
 Dialect = Annotated[str, typer.Option("--dialect", help="read the CL file as this dialect instead of the recognised one")]
 Allow = Annotated[list[str] | None, typer.Option("--allow-unknown", metavar="WORD",
@@ -67,14 +71,17 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
             smooth: Annotated[bool, typer.Option("--smooth", help="move points onto smooth curves inside the "
                                                  "tolerance")] = False,
             setup: Setup = "", tolerance: Tolerance = 0.01, axis_tolerance: AxisTolerance = 0.05, units: Units = "",
-            dialect: Dialect = "", allow_unknown: Allow = None, json: Json = "") -> None:
+            dialect: Dialect = "", allow_unknown: Allow = None, error_model: Errors = "", beyond: Beyond = False,
+            json: Json = "") -> None:
     """Convert a CL file to G-code, read it back and prove it; nothing is written where a proof fails."""
     _choice("--orient", orient, ("keep",))
     _choice("--feed", feed, ("programmed", "planned"))
     _choice("--output-mode", output_mode, ("auto", "axes", "tcp", "tilted"))
     options = replace(_options(tolerance, axis_tolerance, feed_mode, setup, units, dialect, allow_unknown),
-                      output=output_mode, feed=feed, merge_feeds=merge_feeds / 100.0, smooth=smooth)  # type: ignore[arg-type]
-    refuse_overwriting({"-o": str(output), "--json": json}, {"the CL file": str(file), "the set-up": setup})
+                      output=output_mode, feed=feed, merge_feeds=merge_feeds / 100.0, smooth=smooth,  # type: ignore[arg-type]
+                      error_model=error_model, error_beyond=beyond)
+    refuse_overwriting({"-o": str(output), "--json": json}, {"the CL file": str(file), "the set-up": setup,
+                                                             "the error model": error_model})
     from postproc import summary
     from postproc.files import write_atomically
     from postproc.pipeline import convert as run
@@ -92,9 +99,10 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
 def verify(gcode: Annotated[Path, typer.Argument(metavar="GCODE", help="G-code file")], file: ClFile,
            machine: MachineName, controller: ControllerName, setup: Setup = "", tolerance: Tolerance = 0.01,
            axis_tolerance: AxisTolerance = 0.05, units: Units = "", dialect: Dialect = "", allow_unknown: Allow = None,
-           json: Json = "") -> None:
+           error_model: Errors = "", json: Json = "") -> None:
     """Read a G-code file back and compare its motion with a CL file."""
-    options = _options(tolerance, axis_tolerance, "auto", setup, units, dialect, allow_unknown)
+    options = replace(_options(tolerance, axis_tolerance, "auto", setup, units, dialect, allow_unknown),
+                      error_model=error_model)
     refuse_overwriting({"--json": json}, {"the CL file": str(file), "the G-code file": str(gcode), "the set-up": setup})
     from postproc import summary
     from postproc.pipeline import verify as run
@@ -110,9 +118,10 @@ def verify(gcode: Annotated[Path, typer.Argument(metavar="GCODE", help="G-code f
 def trace(file: ClFile, line: Annotated[int, typer.Option("--line", metavar="L", min=1, help="line of the CL file")],
           machine: MachineName, controller: ControllerName, setup: Setup = "", tolerance: Tolerance = 0.01,
           axis_tolerance: AxisTolerance = 0.05, units: Units = "", dialect: Dialect = "", allow_unknown: Allow = None,
-          json: Json = "") -> None:
+          error_model: Errors = "", beyond: Beyond = False, json: Json = "") -> None:
     """Show one point of a CL file through every stage, from its record to its blocks and back."""
-    options = _options(tolerance, axis_tolerance, "auto", setup, units, dialect, allow_unknown)
+    options = replace(_options(tolerance, axis_tolerance, "auto", setup, units, dialect, allow_unknown),
+                      error_model=error_model, error_beyond=beyond)
     refuse_overwriting({"--json": json}, {"the CL file": str(file), "the set-up": setup})
     from postproc.pipeline import convert as run
     from postproc.trace import as_text, trace_line

@@ -23,16 +23,20 @@ from postproc.control import Control
 from postproc.groups import groups
 from postproc.modes import OutputModes
 from postproc.moves import Moves
-from postproc.path import ARC, FEED, Path
+from postproc.path import ARC, FEED, TRAVERSE, Path
 from postproc.word_arcs import PLANE_COLUMNS
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error, info
 from toolpaths.units import DEG
 
 SHARE = 0.1
-"""of the tip tolerance: what the correction may be off between corrected points"""
+"""of the tolerances: what the correction may be off between corrected points"""
+LEAST = 0.2
+"""of that, where the axis turns fast"""
 LOOKS = (0.25, 0.5, 0.75)
 """where the motion between two corrected points is looked at"""
+RAPIDS = 4.0
+"""times that share for rapids of the CL file; linking moves only have to come to their ends"""
 SHORTEST = 0.05
 """mm of tip way or degrees of a rotary axis: a block that short is not halved again"""
 BISECTIONS = 14
@@ -239,6 +243,13 @@ class _Work:
                 q[rows] = self.at(there[rows], block[rows], way[rows], ends[1][rows] if fixed else None)
         return q
 
+    def poses(self, q: Floats, blocks: Ints) -> tuple[Floats, Floats]:
+        """Nominal (tip, axis), each (N, 3), of q (N, J) inside blocks (N,)."""
+        tip, axis = np.empty((len(q), 3)), np.empty((len(q), 3))
+        for k in groups(self.tools[blocks]):
+            tip[k], axis[k] = self.kinematics(int(self.tools[blocks[k[0]]])).forward(q[k])
+        return tip, axis
+
     def off(self, nominal: Floats, q: Floats, blocks: Ints, way: Floats) -> Floats:
         """Distance (N,) mm of the actual tip at q from the nominal one at `nominal` (N, J), inside blocks (N,)."""
         result = np.empty(len(q))
@@ -341,15 +352,16 @@ def on_arc(plane: Ints, ccw: Bools, center: Floats, start: Floats, end: Floats, 
 # ---- points between ------------------------------------------------------------------------------------------------
 
 def _divided(path: Path, nominal: Path, work: _Work, allowed: float) -> tuple[Path, int]:
-    """The path with its feed blocks halved until their motion is within `allowed` mm of the nominal one.
+    """The path with its blocks halved until their motion is near enough to the nominal one (`allowed` mm, see `_bound`).
 
     Where an axis turns back, what it loses by that is taken up on the spot at the start of the block.
     """
-    block = np.flatnonzero((path.code == FEED) & ~path.home & (np.arange(len(path)) > 0))
+    cl_rapid = (path.code == TRAVERSE) & np.isfinite(path.u)
+    block = np.flatnonzero(((path.code == FEED) | cl_rapid) & ~path.home & (np.arange(len(path)) > 0))
     block = block[~path.home[block - 1]]
     pieces, found = _taken_up(path, nominal, work, block, allowed)
     for _ in range(ROUNDS):
-        pieces = pieces.rows(_off(pieces, path, work) > allowed)
+        pieces = pieces.rows(_off(pieces, path, work) > _bound(pieces, path, work, allowed))
         if not len(pieces.block):
             break
         middle = 0.5 * (pieces.t0 + pieces.t1)
@@ -389,12 +401,13 @@ def _taken_up(path: Path, nominal: Path, work: _Work, block: Ints,
     At a block's start that is one point, inside a block two at one place: corrected by the old way and by the new one.
     """
     zero = np.zeros(len(block))
-    back = np.flatnonzero(np.any(work.way_at(block, zero) * work.way[block - 1] < 0.0, axis=1))
+    cutting = path.code[block] == FEED
+    back = np.flatnonzero(cutting & np.any(work.way_at(block, zero) * work.way[block - 1] < 0.0, axis=1))
     q = work.corrected(nominal.q[block[back] - 1], block[back], work.way_at(block[back], zero[back]), path)
     jump = np.abs(q - path.q[block[back] - 1]).max(axis=1, initial=0.0) > allowed
     start = path.q[block - 1]
     start[back[jump]] = q[jump]
-    turning, at = _reversals(work, block)
+    turning, at = _reversals(work, block[cutting])
     there = work.nominal(turning, at)
     old, new = (work.corrected(there, turning, work.way_at(turning, t), path)
                 for t in (at, np.minimum(at + 2.0 * MOMENT, 1.0)))
@@ -435,6 +448,17 @@ def _off(pieces: _Pieces, path: Path, work: _Work) -> Floats:
         worst = np.maximum(worst, work.off(work.nominal(pieces.block, at), got, pieces.block,
                                            work.way_at(pieces.block, at)))
     return worst
+
+
+def _bound(pieces: _Pieces, path: Path, work: _Work, allowed: float) -> Floats:
+    """(N,) mm: less where the axis turns so fast that the tip's being late would cost more than its share of the axis
+    tolerance; rapids have RAPIDS times as much."""
+    ends = [np.concatenate(work.poses(work.nominal(pieces.block, t), pieces.block), axis=1) for t in (pieces.t0, pieces.t1)]
+    way, turn = (np.linalg.norm((ends[1] - ends[0])[:, part], axis=1) for part in (slice(0, 3), slice(3, 6)))
+    late = SHARE * work.axis_tolerance * way / np.where(turn > 0.0, turn, 1.0)
+    cutting = np.where(turn > 0.0, np.clip(late, LEAST * allowed, allowed), allowed)
+    result: Floats = np.where(path.code[pieces.block] == FEED, cutting, RAPIDS * allowed)
+    return result
 
 
 def _long(pieces: _Pieces, work: _Work) -> Bools:

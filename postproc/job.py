@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -25,6 +26,9 @@ from toolpaths.diagnostics import Diagnostic, error, has_errors, info, warning
 from toolpaths.toolpath import Role, Toolpath
 from toolpaths.units import DEG
 
+if TYPE_CHECKING:
+    from machines.geometric_error.model import ErrorModel
+
 
 @dataclass(frozen=True)
 class Job:
@@ -40,6 +44,8 @@ class Job:
     moves: Moves
     space: SafeSpace
     modes: OutputModes
+    errors: ErrorModel | None = None
+    """geometric errors of the machine"""
 
     @property
     def axis_tolerance(self) -> float:
@@ -129,9 +135,19 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
                       helix_planes=controller.arcs.helix_planes)
     modes, found = output_modes(control, controller, setup, options, toolpath, decimals(control, controller))
     diagnostics += found
+    errors, found = _error_model(machine, options)
+    diagnostics += found
     job = Job(toolpath, machine, controller, setup, options, placement, control, moves, safe_space(moves, setup, placement),
-              modes)
+              modes, errors)
     return job, diagnostics + _tool_lengths(job) + _unused_tools(job)
+
+
+def _error_model(machine: Machine, options: Options) -> tuple[ErrorModel | None, list[Diagnostic]]:
+    if not options.error_model:
+        return None, []
+    from machines.geometric_error.loader import load_checked
+
+    return load_checked(options.error_model, machine)
 
 
 def _refused(toolpath: Toolpath) -> list[Diagnostic]:

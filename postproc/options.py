@@ -26,6 +26,10 @@ class Options:
     merge_feeds: float = 0.0
     """part by which a planned feed may be lowered so that neighbouring blocks share one"""
     smooth: bool = False
+    error_model: str = ""
+    """file of the machine's geometric errors"""
+    error_beyond: bool = False
+    """True: errors at the ends of their measured ranges count beyond them too"""
 
     def header(self) -> list[str]:
         """The options as comment lines of an output file."""
@@ -37,6 +41,8 @@ class Options:
             lines.append(f"feed {self.feed}, merged within {100.0 * self.merge_feeds:g} %")
         if self.smooth:
             lines.append("points smoothed")
+        if self.error_model:
+            lines.append(f"error model {self.error_model}" + (", beyond its range too" if self.error_beyond else ""))
         for name in ("setup", "units", "dialect"):
             if getattr(self, name):
                 lines.append(f"{name} {getattr(self, name)}")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path as FilePath
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -31,10 +32,14 @@ from postproc.rounding import rounding_problem
 from postproc.setup import SetupFile, load_setup
 from postproc.smoothed_moves import smoothed_moves
 from postproc.travel import check_travel
+from postproc.word_rows import block_tools
 from toolpaths.diagnostics import Diagnostic, DiagnosticError, error, has_errors
 from toolpaths.smoothing.smooth import Tolerance
 from toolpaths.toolpath import Toolpath
 from toolpaths.units import DEG
+
+if TYPE_CHECKING:
+    from postproc.compensation import Compensation
 
 Progress = Callable[[str, int, int], None]
 MARGIN = 0.85
@@ -57,6 +62,8 @@ class PostResult:
     toolpath: Toolpath | None = None
     job: Job | None = None
     path: Path | None = None
+    nominal: Path | None = None
+    compensation: Compensation | None = None
     program: Program | None = None
     feeds: Feeds | None = None
     motion: PlannedMotion | None = None
@@ -127,6 +134,10 @@ def _stages(result: PostResult, progress: Progress | None) -> PostResult:
     result = _with(result, found, path=path)
     if path is None:
         return result
+    if job.errors is not None and job.errors.corrected_by == "post":
+        result, path = _compensated(result, job, moves, path)
+        if path is None:
+            return result
     found, extents = check_travel(path, job.moves, job.control, job.kinematics, file)
     result = _with(result, [*found, *check_reach(path, job.moves, job.control, file)], extents=extents)
     if not result.ok:
@@ -154,6 +165,17 @@ def _with(result: PostResult, diagnostics: list[Diagnostic], **values: object) -
     return replace(result, diagnostics=(*result.diagnostics, *diagnostics), **values)  # type: ignore[arg-type]
 
 
+def _compensated(result: PostResult, job: Job, moves: Moves, path: Path) -> tuple[PostResult, Path | None]:
+    """The path on the machine with its geometric errors; `nominal` keeps it as it was."""
+    from postproc.compensation import compensate
+
+    assert job.errors is not None
+    options = job.options
+    corrected, report, found = compensate(path, moves, block_tools(path, moves), job.kinematics, job.errors, job.modes,
+                                          options.tolerance, job.axis_tolerance, options.error_beyond, job.toolpath.file)
+    return _with(result, found, path=corrected, nominal=path, compensation=report), corrected
+
+
 def tolerance_shares(job: Job) -> tuple[dict[str, float], list[Diagnostic]]:
     """Where the tolerance goes (mm; axis_ in degrees): what the control's smoothing and rounding leave is linearising."""
     tolerance, axis = job.options.tolerance, job.options.axis_tolerance
@@ -166,6 +188,12 @@ def tolerance_shares(job: Job) -> tuple[dict[str, float], list[Diagnostic]]:
               "rounding": bound.tip, "axis_rounding": bound.axis / DEG,
               "linearising": MARGIN * (tolerance - smoothing - bound.tip),
               "axis_linearising": MARGIN * (axis - axis_smoothing - bound.axis / DEG)}
+    if job.errors is not None and job.errors.corrected_by == "post":
+        from postproc.compensation import SHARE
+
+        shares |= {"geometric_errors": SHARE * tolerance, "axis_geometric_errors": SHARE * axis}
+        for name in ("linearising", "axis_linearising"):
+            shares[name] -= shares[name.replace("linearising", "geometric_errors")]
     if job.options.smooth:
         for name in ("linearising", "axis_linearising"):
             shares[name.replace("linearising", "points")] = POINTS * shares[name]
@@ -204,6 +232,7 @@ def write_text(result: PostResult) -> str:
               f"controller {result.controller_name}", *result.options.header(),
               f"words: {_meanings(result.program)}",
               f"work offset {result.setup.work_offset_code} in machine coordinates: {offset}"]
+    header += _corrections(result)
     if result.toolpath.name:
         header.insert(1, f"part {result.toolpath.name}")
     shares = result.shares or {}
@@ -211,6 +240,17 @@ def write_text(result: PostResult) -> str:
                         shares["smoothing"], result.setup.work_offset_code, axis_smoothing=shares["axis_smoothing"],
                         name=FilePath(result.toolpath.file).stem, subprograms=result.setup.output.subprograms)
     return "\n".join(writer.lines(header)) + "\n"
+
+
+def _corrections(result: PostResult) -> list[str]:
+    """Header lines that say who corrects geometric errors."""
+    if result.job is None or result.job.errors is None:
+        return []
+    name = result.job.errors.name
+    if result.compensation is None:
+        return [f"geometric errors {name}: corrected by the control, not in this program"]
+    return [f"geometric errors {name}: corrected in this program; the control must not correct them again",
+            *result.compensation.lines()]
 
 
 def _meanings(program: Program) -> str:

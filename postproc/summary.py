@@ -30,8 +30,19 @@ def as_dict(result: PostResult, output: str) -> dict[str, Any]:
         "feed_reduced_blocks": int(result.feeds.slowed.sum()) if result.feeds is not None else 0,
         "axis_extents": {k: list(v) for k, v in (result.extents or {}).items()},
         "tolerance_shares": result.shares or {},
+        "geometric_errors": _errors(result),
         "diagnostics": [d.as_dict() for d in result.diagnostics],
     }
+
+
+def _errors(result: PostResult) -> dict[str, Any] | None:
+    """What the correction of geometric errors did; None without it."""
+    found = result.compensation
+    if found is None or result.job is None or result.job.errors is None:
+        return None
+    return {"model": result.job.errors.name, "tip_before_mm": found.tip_before, "axis_before_deg": found.axis_before / DEG,
+            "tip_residual_mm": found.tip_after, "axis_residual_deg": found.axis_after / DEG, "points_added": found.added,
+            "arcs_resolved": found.resolved, "blocks_near_a_pole": found.partial}
 
 
 def _number(value: float) -> float | None:
@@ -67,6 +78,8 @@ def as_text(result: PostResult, output: str) -> str:
             result.machine.axis_names, result.job.control.work_offset, strict=True))
         lines.append(f"work offset {result.setup.work_offset_code}: {offset}")
     lines.append("axes: " + ", ".join(f"{k} {_places(lo)} to {_places(hi)}" for k, (lo, hi) in d["axis_extents"].items()))
+    if result.compensation is not None:
+        lines += result.compensation.lines()
     if d["feed_reduced_blocks"]:
         lines.append(f"feed reduced for an axis limit in {d['feed_reduced_blocks']} blocks")
     if d["singular_events"]:

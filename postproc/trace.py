@@ -72,6 +72,8 @@ def _move(result: PostResult, m: int) -> dict[str, Any]:
     path = result.path
     blocks = np.flatnonzero(path.move == m)
     entry["joints"] = [_named(result, path.q[b] * unit) for b in blocks]
+    if result.nominal is not None:
+        entry["nominal_joints"] = [_named(result, q * unit) for q in result.nominal.q[result.nominal.move == m]]
     written = np.flatnonzero(result.program.row == moves.row[m])
     entry["blocks"] = _texts(result, written)
     c = result.comparison
@@ -132,6 +134,7 @@ def _move_text(move: dict[str, Any]) -> list[str]:
     lines = [f"  table frame  tip {_vector(move['table_frame']['tip_mm'])}  axis {_vector(move['table_frame']['axis'])}"
              + ("  (reached by a linking move)" if move["linked"] else "")]
     lines += [f"  branch {k}     {_joints(b)}" for k, b in enumerate(move["branches"])]
+    lines += [f"  nominal      {_joints(q)}" for q in move.get("nominal_joints", [])]
     lines += [f"  joints       {_joints(q)}" for q in move.get("joints", [])]
     lines += [f"  block        {text}" for text in move.get("blocks", [])]
     if "read_back" in move:

@@ -9,7 +9,7 @@ import numpy as np
 from postproc.job import Job
 from postproc.readback.compare import Comparison, compare
 from postproc.readback.dialects import reader_for
-from postproc.readback.execute import Offsets, run
+from postproc.readback.execute import Motion, Offsets, run
 from postproc.readback.poses import Executed, poses_before
 from toolpaths.diagnostics import Diagnostic, error, has_errors
 
@@ -36,7 +36,17 @@ def read_back(data: bytes, job: Job, file: str, progress: Callable[[str, int, in
         return None, [*diagnostics, error("verify.no_motion", "the program moves nothing", file=gcode)]
     if progress:
         progress("read back", 0, len(motion))
-    executed = Executed(control, job.kinematics_of, offsets.lengths, poses_before(motion, control))
+    executed = _executed(job, motion, offsets.lengths)
     with np.errstate(invalid="ignore"):
         comparison = compare(motion, job, executed, gcode)
     return comparison, [*diagnostics, *comparison.diagnostics]
+
+
+def _executed(job: Job, motion: Motion, lengths: dict[int, float]) -> Executed:
+    """Poses of the machine as it is: with its errors where the program corrects them."""
+    before = poses_before(motion, job.control)
+    if job.errors is None or job.errors.corrected_by != "post":
+        return Executed(job.control, job.kinematics_of, lengths, before)
+    from postproc.readback.actual import ActualExecuted
+
+    return ActualExecuted(job.control, job.kinematics_of, lengths, before, model=job.errors, motion=motion)
