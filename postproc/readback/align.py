@@ -20,7 +20,8 @@ def align(tip: Floats, axis: Floats, sweep: Floats, curves: Curves, link: Bools,
     """Walk blocks along the reference.
 
     A move is done by the first block that has come to its end: past the end on a line, the whole sweep on an arc,
-    the final direction where the axis turns. A move that goes nowhere needs no block.
+    the final direction where the axis turns; blocks behind it that come nearer to the end are its own too. A move that
+    goes nowhere needs no block.
 
     Args:
         tip, axis (E, 3): poses at the ends of the executed blocks
@@ -43,7 +44,7 @@ def align(tip: Floats, axis: Floats, sweep: Floats, curves: Curves, link: Bools,
 def _fast() -> Callable[..., Any]:
     """The same functions compiled; the module's helpers are replaced, so that compiled code calls compiled code."""
     if not _compiled:
-        for name in ("_apart", "_angle", "_turned", "_line_done"):
+        for name in ("_apart", "_angle", "_turned", "_line_done", "_nearer"):
             globals()[name] = _jit(globals()[name])
         _compiled.append(_jit(_walk))
     return _compiled[0]
@@ -90,6 +91,15 @@ def _line_done(tip: Any, axis: Any, start: Any, end: Any, axis0: Any, axis1: Any
     return past >= -min(tol, 0.5 * length)
 
 
+def _nearer(tip: Any, axis: Any, after: Any, axis_after: Any, end: Any, axis1: Any, grain: float, axis_grain: float) -> Any:
+    """True where a pose is off the end of its move by more than rounding, and the block after it comes nearer."""
+    off, turn = _apart(tip, end), _angle(axis, axis1)
+    if off <= grain and turn <= axis_grain:
+        return False
+    off_after, turn_after = _apart(after, end), _angle(axis_after, axis1)
+    return off_after <= max(off, grain) and turn_after <= max(turn, axis_grain)
+
+
 def _walk(tip: Any, axis: Any, swept: Any, start: Any, end: Any, axis0: Any, axis1: Any, kind: Any, center: Any,
           normal: Any, sweep: Any, tol: float, axis_tol: float, grain: float, axis_grain: float) -> tuple[Any, Any]:
     count, moves = len(tip), len(end)
@@ -122,6 +132,9 @@ def _walk(tip: Any, axis: Any, swept: Any, start: Any, end: Any, axis0: Any, axi
             for r in range(j + 1, count):
                 owner[r] = i
             return match, owner
+        while k < count and _nearer(tip[k - 1], axis[k - 1], tip[k], axis[k], end[i], axis1[i], grain, axis_grain):
+            owner[k] = i
+            k += 1
         j = k - 1
         match[i] = j
     return match, owner

@@ -23,6 +23,9 @@ from toolpaths.toolpath import Kind
 ALLOWED_SPEED = 1.02
 """share of the programmed feed above which a move counts as too fast (short blocks carry rounding)"""
 
+_TURNS_BACK = 1e-6
+"""mm that a tool must rise for a peck to have ended"""
+
 ROUNDING_SLACK = 1e-3
 """mm or degrees by which rounded words may pass a limit that the exact ones keep"""
 
@@ -79,10 +82,11 @@ def check_holes(motion: Motion, job: Job, moves: Moves, tip: Floats, owner: Ints
             bad_dwell.append(part[0])
         if cycle.kind in PECKING and cycle.steps:
             depth = (moves.tip[m[at]] - tip[part]) @ moves.axis[m[at]]
-            total, feeding = cycle.depth + cycle.clearance, motion.code[part] > 0
-            pecks = feeding & ~np.append(feeding[1:], False)
+            total = cycle.depth + cycle.clearance
+            deeper = np.diff(depth, prepend=-np.inf, append=-np.inf)
+            pecks = (deeper[:-1] > 0.0) & (deeper[1:] < -_TURNS_BACK)
             deepest = np.maximum.accumulate(np.concatenate([[-cycle.depth], depth[pecks]]))
-            out = int((~feeding & (depth <= 0.01 - total)).sum())
+            out = int((depth <= 0.01 - total).sum())
             if np.diff(deepest).max(initial=0.0) > max(cycle.steps) + 0.01:
                 bad_peck.append(part[0])
             elif cycle.kind == "DEEP" and out < int(pecks.sum()) - 1:

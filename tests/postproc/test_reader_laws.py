@@ -276,7 +276,7 @@ def test_pivots_of_the_control_that_are_not_the_machines_show() -> None:
 def shifted(kin: Kinematics) -> Kinematics:
     """The kinematics with a rotary axis 0.2 mm aside."""
     assert isinstance(kin, Serial)
-    links = [replace(k, point=k.point + [0.2, 0.0, 0.0]) if k.name == "B" else k for k in kin.chain]
+    links = [replace(k, point=k.point + np.array([0.2, 0.0, 0.0])) if k.name == "B" else k for k in kin.chain]
     return replace(kin, chain=tuple(links))
 
 

@@ -43,7 +43,8 @@ from toolpaths.diagnostics import Diagnostic, error
 FORCED = 128
 """added to the letter of a word that is absolute whatever holds"""
 _COMMENT = re.compile(rb'("[^"\n]*")|;[^\n]*')
-_SPECIAL = re.compile(rb"(?m)^[^\n]*(?:[A-Z_$][A-Z_$]|[=(\"\[:@])[^\n]*$")
+_SIGNS = np.isin(np.arange(256), list(b'=("[:@'))
+_NAMES = np.isin(np.arange(256), list(b"ABCDEFGHIJKLMNOPQRSTUVWXYZ_$"))
 _TOKEN = re.compile(
     r"\s*(?:(?P<call>[A-Z_$][A-Z_$0-9]+)\s*\((?P<args>(?:\"[^\"]*\"|[^()\"])*)\)"
     r"|(?P<key>[A-Z]+\d*)\s*=\s*(?:(?P<how>[A-Z]+)\s*\(\s*(?P<within>[-+]?(?:\d+\.?\d*|\.\d+))\s*\)"
@@ -81,21 +82,13 @@ class SiemensReader(Reader):
         text = _COMMENT.sub(lambda m: m[1] or b"", data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")).upper()
         self.programs = [(text.count(b"\n", 0, m.start()) + 1, m[1].decode()) for m in _PROGRAM.finditer(text)]
         text, found = block_delete(_PROGRAM.sub(b"", text), file)
-        special: list[tuple[int, str]] = []
-
-        def cut(match: re.Match[bytes]) -> bytes:
-            special.append((match.start(), match[0].decode("ascii", "replace")))
-            return b""
-        ends = np.flatnonzero(np.frombuffer(text, dtype=np.uint8) == 10)
-        words, more = read_words(_SPECIAL.sub(cut, text), file)
+        text, special = _apart(text)
+        words, more = read_words(text, file)
         new: New = []
         statements: list[Statement] = []
-        for start, row in special:
-            more += _parse(row, int(np.searchsorted(ends, start)) + 1, new, statements, file)
-        point = words.point
-        words = added(Words(words.letter, words.value, words.line, words.lines), new)
-        return Text(words if new else Words(words.letter, words.value, words.line, words.lines, point),
-                    tuple(statements)), found + more
+        for line, row in special:
+            more += _parse(row, line, new, statements, file)
+        return Text(added(words, new), tuple(statements)), found + more
 
     def check(self, words: Words, file: str) -> list[Diagnostic]:
         """Codes and words; relative and forced ones count as plain."""
@@ -291,6 +284,21 @@ class _Run:
         moves = np.unique(self.words.line[np.isin(self.words.letter & 95, [ord(a) for a in self.axes])])
         calls = moves[(held[moves] >= 0.0) & ~np.isin(moves, [m[0] for m in modal])]
         self.new += [(int(b), CALL, float(held[b])) for b in calls]
+
+
+def _apart(text: bytes) -> tuple[bytes, list[tuple[int, str]]]:
+    """(text whose blocks with names, calls or = are left empty, those blocks by line)."""
+    signs = np.frombuffer(text, dtype=np.uint8)
+    letter = _NAMES[signs]
+    at = np.flatnonzero(_SIGNS[signs] | np.append(letter[:-1] & letter[1:], False))
+    ends = np.append(np.flatnonzero(signs == 10), len(text))
+    kept, special, done = [], list[tuple[int, str]](), 0
+    for line in np.unique(np.searchsorted(ends, at)).tolist():
+        first, last = int(ends[line - 1]) + 1 if line else 0, int(ends[line])
+        special.append((line + 1, text[first:last].decode("ascii", "replace")))
+        kept.append(text[done:first])
+        done = last
+    return b"".join([*kept, text[done:]]), special
 
 
 def _parse(row: str, line: int, new: New, statements: list[Statement], file: str) -> list[Diagnostic]:
