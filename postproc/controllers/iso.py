@@ -12,7 +12,7 @@ from postproc.controllers.state import peck_of
 from postproc.controllers.writer import Writer
 from postproc.program import INVERSE, PER_MINUTE, Hole
 from postproc.word_arcs import PLANE_AXIS
-from toolpaths.arrays import Array, Bools
+from toolpaths.arrays import Array, Bools, Floats
 from toolpaths.toolpath import Cycle
 
 CHUNK = 20000
@@ -51,12 +51,15 @@ class IsoWriter(Writer):
     def heads(self, first: int, last: int) -> list[str]:
         """Motion, plane and feed mode codes, '' where they stand already."""
         p, codes = self.program, self.controller.codes
-        result = []
         names = (codes.traverse, codes.feed, codes.arc_cw, codes.arc_ccw)
         motion = np.where(p.code[first:last] == 2, 2 + p.ccw[first:last], p.code[first:last])
-        for code, home, plane, mode in zip(motion.tolist(), p.home[first:last].tolist(),
-                                           p.plane[first:last].tolist(), p.mode[first:last].tolist(), strict=True):
-            words = []
+        state = np.stack([motion, p.plane[first:last], p.mode[first:last]])
+        differs = np.append(True, (state[:, 1:] != state[:, :-1]).any(axis=0)) | p.home[first:last]
+        differs[1:] |= p.home[first:last - 1]
+        result = [""] * (last - first)
+        for row in np.flatnonzero(differs).tolist():
+            code, home, words = int(motion[row]), bool(p.home[first + row]), []
+            plane, mode = int(p.plane[first + row]), int(p.mode[first + row])
             if code and mode != self.mode:
                 words.append(codes.inverse_time if mode == INVERSE else codes.per_minute)
                 self.mode = mode
@@ -70,7 +73,7 @@ class IsoWriter(Writer):
             if home or names[code] != self.motion:
                 words.append(names[code])
                 self.motion = names[code]
-            result.append("".join(self.space + w for w in words))
+            result[row] = "".join(self.space + w for w in words)
         return result
 
     def add_length(self, heads: list[str], first: int, last: int) -> None:
@@ -93,26 +96,32 @@ class IsoWriter(Writer):
             heads[at] += self.space + code
             self.length_off = not self.length_off
 
+    def feed_texts(self, values: Floats) -> list[str]:
+        """The numbers of feed words: the controller's decimals, two more for feeds below 1."""
+        places = self.controller.format.feed_decimals
+        result = self.number_text(values, places)
+        small = np.flatnonzero(values < 1.0)
+        for k, text in zip(small.tolist(), self.number_text(values[small], places + 2), strict=True):
+            result[k] = text
+        return result
+
     def feed_text(self, value: float) -> str:
-        """The number of a feed word: the controller's decimals, more for feeds below 1."""
-        places = self.controller.format.feed_decimals + (2 if value < 1.0 else 0)
-        return self.number_text(np.array([value]), places)[0]
+        """One of them."""
+        return self.feed_texts(np.array([value]))[0]
 
     def feeds(self, first: int, last: int) -> list[str]:
         """Feed words, '' where the feed stands already (each block of inverse time states it)."""
         p = self.program
-        result = []
-        every = self.controller.feed.word_every_inverse_block
-        changes = self.mode_changes[first:last].tolist()
-        for value, mode, cutting, changed in zip(p.feed[first:last].tolist(), p.mode[first:last].tolist(),
-                                                 (p.code[first:last] > 0).tolist(), changes, strict=True):
-            if not cutting:
-                result.append("")
-                continue
-            text = self.feed_text(value)
-            needed = text != self.feed or changed or (mode == INVERSE and every)
+        result = [""] * (last - first)
+        rows = np.flatnonzero(p.code[first:last] > 0)
+        values, inverse = p.feed[first + rows], p.mode[first + rows] == INVERSE
+        needed = self.mode_changes[first + rows] | (inverse & self.controller.feed.word_every_inverse_block)
+        differs = np.append(True, values[1:] != values[:-1]) if len(rows) else needed
+        stated = np.flatnonzero(needed | differs)
+        for k, text in zip(stated.tolist(), self.feed_texts(values[stated]), strict=True):
+            if needed[k] or text != self.feed:
+                result[int(rows[k])] = f"{self.space}F{text}"
             self.feed = text
-            result.append(f"{self.space}F{text}" if needed else "")
         return result
 
     @cached_property

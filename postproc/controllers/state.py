@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator
 
 import numpy as np
@@ -55,17 +56,16 @@ class WriterState:
     # ---- numbers ------------------------------------------------------------------------------------------------
 
     def number_text(self, values: Floats, places: int) -> list[str]:
-        """Numbers as text, rounded to `places`, -0 as 0."""
+        """Numbers as text, rounded to `places`, -0 as 0; all at once, which is much faster than one by one."""
         style = self.controller.format
         sign = "+" if style.plus_sign else ""
-        texts = [f"{v:{sign}.{places}f}" for v in (values + 0.0).tolist()]
+        text = f"%{sign}.{places}f " * len(values) % tuple(values.tolist())
         if style.trim_zeros and places:
-            texts = [t.rstrip("0").rstrip("." if not style.decimal_point else "\0") for t in texts]
+            text = _ZEROS.sub(" ", text)
+            text = text if style.decimal_point else text.replace(". ", " ")
         elif style.decimal_point and not places:
-            texts = [t + "." for t in texts]
-        zero = sign + "0"
-        texts = [t.replace("-0", zero) if t.strip("-0.") == "" and t.startswith("-") else t for t in texts]
-        return texts
+            text = text.replace(" ", ". ")
+        return _MINUS_ZERO.sub(f"{sign}0", text).split()
 
     def hole_feed(self, hole: Hole) -> float:
         """Feed of a hole's way down, mm/min."""
@@ -148,6 +148,10 @@ class WriterState:
         tilt = next((angle for letter, angle in section.rotary if letter in "AB"), 0.0)
         direction = "-1" if tilt < 0.0 else "1"
         return {"register": self.register, "work_offset": self.work_offset, "direction": direction, **angles}
+
+
+_ZEROS = re.compile(r"0+ ")
+_MINUS_ZERO = re.compile(r"-0(?=\.?0* )")
 
 
 def peck_of(cycle: Cycle) -> float:
