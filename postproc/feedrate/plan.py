@@ -93,7 +93,7 @@ def plan_second_order(path: Path, limits: JointLimits, feed: Feed = np.inf, stop
     allowed = Allowed(feed, options.override)
     pieces = []
     for eased in _stretches(path, stops, 0.0):
-        sigma = knots if knots is not None else mesh(eased, limits, partial(eased.speed_limit, feed=allowed), options.knots)
+        sigma = knots if knots is not None else _mesh(eased, limits, allowed, options.knots)
         at = eased.derivatives(sigma)
         cap = np.minimum(squared_speed(at.dq, limits.velocity), allowed(eased.parameter(sigma)[0]) ** 2)
         x = second_order(sigma, at.dq, at.d2q, limits.acceleration, cap, options.method.kernel)

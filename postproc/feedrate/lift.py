@@ -1,0 +1,54 @@
+"""What a motion would gain if one limit alone were lifted: plans without it, for the limits that cost something."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from postproc.feedrate.feed import Feed
+from postproc.feedrate.limits import JointLimits, ToolLimits
+from postproc.feedrate.motion import Plan
+from postproc.feedrate.paths import Path
+from postproc.feedrate.plan import Options, plan
+from postproc.feedrate.trajectory import ORDERS
+
+HIGHER = 1e3
+"""By this much a limit is raised: some velocity and some jerk must bound a motion that is planned."""
+
+
+class Gain(NamedTuple):
+    """Joint (-1 the feed, J the tool), order (1 velocity, 2 acceleration, 3 jerk), seconds saved without this limit."""
+
+    axis: int
+    order: int
+    seconds: float
+
+
+def gains(path: Path, limits: JointLimits, feed: Feed, stops: Sequence[float], made: Plan, options: Options | None = None,
+          least: float = 1e-3) -> list[Gain]:
+    """Gains, largest first, of the limits whose share of `made` is `least` of its time or more; one plan each.
+
+    They do not add up: where one limit goes, the next one binds. A limit without a share gains nothing, the problem
+    being convex next to its optimum. `made` is the plan of the same arguments in fast mode.
+    """
+    enough, found = least * made.seconds, []
+    shares = made.shares
+    for order, axis in np.argwhere(shares.limits >= enough).tolist():
+        seconds = plan(path, without(limits, axis, order + 1), feed, stops, options).seconds
+        found.append(Gain(axis, order + 1, made.seconds - seconds))
+    if shares.feed >= enough:
+        found.append(Gain(-1, 1, made.seconds - plan(path, limits, np.inf, stops, options).seconds))
+    return sorted(found, key=lambda gain: -gain.seconds)
+
+
+def without(limits: JointLimits, axis: int, order: int) -> JointLimits:
+    """`limits` with that of one joint, or of the tool for axis J, and one order lifted."""
+    if axis == len(limits.velocity):
+        tool = limits.tool or ToolLimits()
+        return replace(limits, tool=replace(tool, **{("tilt_rate", "acceleration", "jerk")[order - 1]: np.inf}))
+    values = getattr(limits, ORDERS[order - 1]).copy()
+    values[axis] *= HIGHER
+    return replace(limits, **{ORDERS[order - 1]: values})
