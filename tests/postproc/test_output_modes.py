@@ -327,7 +327,7 @@ def skipping(*inside: str) -> list[str]:
 
 
 def test_skipped_blocks_and_what_follows_them() -> None:
-    result = convert(toolpath(*skipping("GOTO/10,5,5", "STOP", "GOTO/10,10,5", "COOLNT/OFF")), "mill-3axis", "generic-iso")
+    result = convert(toolpath(*skipping("STOP", "GOTO/10,5,5", "GOTO/10,10,5", "COOLNT/OFF")), "mill-3axis", "generic-iso")
     p = result.program
     rows = np.flatnonzero(p.skip)
     assert p.words[rows].tolist() == [[10, 5, 5], [10, 10, 5]] or len(rows) == 2

@@ -11,6 +11,7 @@ import pytest
 import postproc
 from postproc.blocks import rapid_codes
 from postproc.control import Control
+from postproc.links import SafeSpace, _stays_clear
 from postproc.setup import load_setup
 from postproc.travel import extremes
 from tests.postproc.kit import angle, codes, convert, goto, machine, tilted, tool_setup, toolpath
@@ -116,6 +117,12 @@ def test_cycles_are_native_in_planes_only(name: str, output: str, count: int, tm
         assert result.program.feed[hole.drill] == 100.0
 
 
+@pytest.mark.parametrize(("cycles", "count"), [("true", 2), ("false", 0)])
+def test_an_upright_tool_drills_natively_in_tip_mode_where_that_may_be(cycles: str, count: int, tmp_path: Path) -> None:
+    result = made(tmp_path, holes(np.array([0, 0, 1.0])), "mikron-ucp710", "tcp", TCP + f"cycles = {cycles}\n")
+    assert len(result.program.holes) == count
+
+
 def test_axis_positions_of_a_table_machine_drill_along_z(tmp_path: Path) -> None:
     """The tool stands along the machine's Z at every pose of a table; on a head it does not."""
     assert len(made(tmp_path, holes(AXIS), "mikron-ucp710", "axes").program.holes) == 2
@@ -166,7 +173,19 @@ def test_rapids_that_would_leave_their_line_are_fed(tmp_path: Path) -> None:
 
 def test_holes_at_one_level_are_reached_in_rapid(tmp_path: Path) -> None:
     lines = ["RAPID", "GOTO/0,0,50", "CYCLE/DRILL,DEPTH,5,MMPM,100,CLEAR,3", "GOTO/0,0,0", "GOTO/20,7,0", "CYCLE/OFF"]
-    assert len(made(tmp_path, lines, "mill-3axis", more=DOG).program.holes) == 2
+    result = made(tmp_path, lines, "mill-3axis", more=DOG)
+    assert len(result.program.holes) == 2 and "feed.rapid_as_feed" not in codes(result.diagnostics)
+
+
+def test_a_way_is_looked_at_along_its_dog_leg() -> None:
+    """The straight way passes the sphere at 17.9 mm; with equal speeds X and Y go through its centre."""
+    m = machine("mill-3axis")
+    m = replace(m, limits=replace(m.limits, velocity=np.full(3, 300.0)))
+    corners = 10.0 * np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, 8).T
+    space = SafeSpace(np.zeros(3), 10.0, corners, None, 5.0)
+    way = np.array([[-40.0, -40.0, 0.0], [40.0, 0.0, 0.0]])
+    for rapids, clear in (("straight", True), ("dog-leg", False)):
+        assert _stays_clear(Control(m, "axes", np.zeros(3), rapids=rapids), m.kinematics, space, way, 1.0) == clear
 
 
 def test_linking_moves_are_clear_along_their_dog_legs(tmp_path: Path) -> None:
