@@ -8,17 +8,18 @@ and sites are added where it is off by more than a small share of the tolerance.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from scipy.interpolate import BSpline, make_interp_spline
 
 from machines.kinematics.base import Kinematics
+from postproc.feedrate.geometry_poles import past_poles
 from postproc.feedrate.geometry_sites import sites
 from postproc.feedrate.paths import Derivatives, SplinePath
 from postproc.joint_path import nearest_solution
-from toolpaths.arrays import Floats
+from toolpaths.arrays import Bools, Floats
 from toolpaths.rotations import angle_between
 from toolpaths.smoothing.smooth import Smooth
 
@@ -38,11 +39,13 @@ class MachinePath:
         s (N,): the sites
         values (N, J + 6): joints, tip and axis there
         worst: largest deviation from the smoothed path between sites, over the tolerance
+        led (N,): sites near a singular direction where the axis is led past it, see `past_poles`
     """
 
     s: Floats
     values: Floats
     worst: float
+    led: Bools
 
     @property
     def joints(self) -> int:
@@ -108,7 +111,7 @@ def machine_path(path: Smooth, first: float, last: float, kin: Kinematics, near:
         bad[1:] |= bad[:-1]
         bad[:-1] |= bad[1:]
         s = np.sort(np.concatenate((s, 0.5 * (s[:-1] + s[1:])[bad])))
-    return MachinePath(made.s, made.values, worst)
+    return replace(made, worst=worst)
 
 
 def _interpolated(path: Smooth, s: Floats, kin: Kinematics, near: Near) -> MachinePath:
@@ -118,7 +121,9 @@ def _interpolated(path: Smooth, s: Floats, kin: Kinematics, near: Near) -> Machi
     good = np.asarray(np.isfinite(q).all(axis=1))
     if not good.all():
         raise ArithmeticError(f"no joints at s = {s[int(np.argmin(good))]:.6g} mm of the smoothed path")
-    return MachinePath(s, np.hstack((q, tip, axis)), 0.0)
+    q, led = past_poles(s, q, tip, axis, kin, path.tolerance.axis)
+    axis[led] = kin.forward(q[led])[1]
+    return MachinePath(s, np.hstack((q, tip, axis)), 0.0, led)
 
 
 def _off(made: MachinePath, path: Smooth, kin: Kinematics) -> Floats:
@@ -126,6 +131,7 @@ def _off(made: MachinePath, path: Smooth, kin: Kinematics) -> Floats:
     middle = 0.5 * (made.s[:-1] + made.s[1:])
     tip, axis = path.at(middle)
     found_tip, found_axis = kin.forward(made.derivatives(middle).q, near=np.hstack((tip, axis)))
-    off = np.maximum(np.linalg.norm(found_tip - tip, axis=1) / path.tolerance.tip,
-                     angle_between(found_axis, kin.nearest_axis(axis)) / path.tolerance.axis)
+    axis_off = angle_between(found_axis, kin.nearest_axis(axis)) / path.tolerance.axis
+    axis_off[made.led[1:] | made.led[:-1]] = 0.0
+    off = np.maximum(np.linalg.norm(found_tip - tip, axis=1) / path.tolerance.tip, axis_off)
     return np.asarray(np.nan_to_num(off, nan=np.inf))

@@ -191,3 +191,42 @@ def test_chains_leave_rapids_links_and_holes_out() -> None:
     assert len(found) == 2 and (moves.kind[rows] != 0).all() and (moves.hole[rows] < 0).all()
     tips = moves.tip[rows]
     assert tips[:, 0].tolist() == [10.0, 20.0, 40.0]
+
+
+def pole(off: float) -> list[str]:
+    """Straight cut, the axis passing the direction of C at `off` degrees."""
+    x = np.linspace(-30.0, 30.0, 120)
+    lean = np.radians(0.3 * x)
+    axis = np.stack((np.sin(lean), np.full(120, np.sin(np.radians(off))), np.cos(lean)), axis=1)
+    axis = np.round(axis / np.linalg.norm(axis, axis=1, keepdims=True), 7)
+    tip = np.round(np.stack((x, 0.1 * x, 0.0 * x), axis=1), 4)
+    return goto(tip, axis / np.linalg.norm(axis, axis=1, keepdims=True))
+
+
+@pytest.mark.parametrize("off", [0.0005, 0.02])
+def test_direction_of_a_rotary_axis_is_passed_without_a_swing(off: float) -> None:
+    lines = pole(off)
+    result = good(convert(toolpath("RAPID", lines[0], "FEDRAT/MMPM,1500", *lines[1:]), "mikron-ucp710"))
+    assert result.path is not None and result.job is not None
+    made = motion(result)
+    cutting = made.needed > 0.0
+    assert made.needed[cutting].sum() < result.path.seconds[cutting].sum()
+    one, = made.passes
+    path, = one.paths
+    assert path.led.any() and np.ptp(path.values[:, 4]) < np.radians(5.0)
+    kin = result.job.kinematics(int(result.job.moves.tool[one.move[0]]))
+    tip, axis = one.smooth.at(path.s)
+    found_tip, found_axis = kin.forward(path.values[:, :5])
+    assert np.linalg.norm(found_tip - tip, axis=1).max() < 1e-9
+    assert angle_between(found_axis, axis).max() <= TOLERANCE.axis
+    assert made.seconds < 3.0
+
+
+def test_a_real_swing_beside_the_direction_of_a_rotary_axis_stays_a_swing() -> None:
+    lines = pole(0.5)
+    result = good(convert(toolpath("RAPID", lines[0], "FEDRAT/MMPM,1500", *lines[1:]), "mikron-ucp710"))
+    made = motion(result)
+    one, = made.passes
+    assert not one.paths[0].led.any() and np.ptp(one.paths[0].values[:, 4]) > np.radians(170.0)
+    assert result.path is not None
+    assert np.fmax(made.needed, result.path.seconds)[one.block].sum() > 1.2 * result.path.seconds[one.block].sum()
