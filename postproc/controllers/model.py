@@ -1,4 +1,4 @@
-"""The controller file: formats, modal groups, interpolation, arcs, cycles, feeds, comments, program frame."""
+"""The controller file: how blocks are spelt, arcs, cycles, feeds, what lies between blocks, output modes."""
 
 from __future__ import annotations
 
@@ -9,133 +9,16 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from machines.user_file import UserModel, load_toml
-from postproc.controllers.texts import (
-    CYCLE_VALUES,
-    Named,
-    Numbered,
-    Registered,
-    Timed,
-    WorkOffsets,
-    placeholders,
-)
+from postproc.controllers.spelling import Codes, Comment, Format, Frame, Subprograms, Tools
+from postproc.controllers.texts import CYCLE_VALUES, placeholders
 from toolpaths.diagnostics import Diagnostic
-
-
-class Format(UserModel):
-    """How numbers and blocks are spelt."""
-
-    linear_decimals: int = Field(default=4, ge=0, le=9)
-    rotary_decimals: int = Field(default=4, ge=0, le=9)
-    feed_decimals: int = Field(default=4, ge=0, le=9)
-    trim_zeros: bool = True
-    """no zeros at the end of a decimal fraction"""
-    decimal_point: bool = False
-    """a point even in whole numbers"""
-    space: bool = True
-    """a blank between words"""
-    line_length: int = Field(default=252, ge=40)
-    """most characters of a block"""
-    sequence_step: int = Field(default=0, ge=0)
-    """block numbers: step, 0 for none"""
-    sequence_prefix: str = Field(default="N", pattern=r"^[N:]?$")
-    """letter before a block number"""
-    plus_sign: bool = False
-    """a sign before positive numbers too"""
-
-
-class Comment(UserModel):
-    """Comments of a block."""
-
-    open: str = "("
-    close: str = ")"
-    forbidden: str = "()"
-    """characters that a comment must not hold"""
-
-
-class Frame(UserModel):
-    """Blocks that stand around every program."""
-
-    begin: tuple[Named, ...] = ("%",)
-    """{name} is the program's name, {number} its number in four digits"""
-    number: int = Field(default=1, ge=1, le=9999)
-    """of the program, where the controller has numbers"""
-    preamble: tuple[Annotated[str, placeholders("work_offset")], ...] = ()
-    """safe start: units, modes and planes that the program relies on; {work_offset} is the set-up's code"""
-    work_offsets: WorkOffsets = Field(default_factory=dict)
-    """what the controller writes for G54 to G59 and G59.1 to G59.3; empty: those codes themselves"""
-    operation: tuple[Annotated[str, placeholders("comment", "name", "number")], ...] = ()
-    """blocks at the start of each operation, from where a program can be taken up: {name} of the operation, {comment} with
-    it, {number} 100, 200, ..."""
-    passive: tuple[Annotated[str, Field(pattern=r"^[GM][0-9]+(\.[0-9]+)?$")], ...] = ()
-    """codes of the shop's own blocks that move nothing: read back without being executed"""
-    path_tolerance: tuple[Annotated[str, placeholders("tolerance", "chain", "axis")], ...] = ()
-    """blocks that set the control's own smoothing; {tolerance} and {chain} in mm, {axis} in degrees"""
-    ending: tuple[str, ...] = ("M30",)
-    end: tuple[Named, ...] = ("%",)
-    """{name} and {number} as in `begin`"""
-
-
-class Codes(UserModel):
-    """G and M codes by canonical function."""
-
-    traverse: str = "G0"
-    feed: str = "G1"
-    arc_cw: str = "G2"
-    arc_ccw: str = "G3"
-    planes: dict[str, str] = Field(default_factory=lambda: {"17": "G17", "18": "G18", "19": "G19"})
-    per_minute: str = "G94"
-    inverse_time: str = "G93"
-    machine_coordinates: str = "G53"
-    spindle_cw: str = "M3"
-    spindle_ccw: str = "M4"
-    spindle_stop: str = "M5"
-    flood: str = "M8"
-    mist: str = "M7"
-    through: str = ""
-    """coolant through the tool; empty: the controller has none, flood is used with a warning"""
-    coolant_off: str = "M9"
-    stop: str = "M0"
-    optional_stop: str = "M1"
-    tool_select: Numbered = "T{number}"
-    tool_change: Numbered = "T{number} M6"
-    length_offset: Registered = "G43 H{register}"
-    length_cancel: str = "G49"
-    dwell: Timed = "G4 P{seconds}"
-    rigid_tap: Annotated[str, placeholders("speed")] = ""
-    """block before a tapping cycle that couples feed and spindle"""
-    compensation_left: Registered = "G41 D{register}"
-    compensation_right: Registered = "G42 D{register}"
-    compensation_off: str = "G40"
-
-
-class Tools(UserModel):
-    """Tool change, length register and preload."""
-
-    preload: bool = False
-    """the next tool is selected right after a change"""
-    length_with_z: bool = False
-    """the length register stands in the first block that states Z, not in a block of its own"""
-    length_automatic: bool = False
-    """a tool change puts the tool's length in force by itself; with an empty `length_cancel` it cannot be taken back"""
-    home_without_length: bool = False
-    """blocks in machine coordinates switch the length register off"""
-
-
-class Subprograms(UserModel):
-    """Operations as subprograms in the same file."""
-
-    call: Annotated[str, placeholders("number")] = ""
-    """block that calls one; empty: the controller has none in a file. Numbers are 1001, 1002, ..."""
-    begin: tuple[Annotated[str, placeholders("number")], ...] = ()
-    end: tuple[Annotated[str, placeholders("number")], ...] = ()
-    place: Literal["before", "after"] = "after"
-    """before the main program's first block, or behind its end"""
 
 
 class Arcs(UserModel):
     """Which arcs the controller takes."""
 
     enabled: bool = True
+    """arcs are written as arcs, else as lines"""
     largest_radius: float = Field(default=10000.0, gt=0.0)
     """mm; larger arcs are written as lines"""
     helix_planes: tuple[Literal[17, 18, 19], ...] = (17, 18, 19)
@@ -161,12 +44,17 @@ class Cycles(UserModel):
     """
 
     enabled: bool = True
+    """canned cycles are written, else single moves"""
     table: dict[str, CannedCycle] = Field(default_factory=dict)
+    """by kind"""
     with_dwell: dict[str, CannedCycle] = Field(default_factory=dict)
     """used instead where the cycle dwells"""
     to_initial: str = "G98"
+    """retract to the level that the tool came from"""
     to_plane: str = "G99"
+    """retract to the R plane"""
     cancel: str = "G80"
+    """ends a canned cycle; empty: it ends by itself"""
     planes: tuple[int, ...] = (17,)
     """planes in which cycles may run"""
     rigid_only: tuple[str, ...] = ("TAP",)
@@ -183,6 +71,7 @@ class Feed(UserModel):
     inverse_time: bool = True
     """the controller has a feed by inverse time"""
     word_every_inverse_block: bool = True
+    """every block of inverse time states its feed"""
     cleared_by_mode_change: bool = True
     """the feed must be stated anew after a change of the feed mode"""
     least_inverse_rate: float = Field(default=0.0, ge=0.0)
@@ -198,6 +87,7 @@ class Kinematics(UserModel):
     """Which motion lies between two blocks."""
 
     linear: Literal["joints"] = "joints"
+    """straight in the joints, where words are axis positions"""
     rapids: Literal["straight", "dog-leg"] = "straight"
     """dog-leg: every axis at its own rapid speed, so that the tool leaves the straight line"""
     modules: bool = False
@@ -239,7 +129,9 @@ class TcpMode(Mode):
     leave: tuple[Annotated[str, placeholders("register", "work_offset")], ...]
     """blocks that switch it off"""
     cycles: bool = False
+    """canned cycles may stand in it"""
     compensation: bool = False
+    """cutter compensation may stand in it"""
 
 
 class TiltedMode(Mode):
@@ -262,13 +154,16 @@ class Modes(UserModel):
     """Output modes beside axis positions."""
 
     tcp: TcpMode | None = None
+    """tool-centre-point mode"""
     tilted: TiltedMode | None = None
+    """tilted working plane"""
 
 
 class ControllerFile(UserModel):
     """A controller."""
 
     description: str
+    """one line for people"""
     writer: Literal["iso", "linuxcnc", "fanuc", "haas", "siemens", "heidenhain"] = "iso"
     """class that adds what data cannot say"""
     sources: tuple[str, ...] = ()

@@ -1,0 +1,153 @@
+"""Keys of a controller file that say how blocks are spelt: numbers, comments, the program's frame, codes, tools."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from machines.user_file import UserModel
+from postproc.controllers.texts import Named, Numbered, Registered, Timed, WorkOffsets, placeholders
+
+
+class Format(UserModel):
+    """How numbers and blocks are spelt."""
+
+    linear_decimals: int = Field(default=4, ge=0, le=9)
+    """of X, Y, Z and other lengths"""
+    rotary_decimals: int = Field(default=4, ge=0, le=9)
+    """of A, B, C, degrees"""
+    feed_decimals: int = Field(default=4, ge=0, le=9)
+    """of F; two more below 1"""
+    trim_zeros: bool = True
+    """no zeros at the end of a decimal fraction"""
+    decimal_point: bool = False
+    """a point even in whole numbers"""
+    space: bool = True
+    """a blank between words"""
+    line_length: int = Field(default=252, ge=40)
+    """most characters of a block"""
+    sequence_step: int = Field(default=0, ge=0)
+    """block numbers: step, 0 for none"""
+    sequence_prefix: str = Field(default="N", pattern=r"^[N:]?$")
+    """letter before a block number"""
+    plus_sign: bool = False
+    """a sign before positive numbers too"""
+
+
+class Comment(UserModel):
+    """Comments of a block."""
+
+    open: str = "("
+    """what begins a comment"""
+    close: str = ")"
+    """what ends it"""
+    forbidden: str = "()"
+    """characters that a comment must not hold"""
+
+
+class Frame(UserModel):
+    """Blocks that stand around every program."""
+
+    begin: tuple[Named, ...] = ("%",)
+    """{name} is the program's name, {number} its number in four digits"""
+    number: int = Field(default=1, ge=1, le=9999)
+    """of the program, where the controller has numbers"""
+    preamble: tuple[Annotated[str, placeholders("work_offset")], ...] = ()
+    """safe start: units, modes and planes that the program relies on; {work_offset} is the set-up's code"""
+    work_offsets: WorkOffsets = Field(default_factory=dict)
+    """what the controller writes for G54 to G59 and G59.1 to G59.3; empty: those codes themselves"""
+    operation: tuple[Annotated[str, placeholders("comment", "name", "number")], ...] = ()
+    """blocks at the start of each operation, from where a program can be taken up: {name} of the operation, {comment} with
+    it, {number} 100, 200, ..."""
+    passive: tuple[Annotated[str, Field(pattern=r"^[GM][0-9]+(\.[0-9]+)?$")], ...] = ()
+    """codes of the shop's own blocks that move nothing: read back without being executed"""
+    path_tolerance: tuple[Annotated[str, placeholders("tolerance", "chain", "axis")], ...] = ()
+    """blocks that set the control's own smoothing; {tolerance} and {chain} in mm, {axis} in degrees"""
+    ending: tuple[str, ...] = ("M30",)
+    """blocks that end every program"""
+    end: tuple[Named, ...] = ("%",)
+    """{name} and {number} as in `begin`"""
+
+
+class Codes(UserModel):
+    """G and M codes by canonical function."""
+
+    traverse: str = "G0"
+    """rapid"""
+    feed: str = "G1"
+    """straight line at feed"""
+    arc_cw: str = "G2"
+    """arc clockwise"""
+    arc_ccw: str = "G3"
+    """arc anti-clockwise"""
+    planes: dict[str, str] = Field(default_factory=lambda: {"17": "G17", "18": "G18", "19": "G19"})
+    """of arcs, by 17, 18, 19"""
+    per_minute: str = "G94"
+    """feed per minute"""
+    inverse_time: str = "G93"
+    """feed by inverse time"""
+    machine_coordinates: str = "G53"
+    """block in machine coordinates"""
+    spindle_cw: str = "M3"
+    """spindle clockwise"""
+    spindle_ccw: str = "M4"
+    """spindle anti-clockwise"""
+    spindle_stop: str = "M5"
+    """spindle off"""
+    flood: str = "M8"
+    """coolant"""
+    mist: str = "M7"
+    """coolant as mist"""
+    through: str = ""
+    """coolant through the tool; empty: the controller has none, flood is used with a warning"""
+    coolant_off: str = "M9"
+    """all coolant off"""
+    stop: str = "M0"
+    """stop"""
+    optional_stop: str = "M1"
+    """stop where the operator's switch says so"""
+    tool_select: Numbered = "T{number}"
+    """the tool of the next change is made ready"""
+    tool_change: Numbered = "T{number} M6"
+    """tool change, a block a line"""
+    length_offset: Registered = "G43 H{register}"
+    """length register in force; empty: the controller has none"""
+    length_cancel: str = "G49"
+    """length register off"""
+    dwell: Timed = "G4 P{seconds}"
+    """a dwell, a block a line"""
+    rigid_tap: Annotated[str, placeholders("speed")] = ""
+    """block before a tapping cycle that couples feed and spindle"""
+    compensation_left: Registered = "G41 D{register}"
+    """cutter compensation, cutter left of the path"""
+    compensation_right: Registered = "G42 D{register}"
+    """cutter right of the path"""
+    compensation_off: str = "G40"
+    """cutter compensation off"""
+
+
+class Tools(UserModel):
+    """Tool change, length register and preload."""
+
+    preload: bool = False
+    """the next tool is selected right after a change"""
+    length_with_z: bool = False
+    """the length register stands in the first block that states Z, not in a block of its own"""
+    length_automatic: bool = False
+    """a tool change puts the tool's length in force by itself; with an empty `length_cancel` it cannot be taken back"""
+    home_without_length: bool = False
+    """blocks in machine coordinates switch the length register off"""
+
+
+class Subprograms(UserModel):
+    """Operations as subprograms in the same file."""
+
+    call: Annotated[str, placeholders("number")] = ""
+    """block that calls one; empty: the controller has none in a file. Numbers are 1001, 1002, ..."""
+    begin: tuple[Annotated[str, placeholders("number")], ...] = ()
+    """blocks that begin one"""
+    end: tuple[Annotated[str, placeholders("number")], ...] = ()
+    """blocks that end one"""
+    place: Literal["before", "after"] = "after"
+    """before the main program's first block, or behind its end"""
