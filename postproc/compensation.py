@@ -15,7 +15,7 @@ from functools import cached_property
 
 import numpy as np
 
-from machines.geometric_error.actual import Actual, carried_on
+from machines.geometric_error.actual import Actual, carried_on, moving_sign
 from machines.geometric_error.correction import correct
 from machines.geometric_error.model import ErrorModel
 from machines.kinematics.base import Kinematics
@@ -43,8 +43,6 @@ BISECTIONS = 14
 """to find where in a block an axis turns back"""
 ROUNDS = 20
 """how often a block is halved at most; SHORTEST ends it before"""
-STILL = 1e-10
-"""mm or rad: a joint that moves less rests"""
 MOMENT = 1e-3
 """of a block: how far back its direction at a place is looked at"""
 ALONE = -1
@@ -147,7 +145,7 @@ class _Work:
         """(K, J) sign of each joint's last motion at the ends of the blocks; on arcs that of their last moment."""
         q, block = self.path.q, np.arange(len(self.path))
         moved = np.zeros(q.shape)
-        moved[1:] = np.sign(np.diff(q, axis=0))
+        moved[1:] = moving_sign(np.diff(q, axis=0), self.rotary)
         arcs = block[self.path.code == ARC]
         moved[arcs] = self.moving(arcs, np.ones(len(arcs)))
         return carried_on(moved)
@@ -155,9 +153,7 @@ class _Work:
     def moving(self, block: Ints, t: Floats) -> Floats:
         """(N, J) sign of each joint's nominal motion at fraction t (N,) of blocks (N,); a moment after at their start."""
         before = np.clip(t - MOMENT, 0.0, 1.0 - MOMENT)
-        step = self.nominal(block, before + MOMENT) - self.nominal(block, before)
-        result: Floats = np.sign(np.where(np.abs(step) > STILL, step, 0.0))
-        return result
+        return moving_sign(self.nominal(block, before + MOMENT) - self.nominal(block, before), self.rotary)
 
     def way_at(self, block: Ints, t: Floats) -> Floats:
         """(N, J) sign of each joint's last motion inside blocks; a joint that rests has the sign of the block before."""

@@ -16,6 +16,10 @@ from toolpaths.arrays import Bools, Floats
 
 Placed = tuple[Floats, Floats, Floats]
 """tip, tool axis, x of the tool, each (N, 3), in the table frame"""
+RESTS = 1e-3
+"""part of the largest motion that counts as none; errors have slopes far below"""
+LEVER = 100.0
+"""mm per rad"""
 
 
 class Actual(ABC):
@@ -65,6 +69,16 @@ def approach(q: Floats) -> Floats:
     moved = np.zeros(q.shape)
     moved[1:] = np.sign(np.diff(q, axis=0))
     return carried_on(moved)
+
+
+def moving_sign(step: Floats, rotary: Bools) -> Floats:
+    """Sign of motion (N, J) of joint steps (N, J): 0 for joints that move by less than RESTS of the one that moves most.
+
+    What is left out are the drifts that a correction itself makes; rotary joints count with LEVER mm per rad.
+    """
+    size = np.abs(step) * np.where(rotary, LEVER, 1.0)
+    result: Floats = np.where(size > RESTS * size.max(axis=1, keepdims=True, initial=0.0), np.sign(step), 0.0)
+    return result
 
 
 def carried_on(way: Floats) -> Floats:

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from machines.geometric_error.actual import Actual, carried_on
+from machines.geometric_error.actual import Actual, carried_on, moving_sign
 from machines.geometric_error.model import ErrorModel
 from postproc.readback.execute import Motion
 from postproc.readback.poses import Executed
@@ -15,8 +15,6 @@ from toolpaths.arrays import Floats, Ints
 
 MOMENT = 1e-3
 """of a block: how far back the direction of an axis is looked at"""
-STILL = 1e-10
-"""mm or rad: an axis that moves less in that moment rests"""
 
 
 @dataclass(frozen=True)
@@ -44,8 +42,7 @@ class ActualExecuted(Executed):
         """(K, J) sign of each joint's motion at fraction t; at the start of a block a moment after it."""
         before = np.clip(np.broadcast_to(t, len(rows)) - MOMENT, 0.0, 1.0 - MOMENT)
         step = self.joints(motion, rows, before + MOMENT) - self.joints(motion, rows, before)
-        result: Floats = np.where(np.abs(step) > STILL, np.sign(step), 0.0)
-        return result
+        return moving_sign(step, np.array(self.control.machine.rotary))
 
     @cached_property
     def _last(self) -> Floats:

@@ -1,0 +1,207 @@
+"""Programs with geometric errors corrected: proved on the machine with errors, and what they keep and refuse."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import machines
+import postproc
+import toolpaths
+from machines.geometric_error.exchange import save
+from machines.geometric_error.loader import load
+from machines.geometric_error.model import ErrorModel
+from machines.geometric_error.serial_errors import SerialErrors
+from postproc.cli import app
+from postproc.compensation import SHARE, one_orientation
+from postproc.options import Options
+from postproc.pipeline import PostResult, verify
+from postproc.setup import load_setup
+from toolpaths.units import DEG
+
+SAMPLES = Path("samples")
+ERRORS = SAMPLES / "errors"
+MIKRON = str(ERRORS / "mikron-ucp710.toml")
+CASES = [("five_faces.cls", "mikron-ucp710", "linuxcnc", "tools"), ("five_faces.cls", "mikron-ucp710", "fanuc-30i", "tools"),
+         ("five_tilted.cls", "mikron-ucp710", "heidenhain-tnc640", "tools"),
+         ("tool_axis_tour.apt", "mikron-ucp710", "linuxcnc", "tools"),
+         ("tool_axis_tour.apt", "mikron-ucp710", "fanuc-30i", "tools"),
+         ("tool_axis_tour.apt", "linuxcnc-xyzac-trt", "linuxcnc", "tools"), ("pocket.cls", "uranesx", "linuxcnc", "delta"),
+         ("h4a_indexed.cls", "h4a-c-table", "linuxcnc", "h4a")]
+
+
+@cache
+def converted(sample: str, machine: str, controller: str = "linuxcnc", setup: str = "tools", model: str = "",
+              beyond: bool = False) -> PostResult:
+    path, found = toolpaths.read(SAMPLES / sample)
+    options = Options(setup=str(SAMPLES / f"{setup}.setup.toml"), error_model=model, error_beyond=beyond)
+    return postproc.convert(path, machine, controller, options=options, diagnostics=found)
+
+
+def blocks(result: PostResult) -> list[str]:
+    """The text without comments."""
+    return [line for line in result.text.splitlines() if line and line[0] not in "(;"]
+
+
+@pytest.mark.parametrize(("sample", "machine", "controller", "setup"), CASES)
+def test_corrected_programs_are_proved_on_the_machine_with_errors(sample: str, machine: str, controller: str,
+                                                                  setup: str) -> None:
+    result = converted(sample, machine, controller, setup, str(ERRORS / f"{machine}.toml"))
+    assert result.ok, [str(d) for d in result.diagnostics]
+    found, comparison = result.compensation, result.comparison
+    assert found is not None and comparison is not None
+    assert found.tip_before > 0.02 and found.tip_after < 1e-4
+    assert comparison.worst_tip < 0.01 and comparison.worst_axis < 0.05 * DEG
+    assert found.axis_after < found.axis_before or machine == "uranesx"
+
+
+@pytest.mark.parametrize("corrected", [True, False])
+def test_what_is_right_on_one_machine_is_wrong_on_the_other(corrected: bool, tmp_path: Path) -> None:
+    """The corrected program on the nominal machine and the nominal program on the machine with errors both fail."""
+    model = MIKRON if corrected else ""
+    result = converted("five_faces.cls", "mikron-ucp710", model=model)
+    (tmp_path / "a.ngc").write_text(result.text)
+    path, found = toolpaths.read(SAMPLES / "five_faces.cls")
+    options = Options(setup=str(SAMPLES / "tools.setup.toml"), error_model="" if corrected else MIKRON)
+    crossed = verify(tmp_path / "a.ngc", path, "mikron-ucp710", "linuxcnc", options, found)
+    assert not crossed.ok and any(d.code.startswith("verify.") for d in crossed.diagnostics)
+    same = verify(tmp_path / "a.ngc", path, "mikron-ucp710", "linuxcnc", replace(options, error_model=model), found)
+    assert same.ok
+
+
+def written(folder: Path, model: ErrorModel) -> str:
+    return str(save(replace(model, name="m"), folder)[0])
+
+
+def test_zero_errors_leave_the_blocks_as_they_are(tmp_path: Path) -> None:
+    machine = machines.load("mikron-ucp710")
+    zero = written(tmp_path, replace(load(MIKRON, machine).zero(), covariance=None))
+    assert blocks(converted("five_faces.cls", "mikron-ucp710", model=zero)) == blocks(
+        converted("five_faces.cls", "mikron-ucp710"))
+
+
+def test_the_place_of_correction_stands_in_the_output(tmp_path: Path) -> None:
+    by_post = converted("five_faces.cls", "mikron-ucp710", model=MIKRON)
+    assert "corrected in this program; the control must not correct them again" in by_post.text
+    model = load(MIKRON, machines.load("mikron-ucp710"))
+    control = written(tmp_path, replace(model, corrected_by="control", covariance=None))
+    by_control = converted("five_faces.cls", "mikron-ucp710", model=control)
+    assert by_control.ok and "corrected by the control, not in this program" in by_control.text
+    assert blocks(by_control) == blocks(converted("five_faces.cls", "mikron-ucp710"))
+
+
+def test_rotary_axes_stand_still_where_they_did() -> None:
+    result = converted("five_faces.cls", "mikron-ucp710", model=MIKRON)
+    path, nominal = result.path, result.nominal
+    assert path is not None and nominal is not None and result.compensation is not None
+    tools = np.zeros(len(nominal), dtype=np.int64)
+    runs = one_orientation(nominal.q[:, 3:], tools, nominal.home)
+    assert runs.max() >= 4
+    for k in np.unique(nominal.move[np.isfinite(nominal.u)]):
+        assert np.ptp(path.q[(path.move == k) & np.isfinite(path.u), 3:], axis=0).max() == 0.0
+    assert np.abs(path.q[-1] - nominal.q[-1]).max() == 0.0  # home is the machine's own
+    assert result.compensation.residual_axis.shape == (len(nominal), 3)
+
+
+def test_points_are_added_only_where_they_are_needed_and_keep_time_and_order() -> None:
+    result = converted("tool_axis_tour.apt", "mikron-ucp710", model=MIKRON)
+    path, nominal = result.path, result.nominal
+    assert path is not None and nominal is not None and result.compensation is not None
+    assert len(path) == len(nominal) + result.compensation.added
+    assert result.compensation.added < len(nominal)
+    for k in np.unique(nominal.move):
+        before, after = nominal.seconds[nominal.move == k], path.seconds[path.move == k]
+        assert np.nansum(after) == pytest.approx(np.nansum(before), rel=1e-12)
+        u = path.u[(path.move == k) & np.isfinite(path.u)]
+        assert (np.diff(u) >= 0.0).all()
+    assert (np.diff(path.begin) >= 0).all() and path.begin[-1] == len(path)
+
+
+SQUARE = """PARTNO/SQUARE
+UNITS/MM
+LOADTL/1
+SPINDL/RPM,5000,CLW
+RAPID
+GOTO/-40,0,20
+FEDRAT/500,MMPM
+GOTO/-40,0,0
+GOTO/40,0,0
+GOTO/-40,0,0
+CIRCLE/0,0,0,0,0,1,40
+GOTO/40,0,0
+RAPID
+GOTO/40,0,20
+FINI
+"""
+
+
+def mill(tmp_path: Path, toml: str, table: str = "") -> PostResult:
+    (tmp_path / "x.csv").write_text(table)
+    (tmp_path / "e.toml").write_text(toml)
+    (tmp_path / "s.apt").write_text(SQUARE)
+    path, found = toolpaths.read(tmp_path / "s.apt")
+    setup, _ = load_setup(None)
+    return postproc.convert(path, "mill-3axis", "linuxcnc", setup, Options(error_model=str(tmp_path / "e.toml")), found)
+
+
+def test_lost_motion_is_taken_up_where_the_axis_turns_back(tmp_path: Path) -> None:
+    result = mill(tmp_path, '[components.EXX]\ntable = "x.csv"\n',
+                  "X [mm], EXX+ [um], EXX- [um]\n-500, 0, 10\n500, 0, 10\n")
+    assert result.ok, [str(d) for d in result.diagnostics]
+    x = [float(w[1:]) for line in blocks(result) for w in line.split() if w[0] == "X"]
+    assert 40.0 in x and 39.99 in x and -40.01 in x
+
+
+def test_arcs_survive_a_squareness_error_and_not_a_wavy_guide(tmp_path: Path) -> None:
+    square = mill(tmp_path, "[location]\nEA0Z = 20\n")
+    assert square.ok and square.compensation is not None and square.compensation.resolved == 0
+    assert any(line.startswith(("G2", "G3")) or " G2 " in line or " G3 " in line for line in blocks(square))
+    wavy = mill(tmp_path, '[components.EYX]\ntable = "x.csv"\n', "X [mm], EYX [um]\n-500, 0\n-20, 0\n0, 15\n20, 0\n500, 0\n")
+    assert wavy.ok and wavy.compensation is not None and wavy.compensation.resolved == 1
+    assert wavy.comparison is not None and wavy.comparison.worst_tip < 2.0 * SHARE * 0.01
+
+
+def test_beyond_the_measured_range_is_refused_unless_asked_for(tmp_path: Path) -> None:
+    toml = "[components.EYX]\npolynomial = [3.0]\nrange = [-30, 30]\n"
+    refused = mill(tmp_path, toml)
+    fault = next(d for d in refused.diagnostics if d.code == "compensation.range")
+    assert not refused.ok and refused.text == "" and fault.lines and "-40.000 to 40.000" in fault.message
+    path, found = toolpaths.read(tmp_path / "s.apt")
+    asked = postproc.convert(path, "mill-3axis", "linuxcnc", None,
+                             Options(error_model=str(tmp_path / "e.toml"), error_beyond=True), found)
+    assert asked.ok and any(d.code == "compensation.range" for d in asked.diagnostics)
+
+
+def test_a_faulty_model_stops_the_conversion(tmp_path: Path) -> None:
+    result = mill(tmp_path, "[location]\nEX0Y = 20\n")
+    assert not result.ok and any(d.code == "error-model.no-effect" and d.lines == (2,) for d in result.diagnostics)
+
+
+def test_command_line_convert_verify_trace(tmp_path: Path) -> None:
+    out, common = tmp_path / "a.ngc", ["-m", "mikron-ucp710", "-c", "linuxcnc", "--setup", "samples/tools.setup.toml",
+                                       "--error-model", MIKRON, "--json", "-"]
+    run = CliRunner().invoke(app, ["convert", "samples/five_faces.cls", "-o", str(out), *common])
+    assert run.exit_code == 0, run.stderr
+    figures = json.loads(run.stdout)["geometric_errors"]
+    assert figures["tip_before_mm"] > 0.02 and figures["tip_residual_mm"] < 1e-4
+    assert "geometric_errors" in json.loads(run.stdout)["tolerance_shares"]
+    run = CliRunner().invoke(app, ["verify", str(out), "samples/five_faces.cls", *common])
+    assert run.exit_code == 0 and json.loads(run.stdout)["proved"]
+    run = CliRunner().invoke(app, ["trace", "samples/five_faces.cls", "--line", "28", *common])
+    moves = [m for p in json.loads(run.stdout)["points"] for m in p["moves"]]
+    nominal, corrected = moves[0]["nominal_joints"][-1], moves[0]["joints"][-1]
+    assert 0.0 < max(abs(nominal[k] - corrected[k]) for k in nominal) < 0.2
+    missing = CliRunner().invoke(app, ["convert", "samples/five_faces.cls", "-o", str(out), "-m", "mikron-ucp710", "-c",
+                                       "linuxcnc", "--error-model", "nowhere.toml"])
+    assert missing.exit_code == 1 and "file.not-found" in missing.stderr
+
+
+def test_models_of_other_machines_are_refused() -> None:
+    assert not converted("five_faces.cls", "trunnion-bc", model=MIKRON).ok
+    assert ErrorModel(SerialErrors()).names == []
