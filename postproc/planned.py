@@ -13,7 +13,7 @@ from machines.kinematics.base import Kinematics
 from machines.machine import Limits, Machine
 from postproc.feedrate.limits import JointLimits
 from postproc.feedrate.motion import Plan
-from postproc.feedrate.plan import Options, plan
+from postproc.feedrate.plan import Options, plan, plan_second_order
 from postproc.feedrate.shares import Shares
 from postproc.feedrate.trajectory import JointTrajectory
 from postproc.moves import Moves
@@ -21,7 +21,7 @@ from postproc.pass_geometry import PassGeometry, pass_geometry
 from postproc.path import Path
 from postproc.steady_feed import CORNER, steady_seconds
 from toolpaths.arrays import Floats, Ints
-from toolpaths.diagnostics import Diagnostic, require
+from toolpaths.diagnostics import Diagnostic, DiagnosticError, error, require
 from toolpaths.smoothing.blend import SHARPEST
 from toolpaths.smoothing.smooth import Tolerance
 
@@ -52,6 +52,12 @@ class PassFeed:
             timed = np.diff(self.s)[move] / self.seconds[move]
             fed = self.feed[move] / self._tip_speed(s)
         return np.asarray(np.where(np.isnan(self.feed[move]), timed, fed))
+
+    @property
+    def breaks(self) -> Floats:
+        """Where one move gives way to another feed; each move of a stated time has its own."""
+        before, behind = self.feed[:-1], self.feed[1:]
+        return np.asarray(self.s[1:-1][(before != behind) & (np.diff(self.s)[1:] > 0.0)])
 
     def _tip_speed(self, s: Floats) -> Floats:
         """(N,) mm of the tip per mm of way."""
@@ -93,8 +99,20 @@ class PlannedMotion:
 
     @cached_property
     def plans(self) -> tuple[Plan, ...]:
-        """One for each pass; made when they are first asked for."""
-        return tuple(plan_pass(one, self.source.moves, self.source.bounds) for one in self.passes)
+        """One for each pass; made when they are first asked for.
+
+        Raises:
+            DiagnosticError: where no motion keeps the limits.
+        """
+        return tuple(self._plan(one) for one in self.passes)
+
+    def _plan(self, one: PassGeometry) -> Plan:
+        try:
+            return plan_pass(one, self.source.moves, self.source.bounds)
+        except (ValueError, ArithmeticError) as fault:
+            lines = self.source.moves.line[one.move[[0, -1]]].tolist()
+            raise DiagnosticError([error("plan.failed", f"no motion could be planned: {fault}", file=self.source.file,
+                                         lines=lines, hint="--feed programmed does without a plan")]) from fault
 
     @property
     def seconds(self) -> float:
@@ -107,8 +125,9 @@ class PlannedMotion:
 
     @property
     def shares(self) -> Shares | None:
-        """What each limit costs, over all passes; None where nothing cuts."""
-        return reduce(add, (made.shares for made in self.plans)) if self.plans else None
+        """What each limit costs, over all passes; None where nothing cuts, or the machine states no jerk."""
+        known = bool(self.passes) and bool(np.isfinite(self.source.bounds.jerk).all())
+        return reduce(add, (made.shares for made in self.plans)) if known else None
 
     def limiting(self) -> dict[str, dict[str, float]]:
         """Seconds that each limit of each axis costs, as the plan's multipliers share them out."""
@@ -153,9 +172,13 @@ def planned_motion(source: Source) -> tuple[PlannedMotion | None, list[Diagnosti
 
 
 def plan_pass(one: PassGeometry, moves: Moves, limits: JointLimits, options: Options | None = None) -> Plan:
-    """The motion of least time along a pass, from rest to rest, stopping where its geometry does."""
+    """The motion of least time along a pass, from rest to rest, stopping where its geometry does.
+
+    Of second order where the machine states no jerk for some axis.
+    """
     feed = PassFeed(one, one.smooth.s, moves.feed[one.move], moves.seconds[one.move] * one.share)
-    made = [plan(path, limits, feed, options=options) for path in one.paths]
+    run = plan if np.isfinite(limits.jerk).all() else plan_second_order
+    made = [run(path, limits, feed, options=options) for path in one.paths]
     return replace(made[0], pieces=tuple(piece for each in made for piece in each.pieces),
                    iterations=max(each.iterations for each in made), mismatch=max(each.mismatch for each in made),
                    solved=all(each.solved for each in made))

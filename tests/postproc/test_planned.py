@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -13,12 +14,13 @@ from postproc.feedrate.limits import JointLimits
 from postproc.feedrate.plan import Options
 from postproc.pass_geometry import PassGeometry, chains, pass_geometry, stops_of
 from postproc.pipeline import PostResult
-from postproc.planned import PlannedMotion, Source, joint_limits, plan_pass, planned_motion
+from postproc.planned import PassFeed, PlannedMotion, Source, joint_limits, plan_pass, planned_motion
 from postproc.setup import load_setup
 from postproc.steady_feed import CORNER, steady_speed
 from tests.postproc.kit import SAMPLES, convert, good, goto, machine, toolpath
 from toolpaths import read
 from toolpaths.arrays import Floats
+from toolpaths.diagnostics import DiagnosticError
 from toolpaths.rotations import angle_between
 from toolpaths.smoothing.smooth import Tolerance
 
@@ -230,3 +232,43 @@ def test_a_real_swing_beside_the_direction_of_a_rotary_axis_stays_a_swing() -> N
     assert not one.paths[0].led.any() and np.ptp(one.paths[0].values[:, 4]) > np.radians(170.0)
     assert result.path is not None
     assert np.fmax(made.needed, result.path.seconds)[one.block].sum() > 1.2 * result.path.seconds[one.block].sum()
+
+
+def test_feed_changes_are_known_to_the_planner_and_kept() -> None:
+    result = good(convert(toolpath("RAPID", "GOTO/0,0,50", "FEDRAT/MMPM,1200", "GOTO/40,0,50", "FEDRAT/MMPM,600",
+                                   "GOTO/60,0,50", "GOTO/80,0,50"), "mill-3axis"))
+    made = motion(result)
+    one, = made.passes
+    plan, = made.plans
+    feed = PassFeed(one, one.smooth.s, made.source.moves.feed[one.move], made.source.moves.seconds[one.move])
+    assert feed.breaks.tolist() == [40.0]
+    assert feed(np.array([20.0, 50.0])).tolist() == pytest.approx([20.0, 10.0])
+    speed = plan.speed(np.linspace(0.0, 80.0, 500))
+    assert speed[:250].max() == pytest.approx(20.0, rel=1e-3) and speed[260:].max() <= 10.0 * (1.0 + 1e-3)
+
+
+def test_a_stated_time_is_the_least_time_of_a_move() -> None:
+    ways = ["RAPID", "GOTO/0,0,50", "FEDRAT/INVERS,30", "GOTO/10,0,50", "GOTO/30,0,50"]
+    result = good(convert(toolpath(*ways), "mill-3axis"))
+    made = motion(result)
+    assert made.seconds > 4.0
+    speed = made.plans[0].speed(np.array([5.0, 20.0]))
+    assert speed[0] <= 5.0 + 1e-6 and speed[1] <= 10.0 + 1e-6
+
+
+def test_machine_without_jerk_limits_is_planned_at_second_order() -> None:
+    result = waves("mikron-ucp710")
+    assert result.job is not None
+    own = limits_of(machine("mikron-ucp710"))
+    free = JointLimits(own.velocity, own.acceleration, np.full(5, np.inf))
+    one, = geometry(result)
+    fast, slow = (plan_pass(one, result.job.moves, limits).seconds for limits in (free, own))
+    assert 0.5 * slow < fast < slow
+    assert (steady_speed(one, free) >= steady_speed(one, own)).all()
+
+
+def test_what_cannot_be_planned_is_named() -> None:
+    made = motion(waves("mikron-ucp710"))
+    broken = replace(made.passes[0].paths[0], values=np.nan * made.passes[0].paths[0].values)
+    with pytest.raises(DiagnosticError, match=r"plan\.failed"):
+        made._plan(replace(made.passes[0], paths=(broken,)))
