@@ -63,7 +63,7 @@ class Text:
 
 
 LawName = Literal["axes", "tcp", "tilted"]
-Choice = Literal["nearest", "+", "-", "stand"]
+Choice = Literal["nearest", "+", "-"]
 
 
 @dataclass(frozen=True)
@@ -74,8 +74,7 @@ class Law:
         name: "axes", "tcp" or "tilted"; code: as the program writes it
         rotation (3, 3), shift (3,): of a tilted plane; columns are X', Y', Z' seen from the table, shift from the work
             offset's zero, mm; rotation None: the tool's frame where the rotary axes stand
-        choice: how the control picks the rotary positions: the nearest, those with the first axis at + or -, or
-            the angles stated are those of the axes themselves ("stand": rotary (K,) degrees)
+        choice: how the control picks the rotary positions: the nearest, or those with the first tilting axis at + or -
     """
 
     name: LawName
@@ -83,7 +82,6 @@ class Law:
     rotation: Floats | None = None
     shift: Floats = field(default_factory=lambda: np.zeros(3))
     choice: Choice = "nearest"
-    rotary: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -113,7 +111,7 @@ class Drill:
 class Canonical:
     """B blocks in the order in which the control runs them; words count blocks from 1.
 
-    `line` (B + 1,) is the line of the file that a block stands in, `file` (B + 1,) the number of its file in `files`.
+    `line` (B + 1,) is the line that a block stands in, of the main file or of that of its subprogram.
     """
 
     words: Words

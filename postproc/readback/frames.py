@@ -105,21 +105,9 @@ def frame_of(law: Law, control: Control | None, length: float, position: Floats,
         return Frame("tcp", control, kin, np.eye(3), control.origin)
     q = position / control.unit
     rotation = tool_frame(kin, q) if law.rotation is None else law.rotation
-    if law.choice == "stand":
-        found += _not_standing(law, control, position, file, line)
-        rotation = tool_frame(kin, q)
-    elif law.rotation is not None:
+    if law.rotation is not None:
         found += _wrong_pose(law, control, kin, q, file, line)
     return Frame("tilted", control, kin, rotation, control.origin + law.shift)
-
-
-def _not_standing(law: Law, control: Control, position: Floats, file: str, line: int) -> list[Diagnostic]:
-    """Rotary positions stated with the plane itself against those in force."""
-    stands = position[control.rotary]
-    off = np.abs(stands - np.array(law.rotary[:len(stands)]))
-    if (off <= ANGLE_SLACK).all():
-        return []
-    return [_pose_error(law, control, stands, np.array(law.rotary[:len(stands)]), file, line)]
 
 
 def _wrong_pose(law: Law, control: Control, kin: Kinematics, q: Floats, file: str, line: int) -> list[Diagnostic]:

@@ -236,7 +236,11 @@ def _holes(state: _State, moving: Bools, drilling: Ints, code: Canonical, file: 
             if fresh:
                 sticky.enter(level)
             drill = _sticky(state, sticky, n, z, code, file, found)
-            if drill is not None:
+            times = section.repeats[n]
+            if drill is not None and not (np.isnan(times) or (times >= 1.0 and times == round(times))):
+                found.append(error("gcode.cycle", f"a cycle that is repeated {times:g} times", file=file,
+                                   lines=[int(code.line[n + section.first])], hint="1 or more, a whole number"))
+            elif drill is not None:
                 spelt[n] = _repeated(state, n, drill, begun, target, z, fresh)
         out = float(spelt[n][-1][1][z]) if n in spelt else level
         state.columns[n, z] = out

@@ -60,7 +60,13 @@ def tokenise(data: bytes, file: str = "") -> tuple[Words, list[Diagnostic]]:
 
 def plain(data: bytes, comments: re.Pattern[bytes] = _COMMENTS) -> bytes:
     """Text with line feeds alone and without comments."""
-    return comments.sub(b"", data.replace(b"\r\n", b"\n").replace(b"\r", b"\n"))
+    return comments.sub(b"", lines_of(data))
+
+
+def lines_of(data: bytes) -> bytes:
+    """Text whose lines all end with a line feed."""
+    text = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    return text if text.endswith(b"\n") else text + b"\n"
 
 
 def read_words(text: bytes, file: str = "") -> tuple[Words, list[Diagnostic]]:

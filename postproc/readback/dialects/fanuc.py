@@ -53,7 +53,7 @@ class FanucReader(IsoReader):
         starts, numbers = words.pick("O")
         back, _ = codes(words, "M", (99,))
         ends = [*(starts[1:] - 1).tolist(), words.lines]
-        spans = {f"O{int(n)}": (int(a), int(b)) for n, a, b in zip(numbers, starts, ends, strict=True)}
+        spans = {f"O{int(n)}": (int(a), int(b)) for n, a, b in zip(numbers, starts, ends, strict=False)}
         main = (1, ends[0] if len(starts) else words.lines)
         own = file == self.main_file
         if not len(starts) and not own:

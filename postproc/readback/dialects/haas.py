@@ -30,6 +30,8 @@ class HaasReader(FanucReader):
     laws = (43.0, 49.0, 234.0, 254.0, 255.0)
     tcp_code = 234.0
     extended_offset = 154.0
+    arc_slack = 0.01
+    """mm, assumed: the manual has no spiral"""
     repeats = "L"
 
     def time(self, words: Words, k: int) -> float:

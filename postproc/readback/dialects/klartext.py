@@ -19,7 +19,7 @@ from postproc.readback.dialects.iso import New
 from postproc.readback.dialects.klartext_run import Run
 from postproc.readback.flow import Call, Structure
 from postproc.readback.modal import GROUPS, Groups
-from postproc.readback.words import Words, block_delete, read_words
+from postproc.readback.words import Words, block_delete, lines_of, read_words
 from toolpaths.arrays import Ints
 from toolpaths.diagnostics import Diagnostic, error, warning
 
@@ -51,7 +51,7 @@ class KlartextReader(Reader):
 
     def tokens(self, data: bytes, file: str) -> tuple[Text, list[Diagnostic]]:
         """Words of L blocks; statements of the others."""
-        text = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n").upper()
+        text = lines_of(data).upper()
         text = _COMMENT.sub(lambda m: b"~" if m[0].rstrip().endswith(b"~") else b"", text)
         text = _JOINED.sub(b" \x01", text)
         rows = np.cumsum([0, *(1 + row.count(b"\x01") for row in text.split(b"\n"))]) if b"\x01" in text else None

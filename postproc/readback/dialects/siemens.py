@@ -36,7 +36,7 @@ from postproc.readback.dialects.siemens_cycles import CYCLES, drill_of
 from postproc.readback.flow import Call, Structure
 from postproc.readback.modal import GROUPS, Groups, codes, fill, number_of
 from postproc.readback.turns import turned
-from postproc.readback.words import Words, block_delete, read_words
+from postproc.readback.words import Words, block_delete, lines_of, read_words
 from toolpaths.arrays import Bools, Ints
 from toolpaths.diagnostics import Diagnostic, error
 
@@ -79,7 +79,7 @@ class SiemensReader(Reader):
 
     def tokens(self, data: bytes, file: str) -> tuple[Text, list[Diagnostic]]:
         """Blocks of plain words at once; those with names, calls and = one by one."""
-        text = _COMMENT.sub(lambda m: m[1] or b"", data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")).upper()
+        text = _COMMENT.sub(lambda m: m[1] or b"", lines_of(data)).upper()
         self.programs = [(text.count(b"\n", 0, m.start()) + 1, m[1].decode()) for m in _PROGRAM.finditer(text)]
         text, found = block_delete(_PROGRAM.sub(b"", text), file)
         text, special = _apart(text)
