@@ -8,7 +8,7 @@ Jx stays regular all along the move is proved on the way, and where it cannot be
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -25,6 +25,7 @@ from toolpaths.arrays import Floats
 _Z = (0.0, 0.0, 1.0)
 _ROUNDS = 6
 _GROWTH = 1.02
+_PARTS = 4
 UNBOUNDED = 1e30
 """a third derivative for which no bound was found"""
 
@@ -40,11 +41,28 @@ def pose_jets(kin: Kinematics, q0: Floats, q1: Floats) -> tuple[Jet, Jet]:
     """
     if isinstance(kin, Serial):
         return _serial(kin, q0, q1)
-    if isinstance(kin, LinearDelta):
-        return _delta(kin, q0, q1)
-    if isinstance(kin, H4Linear):
-        return _h4(kin, q0, q1)
+    if isinstance(kin, LinearDelta | H4Linear):
+        return _by_parts(kin, q0, q1)
     raise TypeError(f"{type(kin).__name__} has no bound for straight joint moves")
+
+
+def _by_parts(kin: LinearDelta | H4Linear, q0: Floats, q1: Floats) -> tuple[Jet, Jet]:
+    """Where a whole move is too long for a bound, the largest of the bounds of its parts, each over a shorter time."""
+    whole = _platform(kin, q0, q1)
+    third = [np.array(np.broadcast_to(jet.third, len(q0)), dtype=np.float64) for jet in whole]
+    rows = np.flatnonzero(np.maximum(*third) >= UNBOUNDED)
+    if len(rows):
+        cuts = [q0[rows] + k / _PARTS * (q1[rows] - q0[rows]) for k in range(_PARTS + 1)]
+        parts = _platform(kin, np.concatenate(cuts[:-1]), np.concatenate(cuts[1:]))
+        for column, jet in zip(third, parts, strict=True):
+            most = np.broadcast_to(jet.third, len(rows) * _PARTS).reshape(_PARTS, -1).max(axis=0)
+            column[rows] = np.minimum(most * _PARTS**3, UNBOUNDED)
+    tip, axis = (replace(jet, third=column) for jet, column in zip(whole, third, strict=True))
+    return tip, axis
+
+
+def _platform(kin: LinearDelta | H4Linear, q0: Floats, q1: Floats) -> tuple[Jet, Jet]:
+    return _delta(kin, q0, q1) if isinstance(kin, LinearDelta) else _h4(kin, q0, q1)
 
 
 def _serial(kin: Serial, q0: Floats, q1: Floats) -> tuple[Jet, Jet]:

@@ -9,10 +9,10 @@ from machines.machine import Limits
 from postproc.joints.lattice import Run
 from postproc.joints.plan import Solution, plan_runs
 from postproc.joints.tracks import TRAVEL_SLACK, distance, wrap
-from toolpaths.arrays import Floats
+from toolpaths.arrays import Floats, Ints
 from toolpaths.rotations import angle_between
 
-__all__ = ["TRAVEL_SLACK", "Solution", "nearest_solution", "reachable_axes", "solve", "wrap"]
+__all__ = ["TRAVEL_SLACK", "Solution", "branch_of", "nearest_solution", "reachable_axes", "solve", "wrap"]
 
 
 def reachable_axes(kin: Kinematics, axis: Floats, tolerance: float) -> tuple[Floats, Floats]:
@@ -33,12 +33,24 @@ def solve(kin: Kinematics, tip: Floats, axis: Floats, limits: Limits, start: Flo
     return plan_runs([Run(kin, tip, axis)], limits, start, None, may_rewind)[0]
 
 
-def nearest_solution(kin: Kinematics, tip: Floats, axis: Floats, near: Floats) -> Floats:
-    """Joints (N, J) of poses, on the branch and winding nearest to `near` (N, J)."""
+def nearest_solution(kin: Kinematics, tip: Floats, axis: Floats, near: Floats, branch: Ints | None = None) -> Floats:
+    """Joints (N, J) of poses, on the branch and winding nearest to `near` (N, J).
+
+    `branch` (N,) names the branch where it is known, -1 where it is not.
+    """
     rotary = np.array(kin.rotary)
     branches = kin.inverse(tip, axis, near=near)
     far = np.stack([distance(near, b, rotary) for b in branches])
     chosen = far.argmin(axis=0)
+    if branch is not None:
+        chosen = np.where(branch >= 0, branch, chosen)
     q: Floats = branches[chosen, np.arange(len(tip))].copy()
     q[:, rotary] = near[:, rotary] + wrap(q[:, rotary] - near[:, rotary])
     return q
+
+
+def branch_of(kin: Kinematics, tip: Floats, axis: Floats, q: Floats) -> Ints:
+    """(N,) the branch that joints q (N, J) of poses are on; -1 where the tool lies along a rotary axis."""
+    rotary = np.array(kin.rotary)
+    far = np.stack([distance(q, b, rotary) for b in kin.inverse(tip, axis, near=q)])
+    return np.where(kin.singular(np.nan_to_num(q)), -1, far.argmin(axis=0))

@@ -13,7 +13,7 @@ import numpy as np
 from machines.kinematics.base import Kinematics
 from postproc.bound import Stretch, bounds
 from postproc.control import Control
-from postproc.joint_path import nearest_solution, wrap
+from postproc.joint_path import branch_of, nearest_solution, wrap
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.rotations import angle_between
 from toolpaths.shape import Curves
@@ -22,6 +22,7 @@ _SMALLEST = 1e-9
 """of a curve: a block that short and still outside is a jump"""
 _AIM, _ENOUGH = 0.95, 0.85
 """of the tolerance: what a step aims at, and what is near enough to the longest"""
+_UNKNOWN = -2
 _NARROW = 1.05
 """a longest step that is known within this factor is known"""
 
@@ -73,7 +74,7 @@ class _Front:
     """Where each unfinished curve stands, and the blocks done so far: one step of all curves at a time.
 
     `at`, `joints`, `pose`: where the next block begins; `step`: its length to be tried; `held`, `failed`: the longest step
-    that is inside the tolerance and the shortest that is not, of the block being looked for.
+    that is inside the tolerance and the shortest that is not, of the block being looked for; `even`: half of what is left.
     """
 
     def __init__(self, control: Control, kin: Kinematics, curves: Curves, q0: Floats, q1: Floats, index: Ints,
@@ -86,6 +87,8 @@ class _Front:
         self.longest = np.minimum(0.5 * np.pi / np.maximum(turn, 1e-9), 1.0)
         self.step = self.longest.copy()
         self.held, self.failed = np.zeros(len(index)), np.full(len(index), np.inf)
+        self.branch = np.full(len(index), _UNKNOWN)
+        self.even = np.zeros(len(index), dtype=np.bool_)
         self.curve: list[Ints] = []
         self.u: list[Floats] = []
         self.q: list[Floats] = []
@@ -100,11 +103,16 @@ class _Front:
         ratio = np.maximum(tip / self.tolerance, axis / self.axis_tolerance)
         good = ratio <= 1.0
         full = (u1 == 1.0) | (self.step >= self.longest)
-        taken = good & (full | (ratio >= _ENOUGH) | (self.failed <= _NARROW * self.step))
+        taken = good & (full | self.even | (ratio >= _ENOUGH) | (self.failed <= _NARROW * self.step))
+        # What is left after this block would be shorter than it: both are made alike, so that no block is very short.
+        halves = taken & ~self.even & (u1 < 1.0) & (1.0 - u1 < self.step)
+        taken &= ~halves
         self._record(taken, u1, q1, tip, axis)
         gone = ~good & (self.step <= _SMALLEST)
         self.broken.append(self.index[gone])
         self._next(taken, good, ratio, u1, q1, pose)
+        self.step = np.where(halves, 0.5 * (1.0 - self.at), self.step)
+        self.even = halves
         self._keep(~(gone | (taken & (u1 == 1.0))))
 
     def _tried(self) -> tuple[Floats, Floats, tuple[Floats, Floats]]:
@@ -116,8 +124,24 @@ class _Front:
             tip, axis = self.curves.take(self.index[inner]).at(u1[inner])
             share = (u1 - self.at)[inner] / (1.0 - self.at[inner])
             near = self.joints[inner] + share[:, None] * (q1[inner] - self.joints[inner])
-            q1[inner] = nearest_solution(self.kin, tip, axis, near)
+            q1[inner] = nearest_solution(self.kin, tip, axis, near, self._branches(inner))
         return u1, q1, self.kin.forward(q1)
+
+    def _branches(self, rows: Ints) -> Ints:
+        """(N,) the branch that both ends of a curve are on, -1 where they are on different ones or on none.
+
+        Near a singular direction another branch may come within the tolerance: it does not lead to the curve's end.
+        """
+        new = rows[self.branch[rows] == _UNKNOWN]
+        if len(new) and self.kin.branches > 1:
+            curves = self.curves.take(self.index[new])
+            first = branch_of(self.kin, *curves.at(self.at[new]), self.joints[new])
+            last = branch_of(self.kin, curves.end, curves.axis1, self.last[self.index[new]])
+            both = np.where(first >= 0, first, last)
+            self.branch[new] = np.where((last >= 0) & (both != last), -1, both)
+        elif len(new):
+            self.branch[new] = 0
+        return self.branch[rows]
 
     def _record(self, taken: Bools, u1: Floats, q1: Floats, tip: Floats, axis: Floats) -> None:
         if taken.any():
@@ -143,7 +167,7 @@ class _Front:
         self.pose = (np.where(taken[:, None], pose[0], self.pose[0]), np.where(taken[:, None], pose[1], self.pose[1]))
 
     def _keep(self, rows: Bools) -> None:
-        for name in ("index", "at", "joints", "longest", "step", "held", "failed"):
+        for name in ("index", "at", "joints", "longest", "step", "held", "failed", "branch", "even"):
             setattr(self, name, getattr(self, name)[rows])
         self.pose = (self.pose[0][rows], self.pose[1][rows])
 

@@ -108,13 +108,15 @@ class Pose:
 
 
 def plan_link(control: Control, kin0: Kinematics, kin1: Kinematics, space: SafeSpace, before: Pose | None,
-              after: Pose | None, by_home: bool) -> Link:
+              after: Pose | None, by_home: bool, turning: bool | None = None) -> Link:
     """The way from pose `before` (None: at home) to above pose `after` (None: home), with the tools of kin0, kin1.
 
     `control` is under the law of the way between the safe planes; retract and approach go by the law of their pose.
     Where travel is too short for any, the first is returned: the travel check then names the axis and the value.
+    `turning` tells whether the part turns under the tool on the way; by itself where the tool axis is another.
     """
-    turning = before is None or after is None or bool(angle_between(before.axis, after.axis) > 1e-9)
+    if turning is None:
+        turning = before is None or after is None or bool(angle_between(before.axis, after.axis) > 1e-9)
     first: Link | None = None
     for share in _MARGINS if space.distance is None else (1.0,):
         link = _link(control, kin0, kin1, space, before, after, by_home, turning, share)

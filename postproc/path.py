@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from machines.kinematics.base import Kinematics
+from postproc import joint_faults
 from postproc import path_faults as faults
 from postproc.blocks import ARC as ARC
 from postproc.blocks import FEED as FEED
@@ -15,18 +16,18 @@ from postproc.blocks import TRAVERSE as TRAVERSE
 from postproc.blocks import Builder, add_run, rapid_codes
 from postproc.control import Control
 from postproc.groups import groups
-from postproc.joint_path import reachable_axes, solve
+from postproc.joints.lead import Event
 from postproc.links import Link, Pose, SafeSpace, plan_link
 from postproc.modes import OutputModes, WordFrame, stands_still, turning_run
 from postproc.moves import Moves
+from postproc.rewinds import Drawing
+from postproc.run_plan import RunPlan, plan_moves
 from toolpaths.arrays import Array, Bools, Floats, Ints
 from toolpaths.diagnostics import Diagnostic, has_errors
 from toolpaths.shape import Curves
 from toolpaths.toolpath import Kind
 
 Progress = Callable[[str, int, int], None]
-AXIS_SHARE = 0.2
-"""share of the axis tolerance that may go into moving an axis onto the set the machine can reach"""
 _LEG = 0.01, 1e-3
 """mm and rad that a rapid of a linking move may leave its line by before it is written as a feed move"""
 
@@ -47,7 +48,9 @@ class Path:
         frame (K,): index into `frames`: what the words of the block mean
         begin (M + 1,): the block before which the records without motion of a move act
         singular (M,): moves whose pose lies along a rotary axis; turns: moves that begin with a turn on the spot
-        worst_tip, worst_axis: deviation left between points, mm and rad
+        worst_tip, worst_axis: bound of the deviation between points, mm and rad
+        rewinds (W,): moves before or in which the tool is drawn back to unwind an axis
+        events: passages by singular directions: first and last move, and what was done
     """
 
     q: Floats
@@ -67,6 +70,8 @@ class Path:
     worst_tip: float
     worst_axis: float
     frames: tuple[WordFrame, ...]
+    rewinds: Ints
+    events: tuple[tuple[int, int, Event], ...]
 
     def __len__(self) -> int:
         return len(self.q)
@@ -80,19 +85,16 @@ class Path:
 class _Road:
     """What building a path needs throughout; tolerances in mm and rad."""
 
-    kinematics: Callable[[int], Kinematics]
-    moves: Moves
-    space: SafeSpace
+    plan: RunPlan
     modes: OutputModes
     operation: Ints
-    tolerance: float
     axis_tolerance: float
     file: str
 
 
 def build_path(modes: OutputModes, kinematics: Callable[[int], Kinematics], moves: Moves, space: SafeSpace,
                home_rows: frozenset[int], operation: Ints, tolerance: float, axis_tolerance: float, file: str = "",
-               progress: Progress | None = None) -> tuple[Path | None, list[Diagnostic]]:
+               progress: Progress | None = None, drawing: Drawing | None = None) -> tuple[Path | None, list[Diagnostic]]:
     """Blocks for all moves (in the table frame).
 
     Args:
@@ -100,11 +102,16 @@ def build_path(modes: OutputModes, kinematics: Callable[[int], Kinematics], move
         home_rows: linked rows of Moves whose link goes by home (tool change, GOHOME, first)
         operation (M,): of each move
         tolerance, axis_tolerance: mm and rad that linearising may use
+        drawing: what the set-up says about rewinds and preferred joints; default: its defaults
     """
-    road = _Road(kinematics, moves, space, modes, operation, tolerance, axis_tolerance, file)
-    out = Builder(moves, len(modes.control.machine.axis_names))
+    machine, given = modes.control.machine, moves
+    drawing = drawing or Drawing.default(space)
+    plan = plan_moves(machine, kinematics, moves, drawing.manner(machine, axis_tolerance),
+                      None if progress is None else lambda run: progress("joints", run, int(given.link.sum())))
+    road = _Road(plan, modes, operation[plan.refined.origin], axis_tolerance, file)
+    moves, home_rows = plan.refined.moves, plan.refined.among(home_rows)
+    out = Builder(moves, len(machine.axis_names))
     out.frame(modes.base)
-    singular = np.zeros(len(moves), dtype=bool)
     state: Pose | None = None
     frame, kin = modes.base, kinematics(int(moves.tool[0]))
     diagnostics: list[Diagnostic] = []
@@ -113,37 +120,48 @@ def build_path(modes: OutputModes, kinematics: Callable[[int], Kinematics], move
     for first, last in zip(starts, [*starts[1:], len(moves)], strict=True):
         before, kin = kin, kinematics(int(moves.tool[first]))
         rows = np.arange(first, last)
-        run, found = _solve_run(road, kin, rows, modes.control.machine.home if state is None else state.q)
+        run, found = _solve_run(road, kin, rows)
         diagnostics += found
         if run is None or has_errors(diagnostics):
             continue
-        singular[rows] = run.singular
         target = Pose(moves.tip[first], run.axis[0], run.q[0], run.frame.control)
         by_home = first in home_rows
         way = _way(modes, frame, run.frame, by_home)
-        link = plan_link(way.control, before, kin, space, state, target, by_home)
+        link = drawing.link(way.control, kin, state, target) if plan.refined.rewind[first] else plan_link(
+            way.control, before, kin, space, state, target, by_home)
         _add_link(out, moves, int(first), link, _Legs(frame, way, run.frame, before, kin, state))
         if not link.clear:
             diagnostics.append(faults.no_way(moves, int(first), file))
         if len(rows) > 1:
             curves = reference.take(rows[1:])
             left, turned, broken = add_run(out, run.frame, kin, moves, rows[1:], _with_axes(curves, run.axis), run.q,
-                                           tolerance, axis_tolerance - run.moved)
+                                           tolerance, run.left)
             worst = np.maximum(worst, left)
             turns.append(turned)
             diagnostics += faults.broken(moves, broken, file)
         state, frame = Pose(moves.tip[last - 1], run.axis[-1], run.q[-1], run.frame.control), run.frame
         if progress:
-            progress("joints", int(last), len(moves))
+            progress("blocks", int(last), len(moves))
     if has_errors(diagnostics):
         return None, faults.merged(diagnostics)
     if state is not None:
         _add_end(out, modes, frame, kin, space, state, len(moves) - 1)
     out.begin[len(moves)] = out.count
     columns = {k: out.joined(k) for k in out.columns}
-    path = Path(**columns, begin=out.begin, singular=singular, turns=np.concatenate(turns), worst_tip=float(worst[0]),
-                worst_axis=float(worst[1]), frames=tuple(out.frames))
-    return path, faults.merged(diagnostics) + faults.rapid_as_feed(path.code, path.move, path.seconds, moves, file)
+    path = _of_given(columns, out, plan, len(given), np.concatenate(turns), worst)
+    diagnostics += joint_faults.planned(plan, machine, given, file)
+    return path, faults.merged(diagnostics) + faults.rapid_as_feed(path.code, path.move, path.seconds, given, file)
+
+
+def _of_given(columns: dict[str, Array], out: Builder, plan: RunPlan, count: int, turns: Ints, worst: Floats) -> Path:
+    """The path of the parts of moves as that of the `count` moves themselves."""
+    parts = plan.refined
+    singular = np.zeros(count, dtype=bool)
+    singular[parts.origin] = plan.singular
+    columns = columns | {"move": parts.origin[columns["move"]], "u": parts.at(columns["move"], columns["u"])}
+    return Path(**columns, begin=parts.begins(out.begin, count), singular=singular, turns=np.unique(parts.origin[turns]),
+                worst_tip=float(worst[0]), worst_axis=float(worst[1]), frames=tuple(out.frames),
+                rewinds=parts.origin[parts.rewind], events=plan.events)
 
 
 @dataclass(frozen=True)
@@ -153,18 +171,17 @@ class _Run:
     frame: WordFrame
     axis: Floats
     q: Floats
-    singular: Bools
-    moved: float
-    """largest angle by which axes were moved, rad"""
+    left: float
+    """rad of the axis tolerance that linearising may use"""
 
 
-def _solve_run(road: _Road, kin: Kinematics, rows: Ints, start: Floats) -> tuple[_Run | None, list[Diagnostic]]:
-    """The joints of the moves `rows` from joints `start` on, in the output mode that is theirs."""
-    moves, modes, machine = road.moves, road.modes, road.modes.control.machine
-    axis, moved = reachable_axes(kin, moves.axis[rows], AXIS_SHARE * road.axis_tolerance)
-    diagnostics = faults.moved_axes(moves, rows, moved, road.file)
-    found = solve(kin, moves.tip[rows], axis, machine.limits, start)
-    diagnostics += faults.unreachable(modes.control, kin, moves, rows, axis, found.q, road.file)
+def _solve_run(road: _Road, kin: Kinematics, rows: Ints) -> tuple[_Run | None, list[Diagnostic]]:
+    """The joints of the moves `rows` as planned, in the output mode that is theirs."""
+    plan, modes = road.plan, road.modes
+    moves, q, left = plan.refined.moves, plan.q[rows], float(plan.left[rows[0]])
+    axis = moves.axis[rows]
+    diagnostics = faults.moved_axes(moves, rows, plan.moved[rows], road.file)
+    diagnostics += faults.unreachable(modes.control, kin, moves, rows, axis, q, road.file)
     if has_errors(diagnostics):
         return None, diagnostics
     still = stands_still(axis, road.axis_tolerance)
@@ -173,11 +190,11 @@ def _solve_run(road: _Road, kin: Kinematics, rows: Ints, start: Floats) -> tuple
         return None, [*diagnostics, turning_run(np.unique(moves.line[rows]).tolist(), road.file)]
     if law != "tilted":
         frame = modes.tcp if law == "tcp" else modes.base
-        return _Run(frame, axis, found.q, found.singular, float(moved.max())), diagnostics
-    frame, at = modes.plane(kin, found.q[0])
+        return _Run(frame, axis, q, left), diagnostics
+    frame, at = modes.plane(kin, q[0])
     q = frame.control.slides_for(kin, moves.tip[rows], np.tile(at, (len(rows), 1)))
     axis = np.repeat(kin.forward(q[:1])[1], len(rows), axis=0)
-    return _Run(frame, axis, q, found.singular, float(moved.max())), diagnostics
+    return _Run(frame, axis, q, left), diagnostics
 
 
 def _way(modes: OutputModes, before: WordFrame, after: WordFrame, by_home: bool) -> WordFrame:

@@ -12,9 +12,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from machines.machine import Limits
+from postproc.joints.greedy import greedy
 from postproc.joints.lattice import Lattice, Run, lattice_of
 from postproc.joints.search import Choice, Piece, cheapest, pieces, wrong_side
-from postproc.joints.states import BAD, SECONDS, Segment, least_of, rough_segments, tidy_segments
+from postproc.joints.states import BAD, NEVER, SECONDS, Segment, least_of, rough_segments, tidy_segments
 from postproc.joints.tracks import TRAVEL_SLACK, TWO_PI, wrap
 from toolpaths.arrays import Bools, Floats
 
@@ -32,7 +33,10 @@ class Rewind:
 
 @dataclass(frozen=True)
 class Loser:
-    """A state that a run could have begun in: joints (J,), and by how much (5,) the best end from there is dearer."""
+    """A state that a run could have begun in: joints (J,), and by how much (5,) the best end from there is dearer.
+
+    Infinitely where no winding of its branch goes through the run.
+    """
 
     q: Floats
     dearer: Floats
@@ -49,6 +53,8 @@ class Solution:
     outside: int = 0
     """poses outside travel or without solution"""
     losers: tuple[Loser, ...] = ()
+    greedy: int = 0
+    """rewinds if every pose took the nearest joints"""
 
 
 @dataclass(frozen=True)
@@ -186,8 +192,17 @@ def _solution(stage: _Stage, at: Floats) -> Solution:
                     for p, n, o in zip(taken, taken[1:], offset[1:], strict=False) if p.rewind)
     low, high = lattice.limits.lower - TRAVEL_SLACK, lattice.limits.upper + TRAVEL_SLACK
     outside = int((~((q >= low) & (q <= high)).all(axis=1)).sum())
-    losers = tuple(Loser(q0[k], every[k] - every[best]) for k in range(len(every)) if k != best)
-    return Solution(q, family, rewinds, outside, losers)
+    return Solution(q, family, rewinds, outside, _losers(lattice, stage.segments[0], q0, every, best),
+                    greedy(lattice, at).rewinds)
+
+
+def _losers(lattice: Lattice, first: Segment, q0: Floats, every: Floats, best: int) -> tuple[Loser, ...]:
+    """The other states of the first pose, and the branches that it has but the run has not."""
+    shut = set(range(len(lattice.values))) - {branch for branch, _ in first.states}
+    with np.errstate(invalid="ignore"):
+        dearer = np.where(every == np.inf, np.inf, every - every[best])
+    return (*(Loser(q0[k], dearer[k]) for k in range(len(every)) if k != best),
+            *(Loser(lattice.values[b, 0], NEVER) for b in sorted(shut) if np.isfinite(lattice.values[b, 0]).all()))
 
 
 def _rows(lattice: Lattice, piece: Piece, first: int) -> Floats:

@@ -1,0 +1,72 @@
+"""What is told about the plan of the joints: rewinds, singular directions, why a branch was taken."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from machines.machine import Machine
+from postproc.joints.plan import Loser, Rewind
+from postproc.joints.states import BAD, CUTS, REWINDS, SECONDS, WRONG
+from postproc.moves import Moves
+from postproc.run_plan import RunPlan
+from toolpaths.arrays import Floats
+from toolpaths.diagnostics import Diagnostic, info, warning
+from toolpaths.units import DEG
+
+_REASONS = ((BAD, "leave travel"), (REWINDS, "need more rewinds"), (CUTS, "need more rewinds in the cut"),
+            (WRONG, "stand on the side that the set-up does not prefer"), (SECONDS, "take longer"))
+
+
+def planned(plan: RunPlan, machine: Machine, moves: Moves, file: str) -> list[Diagnostic]:
+    """Everything about a plan; `moves` are those of the CL file."""
+    return [*_rewinds(plan, machine, moves, file), *_events(plan, machine, moves, file), *_choices(plan, moves, file)]
+
+
+def _rewinds(plan: RunPlan, machine: Machine, moves: Moves, file: str) -> list[Diagnostic]:
+    origin = plan.refined.origin[plan.refined.rewind]
+    done = [r for s in plan.solutions for r in s.rewinds]
+    greedy = sum(s.greedy for s in plan.solutions)
+    result = []
+    for cuts, write in ((False, info), (True, warning)):
+        lines = [int(moves.line[m]) for m, r in zip(origin, done, strict=True) if r.cuts == cuts]
+        if lines:
+            first = next(r for r in done if r.cuts == cuts)
+            where = "in the cut" if cuts else "where the tool does not cut"
+            result.append(write("rewind.made", f"travel ends within a run: the tool is drawn back {where}, "
+                                f"{_ways(machine, first)} (nearest joints throughout would take {greedy} rewinds)",
+                                file=file, lines=lines[:6], count=len(lines)))
+    return result
+
+
+def _ways(machine: Machine, rewind: Rewind) -> str:
+    ways = [(k, a / DEG, b / DEG) for k, rotary, a, b in zip(
+        machine.axis_names, machine.rotary, rewind.before, rewind.after, strict=True) if rotary and abs(a - b) > 1e-9]
+    return ", ".join(f"{k} goes from {a:.3f} to {b:.3f} degrees" for k, a, b in ways)
+
+
+def _events(plan: RunPlan, machine: Machine, moves: Moves, file: str) -> list[Diagnostic]:
+    return [info("singular.led", f"the tool passes the direction of axis {machine.axis_names[e.joint]} at "
+                 f"{e.miss / DEG:.4f} degrees: its axis is led past by {e.deviation / DEG:.4f} degrees at most, so that "
+                 f"{machine.axis_names[e.joint]} turns at {e.after / DEG:.1f} degrees/s, not {e.before / DEG:.1f}, at the "
+                 "programmed feed", file=file, lines=sorted({int(moves.line[first]), int(moves.line[last])}))
+            for first, last, e in plan.events]
+
+
+def _choices(plan: RunPlan, moves: Moves, file: str) -> list[Diagnostic]:
+    """Why the runs begin as they do, by the reason that decided against the best of the others."""
+    lines: dict[str, list[int]] = {}
+    starts = np.flatnonzero(moves.link)
+    for start, solution in zip(starts, plan.solutions, strict=True):
+        if solution.losers:
+            lines.setdefault(_reason(solution.losers), []).append(int(moves.line[start]))
+    return [info("joints.chosen", f"the other branches and windings {reason}", file=file, lines=found[:6], count=len(found))
+            for reason, found in sorted(lines.items())]
+
+
+def _reason(losers: tuple[Loser, ...]) -> str:
+    """What decides against the loser that comes nearest."""
+    best: Floats = min((x.dearer for x in losers), key=lambda cost: tuple(cost.tolist()))
+    for column, text in _REASONS:
+        if best[column] > 1e-9:
+            return text
+    return "are as good"

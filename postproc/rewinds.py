@@ -1,0 +1,116 @@
+"""Rewinds: how the tool is drawn back to unwind an axis, and which joints a set-up prefers.
+
+The tool goes along its axis to where nothing is that it could cut, the axes turn there, and it comes back to the very pose:
+no rotary axis turns about a tool in the material.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Literal
+
+import numpy as np
+from pydantic import Field
+
+from machines.kinematics.base import Kinematics
+from machines.machine import Machine
+from machines.user_file import UserModel
+from postproc.control import Control
+from postproc.joints.plan import Wishes
+from postproc.links import Link, Pose, SafeSpace, plan_link
+from postproc.run_plan import Manner
+from toolpaths.arrays import Floats
+from toolpaths.diagnostics import Diagnostic, error
+from toolpaths.units import DEG
+
+Vector = tuple[float, float, float]
+
+
+class Stock(UserModel):
+    """A box in the part frame, mm."""
+
+    low: Vector
+    high: Vector
+
+
+class Rewind(UserModel):
+    """Unwinding an axis in the middle of a run, where its travel ends."""
+
+    allowed: bool = True
+    """false: a path that needs one is refused"""
+    feed: float | None = Field(default=None, gt=0.0)
+    """of the way back into a cut, mm/min; default: that of the cut"""
+    stock: Stock | None = None
+    """the tool is drawn out of this box and of what is cut; default: to the safe plane"""
+
+
+class Joints(UserModel):
+    """Joints to be preferred where travel and rewinds leave a choice."""
+
+    side: dict[str, Literal["positive", "negative"]] = Field(default_factory=dict)
+    """of a rotary axis, e.g. side = {A = "negative"}"""
+    start: dict[str, float] = Field(default_factory=dict)
+    """where a rotary axis stands when the program begins, degrees, e.g. start = {C = 180}; default: home"""
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """Drawing back on one machine: `space` is kept free of the tool while axes turn."""
+
+    space: SafeSpace
+    rewind: Rewind = field(default_factory=Rewind)
+    wishes: Wishes = field(default_factory=Wishes)
+
+    @classmethod
+    def default(cls, space: SafeSpace) -> Drawing:
+        """That of a set-up which says nothing."""
+        return cls(space)
+
+    def manner(self, machine: Machine, axis_tolerance: float) -> Manner:
+        """How the runs of a program are planned on a machine."""
+        feed = None if self.rewind.feed is None else self.rewind.feed / 60.0
+        slow = machine.limits.velocity[~np.array(machine.rotary)]
+        speed = float(slow.min()) if len(slow) else np.inf
+        return Manner(self.wishes, self.rewind.allowed, feed, partial(self._away, speed, feed or speed), axis_tolerance)
+
+    def _away(self, rapid: float, feed: float, tip: Floats, axis: Floats) -> Floats:
+        """Time (N,) s to draw back from poses (N, 3) to the sphere about what is cut, and to come down again."""
+        height = ((tip - self.space.centre) * axis).sum(axis=1)
+        top = self.space.distance if self.space.distance is not None else self.space.radius + self.space.margin
+        return np.asarray(np.maximum(top - height, 0.0) * (1.0 / rapid + 1.0 / feed))
+
+    def link(self, control: Control, kin: Kinematics, before: Pose | None, after: Pose) -> Link:
+        """The way from a pose back to it with other joints."""
+        return plan_link(control, kin, kin, self.space, before, after, False, True)
+
+
+def drawing_of(rewind: Rewind, joints: Joints, space: SafeSpace, corners: Floats | None, machine: Machine,
+               file: str = "") -> tuple[Drawing, list[Diagnostic]]:
+    """What a set-up says, for a machine; `corners` (8, 3) are those of the stock in the table frame."""
+    diagnostics = [error("setup.joints", f"joints.{table}.{letter}: {machine.name} has no rotary axis {letter}", file=file,
+                         hint="it has: " + ", ".join(_rotaries(machine)))
+                   for table in ("side", "start") for letter in getattr(joints, table) if letter not in _rotaries(machine)]
+    if rewind.stock is not None and not (np.array(rewind.stock.low) < np.array(rewind.stock.high)).all():
+        diagnostics.append(error("setup.stock", f"rewind.stock: low {rewind.stock.low} must be below high "
+                                 f"{rewind.stock.high} in x, y and z", file=file))
+    if diagnostics:
+        return Drawing(space), diagnostics
+    index = machine.axis_names.index
+    wishes = Wishes({index(k): 1 if v == "positive" else -1 for k, v in joints.side.items()},
+                    {index(k): v * DEG for k, v in joints.start.items()})
+    return Drawing(space if corners is None else _with_stock(space, corners), rewind, wishes), []
+
+
+def _rotaries(machine: Machine) -> list[str]:
+    return [k for k, rotary in zip(machine.axis_names, machine.rotary, strict=True) if rotary]
+
+
+def _with_stock(space: SafeSpace, corners: Floats) -> SafeSpace:
+    """The box round the stock and what is cut, with the sphere about it."""
+    low, high = (f(np.concatenate([corners, space.corners]), axis=0) for f in (np.min, np.max))
+    pick = np.array(np.meshgrid([0, 1], [0, 1], [0, 1])).reshape(3, 8).T
+    box = np.where(pick == 0, low, high)
+    centre = 0.5 * (low + high)
+    return replace(space, centre=centre, corners=box, radius=float(np.linalg.norm(box - centre, axis=1).max()),
+                   distance=None)

@@ -1,0 +1,177 @@
+"""The joints of all runs of a program before any block is made: axes moved and led, branches, windings, rewinds."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from machines.kinematics.base import Kinematics
+from machines.machine import Machine
+from postproc.joint_path import reachable_axes
+from postproc.joints.lattice import Run
+from postproc.joints.lead import Event, Led, lead_past, whole
+from postproc.joints.plan import Solution, Wishes, plan_runs
+from postproc.moves import Moves
+from postproc.refined import Refined, cut, with_rewinds
+from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.shape import Curves
+from toolpaths.toolpath import Kind
+from toolpaths.units import DEG
+
+AXIS_SHARE = 0.2
+"""share of the axis tolerance that may go into moving an axis onto the set the machine can reach"""
+LEAD_SHARE = 0.5
+"""share of what is left then that leading past singular directions may take"""
+_COARSE = 10.0 * DEG
+"""turn of a rotary axis in one move above which a run that leaves travel is looked at more finely"""
+
+
+@dataclass(frozen=True)
+class Manner:
+    """How runs are planned.
+
+    Attributes:
+        wishes: of the set-up
+        may_rewind: False where the set-up forbids it
+        feed: mm/s of the way back into the cut; None: that of the cut
+        away: (tips (N, 3), axes (N, 3)) -> s (N,) that drawing back and coming down takes
+        tolerance: rad, of the axis
+    """
+
+    wishes: Wishes
+    may_rewind: bool
+    feed: float | None
+    away: Callable[[Floats, Floats], Floats]
+    tolerance: float
+
+
+@dataclass(frozen=True)
+class RunPlan:
+    """All runs: parts of moves, and at each part's end joints (R, J), family (R,), what the axis was moved by (R,).
+
+    Attributes:
+        left: (R,) rad of the axis tolerance that linearising may use
+        events: passages by singular directions, with the moves (first, last) of each
+        solutions: of the runs of the CL file, in order
+    """
+
+    refined: Refined
+    q: Floats
+    singular: Bools
+    moved: Floats
+    left: Floats
+    events: tuple[tuple[int, int, Event], ...]
+    solutions: tuple[Solution, ...]
+
+
+@dataclass(frozen=True)
+class _Part:
+    """One run while it is planned: its rows of Moves, the axes they are given, the curves after its first pose."""
+
+    kin: Kinematics
+    rows: Ints
+    axis: Floats
+    moved: Floats
+    led: Led
+
+    def poses(self) -> tuple[Floats, Floats]:
+        """Tips and axes (N, 3) that the run goes through."""
+        return (np.concatenate([self.first[:, :3], self.led.curves.end]),
+                np.concatenate([self.first[:, 3:], self.led.curves.axis1]))
+
+    @property
+    def first(self) -> Floats:
+        """(1, 6) the pose that the run begins at."""
+        return np.concatenate([self._tip, self.axis[:1]], axis=1)
+
+    _tip: Floats
+
+
+def plan_moves(machine: Machine, kinematics: Callable[[int], Kinematics], moves: Moves, manner: Manner,
+               progress: Callable[[int], None] | None = None) -> RunPlan:
+    """The joints of all moves (in the table frame), run by run as `moves.link` divides them."""
+    starts, reference = np.flatnonzero(moves.link), moves.curves()
+    parts = []
+    for first, last in zip(starts, [*starts[1:], len(moves)], strict=True):
+        parts.append(_part(machine, kinematics(int(moves.tool[first])), moves, reference, np.arange(first, last), manner))
+    runs = [_run(part, moves, manner) for part in parts]
+    found = plan_runs(runs, machine.limits, machine.home, manner.wishes, manner.may_rewind, progress)
+    if manner.may_rewind and any(s.outside for s in found):
+        parts = [_finer(part, s) if s.outside else part for part, s in zip(parts, found, strict=True)]
+        runs = [_run(part, moves, manner) for part in parts]
+        found = plan_runs(runs, machine.limits, machine.home, manner.wishes, manner.may_rewind, progress)
+    return _together(moves, parts, found, manner)
+
+
+def _part(machine: Machine, kin: Kinematics, moves: Moves, reference: Curves, rows: Ints, manner: Manner) -> _Part:
+    axis, moved = reachable_axes(kin, moves.axis[rows], AXIS_SHARE * manner.tolerance)
+    curves = reference.take(rows[1:])
+    curves = Curves(curves.start, curves.end, axis[:-1], axis[1:], curves.is_arc, curves.center, curves.normal, curves.sweep)
+    led = whole(curves)
+    if len(curves) and any(kin.rotary):
+        allowed = LEAD_SHARE * (manner.tolerance - float(moved.max()))
+        led = lead_past(kin, curves, _seconds(moves, rows[1:], curves), allowed, machine.limits.velocity)
+    return _Part(kin, rows, axis, moved, led, moves.tip[rows[:1]])
+
+
+def _seconds(moves: Moves, rows: Ints, curves: Curves) -> Floats:
+    """Time (N,) of moves at the programmed feed, NaN for rapids."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        time = np.where(moves.seconds[rows] > 0.0, moves.seconds[rows], curves.length() / moves.feed[rows])
+    return np.where((moves.kind[rows] == Kind.RAPID) | ~(time > 0.0), np.nan, time)
+
+
+def _run(part: _Part, moves: Moves, manner: Manner) -> Run:
+    tip, axis = part.poses()
+    owner = np.concatenate([part.rows[:1], part.rows[1:][part.led.parent]])
+    rapid = moves.kind[owner] == Kind.RAPID
+    rest = rapid | np.append(rapid[1:], True)
+    return Run(part.kin, tip, axis, rest, manner.away(tip, axis))
+
+
+def _finer(part: _Part, solution: Solution) -> _Part:
+    """The run with moves that turn a rotary axis far cut into parts, so that a rewind may stand between their ends."""
+    step = np.abs(np.diff(solution.q[:, np.array(part.kin.rotary)], axis=0)).max(axis=1, initial=0.0)
+    count = np.maximum(np.ceil(np.nan_to_num(step) / _COARSE), 1).astype(np.int64)
+    if not (count > 1).any():
+        return part
+    led, index = part.led, np.repeat(np.arange(len(count)), count)
+    k = np.arange(len(index)) - np.repeat(np.cumsum(count) - count, count)
+    low, high = k / count[index], np.where(k + 1 == count[index], 1.0, (k + 1) / count[index])
+    picked = led.curves.take(index)
+    (start, axis0), (end, axis1) = picked.at(low), picked.at(high)
+    curves = Curves(start, end, axis0, axis1, picked.is_arc, picked.center, picked.normal, picked.sweep * (high - low))
+    u0, u1 = led.u0[index], led.u1[index]
+    end = np.where(high == 1.0, u1, u0 + high * (u1 - u0))
+    finer = Led(curves, led.parent[index], u0 + low * (u1 - u0), end, led.events)
+    return _Part(part.kin, part.rows, part.axis, part.moved, finer, part._tip)
+
+
+def _together(moves: Moves, parts: list[_Part], found: list[Solution], manner: Manner) -> RunPlan:
+    """All runs one after the other, cut where there are rewinds."""
+    owner = [np.append(0, 1 + p.led.parent) for p in parts]
+    poses = [p.poses() for p in parts]
+    refined = cut(moves, np.concatenate([p.rows[k] for p, k in zip(parts, owner, strict=True)]),
+                  np.concatenate([np.append(0.0, p.led.u0) for p in parts]),
+                  np.concatenate([np.append(1.0, p.led.u1) for p in parts]),
+                  np.concatenate([tip for tip, _ in poses]), np.concatenate([axis for _, axis in poses]))
+    begin = np.cumsum([0, *(len(k) for k in owner)])
+    rewinds = [(int(b) + r.row, r) for b, s in zip(begin, found, strict=False) for r in s.rewinds]
+    rows = np.array([row for row, _ in rewinds], dtype=np.int64)
+    refined = with_rewinds(refined, rows, np.array([r.cuts for _, r in rewinds], dtype=np.bool_), manner.feed)
+    q, singular = np.concatenate([s.q for s in found]), np.concatenate([s.singular for s in found])
+    moved = np.concatenate([p.moved[k] for p, k in zip(parts, owner, strict=True)])
+    left = np.repeat([_left(p, manner) for p in parts], np.diff(begin))
+    if rewinds:
+        q = np.insert(q, rows + 1, np.stack([r.after for _, r in rewinds]), axis=0)
+        singular, moved, left = (np.insert(x, rows + 1, x[rows]) for x in (singular, moved, left))
+    events = tuple((int(p.rows[1 + e.first]), int(p.rows[1 + e.last]), e) for p in parts for e in p.led.events)
+    return RunPlan(refined, q, singular, moved, left, events, tuple(found))
+
+
+def _left(part: _Part, manner: Manner) -> float:
+    """What moving and leading the axis leave of the tolerance."""
+    led = max((e.deviation for e in part.led.events), default=0.0)
+    return manner.tolerance - float(part.moved.max()) - led
