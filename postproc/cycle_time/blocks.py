@@ -108,7 +108,8 @@ class Blocks:
         start, end (E, A): where the block begins and ends
         line (E,): line of the program
         rapid, arc (E,): kind; neither is a straight feed
-        center, normal (E, 3), sweep (E,): of arcs in X, Y, Z: counter-clockwise about `normal` by `sweep` rad
+        center, normal (E, 3), sweep (E,): of arcs in X, Y, Z: counter-clockwise about `normal` by `sweep` rad, the center
+            at the height of the start
         speed (E,): what the feed word asks for along `length`, inf for rapids
         path (E,): Path that holds at the block; tolerance (E,): mm of its blends, inf without a limit, NaN where the
             program does not say; chain (E,): mm within which short lines may be merged, 0 for not

@@ -21,6 +21,7 @@ from postproc.cycle_time.phases import Timed, ramps, summed
 from postproc.cycle_time.shape import NOTHING, shape
 from postproc.feedrate.compiled import compiled
 from toolpaths.arrays import Array, Bools, Floats, Ints
+from toolpaths.units import DEG
 
 STOP, TANGENT, OVERLAP = 0, 2, 3
 """How a segment of the row ends; OVERLAP: the next one starts while this one slows down (parabolic blend)"""
@@ -97,32 +98,40 @@ def in_a_row(s: Segments, cycle: float) -> Row:
 
 
 def _choice(s: Segments, c: Corners, at: Ints, arcs: Blends, cycle: float) -> tuple[Bools, Bools]:
-    """(K,) where the blend arc, where passing as tangent wins; else two ramps overlap (`tpChooseBestBlend`)."""
+    """(K,) where the blend arc, where passing as tangent wins; else two ramps overlap (`tpChooseBestBlend`).
+
+    The decision falls while both segments may still lose half of their length to the next blends.
+    """
     most = clamped(s.length, s.most, cycle)
-    trimmed = s.length.copy()
-    better = arcs.good & (arcs.most > c.speed[at])
+    share = np.full(len(s), 0.5 * (1.0 - KINK))
+    rate = s.acceleration * share * np.where(s.blocks.arc, TANGENTIAL, 1.0)
+    arc_speed = np.where(arcs.good, clamped(arcs.length, arcs.most, cycle), 0.0)
+    better = arc_speed > c.speed[at]
     for _ in range(2):
-        trimmed[:] = s.length
+        trimmed = s.length.copy()
         trimmed[at[better] + 1] -= arcs.trim[better, 1]
-        trimmed = np.maximum(trimmed, NOTHING)
-        net = _overlap(s, at, at + 1, trimmed, most, np.full(len(s), 0.5 * (1.0 - KINK)), half_lengths=True)[1] / 2.0
-        arc_speed = np.where(arcs.good, arcs.most, 0.0)
+        length = np.maximum(trimmed[at], NOTHING), s.length[at + 1]
+        net = _overlap(s, at, length, (0.5, 0.5), np.minimum(s.asked, most), rate, share)[1] / 2.0
         better = (arc_speed > c.speed[at]) & (arc_speed > net)
     return better, ~better & (c.speed[at] > net)
 
 
-def _overlap(s: Segments, one: Ints, two: Ints, length: Floats, most: Floats, share: Floats,
-             half_lengths: bool = False) -> tuple[Floats, Floats]:
-    """(speed below which the next begins, speed along the blend) (K,) of overlapping ramps (`tpComputeBlendVelocity`)."""
-    rate = s.acceleration * share * np.where(s.blocks.arc, TANGENTIAL, 1.0)
-    target = np.minimum(s.asked, most)
-    fraction = 0.5 if half_lengths else 1.0
-    reach = np.minimum(np.sqrt(rate * length * fraction), target)
-    longest = np.minimum(length[one] / reach[one], length[two] / reach[two])
-    seconds = np.minimum(longest, np.maximum(reach[one] / rate[one], reach[two] / rate[two]))
-    speed, following = (np.minimum(reach[k], seconds * rate[k]) for k in (one, two))
-    theta = np.arccos(np.clip(-(_or_x(s.shape.last[one]) * _pull(s, two, share)).sum(axis=1), -1.0, 1.0)) / 2.0
-    tolerance = s.blocks.tolerance[one]
+def _overlap(s: Segments, one: Ints, length: tuple[Floats, Floats], part: tuple[Floats | float, Floats | float],
+             target: Floats, rate: Floats, share: Floats) -> tuple[Floats, Floats]:
+    """(speed below which the next begins, speed along the blend) (K,) of overlapping ramps (`tpComputeBlendVelocity`).
+
+    `length`, `part`: of the segments `one` and of those behind; how much of each may be counted on. Where rotary axes
+    move alone the tolerance counts as degrees.
+    """
+    two = one + 1
+    reach = [np.minimum(np.sqrt(rate[k] * way * much), target[k])
+             for k, way, much in zip((one, two), length, part, strict=True)]
+    longest = np.minimum(length[0] / reach[0], length[1] / reach[1])
+    seconds = np.minimum(longest, np.maximum(reach[0] / rate[one], reach[1] / rate[two]))
+    speed, following = (np.minimum(v, seconds * rate[k]) for k, v in zip((one, two), reach, strict=True))
+    theta = np.arccos(np.clip(-(_flat(s, s.shape.last, one) * _pull(s, two, share)).sum(axis=1), -1.0, 1.0)) / 2.0
+    alone = (s.shape.last[one] == 0.0).all(axis=1)
+    tolerance = s.blocks.tolerance[one] * np.where(alone, DEG, 1.0)
     with np.errstate(divide="ignore", invalid="ignore"):
         limit = np.where((np.cos(theta) > 1e-3) & np.isfinite(tolerance),
                          2.0 * np.sqrt(rate[one] * tolerance / np.cos(theta)), np.inf)
@@ -133,7 +142,7 @@ def _overlap(s: Segments, one: Ints, two: Ints, length: Floats, most: Floats, sh
 def _pull(s: Segments, rows: Ints, share: Floats) -> Floats:
     """(K, 3) unit direction of the acceleration at the begin of segments: that of the tangent, on arcs with half the
     asked speed's centripetal part (`tcCircleStartAccelUnitVector`)."""
-    tangent = _or_x(s.shape.first[rows])
+    tangent = _flat(s, s.shape.first, rows)
     radius = np.where(s.blocks.arc[rows], s.shape.radius[rows], 1.0)
     spoke = s.blocks.xyz[rows] - s.blocks.center[rows]
     inward = -spoke / np.maximum(np.linalg.norm(spoke, axis=1, keepdims=True), 1e-300)
@@ -142,9 +151,13 @@ def _pull(s: Segments, rows: Ints, share: Floats) -> Floats:
     return np.asarray(pull / np.maximum(np.linalg.norm(pull, axis=1, keepdims=True), 1e-300))
 
 
-def _or_x(tangent: Floats) -> Floats:
-    """Directions (K, 3); along X where X, Y, Z stand still, as LinuxCNC has it for a line without length."""
-    return np.where((tangent == 0.0).all(axis=1)[:, None], np.array([1.0, 0.0, 0.0]), tangent)
+def _flat(s: Segments, tangent: Floats, rows: Ints) -> Floats:
+    """(K, 3) tangents of segments; those of helices in the plane; along X where X, Y, Z stand still, as LinuxCNC has it
+    for a line without length."""
+    own, normal = tangent[rows], s.blocks.normal[rows]
+    own = np.where(s.blocks.arc[rows][:, None], own - (own * normal).sum(axis=1)[:, None] * normal, own)
+    size = np.linalg.norm(own, axis=1, keepdims=True)
+    return np.where(size > 0.0, own / np.maximum(size, 1e-300), np.array([1.0, 0.0, 0.0]))
 
 
 def _put_together(s: Segments, c: Corners, ends: Array, at: Ints, arcs: Blends, blended: Bools, tangent: Bools,
@@ -177,7 +190,9 @@ def _put_together(s: Segments, c: Corners, ends: Array, at: Ints, arcs: Blends, 
                     np.inf)
     here = np.flatnonzero((ends[:-1] == OVERLAP) & joined)
     overlap = np.zeros(count)
-    overlap[here] = _overlap(s, here, here + 1, length, most, share)[0]
+    last = np.append(~joined[1:], True)[here]
+    overlap[here] = _overlap(s, here, (length[here], length[here + 1]), (1.0, np.where(last, 0.5, 1.0)),
+                             np.minimum(s.asked, most), rate, share)[0]
     fresh = s.fresh.copy()
     fresh_blend = fresh[arc_at] & used
     return Row(both(np.arange(count), arc_at), both(length, blend_length), both(s.asked, arcs.asked[arc]),

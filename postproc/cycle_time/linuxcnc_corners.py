@@ -119,8 +119,9 @@ def _unit(v: Floats) -> Floats:
 
 def _side(s: Segments, rows: Ints, half: Floats, point: Floats, u1: Floats, u2: Floats, before: bool) -> _Side:
     """The segments `rows` (K,) as the side before or behind the corner."""
-    arc, center, radius = s.blocks.arc[rows], s.blocks.center[rows], s.shape.radius[rows]
+    arc, center = s.blocks.arc[rows], s.blocks.center[rows]
     spoke = point - center
+    radius = np.linalg.norm(spoke, axis=1)
     inward = (spoke * (u2 if before else u1)).sum(axis=1)
     convex = arc & ((inward < 0.0) if before else (inward >= 0.0))
     most = np.minimum(s.blocks.sweep[rows] * (2.0 / 3.0 if before else 1.0 / 3.0), np.where(convex, half, np.pi / 2.0))

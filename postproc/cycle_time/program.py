@@ -60,13 +60,12 @@ def blocks_of(code: Canonical, motion: Motion, machine: Machine, control: Contro
     end = motion.end * unit
     start = np.concatenate([motion.start[None] * unit, end[:-1]])
     arc = motion.code == 2
-    normal, sweep = _arcs(motion, control, arc)
+    normal, sweep, center = _arcs(motion, control, arc, start)
     path, tolerance, chain = _path_modes(words, own_path)
     path = np.where(motion.hole, Path.EXACT, path[block])
-    blocks = Blocks(Axes.of(machine), start, end, motion.line, motion.code == 0, arc,
-                    np.where(arc[:, None], motion.center, 0.0), normal, sweep, np.full(len(end), np.inf), path,
-                    tolerance[block], chain[block], origin.operation, origin.names, _pauses(words, block, code.line, motion,
-                                                                                          machine),
+    pauses = _pauses(words, block, code.line, motion, machine)
+    blocks = Blocks(Axes.of(machine), start, end, motion.line, motion.code == 0, arc, center, normal, sweep,
+                    np.full(len(end), np.inf), path, tolerance[block], chain[block], origin.operation, origin.names, pauses,
                     origin.cl_line, _tip_lengths(motion, control))
     blocks = replace(blocks, speed=_speeds(words, block, motion, blocks, by_radius))
     moving = (np.abs(end - start) > NOTHING).any(axis=1) | arc
@@ -90,13 +89,16 @@ def _block_of(code: Canonical, motion: Motion) -> Ints:
     return result
 
 
-def _arcs(motion: Motion, control: Control, arc: Bools) -> tuple[Floats, Floats]:
-    """normal (E, 3) and sweep (E,) of arcs."""
-    normal, at = np.zeros((len(motion), 3)), np.flatnonzero(arc)
+def _arcs(motion: Motion, control: Control, arc: Bools, start: Floats) -> tuple[Floats, Floats, Floats]:
+    """normal (E, 3), sweep (E,) and center (E, 3) of arcs, the center at the height of the start."""
+    normal, center, at = np.zeros((len(motion), 3)), np.zeros((len(motion), 3)), np.flatnonzero(arc)
     if not len(at):
-        return normal, np.zeros(len(motion))
-    normal[at, np.array([2, 1, 0])[motion.plane[at] - 17]] = np.where(motion.ccw[at], 1.0, -1.0)
-    return normal, np.nan_to_num(arc_sweeps(motion, control))
+        return normal, np.zeros(len(motion)), center
+    height = np.array([2, 1, 0])[motion.plane[at] - 17]
+    normal[at, height] = np.where(motion.ccw[at], 1.0, -1.0)
+    center[at] = motion.center[at]
+    center[at, height] = start[at, control.xyz[height]]
+    return normal, np.nan_to_num(arc_sweeps(motion, control)), center
 
 
 def _tip_lengths(motion: Motion, control: Control) -> Floats:
