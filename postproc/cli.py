@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from postproc.cli_calibrate import calibrate
 from postproc.cli_catalogue import controller_app, machine_app, setup_app
 from postproc.cli_time import time
 from postproc.console import Json, controller_of, machine_of, progress_bar, refuse_overwriting, report, shown_errors
@@ -24,6 +25,7 @@ app = typer.Typer(name="postproc", no_args_is_help=True, add_completion=False, r
 app.add_typer(machine_app, name="machine")
 app.add_typer(setup_app, name="setup")
 app.add_typer(controller_app, name="controller")
+app.command(epilog="Example: postproc calibrate reversal.toml -o errors.toml")(calibrate)
 app.command(epilog="Example: postproc time part.cls -m mikron-ucp710 -c linuxcnc")(time)
 
 ClFile = Annotated[Path, typer.Argument(metavar="FILE", help="CL file (APT text)")]

@@ -131,8 +131,13 @@ class MachineFit:
 def fit(model: ErrorModel, kinematics: Kinematics, measured: Measurements, parameters: Sequence[str] = (),
         robust: bool = False) -> MachineFit:
     """Identify; see `problem_of`. Where the data do not tell all, `result.not_identifiable` names it."""
-    result = solve(problem_of(model, kinematics, measured, parameters), robust)
+    problem = problem_of(model, kinematics, measured, parameters)
+    result = solve(problem, robust)
     count = len(model.names)
-    found = replace(model.with_values(result.values[:count]), covariance=result.covariance[:count, :count])
+    covariance = np.array(result.covariance[:count, :count])
+    if model.covariance is not None:  # what is known of the parameters that stay
+        stay = np.flatnonzero(~problem.free[:count])
+        covariance[np.ix_(stay, stay)] = model.covariance[np.ix_(stay, stay)]
+    found = replace(model.with_values(result.values[:count]), covariance=covariance)
     names = result.names[count:]
     return MachineFit(found, result, dict(zip(names, result.values[count:].tolist(), strict=True)))

@@ -1,0 +1,260 @@
+"""A measurement file to an error model: read, identify, report; a fit that the data do not support gives no model."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from machines.calibration.machine_fit import Measurements, fit
+from machines.calibration.measurement_file import (
+    BarModel,
+    LaserModel,
+    MeasurementModel,
+    PosesModel,
+    ReversalModel,
+    RotaryModel,
+)
+from machines.calibration.problem import CalibrationResult
+from machines.calibration.reversal import identify, plan, statistics
+from machines.calibration.rotary_fit import error_model, fit_rotary
+from machines.calibration.simulator import PARTS, Bench
+from machines.geometric_error.covariance import angular
+from machines.geometric_error.csv_table import ANGLES, LENGTHS, UNITS, CsvTable, read_csv
+from machines.geometric_error.curves import Table
+from machines.geometric_error.loader import load_checked as load_errors
+from machines.geometric_error.model import ErrorModel
+from machines.geometric_error.names import DIRECTIONS, ErrorName
+from machines.geometric_error.serial_errors import Component, SerialErrors
+from machines.loader import load_checked as load_machine
+from machines.machine import Machine
+from machines.user_file import UserFile, nearest, read_toml, validate
+from toolpaths.arrays import Floats
+from toolpaths.diagnostics import Diagnostic, error, has_errors, info
+
+ARCSEC = UNITS["arcsec"]
+KINDS = ("reversal", "rotary", "poses", "ball_bar", "laser")
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """What was found: the model (None where the data do not support it) and the figures of `calibrate --json`."""
+
+    model: ErrorModel | None
+    figures: dict[str, Any]
+
+
+def calibrate(source: str | Path) -> tuple[Calibration | None, list[Diagnostic]]:
+    """Identify what a measurement file asks for; None and what is wrong where it cannot be read."""
+    file, diagnostics = read_toml(source, None, "measurement")
+    if file is None:
+        return None, diagnostics
+    checked, diagnostics = validate(file, MeasurementModel)
+    if checked is None:
+        return None, diagnostics
+    given = [kind for kind in KINDS if getattr(checked, kind) is not None]
+    if len(given) != 1:
+        return None, [file.problem("calibrate.kind", (), f"{len(given)} kinds of measurement, one is needed",
+                                   "write one of " + ", ".join(f"[{k}]" for k in KINDS))]
+    origin = file.origin(("machine",))
+    beside = Path(origin.file).parent / checked.machine
+    machine, found = load_machine(beside if beside.suffix == ".toml" and beside.exists() else checked.machine)
+    if machine is None:
+        return None, found
+    return _Run(file, checked, machine, given[0]).result()
+
+
+class _Run:
+    """One measurement file being worked on; collects what is wrong."""
+
+    def __init__(self, file: UserFile, checked: MeasurementModel, machine: Machine, kind: str) -> None:
+        self.file, self.checked, self.machine, self.kind = file, checked, machine, kind
+        self.found: list[Diagnostic] = []
+
+    def result(self) -> tuple[Calibration | None, list[Diagnostic]]:
+        """See `calibrate`."""
+        given = getattr(self.checked, self.kind)
+        origin = self.file.origin((self.kind, "table"))
+        table, found = read_csv(Path(origin.file).parent / given.table, (origin.file, origin.line))
+        self.found += found
+        if table is None:
+            return None, self.found
+        done = self._identified(given, table)
+        if done is None or (has_errors(self.found) and done.model is not None):
+            return None, self.found
+        return done, self.found
+
+    def _identified(self, given: Any, table: CsvTable) -> Calibration | None:
+        if isinstance(given, ReversalModel):
+            return self._reversal(given, table)
+        return self._rotary(given, table) if isinstance(given, RotaryModel) else self._machine(given, table)
+
+    def _problem(self, code: str, message: str, hint: str = "", key: str = "table") -> None:
+        self.found.append(self.file.problem(code, (self.kind, key), message, hint))
+
+    # ---- tables ----------------------------------------------------------------------------------------------------
+
+    def _columns(self, table: CsvTable, wanted: Sequence[tuple[str, str]]) -> bool:
+        """True where all columns are there with the right kind of unit: "length", "angle" or "" for a number."""
+        for name, kind in wanted:
+            units = {"length": LENGTHS, "angle": ANGLES, "": {"": 1.0}}[kind]
+            if name not in table.columns:
+                self._problem("calibrate.column", f"{Path(table.file).name} has no column {name!r}",
+                              nearest(name, list(table.columns)))
+            elif table.unit[name] not in units:
+                self._problem("calibrate.unit", f"column {name!r} has unit {table.unit[name]!r}",
+                              f"write {name} [unit] with one of " + ", ".join(units) if kind else f"write {name} alone")
+        return not has_errors(self.found)
+
+    def _places(self, table: CsvTable, steps: int) -> tuple[Floats, Floats, int] | None:
+        """(set-up, step, number of set-ups) of each row."""
+        setup, step = table.columns["setup"], table.columns["step"]
+        bad = (setup != np.round(setup)) | (setup < 0) | (step != np.round(step)) | (step < 0) | (step >= steps)
+        pairs = setup * steps + step
+        twice = np.array([np.sum(pairs[:k] == p) > 0 for k, p in enumerate(pairs)])
+        for where, what in ((bad, f"is no set-up 0, 1, ... and step 0 .. {steps - 1}"), (twice, "was measured before")):
+            if where.any():
+                row = int(np.argmax(where))
+                self.found.append(error("calibrate.row", f"set-up {setup[row]:g}, step {step[row]:g} {what}",
+                                        file=table.file, lines=[table.lines[row]]))
+                return None
+        return setup.astype(np.int64), step.astype(np.int64), int(setup.max()) + 1
+
+    # ---- kinds -----------------------------------------------------------------------------------------------------
+
+    def _axis(self, letter: str) -> bool:
+        if letter not in self.machine.axis_names:
+            self._problem("calibrate.axis", f"{self.machine.name} has no axis {letter}", "it has "
+                          + ", ".join(self.machine.axis_names), "axis")
+            return False
+        return True
+
+    def _reversal(self, given: ReversalModel, table: CsvTable) -> Calibration | None:
+        if not self._axis(given.axis) or not self._columns(table, (("setup", ""), ("step", ""), ("reading", "angle"))):
+            return None
+        places = self._places(table, given.steps)
+        if places is None:
+            return None
+        setup, step, m = places
+        if given.shifts and len(given.shifts) != m:
+            self._problem("calibrate.shifts", f"{len(given.shifts)} shifts for {m} set-ups", "write one per set-up",
+                          "shifts")
+            return None
+        readings = np.full((m, given.steps), np.nan)
+        readings[setup, step] = table.columns["reading"]
+        sigma = given.sigma_arcsec * ARCSEC
+        fitted = identify(readings, sigma, given.zeroed, self.checked.robust, given.shifts or None)
+        figures = _figures(fitted.result, {}, fitted.conditioning.rank, fitted.conditioning.condition_number)
+        figures |= {"axis_arcsec": _list(fitted.axis / ARCSEC), "axis_sigma_arcsec": _list(fitted.axis_sigma / ARCSEC),
+                    "indexer_arcsec": _list(fitted.indexer / ARCSEC),
+                    "set_by_closure": ["sum of the axis's errors over a turn", "sum of the indexer's errors over a turn",
+                                       *(["constant of each set-up"] if given.zeroed else [])],
+                    "residual_rms_arcsec": statistics(fitted.residuals).rms / ARCSEC,
+                    "plan": [{"setups": c.setups, "sigma_arcsec": c.sigma / ARCSEC, "minutes": c.minutes}
+                             for c in plan(given.steps, sigma, self.checked.minutes_per_reading,
+                                           self.checked.minutes_per_setup, min(given.steps, 6), given.zeroed)]}
+        if fitted.lacking:
+            self._problem("calibrate.rank", f"the readings do not tell axis and indexer apart: {fitted.lacking}")
+            return Calibration(None, figures)
+        name = ErrorName(DIRECTIONS.index(given.axis), False, given.axis)
+        x = 2.0 * np.pi * np.arange(given.steps) / given.steps
+        model = ErrorModel(SerialErrors((Component(name, Table(x, fitted.axis, "spline", period=2.0 * np.pi)),)),
+                           covariance=fitted.covariance[: given.steps, : given.steps])
+        return self._done(model, figures)
+
+    def _rotary(self, given: RotaryModel, table: CsvTable) -> Calibration | None:
+        kinds = (("setup", ""), ("step", ""), *((p, "length" if p[0] == "d" else "angle") for p in PARTS))
+        if not self._axis(given.axis) or not self._columns(table, kinds):
+            return None
+        places = self._places(table, given.steps)
+        if places is None:
+            return None
+        setup, step, m = places
+        readings = np.full((m, given.steps, 6), np.nan)
+        readings[setup, step] = np.stack([table.columns[p] for p in PARTS], axis=1)
+        sigma = np.repeat([given.sigma_um * 1e-3, given.sigma_arcsec * ARCSEC], 3)
+        bench = Bench(given.steps, given.axis_to_indexer, given.indexer_to_reflector, np.array(given.shift))
+        if given.harmonics > (given.steps - 1) // 2:
+            self._problem("calibrate.harmonics", f"{given.steps} steps carry {(given.steps - 1) // 2} harmonics at the "
+                          f"most, {given.harmonics} are asked for", "ask for fewer, or measure more steps", "harmonics")
+            return None
+        fitted = fit_rotary(bench, readings, sigma, given.harmonics)
+        model = error_model(fitted, given.axis)
+        figures = _figures(fitted.result, {}, fitted.result.rank, fitted.result.condition_number)
+        figures["not_identifiable"] = [[name] for name in fitted.lost]
+        if fitted.lost:
+            self.found.append(info("calibrate.hidden", "the mounting can pretend " + ", ".join(fitted.lost) + " as well; "
+                                   "they are 0 in the model", file=self.file.file))
+        return self._done(model, figures)
+
+    def _machine(self, given: PosesModel | BarModel | LaserModel, table: CsvTable) -> Calibration | None:
+        names = self.machine.axis_names
+        joints = [(n, "angle" if r else "length") for n, r in zip(names, self.machine.rotary, strict=True)]
+        wanted = {"poses": ("dx", "dy", "dz"), "ball_bar": ("distance",), "laser": ("reading",)}[self.kind]
+        if not self._columns(table, [*joints, *((w, "length") for w in wanted)]):
+            return None
+        start = self._start()
+        if start is None:
+            return None
+        q = np.stack([table.columns[n] for n in names], axis=1)
+        read = np.stack([table.columns[w] for w in wanted], axis=1)
+        kinematics, sigma = self.machine.kinematics.with_tool(given.tool_length), given.sigma_um * 1e-3
+        if isinstance(given, PosesModel):
+            measured = Measurements("position", q, read, sigma, zeroed=given.zeroed)
+        elif isinstance(given, BarModel):
+            measured = Measurements("distance", q, read[:, 0], sigma, centre=np.array(given.centre))
+        else:
+            toward = np.array(given.toward) / np.linalg.norm(given.toward)
+            measured = Measurements("along", q, read[:, 0], sigma, toward=toward, zeroed=given.zeroed)
+        try:
+            fitted = fit(start, kinematics, measured, self.checked.parameters, self.checked.robust)
+        except ValueError as fault:
+            self.found.append(self.file.problem("calibrate.parameter", ("parameters",), str(fault)))
+            return None
+        result = fitted.result
+        figures = _figures(result, {}, result.rank, result.condition_number) | {"setup_mm": fitted.setup}
+        if not result.converged:
+            self._problem("calibrate.converged", "the fit does not come to an end", "check units and signs of the table")
+        for group in result.not_identifiable:
+            self._problem("calibrate.rank", f"the readings tell only combinations of {', '.join(group[:12])}",
+                          "measure where they differ, or name fewer under parameters")
+        return Calibration(None, figures) if has_errors(self.found) else self._done(fitted.model, figures)
+
+    def _start(self) -> ErrorModel | None:
+        if not self.checked.model:
+            self.found.append(self.file.problem("calibrate.model", ("model",), "no error model to start from",
+                                                "write model = \"start.toml\", with the parameters that are wanted, all 0"))
+            return None
+        origin = self.file.origin(("model",))
+        model, found = load_errors(Path(origin.file).parent / self.checked.model, self.machine)
+        self.found += found
+        return model
+
+    def _done(self, model: ErrorModel, figures: dict[str, Any]) -> Calibration:
+        model = replace(model, machine=self.machine.name)
+        figures["parameters"] = _parameters(model)
+        return Calibration(model, figures)
+
+
+def _figures(result: CalibrationResult, parameters: dict[str, Any], rank: int, number: float) -> dict[str, Any]:
+    count = max(len(result.residuals), 1)
+    return {"parameters": parameters, "rank": rank, "condition_number": number if np.isfinite(number) else None,
+            "rms_before": float(np.sqrt(result.cost_before / count)), "rms_after": float(np.sqrt(result.cost_after / count)),
+            "converged": result.converged, "not_identifiable": [list(group) for group in result.not_identifiable]}
+
+
+def _parameters(model: ErrorModel) -> dict[str, Any]:
+    """By name: value, sigma, unit (um or arcsec)."""
+    sigma = np.zeros(len(model.names)) if model.covariance is None else np.sqrt(np.diag(model.covariance))
+    units = ["arcsec" if angular(name) else "um" for name in model.names]
+    return {name: {"value": float(v / UNITS[u]), "sigma": float(s / UNITS[u]), "unit": u}
+            for name, v, s, u in zip(model.names, model.values, sigma, units, strict=True)}
+
+
+def _list(values: Floats) -> list[float | None]:
+    return [float(v) if np.isfinite(v) else None for v in values]
+
+
