@@ -46,7 +46,7 @@ def plan_feeds(path: Path, control: Control, step: Floats, asked: Floats, passes
         planned: feeds that keep acceleration and jerk, too; velocities only without it
     """
     mode = _modes(path, control, step, passes, native, feed_mode, rules)
-    needed = least_seconds(path, control, asked)
+    needed = least_seconds(path, control, asked, step)
     if planned is None:
         return feed_words(path, control, step, asked, needed, mode, rules)
     feeds = feed_words(path, control, step, asked, np.fmax(needed, planned.needed), mode, rules)
@@ -56,11 +56,13 @@ def plan_feeds(path: Path, control: Control, step: Floats, asked: Floats, passes
     return replace(feeds, feed=feed, seconds=feeds.seconds * factor, slowed=feeds.slowed | (factor > 1.0 + 1e-9))
 
 
-def least_seconds(path: Path, control: Control, asked: Floats) -> Floats:
-    """(K,) s that the velocities of the axes ask of each block."""
+def least_seconds(path: Path, control: Control, asked: Floats, step: Floats) -> Floats:
+    """(K,) s that the velocities of the axes ask of each block, by its joints and by its rounded words, step (K, J)."""
     joints = np.concatenate([control.machine.home[None, :], path.q[:-1]])
     velocity = control.machine.limits.velocity
-    needed = (np.abs(path.q - joints) / velocity).max(axis=1)
+    way = np.abs(path.q - joints)
+    joint = np.array([f.control.law == "axes" for f in path.frames])[path.frame][:, None] | np.array(control.machine.rotary)
+    needed = (np.where(joint, np.maximum(way, np.abs(step) / control.unit), way) / velocity).max(axis=1)
     arc = (path.code == ARC) & ~_control_bends(path)
     if arc.any():
         top = asked / velocity[control.xyz].min()

@@ -128,6 +128,8 @@ class Reader:
 
     def block(self, k: int) -> None:
         p = self.program
+        if p.code[k] > 0:
+            self.stated[:] = False
         self.stated |= p.write[k]
         if p.home[k]:
             assert self.section.law == "axes" and p.code[k] == 0

@@ -259,7 +259,8 @@ def test_rotary_axes_are_stated_where_they_stand_already(law: str, tmp_path: Pat
     path = operations(flat, piece)
     own = setup_of(tmp_path, f'[output.operations]\nA = "{law}"\n')
     result = convert(path, "mikron-ucp710", shop(tmp_path), own)
-    assert [s.law for s in result.program.sections] == ["axes", *(["tilted", "axes"] if law == "tilted" else []), "tcp", "axes"]
+    first = ["axes", "tilted", "axes"] if law == "tilted" else ["axes"]
+    assert [s.law for s in result.program.sections] == [*first, "tcp", "axes"]
     follows(result)
 
 
