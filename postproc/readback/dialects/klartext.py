@@ -24,6 +24,7 @@ from toolpaths.arrays import Ints
 from toolpaths.diagnostics import Diagnostic, error, warning
 
 _COMMENT = re.compile(rb";[^~\n]*(?:~[ \t]*(?=\n))?|;[^\n]*")
+_SKIPPED = re.compile(rb"(?m)^[ \t]*/[ \t]*(\d+[ \t]+)")
 _JOINED = re.compile(rb"~[ \t]*\n")
 _SLOW = re.compile(rb"(?m)^(?![ \t]*(?:\d+[ \t]+)?L[ \t](?![^\n]*M12[89]))[^\n]+$")
 _HEAD = re.compile(rb"(?m)^[ \t]*(?:\d+[ \t]+)?L[ \t]")
@@ -55,7 +56,7 @@ class KlartextReader(Reader):
         text = _COMMENT.sub(lambda m: b"~" if m[0].rstrip().endswith(b"~") else b"", text)
         text = _JOINED.sub(b" \x01", text)
         rows = np.cumsum([0, *(1 + row.count(b"\x01") for row in text.split(b"\n"))]) if b"\x01" in text else None
-        text, found = block_delete(text.replace(b"\x01", b" "), file)
+        text, found = block_delete(_SKIPPED.sub(rb"\1/", text.replace(b"\x01", b" ")), file)
         slow: list[tuple[int, str]] = []
 
         def cut(match: re.Match[bytes]) -> bytes:
