@@ -230,7 +230,7 @@ def check_links(motion: Motion, executed: Executed, moves: Moves, owner: Ints, s
            faults: Faults) -> list[Diagnostic]:
     """Linking blocks, those after the last point too, stay on the line of retract, clear of the path, or on the line of
     approach."""
-    rows = np.flatnonzero((owner >= len(moves)) | moves.link[np.minimum(owner, len(moves) - 1)])
+    rows = np.flatnonzero((owner == len(moves)) | ((owner < len(moves)) & moves.link[np.minimum(owner, len(moves) - 1)]))
     rows = rows[rows > 0]
     bad = np.zeros(len(rows), dtype=bool)
     m = owner[rows]

@@ -21,7 +21,8 @@ from postproc.readback.checks import (
 from postproc.readback.execute import Motion
 from postproc.readback.faults import Faults
 from postproc.readback.poses import SAMPLES, Executed, arc_sweeps
-from toolpaths.arrays import Floats, Ints
+from postproc.readback.rewinds import check_rewinds, rewinds
+from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.diagnostics import Diagnostic
 from toolpaths.rotations import angle_between
 from toolpaths.shape import Curves
@@ -57,8 +58,9 @@ def compare(motion: Motion, job: Job, executed: Executed, gcode: str = "") -> Co
     tip, axis = executed.poses(motion, np.arange(len(motion)), 1.0)
     words = job.controller.format
     grain = max(1e-3, 1.5 * 10.0**-words.linear_decimals), max(1e-6, 1.5 * DEG * 10.0**-words.rotary_decimals)
-    match, owner = align(tip, axis, arc_sweeps(motion, executed.control), curves, moves.link, tolerance, axis_tolerance,
-                         grain)
+    number = rewinds(motion, tip, axis, executed.control.rotary, (2.0 * tolerance, 2.0 * axis_tolerance))
+    match, owner = _aligned(np.flatnonzero(number < 0), tip, axis, arc_sweeps(motion, executed.control), curves, moves.link,
+                            tolerance, axis_tolerance, grain)
     lost = unreached(match)
     diagnostics = [] if lost < 0 else [_not_reached(motion, moves, match, lost, faults)]
     rows = np.flatnonzero((owner < len(moves)) & ~moves.link[np.minimum(owner, len(moves) - 1)])
@@ -76,9 +78,19 @@ def compare(motion: Motion, job: Job, executed: Executed, gcode: str = "") -> Co
     diagnostics += check_speeds(motion, executed.control, moves, curves, owner, match,
                                 job.controller.feed.arc_inverse == "radius", faults)
     diagnostics += check_links(motion, executed, moves, owner, job.space, tolerance, faults)
+    diagnostics += check_rewinds(motion, executed, number, tip, axis, job.space, tolerance, faults)
     diagnostics += check_travel(motion, executed, moves, owner, faults)
     diagnostics += check_smoothing(motion, job, moves, owner, faults)
     return Comparison(worst_tip, worst_axis, tip_line, axis_line, tip, axis, match, owner, tuple(diagnostics))
+
+
+def _aligned(kept: Ints, tip: Floats, axis: Floats, sweep: Floats, curves: Curves, link: Bools, tolerance: float,
+             axis_tolerance: float, grain: tuple[float, float]) -> tuple[Ints, Ints]:
+    """`align` without the blocks of rewinds, which get no move (M + 1): but for them the tool only rests there."""
+    match, short = align(tip[kept], axis[kept], sweep[kept], curves, link, tolerance, axis_tolerance, grain)
+    owner = np.full(len(tip), len(link) + 1)
+    owner[kept] = short
+    return np.where(match >= 0, kept[match], match), owner
 
 
 def _not_reached(motion: Motion, moves: Moves, match: Ints, lost: int, faults: Faults) -> Diagnostic:

@@ -1,0 +1,90 @@
+"""Rewinds in a program: the tool leaves the part, axes unwind, it comes back to the very pose. Found from motion alone.
+
+A rewind is known by what no other motion does: the tool stands in one pose twice with rotary axes that stand elsewhere, and
+between the two it moved in rapid.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from postproc.links import SafeSpace
+from postproc.readback.execute import Motion
+from postproc.readback.faults import Faults
+from postproc.readback.poses import Executed
+from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.diagnostics import Diagnostic
+
+_REACH = 60
+"""blocks before and behind the unwinding block that are looked at"""
+_UNWOUND = 20.0
+"""degrees: least turn of a block that may unwind"""
+_MOVED = 1.0
+"""degrees: least difference of a rotary axis between the two stands"""
+
+
+def rewinds(motion: Motion, tip: Floats, axis: Floats, rotary: Ints, grain: tuple[float, float]) -> Ints:
+    """(E,) number of the rewind that each block belongs to, -1 for none.
+
+    Args:
+        tip, axis: (E, 3) poses at the ends of the blocks
+        rotary: joint numbers
+        grain: mm, rad within which two poses are the same
+    """
+    result = np.full(len(motion), -1)
+    if not len(rotary) or len(motion) < 3:
+        return result
+    angle = motion.end[:, rotary]
+    turned = np.append(0.0, np.abs(np.diff(angle, axis=0)).max(axis=1)) >= _UNWOUND
+    count = 0
+    for k in np.flatnonzero(turned & (motion.code == 0)):
+        if result[k] >= 0:
+            continue
+        found = _around(int(k), motion.code == 0, tip, axis, angle, grain)
+        if found is not None:
+            result[found[0]:found[1] + 1] = count
+            count += 1
+    return result
+
+
+def _around(k: int, rapid: Bools, tip: Floats, axis: Floats, angle: Floats,
+            grain: tuple[float, float]) -> tuple[int, int] | None:
+    """(first, last) block of the rewind round block k; the pose is that where block first - 1 ends.
+
+    Above the part the tool stands in one pose twice too: the first pose since the last cut that is come back to counts.
+    """
+    low, high = max(k - _REACH, 1), min(k + _REACH, len(tip))
+    stop = np.flatnonzero(~rapid[low:k])
+    low += int(stop[-1]) if len(stop) else 0
+    begin, end = np.arange(max(low - 1, 0), k), np.arange(k, high)
+    same = (np.linalg.norm(tip[begin, None] - tip[None, end], axis=2) <= grain[0]) & (
+        np.linalg.norm(axis[begin, None] - axis[None, end], axis=2) <= grain[1])
+    same &= np.abs(angle[begin, None] - angle[None, end]).max(axis=2) >= _MOVED
+    pairs = np.argwhere(same)
+    if not len(pairs):
+        return None
+    first, last = pairs[0]
+    return int(begin[first]) + 1, int(end[last])
+
+
+def check_rewinds(motion: Motion, executed: Executed, number: Ints, tip: Floats, axis: Floats, space: SafeSpace,
+                  tolerance: float, faults: Faults) -> list[Diagnostic]:
+    """Blocks of rewinds stay on the line of the tool axis where they left the cut, or clear of the path."""
+    rows = np.flatnonzero(number >= 0)
+    if not len(rows):
+        return []
+    first = rows[np.searchsorted(number[rows], number[rows])]
+    pose, direction = tip[first - 1], axis[first - 1]
+    bad = np.zeros(len(rows), dtype=np.bool_)
+    for t in executed.times(motion, rows):
+        now, along = executed.poses(motion, rows, t)
+        offset = now - pose
+        height = np.maximum(np.einsum("ni,ni->n", offset, direction), 0.0)
+        beside = np.linalg.norm(offset - height[:, None] * direction, axis=1) > tolerance
+        turned = np.linalg.norm(along - direction, axis=1) > 1e-6
+        bad |= (beside | turned) & ~space.clear(now, along, -tolerance)
+    if not bad.any():
+        return []
+    k = int(np.flatnonzero(bad)[0])
+    return [faults.error("verify.rewind", "an axis unwinds while the tool is too near to the part", 0,
+                         int(motion.line[rows[k]]), int(bad.sum()))]
