@@ -7,13 +7,14 @@ number for has a sign of its own:
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
 
 from postproc.readback.words import Words
 from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.diagnostics import Diagnostic
 
 REGISTER = "@"
 """length register in force from this block on, -1 for none"""
@@ -62,6 +63,7 @@ class Text:
     statements: tuple[Statement, ...] = ()
 
 
+Files = tuple[tuple[str, int], ...]
 LawName = Literal["axes", "tcp", "tilted"]
 Choice = Literal["nearest", "+", "-"]
 
@@ -111,13 +113,33 @@ class Drill:
 class Canonical:
     """B blocks in the order in which the control runs them; words count blocks from 1.
 
-    `line` (B + 1,) is the line that a block stands in, of the main file or of that of its subprogram.
+    `line` (B + 1,) is the line that a block stands in; lines of further files count on from those before. `files`: their
+    names, and the lines that stand before each; empty for one file.
     """
 
     words: Words
     line: Ints
     laws: tuple[Law, ...] = ()
     drills: tuple[Drill, ...] = ()
+    files: Files = ()
+
+
+def placed(found: list[Diagnostic], files: Files) -> list[Diagnostic]:
+    """Diagnostics whose lines count through all files, with the file and line of each."""
+    result = []
+    for d in found:
+        k = int(np.searchsorted([n for _, n in files], d.lines[0])) - 1 if files and d.lines else 0
+        result.append(replace(d, file=files[k][0], lines=tuple(n - files[k][1] for n in d.lines)) if k > 0 else d)
+    return result
+
+
+def in_files(line: Ints, files: Files) -> Ints:
+    """Lines that count through all files as lines of their own files."""
+    if not files:
+        return line
+    before = np.array([n for _, n in files], dtype=np.int64)
+    result: Ints = line - before[np.maximum(np.searchsorted(before, line) - 1, 0)]
+    return result
 
 
 def added(words: Words, new: list[tuple[int, str, float]], drop: Bools | None = None) -> Words:

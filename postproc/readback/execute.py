@@ -10,7 +10,7 @@ import numpy as np
 
 from postproc.control import Control
 from postproc.readback import frames
-from postproc.readback.canonical import CALL, LAW, REST, TURNS, Canonical, Law, Text
+from postproc.readback.canonical import CALL, LAW, REST, TURNS, Canonical, Law, Text, in_files, placed
 from postproc.readback.frames import AXES, Frame
 from postproc.readback.modal import Modal, columns, fill, fill_values, modal_state
 from postproc.readback.sections import Rows, Section, run_section
@@ -110,7 +110,7 @@ def run(code: Canonical, letters: tuple[str, ...], offsets: Offsets, file: str =
         position = part.end[-1] if len(part.end) else position
         parts.append(part)
     rows = Rows.joined(parts, len(letters))
-    return _motion(words, modal, rows, code, tuple(used), offsets, rests), found
+    return _motion(words, modal, rows, code, tuple(used), offsets, rests), placed(found, code.files)
 
 
 def _stretches(words: Words, modal: Modal, laws: tuple[Law, ...]) -> list[tuple[int, int, Law | None, int]]:
@@ -157,7 +157,7 @@ def _motion(words: Words, modal: Modal, rows: Rows, code: Canonical, used: tuple
     feed, missing = _feeds(words, modal, rows)
     dwell = _dwell(block, rows.code, rows.hole, rows.dwell, rests)
     inverse = modal.inverse[block] & ~rows.hole
-    return Motion(code.line[block], rows.code, rows.end, offsets.home, modal.plane[block],
+    return Motion(in_files(code.line[block], code.files), rows.code, rows.end, offsets.home, modal.plane[block],
                   modal.motion[block] == 3, rows.center, feed, inverse, modal.tool[block], modal.length_register[block],
                   modal.spindle[block], modal.rpm[block], modal.flood[block], modal.mist[block], rows.hole, missing, dwell,
                   modal.compensation[block], modal.offset[block], modal.blend[block], rows.frame, used)

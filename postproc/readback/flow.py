@@ -42,7 +42,7 @@ class Structure:
 
 
 def expand(texts: list[Text], structures: list[Structure], file: str) -> tuple[Text, Ints, list[Diagnostic]]:
-    """(text whose lines are blocks in running order, line of each block (B + 1,), faults).
+    """(text whose lines are blocks in running order, line of each block (B + 1,) counted through all files, faults).
 
     The first file holds the main program; the names of all files are one list, the calling file's own come first.
     """
@@ -55,10 +55,11 @@ def expand(texts: list[Text], structures: list[Structure], file: str) -> tuple[T
         return texts[0], np.arange(texts[0].words.lines + 1), found[:1]
     statements = tuple(s for t in texts for s in t.statements)
     before = np.cumsum([0, *(len(t.statements) for t in texts)])
+    rows = np.cumsum([0, *(t.words.lines for t in texts)])
     parts, lines, at = [], [np.zeros(1, dtype=np.int64)], 0
     for k, first, last in spans:
         parts.append(_slice(texts[k].words, first, last, at, int(before[k])))
-        lines.append(np.arange(first, last + 1))
+        lines.append(np.arange(first, last + 1) + int(rows[k]))
         at += last - first + 1
     words = Words(np.concatenate([p.letter for p in parts]), np.concatenate([p.value for p in parts]),
                   np.concatenate([p.line for p in parts]), at,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cache
 
 import numpy as np
@@ -31,7 +32,7 @@ def control(name: str = "mill-3axis", rapids: Rapids = "straight", own: Kinemati
     return Control(machine(name), "axes", np.array(ORIGIN), rapids=rapids, own_kinematics=own)
 
 
-def executed(dialect: str, text: str, on: str = "mill-3axis", others: dict[str, bytes] | None = None,
+def executed(dialect: str, text: str, on: str = "mill-3axis", others: Mapping[str, bytes] | None = None,
              of: Control | None = None) -> tuple[Motion | None, list[Diagnostic]]:
     """Motion of a program, and what the reader finds."""
     held = of or control(on)

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+from postproc.readback.files import Beside
 from tests.postproc.reader_kit import FANUC, HAAS, executed, faults, good, words
 from tests.postproc.reader_kit import controller as spec
 
@@ -131,6 +134,23 @@ def test_subprograms_of_the_same_file_run_as_often_as_asked() -> None:
 def test_subprograms_of_other_files() -> None:
     motion = good(FANUC, program("G0 X0. Y0. Z0.\nM98 P77\nX9.\n"), others={"O77.nc": b"%\nO0077\nX3.\nM99\n%\n"})
     assert words(motion)[1:] == [[3, 0, 0], [9, 0, 0]]
+
+
+def test_a_fault_in_another_file_points_there() -> None:
+    others = {"O77.nc": b"%\nO0077\nG2 X1. R.1 F9\nM99\n%\n", "O78.nc": b"%\nO78\nG52 X1.\nM99\n%\n"}
+    _, found = executed(FANUC, program("G0 X0. Y0. Z0.\nM98 P77\n"), others=others)
+    assert [(d.code, d.file, list(d.lines)) for d in found] == [("gcode.arc", "O77.nc", [3])], "O78 is not called"
+    _, found = executed(FANUC, program("G0 X0. Y0. Z0.\nM98 P78\n"), others=others)
+    assert [(d.code, d.file, list(d.lines)) for d in found] == [("gcode.unknown_code", "O78.nc", [3])]
+
+
+def test_files_beside_a_program(tmp_path: Path) -> None:
+    for name in ("MAIN.nc", "o0077.NC"):
+        (tmp_path / name).write_bytes(b"%\nO0077\nX3.\nM99\n%\n")
+    beside = Beside(tmp_path / "MAIN.nc")
+    assert list(beside) == ["o0077.NC"] and len(beside) == 1 and "MAIN.nc" not in beside
+    motion = good(FANUC, program("G0 X0. Y0. Z0.\nM98 P77\n"), others=beside)
+    assert words(motion)[-1] == [3, 0, 0]
 
 
 def test_local_subprograms_of_haas() -> None:

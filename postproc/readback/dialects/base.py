@@ -4,15 +4,20 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import PurePath
+
+import numpy as np
 
 from postproc.controllers.model import ControllerFile
-from postproc.readback.canonical import Canonical, Text, offset_number
+from postproc.readback.canonical import Canonical, Text, offset_number, placed
 from postproc.readback.flow import Structure, expand
 from postproc.readback.modal import GROUPS, Groups, check_codes, check_end, codes, drop_passive
 from postproc.readback.words import Words
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, has_errors
 
+Program = tuple[Text, Structure]
 M_CODES = (0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 30.0)
 
 
@@ -62,28 +67,46 @@ class Reader(ABC):
     def read(self, data: bytes, file: str = "", others: Mapping[str, bytes] | None = None,
              ) -> tuple[Canonical | None, list[Diagnostic]]:
         """A program, with the files of its subprograms by name, as canonical words; None where it cannot be read."""
-        texts, structures, found = [], [], []
         self.main_file = file
-        for name, content in {file: data, **(others or {})}.items():
-            text, more = self.tokens(content, name)
+        found: list[Diagnostic] = []
+        programs: dict[str, Program] = {}
+        waiting, others = {file: data}, others or {}
+        stems = {PurePath(name).stem.upper(): name for name in others}
+        while waiting:
+            name = next(iter(waiting))
+            read, more = self.program(waiting.pop(name), name)
             found += more
-            if has_errors(found):
+            if read is None:
                 return None, found
-            if self.controller is not None:
-                text = Text(drop_passive(text.words, self.controller.program.passive), text.statements)
-            structure, more = self.structure(text, name)
-            found += [*more, *self.check(text.words, name)]
-            if name == file:
-                found += check_end(text.words, file, self.behind_end(structure))
-                structure.main = _to_end(text.words, structure.main)
-            texts.append(text)
-            structures.append(structure)
-        text, line, more = expand(texts, structures, file)
-        found += more
+            programs[name] = read
+            wanted = {stems[s] for call in programs[name][1].calls.values() for s in self.stems(call.name) if s in stems}
+            waiting |= {n: others[n] for n in sorted(wanted - set(programs) - set(waiting))}
+        texts, structures = zip(*programs.values(), strict=True)
+        text, line, more = expand(list(texts), list(structures), file)
+        before = np.cumsum([0, *(t.words.lines for t in texts)]).tolist()
+        files = tuple(zip(programs, before, strict=False)) if len(programs) > 1 else ()
         if has_errors(more):
+            return None, [*found, *more]
+        code, last = self.canonical(text, line, file)
+        return replace(code, files=files), [*found, *more, *placed(last, files)]
+
+    def program(self, data: bytes, name: str) -> tuple[Program | None, list[Diagnostic]]:
+        """Words and programs of one file; None where its text cannot be read."""
+        text, found = self.tokens(data, name)
+        if has_errors(found):
             return None, found
-        code, more = self.canonical(text, line, file)
-        return code, [*found, *more]
+        if self.controller is not None:
+            text = Text(drop_passive(text.words, self.controller.program.passive), text.statements)
+        structure, more = self.structure(text, name)
+        found += [*more, *self.check(text.words, name)]
+        if name == self.main_file:
+            found += check_end(text.words, name, self.behind_end(structure))
+            structure.main = _to_end(text.words, structure.main)
+        return (text, structure), found
+
+    def stems(self, call: str) -> tuple[str, ...]:
+        """Names that the file of a subprogram may bear, in capitals, without their ending."""
+        return (call,)
 
 
 def _to_end(words: Words, main: tuple[int, int]) -> tuple[int, int]:

@@ -67,6 +67,11 @@ class FanucReader(IsoReader):
         """True where an M99 ends a subprogram inside of the main program."""
         return False
 
+    def stems(self, call: str) -> tuple[str, ...]:
+        """O77 may be in O77, O0077, 77, 0077."""
+        number = int(call[1:]) if call[1:].isdigit() else -1
+        return call, f"O{number:04d}", f"{number}", f"{number:04d}"
+
     def calls(self, words: Words) -> dict[int, Call]:
         """M98 P of four digits L, or P with the number of times before the last four."""
         result = {}

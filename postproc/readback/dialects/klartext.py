@@ -128,6 +128,10 @@ class KlartextReader(Reader):
         """Number of the preset that CYCL DEF 247 takes."""
         return float(dict(_QWORD.findall(text)).get("339", "nan"))
 
+    def stems(self, call: str) -> tuple[str, ...]:
+        """The name of CALL PGM, without folders."""
+        return (call.removeprefix("PGM "),) if call.startswith("PGM ") else ()
+
     def behind_end(self, structure: Structure) -> tuple[tuple[int, int], ...]:
         """Lines that may stand behind the end: those of labels."""
         ends = tuple((b, b) for b in self.ends)

@@ -90,6 +90,10 @@ class SiemensReader(Reader):
             more += _parse(row, line, new, statements, file)
         return Text(added(words, new), tuple(statements)), found + more
 
+    def stems(self, call: str) -> tuple[str, ...]:
+        """POCKET may be in POCKET, _N_POCKET_SPF, POCKET_SPF."""
+        return call, f"_N_{call}_SPF", f"{call}_SPF"
+
     def check(self, words: Words, file: str) -> list[Diagnostic]:
         """Codes and words; relative and forced ones count as plain."""
         letter = words.letter & 127
