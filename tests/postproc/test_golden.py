@@ -23,6 +23,7 @@ LAWS = [("fanuc-30i", "mikron-ucp710"), ("haas-ngc", "trunnion-bc"), ("siemens-8
         ("heidenhain-tnc640", "mikron-ucp710")]
 """three_laws.cls in each output mode: one flat and one tilted operation, one that turns the tool axis"""
 PIECES = [
+    *((GOLDEN / "every_cycle.cls", machine, controller) for controller, machine in LAWS),
     (SAMPLES / "pocket.cls", "mill-3axis", "linuxcnc"),
     (SAMPLES / "pocket.cls", "mill-3axis", "generic-iso"),
     (SAMPLES / "inch_plate.apt", "mill-3axis", "linuxcnc"),
