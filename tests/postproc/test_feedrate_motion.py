@@ -11,8 +11,9 @@ import pytest
 from postproc.feedrate.limits import JointLimits, ToolLimits
 from postproc.feedrate.mesh import Spacing
 from postproc.feedrate.motion import Plan
-from postproc.feedrate.paths import Derivatives
+from postproc.feedrate.paths import Derivatives, Eased
 from postproc.feedrate.plan import Options, plan, plan_second_order
+from postproc.feedrate.rows import tool
 from postproc.feedrate.windows import Method
 from tests.postproc.feedrate_kit import MIKRON, PolynomialPath, only_jerk, random_path, zigzag
 from toolpaths.arrays import Floats
@@ -34,6 +35,12 @@ def test_by_place_is_by_time(made: Plan) -> None:
     assert made.speed(np.array([0.0, 30.0, 100.0])).tolist() == [0.0, 0.0, 0.0]
 
 
+def test_the_last_sample_is_at_rest(made: Plan) -> None:
+    samples = made.trajectory()
+    assert samples.t[-1] >= made.seconds > samples.t[-2]
+    assert not np.any(np.concatenate((samples.qd[-1], samples.qdd[-1], samples.qddd[-1])))
+
+
 def test_at_places(made: Plan) -> None:
     samples = made.trajectory()
     some = made.at(samples.s[50:-50:7])
@@ -47,7 +54,7 @@ def test_at_places(made: Plan) -> None:
 
 def test_blocks(made: Plan) -> None:
     """Times add up to the whole, also over stops; lowest and highest are those of dense places."""
-    cuts = np.array([0.0, 0.5, 10.0, 29.0, 33.0, 60.0, 60.01, 100.0])
+    cuts = np.array([0.0, 0.5, 10.0, 29.0, 30.0, 33.0, 60.0, 70.0, 72.0, 100.0])
     blocks = made.blocks(cuts)
     assert blocks.seconds.sum() == pytest.approx(made.seconds, rel=1e-9)
     np.testing.assert_allclose(blocks.mean * blocks.seconds, np.diff(cuts))
@@ -55,7 +62,7 @@ def test_blocks(made: Plan) -> None:
         dense = made.speed(np.append(np.linspace(a, b, 400), np.clip([30.0, 71.0], a, b)))
         assert blocks.lowest[i] == pytest.approx(dense.min(), rel=5e-3, abs=0.2)
         assert blocks.highest[i] == pytest.approx(dense.max(), rel=5e-3)
-    assert blocks.lowest[3] == 0.0
+    assert blocks.lowest[[0, 3, 4, 7, 8]].tolist() == [0.0] * 5 and blocks.lowest[5] > 0.0
 
 
 def test_chunks_are_the_whole(made: Plan) -> None:
@@ -163,6 +170,56 @@ def test_limits_at_the_tool_hold_by_length() -> None:
         assert made.shares.limits[:, 3].sum() == pytest.approx(made.seconds, rel=1e-3)
         assert samples.tool is not None
         np.testing.assert_allclose(np.linalg.norm(samples.qdd, axis=1), samples.tool[:, 1], rtol=1e-9, atol=1e-9)
+
+
+class Screw(PolynomialPath):
+    """Tip on a slender helix: its steady jerk is along the binormal, k t sd^3 with curvature k and torsion t.
+
+    One solve limits it beside the jerk in the plane of curvature, strict their sum.
+    """
+
+    r, c = 0.05, 1.0
+
+    def __init__(self, length: float) -> None:
+        super().__init__([[0.0, 1.0]], length)
+
+    def tip(self, s: Floats) -> Derivatives:
+        rate = 1.0 / np.hypot(self.r, self.c)
+        turn = [rate * s + k * np.pi / 2 for k in range(4)]
+        rise = [self.c * rate * s, np.full(len(s), self.c * rate), 0.0 * s, 0.0 * s]
+        return Derivatives(*(np.stack((self.r * rate**k * np.cos(at), self.r * rate**k * np.sin(at), up), axis=1)
+                             for k, (at, up) in enumerate(zip(turn, rise, strict=True))))
+
+    def axis(self, s: Floats) -> Derivatives:
+        return Derivatives(*(0.0 * order for order in self.tip(s)))
+
+
+def test_jerk_out_of_the_plane_of_curvature_is_limited() -> None:
+    limits = JointLimits(np.array([1e4]), np.array([1e6]), np.array([1e7]), ToolLimits(jerk=500.0))
+    path = Screw(60.0)
+    made = plan(path, limits)
+    curvature, torsion = (value / (path.r**2 + path.c**2) for value in (path.r, path.c))
+    speed = (500.0 / (curvature * torsion)) ** (1.0 / 3.0)
+    assert made.speed(np.array([30.0]))[0] == pytest.approx(speed, rel=0.02)
+    assert 1.1 < made.usage().tool[2] < 1.45
+    strict = plan(path, limits, options=STRICT)
+    assert strict.usage().worst <= 1.0 and strict.seconds < 1.13 * made.seconds
+
+
+def test_normal_at_an_inflection_comes_from_the_next_derivative() -> None:
+    class Cubic(PolynomialPath):
+        def tip(self, s: Floats) -> Derivatives:
+            zero, one = 0.0 * s, 0.0 * s + 1.0
+            return Derivatives(*(np.stack(row, axis=1) for row in (
+                (s, zero, (s - 5.0) ** 3), (one, zero, 3.0 * (s - 5.0) ** 2), (zero, zero, zero), (zero, zero, 6.0 * one))))
+
+        def axis(self, s: Floats) -> Derivatives:
+            return self.tip(s)
+
+    eased = Eased.between(Cubic([[0.0, 1.0]], 10.0), 0.0, 10.0, 2.0)
+    sigma = eased.sigma(np.array([5.0]))
+    frame = np.concatenate(tool(eased, sigma, eased.parameter(sigma)).frame)
+    np.testing.assert_allclose(np.abs(frame), np.eye(3)[[0, 2, 1]], atol=1e-9)
 
 
 def test_tool_on_a_straight_line_gives_nothing_away() -> None:

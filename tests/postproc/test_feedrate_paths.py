@@ -10,7 +10,7 @@ from postproc.feedrate.limits import JointLimits, squared_speed, steady_cap
 from postproc.feedrate.mesh import FEWEST, Spacing, mesh
 from postproc.feedrate.paths import Eased, SplinePath
 from postproc.feedrate.spline_kernel import spline
-from tests.postproc.feedrate_kit import MIKRON, PolynomialPath, random_path
+from tests.postproc.feedrate_kit import MIKRON, PolynomialPath, random_path, unlimited
 
 
 def test_eased_derivatives_are_those_of_the_eased_path() -> None:
@@ -87,3 +87,16 @@ def test_compiled_spline_equals_scipys(degree: int) -> None:
         compiled(spline)(path._orders[0].t, degree, *path._coefficients, s, out)
         for order, other in zip(plain, out, strict=True):
             np.testing.assert_allclose(other, order, rtol=1e-10, atol=1e-9 * np.abs(order).max())
+
+
+def test_knots_follow_bulges_of_the_third_derivative() -> None:
+    """Within one cell between breaks: the bulge of the jerk between two knots stays near the share asked for."""
+    eased = Eased.between(random_path(2), 0.0, 100.0, 25.0)
+    knots = mesh(eased, MIKRON, unlimited, Spacing(dt=1.0, longest=2.0, slope=1.0, hump=0.05))
+    middle = 0.5 * (knots[1:] + knots[:-1])
+    at, ends = eased.derivatives(middle), eased.derivatives(knots).d3q
+    speed = np.sqrt(np.minimum(squared_speed(at.dq, MIKRON.velocity), steady_cap(at.d2q, at.d3q, MIKRON)))
+    bulge = np.abs(at.d3q - 0.5 * (ends[1:] + ends[:-1])) * speed[:, None] ** 3 / MIKRON.jerk
+    inside = (middle > 30.0) & (middle < eased.end - 30.0)
+    assert 0.02 < np.quantile(bulge[inside].max(axis=1), 0.95) < 0.08
+    assert len(mesh(eased, MIKRON, unlimited, Spacing(dt=1.0, longest=2.0, slope=1.0, hump=1e9))) < 0.9 * len(knots)

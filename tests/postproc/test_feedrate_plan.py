@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
+from itertools import cycle
 
 import numpy as np
 import pytest
@@ -160,11 +160,12 @@ def test_short_overlaps_are_widened() -> None:
 
 def test_windows_that_stop_early_are_slow_not_wrong(monkeypatch: pytest.MonkeyPatch) -> None:
     """They do not agree then; the motion is slowed as a whole and says so."""
-    monkeypatch.setattr(windows, "solve", partial(interior.solve, most=9))
+    most = cycle((8, 40))
+    monkeypatch.setattr(windows, "solve", lambda steps, rows, gap: interior.solve(steps, rows, gap, most=next(most)))
     path = zigzag(300.0)
     grid = uniform(path, 3000)
     report = solved(grid, Method(window=800, overlap=100))
-    assert not report.solved and report.mismatch > 1e-3
+    assert not report.solved and report.mismatch > 0.1
     assert grid.problem().ratios(report.c).max() < 1.0
     assert not plan(path, MIKRON, knots=grid.sigma, options=Options(method=Method(window=800, overlap=100))).solved
 
