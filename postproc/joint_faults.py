@@ -57,16 +57,16 @@ def _choices(plan: RunPlan, moves: Moves, file: str) -> list[Diagnostic]:
     lines: dict[str, list[int]] = {}
     starts = np.flatnonzero(moves.link)
     for start, solution in zip(starts, plan.solutions, strict=True):
-        if solution.losers:
+        if solution.losers and _reason(solution.losers):
             lines.setdefault(_reason(solution.losers), []).append(int(moves.line[start]))
     return [info("joints.chosen", f"the other branches and windings {reason}", file=file, lines=found[:6], count=len(found))
             for reason, found in sorted(lines.items())]
 
 
 def _reason(losers: tuple[Loser, ...]) -> str:
-    """What decides against the loser that comes nearest."""
+    """What decides against the loser that comes nearest; "" where it is as good."""
     best: Floats = min((x.dearer for x in losers), key=lambda cost: tuple(cost.tolist()))
     for column, text in _REASONS:
         if best[column] > 1e-9:
             return text
-    return "are as good"
+    return ""

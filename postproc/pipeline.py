@@ -28,6 +28,7 @@ from postproc.program import Program
 from postproc.reach import check_reach
 from postproc.readback.compare import Comparison
 from postproc.readback.verify import read_back
+from postproc.rewinds import drawing_of
 from postproc.rounding import rounding_problem
 from postproc.setup import SetupFile, load_setup
 from postproc.smoothed_moves import smoothed_moves
@@ -129,8 +130,12 @@ def _stages(result: PostResult, progress: Progress | None) -> PostResult:
     if not result.ok:
         return result
     moves = written_moves(job, shares)
+    drawing, found = drawing_of(job.setup, job.placement, job.space, job.machine, options.setup or file)
+    result = _with(result, found)
+    if not result.ok:
+        return result
     path, found = build_path(job.modes, job.kinematics, moves, job.space, job.home_rows(), job.operation,
-                             shares["linearising"], shares["axis_linearising"] * DEG, file, progress)
+                             shares["linearising"], shares["axis_linearising"] * DEG, file, progress, drawing)
     result = _with(result, found, path=path)
     if path is None:
         return result

@@ -8,50 +8,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Literal
 
 import numpy as np
-from pydantic import Field
 
 from machines.kinematics.base import Kinematics
 from machines.machine import Machine
-from machines.user_file import UserModel
 from postproc.control import Control
 from postproc.joints.plan import Wishes
 from postproc.links import Link, Pose, SafeSpace, plan_link
 from postproc.run_plan import Manner
+from postproc.setup import Placement, Rewind, SetupFile
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.units import DEG
-
-Vector = tuple[float, float, float]
-
-
-class Stock(UserModel):
-    """A box in the part frame, mm."""
-
-    low: Vector
-    high: Vector
-
-
-class Rewind(UserModel):
-    """Unwinding an axis in the middle of a run, where its travel ends."""
-
-    allowed: bool = True
-    """false: a path that needs one is refused"""
-    feed: float | None = Field(default=None, gt=0.0)
-    """of the way back into a cut, mm/min; default: that of the cut"""
-    stock: Stock | None = None
-    """the tool is drawn out of this box and of what is cut; default: to the safe plane"""
-
-
-class Joints(UserModel):
-    """Joints to be preferred where travel and rewinds leave a choice."""
-
-    side: dict[str, Literal["positive", "negative"]] = Field(default_factory=dict)
-    """of a rotary axis, e.g. side = {A = "negative"}"""
-    start: dict[str, float] = Field(default_factory=dict)
-    """where a rotary axis stands when the program begins, degrees, e.g. start = {C = 180}; default: home"""
 
 
 @dataclass(frozen=True)
@@ -85,9 +54,10 @@ class Drawing:
         return plan_link(control, kin, kin, self.space, before, after, False, True)
 
 
-def drawing_of(rewind: Rewind, joints: Joints, space: SafeSpace, corners: Floats | None, machine: Machine,
+def drawing_of(setup: SetupFile, placement: Placement, space: SafeSpace, machine: Machine,
                file: str = "") -> tuple[Drawing, list[Diagnostic]]:
-    """What a set-up says, for a machine; `corners` (8, 3) are those of the stock in the table frame."""
+    """What a set-up says, for a machine; faults point into `file`, that of the set-up."""
+    rewind, joints = setup.rewind, setup.joints
     diagnostics = [error("setup.joints", f"joints.{table}.{letter}: {machine.name} has no rotary axis {letter}", file=file,
                          hint="it has: " + ", ".join(_rotaries(machine)))
                    for table in ("side", "start") for letter in getattr(joints, table) if letter not in _rotaries(machine)]
@@ -99,7 +69,9 @@ def drawing_of(rewind: Rewind, joints: Joints, space: SafeSpace, corners: Floats
     index = machine.axis_names.index
     wishes = Wishes({index(k): 1 if v == "positive" else -1 for k, v in joints.side.items()},
                     {index(k): v * DEG for k, v in joints.start.items()})
-    return Drawing(space if corners is None else _with_stock(space, corners), rewind, wishes), []
+    if rewind.stock is not None:
+        space = _with_stock(space, placement.points(_box(np.array(rewind.stock.low), np.array(rewind.stock.high))))
+    return Drawing(space, rewind, wishes), []
 
 
 def _rotaries(machine: Machine) -> list[str]:
@@ -107,10 +79,15 @@ def _rotaries(machine: Machine) -> list[str]:
 
 
 def _with_stock(space: SafeSpace, corners: Floats) -> SafeSpace:
-    """The box round the stock and what is cut, with the sphere about it."""
-    low, high = (f(np.concatenate([corners, space.corners]), axis=0) for f in (np.min, np.max))
-    pick = np.array(np.meshgrid([0, 1], [0, 1], [0, 1])).reshape(3, 8).T
-    box = np.where(pick == 0, low, high)
-    centre = 0.5 * (low + high)
+    """The box, along the table's axes, round the stock and what is cut, with the sphere about it."""
+    every = np.concatenate([corners, space.corners])
+    low, high = every.min(axis=0), every.max(axis=0)
+    box, centre = _box(low, high), 0.5 * (low + high)
     return replace(space, centre=centre, corners=box, radius=float(np.linalg.norm(box - centre, axis=1).max()),
                    distance=None)
+
+
+def _box(low: Floats, high: Floats) -> Floats:
+    """(8, 3) corners."""
+    pick = np.array(np.meshgrid([0, 1], [0, 1], [0, 1])).reshape(3, 8).T
+    return np.where(pick == 0, low, high)

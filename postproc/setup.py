@@ -77,6 +77,35 @@ class Pivot(UserModel):
     """a point of its line when all axes stand at 0, in machine coordinates, mm"""
 
 
+class Stock(UserModel):
+    """A box in the part frame, mm."""
+
+    low: Vector
+    """its least x, y, z"""
+    high: Vector
+    """its greatest x, y, z"""
+
+
+class Rewind(UserModel):
+    """Unwinding an axis in the middle of a run, where its travel ends."""
+
+    allowed: bool = True
+    """false: a path that needs a rewind is refused"""
+    feed: float | None = Field(default=None, gt=0.0)
+    """of the way back into a cut, mm/min; default: that of the cut"""
+    stock: Stock | None = None
+    """the tool is drawn out of this box (and of what is cut); default: to the safe plane"""
+
+
+class Joints(UserModel):
+    """Joints to be preferred where travel and rewinds leave a choice."""
+
+    side: dict[Annotated[str, Field(pattern="^[ABC]$")], Literal["positive", "negative"]] = Field(default_factory=dict)
+    """of a rotary axis, e.g. side = {A = "negative"}"""
+    start: dict[Annotated[str, Field(pattern="^[ABC]$")], float] = Field(default_factory=dict)
+    """where a rotary axis should stand when the program begins, degrees, e.g. start = {C = 180}; default: home"""
+
+
 class SetupFile(UserModel):
     """A set-up. Everything has a default: part frame on the table frame, first system of the file as work offset."""
 
@@ -92,6 +121,8 @@ class SetupFile(UserModel):
     output: Output = Output()
     control_pivots: dict[Annotated[str, Field(pattern="^[ABC]$")], Pivot] = Field(default_factory=dict)
     """by rotary axis, e.g. [control_pivots.A]: what the control's parameters say; default: as the machine file"""
+    rewind: Rewind = Rewind()
+    joints: Joints = Joints()
 
 
 @dataclass(frozen=True)

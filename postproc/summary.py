@@ -25,14 +25,21 @@ def as_dict(result: PostResult, output: str) -> dict[str, Any]:
         "cycle_time_s": None,
         "worst_tip_deviation_mm": _number(c.worst_tip) if c else None,
         "worst_axis_deviation_deg": _number(c.worst_axis / DEG) if c else None,
-        "rewinds": 0,
-        "singular_events": len(result.path.turns) if result.path is not None else 0,
+        "rewinds": len(result.path.rewinds) if result.path is not None else 0,
+        "singular_events": len(result.path.turns) + len(result.path.events) if result.path is not None else 0,
+        "linearising_bound": _bound(result),
         "feed_reduced_blocks": int(result.feeds.slowed.sum()) if result.feeds is not None else 0,
         "axis_extents": {k: list(v) for k, v in (result.extents or {}).items()},
         "tolerance_shares": result.shares or {},
         "geometric_errors": _errors(result),
         "diagnostics": [d.as_dict() for d in result.diagnostics],
     }
+
+
+def _bound(result: PostResult) -> dict[str, float] | None:
+    """Proved bound of the deviation between points, before rounding."""
+    path = result.path
+    return None if path is None else {"tip_mm": path.worst_tip, "axis_deg": path.worst_axis / DEG}
 
 
 def _errors(result: PostResult) -> dict[str, Any] | None:
@@ -83,7 +90,9 @@ def as_text(result: PostResult, output: str) -> str:
     if d["feed_reduced_blocks"]:
         lines.append(f"feed reduced for an axis limit in {d['feed_reduced_blocks']} blocks")
     if d["singular_events"]:
-        lines.append(f"turns on the spot where the tool lies along a rotary axis: {d['singular_events']}")
+        lines.append(f"singular directions passed: {d['singular_events']}")
+    if d["rewinds"]:
+        lines.append(f"rewinds: {d['rewinds']}")
     return "\n".join(lines)
 
 
