@@ -31,8 +31,8 @@ AXIS_TOLERANCE = 0.05 * DEG
 """rad, unless another is given"""
 BLIND = 1e-9
 """axis rate below which a turn does not move the axis"""
-CLOSED = 1e-7
-"""mm and rad: a step that small is the last; it leaves less than a hundredth of itself"""
+CLOSED = 5e-5, 5e-7
+"""mm and rad: steps that small are the last; they leave less than a hundredth of themselves"""
 STEPS = 8
 BEYOND = 1e-3
 """mm and rad by which corrected joints may pass the measured range that the nominal ones keep"""
@@ -92,7 +92,8 @@ def correct(actual: Actual, q: Floats, tip: Floats, axis: Floats, *, group: Ints
         step = np.concatenate([_displacements(rates[:, :3, :3], gap), turned], axis=1)
         w, steps = w + step, steps + 1
         placed = actual.place(w, direction)
-        if not np.nanmax(np.abs(step), initial=0.0) > CLOSED:
+        if not any(np.nanmax(np.abs(part), initial=0.0) > small for part, small in zip(
+                (step[:, :3], step[:, 3:]), CLOSED, strict=True)):
             break
     partial = np.zeros(len(q), dtype=np.bool_) if turns is None else np.asarray(np.any(turns.weak, axis=1))
     after = _deviation(placed[0], placed[1], tip, axis)

@@ -153,6 +153,16 @@ class Fourier(Curve):
         harmonics = range(1, 1 + len(self.values) // 2)
         return [".mean", *(f".cos{k}" for k in harmonics), *(f".sin{k}" for k in harmonics)]
 
+    def at(self, x: Floats, direction: Floats | float = 0.0) -> Floats:
+        """See the base class; Horner's rule in exp(i phase)."""
+        mean, cosine, sine = np.split(self.values, [1, 1 + len(self.values) // 2])
+        turn = np.exp(1j * ((np.clip(x, *self.range) - self.origin) * (2.0 * np.pi / self.period)))
+        total = np.zeros(x.shape, dtype=np.complex128)
+        for wave in (cosine - 1j * sine)[::-1]:
+            total = (total + wave) * turn
+        result: Floats = mean[0] + total.real
+        return result
+
     def basis(self, x: Floats, direction: Floats) -> Floats:
         """See the base class."""
         harmonics = np.arange(1, 1 + len(self.values) // 2)
@@ -175,6 +185,14 @@ class Polynomial(Curve):
     def labels(self) -> list[str]:
         """.c0, .c1, ..."""
         return [f".c{k}" for k in range(len(self.values))]
+
+    def at(self, x: Floats, direction: Floats | float = 0.0) -> Floats:
+        """See the base class; Horner's rule."""
+        t = (np.clip(x, *self.range) - self.origin) / self.scale
+        result: Floats = np.full(x.shape, self.values[-1])
+        for value in self.values[-2::-1]:
+            result = result * t + value
+        return result
 
     def basis(self, x: Floats, direction: Floats) -> Floats:
         """See the base class."""

@@ -25,7 +25,7 @@ from toolpaths.arrays import Floats, Ints, frozen
 RODS = 6
 STEPS = 12
 """of the chord iteration at most; it gains about four digits each"""
-CLOSED = 1e-15
+CLOSED = 1e-13
 """largest (|AB|^2 - L^2) / 2 L^2 of a solved platform"""
 LEAST_GAIN = 0.5
 """a step that leaves more of the error than this is the last: rounding is reached"""
@@ -111,7 +111,7 @@ class RodFrame:
         reach = q[:, self.leg, None] * self.direction[self.leg] + self.arm
         if errors is None:
             return np.asarray(self.rail[self.leg] + reach)
-        turned = np.einsum("rij,nrj->nri", turns(errors.guide)[self.leg], reach)
+        turned = np.stack([reach[:, r] @ matrix.T for r, matrix in enumerate(turns(errors.guide)[self.leg])], axis=1)
         own = np.einsum("rij,rj->ri", self.guide[self.leg], errors.carriage)
         return np.asarray((self.rail + errors.rail)[self.leg] + turned + own)
 
@@ -124,12 +124,11 @@ class RodFrame:
         inverse = inverted(self.twist_rows(self.carriage_joints(q), place, turned))
         turned, before = np.array(turned), np.full(len(q), np.inf)
         for _ in range(STEPS):
-            ends = np.einsum("nij,rj->nri", turned, b)
-            rods = place[:, None] + ends - a
-            gap = 0.5 * (np.einsum("nri,nri->nr", rods, rods) - lengths**2)
-            step = -np.einsum("nij,nj->ni", inverse, gap)
+            rods = b @ np.swapaxes(turned, 1, 2) + (place[:, None] - a)
+            gap = 0.5 * (np.sum(rods * rods, axis=2) - lengths**2)
+            step = -(inverse @ gap[:, :, None])[:, :, 0]
             place = place + step[:, :3]
-            turned = turns(step[:, 3:]) @ turned
+            turned = turned_by(step[:, 3:]) @ turned
             worst = np.abs(gap / lengths**2).max(axis=1)
             if not np.any((worst > CLOSED) & (worst < LEAST_GAIN * before)):
                 break
@@ -139,9 +138,13 @@ class RodFrame:
 
     def twist_rows(self, carriages: Floats, place: Floats, turned: Floats) -> Floats:
         """T (N, 6, 6), E-16: rows (AB, DB x AB) that act on the platform's displacement and turn about X."""
-        ends = np.einsum("nij,rj->nri", turned, self.joint)
+        ends = self.joint @ np.swapaxes(turned, 1, 2)
         rods = place[:, None] + ends - carriages
-        return np.concatenate([rods, np.cross(ends, rods)], axis=2)
+        result = np.empty((len(place), RODS, 6))
+        result[:, :, :3] = rods
+        for i, (j, k) in enumerate(((1, 2), (2, 0), (0, 1)), 3):
+            result[:, :, i] = ends[:, :, j] * rods[:, :, k] - ends[:, :, k] * rods[:, :, j]
+        return result
 
     def sensitivity(self, q: Floats, place: Floats, turned: Floats) -> Floats:
         """S (N, 6, P) of T (dX, dR) = S E, E-15 to E-31 as corrected: P parameters in the order of E-14."""
@@ -167,11 +170,13 @@ class RodFrame:
 
 def inverted(matrices: Floats) -> Floats:
     """Inverses (N, M, M), NaN where one is singular or not finite."""
-    bad = ~(np.abs(np.linalg.det(np.nan_to_num(matrices))) > 0.0) | ~np.isfinite(matrices).all(axis=(1, 2))
-    safe = np.where(bad[:, None, None], np.eye(matrices.shape[1]), matrices)
-    result: Floats = np.asarray(np.linalg.inv(safe), dtype=np.float64)
-    result[bad] = np.nan
-    return result
+    try:
+        return np.asarray(np.linalg.inv(matrices), dtype=np.float64)  # NaN goes through
+    except np.linalg.LinAlgError:
+        bad = ~(np.abs(np.linalg.det(matrices)) > 0.0)
+        result = np.asarray(np.linalg.inv(np.where(bad[:, None, None], np.eye(matrices.shape[1]), matrices)), np.float64)
+        result[bad] = np.nan
+        return result
 
 
 def rod_frame(kinematics: LinearDelta | H4Linear) -> RodFrame:
@@ -205,6 +210,19 @@ def _guide(direction: Floats, *towards: Floats) -> Floats:
     x = next(v for v in across if np.linalg.norm(v) > 1e-9)
     x = x / np.linalg.norm(x)
     return np.stack([x, np.cross(direction, x), direction], axis=1)
+
+
+def turned_by(vector: Floats) -> Floats:
+    """Rotation matrices (N, 3, 3) of small rotation vectors (N, 3) (Rodrigues, with sin x / x and the like as series)."""
+    square = np.sum(vector * vector, axis=1)
+    s, c = 1.0 - square / 6.0 * (1.0 - square / 20.0), 0.5 - square / 24.0 * (1.0 - square / 30.0)
+    result = np.empty((len(vector), 3, 3))
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        result[:, i, i] = 1.0 - c * (square - vector[:, i] ** 2)
+        result[:, i, j] = c * vector[:, i] * vector[:, j] - s * vector[:, k]
+        result[:, j, i] = c * vector[:, i] * vector[:, j] + s * vector[:, k]
+    return result
 
 
 def platform_turn(tilt: Floats) -> Floats:
