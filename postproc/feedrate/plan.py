@@ -132,32 +132,32 @@ def _solve(grid: Knots, options: Options) -> tuple[Profile, Solved, float]:
     The fastest of them with the factor on time that it still needs there; 1 in fast mode.
     """
     report = solved(grid, options.method)
-    profile, best = _profile(grid, report.c), None
+    profile = _profile(grid, report.c)
     if not options.strict:
         return profile, report, 1.0
-    for left in reversed(range(options.passes + 1)):
-        slower, better = tightened(grid, profile, bool(options.method.kernel))
-        seconds = slower * float(profile.times[-1])
-        if best is None or seconds < best[0]:
-            best = seconds, (profile, report, slower)
-        if better is None or not left:
+    slower, better = tightened(grid, profile, bool(options.method.kernel))
+    best = slower * float(profile.times[-1]), slower, grid, report
+    for _ in range(options.passes):
+        if better is None:
             break
         report = solved(better, options.method, report.c if len(better.sigma) == len(grid.sigma) else None)
         grid, profile = better, _profile(better, report.c)
-    assert best is not None
-    return best[1]
+        slower, better = tightened(grid, profile, bool(options.method.kernel))
+        best = min(best, (slower * float(profile.times[-1]), slower, grid, report), key=lambda one: one[0])
+    _, slower, grid, last = best
+    return profile if last is report else _profile(grid, last.c), last, slower
 
 
 def _profile(grid: Knots, c: Floats) -> Profile:
     """Piecewise cubic, made in chunks."""
     count = len(grid.sigma)
     cuts = np.linspace(0, count, max(1, count // CHUNK) + 1).astype(int)
-    parts = []
-    for first, last in pairwise(cuts):
+    pieces = np.empty((4, count - 1))
+    for first, last in pairwise(cuts.tolist()):
         stop = min(last + 1, count)
-        parts.append(spline_profile(grid.sigma[first:stop], rest_basis(grid.sigma, grid.eased.ease, first, stop),
-                                    c[first:stop + 2]).pieces)
-    return Profile(grid.sigma, np.concatenate(parts, axis=1))
+        basis = rest_basis(grid.sigma, grid.eased.ease, first, stop)
+        pieces[:, first:stop - 1] = spline_profile(grid.sigma[first:stop], basis, c[first:stop + 2]).pieces
+    return Profile(grid.sigma, pieces)
 
 
 def _within(made: Plan, guess: Floats) -> Plan:

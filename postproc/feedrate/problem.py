@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from postproc.feedrate.limits import JointLimits
 from postproc.feedrate.paths import Eased
@@ -84,7 +85,7 @@ class Knots:
     sigma: Floats
     limits: JointLimits
     feed: Callable[[Floats], Floats]
-    tight: Floats | None = None
+    tight: npt.NDArray[np.float32] | None = None
 
     def speed_limit(self, sigma: Floats) -> Floats:
         """Largest sigma_dot (N,) that the feed allows."""
@@ -95,7 +96,7 @@ class Knots:
         last = len(self.sigma) if last is None else last
         sigma = self.sigma[first:last]
         at = rows(self.eased, sigma, self.limits, self.feed)
-        tight = np.ones((3, len(sigma))) if self.tight is None else np.ascontiguousarray(self.tight[:, first:last])
+        tight = np.ones((3, len(sigma))) if self.tight is None else self.tight[:, first:last].astype(np.float64)
         h = np.diff(sigma)
         weight = 0.5 * (np.append(h, 0.0) + np.insert(h, 0, 0.0))
         dq, d2q, d3q = (np.ascontiguousarray(order.T) for order in at[:3])

@@ -31,7 +31,7 @@ def tightened(grid: Knots, profile: Profile, kernel: bool = False) -> tuple[floa
     The better grid has tighter rows, and more knots where tightening was in vain: a spline of the path bends there
     within one interval.
     """
-    excess = np.empty((3, len(grid.sigma) - 1))
+    excess = np.empty((3, len(grid.sigma) - 1), dtype=np.float32)
     for first in range(0, excess.shape[1], CHUNK):
         here = np.arange(first, min(first + CHUNK, excess.shape[1]))
         excess[:, here] = _ratios(grid, profile, here, kernel)
@@ -40,9 +40,12 @@ def tightened(grid: Knots, profile: Profile, kernel: bool = False) -> tuple[floa
     if max(velocity, acceleration, jerk) <= ENOUGH:
         return slower, None
     split = excess.max(axis=0) > (FIRST_SPLIT if grid.tight is None else SPLIT)
-    excess = np.maximum(excess, 1.0) ** MORE
-    tight = np.maximum(np.pad(excess, ((0, 0), (1, 0)), mode="edge"), np.pad(excess, ((0, 0), (0, 1)), mode="edge"))
-    tight = tight if grid.tight is None else grid.tight * tight
+    np.power(np.maximum(excess, 1.0, out=excess), MORE, out=excess)
+    tight = np.ones((3, len(grid.sigma)), dtype=np.float32)
+    tight[:, :-1] = excess
+    np.maximum(tight[:, 1:], excess, out=tight[:, 1:])
+    if grid.tight is not None:
+        tight *= grid.tight
     return slower, _split(replace(grid, tight=tight), split) if split.any() else replace(grid, tight=tight)
 
 

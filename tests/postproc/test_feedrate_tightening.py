@@ -49,7 +49,7 @@ def test_a_warm_start_finds_the_same_in_fewer_steps() -> None:
     first = solve_problem(grid.problem(), NumpySteps)
     rng = np.random.default_rng(1)
     tight = 1.0 + 0.1 * rng.random((3, 501)) * (rng.random((3, 501)) < 0.1)
-    problem = replace(grid, tight=tight).problem()
+    problem = replace(grid, tight=tight.astype(np.float32)).problem()
     cold, warm = solve_problem(problem, NumpySteps), solve_problem(problem, NumpySteps, first.c)
     assert warm.solved and warm.iterations <= 0.75 * cold.iterations
     times = [float(np.sum(problem.weight * problem.basis.values(one.c)[0] ** -0.5)) for one in (cold, warm)]
