@@ -118,6 +118,7 @@ class Blocks:
         cl_line (E,): line of the CL file that the block comes from, -1 where that is not known
         given (E,): way that the feed refers to where the columns do not tell it (the tip's, under a control's own
             kinematics), NaN elsewhere
+        pieces (E,): of how many rows its block of the program consists; None: all of one
     """
 
     axes: Axes
@@ -138,6 +139,7 @@ class Blocks:
     pauses: Pauses = field(default_factory=Pauses.none)
     cl_line: Ints | None = None
     given: Floats | None = None
+    pieces: Ints | None = None
 
     def __post_init__(self) -> None:
         n, a = len(self.line), len(self.axes.letters)

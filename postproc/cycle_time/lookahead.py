@@ -71,7 +71,8 @@ def limits(blocks: Blocks, form: Shape, model: CycleTimeModel) -> tuple[Floats, 
         target = np.minimum(target, np.where(blocks.arc, np.sqrt(NORMAL_SHARE * rate * radius), np.inf))
         rate = np.where(blocks.arc, np.sqrt(np.maximum(rate**2 - (target**2 / radius) ** 2, (0.5 * rate) ** 2)), rate)
     if model.block_time > 0.0:
-        target = np.minimum(target, form.length / model.block_time)
+        whole = form.length if blocks.pieces is None else form.length * blocks.pieces
+        target = np.minimum(target, whole / model.block_time)
     return target, rate, jerk
 
 

@@ -24,6 +24,8 @@ LEAST_RATE = 0.1
 """mm or degrees per min: slower inverse-time feeds run at this (LinuxCNC interp_inverse.cc)"""
 CHORD = 0.1
 """rad of an arc that one straight piece stands for where the control bends it through its kinematics"""
+BEND, MOST_PIECES = 0.002, 64
+"""mm or degrees off its axes' straight line that one piece of a block may be, and pieces of a block at most"""
 INCH = 25.4
 
 
@@ -69,7 +71,7 @@ def blocks_of(code: Canonical, motion: Motion, machine: Machine, control: Contro
                     origin.cl_line, _tip_lengths(motion, control))
     blocks = replace(blocks, speed=_speeds(words, block, motion, blocks, by_radius))
     moving = (np.abs(end - start) > NOTHING).any(axis=1) | arc
-    blocks = _unrolled(blocks, motion, control, unit) if (arc & (motion.frame > 0)).any() else blocks.take(moving)
+    blocks = _unrolled(blocks, motion, control, unit) if (motion.frame > 0).any() else blocks.take(moving)
     return replace(blocks, pauses=_with_indexing(blocks, machine))
 
 
@@ -114,21 +116,33 @@ def _tip_lengths(motion: Motion, control: Control) -> Floats:
 
 
 def _unrolled(blocks: Blocks, motion: Motion, control: Control, unit: Floats) -> Blocks:
-    """Arcs that the control bends through its kinematics as short straight pieces; blocks that do not move left out."""
+    """Blocks that the control bends through its kinematics as straight pieces; what does not move is left out."""
     bent = blocks.arc & (motion.frame > 0)
-    count = np.where(bent, np.ceil(blocks.sweep / CHORD).astype(np.int64), 1)
+    count = np.where(bent, np.ceil(blocks.sweep / CHORD).astype(np.int64), _pieces(blocks, motion, control, unit))
     row = np.repeat(np.arange(len(blocks)), count)
     part = (np.arange(len(row)) - (np.cumsum(count) - count)[row] + 1.0) / count[row]
     wide = blocks.take(row)
     end = wide.end.copy()
-    inner = np.flatnonzero(bent[row])
+    inner = np.flatnonzero((count > 1)[row])
     end[inner] = positions(motion, control, row[inner], part[inner]) * unit
     start = np.concatenate([blocks.start[:1], end[:-1]])
     pauses = replace(blocks.pauses, block=np.where(blocks.pauses.block >= 0, np.searchsorted(
         row, blocks.pauses.block, side="right") - 1, -1))
-    wide = replace(wide, start=start, end=end, arc=wide.arc & ~bent[row], pauses=pauses,
+    wide = replace(wide, start=start, end=end, arc=wide.arc & ~bent[row], pauses=pauses, pieces=count[row],
                    given=wide.given / count[row] if wide.given is not None else None)
     return wide.take((np.abs(end - start) > NOTHING).any(axis=1) | wide.arc)
+
+
+def _pieces(blocks: Blocks, motion: Motion, control: Control, unit: Floats) -> Ints:
+    """(E,) pieces of blocks whose axes leave the straight line while the tip stays on it: 1 elsewhere."""
+    count = np.ones(len(blocks), dtype=np.int64)
+    rows = np.flatnonzero((motion.frame > 0) & ~blocks.arc)
+    if len(rows):
+        middle = positions(motion, control, rows, np.full(len(rows), 0.5)) * unit
+        off = np.abs(middle - (blocks.start[rows] + blocks.end[rows]) / 2.0)
+        slack = np.where(blocks.axes.rotary, BEND * DEG, BEND)
+        count[rows] = np.clip(np.ceil(np.sqrt((off / slack).max(axis=1))), 1, MOST_PIECES)
+    return count
 
 
 def _path_modes(words: Words, own_path: bool) -> tuple[Array, Floats, Floats]:
