@@ -93,6 +93,8 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
         path, found = _read(file, options, progress)
         result = run(path, m, spec, options=options, diagnostics=found, progress=progress)
         if result.ok:
+            for name, text in (result.files or {}).items():
+                write_atomically(output.parent / name, text)
             write_atomically(output, result.text)
     report(result.diagnostics, json, summary.as_dict(result, str(output)), summary.as_text(result, str(output)))
 

@@ -71,6 +71,8 @@ class PostResult:
     comparison: Comparison | None = None
     extents: dict[str, tuple[float, float]] | None = None
     shares: dict[str, float] | None = None
+    files: dict[str, str] | None = None
+    """texts of subprograms in files of their own, by file name"""
 
     @property
     def ok(self) -> bool:
@@ -157,13 +159,15 @@ def _stages(result: PostResult, progress: Progress | None) -> PostResult:
     result = _with(result, found, program=program, feeds=feeds)
     if not result.ok:
         return result
-    text = write_text(result)
-    result = _with(result, long_blocks(text, result.controller.format.line_length, file))
+    text, files = write_text(result)
+    most = result.controller.format.line_length
+    result = _with(result, [d for t in (text, *files.values()) for d in long_blocks(t, most, file)])
     if not result.ok:
         return result
-    comparison, found = read_back(text.encode(), job, file, progress)
+    comparison, found = read_back(text.encode(), job, file, progress,
+                                  others={name: t.encode() for name, t in files.items()})
     result = _with(result, found, comparison=comparison)
-    return replace(result, text=text) if result.ok else result
+    return replace(result, text=text, files=files) if result.ok else result
 
 
 def _with(result: PostResult, diagnostics: list[Diagnostic], **values: object) -> PostResult:
@@ -227,8 +231,8 @@ def plan_motion(job: Job, moves: Moves, path: Path) -> tuple[PlannedMotion | Non
                                  job.toolpath.file))
 
 
-def write_text(result: PostResult) -> str:
-    """The text of the program, header with what made it."""
+def write_text(result: PostResult) -> tuple[str, dict[str, str]]:
+    """The text of the program, header with what made it, and of its subprograms in files of their own by file name."""
     assert result.program is not None and result.toolpath is not None and result.job is not None
     job, machine = result.job, result.machine
     letters = zip(machine.axis_names, job.control.work_offset, strict=True)
@@ -244,7 +248,8 @@ def write_text(result: PostResult) -> str:
     writer = writer_for(result.controller, result.program, result.toolpath.cycles, job.control.length_on_z,
                         shares["smoothing"], result.setup.work_offset_code, axis_smoothing=shares["axis_smoothing"],
                         name=FilePath(result.toolpath.file).stem, subprograms=result.setup.output.subprograms)
-    return "\n".join(writer.lines(header)) + "\n"
+    text = "\n".join(writer.lines(header)) + "\n"
+    return text, {name: "\n".join(blocks) + "\n" for name, blocks in writer.files.items()}
 
 
 def _corrections(result: PostResult) -> list[str]:

@@ -33,6 +33,10 @@ class KlartextWriter(Writer):
         self.count += 1
         return f"{self.count} {block}"
 
+    def first_number(self) -> None:
+        """Begin to number blocks anew."""
+        self.count = -1
+
     def framed(self, block: str) -> str:
         """Blocks of the frame, and comments, are numbered too."""
         return self.numbered(block)

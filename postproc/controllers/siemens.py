@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
@@ -12,6 +12,12 @@ from postproc.program import Hole
 
 class SiemensWriter(IsoWriter):
     """Siemens: cycles are modal calls (MCALL), each block that moves calls them; F of a cycle is the feed in force."""
+
+    def sorted_blocks(self) -> tuple[Iterable[str], dict[int, list[str]]]:
+        """As of every writer; names of programs begin with two letters."""
+        if not self.name[:2].isalpha():
+            self.name = f"NC{self.name}"
+        return super().sorted_blocks()
 
     def smoothing_blocks(self) -> list[str]:
         """CYCLE832: its third parameter must be given, and is 1 on machines without rotary axes."""

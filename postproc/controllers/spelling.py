@@ -141,13 +141,15 @@ class Tools(UserModel):
 
 
 class Subprograms(UserModel):
-    """Operations as subprograms in the same file."""
+    """Operations as subprograms; their numbers are 1001, 1002, ..., {name} is the program's."""
 
-    call: Annotated[str, placeholders("number")] = ""
-    """block that calls one; empty: the controller has none in a file. Numbers are 1001, 1002, ..."""
-    begin: tuple[Annotated[str, placeholders("number")], ...] = ()
+    call: Named = ""
+    """block that calls one; empty: none are written"""
+    begin: tuple[Named, ...] = ()
     """blocks that begin one"""
-    end: tuple[Annotated[str, placeholders("number")], ...] = ()
+    end: tuple[Named, ...] = ()
     """blocks that end one"""
-    place: Literal["before", "after"] = "after"
-    """before the main program's first block, or behind its end"""
+    place: Literal["before", "after", "files"] = "after"
+    """before the main program's first block, behind its end, or each in a file of its own beside the program"""
+    file: Named = "{name}_{number}"
+    """name of such a file"""

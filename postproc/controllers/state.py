@@ -19,7 +19,7 @@ class WriterState:
 
     `law` is that of the words; `register` the length register of the tool in the spindle; `length_off` is True where the
     register is not in force and waits for the next block that states Z; `speed` is the spindle's (1/min, negative:
-    anti-clockwise, 0 unknown).
+    anti-clockwise, 0 unknown). `files` are the subprograms in files of their own, by name, once the program is written.
     """
 
     def __init__(self, controller: ControllerFile, program: Program, cycles: tuple[Cycle, ...], length_offsets: bool,
@@ -30,6 +30,7 @@ class WriterState:
         self.work_offset = controller.program.work_offsets.get(work_offset, work_offset)
         self.name = "".join(c if c.isascii() and c.isalnum() else "_" for c in name).upper()[:24] or "PROGRAM"
         self.subprograms = subprograms and bool(controller.subprograms.call)
+        self.files: dict[str, list[str]] = {}
         self.space = " " if controller.format.space else ""
         self.number = 0
         self.law, self.register, self.length_off, self.speed = program.sections[0].law, "", False, 0.0

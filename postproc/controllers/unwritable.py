@@ -20,7 +20,7 @@ def unwritable(controller: ControllerFile, program: Program, cycles: tuple[Cycle
 def _subprograms(controller: ControllerFile, wanted: bool) -> list[Diagnostic]:
     if not wanted or controller.subprograms.call:
         return []
-    return [error("output.subprograms", "operations as subprograms of the same file: this controller has no such",
+    return [error("output.subprograms", "operations as subprograms: this controller has none",
                   hint="take subprograms out of the set-up's [output], or state [subprograms] in the controller file")]
 
 

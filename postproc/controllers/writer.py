@@ -25,38 +25,44 @@ class Writer(WriterState):
     """Writes one program."""
 
     def lines(self, header: list[str]) -> Iterator[str]:
-        """The blocks of the whole program, without line ends."""
-        frame = self.controller.program
+        """The blocks of the whole program, without line ends; subprograms of files of their own go into `files`."""
+        frame, place = self.controller.program, self.controller.subprograms.place
         named = {"name": self.name, "number": f"{frame.number:04d}"}
         main, subs = self.sorted_blocks()
-        before = self.controller.subprograms.place == "before"
+        inside = [block for blocks in subs.values() for block in blocks] if place != "files" else []
         yield from (self.framed(block.format(**named)) for block in frame.begin)
         yield from map(self.framed, map(self.comment, (*header, *self.relies_on())))
-        yield from map(self.numbered, subs if before else [])
+        yield from map(self.numbered, inside if place == "before" else [])
         yield from map(self.numbered, main)
         yield from map(self.numbered, frame.ending)
-        yield from map(self.numbered, [] if before else subs)
+        yield from map(self.numbered, inside if place == "after" else [])
         yield from (self.framed(block.format(**named)) for block in frame.end)
+        for number, blocks in subs.items() if place == "files" else ():
+            self.first_number()
+            name = self.controller.subprograms.file.format(name=self.name, number=number)
+            self.files[name] = [self.numbered(block) for block in blocks]
 
-    def sorted_blocks(self) -> tuple[Iterable[str], list[str]]:
-        """Blocks of the main program up to its ending, and those of the subprograms, one for each operation."""
+    def sorted_blocks(self) -> tuple[Iterable[str], dict[int, list[str]]]:
+        """Blocks of the main program up to its ending, and those of the subprograms by number, one for each operation."""
         start = chain(self.start(), self.smoothing_blocks())
-        spec, number = self.controller.subprograms, 1000
         if not self.subprograms:
-            return chain(start, (block for block in self.body() if block != MARK)), []
-        main, subs = list(start), list[str]()
+            return chain(start, (block for block in self.body() if block != MARK)), {}
+        spec, main, subs = self.controller.subprograms, list(start), dict[int, list[str]]()
         into = main
-        for block in chain(self.body(), [MARK]):
+        for block in self.body():
             if block != MARK:
                 into.append(block)
                 continue
-            if into is subs:
-                subs += [text.format(number=number) for text in spec.end]
-            into, number = subs, number + 1
-            main.append(spec.call.format(number=number))
-            subs += [text.format(number=number) for text in spec.begin]
-        del main[-1], subs[len(subs) - len(spec.begin):]
+            named = {"name": self.name, "number": 1001 + len(subs)}
+            main.append(spec.call.format(**named))
+            into = subs[1001 + len(subs)] = [text.format(**named) for text in spec.begin]
+        for number, blocks in subs.items():
+            blocks += [text.format(name=self.name, number=number) for text in spec.end]
         return main, subs
+
+    def first_number(self) -> None:
+        """Begin to number blocks anew."""
+        self.number = 0
 
     def framed(self, block: str) -> str:
         """A block of the frame, or a comment at the head, as the file holds it."""

@@ -7,10 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 import toolpaths
+from postproc.cli import app
 from postproc.program import Command, Program, Section
-from tests.postproc.kit import convert, good, tool_setup
+from postproc.setup import SetupFile
+from tests.postproc.kit import SAMPLES, convert, good, tool_setup
 from tests.postproc.program_kit import LOAD, blocks, command, lines, program, step
 from toolpaths.diagnostics import has_errors
 
@@ -82,9 +85,7 @@ def test_blocks_with_a_number_of_their_own_get_no_other(tmp_path: Path) -> None:
 def test_subprograms_read_back_as_the_part(controller: str, machine: str) -> None:
     path, found = toolpaths.read(GOLDEN / "three_laws.cls")
     assert not has_errors(found)
-    usual = tool_setup()
-    setup = usual.model_copy(update={"output": usual.output.model_copy(update={"subprograms": True})})
-    result = good(convert(path, machine, controller, setup))
+    result = good(convert(path, machine, controller, with_subprograms()))
     plain = good(convert(path, machine, controller))
     assert result.comparison is not None and plain.comparison is not None
     assert sum(c in result.text for c in ("P1001", "P1002", "P1003", "LBL 1001\n", "LBL 1002\n", "LBL 1003\n")) == 3
@@ -92,11 +93,47 @@ def test_subprograms_read_back_as_the_part(controller: str, machine: str) -> Non
     assert result.comparison.worst_tip == plain.comparison.worst_tip
 
 
-def test_subprograms_are_refused_where_a_file_holds_none() -> None:
+def with_subprograms() -> SetupFile:
+    usual = tool_setup()
+    return usual.model_copy(update={"output": usual.output.model_copy(update={"subprograms": True})})
+
+
+def test_subprograms_are_refused_where_there_are_none() -> None:
     path, _ = toolpaths.read(GOLDEN / "three_laws.cls")
-    setup = tool_setup().model_copy(update={"output": tool_setup().output.model_copy(update={"subprograms": True})})
-    result = convert(path, "mikron-ucp710", "siemens-840d", setup)
+    result = convert(path, "mikron-ucp710", "generic-iso", with_subprograms())
     assert not result.ok and "output.subprograms" in {d.code for d in result.diagnostics}
+
+
+def test_siemens_subprograms_are_files_of_their_own_and_read_back() -> None:
+    path, _ = toolpaths.read(GOLDEN / "three_laws.cls")
+    result = good(convert(path, "mikron-ucp710", "siemens-840d", with_subprograms()))
+    assert result.files is not None and list(result.files) == [f"THREE_LAWS_{n}.SPF" for n in (1001, 1002, 1003)]
+    assert [line.split(" ")[1] for line in result.text.splitlines() if "THREE_LAWS_" in line] == [
+        "THREE_LAWS_1001", "THREE_LAWS_1002", "THREE_LAWS_1003"]
+    for text in result.files.values():
+        assert "N10 " in text and text.splitlines()[-1].endswith(" M17")
+    assert "CYCLE800(0" not in result.text and "CYCLE800(0" in result.files["THREE_LAWS_1002.SPF"]
+
+
+def test_klartext_operations_in_files_of_their_own_read_back(tmp_path: Path) -> None:
+    shop = tmp_path / "shop.toml"
+    shop.write_text('base = "heidenhain-tnc640"\n[subprograms]\ncall = "CALL PGM {name}_{number}.H"\n'
+                    'begin = ["BEGIN PGM {name}_{number} MM"]\nend = ["END PGM {name}_{number} MM"]\n'
+                    'place = "files"\nfile = "{name}_{number}.H"\n')
+    path, _ = toolpaths.read(GOLDEN / "three_laws.cls")
+    result = good(convert(path, "mikron-ucp710", shop, with_subprograms()))
+    assert result.files is not None and len(result.files) == 3
+    assert all(text.startswith("0 BEGIN PGM THREE_LAWS_100") for text in result.files.values())
+
+
+def test_the_command_writes_the_files_beside_the_program(tmp_path: Path) -> None:
+    setup, out = tmp_path / "s.toml", tmp_path / "part.mpf"
+    setup.write_text((SAMPLES / "tools.setup.toml").read_text() + "\n[output]\nsubprograms = true\n")
+    done = CliRunner().invoke(app, ["convert", str(GOLDEN / "three_laws.cls"), "-m", "mikron-ucp710", "-c", "siemens-840d",
+                                    "-o", str(out), "--setup", str(setup)])
+    assert done.exit_code == 0, done.output
+    assert sorted(p.name for p in tmp_path.iterdir()) == [*(f"THREE_LAWS_{n}.SPF" for n in (1001, 1002, 1003)), "part.mpf",
+                                                          "s.toml"]
 
 
 def switched(controller: str) -> list[str]:
