@@ -27,6 +27,7 @@ from postproc.planned import PlannedMotion, Source, planned_motion
 from postproc.program import Program
 from postproc.reach import check_reach
 from postproc.readback.compare import Comparison
+from postproc.readback.files import Beside
 from postproc.readback.verify import read_back
 from postproc.rewinds import drawing_of
 from postproc.rounding import rounding_problem
@@ -324,5 +325,5 @@ def verify(gcode: str | FilePath, path: Toolpath, machine: Machine | str | FileP
     found += more
     if job is None or has_errors(found):
         return VerifyResult(str(gcode), None, tuple(found))
-    comparison, more = read_back(data, job, path.file, progress, str(gcode))
+    comparison, more = read_back(data, job, path.file, progress, str(gcode), Beside(gcode))
     return VerifyResult(str(gcode), comparison, (*found, *more))
