@@ -12,6 +12,7 @@ from toolpaths.diagnostics import Diagnostic, error, warning
 
 _COMMENTS = re.compile(rb"\([^()\n]*\)|;[^\n]*")
 _WORD = re.compile(rb"\s*([A-Za-z])\s*([-+]?(?:\d+\.?\d*|\.\d+))\s*")
+_SWITCH = re.compile(rb"(?m)^([ \t]*(?:N?[ \t]*\d+[ \t]*)?)/\d?(?=[ \t]*[A-Z\n])")
 _LETTERS = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz"
 _BLANKS = bytes.maketrans(_LETTERS + b"\n", b" " * 53)
 _NUMBER = np.zeros(256, dtype=bool)
@@ -95,9 +96,14 @@ def _points(codes: Array, where: Ints) -> Bools:
 
 def _tape_marks(text: bytes) -> list[int]:
     """Lines of % that stand between blocks, where a control stops reading."""
-    lines = [n for n, line in enumerate(text.split(b"\n"), 1) if line.strip()]
-    marks = [text.count(b"\n", 0, m.start()) + 1 for m in re.finditer(rb"(?m)^[ \t]*%", text)]
-    return [n for n in marks if lines and n not in (lines[0], lines[-1])]
+    starts = [m.start() for m in re.finditer(rb"(?m)^[ \t]*%", text)] if b"%" in text else []
+    if not starts:
+        return []
+    ends = np.flatnonzero(np.frombuffer(text, dtype=np.uint8) == 10)
+    marks = (np.searchsorted(ends, starts) + 1).tolist()
+    first = text.count(b"\n", 0, len(text) - len(text.lstrip())) + 1
+    last = text.count(b"\n", 0, len(text.rstrip())) + 1
+    return [n for n in marks if n not in (first, last)]
 
 
 def _early_end(lines: list[int], file: str) -> list[Diagnostic]:
@@ -108,12 +114,13 @@ def _early_end(lines: list[int], file: str) -> list[Diagnostic]:
 
 
 def block_delete(text: bytes, file: str) -> tuple[bytes, list[Diagnostic]]:
-    """Text without the "/" that begin blocks, and a warning where there are any."""
-    mark = re.compile(rb"(?m)^([ \t]*(?:N?[ \t]*\d+[ \t]*)?)/\d?(?=[ \t]*[A-Z\n])")
-    lines = [text.count(b"\n", 0, m.start(1)) + 1 for m in mark.finditer(text)] if b"/" in text else []
-    if not lines:
+    """Text without the "/" that begin blocks, and a warning where there are any; a digit behind it names the switch."""
+    starts = [m.start(1) for m in _SWITCH.finditer(text)] if b"/" in text else []
+    if not starts:
         return text, []
-    return mark.sub(rb"\1", text), [warning(
+    ends = np.flatnonzero(np.frombuffer(text, dtype=np.uint8) == 10)
+    lines = (np.searchsorted(ends, starts) + 1).tolist()
+    return _SWITCH.sub(rb"\1", text), [warning(
         "gcode.block_delete", "a block that a switch at the control leaves out (/)", file=file, lines=lines[:6],
         count=len(lines), hint="what is proved holds with that switch off: these blocks are run")]
 

@@ -274,6 +274,29 @@ def test_walk_gives_each_move_its_own_blocks(seed: int) -> None:
     assert match[-1] == len(tips) - 1 and (np.diff(owner) >= 0).all()
 
 
+def line_move(axis1: np.ndarray = np.array([0.0, 0, 1])) -> Curves:
+    """10 mm along X, the axis turned from Z to axis1."""
+    none = np.zeros((1, 3))
+    return Curves(none, np.array([[10.0, 0, 0]]), np.array([[0.0, 0, 1]]), axis1[None], np.array([False]), none,
+                  np.array([[0.0, 0, 1]]), np.zeros(1))
+
+
+def test_blocks_that_come_nearer_to_the_end_are_the_moves_own() -> None:
+    """The last 4 micrometres of a move are its own block, not the next move's."""
+    tip, up = np.array([[5.0, 0, 0], [9.996, 0, 0], [10.0, 0, 0], [10.0, 1, 0]]), np.tile([0.0, 0, 1], (4, 1))
+    match, owner = align.align(tip, up, np.full(4, np.nan), line_move(), np.array([False]), 0.01, 1e-3)
+    assert match.tolist() == [2] and owner.tolist() == [0, 0, 0, 1]
+
+
+def test_a_move_is_not_done_before_its_axis_is_there() -> None:
+    """At the end of the way, but 1.5 tolerances short of the direction: the next block ends the move."""
+    def at(degrees: float) -> np.ndarray:
+        return np.array([np.sin(np.radians(degrees)), 0, np.cos(np.radians(degrees))])
+    tip, axis = np.array([[10.0, 0, 0], [10.005, 0, 0]]), np.array([at(4.925), at(5.0)])
+    match, _ = align.align(tip, axis, np.full(2, np.nan), line_move(at(5.0)), np.array([False]), 0.01, np.radians(0.05))
+    assert match.tolist() == [1]
+
+
 def test_walk_stops_where_blocks_are_missing() -> None:
     data = random_walk(np.random.default_rng(4), 50)
     match, _ = walked(data, slice(0, len(data[1]) // 2))

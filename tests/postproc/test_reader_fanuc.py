@@ -100,6 +100,11 @@ def test_g80_ends_a_sequence_and_its_first_level() -> None:
     assert heights("G98 G81 X0. Y0. Z-5. R1. F100\nG80\nG0 Z9.\nG81 X1. Z-5. R1.\n")[-1] == (9, 0)
 
 
+def test_g80_alone_begins_a_new_first_level() -> None:
+    """From R 1, where G99 left the tool, not from 20 where the first sequence began."""
+    assert heights("G99 G81 X0. Y0. Z-5. R1. F100\nG80\nG98 G81 X1. Z-5. R0.\n")[-1] == (1, 0)
+
+
 def test_dwells_in_milliseconds_seconds_and_at_the_bottom() -> None:
     text = "G0 X0. Y0. Z9.\nG4 P1500\nX1.\nG4 X2.5\nX2.\nG82 Z-1. R1. P250 F100\nG80\n"
     assert good(FANUC, program(text)).dwell.tolist()[:3] == [1.5, 2.5, 0]

@@ -184,6 +184,20 @@ def test_comments_blank_lines_and_headings() -> None:
     assert [(d.code, d.severity.name) for d in found] == [("gcode.block_delete", "WARNING")]
 
 
+def test_the_block_switch_before_or_behind_the_number() -> None:
+    motion, found = executed(TNC, "0 BEGIN PGM T MM\n1 L X+1 FMAX\n/22 L X+2 FMAX\n3 /L X+3 FMAX\n4 M30\n5 END PGM T MM\n")
+    assert motion is not None and [w[0] for w in words(motion)] == [1, 2, 3]
+    assert [(d.code, list(d.lines)) for d in found] == [("gcode.block_delete", [3, 4])]
+
+
+def test_a_position_of_another_mode_is_not_known() -> None:
+    """What X and Y are changes with the law: a pole counted from them has to wait until they are stated."""
+    body = START + "FUNCTION RESET TCPM\nCC IX+1 IY+0\nC IX+2 DR+ F9\n"
+    assert faults(TNC, program(body)) == {}, "no law was in force"
+    body = START + "PLANE SPATIAL SPA+0 SPB+0 SPC+0 TURN FMAX TABLE ROT\nCC IX+1 IY+0\nPLANE RESET STAY\n"
+    assert faults(TNC, program(body), "mikron-ucp710") == {"gcode.pole": [5]}
+
+
 def test_inches_are_refused() -> None:
     assert faults(TNC, program("L X+1 FMAX\n").replace(" MM", " INCH")) == {"gcode.units": [1]}
 

@@ -152,6 +152,20 @@ def test_points_of_a_plane_are_where_its_frame_has_them(dialect: str, name: str,
     assert [motion.frames[k].law for k in motion.frame[-n:]] == ["tilted"] * n
 
 
+@pytest.mark.parametrize("dialect", [FANUC, SIEMENS])
+def test_zero_of_a_plane_beside_that_of_the_work_offset(dialect: str) -> None:
+    """G68.2 X Y Z, _X0 _Y0 _Z0 count in the work offset, _X1 _Y1 _Z1 in the plane."""
+    name, rotary = "mikron-ucp710", {"A": -30.0, "C": 40.0}
+    r, text = matrix_of(name, rotary), in_plane(dialect, name, rotary)
+    if dialect == FANUC:
+        text, zero = text.replace("X0. Y0. Z0.", "X3. Y4. Z-5."), np.array([3.0, 4, -5])
+    else:
+        text = text.replace(",57,0,0,0,", ",57,3,4,-5,").replace(",0,0,0,-1,", ",1,2,7,-1,")
+        zero = np.array([3.0, 4, -5]) + r @ [1, 2, 7]
+    tip, _ = tips_of(good(dialect, text, name), name)
+    assert np.abs(tip[-len(PLANE_POINTS):] - zero - PLANE_POINTS @ r.T).max() < 1e-5
+
+
 @pytest.mark.parametrize(("name", "rotary"), TABLES)
 def test_dynamic_work_offset_follows_the_tables(name: str, rotary: dict[str, float]) -> None:
     tip, _ = tips_of(good(HAAS, in_plane(HAAS, name, rotary), name), name)

@@ -260,8 +260,9 @@ class Run:
             self.fault("gcode.mode", b, f"{law.code} while another mode is on", "leave the mode that is on first")
         if law.name == "axes" and state == "tilted":
             return
+        if state != self.state:
+            self.track.lost(b, "XYZ")
         self.state = state
-        self.track.lost(b, "XYZ")
         self.new.append((b, LAW, float(len(self.laws))))
         self.laws.append(law)
 

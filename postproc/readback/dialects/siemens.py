@@ -281,13 +281,12 @@ class _Run:
         self.enter(b, "tilted", Law("tilted", s.name, rotation, shift, choice))  # type: ignore[arg-type]
 
     def modal_calls(self, modal: list[tuple[int, int]]) -> None:
-        """Each block that moves calls the cycle of the MCALL in force, but not the blocks of MCALL themselves."""
+        """Each block that moves calls the cycle of the MCALL in force."""
         if not modal:
             return
         held = fill(np.array([m[0] for m in modal]), np.array([float(m[1]) for m in modal]), self.words.lines, -1.0)
         moves = np.unique(self.words.line[np.isin(self.words.letter & 95, [ord(a) for a in self.axes])])
-        calls = moves[(held[moves] >= 0.0) & ~np.isin(moves, [m[0] for m in modal])]
-        self.new += [(int(b), CALL, float(held[b])) for b in calls]
+        self.new += [(int(b), CALL, float(held[b])) for b in moves[held[moves] >= 0.0]]
 
 
 def _apart(text: bytes) -> tuple[bytes, list[tuple[int, str]]]:
