@@ -58,7 +58,7 @@ def compare(motion: Motion, job: Job, executed: Executed, gcode: str = "") -> Co
     tip, axis = executed.poses(motion, np.arange(len(motion)), 1.0)
     words = job.controller.format
     grain = max(1e-3, 1.5 * 10.0**-words.linear_decimals), max(1e-6, 1.5 * DEG * 10.0**-words.rotary_decimals)
-    number = rewinds(motion, tip, axis, executed.control.rotary, (2.0 * tolerance, 2.0 * axis_tolerance))
+    number = rewinds(motion, tip, axis, moves.tip, executed.control.rotary, (2.0 * tolerance, 2.0 * axis_tolerance))
     match, owner = _aligned(np.flatnonzero(number < 0), tip, axis, arc_sweeps(motion, executed.control), curves, moves.link,
                             tolerance, axis_tolerance, grain)
     lost = unreached(match)

@@ -23,11 +23,12 @@ _MOVED = 1.0
 """degrees: least difference of a rotary axis between the two stands"""
 
 
-def rewinds(motion: Motion, tip: Floats, axis: Floats, rotary: Ints, grain: tuple[float, float]) -> Ints:
+def rewinds(motion: Motion, tip: Floats, axis: Floats, stops: Floats, rotary: Ints, grain: tuple[float, float]) -> Ints:
     """(E,) number of the rewind that each block belongs to, -1 for none.
 
     Args:
         tip, axis: (E, 3) poses at the ends of the blocks
+        stops: (M, 3) tips of the CL file
         rotary: joint numbers
         grain: mm, rad within which two poses are the same
     """
@@ -40,18 +41,19 @@ def rewinds(motion: Motion, tip: Floats, axis: Floats, rotary: Ints, grain: tupl
     for k in np.flatnonzero(turned & (motion.code == 0)):
         if result[k] >= 0:
             continue
-        found = _around(int(k), motion.code == 0, tip, axis, angle, grain)
+        found = _around(int(k), motion.code == 0, tip, axis, stops, angle, grain)
         if found is not None:
             result[found[0]:found[1] + 1] = count
             count += 1
     return result
 
 
-def _around(k: int, rapid: Bools, tip: Floats, axis: Floats, angle: Floats,
+def _around(k: int, rapid: Bools, tip: Floats, axis: Floats, stops: Floats, angle: Floats,
             grain: tuple[float, float]) -> tuple[int, int] | None:
     """(first, last) block of the rewind round block k; the pose is that where block first - 1 ends.
 
-    Above the part the tool stands in one pose twice too: the first pose since the last cut that is come back to counts.
+    On the way the tool stands in other poses twice too. The innermost that is a position of the CL file counts, for what
+    lies outside it is motion of the CL file; without any the outermost.
     """
     low, high = max(k - _REACH, 1), min(k + _REACH, len(tip))
     stop = np.flatnonzero(~rapid[low:k])
@@ -63,8 +65,10 @@ def _around(k: int, rapid: Bools, tip: Floats, axis: Floats, angle: Floats,
     pairs = np.argwhere(same)
     if not len(pairs):
         return None
-    first, last = pairs[0]
-    return int(begin[first]) + 1, int(end[last])
+    for first, last in pairs[np.lexsort((pairs[:, 1], -pairs[:, 0]))]:
+        if (np.linalg.norm(stops - tip[begin[first]], axis=1) <= grain[0]).any():
+            return int(begin[first]) + 1, int(end[last])
+    return int(begin[pairs[0, 0]]) + 1, int(end[pairs[0, 1]])
 
 
 def check_rewinds(motion: Motion, executed: Executed, number: Ints, tip: Floats, axis: Floats, space: SafeSpace,
