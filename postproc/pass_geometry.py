@@ -21,7 +21,7 @@ from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.rotations import angle_between
 from toolpaths.shape import Curves
 from toolpaths.smoothing.blend import SHARPEST
-from toolpaths.smoothing.smooth import Smooth, Tolerance, smooth
+from toolpaths.smoothing.smooth import Smooth, Tolerance, smooth_all
 from toolpaths.toolpath import Kind, Toolpath
 
 RUNNING = frozenset({"PPRINT", "FEDRAT", "SEQNO", "MODE", "ROTATE", "SELECT", "INDIRV", "INDIRP", "TLON", "TLAXIS"})
@@ -76,19 +76,27 @@ def pass_geometry(path: Path, moves: Moves, kinematics: Callable[[int], Kinemati
         stops: rows of Moves before which the motion stops, besides those where it turns on the spot
         sharpest: rad; it stops at corners that turn by more
     """
-    result, diagnostics = [], []
     reference = moves.curves()
-    for first, last in chains(moves, np.union1d(stops, path.turns)):
-        block = _blocks(path, first, last)
-        kin = kinematics(int(moves.tool[first]))
+    written = [_written(path, block, reference, kinematics(int(moves.tool[first])))
+               for first, last in chains(moves, np.union1d(stops, path.turns)) if len(block := _blocks(path, first, last))]
+    if not written:
+        return [], []
+    begin = np.concatenate(([0], np.cumsum([len(one.move) for one in written])))
+    result, diagnostics = [], []
+    for one, found in zip(written, smooth_all(_joined(written), begin, tolerance, sharpest), strict=True):
         try:
-            found = _pass(path, block, reference, kin, tolerance, sharpest) if len(block) else None
-            result += [found] if found is not None else []
+            result += [_pass(path, one, found, kinematics(int(moves.tool[one.move[0]])))] if found is not None else []
         except ArithmeticError as fault:
             diagnostics.append(error("plan.reach", f"the smoothed path leaves what the machine can reach: {fault}",
-                                     file=file, lines=moves.line[[first, last - 1]].tolist(),
+                                     file=file, lines=moves.line[one.move[[0, -1]]].tolist(),
                                      hint="--feed programmed, a smaller --tolerance, or move the part"))
     return result, diagnostics
+
+
+def _joined(written: list[_Written]) -> Curves:
+    """The curves of all passes in a row."""
+    return Curves(*(np.concatenate([getattr(one.curves, name) for one in written])
+                    for name in Curves.__dataclass_fields__))
 
 
 def _blocks(path: Path, first: int, last: int) -> Ints:
@@ -100,8 +108,9 @@ def _blocks(path: Path, first: int, last: int) -> Ints:
 
 @dataclass(frozen=True)
 class _Written:
-    """Curves as the blocks follow them: `curve` (k,) of each block, and where on it the block ends, `u` (k,)."""
+    """Curves as the blocks (k,) follow them: `curve` (k,) of each block, and where on it the block ends, `u` (k,)."""
 
+    block: Ints
     curves: Curves
     move: Ints
     share: Floats
@@ -132,16 +141,12 @@ def _written(path: Path, block: Ints, reference: Curves, kin: Kinematics) -> _Wr
     begin = np.concatenate(([0.0], np.where(u[rows[:-1]] < 1.0, u[rows[:-1]], 0.0)))
     whole = ~led[rows]
     curves = Curves(start, tip[rows], axis0, axis[rows], own.is_arc & whole, own.center, own.normal, own.sweep)
-    return _Written(curves, move[rows], u[rows] - begin, curve, np.where(led, 1.0, u))
+    return _Written(block, curves, move[rows], u[rows] - begin, curve, np.where(led, 1.0, u))
 
 
-def _pass(path: Path, block: Ints, reference: Curves, kin: Kinematics, tolerance: Tolerance,
-          sharpest: float) -> PassGeometry | None:
-    """The geometry of a chain of blocks; None where nothing moves."""
-    written = _written(path, block, reference, kin)
-    found = smooth(written.curves, tolerance, sharpest)
-    if found is None:
-        return None
+def _pass(path: Path, written: _Written, found: Smooth, kin: Kinematics) -> PassGeometry:
+    """The geometry of a chain of blocks."""
+    block = written.block
     ends = found.s[written.curve] + written.u * np.diff(found.s)[written.curve]
     begin = np.concatenate((found.s[:1], ends[:-1]))
     jump = np.flatnonzero(np.diff(block) > 1) + 1

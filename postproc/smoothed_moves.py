@@ -9,7 +9,7 @@ import numpy as np
 from postproc.moves import Moves
 from postproc.pass_geometry import chains
 from toolpaths.arrays import Floats, Ints
-from toolpaths.smoothing.smooth import Smooth, Tolerance, smooth
+from toolpaths.smoothing.smooth import Smooth, Tolerance, smooth_all
 
 
 def smoothed_moves(moves: Moves, tolerance: Tolerance, stops: Ints) -> Moves:
@@ -18,17 +18,19 @@ def smoothed_moves(moves: Moves, tolerance: Tolerance, stops: Ints) -> Moves:
     Chords between moved points stay within the same tolerance of the chords they replace. Points between other moves
     (long lines, arcs, corners) and points before which the motion stops (`stops`, rows) are not moved.
     """
-    tip, axis, reference = moves.tip.copy(), moves.axis.copy(), moves.curves()
-    for first, last in chains(moves, stops):
-        curves = reference.take(np.arange(first, last))
-        found = smooth(curves, tolerance)
+    tip, axis = moves.tip.copy(), moves.axis.copy()
+    ranges = chains(moves, stops)
+    rows = np.concatenate([np.arange(*one) for one in ranges]) if ranges else np.zeros(0, dtype=np.int64)
+    first = np.concatenate(([0], np.cumsum([last - begin for begin, last in ranges]))).astype(np.int64)
+    curves = moves.curves().take(rows)
+    for (begin, last), found in zip(ranges, smooth_all(curves, first, tolerance), strict=True):
         if found is None:
             continue
-        rows, places = _inside(found)
-        values = found.members.at(places, found.s[rows + 1])
-        tip[first + rows] = values[:, :3]
-        if (curves.axis1 != curves.axis0[0]).any():
-            axis[first + rows] = _unit(values[:, 3:])
+        inside, places = _inside(found)
+        values = found.members.at(places, found.s[inside + 1])
+        tip[begin + inside] = values[:, :3]
+        if (moves.axis[begin:last] != moves.axis[begin - 1]).any():
+            axis[begin + inside] = _unit(values[:, 3:])
     return replace(moves, tip=tip, axis=axis)
 
 

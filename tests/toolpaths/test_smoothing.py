@@ -12,7 +12,7 @@ from toolpaths.shape import Curves
 from toolpaths.smoothing.blend import HIGHEST, ramp
 from toolpaths.smoothing.bspline import DEGREE, Knots, basis
 from toolpaths.smoothing.fit import fit
-from toolpaths.smoothing.smooth import Smooth, Tolerance, smooth
+from toolpaths.smoothing.smooth import Smooth, Tolerance, smooth, smooth_all
 from toolpaths.smoothing.sweep import Data, Normal, compiled_sweep, sweep
 
 TOLERANCE = Tolerance(0.005, np.radians(0.025))
@@ -88,8 +88,8 @@ def test_bound_of_each_chord_holds() -> None:
     p = np.hstack((np.concatenate((curves.start[:1], curves.end)),
                    11.0 * np.concatenate((curves.axis0[:1], curves.axis1))))
     s = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(p, axis=0), axis=1))))
-    found = fit(s, p, np.array([0, len(s)]), 0.004)
-    spline = BSpline(found.knots.t, found.c, DEGREE)
+    found, = fit(s, p, np.array([0, len(s)]), 0.004)
+    spline = BSpline(found.t, found.c, DEGREE)
     u = np.linspace(0.0, 1.0, 101)[:, None]
     gap = spline(s[:-1] + u * np.diff(s)) - (p[:-1] + u[..., None] * np.diff(p, axis=0))
     truth = np.maximum(np.linalg.norm(gap[..., :3], axis=2), np.linalg.norm(gap[..., 3:], axis=2)).max(axis=0) / 0.004
@@ -240,3 +240,23 @@ def test_dense_points_with_tight_turns_and_uneven_steps_stay_inside(sharp: float
     assert path is not None and path.members.spline.any()
     worst_tip, worst_axis = off(path, curves, 41)
     assert worst_tip <= TOLERANCE.tip and worst_axis <= TOLERANCE.axis
+
+
+def test_many_chains_at_once_are_those_one_by_one() -> None:
+    rng = np.random.default_rng(4)
+    square = np.array([[0.0, 0, 0], [10, 0, 0], [10, 10, 0], [0, 10, 0]])
+    noisy = np.round(np.cumsum(rng.normal(size=(60, 3)) * [0.02, 0.02, 0.02] + [0.3, 0.0, 0.0], axis=0), 4)
+    chains = [rounded(0.3, 30.0), chain(square), chain(np.zeros((4, 3))), rounded(0.6, 40.0), chain(noisy),
+              rounded(0.1, 9.0)]
+    columns = [np.concatenate([getattr(c, name) for c in chains]) for name in Curves.__dataclass_fields__]
+    first = np.concatenate(([0], np.cumsum([len(c) for c in chains])))
+    for own, curves in zip(smooth_all(Curves(*columns), first, TOLERANCE), chains, strict=True):
+        alone = smooth(curves, TOLERANCE)
+        assert (own is None) is (alone is None)
+        if own is None or alone is None:
+            continue
+        s = np.linspace(0.0, alone.s[-1], 400)
+        assert own.s.tolist() == alone.s.tolist() and own.members.first.tolist() == alone.members.first.tolist()
+        np.testing.assert_allclose(own.at(s)[0], alone.at(s)[0], atol=1e-9)
+        np.testing.assert_allclose(own.at(s)[1], alone.at(s)[1], atol=1e-10)
+        assert own.worst == pytest.approx(alone.worst, abs=1e-6) and own.stops.tolist() == alone.stops.tolist()

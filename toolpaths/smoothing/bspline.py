@@ -38,6 +38,11 @@ class Knots:
         repeat[first[1:] - 1] = ORDER
         return Knots(np.repeat(values, repeat), first + 2 * DEGREE * np.arange(len(first)))
 
+    def taken(self, which: Bools) -> Knots:
+        """Those of some stretches (G,)."""
+        size = np.diff(self.first)
+        return Knots(self.t[np.repeat(which, size)], np.concatenate(([0], np.cumsum(size[which]))))
+
     @property
     def count(self) -> int:
         """K, number of coefficients."""

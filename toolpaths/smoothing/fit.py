@@ -31,12 +31,28 @@ GOOD = 0.95
 
 @dataclass(frozen=True)
 class Fit:
-    """Splines of all stretches: knots, coefficients (K, 6); `ratio` (P - 1,) bound of deviation over tolerance on each
-    chord of the polyline, 0 on those between stretches."""
+    """Splines of G stretches: knots and coefficients (K, 6)."""
 
     knots: Knots
     c: Floats
+
+
+@dataclass(frozen=True)
+class Spline:
+    """One stretch: clamped knots t, coefficients c (k, 6), `ratio` (P - 1,) bound of deviation over tolerance on each
+    chord of its polyline."""
+
+    t: Floats
+    c: Floats
     ratio: Floats
+
+
+def assembled(splines: list[Spline], shift: float) -> Fit | None:
+    """All of them, their parameters less by `shift`; None for none."""
+    if not splines:
+        return None
+    first = np.concatenate(([0], np.cumsum([len(one.t) for one in splines])))
+    return Fit(Knots(np.concatenate([one.t for one in splines]) - shift, first), np.concatenate([one.c for one in splines]))
 
 
 @dataclass(frozen=True)
@@ -56,51 +72,65 @@ class _Polyline:
     row: Ints
 
 
-def fit(s: Floats, p: Floats, first: Ints, tolerance: float) -> Fit:
-    """Splines along polylines, their end points kept.
+def fit(s: Floats, p: Floats, first: Ints, tolerance: float) -> list[Spline]:
+    """One spline for each polyline, its end points kept; none depends on the others.
 
     Args:
-        s (P,): parameter of the points, rising inside a stretch
+        s (P,): parameter of the points, rising inside a stretch, and from stretch to stretch
         p (P, 6): points
         first (G + 1,): where each stretch begins; 2 points or more to a stretch
         tolerance: of the columns 0 to 2 and 3 to 5 each, by length
     """
-    height = heights(s, p, first) / tolerance
-    line = _polyline(s, p, first, height)
-    knots = _first_knots(s, first, height)
-    fixed = p[first[:-1]], p[first[1:] - 1]
-    for _ in range(HALVINGS):
-        found = _rounds(knots, line, fixed, tolerance)
-        bad = found.ratio > 1.0
-        if not bad.any():
-            return found
-        knots = _halved(knots, s, bad)
-    return _rounds(knots, line, fixed, tolerance)
+    found: dict[int, Spline] = {}
+    active, knots = np.arange(len(first) - 1), None
+    for halvings_left in reversed(range(HALVINGS + 1)):
+        height = heights(s, p, first) / tolerance
+        line = _polyline(s, p, first, height)
+        knots = _first_knots(s, first, height) if knots is None else knots
+        made, ratio = _rounds(knots, line, (p[first[:-1]], p[first[1:] - 1]), tolerance)
+        again = (np.maximum.reduceat(np.append(ratio, 0.0), first[:-1]) > 1.0) & (halvings_left > 0)
+        for k in np.flatnonzero(~again).tolist():
+            found[int(active[k])] = _one(made, ratio, first, k)
+        if not again.any():
+            break
+        knots = _halved(knots, s, ratio > 1.0).taken(again)
+        rows = np.repeat(again, np.diff(first))
+        s, p, first, active = s[rows], p[rows], np.append(0, np.cumsum(np.diff(first)[again])), active[again]
+    return [found[k] for k in range(len(found))]
+
+
+def _one(made: Fit, ratio: Floats, first: Ints, k: int) -> Spline:
+    """Stretch k of a fit."""
+    begin, last = made.knots.ends
+    return Spline(made.knots.t[made.knots.first[k]:made.knots.first[k + 1]], made.c[begin[k]:last[k] + 1],
+                  ratio[first[k]:first[k + 1] - 1])
 
 
 def heights(s: Floats, p: Floats, first: Ints) -> Floats:
     """(P - 1,) height over each chord of a curve that turns there as the polyline turns at the chord's ends.
 
     An arc of length h that turns by an angle a rises h a/8 over its chord; half of the turn at each end is the chord's.
+    Chords at the end of a stretch take the turn at their other end for both; those between stretches count as 0.
     """
     step = np.diff(s)
     step[first[1:-1] - 1] = 1.0
     along = np.diff(p, axis=0) / step[:, None]
-    turn = np.linalg.norm(np.diff(along, axis=0), axis=1)
-    turn[first[1:-1] - 1] = 0.0
-    turn[np.maximum(first[1:-1] - 2, 0)] = 0.0
-    both = np.concatenate((turn[:1], turn)) + np.concatenate((turn, turn[-1:])) if len(turn) else np.zeros(len(step))
-    return np.asarray(step * both / 16.0)
+    turn = np.concatenate(([0.0], np.linalg.norm(np.diff(along, axis=0), axis=1), [0.0]))
+    turn[first[1:-1]], turn[first[1:-1] - 1] = 0.0, 0.0
+    before, behind = turn[:-1].copy(), turn[1:].copy()
+    before[first[:-1]], behind[first[1:] - 2] = turn[first[:-1] + 1], turn[first[1:] - 2]
+    result = step * (before + behind) / 16.0
+    result[first[1:-1] - 1] = 0.0
+    return np.asarray(result)
 
 
 def _first_knots(s: Floats, first: Ints, height: Floats) -> Knots:
     """Knots at points, denser where the chords are far from the curve, and at the ends of each stretch."""
-    share = np.append(np.where(height > NEAR, 1.0 / DENSE, 1.0 / SPARSE), 0.0)
-    passed = np.floor(np.concatenate(([0.0], np.cumsum(share)[:-1])) + 1e-9)
+    share = np.concatenate(([0.0], np.cumsum(np.where(height > NEAR, 1.0 / DENSE, 1.0 / SPARSE))))
+    passed = np.floor(share - np.repeat(share[first[:-1]], np.diff(first)) + 1e-9)
     keep = np.append(True, np.diff(passed) > 0.0)
-    for offset in (0, 1):
-        keep[np.minimum(first[:-1] + offset, len(s) - 1)] = offset == 0
-        keep[first[1:] - 1 - offset] = offset == 0
+    keep[np.minimum(first[:-1] + 1, len(s) - 1)] = False
+    keep[first[1:] - 2] = False
     keep[first[:-1]], keep[first[1:] - 1] = True, True
     return Knots.clamped(s[keep], np.concatenate(([0], np.cumsum(keep)))[first])
 
@@ -121,19 +151,26 @@ def _polyline(s: Floats, p: Floats, first: Ints, height: Floats) -> _Polyline:
     return _Polyline(every, values, number, weight, s, chord, row)
 
 
-def _rounds(knots: Knots, line: _Polyline, fixed: tuple[Floats, Floats], tolerance: float) -> Fit:
-    """The fit on these knots after some rounds of raising weights."""
+def _rounds(knots: Knots, line: _Polyline, fixed: tuple[Floats, Floats], tolerance: float) -> tuple[Fit, Floats]:
+    """The fit on these knots after some rounds of raising weights, and the bound on each chord (P - 1,).
+
+    A stretch that is good enough stays as it is.
+    """
     k = knots.span(line.s, line.stretch)
     places = Data(line.s, line.p, k, k - DEGREE - ORDER * line.stretch)
     penalty, run, weight = _penalty(knots), sweep_for(len(k)), line.weight.copy()
     c, ratio = np.zeros((knots.count, WIDTH)), np.zeros(len(k))
+    begin = np.flatnonzero(np.diff(line.stretch, prepend=-1))
+    of_stretch = np.repeat(np.arange(len(begin)), np.diff(knots.first) - ORDER)
     for turn in range(ROUNDS + 1):
         normal = Normal(penalty.copy(), np.zeros((knots.count, WIDTH)))
         run(knots.t, places, c, weight, tolerance if turn else np.inf, ratio, normal)
-        if turn == ROUNDS or (turn and ratio.max() <= GOOD):
+        good = np.maximum.reduceat(ratio, begin) <= (GOOD if turn else -1.0)
+        if turn == ROUNDS or good.all():
             break
-        c = _solved(knots, normal, fixed)
-    return Fit(knots, c, _bound(knots, c, line, ratio, tolerance))
+        c = np.where(good[of_stretch][:, None], c, _solved(knots, normal, fixed))
+    made = Fit(knots, c)
+    return made, _bound(made, line, ratio, tolerance)
 
 
 def _penalty(knots: Knots) -> Floats:
@@ -163,32 +200,32 @@ def _solved(knots: Knots, normal: Normal, fixed: tuple[Floats, Floats]) -> Float
     return np.asarray(solveh_banded(bands, right, lower=True, overwrite_ab=True, overwrite_b=True, check_finite=False))
 
 
-def _bound(knots: Knots, c: Floats, line: _Polyline, ratio: Floats, tolerance: float) -> Floats:
-    """(P - 1,) bound of deviation over tolerance on each chord.
+def _bound(made: Fit, line: _Polyline, ratio: Floats, tolerance: float) -> Floats:
+    """(P - 1,) bound of deviation over tolerance on each chord, 0 on those between stretches.
 
     From values on the chord: between two places a distance d apart a function stays within d^2/8 of its second
-    derivative's maximum of the straight line. Where ends and middle do not suffice the quarters are looked at, too.
+    derivative's maximum of the straight line. Where ends and middle do not suffice the eighths are looked at, too.
     """
     begin, end = line.ends[line.chord], line.ends[line.chord + 1]
-    curved = (end - begin) ** 2 / 8.0 * steepest(knots, c, begin, end) / tolerance
+    curved = (end - begin) ** 2 / 8.0 * steepest(made.knots, made.c, begin, end) / tolerance
     off = np.max([ratio[line.row + j] for j in range(3)], axis=0)
     bound = off + curved / 4.0
     doubt = np.flatnonzero((bound > 1.0) & (off <= 1.0))
-    for part in (0.125, 0.25, 0.375, 0.625, 0.75, 0.875):
-        off[doubt] = np.maximum(off[doubt], _ratio_at(knots, c, line, doubt, part, tolerance))
+    for part in (0.125, 0.25, 0.375, 0.625, 0.75, 0.875) if len(doubt) else ():
+        off[doubt] = np.maximum(off[doubt], _ratio_at(made, line, doubt, part, tolerance))
     bound[doubt] = off[doubt] + curved[doubt] / 64.0
     result = np.zeros(len(line.ends) - 1)
     result[line.chord] = bound
     return result
 
 
-def _ratio_at(knots: Knots, c: Floats, line: _Polyline, which: Ints, part: float, tolerance: float) -> Floats:
+def _ratio_at(made: Fit, line: _Polyline, which: Ints, part: float, tolerance: float) -> Floats:
     """Deviation over tolerance (N,) at that part of the chords `which` (N,)."""
     row = line.row[which]
     s = line.s[row] + part * (line.s[row + 2] - line.s[row])
-    k = knots.span(s, line.stretch[row])
+    k = made.knots.span(s, line.stretch[row])
     chord = line.p[row] + part * (line.p[row + 2] - line.p[row])
-    off = evaluate(knots.t, c, Data(s, chord, k, knots.coefficient[k])) - chord
+    off = evaluate(made.knots.t, made.c, Data(s, chord, k, made.knots.coefficient[k])) - chord
     return np.asarray(np.maximum(np.linalg.norm(off[:, :3], axis=1), np.linalg.norm(off[:, 3:], axis=1)) / tolerance)
 
 

@@ -17,7 +17,7 @@ from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.rotations import angle_between
 from toolpaths.shape import Curves
 from toolpaths.smoothing.blend import SHARPEST, Blends, chosen
-from toolpaths.smoothing.fit import Fit, fit
+from toolpaths.smoothing.fit import Spline, assembled, fit
 from toolpaths.smoothing.members import Members
 from toolpaths.smoothing.stretches import Segments, corners, segments
 from toolpaths.smoothing.tangents import lengths, rates, turns
@@ -81,56 +81,87 @@ def smooth(curves: Curves, tolerance: Tolerance, sharpest: float = SHARPEST) -> 
     Args:
         sharpest: rad; the motion stops where tip and axis together turn by more in one joint
     """
+    return smooth_all(curves, np.array([0, len(curves)]), tolerance, sharpest)[0]
+
+
+def smooth_all(curves: Curves, first: Ints, tolerance: Tolerance, sharpest: float = SHARPEST) -> list[Smooth | None]:
+    """`smooth` of many chains, curves [first[k], first[k + 1]) of each; what comes out does not depend on the others."""
     way = lengths(curves, tolerance.scale)
     moving = way > STILL
-    s = np.concatenate(([0.0], np.cumsum(np.where(moving, way, 0.0))))
-    if not moving.any():
-        return None
-    kept = curves.take(np.flatnonzero(moving))
-    ends = np.append(s[:-1][moving], s[-1])
+    begin = np.concatenate(([0], np.cumsum(moving)))[first]
+    rows = np.flatnonzero(moving)
+    if not len(rows):
+        return [None] * (len(first) - 1)
+    kept, ends = curves.take(rows), np.concatenate(([0.0], np.cumsum(way[rows])))
+    apart = np.zeros(len(rows) + 1, dtype=bool)
+    apart[begin] = True
     before, after = rates(kept, tolerance.scale)
-    turn = turns(after[:-1], before[1:])
-    parts, found = _fitted(kept, ends, way[moving], turn, tolerance)
-    members = Members(kept, ends, parts.first, parts.spline, tolerance.scale, found)
-    joint_turn = turn[parts.first[1:-1] - 1]
-    blends = chosen(members, joint_turn, tolerance.tip, (1.0 - SHARE) * tolerance.tip, min(sharpest, SHARPEST))
-    worst = SHARE * float(found.ratio.max(initial=0.0)) if found is not None else 0.0
-    return Smooth(s, members, blends, worst, tolerance)
+    turn = np.where(apart[1:-1], 0.0, turns(after[:-1], before[1:]))
+    parts, splines = _fitted(kept, ends, way[rows], turn, apart[1:-1], tolerance)
+    members = Members(kept, ends, parts.first, parts.spline, tolerance.scale, assembled(splines, 0.0))
+    joint = parts.first[1:-1] - 1
+    blends = chosen(members, np.where(apart[1:-1], np.inf, turn)[joint], tolerance.tip, (1.0 - SHARE) * tolerance.tip,
+                    min(sharpest, SHARPEST))
+    result: list[Smooth | None] = []
+    for k in range(len(first) - 1):
+        own = np.where(moving, way, 0.0)[first[k]:first[k + 1]]
+        s = np.concatenate(([0.0], np.cumsum(own)))
+        result.append(_chain(members, blends, splines, begin[k:k + 2], s, tolerance) if begin[k + 1] > begin[k] else None)
+    return result
 
 
-def _fitted(curves: Curves, s: Floats, way: Floats, turn: Floats, tolerance: Tolerance) -> tuple[Segments, Fit | None]:
-    """Segments and the splines of those that are splines.
+def _chain(members: Members, blends: Blends, splines: list[Spline], rows: Ints, s: Floats, tolerance: Tolerance) -> Smooth:
+    """One chain, moves [rows[0], rows[1]), of the members of all; its parameter begins at 0."""
+    low, high = np.searchsorted(members.first, rows).tolist()
+    start = float(members.ends[rows[0]])
+    number = np.concatenate(([0], np.cumsum(members.spline)))
+    own = splines[int(number[low]):int(number[high])]
+    ends = members.ends[rows[0]:rows[1] + 1] - start
+    ends[-1] = s[-1]
+    mine = Members(members.curves.take(np.arange(rows[0], rows[1])), ends, members.first[low:high + 1] - rows[0],
+                   members.spline[low:high], members.scale, assembled(own, start))
+    joints = slice(low, high - 1)
+    joined = Blends(blends.s[joints] - start, blends.half[joints], blends.stop[joints], blends.turn[joints])
+    worst = SHARE * max((float(one.ratio.max()) for one in own), default=0.0)
+    return Smooth(s, mine, joined, worst, tolerance)
+
+
+def _fitted(curves: Curves, s: Floats, way: Floats, turn: Floats, apart: Bools,
+            tolerance: Tolerance) -> tuple[Segments, list[Spline]]:
+    """Segments, and the splines of those that are splines; `apart` are joints of two chains.
 
     Chords that no spline keeps to end up between corners; after some tries all chords of such a spline do, so that
     this ends.
     """
-    p = points(curves, tolerance.scale)
-    corner = corners(way, turn, curves.is_arc, SHARE * tolerance.tip)
+    corner = corners(way, turn, curves.is_arc, apart, SHARE * tolerance.tip)
+    known: dict[tuple[int, int], Spline] = {}
     for retry in count():
         parts = segments(corner, curves.is_arc)
-        rows, first = _rows(parts)
-        if not len(rows):
+        wanted = list(zip(parts.first[:-1][parts.spline].tolist(), parts.first[1:][parts.spline].tolist(), strict=True))
+        new = [moves for moves in wanted if moves not in known]
+        bad = []
+        for moves, one in zip(new, _fit(curves, s, new, tolerance), strict=True):
+            chords = np.flatnonzero(one.ratio > 1.0)
+            bad.append(moves[0] + chords)
+            if not len(chords):
+                known[moves] = one
+        if not any(len(chords) for chords in bad):
             break
-        found = fit(s[rows], p[rows], first, SHARE * tolerance.tip)
-        bad = np.flatnonzero(found.ratio > 1.0)
-        if not len(bad):
-            return parts, found
-        corner = _more_corners(corner, parts, rows[bad], retry >= RETRIES)
-    return parts, None
+        corner = _more_corners(corner, parts, np.concatenate(bad), retry >= RETRIES)
+    return parts, [known[moves] for moves in wanted]
 
 
-def points(curves: Curves, scale: float) -> Floats:
-    """(M + 1, 6) tip and scaled axis at the ends of M curves in a chain."""
-    tip = np.concatenate((curves.start[:1], curves.end))
-    return np.hstack((tip, scale * np.concatenate((curves.axis0[:1], curves.axis1))))
-
-
-def _rows(parts: Segments) -> tuple[Ints, Ints]:
-    """Points of all splines, one behind the other, and where each begins among them."""
-    begin, end = parts.first[:-1][parts.spline], parts.first[1:][parts.spline]
+def _fit(curves: Curves, s: Floats, moves: list[tuple[int, int]], tolerance: Tolerance) -> list[Spline]:
+    """Splines along the points of moves [begin, end)."""
+    if not moves:
+        return []
+    begin, end = np.array(moves).T
     size = end - begin + 1
     first = np.concatenate(([0], np.cumsum(size)))
-    return np.arange(first[-1]) - np.repeat(first[:-1] - begin, size), first
+    row = np.arange(first[-1]) - np.repeat(first[:-1] - begin, size)
+    tip, axis = curves.end[row - 1], curves.axis1[row - 1]
+    tip[first[:-1]], axis[first[:-1]] = curves.start[begin], curves.axis0[begin]
+    return fit(s[row], np.hstack((tip, tolerance.scale * axis)), first, SHARE * tolerance.tip)
 
 
 def _more_corners(corner: Bools, parts: Segments, chord: Ints, all_of_it: bool) -> Bools:

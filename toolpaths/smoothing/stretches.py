@@ -38,31 +38,28 @@ class Segments:
         return len(self.spline)
 
 
-def corners(length: Floats, turn: Floats, is_arc: Bools, tolerance: float) -> Bools:
+def corners(length: Floats, turn: Floats, is_arc: Bools, apart: Bools, tolerance: float) -> Bools:
     """(M - 1,) joints between M moves that no spline may cross.
 
     Beside arcs and long chords; where the polyline turns by more than a curve within the tolerance of its chords
-    could, and where it turns much more than beside the joint.
+    could, and where it turns much more than beside the joint; and at those that are `apart`.
     """
-    long = _long(length) | is_arc
-    apart = long[1:] | long[:-1]
+    long = _long(length, np.concatenate(([0], np.cumsum(apart)))) | is_arc
     shorter = np.minimum(length[1:], length[:-1])
     sharp = shorter * turn / 8.0 > HIGH * tolerance
     beside = np.concatenate(([0.0], turn, [0.0]))
     alone = turn > ALONE * np.maximum(beside[:-2], beside[2:])
     alone &= turn * TURN_SPAN * np.maximum(length[1:], length[:-1]) * ROUND > tolerance
-    return np.asarray(apart | sharp | alone)
+    return np.asarray(apart | long[1:] | long[:-1] | sharp | alone)
 
 
-def _long(length: Floats) -> Bools:
-    """(M,) chords much longer than the second shortest of the two before and the two behind."""
+def _long(length: Floats, chain: Ints) -> Bools:
+    """(M,) chords much longer than the second shortest of the two before and the two behind in the same chain (M,)."""
     around = np.full((4, len(length)), np.inf)
     for row, shift in enumerate((-2, -1, 1, 2)):
         if abs(shift) < len(length):
-            if shift < 0:
-                around[row, -shift:] = length[:shift]
-            else:
-                around[row, :-shift] = length[shift:]
+            here, there = slice(max(-shift, 0), min(-shift, 0) or None), slice(max(shift, 0), min(shift, 0) or None)
+            around[row, here] = np.where(chain[here] == chain[there], length[there], np.inf)
     return np.asarray(length > LONG * np.sort(around, axis=0)[1])
 
 
