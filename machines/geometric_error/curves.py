@@ -34,7 +34,7 @@ class Curve(ABC):
         """(N, P) derivatives of the value by the parameters, arguments as in `at`."""
 
     def at(self, x: Floats, direction: Floats | float = 0.0) -> Floats:
-        """Values (N,) at positions (N,) reached in `direction` (N,): +1, -1, or 0 for the mean of both."""
+        """Values (N,) at positions (N,) reached in `direction` (N,): +1, -1, 0 for the mean of both, between by shares."""
         result: Floats = self.basis(x, np.broadcast_to(np.asarray(direction, dtype=np.float64), x.shape)) @ self.values
         return result
 
@@ -83,8 +83,8 @@ class Table(Curve):
         if not self.both:
             return self._way(inside, self.values)
         forward, backward = (self._way(inside, half) for half in np.split(self.values, 2))
-        way = np.broadcast_to(direction, x.shape)
-        result: Floats = np.where(way > 0.0, forward, np.where(way < 0.0, backward, 0.5 * (forward + backward)))
+        share = 0.5 * (1.0 + np.clip(direction, -1.0, 1.0))
+        result: Floats = backward + share * (forward - backward)
         return result
 
     def basis(self, x: Floats, direction: Floats) -> Floats:
@@ -93,7 +93,7 @@ class Table(Curve):
         hats = self._spline(np.eye(len(self.x)), inside) if self.rule == "spline" else self._hats(inside)
         if not self.both:
             return hats
-        share = np.clip(0.5 * (1.0 + np.sign(direction)), 0.0, 1.0)[:, None]
+        share = 0.5 * (1.0 + np.clip(direction, -1.0, 1.0))[:, None]
         return np.concatenate([share * hats, (1.0 - share) * hats], axis=1)
 
     def _inside(self, x: Floats) -> Floats:

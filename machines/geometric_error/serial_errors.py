@@ -92,6 +92,14 @@ class SerialErrors:
                 result[component.name.part] = result[component.name.part] + value
         return result
 
+    def gap(self, axis: str, x: Floats) -> Floats:
+        """Lost motion (N,) of an axis at positions (N,): how far its positioning error differs by the way of approach."""
+        result = np.zeros(x.shape)
+        for component in self.components:
+            if component.name.axis == axis and str(component.name)[1] == axis:
+                result += component.curve.at(x, 1.0) - component.curve.at(x, -1.0)
+        return np.abs(result)
+
     def outside(self, names: tuple[str, ...], q: Floats, margin: float = 0.0) -> Bools:
         """True (N, J) where a joint of q (N, J) stands outside what was measured of it, by more than `margin`."""
         result = np.zeros(q.shape, dtype=np.bool_)

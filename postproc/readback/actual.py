@@ -15,6 +15,8 @@ from toolpaths.arrays import Floats, Ints
 
 MOMENT = 1e-3
 """of a block: how far back the direction of an axis is looked at"""
+NO_GAP = 1e-9
+"""mm or rad: lost motion below which an axis has none"""
 
 
 @dataclass(frozen=True)
@@ -51,5 +53,15 @@ class ActualExecuted(Executed):
         return carried_on(self._moving(self.motion, every, 1.0))
 
     def _way(self, motion: Motion, rows: Ints, t: float | Floats) -> Floats:
-        moving = self._moving(motion, rows, t)
-        return np.asarray(np.where(moving != 0.0, moving, self._last[np.maximum(rows - 1, 0)]))
+        """(K, J) by which way each joint is where it is; one that has turned back has taken up what it loses by shares."""
+        moving, last = self._moving(motion, rows, t), self._last[np.maximum(rows - 1, 0)]
+        way: Floats = np.where(moving != 0.0, moving, last)
+        back = np.argwhere(moving * last < 0.0)
+        if len(back):
+            q, begin = self.joints(motion, rows, t), self.joints(motion, rows, 0.0)
+            for j in np.unique(back[:, 1]).tolist():
+                k = back[back[:, 1] == j, 0]
+                gap = np.maximum(self.model.axes.gap(self.control.machine.axis_names[j], q[k, j]), NO_GAP)
+                taken = np.minimum(np.abs(q[k, j] - begin[k, j]) / gap, 1.0)
+                way[k, j] = last[k, j] + taken * (moving[k, j] - last[k, j])
+        return way
