@@ -11,10 +11,13 @@ from toolpaths.toolpath import Cycle
 
 
 def unwritable(controller: ControllerFile, program: Program, cycles: tuple[Cycle, ...], file: str,
-               subprograms: bool = False) -> list[Diagnostic]:
-    """Commands and cycles that the controller's texts cannot say in full, and subprograms where it has none in a file."""
-    return [*_subprograms(controller, subprograms), *_length_registers(controller, program, file),
-            *_radius_registers(controller, program, file), *_pitches(controller, program, cycles, file)]
+               subprograms: bool = False, length_offsets: bool = True) -> list[Diagnostic]:
+    """Commands and cycles that the controller's texts cannot say in full, and subprograms where it has none.
+
+    `length_offsets` is False where the words hold the length of the tool already.
+    """
+    return [*_subprograms(controller, subprograms), *_own_length(controller, program, file, length_offsets),
+            *_length_registers(controller, program, file), *_radius_registers(controller, program, file), *_pitches(controller, program, cycles, file)]
 
 
 def _subprograms(controller: ControllerFile, wanted: bool) -> list[Diagnostic]:
@@ -22,6 +25,19 @@ def _subprograms(controller: ControllerFile, wanted: bool) -> list[Diagnostic]:
         return []
     return [error("output.subprograms", "operations as subprograms: this controller has none",
                   hint="take subprograms out of the set-up's [output], or state [subprograms] in the controller file")]
+
+
+def _own_length(controller: ControllerFile, program: Program, file: str, length_offsets: bool) -> list[Diagnostic]:
+    """A length that a tool change puts in force for good, where the words hold it already."""
+    if length_offsets or not controller.tools.length_automatic or controller.codes.length_cancel:
+        return []
+    tools = sorted({float(command.args[0]) for _, command in _commands(program) if command.name == "CHANGE_TOOL"})
+    if not tools:
+        return []
+    names = ", ".join(f"T{tool:g}" for tool in tools)
+    return [warning("tool.length_twice", f"the words hold the lengths of {names} already, and this controller adds that of its "
+                    "tool table with every tool change", file=file, count=len(tools),
+                    hint="L and DL of these tools must be 0 in the control's tool table")]
 
 
 def _commands(program: Program) -> Iterator[tuple[int, Command]]:

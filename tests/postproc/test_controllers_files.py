@@ -106,6 +106,15 @@ def test_a_radius_register_that_is_not_written_is_said(name: str) -> None:
     assert said("fanuc-30i", made) == set()
 
 
+def test_lengths_that_would_count_twice_are_said() -> None:
+    made = program([step("rapid", X=1.0)], {0: LOAD})
+    for name, expected in (("heidenhain-tnc640", {"tool.length_twice"}), ("siemens-840d", set()), ("fanuc-30i", set())):
+        spec, _ = load_controller(name)
+        assert spec is not None
+        assert {d.code for d in unwritable(spec, made, (), "a.cls", length_offsets=False)} == expected
+        assert {d.code for d in unwritable(spec, made, (), "a.cls")} == set()
+
+
 def test_a_tap_needs_its_pitch_or_a_speed() -> None:
     steps, hole = drilled("TAP")
     tap, pitched = Cycle("TAP", 8.0, 2.0, 2.0, 200.0), Cycle("TAP", 8.0, 2.0, 2.0, 200.0, pitch=1.0)
