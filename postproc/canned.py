@@ -15,6 +15,8 @@ from toolpaths.arrays import Bools, Ints
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.toolpath import Kind, Toolpath
 
+ROUNDED = 1.5
+"""last decimals by which words along a hole may differ in a plane whose printed angles are rounded"""
 SINGLE_MOVES = frozenset({"DRILL", "THRU", "CSINK", "FACE", "DEEP", "BRKCHP", "BORE", "REAM"})
 """kinds of cycles that rapids, feeds and dwells replace"""
 
@@ -96,14 +98,18 @@ def _hole(toolpath: Toolpath, moves: Moves, path: Path, rows: WordRows, control:
     z = int(control.xyz[2])
     words = np.concatenate([rows.start[first:first + 1], rows.end[first:last + 1]])
     start = int(np.flatnonzero(phases <= Phase.APPROACH)[-1]) + 1 if (phases <= Phase.APPROACH).any() else 0
-    along = bool((np.delete(words[start:], z, axis=1) == np.delete(words[start], z)).all())
+    slack = 1e-9
+    if path.frames[int(path.frame[first])].control.law == "tilted":
+        slack = ROUNDED * 10.0 ** -controller.format.linear_decimals
+    along = bool((np.abs(np.delete(words[start:], z, axis=1) - np.delete(words[start], z)) <= slack).all())
     plane, out, deepest = float(words[start, z]), float(words[-1, z]), float(words[bottom - first + 1, z])
     if feeding_rapid(moves, path, np.arange(first, last + 1)).any() or phases[-1] == Phase.DRILL:
         return None
     if key not in spec or not along or deepest >= plane or len(set(cycle.steps)) > 1:
         return None
-    if abs(out - plane) > 1e-9 and abs(out - initial) > 1e-9:
+    if min(abs(out - plane), abs(out - initial)) > slack:
         return None
+    out = plane if abs(out - plane) <= slack else initial
     return Hole(first, last, int(moves.cycle[path.move[first]]), plane, deepest, out, initial, key, bottom)
 
 

@@ -308,3 +308,14 @@ def test_a_pivot_of_no_axis_is_an_error(tmp_path: Path) -> None:
     own = tool_setup().model_copy(update={"control_pivots": {"A": postproc.setup.Pivot(point=(0, 0, 0))}})
     result = convert(toolpath("RAPID", "GOTO/0,0,50", "GOTO/0,0,5"), "mill-3axis", shop(tmp_path), own)
     assert "setup.pivot" in codes(result.diagnostics) and result.program is None
+
+
+@pytest.mark.parametrize("output", ["tilted", "auto"])
+def test_deep_holes_are_native_beside_rounded_angles(output: str, tmp_path: Path) -> None:
+    """20 mm of depth in planes whose printed angles are rounded: the last decimal across the tool may flip on the way."""
+    for angle_of in (23.4567, 41.2345, 57.6543, 12.3456):
+        axis = tilted(angle_of, 3 * angle_of)
+        lines = [n.replace("DEPTH,5", "DEPTH,60").replace("DRILL", "TAP") for n in holes(axis)]
+        for name in (*FRAMES, "nutating-head"):
+            result = made(tmp_path, lines, name, output)
+            assert len(result.program.holes) == 2 and "cycle.not_native" not in codes(result.diagnostics), (angle_of, name)
