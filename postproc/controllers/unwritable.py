@@ -17,7 +17,8 @@ def unwritable(controller: ControllerFile, program: Program, cycles: tuple[Cycle
     `length_offsets` is False where the words hold the length of the tool already.
     """
     return [*_subprograms(controller, subprograms), *_own_length(controller, program, file, length_offsets),
-            *_length_registers(controller, program, file), *_radius_registers(controller, program, file), *_pitches(controller, program, cycles, file)]
+            *_length_registers(controller, program, file), *_radius_registers(controller, program, file),
+            *_pitches(controller, program, cycles, file)]
 
 
 def _subprograms(controller: ControllerFile, wanted: bool) -> list[Diagnostic]:
@@ -35,8 +36,8 @@ def _own_length(controller: ControllerFile, program: Program, file: str, length_
     if not tools:
         return []
     names = ", ".join(f"T{tool:g}" for tool in tools)
-    return [warning("tool.length_twice", f"the words hold the lengths of {names} already, and this controller adds that of its "
-                    "tool table with every tool change", file=file, count=len(tools),
+    return [warning("tool.length_twice", f"the words hold the lengths of {names} already, and this controller adds that of "
+                    "its tool table with every tool change", file=file, count=len(tools),
                     hint="L and DL of these tools must be 0 in the control's tool table")]
 
 
