@@ -73,7 +73,7 @@ def pass_geometry(path: Path, moves: Moves, kinematics: Callable[[int], Kinemati
 
     Args:
         kinematics: the kinematics with the tool of that index of the Toolpath
-        stops: rows of Moves before which the motion stops, besides those where it turns on the spot
+        stops: rows of Moves before which the motion stops, besides those where it turns on the spot or is drawn back
         sharpest: rad; it stops at corners that turn by more
     """
     reference = moves.curves()
