@@ -16,15 +16,16 @@ def least_jerk_time(problem: Problem, c: Floats, rounds: int = 60, close: float 
 
     Each is min sum w t with t >= x^-1/2, a power cone per knot. Unknowns are relative to the last solution.
     """
-    best = np.inf
+    best, idle = np.inf, 0
     for _ in range(rounds):
         better, time = _convex(problem, c)
         if better is None:  # numerical trouble of the solver; a little slower is feasible, too
             c = 0.99 * c
             continue
-        if abs(best - time) < close * time:
-            return min(best, time)
+        idle = idle + 1 if time > (1.0 - close) * best else 0
         c, best = better, min(best, time)
+        if idle == 3:
+            return best
     raise ArithmeticError("the reference did not converge")
 
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.interpolate import BSpline
+from scipy.interpolate import BSpline, make_interp_spline
 
 from postproc.feedrate.interior import NumpySteps
 from postproc.feedrate.interior_packed import PackedSteps
+from postproc.feedrate.limits import JointLimits
 from postproc.feedrate.mesh import Spacing, mesh
-from postproc.feedrate.paths import Eased
+from postproc.feedrate.paths import Eased, SplinePath
 from postproc.feedrate.problem import Knots
 from postproc.feedrate.spline import REST, rest_basis, rest_law, stencils
 from postproc.feedrate.windows import solve_problem
@@ -91,3 +92,20 @@ def test_twice_the_knots_change_the_time_little() -> None:
         problem = grid.problem()
         times.append(float(np.sum(problem.weight * problem.basis.values(solve_problem(problem, NumpySteps).c)[0] ** -0.5)))
     assert times[0] == pytest.approx(times[1], rel=5e-4)
+
+
+@pytest.mark.parametrize("joints", [1, 2, 3, 6, 9])
+def test_one_to_nine_joints(joints: int) -> None:
+    """Compiled as numpy, within the limits, and a joint that stands still changes nothing."""
+    rng = np.random.default_rng(joints)
+    spline = make_interp_spline(np.linspace(0.0, 100.0, 20), np.cumsum(rng.normal(size=(20, joints)) * 4.0, axis=0), k=5)
+    limits = JointLimits(*(value * np.ones(joints) for value in (500.0, 2500.0, 5e4)))
+    problem = uniform(SplinePath(spline.t, spline.c), 300, limits).problem()
+    plain, fast = solve_problem(problem, NumpySteps), solve_problem(problem, PackedSteps)
+    np.testing.assert_allclose(fast.c, plain.c, rtol=1e-8)
+    assert plain.solved and 0.97 < problem.ratios(plain.c).max() < 1.0
+    still = SplinePath(spline.t, np.concatenate((spline.c, np.full((len(spline.c), 1), 3.0)), axis=1))
+    wide = JointLimits(*(value * np.ones(joints + 1) for value in (500.0, 2500.0, 5e4)))
+    more = uniform(still, 300, wide).problem()
+    x = [one.basis.values(solve_problem(one, NumpySteps).c)[0] for one in (problem, more)]
+    assert np.sum(more.weight * x[1] ** -0.5) == pytest.approx(np.sum(problem.weight * x[0] ** -0.5), rel=1e-4)
