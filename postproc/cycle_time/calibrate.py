@@ -157,7 +157,8 @@ def _fit(model: CycleTimeModel, fitted: CycleTimeModel, covariance: Floats, free
         log=file, samples=len(measured), machine=machine.name if machine is not None else "",
         rms_before=_rms(before - measured), rms_after=_rms(after - measured), relative=relative,
         covariance=tuple(tuple(float(v) for v in row) for row in covariance), not_identifiable=hidden)
-    result = fitted.model_copy(update={"calibration": calibration, "assumed": hidden,
+    others = tuple(name for name in model.assumed if name not in PARAMETERS)
+    result = fitted.model_copy(update={"calibration": calibration, "assumed": (*hidden, *others),
                                        "description": f"{model.description}, calibrated"})
     values = {PARAMETERS[k]: (float(getattr(result, PARAMETERS[k])), float(sigma[k])) for k in free}
     return Fit(result, measured, after, values)

@@ -41,6 +41,10 @@ class Estimate:
 
 def timed(blocks: Blocks, model: CycleTimeModel) -> Timed:
     """The blocks under a model."""
+    if model.spindle_time > 0.0:
+        p = blocks.pauses
+        runs_up = np.where(p.cause == Cause.SPINDLE, model.spindle_time, 0.0)
+        blocks = replace(blocks, pauses=replace(p, seconds=p.seconds + runs_up))
     if model.kind == "linuxcnc":
         return linuxcnc(blocks, Settings(cycle=model.servo_cycle, override=model.override, rapid=model.rapid))
     return lookahead(blocks, model)
@@ -105,11 +109,12 @@ def _changes(blocks: Blocks, machine: Machine, model: CycleTimeModel) -> list[tu
 
 def _parameter_changes(blocks: Blocks, model: CycleTimeModel) -> list[tuple[str, list[Change]]]:
     """The model's own parameters: assumed ones alone, fitted ones along the principal axes of their covariance."""
+    alone = [name for name in model.assumed if model.calibration is None or name not in PARAMETERS]
+    result = [(f"assumed {name}", [(blocks, with_values(model, {name: sign * ASSUMED[name]})) for sign in (-1, 1)])
+              for name in alone]
     if model.calibration is None:
-        return [(f"assumed {name}", [(blocks, with_values(model, {name: sign * ASSUMED[name]})) for sign in (-1, 1)])
-                for name in model.assumed]
+        return result
     values, vectors = np.linalg.eigh(np.array(model.calibration.covariance))
-    result = []
     for k, (size, direction) in enumerate(zip(np.sqrt(np.maximum(values, 0.0)), vectors.T, strict=True)):
         moves = [dict(zip(PARAMETERS, sign * size * direction, strict=True)) for sign in (-1, 1)]
         result.append((f"fit {k + 1}", [(blocks, with_values(model, move)) for move in moves]))
@@ -118,7 +123,9 @@ def _parameter_changes(blocks: Blocks, model: CycleTimeModel) -> list[tuple[str,
 
 def with_values(model: CycleTimeModel, logarithms: dict[str, float]) -> CycleTimeModel:
     """The model with parameters moved by differences of their logarithms."""
-    return model.with_values(model.values() + np.array([logarithms.get(name, 0.0) for name in PARAMETERS]))
+    moved = model.with_values(model.values() + np.array([logarithms.get(name, 0.0) for name in PARAMETERS]))
+    others = {name: getattr(model, name) * float(np.exp(v)) for name, v in logarithms.items() if name not in PARAMETERS}
+    return moved.model_copy(update=others)
 
 
 def _scaled(blocks: Blocks, limit: str, which: Floats, sign: int) -> Blocks:

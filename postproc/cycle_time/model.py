@@ -16,7 +16,8 @@ from toolpaths.diagnostics import Diagnostic
 PARAMETERS = ("corner_tolerance", "block_time", "rapid", "override", "stop_time")
 """what a log can tell, in the order of `Calibration.covariance`"""
 ASSUMED = {"corner_tolerance": 0.7, "block_time": 0.7, "rapid": 0.05, "override": 0.02, "stop_time": 0.7,
-           "velocity": 0.15, "acceleration": 0.3, "jerk": 0.5, "tool_change": 0.3, "clamp": 0.3, "unclamp": 0.3}
+           "spindle_time": 0.7, "velocity": 0.15, "acceleration": 0.3, "jerk": 0.5, "tool_change": 0.3, "clamp": 0.3,
+           "unclamp": 0.3}
 """standard deviation of the logarithm of a value that no document states"""
 
 
@@ -62,6 +63,8 @@ class CycleTimeModel(UserModel):
     """of feeds"""
     stop_time: float = Field(default=0.005, ge=0.0, le=10.0)
     """s in position before motion goes on after a stop"""
+    spindle_time: float = Field(default=0.0, ge=0.0, le=60.0)
+    """s that the spindle takes to come up to speed at each M3 or M4"""
     servo_cycle: float = Field(default=0.001, gt=0.0, le=0.1)
     """s, of LinuxCNC"""
     own_share: float = Field(default=0.03, ge=0.0, le=1.0)

@@ -198,3 +198,12 @@ def test_override_makes_cutting_shorter() -> None:
              for o in (1.0, 1.25)]
     assert times[1] == pytest.approx(times[0] / 1.25, rel=0.01)
     assert times[3] == pytest.approx(times[2] / 1.25, rel=0.01)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_spindle_runs_up_at_each_start(kind: str) -> None:
+    b = blocks(f"{HEAD} G64 P0.01\nF600\nM3 S500\nG1 X10\nM5\nG1 X20\nM3 S900\nG1 X30")
+    slow, quick = (model(kind).model_copy(update={"spindle_time": s}) for s in (2.0, 0.0))
+    assert total(b, timed(b, slow)) == pytest.approx(total(b, timed(b, quick)) + 4.0, rel=1e-9)
+    s = shares(estimate(b, machine(), slow, with_band=False))
+    assert s.by_cause["spindle"].sum() == pytest.approx(4.0, abs=0.02)
