@@ -274,7 +274,7 @@ def test_walk_gives_each_move_its_own_blocks(seed: int) -> None:
     assert match[-1] == len(tips) - 1 and (np.diff(owner) >= 0).all()
 
 
-def line_move(axis1: np.ndarray = np.array([0.0, 0, 1])) -> Curves:
+def line_move(axis1: np.ndarray) -> Curves:
     """10 mm along X, the axis turned from Z to axis1."""
     none = np.zeros((1, 3))
     return Curves(none, np.array([[10.0, 0, 0]]), np.array([[0.0, 0, 1]]), axis1[None], np.array([False]), none,
@@ -284,7 +284,7 @@ def line_move(axis1: np.ndarray = np.array([0.0, 0, 1])) -> Curves:
 def test_blocks_that_come_nearer_to_the_end_are_the_moves_own() -> None:
     """The last 4 micrometres of a move are its own block, not the next move's."""
     tip, up = np.array([[5.0, 0, 0], [9.996, 0, 0], [10.0, 0, 0], [10.0, 1, 0]]), np.tile([0.0, 0, 1], (4, 1))
-    match, owner = align.align(tip, up, np.full(4, np.nan), line_move(), np.array([False]), 0.01, 1e-3)
+    match, owner = align.align(tip, up, np.full(4, np.nan), line_move(up[0]), np.array([False]), 0.01, 1e-3)
     assert match.tolist() == [2] and owner.tolist() == [0, 0, 0, 1]
 
 
