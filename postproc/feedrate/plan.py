@@ -20,7 +20,7 @@ from postproc.feedrate.rows import steady_tool_speed
 from postproc.feedrate.second_order import second_order
 from postproc.feedrate.shares import shares
 from postproc.feedrate.spline import rest_basis
-from postproc.feedrate.tightening import tightened
+from postproc.feedrate.tightening import SPLIT, tightened
 from postproc.feedrate.windows import Method, Solved, solved
 from toolpaths.arrays import Floats
 
@@ -135,14 +135,14 @@ def _solve(grid: Knots, options: Options) -> tuple[Profile, Solved, float]:
     profile = _profile(grid, report.c)
     if not options.strict:
         return profile, report, 1.0
-    slower, better = tightened(grid, profile, bool(options.method.kernel))
+    slower, better = tightened(grid, profile, SPLIT[0], bool(options.method.kernel))
     best = slower * float(profile.times[-1]), slower, grid, report
-    for _ in range(options.passes):
+    for before in range(1, options.passes + 1):
         if better is None:
             break
         report = solved(better, options.method, report.c if len(better.sigma) == len(grid.sigma) else None)
         grid, profile = better, _profile(better, report.c)
-        slower, better = tightened(grid, profile, bool(options.method.kernel))
+        slower, better = tightened(grid, profile, SPLIT[min(before, len(SPLIT) - 1)], bool(options.method.kernel))
         best = min(best, (slower * float(profile.times[-1]), slower, grid, report), key=lambda one: one[0])
     _, slower, grid, last = best
     return profile if last is report else _profile(grid, last.c), last, slower

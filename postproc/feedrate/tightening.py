@@ -20,16 +20,16 @@ ENOUGH = 1.002
 MORE = 1.6
 """Power of the excess by which rows are tightened: a peak between knots falls by some 60 % of what its knots do."""
 BETWEEN = (0.25, 0.5, 0.75)
-FIRST_SPLIT, SPLIT = 1.5, 1.02
-"""Ratios between knots from which an interval is halved, before and after a first tightening."""
+SPLIT = (1.5, 1.5, 1.02, 1.02)
+"""Ratios between knots from which an interval is halved, by the number of tightenings before."""
 CHUNK = 16384
 
 
-def tightened(grid: Knots, profile: Profile, kernel: bool = False) -> tuple[float, Knots | None]:
+def tightened(grid: Knots, profile: Profile, split_from: float, kernel: bool = False) -> tuple[float, Knots | None]:
     """Factor on time that brings what is seen between the knots to 1; a better grid, None where nothing is exceeded.
 
-    The better grid has tighter rows, and more knots where tightening was in vain: a spline of the path bends there
-    within one interval.
+    The better grid has tighter rows, and more knots where the ratio is above `split_from`: where tightening was in vain,
+    as a spline of the path bends within one interval.
     """
     excess = np.empty((3, len(grid.sigma) - 1), dtype=np.float32)
     for first in range(0, excess.shape[1], CHUNK):
@@ -39,7 +39,7 @@ def tightened(grid: Knots, profile: Profile, kernel: bool = False) -> tuple[floa
     slower = max(velocity, acceleration**0.5, jerk ** (1.0 / 3.0))
     if max(velocity, acceleration, jerk) <= ENOUGH:
         return slower, None
-    split = excess.max(axis=0) > (FIRST_SPLIT if grid.tight is None else SPLIT)
+    split = excess.max(axis=0) > split_from
     np.power(np.maximum(excess, 1.0, out=excess), MORE, out=excess)
     tight = np.ones((3, len(grid.sigma)), dtype=np.float32)
     tight[:, :-1] = excess

@@ -33,7 +33,7 @@ def test_tightening_lowers_what_is_seen_between_knots() -> None:
     found, slower = None, []
     for _ in range(6):
         found = solve_problem(grid.problem(), NumpySteps, found)
-        factor, better = tightened(grid, spline_profile(grid.sigma, rest_basis(grid.sigma, grid.eased.ease), found.c))
+        factor, better = tightened(grid, spline_profile(grid.sigma, rest_basis(grid.sigma, grid.eased.ease), found.c), 1.02)
         slower.append(factor)
         found = found.c if better is not None and len(better.sigma) == len(grid.sigma) else None
         if better is None:
@@ -67,5 +67,5 @@ def test_limits_at_the_tool_are_tightened_too() -> None:
     limits = JointLimits(np.array([1e4]), np.array([1e6]), np.array([1e7]), ToolLimits(jerk=500.0))
     grid = Knots(eased, np.linspace(0.0, eased.end, 400), limits, unlimited)
     found = solve_problem(grid.problem(), NumpySteps)
-    factor, better = tightened(grid, spline_profile(grid.sigma, rest_basis(grid.sigma, grid.eased.ease), found.c))
+    factor, better = tightened(grid, spline_profile(grid.sigma, rest_basis(grid.sigma, grid.eased.ease), found.c), 1.02)
     assert factor > 1.05 and better is not None
