@@ -73,6 +73,7 @@ def _blocks(file: Path, machine: Machine, controller: str, model: str, options: 
     from postproc.controllers.model import load_controller
     from postproc.cycle_time.model import load_model, model_name
     from postproc.cycle_time.source import from_conversion, from_gcode, looks_like_gcode, read_file
+    from postproc.readback.files import Beside
     from postproc.setup import load_setup
     from toolpaths.diagnostics import require
 
@@ -86,7 +87,7 @@ def _blocks(file: Path, machine: Machine, controller: str, model: str, options: 
         setup, found = load_setup(options.setup or None)
         require(found)
         assert setup is not None
-        blocks, found = from_gcode(data, machine, spec, setup, str(file))
+        blocks, found = from_gcode(data, machine, spec, setup, str(file), Beside(file))
         return blocks, planner, found
     import toolpaths
     from postproc.pipeline import convert

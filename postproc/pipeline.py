@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING
 
@@ -42,6 +43,7 @@ from toolpaths.units import DEG
 
 if TYPE_CHECKING:
     from postproc.compensation import Compensation
+    from postproc.cycle_time.estimate import Estimate
 
 Progress = Callable[[str, int, int], None]
 MARGIN = 0.85
@@ -79,6 +81,13 @@ class PostResult:
     def ok(self) -> bool:
         """True where nothing stands against writing the text."""
         return not has_errors(self.diagnostics)
+
+    @cached_property
+    def estimate(self) -> Estimate | None:
+        """How long the program takes under its controller, made when first asked for; None where nothing is written."""
+        from postproc.cycle_time.conversion import estimate_of
+
+        return estimate_of(self)
 
 
 def convert(path: Toolpath, machine: Machine | str | FilePath, controller: str | FilePath = "linuxcnc",

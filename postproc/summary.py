@@ -14,6 +14,8 @@ from toolpaths.units import DEG
 
 def as_dict(result: PostResult, output: str) -> dict[str, Any]:
     """The keys of `convert --json`; lengths mm, angles degrees, times s; null where a stage was not reached."""
+    from postproc.cycle_time import conversion
+
     c = result.comparison
     return {
         "output": output if result.ok else None,
@@ -22,7 +24,7 @@ def as_dict(result: PostResult, output: str) -> dict[str, Any]:
         "points_in": points_in(result.toolpath) if result.toolpath is not None else 0,
         "blocks_out": len(result.program) if result.program is not None else 0,
         "points_added": points_added(result),
-        "cycle_time_s": None,
+        **conversion.figures(result.estimate),
         "worst_tip_deviation_mm": _number(c.worst_tip) if c else None,
         "worst_axis_deviation_deg": _number(c.worst_axis / DEG) if c else None,
         "rewinds": len(result.path.rewinds) if result.path is not None else 0,
@@ -84,6 +86,10 @@ def as_text(result: PostResult, output: str) -> str:
         offset = " ".join(f"{k}{round(v, 4) + 0.0:.4f}" for k, v in zip(
             result.machine.axis_names, result.job.control.work_offset, strict=True))
         lines.append(f"work offset {result.setup.work_offset_code}: {offset}")
+    if result.estimate is not None:
+        from postproc.cycle_time.conversion import text
+
+        lines.append(text(result.estimate))
     lines.append("axes: " + ", ".join(f"{k} {_places(lo)} to {_places(hi)}" for k, (lo, hi) in d["axis_extents"].items()))
     if result.compensation is not None:
         lines += result.compensation.lines()

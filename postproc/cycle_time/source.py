@@ -25,7 +25,8 @@ def from_conversion(result: PostResult) -> Blocks:
     assert result.job is not None and result.comparison is not None and result.ok
     job = result.job
     lengths = job.register_lengths()
-    code, motion, found = _executed(result.text.encode(), result.controller, job.control, lengths, "")
+    others = {name: text.encode() for name, text in (result.files or {}).items()}
+    code, motion, found = _executed(result.text.encode(), result.controller, job.control, lengths, "", others)
     assert code is not None and motion is not None, found
     moves, path = job.moves.without_pecks(), job.toolpath
     owner = np.clip(result.comparison.owner, 0, len(moves) - 1)

@@ -1,0 +1,42 @@
+"""The time of what a conversion has written."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from postproc.cycle_time.estimate import Estimate, estimate
+from postproc.cycle_time.model import load_model, model_name
+from postproc.cycle_time.report import as_dict, clock
+from postproc.cycle_time.source import from_conversion
+from postproc.pipeline import PostResult
+from toolpaths.diagnostics import require
+
+BAND_UP_TO = 20_000
+"""blocks up to which a conversion also gives the band, which takes some ten estimates"""
+
+
+def estimate_of(result: PostResult) -> Estimate | None:
+    """The estimate under the model of the controller; None where nothing is written."""
+    if not result.ok:
+        return None
+    model, found = load_model(model_name(result.controller_name, result.controller.writer))
+    require(found)
+    assert model is not None
+    blocks = from_conversion(result)
+    return estimate(blocks, result.machine, model, with_band=len(blocks) <= BAND_UP_TO) if len(blocks) else None
+
+
+def figures(e: Estimate | None) -> dict[str, Any]:
+    """The keys of `convert --json` that tell times; s, null where there are none."""
+    if e is None:
+        return {"cycle_time_s": None, "lower_bound_s": None, "band_s": None, "time": None}
+    d = as_dict(e)
+    band = d["band_s"] if e.doubts else None
+    more = ("model", "assumed", "cutting_s", "rapids_s", "causes", "feed_s", "limiting", "operations", "most_expensive")
+    return {"cycle_time_s": e.seconds, "lower_bound_s": e.lower_bound, "band_s": band, "time": {key: d[key] for key in more}}
+
+
+def text(e: Estimate) -> str:
+    """One line for people."""
+    band = f", 95 % between {clock(e.band[0])} and {clock(e.band[1])}" if e.doubts else ""
+    return f"time: {clock(e.seconds)}{band} (model {e.model.kind}; no control is below {clock(e.lower_bound)})"
