@@ -156,9 +156,8 @@ def _motion(words: Words, modal: Modal, rows: Rows, code: Canonical, used: tuple
     block = rows.block
     feed, missing = _feeds(words, modal, rows)
     dwell = _dwell(block, rows.code, rows.hole, rows.dwell, rests)
-    inverse = modal.inverse[block] & ~rows.hole
     return Motion(in_files(code.line[block], code.files), rows.code, rows.end, offsets.home, modal.plane[block],
-                  modal.motion[block] == 3, rows.center, feed, inverse, modal.tool[block], modal.length_register[block],
+                  modal.motion[block] == 3, rows.center, feed, modal.inverse[block], modal.tool[block], modal.length_register[block],
                   modal.spindle[block], modal.rpm[block], modal.flood[block], modal.mist[block], rows.hole, missing, dwell,
                   modal.compensation[block], modal.offset[block], modal.blend[block], rows.frame, used)
 

@@ -13,6 +13,7 @@ import pytest
 
 from machines.kinematics.base import Kinematics
 from machines.kinematics.serial import Serial
+from postproc.readback.checks import block_seconds
 from postproc.readback.execute import Motion
 from tests.postproc.kit import angle, machine, pose_of
 from tests.postproc.reader_kit import (
@@ -315,3 +316,28 @@ def test_dog_legs_bend_in_joints_but_not_under_the_tip_law() -> None:
     assert motion is not None and motion.code.tolist() == [0, 0]
     tip, _ = look(motion, held).poses(motion, np.array([1]), 0.5)
     assert np.abs(tip[0] - np.array(ORIGIN) - [30, 5, 100]).max() < 1e-5
+
+
+def seconds(dialect: str, text: str, name: str, by_radius: bool = False) -> list[float]:
+    held = replace(control(name), feed_rule="all")
+    motion, found = executed(dialect, text, name, of=held)
+    assert motion is not None and not has_errors(found), [str(d) for d in found]
+    return block_seconds(motion, held, by_radius).round(6).tolist()
+
+
+def test_feed_per_minute_is_that_of_the_tip_under_the_tip_law_and_in_a_plane() -> None:
+    """30 mm and 40 degrees at 600: 3 s by the tip, 5 s where all axes count as one length; turning alone, degrees."""
+    turned = [{"A": 0.0, "C": 0.0}, {"A": 0.0, "C": 40.0}, {"A": 0.0, "C": 50.0}]
+    tips = np.array([[0.0, 0, 10], [30, 0, 10], [30, 0, 10]])
+    assert seconds(FANUC, by_tip(FANUC, tips, turned).replace("F500", "F600"), "mikron-ucp710")[1:] == [3.0, 1.0]
+    text = framed(FANUC, ["G0 G43 H1 X0. Y0. Z10. A0. C0.", "G1 X30. C40. F600"])
+    assert seconds(FANUC, text, "mikron-ucp710")[1:] == [5.0]
+    plane = in_plane(FANUC, "mikron-ucp710", {"A": -30.0, "C": 40.0}, np.array([[0.0, 0, 30], [30, 40, 30]]))
+    assert seconds(FANUC, plane, "mikron-ucp710")[-1:] == [6.0]
+
+
+def test_inverse_time_of_arcs_by_length_and_by_radius() -> None:
+    """Half a turn at F2: half a minute for the block, or pi / 2 minutes where F is the speed over the radius."""
+    text = framed(FANUC, ["G0 X0. Y0. Z0.", "G93 G3 X10. I5. J0. F2.", "G1 X20. F2."])
+    assert seconds(FANUC, text, "mikron-ucp710")[1:] == [30.0, 30.0]
+    assert seconds(FANUC, text, "mikron-ucp710", by_radius=True)[1:] == [round(30.0 * math.pi, 6), 30.0]

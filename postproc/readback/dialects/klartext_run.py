@@ -32,8 +32,8 @@ from postproc.readback.turns import turned
 from toolpaths.arrays import Ints
 from toolpaths.diagnostics import Diagnostic, error
 
-PLANES = {frozenset("XY"): ("X", "Y", 17), frozenset("XZ"): ("Z", "X", 18), frozenset("YZ"): ("Y", "Z", 19)}
-"""axes of a circle, the first turns to the second for DR+"""
+PLANES = {frozenset("XY"): 17.0, frozenset("XZ"): 18.0, frozenset("YZ"): 19.0}
+"""codes of the planes of circles by their axes; DR+ turns as G3 does there"""
 _TCPM = {"F", "TCP", "AXIS", "POS", "PATHCTRL", "REFPNT", "TIP-TIP"}
 _PLANE = {"TURN", "MOVE", "STAY", "FMAX", "F", "MAX", "TABLE", "COORD", "ROT", "SYM+", "SYM-", "SEQ+", "SEQ-"}
 
@@ -136,9 +136,8 @@ class Run:
         if not self.pole or sense == 0.0:
             self.fault("gcode.pole", b, f"{s.name} without CC or DR", "CC before it, DR+ or DR- in it")
             return False
-        first, second, code = PLANES[frozenset(self.pole)]
-        self.new += [(b, "G", 3.0 if sense > 0.0 else 2.0), (b, "G", float(code))]
-        self.new += [(b, {"X": "I", "Y": "J", "Z": "K"}[a], self.pole[a]) for a in (first, second)]
+        self.new += [(b, "G", 3.0 if sense > 0.0 else 2.0), (b, "G", PLANES[frozenset(self.pole)])]
+        self.new += [(b, {"X": "I", "Y": "J", "Z": "K"}[a], value) for a, value in self.pole.items()]
         return True
 
     def states(self, b: int, end: dict[str, float]) -> None:
@@ -156,8 +155,8 @@ class Run:
         if "R" not in s.keys or sense == 0.0:
             self.fault("gcode.arc", b, "CR without R or DR", "R+ up to half a turn, R- for more; DR+ or DR-")
             return
-        plane = PLANES.get(frozenset(end), ("X", "Y", 17))[2]
-        self.new += [(b, "G", 3.0 if sense > 0.0 else 2.0), (b, "G", float(plane)), (b, "R", s.keys["R"])]
+        plane = PLANES.get(frozenset(end), 17.0)
+        self.new += [(b, "G", 3.0 if sense > 0.0 else 2.0), (b, "G", plane), (b, "R", s.keys["R"])]
         self.states(b, end)
 
     def polar(self, b: int) -> tuple[float, float] | None:
