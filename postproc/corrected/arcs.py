@@ -1,0 +1,52 @@
+"""Arcs through their corrected ends, where they stay near enough to the nominal ones."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from postproc.corrected.work import Work, on_arc
+from postproc.groups import groups
+from postproc.path import ARC, FEED, Path
+from postproc.word_arcs import PLANE_COLUMNS
+from toolpaths.arrays import Bools, Floats, Ints
+
+LOOKS = (0.25, 0.5, 0.75)
+"""where the motion between two corrected points is looked at"""
+LOOSE = 4.0
+"""times the share of the correction for rapids of the CL file, and for arcs and the lines that replace them, which take no
+share of linearising; linking moves only have to come to their ends"""
+
+
+def fitted_arcs(path: Path, nominal: Path, work: Work, start: Floats, allowed: float) -> tuple[Path, Bools]:
+    """The path with arcs through their corrected ends, and which of them leave the nominal arc by more than `allowed`."""
+    resolved, center = np.zeros(len(path), dtype=bool), path.center.copy()
+    arcs = np.flatnonzero(path.code == ARC)
+    for rows in groups(path.frame[arcs], work.tools[arcs]):
+        k = arcs[rows]
+        kin = work.kinematics(int(work.tools[k[0]]))
+        old, new = (p.frames[int(p.frame[k[0]])].control for p in (nominal, path))
+        n0, n1, c0, c1 = (control.words(q, kin, 0.0) for control, q in ((old, nominal.q[k - 1]), (old, nominal.q[k]),
+                                                                        (new, start[k]), (new, path.q[k])))
+        xyz = new.xyz
+        center[k] = _new_centers(path, k, n0[:, xyz], n1[:, xyz], c0[:, xyz], c1[:, xyz])
+        for t in LOOKS:
+            share = np.full(len(k), t)
+            got = new.joints(on_arc(path.plane[k], path.ccw[k], center[k], c0, c1, share, xyz), kin, 0.0)
+            resolved[k] |= ~(work.off(work.nominal(k, share), got, k, work.way_at(k, share)) <= LOOSE * allowed)
+    return replace(path, center=center, code=np.where(resolved, FEED, path.code).astype(path.code.dtype)), resolved
+
+
+def _new_centers(path: Path, k: Ints, n0: Floats, n1: Floats, c0: Floats, c1: Floats) -> Floats:
+    """Centres (N, 3) relative to the corrected start: as the ends have moved, then at the same distance from both."""
+    result = path.center[k] + 0.5 * (c1 - n1 - (c0 - n0))
+    for plane, (i, j) in PLANE_COLUMNS.items():
+        rows = np.flatnonzero(path.plane[k] == plane)
+        chord = (c1 - c0)[rows][:, (i, j)]
+        length = np.linalg.norm(chord, axis=1)
+        open_ = length > 1e-6
+        along = chord / np.where(open_, length, 1.0)[:, None]
+        off = 0.5 * length - np.sum(result[rows][:, (i, j)] * along, axis=1)
+        result[rows[:, None], [i, j]] += np.where(open_, off, 0.0)[:, None] * along
+    return result

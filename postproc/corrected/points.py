@@ -1,0 +1,112 @@
+"""Points between the corrected ends of blocks, where the motion would leave the nominal one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from postproc.corrected.arcs import LOOKS, LOOSE
+from postproc.corrected.reversals import SHORTEST, Starts, inserted, reversals
+from postproc.corrected.work import MOMENT, Work
+from postproc.path import ARC, FEED, TRAVERSE, Path
+from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.units import DEG
+
+ROUNDS = 20
+"""how often a block is halved at most; SHORTEST ends it before"""
+LEAST = 0.2
+"""of what is allowed, where the axis turns fast"""
+
+
+def divided(path: Path, work: Work, starts: Starts, allowed: float) -> Path:
+    """The path with its blocks halved until their motion is near enough to the nominal one (`allowed` mm, see `_bound`)."""
+    cl_rapid = (path.code == TRAVERSE) & np.isfinite(path.u)
+    block = np.flatnonzero(((path.code == FEED) | cl_rapid) & ~path.home & (np.arange(len(path)) > 0))
+    block = block[~path.home[block - 1]]
+    pieces, found = _taken_up(path, work, starts, block, allowed)
+    for _ in range(ROUNDS):
+        pieces = pieces.rows(_off(pieces, path, work) > _bound(pieces, path, work, allowed))
+        if not len(pieces.block):
+            break
+        middle = 0.5 * (pieces.t0 + pieces.t1)
+        there = work.nominal(pieces.block, middle)
+        q = work.corrected(there, pieces.block, work.way_at(pieces.block, middle), path)
+        found.append((pieces.block, middle, q))
+        pieces = pieces.halved(middle, q)
+        pieces = pieces.rows(_long(pieces, work))
+    where, share, joints = (np.concatenate(column) for column in zip(*found, strict=True))
+    return inserted(path, where, share, joints) if len(where) else path
+
+
+@dataclass(frozen=True)
+class Pieces:
+    """Parts t0..t1 (N,) of blocks (N,) with the corrected joints (N, J) at their ends."""
+
+    block: Ints
+    t0: Floats
+    t1: Floats
+    q0: Floats
+    q1: Floats
+
+    def rows(self, keep: Bools) -> Pieces:
+        """Some of them."""
+        return Pieces(self.block[keep], self.t0[keep], self.t1[keep], self.q0[keep], self.q1[keep])
+
+    def halved(self, middle: Floats, q: Floats) -> Pieces:
+        """Both halves of each, the joints in the middle being q."""
+        return Pieces(np.tile(self.block, 2), np.concatenate([self.t0, middle]), np.concatenate([middle, self.t1]),
+                       np.concatenate([self.q0, q]), np.concatenate([q, self.q1]))
+
+
+def _taken_up(path: Path, work: Work, starts: Starts, block: Ints,
+              allowed: float) -> tuple[Pieces, list[tuple[Ints, Floats, Floats]]]:
+    """The blocks as pieces, cut where an axis turns back, and the points that take up what it loses by that.
+
+    At a block's start that is one point, inside a block two at one place: corrected by the old way and by the new one.
+    """
+    zero = np.zeros(len(block))
+    turning, at = reversals(work, block[path.code[block] == FEED])
+    there = work.nominal(turning, at)
+    old, new = (work.corrected(there, turning, work.way_at(turning, t), path)
+                for t in (at, np.minimum(at + 2.0 * MOMENT, 1.0)))
+    cut = np.abs(new - old).max(axis=1, initial=0.0) > allowed
+    turning, at, old, new = turning[cut], at[cut], old[cut], new[cut]
+    owner = np.concatenate([block, turning])
+    t0, t1 = np.concatenate([zero, at]), np.concatenate([zero + 1.0, at])
+    begins, ends = np.lexsort((t0, owner)), np.lexsort((t1, owner))
+    pieces = Pieces(owner[begins], t0[begins], t1[ends], np.concatenate([starts.q[block], new])[begins],
+                     np.concatenate([path.q[block], old])[ends])
+    back = starts.block
+    return pieces, [(back, np.zeros(len(back)), starts.q[back]), (turning, at, old), (turning, at, new)]
+
+
+def _off(pieces: Pieces, path: Path, work: Work) -> Floats:
+    """(N,) mm, largest distance from the nominal motion at LOOKS."""
+    worst = np.zeros(len(pieces.block))
+    for look in LOOKS:
+        t = np.full(len(worst), look)
+        at = pieces.t0 + t * (pieces.t1 - pieces.t0)
+        got = work.straight(path, pieces.q0, pieces.q1, pieces.block, t)
+        worst = np.maximum(worst, work.off(work.nominal(pieces.block, at), got, pieces.block,
+                                           work.way_at(pieces.block, at)))
+    return worst
+
+
+def _bound(pieces: Pieces, path: Path, work: Work, allowed: float) -> Floats:
+    """(N,) mm: less where the axis turns so fast that the tip's being late would cost more than its share of the axis
+    tolerance; LOOSE times as much for rapids and arcs."""
+    ends = [np.concatenate(work.poses(work.nominal(pieces.block, t), pieces.block), axis=1) for t in (pieces.t0, pieces.t1)]
+    way, turn = (np.linalg.norm((ends[1] - ends[0])[:, part], axis=1) for part in (slice(0, 3), slice(3, 6)))
+    late = work.axis_share * way / np.where(turn > 0.0, turn, 1.0)
+    cutting = np.where(turn > 0.0, np.clip(late, LEAST * allowed, allowed), allowed)
+    loose = (path.code[pieces.block] != FEED) | (work.path.code[pieces.block] == ARC)
+    result: Floats = np.where(loose, LOOSE * allowed, cutting)
+    return result
+
+
+def _long(pieces: Pieces, work: Work) -> Bools:
+    """True (N,) for pieces that are worth halving."""
+    step = np.abs(work.nominal(pieces.block, pieces.t1) - work.nominal(pieces.block, pieces.t0))
+    result: Bools = (step / np.where(work.rotary, DEG, 1.0)).max(axis=1) > SHORTEST
+    return result

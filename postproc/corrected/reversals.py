@@ -1,0 +1,106 @@
+"""Where axes turn back: blocks begin by the new way, arcs are cut there; and points put into a path."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from machines.geometric_error.actual import carried_on
+from postproc.corrected.work import EDGES, Work
+from postproc.path import ARC, FEED, Path
+from postproc.word_arcs import PLANE_COLUMNS
+from toolpaths.arrays import Floats, Ints
+
+BISECTIONS = 12
+"""halvings to find where between two looks an axis turns back"""
+SHORTEST = 0.05
+"""mm of tip way or degrees of a rotary axis: a block that short is not divided"""
+
+
+def arcs_cut(path: Path, tools: Ints, work: Work) -> tuple[Path, Ints]:
+    """The path, and the tools of its blocks, with arcs cut where an axis that loses motion turns back."""
+    arcs = np.flatnonzero((path.code == ARC) & (np.arange(len(path)) > 0))
+    block, t = reversals(work, arcs)
+    q = work.nominal(block, t)
+    apart = [np.linalg.norm(q - other, axis=1) > SHORTEST for other in (path.q[block - 1], path.q[block])]
+    again = np.concatenate([[False], (block[1:] == block[:-1]) & (np.linalg.norm(np.diff(q, axis=0), axis=1) <= SHORTEST)]) \
+        if len(block) else np.zeros(0, dtype=bool)
+    keep = apart[0] & apart[1] & ~again
+    block, t = block[keep], t[keep]
+    if not len(block):
+        return path, tools
+    cut = inserted(path, block, t, work.nominal(block, t))
+    owner = np.repeat(np.arange(len(path)), 1 + np.bincount(block, minlength=len(path)))
+    center = cut.center.copy()
+    for k in np.flatnonzero((owner[1:] == owner[:-1]) & (cut.code[1:] == ARC)) + 1:
+        control, kin = cut.frames[int(cut.frame[k])].control, work.kinematics(int(tools[owner[k]]))
+        ends = control.words(np.stack([path.q[owner[k] - 1], cut.q[k - 1]]), kin, 0.0)[:, control.xyz]
+        flat = list(PLANE_COLUMNS[int(cut.plane[k])])
+        center[k, flat] -= (ends[1] - ends[0])[flat]
+    return replace(cut, center=center), tools[owner]
+
+
+@dataclass(frozen=True)
+class Starts:
+    """Where blocks begin when corrected: (K, J); those of `block` (N,) after taking up what an axis has lost."""
+
+    q: Floats
+    block: Ints
+
+
+def starts_of(path: Path, nominal: Path, work: Work, allowed: float) -> Starts:
+    """Corrected joints where blocks begin; cutting ones whose axis turns back begin by the new way."""
+    start = np.concatenate([path.q[:1], path.q[:-1]])
+    block = np.flatnonzero(((path.code == FEED) | (path.code == ARC)) & ~path.home & (np.arange(len(path)) > 0))
+    block = block[~path.home[block - 1]]
+    way = work.begin_way(block)
+    turned = np.any(way * work.way[block - 1] < 0.0, axis=1)
+    back = block[turned]
+    q = work.corrected(nominal.q[back - 1], back, way[turned], path)
+    jump = np.abs(q - start[back]).max(axis=1, initial=0.0) > allowed
+    start[back[jump]] = q[jump]
+    return Starts(start, back[jump])
+
+
+def reversals(work: Work, block: Ints) -> tuple[Ints, Floats]:
+    """(block, fraction), by block, of the places inside blocks where a joint that loses motion turns back (bisection)."""
+    where, at = [np.zeros(0, dtype=np.int64)], [np.zeros(0)]
+    if not len(block) or not work.losing:
+        return where[0], at[0]
+    signs = np.stack([work.moving(block, np.full(len(block), t)) for t in EDGES])
+    for j in work.losing:
+        sign = carried_on(signs[:, :, j])
+        for i, (one, two) in enumerate(pairwise(sign)):
+            rows = np.flatnonzero(one * two < 0.0)
+            low, high = np.full(len(rows), EDGES[i]), np.full(len(rows), EDGES[i + 1])
+            for _ in range(BISECTIONS if len(rows) else 0):
+                middle = 0.5 * (low + high)
+                still = work.moving(block[rows], middle)[:, j] == one[rows]
+                low, high = np.where(still, middle, low), np.where(still, high, middle)
+            where.append(block[rows])
+            at.append(low)
+    order = np.lexsort((np.concatenate(at), np.concatenate(where)))
+    return np.concatenate(where)[order], np.concatenate(at)[order]
+
+
+def inserted(path: Path, block: Ints, t: Floats, q: Floats) -> Path:
+    """The path with points (M, J) at fractions t (M,) of blocks (M,): columns, times and beginnings carried along."""
+    n = len(path)
+    owner = np.concatenate([block, np.arange(n)])
+    share = np.concatenate([t, np.ones(n)])
+    order = np.lexsort((share, owner))
+    owner, share = owner[order], share[order]
+    columns = {name: getattr(path, name)[owner] for name in ("move", "code", "home", "plane", "ccw", "center", "state",
+                                                             "frame")}
+    columns["code"][(share == 0.0) & (columns["code"] == ARC)] = FEED  # taking up on the spot
+    first = np.concatenate([[True], owner[1:] != owner[:-1]])
+    before = np.where(first, 0.0, np.concatenate([[0.0], share[:-1]]))
+    begins = np.concatenate([[0.0], path.u[:-1]])
+    fresh = np.concatenate([[True], path.move[1:] != path.move[:-1]]) | ~(begins < path.u)
+    begins = np.where(fresh, 0.0, begins)
+    u = begins[owner] + share * (path.u - begins)[owner]
+    begin = np.searchsorted(owner, path.begin, side="left")
+    return replace(path, q=np.concatenate([q, path.q])[order], u=np.where(share == 1.0, path.u[owner], u),
+                   seconds=path.seconds[owner] * (share - before), begin=begin.astype(np.int64), **columns)

@@ -1,0 +1,209 @@
+"""The machine with errors along a path: nominal and corrected joints anywhere in its blocks, and the ways of its axes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from machines.geometric_error.actual import Actual, carried_on, moving_sign
+from machines.geometric_error.correction import correct
+from machines.geometric_error.model import ErrorModel
+from machines.kinematics.base import Kinematics
+from postproc.groups import groups
+from postproc.path import ARC, Path
+from postproc.word_arcs import PLANE_COLUMNS
+from toolpaths.arrays import Bools, Floats, Ints
+
+MOMENT = 1e-3
+"""of a block: how far back its direction at a place is looked at"""
+EDGES = tuple(k / 16.0 for k in range(17))
+"""where the directions of the axes in a block are looked at"""
+ALONE = -1
+
+
+@dataclass(frozen=True)
+class CorrectedEnds:
+    """Corrected joints (K, J) and what `correct` said of them, for all blocks."""
+
+    q: Floats
+    before: Floats
+    after: Floats
+    residual: Floats
+    partial: Bools
+    unmeasured: Bools
+
+
+class Work:
+    """What is needed throughout: the machine with errors by tool, groups of one orientation, ways of approach."""
+
+    def __init__(self, path: Path, tools: Ints, kinematics: Callable[[int], Kinematics], model: ErrorModel,
+                 axis_tolerance: float, beyond: bool, share: float) -> None:
+        self.path, self.tools, self.kinematics = path, tools, kinematics
+        self.axis_tolerance, self.beyond, self.model = axis_tolerance, beyond, model
+        self.axis_share = share * axis_tolerance
+        self.rotary = np.array(kinematics(int(tools[0])).rotary)
+        self.group = one_orientation(path.q[:, self.rotary], tools, path.home)
+        self._actual: dict[int, Actual] = {}
+
+    def actual(self, tool: int) -> Actual:
+        """The machine with errors at the tip of a tool."""
+        if tool not in self._actual:
+            self._actual[tool] = self.model.on(self.kinematics(tool))
+        return self._actual[tool]
+
+    @cached_property
+    def losing(self) -> list[int]:
+        """Joints whose positioning error differs by the way of approach."""
+        names = self.kinematics(int(self.tools[0])).axis_names
+        return [j for j, name in enumerate(names) if self.model.axes.gap(name, self.path.q[:, j]).any()]
+
+    @cached_property
+    def way(self) -> Floats:
+        """(K, J) sign of each joint's last motion at the ends of the blocks; on arcs that of their last moment."""
+        q, block = self.path.q, np.arange(len(self.path))
+        moved = np.zeros(q.shape)
+        moved[1:] = moving_sign(np.diff(q, axis=0), self.rotary)
+        arcs = block[self.path.code == ARC]
+        moved[arcs] = self.moving(arcs, np.ones(len(arcs)))
+        return carried_on(moved)
+
+    def moving(self, block: Ints, t: Floats) -> Floats:
+        """(N, J) sign of each joint's nominal motion at fraction t (N,) of blocks (N,); a moment after at their start."""
+        before = np.clip(t - MOMENT, 0.0, 1.0 - MOMENT)
+        return moving_sign(self.nominal(block, before + MOMENT) - self.nominal(block, before), self.rotary)
+
+    def way_at(self, block: Ints, t: Floats) -> Floats:
+        """(N, J) sign of each joint's last motion inside blocks; a joint that rests has the sign of the block before."""
+        moving = self.moving(block, t)
+        return np.asarray(np.where(moving != 0.0, moving, self.way[np.maximum(block - 1, 0)]))
+
+    def begin_way(self, block: Ints) -> Floats:
+        """(N, J) sign of each joint's first motion in blocks (N,); of a joint that rests, that of the block before."""
+        signs = np.stack([self.moving(block, np.full(len(block), t)) for t in EDGES[::-1]])
+        first = carried_on(signs.reshape(len(EDGES), -1))[-1].reshape(len(block), -1)
+        return np.asarray(np.where(first != 0.0, first, self.way[np.maximum(block - 1, 0)]))
+
+    def nominal(self, block: Ints, t: Floats) -> Floats:
+        """Nominal joints (N, J) at fraction t (N,) of blocks (N,), along the arc of those that are arcs."""
+        path = self.path
+        result = self.straight(path, path.q[block - 1], path.q[block], block, t)
+        for rows in groups(path.frame[block], self.tools[block]):
+            k = rows[path.code[block[rows]] == ARC]
+            if len(k):
+                control = path.frames[int(path.frame[block[k[0]]])].control
+                kin = self.kinematics(int(self.tools[block[k[0]]]))
+                start, end = (control.words(path.q[at], kin, 0.0) for at in (block[k] - 1, block[k]))
+                arc = block[k]
+                words = on_arc(path.plane[arc], path.ccw[arc], path.center[arc], start, end, t[k], control.xyz)
+                result[k] = control.joints(words, kin, 0.0)
+        return result
+
+    def straight(self, path: Path, q0: Floats, q1: Floats, block: Ints, t: Floats) -> Floats:
+        """Joints (N, J) at fraction t (N,) of straight blocks from q0 to q1 (N, J), under the law of each in `path`."""
+        result = np.empty_like(q0)
+        for k in groups(path.frame[block], self.tools[block]):
+            control = path.frames[int(path.frame[block[k[0]]])].control
+            result[k] = control.between(q0[k], q1[k], t[k], self.kinematics(int(self.tools[block[k[0]]])))[2]
+        return result
+
+    def ends(self) -> CorrectedEnds:
+        """All block ends; home blocks as they are."""
+        n, joints = self.path.q.shape
+        out = CorrectedEnds(self.path.q.copy(), np.zeros((n, 2)), np.zeros((n, 2)), np.zeros((n, 6)),
+                            np.zeros(n, dtype=bool), np.zeros((n, joints), dtype=bool))
+        for k in groups(self.tools):
+            rows = k[~self.path.home[k]]
+            if not len(rows):
+                continue
+            tool = int(self.tools[k[0]])
+            q = self.path.q[rows]
+            tip, axis = self.kinematics(tool).forward(q)
+            found = correct(self.actual(tool), q, tip, axis, group=self.group[rows], direction=self.way[rows],
+                            axis_tolerance=self.axis_tolerance, beyond=self.beyond)
+            out.q[rows] = self._exact_turns(found.q, rows)
+            out.before[rows] = np.stack([found.tip_before, found.axis_before], axis=1)
+            out.after[rows] = np.stack([found.tip_after, found.axis_after], axis=1)
+            out.residual[rows] = np.concatenate([found.tip_residual, found.axis_residual], axis=1)
+            out.partial[rows], out.unmeasured[rows] = found.partial, found.unmeasured
+        return out
+
+    def _exact_turns(self, q: Floats, rows: Ints) -> Floats:
+        """The same joints, those of a group with the rotary axes of its first block to the last digit."""
+        mine = self.group[rows]
+        _, first, inverse = np.unique(np.where(mine >= 0, mine, -2 - np.arange(len(mine))), return_index=True,
+                                      return_inverse=True)
+        result = q.copy()
+        result[:, self.rotary] = q[first[inverse]][:, self.rotary]
+        return result
+
+    def at(self, q: Floats, blocks: Ints, way: Floats, turns: Floats | None = None) -> Floats:
+        """Corrected joints (N, J) of nominal q (N, J) inside blocks (N,); `turns` (N, R) fixes the rotary axes."""
+        result = np.empty_like(q)
+        for k in groups(self.tools[blocks]):
+            tool = int(self.tools[blocks[k[0]]])
+            tip, axis = self.kinematics(tool).forward(q[k])
+            start = q[k].copy()
+            if turns is not None:
+                start[:, self.rotary] = turns[k]
+            result[k] = correct(self.actual(tool), start, tip, axis, direction=way[k], turn=turns is None,
+                                axis_tolerance=self.axis_tolerance, beyond=self.beyond).q
+        return result
+
+    def corrected(self, there: Floats, block: Ints, way: Floats, path: Path) -> Floats:
+        """Corrected joints (N, J) of nominal ones inside blocks (N,) of the corrected `path`.
+
+        Blocks at one orientation keep it.
+        """
+        ends = path.q[block - 1][:, self.rotary], path.q[block][:, self.rotary]
+        held: Bools = np.all(ends[0] == ends[1], axis=1)
+        q = np.empty_like(there)
+        for rows, fixed in ((np.flatnonzero(held), True), (np.flatnonzero(~held), False)):
+            if len(rows):
+                q[rows] = self.at(there[rows], block[rows], way[rows], ends[1][rows] if fixed else None)
+        return q
+
+    def poses(self, q: Floats, blocks: Ints) -> tuple[Floats, Floats]:
+        """Nominal (tip, axis), each (N, 3), of q (N, J) inside blocks (N,)."""
+        tip, axis = np.empty((len(q), 3)), np.empty((len(q), 3))
+        for k in groups(self.tools[blocks]):
+            tip[k], axis[k] = self.kinematics(int(self.tools[blocks[k[0]]])).forward(q[k])
+        return tip, axis
+
+    def off(self, nominal: Floats, q: Floats, blocks: Ints, way: Floats) -> Floats:
+        """Distance (N,) mm of the actual tip at q from the nominal one at `nominal` (N, J), inside blocks (N,)."""
+        result = np.empty(len(q))
+        for k in groups(self.tools[blocks]):
+            tool = int(self.tools[blocks[k[0]]])
+            actual, (tip, axis) = self.actual(tool), self.kinematics(tool).forward(nominal[k])
+            w = actual.coordinates(q[k], np.concatenate([tip, axis], axis=1))
+            result[k] = np.linalg.norm(actual.place(w, way[k])[0] - tip, axis=1)
+        return result
+
+
+def one_orientation(turns: Floats, tools: Ints, home: Bools) -> Ints:
+    """(K,) number of the run of blocks at the same rotary joints (K, R) with the same tool; ALONE for single blocks."""
+    same = (turns[1:] == turns[:-1]).all(axis=1) & (tools[1:] == tools[:-1]) & ~home[1:] & ~home[:-1]
+    run = np.concatenate([[0], np.cumsum(~same)])
+    count = np.bincount(run)
+    result: Ints = np.where(count[run] > 1, run, ALONE)
+    return result
+
+
+def on_arc(plane: Ints, ccw: Bools, center: Floats, start: Floats, end: Floats, t: Floats, xyz: Ints) -> Floats:
+    """Words (N, J) at fraction t (N,) of arc blocks from `start` to `end` (N, J); the third axis rises evenly."""
+    result = start + t[:, None] * (end - start)
+    for number, (i, j) in PLANE_COLUMNS.items():
+        k = np.flatnonzero(plane == number)
+        a, b = int(xyz[i]), int(xyz[j])
+        middle = start[k][:, (a, b)] + center[k][:, (i, j)]
+        first, last = start[k][:, (a, b)] - middle, end[k][:, (a, b)] - middle
+        sense = np.where(ccw[k], 1.0, -1.0)
+        swept = np.mod(sense * (np.arctan2(last[:, 1], last[:, 0]) - np.arctan2(first[:, 1], first[:, 0])), 2.0 * np.pi)
+        swept = np.where(swept < 1e-9, 2.0 * np.pi, swept) * sense * t[k]
+        cos, sin = np.cos(swept), np.sin(swept)
+        result[k, a] = middle[:, 0] + cos * first[:, 0] - sin * first[:, 1]
+        result[k, b] = middle[:, 1] + sin * first[:, 0] + cos * first[:, 1]
+    return result
