@@ -23,6 +23,9 @@ from toolpaths.toolpath import Kind
 ALLOWED_SPEED = 1.02
 """share of the programmed feed above which a move counts as too fast (short blocks carry rounding)"""
 
+STILL = 1e-7
+"""mm or degrees that come of reckoning, not of motion"""
+
 _TURNS_BACK = 1e-6
 """mm that a tool must rise for a peck to have ended"""
 
@@ -212,7 +215,7 @@ def block_seconds(motion: Motion, control: Control, by_radius: bool = False) -> 
     length = control.feed_length(step)
     tips = np.flatnonzero(motion.frame > 0)
     if len(tips):
-        length[tips] = control.under("tcp").feed_length(step[tips])
+        length[tips] = control.under("tcp").feed_length(np.where(np.abs(step[tips]) > STILL, step[tips], 0.0))
     sweep = arc_sweeps(motion, control)
     for plane, (i, j) in PLANE_COLUMNS.items():
         k = np.flatnonzero(np.isfinite(sweep) & (motion.plane == plane))
