@@ -33,6 +33,7 @@ def as_dict(result: PostResult, output: str) -> dict[str, Any]:
         "feed_reduced_blocks": int(result.feeds.slowed.sum()) if result.feeds is not None else 0,
         "axis_extents": {k: list(v) for k, v in (result.extents or {}).items()},
         "tolerance_shares": result.shares or {},
+        "output_modes": output_modes(result),
         "geometric_errors": _errors(result),
         "diagnostics": [d.as_dict() for d in result.diagnostics],
     }
@@ -62,6 +63,23 @@ def _places(value: float) -> str:
     return f"{round(value, 3) + 0.0:.3f}"
 
 
+def output_modes(result: PostResult) -> dict[str, list[str]]:
+    """By operation, the laws ("axes", "tcp", "tilted") that its cutting blocks are written under."""
+    p, toolpath = result.program, result.toolpath
+    if p is None or toolpath is None:
+        return {}
+    section = np.searchsorted([s.first for s in p.sections], np.arange(len(p)), side="right") - 1
+    cut = np.flatnonzero((p.code > 0) & ~p.link)
+    pairs = np.unique(np.stack([toolpath.operation[p.row[cut]], section[cut]], axis=1), axis=0)
+    found: dict[str, list[str]] = {}
+    for operation, k in pairs.tolist():
+        name = toolpath.operations[operation].name or f"OPERATION {operation + 1}"
+        laws = found.setdefault(name, [])
+        if p.sections[k].law not in laws:
+            laws.append(p.sections[k].law)
+    return found
+
+
 def points_added(result: PostResult) -> int:
     """Blocks that linearising put between CL points."""
     if result.path is None:
@@ -82,6 +100,8 @@ def as_text(result: PostResult, output: str) -> str:
              f"{result.options.axis_tolerance:g} degrees)",
              f"tolerance: linearising {shares['linearising']:.4f}, control's smoothing {shares['smoothing']:.4f}, "
              f"rounding at most {shares['rounding']:.5f} mm"]
+    if any(laws != ["axes"] for laws in d["output_modes"].values()):
+        lines.append("output: " + ", ".join(f"{name} {' and '.join(laws)}" for name, laws in d["output_modes"].items()))
     if result.job is not None:
         offset = " ".join(f"{k}{round(v, 4) + 0.0:.4f}" for k, v in zip(
             result.machine.axis_names, result.job.control.work_offset, strict=True))

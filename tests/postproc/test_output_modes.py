@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import toolpaths
+from postproc import summary
 from postproc.planes import angles_of, rotation_of, stated
 from postproc.setup import SetupFile, load_setup
 from tests.postproc.kit import SAMPLES, angle, codes, convert, goto, tilted, tool_setup, toolpath
@@ -350,3 +351,13 @@ def test_holes_are_spelt_out_among_skipped_blocks() -> None:
     plain = convert(toolpath(*hole), "mill-3axis", "generic-iso")
     skipped = convert(toolpath(*skipping(*hole)), "mill-3axis", "generic-iso")
     assert len(plain.program.holes) == 2 and not skipped.program.holes
+
+
+def test_the_summary_says_the_mode_of_every_operation(tmp_path: Path) -> None:
+    path = operations(indexed()[-8:], indexed()[-8:], turning())
+    own = setup_of(tmp_path, '[output.operations]\nB = "axes"\n')
+    result = convert(path, "mikron-ucp710", shop(tmp_path), own)
+    assert summary.as_dict(result, "x")["output_modes"] == {"A": ["tilted"], "B": ["axes"], "C": ["tcp"]}
+    plain = convert(path, "mikron-ucp710", "generic-iso")
+    assert summary.output_modes(plain) == {"A": ["axes"], "B": ["axes"], "C": ["axes"]}
+    assert "output:" not in summary.as_text(plain, "x")
