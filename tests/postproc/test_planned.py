@@ -272,3 +272,15 @@ def test_what_cannot_be_planned_is_named() -> None:
     broken = replace(made.passes[0].paths[0], values=np.nan * made.passes[0].paths[0].values)
     with pytest.raises(DiagnosticError, match=r"plan\.failed"):
         made._plan(replace(made.passes[0], paths=(broken,)))
+
+
+def test_plan_takes_the_tool_axes_that_are_written() -> None:
+    lines = pole(0.02)
+    result = good(convert(toolpath("RAPID", lines[0], "FEDRAT/MMPM,1500", *lines[1:]), "mikron-ucp710"))
+    assert result.path is not None and result.job is not None
+    one, = geometry(result)
+    kin = result.job.kinematics(int(result.job.moves.tool[one.move[0]]))
+    _, written = kin.forward(result.path.q[one.block])
+    _, commanded = result.job.moves.curves().take(result.path.move[one.block]).at(result.path.u[one.block])
+    assert angle_between(written, commanded).max() > 0.35 * TOLERANCE.axis
+    assert angle_between(one.smooth.at(one.ends)[1], written).max() < 0.3 * TOLERANCE.axis

@@ -13,6 +13,7 @@ from toolpaths.smoothing.blend import HIGHEST, ramp
 from toolpaths.smoothing.bspline import DEGREE, Knots, basis
 from toolpaths.smoothing.fit import fit
 from toolpaths.smoothing.smooth import Smooth, Tolerance, smooth, smooth_all
+from toolpaths.smoothing.stretches import corners
 from toolpaths.smoothing.sweep import Data, Normal, compiled_sweep, sweep
 
 TOLERANCE = Tolerance(0.005, np.radians(0.025))
@@ -246,8 +247,9 @@ def test_many_chains_at_once_are_those_one_by_one() -> None:
     rng = np.random.default_rng(4)
     square = np.array([[0.0, 0, 0], [10, 0, 0], [10, 10, 0], [0, 10, 0]])
     noisy = np.round(np.cumsum(rng.normal(size=(60, 3)) * [0.02, 0.02, 0.02] + [0.3, 0.0, 0.0], axis=0), 4)
-    chains = [rounded(0.3, 30.0), chain(square), chain(np.zeros((4, 3))), rounded(0.6, 40.0), chain(noisy),
-              rounded(0.1, 9.0)]
+    straight = np.stack((0.2 * np.arange(40), np.zeros(40), 1e-4 * np.arange(40) ** 2), axis=1)
+    chains = [chain(straight), chain(straight + np.array([0.0, 30.0, 0.0])), rounded(0.3, 30.0), chain(square),
+              chain(np.zeros((4, 3))), rounded(0.6, 40.0), chain(noisy), rounded(0.1, 9.0)]
     columns = [np.concatenate([getattr(c, name) for c in chains]) for name in Curves.__dataclass_fields__]
     first = np.concatenate(([0], np.cumsum([len(c) for c in chains])))
     for own, curves in zip(smooth_all(Curves(*columns), first, TOLERANCE), chains, strict=True):
@@ -260,3 +262,32 @@ def test_many_chains_at_once_are_those_one_by_one() -> None:
         np.testing.assert_allclose(own.at(s)[0], alone.at(s)[0], atol=1e-9)
         np.testing.assert_allclose(own.at(s)[1], alone.at(s)[1], atol=1e-10)
         assert own.worst == pytest.approx(alone.worst, abs=1e-6) and own.stops.tolist() == alone.stops.tolist()
+
+
+def test_knots_are_halved_where_a_bend_needs_it() -> None:
+    s = np.arange(0.0, 20.0, 0.05)
+    p = np.zeros((len(s), 6))
+    p[:, 0], p[:, 1] = s, 0.02 * np.exp(-((s - 10.0) / 0.12) ** 2)
+    found, = fit(s, p, np.array([0, len(s)]), 0.001)
+    gaps = np.diff(np.unique(found.t))
+    near = np.abs(np.unique(found.t)[:-1] - 10.0) < 0.5
+    assert found.ratio.max() <= 1.0
+    assert gaps[near].min() < 0.06 and np.median(gaps[~near]) > 0.15
+
+
+def test_corners_by_hand() -> None:
+    none = np.zeros(9, dtype=bool)
+    arc = none.copy()
+    arc[4] = True
+    polygon = corners(np.full(9, 1.0), np.full(8, 0.2), none, none[1:], 0.005)
+    assert polygon.all()
+    dense = np.zeros(8)
+    dense[3] = 0.3
+    assert np.flatnonzero(corners(np.full(9, 0.1), dense, none, none[1:], 0.005)).tolist() == [3]
+    assert np.flatnonzero(corners(np.full(9, 0.1), np.zeros(8), arc, none[1:], 0.005)).tolist() == [3, 4]
+    length = np.full(9, 0.1)
+    length[6] = 5.0
+    assert np.flatnonzero(corners(length, np.zeros(8), none, none[1:], 0.005)).tolist() == [5, 6]
+    apart = np.zeros(8, dtype=bool)
+    apart[1] = True
+    assert np.flatnonzero(corners(np.full(9, 0.1), np.zeros(8), none, apart, 0.005)).tolist() == [1]

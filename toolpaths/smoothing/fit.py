@@ -22,7 +22,8 @@ SPARSE, DENSE = 4.0, 2.0
 NEAR = 0.25
 """Height of the curve over its chord, over the tolerance, from which knots are dense."""
 ROUNDS = 10
-HALVINGS = 2
+HALVINGS = 1
+"""More of them follow the polyline, wiggling: what is outside then becomes lines."""
 BETWEEN = 0.02
 """Least weight of the middle of a chord; it grows with the curve's height over the chord."""
 GOOD = 0.95
