@@ -158,8 +158,8 @@ def _motion(words: Words, modal: Modal, rows: Rows, code: Canonical, used: tuple
     dwell = _dwell(block, rows.code, rows.hole, rows.dwell, rests)
     return Motion(in_files(code.line[block], code.files), rows.code, rows.end, offsets.home, modal.plane[block],
                   modal.motion[block] == 3, rows.center, feed, modal.inverse[block], modal.tool[block],
-                  modal.length_register[block], modal.spindle[block], modal.rpm[block], modal.flood[block], modal.mist[block],
-                  rows.hole, missing, dwell,
+                  modal.length_register[block], modal.spindle[block], modal.rpm[block], modal.flood[block],
+                  modal.mist[block], rows.hole, missing, dwell,
                   modal.compensation[block], modal.offset[block], modal.blend[block], rows.frame, used)
 
 

@@ -1,0 +1,132 @@
+"""The statements of a SINUMERIK program in running order: modes, planes, cycles, machine coordinates."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from postproc.readback.canonical import CALL, LAW, SMOOTH, STATEMENT, Drill, Law, Statement, Text
+from postproc.readback.dialects.iso import New
+from postproc.readback.dialects.siemens_cycles import CYCLES, drill_of
+from postproc.readback.modal import fill, number_of
+from postproc.readback.turns import turned
+from postproc.readback.words import Words
+from toolpaths.arrays import Ints
+from toolpaths.diagnostics import Diagnostic, error
+
+_SEQUENCE = {1: "X", 2: "Y", 3: "Z"}
+
+
+class Run:
+    """The statements of a program in running order."""
+
+    def __init__(self, words: Words, text: Text, line: Ints, file: str, found: list[Diagnostic], new: New,
+                 axes: tuple[str, ...]) -> None:
+        self.words, self.text, self.line, self.file, self.found, self.new = words, text, line, file, found, new
+        self.axes = axes
+        self.length: list[tuple[int, float]] = []
+        self.laws: list[Law] = []
+        self.drills: list[Drill] = []
+        self.state, self.called, self.oriented = "axes", -1, False
+
+    def fault(self, code: str, b: int, message: str, hint: str) -> None:
+        """An ERROR at a block."""
+        self.found.append(error(code, message, file=self.file, lines=[int(self.line[b])], hint=hint))
+
+    def statements(self) -> tuple[tuple[Law, ...], tuple[Drill, ...]]:
+        """Laws and cycles, with the words that put them in force."""
+        where, index = self.words.pick(STATEMENT)
+        blocks: dict[int, list[Statement]] = {}
+        for b, k in zip(where.tolist(), index.tolist(), strict=True):
+            blocks.setdefault(b, []).append(self.text.statements[int(k)])
+        modal: list[tuple[int, int]] = []
+        for b, all_here in sorted(blocks.items()):
+            names = [s.name for s in all_here]
+            if "MCALL" in names:
+                modal.append((b, -1))
+            for s in all_here:
+                self.one(b, s, modal, "MCALL" in names)
+        self.modal_calls(modal)
+        return tuple(self.laws), tuple(self.drills)
+
+    def one(self, b: int, s: Statement, modal: list[tuple[int, int]], is_modal: bool) -> None:
+        """One statement of block b."""
+        if s.name == "SUPA":
+            self.machine_move(b)
+        elif s.name == "TRAORI":
+            self.enter(b, "tcp", Law("tcp", "TRAORI"))
+        elif s.name == "TRAFOOF":
+            self.enter(b, "axes", Law("axes", s.name))
+        elif s.name == "CYCLE800":
+            self.swivel(b, s)
+        elif s.name == "ORIAXES":
+            self.oriented = True
+        elif s.name == "CYCLE832":
+            off = "_OFF" in s.args or s.number(0, 0.0) <= 0.0
+            self.new.append((b, SMOOTH, float("inf") if off else s.number(0)))
+        elif s.name in CYCLES:
+            drill, why = drill_of(s, float(number_of(self.words, "S")[b]))
+            if drill is None:
+                self.fault("gcode.cycle", b, f"{s.name} {why}", "as the post writes it")
+                return
+            self.drills.append(drill)
+            if is_modal:
+                modal[-1] = b, len(self.drills) - 1
+            else:
+                self.new.append((b, CALL, float(len(self.drills) - 1)))
+
+    def enter(self, b: int, state: str, law: Law) -> None:
+        """A law in force from block b on."""
+        if state != "axes" and self.state != "axes":
+            self.fault("gcode.mode", b, f"{law.code} while another mode is on", "leave the mode that is on first")
+        if state == "tcp" and self.turning_without_axes(b):
+            self.fault("gcode.mode", b, "TRAORI with rotary words, but without ORIAXES",
+                       "state ORIMKS ORIAXES: rotary axes linear")
+        self.state = state
+        self.new.append((b, LAW, float(len(self.laws))))
+        self.laws.append(law)
+
+    def turning_without_axes(self, b: int) -> bool:
+        """True where rotary words follow block b and ORIAXES does not come before them."""
+        rotary = np.isin(self.words.letter & 95, [ord(a) for a in self.axes if a in "ABC"]) & (self.words.line > b)
+        first = int(self.words.line[rotary].min(initial=self.words.lines + 1))
+        where, index = self.words.pick(STATEMENT)
+        names = [self.text.statements[int(k)].name for k in index]
+        stated = [int(w) for w, name in zip(where, names, strict=True) if name == "ORIAXES"]
+        return first <= self.words.lines and not any(w <= first for w in stated)
+
+    def machine_move(self, b: int) -> None:
+        """SUPA: machine coordinates in this block; the tool length must be off."""
+        self.new.append((b, "G", 53.0))
+        length = [value for at, value in self.length if at <= b]
+        low, high = np.searchsorted(self.words.line, [b, b + 1])
+        if length and length[-1] >= 0.0 and ord("Z") in self.words.letter[low:high]:
+            self.fault("gcode.machine_position", b, "SUPA with a tool length in force", "write D0 beside SUPA")
+
+    def swivel(self, b: int, s: Statement) -> None:
+        """CYCLE800(_FR, _TC, _ST, _MODE, _X0, _Y0, _Z0, _A, _B, _C, _X1, _Y1, _Z1, _DIR, _FR_I, _DMODE)."""
+        if not any(isinstance(a, float) for a in s.args):
+            self.enter(b, "axes", Law("axes", s.name))
+            return
+        mode = int(s.number(3, 0.0))
+        if s.number(0, 0.0) != 0.0 or s.number(2, 0.0) != 0.0 or mode >> 6:
+            self.fault("gcode.mode", b, "CYCLE800 that retracts, adds to a plane, or turns otherwise than axis by axis",
+                       "_FR 0, _ST 0, _MODE 57")
+            return
+        axes = [_SEQUENCE.get(mode >> shift & 3, "") for shift in (0, 2, 4)]
+        if "" in axes:
+            self.fault("gcode.mode", b, f"CYCLE800 with _MODE {mode}: no order of turns", "_MODE 57: X, then Y, then Z")
+            return
+        rotation = turned("".join(axes), [s.number(k, 0.0) for k in (7, 8, 9)])
+        shift = np.array([s.number(k, 0.0) for k in (4, 5, 6)])
+        shift = shift + rotation @ np.array([s.number(k, 0.0) for k in (10, 11, 12)])
+        direction = s.number(13, 0.0)
+        choice = "+" if direction > 0.0 else "-" if direction < 0.0 else "nearest"
+        self.enter(b, "tilted", Law("tilted", s.name, rotation, shift, choice))  # type: ignore[arg-type]
+
+    def modal_calls(self, modal: list[tuple[int, int]]) -> None:
+        """Each block that moves calls the cycle of the MCALL in force."""
+        if not modal:
+            return
+        held = fill(np.array([m[0] for m in modal]), np.array([float(m[1]) for m in modal]), self.words.lines, -1.0)
+        moves = np.unique(self.words.line[np.isin(self.words.letter & 95, [ord(a) for a in self.axes])])
+        self.new += [(int(b), CALL, float(held[b])) for b in moves[held[moves] >= 0.0]]
