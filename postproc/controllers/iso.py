@@ -55,7 +55,6 @@ class IsoWriter(Writer):
         motion = np.where(p.code[first:last] == 2, 2 + p.ccw[first:last], p.code[first:last])
         state = np.stack([motion, p.plane[first:last], p.mode[first:last]])
         differs = np.append(True, (state[:, 1:] != state[:, :-1]).any(axis=0)) | p.home[first:last]
-        differs[1:] |= p.home[first:last - 1]
         result = [""] * (last - first)
         for row in np.flatnonzero(differs).tolist():
             code, home, words = int(motion[row]), bool(p.home[first + row]), []
