@@ -186,7 +186,7 @@ def tie(low: Floats, right: Floats, tied: tuple[int, int]) -> slice:
     first, last = tied
     n = len(right)
     for start, stop, keep in ((0, first, first - 1), (n - last, n, n - last)):
-        inner = [low[d, start:stop - d].sum() for d in range(3)]
+        inner = [low[d, start:max(stop - d, start)].sum() for d in range(3)]
         low[0, keep], right[keep] = inner[0] + 2.0 * (inner[1] + inner[2]), right[start:stop].sum()
     if first > 1:
         low[1, first - 1] += low[2, first - 2]

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from postproc.feedrate.coefficient_kernel import advance, begin, relative, tie_ends
 from postproc.feedrate.compiled import compiled
-from postproc.feedrate.interior import Multipliers, NumpySteps, tie
+from postproc.feedrate.interior import Multipliers, NumpySteps
 from postproc.feedrate.interior_kernel import COMMON, LANES, PER_JOINT, assemble, band, direction, pentadiagonal
 from postproc.feedrate.problem import Problem
 from toolpaths.arrays import Floats
@@ -62,29 +63,26 @@ class PackedSteps:
 
     def assemble(self, mu: float, primal: float, dual: float) -> tuple[float, float]:
         """See `interior.Steps`."""
-        self._all += primal * self._step
         if not len(self._zc):
             self._first(mu)
-        self._zc *= 1.0 + dual * self._rc
+        compiled(advance)(self._all, self._step, self._zc, self._rc, primal, dual)
         w, v = self._w.reshape(-1), self._v.reshape(-1)
         gap, time = compiled(assemble)(w, v, self._all, self._inverse, self._blocks, mu, dual)
-        self._low[:], self._force[:] = 0.0, 0.0
-        self._low[0, :self._size], self._force[:self._size] = self._zc / self.c, mu / self.c
+        gap += compiled(begin)(self._all, self._zc, mu, self._low, self._force)
         compiled(band)(w, self._blocks, self._low, self._force)
-        return gap + float(np.sum(self._zc * self.c)), time
+        return gap, time
 
     def direction(self, mu: float) -> tuple[float, float]:
         """See `interior.Steps`."""
         low, right = self._low[:, :self._size], self._force[:self._size]
-        here = tie(low, right, self.problem.basis.tied)
+        first, last = self.problem.basis.tied
+        compiled(tie_ends)(low, right, first, last)
+        here = slice(first - 1, self._size - last + 1)
         room = self._scratch[:, here]
         if not compiled(pentadiagonal)(low[:, here], right[here], room[0], room[1:]):
             return 0.0, 0.0
-        right[:here.start], right[here.stop:] = right[here.start], right[here.stop - 1]
-        self._step[:self._size] = right
+        ends = compiled(relative)(right, first, last, self._all, self._zc, mu, self._step, self._rc)
         w, v = self._w.reshape(-1), self._v.reshape(-1)
-        fall, loss = compiled(direction)(w, v, self._step, self._inverse, self._blocks, mu)
-        rate = right / self.c
-        self._rc = mu / (self.c * self._zc) - 1.0 - rate
-        fall, loss = max(fall, float(np.max(-rate))), max(loss, float(np.max(-self._rc)))
+        inner = compiled(direction)(w, v, self._step, self._inverse, self._blocks, mu)
+        fall, loss = (max(pair) for pair in zip(ends, inner, strict=True))
         return (1.0 / fall if fall > 0.0 else np.inf, 1.0 / loss if loss > 0.0 else np.inf)

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 from scipy.interpolate import BSpline, make_interp_spline
 
-from postproc.feedrate.interior import NumpySteps
+from postproc.feedrate.coefficient_kernel import tie_ends
+from postproc.feedrate.compiled import compiled
+from postproc.feedrate.interior import NumpySteps, solve_tied
 from postproc.feedrate.interior_packed import PackedSteps
 from postproc.feedrate.limits import JointLimits
 from postproc.feedrate.mesh import Spacing, mesh
@@ -109,3 +111,21 @@ def test_one_to_nine_joints(joints: int) -> None:
     more = uniform(still, 300, wide).problem()
     x = [one.basis.values(solve_problem(one, NumpySteps).c)[0] for one in (problem, more)]
     assert np.sum(more.weight * x[1] ** -0.5) == pytest.approx(np.sum(problem.weight * x[0] ** -0.5), rel=1e-4)
+
+
+@pytest.mark.parametrize("tied", [(1, 1), (1, 11), (11, 1), (11, 11)])
+def test_tied_equations_are_those_of_one_unknown(tied: tuple[int, int]) -> None:
+    """Solved with both ends replaced by one unknown each, dense; untied ends change nothing. Compiled alike."""
+    rng, n = np.random.default_rng(5), 40
+    low = np.concatenate((rng.uniform(5.0, 6.0, (1, n)), rng.normal(size=(2, n))))
+    full = np.diag(low[0]) + sum(np.diag(low[d, :n - d], k) for d in (1, 2) for k in (d, -d))
+    right = rng.normal(size=n)
+    spread = np.eye(n)[:, tied[0] - 1:n - tied[1] + 1]
+    spread[:tied[0], 0], spread[n - tied[1]:, -1] = 1.0, 1.0
+    wanted = spread @ np.linalg.solve(spread.T @ full @ spread, spread.T @ right)
+    here = slice(tied[0] - 1, n - tied[1] + 1)
+    other, force = low.copy(), right.copy()
+    compiled(tie_ends)(other, force, *tied)
+    np.testing.assert_allclose(solve_tied(low, right, tied), wanted, atol=1e-12)
+    band = np.diag(other[0, here]) + sum(np.diag(other[d, here][:-d], k) for d in (1, 2) for k in (d, -d))
+    np.testing.assert_allclose(np.linalg.solve(band, force[here]), wanted[here], atol=1e-12)
