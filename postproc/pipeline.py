@@ -33,6 +33,7 @@ from postproc.readback.verify import read_back
 from postproc.rewinds import drawing_of
 from postproc.rounding import rounding_problem
 from postproc.setup import SetupFile, load_setup
+from postproc.singular import check_singular
 from postproc.smoothed_moves import smoothed_moves
 from postproc.travel import check_travel
 from postproc.word_rows import block_tools
@@ -156,7 +157,9 @@ def _stages(result: PostResult, progress: Progress | None) -> PostResult:
         if path is None:
             return result
     found, extents = check_travel(path, job.moves, job.control, job.kinematics, file)
-    result = _with(result, [*found, *check_reach(path, job.moves, job.control, file)], extents=extents)
+    found += check_reach(path, job.moves, job.control, file)
+    found += check_singular(path, job.moves, job.control, job.setup.joints.singular_distance, file)
+    result = _with(result, found, extents=extents)
     if not result.ok:
         return result
     motion, found = plan_motion(job, moves, path)

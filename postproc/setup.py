@@ -104,6 +104,8 @@ class Joints(UserModel):
     """of a rotary axis, e.g. side = {A = "negative"}"""
     start: dict[Annotated[str, Field(pattern="^[ABC]$")], float] = Field(default_factory=dict)
     """where a rotary axis should stand when the program begins, degrees, e.g. start = {C = 180}; default: home"""
+    singular_distance: float = Field(default=0.05, gt=0.0, lt=1.0)
+    """that a parallel machine keeps from its singular positions: |cos| of rod and slide, least singular value of Jx"""
 
 
 class SetupFile(UserModel):

@@ -152,7 +152,7 @@ def speed(n: int) -> None:
         print(f"{n} points, {name}" + (", C within +-400 degrees" if limits_of else ""))
         base = clocked("inverse kinematics, all branches", n, 0.0, lambda: m.kinematics.inverse(tip, axis))  # noqa: B023
         found: list[np.ndarray] = []
-        clocked("plan", n, base, lambda: found.append(plan_runs(
+        clocked("plan", n, base, lambda: found.append(plan_runs(  # noqa: B023
             [Run(m.kinematics, tip, axis)], limits, m.home)[0].q))  # noqa: B023
         zero = np.zeros((n - 1, 3))
         curves = Curves(tip[:-1], tip[1:], axis[:-1], axis[1:], np.zeros(n - 1, dtype=bool), zero, zero, np.zeros(n - 1))

@@ -1,0 +1,34 @@
+"""The stated distance that a parallel machine keeps from its singular positions, at points and between them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from machines.singular_distance import NAMES, has_singular_distance, singular_distance_between
+from postproc.control import Control
+from postproc.moves import Moves
+from postproc.path import Path
+from toolpaths.diagnostics import Diagnostic, error, info
+
+
+def check_singular(path: Path, moves: Moves, control: Control, least: float, file: str = "") -> list[Diagnostic]:
+    """How near the blocks come to singular positions: told, and an error below `least`; nothing for serial machines."""
+    kinematics = control.machine.kinematics
+    if not has_singular_distance(kinematics) or not len(path):
+        return []
+    found = singular_distance_between(kinematics, np.concatenate([control.machine.home[None, :], path.q]))
+    result = []
+    for name, values in zip(NAMES, found.T, strict=True):
+        worst = int(np.nanargmin(values))
+        line = int(moves.line[path.move[worst]])
+        bad = np.unique(moves.line[path.move[np.flatnonzero(values < least)]])
+        if len(bad):
+            lines = [line, *(n for n in bad[:6].tolist() if n != line)]
+            result.append(error("singular.distance", f"{name} comes to {values[worst]:.4f} of a singular position, allowed "
+                                f"at least {least:g}", file=file, lines=lines, count=len(bad),
+                                hint="move or turn the part in the set-up, or state another joints.singular_distance"))
+    if not result:
+        told = ", ".join(f"{name} {np.nanmin(values):.3f}" for name, values in zip(NAMES, found.T, strict=True))
+        result.append(info("singular.distance", f"distance from singular positions: {told} (stated: at least {least:g})",
+                           file=file))
+    return result
