@@ -18,6 +18,7 @@ from machines.geometric_error.model import ErrorModel
 from machines.kinematics.base import Kinematics
 from postproc.control import Control
 from postproc.corrected.arcs import fitted_arcs
+from postproc.corrected.cycles import whole_holes
 from postproc.corrected.points import divided
 from postproc.corrected.reversals import arcs_cut, starts_of
 from postproc.corrected.work import Work
@@ -86,6 +87,7 @@ def compensate(path: Path, moves: Moves, tools: Ints, kinematics: Callable[[int]
         return None, None, diagnostics or [_lost(path, moves, lost, file)]
     corrected = framed(replace(path, q=found.q), path, modes, work)
     corrected = replace(corrected, q=kept_in_travel(corrected.q, path, modes.control))
+    corrected, work.whole = whole_holes(corrected, path, moves, work, SHARE * tolerance)
     starts = starts_of(corrected, path, work, SHARE * tolerance)
     corrected, resolved = fitted_arcs(corrected, path, work, starts.q, SHARE * tolerance)
     corrected = divided(corrected, work, starts, SHARE * tolerance)

@@ -23,7 +23,7 @@ def divided(path: Path, work: Work, starts: Starts, allowed: float) -> Path:
     """The path with its blocks halved until their motion is near enough to the nominal one (`allowed` mm, see `_bound`)."""
     cl_rapid = (path.code == TRAVERSE) & np.isfinite(path.u)
     block = np.flatnonzero(((path.code == FEED) | cl_rapid) & ~path.home & (np.arange(len(path)) > 0))
-    block = block[~path.home[block - 1]]
+    block = block[~path.home[block - 1] & ~work.whole[block]]
     pieces, found = _taken_up(path, work, starts, block, allowed)
     for _ in range(ROUNDS):
         pieces = pieces.rows(_off(pieces, path, work) > _bound(pieces, path, work, allowed))

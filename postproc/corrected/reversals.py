@@ -54,7 +54,7 @@ def starts_of(path: Path, nominal: Path, work: Work, allowed: float) -> Starts:
     """Corrected joints where blocks begin; cutting ones whose axis turns back begin by the new way."""
     start = np.concatenate([path.q[:1], path.q[:-1]])
     block = np.flatnonzero(((path.code == FEED) | (path.code == ARC)) & ~path.home & (np.arange(len(path)) > 0))
-    block = block[~path.home[block - 1]]
+    block = block[~path.home[block - 1] & ~work.whole[block]]
     way = work.begin_way(block)
     turned = np.any(way * work.way[block - 1] < 0.0, axis=1)
     back = block[turned]

@@ -44,6 +44,7 @@ class Work:
         self.path, self.tools, self.kinematics = path, tools, kinematics
         self.axis_tolerance, self.beyond, self.model = axis_tolerance, beyond, model
         self.axis_share = share * axis_tolerance
+        self.whole: Bools = np.zeros(len(path), dtype=np.bool_)
         self.rotary = np.array(kinematics(int(tools[0])).rotary)
         self.group = one_orientation(path.q[:, self.rotary], tools, path.home)
         self._actual: dict[int, Actual] = {}

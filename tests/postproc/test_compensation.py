@@ -71,6 +71,21 @@ def test_arcs_are_cut_where_an_axis_loses_motion_and_stay_arcs() -> None:
     assert len(result.path) < 2 * len(result.nominal)
 
 
+def cycles(result: PostResult) -> int:
+    assert result.program is not None, [str(d) for d in result.diagnostics]
+    return len(result.program.holes)
+
+
+@pytest.mark.parametrize("sample", ["five_faces.cls", "pocket.cls"])
+def test_cycles_survive_where_one_correction_of_the_hole_is_near_enough(sample: str, tmp_path: Path) -> None:
+    kept = converted(sample, "mikron-ucp710", model=MIKRON)
+    plain = converted(sample, "mikron-ucp710")
+    assert kept.ok and 4 <= cycles(kept) <= cycles(plain)
+    assert sample == "pocket.cls" or cycles(kept) == cycles(plain)
+    leaning = written(tmp_path, ErrorModel(SerialErrors(constants={"EA0Z": 200.0 * DEG / 3600.0})))
+    assert cycles(converted(sample, "mikron-ucp710", model=leaning)) < cycles(plain)
+
+
 @pytest.mark.parametrize("corrected", [True, False])
 def test_what_is_right_on_one_machine_is_wrong_on_the_other(corrected: bool, tmp_path: Path) -> None:
     """The corrected program on the nominal machine and the nominal program on the machine with errors both fail."""
