@@ -11,7 +11,7 @@ from postproc.word_arcs import PLANE_AXIS, PLANE_COLUMNS
 from toolpaths.arrays import Array, Bools, Floats, Ints
 
 if TYPE_CHECKING:
-    from postproc.readback.sections import Rows
+    from postproc.readback.rows import Rows
 
 _SMALL = 1e-9
 _RADIUS_SLACK = 0.01

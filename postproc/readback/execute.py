@@ -13,7 +13,8 @@ from postproc.readback import frames
 from postproc.readback.canonical import CALL, LAW, REST, TURNS, Canonical, Law, Text, in_files, placed
 from postproc.readback.frames import AXES, Frame
 from postproc.readback.modal import Modal, columns, fill, fill_values, modal_state
-from postproc.readback.sections import Rows, Section, run_section
+from postproc.readback.rows import Rows, Section
+from postproc.readback.sections import run_section
 from postproc.readback.words import Words
 from toolpaths.arrays import Array, Bools, Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error

@@ -1,0 +1,115 @@
+"""Blocks of one law as arrays: what they state, and the rows of motion that they become."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from toolpaths.arrays import Array, Bools, Floats, Ints
+
+if TYPE_CHECKING:
+    from postproc.readback.execute import Offsets
+
+INCH = 25.4
+
+
+@dataclass(frozen=True)
+class Section:
+    """Blocks `first` and on (N), as their words and modal state have them.
+
+    `columns`, `steps` (N, J) are absolute and relative axis words, `relative`, `absolute` (N, 3) centres of arcs from the
+    start and in coordinates, `extra` (N, 7) the words Z, R, Q, P, I, J, K of a cycle, `deep` (N, 3) z, r and turns,
+    `repeats` and `call` (N,) as stated; NaN where a block states none.
+    """
+
+    first: int
+    motion: Array
+    plane: Array
+    machine: Bools
+    level: Array
+    inch: Bools
+    columns: Floats
+    steps: Floats
+    rest: Bools
+    length: Floats
+    relative: Floats
+    absolute: Floats
+    extra: Floats
+    deep: Floats
+    repeats: Floats
+    call: Floats
+
+    def cut(self, first: int, last: int) -> Section:
+        """Blocks first to before last."""
+        values = {f.name: getattr(self, f.name) for f in fields(self)}
+        parts: dict[str, Any] = {name: value[first:last] for name, value in values.items() if isinstance(value, np.ndarray)}
+        return replace(self, first=first, **parts)
+
+    @cached_property
+    def has_steps(self) -> bool:
+        """True where any word is relative."""
+        return bool(np.isfinite(self.steps).any())
+
+    @property
+    def stated(self) -> Bools:
+        """(N, J) axes that a block moves."""
+        return np.isfinite(self.columns) | np.isfinite(self.steps)
+
+    @property
+    def scale(self) -> Floats:
+        """(N,) mm per unit of length."""
+        return np.where(self.inch, INCH, 1.0)
+
+
+@dataclass(frozen=True)
+class Rows:
+    """R rows of motion: block, code, end (R, J) in machine coordinates, centre (R, 3) in those of the frame, number of the
+    frame; hole, feed (NaN: the F word in force), rest of cycles."""
+
+    block: Ints
+    code: Array
+    end: Floats
+    center: Floats
+    frame: Ints
+    hole: Bools
+    feed: Floats
+    dwell: Floats
+
+    @staticmethod
+    def joined(parts: list[Rows], width: int) -> Rows:
+        """Parts in order; none is no rows."""
+        if len(parts) == 1:
+            return parts[0]
+        if not parts:
+            none = np.zeros(0)
+            return Rows(none.astype(np.int64), none.astype(np.int8), np.zeros((0, width)), np.zeros((0, 3)),
+                        none.astype(np.int64), none.astype(bool), none, none)
+        return Rows(*(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(Rows)))
+
+
+@dataclass
+class State:
+    """What a section is worked out on: absolute words (N, J) in coordinates, and where the blocks begin (J,)."""
+
+    section: Section
+    columns: Floats
+    steps: Floats
+    start: Floats
+    shift: Floats
+    """(N, J) from the program's words to coordinates"""
+    offsets: Offsets
+
+    def carried(self) -> Floats:
+        """(N + 1, J) where every axis stands: before the first block, and behind each."""
+        ends = np.concatenate([self.start[None, :], self.columns])
+        n = np.arange(len(ends))
+        for j in range(ends.shape[1]):
+            last = np.maximum.accumulate(np.where(np.isfinite(ends[:, j]), n, 0))
+            ends[:, j] = ends[last, j]
+            if self.section.has_steps:
+                walked = np.cumsum(np.concatenate([[0.0], np.nan_to_num(self.steps[:, j])]))
+                ends[:, j] += walked - walked[last]
+        return ends
