@@ -42,15 +42,13 @@ def steady_speed(one: PassGeometry, limits: JointLimits) -> Floats:
 def span_speed(path: MachinePath, limits: JointLimits) -> Floats:
     """(S,) largest constant ds/dt on each span between knots, from below: derivatives stay within the hull of their
     B-spline coefficients (de Boor, A Practical Guide to Splines, XI)."""
-    with np.errstate(divide="ignore"):
-        caps = [np.min(limit / _hull(path, order), axis=1) ** (1.0 / order) for order, limit in
-                enumerate((limits.velocity, limits.acceleration, limits.jerk), start=1)]
-    return np.asarray(np.min(caps, axis=0))
-
-
-def _hull(path: MachinePath, order: int) -> Floats:
-    """(S, J) largest coefficient of that derivative on each span."""
-    derivative = path.fitted.derivative(order)
-    size = np.abs(derivative.c[:len(path.s) - order])
-    spans = len(path.s) - DEGREE
-    return np.asarray(np.max([size[k:k + spans] for k in range(DEGREE - order + 1)], axis=0))
+    t, c, spans = path.fitted.t, path.fitted.c, len(path.s) - DEGREE
+    speed = np.full(spans, np.inf)
+    for order, limit in enumerate((limits.velocity, limits.acceleration, limits.jerk), start=1):
+        degree = DEGREE + 1 - order
+        c = degree * np.diff(c, axis=0) / (t[degree + 1:-1] - t[1:-degree - 1])[:, None]
+        t = t[1:-1]
+        hull = np.max([np.abs(c[k:k + spans]) for k in range(degree)], axis=0)
+        with np.errstate(divide="ignore"):
+            speed = np.minimum(speed, np.min(limit / hull, axis=1) ** (1.0 / order))
+    return speed

@@ -40,12 +40,19 @@ class MachinePath:
         values (N, J + 6): joints, tip and axis there
         worst: largest deviation from the smoothed path between sites, over the tolerance
         led (N,): sites near a singular direction where the axis is led past it, see `past_poles`
+        fitted: the joints as scipy's spline
     """
 
     s: Floats
     values: Floats
     worst: float
     led: Bools
+    fitted: BSpline
+
+    @staticmethod
+    def through(s: Floats, values: Floats, led: Bools) -> MachinePath:
+        """The path through sites."""
+        return MachinePath(s, values, 0.0, led, make_interp_spline(s, values[:, :-6], k=DEGREE))
 
     @property
     def joints(self) -> int:
@@ -63,12 +70,7 @@ class MachinePath:
     @property
     def breaks(self) -> Floats:
         """Knots of the spline."""
-        return self.spline.breaks
-
-    @cached_property
-    def fitted(self) -> BSpline:
-        """The joints as scipy's spline, for its coefficients."""
-        return make_interp_spline(self.s, self.values[:, :self.joints], k=DEGREE)
+        return np.asarray(self.fitted.t[DEGREE:-DEGREE])
 
     @cached_property
     def spline(self) -> SplinePath:
@@ -123,14 +125,14 @@ def _interpolated(path: Smooth, s: Floats, kin: Kinematics, near: Near) -> Machi
         raise ArithmeticError(f"no joints at s = {s[int(np.argmin(good))]:.6g} mm of the smoothed path")
     q, led = past_poles(s, q, tip, axis, kin, path.tolerance.axis)
     axis[led] = kin.forward(q[led])[1]
-    return MachinePath(s, np.hstack((q, tip, axis)), 0.0, led)
+    return MachinePath.through(s, np.hstack((q, tip, axis)), led)
 
 
 def _off(made: MachinePath, path: Smooth, kin: Kinematics) -> Floats:
     """(N - 1,) deviation of the joint spline from the smoothed path amid the sites, over the tolerance."""
     middle = 0.5 * (made.s[:-1] + made.s[1:])
     tip, axis = path.at(middle)
-    found_tip, found_axis = kin.forward(made.derivatives(middle).q, near=np.hstack((tip, axis)))
+    found_tip, found_axis = kin.forward(made.fitted(middle), near=np.hstack((tip, axis)))
     axis_off = angle_between(found_axis, kin.nearest_axis(axis)) / path.tolerance.axis
     axis_off[made.led[1:] | made.led[:-1]] = 0.0
     off = np.maximum(np.linalg.norm(found_tip - tip, axis=1) / path.tolerance.tip, axis_off)

@@ -207,7 +207,7 @@ def parallel() -> None:
         for path in one.paths:
             gauge = path.values[:, :path.joints]
             coordinates = np.hstack((platform(made, gauge), gauge[:, 4:]))
-            virtual = MachinePath(path.s, np.hstack((coordinates, path.values[:, path.joints:])), 0.0, path.led)
+            virtual = MachinePath.through(path.s, np.hstack((coordinates, path.values[:, path.joints:])), path.led)
             boxed = plan(virtual, inner, FAST, options=Options(strict=True))
             other += boxed.seconds
             run = boxed.trajectory()

@@ -8,6 +8,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from scipy.interpolate import BSpline
 
 from machines.machine import Machine
 from postproc.feedrate.limits import JointLimits
@@ -269,7 +270,8 @@ def test_machine_without_jerk_limits_is_planned_at_second_order() -> None:
 
 def test_what_cannot_be_planned_is_named() -> None:
     made = motion(waves("mikron-ucp710"))
-    broken = replace(made.passes[0].paths[0], values=np.nan * made.passes[0].paths[0].values)
+    path = made.passes[0].paths[0]
+    broken = replace(path, fitted=BSpline(path.fitted.t, np.nan * path.fitted.c, 5))
     with pytest.raises(DiagnosticError, match=r"plan\.failed"):
         made._plan(replace(made.passes[0], paths=(broken,)))
 
