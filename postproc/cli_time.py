@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from machines.machine import Machine
     from postproc.cycle_time.blocks import Blocks
     from postproc.cycle_time.model import CycleTimeModel
+    from postproc.cycle_time.phases import Timed
     from postproc.options import Options
     from toolpaths.diagnostics import Diagnostic
 
@@ -44,12 +45,12 @@ def time(file: Annotated[Path, typer.Argument(metavar="FILE", help="CL file, or 
     text = ""
     with shown_errors(json), progress_bar() as progress:
         m = machine_of(machine)
-        blocks, planner, found = _blocks(file, m, controller, model, options, progress)
+        blocks, planner, times, found = _blocks(file, m, controller, model, options, progress)
         if blocks is not None and calibrate:
             planner, values, more = _calibrated(blocks, m, planner, calibrate, output)
-            found += more
+            found, times = [*found, *more], None
         if blocks is not None and planner is not None:
-            e = estimate(blocks, m, planner)
+            e = estimate(blocks, m, planner, times=times)
             values, text = figures.as_dict(e) | values, figures.as_text(e, file.name)
     report(tuple(found), json, values | {"diagnostics": [d.as_dict() for d in found]}, text)
 
@@ -68,8 +69,8 @@ def _check(output: str, calibrate: str, units: str, dialect: str) -> None:
 
 
 def _blocks(file: Path, machine: Machine, controller: str, model: str, options: Options,
-            progress: Any) -> tuple[Blocks | None, CycleTimeModel | None, list[Diagnostic]]:
-    """The blocks of a CL file (converted first) or of a program, and the model of the control."""
+            progress: Any) -> tuple[Blocks | None, CycleTimeModel | None, Timed | None, list[Diagnostic]]:
+    """The blocks of a CL file (converted first) or of a program, the model of the control, and times that are planned."""
     from postproc.controllers.model import load_controller
     from postproc.cycle_time.model import load_model, model_name
     from postproc.cycle_time.source import from_conversion, from_gcode, looks_like_gcode, read_file
@@ -88,13 +89,20 @@ def _blocks(file: Path, machine: Machine, controller: str, model: str, options: 
         require(found)
         assert setup is not None
         blocks, found = from_gcode(data, machine, spec, setup, str(file), Beside(file))
-        return blocks, planner, found
+        return blocks, planner, None, found
     import toolpaths
     from postproc.pipeline import convert
 
     path, found = toolpaths.read(file, units=options.units or None, dialect=options.dialect or None)
     result = convert(path, machine, controller, options=options, diagnostics=found, progress=progress)
-    return (from_conversion(result) if result.ok else None), planner, list(result.diagnostics)
+    if not result.ok or planner is None:
+        return None, planner, None, list(result.diagnostics)
+    blocks, times, found = from_conversion(result), None, []
+    if planner.kind == "ideal":
+        from postproc.cycle_time.planned import planned_times
+
+        times, found = planned_times(result, blocks, planner)
+    return blocks, planner, times, [*result.diagnostics, *found]
 
 
 def _calibrated(blocks: Blocks, machine: Machine, planner: CycleTimeModel | None, log: str,

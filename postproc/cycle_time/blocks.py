@@ -116,6 +116,7 @@ class Blocks:
         operation (E,): index into `operations`
         pauses: rests by command
         cl_line (E,): line of the CL file that the block comes from, -1 where that is not known
+        move (E,): row of the job's moves that the block does, -1 where none is known
         given (E,): way that the feed refers to where the columns do not tell it (the tip's, under a control's own
             kinematics), NaN elsewhere
         pieces (E,): of how many rows its block of the program consists; None: all of one
@@ -138,6 +139,7 @@ class Blocks:
     operations: tuple[str, ...] = ("",)
     pauses: Pauses = field(default_factory=Pauses.none)
     cl_line: Ints | None = None
+    move: Ints | None = None
     given: Floats | None = None
     pieces: Ints | None = None
 

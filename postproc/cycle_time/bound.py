@@ -42,13 +42,16 @@ def cut_off(blocks: Blocks, form: Shape, model: CycleTimeModel) -> Floats:
     """(E,) mm by which blends can make each block shorter.
 
     The chord that takes d off both sides of a corner of turning angle phi lies d sin(phi/2) from it and is 2 d
-    (1 - cos(phi/2)) shorter; d is at most half a block. Where the limit is a tolerance e, d <= e/sin(phi/2).
+    (1 - cos(phi/2)) shorter; d is at most half a block. Where the limit is a tolerance e, d <= e/sin(phi/2). The ideal
+    motion is planned within the model's tolerance, whatever the program leaves to the control.
     """
     dot = np.clip((form.last[:-1] * form.first[1:]).sum(axis=1), -1.0, 1.0)
     sine, cosine = np.sqrt((1.0 - dot) / 2.0), np.sqrt((1.0 + dot) / 2.0)
     stated = blocks.tolerance[:-1]
     unlimited = model.kind == "linuxcnc"
     tolerance = np.where(np.isnan(stated) | (np.isinf(stated) & (not unlimited)), model.corner_tolerance, stated)
+    if model.kind == "ideal":
+        tolerance = np.maximum(tolerance, model.corner_tolerance)
     with np.errstate(divide="ignore"):
         reach = np.minimum(np.minimum(form.length[:-1], form.length[1:]) / 2.0, tolerance / sine)
     spared = np.where((blocks.path[:-1] == Path.BLEND) & ~blocks.forced[:-1], reach * (1.0 - cosine), 0.0)

@@ -57,13 +57,15 @@ def total(blocks: Blocks, times: Timed) -> float:
     return moving + float(times.pause[outside].sum())
 
 
-def estimate(blocks: Blocks, machine: Machine, model: CycleTimeModel, with_band: bool = True) -> Estimate:
+def estimate(blocks: Blocks, machine: Machine, model: CycleTimeModel, with_band: bool = True,
+             times: Timed | None = None) -> Estimate:
     """Time, bound and band of a program.
 
     Args:
         with_band: False leaves the band at the time itself, for many programs in a row
+        times: of a motion that is planned already, instead of the model's; the doubts stay the model's
     """
-    times = timed(blocks, model)
+    times = times or timed(blocks, model)
     seconds = total(blocks, times)
     bound = lower_bound(blocks, model)
     if not with_band:
@@ -79,8 +81,9 @@ def _doubts(blocks: Blocks, machine: Machine, model: CycleTimeModel,
     own = model.calibration.relative if model.calibration else model.own_share
     low = high = (COVERAGE * own * seconds) ** 2
     doubts = {"the model itself": own * seconds}
+    begin = total(blocks, timed(blocks, model))
     for name, changed in _changes(blocks, machine, model):
-        moved = sorted(total(b, timed(b, m)) - seconds for b, m in changed)
+        moved = sorted(total(b, timed(b, m)) - begin for b, m in changed)
         low += (COVERAGE * min(moved[0], 0.0)) ** 2
         high += (COVERAGE * max(moved[-1], 0.0)) ** 2
         doubts[name] = (moved[-1] - moved[0]) / 2.0

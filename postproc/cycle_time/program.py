@@ -31,11 +31,12 @@ INCH = 25.4
 
 @dataclass(frozen=True)
 class Origin:
-    """Where motion blocks come from: operation (E,) of `names`, CL line (E,) or None."""
+    """Where motion blocks come from: operation (E,) of `names`; CL line and row of the job's moves (E,) or None."""
 
     operation: Ints
     names: tuple[str, ...]
     cl_line: Ints | None = None
+    move: Ints | None = None
 
     @staticmethod
     def by_tool(motion: Motion) -> Origin:
@@ -68,7 +69,7 @@ def blocks_of(code: Canonical, motion: Motion, machine: Machine, control: Contro
     pauses = _pauses(words, block, code.line, motion, machine)
     blocks = Blocks(Axes.of(machine), start, end, motion.line, motion.code == 0, arc, center, normal, sweep,
                     np.full(len(end), np.inf), path, tolerance[block], chain[block], origin.operation, origin.names, pauses,
-                    origin.cl_line, _tip_lengths(motion, control))
+                    origin.cl_line, origin.move, _tip_lengths(motion, control))
     blocks = replace(blocks, speed=_speeds(words, block, motion, blocks, by_radius))
     moving = (np.abs(end - start) > NOTHING).any(axis=1) | arc
     blocks = _unrolled(blocks, motion, control, unit) if (motion.frame > 0).any() else blocks.take(moving)

@@ -12,6 +12,7 @@ from postproc.control import Control, Law
 from postproc.controllers.model import ControllerFile
 from postproc.cycle_time.blocks import Blocks
 from postproc.cycle_time.program import Origin, blocks_of
+from postproc.moves import Phase
 from postproc.pipeline import PostResult
 from postproc.readback.canonical import Canonical
 from postproc.readback.dialects import reader_for
@@ -32,8 +33,9 @@ def from_conversion(result: PostResult) -> Blocks:
     owner = np.clip(result.comparison.owner, 0, len(moves) - 1)
     names = tuple(op.name or f"operation {k + 1}" for k, op in enumerate(path.operations))
     inside = (result.comparison.owner >= 0) & (result.comparison.owner < len(moves))
+    kept = np.flatnonzero(job.moves.phase != Phase.PECK)
     origin = Origin(path.operation[moves.row[owner]].astype(np.int64), names,
-                    np.where(inside, moves.line[owner], -1).astype(np.int64))
+                    np.where(inside, moves.line[owner], -1).astype(np.int64), np.where(inside, kept[owner], -1))
     return _blocks(code, motion, result.machine, job.control, result.controller, origin)
 
 

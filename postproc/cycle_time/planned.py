@@ -1,0 +1,59 @@
+"""The ideal model of a CL file: its passes as the feed planner moves them, everything between as the model says."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from postproc.cycle_time.blocks import Blocks
+from postproc.cycle_time.lookahead import lookahead
+from postproc.cycle_time.model import CycleTimeModel
+from postproc.cycle_time.phases import Timed
+from postproc.pass_geometry import stops_of
+from postproc.pipeline import PostResult
+from postproc.planned import PlannedMotion, Source
+from toolpaths.arrays import Floats
+from toolpaths.diagnostics import Diagnostic, DiagnosticError, warning
+from toolpaths.smoothing.smooth import Tolerance
+
+
+def planned_times(result: PostResult, blocks: Blocks, model: CycleTimeModel) -> tuple[Timed, list[Diagnostic]]:
+    """Times of a conversion's blocks; a warning where no pass could be planned, so that all times are the model's."""
+    times = lookahead(blocks, model)
+    job, path = result.job, result.path
+    if job is None or path is None or blocks.move is None:
+        return times, []
+    moves = job.moves
+    source = Source(path, moves, job.machine, job.kinematics, Tolerance(job.options.tolerance, job.axis_tolerance),
+                    stops_of(job.toolpath, moves), job.toolpath.file)
+    motion = result.motion or PlannedMotion(source, np.zeros(0))
+    try:
+        spans = [(int(one.move.min()), int(one.move.max()), made.seconds)
+                 for one, made in zip(motion.passes, motion.plans, strict=True)]
+    except DiagnosticError as fault:
+        return times, [warning("time.plan", f"the motion cannot be planned, times of passes are the model's: {fault}",
+                               file=job.toolpath.file, hint="--model lookahead")]
+    return with_seconds(times, _of_passes(blocks, times, spans)), []
+
+
+def _of_passes(blocks: Blocks, times: Timed, spans: list[tuple[int, int, float]]) -> Floats:
+    """(E,) s of each block: in passes the plan's time, shared out as the model has it."""
+    assert blocks.move is not None
+    seconds = times.seconds.copy()
+    cutting = ~blocks.rapid
+    for first, last, planned in spans:
+        rows = np.flatnonzero(cutting & (blocks.move >= first) & (blocks.move <= last))
+        own = seconds[rows].sum()
+        if own > 0.0:
+            seconds[rows] *= planned / own
+    return seconds
+
+
+def with_seconds(times: Timed, seconds: Floats) -> Timed:
+    """The same order of blocks and rests, with other times of the blocks; their phases shrink and grow alike."""
+    rest = np.append(np.diff(times.begin) - times.seconds[:-1], 0.0) if len(seconds) else seconds
+    begin = np.concatenate([[0.0], np.cumsum(seconds + rest)[:-1]])
+    scale = seconds / np.maximum(times.seconds, 1e-300)
+    return replace(times, begin=begin, end=begin + seconds, ramp=times.ramp * scale, steady=times.steady * scale,
+                   jerk=times.jerk * scale, lost_stop=times.lost_stop * scale, lost_corner=times.lost_corner * scale)

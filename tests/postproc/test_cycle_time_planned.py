@@ -1,0 +1,62 @@
+"""The ideal model of a CL file is the feed planner's motion."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import postproc
+import toolpaths
+from postproc.cycle_time.bound import lower_bound
+from postproc.cycle_time.estimate import estimate, timed, total
+from postproc.cycle_time.planned import planned_times, with_seconds
+from postproc.cycle_time.source import from_conversion
+from postproc.pipeline import PostResult
+from tests.postproc.kit import SAMPLES, TOOLS, toolpath
+from tests.postproc.time_kit import model
+
+
+def converted(name: str, machine: str, **options: object) -> PostResult:
+    path, found = toolpaths.read(SAMPLES / name)
+    result = postproc.convert(path, machine, "linuxcnc", TOOLS, postproc.Options(**options), found)
+    assert result.ok, result.diagnostics
+    return result
+
+
+@pytest.mark.parametrize(("name", "machine"), [("pocket.cls", "mill-3axis"), ("tool_axis_tour.apt", "mikron-ucp710")])
+def test_passes_take_what_the_plan_takes(name: str, machine: str) -> None:
+    result = converted(name, machine, feed="planned")
+    blocks, ideal = from_conversion(result), model("ideal")
+    times, found = planned_times(result, blocks, ideal)
+    assert not found and result.motion is not None and blocks.move is not None
+    passes = np.zeros(len(blocks), dtype=bool)
+    for one in result.motion.passes:
+        passes |= ~blocks.rapid & (blocks.move >= one.move.min()) & (blocks.move <= one.move.max())
+    assert times.seconds[passes].sum() == pytest.approx(result.motion.seconds, rel=1e-9)
+    own = timed(blocks, ideal)
+    np.testing.assert_allclose(times.seconds[~passes], own.seconds[~passes], rtol=1e-9, atol=1e-9)
+    assert lower_bound(blocks, ideal) <= total(blocks, times)
+    e = estimate(blocks, result.machine, ideal, times=times)
+    assert e.seconds == pytest.approx(total(blocks, times)) and e.band[0] < e.seconds < e.band[1]
+
+
+def test_one_straight_pass_is_rest_to_rest() -> None:
+    """A line of 200 mm at 1200 mm/min: plan, model and closed form agree."""
+    path = toolpath("RAPID", "GOTO/0,0,50", "RAPID", "GOTO/0,0,5", "FEDRAT/MMPM,1200", "GOTO/200,0,5", "RAPID",
+                    "GOTO/200,0,50")
+    result = postproc.convert(path, "mill-3axis", "linuxcnc", TOOLS)
+    blocks, ideal = from_conversion(result), model("ideal")
+    times, found = planned_times(result, blocks, ideal)
+    assert not found
+    cut = np.flatnonzero(~blocks.rapid)
+    expected = 200.0 / 20.0 + 2.0 * np.sqrt(20.0 / 30000.0)
+    assert times.seconds[cut].sum() == pytest.approx(expected, rel=2e-3)
+    assert timed(blocks, ideal).seconds[cut].sum() == pytest.approx(expected, rel=1e-9)
+
+
+def test_other_times_keep_rests_between_blocks() -> None:
+    blocks = from_conversion(converted("pocket.cls", "mill-3axis"))
+    own = timed(blocks, model("lookahead"))
+    slow = with_seconds(own, 2.0 * own.seconds)
+    np.testing.assert_allclose(slow.begin[1:] - slow.end[:-1], own.begin[1:] - own.end[:-1], atol=1e-9)
+    np.testing.assert_allclose(slow.end - slow.begin, 2.0 * own.seconds, atol=1e-9)
