@@ -109,7 +109,7 @@ class _Front:
         taken &= ~halves
         self._record(taken, u1, q1, tip, axis)
         gone = ~good & (self.step <= _SMALLEST)
-        self.broken.append(self.index[gone])
+        self._give_up(self.index[gone])
         self._next(taken, good, ratio, u1, q1, pose)
         self.step = np.where(halves, 0.5 * (1.0 - self.at), self.step)
         self.even = halves
@@ -149,6 +149,13 @@ class _Front:
             self.u.append(u1[taken])
             self.q.append(q1[taken])
             self.worst = np.maximum(self.worst, [tip[taken].max(), axis[taken].max()])
+
+    def _give_up(self, index: Ints) -> None:
+        """Curves that jump end where they should, so that every curve has its blocks."""
+        self.broken.append(index)
+        self.curve.append(index)
+        self.u.append(np.ones(len(index)))
+        self.q.append(self.last[index])
 
     def _next(self, taken: Bools, good: Bools, ratio: Floats, u1: Floats, q1: Floats,
               pose: tuple[Floats, Floats]) -> None:
