@@ -86,3 +86,11 @@ PROGRAMS: dict[str, tuple[str, str]] = {
                                      + circle(150, 30.0, turned)),
 }
 END = "M2\n"
+MEASURED = {
+    "zigzag, G61.1": 10.058, "zigzag, G64": 5.579, "circle of lines, G64 P0.01": 3.800, "circle of lines, G61": 7.210,
+    "random lines, G64 P0.01": 12.400, "random lines, G64 P0.1 Q0": 11.962, "arcs, G64 P0.05": 7.206, "arcs, G61": 7.289,
+    "helices, G64 P0.02": 4.936, "rapids, G64 P0.02": 6.556, "canned cycles": 12.189, "inch": 8.946,
+    "spindle, coolant, dwell": 4.399, "tool changes": 5.006, "4 axes, G94, G64 P0.01": 6.690,
+    "5 axes, G94, G64 P0.01": 9.165, "5 axes, G94, G61": 7.768, "5 axes, G93, G64 P0.01": 14.288, "5 axes, G93, G61": 12.063,
+    "rotary axes alone": 8.149, "5 axes, control's kinematics": 4.751}
+"""s that LinuxCNC 2.9's simulator took, for where it is not installed"""

@@ -19,6 +19,7 @@ from postproc.cycle_time.model import CycleTimeModel
 from postproc.cycle_time.shape import shape
 from postproc.cycle_time.shares import most_expensive, operations, shares
 from postproc.feedrate.compiled import compiled
+from tests.linuxcnc import time_programs
 from tests.postproc.time_kit import HEAD, blocks, machine, model, random_program
 
 KINDS = ("linuxcnc", "lookahead", "ideal")
@@ -207,3 +208,10 @@ def test_the_spindle_runs_up_at_each_start(kind: str) -> None:
     assert total(b, timed(b, slow)) == pytest.approx(total(b, timed(b, quick)) + 4.0, rel=1e-9)
     s = shares(estimate(b, machine(), slow, with_band=False))
     assert s.by_cause["spindle"].sum() == pytest.approx(4.0, abs=0.02)
+
+
+@pytest.mark.parametrize("name", time_programs.PROGRAMS)
+def test_linuxcnc_takes_as_long_as_its_simulator_once_did(name: str) -> None:
+    on, program = time_programs.PROGRAMS[name]
+    b = blocks(program, time_programs.machine(on))
+    assert total(b, timed(b, model("linuxcnc"))) == pytest.approx(time_programs.MEASURED[name], rel=0.01)
