@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from machines.geometric_error.model import ErrorModel
+from machines.geometric_error.model import ErrorModel, doubt
 from machines.kinematics.base import Kinematics
 from postproc.control import Control
 from postproc.corrected.arcs import fitted_arcs
@@ -22,6 +22,7 @@ from postproc.corrected.cycles import whole_holes
 from postproc.corrected.points import divided
 from postproc.corrected.reversals import arcs_cut, starts_of
 from postproc.corrected.work import Work
+from postproc.groups import groups
 from postproc.modes import OutputModes
 from postproc.moves import Moves
 from postproc.path import Path
@@ -29,6 +30,8 @@ from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error, info
 from toolpaths.units import DEG
 
+DOUBTS = 500
+"""blocks at which the doubt of the correction is computed"""
 SHARE = 0.1
 """of the tolerances: what the correction may be off between corrected points"""
 
@@ -44,6 +47,7 @@ class Compensation:
         added: points added; resolved: arcs that became lines
         partial: blocks near a pole, whose axis is corrected in part
         moved: (J,) largest correction of each joint
+        doubt_tip, doubt_axis: largest standard deviation that the model's covariance gives; None where it has none
     """
 
     tip_before: float
@@ -56,13 +60,18 @@ class Compensation:
     resolved: int
     partial: int
     moved: Floats
+    doubt_tip: float | None = None
+    doubt_axis: float | None = None
 
     def lines(self) -> list[str]:
         """What happened, for header and summary."""
         arcsec = DEG / 3600.0
         return [f"geometric errors corrected: tip {1e3 * self.tip_before:.1f} um, axis {self.axis_before / arcsec:.1f} "
                 f"arcsec before, {1e3 * self.tip_after:.2f} um and {self.axis_after / arcsec:.2f} arcsec left",
-                f"{self.added} points added, {self.resolved} arcs resolved, {self.partial} blocks near a pole"]
+                f"{self.added} points added, {self.resolved} arcs resolved, {self.partial} blocks near a pole",
+                *([] if self.doubt_tip is None or self.doubt_axis is None else
+                  [f"doubt of the correction (one standard deviation): tip {1e3 * self.doubt_tip:.2f} um, axis "
+                   f"{self.doubt_axis / arcsec:.2f} arcsec"])]
 
 
 def compensate(path: Path, moves: Moves, tools: Ints, kinematics: Callable[[int], Kinematics], model: ErrorModel,
@@ -93,10 +102,12 @@ def compensate(path: Path, moves: Moves, tools: Ints, kinematics: Callable[[int]
     corrected = divided(corrected, work, starts, SHARE * tolerance)
     (tip_before, axis_before), (tip_after, axis_after) = (x[live].max(axis=0, initial=0.0).tolist()
                                                           for x in (found.before, found.after))
+    doubt_tip, doubt_axis = _doubt(path, live, work, model)
     report = Compensation(
         tip_before, axis_before, tip_after, axis_after, residual_tip=found.residual[:, :3],
         residual_axis=found.residual[:, 3:], added=len(corrected) - before_cut, resolved=int(resolved.sum()),
-        partial=int(found.partial[live].sum()), moved=np.abs(found.q - path.q).max(axis=0, initial=0.0))
+        partial=int(found.partial[live].sum()), moved=np.abs(found.q - path.q).max(axis=0, initial=0.0),
+        doubt_tip=doubt_tip, doubt_axis=doubt_axis)
     return corrected, report, [*diagnostics, *(info("compensation", line, file=file) for line in report.lines())]
 
 
@@ -125,6 +136,22 @@ def framed(path: Path, nominal: Path, modes: OutputModes, work: Work) -> Path:
         frame[k] = frames.index(new)
         q[whole] = work.at(nominal.q[whole], whole, work.way[whole], np.tile(at[work.rotary], (len(whole), 1)))
     return replace(path, q=q, frame=frame, frames=tuple(frames))
+
+
+def _doubt(path: Path, live: Bools, work: Work, model: ErrorModel) -> tuple[float | None, float | None]:
+    """Largest standard deviations at up to DOUBTS blocks spread over the path."""
+    if model.covariance is None or not live.any():
+        return None, None
+    rows = np.flatnonzero(live)
+    rows = rows[np.unique(np.linspace(0, len(rows) - 1, DOUBTS).astype(np.int64))]
+    tip, axis = 0.0, 0.0
+    for k in groups(work.tools[rows]):
+        tool = int(work.tools[rows[k[0]]])
+        actual, q = work.actual(tool), path.q[rows[k]]
+        w = actual.coordinates(q, np.concatenate(work.kinematics(tool).forward(q), axis=1))
+        found = doubt(model, actual, w, work.way[rows[k]])
+        tip, axis = max(tip, float(found.tip_worst.max())), max(axis, float(found.axis.max()))
+    return tip, axis
 
 
 # ---- what cannot be done ----------------------------------------------------------------------------------------------

@@ -52,7 +52,8 @@ def _errors(result: PostResult) -> dict[str, Any] | None:
         return None
     return {"model": result.job.errors.name, "tip_before_mm": found.tip_before, "axis_before_deg": found.axis_before / DEG,
             "tip_residual_mm": found.tip_after, "axis_residual_deg": found.axis_after / DEG, "points_added": found.added,
-            "arcs_resolved": found.resolved, "blocks_near_a_pole": found.partial}
+            "arcs_resolved": found.resolved, "blocks_near_a_pole": found.partial,
+            "tip_sigma_mm": found.doubt_tip, "axis_sigma_deg": None if found.doubt_axis is None else found.doubt_axis / DEG}
 
 
 def _number(value: float) -> float | None:

@@ -215,6 +215,7 @@ def test_command_line_convert_verify_trace(tmp_path: Path) -> None:
     assert run.exit_code == 0, run.stderr
     figures = json.loads(run.stdout)["geometric_errors"]
     assert figures["tip_before_mm"] > 0.02 and figures["tip_residual_mm"] < 1e-4
+    assert 1e-4 < figures["tip_sigma_mm"] < 5e-3 and figures["axis_sigma_deg"] > 0.0
     assert "geometric_errors" in json.loads(run.stdout)["tolerance_shares"]
     run = CliRunner().invoke(app, ["verify", str(out), "samples/five_faces.cls", *common])
     assert run.exit_code == 0 and json.loads(run.stdout)["proved"]
