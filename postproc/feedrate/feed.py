@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -70,7 +71,7 @@ class Allowed:
         """Whether it is known to be nearly constant between its `breaks`."""
         return not callable(self.feed) or hasattr(self.feed, "breaks")
 
-    @property
+    @cached_property
     def breaks(self) -> Floats:
         """Where it changes, as far as is known."""
         return np.asarray(getattr(self.feed, "breaks", ()), dtype=np.float64)
