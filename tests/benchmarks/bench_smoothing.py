@@ -2,7 +2,7 @@
 
     python tests/benchmarks/bench_smoothing.py [speed] [plan] [samples] [parallel]
 
-speed: points per second and deviation over the tolerance, 10^3 to 10^6 points in steps of 0.05 to 0.4 mm.
+speed: points per second of the processor and deviation over the tolerance, 10^3 to 10^6 points in steps of 0.05 to 0.4 mm.
 plan: planned time of smoothed points over that of the noise-free curve, and of a spline through the rounded points.
 samples: time of geometry and feeds beside the rest of the conversion, planned seconds beside those at the feed.
 parallel: one pass on `uranesx` and on `h4a-c-table` under the limits of the slides, and under the largest box of
@@ -70,12 +70,12 @@ def smoothed(curves: Curves) -> Smooth:
 
 
 def timed(run: Callable[[], object], repeats: int) -> float:
-    """Median seconds."""
+    """Median seconds of the processor, one thread: what others do on the host counts little."""
     seconds = []
     for _ in range(repeats):
-        start = time.perf_counter()
+        start = time.process_time()
         run()
-        seconds.append(time.perf_counter() - start)
+        seconds.append(time.process_time() - start)
     return statistics.median(seconds)
 
 

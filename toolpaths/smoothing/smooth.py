@@ -92,7 +92,7 @@ def smooth_all(curves: Curves, first: Ints, tolerance: Tolerance, sharpest: floa
     rows = np.flatnonzero(moving)
     if not len(rows):
         return [None] * (len(first) - 1)
-    kept, ends = curves.take(rows), np.concatenate(([0.0], np.cumsum(way[rows])))
+    kept, ends = curves if moving.all() else curves.take(rows), np.concatenate(([0.0], np.cumsum(way[rows])))
     apart = np.zeros(len(rows) + 1, dtype=bool)
     apart[begin] = True
     before, after = rates(kept, tolerance.scale)
@@ -118,7 +118,8 @@ def _chain(members: Members, blends: Blends, splines: list[Spline], rows: Ints, 
     own = splines[int(number[low]):int(number[high])]
     ends = members.ends[rows[0]:rows[1] + 1] - start
     ends[-1] = s[-1]
-    mine = Members(members.curves.take(np.arange(rows[0], rows[1])), ends, members.first[low:high + 1] - rows[0],
+    curves = Curves(*(getattr(members.curves, name)[rows[0]:rows[1]] for name in Curves.__dataclass_fields__))
+    mine = Members(curves, ends, members.first[low:high + 1] - rows[0],
                    members.spline[low:high], members.scale, assembled(own, start))
     joints = slice(low, high - 1)
     joined = Blends(blends.s[joints] - start, blends.half[joints], blends.stop[joints], blends.turn[joints])
