@@ -100,10 +100,12 @@ def _joined(written: list[_Written]) -> Curves:
 
 
 def _blocks(path: Path, first: int, last: int) -> Ints:
-    """Cutting blocks of these moves, turns on the spot left out."""
+    """Cutting blocks of these moves; those that stay where they are (turns, lost motion taken up) left out."""
     low, high = np.searchsorted(path.move, [first, last])
     here = np.arange(low, high)
-    return np.asarray(here[(path.code[here] != TRAVERSE) & (path.u[here] > 0.0)])
+    before = np.maximum(here - 1, 0)
+    onward = (path.move[here] != path.move[before]) | ~(path.u[here] <= path.u[before]) | (here == 0)
+    return np.asarray(here[(path.code[here] != TRAVERSE) & (path.u[here] > 0.0) & onward])
 
 
 @dataclass(frozen=True)
