@@ -124,7 +124,8 @@ def _without_stops(motion: Motion) -> Motion:
     """The motion without the steps of canned cycles that go nowhere."""
     step = np.diff(motion.end, axis=0, prepend=motion.start[None])
     keep = (step != 0.0).any(axis=1) | ~motion.hole
-    return replace(motion, **{f.name: getattr(motion, f.name)[keep] for f in fields(motion) if f.name != "start"})
+    return replace(motion, **{f.name: getattr(motion, f.name)[keep] for f in fields(motion)
+                              if f.name not in ("start", "frames")})
 
 
 def known(o: Output) -> Bools:
