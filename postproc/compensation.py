@@ -47,6 +47,7 @@ class Compensation:
         added: points added; resolved: arcs that became lines
         partial: blocks near a pole, whose axis is corrected in part
         moved: (J,) largest correction of each joint
+        owner, part: block of the nominal path that each block is of, and part of its time
         doubt_tip, doubt_axis: largest standard deviation that the model's covariance gives; None where it has none
     """
 
@@ -60,6 +61,8 @@ class Compensation:
     resolved: int
     partial: int
     moved: Floats
+    owner: Ints
+    part: Floats
     doubt_tip: float | None = None
     doubt_axis: float | None = None
 
@@ -86,8 +89,9 @@ def compensate(path: Path, moves: Moves, tools: Ints, kinematics: Callable[[int]
         beyond: True corrects outside the measured range with the error at its end
     """
     work = Work(path, tools, kinematics, model, axis_tolerance, beyond, SHARE)
-    before_cut, (path, tools) = len(path), arcs_cut(path, tools, work)
-    work = Work(path, tools, kinematics, model, axis_tolerance, beyond, SHARE)
+    cut = arcs_cut(path, work)
+    path, before_cut = cut.path, len(path)
+    work = Work(path, tools[cut.owner], kinematics, model, axis_tolerance, beyond, SHARE)
     found = work.ends()
     live = ~path.home
     diagnostics = _unmeasured(path, moves, modes.control, found.unmeasured & live[:, None], beyond, file)
@@ -99,7 +103,8 @@ def compensate(path: Path, moves: Moves, tools: Ints, kinematics: Callable[[int]
     corrected, work.whole = whole_holes(corrected, path, moves, work, SHARE * tolerance)
     starts = starts_of(corrected, path, work, SHARE * tolerance)
     corrected, resolved = fitted_arcs(corrected, path, work, starts.q, SHARE * tolerance)
-    corrected = divided(corrected, work, starts, SHARE * tolerance)
+    whole = divided(corrected, work, starts, SHARE * tolerance).of(cut)
+    corrected = whole.path
     (tip_before, axis_before), (tip_after, axis_after) = (x[live].max(axis=0, initial=0.0).tolist()
                                                           for x in (found.before, found.after))
     doubt_tip, doubt_axis = _doubt(path, live, work, model)
@@ -107,7 +112,7 @@ def compensate(path: Path, moves: Moves, tools: Ints, kinematics: Callable[[int]
         tip_before, axis_before, tip_after, axis_after, residual_tip=found.residual[:, :3],
         residual_axis=found.residual[:, 3:], added=len(corrected) - before_cut, resolved=int(resolved.sum()),
         partial=int(found.partial[live].sum()), moved=np.abs(found.q - path.q).max(axis=0, initial=0.0),
-        doubt_tip=doubt_tip, doubt_axis=doubt_axis)
+        owner=whole.owner, part=whole.part, doubt_tip=doubt_tip, doubt_axis=doubt_axis)
     return corrected, report, [*diagnostics, *(info("compensation", line, file=file) for line in report.lines())]
 
 

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import groupby, islice, pairwise
 
 import numpy as np
 
 from machines.kinematics.base import Kinematics
-from postproc.feedrate.geometry import MachinePath, machine_path
+from postproc.feedrate.geometry import MachinePath, Stretch, machine_paths
 from postproc.moves import Moves
 from postproc.path import TRAVERSE, Path
 from toolpaths.arrays import Floats, Ints
@@ -82,14 +82,20 @@ def pass_geometry(path: Path, moves: Moves, kinematics: Callable[[int], Kinemati
     if not written:
         return [], []
     begin = np.concatenate(([0], np.cumsum([len(one.move) for one in written])))
+    smoothed = smooth_all(_joined(written), begin, tolerance, sharpest)
+    passes = [_placed(path, one, found) for one, found in zip(written, smoothed, strict=True) if found is not None]
+    paths = iter(_machine_paths(passes, moves, kinematics))
     result, diagnostics = [], []
-    for one, found in zip(written, smooth_all(_joined(written), begin, tolerance, sharpest), strict=True):
-        try:
-            result += [_pass(path, one, found, kinematics(int(moves.tool[one.move[0]])))] if found is not None else []
-        except ArithmeticError as fault:
-            diagnostics.append(error("plan.reach", f"the smoothed path leaves what the machine can reach: {fault}",
-                                     file=file, lines=moves.line[one.move[[0, -1]]].tolist(),
+    for one in passes:
+        own = list(islice(paths, len(one.stretches)))
+        faults = [fault for fault in own if isinstance(fault, str)]
+        if faults:
+            diagnostics.append(error("plan.reach", f"the smoothed path leaves what the machine can reach: {faults[0]}",
+                                     file=file, lines=moves.line[one.written.move[[0, -1]]].tolist(),
                                      hint="--feed programmed, a smaller --tolerance, or move the part"))
+            continue
+        result.append(PassGeometry(one.written.move, one.written.share, one.written.block, one.begin, one.ends, one.smooth,
+                                   tuple(made for made in own if isinstance(made, MachinePath))))
     return result, diagnostics
 
 
@@ -100,12 +106,10 @@ def _joined(written: list[_Written]) -> Curves:
 
 
 def _blocks(path: Path, first: int, last: int) -> Ints:
-    """Cutting blocks of these moves; those that stay where they are (turns, lost motion taken up) left out."""
+    """Cutting blocks of these moves, turns on the spot left out."""
     low, high = np.searchsorted(path.move, [first, last])
     here = np.arange(low, high)
-    before = np.maximum(here - 1, 0)
-    onward = (path.move[here] != path.move[before]) | ~(path.u[here] <= path.u[before]) | (here == 0)
-    return np.asarray(here[(path.code[here] != TRAVERSE) & (path.u[here] > 0.0) & onward])
+    return np.asarray(here[(path.code[here] != TRAVERSE) & (path.u[here] > 0.0)])
 
 
 @dataclass(frozen=True)
@@ -146,19 +150,39 @@ def _written(path: Path, block: Ints, reference: Curves, kin: Kinematics) -> _Wr
     return _Written(block, curves, move[rows], u[rows] - begin, curve, np.where(led, 1.0, u))
 
 
-def _pass(path: Path, written: _Written, found: Smooth, kin: Kinematics) -> PassGeometry:
-    """The geometry of a chain of blocks."""
+@dataclass(frozen=True)
+class _Placed:
+    """A pass with its blocks placed along s, and its stretches between stops."""
+
+    written: _Written
+    smooth: Smooth
+    begin: Floats
+    ends: Floats
+    stretches: tuple[Stretch, ...]
+
+
+def _placed(path: Path, written: _Written, found: Smooth) -> _Placed:
+    """Where the blocks of a chain are along s, and where it stops."""
     block = written.block
     ends = found.s[written.curve] + written.u * np.diff(found.s)[written.curve]
     begin = np.concatenate((found.s[:1], ends[:-1]))
     jump = np.flatnonzero(np.diff(block) > 1) + 1
     cuts = np.unique(np.concatenate(([0.0], found.stops, ends[jump - 1], found.s[-1:])))
-    paths = []
+    stretches = []
     for low, high in pairwise(cuts.tolist()):
         own = np.flatnonzero((ends > low) & (begin < high))
         near = _Near(np.append(begin[own[:1]], ends[own]), path.q[np.append(block[own[:1]] - 1, block[own])])
-        paths.append(machine_path(found, low, high, kin, near))
-    return PassGeometry(written.move, written.share, block, begin, ends, found, tuple(paths))
+        stretches.append(Stretch(found, low, high, near))
+    return _Placed(written, found, begin, ends, tuple(stretches))
+
+
+def _machine_paths(passes: list[_Placed], moves: Moves, kinematics: Callable[[int], Kinematics]) -> list[MachinePath | str]:
+    """The joints along all stretches in order, those of one tool together."""
+    tool = [int(moves.tool[one.written.move[0]]) for one in passes]
+    result: list[MachinePath | str] = []
+    for index, group in groupby(zip(tool, passes, strict=True), key=lambda pair: pair[0]):
+        result += machine_paths([stretch for _, one in group for stretch in one.stretches], kinematics(index))
+    return result
 
 
 @dataclass(frozen=True)

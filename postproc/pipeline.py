@@ -37,6 +37,7 @@ from postproc.singular import check_singular
 from postproc.smoothed_moves import smoothed_moves
 from postproc.travel import check_travel
 from postproc.word_rows import block_tools
+from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic, DiagnosticError, error, has_errors
 from toolpaths.smoothing.smooth import Tolerance
 from toolpaths.toolpath import Toolpath
@@ -162,11 +163,11 @@ def _stages(result: PostResult, progress: Progress | None) -> PostResult:
     result = _with(result, found, extents=extents)
     if not result.ok:
         return result
-    motion, found = plan_motion(job, moves, path)
+    motion, found = plan_motion(job, moves, result.nominal or path)
     result = _with(result, found, motion=motion)
     if not result.ok:
         return result
-    planned = None if motion is None else Planned(motion.needed, options.merge_feeds)
+    planned = None if motion is None else Planned(_on_path(result, motion.needed), options.merge_feeds)
     program, feeds, found = compile_program(job, moves, path, planned)
     found += unwritable(result.controller, program, toolpath.cycles, file, result.setup.output.subprograms,
                         job.control.length_on_z)
@@ -197,6 +198,12 @@ def _compensated(result: PostResult, job: Job, moves: Moves, path: Path) -> tupl
     corrected, report, found = compensate(path, moves, block_tools(path, moves), job.kinematics, job.errors, job.modes,
                                           options.tolerance, job.axis_tolerance, options.error_beyond, job.toolpath.file)
     return _with(result, found, path=corrected, nominal=path, compensation=report), corrected
+
+
+def _on_path(result: PostResult, seconds: Floats) -> Floats:
+    """Seconds of the planned blocks on the blocks that are written; those of corrected ones are parts of nominal ones."""
+    found = result.compensation
+    return seconds if found is None else np.asarray(seconds[found.owner] * found.part)
 
 
 def tolerance_shares(job: Job) -> tuple[dict[str, float], list[Diagnostic]]:

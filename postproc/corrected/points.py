@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from postproc.corrected.arcs import LOOKS, LOOSE
-from postproc.corrected.reversals import SHORTEST, Starts, inserted, reversals
+from postproc.corrected.reversals import SHORTEST, Divided, Starts, inserted, reversals
 from postproc.corrected.work import MOMENT, Work
 from postproc.path import ARC, FEED, TRAVERSE, Path
 from toolpaths.arrays import Bools, Floats, Ints
@@ -19,7 +19,7 @@ LEAST = 0.2
 """of what is allowed, where the axis turns fast"""
 
 
-def divided(path: Path, work: Work, starts: Starts, allowed: float) -> Path:
+def divided(path: Path, work: Work, starts: Starts, allowed: float) -> Divided:
     """The path with its blocks halved until their motion is near enough to the nominal one (`allowed` mm, see `_bound`)."""
     cl_rapid = (path.code == TRAVERSE) & np.isfinite(path.u)
     block = np.flatnonzero(((path.code == FEED) | cl_rapid) & ~path.home & (np.arange(len(path)) > 0))
@@ -36,7 +36,7 @@ def divided(path: Path, work: Work, starts: Starts, allowed: float) -> Path:
         pieces = pieces.halved(middle, q)
         pieces = pieces.rows(_long(pieces, work))
     where, share, joints = (np.concatenate(column) for column in zip(*found, strict=True))
-    return inserted(path, where, share, joints) if len(where) else path
+    return inserted(path, where, share, joints)
 
 
 @dataclass(frozen=True)

@@ -19,8 +19,8 @@ SHORTEST = 0.05
 """mm of tip way or degrees of a rotary axis: a block that short is not divided"""
 
 
-def arcs_cut(path: Path, tools: Ints, work: Work) -> tuple[Path, Ints]:
-    """The path, and the tools of its blocks, with arcs cut where an axis that loses motion turns back."""
+def arcs_cut(path: Path, work: Work) -> Divided:
+    """The path with arcs cut where an axis that loses motion turns back."""
     arcs = np.flatnonzero((path.code == ARC) & (np.arange(len(path)) > 0))
     block, t = reversals(work, arcs)
     q = work.nominal(block, t)
@@ -29,17 +29,15 @@ def arcs_cut(path: Path, tools: Ints, work: Work) -> tuple[Path, Ints]:
         if len(block) else np.zeros(0, dtype=bool)
     keep = apart[0] & apart[1] & ~again
     block, t = block[keep], t[keep]
-    if not len(block):
-        return path, tools
-    cut = inserted(path, block, t, work.nominal(block, t))
-    owner = np.repeat(np.arange(len(path)), 1 + np.bincount(block, minlength=len(path)))
+    made = inserted(path, block, t, work.nominal(block, t))
+    cut, owner, tools = made.path, made.owner, work.tools
     center = cut.center.copy()
     for k in np.flatnonzero((owner[1:] == owner[:-1]) & (cut.code[1:] == ARC)) + 1:
         control, kin = cut.frames[int(cut.frame[k])].control, work.kinematics(int(tools[owner[k]]))
         ends = control.words(np.stack([path.q[owner[k] - 1], cut.q[k - 1]]), kin, 0.0)[:, control.xyz]
         flat = list(PLANE_COLUMNS[int(cut.plane[k])])
         center[k, flat] -= (ends[1] - ends[0])[flat]
-    return replace(cut, center=center), tools[owner]
+    return replace(made, path=replace(cut, center=center))
 
 
 @dataclass(frozen=True)
@@ -85,7 +83,20 @@ def reversals(work: Work, block: Ints) -> tuple[Ints, Floats]:
     return np.concatenate(where)[order], np.concatenate(at)[order]
 
 
-def inserted(path: Path, block: Ints, t: Floats, q: Floats) -> Path:
+@dataclass(frozen=True)
+class Divided:
+    """A path made of another's blocks: `owner` (K,) which of them each block is of, `part` (K,) of its time."""
+
+    path: Path
+    owner: Ints
+    part: Floats
+
+    def of(self, before: Divided) -> Divided:
+        """The same, told of the path that `before` was made from."""
+        return Divided(self.path, before.owner[self.owner], before.part[self.owner] * self.part)
+
+
+def inserted(path: Path, block: Ints, t: Floats, q: Floats) -> Divided:
     """The path with points (M, J) at fractions t (M,) of blocks (M,): columns, times and beginnings carried along."""
     n = len(path)
     owner = np.concatenate([block, np.arange(n)])
@@ -102,5 +113,6 @@ def inserted(path: Path, block: Ints, t: Floats, q: Floats) -> Path:
     begins = np.where(fresh, 0.0, begins)
     u = begins[owner] + share * (path.u - begins)[owner]
     begin = np.searchsorted(owner, path.begin, side="left")
-    return replace(path, q=np.concatenate([q, path.q])[order], u=np.where(share == 1.0, path.u[owner], u),
+    made = replace(path, q=np.concatenate([q, path.q])[order], u=np.where(share == 1.0, path.u[owner], u),
                    seconds=path.seconds[owner] * (share - before), begin=begin.astype(np.int64), **columns)
+    return Divided(made, owner, share - before)

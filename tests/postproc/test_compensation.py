@@ -148,6 +148,17 @@ def test_points_are_added_only_where_they_are_needed_and_keep_time_and_order() -
     assert (np.diff(path.begin) >= 0).all() and path.begin[-1] == len(path)
 
 
+def test_planned_feeds_go_with_corrected_blocks() -> None:
+    path, found = toolpaths.read(SAMPLES / "tool_axis_tour.apt")
+    options = Options(setup=str(SAMPLES / "tools.setup.toml"), error_model=MIKRON, feed="planned")
+    result = postproc.convert(path, "mikron-ucp710", "linuxcnc", options=options, diagnostics=found)
+    assert result.ok and result.path is not None and result.compensation is not None and result.nominal is not None
+    owner, part = result.compensation.owner, result.compensation.part
+    assert len(owner) == len(part) == len(result.path)
+    assert np.bincount(owner, part) == pytest.approx(np.ones(len(result.nominal)))
+    assert np.array_equal(result.path.move, result.nominal.move[owner])
+
+
 SQUARE = """PARTNO/SQUARE
 UNITS/MM
 LOADTL/1
