@@ -42,7 +42,7 @@ def estimated(text: str, on: Machine) -> Estimate:
 def run(simulate: Callable[..., Run], text: str, on: Machine, folder: Path) -> Run:
     """Commands between motions wait for processes of the host, whose delays the fast clock multiplies."""
     (folder / "program.ngc").write_text(text)
-    warp = 4 if "M6" in text or "M8" in text else 20
+    warp = 3 if any(word in text for word in ("M6", "M8", "F30000")) else 20
     result: Run = simulate(on, folder / "program.ngc", {1: (0.0, 6.0), 2: (0.0, 6.0)}, warp=warp)
     assert result.errors == ()
     return result

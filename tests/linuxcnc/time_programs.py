@@ -58,6 +58,11 @@ CYCLES = ("G0 Z300\nG98 G81 X0 Y0 Z280 R290 F800\nX20\nX40 Y20\nG80\nG99 G83 X0 
 ROTARY = "".join(f"G1 A{20 * (i % 3)} C{i * 25}\n" for i in range(1, 9)) + "G0 A0 C0\nG0 C90\n"
 INDEXED = "".join(f"G1 X{i * 2} Z{450 - (i % 3)} A{i * 4}\n" for i in range(1, 45))
 COMMANDS = "M3 S1000\nF2000\nG1 X20\nG4 P1.5\nG1 Y20\nM8\nG1 X0\nM9\nG0 Z350\nM5\nG1 Y0\n"
+SPEED = "".join(f"G1 X{0.5 * i:.1f}\n" for i in range(1, 500)) + "".join(
+    f"G1 X249.5 Y{0.05 * i:.2f}\n" for i in range(1, 400))
+SMALL_ARCS = "G0 X0 Y0 Z300\n" + "".join(
+    f"G17 G2 X{4 * i + 4} Y0 I2 J0\nG18 G3 X{4 * i} Z300 I-2 K0\nG19 G2 Y0 Z300 J3 K0\nG0 X{4 * i + 4}\n" for i in range(8))
+IN_TURN = "".join(f"G1 A{12 * (i % 2)} C{5 * i}\nG1 X{10 * i}\nG2 X{10 * i + 5} Y0 I2.5 J0\n" for i in range(1, 9))
 CHANGES = ("T1 M6\nG43 H1\nF2000\nG0 X20\nG1 Z350\nG1 Y20\nG0 Z400\nG49\nT2 M6\nG43 H2\nG0 X0\nG1 Z350\nG1 Y0\n")
 
 PROGRAMS: dict[str, tuple[str, str]] = {
@@ -82,6 +87,10 @@ PROGRAMS: dict[str, tuple[str, str]] = {
     "5 axes, G93, G64 P0.01": ("mikron-ucp710", f"{HEAD} G64 P0.01\nG0 Z240 A20\nG93\n{finishing(200)}G94\n"),
     "5 axes, G93, G61": ("mikron-ucp710", f"{HEAD} G61\nG0 Z240 A20\nG93\n{finishing(120)}G94\n"),
     "rotary axes alone": ("mikron-ucp710", f"{HEAD} G64 P0.01\nF3600\n{ROTARY}"),
+    "short lines at speed": ("mill-3axis", f"{HEAD} G64 P0.01 Q0\nF30000\n{SPEED}"),
+    "straight chain, G64 Q0.01": ("mill-3axis", f"{HEAD} G64 P0.01\nF24000\n{SPEED}"),
+    "small arcs in all planes": ("mill-3axis", f"{HEAD} G64 P0.01\nF12000\n{SMALL_ARCS}"),
+    "rotary and linear in turn": ("mikron-ucp710", f"{HEAD} G64 P0.01\nG0 Z200\nF3000\n{IN_TURN}"),
     "5 axes, control's kinematics": ("linuxcnc-xyzac-trt", f"{HEAD} G64 P0.05\nG0 Z300\nF3000\n"
                                      + circle(150, 30.0, turned)),
 }
@@ -92,5 +101,6 @@ MEASURED = {
     "helices, G64 P0.02": 4.936, "rapids, G64 P0.02": 6.556, "canned cycles": 12.189, "inch": 8.946,
     "spindle, coolant, dwell": 4.399, "tool changes": 5.006, "4 axes, G94, G64 P0.01": 6.690,
     "5 axes, G94, G64 P0.01": 9.165, "5 axes, G94, G61": 7.768, "5 axes, G93, G64 P0.01": 14.288, "5 axes, G93, G61": 12.063,
-    "rotary axes alone": 8.149, "5 axes, control's kinematics": 4.751}
+    "rotary axes alone": 8.149, "short lines at speed": 1.202, "straight chain, G64 Q0.01": 0.961,
+    "small arcs in all planes": 5.696, "rotary and linear in turn": 6.762, "5 axes, control's kinematics": 4.751}
 """s that LinuxCNC 2.9's simulator took, for where it is not installed"""

@@ -210,6 +210,43 @@ def test_the_spindle_runs_up_at_each_start(kind: str) -> None:
     assert s.by_cause["spindle"].sum() == pytest.approx(4.0, abs=0.02)
 
 
+def test_a_corner_is_passed_as_its_parabola_allows() -> None:
+    """Square corner, tolerance e: v^2 = 8 e A/sqrt(2); both lines long enough."""
+    b = blocks("G21 G90 G94 G17\nF3000\nG1 X50\nG1 Y50", controller="generic-iso")
+    m = model("ideal").model_copy(update={"jerk": False})
+    corner = np.sqrt(8.0 * 0.01 * 3000.0 / np.sqrt(2.0))
+    expected = 2.0 * 50.0 / 50.0 + 50.0 / 3000.0 + (50.0 - corner) ** 2 / 3000.0 / 50.0
+    assert total(b, timed(b, m)) == pytest.approx(expected, rel=1e-12)
+
+
+def test_jerk_of_a_run_over_several_blocks_is_that_of_one() -> None:
+    one, several = (blocks(f"{HEAD}\nF3000\n{text}", controller="generic-iso") for text in (
+        "G1 X90", "\n".join(f"G1 X{x}" for x in (0.05, 0.2, 0.5, 40, 89.6, 89.9, 90))))
+    times = [total(b, timed(b, model("ideal"))) for b in (one, several)]
+    assert times[1] == pytest.approx(times[0], rel=1e-9)
+
+
+def test_doubts_reach_to_both_sides() -> None:
+    b, m = blocks(random_program(4)), machine()
+    e = estimate(b, m, model("lookahead"))
+    own = 1.96 * e.doubts["the model itself"]
+    assert e.seconds - e.band[0] > 1.2 * own and e.band[1] - e.seconds > 1.2 * own
+
+
+def test_what_each_axis_does_on_an_arc() -> None:
+    b = blocks("G21 G90 G94\nF600\nG0 Z300\nG17 G2 X20 I10 J0\nG18 G2 X40 Z290 I10 K0\nG19 G2 Y20 J10 K0")
+    share = shape(b).share[-3:]
+    pitch = 1.0
+    np.testing.assert_allclose(share[0], [1.0, 1.0, 0.0], atol=1e-12)
+    assert share[1, 1] == pytest.approx(0.0, abs=1e-9) and share[1, 0] == pytest.approx(pitch)
+    np.testing.assert_allclose(share[2], [0.0, 1.0, 1.0], atol=1e-12)
+
+
+def test_at_most_a_hundred_points_are_merged() -> None:
+    b = blocks(f"{HEAD} G64 P0.01\nF3000\n" + "\n".join(f"G1 X{0.2 * i:.1f}" for i in range(1, 500)))
+    assert np.diff(np.concatenate([[-1], merge(b)[1]])).max() == 101
+
+
 @pytest.mark.parametrize("name", time_programs.PROGRAMS)
 def test_linuxcnc_takes_as_long_as_its_simulator_once_did(name: str) -> None:
     on, program = time_programs.PROGRAMS[name]

@@ -94,7 +94,7 @@ def test_tip_of_a_controls_own_mode_runs_at_the_feed() -> None:
     """Under G43.4 the feed is the tip's, whatever way the axes take."""
     fanuc, _ = load_controller("fanuc-30i")
     assert fanuc is not None
-    path, found = toolpaths.read(SAMPLES / "five_tilted.cls")
+    path, found = toolpaths.read(SAMPLES / "tool_axis_tour.apt")
     result = postproc.convert(path, "mikron-ucp710", "fanuc-30i", TOOLS, postproc.Options(output="tcp"), found)
     if not result.ok:
         pytest.skip("; ".join(str(d) for d in result.diagnostics))
@@ -102,6 +102,9 @@ def test_tip_of_a_controls_own_mode_runs_at_the_feed() -> None:
     assert b.given is not None
     tips = np.isfinite(b.given) & ~b.rapid
     assert tips.any() and (shape(b).length[tips] == b.given[tips]).all()
+    assert b.pieces is not None and b.pieces.max() > 1
+    lines = np.bincount(b.line[tips], weights=b.given[tips])
+    assert (lines > 0.0).sum() < tips.sum()
 
 
 def test_programs_and_cl_files_are_told_apart() -> None:
