@@ -15,11 +15,11 @@ import numpy as np
 from scipy.interpolate import BSpline, make_interp_spline
 
 from machines.kinematics.base import Kinematics
-from postproc.feedrate.geometry_poles import past_poles
+from postproc.feedrate.geometry_poles import near_poles, past_poles
 from postproc.feedrate.geometry_sites import sites
 from postproc.feedrate.paths import Derivatives, SplinePath
 from postproc.joint_path import nearest_solution
-from toolpaths.arrays import Bools, Floats
+from toolpaths.arrays import Array, Bools, Floats
 from toolpaths.rotations import angle_between
 from toolpaths.smoothing.smooth import Smooth
 
@@ -27,6 +27,8 @@ DEGREE = 5
 SHARE = 0.05
 """of the tolerance that the joint spline may use"""
 ROUNDS = 6
+MANY = 50_000
+"""sites that are solved together"""
 Near = Callable[[Floats], Floats]
 """Joints (N, J) at s (N,) that the solution must be nearest to: its branch and winding."""
 
@@ -96,44 +98,105 @@ class MachinePath:
         return Derivatives(*(order[:, 3:] for order in self.tool.derivatives(s)))
 
 
+@dataclass(frozen=True)
+class Stretch:
+    """A smoothed path between two stops, s = first to last, and the joints to stay near to."""
+
+    path: Smooth
+    first: float
+    last: float
+    near: Near
+
+
 def machine_path(path: Smooth, first: float, last: float, kin: Kinematics, near: Near) -> MachinePath:
     """The joints' spline along `path` from s = first to last, without a stop between.
 
     Raises:
         ArithmeticError: where the machine has no solution, with the s of the first such place.
     """
-    s = sites(path, first, last)
+    found, = machine_paths([Stretch(path, first, last, near)], kin)
+    if isinstance(found, str):
+        raise ArithmeticError(found)
+    return found
+
+
+def machine_paths(stretches: list[Stretch], kin: Kinematics) -> list[MachinePath | str]:
+    """`machine_path` of each; what is wrong where the machine has no solution. Many short ones are solved together."""
+    result: list[MachinePath | str] = [""] * len(stretches)
+    at = {i: sites(one.path, one.first, one.last) for i, one in enumerate(stretches)}
     for turn in range(ROUNDS + 1):
-        made = _interpolated(path, s, kin, near)
-        off = _off(made, path, kin)
-        worst = float(off.max())
-        bad = off > SHARE
-        if turn == ROUNDS or not bad.any():
+        finer: dict[int, Floats] = {}
+        for group in _groups(at):
+            made = _interpolated([stretches[i] for i in group], [at[i] for i in group], kin)
+            solved = [(i, one) for i, one in zip(group, made, strict=True) if isinstance(one, MachinePath)]
+            for i, one in zip(group, made, strict=True):
+                result[i] = one
+            for (i, one), off in zip(solved, _off([one for _, one in solved], [stretches[i].path for i, _ in solved], kin),
+                                     strict=True):
+                result[i] = replace(one, worst=float(off.max()))
+                if turn < ROUNDS and bool((off > SHARE).any()):
+                    finer[i] = _finer(at[i], off > SHARE)
+        at = finer
+        if not at:
             break
-        bad[1:] |= bad[:-1]
-        bad[:-1] |= bad[1:]
-        s = np.sort(np.concatenate((s, 0.5 * (s[:-1] + s[1:])[bad])))
-    return replace(made, worst=worst)
+    return result
 
 
-def _interpolated(path: Smooth, s: Floats, kin: Kinematics, near: Near) -> MachinePath:
-    tip, axis = path.at(s)
-    axis = kin.nearest_axis(axis)
-    q = nearest_solution(kin, tip, axis, near(s))
-    good = np.asarray(np.isfinite(q).all(axis=1))
-    if not good.all():
-        raise ArithmeticError(f"no joints at s = {s[int(np.argmin(good))]:.6g} mm of the smoothed path")
-    q, led = past_poles(s, q, tip, axis, kin, path.tolerance.axis)
-    axis[led] = kin.forward(q[led])[1]
-    return MachinePath.through(s, np.hstack((q, tip, axis)), led)
+def _groups(at: dict[int, Floats]) -> list[list[int]]:
+    """Numbers in groups of about MANY sites."""
+    groups: list[list[int]] = []
+    total = MANY
+    for i, s in at.items():
+        if total + len(s) > MANY:
+            groups.append([])
+            total = 0
+        groups[-1].append(i)
+        total += len(s)
+    return groups
 
 
-def _off(made: MachinePath, path: Smooth, kin: Kinematics) -> Floats:
-    """(N - 1,) deviation of the joint spline from the smoothed path amid the sites, over the tolerance."""
-    middle = 0.5 * (made.s[:-1] + made.s[1:])
-    tip, axis = path.at(middle)
-    found_tip, found_axis = kin.forward(made.fitted(middle), near=np.hstack((tip, axis)))
-    axis_off = angle_between(found_axis, kin.nearest_axis(axis)) / path.tolerance.axis
-    axis_off[made.led[1:] | made.led[:-1]] = 0.0
-    off = np.maximum(np.linalg.norm(found_tip - tip, axis=1) / path.tolerance.tip, axis_off)
-    return np.asarray(np.nan_to_num(off, nan=np.inf))
+def _finer(s: Floats, bad: Bools) -> Floats:
+    """Sites with one more in the middle of bad intervals and of those beside."""
+    wide = bad.copy()
+    wide[1:] |= bad[:-1]
+    wide[:-1] |= bad[1:]
+    return np.sort(np.concatenate((s, 0.5 * (s[:-1] + s[1:])[wide])))
+
+
+def _split(values: Array, parts: list[Floats]) -> list[Array]:
+    return np.split(values, np.cumsum([len(part) for part in parts])[:-1])
+
+
+def _interpolated(stretches: list[Stretch], at: list[Floats], kin: Kinematics) -> list[MachinePath | str]:
+    """Splines through the exact joints at sites."""
+    poses = [one.path.at(s) for one, s in zip(stretches, at, strict=True)]
+    tip, axis = np.concatenate([pose[0] for pose in poses]), kin.nearest_axis(np.concatenate([pose[1] for pose in poses]))
+    q = nearest_solution(kin, tip, axis, np.concatenate([one.near(s) for one, s in zip(stretches, at, strict=True)]))
+    columns = [_split(values, at) for values in (q, tip, axis, near_poles(q, kin))]
+    result: list[MachinePath | str] = []
+    for one, s, own, own_tip, own_axis, inside in zip(stretches, at, *columns, strict=True):
+        good = np.isfinite(own).all(axis=1)
+        if not good.all():
+            result.append(f"no joints at s = {s[int(np.argmin(good))]:.6g} mm of the smoothed path")
+            continue
+        joints, led = past_poles(s, own, own_tip, own_axis, inside, kin, one.path.tolerance.axis)
+        if led.any():
+            own_axis[led] = kin.forward(joints[led])[1]
+        result.append(MachinePath.through(s, np.hstack((joints, own_tip, own_axis)), led))
+    return result
+
+
+def _off(made: list[MachinePath], paths: list[Smooth], kin: Kinematics) -> list[Floats]:
+    """(N - 1,) of each: deviation of the joint spline from the smoothed path amid the sites, over the tolerance."""
+    if not made:
+        return []
+    middle = [0.5 * (one.s[:-1] + one.s[1:]) for one in made]
+    poses = [path.at(s) for path, s in zip(paths, middle, strict=True)]
+    tip, axis = np.concatenate([pose[0] for pose in poses]), kin.nearest_axis(np.concatenate([pose[1] for pose in poses]))
+    q = np.concatenate([one.fitted(s) for one, s in zip(made, middle, strict=True)])
+    found_tip, found_axis = kin.forward(q, near=np.hstack((tip, axis)))
+    axis_off = angle_between(found_axis, axis)
+    axis_off[np.concatenate([one.led[1:] | one.led[:-1] for one in made])] = 0.0
+    tip_off = np.linalg.norm(found_tip - tip, axis=1)
+    return [np.nan_to_num(np.maximum(a / path.tolerance.tip, b / path.tolerance.axis), nan=np.inf)
+            for path, a, b in zip(paths, _split(tip_off, middle), _split(axis_off, middle), strict=True)]

@@ -18,16 +18,20 @@ from toolpaths.rotations import angle_between
 ZONE = np.sin(np.radians(1.0))
 """Sine of the angle between tool and rotary axis below which joints are not solved from the direction."""
 DEGREE = 5
+CHUNK = 32768
 
 
-def past_poles(s: Floats, q: Floats, tip: Floats, axis: Floats, kin: Kinematics, tolerance: float) -> tuple[Floats, Bools]:
+def past_poles(s: Floats, q: Floats, tip: Floats, axis: Floats, near: Bools, kin: Kinematics,
+               tolerance: float) -> tuple[Floats, Bools]:
     """Joints (N, J) at rising s (N,) with the zones led through, and True (N,) where that was done.
 
     Args:
         q (N, J): joints solved for tip and axis (N, 3)
+        near (N,): of `near_poles`
         tolerance: rad that the axis may be off by it
     """
-    inside = _inside(q, kin)
+    inside = near.copy()
+    inside[[0, -1]] = False
     led = np.zeros(len(s), dtype=bool)
     if not kin.slides_affine or not inside.any() or (~inside).sum() <= DEGREE:
         return q, led
@@ -46,14 +50,16 @@ def past_poles(s: Floats, q: Floats, tip: Floats, axis: Floats, kin: Kinematics,
     return np.where(led[:, None], changed, q), led
 
 
-def _inside(q: Floats, kin: Kinematics) -> Bools:
-    """(N,) places where the tool lies nearly along a rotary axis, both ends left out."""
+def near_poles(q: Floats, kin: Kinematics) -> Bools:
+    """(N,) places where the tool lies nearly along a rotary axis of a machine that has two."""
     rotary = np.flatnonzero(np.array(kin.rotary))
+    result = np.zeros(len(q), dtype=bool)
     if len(rotary) < 2:
-        return np.zeros(len(q), dtype=bool)
-    inside = np.asarray((np.linalg.norm(kin.jacobian(q)[:, 3:][:, :, rotary], axis=1) < ZONE).any(axis=1))
-    inside[[0, -1]] = False
-    return inside
+        return result
+    for k in range(0, len(q), CHUNK):
+        turned = np.linalg.norm(kin.jacobian(q[k:k + CHUNK])[:, 3:][:, :, rotary], axis=1)
+        result[k:k + CHUNK] = (turned < ZONE).any(axis=1)
+    return result
 
 
 def slides_for(kin: Kinematics, tip: Floats, q: Floats) -> Floats:

@@ -11,6 +11,7 @@ import pytest
 from scipy.interpolate import BSpline
 
 from machines.machine import Machine
+from postproc.feedrate.geometry import MachinePath, Stretch, machine_path, machine_paths
 from postproc.feedrate.limits import JointLimits
 from postproc.feedrate.plan import Options
 from postproc.pass_geometry import PassGeometry, chains, pass_geometry, stops_of
@@ -23,7 +24,8 @@ from toolpaths import read
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import DiagnosticError
 from toolpaths.rotations import angle_between
-from toolpaths.smoothing.smooth import Tolerance
+from toolpaths.shape import Curves
+from toolpaths.smoothing.smooth import Tolerance, smooth
 
 TOLERANCE = Tolerance(0.01, np.radians(0.05))
 
@@ -286,3 +288,30 @@ def test_plan_takes_the_tool_axes_that_are_written() -> None:
     _, commanded = result.job.moves.curves().take(result.path.move[one.block]).at(result.path.u[one.block])
     assert angle_between(written, commanded).max() > 0.35 * TOLERANCE.axis
     assert angle_between(one.smooth.at(one.ends)[1], written).max() < 0.3 * TOLERANCE.axis
+
+
+def straight(*tips: tuple[float, float, float]) -> Curves:
+    tip = np.array(tips)
+    moves = len(tip) - 1
+    up, none = np.tile([0.0, 0.0, 1.0], (moves, 1)), np.zeros((moves, 3))
+    return Curves(tip[:-1], tip[1:], up, up, np.zeros(moves, dtype=bool), none, none, np.zeros(moves))
+
+
+def test_stretches_together_are_those_alone_and_one_out_of_reach_spoils_no_other() -> None:
+    kin = machine("uranesx").kinematics
+    home = machine("uranesx").home
+    paths = [smooth(straight(*tips), TOLERANCE) for tips in (
+        ((0.0, 0.0, 0.0), (50.0, 0.0, 0.0), (50.0, 40.0, -20.0)), ((0.0, 0.0, 0.0), (5000.0, 0.0, 0.0)),
+        ((-80.0, 10.0, 5.0), (-20.0, 60.0, 5.0)))]
+    stretches = [Stretch(path, 0.0, float(path.s[-1]), lambda s: np.tile(home, (len(s), 1))) for path in paths
+                 if path is not None]
+    found = machine_paths(stretches, kin)
+    assert [isinstance(one, MachinePath) for one in found] == [True, False, True]
+    assert "no joints at s = " in str(found[1])
+    for one, own in ((stretches[0], found[0]), (stretches[2], found[2])):
+        alone = machine_path(one.path, one.first, one.last, kin, one.near)
+        assert isinstance(own, MachinePath) and own.s.tolist() == alone.s.tolist()
+        np.testing.assert_allclose(own.values, alone.values, rtol=0.0, atol=1e-12)
+        assert own.worst == pytest.approx(alone.worst, rel=1e-6) and own.worst <= 0.05
+    with pytest.raises(ArithmeticError, match="no joints"):
+        machine_path(stretches[1].path, 0.0, 5000.0, kin, stretches[1].near)
