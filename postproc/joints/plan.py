@@ -51,7 +51,7 @@ class Solution:
     """(N,) rows where the tool lies along a rotary axis"""
     rewinds: tuple[Rewind, ...] = ()
     outside: int = 0
-    """poses outside travel or without solution"""
+    """poses outside travel or without solution, and steps between poses that no state makes inside travel"""
     losers: tuple[Loser, ...] = ()
     greedy: int = 0
     """rewinds if every pose took the nearest joints"""
@@ -191,9 +191,17 @@ def _solution(stage: _Stage, at: Floats) -> Solution:
     rewinds = tuple(Rewind(p.last, q[p.last], _rows(lattice, n, p.last)[0] + o, not bool(lattice.rest[p.last]))
                     for p, n, o in zip(taken, taken[1:], offset[1:], strict=False) if p.rewind)
     low, high = lattice.limits.lower - TRAVEL_SLACK, lattice.limits.upper + TRAVEL_SLACK
-    outside = int((~((q >= low) & (q <= high)).all(axis=1)).sum())
+    stood = np.concatenate([q, *(r.after[None] for r in rewinds)])
+    outside = int((~((stood >= low) & (stood <= high)).all(axis=1)).sum()) + _jumps(lattice, taken, q)
     return Solution(q, family, rewinds, outside, _losers(lattice, stage.segments[0], q0, every, best),
                     greedy(lattice, at).rewinds)
+
+
+def _jumps(lattice: Lattice, taken: list[Piece], q: Floats) -> int:
+    """Steps to another winding that are neither rewinds nor turns on the spot: travel ends between two poses."""
+    ends = np.array([p.last for p in taken[:-1] if not p.rewind and not lattice.free[p.last]], dtype=np.int64)
+    step = np.abs(q[ends + 1] - q[ends])[:, lattice.rotary]
+    return int((step > np.pi + 1e-6).any(axis=1).sum())
 
 
 def _losers(lattice: Lattice, first: Segment, q0: Floats, every: Floats, best: int) -> tuple[Loser, ...]:

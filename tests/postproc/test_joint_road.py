@@ -1,0 +1,101 @@
+"""Plans of joints on the road: rewinds between far points, several runs, wishes of the set-up, parallel machines."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import postproc
+from machines.machine import Machine
+from postproc.pipeline import PostResult
+from postproc.setup import Joints, SetupFile
+from tests.postproc.joint_kit import DEG, machine, tilted
+from tests.postproc.kit import goto, tool_setup, toolpath
+
+
+def limited(name: str, letter: str, low: float, high: float) -> Machine:
+    """A machine with other travel of a rotary axis, degrees."""
+    m = machine(name)
+    lower, upper = m.limits.lower.copy(), m.limits.upper.copy()
+    j = m.axis_names.index(letter)
+    lower[j], upper[j] = low * DEG, high * DEG
+    return replace(m, limits=replace(m.limits, lower=lower, upper=upper))
+
+
+def cone(turns: float, step: float, tilt: float = 25.0) -> list[str]:
+    """One cut round a cone, points `step` degrees apart."""
+    phi = np.arange(0, 360 * turns + 1e-9, step)
+    tip = np.stack([30 * np.cos(phi * DEG), 30 * np.sin(phi * DEG), -phi / 90], axis=1)
+    lines = goto(tip, tilted(tilt, phi))
+    return ["RAPID", lines[0], "FEDRAT/MMPM,1000", *lines[1:]]
+
+
+def run(lines: list[str], m: Machine, setup: SetupFile | None = None, **options: object) -> PostResult:
+    result = postproc.convert(toolpath(*lines), m, setup=setup or tool_setup(), options=postproc.Options(**options))
+    assert result.ok, [str(d) for d in result.diagnostics]
+    return result
+
+
+@pytest.mark.parametrize("step", [5.0, 60.0, 72.0])
+def test_a_rewind_may_stand_between_the_points_of_a_path(step: float) -> None:
+    """C within +-190 degrees: the overlap of 20 degrees is passed between two points, so moves are cut there."""
+    m = limited("mikron-ucp710", "C", -190, 190)
+    m = replace(m, limits=replace(m.limits, lower=np.where(np.arange(5) == 3, 0.0, m.limits.lower)))
+    result = run(cone(2.0, step), m)
+    path = result.path
+    assert len(path.rewinds) == 2
+    c = path.q[:, 4] / DEG
+    assert c.min() >= -190 - 1e-6 and c.max() <= 190 + 1e-6
+    cutting = ~np.isnan(path.u)
+    assert np.abs(np.diff(c))[cutting[1:]].max() < 30.0, "no whole turn in the cut"
+    last = np.append(path.move[1:] != path.move[:-1], True)
+    assert (path.u[last & cutting] == 1.0).all(), "every move comes to its end"
+    inner = cutting[1:] & cutting[:-1] & (path.move[1:] == path.move[:-1])
+    assert (np.diff(path.u)[inner] > -1e-12).all()
+
+
+def test_the_winding_of_a_run_looks_ahead_to_the_next() -> None:
+    """C within +-370: a run of 300 degrees, then one that goes on from there; the first begins low enough for both."""
+    m = limited("mikron-ucp710", "C", -370, 370)
+    first, second = cone(0.8, 4.0), cone(0.8, 4.0)
+    result = run([*first, "GOHOME", *second], m)
+    assert not len(result.path.rewinds)
+    home = result.path.home
+    c = result.path.q[:, 4] / DEG
+    assert np.abs(np.diff(c)[~home[1:] & ~home[:-1]]).max() < 400
+    assert c.min() >= -370 and c.max() <= 370
+
+
+@pytest.mark.parametrize("side", ["positive", "negative"])
+def test_the_set_up_chooses_the_side_of_the_tilt_axis(side: str) -> None:
+    setup = tool_setup().model_copy(update={"joints": Joints.model_validate({"side": {"B": side}})})
+    result = run(cone(0.5, 5.0), machine("trunnion-bc"), setup)
+    cutting = ~np.isnan(result.path.u)
+    b = result.path.q[cutting, 3]
+    assert (b > 0.1).all() if side == "positive" else (b < -0.1).all()
+
+
+def test_the_set_up_says_where_the_program_begins() -> None:
+    setup = tool_setup().model_copy(update={"joints": Joints.model_validate({"start": {"C": 1080.0}})})
+    result = run(cone(0.5, 5.0), machine("mikron-ucp710"), setup)
+    cutting = ~np.isnan(result.path.u)
+    assert np.abs(result.path.q[cutting, 4] / DEG - 1080).max() < 400
+    wrong = tool_setup().model_copy(update={"joints": Joints.model_validate({"start": {"B": 0.0}})})
+    refused = postproc.convert(toolpath(*cone(0.5, 5.0)), machine("mikron-ucp710"), setup=wrong)
+    (d,) = [d for d in refused.diagnostics if d.code == "setup.joints"]
+    assert "joints.start.B" in d.message and "A, C" in d.hint and not refused.text
+
+
+def test_rewinds_with_the_feeds_of_a_plan() -> None:
+    """A planned pass ends where the tool is drawn back; the program is read back as ever."""
+    result = run(cone(2.5, 5.0), limited("mikron-ucp710", "C", -400, 400), feed="planned")
+    assert len(result.path.rewinds) == 1
+
+
+def test_choices_are_told() -> None:
+    """A within -30 to 120: the other side cannot hold 45 degrees."""
+    result = run(cone(0.5, 5.0, 45.0), machine("mikron-ucp710"))
+    (d,) = [d for d in result.diagnostics if d.code == "joints.chosen"]
+    assert "leave travel" in d.message
