@@ -14,12 +14,11 @@ from toolpaths.arrays import Floats
 
 @dataclass(frozen=True)
 class Greedy:
-    """Rewinds, poses outside travel, time with every axis at its velocity, joints at the end (J,)."""
+    """Rewinds, poses outside travel, time with every axis at its velocity."""
 
     rewinds: int
     outside: int
     seconds: float
-    end: Floats
 
 
 def greedy(lattice: Lattice, start: Floats) -> Greedy:
@@ -32,7 +31,7 @@ def greedy(lattice: Lattice, start: Floats) -> Greedy:
         outside += int(segment.bad[state])
         time += float(lattice.clock[branch, segment.last] - lattice.clock[branch, segment.first])
         if k + 1 == len(segments):
-            return Greedy(rewinds, outside, time, lattice.joints(branch, segment.last, segment.states[state][1]))
+            return Greedy(rewinds, outside, time)
         after = segments[k + 1]
         to, cost = min(leading(lattice, segment, after)[state], key=lambda way: (way[1][BAD], way[1][SECONDS]))
         time += float(cost[SECONDS])
