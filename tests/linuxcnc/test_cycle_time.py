@@ -44,10 +44,10 @@ def in_motion(e: Estimate) -> float:
     return float(e.timed.end.max() - e.timed.begin.min())
 
 
-def run(simulate: Callable[..., Run], text: str, on: Machine, folder: Path) -> Run:
+def run(simulate: Callable[..., Run], text: str, on: Machine, folder: Path, fast: int = 20) -> Run:
     """Commands between motions wait for processes of the host, whose delays the fast clock multiplies."""
     (folder / "program.ngc").write_text(text)
-    warp = 3 if any(word in text for word in ("M6", "M8", "F30000", "F24000")) else 20
+    warp = 3 if any(word in text for word in ("M6", "M8", "F30000", "F24000")) else fast
     result: Run = simulate(on, folder / "program.ngc", {1: (0.0, 6.0), 2: (0.0, 6.0)}, warp=warp)
     assert result.errors == ()
     return result
@@ -74,13 +74,13 @@ def test_mean_of_all_programs() -> None:
 def test_lines_are_taken_up_when_the_simulator_takes_them_up(simulate, tmp_path: Path) -> None:
     """Not only the sum is right: every line begins within a few per mille of the run."""
     on, text = machine("mill-3axis"), f"{HEAD} G64 P0.05 Q0\nG0 Z300\nF3000\n{random_lines(60)}{END}"
-    result = run(simulate, text, on, tmp_path)
+    result = run(simulate, text, on, tmp_path, fast=6)
     b = blocks(text, on)
     begin = estimated(text, on).timed.begin
     moving = np.flatnonzero(np.any(np.diff(result.joints, axis=0) != 0.0, axis=1))[0]
     for row in range(5, len(b), 7):
         measured = result.t[np.flatnonzero(result.line == b.line[row])[0]] - result.t[moving]
-        assert begin[row] == pytest.approx(measured, abs=0.02)
+        assert begin[row] == pytest.approx(measured, abs=0.025)
 
 
 def test_a_generic_model_learns_linuxcnc_from_its_log(simulate, tmp_path: Path) -> None:
