@@ -13,7 +13,7 @@ from postproc.path import ARC, FEED, Path
 from postproc.word_arcs import PLANE_COLUMNS
 from toolpaths.arrays import Floats, Ints
 
-BISECTIONS = 12
+BISECTIONS = 14
 """halvings to find where between two looks an axis turns back"""
 SHORTEST = 0.05
 """mm of tip way or degrees of a rotary axis: a block that short is not divided"""
@@ -63,24 +63,37 @@ def starts_of(path: Path, nominal: Path, work: Work, allowed: float) -> Starts:
 
 
 def reversals(work: Work, block: Ints) -> tuple[Ints, Floats]:
-    """(block, fraction), by block, of the places inside blocks where a joint that loses motion turns back (bisection)."""
+    """(block, fraction), by block, of the places inside blocks where a joint that loses motion turns back.
+
+    On arcs a joint may do so twice; on straight blocks once, and only where the words are the tip.
+    """
+    arc = work.path.code[block] == ARC
+    tip = np.array([frame.control.law == "tcp" for frame in work.path.frames])[work.path.frame[block]]
+    found = [_bisected(work, block[arc], EDGES), _bisected(work, block[~arc & tip], (0.0, 1.0))]
+    where, at = (np.concatenate(column) for column in zip(*found, strict=True))
+    order = np.lexsort((at, where))
+    return where[order], at[order]
+
+
+def _bisected(work: Work, block: Ints, edges: tuple[float, ...]) -> tuple[Ints, Floats]:
+    """(block, fraction) of the places where the direction of a joint changes between two of the edges."""
     where, at = [np.zeros(0, dtype=np.int64)], [np.zeros(0)]
     if not len(block) or not work.losing:
         return where[0], at[0]
-    signs = np.stack([work.moving(block, np.full(len(block), t)) for t in EDGES])
+    signs = np.stack([work.moving(block, np.full(len(block), t)) for t in edges])
     for j in work.losing:
         sign = carried_on(signs[:, :, j])
         for i, (one, two) in enumerate(pairwise(sign)):
             rows = np.flatnonzero(one * two < 0.0)
-            low, high = np.full(len(rows), EDGES[i]), np.full(len(rows), EDGES[i + 1])
+            low, high = np.full(len(rows), edges[i]), np.full(len(rows), edges[i + 1])
             for _ in range(BISECTIONS if len(rows) else 0):
                 middle = 0.5 * (low + high)
                 still = work.moving(block[rows], middle)[:, j] == one[rows]
                 low, high = np.where(still, middle, low), np.where(still, high, middle)
             where.append(block[rows])
             at.append(low)
-    order = np.lexsort((np.concatenate(at), np.concatenate(where)))
-    return np.concatenate(where)[order], np.concatenate(at)[order]
+    return np.concatenate(where), np.concatenate(at)
+
 
 
 @dataclass(frozen=True)

@@ -83,8 +83,12 @@ class Work:
 
     def begin_way(self, block: Ints) -> Floats:
         """(N, J) sign of each joint's first motion in blocks (N,); of a joint that rests, that of the block before."""
-        signs = np.stack([self.moving(block, np.full(len(block), t)) for t in EDGES[::-1]])
-        first = carried_on(signs.reshape(len(EDGES), -1))[-1].reshape(len(block), -1)
+        first = np.zeros((len(block), self.path.q.shape[1]))
+        arc = self.path.code[block] == ARC
+        for rows, edges in ((np.flatnonzero(arc), EDGES), (np.flatnonzero(~arc), (0.0, 1.0))):
+            for t in edges[::-1] if len(rows) else ():
+                sign = self.moving(block[rows], np.full(len(rows), t))
+                first[rows] = np.where(sign != 0.0, sign, first[rows])
         return np.asarray(np.where(first != 0.0, first, self.way[np.maximum(block - 1, 0)]))
 
     def nominal(self, block: Ints, t: Floats) -> Floats:
