@@ -97,7 +97,9 @@ def looks_like_gcode(data: bytes) -> bool:
         line = raw.strip().upper()
         if not line or line.startswith((b"(", b";", b"$$")):
             continue
-        if line.startswith((b"%", b"O", b"BEGIN PGM")) and b"/" not in line.split(b"(")[0]:
+        if line.lstrip(b"0123456789 ").startswith(b"BEGIN PGM"):
+            return True
+        if line.startswith((b"%", b"O")) and b"/" not in line.split(b"(")[0]:
             return True
         head = line.lstrip(b"/N0123456789 :")
         return head[:1] in b"GMTXYZABCSF" and head[1:2].isdigit() if b"/" not in line[1:] else False
