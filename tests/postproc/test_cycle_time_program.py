@@ -110,8 +110,8 @@ def test_tip_of_a_controls_own_mode_runs_at_the_feed() -> None:
 def test_programs_and_cl_files_are_told_apart() -> None:
     for name in ("pocket.cls", "tool_axis_tour.apt", "inch_plate.apt", "h4a_dome.cls"):
         assert not looks_like_gcode((SAMPLES / name).read_bytes())
-    for text in (b"%\nO0001\nG1 X1\n", b"(part)\nN10 G21 G90\n", b"G0 X1\n", b"/N5 M30\n", b"BEGIN PGM A MM\n", b"0 BEGIN PGM A MM\n",
-                 b"; comment\nT1 M6\n", b"X10 Y5\n"):
+    for text in (b"%\nO0001\nG1 X1\n", b"(part)\nN10 G21 G90\n", b"G0 X1\n", b"/N5 M30\n", b"BEGIN PGM A MM\n",
+                 b"0 BEGIN PGM A MM\n", b"; comment\nT1 M6\n", b"X10 Y5\n"):
         assert looks_like_gcode(text), text
     for text in (b"PARTNO A\nUNITS/MM\nGOTO/1,2,3\n", b"TOOL PATH/A,TOOL,B\n", b"$$ note\nCUTTER/10\n", b""):
         assert not looks_like_gcode(text), text
