@@ -72,8 +72,11 @@ def _around(k: int, rapid: Bools, tip: Floats, axis: Floats, stops: Floats, angl
 
 
 def check_rewinds(motion: Motion, executed: Executed, number: Ints, tip: Floats, axis: Floats, space: SafeSpace,
-                  tolerance: float, faults: Faults) -> list[Diagnostic]:
-    """Blocks of rewinds stay on the line of the tool axis where they left the cut, or clear of the path."""
+                  tolerance: float, axis_grain: float, faults: Faults) -> list[Diagnostic]:
+    """Blocks of rewinds stay on the line of the tool axis where they left the cut, or clear of the path.
+
+    `tolerance` is in mm, `axis_grain` in rad: what the rounding of rotary words alone turns the tool by.
+    """
     rows = np.flatnonzero(number >= 0)
     if not len(rows):
         return []
@@ -85,7 +88,7 @@ def check_rewinds(motion: Motion, executed: Executed, number: Ints, tip: Floats,
         offset = now - pose
         height = np.maximum(np.einsum("ni,ni->n", offset, direction), 0.0)
         beside = np.linalg.norm(offset - height[:, None] * direction, axis=1) > tolerance
-        turned = np.linalg.norm(along - direction, axis=1) > 1e-6
+        turned = np.linalg.norm(along - direction, axis=1) > axis_grain
         bad |= (beside | turned) & ~space.clear(now, along, -tolerance)
     if not bad.any():
         return []
