@@ -37,6 +37,7 @@ class Control:
         origin (3,): origin of the work offset in the table frame, mm
         arc_limit: largest radius that may stay an arc, mm; 0 for no arcs
         helix_planes: planes in which an arc may rise along its axis
+        arc_planes: planes in which an arc may stay an arc
         base: the law at the program's start; "tcp" where the control runs the kinematics for the whole program
         plane: of the law "tilted"
         rapids: "straight", or "dog-leg": each axis at its own rapid speed (not under "tcp")
@@ -54,6 +55,7 @@ class Control:
     feed_rule: FeedLength = "xyz-first"
     own_kinematics: Kinematics | None = None
     helix_planes: tuple[int, ...] = (17, 18, 19)
+    arc_planes: tuple[int, ...] = (17, 18, 19)
 
     @cached_property
     def _others(self) -> dict[tuple[object, ...], Control]:

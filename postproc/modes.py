@@ -9,7 +9,7 @@ import numpy as np
 
 from machines.kinematics.base import Kinematics
 from postproc.control import Control, Law, tool_frames
-from postproc.controllers.model import ControllerFile
+from postproc.controllers.model import ControllerFile, Mode
 from postproc.options import Options
 from postproc.planes import Plane, stated
 from postproc.setup import SetupFile
@@ -69,7 +69,7 @@ class OutputModes:
             return self.base
         control = self.control.under("tcp")
         mode = self.controller.modes.tcp
-        return WordFrame(control if mode is None or mode.arcs else replace(control, arc_limit=0.0))
+        return WordFrame(_with_arcs(control, mode))
 
     @cached_property
     def base(self) -> WordFrame:
@@ -102,13 +102,20 @@ class OutputModes:
             return self._planes[rotary], at
         angles, rotation = stated(mode.angles, tool_frames(kin, at[None])[0], tuple(v for _, v in rotary), mode.decimals)
         tilted = control.under("tilted", Plane(rotation, control.origin))
-        frame = WordFrame(tilted if mode.arcs else replace(tilted, arc_limit=0.0), angles, rotary)
+        frame = WordFrame(_with_arcs(tilted, mode), angles, rotary)
         self._planes[rotary] = frame
         return frame, at
 
     @cached_property
     def _planes(self) -> dict[tuple[tuple[str, float], ...], WordFrame]:
         return {}
+
+
+def _with_arcs(control: Control, mode: Mode | None) -> Control:
+    """The control with the arcs that its mode takes."""
+    if mode is None or (mode.arcs and mode.arc_planes == control.arc_planes):
+        return control
+    return replace(control, arc_limit=control.arc_limit if mode.arcs else 0.0, arc_planes=mode.arc_planes)
 
 
 def output_modes(control: Control, controller: ControllerFile, setup: SetupFile, options: Options, toolpath: Toolpath,
@@ -134,9 +141,11 @@ def _not_available(modes: OutputModes, toolpath: Toolpath) -> list[Diagnostic]:
 
 
 def _no_subprograms(controller: ControllerFile, setup: SetupFile, options: Options) -> list[Diagnostic]:
-    if not setup.output.subprograms or controller.subprograms.call:
+    if not setup.output.divided or controller.subprograms.call:
         return []
-    return [error("output.subprograms", "[output] subprograms: the controller has none ([subprograms] of its file)",
+    key = "files" if setup.output.files else "subprograms"
+    table = "subprogram_files" if setup.output.files else "subprograms"
+    return [error("output.subprograms", f"[output] {key}: the controller has none ([{table}] of its file)",
                   file=options.setup, hint="restart = true begins every operation afresh in one program")]
 
 

@@ -60,6 +60,7 @@ def word_arcs(control: Control, kin: Kinematics, curves: Curves, q0: Floats, q1:
         plane[rows] = np.array([19, 18, 17], dtype=np.int8)[third]
         ccw[rows] = along > 0.0
         rise = np.abs(np.einsum("nij,nj->ni", to_words, arc.end - arc.start)[np.arange(len(rows)), third])
+        keep[rows] &= np.isin(plane[rows], control.arc_planes)
         keep[rows] &= (rise <= 1e-9) | np.isin(plane[rows], control.helix_planes)
         center[rows] = np.einsum("nij,nj->ni", to_words, arc.center - arc.start)
         parts[rows] = np.maximum(np.ceil(arc.sweep / (2.0 * np.pi) - 1e-9), 1).astype(np.int64)

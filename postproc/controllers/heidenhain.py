@@ -138,7 +138,8 @@ class KlartextWriter(Writer):
         """Spindle speed that a command of the same place, after the tool change, sets; 0 for none."""
         group = next(g for g in self.program.commands.values() if any(c is change for c in g))
         after = group[next(i for i, c in enumerate(group) if c is change):]
-        return next((float(c.args[0]) for c in after if c.name.startswith("START_SPINDLE") and c.args), 0.0)
+        return next((self.spindle_speed(float(c.args[0])) for c in after
+                     if c.name.startswith("START_SPINDLE") and c.args), 0.0)
 
     def spindle(self, command: Command) -> Iterator[str]:
         """TOOL CALL with the speed where it is another, then M3 or M4."""

@@ -23,6 +23,8 @@ class Arcs(UserModel):
     """mm; larger arcs are written as lines"""
     helix_planes: tuple[Literal[17, 18, 19], ...] = (17, 18, 19)
     """planes in which an arc may move along the third axis too"""
+    start: tuple[str, ...] = ()
+    """blocks of the safe start in programs that hold arcs in G18 or G19"""
 
 
 class CannedCycle(UserModel):
@@ -115,6 +117,8 @@ class Mode(UserModel):
     """how the length register must stand where the mode is entered, and where its `leave` blocks begin"""
     arcs: bool = True
     """arcs may stand in it while the rotary axes stand still"""
+    arc_planes: tuple[Literal[17, 18, 19], ...] = (17, 18, 19)
+    """planes of those arcs"""
     cycles: bool = True
     """canned cycles may stand in it"""
     compensation: bool = True
@@ -174,6 +178,8 @@ class ControllerFile(UserModel):
     codes: Codes = Codes()
     tools: Tools = Tools()
     subprograms: Subprograms = Subprograms()
+    subprogram_files: Subprograms = Subprograms(place="files")
+    """the same in files of their own, which the set-up may ask for"""
     arcs: Arcs = Arcs()
     cycles: Cycles = Cycles()
     feed: Feed = Feed()

@@ -19,6 +19,8 @@ class Format(UserModel):
     """of A, B, C, degrees"""
     feed_decimals: int = Field(default=4, ge=0, le=9)
     """of F; two more below 1"""
+    speed_decimals: int = Field(default=6, ge=0, le=6)
+    """of S"""
     trim_zeros: bool = True
     """no zeros at the end of a decimal fraction"""
     decimal_point: bool = False

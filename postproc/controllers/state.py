@@ -18,8 +18,9 @@ class WriterState:
     """One program on its way to text; the state is what the controller holds while it reads.
 
     `law` is that of the words; `register` the length register of the tool in the spindle; `length_off` is True where the
-    register is not in force and waits for the next block that states Z; `speed` is the spindle's (1/min, negative:
-    anti-clockwise, 0 unknown). `files` are the subprograms in files of their own, by name, once the program is written.
+    register is not in force and waits for the next block that states Z; `speed` is the spindle's as it is written (1/min,
+    negative: anti-clockwise, 0 unknown), `rounded` its ratio to what was asked. `files` are the subprograms in files of
+    their own, by name, once the program is written.
     """
 
     def __init__(self, controller: ControllerFile, program: Program, cycles: tuple[Cycle, ...], length_offsets: bool,
@@ -34,6 +35,7 @@ class WriterState:
         self.space = " " if controller.format.space else ""
         self.number = 0
         self.law, self.register, self.length_off, self.speed = program.sections[0].law, "", False, 0.0
+        self.rounded = 1.0
         self.in_cycle, self.cycle_text, self.operations = False, "", 0
         self.plane, self.mode = 17, PER_MINUTE
         self.restate()
@@ -69,8 +71,13 @@ class WriterState:
         return _MINUS_ZERO.sub(f"{sign}0", text).split()
 
     def hole_feed(self, hole: Hole) -> float:
-        """Feed of a hole's way down, mm/min."""
-        return float(self.program.feed[hole.drill])
+        """Feed of a hole's way down, mm/min; that of a tap keeps the pitch at the speed that is written."""
+        return float(self.program.feed[hole.drill]) * (self.rounded if hole.key.startswith("TAP") else 1.0)
+
+    def spindle_speed(self, asked: float) -> float:
+        """The speed as S can state it, 1/min: more than 0 where it is asked for."""
+        places = self.controller.format.speed_decimals
+        return round(asked, places) or (10.0**-places if asked > 0.0 else 0.0)
 
     def cycle_of(self, hole: Hole) -> CannedCycle:
         """The controller's cycle for a hole."""

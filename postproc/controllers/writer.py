@@ -72,6 +72,8 @@ class Writer(WriterState):
         """Safe start: modes that the program uses off, then the preamble."""
         for mode in self.used_modes():
             yield from mode.start
+        if (self.program.plane[self.program.code == 2] > 17).any():
+            yield from self.controller.arcs.start
         for block in self.controller.program.preamble:
             yield from blocks_of(block.replace("{work_offset}", self.work_offset))
 
@@ -182,9 +184,13 @@ class Writer(WriterState):
         """The spindle's start, with its speed where one is given."""
         codes, clockwise = self.controller.codes, command.name.endswith("_CLOCKWISE")
         code = codes.spindle_cw if clockwise else codes.spindle_ccw
-        if command.args:
-            self.speed = float(command.args[0]) * (1.0 if clockwise else -1.0)
-        yield f"S{self.plain(command.args[0])}{self.space}{code}" if command.args else code
+        if not command.args:
+            yield code
+            return
+        asked = float(command.args[0])
+        speed = self.spindle_speed(asked)
+        self.speed, self.rounded = speed if clockwise else -speed, speed / asked if asked > 0.0 else 1.0
+        yield f"S{self.plain(speed)}{self.space}{code}"
 
     def numbered_command(self, command: Command) -> Iterator[str]:
         """Commands that carry a number."""

@@ -90,9 +90,23 @@ class FanucReader(IsoReader):
         return Canonical(code.words, line, tuple(self.held)), found
 
     def numbers(self, words: Words, line: Ints, file: str) -> list[Diagnostic]:
-        """Lengths and angles without a decimal point: what they mean is a parameter of the control."""
+        """Lengths without a decimal point, whose meaning is a parameter of the control; whole numbers with one."""
         if words.point is None:
             return []
+        return self._bare(words, line, file) + self._pointed(words, line, file)
+
+    def _pointed(self, words: Words, line: Ints, file: str) -> list[Diagnostic]:
+        assert words.point is not None
+        bad = words.point & np.isin(words.letter, [ord(a) for a in "STHD"])
+        blocks = words.line[bad]
+        if not len(blocks):
+            return []
+        letter = chr(words.letter[int(np.flatnonzero(bad)[0])])
+        return [error("gcode.decimal_point", f"{letter} with a decimal point: the control stops there", file=file,
+                      lines=line[blocks][:6].tolist(), count=len(blocks), hint="whole numbers")]
+
+    def _bare(self, words: Words, line: Ints, file: str) -> list[Diagnostic]:
+        assert words.point is not None
         meant = "".join(self.axes) + "IJKRQ"
         bare = ~words.point & (words.value != 0.0) & np.isin(words.letter, [ord(a) for a in meant + meant.lower()])
         blocks = words.line[bare]

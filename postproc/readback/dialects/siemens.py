@@ -1,7 +1,8 @@
 """Siemens SINUMERIK 840D sl, milling.
 
 From the programming manuals Fundamentals, Job Planning and Cycles: X=IC(), X=AC(), CR=, I=AC(), TURN=; G54 to G57, G505 to
-G599; T, M6 and D; SUPA; G4 F; MCALL with CYCLE81 to CYCLE86; TRAORI with ORIAXES, left by TRAFOOF; CYCLE800 with turns
+G599; T, M6 and D; SUPA; G4 F; MCALL with CYCLE81 to CYCLE86; TRAORI with ORIAXES, left by TRAFOOF; SD42940 as a
+statement of its own; CYCLE800 with turns
 about X, Y, Z as _MODE orders them; CYCLE832; subprograms by their names or L numbers, M17, RET.
 """
 
@@ -29,7 +30,7 @@ from postproc.readback.canonical import (
 from postproc.readback.dialects.base import M_CODES, Reader
 from postproc.readback.dialects.iso import New, relative_words
 from postproc.readback.dialects.siemens_cycles import CYCLES
-from postproc.readback.dialects.siemens_run import Run
+from postproc.readback.dialects.siemens_run import LENGTH_AXIS, Run
 from postproc.readback.flow import Call, Structure
 from postproc.readback.modal import GROUPS, Groups, codes, number_of
 from postproc.readback.words import Words, block_delete, lines_of, read_words
@@ -42,7 +43,7 @@ _COMMENT = re.compile(rb'("[^"\n]*")|;[^\n]*')
 _SIGNS = np.isin(np.arange(256), list(b'=("[:@'))
 _NAMES = np.isin(np.arange(256), list(b"ABCDEFGHIJKLMNOPQRSTUVWXYZ_$"))
 _TOKEN = re.compile(
-    r"\s*(?:(?P<call>[A-Z_$][A-Z_$0-9]+)\s*\((?P<args>(?:\"[^\"]*\"|[^()\"])*)\)"
+    r"\s*(?:(?P<setting>\$SC_[A-Z_]+)\s*=\s*(?P<set>[-+]?\d+)(?![\d.])|(?P<call>[A-Z_$][A-Z_$0-9]+)\s*\((?P<args>(?:\"[^\"]*\"|[^()\"])*)\)"
     r"|(?P<key>[A-Z]+\d*)\s*=\s*(?:(?P<how>[A-Z]+)\s*\(\s*(?P<within>[-+]?(?:\d+\.?\d*|\.\d+))\s*\)"
     r"|(?P<value>[-+]?(?:\d+\.?\d*|\.\d+)))"
     r"|(?P<letter>[A-Z])\s*(?P<number>[-+]?(?:\d+\.?\d*|\.\d+))(?![A-Z_=(])"
@@ -51,7 +52,8 @@ _PROGRAM = re.compile(rb"(?m)^[ \t]*%_N_([A-Z0-9_]+)_([MS]PF)[^\n]*$")
 PASSIVE = frozenset({"MSG", "SOFT", "BRISK", "FFWON", "FFWOF", "CFTCP", "CFC", "CFIN", "RTLION", "STOPRE", "NORM", "DIAMOF",
                      "WORKPIECE", "ORIMKS", "PROC", "COMPOF"})
 """names that change nothing of what is read back here"""
-KNOWN = PASSIVE.union(CYCLES, ("SUPA", "TRAORI", "TRAFOOF", "ORIAXES", "CYCLE800", "CYCLE832", "MCALL", "RET", "CALL"))
+KNOWN = PASSIVE.union(CYCLES, ("SUPA", "TRAORI", "TRAFOOF", "ORIAXES", "CYCLE800", "CYCLE832", "MCALL", "RET", "CALL",
+                         LENGTH_AXIS))
 
 
 class SiemensReader(Reader):
@@ -199,6 +201,9 @@ def _token(match: re.Match[str], line: int, new: New, statements: list[Statement
     """One word or statement; False where it is not read."""
     if match["letter"]:
         new.append((line, match["letter"], float(match["number"])))
+    elif match["setting"]:
+        new.append((line, STATEMENT, float(len(statements))))
+        statements.append(Statement(match["setting"], (float(match["set"]),)))
     elif match["key"]:
         return _assigned(match, line, new)
     elif match["call"] or match["name"]:

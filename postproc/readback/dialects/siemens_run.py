@@ -7,12 +7,15 @@ import numpy as np
 from postproc.readback.canonical import CALL, LAW, SMOOTH, STATEMENT, Drill, Law, Statement, Text
 from postproc.readback.dialects.iso import New
 from postproc.readback.dialects.siemens_cycles import CYCLES, drill_of
-from postproc.readback.modal import fill, number_of
+from postproc.readback.modal import codes, fill, number_of
 from postproc.readback.turns import turned
 from postproc.readback.words import Words
-from toolpaths.arrays import Ints
+from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
 
+LENGTH_AXIS = "$SC_TOOL_LENGTH_CONST"
+"""SD42940: 17 keeps the tool length along Z in every plane, from the next D on (NC programming, tool length and plane
+change); otherwise it turns with G18 and G19"""
 _SEQUENCE = {1: "X", 2: "Y", 3: "Z"}
 
 
@@ -24,6 +27,8 @@ class Run:
         self.words, self.text, self.line, self.file, self.found, self.new = words, text, line, file, found, new
         self.axes = axes
         self.length: list[tuple[int, float]] = []
+        self.kept: list[tuple[int, float]] = []
+        self.states: list[tuple[int, float]] = []
         self.laws: list[Law] = []
         self.drills: list[Drill] = []
         self.state, self.called, self.oriented = "axes", -1, False
@@ -46,6 +51,7 @@ class Run:
             for s in all_here:
                 self.one(b, s, modal, "MCALL" in names)
         self.modal_calls(modal)
+        self.turned_lengths()
         return tuple(self.laws), tuple(self.drills)
 
     def one(self, b: int, s: Statement, modal: list[tuple[int, int]], is_modal: bool) -> None:
@@ -58,6 +64,8 @@ class Run:
             self.enter(b, "axes", Law("axes", s.name))
         elif s.name == "CYCLE800":
             self.swivel(b, s)
+        elif s.name == LENGTH_AXIS:
+            self.kept.append((b, s.number(0)))
         elif s.name == "ORIAXES":
             self.oriented = True
         elif s.name == "CYCLE832":
@@ -82,6 +90,7 @@ class Run:
             self.fault("gcode.mode", b, "TRAORI with rotary words, but without ORIAXES",
                        "state ORIMKS ORIAXES: rotary axes linear")
         self.state = state
+        self.states.append((b, float(state == "tcp")))
         self.new.append((b, LAW, float(len(self.laws))))
         self.laws.append(law)
 
@@ -101,6 +110,23 @@ class Run:
         low, high = np.searchsorted(self.words.line, [b, b + 1])
         if length and length[-1] >= 0.0 and ord("Z") in self.words.letter[low:high]:
             self.fault("gcode.machine_position", b, "SUPA with a tool length in force", "write D0 beside SUPA")
+
+    def turned_lengths(self) -> None:
+        """G18 and G19 turn the length of the tool in force out of Z, and under TRAORI its direction."""
+        blocks, plane = codes(self.words, "G", (17, 18, 19))
+        if not (plane > 17).any():
+            return
+        lines = self.words.lines
+        turned_plane = fill(blocks, plane.astype(float), lines, 17.0) > 17.0
+        at = np.array([b for b, _ in self.length], dtype=np.int64)
+        in_force = np.array([float(value >= 0.0) for _, value in self.length])
+        kept = fill(*_columns(self.kept), lines, 0.0)[at] == 17.0
+        turns = fill(at, in_force * ~kept, lines, 0.0) > 0.0
+        oriented = fill(*_columns(self.states), lines, 0.0) > 0.0
+        for bad, what, hint in ((turned_plane & turns & ~oriented, "tool length", f"state {LENGTH_AXIS}=17 before D1"),
+                                (turned_plane & oriented, "tool's direction", "arcs in G17 only under TRAORI")):
+            if bad.any():
+                self.fault("gcode.tool_length", int(bad.argmax()), f"G18 or G19 turns the {what} out of Z", hint)
 
     def swivel(self, b: int, s: Statement) -> None:
         """CYCLE800(_FR, _TC, _ST, _MODE, _X0, _Y0, _Z0, _A, _B, _C, _X1, _Y1, _Z1, _DIR, _FR_I, _DMODE)."""
@@ -130,3 +156,8 @@ class Run:
         held = fill(np.array([m[0] for m in modal]), np.array([float(m[1]) for m in modal]), self.words.lines, -1.0)
         moves = np.unique(self.words.line[np.isin(self.words.letter & 95, [ord(a) for a in self.axes])])
         self.new += [(int(b), CALL, float(held[b])) for b in moves[held[moves] >= 0.0]]
+
+
+def _columns(pairs: list[tuple[int, float]]) -> tuple[Ints, Floats]:
+    """(blocks, values) of pairs."""
+    return np.array([b for b, _ in pairs], dtype=np.int64), np.array([v for _, v in pairs], dtype=float)
