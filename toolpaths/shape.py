@@ -95,6 +95,15 @@ class Curves:
         result: Floats = np.clip(u, 0.0, 1.0)
         return result
 
+    def turned(self, axis: Floats, guess: Floats) -> Floats:
+        """u (N,) in [0, 1] where axes (N, 3) stand on their great circles; `guess` (N,) where the axis does not turn."""
+        turn = angle_between(self.axis0, self.axis1)
+        turns = turn > 1e-6
+        across = np.cross(np.cross(self.axis0, self.axis1), self.axis0) / np.sin(np.where(turns, turn, 1.0))[:, None]
+        angle = np.arctan2((axis * across).sum(axis=1), (axis * self.axis0).sum(axis=1))
+        result: Floats = np.where(turns, np.clip(angle / np.where(turns, turn, 1.0), 0.0, 1.0), guess)
+        return result
+
     def _arc_project(self, arc: Ints, tip: Floats, guess: Floats) -> Floats:
         normal, center, sweep = self.normal[arc], self.center[arc], self.sweep[arc]
         radial = self.start[arc] - center
@@ -106,14 +115,16 @@ class Curves:
         result: Floats = angle / sweep
         return result
 
-    def deviation(self, tip: Floats, axis: Floats, guess: Floats) -> tuple[Floats, Floats, Floats]:
+    def deviation(self, tip: Floats, axis: Floats, guess: Floats, play: float = 0.0) -> tuple[Floats, Floats, Floats]:
         """How far poses are off their curves: (tip (N,) mm, axis (N,) rad, u (N,)).
 
-        The tip is measured to the nearest point of the curve, the axis against the great circle at that point (at
-        the guess where the tip hardly moves).
+        The tip is measured to the nearest point of the curve, the axis against the great circle at that point (at its own
+        place on the great circle where the tip hardly moves). The nearest point is not known better than `play` (mm), to
+        which the words of a program round the tip: the axis counts at the best place within that.
         """
-        u = self.project(tip, guess)
+        u, length = self.project(tip, guess), self.length()
         on_tip, _ = self.at(u)
-        v = np.where(self.length() > 0.1, u, guess)
+        reach = np.where(length > 0.1, play / np.maximum(length, 0.1), 1.0)
+        v = np.clip(np.clip(self.turned(axis, guess), u - reach, u + reach), 0.0, 1.0)
         _, on_axis = self.at(v)
         return np.linalg.norm(tip - on_tip, axis=1), angle_between(axis, on_axis), u

@@ -64,7 +64,7 @@ def compare(motion: Motion, job: Job, executed: Executed, gcode: str = "") -> Co
     lost = unreached(match)
     diagnostics = [] if lost < 0 else [_not_reached(motion, moves, match, lost, faults)]
     rows = np.flatnonzero((owner < len(moves)) & ~moves.link[np.minimum(owner, len(moves) - 1)])
-    tip_off, axis_off = _deviations(motion, executed, moves, curves, rows, owner)
+    tip_off, axis_off = _deviations(motion, executed, moves, curves, rows, owner, max(grain[0], 0.1 * tolerance))
     done = np.flatnonzero(match >= 0)
     visit = np.linalg.norm(tip[match[done]] - moves.tip[done], axis=1)
     tilt = angle_between(axis[match[done]], moves.axis[done])
@@ -108,8 +108,8 @@ def _off_level(curve: Curves, tip: Floats) -> Floats:
 
 
 def _deviations(motion: Motion, executed: Executed, moves: Moves, curves: Curves, rows: Ints,
-                owner: Ints) -> tuple[Floats, Floats]:
-    """Worst (tip, axis) deviation (K,) over samples of each block from the curve of its move.
+                owner: Ints, play: float) -> tuple[Floats, Floats]:
+    """Worst (tip, axis) deviation (K,) over samples of each block from the curve of its move; `play` of `deviation`, mm.
 
     Where rapids are dog-legs, those from hole to hole only keep their height.
     """
@@ -123,21 +123,12 @@ def _deviations(motion: Motion, executed: Executed, moves: Moves, curves: Curves
         curve = curves.take(owner[rows[part]])
         for t in SAMPLES:
             tip, axis = executed.poses(motion, rows[part], t)
-            guess = _turned_so_far(curve, axis, np.minimum((first[part] + t) / blocks[part], 1.0))
-            d, e, _ = curve.deviation(tip, axis, guess)
+            guess = np.minimum((first[part] + t) / blocks[part], 1.0)
+            d, e, _ = curve.deviation(tip, axis, guess, play)
             d = np.where(level[part], _off_level(curve, tip), d)
             tip_off[part] = np.fmax(tip_off[part], np.nan_to_num(d, nan=np.inf))
             axis_off[part] = np.fmax(axis_off[part], np.nan_to_num(e, nan=np.inf))
     return tip_off, axis_off
-
-
-def _turned_so_far(curve: Curves, axis: Floats, guess: Floats) -> Floats:
-    """Where on their great circle axes (K, 3) stand, for moves whose tip hardly moves; `guess` (K,) for others."""
-    turn = angle_between(curve.axis0, curve.axis1)
-    spot = (curve.length() <= 0.1) & (turn > 1e-6)
-    across = np.cross(np.cross(curve.axis0, curve.axis1), curve.axis0) / np.sin(np.where(spot, turn, 1.0))[:, None]
-    angle = np.arctan2((axis * across).sum(axis=1), (axis * curve.axis0).sum(axis=1))
-    return np.where(spot, np.clip(angle / np.where(spot, turn, 1.0), 0.0, 1.0), guess)
 
 
 def _place(rows: Ints, owner: Ints) -> tuple[Floats, Floats]:
