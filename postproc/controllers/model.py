@@ -186,6 +186,10 @@ class ControllerFile(UserModel):
     kinematics: Kinematics = Kinematics()
     modes: Modes = Modes()
 
+    def divided(self, files: bool) -> ControllerFile:
+        """The controller that writes operations into files of their own, where that is asked for."""
+        return self.model_copy(update={"subprograms": self.subprogram_files}) if files else self
+
 
 def builtin_files() -> dict[str, Path]:
     """Controller files of the product by name."""

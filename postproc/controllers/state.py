@@ -50,11 +50,14 @@ class WriterState:
         self.plane, self.mode = 0, -1
 
     def comment(self, text: str) -> str:
-        """One comment block, without characters that would end it, cut to the line length."""
+        """One comment block."""
+        return f"{self.controller.comment.open}{self.clean(text)}{self.controller.comment.close}"
+
+    def clean(self, text: str) -> str:
+        """The text without characters that a comment must not hold, cut to the line length."""
         style = self.controller.comment
-        clean = "".join(" " if c in style.forbidden or not 32 <= ord(c) < 127 else c for c in text)
         room = self.controller.format.line_length - len(style.open) - len(style.close) - 12
-        return f"{style.open}{clean[:room]}{style.close}"
+        return "".join(" " if c in style.forbidden or not 32 <= ord(c) < 127 else c for c in text[:room])
 
     # ---- numbers ------------------------------------------------------------------------------------------------
 

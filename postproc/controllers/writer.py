@@ -171,7 +171,7 @@ class Writer(WriterState):
         """The start of an operation: its blocks, and every modal code stated anew behind them."""
         self.operations += 1
         yield MARK
-        values = {"name": name, "comment": self.comment(name), "number": 100 * self.operations}
+        values = {"name": self.clean(name), "comment": self.comment(name), "number": 100 * self.operations}
         blocks = self.controller.program.operation
         yield from (block.format(**values) for block in blocks)
         if blocks:
@@ -203,7 +203,7 @@ class Writer(WriterState):
         elif command.name == "USE_TOOL_LENGTH_OFFSET":
             yield from self.use_length(value)
         elif command.name == "DWELL":
-            seconds = float(args[0])
+            seconds = max(round(float(args[0]), 3), 0.001)
             yield from blocks_of(codes.dwell.format(seconds=self.plain(seconds), milliseconds=round(seconds * 1000.0)))
         elif command.name.startswith("CUTTER_COMPENSATION"):
             code = codes.compensation_left if command.name.endswith("LEFT") else codes.compensation_right

@@ -82,3 +82,19 @@ def test_a_point_in_a_speed_is_refused(word: str) -> None:
         text = f"%\nO1\nG21 G17 G90\nG54\n{word}\nG0 X1.\nM30\n%\n"
         assert "gcode.decimal_point" in faults(controller, text)
         assert not faults(controller, text.replace(word, "S800 M3"))
+
+
+# ---- texts ------------------------------------------------------------------------------------------------------------
+
+@pytest.mark.parametrize(("controller", "name"), [
+    (FANUC, "(A  B C   D)"), (HAAS, "(A  B C   D)"), ("heidenhain-tnc640", "* - A %b C ; d"), (SIEMENS, "; A~%b C ; d")])
+def test_names_of_operations_hold_nothing_that_ends_or_continues_a_block(controller: str, name: str) -> None:
+    text = "A()B C % D" if controller in (FANUC, HAAS) else "A~%b C ; d"
+    made = program([step("rapid", X=1.0)], {0: [command("OPERATION_START", text)]})
+    assert name in blocks(controller, made)
+
+
+@pytest.mark.parametrize(("seconds", "text"), [(0.00044, "DWELL 0.001"), (0.12345, "DWELL 0.123"), (2.0, "DWELL 2")])
+def test_dwells_are_whole_milliseconds_and_none_is_lost(seconds: float, text: str) -> None:
+    made = program([step("rapid", X=1.0)], {0: [command("DWELL", seconds)]})
+    assert blocks("heidenhain-tnc640", made)[1] == f"CYCL DEF 9.1 {text}"
