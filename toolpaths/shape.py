@@ -115,16 +115,16 @@ class Curves:
         result: Floats = angle / sweep
         return result
 
-    def deviation(self, tip: Floats, axis: Floats, guess: Floats, play: float = 0.0) -> tuple[Floats, Floats, Floats]:
+    def deviation(self, tip: Floats, axis: Floats, guess: Floats, within: float = 0.0) -> tuple[Floats, Floats, Floats]:
         """How far poses are off their curves: (tip (N,) mm, axis (N,) rad, u (N,)).
 
-        The tip is measured to the nearest point of the curve, the axis against the great circle at that point (at its own
-        place on the great circle where the tip hardly moves). The nearest point is not known better than `play` (mm), to
-        which the words of a program round the tip: the axis counts at the best place within that.
+        The tip is measured to the nearest point of the curve. The axis is measured against the great circle at the place
+        where it fits best among those whose tip is within `within` mm: a pose is inside the tolerances where one pose of the
+        curve has both near. With 0 that is the nearest point.
         """
-        u, length = self.project(tip, guess), self.length()
+        u = self.project(tip, guess)
         on_tip, _ = self.at(u)
-        reach = np.where(length > 0.1, play / np.maximum(length, 0.1), 1.0)
-        v = np.clip(np.clip(self.turned(axis, guess), u - reach, u + reach), 0.0, 1.0)
-        _, on_axis = self.at(v)
-        return np.linalg.norm(tip - on_tip, axis=1), angle_between(axis, on_axis), u
+        off = np.linalg.norm(tip - on_tip, axis=1)
+        reach = np.sqrt(np.maximum(within**2 - off**2, 0.0)) / np.maximum(self.length(), 1e-12)
+        _, on_axis = self.at(np.clip(np.clip(self.turned(axis, u), u - reach, u + reach), 0.0, 1.0))
+        return off, angle_between(axis, on_axis), u

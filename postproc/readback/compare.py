@@ -64,7 +64,7 @@ def compare(motion: Motion, job: Job, executed: Executed, gcode: str = "") -> Co
     lost = unreached(match)
     diagnostics = [] if lost < 0 else [_not_reached(motion, moves, match, lost, faults)]
     rows = np.flatnonzero((owner < len(moves)) & ~moves.link[np.minimum(owner, len(moves) - 1)])
-    tip_off, axis_off = _deviations(motion, executed, moves, curves, rows, owner, max(grain[0], 0.1 * tolerance))
+    tip_off, axis_off = _deviations(motion, executed, moves, curves, rows, owner, tolerance)
     done = np.flatnonzero(match >= 0)
     visit = np.linalg.norm(tip[match[done]] - moves.tip[done], axis=1)
     tilt = angle_between(axis[match[done]], moves.axis[done])
@@ -108,8 +108,8 @@ def _off_level(curve: Curves, tip: Floats) -> Floats:
 
 
 def _deviations(motion: Motion, executed: Executed, moves: Moves, curves: Curves, rows: Ints,
-                owner: Ints, play: float) -> tuple[Floats, Floats]:
-    """Worst (tip, axis) deviation (K,) over samples of each block from the curve of its move; `play` of `deviation`, mm.
+                owner: Ints, within: float) -> tuple[Floats, Floats]:
+    """Worst (tip, axis) deviation (K,) over samples of each block from the curve of its move; `within` mm of its tip.
 
     Where rapids are dog-legs, those from hole to hole only keep their height.
     """
@@ -124,7 +124,7 @@ def _deviations(motion: Motion, executed: Executed, moves: Moves, curves: Curves
         for t in SAMPLES:
             tip, axis = executed.poses(motion, rows[part], t)
             guess = np.minimum((first[part] + t) / blocks[part], 1.0)
-            d, e, _ = curve.deviation(tip, axis, guess, play)
+            d, e, _ = curve.deviation(tip, axis, guess, within)
             d = np.where(level[part], _off_level(curve, tip), d)
             tip_off[part] = np.fmax(tip_off[part], np.nan_to_num(d, nan=np.inf))
             axis_off[part] = np.fmax(axis_off[part], np.nan_to_num(e, nan=np.inf))
