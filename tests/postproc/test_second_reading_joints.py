@@ -1,0 +1,68 @@
+"""Faults of a second reading: what the read-back takes for a deviation, a rewind, a point of its own."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from postproc.readback.align import align
+from tests.postproc.kit import convert, good, goto, sample, toolpath
+from toolpaths.shape import Curves
+from toolpaths.units import DEG
+
+UP = np.array([0.0, 0.0, 1.0])
+
+
+def tilted(degrees: float) -> np.ndarray:
+    return np.array([np.sin(degrees * DEG), 0.0, np.cos(degrees * DEG)])
+
+
+def line(start: np.ndarray, end: np.ndarray, axis0: np.ndarray = UP, axis1: np.ndarray = UP) -> Curves:
+    zero = np.zeros((1, 3))
+    return Curves(start[None], end[None], axis0[None], axis1[None], np.zeros(1, dtype=bool), zero, zero, np.zeros(1))
+
+
+@pytest.mark.parametrize("name", ["h4a_dome.cls", "tool_axis_tour.apt"])
+def test_rewinds_in_words_of_three_decimals_are_clear(name: str) -> None:
+    result = sample(name, "nutating-head", "haas-ngc")
+    assert len(result.path.rewinds) > 0 and result.controller.format.rotary_decimals == 3
+
+
+def test_a_pose_is_measured_where_tip_and_axis_fit_together() -> None:
+    """The axis turns by 80 degrees on 0.5 mm: 5 um of the tip are 0.8 degrees."""
+    curve = line(np.zeros(3), np.array([0.5, 0.0, 0.0]), UP, tilted(80.0))
+    tip, axis, guess = np.array([[0.255, 0.0, 0.0]]), tilted(40.0)[None], np.array([0.5])
+    assert curve.deviation(tip, axis, guess)[1] == pytest.approx(0.8 * DEG)
+    assert curve.deviation(tip, axis, guess, 0.01)[1] == pytest.approx(0.0, abs=1e-9)
+    assert curve.deviation(tip, axis, guess, 0.003)[1] == pytest.approx(0.32 * DEG)
+    aside = np.array([[0.255, 0.004, 0.0]])
+    assert curve.deviation(aside, axis, guess, 0.005)[1] == pytest.approx(0.32 * DEG)
+
+
+def test_a_short_move_whose_axis_lags_behind_its_tip_is_off() -> None:
+    curve = line(np.zeros(3), np.array([0.08, 0.0, 0.0]), UP, tilted(40.0))
+    _, off, _ = curve.deviation(np.array([[0.08, 0.0, 0.0]]), UP[None], np.array([0.5]), 0.01)
+    assert off == pytest.approx(35.0 * DEG)
+
+
+@pytest.mark.parametrize("name", ["mikron-ucp710", "fork-head-ab"])
+def test_fast_turns_on_short_ways(name: str) -> None:
+    """0.13 mm with 115 degrees of the axis: the rounding of the words stands for a tenth of a degree."""
+    tip = np.array([[-5.0, 1.7, 7.0], [4.789, 56.358, -15.864], [4.807, 56.247, -15.804], [4.936, 55.477, -15.386]])
+    axis = np.array([[0.0, 0.1, 1.0], [-0.60012, 0.7189, 0.35078], [0.56411, -0.44859, 0.69321], [0.5497, -0.451, 0.7031]])
+    rows = goto(tip, axis / np.linalg.norm(axis, axis=1)[:, None])
+    good(convert(toolpath("RAPID", rows[0], "FEDRAT/MMPM,1000", *rows[1:]), name))
+
+
+def test_a_move_of_a_few_grains_needs_no_block_of_its_own() -> None:
+    """Repeated points a micrometre apart: one block may stand for several of them, the next one is far."""
+    x = np.array([0.0, 1.0, 1.0, 1.001, 1.05, 2.0])
+    point = np.stack([x, 0 * x, 0 * x], axis=1)
+    up = np.tile(UP, (5, 1))
+    zero = np.zeros((5, 3))
+    curves = Curves(point[:-1], point[1:], up, up, np.zeros(5, dtype=bool), zero, zero, np.zeros(5))
+    tip = point[[1, 3, 4, 5]]
+    match, _ = align(tip, up[:4], np.full(4, np.nan), curves, np.zeros(5, dtype=bool), 0.01, 1e-3)
+    assert match.tolist() == [0, 1, 1, 2, 3]
+    match, _ = align(tip[[0, 2, 3]], up[:3], np.full(3, np.nan), curves, np.zeros(5, dtype=bool), 0.01, 1e-3)
+    assert (match[:3] >= 0).all() and match[-1] == 2
