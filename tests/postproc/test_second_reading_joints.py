@@ -56,12 +56,12 @@ def test_fast_turns_on_short_ways(name: str) -> None:
 
 def test_a_move_of_a_few_grains_needs_no_block_of_its_own() -> None:
     """Repeated points a micrometre apart: one block may stand for several of them, the next one is far."""
-    x = np.array([0.0, 1.0, 1.0, 1.001, 1.05, 2.0])
+    x = np.array([0.0, 1.0, 1.0, 1.001 + 1e-10, 1.05, 2.0])
     point = np.stack([x, 0 * x, 0 * x], axis=1)
     up = np.tile(UP, (5, 1))
     zero = np.zeros((5, 3))
     curves = Curves(point[:-1], point[1:], up, up, np.zeros(5, dtype=bool), zero, zero, np.zeros(5))
-    tip = point[[1, 3, 4, 5]]
+    tip = point[[1, 3, 4, 5]] - [2e-10, 0.0, 0.0]
     match, _ = align(tip, up[:4], np.full(4, np.nan), curves, np.zeros(5, dtype=bool), 0.01, 1e-3)
     assert match.tolist() == [0, 1, 1, 2, 3]
     match, _ = align(tip[[0, 2, 3]], up[:3], np.full(3, np.nan), curves, np.zeros(5, dtype=bool), 0.01, 1e-3)
