@@ -13,9 +13,14 @@ from postproc.console import Json, refuse_overwriting, report, shown_errors
 def calibrate(file: Annotated[Path, typer.Argument(metavar="MEASUREMENTS.toml", help="what was measured, and how")],
               output: Annotated[Path, typer.Option("-o", "--output", metavar="ERROR_MODEL.toml",
                                                    help="error model to write; its tables are put beside it")],
+              figure: Annotated[Path | None, typer.Option("--figure", metavar="FILE", help="drawing of signatures, "
+                                                          "residuals and condition number, .png or .svg")] = None,
               json: Json = "") -> None:
     """Identify a machine's errors from measurements, each with its doubt; what the data do not tell is refused."""
-    refuse_overwriting({"-o": str(output), "--json": json}, {"the measurements": str(file)})
+    refuse_overwriting({"-o": str(output), "--figure": str(figure or ""), "--json": json}, {"the measurements": str(file)})
+    ending = "" if figure is None else figure.suffix.lower()
+    if figure is not None and ending not in (".png", ".svg"):
+        raise typer.BadParameter(f"{figure.name} is no .png or .svg file", param_hint="--figure")
     from dataclasses import replace
 
     from machines.calibration.calibrate import calibrate as run
@@ -28,6 +33,10 @@ def calibrate(file: Annotated[Path, typer.Argument(metavar="MEASUREMENTS.toml", 
         if found is not None and found.model is not None:
             for name, text in write_model(replace(found.model, name=output.stem), f"from {file.name}").items():
                 write_atomically(output.parent / (output.name if name == f"{output.stem}.toml" else name), text)
+            if figure is not None:
+                from machines.calibration.figures import draw
+
+                write_atomically(figure, draw(figures, f"calibration: {file.name}", ending))
     done = found is not None and found.model is not None
     report(tuple(diagnostics), json, {"output": str(output) if done else None, **figures,
                                       "diagnostics": [d.as_dict() for d in diagnostics]}, _text(figures, output, done))

@@ -10,8 +10,9 @@ from pathlib import Path
 from toolpaths.diagnostics import Diagnostic, DiagnosticError, error
 
 
-def write_atomically(path: Path, text: str) -> None:
-    """Write `text` beside `path` and put it in its place at once; folders are made as needed, links are kept.
+def write_atomically(path: Path, text: str | bytes) -> None:
+    """Write `text` (UTF-8, or bytes as they are) beside `path` and put it in its place at once; folders are made as needed,
+    links are kept.
 
     Raises:
         DiagnosticError: where the file cannot be written; what stood there stays.
@@ -28,8 +29,8 @@ def write_atomically(path: Path, text: str) -> None:
         raise DiagnosticError([_cannot(path, fault)]) from fault
     temporary = Path(name)
     try:
-        with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as file:
-            file.write(text)
+        with os.fdopen(handle, "wb") as file:
+            file.write(text.encode("utf-8") if isinstance(text, str) else text)
         temporary.chmod(0o666 & ~_umask())
         temporary.replace(path)
     except OSError as fault:

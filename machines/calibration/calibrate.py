@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from machines.calibration.account import account, finite, listed, parameters, series_signatures, signature, weighted
 from machines.calibration.machine_fit import Measurements, fit
 from machines.calibration.measurement_file import (
     BarModel,
@@ -18,17 +19,18 @@ from machines.calibration.measurement_file import (
     ReversalModel,
     RotaryModel,
 )
-from machines.calibration.problem import CalibrationResult
 from machines.calibration.reversal import identify, plan, statistics
-from machines.calibration.rotary_fit import error_model, fit_rotary
+from machines.calibration.rotary_fit import error_model, fit_rotary, hidden, told_apart
 from machines.calibration.simulator import PARTS, Bench
-from machines.geometric_error.covariance import angular
+from machines.geometric_error.axis_motion import ALONG
 from machines.geometric_error.csv_table import ANGLES, LENGTHS, UNITS, CsvTable, read_csv
 from machines.geometric_error.curves import Table
 from machines.geometric_error.loader import load_checked as load_errors
 from machines.geometric_error.model import ErrorModel
 from machines.geometric_error.names import DIRECTIONS, ErrorName
 from machines.geometric_error.serial_errors import Component, SerialErrors
+from machines.kinematics.h4_axes import H4TableAxis
+from machines.kinematics.serial import Serial
 from machines.loader import load_checked as load_machine
 from machines.machine import Machine
 from machines.user_file import UserFile, nearest, read_toml, validate
@@ -36,6 +38,8 @@ from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic, error, has_errors, info
 
 ARCSEC = UNITS["arcsec"]
+SETUPS = 6
+"""up to which the condition number of a rotary axis's readings is told"""
 KINDS = ("reversal", "rotary", "poses", "ball_bar", "laser")
 
 
@@ -113,27 +117,46 @@ class _Run:
         """(set-up, step, number of set-ups) of each row."""
         setup, step = table.columns["setup"], table.columns["step"]
         bad = (setup != np.round(setup)) | (setup < 0) | (step != np.round(step)) | (step < 0) | (step >= steps)
-        pairs = setup * steps + step
-        twice = np.array([np.sum(pairs[:k] == p) > 0 for k, p in enumerate(pairs)])
+        twice = np.ones(len(setup), dtype=np.bool_)
+        twice[np.unique(setup * steps + step, return_index=True)[1]] = False
         for where, what in ((bad, f"is no set-up 0, 1, ... and step 0 .. {steps - 1}"), (twice, "was measured before")):
             if where.any():
                 row = int(np.argmax(where))
                 self.found.append(error("calibrate.row", f"set-up {setup[row]:g}, step {step[row]:g} {what}",
                                         file=table.file, lines=[table.lines[row]]))
                 return None
-        return setup.astype(np.int64), step.astype(np.int64), int(setup.max()) + 1
+        known = np.unique(setup)
+        if known[-1] != len(known) - 1:
+            missing = int(np.argmax(known != np.arange(len(known))))
+            self._problem("calibrate.setup", f"set-up {known[-1]:g} has readings, set-up {missing} has none",
+                          "number the set-ups 0, 1, ... without a gap; `shifts` says how far the indexer was turned in each")
+            return None
+        return setup.astype(np.int64), step.astype(np.int64), len(known)
 
     # ---- kinds -----------------------------------------------------------------------------------------------------
 
-    def _axis(self, letter: str) -> bool:
+    def _axis(self, letter: str) -> int:
+        """1 or -1: how the axis turns about x, y or z of the machine at positive commands; 0 and a problem if it does not."""
         if letter not in self.machine.axis_names:
             self._problem("calibrate.axis", f"{self.machine.name} has no axis {letter}", "it has "
                           + ", ".join(self.machine.axis_names), "axis")
-            return False
-        return True
+            return 0
+        kinematics = self.machine.kinematics
+        if not isinstance(kinematics, Serial):
+            return -1 if isinstance(kinematics, H4TableAxis) and kinematics.sense < 0 else 1
+        along = next(j.direction for j in kinematics.chain if j.name == letter)["ABC".index(letter)]
+        if abs(along) < 1.0 - ALONG:
+            self._problem("calibrate.axis", f"{letter} of {self.machine.name} is inclined: E{letter}{letter} is not its "
+                          "positioning error", "measure poses, and name its parameters", "axis")
+            return 0
+        return 1 if along > 0.0 else -1
+
+    def _carries_part(self, letter: str) -> bool:
+        return f"{letter}'" in self.machine.structure or isinstance(self.machine.kinematics, H4TableAxis)
 
     def _reversal(self, given: ReversalModel, table: CsvTable) -> Calibration | None:
-        if not self._axis(given.axis) or not self._columns(table, (("setup", ""), ("step", ""), ("reading", "angle"))):
+        sense = self._axis(given.axis)
+        if not sense or not self._columns(table, (("setup", ""), ("step", ""), ("reading", "angle"))):
             return None
         places = self._places(table, given.steps)
         if places is None:
@@ -147,27 +170,33 @@ class _Run:
         readings[setup, step] = table.columns["reading"]
         sigma = given.sigma_arcsec * ARCSEC
         fitted = identify(readings, sigma, given.zeroed, self.checked.robust, given.shifts or None)
-        figures = _figures(fitted.result, {}, fitted.conditioning.rank, fitted.conditioning.condition_number)
-        figures |= {"axis_arcsec": _list(fitted.axis / ARCSEC), "axis_sigma_arcsec": _list(fitted.axis_sigma / ARCSEC),
-                    "indexer_arcsec": _list(fitted.indexer / ARCSEC),
+        figures = account(fitted.result, fitted.conditioning.rank, fitted.conditioning.condition_number)
+        degrees = np.asarray(np.arange(given.steps) * (360.0 / given.steps), dtype=np.float64)
+        curves = {"axis": (fitted.axis, fitted.axis_sigma), "indexer": (fitted.indexer, fitted.indexer_sigma)}
+        figures |= {"signatures": {k: signature(degrees, *curve, "arcsec") for k, curve in curves.items()},
+                    "residuals": weighted(fitted.residuals, sigma, [f"set-up {k}" for k in range(m)]),
+                    "axis_arcsec": listed(fitted.axis / ARCSEC), "axis_sigma_arcsec": listed(fitted.axis_sigma / ARCSEC),
+                    "indexer_arcsec": listed(fitted.indexer / ARCSEC),
                     "set_by_closure": ["sum of the axis's errors over a turn", "sum of the indexer's errors over a turn",
                                        *(["constant of each set-up"] if given.zeroed else [])],
                     "residual_rms_arcsec": statistics(fitted.residuals).rms / ARCSEC,
-                    "plan": [{"setups": c.setups, "sigma_arcsec": c.sigma / ARCSEC, "minutes": c.minutes}
+                    "plan": [{"setups": c.setups, "sigma_arcsec": finite(c.sigma / ARCSEC), "minutes": c.minutes,
+                              "condition_number": finite(c.condition_number)}
                              for c in plan(given.steps, sigma, self.checked.minutes_per_reading,
-                                           self.checked.minutes_per_setup, min(given.steps, 6), given.zeroed)]}
+                                           self.checked.minutes_per_setup, min(given.steps, 12), given.zeroed)]}
         if fitted.lacking:
             self._problem("calibrate.rank", f"the readings do not tell axis and indexer apart: {fitted.lacking}")
             return Calibration(None, figures)
         name = ErrorName(DIRECTIONS.index(given.axis), False, given.axis)
         x = 2.0 * np.pi * np.arange(given.steps) / given.steps
-        model = ErrorModel(SerialErrors((Component(name, Table(x, fitted.axis, "spline", period=2.0 * np.pi)),)),
+        model = ErrorModel(SerialErrors((Component(name, Table(x, sense * fitted.axis, "spline", period=2.0 * np.pi)),)),
                            covariance=fitted.covariance[: given.steps, : given.steps])
         return self._done(model, figures)
 
     def _rotary(self, given: RotaryModel, table: CsvTable) -> Calibration | None:
         kinds = (("setup", ""), ("step", ""), *((p, "length" if p[0] == "d" else "angle") for p in PARTS))
-        if not self._axis(given.axis) or not self._columns(table, kinds):
+        sense = self._axis(given.axis)
+        if not sense or not self._columns(table, kinds):
             return None
         places = self._places(table, given.steps)
         if places is None:
@@ -181,10 +210,18 @@ class _Run:
             self._problem("calibrate.harmonics", f"{given.steps} steps carry {(given.steps - 1) // 2} harmonics at the "
                           f"most, {given.harmonics} are asked for", "ask for fewer, or measure more steps", "harmonics")
             return None
-        fitted = fit_rotary(bench, readings, sigma, given.harmonics)
-        model = error_model(fitted, given.axis)
-        figures = _figures(fitted.result, {}, fitted.result.rank, fitted.result.condition_number)
-        figures["not_identifiable"] = [[name] for name in fitted.lost]
+        fitted = fit_rotary(bench, readings, sigma, given.harmonics, self.checked.robust)
+        model = error_model(fitted, given.axis, sense=sense, carries_part=self._carries_part(given.axis))
+        figures = account(fitted.result, fitted.result.rank, fitted.result.condition_number)
+        figures |= {"not_identifiable": [[name] for name in fitted.lost], "signatures": series_signatures(fitted),
+                    "residuals": weighted(fitted.residuals.reshape(-1, 6).T, sigma[:, None], list(PARTS)),
+                    "plan": [{"setups": k, "condition_number": finite(told_apart(bench, k, sigma, given.harmonics))}
+                             for k in range(1, max(m, min(given.steps, SETUPS)) + 1)]}
+        untold = sorted(set(fitted.lost) - set(hidden(bench, sigma, given.harmonics)))
+        if untold:
+            self._problem("calibrate.rank", f"the readings do not tell {', '.join(untold[:12])}",
+                          "measure one more set-up, the indexer turned by one increment more")
+            return Calibration(None, figures)
         if fitted.lost:
             self.found.append(info("calibrate.hidden", "the mounting can pretend " + ", ".join(fitted.lost) + " as well; "
                                    "they are 0 in the model", file=self.file.file))
@@ -215,7 +252,9 @@ class _Run:
             self.found.append(self.file.problem("calibrate.parameter", ("parameters",), str(fault)))
             return None
         result = fitted.result
-        figures = _figures(result, {}, result.rank, result.condition_number) | {"setup_mm": fitted.setup}
+        rows = result.residuals.reshape(len(q), -1).T
+        figures = account(result, result.rank, result.condition_number) | {
+            "setup_mm": fitted.setup, "residuals": weighted(rows, sigma, list(wanted))}
         if not result.converged:
             self._problem("calibrate.converged", "the fit does not come to an end", "check units and signs of the table")
         for group in result.not_identifiable:
@@ -235,26 +274,5 @@ class _Run:
 
     def _done(self, model: ErrorModel, figures: dict[str, Any]) -> Calibration:
         model = replace(model, machine=self.machine.name)
-        figures["parameters"] = _parameters(model)
+        figures["parameters"] = parameters(model)
         return Calibration(model, figures)
-
-
-def _figures(result: CalibrationResult, parameters: dict[str, Any], rank: int, number: float) -> dict[str, Any]:
-    count = max(len(result.residuals), 1)
-    return {"parameters": parameters, "rank": rank, "condition_number": number if np.isfinite(number) else None,
-            "rms_before": float(np.sqrt(result.cost_before / count)), "rms_after": float(np.sqrt(result.cost_after / count)),
-            "converged": result.converged, "not_identifiable": [list(group) for group in result.not_identifiable]}
-
-
-def _parameters(model: ErrorModel) -> dict[str, Any]:
-    """By name: value, sigma, unit (um or arcsec)."""
-    sigma = np.zeros(len(model.names)) if model.covariance is None else np.sqrt(np.diag(model.covariance))
-    units = ["arcsec" if angular(name) else "um" for name in model.names]
-    return {name: {"value": float(v / UNITS[u]), "sigma": float(s / UNITS[u]), "unit": u}
-            for name, v, s, u in zip(model.names, model.values, sigma, units, strict=True)}
-
-
-def _list(values: Floats) -> list[float | None]:
-    return [float(v) if np.isfinite(v) else None for v in values]
-
-

@@ -16,7 +16,8 @@ Sigma = Annotated[float, Field(gt=0)]
 
 
 class ReversalModel(UserModel):
-    """`[reversal]`: axis against indexer. Table: setup (0, 1, ...), step (0 .. n - 1), reading [arcsec]."""
+    """`[reversal]`: axis against indexer. Table: setup (0, 1, ...), step (0 .. n - 1), reading [arcsec]: actual less
+    commanded, counted as the axis counts."""
 
     table: str
     """CSV file beside this one"""
@@ -38,7 +39,8 @@ class RotaryModel(UserModel):
     table: str
     """CSV file beside this one; empty cells are not allowed, leave whole rows out"""
     axis: Literal["A", "B", "C"]
-    """rotary axis that was measured, its line along z of the readings"""
+    """rotary axis that was measured. Readings are of what it moves, tool or part: z where that turns to at positive
+    commands, x along the machine's X (axis C), Y (A) or Z (B)"""
     steps: Annotated[int, Field(ge=3)]
     """n, steps of a turn"""
     harmonics: Annotated[int, Field(ge=1)]

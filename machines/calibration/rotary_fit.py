@@ -17,8 +17,13 @@ from machines.calibration.simulator import MOUNTS, PARTS, Bench, motion_jacobian
 from machines.geometric_error.curves import Fourier
 from machines.geometric_error.model import ErrorModel
 from machines.geometric_error.names import DIRECTIONS, ErrorName
-from machines.geometric_error.serial_errors import Component, SerialErrors
+from machines.geometric_error.serial_errors import Component, Frame, SerialErrors
 from toolpaths.arrays import Bools, Floats
+
+ENOUGH = 3
+"""set-ups, turned by one increment each: more tell no other amplitudes"""
+TOLD = 1e-6
+"""of a column's length: where mounting and indexer leave less of it, it is not told"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +46,7 @@ class RotaryFit:
     residuals: Floats
 
 
-def fit_rotary(bench: Bench, readings: Floats, sigma: Floats, harmonics: int) -> RotaryFit:
+def fit_rotary(bench: Bench, readings: Floats, sigma: Floats, harmonics: int, robust: bool = False) -> RotaryFit:
     """From readings (m, n, 6), NaN where one is missing; `sigma` (6,) of displacements and turns.
 
     Raises:
@@ -56,7 +61,7 @@ def fit_rotary(bench: Bench, readings: Floats, sigma: Floats, harmonics: int) ->
     rows, observed = design[known], readings.ravel()[known]
     count = 12 * harmonics
     lost = _lost(rows / weights[:, None], count)
-    result = solve(linear(names, rows, observed, weights))
+    result = solve(linear(names, rows, observed, weights), robust)
     values = np.where(lost, 0.0, result.values[:count])
     shape = (len(PARTS), 2, harmonics)
     spread = np.where(lost, np.inf, np.sqrt(np.diag(result.covariance)[:count]))
@@ -88,26 +93,65 @@ def _design(bench: Bench, m: int, harmonics: int) -> tuple[Floats, tuple[str, ..
     return np.concatenate(blocks), tuple(names)
 
 
-def _lost(rows: Floats, count: int) -> Bools:
-    """(count,) True for the first columns that lie in the span of the others beyond them, or of lost and others."""
+def hidden(bench: Bench, sigma: Floats, harmonics: int) -> tuple[str, ...]:
+    """Names of the amplitudes that the mounting can pretend however many set-ups are measured."""
+    design, names = _design(bench, min(bench.steps, ENOUGH), harmonics)
+    lost = _lost(design / np.tile(sigma, len(design) // 6)[:, None], 12 * harmonics)
+    return tuple(np.array(names[:12 * harmonics])[lost].tolist())
+
+
+def told_apart(bench: Bench, m: int, sigma: Floats, harmonics: int) -> float:
+    """Condition number (2-norm, columns of length 1) of the amplitudes that m set-ups tell, mounting and indexer taken out;
+    inf where they tell none."""
+    values = np.linalg.svd(_left(_design(bench, m, harmonics)[0] / np.tile(sigma, m * bench.steps)[:, None], 12 * harmonics),
+                           compute_uv=False)
+    told = values[values > TOLD]
+    return float(told[0] / told[-1]) if len(told) else float("inf")
+
+
+def _left(rows: Floats, count: int) -> Floats:
+    """The first columns, scaled to length 1, less what lies in the span of the others."""
     wanted, nuisance = rows[:, :count], rows[:, count:]
     u, s, _ = np.linalg.svd(nuisance, full_matrices=False)
     span = u[:, s > 1e-9 * s[0]]
-    left = wanted - span @ (span.T @ wanted)
-    left = left / np.maximum(np.linalg.norm(wanted, axis=0), 1e-300)
-    _, values, vt = np.linalg.svd(left, full_matrices=False)
-    untold = vt[values <= 1e-6 * max(values[0], 1e-300)]
-    result: Bools = np.asarray(np.sum(untold**2, axis=0) > 1e-6)
+    result: Floats = (wanted - span @ (span.T @ wanted)) / np.maximum(np.linalg.norm(wanted, axis=0), 1e-300)
     return result
 
 
-def error_model(fitted: RotaryFit, axis: str, machine: str = "", name: str = "") -> ErrorModel:
-    """The model of the axis with its covariance; series in the turned frame ("moving"), means 0 (they are mounting)."""
+def _lost(rows: Floats, count: int) -> Bools:
+    """(count,) True for the first columns that lie in the span of the others beyond them, or of lost and others."""
+    square = np.linalg.qr(_left(rows, count), mode="r")
+    _, values, vt = np.linalg.svd(np.concatenate([square, np.zeros((count - len(square), count))]))
+    result: Bools = np.asarray(np.sum(vt[values <= TOLD] ** 2, axis=0) > 1e-6)
+    return result
+
+
+def error_model(fitted: RotaryFit, axis: str, machine: str = "", name: str = "", sense: int = 1,
+                carries_part: bool = False) -> ErrorModel:
+    """The model of the axis with its covariance; means 0 (they are mounting).
+
+    The readings have z where what moves turns to at positive commands, x along the machine axis that follows the letter in
+    X, Y, Z (A: Y, B: Z, C: X). An axis that carries the tool has its series in the turned frame ("moving"); one that carries
+    the part moves the tool relative to it by the inverse, in the frame of the part ("fixed").
+
+    Args:
+        sense: -1 where positive commands turn the tool's side against the machine axis
+        carries_part: True for an axis on the part's side
+    """
     harmonics = fitted.amplitudes.shape[2]
-    components = [Component(ErrorName(part, False, axis), Fourier(np.concatenate([[0.0], *fitted.amplitudes[part]])))
+    turn = _to_machine("ABC".index(axis), -sense if carries_part else sense) * (-1.0 if carries_part else 1.0)
+    amplitudes = np.einsum("pr,rch->pch", turn, fitted.amplitudes)
+    components = [Component(ErrorName(part, False, axis), Fourier(np.concatenate([[0.0], *amplitudes[part]])))
                   for part in range(len(DIRECTIONS))]
-    model = ErrorModel(SerialErrors(tuple(components), frame={axis: "moving"}), name=name or axis, machine=machine)
+    frame: Frame = "fixed" if carries_part else "moving"
+    model = ErrorModel(SerialErrors(tuple(components), frame={axis: frame}), name=name or axis, machine=machine)
     at = np.concatenate([1 + part * (1 + 2 * harmonics) + np.arange(2 * harmonics) for part in range(len(DIRECTIONS))])
-    covariance = np.zeros((len(model.names), len(model.names)))
-    covariance[np.ix_(at, at)] = fitted.covariance
+    covariance, spread = np.zeros((len(model.names), len(model.names))), np.kron(turn, np.eye(2 * harmonics))
+    covariance[np.ix_(at, at)] = spread @ fitted.covariance @ spread.T
     return replace(model, covariance=covariance)
+
+
+def _to_machine(along: int, sense: int) -> Floats:
+    """(6, 6) torsors of the readings to those along x, y, z of the machine; z of the readings is `sense` times `along`."""
+    columns = np.eye(3)[[(along + 1) % 3, (along + 2) % 3, along]].T * [1.0, sense, sense]
+    return np.asarray(np.kron(np.eye(2), columns), dtype=np.float64)

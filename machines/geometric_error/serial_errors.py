@@ -9,7 +9,8 @@ x, y, z of the machine frame, so that primed axes need no rule of their own. Wit
 - L_i, location: moves the line of the axis (about a point of it; for a slide about its reference point) and nothing
   that the axis carries: at q = 0 it has no effect. That is what ISO 230-1 calls the axis average line.
 - E_i, component errors: displaced, then turned about x, y, z (C 1.14), about the reference point of the axis. "fixed"
-  takes their directions before the axis turns (ISO 230-7), "moving" after it, as C 1.11 and 1.14 have it. The
+  takes their directions on the part's side of the axis, "moving" on its tool's side, as C 1.11 and 1.14 have it:
+  those of the bed (ISO 230-7) are "fixed" for an axis that carries the tool, "moving" for one that carries the part. The
   reference point of a slide travels with it.
 - S, spindle: displaces and turns the tool about the gauge point.
 

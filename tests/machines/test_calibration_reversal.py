@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from machines.calibration.problem import linear, solve
 from machines.calibration.reversal import conditioning, identify, plan, reversal_matrix, statistics
@@ -209,3 +210,44 @@ def test_all_six_errors_from_reversal_with_mounting_and_indexer() -> None:
     assert model.axes.frame["C"] == "moving"
     with pytest.raises(ValueError, match="harmonics"):
         fit_rotary(BENCH, read, sigma, 6)
+
+
+# ---- all six, on the axis where it is ------------------------------------------------------------------------------
+
+FRAMES = {("mikron-ucp710", "C"): ([1, 0, 0], [0, -1, 0], [0, 0, -1]),
+          ("mikron-ucp710", "A"): ([0, 1, 0], [0, 0, -1], [-1, 0, 0]),
+          ("fork-head-ab", "A"): ([0, 1, 0], [0, 0, 1], [1, 0, 0]), ("fork-head-ab", "B"): ([0, 0, 1], [1, 0, 0], [0, 1, 0])}
+"""axes of the readings in the machine: z where what moves turns to, a table against the machine's axis"""
+
+
+@pytest.mark.parametrize(("name", "letter"), FRAMES)
+def test_six_errors_move_the_tool_as_the_measured_body_moves(name: str, letter: str) -> None:
+    """What was measured of head or table, put together again by rotation matrices in the bed, is what the model does."""
+    import machines
+
+    rng, bench = np.random.default_rng(21), Bench(12, 80.0, 120.0, np.array([15.0, -8.0, 0.0]))
+    size = np.repeat([0.01, 5.0 * ARCSEC], 3)
+    first = rng.normal(size=(6, 2)) * (size * [0, 0, 1, 0, 0, 1])[:, None]  # what the mounting does not hide
+    series = first[:, 0] * np.cos(bench.angles)[:, None] + first[:, 1] * np.sin(bench.angles)[:, None]
+    second = rng.normal(size=(6, 2)) * size[:, None]
+    series += second[:, 0] * np.cos(2 * bench.angles)[:, None] + second[:, 1] * np.sin(2 * bench.angles)[:, None]
+    read = simulate(bench, series, np.zeros((12, 6)), np.zeros((3, 3, 6)))
+    fitted = fit_rotary(bench, read, size, 2)
+    kin = machines.load(name).kinematics.with_tool(50.0)
+    table = name == "mikron-ucp710"
+    actual = error_model(fitted, letter, carries_part=table).on(kin)
+    q = np.zeros((12, 5))
+    q[:, :3] = [30.0, -40.0, 25.0]
+    index = kin.axis_names.index(letter)
+    start = kin.forward(q[:1])[0][0]
+    q[:, index] = bench.angles
+    point = next(j.point for j in kin.chain if j.name == letter) + (0.0 if table else q[0, :3])
+    frame = np.array(FRAMES[name, letter], dtype=float).T
+    for k, (angle, e) in enumerate(zip(bench.angles, series, strict=True)):
+        turned = Rotation.from_rotvec(frame[:, 2] * angle)
+        small = Rotation.from_rotvec(frame @ e[3:])
+        if table:  # the part moves by turned * small about its point; the tool stands in the bed
+            wanted = small.inv().apply(turned.inv().apply(start - point) - frame @ e[:3]) + point
+        else:
+            wanted = turned.apply(small.apply(start - point) + frame @ e[:3]) + point
+        assert actual.place(q[k:k + 1])[0][0] == pytest.approx(wanted, abs=2e-5)

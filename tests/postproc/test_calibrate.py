@@ -88,6 +88,9 @@ FAULTS = [
     ("column", "reversal.csv", ("reading", "angle"), "calibrate.column", 5),
     ("unit", "reversal.csv", ("[arcsec]", "[um]"), "calibrate.unit", 5),
     ("step", "reversal.csv", ("0,11,", "0,12,"), "calibrate.row", 14),
+    ("gap", "reversal.csv", ("3,0,", "1000000000,0,"), "calibrate.setup", 5),
+    ("oblique", "reversal.toml", ('"mikron-ucp710"\n\n[reversal]\ntable = "reversal.csv"\naxis = "C"',
+                                  '"nutating-head"\n\n[reversal]\ntable = "reversal.csv"\naxis = "B"'), "calibrate.axis", 6),
     ("twice", "reversal.csv", ("0,11,", "0,10,"), "calibrate.row", 14),
 ]
 
@@ -137,4 +140,68 @@ def test_all_six_errors_from_a_file(folder: Path) -> None:
     figures = run(folder, "six.toml", "six-model.toml")
     assert figures["parameters"]["EZC.cos2"]["value"] == pytest.approx(1.0, abs=0.05)
     assert figures["parameters"]["ECC.sin1"]["value"] == pytest.approx(4.0, abs=0.1)
-    assert load(folder / "six-model.toml", machines.load("mikron-ucp710")).axes.frame["C"] == "moving"
+    assert "C" not in load(folder / "six-model.toml", machines.load("mikron-ucp710")).axes.frame  # it carries the part
+    (folder / "six.csv").write_text("\n".join((folder / "six.csv").read_text().splitlines()[:13]) + "\n")
+    refused = run(folder, "six.toml", "none.toml", 1)
+    assert refused["output"] is None and not (folder / "none.toml").exists()
+
+
+@pytest.mark.parametrize("ending", ["png", "SVG"])
+@pytest.mark.parametrize("source", ["reversal.toml", "probe.toml"])
+def test_figures_are_drawn_when_asked_for(folder: Path, source: str, ending: str) -> None:
+    from xml.etree import ElementTree
+
+    run(folder, "reversal.toml", "axis.toml")
+    odd = folder / f"$x_{{$ & <b>\u0007-- {source}"
+    odd.write_text((folder / source).read_text())
+    images = []
+    for name in ("a", "b"):
+        done = CliRunner().invoke(app, ["calibrate", str(odd), "-o", str(folder / "o.toml"),
+                                        "--figure", str(folder / f"{name}.{ending}")])
+        assert done.exit_code == 0, done.output
+        images.append((folder / f"{name}.{ending}").read_bytes())
+    assert images[0] == images[1] and len(images[0]) > 10_000
+    if ending == "png":
+        assert images[0].startswith(b"\x89PNG")
+    else:
+        text = images[0].decode()
+        assert ElementTree.fromstring(text).tag.endswith("svg")
+        assert ("condition number" in text) == (source == "reversal.toml")
+        assert "residual [standard deviations]" in text
+
+
+def test_a_figure_shows_what_the_readings_gave(folder: Path) -> None:
+    """Points of the picture are those of the account: signature, residuals in standard deviations, 15.32 for m = 2."""
+    from matplotlib.figure import Figure
+
+    from machines.calibration import figures as drawn
+
+    found, _ = calibrate(folder / "reversal.toml")
+    assert found is not None
+    panels = drawn._panels(found.figures)
+    sheet = Figure()
+    places = sheet.subplots(len(panels), 1)
+    for place, (panel, given) in zip(places, panels, strict=True):
+        panel(place, given)
+    axis, indexer = places[0].lines
+    assert axis.get_ydata() == pytest.approx(found.figures["axis_arcsec"])
+    assert indexer.get_ydata() == pytest.approx(found.figures["indexer_arcsec"])
+    residuals = np.concatenate([line.get_ydata() for line in places[1].lines[:4]])
+    assert np.sqrt(np.mean(residuals**2)) == pytest.approx(found.figures["rms_after"])
+    assert places[2].lines[0].get_xdata().tolist() == list(range(2, 13))
+    assert places[2].lines[0].get_ydata()[0] == pytest.approx(15.3226, abs=1e-3)
+
+
+def test_wrong_figures_are_refused_and_none_is_drawn_of_a_refused_fit(folder: Path) -> None:
+    call = ["calibrate", str(folder / "reversal.toml"), "-o", str(folder / "o.toml"), "--figure"]
+    done = CliRunner().invoke(app, [*call, str(folder / "f.gif")])
+    assert done.exit_code == 2 and ".png or .svg" in done.output and not (folder / "o.toml").exists()
+    (folder / "reversal.csv").write_text("\n".join((folder / "reversal.csv").read_text().splitlines()[:14]) + "\n")
+    done = CliRunner().invoke(app, [*call, str(folder / "f.png")])
+    assert done.exit_code == 1 and not (folder / "f.png").exists()
+
+
+def test_drawing_is_not_loaded_unless_asked_for(folder: Path) -> None:
+    code = (f"import sys; from machines.calibration.calibrate import calibrate; "
+            f"calibrate({str(folder / 'reversal.toml')!r}); sys.exit('matplotlib' in sys.modules)")
+    assert subprocess.run([sys.executable, "-c", code], check=False, timeout=60).returncode == 0

@@ -1,0 +1,69 @@
+"""What a calibration found, as plain numbers: the figures of `calibrate --json` and of its drawing."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from machines.calibration.problem import CalibrationResult
+from machines.calibration.rotary_fit import RotaryFit
+from machines.calibration.simulator import PARTS
+from machines.geometric_error.covariance import angular
+from machines.geometric_error.csv_table import UNITS
+from machines.geometric_error.model import ErrorModel
+from toolpaths.arrays import Floats
+
+CURVE = 5
+"""degrees between the points of a drawn series"""
+
+
+def account(result: CalibrationResult, rank: int, number: float) -> dict[str, Any]:
+    """Of every fit: rank, condition number (None where it is infinite), weighted residual before and after."""
+    count = max(len(result.residuals), 1)
+    return {"parameters": {}, "rank": rank, "condition_number": finite(number),
+            "rms_before": float(np.sqrt(result.cost_before / count)), "rms_after": float(np.sqrt(result.cost_after / count)),
+            "converged": result.converged, "not_identifiable": [list(group) for group in result.not_identifiable]}
+
+
+def parameters(model: ErrorModel) -> dict[str, Any]:
+    """By name: value, sigma, unit (um or arcsec)."""
+    sigma = np.zeros(len(model.names)) if model.covariance is None else np.sqrt(np.diag(model.covariance))
+    units = ["arcsec" if angular(name) else "um" for name in model.names]
+    return {name: {"value": float(v / UNITS[u]), "sigma": float(s / UNITS[u]), "unit": u}
+            for name, v, s, u in zip(model.names, model.values, sigma, units, strict=True)}
+
+
+def signature(degrees: Floats, values: Floats, sigma: Floats, unit: str) -> dict[str, Any]:
+    """A curve (N,) over the axis's position with its standard deviation; mm or rad in, `unit` out."""
+    return {"degrees": listed(degrees), "values": listed(values / UNITS[unit]), "sigma": listed(sigma / UNITS[unit]),
+            "unit": unit}
+
+
+def series_signatures(fitted: RotaryFit) -> dict[str, Any]:
+    """The six series of a rotary axis over a turn, by reading; amplitudes that are not told count as 0."""
+    degrees = np.arange(0.0, 360.0 + CURVE, CURVE)
+    phase = np.radians(degrees)[:, None] * np.arange(1, fitted.amplitudes.shape[2] + 1)
+    waves = np.concatenate([np.cos(phase), np.sin(phase)], axis=1)
+    size, found = waves.shape[1], {}
+    for k, part in enumerate(PARTS):
+        own = fitted.covariance[k * size:(k + 1) * size, k * size:(k + 1) * size]
+        spread = np.sqrt(np.einsum("na,ab,nb->n", waves, own, waves))
+        unit = "um" if part[0] == "d" else "arcsec"
+        found[part] = signature(degrees, waves @ fitted.amplitudes[k].ravel(), spread, unit)
+    return found
+
+
+def weighted(rows: Floats, sigma: Floats | float, names: list[str]) -> dict[str, list[float | None]]:
+    """Residuals (K, R) of K named rows in standard deviations (broadcast), None where there is no reading."""
+    return {name: listed(row) for name, row in zip(names, rows / sigma, strict=True)}
+
+
+def listed(values: Floats) -> list[float | None]:
+    """Plain numbers, None where one is not finite."""
+    return [finite(float(v)) for v in values]
+
+
+def finite(value: float) -> float | None:
+    """None where it is not."""
+    return float(value) if np.isfinite(value) else None

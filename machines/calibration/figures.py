@@ -1,0 +1,127 @@
+"""A calibration drawn: signatures (or parameters) with their doubt, residuals, condition number against set-ups.
+
+matplotlib is imported only here, when a figure is asked for. What comes from files is drawn as it stands, never as markup.
+"""
+
+from __future__ import annotations
+
+import io
+import warnings
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+FORMATS = (".png", ".svg")
+"""by the ending of the file"""
+SIZE = 8.0, 3.2
+"""inches, of one panel"""
+DOTS = 120
+"""per inch, of PNG"""
+MANY = 40
+"""parameters beyond which their names are left out"""
+BOUND = 1.96
+"""standard deviations of the 95 % bounds drawn"""
+BESIDE: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (1.0, 1.0), "fontsize": "small", "frameon": False}
+"""where legends stand"""
+TITLE = 90
+"""characters of a title"""
+
+
+def draw(figures: dict[str, Any], title: str, ending: str) -> bytes:
+    """The figures of a `Calibration` as an image file.
+
+    Args:
+        ending: one of FORMATS
+
+    Raises:
+        ValueError: for another ending.
+    """
+    if ending not in FORMATS:
+        raise ValueError(f"no figure format {ending!r}; known: {', '.join(FORMATS)}")
+    import matplotlib
+    from matplotlib.figure import Figure
+
+    panels = _panels(figures)
+    rules: Any = {"svg.hashsalt": "postproc", "font.family": "DejaVu Sans", "axes.grid": True, "grid.alpha": 0.3,
+             "axes.formatter.use_mathtext": False, "text.parse_math": False}
+    with matplotlib.rc_context(rules), warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="Glyph")
+        sheet = Figure(figsize=(SIZE[0], SIZE[1] * len(panels)), dpi=DOTS, layout="constrained")
+        sheet.suptitle(_plain(title))
+        for place, (panel, given) in zip(np.ravel(sheet.subplots(len(panels), 1)), panels, strict=True):
+            panel(place, given)
+        out = io.BytesIO()
+        sheet.savefig(out, format=ending[1:], metadata={"Date": None} if ending == ".svg" else {"Software": None})
+    return out.getvalue()
+
+
+def _panels(figures: dict[str, Any]) -> list[tuple[Any, Any]]:
+    """(function, what it draws), top to bottom; signatures by unit."""
+    curves = figures.get("signatures", {})
+    units = sorted({curve["unit"] for curve in curves.values()})
+    found: list[tuple[Any, Any]] = [(_signatures, {k: c for k, c in curves.items() if c["unit"] == u}) for u in units]
+    if not curves:
+        chosen = figures["parameters"]
+        found = [(_parameters, {k: p for k, p in chosen.items() if p["unit"] == u})
+                 for u in sorted({p["unit"] for p in chosen.values()})]
+    found.append((_residuals, figures["residuals"]))
+    return found + ([(_conditions, figures["plan"])] if figures.get("plan") else [])
+
+
+def _signatures(place: Axes, curves: dict[str, Any]) -> None:
+    for name, curve in curves.items():
+        x, y, sigma = (_floats(curve[key]) for key in ("degrees", "values", "sigma"))
+        line, = place.plot(x, y, marker="." if len(x) < MANY else "", label=_plain(name))
+        place.fill_between(x, y - BOUND * sigma, y + BOUND * sigma, color=line.get_color(), alpha=0.2, linewidth=0.0)
+    _labelled(place, "position [deg]", f"signature [{next(iter(curves.values()))['unit']}], 95 % bounds")
+    place.legend(**BESIDE)
+
+
+def _parameters(place: Axes, chosen: dict[str, Any]) -> None:
+    values, sigma = (np.array([p[key] for p in chosen.values()]) for key in ("value", "sigma"))
+    at = np.arange(len(values))
+    place.errorbar(at, values, yerr=BOUND * sigma, fmt="o", markersize=3.0, capsize=3.0)
+    if len(at) <= MANY:
+        place.set_xticks(at, [_plain(name) for name in chosen], rotation=90, fontsize="small")
+    _labelled(place, "parameter", f"value [{next(iter(chosen.values()))['unit']}], 95 % bounds")
+
+
+def _residuals(place: Axes, rows: dict[str, Any]) -> None:
+    for name, row in rows.items():
+        place.plot(_floats(row), linestyle="", marker=".", label=_plain(name))
+    for bound in (-BOUND, BOUND):
+        place.axhline(bound, color="gray", linewidth=0.8, linestyle="--")
+    _labelled(place, "reading", "residual [standard deviations]")
+    place.legend(**BESIDE)
+
+
+def _conditions(place: Axes, plan: list[dict[str, Any]]) -> None:
+    setups, number = [c["setups"] for c in plan], _floats([c["condition_number"] for c in plan])
+    place.plot(setups, number, marker="o")
+    place.set_xticks(setups)
+    for m, value in zip(setups, number, strict=True):
+        if np.isnan(value):
+            place.axvline(m, color="tab:red", linewidth=0.8, linestyle=":",
+                          label="" if place.get_legend_handles_labels()[1] else "not told")
+    if np.isnan(number).any():
+        place.legend(**BESIDE)
+    _labelled(place, "set-ups m", "condition number")
+
+
+def _labelled(place: Axes, x: str, y: str) -> None:
+    place.set_xlabel(x)
+    place.set_ylabel(y)
+
+
+def _floats(values: list[float | None]) -> np.ndarray[Any, np.dtype[np.float64]]:
+    """NaN for None."""
+    return np.array([np.nan if v is None else v for v in values], dtype=np.float64)
+
+
+def _plain(text: str) -> str:
+    """One line of printable characters; a label that began with _ would be left out of a legend."""
+    shown = "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text)[:TITLE]
+    return f" {shown}" if shown.startswith("_") else shown
