@@ -186,14 +186,19 @@ def check_smoothing(motion: Motion, job: Job, moves: Moves, owner: Ints, faults:
 
 
 def check_speeds(motion: Motion, control: Control, moves: Moves, curves: Curves, owner: Ints, match: Ints, by_radius: bool,
-                 faults: Faults) -> list[Diagnostic]:
-    """Moves that the F words run faster than programmed, over the whole move."""
+                 tolerance: float, faults: Faults) -> list[Diagnostic]:
+    """Moves that the F words run faster than programmed, over the whole move.
+
+    Chords within the tolerance e of an arc are shorter than its length r s by up to s e / 3: e = c^2 / (8 r) and the arc
+    of a chord c is c (1 + c^2 / (24 r^2)).
+    """
     seconds = block_seconds(motion, control, by_radius)
     cutting = (owner < len(moves)) & (motion.code > 0)
     total = np.bincount(owner[cutting], weights=seconds[cutting], minlength=len(moves) + 1)[:len(moves)]
     length = curves.length()
     asked = np.where(moves.seconds > 0.0, moves.seconds, length / moves.feed)
-    slack = 0.002 / np.where(moves.feed > 0.0, moves.feed, np.inf)
+    shorter = 0.002 + np.where(curves.is_arc, np.abs(curves.sweep) * tolerance / 3.0, 0.0)
+    slack = shorter / np.where(moves.feed > 0.0, moves.feed, np.inf)
     check = (moves.kind != Kind.RAPID) & ~moves.link & (match >= 0) & (total > 0.0)
     fast = np.flatnonzero(check & (total * ALLOWED_SPEED + slack < asked))
     if not len(fast):

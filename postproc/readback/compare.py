@@ -76,7 +76,7 @@ def compare(motion: Motion, job: Job, executed: Executed, gcode: str = "") -> Co
     diagnostics += check_states(motion, job, moves, owner, faults)
     diagnostics += check_holes(motion, job, moves, tip, owner, faults)
     diagnostics += check_speeds(motion, executed.control, moves, curves, owner, match,
-                                job.controller.feed.arc_inverse == "radius", faults)
+                                job.controller.feed.arc_inverse == "radius", tolerance, faults)
     diagnostics += check_links(motion, executed, moves, owner, job.space, tolerance, faults)
     diagnostics += check_rewinds(motion, executed, number, tip, axis, job.space, tolerance, grain[1], faults)
     diagnostics += check_travel(motion, executed, moves, owner, faults)

@@ -10,7 +10,9 @@ from postproc.job import Job
 from postproc.readback.compare import Comparison, compare
 from postproc.readback.dialects import reader_for
 from postproc.readback.execute import Motion, Offsets, run
+from postproc.readback.faults import Faults
 from postproc.readback.poses import Executed, poses_before
+from postproc.readback.stops import check_stops
 from toolpaths.diagnostics import Diagnostic, error, has_errors
 
 
@@ -39,7 +41,8 @@ def read_back(data: bytes, job: Job, file: str, progress: Callable[[str, int, in
     executed = _executed(job, motion, offsets.lengths)
     with np.errstate(invalid="ignore"):
         comparison = compare(motion, job, executed, gcode)
-    return comparison, [*diagnostics, *comparison.diagnostics]
+    stops = check_stops(code, motion, job, Faults(job.toolpath.file, gcode))
+    return comparison, [*diagnostics, *comparison.diagnostics, *stops]
 
 
 def _executed(job: Job, motion: Motion, lengths: dict[int, float]) -> Executed:

@@ -46,7 +46,7 @@ def test_show_prints_every_value_with_its_place(tmp_path: Path) -> None:
     file = shop(tmp_path, 'base = "haas-ngc"', "[codes]", 'mist = "M73"')
     text = CliRunner().invoke(app, ["controller", "show", str(file)]).output.splitlines()
     assert len(text) == len(controller_values(str(file))[0])
-    assert [line for line in text if "codes.mist" in line] == ['shop.toml:3       codes.mist = "M73"']
+    assert [line.split() for line in text if "codes.mist" in line] == [["shop.toml:3", "codes.mist", "=", '"M73"']]
     assert any(line.startswith("haas-ngc.toml:") and 'work_offsets.G59.1 = "G154 P1"' in line for line in text)
     assert any(line.startswith("default") and 'codes.flood = "M8"' in line for line in text)
 

@@ -85,7 +85,7 @@ def test_tapering_pecks_of_haas() -> None:
 
 @pytest.mark.parametrize("code", ["G84", "G74", "G85", "G89 P100"])
 def test_taps_and_bores_leave_at_feed(code: str) -> None:
-    assert heights(f"G98 {code} X0. Y0. Z-5. R1. F100\n") == [(1, 0), (-5, 1), (1, 1), (20, 0)]
+    assert heights(f"M29 S100\nG98 {code} X0. Y0. Z-5. R1. F100\n") == [(1, 0), (-5, 1), (1, 1), (20, 0)]
 
 
 def test_repeats_step_on_under_g91() -> None:

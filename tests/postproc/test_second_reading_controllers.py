@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import math
+import re
+from pathlib import Path
 
 import pytest
 
-from tests.postproc.kit import convert, good, toolpath
+from postproc.options import Options
+from postproc.pipeline import verify
+from tests.postproc.kit import TOOLS, convert, good, toolpath
 from tests.postproc.program_kit import LOAD, blocks, command, drilled, lines, program, step
 from tests.postproc.reader_kit import FANUC, HAAS, SIEMENS, faults
 from toolpaths.toolpath import Cycle
@@ -98,3 +102,54 @@ def test_names_of_operations_hold_nothing_that_ends_or_continues_a_block(control
 def test_dwells_are_whole_milliseconds_and_none_is_lost(seconds: float, text: str) -> None:
     made = program([step("rapid", X=1.0)], {0: [command("DWELL", seconds)]})
     assert blocks("heidenhain-tnc640", made)[1] == f"CYCL DEF 9.1 {text}"
+
+
+# ---- what no position shows -------------------------------------------------------------------------------------------
+
+def taps(between: str) -> str:
+    head = "%\nO1\nG21 G17 G90 G94\nG54\nS500 M3\nG0 X0. Y0. Z9.\n"
+    return f"{head}{between}G98 G84 X1. Y0. Z-9. R2. F500.\nX2. Y0.\nG80\nM30\n%\n"
+
+
+@pytest.mark.parametrize(("between", "bad"), [
+    ("", True), ("M29 S500\n", False), ("M29 S500\nG0 X1.\n", True),
+    ("M29 S500\nG98 G84 X0. Y0. Z-5. R2. F500.\n", False), ("M29 S500\nG98 G84 X0. Y0. Z-5. R2. F500.\nG80\n", True)])
+def test_taps_without_m29_are_refused_where_the_control_couples_by_it(between: str, bad: bool) -> None:
+    assert ("gcode.rigid_tap" in faults(FANUC, taps(between))) == bad
+    assert "gcode.rigid_tap" not in faults(HAAS, taps(between))
+
+
+def test_a_plane_ends_with_the_length_off() -> None:
+    text = ("%\nO1\nG21 G17 G90 G94\nG54\nT1 M6\nG68.2 X0. Y0. Z0. I0. J0. K0.\nG53.1\nG0 G43 H1 X0. Y0. Z9.\n{0}"
+            "G69\nM30\n%\n")
+    assert faults(FANUC, text.format("G49\n"), on="mikron-ucp710") == {}
+    assert "gcode.mode" in faults(FANUC, text.format(""), on="mikron-ucp710")
+
+
+WAITS = toolpath("GOTO/0,0,0", "STOP", "GOTO/5,0,0", "OPSTOP", "GOTO/9,0,0", "DELAY/1.5", "GOTO/9,5,0", "DELAY/20,REV",
+                 "GOTO/9,9,0")
+
+
+@pytest.mark.parametrize("controller", ["linuxcnc", FANUC, HAAS, SIEMENS, "heidenhain-tnc640"])
+@pytest.mark.parametrize(("code", "fault"), [
+    (r"M0", "verify.stop"), (r"M1", "verify.stop"), (r"(G4 [PF]1\.?5(00)?|CYCL DEF 9\.1 DWELL 1\.5)", "verify.dwell"),
+    (r"(G4 [PF]1\.?2(00)?|CYCL DEF 9\.1 DWELL 1\.2)", "verify.dwell")])
+def test_stops_and_rests_are_missed(controller: str, code: str, fault: str, tmp_path: Path) -> None:
+    text = good(convert(WAITS, "mill-3axis", controller)).text
+    kept = [n for n in text.splitlines() if not re.fullmatch(rf"(N?\d+ )?{code}", n)]
+    if controller == "heidenhain-tnc640" and "DWELL" in code and fault == "verify.dwell":
+        kept.remove(next(n for n in kept if n.endswith("DWELL TIME")))
+    assert len(kept) < len(text.splitlines())
+    file = tmp_path / "TEST.nc"
+    for lines_, expected in ((text.splitlines(), set()), (kept, {fault})):
+        file.write_text("\n".join(lines_) + "\n")
+        result = verify(file, WAITS, "mill-3axis", controller, Options(setup=str(TOOLS)))
+        assert {d.code for d in result.diagnostics if d.severity.name == "ERROR"} == expected
+
+
+@pytest.mark.parametrize("radius", [0.012, 0.03, 0.1])
+@pytest.mark.parametrize("controller", [FANUC, SIEMENS])
+def test_chords_of_tiny_arcs_are_not_taken_for_too_fast(controller: str, radius: float) -> None:
+    path = toolpath("MULTAX/ON", "GOTO/0,0,0,0,0,1", f"MOVARC/CENTER,{radius},0,0,AXIS,0,0,1,RADIUS,{radius}",
+                    f"GOTO/{2.0 * radius},0,0", "GOTO/9,0,0,0.0998334,0,0.9950042")
+    good(convert(path, "mikron-ucp710", controller, output="tcp"))

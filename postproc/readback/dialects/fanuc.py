@@ -68,9 +68,9 @@ class FanucReader(IsoReader):
         return False
 
     def stems(self, call: str) -> tuple[str, ...]:
-        """O77 may be in O77, O0077, 77, 0077."""
+        """O77 may be in O77, O0077, O00077 (Haas), 77, 0077."""
         number = int(call[1:]) if call[1:].isdigit() else -1
-        return call, f"O{number:04d}", f"{number}", f"{number:04d}"
+        return call, f"O{number:04d}", f"O{number:05d}", f"{number}", f"{number:04d}"
 
     def calls(self, words: Words) -> dict[int, Call]:
         """M98 P of four digits L, or P with the number of times before the last four."""
@@ -159,6 +159,22 @@ class FanucReader(IsoReader):
         self.modes(words, new, drop, line, file, found)
         self.reference(words, new, drop, line, file, found)
         self.machine_moves(words, line, file, found)
+        self.taps(words, line, file, found)
+
+    def taps(self, words: Words, line: Ints, file: str, found: list[Diagnostic]) -> None:
+        """G74 and G84 tap rigidly only behind M29 (B-63944EN-2, rigid tapping), which ends with the next code of motion."""
+        if self.controller is None or not self.controller.codes.rigid_tap.startswith("M29"):
+            return
+        blocks, code = codes(words, "G", self.groups["motion"])
+        rigid = codes(words, "M", (29,))[0]
+        taps = np.flatnonzero(np.isin(code, (74, 84)))
+        before = np.where(taps > 0, blocks[taps - 1], 0)
+        again = (taps > 0) & np.isin(code[taps - 1], (74, 84))
+        bare = ~again & (np.searchsorted(rigid, before, side="left") == np.searchsorted(rigid, blocks[taps], side="right"))
+        if bare.any():
+            found.append(error("gcode.rigid_tap", "tapping without M29: feed and spindle are not coupled", file=file,
+                               lines=line[blocks[taps[bare]]][:6].tolist(), count=int(bare.sum()),
+                               hint="write M29 S in the block before"))
 
     def modes(self, words: Words, new: New, drop: Bools, line: Ints, file: str, found: list[Diagnostic]) -> None:
         """The laws, code by code in running order."""
@@ -197,6 +213,8 @@ class FanucReader(IsoReader):
             return "while a length offset is in force"
         if code in (68.2, 254, self.tcp_code) and state != "axes":
             return "while another mode is on"
+        if code == 69 and state == "tilted" and length >= 0.0:
+            return "while a length offset is in force"
         return "between G68.2 and G53.1" if state == "pending" and code != 69 else ""
 
     def hold(self, new: New, b: int, law: Law, state: str) -> str:

@@ -1,0 +1,56 @@
+"""Stops and rests of the CL file, which no position shows, in the program."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from postproc.events import Spindle, numbers, spindle_after, words
+from postproc.holes import Phase
+from postproc.job import Job
+from postproc.readback.canonical import Canonical
+from postproc.readback.execute import Motion
+from postproc.readback.faults import Faults
+from postproc.readback.modal import codes
+from toolpaths.diagnostics import Diagnostic
+from toolpaths.units import PER_MINUTE
+
+_ROUNDING = 1e-3
+"""s by which a written rest may be shorter"""
+_STOPS = (("STOP", 0.0), ("OPSTOP", 1.0))
+
+
+def check_stops(code: Canonical, motion: Motion, job: Job, faults: Faults) -> list[Diagnostic]:
+    """As many stops (M0, M1) as the CL file has, and no less time of rest."""
+    result = []
+    for word, number in _STOPS:
+        lines = [event.line for event in job.toolpath.events if event.word == word]
+        stated = len(codes(code.words, "M", (number,))[0])
+        if stated < len(lines):
+            result.append(faults.error("verify.stop", f"the program holds M{number:g} {stated} times, the CL file {word} "
+                                       f"{len(lines)} times", lines[stated], int(motion.line[-1]), len(lines) - stated))
+    rests = [*_delays(job), *_at_bottoms(job)]
+    asked, found = sum(seconds for seconds, _ in rests), float(motion.dwell.sum())
+    if found < asked - _ROUNDING * len(rests) - 1e-9:
+        result.append(faults.error("verify.dwell", f"the program rests for {found:.3f} s, the CL file for {asked:.3f} s",
+                                   rests[0][1], int(motion.line[-1])))
+    return result
+
+
+def _delays(job: Job) -> Iterator[tuple[float, int]]:
+    """(s, line) of DELAY records, those in revolutions at the speed then in force."""
+    spindle = Spindle()
+    for event in job.toolpath.events:
+        if event.word == "SPINDL":
+            spindle = spindle_after(event, spindle)
+        elif event.word == "DELAY" and numbers(event):
+            per_second = spindle.rpm * PER_MINUTE if "REV" in words(event) else 1.0
+            yield numbers(event)[0] / per_second, event.line
+
+
+def _at_bottoms(job: Job) -> Iterator[tuple[float, int]]:
+    """(s, line) of the rests of drilled holes."""
+    moves = job.moves.without_pecks()
+    for k in np.flatnonzero(moves.phase == Phase.DRILL).tolist():
+        yield job.toolpath.cycles[int(moves.cycle[k])].dwell, int(moves.line[k])
