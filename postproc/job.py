@@ -18,6 +18,7 @@ from postproc.modes import OutputModes, output_modes
 from postproc.moves import Moves, build_moves
 from postproc.options import Options
 from postproc.pivots import control_kinematics
+from postproc.parts import cut_operations
 from postproc.records import plain_records
 from postproc.rounding import Rounding, decimals, rounding_bound
 from postproc.setup import Placement, SetupFile, part_placement, work_frame
@@ -113,6 +114,8 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
             options: Options) -> tuple[Job | None, list[Diagnostic]]:
     """The job (its path has plain records, see `plain_records`), or None and why there is none."""
     toolpath, diagnostics = plain_records(toolpath, controller)
+    toolpath, found = cut_operations(toolpath, setup.output.longest)
+    diagnostics += found
     diagnostics += [*_refused(toolpath), *_no_inverse_time(controller, options)]
     placement, found = part_placement(setup, options.setup)
     diagnostics += found

@@ -63,11 +63,20 @@ class Output(UserModel):
     """every operation begins at home with everything restated, so that the program can be taken up there"""
     subprograms: bool = False
     """every operation is a subprogram of the same file, where the controller has such; it then begins as with restart"""
+    files: bool = False
+    """every operation is a subprogram in a file of its own beside the program, which calls them"""
+    longest: int = Field(default=0, ge=0)
+    """most points of the CL file in one part: longer operations are cut at rapids, each part begins as with restart; 0: any"""
 
     @property
     def apart(self) -> bool:
         """True where nothing that holds in one operation may be needed in the next."""
-        return self.restart or self.subprograms
+        return self.restart or self.divided or self.longest > 0
+
+    @property
+    def divided(self) -> bool:
+        """True where operations are subprograms."""
+        return self.subprograms or self.files
 
 
 class Pivot(UserModel):
