@@ -17,8 +17,8 @@ from postproc.links import SafeSpace, safe_space
 from postproc.modes import OutputModes, output_modes
 from postproc.moves import Moves, build_moves
 from postproc.options import Options
-from postproc.pivots import control_kinematics
 from postproc.parts import cut_operations
+from postproc.pivots import control_kinematics
 from postproc.records import plain_records
 from postproc.rounding import Rounding, decimals, rounding_bound
 from postproc.setup import Placement, SetupFile, part_placement, work_frame

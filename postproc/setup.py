@@ -66,7 +66,7 @@ class Output(UserModel):
     files: bool = False
     """every operation is a subprogram in a file of its own beside the program, which calls them"""
     longest: int = Field(default=0, ge=0)
-    """most points of the CL file in one part: longer operations are cut at rapids, each part begins as with restart; 0: any"""
+    """most CL points of one part: longer operations are cut at rapids, each part begins as with restart; 0: any"""
 
     @property
     def apart(self) -> bool:
