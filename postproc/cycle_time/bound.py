@@ -35,7 +35,18 @@ def lower_bound(blocks: Blocks, model: CycleTimeModel) -> float:
     free = np.full(len(merged), np.inf)
     loop = compiled(speeds) if len(merged) >= KERNEL_FROM else speeds
     first, last = loop(length, target, target, rate, through, free, free)
-    return float(ramps(length, first, last, target, rate).seconds.sum() + blocks.pauses.seconds.sum())
+    seconds = ramps(length, first, last, target, rate).seconds - early(merged, form, model)
+    return float(np.maximum(seconds, 0.0).sum() + blocks.pauses.seconds.sum())
+
+
+def early(blocks: Blocks, form: Shape, model: CycleTimeModel) -> Floats:
+    """(E,) s by which the next block may begin before the feeds allow it: LinuxCNC's overlapping ramps begin with a servo
+    cycle, so that up to one is gained at each (`linuxcnc._overlapping`)."""
+    result = np.zeros(len(blocks))
+    if model.kind == "linuxcnc":
+        overlaps = (blocks.path[:-1] == Path.BLEND) & ~blocks.forced[:-1] & (form.turns[:-1] | form.turns[1:])
+        result[:-1] = np.where(overlaps, model.servo_cycle, 0.0)
+    return result
 
 
 def cut_off(blocks: Blocks, form: Shape, model: CycleTimeModel) -> Floats:

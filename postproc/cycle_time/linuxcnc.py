@@ -17,7 +17,7 @@ from postproc.cycle_time.blocks import Blocks, Cause, Path
 from postproc.cycle_time.linuxcnc_corners import KINK, Blends, Corners, blends, corners
 from postproc.cycle_time.linuxcnc_kernels import speeds, timeline
 from postproc.cycle_time.linuxcnc_segments import KERNEL_FROM, NORMAL_SHARE, Segments, clamped, segments
-from postproc.cycle_time.phases import Timed, ramps, summed
+from postproc.cycle_time.phases import Ramps, Timed, ramps, summed
 from postproc.cycle_time.shape import NOTHING, shape
 from postproc.feedrate.compiled import compiled
 from toolpaths.arrays import Array, Bools, Floats, Ints
@@ -45,12 +45,14 @@ SETTLED = 0.003
 class Settings:
     """Of the controller: servo cycle, s; depth of the look-ahead in segments ([TRAJ] ARC_BLEND_OPTIMIZATION_DEPTH).
 
-    `stop_cycles`: servo cycles that a stop costs over the ramps (measured); `override`: of feeds; `rapid`: of rapids.
+    `stop_cycles`: servo cycles that a stop costs over the ramps, `blend_cycles`: by which overlapping segments begin earlier
+    (both measured); `override`: of feeds; `rapid`: of rapids.
     """
 
     cycle: float = 0.001
     depth: int = 50
     stop_cycles: float = 0.5
+    blend_cycles: float = 0.5
     override: float = 1.0
     rapid: float = 1.0
 
@@ -243,13 +245,24 @@ def _timed(blocks: Blocks, s: Segments, row: Row, settings: Settings) -> Timed:
     gentle = through & ~row.traverse & (2.0 * row.length < RAMP_TIME * (first + np.minimum(last, target))) & (last > 0.0)
     r = ramps(row.length, first, last, target, row.rate, gentle)
     stops = ~through
-    overlap = np.where(row.ends == OVERLAP, np.minimum(row.overlap_speed / row.rate, r.down), 0.0)
+    overlap = _overlapping(row, r, settings)
     settling = np.where(stops & (overlap == 0.0), settings.stop_cycles * settings.cycle, 0.0)
     pause, resting = _pauses(blocks, s, row)
     clock = compiled(timeline) if big else timeline
     begin, end = clock(r.seconds + settling, overlap, resting, row.fresh)
     end[-1:] += SETTLED
     return _by_block(blocks, s, row, r.up + r.down, r.steady, begin, end, pause, stops, first, last, r.peak)
+
+
+def _overlapping(row: Row, r: Ramps, settings: Settings) -> Floats:
+    """(M,) s before the end of a segment at which the next begins.
+
+    It begins with the servo cycle in which the speed falls below that of the blend, half a cycle before it does on average;
+    of segments that only gain and lose speed the part that does not overlap (measured: the rounded peak takes the rest).
+    """
+    overlap = np.where(row.ends == OVERLAP, np.minimum(row.overlap_speed / row.rate, r.down), 0.0)
+    part = np.maximum(np.minimum(r.steady / settings.cycle, 1.0), 1.0 - overlap / np.maximum(r.down, 1e-300))
+    return np.asarray(overlap + np.where(overlap > 0.0, settings.blend_cycles * settings.cycle * part, 0.0))
 
 
 def _ahead(row: Row, depth: int) -> Floats:

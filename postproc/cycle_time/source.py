@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -91,18 +92,22 @@ def _blocks(code: Canonical, motion: Motion, machine: Machine, control: Control,
                      by_radius=controller.feed.arc_inverse == "radius")
 
 
+_RECORD = re.compile(rb"(N?\d+\s*)?[A-Z][A-Z0-9]*\s*/")
+"""An APT record with a major word, with or without a sequence number"""
+_BLOCK = re.compile(rb"%|O\d|/?\s*N\d+\s*\S|/?\s*(\d+\s*)?BEGIN PGM|/?\s*[GMTXYZABCSF]\s*[-+.\d]")
+"""A line that only programs have: a program's name, a block number, or an address with a number"""
+
+
 def looks_like_gcode(data: bytes) -> bool:
-    """True for a program of a control: a % or O line, or blocks of words, in what comes before any APT record."""
+    """True for a program of a control: a name, a numbered block or words, in what comes before any APT record."""
     for raw in data[:20_000].splitlines():
         line = raw.strip().upper()
-        if not line or line.startswith((b"(", b";", b"$$")):
+        if line.startswith((b"(", b";", b"$$")) or not line:
             continue
-        if line.lstrip(b"0123456789 ").startswith(b"BEGIN PGM"):
+        if _RECORD.match(line):
+            return False
+        if _BLOCK.match(line):
             return True
-        if line.startswith((b"%", b"O")) and b"/" not in line.split(b"(")[0]:
-            return True
-        head = line.lstrip(b"/N0123456789 :")
-        return head[:1] in b"GMTXYZABCSF" and head[1:2].isdigit() if b"/" not in line[1:] else False
     return False
 
 

@@ -63,6 +63,9 @@ SPEED = "".join(f"G1 X{0.5 * i:.1f}\n" for i in range(1, 500)) + "".join(
 SMALL_ARCS = "G0 X0 Y0 Z300\n" + "".join(
     f"G17 G2 X{4 * i + 4} Y0 I2 J0\nG18 G3 X{4 * i} Z300 I-2 K0\nG19 G2 Y0 Z300 J3 K0\nG0 X{4 * i + 4}\n" for i in range(8))
 IN_TURN = "".join(f"G1 A{12 * (i % 2)} C{5 * i}\nG1 X{10 * i}\nG2 X{10 * i + 5} Y0 I2.5 J0\n" for i in range(1, 9))
+STEADY = "".join(f"G1 X{0.5 * i:g} Y{5.0 * math.sin(i / 8):.4f} C{0.8 * i:.4f} F{500.0 + 50.0 * math.sin(i / 7):.2f}\n"
+                 for i in range(1, 100))
+REPEATED = "G0 Z300\nF900\nG91 G81 X10 Y2 Z-8 R-2 L4\nG80 G90\nG0 Z310\n"
 CHANGES = ("T1 M6\nG43 H1\nF2000\nG0 X20\nG1 Z350\nG1 Y20\nG0 Z400\nG49\nT2 M6\nG43 H2\nG0 X0\nG1 Z350\nG1 Y0\n")
 
 PROGRAMS: dict[str, tuple[str, str]] = {
@@ -80,6 +83,9 @@ PROGRAMS: dict[str, tuple[str, str]] = {
     "inch": ("mill-3axis", "G20 G90 G94 G64 P0.001\nF120\n" + "".join(
         f"G1 X{(i % 2) * 1.5} Y{i * 0.2:.2f}\n" for i in range(1, 12)) + "G0 Z13\n"),
     "spindle, coolant, dwell": ("mill-3axis", f"{HEAD} G64 P0.01\n{COMMANDS}"),
+    "cycles repeated, no G98": ("mill-3axis", f"{HEAD} G64 P0.02\n{REPEATED}"),
+    "5 axes at their feed, G93": ("mikron-ucp710", f"{HEAD} G64 P0.02\nG0 Z240\nG93\n{STEADY}G94\n"),
+    "5 axes at their feed, tip": ("linuxcnc-xyzac-trt", f"{HEAD} G64 P0.02\nG0 Z300\nG93\n{STEADY}G94\n"),
     "tool changes": ("mill-3axis", f"{HEAD} G64 P0.01\n{CHANGES}"),
     "4 axes, G94, G64 P0.01": ("mill-4axis", f"{HEAD} G64 P0.01\nG0 Z450\nF2000\n{INDEXED}"),
     "5 axes, G94, G64 P0.01": ("mikron-ucp710", f"{HEAD} G64 P0.01\nF3000\n{circle(200, 30.0, turned)}"),
@@ -102,5 +108,6 @@ MEASURED = {
     "spindle, coolant, dwell": 4.399, "tool changes": 5.006, "4 axes, G94, G64 P0.01": 6.690,
     "5 axes, G94, G64 P0.01": 9.165, "5 axes, G94, G61": 7.768, "5 axes, G93, G64 P0.01": 14.288, "5 axes, G93, G61": 12.063,
     "rotary axes alone": 8.149, "short lines at speed": 1.202, "straight chain, G64 Q0.01": 0.961,
-    "small arcs in all planes": 5.696, "rotary and linear in turn": 6.762, "5 axes, control's kinematics": 4.751}
+    "small arcs in all planes": 5.696, "rotary and linear in turn": 6.762, "5 axes, control's kinematics": 4.751,
+    "cycles repeated, no G98": 3.602, "5 axes at their feed, G93": 11.992, "5 axes at their feed, tip": 12.377}
 """s that LinuxCNC 2.9's simulator took, for where it is not installed"""

@@ -111,10 +111,22 @@ def test_programs_and_cl_files_are_told_apart() -> None:
     for name in ("pocket.cls", "tool_axis_tour.apt", "inch_plate.apt", "h4a_dome.cls"):
         assert not looks_like_gcode((SAMPLES / name).read_bytes())
     for text in (b"%\nO0001\nG1 X1\n", b"(part)\nN10 G21 G90\n", b"G0 X1\n", b"/N5 M30\n", b"BEGIN PGM A MM\n",
-                 b"0 BEGIN PGM A MM\n", b"; comment\nT1 M6\n", b"X10 Y5\n"):
+                 b"0 BEGIN PGM A MM\n", b"; comment\nT1 M6\n", b"X10 Y5\n", b"; set\nN10 CYCLE800()\nN20 G17\n",
+                 b"TRAORI\nG1 X1\n", b"N10 X=5/2\n"):
         assert looks_like_gcode(text), text
-    for text in (b"PARTNO A\nUNITS/MM\nGOTO/1,2,3\n", b"TOOL PATH/A,TOOL,B\n", b"$$ note\nCUTTER/10\n", b""):
+    for text in (b"PARTNO A\nUNITS/MM\nGOTO/1,2,3\n", b"TOOL PATH/A,TOOL,B\n", b"$$ note\nCUTTER/10\n", b"",
+                 b"PARTNO B\nMACHIN/A\nX1 = POINT/1,2\n", b"N10 UNITS/MM\n", b"10 GOTO / 1,2,3\n"):
         assert not looks_like_gcode(text), text
+
+
+def test_cycles_return_to_r_until_linuxcnc_is_told_otherwise() -> None:
+    """Measured: a fresh LinuxCNC without G98 or G99; other controls begin with G98."""
+    text = f"{HEAD}\nG0 Z300\nF900\n{{}}G81 X5 Y5 Z280 R290\nX10\nG80"
+
+    def last(level: str, controller: str = "linuxcnc") -> float:
+        return float(blocks(text.format(level), controller=controller).end[-1, 2])
+    assert last("") == last("G99 ") == 290.0
+    assert last("G98 ") == last("", "generic-iso") == 300.0
 
 
 def test_faults_of_a_program_are_told() -> None:

@@ -51,6 +51,7 @@ class IsoReader(Reader):
         self.tools(words, new, line, file, found)
         self.rests(words, new, drop, line, file, found)
         self.paths(words, new)
+        self.levels(words, new)
         blocks, value = codes(words, "G", self.groups["offset"])
         new += [(int(b), OFFSET, float(v)) for b, v in zip(blocks, value, strict=True)]
         self.others(words, new, drop, line, file, found)
@@ -101,6 +102,16 @@ class IsoReader(Reader):
             if c == 64 and "P" in stated:
                 value = stated["P"] + stated.get("Q", stated["P"])
             new.append((b, SMOOTH, value * (self.millimetres if units[b] == 20 else 1.0)))
+
+    def levels(self, words: Words, new: New) -> None:
+        """A fresh LinuxCNC's cycles return to R until G98 is stated (measured on 2.9; later it keeps the mode of the program
+        before)."""
+        cycles = codes(words, "G", CYCLES)[0]
+        if self.controller is None or self.controller.writer != "linuxcnc" or not len(cycles):
+            return
+        stated = codes(words, "G", GROUPS["level"])[0]
+        if not (stated <= cycles[0]).any():
+            new.append((int(cycles[0]), "G", 99.0))
 
     def others(self, words: Words, new: New, drop: Bools, line: Ints, file: str, found: list[Diagnostic]) -> None:
         """What a dialect has besides."""
