@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -13,6 +14,10 @@ from postproc.program import Command, Hole
 from postproc.word_arcs import PLANE_AXIS
 from toolpaths.arrays import Floats
 from toolpaths.units import DEG
+
+
+LONGEST_DWELL = 3600.0
+"""s that one cycle 9 can rest"""
 
 
 class KlartextWriter(Writer):
@@ -131,6 +136,9 @@ class KlartextWriter(Writer):
             speed = self.speed_after(command)
             self.called = speed or self.called
             yield f"TOOL CALL {self.plain(command.args[0])} Z" + (f" S{self.plain(speed)}" if speed else "")
+        elif command.name == "DWELL" and float(command.args[0]) > LONGEST_DWELL:
+            for part in (LONGEST_DWELL, float(command.args[0]) - LONGEST_DWELL):
+                yield from self.command(replace(command, args=(part,)))
         else:
             yield from super().command(command)
 

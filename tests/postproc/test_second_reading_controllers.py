@@ -153,3 +153,9 @@ def test_chords_of_tiny_arcs_are_not_taken_for_too_fast(controller: str, radius:
     path = toolpath("MULTAX/ON", "GOTO/0,0,0,0,0,1", f"MOVARC/CENTER,{radius},0,0,AXIS,0,0,1,RADIUS,{radius}",
                     f"GOTO/{2.0 * radius},0,0", "GOTO/9,0,0,0.0998334,0,0.9950042")
     good(convert(path, "mikron-ucp710", controller, output="tcp"))
+
+
+def test_rests_beyond_an_hour_are_several_in_klartext() -> None:
+    made = program([step("rapid", X=1.0)], {0: [command("DWELL", 7300.5)]})
+    assert [n for n in blocks("heidenhain-tnc640", made) if "9.1" in n] == [
+        "CYCL DEF 9.1 DWELL 3600", "CYCL DEF 9.1 DWELL 3600", "CYCL DEF 9.1 DWELL 100.5"]
