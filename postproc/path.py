@@ -138,7 +138,7 @@ def build_path(modes: OutputModes, kinematics: Callable[[int], Kinematics], move
                                            tolerance, run.left)
             worst = np.maximum(worst, left)
             turns.append(turned)
-            diagnostics += faults.broken(moves, broken, file)
+            diagnostics += faults.broken(machine, moves, broken, run.q[[broken - first - 1, broken - first]], file)
         state, frame = Pose(moves.tip[last - 1], run.axis[-1], run.q[-1], run.frame.control), run.frame
         if progress:
             progress("blocks", int(last), len(moves))

@@ -5,13 +5,18 @@ from __future__ import annotations
 import numpy as np
 
 from machines.kinematics.base import Kinematics
+from machines.machine import Machine
 from postproc.control import Control
+from postproc.joint_path import TRAVEL_SLACK
 from postproc.moves import Moves
-from toolpaths.arrays import Array, Floats, Ints
+from toolpaths.arrays import Array, Bools, Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error, info
 from toolpaths.rotations import angle_between
 from toolpaths.toolpath import Kind
 from toolpaths.units import DEG
+
+_ELSEWHERE = 1e-3
+"""mm: a tip that its joints miss by more is not reached"""
 
 
 def merged(diagnostics: list[Diagnostic]) -> list[Diagnostic]:
@@ -38,7 +43,7 @@ def moved_axes(moves: Moves, rows: Ints, moved: Floats, file: str) -> list[Diagn
 
 def unreachable(control: Control, kin: Kinematics, moves: Moves, rows: Ints, axis: Floats, q: Floats,
                  file: str) -> list[Diagnostic]:
-    bad = np.flatnonzero(~np.isfinite(q).all(axis=1))
+    bad = np.flatnonzero(~np.isfinite(q).all(axis=1) | _elsewhere(kin, moves.tip[rows], q))
     if not len(bad):
         return []
     name = control.machine.name
@@ -59,17 +64,44 @@ def unreachable(control: Control, kin: Kinematics, moves: Moves, rows: Ints, axi
                   hint="move the part in the set-up (part.origin)")]
 
 
+def _elsewhere(kin: Kinematics, tip: Floats, q: Floats) -> Bools:
+    """(N,) True where a parallel machine is assembled so that its joints bring the tool to another place than the tip."""
+    if kin.slides_affine:
+        return np.zeros(len(tip), dtype=np.bool_)
+    there, _ = kin.forward(q)
+    return np.asarray(~(np.linalg.norm(there - tip, axis=1) <= _ELSEWHERE))
+
+
 def no_way(moves: Moves, row: int, file: str) -> Diagnostic:
     return error("link.blocked", "no linking move stays above the safe planes", file=file, lines=[int(moves.line[row])],
                  hint="give clearance.centre and a larger clearance.distance in the set-up")
 
 
-def broken(moves: Moves, rows: Ints, file: str) -> list[Diagnostic]:
-    if not len(rows):
-        return []
-    return [error("path.jump", "the rotary axes jump here: no points between keep the tool on its path", file=file,
-                  lines=moves.line[rows][:6].tolist(), count=len(rows),
-                  hint="retract before this point, or change the tool axis")]
+def broken(machine: Machine, moves: Moves, rows: Ints, q: Floats, file: str) -> list[Diagnostic]:
+    """Moves `rows` (K,) that no number of points keeps on their path; `q` (2, K, J) joints where they begin and end.
+
+    Outside travel the plan takes whatever comes: there it is travel that is short.
+    """
+    excess = np.maximum(machine.limits.lower - q, q - machine.limits.upper).max(axis=0)
+    short = excess.max(axis=1, initial=0.0) > TRAVEL_SLACK
+    result = []
+    for name, at, rotary, lower, upper, over in zip(machine.axis_names, np.moveaxis(q, 2, 0), machine.rotary,
+                                                    machine.limits.lower, machine.limits.upper, excess.T, strict=True):
+        bad = np.flatnonzero(over > TRAVEL_SLACK)
+        if len(bad):
+            unit, what = (1.0 / DEG, "degrees") if rotary else (1.0, "mm")
+            worst = bad[over[bad].argmax()]
+            value = max(at[:, worst].tolist(), key=lambda v: max(lower - v, v - upper))
+            result.append(error("travel.exceeded", f"axis {name} goes to {value * unit:.4f} {what}, allowed "
+                                f"{lower * unit:.4f} to {upper * unit:.4f} {what}", file=file,
+                                lines=moves.line[rows[bad]][:6].tolist(), count=len(bad),
+                                hint="turn or move the part in the set-up, or split the operation"))
+    jumps = rows[~short]
+    if len(jumps):
+        result.append(error("path.jump", "the rotary axes jump here: no points between keep the tool on its path",
+                            file=file, lines=moves.line[jumps][:6].tolist(), count=len(jumps),
+                            hint="retract before this point, or change the tool axis"))
+    return result
 
 
 def rapid_as_feed(code: Array, move: Ints, seconds: Floats, moves: Moves, file: str) -> list[Diagnostic]:

@@ -64,3 +64,19 @@ def test_a_move_of_a_few_grains_needs_no_block_of_its_own() -> None:
     tip = point[[1, 3, 4, 5]] - [2e-10, 0.0, 0.0]
     match, _ = align(tip, up[:4], np.full(4, np.nan), curves, np.zeros(5, dtype=bool), 0.01, 1e-3)
     assert match.tolist() == [0, 1, 1, 2, 3]
+
+
+@pytest.mark.parametrize("rows", [["GOTO/0,0,0"], ["GOTO/0,0,0", "FEDRAT/MMPM,100", "GOTO/10,0,0"]])
+def test_positions_of_another_assembly_are_out_of_reach(rows: list[str]) -> None:
+    """Above the slides the rods have lengths that fit, but the platform hangs below them."""
+    (fault,) = [d for d in convert(toolpath("RAPID", *rows), "h4a-c-table").diagnostics if d.severity.name == "ERROR"]
+    assert fault.code == "reach.position" and "(0.0000, 0.0000, 0.0000)" in fault.message
+
+
+def test_where_travel_is_short_a_jump_is_told_as_that() -> None:
+    heading = np.radians(np.linspace(0.0, 330.0, 34))
+    axis = np.stack([0.0 * heading, np.sin(heading), np.cos(heading)], axis=1)
+    rows = goto(np.zeros((len(axis), 3)) + np.linspace(0.0, 60.0, len(axis))[:, None] * [1.0, 0.0, 0.0], axis)
+    result = convert(toolpath("RAPID", rows[0], "FEDRAT/MMPM,1000", *rows[1:]), "fork-head-ab")
+    errors = [d for d in result.diagnostics if d.severity.name == "ERROR"]
+    assert {d.code for d in errors} == {"travel.exceeded"} and any("axis A" in d.message for d in errors)
