@@ -15,7 +15,6 @@ from postproc.word_arcs import PLANE_AXIS
 from toolpaths.arrays import Floats
 from toolpaths.units import DEG
 
-
 LONGEST_DWELL = 3600.0
 """s that one cycle 9 can rest"""
 
