@@ -10,6 +10,8 @@ import typer
 
 from postproc.cli_calibrate import calibrate
 from postproc.cli_catalogue import controller_app, machine_app, setup_app
+from postproc.cli_orient import ORIENTATIONS, MaxTilt, Orient
+from postproc.cli_orient import orient as orient_command
 from postproc.cli_time import time
 from postproc.console import Json, controller_of, machine_of, progress_bar, refuse_overwriting, report, shown_errors
 from postproc.console import rounded as rounded
@@ -27,6 +29,7 @@ app.add_typer(setup_app, name="setup")
 app.add_typer(controller_app, name="controller")
 app.command(epilog="Example: postproc calibrate reversal.toml -o errors.toml")(calibrate)
 app.command(epilog="Example: postproc time part.cls -m mikron-ucp710 -c linuxcnc")(time)
+app.command("orient", epilog="Example: postproc orient part.cls -m mikron-ucp710 --max-tilt 45")(orient_command)
 
 ClFile = Annotated[Path, typer.Argument(metavar="FILE", help="CL file (APT text)")]
 MachineName = Annotated[str, typer.Option("-m", "--machine", help="machine: a name from the list, or a TOML file")]
@@ -65,7 +68,7 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
             feed_mode: Annotated[str, typer.Option("--feed-mode", help="auto, per-minute or inverse-time")] = "auto",
             output_mode: Annotated[str, typer.Option("--output-mode", help="auto, axes (axis positions), tcp (the control "
                                                      "runs the kinematics) or tilted (turned plane)")] = "auto",
-            orient: Annotated[str, typer.Option("--orient", help="keep: the tool axes of the CL file")] = "keep",
+            orient: Orient = "keep", max_tilt: MaxTilt = 60.0,
             feed: Annotated[str, typer.Option("--feed", help="programmed: the feeds of the CL file; planned: reduced where "
                                                      "an axis would exceed velocity, acceleration or jerk")] = "programmed",
             merge_feeds: Annotated[float, typer.Option("--merge-feeds", metavar="PERCENT", min=0.0, max=50.0, help="planned "
@@ -76,12 +79,13 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
             dialect: Dialect = "", allow_unknown: Allow = None, error_model: Errors = "", beyond: Beyond = False,
             json: Json = "") -> None:
     """Convert a CL file to G-code, read it back and prove it; nothing is written where a proof fails."""
-    _choice("--orient", orient, ("keep",))
+    _choice("--orient", orient, ORIENTATIONS)
     _choice("--feed", feed, ("programmed", "planned"))
     _choice("--output-mode", output_mode, ("auto", "axes", "tcp", "tilted"))
     options = replace(_options(tolerance, axis_tolerance, feed_mode, setup, units, dialect, allow_unknown),
                       output=output_mode, feed=feed, merge_feeds=merge_feeds / 100.0, smooth=smooth,  # type: ignore[arg-type]
-                      error_model=error_model, error_beyond=beyond)
+                      error_model=error_model, error_beyond=beyond, orient=orient,  # type: ignore[arg-type]
+                      max_tilt=max_tilt)
     refuse_overwriting({"-o": str(output), "--json": json}, {"the CL file": str(file), "the set-up": setup,
                                                              "the error model": error_model})
     from postproc import summary
@@ -103,10 +107,11 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
 def verify(gcode: Annotated[Path, typer.Argument(metavar="GCODE", help="G-code file")], file: ClFile,
            machine: MachineName, controller: ControllerName, setup: Setup = "", tolerance: Tolerance = 0.01,
            axis_tolerance: AxisTolerance = 0.05, units: Units = "", dialect: Dialect = "", allow_unknown: Allow = None,
-           error_model: Errors = "", json: Json = "") -> None:
+           error_model: Errors = "", orient: Orient = "keep", max_tilt: MaxTilt = 60.0, json: Json = "") -> None:
     """Read a G-code file back and compare its motion with a CL file."""
+    _choice("--orient", orient, ORIENTATIONS)
     options = replace(_options(tolerance, axis_tolerance, "auto", setup, units, dialect, allow_unknown),
-                      error_model=error_model)
+                      error_model=error_model, orient=orient, max_tilt=max_tilt)  # type: ignore[arg-type]
     refuse_overwriting({"--json": json}, {"the CL file": str(file), "the G-code file": str(gcode), "the set-up": setup})
     from postproc import summary
     from postproc.pipeline import verify as run

@@ -8,6 +8,7 @@ from typing import Literal
 FeedMode = Literal["auto", "per-minute", "inverse-time"]
 OutputMode = Literal["auto", "axes", "tcp", "tilted"]
 FeedSource = Literal["programmed", "planned"]
+Orientation = Literal["keep", "per-pass", "whole-part", "auto"]
 
 
 @dataclass(frozen=True)
@@ -26,6 +27,10 @@ class Options:
     merge_feeds: float = 0.0
     """part by which a planned feed may be lowered so that neighbouring blocks share one"""
     smooth: bool = False
+    orient: Orientation = "keep"
+    """tool axes of positioned passes: those of the CL file, or chosen for the least planned time"""
+    max_tilt: float = 60.0
+    """of chosen axes, degrees from the surface normals of the file, or from its own axes where it has none"""
     error_model: str = ""
     """file of the machine's geometric errors"""
     error_beyond: bool = False
@@ -39,6 +44,9 @@ class Options:
             lines.append(f"output mode {self.output}")
         if self.feed != "programmed":
             lines.append(f"feed {self.feed}, merged within {100.0 * self.merge_feeds:g} %")
+        if self.orient != "keep":
+            lines += [f"tool axes chosen: orient {self.orient}, max tilt {self.max_tilt:g} degrees",
+                      "proved against the CL file with these axes, its tips moved to keep the ball's contact"]
         if self.smooth:
             lines.append("points smoothed")
         if self.error_model:

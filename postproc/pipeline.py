@@ -117,9 +117,20 @@ def convert(path: Toolpath, machine: Machine | str | FilePath, controller: str |
         setup, more = load_setup(options.setup or None)
         toolpaths.diagnostics.require(more)
     assert spec is not None and setup is not None
-    known = _reading(path, diagnostics)
+    path, known = _oriented(path, machine, setup, options, _reading(path, diagnostics), progress)
     start = PostResult("", options, machine, spec, FilePath(controller).stem, setup, known, path)
     return start if not start.ok else _stages(start, progress)
+
+
+def _oriented(path: Toolpath, machine: Machine, setup: SetupFile, options: Options, known: tuple[Diagnostic, ...],
+              progress: Progress | None) -> tuple[Toolpath, tuple[Diagnostic, ...]]:
+    """The path with the tool axes that --orient asks for, where it can be read at all."""
+    if options.orient == "keep" or has_errors(known):
+        return path, known
+    from postproc.orientation.orient import orient
+
+    choice, found = orient(path, machine, setup, options, progress)
+    return (path if choice is None else choice.toolpath(options.orient)), (*known, *found)
 
 
 def _reading(path: Toolpath, diagnostics: list[Diagnostic] | None) -> tuple[Diagnostic, ...]:
@@ -328,7 +339,7 @@ def verify(gcode: str | FilePath, path: Toolpath, machine: Machine | str | FileP
     Raises:
         DiagnosticError: where machine, controller or set-up cannot be loaded, or the G-code file not be opened.
     """
-    options, found = options or Options(), list(_reading(path, diagnostics))
+    options = options or Options()
     spec, more = load_controller(controller)
     toolpaths.diagnostics.require(more)
     machine = machine if isinstance(machine, Machine) else machines.load(machine)
@@ -339,6 +350,8 @@ def verify(gcode: str | FilePath, path: Toolpath, machine: Machine | str | FileP
         data = FilePath(gcode).read_bytes()
     except OSError as fault:
         raise DiagnosticError([error("gcode.open", f"cannot be read: {fault.strerror}", file=str(gcode))]) from fault
+    path, known = _oriented(path, machine, setup, options, _reading(path, diagnostics), progress)
+    found = list(known)
     if has_errors(found):
         return VerifyResult(str(gcode), None, tuple(found))
     job, more = prepare(path, machine, spec, setup, options)

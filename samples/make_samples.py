@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import gentle
+import orientation
 import prismatic
 import surfaces
 
@@ -18,6 +19,7 @@ SAMPLES = {
     "inch_plate.apt": prismatic.inch_plate,
     "blade.cls": surfaces.blade,
     "bicubic.cls": surfaces.bicubic,
+    "test_part.cls": orientation.test_part,
     "tool_axis_tour.apt": surfaces.tour,
     "h4a_dome.cls": gentle.h4a_dome,
     "h4a_indexed.cls": gentle.h4a_indexed,

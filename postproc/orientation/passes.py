@@ -1,0 +1,215 @@
+"""Passes of a toolpath as the choice of orientations sees them: one tool axis each, or fixed and why."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from machines.kinematics.base import Kinematics
+from machines.machine import Machine
+from postproc.events import tool_changes
+from postproc.feedrate.feed import StepFeed
+from postproc.feedrate.geometry_sites import sites
+from postproc.links import SafeSpace, safe_space
+from postproc.moves import Moves, build_moves
+from postproc.options import Options
+from postproc.orientation.cutter import ball_radius
+from postproc.pass_geometry import chains, stops_of
+from postproc.setup import Placement, SetupFile, part_placement
+from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.diagnostics import Diagnostic, error, has_errors
+from toolpaths.rotations import angle_between
+from toolpaths.smoothing.smooth import Smooth, Tolerance, smooth_all
+from toolpaths.toolpath import Kind, Role, Toolpath
+from toolpaths.units import DEG
+
+TURNS = 1e-6
+"""rad: axes that differ by less are one"""
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """Cutting motion from stop to stop: sites s (N,), the smoothed tip and axis (N, 3) there, and the feed along s."""
+
+    s: Floats
+    tip: Floats
+    axis: Floats
+    feed: StepFeed
+
+    @property
+    def length(self) -> float:
+        """mm"""
+        return float(self.s[-1] - self.s[0])
+
+    def directions(self) -> dict[str, Floats]:
+        """Unit feed directions (3,): that of the chord ("mean"), and where the stretch begins and ends (section IV.D)."""
+        ways = {"mean": self.tip[-1] - self.tip[0], "initial": self.tip[1] - self.tip[0],
+                "final": self.tip[-1] - self.tip[-2]}
+        return {name: way / size for name, way in ways.items() if (size := float(np.linalg.norm(way))) > 0.0}
+
+
+@dataclass(frozen=True)
+class Pass:
+    """Motion that is turned as a whole: rapids, then cuts with one tool axis, in the table frame.
+
+    Attributes:
+        number: 0, 1, ... in the order of the file
+        rows: [first, last) of Moves
+        tip, axes (n, 3): end poses of these rows
+        rapid (n,): rows that are rapids
+        axis (3,): the tool axis of the CL file
+        normal (K, 3): surface normals that the file gives in this pass, none where it gives none
+        radius: of the ball, mm
+        fixed: why the axis cannot be turned, "" where it can
+        by_home: the tool comes from home (first pass, tool change, GOHOME)
+        tool: index into Toolpath.tools
+    """
+
+    number: int
+    rows: tuple[int, int]
+    tip: Floats
+    axes: Floats
+    rapid: Bools
+    axis: Floats
+    normal: Floats
+    radius: float
+    fixed: str
+    by_home: bool
+    tool: int
+    kin: Kinematics
+    stretches: tuple[Stretch, ...]
+    line: int
+
+    def shift(self, axis: Floats) -> Floats:
+        """(3,) by which the tip moves so that the ball stays where it is: tip' = tip + R (axis - axis')."""
+        return np.asarray(self.radius * (self.axis - axis))
+
+    @property
+    def longest(self) -> Stretch | None:
+        """The stretch that decides about directions."""
+        return max(self.stretches, key=lambda one: one.length, default=None)
+
+
+@dataclass(frozen=True)
+class Work:
+    """A toolpath on a machine, cut into passes; `moves` in the table frame."""
+
+    toolpath: Toolpath
+    machine: Machine
+    setup: SetupFile
+    placement: Placement
+    moves: Moves
+    space: SafeSpace
+    passes: tuple[Pass, ...]
+
+
+def work_of(toolpath: Toolpath, machine: Machine, setup: SetupFile,
+            options: Options) -> tuple[Work | None, list[Diagnostic]]:
+    """The passes of a toolpath on a machine; errors where a pass could be turned but its cutter is not known."""
+    placement, found = part_placement(setup, options.setup)
+    if placement is None:
+        return None, found
+    if not bool((toolpath.role != Role.START).any()):
+        return None, [error("orient.no_motion", "the file commands no motion", file=toolpath.file,
+                            hint="it needs GOTO records")]
+    moves, more = build_moves(toolpath, setup, options.axis_tolerance * DEG)
+    if has_errors(more):
+        return None, [*found, *more]
+    moves = moves.placed(placement)
+    first = _beginnings(toolpath, moves)
+    stretches = _stretches(toolpath, moves, Tolerance(options.tolerance, options.axis_tolerance * DEG))
+    normals = None if toolpath.normal is None else placement.directions(toolpath.normal)[moves.row]
+    by_home = [e.index for e in toolpath.events if e.word == "GOHOME"] + [c.index for c in tool_changes(toolpath)]
+    homes = {0, *np.searchsorted(moves.row, by_home).tolist()}
+    passes = [_pass(number, rows, toolpath, moves, stretches, normals, homes, machine, setup)
+              for number, rows in enumerate(pairwise([*first.tolist(), len(moves)]))]
+    faults = _unknown_cutters(toolpath, passes)
+    work = Work(toolpath, machine, setup, placement, moves, safe_space(moves, setup, placement), tuple(passes))
+    return (None if faults else work), [*found, *more, *faults]
+
+
+def _beginnings(toolpath: Toolpath, moves: Moves) -> Ints:
+    """First rows of Moves of the passes: the first, and each rapid behind a cut that a cut follows; others go on."""
+    rapid = (moves.kind == Kind.RAPID) & (moves.hole < 0)
+    anew = rapid & np.append(False, np.diff(toolpath.pass_[moves.row]) != 0)
+    cuts = np.cumsum(~rapid)
+    first = np.flatnonzero(anew & (cuts > 0) & (cuts < cuts[-1]))
+    return np.append(0, first)
+
+
+def _stretches(toolpath: Toolpath, moves: Moves, tolerance: Tolerance) -> dict[int, list[Stretch]]:
+    """Stretches of each unbroken cut, by its first row of Moves."""
+    found = chains(moves, stops_of(toolpath, moves))
+    if not found:
+        return {}
+    rows = np.concatenate([np.arange(first, last) for first, last in found])
+    begin = np.concatenate(([0], np.cumsum([last - first for first, last in found])))
+    smoothed = smooth_all(moves.curves().take(rows), begin, tolerance)
+    return {first: _cut(one, moves, np.arange(first, last)) for (first, last), one in zip(found, smoothed, strict=True)
+            if one is not None}
+
+
+def _cut(path: Smooth, moves: Moves, rows: Ints) -> list[Stretch]:
+    """A smoothed chain from stop to stop."""
+    way = np.diff(path.s)
+    moving = way > 0.0
+    feed = np.where(np.isnan(moves.feed[rows]), way / moves.seconds[rows], moves.feed[rows])[moving]
+    edges = np.append(path.s[0], path.s[1:][moving])
+    result = []
+    for low, high in pairwise(np.unique(np.concatenate((path.s[:1], path.stops, path.s[-1:]))).tolist()):
+        s = sites(path, low, high)
+        tip, axis = path.at(s)
+        result.append(Stretch(s, tip, axis, StepFeed(edges, feed)))
+    return result
+
+
+def _pass(number: int, rows: tuple[int, int], toolpath: Toolpath, moves: Moves, stretches: dict[int, list[Stretch]],
+          normals: Floats | None, homes: set[int], machine: Machine, setup: SetupFile) -> Pass:
+    here = slice(*rows)
+    cuts = np.flatnonzero(moves.kind[here] != Kind.RAPID)
+    axis = moves.axis[rows[0] + int(cuts[0])] if len(cuts) else moves.axis[rows[0]]
+    tool = int(moves.tool[rows[0] + int(cuts[0])] if len(cuts) else moves.tool[rows[0]])
+    known = toolpath.tools[tool] if tool >= 0 else None
+    radius = ball_radius(known)
+    length = setup.tools.get(str(known.number if known else 0))
+    kin = machine.kinematics.with_tool(length.gauge_length if length else 0.0)
+    normal = np.zeros((0, 3)) if normals is None else normals[here][cuts]
+    line = int(moves.line[rows[0] + int(cuts[0])] if len(cuts) else moves.line[rows[0]])
+    inside = [one for first in range(*rows) for one in stretches.get(first, ())]
+    return Pass(number, rows, moves.tip[here], moves.axis[here], moves.kind[here] == Kind.RAPID, axis,
+                normal[np.isfinite(normal).all(axis=1)], radius or 0.0, _fixed(moves, rows, cuts, axis, radius),
+                not homes.isdisjoint(range(*rows)), tool, kin, tuple(inside), line)
+
+
+def _fixed(moves: Moves, rows: tuple[int, int], cuts: Ints, axis: Floats, radius: float | None) -> str:
+    """Why the axis of a pass is fixed; "" where it may be turned."""
+    here = slice(*rows)
+    if not len(cuts):
+        return "nothing is cut"
+    if bool((moves.hole[here] >= 0).any()):
+        return "drilling: the axis is that of the hole"
+    if bool((angle_between(moves.axis[here], axis[None]) > TURNS).any()):
+        return "the tool axis turns within the pass"
+    if bool((moves.tool[here][cuts] != moves.tool[here][cuts[0]]).any()) or moves.kind[rows[0]] != Kind.RAPID:
+        return "no rapid leads to it on which the tool could turn"
+    if radius is None:
+        return UNKNOWN
+    return "the cutter is no ball: turned, it would touch elsewhere" if radius == 0.0 else ""
+
+
+UNKNOWN = "the form of the cutter is not known"
+
+
+def _unknown_cutters(toolpath: Toolpath, passes: list[Pass]) -> list[Diagnostic]:
+    """A pass whose cutter the file does not describe is no guess."""
+    bad = [one for one in passes if one.fixed == UNKNOWN]
+    if not bad:
+        return []
+    tools = sorted({toolpath.tools[one.tool].number if one.tool >= 0 else 0 for one in bad})
+    names = ", ".join(f"T{n}" for n in tools)
+    return [error("orient.cutter", f"diameter or corner radius of {names} is not in the CL file: re-orienting "
+                  "keeps the contact of a ball of known radius", file=toolpath.file,
+                  lines=[one.line for one in bad][:6], count=len(bad),
+                  hint="state the cutter (CUTTER/16,8 or TLDATA), or keep the orientation (--orient keep)")]
