@@ -16,6 +16,8 @@ from toolpaths.diagnostics import Diagnostic, error
 
 LEAST = 8
 """lines of the log that a fit needs"""
+MOST_LINES, MOST_SECONDS = 1e9, 1e7
+"""what no program and no run has more of"""
 
 
 @dataclass(frozen=True)
@@ -39,22 +41,23 @@ def read_log(file: str | Path, letters: tuple[str, ...]) -> tuple[Log | None, li
     Raises:
         DiagnosticError: where the file cannot be read.
     """
-    text = read_file(file).decode("utf-8", "replace")
+    text = read_file(file, "a log of a measured run: columns nc_line and time_s").decode("utf-8-sig", "replace")
     rows = list(csv.reader(io.StringIO(text)))
     names = [name.strip() for name in rows[0]] if rows else []
     allowed = ("nc_line", "time_s", *letters)
-    if names[:2] != ["nc_line", "time_s"] or set(names) - set(allowed):
-        return None, [error("log.columns", f"columns {', '.join(names) or 'none'}, allowed: nc_line, time_s, then any of "
-                            f"{', '.join(letters)}", file=str(file), lines=[1], hint="the first line names the columns")]
+    if not {"nc_line", "time_s"} <= set(names) <= set(allowed) or len(set(names)) < len(names):
+        return None, [error("log.columns", f"columns {', '.join(names) or 'none'}, allowed: nc_line, time_s and any of "
+                            f"{', '.join(letters)}, each once", file=str(file), lines=[1],
+                            hint="the first line names the columns")]
     values, found = _numbers(rows[1:], len(names), str(file))
     if found:
         return None, found
-    position = np.full((len(values), len(letters)), np.nan)
-    for k, name in enumerate(names[2:], 2):
-        position[:, letters.index(name)] = values[:, k]
-    number = np.array([k for k, row in enumerate(rows[1:], 2) if row])
-    log = Log(values[:, 0].astype(np.int64), values[:, 1], position, number)
-    return (None, found) if (found := _faults(log, values, str(file))) else (log, [])
+    column = dict(zip(names, values.T, strict=True))
+    position = np.stack([column.get(name, np.full(len(values), np.nan)) for name in letters], axis=1)
+    number = np.array([k for k, row in enumerate(rows[1:], 2) if row], dtype=np.int64)
+    if found := _faults(column["nc_line"], column["time_s"], number, str(file)):
+        return None, found
+    return Log(column["nc_line"].astype(np.int64), column["time_s"], position, number), []
 
 
 def _numbers(rows: list[list[str]], columns: int, file: str) -> tuple[Floats, list[Diagnostic]]:
@@ -77,19 +80,22 @@ def _numbers(rows: list[list[str]], columns: int, file: str) -> tuple[Floats, li
     return np.array(values, dtype=np.float64).reshape(-1, columns), []
 
 
-def _faults(log: Log, values: Floats, file: str) -> list[Diagnostic]:
+def _faults(line: Floats, time: Floats, row: Ints, file: str) -> list[Diagnostic]:
     """What makes a log useless."""
-    if len(log.line) < LEAST:
-        return [error("log.short", f"{len(log.line)} samples, at least {LEAST} are needed", file=file,
+    if len(line) < LEAST:
+        return [error("log.short", f"{len(line)} samples, at least {LEAST} are needed", file=file,
                       hint="log every change of the line number")]
-    odd = np.flatnonzero((values[:, 0] != np.round(values[:, 0])) | (values[:, 0] < 1.0))
+    odd = np.flatnonzero((line != np.round(line)) | (line < 1.0) | (line > MOST_LINES))
     if len(odd):
-        return [error("log.line", "nc_line is no line number", file=file, lines=log.row[odd][:6].tolist(), count=len(odd),
-                      hint="lines of the file are whole numbers from 1")]
-    back = np.flatnonzero(np.diff(log.time) < 0.0) + 1
+        return [error("log.line", f"nc_line {line[odd[0]]:g} is no line number", file=file, lines=row[odd][:6].tolist(),
+                      count=len(odd), hint="lines of the file are whole numbers from 1")]
+    back = np.flatnonzero(np.diff(time) < 0.0) + 1
     if len(back):
-        return [error("log.time", "time_s falls", file=file, lines=log.row[back][:6].tolist(), count=len(back),
+        return [error("log.time", "time_s falls", file=file, lines=row[back][:6].tolist(), count=len(back),
                       hint="samples in the order of the run, s from any start")]
+    if not 0.0 < time[-1] - time[0] <= MOST_SECONDS:
+        return [error("log.time", f"time_s goes from {time[0]:g} to {time[-1]:g}, allowed: more than 0 and at most "
+                      f"{MOST_SECONDS:g} s", file=file, lines=row[[0, -1]].tolist(), hint="s, as the run passes")]
     return []
 
 
@@ -106,4 +112,7 @@ def matched(log: Log, blocks: Blocks, file: str) -> tuple[Ints, Ints, list[Diagn
     if len(samples) < LEAST:
         return samples, block, [error("log.lines", f"only {len(samples)} samples stand at lines of the program that move",
                                       file=file, hint="nc_line counts the lines of the file, not N words")]
+    if log.time[samples[-1]] <= log.time[samples[0]]:
+        return samples, block, [error("log.time", "no time passes at lines of the program that move", file=file,
+                                      lines=log.row[samples[[0, -1]]].tolist(), hint="s, as the run passes")]
     return samples, block, []

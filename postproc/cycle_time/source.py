@@ -111,7 +111,7 @@ def looks_like_gcode(data: bytes) -> bool:
     return False
 
 
-def read_file(file: str | Path) -> bytes:
+def read_file(file: str | Path, hint: str = "a CL file, or a program of the controller") -> bytes:
     """The bytes of a file.
 
     Raises:
@@ -121,4 +121,4 @@ def read_file(file: str | Path) -> bytes:
         return Path(file).read_bytes()
     except OSError as fault:
         raise DiagnosticError([error("time.open", f"cannot be read: {fault.strerror}", file=str(file),
-                                     hint="a CL file, or a program of the controller")]) from fault
+                                     hint=hint)]) from fault

@@ -115,7 +115,8 @@ GOOD = "".join(f"{n},{n}\n" for n in range(1, 12))
 
 
 @pytest.mark.parametrize(("text", "code", "lines"), [
-    ("time_s,nc_line\n" + GOOD, "log.columns", (1,)),
+    ("time_s,X\n" + GOOD, "log.columns", (1,)),
+    ("nc_line,time_s,X,X\n" + GOOD, "log.columns", (1,)),
     ("nc_line,time_s,Q\n" + GOOD, "log.columns", (1,)),
     ("", "log.columns", (1,)),
     ("nc_line,time_s\n" + GOOD + "12,ten\n13\n", "log.numbers", (13, 14)),
@@ -123,6 +124,9 @@ GOOD = "".join(f"{n},{n}\n" for n in range(1, 12))
     ("nc_line,time_s\n1,1\n2,2\n", "log.short", ()),
     ("nc_line,time_s\n" + GOOD + "12.5,12\n", "log.line", (13,)),
     ("nc_line,time_s\n" + GOOD + "12,3\n", "log.time", (13,)),
+    ("nc_line,time_s\n" + GOOD + "1e30,12\n", "log.line", (13,)),
+    ("nc_line,time_s\n" + GOOD + "12,1e300\n", "log.time", (2, 13)),
+    ("nc_line,time_s\n" + "".join(f"{k},5\n" for k in range(1, 12)), "log.time", (2, 12)),
 ])
 def test_bad_logs_are_told(tmp_path: Path, text: str, code: str, lines: tuple[int, ...]) -> None:
     (tmp_path / "log.csv").write_text(text)
@@ -136,6 +140,22 @@ def test_a_log_of_another_program_is_refused() -> None:
     log = Log(line, np.arange(20.0), np.full((20, 3), np.nan), line)
     made, found = calibrate(finishing(0), log, model("lookahead"), "log.csv")
     assert made is None and [d.code for d in found] == ["log.lines"]
+
+
+def test_a_log_in_which_the_program_takes_no_time() -> None:
+    b = finishing(0)
+    line = np.append(np.unique(b.line)[:20], 10**6)
+    log = Log(line, np.append(np.full(20, 3.0), 9.0), np.full((21, 3), np.nan), np.arange(2, 23))
+    made, found = calibrate(b, log, model("lookahead"), "log.csv")
+    assert made is None and [d.code for d in found] == ["log.time"]
+
+
+def test_columns_in_any_order_and_a_byte_order_mark(tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_bytes(b"\xef\xbb\xbfX,time_s,nc_line\n" + b"".join(b"%d,%d.5,%d\n" % (9 * k, k, k)
+                                                                                     for k in range(1, 12)))
+    log, found = read_log(tmp_path / "log.csv", ("X", "Y"))
+    assert log is not None and not found
+    assert log.line[2] == 3 and log.time[2] == 3.5 and log.position[2, 0] == 27.0
 
 
 def test_a_log_that_is_not_there(tmp_path: Path) -> None:
