@@ -78,10 +78,17 @@ def compare(motion: Motion, job: Job, executed: Executed, gcode: str = "") -> Co
     diagnostics += check_speeds(motion, executed.control, moves, curves, owner, match,
                                 job.controller.feed.arc_inverse == "radius", tolerance, faults)
     diagnostics += check_links(motion, executed, moves, owner, job.space, tolerance, faults)
-    diagnostics += check_rewinds(motion, executed, number, tip, axis, job.space, tolerance, grain[1], faults)
+    diagnostics += check_rewinds(motion, executed, number, tip, axis, job.space, tolerance, grain[1] + _kept(job), faults)
     diagnostics += check_travel(motion, executed, moves, owner, faults)
     diagnostics += check_smoothing(motion, job, moves, owner, faults)
     return Comparison(worst_tip, worst_axis, tip_line, axis_line, tip, axis, match, owner, tuple(diagnostics))
+
+
+def _kept(job: Job) -> float:
+    """rad: what the correction of geometric errors may turn the tool by between blocks, 0 without errors."""
+    from postproc.compensation import SHARE
+
+    return 0.0 if job.errors is None else SHARE * job.axis_tolerance
 
 
 def _aligned(kept: Ints, tip: Floats, axis: Floats, sweep: Floats, curves: Curves, link: Bools, tolerance: float,

@@ -203,6 +203,60 @@ def test_arcs_survive_a_squareness_error_and_not_a_wavy_guide(tmp_path: Path) ->
     assert wavy.comparison is not None and wavy.comparison.worst_tip < LOOSE * SHARE * 0.01 + 1e-4
 
 
+def test_rewinds_are_proved_on_the_machine_with_errors(tmp_path: Path) -> None:
+    """25 rewinds in one cut: on its way out the correction turns the tool by an arc second, no unwinding in the cut."""
+    machine = str(SAMPLES / "joints" / "limited_c.toml")
+    model = written(tmp_path, replace(load(MIKRON, machines.load("mikron-ucp710")), machine=""))
+    result = converted("joints/spiral_50.cls", machine, model=model)
+    assert result.ok, [str(d) for d in result.diagnostics]
+    assert result.compensation is not None and result.compensation.tip_before > 0.02
+    assert result.comparison is not None and result.comparison.worst_tip < 0.01
+
+
+def words_of_arc(text: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(start, centre, end) in x, y of the first arc of a program."""
+    at = {"X": 0.0, "Y": 0.0}
+    for line in text.splitlines():
+        words = {w[0]: float(w[1:]) for w in line.split() if w[0] in "XYIJ" and w[1:].replace(".", "").lstrip("-").isdigit()}
+        start, at = np.array([at["X"], at["Y"]]), at | {k: v for k, v in words.items() if k in at}
+        if words.keys() & {"I", "J"}:
+            return start, start + np.array([words.get("I", 0.0), words.get("J", 0.0)]), np.array([at["X"], at["Y"]])
+    raise AssertionError("no arc")
+
+
+HALF, QUARTER = "CIRCLE/0,0,0,0,0,1,40\nGOTO/40,0,0\nRAPID\nGOTO/40,0,20", \
+    "CIRCLE/0,0,0,0,0,-1,40\nGOTO/0,40,0\nRAPID\nGOTO/0,40,20"
+SHIFT, SLOPE = "-500, 3\n500, 3\n", "-500, -37.5\n500, 37.5\n"
+"""3 um everywhere; 3 um at x = 40, -3 um at x = -40"""
+
+
+@pytest.mark.parametrize(("name", "table", "start", "centre", "end"), [
+    ("EXX", SHIFT, (-40.003, 0.0), (-0.003, 0.0), (39.997, 0.0)),   # moved along the chord
+    ("EYX", SHIFT, (-40.0, -0.003), (0.0, -0.003), (40.0, -0.003)),  # and across it
+    ("EXX", SLOPE, (-39.997, 0.0), (0.0, 0.0), (39.997, 0.0)),      # smaller
+    ("EYX", SLOPE, (-40.0, 0.003), (0.0, 0.0), (40.0, -0.003))])    # turned about the centre
+def test_the_centre_of_an_arc_goes_with_its_ends(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, table: str,
+                                                 start: tuple[float, float], centre: tuple[float, float],
+                                                 end: tuple[float, float]) -> None:
+    """Half a circle about the origin from x = -40, on a mill with one straight error."""
+    monkeypatch.setitem(globals(), "SQUARE", SQUARE.replace("GOTO/40,0,0\nGOTO/-40,0,0\nCIRCLE", "CIRCLE"))
+    result = mill(tmp_path, f'[components.{name}]\ntable = "x.csv"\n', f"X [mm], {name} [um]\n{table}")
+    assert result.ok and result.compensation is not None and result.compensation.resolved == 0
+    for got, wanted in zip(words_of_arc(result.text), (start, centre, end), strict=True):
+        assert got == pytest.approx(wanted, abs=2e-5)
+
+
+def test_the_centre_of_an_arc_is_as_far_from_both_ends(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A quarter whose ends move unlike: halfway with both, the centre would be 1.5 um farther from one of them."""
+    quarter = SQUARE.replace("GOTO/40,0,0\nGOTO/-40,0,0\nCIRCLE", "CIRCLE").replace(HALF, QUARTER)
+    monkeypatch.setitem(globals(), "SQUARE", quarter)
+    result = mill(tmp_path, '[components.EXX]\ntable = "x.csv"\n', f"X [mm], EXX [um]\n{SLOPE}")
+    assert result.ok and result.compensation is not None and result.compensation.resolved == 0
+    start, centre, end = words_of_arc(result.text)
+    assert start == pytest.approx([-39.997, 0.0]) and end == pytest.approx([0.0, 40.0])
+    assert np.linalg.norm(start - centre) == pytest.approx(np.linalg.norm(end - centre), abs=5e-5)
+
+
 def test_beyond_the_measured_range_is_refused_unless_asked_for(tmp_path: Path) -> None:
     toml = "[components.EYX]\npolynomial = [3.0]\nrange = [-30, 30]\n"
     refused = mill(tmp_path, toml)
