@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+import toolpaths
 from toolpaths.cl.read import ReadResult, read_bytes
 from toolpaths.diagnostics import Severity
 from toolpaths.inspect import inspect
@@ -232,3 +234,14 @@ def test_an_nx_arc_that_ends_a_hair_behind_its_start_goes_back_that_way() -> Non
     p = read(NX + "GOTO/68.9,0,0,0,0,1\nCIRCLE/0,0,0,0,0,-1,68.9,.03,.5,10,0\nGOTO/68.9,-0.0001,0\n", "cl.arc-back")
     assert p.arcs.sweep.tolist() == pytest.approx([0.0001 / 68.9], rel=1e-6)
     assert p.arcs.normal.tolist() == [[0, 0, -1]]
+
+
+def test_an_operation_without_its_end_is_named_where_others_have_theirs(tmp_path: Path) -> None:
+    whole = "TOOL PATH/A,TOOL,T1\nGOTO/1,2,3\nEND-OF-PATH\nTOOL PATH/B,TOOL,T1\nGOTO/1,2,4\nEND-OF-PATH\n"
+    for text, found in ((whole, []), (whole[:-12], [("cl.no-end-of-path", (4,))]), (whole.replace("END-OF-PATH\n", ""), []),
+                        (whole.replace("END-OF-PATH\n", "", 1), [("cl.no-end-of-path", (1,))]),
+                        (whole[:-14], [("cl.cut-off", (5,)), ("cl.no-end-of-path", (4,))]), (whole[:-1], [])):
+        file = tmp_path / "part.cls"
+        file.write_text(text)
+        _, diagnostics = toolpaths.read(file)
+        assert sorted((d.code, d.lines) for d in diagnostics if d.code in ("cl.no-end-of-path", "cl.cut-off")) == found, text

@@ -114,6 +114,10 @@ class Builder:
         self.declared: Declared | None = None
         self.zsurf: float | None = None
         self.subprograms: dict[float, tuple[int, int]] | None = None
+        self.open_paths: list[tuple[int, str]] = []
+        """line and name of the operations that END-OF-PATH has yet to end"""
+        self.paths_ended = False
+        """END-OF-PATH stood in the file"""
         self.finished = -1
         """row at the first FINI"""
         self.calls: list[tuple[int, int]] = []

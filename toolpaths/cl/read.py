@@ -15,6 +15,7 @@ from toolpaths.cl.log import Log
 from toolpaths.cl.scan import LARGEST, LARGEST_OWN, Progress, scan
 from toolpaths.cl.source import normalise
 from toolpaths.cl.statements import Lexer, Program
+from toolpaths.cl.structure import open_paths
 from toolpaths.diagnostics import Diagnostic, Severity, error
 from toolpaths.toolpath import Toolpath
 
@@ -76,6 +77,9 @@ def read_bytes(data: bytes | str, *, file: str = "", units: str | None = None, d
     b = Builder(program, parts.points, found, _units(program, units, log), log, allow_unknown)
     run(b, 0, len(program.statements))
     b.finish_rows()
+    open_paths(b)
+    if file:
+        _cut_off(data, parts.lines, log)
     counts = report_others(b)
     if b.row == 0:
         log.error("cl.empty", "the file holds no point", hint="a CL file has GOTO records")
@@ -83,6 +87,16 @@ def read_bytes(data: bytes | str, *, file: str = "", units: str | None = None, d
     diagnostics = log.diagnostics()
     return ReadResult(_with_faults(toolpath, diagnostics), diagnostics, counts, found.name, evidence,
                       b.arc_records, b.cycle_records, parts.lines)
+
+
+def _cut_off(data: bytes | str, lines: int, log: Log) -> None:
+    """A warning where the last line has no end and is not one that ends a file."""
+    tail = data[-200:].encode("utf-8", "replace") if isinstance(data, str) else bytes(data[-200:])
+    last = tail.replace(b"\r", b"\n").rsplit(b"\n", 1)[-1].rstrip(b"\x1a\x00").strip()
+    if last and not last.upper().startswith((b"FINI", b"END", b"$$")):
+        found = last[:60].decode("ascii", "replace")
+        log.warning("cl.cut-off", f"the file ends behind {found!r} without a line end: it may "
+                    "be cut off", lines, "compare the last line with the CAM system, or write the file anew")
 
 
 def _check_options(units: str | None, dialect: str | None) -> None:

@@ -38,12 +38,24 @@ def tool_path(b: Builder, s: Statement) -> None:
     found = _TOOL_PATH.match(s.body)
     name, tool_name = (found[1].strip(), (found[2] or "").strip()) if found else (s.body, "")
     begin_operation(b, name, tool_name)
+    b.open_paths.append((b.line, name))
     if tool_name:
         describe(b, name=tool_name)
 
 
+def open_paths(b: Builder) -> None:
+    """A warning where a TOOL PATH stands without END-OF-PATH, in a file that has that record."""
+    if not b.paths_ended:
+        return
+    for line, name in b.open_paths:
+        b.log.warning("cl.no-end-of-path", f"operation {name} has no END-OF-PATH: its end may be missing", line,
+                      "write the file anew in the CAM system", key=name)
+
+
 def end_of_path(b: Builder, s: Statement) -> None:
     """END-OF-PATH."""
+    b.paths_ended = True
+    del b.open_paths[-1:]
     end_cycle(b)
 
 
