@@ -136,7 +136,7 @@ class _Run:
     # ---- kinds -----------------------------------------------------------------------------------------------------
 
     def _axis(self, letter: str) -> int:
-        """1 or -1: how the axis turns about x, y or z of the machine at positive commands; 0 and a problem if it does not."""
+        """1 or -1: how the axis turns about x, y or z of the machine at positive commands; 0: not, a problem."""
         if letter not in self.machine.axis_names:
             self._problem("calibrate.axis", f"{self.machine.name} has no axis {letter}", "it has "
                           + ", ".join(self.machine.axis_names), "axis")

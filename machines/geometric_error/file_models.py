@@ -68,8 +68,8 @@ class ReferenceModel(UserModel):
     point: Vector | None = None
     """mm in machine coordinates at zero; for slides it travels along. Default: machine origin; point of a rotary axis"""
     frame: Literal["fixed", "moving"] = "fixed"
-    """rotary axes: directions of the errors are those of the part's side of the axis, or of its tool's side; the bed is on the
-    part's side of an axis that carries the tool, on the tool's side of one that carries the part"""
+    """rotary axes: directions of the errors are those of the part's side of the axis, or of its tool's side; the bed is on
+    the part's side of an axis that carries the tool, on the tool's side of one that carries the part"""
 
 
 class LegModel(UserModel):
