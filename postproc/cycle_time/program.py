@@ -10,7 +10,7 @@ from machines.machine import Machine
 from postproc.control import Control
 from postproc.cycle_time.blocks import Axes, Blocks, Cause, Path, Pauses
 from postproc.cycle_time.shape import NOTHING, shape
-from postproc.readback.canonical import LOADED, OFFSET, REGISTER, SMOOTH, Canonical
+from postproc.readback.canonical import LOADED, OFFSET, REGISTER, REST, SMOOTH, Canonical
 from postproc.readback.execute import Motion
 from postproc.readback.modal import columns, fill_values, modal_state
 from postproc.readback.poses import arc_sweeps, coordinates, positions
@@ -54,7 +54,8 @@ def blocks_of(code: Canonical, motion: Motion, machine: Machine, control: Contro
     Args:
         code: what the reader makes of the text; motion: what executing it gave
         origin: operations and CL lines; by tool where it is left out
-        own_path: True where a program without a path mode blends without a limit (LinuxCNC), else it is the control's
+        own_path: True where a program without a path mode blends without a limit, and a feed keeps the units that held when
+            it was stated (LinuxCNC), else both are the control's
         by_radius: inverse time of arcs counts radians
     """
     origin = origin or Origin.by_tool(motion)
@@ -70,7 +71,8 @@ def blocks_of(code: Canonical, motion: Motion, machine: Machine, control: Contro
     blocks = Blocks(Axes.of(machine), start, end, motion.line, motion.code == 0, arc, center, normal, sweep,
                     np.full(len(end), np.inf), path, tolerance[block], chain[block], origin.operation, origin.names, pauses,
                     origin.cl_line, origin.move, _tip_lengths(motion, control))
-    blocks = replace(blocks, speed=_speeds(words, block, motion, blocks, by_radius))
+    inch = _feed_inch(words, block, own_path)
+    blocks = replace(blocks, speed=_speeds(inch, motion, blocks, by_radius))
     moving = (np.abs(end - start) > NOTHING).any(axis=1) | arc
     blocks = _unrolled(blocks, motion, control, unit) if (motion.frame > 0).any() else blocks.take(moving)
     return replace(blocks, pauses=_with_indexing(blocks, machine))
@@ -171,9 +173,21 @@ def _carried(at: Ints, values: Floats, count: int) -> Floats:
     return fill_values(at, values, count)
 
 
-def _speeds(words: Words, block: Ints, motion: Motion, blocks: Blocks, by_radius: bool) -> Floats:
-    """(E,) mm/s or rad/s that the feed word asks for."""
-    inch = modal_state(words).inch[block]
+def _feed_inch(words: Words, block: Ints, kept: bool) -> Bools:
+    """(E,) True where the feed counts inches; `kept`: by the units in force before the block that states it.
+
+    LinuxCNC carries out F before G20 and G21 of a block, and a change of units leaves the feed alone (measured; order of
+    execution: NIST RS274/NGC table 8).
+    """
+    inch = modal_state(words).inch
+    if not kept:
+        return np.asarray(inch[block])
+    at = np.unique(words.pick("F")[0])
+    return np.asarray(fill_values(at, inch[at - 1].astype(np.float64), words.lines)[block] == 1.0)
+
+
+def _speeds(inch: Bools, motion: Motion, blocks: Blocks, by_radius: bool) -> Floats:
+    """(E,) mm/s or rad/s that the feed word asks for; `inch` (E,): it counts inches."""
     form = shape(blocks)
     linear = (form.first != 0.0).any(axis=1) | blocks.arc
     per_minute = motion.feed * np.where(linear, np.where(inch, INCH, 1.0), DEG)
@@ -185,17 +199,18 @@ def _speeds(words: Words, block: Ints, motion: Motion, blocks: Blocks, by_radius
 
 
 def _pauses(words: Words, block: Ints, line: Ints, motion: Motion, machine: Machine) -> Pauses:
-    """Rests by the codes of the program; dwells stand with the row that they follow."""
+    """Rests by the codes of the program; dwells stand with the row that they follow, those of 0 s are stops."""
     at, codes = words.pick("M")
     at, codes = at[np.isin(codes, RESTING_M)], codes[np.isin(codes, RESTING_M)]
     changes, other = words.pick(LOADED)[0], np.concatenate([words.pick(sign)[0] for sign in (REGISTER, OFFSET, "S")])
     rests = np.flatnonzero(motion.dwell > 0.0)
-    where = np.concatenate([at, changes, other, block[rests]])
+    empty = words.pick(REST)[0][words.pick(REST)[1] == 0.0]
+    where = np.concatenate([at, changes, other, empty, block[rests]])
     row = np.searchsorted(block, where) - 1
     row[len(where) - len(rests):] = rests
     cause = np.concatenate([np.where(np.isin(codes, (3.0, 4.0)), Cause.SPINDLE, Cause.OTHER),
                             np.full(len(changes), Cause.TOOL_CHANGE), np.full(len(other), Cause.OTHER),
-                            np.full(len(rests), Cause.DWELL)])
+                            np.full(len(empty) + len(rests), Cause.DWELL)])
     seconds = np.where(cause == Cause.TOOL_CHANGE, machine.timing.tool_change, 0.0)
     seconds[len(where) - len(rests):] = motion.dwell[rests]
     order = np.lexsort((where, row))

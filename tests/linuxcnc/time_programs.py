@@ -82,6 +82,7 @@ PROGRAMS: dict[str, tuple[str, str]] = {
     "canned cycles": ("mill-3axis", f"{HEAD} G64 P0.02\n{CYCLES}"),
     "inch": ("mill-3axis", "G20 G90 G94 G64 P0.001\nF120\n" + "".join(
         f"G1 X{(i % 2) * 1.5} Y{i * 0.2:.2f}\n" for i in range(1, 12)) + "G0 Z13\n"),
+    "units that change": ("mill-3axis", "G21 G90 G94 G17 G61\nF600\nG1 X10\nG20\nG1 X1\nG21\nG1 X40\nG20 F900\nG1 X1\n"),
     "spindle, coolant, dwell": ("mill-3axis", f"{HEAD} G64 P0.01\n{COMMANDS}"),
     "cycles repeated, no G98": ("mill-3axis", f"{HEAD} G64 P0.02\n{REPEATED}"),
     "5 axes at their feed, G93": ("mikron-ucp710", f"{HEAD} G64 P0.02\nG0 Z240\nG93\n{STEADY}G94\n"),
@@ -109,5 +110,6 @@ MEASURED = {
     "5 axes, G94, G64 P0.01": 9.165, "5 axes, G94, G61": 7.768, "5 axes, G93, G64 P0.01": 14.288, "5 axes, G93, G61": 12.063,
     "rotary axes alone": 8.149, "short lines at speed": 1.202, "straight chain, G64 Q0.01": 0.961,
     "small arcs in all planes": 5.696, "rotary and linear in turn": 6.762, "5 axes, control's kinematics": 4.751,
-    "cycles repeated, no G98": 3.602, "5 axes at their feed, G93": 11.992, "5 axes at their feed, tip": 12.377}
+    "cycles repeated, no G98": 3.602, "5 axes at their feed, G93": 11.992, "5 axes at their feed, tip": 12.377,
+    "units that change": 4.985}
 """s that LinuxCNC 2.9's simulator took, for where it is not installed"""

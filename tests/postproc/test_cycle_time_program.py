@@ -35,6 +35,20 @@ def test_inch_feeds_are_those_of_millimetres() -> None:
     assert shape(inch).length == pytest.approx(shape(mm).length, rel=1e-9)
 
 
+def test_feeds_keep_the_units_in_which_linuxcnc_took_them() -> None:
+    """F is carried out before G20 and G21 of its block, and stays what it was when the units change."""
+    text = "G21 G90 G94\nF600\nG1 X10\nG20\nG1 X1\nF30\nG1 X2\nG21 F30\nG1 X60\nF900\nG1 X70"
+    assert blocks(text).speed == pytest.approx([10.0, 10.0, 12.7, 12.7, 15.0])
+    assert blocks(text, controller="generic-iso").speed == pytest.approx([10.0, 254.0, 12.7, 0.5, 15.0])
+
+
+def test_a_dwell_of_nothing_is_a_stop() -> None:
+    line = "\n".join(f"G4 P{{}}\nG1 X{10 * i}" for i in range(1, 9))
+    none, some = (blocks(f"{HEAD}\nF3000\n{line.format(*[s] * 8)}") for s in ("0", "0.1"))
+    assert none.forced.tolist() == some.forced.tolist() and none.forced.sum() == 7
+    assert none.pauses.seconds.sum() == 0.0 and some.pauses.seconds.sum() == pytest.approx(0.8)
+
+
 def test_slowest_inverse_time() -> None:
     """LinuxCNC runs no slower than 0.1 mm/min in inverse time."""
     assert blocks(f"{HEAD}\nG93 G1 X0.001 F1").speed == pytest.approx([0.1 / 60])
