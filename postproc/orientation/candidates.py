@@ -21,6 +21,8 @@ SAME = 1e-4
 """rad: axes nearer than this are one candidate"""
 _SEEDS = 6
 _APART = 5.0 * DEG
+_NEAR = 1.0 * DEG
+"""an axis that aims at the beginning or the end of a pass is tried where it is so far from all others"""
 _STEPS = (6.0 * DEG, 3.0 * DEG, 1.5 * DEG)
 """of the refinement"""
 _WORTH = 1e-4
@@ -69,9 +71,9 @@ class Search:
         self.lost: dict[int, str] = {}
         self.pruned, self.counted = 0, 1
 
-    def add(self, axis: Floats) -> Turned | None:
-        """A new candidate; None where it is known already or not to be had."""
-        if any(angle_between(axis, other.axis) < SAME for other in self.known):
+    def add(self, axis: Floats, apart: float = SAME) -> Turned | None:
+        """A new candidate; None where one within `apart` is known already or it is not to be had."""
+        if bool((angle_between(np.stack([other.axis for other in self.known]), axis) < apart).any()):
             return None
         made = turned(self.one, axis, self.machine)
         self.known.append(made)
@@ -123,7 +125,8 @@ def _aimed(search: Search) -> dict[str, list[Turned]]:
     result: dict[str, list[Turned]] = {}
     for name, direction in stretch.directions().items():
         axes = _axes_at(kin, q, vertex_angles(kin, q, direction, limit))
-        result[name] = [made for axis in axes if (made := search.add(axis)) is not None]
+        apart = SAME if name == "mean" else _NEAR
+        result[name] = [made for axis in axes if (made := search.add(axis, apart)) is not None]
     return result
 
 

@@ -25,6 +25,8 @@ Progress = Callable[[str, int, int], None]
 _POOL = 5
 """axes besides its own choices that every pass may take"""
 _CLUSTER = 2.0 * DEG
+_EQUAL = 2e-4
+"""part of the time of a cut by which its best orientations may differ; turns decide among them"""
 
 
 @dataclass(frozen=True)
@@ -88,7 +90,8 @@ def _plans(work: Work, results: list[Tried], limit: Limit) -> OrientationChoice:
         return OrientationPlan(tuple(row[k] for row, k in zip(states, picked, strict=True)), seconds(picked, cost, ways))
 
     keep = [0] * len(states)
-    per_pass = [int(np.argmin(cut)) for cut in cuts]
+    best = [np.where(cut <= cut.min() * (1.0 + _EQUAL), row, np.inf) for cut, row in zip(cuts, cost, strict=True)]
+    per_pass = shortest(best, ways)[0]
     paper = [_index(row, one.aimed) for row, one in zip(states, results, strict=True)]
     whole = min([keep, *_wholes(states, keep)], key=lambda picked: seconds(picked, cost, ways))
     plans: dict[Orientation, OrientationPlan] = {"keep": plan(keep), "per-pass": plan(per_pass), "whole-part": plan(whole),

@@ -131,12 +131,20 @@ def work_of(toolpath: Toolpath, machine: Machine, setup: SetupFile,
 
 
 def _beginnings(toolpath: Toolpath, moves: Moves) -> Ints:
-    """First rows of Moves of the passes: the first, and each rapid behind a cut that a cut follows; others go on."""
+    """First rows of Moves of the passes: the first, and each rapid behind a cut that a cut follows; others go on.
+
+    Rapids that still have another axis than the cuts they lead to belong to the pass before.
+    """
     rapid = (moves.kind == Kind.RAPID) & (moves.hole < 0)
     anew = rapid & np.append(False, np.diff(toolpath.pass_[moves.row]) != 0)
-    cuts = np.cumsum(~rapid)
-    first = np.flatnonzero(anew & (cuts > 0) & (cuts < cuts[-1]))
-    return np.append(0, first)
+    cut = np.flatnonzero(~rapid)
+    first = np.flatnonzero(anew)
+    first = first[(first > cut[:1].min(initial=len(moves))) & (first < cut[-1:].max(initial=0))]
+    leads = cut[np.searchsorted(cut, first)]
+    rows = np.arange(len(moves))
+    ahead = cut[np.minimum(np.searchsorted(cut, rows), len(cut) - 1)] if len(cut) else rows
+    other = np.maximum.accumulate(np.where(angle_between(moves.axis, moves.axis[ahead]) > TURNS, rows, -1))
+    return np.append(0, np.clip(other[leads] + 1, first, leads))
 
 
 def _stretches(toolpath: Toolpath, moves: Moves, tolerance: Tolerance) -> dict[int, list[Stretch]]:

@@ -17,7 +17,9 @@ def as_dict(choice: OrientationChoice, plan: Orientation = "auto") -> dict[str, 
     """JSON figures: seconds, degrees; null where the machine cannot run it. Passes as `plan` has them."""
     passes = [{"pass": tried.own.one.number, "line": tried.own.one.line, "fixed": tried.own.one.fixed,
                "orientation_deg": made.rotary(), "time_s": _finite(made.seconds),
-               "reference_time_s": _finite(tried.own.seconds), "limiting_axis": made.limiting,
+               "reference_time_s": _finite(tried.own.seconds),
+               "limiting_axis": made.limiting[0], "limiting_order": made.limiting[1],
+               "axis": choice.work.placement.inverse().directions(made.axis[None])[0].tolist(),
                "planned": tried.planned, "pruned": tried.pruned,
                "rejected": [{"orientation_deg": _angles(other), "reason": why} for other, why in tried.rejected]}
               for tried, made in zip(choice.tried, choice.plans[plan].picked, strict=True)]
@@ -37,7 +39,7 @@ def as_text(choice: OrientationChoice) -> str:
         angles = " ".join(f"{name}{value:.3f}" for name, value in made.rotary().items())
         before = tried.own.seconds
         gain = 100.0 * (1.0 - made.seconds / before) if math.isfinite(before) and before > 0.0 else 0.0
-        why = tried.own.one.fixed or made.limiting
+        why = tried.own.one.fixed or " ".join(made.limiting)
         lines.append(f"{tried.own.one.number:>5} {tried.own.one.line:>7}  {angles:<26} {made.seconds:>9.4f} "
                      f"{tried.own.seconds:>9.4f} {gain:>7.2f}  {why}")
     for name in NAMES:

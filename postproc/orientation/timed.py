@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -19,6 +19,9 @@ from postproc.orientation.passes import Pass, Stretch
 from postproc.planned import ORDERS, joint_limits
 from toolpaths.arrays import Bools, Floats
 from toolpaths.units import DEG
+
+_ROUND = 1.002
+"""for the slope of a joint between sites, which is taken from its differences"""
 
 
 @dataclass(frozen=True)
@@ -42,24 +45,24 @@ class Turned:
     def bound(self) -> float:
         """Least seconds that the cuts can take, whatever the plan: inf where the machine cannot run them.
 
-        From rest to rest no joint is faster than over its own way under its own limits (along a straight pass that is the
-        reach of the polytopes in its direction), and no interval than its velocities and the feed allow.
+        From rest to rest no joint is faster than over its own way under its own limits and the velocity that the feed gives
+        it (along a straight pass that is the reach of the polytopes in its direction), and no interval than its velocities
+        and the feed allow.
         """
         if self.refused:
             return np.inf
         return float(sum(self._least(stretch, q) for stretch, q in zip(self.one.stretches, self.sites, strict=True)))
 
     def _least(self, stretch: Stretch, q: Floats) -> float:
-        rest = float(rest_seconds(q[:1], q[-1:], self.limits, Law.DOG_LEG)[0])
-        middle = 0.5 * (stretch.s[:-1] + stretch.s[1:])
-        even = np.max(np.abs(np.diff(q, axis=0)) / self.limits.velocity, axis=1)
-        steady = float(np.maximum(even, np.diff(stretch.s) / stretch.feed(middle)).sum()) if _one_feed(stretch) else \
-            float(even.sum())
-        return max(rest, steady)
+        way, length = np.abs(np.diff(q, axis=0)), np.diff(stretch.s)
+        most = _largest_feed(stretch)
+        fed = _ROUND * np.max(way / length[:, None], axis=0) * most
+        limits = replace(self.limits, velocity=np.minimum(self.limits.velocity, np.maximum(fed, 1e-9)))
+        rest = float(rest_seconds(q[:1], q[-1:], limits, Law.DOG_LEG)[0])
+        return max(rest, float(np.maximum(np.max(way / self.limits.velocity, axis=1), length / most).sum()))
 
-    @cached_property
     def plans(self) -> tuple[Plan, ...]:
-        """The motion of each stretch, curvature included."""
+        """The motion of each stretch, curvature included; planned anew at each call."""
         own = self.one.shift(self.axis)
         result = []
         for stretch, q in zip(self.one.stretches, self.sites, strict=True):
@@ -69,22 +72,32 @@ class Turned:
             result.append(run(path, self.limits, stretch.feed))
         return tuple(result)
 
-    @cached_property
+    @property
     def seconds(self) -> float:
         """Planned time of the cuts; inf where the machine cannot run them."""
-        return np.inf if self.refused else float(sum(made.seconds for made in self.plans))
+        return self._planned[0]
+
+    @property
+    def limiting(self) -> tuple[str, str]:
+        """The axis and the order that cost most of the planned time, ("feed", "") where that does; empty where nothing is
+        cut or the machine states no jerk."""
+        return self._planned[1]
 
     @cached_property
-    def limiting(self) -> str:
-        """What costs most of the planned time: "X jerk", "feed"; "" where nothing is cut or the machine states no jerk."""
-        if self.refused or not self.plans or not np.isfinite(self.limits.jerk).all():
-            return ""
-        shares = [made.shares for made in self.plans]
+    def _planned(self) -> tuple[float, tuple[str, str]]:
+        """Seconds, and what limits."""
+        if self.refused:
+            return np.inf, ("", "")
+        plans = self.plans()
+        seconds = float(sum(made.seconds for made in plans))
+        if not plans or not np.isfinite(self.limits.jerk).all():
+            return seconds, ("", "")
+        shares = [made.shares for made in plans]
         limits = np.sum([one.limits for one in shares], axis=0)[:, :len(self.machine.axis_names)]
         order, joint = np.unravel_index(int(limits.argmax()), limits.shape)
         if sum(one.feed for one in shares) >= float(limits.max()):
-            return "feed"
-        return f"{self.machine.axis_names[int(joint)]} {ORDERS[int(order)]}"
+            return seconds, ("feed", "")
+        return seconds, (self.machine.axis_names[int(joint)], ORDERS[int(order)])
 
     def rotary(self) -> dict[str, float]:
         """Rotary positions at the start of the cuts, degrees; of machines without rotary joints the axis as I, J, K."""
@@ -93,10 +106,10 @@ class Turned:
         return angles or dict(zip("IJK", self.axis.tolist(), strict=True))
 
 
-def _one_feed(stretch: Stretch) -> bool:
-    """True where the feed does not change between sites, so that it bounds each interval."""
-    breaks = stretch.feed.breaks
-    return not bool(((breaks > stretch.s[0]) & (breaks < stretch.s[-1])).any())
+def _largest_feed(stretch: Stretch) -> float:
+    """mm/s, over the stretch"""
+    first, last = np.searchsorted(stretch.feed.edges, [stretch.s[0], stretch.s[-1]], side="right") - 1
+    return float(stretch.feed.values[first:max(last, first + 1)].max())
 
 
 def turned(one: Pass, axis: Floats, machine: Machine) -> Turned:

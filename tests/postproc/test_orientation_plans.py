@@ -40,8 +40,8 @@ def passes(count: int, head: list[str] | None = None, axis: str = "0,0,1", pitch
     return path
 
 
-def chosen(path: Toolpath, m: Machine, **options: float) -> OrientationChoice:
-    choice, found = orient(path, m, SetupFile(), Options(**options))
+def chosen(path: Toolpath, m: Machine, max_tilt: float = 60.0) -> OrientationChoice:
+    choice, found = orient(path, m, SetupFile(), Options(max_tilt=max_tilt))
     assert choice is not None, found
     return choice
 
@@ -49,6 +49,20 @@ def chosen(path: Toolpath, m: Machine, **options: float) -> OrientationChoice:
 @cache
 def flat() -> OrientationChoice:
     return chosen(passes(6), machine("mikron-ucp710"))
+
+
+def test_rapids_with_the_old_axis_belong_to_the_pass_before() -> None:
+    """A file that lifts off along the old axis before it turns: each pass has one axis and can be turned."""
+    lines = ["MULTAX"]
+    for tilt in (0.0, 20.0):
+        s, c = np.sin(np.radians(tilt)), np.cos(np.radians(tilt))
+        lines += ["RAPID", f"GOTO/0,0,60,0,{s:.9f},{c:.9f}", "RAPID", f"GOTO/0,0,0,0,{s:.9f},{c:.9f}",
+                  f"GOTO/80,0,0,0,{s:.9f},{c:.9f}", "RAPID", f"GOTO/80,0,60,0,{s:.9f},{c:.9f}", "RAPID",
+                  f"GOTO/0,0,60,0,{s:.9f},{c:.9f}"]
+    path, _ = toolpaths.read_bytes("\n".join([*BALL, *lines, "FINI"]).encode(), file="two.apt")
+    choice = chosen(path, machine("mikron-ucp710"))
+    assert [one.own.one.fixed for one in choice.tried] == ["", ""]
+    assert [one.own.one.rows for one in choice.tried] == [(0, 5), (5, 10)]
 
 
 def test_shortest_is_that_of_all_choices() -> None:
@@ -138,8 +152,7 @@ def test_drilling_and_turning_axes_are_fixed() -> None:
     choice = chosen(path, machine("mikron-ucp710"))
     assert choice.tried[0].own.one.fixed == "the tool axis turns within the pass"
     path, _ = toolpaths.read(SAMPLES / "five_faces.cls")
-    choice, found = orient(path, machine("mikron-ucp710"), SetupFile())
-    assert choice is not None, found
+    choice = chosen(path, machine("mikron-ucp710"))
     assert any(one.own.one.fixed.startswith("drilling") for one in choice.tried)
 
 
@@ -149,6 +162,7 @@ def test_command_and_its_keys() -> None:
     values = json.loads(got.stdout)
     assert values["machine"] == "mikron-ucp710" and len(values["passes"]) == 7
     assert {"pass", "orientation_deg", "time_s", "reference_time_s", "limiting_axis", "rejected"} <= set(values["passes"][0])
+    assert values["passes"][0]["limiting_axis"] in ("X", "Y", "Z")
     assert set(values["passes"][0]["orientation_deg"]) == {"A", "C"}
     assert {"keep", "per_pass", "whole_part", "auto"} <= set(values["plans"])
     assert all(values["plans"][name]["time_s"] > 0.0 for name in ("keep", "per_pass", "whole_part", "auto"))
