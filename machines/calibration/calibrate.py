@@ -35,11 +35,13 @@ from machines.loader import load_checked as load_machine
 from machines.machine import Machine
 from machines.user_file import UserFile, nearest, read_toml, validate
 from toolpaths.arrays import Floats
-from toolpaths.diagnostics import Diagnostic, error, has_errors, info
+from toolpaths.diagnostics import Diagnostic, error, has_errors, info, warning
 
 ARCSEC = UNITS["arcsec"]
 SETUPS = 6
 """up to which the condition number of a rotary axis's readings is told"""
+SUSPECT = 2.0
+"""times the stated standard deviation: what is left of the readings by root mean square is more than noise"""
 KINDS = ("reversal", "rotary", "poses", "ball_bar", "laser")
 
 
@@ -183,7 +185,7 @@ class _Run:
                     "plan": [{"setups": c.setups, "sigma_arcsec": finite(c.sigma / ARCSEC), "minutes": c.minutes,
                               "condition_number": finite(c.condition_number)}
                              for c in plan(given.steps, sigma, self.checked.minutes_per_reading,
-                                           self.checked.minutes_per_setup, min(given.steps, 12), given.zeroed)]}
+                                           self.checked.minutes_per_setup, _planned(given.steps, 12, 864), given.zeroed)]}
         if fitted.lacking:
             self._problem("calibrate.rank", f"the readings do not tell axis and indexer apart: {fitted.lacking}")
             return Calibration(None, figures)
@@ -216,7 +218,7 @@ class _Run:
         figures |= {"not_identifiable": [[name] for name in fitted.lost], "signatures": series_signatures(fitted),
                     "residuals": weighted(fitted.residuals.reshape(-1, 6).T, sigma[:, None], list(PARTS)),
                     "plan": [{"setups": k, "condition_number": finite(told_apart(bench, k, sigma, given.harmonics))}
-                             for k in range(1, max(m, min(given.steps, SETUPS)) + 1)]}
+                             for k in range(1, _planned(given.steps, SETUPS, 216) + 1)]}
         untold = sorted(set(fitted.lost) - set(hidden(bench, sigma, given.harmonics)))
         if untold:
             self._problem("calibrate.rank", f"the readings do not tell {', '.join(untold[:12])}",
@@ -273,6 +275,16 @@ class _Run:
         return model
 
     def _done(self, model: ErrorModel, figures: dict[str, Any]) -> Calibration:
+        if figures["rms_after"] > SUSPECT:
+            self.found.append(warning("calibrate.residual", f"what is left is {figures['rms_after']:.1f} times the stated "
+                                      "standard deviation of the readings: the model's own doubt is too small by as much",
+                                      file=self.file.file, hint="look for wrong signs, units and outliers (robust = true), "
+                                      "or state what the instrument really does"))
         model = replace(model, machine=self.machine.name)
         figures["parameters"] = parameters(model)
         return Calibration(model, figures)
+
+
+def _planned(steps: int, most: int, readings: int) -> int:
+    """Set-ups up to which a campaign is planned: `most`, fewer where they have more readings than that; 2 at the least."""
+    return max(2, min(steps, most, readings // steps))

@@ -7,12 +7,14 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, field_validator
 
 from machines.models import NotNegative, Positive, Vector
 from machines.user_file import UserModel
 
-Sigma = Annotated[float, Field(gt=0)]
+Sigma = Annotated[float, Field(ge=1e-6, le=1e6)]
+Steps = Annotated[int, Field(ge=3, le=360)]
+Place = Annotated[float, Field(ge=-1e6, le=1e6)]
 
 
 class ReversalModel(UserModel):
@@ -23,7 +25,7 @@ class ReversalModel(UserModel):
     """CSV file beside this one"""
     axis: Literal["A", "B", "C"]
     """rotary axis that was measured"""
-    steps: Annotated[int, Field(ge=3)]
+    steps: Steps
     """n, steps of a turn"""
     sigma_arcsec: Sigma
     """standard deviation of a reading"""
@@ -41,7 +43,7 @@ class RotaryModel(UserModel):
     axis: Literal["A", "B", "C"]
     """rotary axis that was measured. Readings are of what it moves, tool or part: z where that turns to at positive
     commands, x along the machine's X (axis C), Y (A) or Z (B)"""
-    steps: Annotated[int, Field(ge=3)]
+    steps: Steps
     """n, steps of a turn"""
     harmonics: Annotated[int, Field(ge=1)]
     """of the series that are fitted"""
@@ -53,7 +55,7 @@ class RotaryModel(UserModel):
     """mm along the axis from its reference point to the indexer"""
     indexer_to_reflector: NotNegative = 120.0
     """mm from there to the reflector"""
-    shift: Vector = (0.0, 0.0, 0.0)
+    shift: tuple[Place, Place, Place] = (0.0, 0.0, 0.0)
     """mm, where the reflector stands from the indexer's axis"""
 
 
@@ -77,7 +79,7 @@ class BarModel(UserModel):
     """CSV file beside this one"""
     sigma_um: Sigma
     """standard deviation of a distance"""
-    centre: Vector
+    centre: tuple[Place, Place, Place]
     """mm, nominal centre in the table frame; where it really is, and the bar's length error, are found along"""
     tool_length: NotNegative = 0.0
     """mm"""
@@ -91,11 +93,18 @@ class LaserModel(UserModel):
     sigma_um: Sigma
     """standard deviation of a reading"""
     toward: Vector
-    """unit direction in the table frame"""
+    """direction in the table frame, of any length but 0"""
     tool_length: NotNegative = 0.0
     """mm"""
     zeroed: bool = False
     """the laser's zero is not known and found along"""
+
+    @field_validator("toward")
+    @classmethod
+    def _directed(cls, value: tuple[float, float, float]) -> tuple[float, float, float]:
+        if not 1e-6 <= max(abs(v) for v in value) <= 1e6:
+            raise ValueError("the direction has no usable length; write [1, 0, 0] for x")
+        return value
 
 
 class MeasurementModel(UserModel):

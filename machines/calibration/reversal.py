@@ -138,8 +138,8 @@ class Statistics:
 def statistics(values: Floats) -> Statistics:
     """Of values of any shape; NaN are left out."""
     known = values[np.isfinite(values)]
-    return Statistics(float(known.mean()), float(known.std(ddof=1)), float(np.sqrt(np.mean(known**2))),
-                      float(np.abs(known).max()))
+    deviation = float(known.std(ddof=1)) if len(known) > 1 else float("nan")
+    return Statistics(float(known.mean()), deviation, float(np.sqrt(np.mean(known**2))), float(np.abs(known).max()))
 
 
 @dataclass(frozen=True)

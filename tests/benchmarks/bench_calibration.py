@@ -1,4 +1,4 @@
-"""Calibration: rank, condition number and doubt against set-ups, coverage of the stated bounds, what is left, the whole loop.
+"""Calibration: rank, condition number, doubt against set-ups, coverage of the stated bounds, what is left, the whole loop.
 
     python -m tests.benchmarks.bench_calibration [TRIALS]
 

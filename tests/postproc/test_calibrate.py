@@ -88,6 +88,8 @@ FAULTS = [
     ("column", "reversal.csv", ("reading", "angle"), "calibrate.column", 5),
     ("unit", "reversal.csv", ("[arcsec]", "[um]"), "calibrate.unit", 5),
     ("step", "reversal.csv", ("0,11,", "0,12,"), "calibrate.row", 14),
+    ("endless", "reversal.toml", ("steps = 12", "steps = 100000000"), "file.range", 7),
+    ("no doubt", "reversal.toml", ("= 0.05", "= 1e-320"), "file.range", 8),
     ("gap", "reversal.csv", ("3,0,", "1000000000,0,"), "calibrate.setup", 5),
     ("oblique", "reversal.toml", ('"mikron-ucp710"\n\n[reversal]\ntable = "reversal.csv"\naxis = "C"',
                                   '"nutating-head"\n\n[reversal]\ntable = "reversal.csv"\naxis = "B"'), "calibrate.axis", 6),
@@ -113,6 +115,22 @@ def test_faults_are_named_and_nothing_is_written(folder: Path, name: str, change
         figures = run(folder, "reversal.toml", "out.toml", 1)
         assert figures["output"] is None and figures["not_identifiable"] and figures["rank"] == 13
     assert not (folder / "out.toml").exists()
+
+
+def test_a_direction_of_no_length_is_refused(folder: Path) -> None:
+    (folder / "l.toml").write_text('machine = "mikron-ucp710"\nmodel = "start.toml"\n[laser]\ntable = "probe.csv"\n'
+                                   'sigma_um = 1\ntoward = [0, 0, 0]\n')
+    found, diagnostics = calibrate(folder / "l.toml")
+    assert found is None and [d.lines for d in diagnostics] == [(6,)] and "[1, 0, 0]" in str(diagnostics[0])
+
+
+def test_one_reading_is_not_enough_and_more_than_noise_is_told(folder: Path) -> None:
+    text = (folder / "reversal.csv").read_text()
+    (folder / "reversal.csv").write_text("\n".join(text.splitlines()[:3]) + "\n")
+    assert run(folder, "reversal.toml", "o.toml", 1)["rank"] == 3
+    (folder / "reversal.csv").write_text(text.replace("\n0,5,-11", "\n0,5,-1"))  # one reading 10 arcsec off
+    figures = run(folder, "reversal.toml", "o.toml")
+    assert [d["code"] for d in figures["diagnostics"]] == ["calibrate.residual"] and figures["rms_after"] > 2.0
 
 
 def test_a_fit_without_support_is_refused(folder: Path) -> None:
