@@ -34,9 +34,29 @@ def lower_bound(blocks: Blocks, model: CycleTimeModel) -> float:
     through = ~merged.forced
     free = np.full(len(merged), np.inf)
     loop = compiled(speeds) if len(merged) >= KERNEL_FROM else speeds
-    first, last = loop(length, target, target, rate, through, free, free)
-    seconds = ramps(length, first, last, target, rate).seconds - early(merged, form, model)
+    lent = shared_feed(merged, form, target, model)
+    first, last = loop(length, lent, lent, rate, through, free, free)
+    seconds = np.maximum(ramps(length, first, last, lent, rate).seconds, at_feed(merged, form, length, target, lent, model))
+    seconds = seconds - early(merged, form, model)
     return float(np.maximum(seconds, 0.0).sum() + blocks.pauses.seconds.sum())
+
+
+def shared_feed(blocks: Blocks, form: Shape, target: Floats, model: CycleTimeModel) -> Floats:
+    """(E,) largest speed anywhere in each block: LinuxCNC runs through a blend arc at the faster of both feeds
+    (blendmath.c, `blendParamKinematics`)."""
+    if model.kind != "linuxcnc" or not len(blocks):
+        return target
+    arc = (blocks.path[:-1] == Path.BLEND) & ~blocks.forced[:-1] & (blocks.rapid[1:] == blocks.rapid[:-1])
+    arc &= ~form.turns[:-1] & ~form.turns[1:]
+    both = np.where(arc, np.maximum(target[:-1], target[1:]), 0.0)
+    return np.asarray(np.maximum(target, np.maximum(np.append(both, 0.0), np.concatenate([[0.0], both]))))
+
+
+def at_feed(blocks: Blocks, form: Shape, length: Floats, target: Floats, lent: Floats, model: CycleTimeModel) -> Floats:
+    """(E,) s of each block at its own feed, but of what blends may take at its ends."""
+    reach, _ = reaches(blocks, form, model)
+    taken = np.minimum(np.append(reach, 0.0) + np.concatenate([[0.0], reach]), length)
+    return np.asarray((length - taken) / target + taken / lent)
 
 
 def early(blocks: Blocks, form: Shape, model: CycleTimeModel) -> Floats:
@@ -56,6 +76,13 @@ def cut_off(blocks: Blocks, form: Shape, model: CycleTimeModel) -> Floats:
     (1 - cos(phi/2)) shorter; d is at most half a block. Where the limit is a tolerance e, d <= e/sin(phi/2). The ideal
     motion is planned within the model's tolerance, whatever the program leaves to the control.
     """
+    reach, cosine = reaches(blocks, form, model)
+    spared = reach * (1.0 - cosine)
+    return np.asarray(np.append(spared, 0.0) + np.concatenate([[0.0], spared]))
+
+
+def reaches(blocks: Blocks, form: Shape, model: CycleTimeModel) -> tuple[Floats, Floats]:
+    """(E - 1,) mm that a blend may take of either side of each corner, and cos(phi/2) of the corner."""
     dot = np.clip((form.last[:-1] * form.first[1:]).sum(axis=1), -1.0, 1.0)
     sine, cosine = np.sqrt((1.0 - dot) / 2.0), np.sqrt((1.0 + dot) / 2.0)
     stated = blocks.tolerance[:-1]
@@ -65,5 +92,4 @@ def cut_off(blocks: Blocks, form: Shape, model: CycleTimeModel) -> Floats:
         tolerance = np.maximum(tolerance, model.corner_tolerance)
     with np.errstate(divide="ignore"):
         reach = np.minimum(np.minimum(form.length[:-1], form.length[1:]) / 2.0, tolerance / sine)
-    spared = np.where((blocks.path[:-1] == Path.BLEND) & ~blocks.forced[:-1], reach * (1.0 - cosine), 0.0)
-    return np.asarray(np.append(spared, 0.0) + np.concatenate([[0.0], spared]))
+    return np.where((blocks.path[:-1] == Path.BLEND) & ~blocks.forced[:-1], reach, 0.0), cosine
