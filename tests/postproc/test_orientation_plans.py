@@ -88,6 +88,7 @@ def test_whole_part_pays_where_passes_are_many() -> None:
     """The paper's finding: turning between passes costs more than it gives, one orientation for all gains."""
     few, many = flat(), chosen(passes(24), machine("mikron-ucp710"))
     assert many.plans["whole-part"].seconds < 0.97 * many.plans["keep"].seconds
+    assert many.plans["auto"].seconds <= many.plans["whole-part"].seconds
     gains = [one.plans["keep"].seconds - one.plans["whole-part"].seconds for one in (few, many)]
     assert gains[1] > gains[0]
 
