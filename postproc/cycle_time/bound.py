@@ -53,8 +53,9 @@ def shared_feed(blocks: Blocks, form: Shape, target: Floats, model: CycleTimeMod
 
 
 def at_feed(blocks: Blocks, form: Shape, length: Floats, target: Floats, lent: Floats, model: CycleTimeModel) -> Floats:
-    """(E,) s of each block at its own feed, but of what blends may take at its ends."""
-    reach, _ = reaches(blocks, form, model)
+    """(E,) s of each block at its own feed, but of what blends may take at its ends; none where it goes on straight."""
+    reach, cosine = reaches(blocks, form, model)
+    reach = np.where(cosine < 1.0 - 1e-12, reach, 0.0)
     taken = np.minimum(np.append(reach, 0.0) + np.concatenate([[0.0], reach]), length)
     return np.asarray((length - taken) / target + taken / lent)
 
