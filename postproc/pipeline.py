@@ -117,6 +117,7 @@ def convert(path: Toolpath, machine: Machine | str | FilePath, controller: str |
         setup, more = load_setup(options.setup or None)
         toolpaths.diagnostics.require(more)
     assert spec is not None and setup is not None
+    spec = spec.divided(setup.output.files)
     path, known = _oriented(path, machine, setup, options, _reading(path, diagnostics), progress)
     start = PostResult("", options, machine, spec, FilePath(controller).stem, setup, known, path)
     return start if not start.ok else _stages(start, progress)
@@ -180,7 +181,7 @@ def _stages(result: PostResult, progress: Progress | None) -> PostResult:
         return result
     planned = None if motion is None else Planned(_on_path(result, motion.needed), options.merge_feeds)
     program, feeds, found = compile_program(job, moves, path, planned)
-    found += unwritable(result.controller, program, toolpath.cycles, file, result.setup.output.subprograms,
+    found += unwritable(result.controller, program, toolpath.cycles, file, result.setup.output.divided,
                         job.control.length_on_z)
     result = _with(result, found, program=program, feeds=feeds)
     if not result.ok:
@@ -272,14 +273,16 @@ def write_text(result: PostResult) -> tuple[str, dict[str, str]]:
     header = [f"postproc {VERSION}", f"source {FilePath(result.toolpath.file).name}", f"machine {machine.name}",
               f"controller {result.controller_name}", *result.options.header(),
               f"words: {_meanings(result.program)}",
-              f"work offset {result.setup.work_offset_code} in machine coordinates: {offset}"]
+              f"work offset {result.controller.program.offset_name(result.setup.work_offset_code)} in machine coordinates: "
+              f"{offset}"]
     header += _corrections(result)
     if result.toolpath.name:
         header.insert(1, f"part {result.toolpath.name}")
     shares = result.shares or {}
     writer = writer_for(result.controller, result.program, result.toolpath.cycles, job.control.length_on_z,
                         shares["smoothing"], result.setup.work_offset_code, axis_smoothing=shares["axis_smoothing"],
-                        name=FilePath(result.toolpath.file).stem, subprograms=result.setup.output.subprograms)
+                        name=result.options.name or FilePath(result.toolpath.file).stem,
+                        subprograms=result.setup.output.divided)
     text = "\n".join(writer.lines(header)) + "\n"
     return text, {name: "\n".join(blocks) + "\n" for name, blocks in writer.files.items()}
 
@@ -346,6 +349,7 @@ def verify(gcode: str | FilePath, path: Toolpath, machine: Machine | str | FileP
     setup, more = load_setup(options.setup or None)
     toolpaths.diagnostics.require(more)
     assert spec is not None and setup is not None
+    spec = spec.divided(setup.output.files)
     try:
         data = FilePath(gcode).read_bytes()
     except OSError as fault:
