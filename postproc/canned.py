@@ -17,6 +17,8 @@ from toolpaths.toolpath import Kind, Toolpath
 
 ROUNDED = 1.5
 """last decimals by which words along a hole may differ in a plane whose printed angles are rounded"""
+STATES_RETRACT = ("{retract}", "{second}")
+"""one of them stands in cycles that state the level they retract to"""
 SINGLE_MOVES = frozenset({"DRILL", "THRU", "CSINK", "FACE", "DEEP", "BRKCHP", "BORE", "REAM"})
 """kinds of cycles that rapids, feeds and dwells replace"""
 
@@ -26,7 +28,7 @@ def holes_of(toolpath: Toolpath, moves: Moves, path: Path, words: WordRows, cont
     """Blocks of holes that the controller can drill by itself, and the holes; not among blocks that a switch may `skip`.
 
     Native where the tool stands along Z of the words, the kind is in the controller's table and the way out ends at
-    the clearance plane or at the level that the tool came from.
+    the clearance plane, at the level that the tool came from, or at one that the cycle states.
     """
     native = np.zeros(len(path), dtype=bool)
     holes: list[Hole] = []
@@ -44,6 +46,7 @@ def holes_of(toolpath: Toolpath, moves: Moves, path: Path, words: WordRows, cont
             continue
         first += _rises_first(words, z, int(first), int(last))
         first, last = _without_feeding_rapids(moves, path, int(first), int(last))
+        first += _before_own_level(moves, path, words, z, first, last)
         level = float(words.start[first, z]) if first > 0 else np.inf
         initial = before_initial if previous_last == first - 1 else level
         before_initial, previous_last = initial, last
@@ -72,6 +75,15 @@ def _rises_first(words: WordRows, z: int, first: int, last: int) -> bool:
     """
     step = words.end[first] - words.start[first]
     return 0 < first < last and bool(step[z] > 0.0) and not np.delete(step, z).any()
+
+
+def _before_own_level(moves: Moves, path: Path, words: WordRows, z: int, first: int, last: int) -> int:
+    """How many blocks of a hole come down to the level that it retracts to: they stay blocks of their own."""
+    placing = moves.phase[path.move[first:last + 1]] == Phase.POSITION
+    level = np.abs(words.end[first:last + 1, z] - words.end[last, z]) < 1e-9
+    lowered = words.end[first:last + 1, z] < words.start[first:last + 1, z]
+    found = np.flatnonzero(placing & level & lowered)
+    return int(found[-1]) + 1 if len(found) else 0
 
 
 def _without_feeding_rapids(moves: Moves, path: Path, first: int, last: int) -> tuple[int, int]:
@@ -107,9 +119,10 @@ def _hole(toolpath: Toolpath, moves: Moves, path: Path, rows: WordRows, control:
         return None
     if key not in spec or not along or deepest >= plane or len(set(cycle.steps)) > 1:
         return None
-    if min(abs(out - plane), abs(out - initial)) > slack:
+    near = [level for level in (plane, initial) if abs(out - level) <= slack]
+    if not near and not any(name in spec[key].code for name in STATES_RETRACT):
         return None
-    out = plane if abs(out - plane) <= slack else initial
+    out = near[0] if near else out
     return Hole(first, last, int(moves.cycle[path.move[first]]), plane, deepest, out, initial, key, bottom)
 
 

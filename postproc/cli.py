@@ -85,11 +85,11 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
     options = replace(_options(tolerance, axis_tolerance, feed_mode, setup, units, dialect, allow_unknown),
                       output=output_mode, feed=feed, merge_feeds=merge_feeds / 100.0, smooth=smooth,  # type: ignore[arg-type]
                       error_model=error_model, error_beyond=beyond, orient=orient,  # type: ignore[arg-type]
-                      max_tilt=max_tilt)
+                      max_tilt=max_tilt, name=output.stem)
     refuse_overwriting({"-o": str(output), "--json": json}, {"the CL file": str(file), "the set-up": setup,
                                                              "the error model": error_model})
     from postproc import summary
-    from postproc.files import write_atomically
+    from postproc.files import write_all
     from postproc.pipeline import convert as run
 
     with shown_errors(json), progress_bar() as progress:
@@ -97,9 +97,7 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
         path, found = _read(file, options, progress)
         result = run(path, m, spec, options=options, diagnostics=found, progress=progress)
         if result.ok:
-            for name, text in (result.files or {}).items():
-                write_atomically(output.parent / name, text)
-            write_atomically(output, result.text)
+            result = replace(result, diagnostics=(*result.diagnostics, *write_all(output, result.text, result.files or {})))
     report(result.diagnostics, json, summary.as_dict(result, str(output)), summary.as_text(result, str(output)))
 
 

@@ -77,7 +77,8 @@ class _Writing:
             self.starts.pop(0)
             self.compensation.off_before(move)
             out = self.at(int(self.path.begin[move]))
-            out.append(Command("OPERATION_START", (named.name or f"OPERATION {operation + 1}",), named.line))
+            name = named.name or f"OPERATION {operation + 1}"
+            out.append(Command("OPERATION_START", (name, 1.0) if self.restart else (name,), named.line))
             if self.restart and self.loaded is not None:
                 self._restate(out, move, named.line)
 

@@ -7,7 +7,7 @@ import os
 import tempfile
 from pathlib import Path
 
-from toolpaths.diagnostics import Diagnostic, DiagnosticError, error
+from toolpaths.diagnostics import Diagnostic, DiagnosticError, error, warning
 
 
 def write_atomically(path: Path, text: str | bytes) -> None:
@@ -39,6 +39,46 @@ def write_atomically(path: Path, text: str | bytes) -> None:
     except BaseException:
         temporary.unlink(missing_ok=True)
         raise
+
+
+def write_all(output: Path, text: str, files: dict[str, str]) -> list[Diagnostic]:
+    """Write a program, and before it the files of its subprograms beside it; says which of another program it replaces.
+
+    Raises:
+        DiagnosticError: where one cannot be written, or a subprogram would bear the program's own name.
+    """
+    from postproc.controllers.writer import OF_PROGRAM
+
+    if output.name.lower() in {name.lower() for name in files}:
+        raise DiagnosticError([error("file.own_name", "the program and one of its subprograms would bear the same name",
+                                     file=str(output), hint=f"give -o another name than {', '.join(list(files)[:6])}")])
+    beside = {output.parent / name: text for name, text in files.items()}
+    found = replaced(beside, OF_PROGRAM)
+    for path, content in {**beside, output: text}.items():
+        write_atomically(path, content)
+    return found
+
+
+def replaced(files: dict[Path, str], mark: str) -> list[Diagnostic]:
+    """Files that stand already where `files` will be written, and were written with another program.
+
+    A file names its program in the line that holds `mark`.
+    """
+    found = [path for path, text in files.items() if path.is_file() and not _same_program(path, text, mark.lower())]
+    if not found:
+        return []
+    names = ", ".join(path.name for path in found[:6]) + (", ..." if len(found) > 6 else "")
+    return [warning("file.replaced", f"{names} of another program stood there and {'are' if len(found) > 1 else 'is'} "
+                    "replaced: that program now calls the new text", file=str(found[0]), count=len(found),
+                    hint="write programs whose subprograms bear the same names into folders of their own")]
+
+
+def _same_program(path: Path, text: str, mark: str) -> bool:
+    own = [line for line in text.splitlines()[:8] if mark in line.lower()]
+    try:
+        return own[0] in path.read_text(encoding="utf-8", errors="replace")[:4096].splitlines() if own else False
+    except OSError:
+        return False
 
 
 def _umask() -> int:

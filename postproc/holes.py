@@ -50,7 +50,8 @@ def _legs(top: Floats, axis: Floats, cycle: Cycle, before: Floats | None, initia
     """Above the hole at the level the tool is at (never below the clearance plane), down, drill, out.
 
     Without a known level (`before` None: a linking move leads here) the tool comes straight to the clearance plane
-    and AUTO retracts to it.
+    and AUTO retracts to it. A tap stops on its way down at the retract level that it names: controls come back to the
+    level that a cycle begins from.
     """
     height = float(axis @ top)
     plane = height + cycle.clearance
@@ -61,6 +62,9 @@ def _legs(top: Floats, axis: Floats, cycle: Cycle, before: Floats | None, initia
         if float(axis @ before) < plane - 1e-9:
             legs.append((before + (plane - float(axis @ before)) * axis, Phase.POSITION, Kind.RAPID))
     legs.append((top + (level - height) * axis, Phase.POSITION, Kind.RAPID))
+    own = cycle.retract if cycle.kind == "TAP" and cycle.retract is not None else np.inf
+    if cycle.clearance + 1e-9 < own < level - height - 1e-9:
+        legs.append((top + own * axis, Phase.POSITION, Kind.RAPID))
     if level > plane + 1e-9:
         legs.append((top + cycle.clearance * axis, Phase.APPROACH, Kind.RAPID))
     legs += _pecks(top, axis, cycle)

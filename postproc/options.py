@@ -36,6 +36,9 @@ class Options:
     error_beyond: bool = False
     """True: errors at the ends of their measured ranges count beyond them too"""
 
+    name: str = ""
+    """of the program and its subprograms' files; default: that of the CL file"""
+
     def header(self) -> list[str]:
         """The options as comment lines of an output file."""
         lines = [f"tolerance {self.tolerance:g} mm, axis tolerance {self.axis_tolerance:g} degrees",

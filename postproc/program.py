@@ -18,8 +18,8 @@ class Command:
     """A canonical function without motion, e.g. ("START_SPINDLE_CLOCKWISE", (1200.0,)); `line` is its CL line.
 
     ("ENTER_SECTION", (i,)) and ("LEAVE_SECTION", (i,)) stand where a section that needs codes begins and ends,
-    ("OPERATION_START", (name,)) where the program can be taken up, ("RESTATE",) behind blocks that a switch may leave out:
-    modal codes are stated anew. `skip`: the block switch leaves it out.
+    ("OPERATION_START", (name,)) or (name, 1.0) where the program can be taken up, with 1.0 from home, ("RESTATE",) behind
+    blocks that a switch may leave out: modal codes are stated anew. `skip`: the block switch leaves it out.
     """
 
     name: str

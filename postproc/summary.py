@@ -19,6 +19,7 @@ def as_dict(result: PostResult, output: str) -> dict[str, Any]:
     c = result.comparison
     return {
         "output": output if result.ok else None,
+        "files": files_beside(result, output),
         "machine": result.machine.name,
         "controller": result.controller_name,
         "points_in": points_in(result.toolpath) if result.toolpath is not None else 0,
@@ -37,6 +38,11 @@ def as_dict(result: PostResult, output: str) -> dict[str, Any]:
         "geometric_errors": _errors(result),
         "diagnostics": [d.as_dict() for d in result.diagnostics],
     }
+
+
+def files_beside(result: PostResult, output: str) -> list[str]:
+    """The files of subprograms that are written beside `output`."""
+    return [str(Path(output).parent / name) for name in result.files or {}] if result.ok else []
 
 
 def _bound(result: PostResult) -> dict[str, float] | None:
@@ -103,10 +109,12 @@ def as_text(result: PostResult, output: str) -> str:
              f"rounding at most {shares['rounding']:.5f} mm"]
     if any(laws != ["axes"] for laws in d["output_modes"].values()):
         lines.append("output: " + ", ".join(f"{name} {' and '.join(laws)}" for name, laws in d["output_modes"].items()))
+    if d["files"]:
+        lines.append(f"subprograms beside it: {', '.join(Path(file).name for file in d['files'])}")
     if result.job is not None:
         offset = " ".join(f"{k}{round(v, 4) + 0.0:.4f}" for k, v in zip(
             result.machine.axis_names, result.job.control.work_offset, strict=True))
-        lines.append(f"work offset {result.setup.work_offset_code}: {offset}")
+        lines.append(f"work offset {result.controller.program.offset_name(result.setup.work_offset_code)}: {offset}")
     if result.estimate is not None:
         from postproc.cycle_time.conversion import text
 

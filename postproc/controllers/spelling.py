@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Annotated, Literal
 
 from pydantic import Field
@@ -66,10 +67,19 @@ class Frame(UserModel):
     """codes of the shop's own blocks that move nothing: read back without being executed"""
     path_tolerance: tuple[Annotated[str, placeholders("tolerance", "chain", "axis")], ...] = ()
     """blocks that set the control's own smoothing; {tolerance} and {chain} in mm, {axis} in degrees"""
+    relies_on_turns: Annotated[str, placeholders("axes")] = ""
+    """setting of the control that rotary words of 360 degrees and more need: a comment at the head of programs with such;
+    {axes} are their letters"""
     ending: tuple[str, ...] = ("M30",)
     """blocks that end every program"""
     end: tuple[Named, ...] = ("%",)
     """{name} and {number} as in `begin`"""
+
+    def offset_name(self, code: str) -> str:
+        """A work offset of the set-up as the control names it; of a parameter with a name, that name and its number."""
+        text = self.work_offsets.get(code, code)
+        named = re.search(r"=\+?(\d+) *;(.+)$", text)
+        return f"{named[2].strip().lower()} {named[1]}" if named else text
 
 
 class Codes(UserModel):

@@ -20,7 +20,8 @@ class WriterState:
     `law` is that of the words; `register` the length register of the tool in the spindle; `length_off` is True where the
     register is not in force and waits for the next block that states Z; `speed` is the spindle's as it is written (1/min,
     negative: anti-clockwise, 0 unknown), `rounded` its ratio to what was asked. `files` are the subprograms in files of
-    their own, by name, once the program is written.
+    their own, by name, once the program is written. `turning` and `cooling` say whether spindle and coolant run, None where
+    nobody knows; `taken` are block numbers that subprograms bear.
     """
 
     def __init__(self, controller: ControllerFile, program: Program, cycles: tuple[Cycle, ...], length_offsets: bool,
@@ -38,6 +39,9 @@ class WriterState:
         self.rounded = 1.0
         self.in_cycle, self.cycle_text, self.operations = False, "", 0
         self.plane, self.mode = 17, PER_MINUTE
+        self.turning: bool | None = None
+        self.cooling: bool | None = None
+        self.taken: set[int] = set()
         self.restate()
 
     def restate(self) -> None:

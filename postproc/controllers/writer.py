@@ -15,10 +15,18 @@ from postproc.program import PER_MINUTE, Command, Hole
 
 _LABEL = re.compile(r"%|[NO]\d")
 """blocks that carry a number of their own"""
+_HUNDRED = re.compile(r"N\d+")
+"""number of an operation"""
 SKIP = "/"
 """before blocks that a switch at the control leaves out"""
 MARK = "\0"
 """stands in the body where an operation begins"""
+OF_PROGRAM = "of program"
+"""begins the comment by which a subprogram's file names the program that calls it"""
+FULL_TURN = 360.0
+"""degrees"""
+NEXT = "\1"
+"""before an operation's number, which is the next hundred of the running numbers"""
 
 
 class Writer(WriterState):
@@ -34,12 +42,13 @@ class Writer(WriterState):
         yield from map(self.framed, map(self.comment, (*header, *self.relies_on())))
         yield from map(self.numbered, inside if place == "before" else [])
         yield from map(self.numbered, main)
-        yield from map(self.numbered, frame.ending)
+        yield from map(self.numbered, self.ending())
         yield from map(self.numbered, inside if place == "after" else [])
         yield from (self.framed(block.format(**named)) for block in frame.end)
         for number, blocks in subs.items() if place == "files" else ():
             self.first_number()
             name = self.controller.subprograms.file.format(name=self.name, number=number)
+            blocks.insert(len(self.controller.subprograms.begin), self.comment(f"{OF_PROGRAM} {self.name}"))
             self.files[name] = [self.numbered(block) for block in blocks]
 
     def sorted_blocks(self) -> tuple[Iterable[str], dict[int, list[str]]]:
@@ -54,6 +63,7 @@ class Writer(WriterState):
                 into.append(block)
                 continue
             named = {"name": self.name, "number": 1001 + len(subs)}
+            self.taken.add(1001 + len(subs))
             main.append(spec.call.format(**named))
             into = subs[1001 + len(subs)] = [text.format(**named) for text in spec.begin]
         for number, blocks in subs.items():
@@ -67,6 +77,13 @@ class Writer(WriterState):
     def framed(self, block: str) -> str:
         """A block of the frame, or a comment at the head, as the file holds it."""
         return block
+
+    def ending(self) -> list[str]:
+        """The blocks that end every program, without those that switch off what is off already."""
+        codes = self.controller.codes
+        off = {codes.spindle_stop} if self.turning is False else set()
+        off |= {codes.coolant_off} if self.cooling is False else set()
+        return [block for block in self.controller.program.ending if not set(block.split()) <= off]
 
     def start(self) -> Iterator[str]:
         """Safe start: modes that the program uses off, then the preamble."""
@@ -85,7 +102,16 @@ class Writer(WriterState):
 
     def relies_on(self) -> list[str]:
         """Settings of the control that the program needs, each once."""
-        return list(dict.fromkeys(f"needs {text}" for mode in self.used_modes() for text in mode.relies_on))
+        needed = [text for mode in self.used_modes() for text in mode.relies_on]
+        letters, text = self.beyond_a_turn(), self.controller.program.relies_on_turns
+        needed += [text.format(axes=" ".join(letters))] if letters and text else []
+        return list(dict.fromkeys(f"needs {text}" for text in needed))
+
+    def beyond_a_turn(self) -> list[str]:
+        """Rotary axes with words of a full turn or more, which a control may roll over."""
+        p = self.program
+        far = np.flatnonzero(((np.abs(p.words) >= FULL_TURN) & p.write & ~p.home[:, None]).any(axis=0)).tolist()
+        return [p.letters[j] for j in far if p.letters[j] in "ABC"]
 
     def smoothing_blocks(self) -> list[str]:
         """Blocks that set the control's own smoothing, where something is left to it."""
@@ -100,10 +126,19 @@ class Writer(WriterState):
         if block.startswith(SKIP):
             return SKIP + self.numbered(block[1:])
         style = self.controller.format
+        if block.startswith(NEXT):
+            self.number = self.free(self.number - self.number % 100 + 100, 100)
+            return _HUNDRED.sub(f"N{self.number}", block[1:], count=1)
         if not style.sequence_step or block.startswith(self.controller.comment.open) or _LABEL.match(block):
             return block
-        self.number += style.sequence_step
+        self.number = self.free(self.number + style.sequence_step, style.sequence_step)
         return f"{style.sequence_prefix}{self.number}{self.space}{block}"
+
+    def free(self, number: int, step: int) -> int:
+        """The first of number, number + step, ... that no subprogram bears."""
+        while number in self.taken:
+            number += step
+        return number
 
     def body(self) -> Iterator[str]:
         """Blocks between preamble and ending: stretches of plain motion at once, all else one by one."""
@@ -150,6 +185,7 @@ class Writer(WriterState):
                  "THROUGH_ON": codes.through, "COOLANT_OFF": codes.coolant_off, "PROGRAM_STOP": codes.stop,
                  "OPTIONAL_PROGRAM_STOP": codes.optional_stop, "CUTTER_COMPENSATION_OFF": codes.compensation_off}
         if command.name in fixed:
+            self.switch(command)
             yield fixed[command.name]
         elif command.name in ("ENTER_SECTION", "LEAVE_SECTION"):
             section = self.program.sections[int(command.args[0])]
@@ -159,29 +195,45 @@ class Writer(WriterState):
         elif command.name == "RESTATE":
             self.forget()
         elif command.name == "OPERATION_START":
-            yield from self.operation(str(command.args[0]))
+            yield from self.operation(str(command.args[0]), len(command.args) > 1)
         elif command.name == "COMMENT":
             yield self.comment(str(command.args[0]))
         elif command.name == "INSERT":
+            self.turning = self.cooling = None
             yield str(command.args[0])
         else:
             yield from self.numbered_command(command)
 
-    def operation(self, name: str) -> Iterator[str]:
-        """The start of an operation: its blocks, and every modal code stated anew behind them."""
+    def operation(self, name: str, restart: bool) -> Iterator[str]:
+        """The start of an operation: its blocks, and every modal code stated anew behind them.
+
+        With `restart` the program is taken up there, so the safe start, the work offset and the smoothing come again.
+        """
         self.operations += 1
         yield MARK
         values = {"name": self.clean(name), "comment": self.comment(name), "number": 100 * self.operations}
-        blocks = self.controller.program.operation
-        yield from (block.format(**values) for block in blocks)
-        if blocks:
-            self.forget()
-            stated = {word for block in blocks for word in block.split()}
-            self.plane = 17 if self.controller.codes.planes["17"] in stated else 0
-            self.mode = PER_MINUTE if self.controller.codes.per_minute in stated else -1
+        blocks = [block.format(**values) for block in self.controller.program.operation]
+        blocks += [*self.start(), *self.smoothing_blocks()] if restart and self.operations > 1 else []
+        if not blocks:
+            return
+        self.forget()
+        stated = {word for block in blocks for word in block.split()}
+        self.plane = 17 if self.controller.codes.planes["17"] in stated else 0
+        self.mode = PER_MINUTE if self.controller.codes.per_minute in stated else -1
+        self.length_off |= self.controller.codes.length_cancel in stated
+        numbers = self.controller.format.sequence_step and self.controller.format.sequence_prefix == "N"
+        yield from (f"{NEXT}{block}" if numbers and _HUNDRED.match(block) else block for block in blocks)
+
+    def switch(self, command: Command) -> None:
+        """Remember what stands for sure; what the block switch may leave out does not."""
+        if command.name == "STOP_SPINDLE_TURNING":
+            self.turning = None if command.skip else False
+        elif command.name in ("COOLANT_OFF", "FLOOD_ON", "MIST_ON", "THROUGH_ON"):
+            self.cooling = None if command.skip else command.name != "COOLANT_OFF"
 
     def spindle(self, command: Command) -> Iterator[str]:
         """The spindle's start, with its speed where one is given."""
+        self.turning = True
         codes, clockwise = self.controller.codes, command.name.endswith("_CLOCKWISE")
         code = codes.spindle_cw if clockwise else codes.spindle_ccw
         if not command.args:

@@ -7,7 +7,7 @@
 6 ; feed mode auto
 7 ; output mode axes
 8 ; words: axis positions
-9 ; work offset G54 in machine coordinates: X0.0000 Y0.0000 Z0.0000 A0.0000 C0.0000
+9 ; work offset datum number 1 in machine coordinates: X0.0000 Y0.0000 Z0.0000 A0.0000 C0.0000
 10 CYCL DEF 247 DATUM SETTING ~
 Q339=+1 ;DATUM NUMBER
 11 CYCL DEF 32.0 TOLERANCE
@@ -87,7 +87,5 @@ Q395=+0 ;DEPTH REFERENCE
 76 L Z+250 FMAX M91
 77 L X+0 Y+0 A+0 C+0 FMAX M91
 78 M5
-79 M9
-80 M5
-81 M30
-82 END PGM THREE_LAWS MM
+79 M30
+80 END PGM THREE_LAWS MM

@@ -132,12 +132,12 @@ def test_the_command_writes_the_files_beside_the_program(tmp_path: Path) -> None
     done = CliRunner().invoke(app, ["convert", str(GOLDEN / "three_laws.cls"), "-m", "mikron-ucp710", "-c", "siemens-840d",
                                     "-o", str(out), "--setup", str(setup)])
     assert done.exit_code == 0, done.output
-    assert sorted(p.name for p in tmp_path.iterdir()) == [*(f"THREE_LAWS_{n}.SPF" for n in (1001, 1002, 1003)), "part.mpf",
+    assert sorted(p.name for p in tmp_path.iterdir()) == [*(f"PART_{n}.SPF" for n in (1001, 1002, 1003)), "part.mpf",
                                                           "s.toml"]
     again = CliRunner().invoke(app, ["verify", str(out), str(GOLDEN / "three_laws.cls"), "-m", "mikron-ucp710",
                                      "-c", "siemens-840d", "--setup", str(setup)])
     assert again.exit_code == 0, again.output
-    (tmp_path / "THREE_LAWS_1002.SPF").unlink()
+    (tmp_path / "PART_1002.SPF").unlink()
     assert CliRunner().invoke(app, ["verify", str(out), str(GOLDEN / "three_laws.cls"), "-m", "mikron-ucp710",
                                     "-c", "siemens-840d", "--setup", str(setup)]).exit_code == 1
 

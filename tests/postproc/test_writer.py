@@ -341,7 +341,7 @@ def test_pecks_that_grow_smaller_are_written_as_single_moves() -> None:
 
 
 def test_tapping_is_never_written_as_single_moves() -> None:
-    result = convert(toolpath("RAPID", "GOTO/0,0,50", "CYCLE/TAP,DEPTH,12,RAPTO,3,RTRCTO,20,MANUAL,MMPM,100", "GOTO/10,0,0",
+    result = convert(toolpath("RAPID", "GOTO/0,0,50", "CYCLE/TAP,DEPTH,12,RAPTO,3,RTRCTO,60,MANUAL,MMPM,100", "GOTO/10,0,0",
                               "GOTO/20,0,0"), "mill-3axis")
     assert "cycle.not_native" in codes(result.diagnostics) and not result.text
 
