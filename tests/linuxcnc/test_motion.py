@@ -26,7 +26,7 @@ description = "LinuxCNC that keeps to the path"
 
 [program]
 preamble = ["G21 G90 G94 G17 G40 G49 G80", "G54", "G61"]
-path_tolerance = ""
+path_tolerance = []
 
 [kinematics]
 smoothing_share = 0.0
