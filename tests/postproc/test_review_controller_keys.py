@@ -21,7 +21,8 @@ ONE_VALUE = {"kinematics.linear"}
 OTHERS = {"kinematics.rapids", "feed.length", "feed.arc_inverse", "modes.tcp", "modes.tilted", "arcs.helix_planes",
           "kinematics.smoothing_fixed", "kinematics.axis_smoothing_share", "tools.preload",
           "tools.length_automatic", "program.operation", "subprograms.call", "subprograms.begin", "subprograms.end",
-          "subprograms.place", "subprograms.file", *(f"subprogram_files.{k}" for k in ("call", "begin", "end", "place", "file"))}
+          "subprograms.place", "subprograms.file", "subprogram_files.call", "subprogram_files.begin", "subprogram_files.end",
+          "subprogram_files.place", "subprogram_files.file"}
 """keys of what LinuxCNC has not: test_controllers_*.py, test_parts.py and test_output_modes*.py show what they do"""
 READ_BACK = {"cycles.peck_relief"}
 """how the control moves inside a canned cycle, which the read-back follows and no block states"""
