@@ -62,7 +62,7 @@ class Output(UserModel):
     restart: bool = False
     """every operation begins at home with everything restated, so that the program can be taken up there"""
     subprograms: bool = False
-    """every operation is a subprogram, of the same file or, as on Siemens, in a file of its own; it begins as with restart"""
+    """every operation is a subprogram, of the same file or (Siemens) in one of its own; it begins as with restart"""
     files: bool = False
     """every operation is a subprogram in a file of its own beside the program, which calls them"""
     longest: int = Field(default=0, ge=0)
