@@ -96,6 +96,8 @@ class Drill:
         style: "drill"; "break": between pecks it lifts by `relief`; "peck": out to the plane, rapidly back to `relief`
             before the last depth; "feed_out": out to the plane at feed
         relief: mm; dwell: s at the bottom; feed, feed_out: mm/min, NaN: the F word in force
+        tap: "rigid" where the control couples feed and spindle, "floating" where a chuck makes up; "" for what does not tap
+        pitch: mm per turn of a tap, negative for a left-hand one; NaN: by feed, speed and sense of the spindle
     """
 
     plane: float
@@ -107,6 +109,8 @@ class Drill:
     dwell: float = 0.0
     feed: float = float("nan")
     feed_out: float = float("nan")
+    tap: Literal["", "rigid", "floating"] = ""
+    pitch: float = float("nan")
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from postproc.control import Control
-from postproc.events import compensation_states, coolant_states, loaded_registers, loaded_tools, spindle_states
+from postproc.events import (
+    compensation_side,
+    compensation_states,
+    coolant_states,
+    loaded_registers,
+    loaded_tools,
+    numbers,
+    spindle_states,
+)
 from postproc.holes import PECKING, Phase
 from postproc.job import Job
 from postproc.links import SafeSpace
@@ -77,12 +85,14 @@ def check_holes(motion: Motion, job: Job, moves: Moves, tip: Floats, owner: Ints
         return []
     m = owner[rows]
     starts = np.flatnonzero(np.diff(m, prepend=-1))
-    bad_peck, bad_out, bad_dwell = [], [], []
+    bad_peck, bad_out, bad_dwell, bad_rest = [], [], [], []
     for at, stop in zip(starts, [*starts[1:], len(rows)], strict=True):
         cycle = job.toolpath.cycles[int(moves.cycle[m[at]])]
         part = rows[at:stop]
         if cycle.dwell > 0.0 and motion.dwell[part].sum() < cycle.dwell * 0.99 - 1e-3:
             bad_dwell.append(part[0])
+        elif motion.dwell[part].sum() > cycle.dwell * 1.01 + 2e-3:
+            bad_rest.append(part[0])
         if cycle.kind in PECKING and cycle.steps:
             depth = (moves.tip[m[at]] - tip[part]) @ moves.axis[m[at]]
             total = cycle.depth + cycle.clearance
@@ -97,7 +107,8 @@ def check_holes(motion: Motion, job: Job, moves: Moves, tip: Floats, owner: Ints
     result = []
     for bad, what in ((bad_out, "the tool does not leave the hole between pecks as the CL file says"),
                       (bad_peck, "the hole is drilled in deeper pecks than the CL file says"),
-                      (bad_dwell, "the tool rests at the bottom for less time than the CL file says")):
+                      (bad_dwell, "the tool rests at the bottom for less time than the CL file says"),
+                      (bad_rest, "the tool rests in the hole for more time than the CL file says")):
         if bad:
             result.append(faults.error("verify.hole", what, int(moves.line[owner[bad[0]]]), int(motion.line[bad[0]]),
                                        len(bad)))
@@ -105,11 +116,11 @@ def check_holes(motion: Motion, job: Job, moves: Moves, tip: Floats, owner: Ints
 
 
 _SPINDLE = {-1: "anti-clockwise (M4)", 0: "stopped (M5)", 1: "clockwise (M3)"}
-_COMPENSATION = {40: "off (G40)", 41: "left (G41)", 42: "right (G42)"}
 
 
 def check_states(motion: Motion, job: Job, moves: Moves, owner: Ints, faults: Faults) -> list[Diagnostic]:
-    """Tool, spindle, coolant, compensation and work offset while cutting, against the CL file and the set-up."""
+    """Tool, spindle, coolant, compensation and work offset while cutting, against the CL file and the set-up, in the
+    order of the program."""
     rows = np.flatnonzero((owner < len(moves)) & (motion.code > 0))
     rows = rows[moves.kind[owner[rows]] != Kind.RAPID]
     row = moves.row[owner[rows]]
@@ -118,15 +129,16 @@ def check_states(motion: Motion, job: Job, moves: Moves, owner: Ints, faults: Fa
     cooled, coolant = coolant_states(job.toolpath)[row], motion.flood[rows] | motion.mist[rows]
     side, tilted = compensation_states(job.toolpath)[row], np.abs(moves.axis[owner[rows], 2]) < 1.0 - 1e-9
     same_speed = (np.abs(motion.rpm[rows] - rpm) <= 0.5) | np.isnan(rpm) | (direction == 0)
-    given = motion.compensation[rows]
-    offset = reader_for(job.controller, job.machine.axis_names).offset_of(
-        job.controller.program.work_offsets.get(job.setup.work_offset_code, job.setup.work_offset_code))
+    given, radius, wanted_radius = motion.compensation[rows], motion.radius[rows], _radius_registers(job)[row]
+    reader = reader_for(job.controller, job.machine.axis_names)
+    offset = reader.offset_of(job.controller.program.work_offsets.get(job.setup.work_offset_code,
+                                                                         job.setup.work_offset_code))
     code = np.full(len(rows), offset)
     dropped = tilted & (given == 40) & (motion.frame[rows] == 0)
 
     def number(value: float) -> str:
         return f"{value:g}" if np.isfinite(value) and value >= 0 else "none"
-    result: list[Diagnostic] = []
+    result: list[tuple[int, Diagnostic]] = []
     for what, good, found, wanted, name in (
             ("tool", motion.tool[rows] == tool, motion.tool[rows], tool, number),
             ("spindle", motion.spindle[rows] == direction, motion.spindle[rows], direction, _SPINDLE.__getitem__),
@@ -134,15 +146,33 @@ def check_states(motion: Motion, job: Job, moves: Moves, owner: Ints, faults: Fa
             ("coolant", coolant == cooled, coolant, cooled, lambda on: "on" if on else "off"),
             ("length register", (motion.register[rows] == register) | ~job.control.length_on_z, motion.register[rows],
              register, number),
-            ("cutter compensation", (given == side) | dropped, given, side, _COMPENSATION.__getitem__),
+            ("cutter compensation", (given == side) | dropped, given, side,
+             lambda g: reader.sides[int(g)]),
+            ("register of the cutter compensation", (radius == wanted_radius) | np.isnan(wanted_radius) | (given == 40),
+             radius, wanted_radius, number),
             ("work offset", motion.offset[rows] == code, motion.offset[rows], code,
-             lambda g: f"G{g:g}" if np.isfinite(g) else "not stated")):
+             lambda g: reader.offset_name(g) if np.isfinite(g) else "not stated")):
         bad = np.flatnonzero(~np.asarray(good))
         if len(bad):
             k = int(bad[0])
-            result.append(faults.error(
+            result.append((int(rows[k]), faults.error(
                 "verify.state", f"{what} is {name(found[k])}, it should be {name(wanted[k])}",
-                int(moves.line[owner[rows[k]]]), int(motion.line[rows[k]]), len(bad)))
+                int(moves.line[owner[rows[k]]]), int(motion.line[rows[k]]), len(bad))))
+    return [d for _, d in sorted(result, key=lambda one: one[0])]
+
+
+def _radius_registers(job: Job) -> Floats:
+    """(N,) register of the cutter compensation that CUTCOM names at every row, NaN where it names none or the control's
+    code takes none."""
+    starts, values = [0], [np.nan]
+    for event in job.toolpath.events:
+        if event.word == "CUTCOM" and compensation_side(event):
+            code = job.controller.codes.compensation_right if compensation_side(event) == "RIGHT" else \
+                job.controller.codes.compensation_left
+            starts.append(event.index)
+            values.append((numbers(event) or [np.nan])[0] if "{register}" in code else np.nan)
+    at = np.searchsorted(np.array(starts), np.arange(len(job.toolpath)), side="right") - 1
+    result: Floats = np.array(values, dtype=np.float64)[at]
     return result
 
 
@@ -178,21 +208,20 @@ def check_smoothing(motion: Motion, job: Job, moves: Moves, owner: Ints, faults:
     if not len(bad):
         return []
     k = int(bad[0])
-    found = "is not stated" if np.isnan(motion.blend[k]) else "has no limit (G64 without P)" if np.isinf(motion.blend[k]) \
+    found = "is not stated" if np.isnan(motion.blend[k]) else "has no limit" if np.isinf(motion.blend[k]) \
         else f"may take {motion.blend[k]:g} mm"
     return [faults.error("verify.smoothing", f"the control's smoothing {found}, its share of the tolerance is {share:g} mm",
-                         int(moves.line[owner[k]]), int(motion.line[k]), len(bad), hint="G64 P Q as the post writes it, or "
-                         "G61")]
+                         int(moves.line[owner[k]]), int(motion.line[k]), len(bad),
+                         hint=reader_for(job.controller, job.machine.axis_names).smoothing_hint)]
 
 
-def check_speeds(motion: Motion, control: Control, moves: Moves, curves: Curves, owner: Ints, match: Ints, by_radius: bool,
+def check_speeds(motion: Motion, moves: Moves, curves: Curves, owner: Ints, match: Ints, seconds: Floats,
                  tolerance: float, faults: Faults) -> list[Diagnostic]:
-    """Moves that the F words run faster than programmed, over the whole move.
+    """Moves that the F words run faster than programmed, over the whole move; `seconds` (E,) of each block.
 
     Chords within the tolerance e of an arc are shorter than its length r s by up to s e / 3: e = c^2 / (8 r) and the arc
     of a chord c is c (1 + c^2 / (24 r^2)).
     """
-    seconds = block_seconds(motion, control, by_radius)
     cutting = (owner < len(moves)) & (motion.code > 0)
     total = np.bincount(owner[cutting], weights=seconds[cutting], minlength=len(moves) + 1)[:len(moves)]
     length = curves.length()

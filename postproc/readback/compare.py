@@ -10,6 +10,7 @@ from postproc.job import Job
 from postproc.moves import Moves, Phase
 from postproc.readback.align import align, unreached
 from postproc.readback.checks import (
+    block_seconds,
     check_holes,
     check_kinds,
     check_links,
@@ -22,6 +23,8 @@ from postproc.readback.execute import Motion
 from postproc.readback.faults import Faults
 from postproc.readback.poses import SAMPLES, Executed, arc_sweeps
 from postproc.readback.rewinds import check_rewinds, rewinds
+from postproc.readback.slow import check_slow
+from postproc.readback.taps import check_taps
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.diagnostics import Diagnostic
 from toolpaths.rotations import angle_between
@@ -47,10 +50,10 @@ class Comparison:
     diagnostics: tuple[Diagnostic, ...]
 
 
-def compare(motion: Motion, job: Job, executed: Executed, gcode: str = "") -> Comparison:
+def compare(motion: Motion, job: Job, executed: Executed, gcode: str = "", planned: bool = False) -> Comparison:
     """Every block on its stretch of the reference, every move done, in order, as the CL file has it, inside travel.
 
-    Faults point into the CL file, or into the program where `gcode` names it.
+    Faults point into the CL file, or into the program where `gcode` names it. `planned`: its feeds were.
     """
     tolerance, axis_tolerance = job.options.tolerance, job.axis_tolerance
     moves, faults = job.moves.without_pecks(), Faults(job.toolpath.file, gcode)
@@ -75,8 +78,11 @@ def compare(motion: Motion, job: Job, executed: Executed, gcode: str = "") -> Co
     diagnostics += check_kinds(motion, moves, owner, tip, executed.control.rapids == "dog-leg", faults)
     diagnostics += check_states(motion, job, moves, owner, faults)
     diagnostics += check_holes(motion, job, moves, tip, owner, faults)
-    diagnostics += check_speeds(motion, executed.control, moves, curves, owner, match,
-                                job.controller.feed.arc_inverse == "radius", tolerance, faults)
+    diagnostics += check_taps(motion, job, moves, owner, faults)
+    seconds = block_seconds(motion, executed.control, job.controller.feed.arc_inverse == "radius")
+    diagnostics += check_speeds(motion, moves, curves, owner, match, seconds, tolerance, faults)
+    if not planned:
+        diagnostics += check_slow(motion, executed, job, moves, curves, owner, match, seconds, faults)
     diagnostics += check_links(motion, executed, moves, owner, job.space, tolerance, faults)
     diagnostics += check_rewinds(motion, executed, number, tip, axis, job.space, tolerance, grain[1] + _kept(job), faults)
     diagnostics += check_travel(motion, executed, moves, owner, faults)

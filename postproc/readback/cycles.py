@@ -118,5 +118,5 @@ class Sticky:
         else:
             bottoms = pecks(plane, bottom, q * scale) if code in (73, 83) else (bottom,)
         style = {73: "break", 83: "peck", 74: "feed_out", 84: "feed_out", 85: "feed_out", 89: "feed_out"}.get(code, "drill")
-        rest = dwell if code in (82, 89) and np.isfinite(dwell) else 0.0
+        rest = dwell if code not in (81, 85) and np.isfinite(dwell) else 0.0
         return Drill(plane, bottom, out, bottoms, style, self.relief if code in (73, 83) else 0.0, rest)  # type: ignore[arg-type]

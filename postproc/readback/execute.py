@@ -12,7 +12,7 @@ from postproc.control import Control
 from postproc.readback import frames
 from postproc.readback.canonical import CALL, LAW, REST, TURNS, Canonical, Law, Text, in_files, placed
 from postproc.readback.frames import AXES, Frame
-from postproc.readback.modal import Modal, columns, fill, fill_values, modal_state
+from postproc.readback.modal import Modal, codes, columns, fill, fill_values, modal_state, number_of
 from postproc.readback.rows import Rows, Section
 from postproc.readback.sections import run_section
 from postproc.readback.words import Words
@@ -36,6 +36,9 @@ class Motion:
         dwell (E,): s that the tool rests at the end of the block
         compensation (E,): 40, 41, 42; offset (E,): work offset code; blend (E,): mm of the control's smoothing (Modal)
         frame (E,): index into frames: the law that the block runs under
+        block (E,): running number of the block; radius (E,): register that the compensation in force was stated with, NaN
+            for none
+        pitch (E,): mm per turn of a tapping cycle, negative for left-hand ones, NaN outside; floating (E,): not coupled
     """
 
     line: Ints
@@ -60,6 +63,10 @@ class Motion:
     offset: Floats
     blend: Floats
     frame: Ints
+    block: Ints
+    radius: Floats
+    pitch: Floats
+    floating: Bools
     frames: tuple[Frame, ...] = (AXES,)
 
     def __len__(self) -> int:
@@ -111,7 +118,7 @@ def run(code: Canonical, letters: tuple[str, ...], offsets: Offsets, file: str =
         position = part.end[-1] if len(part.end) else position
         parts.append(part)
     rows = Rows.joined(parts, len(letters))
-    return _motion(words, modal, rows, code, tuple(used), offsets, rests), placed(found, code.files)
+    return _motion(words, modal, rows, code, tuple(used), offsets, rests, section.call), placed(found, code.files)
 
 
 def _stretches(words: Words, modal: Modal, laws: tuple[Law, ...]) -> list[tuple[int, int, Law | None, int]]:
@@ -153,15 +160,38 @@ def _cancelled(words: Words, modal: Modal, section: Section, line: Ints, file: s
 
 
 def _motion(words: Words, modal: Modal, rows: Rows, code: Canonical, used: tuple[Frame, ...], offsets: Offsets,
-            rests: Floats) -> Motion:
+            rests: Floats, call: Floats) -> Motion:
     block = rows.block
     feed, missing = _feeds(words, modal, rows)
     dwell = _dwell(block, rows.code, rows.hole, rows.dwell, rests)
+    pitch, floating = _threads(modal, rows, feed, call, code)
     return Motion(in_files(code.line[block], code.files), rows.code, rows.end, offsets.home, modal.plane[block],
                   modal.motion[block] == 3, rows.center, feed, modal.inverse[block], modal.tool[block],
                   modal.length_register[block], modal.spindle[block], modal.rpm[block], modal.flood[block],
                   modal.mist[block], rows.hole, missing, dwell,
-                  modal.compensation[block], modal.offset[block], modal.blend[block], rows.frame, used)
+                  modal.compensation[block], modal.offset[block], modal.blend[block], rows.frame, block,
+                  _radius_registers(words)[block], pitch, floating, used)
+
+
+def _radius_registers(words: Words) -> Floats:
+    """(B + 1,) D word of the block that switches the compensation on, or in force there; NaN where there is none."""
+    blocks, _ = codes(words, "G", (40, 41, 42))
+    return fill_values(blocks, number_of(words, "D")[blocks], words.lines)
+
+
+def _threads(modal: Modal, rows: Rows, feed: Floats, call: Floats, code: Canonical) -> tuple[Floats, Bools]:
+    """(mm per turn of taps (E,), negative for left-hand ones, NaN for other rows; floating (E,)): G84 and G74 by F and S."""
+    motion, rpm = modal.motion[rows.block], modal.rpm[rows.block]
+    hand = np.where(motion == 84, 1.0, np.where(motion == 74, -1.0, np.nan))
+    called = np.where(rows.hole, call[rows.block], np.nan)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        by_feed = feed / rpm
+    own = np.array([d.pitch for d in code.drills] + [np.nan])
+    kinds = np.array([("", "rigid", "floating").index(d.tap) for d in code.drills] + [0])
+    drill = np.where(np.isfinite(called), called, -1.0).astype(np.int64)
+    by_spindle = np.where(kinds[drill] > 0, by_feed * modal.spindle[rows.block], np.nan)
+    pitch = np.where(rows.hole, hand * by_feed, np.nan)
+    return np.where(drill >= 0, np.where(np.isfinite(own[drill]), own[drill], by_spindle), pitch), kinds[drill] == 2
 
 
 def _dwell(block: Ints, code: Array, hole: Bools, at_bottom: Floats, rests: Floats) -> Floats:

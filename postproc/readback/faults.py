@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from toolpaths.diagnostics import Diagnostic, error
+from toolpaths.diagnostics import Diagnostic, Severity, error
 
 
 @dataclass(frozen=True)
@@ -13,6 +13,10 @@ class Faults:
 
     cl: str
     gcode: str = ""
+
+    def warning(self, code: str, message: str, cl_line: int, block_line: int, count: int = 1, hint: str = "") -> Diagnostic:
+        """A WARNING there."""
+        return replace(self.error(code, message, cl_line, block_line, count, hint), severity=Severity.WARNING)
 
     def error(self, code: str, message: str, cl_line: int, block_line: int, count: int = 1, hint: str = "") -> Diagnostic:
         """An ERROR at a line of the CL file and a line of the program."""

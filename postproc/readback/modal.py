@@ -151,7 +151,8 @@ def check_codes(words: Words, groups: Groups, m_codes: tuple[float, ...], letter
             lines = words.line[pick & (words.value == value)]
             diagnostics.append(error("gcode.unknown_code", f"{what}{value:g} is not executed by this reader", file=file,
                                      lines=lines[:6].tolist(), count=len(lines),
-                                     hint="take it out, or write it by the post"))
+                                     hint="take it out; a code of the shop that moves nothing is named in "
+                                     "program.passive of the controller file"))
     for code in np.unique(words.letter[~known]):
         lines = words.line[words.letter == code]
         diagnostics.append(error("gcode.unknown_word", f"word {chr(code)}: the machine has no such axis", file=file,

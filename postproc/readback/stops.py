@@ -9,7 +9,7 @@ import numpy as np
 from postproc.events import Spindle, numbers, spindle_after, words
 from postproc.holes import Phase
 from postproc.job import Job
-from postproc.readback.canonical import Canonical
+from postproc.readback.canonical import Canonical, in_files
 from postproc.readback.execute import Motion
 from postproc.readback.faults import Faults
 from postproc.readback.modal import codes
@@ -26,7 +26,13 @@ def check_stops(code: Canonical, motion: Motion, job: Job, faults: Faults) -> li
     result = []
     for word, number in _STOPS:
         lines = [event.line for event in job.toolpath.events if event.word == word]
-        stated = len(codes(code.words, "M", (number,))[0])
+        blocks = codes(code.words, "M", (number,))[0]
+        stated = len(blocks)
+        if stated > len(lines):
+            where = in_files(code.line[blocks], code.files)
+            result.append(faults.warning("verify.stop", f"the program holds M{number:g} {stated} times, the CL file {word} "
+                                         f"{len(lines)} times: a stop within a cut marks the part", 0, int(where[0]),
+                                         stated - len(lines), "take out what is not meant"))
         if stated < len(lines):
             result.append(faults.error("verify.stop", f"the program holds M{number:g} {stated} times, the CL file {word} "
                                        f"{len(lines)} times", lines[stated], int(motion.line[-1]), len(lines) - stated))
@@ -35,6 +41,10 @@ def check_stops(code: Canonical, motion: Motion, job: Job, faults: Faults) -> li
     if found < asked - _ROUNDING * len(rests) - 1e-9:
         result.append(faults.error("verify.dwell", f"the program rests for {found:.3f} s, the CL file for {asked:.3f} s",
                                    rests[0][1], int(motion.line[-1])))
+    elif found > asked + max(0.01 * asked, _ROUNDING * (len(rests) + 1)):
+        rest = int(motion.line[int(motion.dwell.argmax())])
+        result.append(faults.warning("verify.rest", f"the program rests for {found:.3f} s, the CL file for {asked:.3f} s", 0,
+                                     rest, hint="take out the rest that is not meant"))
     return result
 
 

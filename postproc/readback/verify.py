@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 import numpy as np
 
 from postproc.job import Job
+from postproc.readback.changes import check_changes
 from postproc.readback.compare import Comparison, compare
 from postproc.readback.dialects import reader_for
 from postproc.readback.execute import Motion, Offsets, run
 from postproc.readback.faults import Faults
 from postproc.readback.poses import Executed, poses_before
+from postproc.readback.slow import HEADER, planned_feeds
 from postproc.readback.stops import check_stops
 from toolpaths.diagnostics import Diagnostic, error, has_errors
+
+_CORRECTED = re.compile(rb"(?im)^[^\n]*geometric errors [^\n]*corrected in this program")
+CAUSES = frozenset({"verify.tool", "verify.tool_change", "verify.state", "verify.tap", "verify.hole"})
+"""told first: a path that is off follows from them"""
 
 
 def read_back(data: bytes, job: Job, file: str, progress: Callable[[str, int, int], None] | None = None, gcode: str = "",
@@ -26,12 +34,16 @@ def read_back(data: bytes, job: Job, file: str, progress: Callable[[str, int, in
     home = control.words(machine.home[None, :], machine.kinematics, 0.0)[0] + control.work_offset
     reader = reader_for(job.controller, machine.axis_names, home)
     code, diagnostics = reader.read(data, gcode, others)
+    diagnostics = [_located(d, job.toolpath.file) for d in diagnostics]
+    if gcode and (job.errors is None or job.errors.corrected_by != "post") and _CORRECTED.search(data[:HEADER]):
+        return None, [error("verify.error_model", "the program corrects geometric errors, none are given here",
+                            file=gcode, hint="verify with --error-model, the file that its header names"), *diagnostics]
     if code is None or has_errors(diagnostics):
         return None, diagnostics
     offsets = Offsets(control.work_offset, control.xyz, job.register_lengths(), home, control.length_on_z,
                       job.controller.cycles.peck_relief, control, reader.rises_first, reader.arc_slack)
     motion, found = run(code, machine.axis_names, offsets, gcode)
-    diagnostics += found
+    diagnostics += [_located(d, job.toolpath.file) for d in found]
     if has_errors(diagnostics):
         return None, diagnostics
     if not len(motion):
@@ -40,9 +52,19 @@ def read_back(data: bytes, job: Job, file: str, progress: Callable[[str, int, in
         progress("read back", 0, len(motion))
     executed = _executed(job, motion, offsets.lengths)
     with np.errstate(invalid="ignore"):
-        comparison = compare(motion, job, executed, gcode)
-    stops = check_stops(code, motion, job, Faults(job.toolpath.file, gcode))
-    return comparison, [*diagnostics, *comparison.diagnostics, *stops]
+        planned = job.options.feed == "planned" or planned_feeds(data)
+        comparison = compare(motion, job, executed, gcode, planned)
+    faults = Faults(job.toolpath.file, gcode)
+    unseen = [*check_changes(code, motion, job, home, faults), *check_stops(code, motion, job, faults)]
+    told = sorted([*unseen, *comparison.diagnostics], key=lambda d: d.code not in CAUSES)
+    return comparison, [*diagnostics, *told]
+
+
+def _located(d: Diagnostic, file: str) -> Diagnostic:
+    """A fault of a program without a file of its own: of the CL file it is made from, the line in the message."""
+    if d.file or not d.lines:
+        return d
+    return replace(d, file=file, lines=(), message=f"{d.message} (line {d.lines[0]} of the program)")
 
 
 def _executed(job: Job, motion: Motion, lengths: dict[int, float]) -> Executed:

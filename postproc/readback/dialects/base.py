@@ -6,11 +6,12 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import PurePath
+from typing import ClassVar
 
 import numpy as np
 
 from postproc.controllers.model import ControllerFile
-from postproc.readback.canonical import Canonical, Text, offset_number, placed
+from postproc.readback.canonical import EXTENDED_OFFSETS, Canonical, Text, offset_number, placed
 from postproc.readback.flow import Structure, expand
 from postproc.readback.modal import GROUPS, Groups, check_codes, check_end, codes, drop_passive
 from postproc.readback.words import Words
@@ -28,6 +29,7 @@ class Reader(ABC):
         groups: G codes that it executes, by group; m_codes; letters: words that are no axes
         rises_first: canned cycles as RS274/NGC has them, see `Offsets`
         arc_slack: mm by which the radius may differ between the ends of an arc
+        sides, smoothing_hint: what the control calls cutter compensation and its own smoothing
     """
 
     groups: Groups = GROUPS
@@ -35,6 +37,8 @@ class Reader(ABC):
     letters = "GMFSTHDNIJKRPQLO"
     rises_first = False
     arc_slack = float("inf")
+    sides: ClassVar[dict[int, str]] = {40: "off (G40)", 41: "left (G41)", 42: "right (G42)"}
+    smoothing_hint = "G64 P Q as the post writes it, or G61"
 
     def __init__(self, axes: tuple[str, ...], controller: ControllerFile | None = None, home: Floats | None = None) -> None:
         self.axes, self.controller, self.home = axes, controller, home
@@ -55,6 +59,10 @@ class Reader(ABC):
     def offset_of(self, text: str) -> float:
         """The number of a work offset as the controller writes it."""
         return offset_number(text)
+
+    def offset_name(self, number: float) -> str:
+        """What the control calls the work offset of a number."""
+        return f"G{number:g}" if number < EXTENDED_OFFSETS else f"G54.1 P{number - EXTENDED_OFFSETS:g}"
 
     def behind_end(self, structure: Structure) -> tuple[tuple[int, int], ...]:
         """Lines that may stand behind the end of the program: those of subprograms."""

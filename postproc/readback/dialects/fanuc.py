@@ -41,6 +41,7 @@ class FanucReader(IsoReader):
     tcp_code = 43.4
     extended_offset = 54.1
     repeats = "K"
+    smoothing_hint = "G05.1 Q1 as the post writes it, or G61"
 
     def tokens(self, data: bytes, file: str) -> tuple[Text, list[Diagnostic]]:
         """The words of one file, program numbers among them."""

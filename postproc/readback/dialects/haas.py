@@ -33,6 +33,11 @@ class HaasReader(FanucReader):
     arc_slack = 0.01
     """mm, assumed: the manual has no spiral"""
     repeats = "L"
+    smoothing_hint = "G187 E as the post writes it, or G61"
+
+    def offset_name(self, number: float) -> str:
+        """Beyond G59 they are G154 P."""
+        return super().offset_name(number).replace("G54.1", "G154")
 
     def time(self, words: Words, k: int) -> float:
         """s of a P word: ms, or s with a point."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import re
 from pathlib import PurePath
+from typing import ClassVar
 
 import numpy as np
 
@@ -47,6 +48,8 @@ class KlartextReader(Reader):
                                "distance": (), "units": (), "feed_mode": (), "plane": ()}
     m_codes = (*M_CODES, 13.0, 14.0, 91.0, 99.0, 127.0, 128.0, 129.0)
     letters = "GMFSR?"
+    sides: ClassVar[dict[int, str]] = {40: "off (R0)", 41: "left (RL)", 42: "right (RR)"}
+    smoothing_hint = "CYCL DEF 32.1 T as the post writes it"
     arc_slack = 0.016
     """mm, the TNC's own (circle end points)"""
 
@@ -127,6 +130,10 @@ class KlartextReader(Reader):
     def offset_of(self, text: str) -> float:
         """Number of the preset that CYCL DEF 247 takes."""
         return float(dict(_QWORD.findall(text)).get("339", "nan"))
+
+    def offset_name(self, number: float) -> str:
+        """A line of the datum table."""
+        return f"datum {number:g}"
 
     def stems(self, call: str) -> tuple[str, ...]:
         """The name of CALL PGM, without folders."""

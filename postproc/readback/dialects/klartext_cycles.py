@@ -22,15 +22,15 @@ Made = tuple[Drill | None, str]
 
 def drill_of(number: int, q: Q, speed: float) -> Made:
     """(cycle, "") or (None, what is missing or not modelled); `speed` of the spindle, 1/min."""
-    kinds = {200: _drill, 201: _ream, 203: _universal, 205: _deep, 206: _tap, 207: _tap, 240: _centre}
-    if number not in kinds:
+    kinds = {200: _drill, 201: _ream, 203: _universal, 205: _deep, 240: _centre}
+    if number not in (*kinds, 206, 207):
         return None, "is not executed by this reader"
     missing = [k for k in ("Q200", "Q201", "Q203") if k not in q]
     if missing:
         return None, f"lacks {missing[0]}"
     if q.get("Q395", 0.0) != 0.0 or q["Q201"] >= 0.0:
         return None, "with Q395, or with a depth that is not negative, is not executed by this reader"
-    return kinds[number](q, speed)
+    return _tap(q, speed, number == 207) if number in (206, 207) else kinds[number](q, speed)
 
 
 def _levels(q: Q) -> tuple[float, float, float]:
@@ -94,10 +94,12 @@ def _deep(q: Q, speed: float) -> Made:
                  _feed(q.get("Q208", 0.0))), ""
 
 
-def _tap(q: Q, speed: float) -> Made:
-    """206 at the feed Q206, 207 at the pitch Q239 times the speed; out as it came in."""
+def _tap(q: Q, speed: float, rigid: bool) -> Made:
+    """206 with a floating chuck at the feed Q206, 207 at the pitch Q239 (negative: left-hand) times the speed; out as it
+    came in."""
     plane, bottom, out = _levels(q)
-    feed = abs(q["Q239"]) * speed if "Q239" in q else q.get("Q206", 0.0)
+    feed = abs(q.get("Q239", 0.0)) * speed if rigid else q.get("Q206", 0.0)
     if not feed > 0.0:
-        return None, "lacks its pitch, feed or speed"
-    return Drill(plane, bottom, out, (bottom,), "feed_out", 0.0, q.get("Q211", 0.0), feed, feed), ""
+        return None, "lacks its pitch Q239, or the speed" if rigid else "lacks its feed Q206"
+    return Drill(plane, bottom, out, (bottom,), "feed_out", 0.0, q.get("Q211", 0.0), feed, feed,
+                 "rigid" if rigid else "floating", q["Q239"] if rigid else math.nan), ""

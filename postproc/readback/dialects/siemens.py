@@ -64,6 +64,7 @@ class SiemensReader(Reader):
         "path": (9, 60, 64), "once": (4,), "exact_stop": (601, 602, 603), "length": (), "level": (), "arc_distance": ()}
     m_codes = (*M_CODES, 17.0)
     letters = "GMFSTDNIJKRLP?~"
+    smoothing_hint = "CYCLE832 as the post writes it, or G60"
     arc_slack = 0.01
     """MD21000 CIRCLE_ERROR_CONST, its default"""
 

@@ -51,13 +51,16 @@ def _deep(s: Statement, plain: Drill, surface: float, speed: float) -> tuple[Dri
 
 def _tap(s: Statement, plain: Drill, surface: float, speed: float) -> tuple[Drill | None, str]:
     """CYCLE84(..., DTB, SDAC, MPIT, PIT, POSS, SST, SST1), CYCLE840(..., DTB, SDR, SDAC, ENC, MPIT, PIT)."""
-    pitch = abs(s.number(8 if s.name == "CYCLE84" else 10))
+    rigid = s.name == "CYCLE84"
+    hand = s.number(8 if rigid else 10)
+    pitch = abs(hand)
     turning = s.number(10) if s.name == "CYCLE84" else speed
     back = s.number(11, 0.0) if s.name == "CYCLE84" else 0.0
     if not pitch * turning > 0.0:
         return None, "lacks its pitch or speed"
     return Drill(plain.plane, plain.bottom, plain.out, plain.bottoms, "feed_out", 0.0, plain.dwell, pitch * turning,
-                 pitch * (back if back > 0.0 else turning)), ""
+                 pitch * (back if back > 0.0 else turning), "rigid" if rigid else "floating",
+                 hand if rigid else math.nan), ""
 
 
 def _bore(s: Statement, plain: Drill, surface: float, speed: float) -> tuple[Drill | None, str]:

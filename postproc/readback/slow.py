@@ -1,0 +1,66 @@
+"""Moves that the F words run slower than programmed."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+
+from postproc.control import Control
+from postproc.job import Job
+from postproc.moves import Moves, Phase
+from postproc.readback.execute import Motion
+from postproc.readback.faults import Faults
+from postproc.readback.poses import Executed
+from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.diagnostics import Diagnostic
+from toolpaths.shape import Curves
+from toolpaths.toolpath import Kind
+
+SLOW = 1.25
+"""times as long as programmed, above which a move counts as slow"""
+_PLANNED = re.compile(rb"(?im)^[ \t(;\d]*feed planned")
+HEADER = 4000
+"""characters of a program that hold its header"""
+
+
+def planned_feeds(data: bytes) -> bool:
+    """True where the header of a program says that its feeds were planned."""
+    return bool(_PLANNED.search(data[:HEADER]))
+
+
+def check_slow(motion: Motion, executed: Executed, job: Job, moves: Moves, curves: Curves, owner: Ints, match: Ints,
+               seconds: Floats, faults: Faults) -> list[Diagnostic]:
+    """Moves that take longer than their programmed feed and the velocities of all axes ask for, once with their count.
+
+    `seconds` (E,) of the blocks at constant feed; pecks feed some of their way again, which counts once. Feeds that were
+    planned keep more limits, and are not judged.
+    """
+    cutting = (owner < len(moves)) & (motion.code > 0)
+    asked = np.where(moves.seconds > 0.0, moves.seconds, curves.length() / moves.feed)
+    spent, least, fed = (np.bincount(owner[cutting], weights=w[cutting], minlength=len(moves) + 1)[:len(moves)]
+                          for w in (seconds, _least(motion, executed, cutting), seconds * motion.feed / 60.0))
+    again = np.where(moves.phase == Phase.DRILL, fed / np.fmax(curves.length(), 1e-9), 1.0)
+    total, needed = (w / np.fmax(again, 1.0) for w in (spent, least))
+    grain = 10.0 * 10.0**-job.controller.format.linear_decimals
+    slack = 0.002 + grain / np.where(moves.feed > 0.0, moves.feed, np.inf)
+    check = (moves.kind != Kind.RAPID) & ~moves.link & (match >= 0) & np.isfinite(asked) & np.isfinite(total)
+    slow = np.flatnonzero(check & (total > SLOW * np.fmax(asked, needed) + slack))
+    if not len(slow):
+        return []
+    k = slow[int((total[slow] / np.fmax(asked[slow], 1e-9)).argmax())]
+    return [faults.warning("verify.slow", f"the move runs at {asked[k] / total[k]:.3f} times the programmed feed, and no "
+                           "axis needs that", int(moves.line[k]), int(motion.line[match[k]]), len(slow),
+                           "the F word, if it is not meant so")]
+
+
+def _least(motion: Motion, executed: Executed, cutting: Bools) -> Floats:
+    """(E,) s that the velocities of the axes ask of each cutting block, from joints at a few places of it."""
+    control: Control = executed.control
+    rows, result = np.flatnonzero(cutting), np.zeros(len(motion))
+    q = executed.joints(motion, rows, 0.0)
+    for t in (0.25, 0.5, 0.75, 1.0):
+        after = executed.joints(motion, rows, t)
+        result[rows] = np.fmax(result[rows], 4.0 * (np.abs(after - q) / control.machine.limits.velocity).max(axis=1))
+        q = after
+    return result
