@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from postproc.pipeline import PostResult, VerifyResult, points_in
+from toolpaths.diagnostics import Severity
 from toolpaths.units import DEG
 
 
@@ -151,7 +152,9 @@ def verify_text(result: VerifyResult) -> str:
     c = result.comparison
     if c is None:
         return "not proved"
-    verdict = "proved" if result.ok else "NOT proved"
-    return (f"{verdict}: {len(c.owner)} blocks; tip within {c.worst_tip:.6f} mm (CL line {c.worst_tip_line[0]}, block line "
+    if not result.ok:
+        errors = sum(d.severity is Severity.ERROR for d in result.diagnostics)
+        return f"NOT proved: {len(c.owner)} blocks, {errors} error{'s' * (errors > 1)}; the first may cause the rest"
+    return (f"proved: {len(c.owner)} blocks; tip within {c.worst_tip:.6f} mm (CL line {c.worst_tip_line[0]}, block line "
             f"{c.worst_tip_line[1]}), axis within {c.worst_axis / DEG:.6f} degrees (CL line {c.worst_axis_line[0]}, block "
             f"line {c.worst_axis_line[1]})")

@@ -6,8 +6,9 @@ from functools import cache
 
 import pytest
 
-from postproc.pipeline import PostResult
+from postproc.pipeline import PostResult, VerifyResult
 from postproc.readback.verify import read_back
+from postproc.summary import verify_text
 from tests.postproc.kit import convert, good, sample, toolpath
 from toolpaths.diagnostics import Diagnostic, Severity
 
@@ -187,3 +188,11 @@ def test_corrections_of_the_header_are_asked_for_first() -> None:
 def test_unknown_codes_name_file_line_and_way_out() -> None:
     told = [d for d in found(part("fanuc-30i"), "M29 S400", "M88\nM29 S400") if d.code == "gcode.unknown_code"]
     assert told[0].file == "test.apt" and "of the program" in told[0].message and "program.passive" in told[0].hint
+
+
+def test_a_program_that_is_not_proved_has_no_deviation_to_show() -> None:
+    result = part("fanuc-30i")
+    assert result.job is not None
+    comparison, told = read_back(result.text.replace("F800.", "F1600.").encode(), result.job, "part.apt")
+    text = verify_text(VerifyResult("p.nc", comparison, tuple(told)))
+    assert text.startswith("NOT proved") and "tip" not in text
