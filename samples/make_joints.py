@@ -46,8 +46,10 @@ def cone(radius: float, height: float, turns: float, count: int) -> tuple[Floats
 
 def forced_rewind() -> str:
     """Four turns round a cone in one run, the tool lifted by 3 mm for a moment after each."""
-    nx = NxFile(("continuous 5-axis: four turns down a cone, axis leaning outwards by 25 degrees; after each turn the tool is",
-                 "lifted by 3 mm in rapid and goes on where it was. An axis with less than four turns must be unwound: there.",
+    nx = NxFile(("continuous 5-axis: four turns down a cone, axis leaning outwards by 25 degrees; after each turn the tool"
+                 " is",
+                 "lifted by 3 mm in rapid and goes on where it was. An axis with less than four turns must be unwound:"
+                 " there.",
                  "Tip of the cone at the origin, mm."), decimals=5)
     nx.operation("CONE", BALL)
     tip, axis = cone(30.0, 25.0, 4.0, 241)
@@ -84,7 +86,8 @@ def full_sphere() -> str:
 def turned_over() -> str:
     """Work on the underside of a part, tool axes round -z, in the part's own frame."""
     nx = NxFile(("continuous 5-axis on the underside of a part: tool axes within 20 degrees of -z. With",
-                 "turned_over.setup.toml the part lies on its back. Origin in the middle of the upper side, part 20 mm high."),
+                 "turned_over.setup.toml the part lies on its back. Origin in the middle of the upper side, part 20 mm"
+                 " high."),
                 decimals=5)
     nx.operation("UNDERSIDE", BALL)
     t = np.linspace(0.0, 1.0, 181)
