@@ -31,16 +31,19 @@ def time(file: Annotated[Path, typer.Argument(metavar="FILE", help="CL file, or 
          axis_tolerance: Annotated[float, typer.Option("--axis-tolerance", metavar="DEG", min=1e-6, max=10.0)] = 0.05,
          units: Annotated[str, typer.Option("--units", help="units of a CL file that states none: mm or inch")] = "",
          dialect: Annotated[str, typer.Option("--dialect", help="read the CL file as this dialect")] = "",
+         error_model: Annotated[str, typer.Option("--error-model", metavar="E.toml", help="a CL file is timed as it is "
+                                                  "written with these geometric errors corrected")] = "",
          json: Json = "") -> None:
     """Estimate how long a program takes, with a band, and where the time goes."""
     _check(output, calibrate, units, dialect)
     refuse_overwriting({"-o": output, "--json": json}, {"the file": str(file), "the set-up": setup, "the log": calibrate,
+                                                        "the error model": error_model,
                                                         "the model": model if Path(model).suffix else ""})
     from postproc.cycle_time import report as figures
     from postproc.cycle_time.estimate import estimate
     from postproc.options import Options
 
-    options = Options(tolerance, axis_tolerance, "auto", setup, units, dialect)
+    options = Options(tolerance, axis_tolerance, "auto", setup, units, dialect, error_model=error_model)
     values: dict[str, Any] = {}
     text = ""
     with shown_errors(json), progress_bar() as progress:

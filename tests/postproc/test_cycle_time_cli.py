@@ -53,6 +53,15 @@ def test_a_cl_file(tmp_path: Path) -> None:
     assert values["causes"]["tool_change_s"] >= 10.0 and len(values["most_expensive"]) == 10
 
 
+def test_a_cl_file_is_timed_with_its_errors_corrected() -> None:
+    given = SAMPLES / "pocket.cls", "-m", "mikron-ucp710", "-c", "linuxcnc", "--setup", TOOLS
+    values = figures(*given, "--error-model", SAMPLES / "errors" / "mikron-ucp710.toml")
+    check(values)
+    assert values["cycle_time_s"] != figures(*given)["cycle_time_s"]
+    wrong = call(*given, "--error-model", "nowhere.toml")
+    assert wrong.exit_code == 1 and "nowhere.toml" in wrong.output
+
+
 def test_a_program_under_every_model(program: Path) -> None:
     times = {}
     for name in ("linuxcnc", "lookahead", "ideal"):
