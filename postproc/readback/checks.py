@@ -22,6 +22,7 @@ from postproc.readback.dialects import reader_for
 from postproc.readback.execute import Motion
 from postproc.readback.faults import Faults
 from postproc.readback.poses import Executed, arc_sweeps, coordinates
+from postproc.readback.rows import INCH
 from postproc.word_arcs import PLANE_COLUMNS
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.diagnostics import Diagnostic
@@ -240,7 +241,8 @@ def check_speeds(motion: Motion, moves: Moves, curves: Curves, owner: Ints, matc
 def block_seconds(motion: Motion, control: Control, by_radius: bool = False) -> Floats:
     """(E,) time of each cutting block at constant feed, s.
 
-    Per minute the length is `Control.feed_length` under the law of the block, that of arcs along the arc. Inverse time
+    Per minute the length is `Control.feed_length` under the law of the block, that of arcs along the arc, in the units of
+    the feed (degrees where no linear axis moves). Inverse time
     counts whole blocks, in arcs 1/(minutes per radian) where the control has it so (`by_radius`).
     """
     rows = np.arange(len(motion))
@@ -258,6 +260,8 @@ def block_seconds(motion: Motion, control: Control, by_radius: bool = False) -> 
             radius = np.linalg.norm(before[k][:, columns] - motion.center[k][:, (i, j)], axis=1)
             rise = step[k, int(control.xyz[3 - i - j])]
             length[k] = np.hypot(radius * sweep[k], rise)
+    linear = np.isfinite(sweep) | (step[:, control.slides] != 0.0).any(axis=1)
+    length = np.where(motion.inch & linear, length / INCH, length)
     share = np.where(np.isfinite(sweep), sweep, 1.0) if by_radius else 1.0
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.asarray(np.where(motion.inverse, 60.0 * share / motion.feed, 60.0 * length / motion.feed))

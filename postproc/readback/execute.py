@@ -13,7 +13,7 @@ from postproc.readback import frames
 from postproc.readback.canonical import CALL, LAW, REST, TURNS, Canonical, Law, Text, in_files, placed
 from postproc.readback.frames import AXES, Frame
 from postproc.readback.modal import Modal, codes, columns, fill, fill_values, modal_state, number_of
-from postproc.readback.rows import Rows, Section
+from postproc.readback.rows import INCH, Rows, Section
 from postproc.readback.sections import run_section
 from postproc.readback.words import Words
 from toolpaths.arrays import Array, Bools, Floats, Ints
@@ -39,6 +39,7 @@ class Motion:
         block (E,): running number of the block; radius (E,): register that the compensation in force was stated with, NaN
             for none
         pitch (E,): mm per turn of a tapping cycle, negative for left-hand ones, NaN outside; floating (E,): not coupled
+        inch (E,): `feed` counts inches where it counts a length
     """
 
     line: Ints
@@ -67,6 +68,7 @@ class Motion:
     radius: Floats
     pitch: Floats
     floating: Bools
+    inch: Bools
     frames: tuple[Frame, ...] = (AXES,)
 
     def __len__(self) -> int:
@@ -170,7 +172,7 @@ def _motion(words: Words, modal: Modal, rows: Rows, code: Canonical, used: tuple
                   modal.length_register[block], modal.spindle[block], modal.rpm[block], modal.flood[block],
                   modal.mist[block], rows.hole, missing, dwell,
                   modal.compensation[block], modal.offset[block], modal.blend[block], rows.frame, block,
-                  _radius_registers(words)[block], pitch, floating, used)
+                  _radius_registers(words)[block], pitch, floating, modal.inch[block], used)
 
 
 def _radius_registers(words: Words) -> Floats:
@@ -185,7 +187,7 @@ def _threads(modal: Modal, rows: Rows, feed: Floats, call: Floats, code: Canonic
     hand = np.where(motion == 84, 1.0, np.where(motion == 74, -1.0, np.nan))
     called = np.where(rows.hole, call[rows.block], np.nan)
     with np.errstate(divide="ignore", invalid="ignore"):
-        by_feed = feed / rpm
+        by_feed = feed * np.where(modal.inch[rows.block], INCH, 1.0) / rpm
     own = np.array([d.pitch for d in code.drills] + [np.nan])
     kinds = np.array([("", "rigid", "floating").index(d.tap) for d in code.drills] + [0])
     drill = np.where(np.isfinite(called), called, -1.0).astype(np.int64)
