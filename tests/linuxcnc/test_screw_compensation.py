@@ -47,15 +47,15 @@ def compensated(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[[bo
 
 
 def at_rest(run_joints: Floats, stops: tuple[float, ...]) -> Floats:
-    """X of the motor where it last stands within 0.2 mm of each stop, in order."""
+    """X of the motor where it last stands within 0.2 mm of each stop, in order; NaN where no such stand was recorded."""
     still = np.flatnonzero(np.all(np.abs(np.diff(run_joints, axis=0)) < 1e-12, axis=1))
     found, first = [], 0
     for stop in stops:
         near = still[(still >= first) & (np.abs(run_joints[still, 0] - stop) < 0.2)]
         runs = np.split(near, np.flatnonzero(np.diff(near) > 1) + 1)
         longest = max(runs, key=len)
-        found.append(run_joints[longest[-1], 0])
-        first = int(longest[-1])
+        found.append(run_joints[longest[-1], 0] if len(longest) else np.nan)
+        first = int(longest[-1]) if len(longest) else first
     return np.array(found)
 
 
@@ -67,9 +67,12 @@ def test_the_motor_moves_by_the_tables_value(simulate, tmp_path: Path, compensat
     stands = {}
     for on in (False, True):
         compensated(on)
-        run = simulate(machine, program)
-        assert run.errors == ()
-        stands[on] = at_rest(run.joints, STOPS)
+        for _ in range(3):  # a busy host may lose samples: then the run is made again
+            run = simulate(machine, program)
+            assert run.errors == ()
+            stands[on] = at_rest(run.joints, STOPS)
+            if np.isfinite(stands[on]).all():
+                break
     assert stands[False] == pytest.approx(STOPS, abs=1e-9)
     way = np.sign(np.diff((-75.0, *STOPS)))
     assert way.tolist() == [1, 1, 1, 1, -1, -1, -1]
