@@ -10,6 +10,7 @@ import numpy as np
 from machines.kinematics.base import Kinematics
 from machines.machine import Machine
 from machines.polytope import held_axis_polytope
+from postproc.orientation.allowed import SAME, Allowed
 from postproc.orientation.passes import Pass
 from postproc.orientation.timed import Turned, turned
 from postproc.orientation.vertices import vertex_angles
@@ -17,8 +18,6 @@ from toolpaths.arrays import Floats
 from toolpaths.rotations import angle_between
 from toolpaths.units import DEG
 
-SAME = 1e-4
-"""rad: axes nearer than this are one candidate"""
 _SEEDS = 6
 _APART = 5.0 * DEG
 _NEAR = 1.0 * DEG
@@ -27,25 +26,6 @@ _STEPS = (6.0 * DEG, 3.0 * DEG, 1.5 * DEG)
 """of the refinement"""
 _WORTH = 1e-4
 """least part of the time that a candidate must gain to be planned, or to be taken"""
-
-
-@dataclass(frozen=True)
-class Limit:
-    """Largest tilt, rad: from each surface normal where the file gives them, else from the CL's own axis."""
-
-    tilt: float
-
-    def refused(self, one: Pass, axis: Floats) -> str:
-        """Why an axis (3,) is not allowed in a pass, "" where it is; its own always is."""
-        if angle_between(axis, one.axis) < SAME:
-            return ""
-        if len(one.normal):
-            tilt, what = float(angle_between(one.normal, axis[None]).max()), "the surface normal"
-        else:
-            tilt, what = float(angle_between(one.axis, axis)), "the axis of the CL file"
-        if tilt <= self.tilt + 1e-9:
-            return ""
-        return f"tilt {tilt / DEG:.3f} degrees from {what}, allowed {self.tilt / DEG:.3f}"
 
 
 @dataclass(frozen=True)
@@ -64,9 +44,9 @@ class Tried:
 class Search:
     """Candidates of one pass, each solved once."""
 
-    def __init__(self, one: Pass, machine: Machine, limit: Limit) -> None:
-        self.one, self.machine, self.limit = one, machine, limit
-        self.own = turned(one, one.axis, machine)
+    def __init__(self, one: Pass, machine: Machine, allowed: Allowed) -> None:
+        self.one, self.machine, self.allowed = one, machine, allowed
+        self.own = turned(one, one.axis, machine, allowed.touching)
         self.known = [self.own]
         self.lost: dict[int, str] = {}
         self.pruned, self.counted = 0, 1
@@ -75,9 +55,9 @@ class Search:
         """A new candidate; None where one within `apart` is known already or it is not to be had."""
         if bool((angle_between(np.stack([other.axis for other in self.known]), axis) < apart).any()):
             return None
-        made = turned(self.one, axis, self.machine)
+        made = turned(self.one, axis, self.machine, self.allowed.touching)
         self.known.append(made)
-        why = self.limit.refused(self.one, axis) or made.refused
+        why = self.allowed.refused(self.one, axis) or made.refused
         if why:
             self.lost[id(made)] = why
             return None
@@ -85,20 +65,24 @@ class Search:
 
     def better(self, best: Turned, made: Turned) -> Turned:
         """The better of two; a candidate whose bound already loses is not planned."""
-        if made.bound >= best.seconds * (1.0 - _WORTH):
+        if made.bound >= best.seconds_allowed * (1.0 - _WORTH):
             self.pruned += 1
             self.lost[id(made)] = f"takes at least {made.bound:.4f} s"
             return best
         self.counted += 1
-        winner, loser = (made, best) if made.seconds < best.seconds * (1.0 - _WORTH) else (best, made)
-        self.lost[id(loser)] = f"takes {loser.seconds:.4f} s"
+        if made.seconds < best.seconds_allowed * (1.0 - _WORTH) and made.touching:
+            self.lost[id(made)] = made.touching
+            return best
+        winner, loser = (made, best) if made.seconds < best.seconds_allowed * (1.0 - _WORTH) else (best, made)
+        why = loser.touching if loser is not made else ""
+        self.lost[id(loser)] = why or f"takes {loser.seconds:.4f} s"
         self.lost.pop(id(winner), None)
         return winner
 
 
-def tried(one: Pass, machine: Machine, limit: Limit) -> Tried:
+def tried(one: Pass, machine: Machine, allowed: Allowed) -> Tried:
     """All candidates of a pass, planned unless their bound says that they lose."""
-    search = Search(one, machine, limit)
+    search = Search(one, machine, allowed)
     if one.fixed:
         return Tried(search.own, search.own, None, (), 0, 1)
     aimed = _aimed(search)
@@ -153,7 +137,7 @@ def _by_reach(search: Search) -> Iterator[Floats]:
         return
     limits = machine.limits
     limit = limits.jerk if np.isfinite(limits.jerk).all() else limits.acceleration
-    cap = search.limit.tilt if not len(one.normal) else np.pi / 2
+    cap = search.allowed.tilt if not len(one.normal) else np.pi / 2
     axes = one.kin.nearest_axis(_cap(one.axis, min(cap, np.pi - 0.1)))
     middle = stretch.tip[len(stretch.tip) // 2] + one.radius * (one.axis - axes)
     q = one.kin.inverse(middle, axes, near=machine.home)
@@ -167,7 +151,7 @@ def _by_reach(search: Search) -> Iterator[Floats]:
     for k in np.argsort(-best, kind="stable").tolist():
         if len(taken) == _SEEDS or best[k] <= 0.0:
             return
-        if all(angle_between(axes[k], other) > _APART for other in taken) and not search.limit.refused(one, axes[k]):
+        if all(angle_between(axes[k], other) > _APART for other in taken) and not search.allowed.refused(one, axes[k]):
             taken.append(axes[k])
             yield axes[k]
 

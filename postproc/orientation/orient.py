@@ -9,14 +9,15 @@ import numpy as np
 
 from machines.machine import Machine
 from postproc.options import Options, Orientation
-from postproc.orientation.candidates import SAME, Limit, Tried, tried
+from postproc.orientation.allowed import SAME, Allowed
+from postproc.orientation.candidates import Tried, tried
 from postproc.orientation.choose import seconds, shortest
 from postproc.orientation.passes import Pass, Work, work_of
 from postproc.orientation.timed import Turned, turned
 from postproc.orientation.turns import Ends, between, ends
 from postproc.setup import SetupFile
 from toolpaths.arrays import Floats
-from toolpaths.diagnostics import Diagnostic, error, warning
+from toolpaths.diagnostics import Diagnostic, error, has_errors, warning
 from toolpaths.rotations import angle_between
 from toolpaths.toolpath import Arcs, Toolpath
 from toolpaths.units import DEG
@@ -24,6 +25,7 @@ from toolpaths.units import DEG
 Progress = Callable[[str, int, int], None]
 _POOL = 5
 """axes besides its own choices that every pass may take"""
+_APART = "check part, fixtures and holder of the set-up, allow more tilt (--max-tilt) or take a longer tool"
 _CLUSTER = 2.0 * DEG
 _EQUAL = 2e-4
 """part of the time of a cut by which its best orientations may differ; turns decide among them"""
@@ -62,40 +64,59 @@ def orient(toolpath: Toolpath, machine: Machine, setup: SetupFile, options: Opti
     work, found = work_of(toolpath, machine, setup, options)
     if work is None:
         return None, found
-    limit = Limit(options.max_tilt * DEG)
+    allowed = Allowed(options.max_tilt * DEG)
     results = []
     for one in work.passes:
         if progress is not None:
             progress("orienting", one.number, len(work.passes))
         try:
-            results.append(tried(one, machine, limit))
+            results.append(tried(one, machine, allowed))
         except (ValueError, ArithmeticError) as fault:
             return None, [*found, error("orient.plan", f"no motion could be planned: {fault}", file=toolpath.file,
                                         lines=[one.line])]
     if all(one.fixed for one in work.passes):
         reasons = "; ".join(dict.fromkeys(one.fixed for one in work.passes))
         found.append(warning("orient.fixed", f"no pass can be turned: {reasons}", file=toolpath.file))
-    return _plans(work, results, limit), found
+    found += _touching(work, results)
+    return (None if has_errors(found) else _plans(work, results, allowed)), found
 
 
-def _plans(work: Work, results: list[Tried], limit: Limit) -> OrientationChoice:
-    """Tables of all states of all passes, and the plans out of them; `auto` chooses among everything the others use."""
-    states = [_states(one, work.machine, limit, pool) for one, pool in zip(results, _pools(results), strict=True)]
+def _touching(work: Work, results: list[Tried]) -> list[Diagnostic]:
+    """Passes whose own axis touches something: a warning where another axis was found, else an error."""
+    result = []
+    for each in results:
+        one, why = each.own.one, each.own.touching
+        if why:
+            told, other = f"pass {one.number} with the axis of the CL file: {why}", each.best is not each.own
+            code, make = ("orient.own_touches", warning) if other else ("orient.touches", error)
+            told += "" if other else "; no other axis is allowed" + (f" ({one.fixed})" if one.fixed else "")
+            result.append(make(code, told, file=work.toolpath.file, lines=[one.line], hint=_APART))
+    return result
+
+
+def _plans(work: Work, results: list[Tried], allowed: Allowed) -> OrientationChoice:
+    """Tables of all states of all passes, and the plans out of them; `auto` chooses among everything the others use.
+
+    `keep` is the CL file as it is, its time is told even where its tool touches something; no other plan takes such a state.
+    """
+    states = [_states(one, work.machine, allowed, pool) for one, pool in zip(results, _pools(results), strict=True)]
     cuts = [np.array([made.seconds for made in row]) for row in states]
     edge = [[ends(made, work) for made in row] for row in states]
     cost = [cut + np.array([e.rapids for e in row]) for cut, row in zip(cuts, edge, strict=True)]
+    free = [np.where([bool(made.touching) for made in row], np.inf, one) for one, row in zip(cost, states, strict=True)]
     ways = _ways(work, edge)
 
     def plan(picked: list[int]) -> OrientationPlan:
         return OrientationPlan(tuple(row[k] for row, k in zip(states, picked, strict=True)), seconds(picked, cost, ways))
 
     keep = [0] * len(states)
-    best = [np.where(cut <= cut.min() * (1.0 + _EQUAL), row, np.inf) for cut, row in zip(cuts, cost, strict=True)]
+    least = [float(np.where(np.isfinite(row), cut, np.inf).min()) for cut, row in zip(cuts, free, strict=True)]
+    best = [np.where(cut <= low * (1.0 + _EQUAL), row, np.inf) for cut, low, row in zip(cuts, least, free, strict=True)]
     per_pass = shortest(best, ways)[0]
     paper = [_index(row, one.aimed) for row, one in zip(states, results, strict=True)]
-    whole = min([keep, *_wholes(states, keep)], key=lambda picked: seconds(picked, cost, ways))
+    whole = min([keep, *_wholes(states, keep)], key=lambda picked: seconds(picked, free, ways))
     plans: dict[Orientation, OrientationPlan] = {"keep": plan(keep), "per-pass": plan(per_pass), "whole-part": plan(whole),
-                                              "auto": plan(shortest(cost, ways)[0])}
+                                              "auto": plan(shortest(free, ways)[0])}
     return OrientationChoice(work, tuple(results), plans, plan(paper))
 
 
@@ -140,7 +161,7 @@ def _groups(passes: list[Pass]) -> list[list[int]]:
     return [members for _, members in groups]
 
 
-def _states(one: Tried, machine: Machine, limit: Limit, pool: list[Floats]) -> list[Turned]:
+def _states(one: Tried, machine: Machine, allowed: Allowed, pool: list[Floats]) -> list[Turned]:
     """Own, best and aimed axes of a pass, then those of its pool that are allowed; no axis twice."""
     result: list[Turned] = []
     for made in (one.own, one.best, one.aimed):
@@ -148,10 +169,10 @@ def _states(one: Tried, machine: Machine, limit: Limit, pool: list[Floats]) -> l
             result.append(made)
     for axis in pool:
         axis = one.own.one.kin.nearest_axis(axis[None])[0]
-        if any(angle_between(axis, other.axis) < SAME for other in result) or limit.refused(one.own.one, axis):
+        if any(angle_between(axis, other.axis) < SAME for other in result) or allowed.refused(one.own.one, axis):
             continue
-        made = turned(one.own.one, axis, machine)
-        if not made.refused:
+        made = turned(one.own.one, axis, machine, allowed.touching)
+        if not made.refused and not made.touching:
             result.append(made)
     return result
 

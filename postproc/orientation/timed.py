@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -24,6 +25,11 @@ _ROUND = 1.002
 """for the slope of a joint between sites, which is taken from its differences"""
 
 
+def no_bodies(one: Pass, axis: Floats) -> str:
+    """Where nothing is known that could be touched, nothing touches."""
+    return ""
+
+
 @dataclass(frozen=True)
 class Turned:
     """A pass turned to `axis` (3,) (the CL's own where it is fixed): joints of its rows `q` (n, J) and of the sites of
@@ -35,6 +41,12 @@ class Turned:
     q: Floats
     sites: tuple[Floats, ...]
     refused: str = ""
+    collides: Callable[[Pass, Floats], str] = no_bodies
+
+    @cached_property
+    def touching(self) -> str:
+        """Which bodies touch and by how much, "" where none do; looked at once, when first asked for."""
+        return self.collides(self.one, self.axis)
 
     @property
     def limits(self) -> JointLimits:
@@ -78,6 +90,11 @@ class Turned:
         return self._planned[0]
 
     @property
+    def seconds_allowed(self) -> float:
+        """As `seconds`; inf where the tool touches what it must not."""
+        return np.inf if self.touching else self.seconds
+
+    @property
     def limiting(self) -> tuple[str, str]:
         """The axis and the order that cost most of the planned time, ("feed", "") where that does; empty where nothing is
         cut or the machine states no jerk."""
@@ -112,14 +129,14 @@ def _largest_feed(stretch: Stretch) -> float:
     return float(stretch.feed.values[first:max(last, first + 1)].max())
 
 
-def turned(one: Pass, axis: Floats, machine: Machine) -> Turned:
+def turned(one: Pass, axis: Floats, machine: Machine, collides: Callable[[Pass, Floats], str] = no_bodies) -> Turned:
     """The pass with its tool along `axis` (3,), on the branch inside travel whose rotary joints are least turned."""
     move = one.shift(axis)
     tips = [one.tip + move, *(stretch.tip + move for stretch in one.stretches)]
     axes = [one.axes, *(s.axis for s in one.stretches)] if one.fixed else [np.tile(axis, (len(tip), 1)) for tip in tips]
     q, refused = _solved(one, machine, np.concatenate(tips), np.concatenate(axes))
     rows, *sites = np.split(q, np.cumsum([len(tip) for tip in tips])[:-1])
-    return Turned(one, axis, machine, rows, tuple(sites), refused)
+    return Turned(one, axis, machine, rows, tuple(sites), refused, collides)
 
 
 def _solved(one: Pass, machine: Machine, tip: Floats, axis: Floats) -> tuple[Floats, str]:

@@ -13,7 +13,7 @@ from machines.machine import Machine
 from postproc.feedrate.rest_to_rest import Law, rest_seconds
 from postproc.joint_path import nearest_solution
 from postproc.joints.tracks import TRAVEL_SLACK
-from postproc.orientation.candidates import SAME
+from postproc.orientation.allowed import SAME
 from postproc.orientation.passes import Pass, Work
 from postproc.orientation.timed import Turned
 from postproc.planned import joint_limits

@@ -17,7 +17,8 @@ import machines
 import toolpaths
 from machines.machine import Machine
 from postproc.options import Options
-from postproc.orientation.candidates import Limit, tried
+from postproc.orientation.allowed import Allowed
+from postproc.orientation.candidates import tried
 from postproc.orientation.orient import OrientationChoice, orient
 from postproc.orientation.passes import Pass, work_of
 from postproc.orientation.timed import turned
@@ -86,7 +87,7 @@ def full() -> None:
         timed(f"{name} on {machine}", toolpaths.read(SAMPLES / name)[0], machines.load(machine), setup)
 
 
-def _grid_best(one: Pass, m: Machine, limit: Limit) -> float:
+def _grid_best(one: Pass, m: Machine, limit: Allowed) -> float:
     """Least time over orientations A, C on a grid, then on a finer one round the best."""
     best, centre, span, step = np.inf, (0.0, 0.0), (60.0, 180.0), GRID
     for _ in range(3):
@@ -112,7 +113,7 @@ def brute() -> None:
     work, _ = work_of(toolpaths.read(SAMPLES / "test_part.cls")[0], m, settings, Options())
     assert work is not None
     for k in (0, 2, 4):
-        one, limit = work.passes[k], Limit(60.0 * DEG)
+        one, limit = work.passes[k], Allowed(60.0 * DEG)
         best, grid = tried(one, m, limit).best.seconds, _grid_best(one, m, limit)
         print(f"Xp = {one.tip[1, 0]:4.0f}: search {best:.4f} s, grid {grid:.4f} s, {100.0 * (best / grid - 1.0):+.2f} %")
 

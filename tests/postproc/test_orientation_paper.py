@@ -10,7 +10,8 @@ import pytest
 from machines.machine import Machine
 from machines.polytope import held_axis_polytope
 from postproc.options import Options
-from postproc.orientation.candidates import Limit, tried
+from postproc.orientation.allowed import Allowed
+from postproc.orientation.candidates import tried
 from postproc.orientation.passes import Pass, work_of
 from postproc.orientation.timed import turned
 from postproc.orientation.vertices import closed_form, is_table_ac, numeric, vertex_angles
@@ -88,7 +89,7 @@ def test_reach_at_solutions_is_that_of_a_vertex(name: str) -> None:
 def test_choice_within_travel_with_smallest_angles() -> None:
     """A of the Mikron ends at -30 degrees: of the solutions of a level pass A = +45 is left; the least |C| is taken."""
     m, passes = part_passes()
-    found = tried(passes[30], m, Limit(90.0 * DEG))
+    found = tried(passes[30], m, Allowed(90.0 * DEG))
     assert found.aimed is not None
     angles = found.aimed.rotary()
     assert 30.0 < angles["A"] < 60.0 and abs(angles["C"]) < 90.0
@@ -103,7 +104,7 @@ def test_heads_do_not_turn_the_polytope(name: str) -> None:
     limit = np.where(kin.rotary, 1.0, 5.0)
     assert len(vertex_angles(kin, np.zeros(5), np.array([0.8, 0.6, 0.0]), limit)) == 0
     m, passes = part_passes(name)
-    found = tried(passes[30], m, Limit(60.0 * DEG))
+    found = tried(passes[30], m, Allowed(60.0 * DEG))
     assert found.best is found.own
 
 
@@ -111,7 +112,7 @@ def test_heads_do_not_turn_the_polytope(name: str) -> None:
 def test_gain_as_printed(plane: int, least: float, most: float) -> None:
     """Xp = 30 gains 16 % within a point (table 2); no pass more than the ideal 1 - 3^(-1/6) of a straight one."""
     m, passes = part_passes()
-    found = tried(passes[plane], m, Limit(60.0 * DEG))
+    found = tried(passes[plane], m, Allowed(60.0 * DEG))
     assert found.aimed is not None
     gain = 100.0 * (1.0 - found.aimed.seconds / found.own.seconds)
     assert least < gain < most
