@@ -181,8 +181,7 @@ def _stages(result: PostResult, progress: Progress | None) -> PostResult:
         return result
     planned = None if motion is None else Planned(_on_path(result, motion.needed), options.merge_feeds)
     program, feeds, found = compile_program(job, moves, path, planned)
-    found += unwritable(result.controller, program, toolpath.cycles, file, result.setup.output.divided,
-                        job.control.length_on_z)
+    found += unwritable(result.controller, program, toolpath.cycles, file, job.control.length_on_z)
     result = _with(result, found, program=program, feeds=feeds)
     if not result.ok:
         return result

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
@@ -33,7 +34,7 @@ class Operation:
 
 
 @dataclass
-class Spelling:
+class Spelling(ABC):
     """What all systems share; lengths are given in mm and the part frame and written in `unit`."""
 
     unit: str = "MM"
@@ -85,40 +86,41 @@ class Spelling:
         self.circle(at_start, at_end, normal, float(np.linalg.norm(start - at_start)), e, turns)
         self.position = e
 
+    @abstractmethod
     def head(self) -> None:
         """Records before the first operation."""
 
+    @abstractmethod
     def goto(self, point: Triple, axis: Triple) -> str:
         """One GOTO."""
-        raise NotImplementedError
 
+    @abstractmethod
     def circle(self, at_start: Floats, at_end: Floats, normal: Floats, radius: float, end: Floats, turns: int) -> None:
         """The records of an arc with its end; centre at the height of start and end, right-hand normal."""
-        raise NotImplementedError
 
+    @abstractmethod
     def begin(self, op: Operation) -> None:
         """Open an operation: frame, tool, spindle, coolant."""
-        raise NotImplementedError
 
+    @abstractmethod
     def feed(self, rate: float) -> None:
         """FEDRAT, mm/min."""
-        raise NotImplementedError
 
+    @abstractmethod
     def cycle(self, depth: float, clear: float, back: float, rate: float, step: float = 0.0) -> None:
         """CYCLE of a kind: depth below and start and retract plane above the hole's top; `step` pecks."""
-        raise NotImplementedError
 
+    @abstractmethod
     def cycle_off(self) -> None:
         """CYCLE/OFF."""
-        raise NotImplementedError
 
+    @abstractmethod
     def end(self) -> None:
         """Close the operation."""
-        raise NotImplementedError
 
+    @abstractmethod
     def close(self) -> None:
         """Records after the last operation."""
-        raise NotImplementedError
 
     def text(self) -> str:
         """The whole file."""

@@ -11,21 +11,13 @@ from toolpaths.toolpath import Cycle
 
 
 def unwritable(controller: ControllerFile, program: Program, cycles: tuple[Cycle, ...], file: str,
-               subprograms: bool = False, length_offsets: bool = True) -> list[Diagnostic]:
-    """Commands and cycles that the controller's texts cannot say in full, and subprograms where it has none.
+               length_offsets: bool = True) -> list[Diagnostic]:
+    """Commands and cycles that the controller's texts cannot say in full.
 
     `length_offsets` is False where the words hold the length of the tool already.
     """
-    return [*_subprograms(controller, subprograms), *_own_length(controller, program, file, length_offsets),
-            *_length_registers(controller, program, file), *_radius_registers(controller, program, file),
-            *_pitches(controller, program, cycles, file)]
-
-
-def _subprograms(controller: ControllerFile, wanted: bool) -> list[Diagnostic]:
-    if not wanted or controller.subprograms.call:
-        return []
-    return [error("output.subprograms", "operations as subprograms: this controller has none",
-                  hint="take subprograms out of the set-up's [output], or state [subprograms] in the controller file")]
+    return [*_own_length(controller, program, file, length_offsets), *_length_registers(controller, program, file),
+            *_radius_registers(controller, program, file), *_pitches(controller, program, cycles, file)]
 
 
 def _own_length(controller: ControllerFile, program: Program, file: str, length_offsets: bool) -> list[Diagnostic]:

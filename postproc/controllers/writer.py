@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator
 from itertools import chain
 
@@ -29,7 +30,7 @@ NEXT = "\1"
 """before an operation's number, which is the next hundred of the running numbers"""
 
 
-class Writer(WriterState):
+class Writer(WriterState, ABC):
     """Writes one program."""
 
     def lines(self, header: list[str]) -> Iterator[str]:
@@ -168,13 +169,13 @@ class Writer(WriterState):
         if self.in_cycle:
             self.in_cycle, self.motion, self.cycle_text = False, "", ""
 
+    @abstractmethod
     def blocks(self, at: int, stop: int) -> Iterator[str]:
         """Motion blocks at..stop."""
-        raise NotImplementedError
 
+    @abstractmethod
     def hole(self, hole: Hole) -> Iterator[str]:
         """A canned cycle: in full where anything but the place of the hole changes, else the place alone."""
-        raise NotImplementedError
 
     # ---- commands -----------------------------------------------------------------------------------------------
 
