@@ -12,12 +12,13 @@ from postproc.job import Job
 from postproc.readback.changes import check_changes
 from postproc.readback.compare import Comparison, compare
 from postproc.readback.dialects import reader_for
+from postproc.readback.dialects.base import UNITS_UNSTATED
 from postproc.readback.execute import Motion, Offsets, run
 from postproc.readback.faults import Faults
 from postproc.readback.poses import Executed, poses_before
 from postproc.readback.slow import HEADER, planned_feeds
 from postproc.readback.stops import check_stops
-from toolpaths.diagnostics import Diagnostic, error, has_errors
+from toolpaths.diagnostics import Diagnostic, Severity, error, has_errors
 
 _CORRECTED = re.compile(rb"(?im)^[^\n]*geometric errors [^\n]*corrected in this program")
 CAUSES = frozenset({"verify.tool", "verify.tool_change", "verify.state", "verify.tap", "verify.hole"})
@@ -34,7 +35,7 @@ def read_back(data: bytes, job: Job, file: str, progress: Callable[[str, int, in
     home = control.words(machine.home[None, :], machine.kinematics, 0.0)[0] + control.work_offset
     reader = reader_for(job.controller, machine.axis_names, home)
     code, diagnostics = reader.read(data, gcode, others)
-    diagnostics = [_located(d, job.toolpath.file) for d in diagnostics]
+    diagnostics = [_located(_judged(d, reader.units_stay), job.toolpath.file) for d in diagnostics]
     if gcode and (job.errors is None or job.errors.corrected_by != "post") and _CORRECTED.search(data[:HEADER]):
         return None, [error("verify.error_model", "the program corrects geometric errors, none are given here",
                             file=gcode, hint="verify with --error-model, the file that its header names"), *diagnostics]
@@ -58,6 +59,11 @@ def read_back(data: bytes, job: Job, file: str, progress: Callable[[str, int, in
     unseen = [*check_changes(code, motion, job, home, faults), *check_stops(code, motion, job, faults)]
     told = sorted([*unseen, *comparison.diagnostics], key=lambda d: d.code not in CAUSES)
     return comparison, [*diagnostics, *told]
+
+
+def _judged(d: Diagnostic, stays: bool) -> Diagnostic:
+    """Units that nothing states: nothing is proved where another program may have left them in inches."""
+    return d if d.code != UNITS_UNSTATED or stays else replace(d, severity=Severity.ERROR)
 
 
 def _located(d: Diagnostic, file: str) -> Diagnostic:

@@ -16,9 +16,10 @@ from postproc.readback.flow import Structure, expand
 from postproc.readback.modal import GROUPS, Groups, check_codes, check_end, codes, drop_passive
 from postproc.readback.words import Words
 from toolpaths.arrays import Floats, Ints
-from toolpaths.diagnostics import Diagnostic, has_errors
+from toolpaths.diagnostics import Diagnostic, has_errors, warning
 
 Program = tuple[Text, Structure]
+UNITS_UNSTATED = "gcode.units_unstated"
 M_CODES = (0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 30.0)
 
 
@@ -30,6 +31,8 @@ class Reader(ABC):
         rises_first: canned cycles as RS274/NGC has them, see `Offsets`
         arc_slack: mm by which the radius may differ between the ends of an arc
         sides, smoothing_hint: what the control calls cutter compensation and its own smoothing
+        units_codes, units_from: what states mm or inches, and what tells them where nothing does
+        units_stay: that is a setting of the control, which no program changes
     """
 
     groups: Groups = GROUPS
@@ -39,6 +42,9 @@ class Reader(ABC):
     arc_slack = float("inf")
     sides: ClassVar[dict[int, str]] = {40: "off (G40)", 41: "left (G41)", 42: "right (G42)"}
     smoothing_hint = "G64 P Q as the post writes it, or G61"
+    units_codes = "G20 or G21"
+    units_from = "the program before left them"
+    units_stay = False
 
     def __init__(self, axes: tuple[str, ...], controller: ControllerFile | None = None, home: Floats | None = None) -> None:
         self.axes, self.controller, self.home = axes, controller, home
@@ -96,7 +102,21 @@ class Reader(ABC):
         if has_errors(more):
             return None, [*found, *more]
         code, last = self.canonical(text, line, file)
-        return replace(code, files=files), [*found, *more, *placed(last, files)]
+        return replace(code, files=files), [*found, *more, *placed([*self.units(code, file), *last], files)]
+
+    def units(self, code: Canonical, file: str) -> list[Diagnostic]:
+        """Axis words before any code says whether they are mm."""
+        words = code.words
+        stated = codes(words, "G", GROUPS["units"])[0].min(initial=words.lines + 1)
+        letters = [ord(a) for axis in self.axes for a in (axis, axis.lower())]
+        blocks = np.unique(words.line[np.isin(words.letter, letters) & (words.line < stated)])
+        return [self.unstated(file, int(code.line[blocks[0]]), len(blocks))] if len(blocks) else []
+
+    def unstated(self, file: str, line: int, count: int = 1) -> Diagnostic:
+        """Words that are read as mm though nothing says so; `verify` makes an error of it where the state is left over."""
+        return warning(UNITS_UNSTATED, f"axis words before any {self.units_codes}, read as mm: mm or inches as "
+                       f"{self.units_from}", file=file, lines=[line], count=count,
+                       hint=f"state {self.units_codes} before the first of them")
 
     def program(self, data: bytes, name: str) -> tuple[Program | None, list[Diagnostic]]:
         """Words and programs of one file; None where its text cannot be read."""

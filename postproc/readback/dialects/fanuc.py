@@ -4,7 +4,8 @@ Rules beyond RS274/NGC, from the user's manual B-64484EN (functions by their nam
 point programming: what a number without a point means is a parameter; it is refused. Canned cycles: over the hole first,
 then to R; K repeats, P in ms. Subprogram call: M98 P L, M99. Tool center point control: G43.4 H, left by G49. Tilted working
 plane command: G68.2 X Y Z I J K, Euler angles about Z, the new X, the new Z; G53.1 aligns the tool; left by G69. AI contour
-control: G5.1 Q1, whose tolerance is a parameter. Reference position: G28.
+control: G5.1 Q1, whose tolerance is a parameter. Reference position: G28. Inch and metric: G20 and
+G21 stay in force over power off.
 """
 
 from __future__ import annotations
@@ -41,6 +42,7 @@ class FanucReader(IsoReader):
     tcp_code = 43.4
     extended_offset = 54.1
     repeats = "K"
+    units_from = "the program before left them, also over power off"
     smoothing_hint = "G05.1 Q1 as the post writes it, or G61"
 
     def tokens(self, data: bytes, file: str) -> tuple[Text, list[Diagnostic]]:

@@ -3,7 +3,8 @@
 P of a dwell is ms, or s with a point; L repeats a cycle; I, J, K of G73 and G83 are the first peck, what each next one is
 less by, and the least; G154 P work offsets; M97 P runs a subprogram of the same program from its N; G234 tool centre point
 control, left by G49; G254 dynamic work offset, left by G255: X, Y, Z stay along the machine's axes while the offset follows
-the rotary tables; G187 P E, rounding of corners in mm.
+the rotary tables; G187 P E, rounding of corners in mm. Inch
+and metric: setting 9; G20 and G21 only ask for it.
 """
 
 from __future__ import annotations
@@ -33,6 +34,8 @@ class HaasReader(FanucReader):
     arc_slack = 0.01
     """mm, assumed: the manual has no spiral"""
     repeats = "L"
+    units_from = "setting 9 of the control has them"
+    units_stay = True
     smoothing_hint = "G187 E as the post writes it, or G61"
 
     def offset_name(self, number: float) -> str:

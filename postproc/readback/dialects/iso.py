@@ -31,6 +31,7 @@ class IsoReader(Reader):
     """Letters and numbers; rests in seconds (P), registers by H."""
 
     rises_first = True
+    units_from = "the program before left them, or as its start-up code and the INI file have them"
     millimetres = 25.4
     """mm of smoothing per unit under G20"""
 

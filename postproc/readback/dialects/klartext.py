@@ -53,6 +53,9 @@ class KlartextReader(Reader):
     arc_slack = 0.016
     """mm, the TNC's own (circle end points)"""
 
+    units_codes = "BEGIN PGM ... MM"
+    units_from = "nobody knows: the control takes no program without"
+
     def tokens(self, data: bytes, file: str) -> tuple[Text, list[Diagnostic]]:
         """Words of L blocks; statements of the others."""
         text = lines_of(data).upper()
@@ -122,10 +125,16 @@ class KlartextReader(Reader):
                 calls[b] = Call(b, f"{s.name[5:]} {name}")
             elif s.name == "BEGIN PGM" and "INCH" in s.args:
                 found.append(error("gcode.units", "a program in inches", file=file, lines=[b], hint="BEGIN PGM ... MM"))
+        if not any(s.name == "BEGIN PGM" and s.args[1] for _, s in here):
+            found.append(self.unstated(file, 1))
         names = {str(s.args[0]) for _, s in here if s.name == "BEGIN PGM"} | {PurePath(file).stem.upper()}
         subprograms |= {f"PGM {name}": (1, text.words.lines) for name in names if name} if file else {}
         subprograms = {k: v for k, v in subprograms.items() if v != (1, text.words.lines) or calls or k.startswith("PGM")}
         return Structure((1, text.words.lines), subprograms, calls), found + _frame(here, file, text.words.lines)
+
+    def units(self, code: Canonical, file: str) -> list[Diagnostic]:
+        """BEGIN PGM states them, or `structure` says that it does not."""
+        return []
 
     def offset_of(self, text: str) -> float:
         """Number of the preset that CYCL DEF 247 takes."""

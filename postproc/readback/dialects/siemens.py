@@ -64,6 +64,8 @@ class SiemensReader(Reader):
         "path": (9, 60, 64), "once": (4,), "exact_stop": (601, 602, 603), "length": (), "level": (), "arc_distance": ()}
     m_codes = (*M_CODES, 17.0)
     letters = "GMFSTDNIJKRLP?~"
+    units_codes = "G70, G71, G700 or G710"
+    units_from = "machine data 20150 and 20152 have the reset position of group 13"
     smoothing_hint = "CYCLE832 as the post writes it, or G60"
     arc_slack = 0.01
     """MD21000 CIRCLE_ERROR_CONST, its default"""
