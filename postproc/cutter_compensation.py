@@ -7,16 +7,25 @@ import numpy as np
 from postproc.controllers.model import Modes
 from postproc.events import compensation_side, numbers
 from postproc.moves import Moves
-from postproc.path import Path
+from postproc.path import TRAVERSE, Path
 from postproc.program import Command
+from toolpaths.arrays import Bools
 from toolpaths.diagnostics import Diagnostic, error, warning
 from toolpaths.toolpath import Event, Kind
+
+UPRIGHT = 1.0 - 1e-9
+"""cosine of the lean below which the tool stands along Z"""
+STILL = 1e-9
+"""rad that a rotary axis may differ by and still stand"""
+STARTS = ("CUTTER_COMPENSATION_LEFT", "CUTTER_COMPENSATION_RIGHT")
 
 
 class Compensation:
     """CUTCOM as the control's cutter compensation: stated when it changes, off before linking moves, holes, tool changes.
 
-    The points are written as the file has them; what the control adds depends on its register.
+    The points are written as the file has them; what the control adds depends on its register. It adds it in the plane of
+    the words (Fanuc B-63944EN-2, cutter compensation: in the plane that G17 to G19 select), so that plane must be square
+    to the tool all the while: a tilted plane, or the tool along Z and no rotary axis turning.
     """
 
     def __init__(self, moves: Moves, path: Path, commands: dict[int, list[Command]], modes: Modes) -> None:
@@ -70,7 +79,7 @@ class Compensation:
         law = self.path.frames[int(self.path.frame[block])].control.law
         if law == "tilted":
             return self.in_plane
-        return (law == "axes" or self.in_tcp) and bool(abs(self.moves.axis[move, 2]) > 1.0 - 1e-9)
+        return (law == "axes" or self.in_tcp) and bool(abs(self.moves.axis[move, 2]) > UPRIGHT)
 
     def off(self, line: int = 0) -> list[Command]:
         """The command that ends it, where it is on."""
@@ -91,8 +100,34 @@ class Compensation:
             result.append(error("cutcom.left_on", "cutting goes on under CUTCOM after a linking move or a hole, which need "
                                 "it off", file=file, lines=self.left_on[:6], count=len(self.left_on),
                                 hint="write CUTCOM/OFF before the retract and CUTCOM/LEFT or RIGHT after the approach"))
-        if self.tilted:
-            result.append(warning("cutcom.tilted", "CUTCOM while the tool axis is tilted is not carried out", file=file,
-                                  lines=self.tilted[:6], count=len(self.tilted),
-                                  hint="it needs a tilted plane (--output-mode tilted, where the controller has it)"))
+        for code, lines, what in (("cutcom.tilted", self.tilted, "CUTCOM while the tool is tilted"),
+                                  ("cutcom.turning", self.turning(), "the tool turns or leans while CUTCOM is on")):
+            if lines:
+                result.append(error(code, f"{what}: the control would shift the path in the plane of the axis words, not "
+                                    "square to the tool", file=file, lines=lines[:6], count=len(lines),
+                                    hint="write the operation in a tilted plane (--output-mode tilted, where the controller "
+                                    "has it), or take CUTCOM out and let the CAM system offset the path"))
+        return result
+
+    def turning(self) -> list[int]:
+        """Lines of cuts under compensation that lean off Z, or turn rotary axes between axis positions."""
+        path, moves = self.path, self.moves
+        laws = np.array([frame.control.law for frame in path.frames])[path.frame]
+        leans = (np.abs(moves.axis[path.move, 2]) <= UPRIGHT) & (laws != "tilted")
+        rotary = path.frames[0].control.rotary
+        turns = np.zeros(len(path), dtype=bool)
+        turns[1:] = (np.abs(np.diff(path.q[:, rotary], axis=0)) > STILL).any(axis=1) & (laws[1:] == "axes")
+        bad = self._compensated() & (path.code != TRAVERSE) & (leans | turns)
+        return [int(line) for line in np.unique(moves.line[path.move[bad]])]
+
+    def _compensated(self) -> Bools:
+        """(K,) blocks between a command that begins compensation and the one that ends it."""
+        result, begun = np.zeros(len(self.path), dtype=bool), -1
+        for block, group in sorted(self.out.items()):
+            for command in group:
+                if begun >= 0 and command.name.startswith("CUTTER_COMPENSATION"):
+                    result[begun:block], begun = True, -1
+                if command.name.startswith(STARTS):
+                    begun = block
+        result[begun if begun >= 0 else len(result):] = True
         return result

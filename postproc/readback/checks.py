@@ -128,14 +128,13 @@ def check_states(motion: Motion, job: Job, moves: Moves, owner: Ints, faults: Fa
     tool, register = loaded_tools(job.toolpath)[row], loaded_registers(job.toolpath)[row]
     direction, rpm = (a[row] for a in spindle_states(job.toolpath))
     cooled, coolant = coolant_states(job.toolpath)[row], motion.flood[rows] | motion.mist[rows]
-    side, tilted = compensation_states(job.toolpath)[row], np.abs(moves.axis[owner[rows], 2]) < 1.0 - 1e-9
+    side = compensation_states(job.toolpath)[row]
     same_speed = (np.abs(motion.rpm[rows] - rpm) <= 0.5) | np.isnan(rpm) | (direction == 0)
     given, radius, wanted_radius = motion.compensation[rows], motion.radius[rows], _radius_registers(job)[row]
     reader = reader_for(job.controller, job.machine.axis_names)
     offset = reader.offset_of(job.controller.program.work_offsets.get(job.setup.work_offset_code,
                                                                          job.setup.work_offset_code))
     code = np.full(len(rows), offset)
-    dropped = tilted & (given == 40) & (motion.frame[rows] == 0)
 
     def number(value: float) -> str:
         return f"{value:g}" if np.isfinite(value) and value >= 0 else "none"
@@ -147,8 +146,7 @@ def check_states(motion: Motion, job: Job, moves: Moves, owner: Ints, faults: Fa
             ("coolant", coolant == cooled, coolant, cooled, lambda on: "on" if on else "off"),
             ("length register", (motion.register[rows] == register) | ~job.control.length_on_z, motion.register[rows],
              register, number),
-            ("cutter compensation", (given == side) | dropped, given, side,
-             lambda g: reader.sides[int(g)]),
+            ("cutter compensation", given == side, given, side, lambda g: reader.sides[int(g)]),
             ("register of the cutter compensation", (radius == wanted_radius) | np.isnan(wanted_radius) | (given == 40),
              radius, wanted_radius, number),
             ("work offset", motion.offset[rows] == code, motion.offset[rows], code,
