@@ -10,6 +10,8 @@ import numpy as np
 from pydantic import Field
 
 from machines.user_file import UserModel, load_toml, read_toml
+from postproc.setup_orientation import OrientationLimits
+from postproc.setup_place import PlacementLimits
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.toolpath import Frame, Toolpath
@@ -126,6 +128,7 @@ class SetupFile(UserModel):
     work_offset_code: str = Field(default="G54", pattern=r"^G(5[4-9]|59\.[1-3])$")
     """register of the control that holds it: G54 to G59, or G59.1 to G59.3 where the control has them"""
     part: PartPlacement = PartPlacement()
+    placement: PlacementLimits = PlacementLimits()
     clearance: Clearance = Clearance()
     tools: dict[Annotated[str, Field(pattern=r"^(0|[1-9][0-9]*)$")], ToolSetup] = Field(default_factory=dict)
     """by tool number without leading zeros, e.g. [tools.1]"""
@@ -134,6 +137,7 @@ class SetupFile(UserModel):
     """by rotary axis, e.g. [control_pivots.A]: what the control's parameters say; default: as the machine file"""
     rewind: Rewind = Rewind()
     joints: Joints = Joints()
+    orientation: OrientationLimits = OrientationLimits()
 
 
 @dataclass(frozen=True)

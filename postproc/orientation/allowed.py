@@ -1,17 +1,22 @@
-"""Tool axes that a pass may take: tilt, and what the tool would touch."""
+"""Tool axes that a pass may take: tilt, lead, distance from the ball's centre, and what the tool would touch."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Protocol
 
+import numpy as np
+
 from postproc.orientation.passes import Pass
-from toolpaths.arrays import Floats
+from postproc.setup_orientation import OrientationLimits
+from toolpaths.arrays import Bools, Floats
 from toolpaths.rotations import angle_between
 from toolpaths.units import DEG
 
 SAME = 1e-4
 """rad: axes nearer than this are one candidate"""
+_SLACK = 1e-9
+NO_LIMITS = OrientationLimits()
 
 
 class Bodies(Protocol):
@@ -22,29 +27,109 @@ class Bodies(Protocol):
 
 
 @dataclass(frozen=True)
+class _Bound:
+    """An angle that must be inside [low, high], rad, at every point of a pass."""
+
+    name: str
+    what: str
+    """what the angle is measured from, where the name does not say it"""
+    values: Floats
+    """(M, K)"""
+    low: float
+    high: float
+
+    def over(self) -> Floats:
+        """(M, K) by how much, rad; 0 or less inside and where the angle is not known."""
+        return np.nan_to_num(np.maximum(self.low - self.values, self.values - self.high), nan=-np.inf)
+
+
+@dataclass(frozen=True)
 class Allowed:
     """What holds for every candidate.
 
     Attributes:
-        tilt: largest, rad: from each surface normal where the file gives them, else from the CL's own axis
+        tilt: largest, rad: from each surface normal where they are known, else from the CL's own axis
         bodies: None where the set-up names none
+        limits: lead, tilt and distance from the ball's centre as the set-up gives them
     """
 
     tilt: float
     bodies: Bodies | None = None
+    limits: OrientationLimits = NO_LIMITS
 
     def refused(self, one: Pass, axis: Floats) -> str:
         """Why an axis (3,) is not allowed in a pass, "" where it is; its own always is."""
-        if angle_between(axis, one.axis) < SAME:
-            return ""
-        if len(one.normal):
-            tilt, what = float(angle_between(one.normal, axis[None]).max()), "the surface normal"
-        else:
-            tilt, what = float(angle_between(one.axis, axis)), "the axis of the CL file"
-        if tilt <= self.tilt + 1e-9:
-            return ""
-        return f"tilt {tilt / DEG:.3f} degrees from {what}, allowed {self.tilt / DEG:.3f}"
+        return "" if angle_between(axis, one.axis) < SAME else self.outside(one, axis)
+
+    def outside(self, one: Pass, axis: Floats) -> str:
+        """Which limit an axis (3,) breaks worst, by the place, the angle there and what is allowed; "" where none."""
+        worst, told = _SLACK, ""
+        for bound in self._bounds(one, axis[None]):
+            over = bound.over()[0]
+            k = int(over.argmax())
+            if over[k] > worst:
+                worst, told = float(over[k]), _told(one, bound, k)
+        return told
+
+    def mask(self, one: Pass, axes: Floats) -> Bools:
+        """(M,) True for the axes (M, 3) that are inside the limits at every point of a pass (M x points at a time)."""
+        result = np.ones(len(axes), dtype=np.bool_)
+        step = one.contact.parts(len(axes))
+        for first in range(0, len(axes), max(1, step)):
+            some = axes[first:first + step]
+            for bound in self._bounds(one, some):
+                result[first:first + step] &= bound.over().max(axis=1, initial=-np.inf) <= _SLACK
+        return result
+
+    def among(self, one: Pass, apart: float) -> Floats:
+        """All axes (M, 3) of an even lattice, some `apart` rad from each other, that a pass may take."""
+        axes = lattice(apart)
+        return axes[self.mask(one, axes)]
 
     def touching(self, one: Pass, axis: Floats) -> str:
         """As `Bodies.touching`; the own axis of a pass can touch as well."""
         return "" if self.bodies is None else self.bodies.touching(one, axis)
+
+    def _bounds(self, one: Pass, axes: Floats) -> list[_Bound]:
+        """What the limits make of unit axes (M, 3)."""
+        at, limits = one.contact, self.limits
+        if not len(at):
+            lean = angle_between(axes, one.axis)[:, None]
+            return [_Bound("tilt", " from the axis of the CL file", lean, 0.0, self.tilt)]
+        least = off_centre(limits, one.radius)
+        result = [_Bound("tilt", " from the surface normal", at.inclination(axes), least, self.tilt)]
+        if limits.lead is not None:
+            result.append(_Bound("lead", "", at.lead(axes), limits.lead[0] * DEG, limits.lead[1] * DEG))
+        if limits.tilt is not None:
+            result.append(_Bound("sideways tilt", "", at.tilt(axes), limits.tilt[0] * DEG, limits.tilt[1] * DEG))
+        return result
+
+
+def off_centre(limits: OrientationLimits, radius: float) -> float:
+    """Least angle between axis and normal, rad, of a ball of `radius`: sin of it is contact radius over ball radius."""
+    if limits.contact_radius is not None:
+        return float(np.arcsin(min(limits.contact_radius / radius, 1.0))) if radius > 0.0 else 0.0
+    return (limits.off_centre or 0.0) * DEG
+
+
+def lattice(apart: float) -> Floats:
+    """Unit directions (M, 3) spread evenly over the sphere, some `apart` rad from each other (spiral of golden angles:
+    Gonzalez, Math. Geosciences 42 (2010))."""
+    count = max(2, int(np.ceil(4.0 * np.pi / apart**2)))
+    k = np.arange(count)
+    z = 1.0 - (2.0 * k + 1.0) / count
+    turn = np.pi * (3.0 - np.sqrt(5.0)) * k
+    flat = np.sqrt(1.0 - z * z)
+    return np.column_stack((flat * np.cos(turn), flat * np.sin(turn), z))
+
+
+def _told(one: Pass, bound: _Bound, k: int) -> str:
+    """A broken limit in words."""
+    where = f" at line {int(one.contact.line[k])}" if len(one.contact) else ""
+    least = f"{bound.low / DEG:.3f} to " if bound.low != 0.0 or not bound.what else ""
+    return f"{bound.name} {bound.values[0, k] / DEG:.3f} degrees{bound.what}{where}, allowed {least}{bound.high / DEG:.3f}"
+
+
+def own_outside(one: Pass, limits: OrientationLimits) -> str:
+    """Which limit of the set-up the CL's own axis of a pass breaks; --max-tilt does not count."""
+    return "" if not len(one.contact) else Allowed(np.pi, None, limits).outside(one, one.axis)

@@ -12,6 +12,7 @@ from postproc.options import Options, Orientation
 from postproc.orientation.allowed import SAME, Allowed
 from postproc.orientation.candidates import Tried, tried
 from postproc.orientation.choose import seconds, shortest
+from postproc.orientation.limited import limit_faults
 from postproc.orientation.passes import Pass, Work, work_of
 from postproc.orientation.timed import Turned, turned
 from postproc.orientation.turns import Ends, between, ends
@@ -64,7 +65,10 @@ def orient(toolpath: Toolpath, machine: Machine, setup: SetupFile, options: Opti
     work, found = work_of(toolpath, machine, setup, options)
     if work is None:
         return None, found
-    allowed = Allowed(options.max_tilt * DEG)
+    found += limit_faults(work, options.setup)
+    if has_errors(found):
+        return None, found
+    allowed = Allowed(options.max_tilt * DEG, None, setup.orientation)
     results = []
     for one in work.passes:
         if progress is not None:
@@ -104,7 +108,7 @@ def _plans(work: Work, results: list[Tried], allowed: Allowed) -> OrientationCho
     edge = [[ends(made, work) for made in row] for row in states]
     cost = [cut + np.array([e.rapids for e in row]) for cut, row in zip(cuts, edge, strict=True)]
     free = [np.where([bool(made.touching) for made in row], np.inf, one) for one, row in zip(cost, states, strict=True)]
-    ways = _ways(work, edge)
+    ways = ways_between(work, edge)
 
     def plan(picked: list[int]) -> OrientationPlan:
         return OrientationPlan(tuple(row[k] for row, k in zip(states, picked, strict=True)), seconds(picked, cost, ways))
@@ -206,7 +210,7 @@ def _wholes(states: list[list[Turned]], keep: list[int]) -> list[list[int]]:
     return result
 
 
-def _ways(work: Work, edge: list[list[Ends]]) -> list[Floats]:
+def ways_between(work: Work, edge: list[list[Ends]]) -> list[Floats]:
     """Seconds between the states of neighbouring passes, from home and back."""
     passes = work.passes
     ways = [between(None, edge[0], work, True, False)]

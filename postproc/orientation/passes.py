@@ -15,12 +15,14 @@ from postproc.feedrate.geometry_sites import sites
 from postproc.links import SafeSpace, safe_space
 from postproc.moves import Moves, build_moves
 from postproc.options import Options
+from postproc.orientation.contact import Contact, contact_of
 from postproc.orientation.cutter import ball_radius
 from postproc.pass_geometry import chains, stops_of
 from postproc.setup import Placement, SetupFile, part_placement
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error, has_errors
 from toolpaths.rotations import angle_between
+from toolpaths.shape import Curves
 from toolpaths.smoothing.smooth import Smooth, Tolerance, smooth_all
 from toolpaths.toolpath import Kind, Role, Toolpath
 from toolpaths.units import DEG
@@ -60,7 +62,7 @@ class Pass:
         tip, axes (n, 3): end poses of these rows
         rapid (n,): rows that are rapids
         axis (3,): the tool axis of the CL file
-        normal (K, 3): surface normals that the file gives in this pass, none where it gives none
+        contact: where the surface normal is known
         radius: of the ball, mm
         fixed: why the axis cannot be turned, "" where it can
         by_home: the tool comes from home (first pass, tool change, GOHOME)
@@ -73,7 +75,7 @@ class Pass:
     axes: Floats
     rapid: Bools
     axis: Floats
-    normal: Floats
+    contact: Contact
     radius: float
     fixed: str
     by_home: bool
@@ -85,6 +87,11 @@ class Pass:
     def shift(self, axis: Floats) -> Floats:
         """(3,) by which the tip moves so that the ball stays where it is: tip' = tip + R (axis - axis')."""
         return np.asarray(self.radius * (self.axis - axis))
+
+    @property
+    def normal(self) -> Floats:
+        """Surface normals (K, 3) that are known in this pass."""
+        return self.contact.normal
 
     @property
     def longest(self) -> Stretch | None:
@@ -105,9 +112,12 @@ class Work:
     passes: tuple[Pass, ...]
 
 
-def work_of(toolpath: Toolpath, machine: Machine, setup: SetupFile,
-            options: Options) -> tuple[Work | None, list[Diagnostic]]:
-    """The passes of a toolpath on a machine; errors where a pass could be turned but its cutter is not known."""
+def work_of(toolpath: Toolpath, machine: Machine, setup: SetupFile, options: Options,
+            turning: bool = True) -> tuple[Work | None, list[Diagnostic]]:
+    """The passes of a toolpath on a machine; errors where a pass could be turned but its cutter is not known.
+
+    Where none will be turned (`turning` False) the form of the cutter does not matter.
+    """
     placement, found = part_placement(setup, options.setup)
     if placement is None:
         return None, found
@@ -118,16 +128,42 @@ def work_of(toolpath: Toolpath, machine: Machine, setup: SetupFile,
     if has_errors(more):
         return None, [*found, *more]
     moves = moves.placed(placement)
-    first = _beginnings(toolpath, moves)
-    stretches = _stretches(toolpath, moves, Tolerance(options.tolerance, options.axis_tolerance * DEG))
     normals = None if toolpath.normal is None else placement.directions(toolpath.normal)[moves.row]
     by_home = [e.index for e in toolpath.events if e.word == "GOHOME"] + [c.index for c in tool_changes(toolpath)]
-    homes = {0, *np.searchsorted(moves.row, by_home).tolist()}
-    passes = [_pass(number, rows, toolpath, moves, stretches, normals, homes, machine, setup)
-              for number, rows in enumerate(pairwise([*first.tolist(), len(moves)]))]
-    faults = _unknown_cutters(toolpath, passes)
+    cutting = _Cutting(toolpath, moves, moves.curves(), normals, machine, setup,
+                       frozenset({0, *np.searchsorted(moves.row, by_home).tolist()}),
+                       _stretches(toolpath, moves, Tolerance(options.tolerance, options.axis_tolerance * DEG)))
+    passes = [_pass(number, rows, cutting)
+              for number, rows in enumerate(pairwise([*_beginnings(toolpath, moves).tolist(), len(moves)]))]
+    faults = _unknown_cutters(toolpath, passes) if turning else []
     work = Work(toolpath, machine, setup, placement, moves, safe_space(moves, setup, placement), tuple(passes))
     return (None if faults else work), [*found, *more, *faults]
+
+
+@dataclass(frozen=True)
+class _Cutting:
+    """What all passes are cut from: moves in the table frame, normals (M, 3) at their ends, NaN where none is known.
+
+    Attributes:
+        homes: rows that the tool comes to from home
+        stretches: by the first row of their cut
+    """
+
+    toolpath: Toolpath
+    moves: Moves
+    curves: Curves
+    normals: Floats | None
+    machine: Machine
+    setup: SetupFile
+    homes: frozenset[int]
+    stretches: dict[int, list[Stretch]]
+
+    def contact(self, cuts: Ints) -> Contact:
+        """Where the surface is known along the moves `cuts`."""
+        if self.normals is None:
+            return Contact.none()
+        ends = np.stack((np.maximum(cuts - 1, 0), cuts), axis=1)
+        return contact_of(self.curves.take(cuts), self.normals[ends], self.moves.line[ends])
 
 
 def _beginnings(toolpath: Toolpath, moves: Moves) -> Ints:
@@ -173,22 +209,27 @@ def _cut(path: Smooth, moves: Moves, rows: Ints) -> list[Stretch]:
     return result
 
 
-def _pass(number: int, rows: tuple[int, int], toolpath: Toolpath, moves: Moves, stretches: dict[int, list[Stretch]],
-          normals: Floats | None, homes: set[int], machine: Machine, setup: SetupFile) -> Pass:
-    here = slice(*rows)
-    cuts = np.flatnonzero(moves.kind[here] != Kind.RAPID)
-    axis = moves.axis[rows[0] + int(cuts[0])] if len(cuts) else moves.axis[rows[0]]
-    tool = int(moves.tool[rows[0] + int(cuts[0])] if len(cuts) else moves.tool[rows[0]])
-    known = toolpath.tools[tool] if tool >= 0 else None
+def _pass(number: int, rows: tuple[int, int], of: _Cutting) -> Pass:
+    here, moves = slice(*rows), of.moves
+    cuts = rows[0] + np.flatnonzero(moves.kind[here] != Kind.RAPID)
+    lead = int(cuts[0]) if len(cuts) else rows[0]
+    axis, tool = moves.axis[lead], int(moves.tool[lead])
+    known = of.toolpath.tools[tool] if tool >= 0 else None
     radius = ball_radius(known)
-    length = setup.tools.get(str(known.number if known else 0))
-    kin = machine.kinematics.with_tool(length.gauge_length if length else 0.0)
-    normal = np.zeros((0, 3)) if normals is None else normals[here][cuts]
-    line = int(moves.line[rows[0] + int(cuts[0])] if len(cuts) else moves.line[rows[0]])
-    inside = [one for first in range(*rows) for one in stretches.get(first, ())]
-    return Pass(number, rows, moves.tip[here], moves.axis[here], moves.kind[here] == Kind.RAPID, axis,
-                normal[np.isfinite(normal).all(axis=1)], radius or 0.0, _fixed(moves, rows, cuts, axis, radius),
-                not homes.isdisjoint(range(*rows)), tool, kin, tuple(inside), line)
+    length = of.setup.tools.get(str(known.number if known else 0))
+    kin = of.machine.kinematics.with_tool(length.gauge_length if length else 0.0)
+    inside = [one for first in range(*rows) for one in of.stretches.get(first, ())]
+    fixed = _kept(of, cuts) or _fixed(moves, rows, cuts - rows[0], axis, radius)
+    return Pass(number, rows, moves.tip[here], moves.axis[here], moves.kind[here] == Kind.RAPID, axis, of.contact(cuts),
+                radius or 0.0, fixed, not of.homes.isdisjoint(range(*rows)), tool, kin, tuple(inside), int(moves.line[lead]))
+
+
+def _kept(of: _Cutting, cuts: Ints) -> str:
+    """Why the set-up keeps the axis of a pass, "" where it does not."""
+    operations = of.toolpath.operations
+    inside = [operations[k].name for k in np.unique(of.toolpath.operation[of.moves.row[cuts]]).tolist()]
+    kept = next((name for name in inside if name in of.setup.orientation.fixed_operations), None)
+    return "" if kept is None else f"the set-up keeps the axis of operation {kept!r}"
 
 
 def _fixed(moves: Moves, rows: tuple[int, int], cuts: Ints, axis: Floats, radius: float | None) -> str:

@@ -1,0 +1,52 @@
+"""Keys of a set-up file that limit the tool axes which re-oriented passes may take."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import AfterValidator, Field, model_validator
+
+from machines.user_file import UserModel
+
+Angle = Annotated[float, Field(ge=-90.0, le=90.0)]
+
+
+def _ordered(values: tuple[float, float]) -> tuple[float, float]:
+    if values[0] > values[1]:
+        raise ValueError(f"the least, {values[0]:g}, is above the greatest, {values[1]:g}: write [least, greatest]")
+    return values
+
+
+Range = Annotated[tuple[Angle, Angle], AfterValidator(_ordered)]
+
+
+class OrientationLimits(UserModel):
+    """Tool axes that a re-oriented pass may take, at every point of it; --max-tilt holds besides.
+
+    The angles are those between axis and surface normal, looked at against the feed direction (LEAD and TILT as in
+    Siemens, SINUMERIK 840D programming guide Advanced, "tool orientation with LEAD and TILT"). They need surface normals:
+    those of the CL file, or of the part mesh ([bodies] part).
+    """
+
+    lead: Range | None = None
+    """[least, greatest] degrees in the plane of feed and surface normal, positive where the axis leans towards the feed"""
+    tilt: Range | None = None
+    """[least, greatest] degrees in the plane square to the feed, positive where the axis leans to the right, seen along
+    the feed with the surface normal upwards"""
+    off_centre: float | None = Field(default=None, ge=0.0, lt=90.0)
+    """least angle between axis and surface normal, degrees, so that a ball does not cut with its dead centre"""
+    contact_radius: float | None = Field(default=None, gt=0.0)
+    """the same as least distance of the contact from the tool axis, mm"""
+    fixed_operations: tuple[str, ...] = ()
+    """names of operations that keep the axes of the CL file"""
+
+    @model_validator(mode="after")
+    def _one_centre(self) -> OrientationLimits:
+        if self.off_centre is not None and self.contact_radius is not None:
+            raise ValueError("off_centre and contact_radius say the same: give one of them")
+        return self
+
+    @property
+    def need_normals(self) -> bool:
+        """True where surface normals must be known."""
+        return any(value is not None for value in (self.lead, self.tilt, self.off_centre, self.contact_radius))

@@ -1,0 +1,231 @@
+"""Limits of tool axes: lead, tilt, dead centre, operations that keep their axes; angles found by construction."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from postproc.options import Options
+from postproc.orientation.allowed import Allowed, lattice, off_centre
+from postproc.orientation.contact import Contact, contact_of
+from postproc.orientation.orient import OrientationChoice, orient
+from postproc.orientation.passes import Pass, work_of
+from postproc.setup import SetupFile, load_setup
+from postproc.setup_orientation import OrientationLimits
+from tests.postproc.kit import codes, machine, toolpath
+from toolpaths.arrays import Floats
+from toolpaths.diagnostics import Diagnostic
+from toolpaths.shape import Curves
+from toolpaths.toolpath import Toolpath
+from toolpaths.units import DEG
+
+BALL = ["UNITS/MM", "CUTTER/16,8", "LOADTL/1", "SPINDL/RPM,1000,CLW", "FEDRAT/MMPM,30000"]
+X, Z = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
+
+
+def along_x(normals: bool = True, passes: int = 1, head: list[str] | None = None, name: str = "") -> Toolpath:
+    """Level passes along +x, surface normal +z where asked for."""
+    extra = ",0,0,1" if normals else ""
+    lines = ["MULTAX", *([f"TOOL PATH/{name}"] if name else [])]
+    for k in range(passes):
+        lines += ["RAPID", f"GOTO/0,{k},30,0,0,1", "RAPID", f"GOTO/0,{k},0,0,0,1{extra}",
+                  *(f"GOTO/{x},{k},0,0,0,1{extra}" for x in (20, 40, 60, 80)), "RAPID", f"GOTO/80,{k},30,0,0,1"]
+    return toolpath(*lines, head=head or BALL)
+
+
+def limited(**keys: object) -> SetupFile:
+    return SetupFile(orientation=OrientationLimits(**keys))
+
+
+def only_pass(path: Toolpath, setup: SetupFile | None = None) -> Pass:
+    work, found = work_of(path, machine("mikron-ucp710"), setup or SetupFile(), Options())
+    assert work is not None, found
+    return work.passes[0]
+
+
+def leaning(lead: float, tilt: float, feed: Floats = X, normal: Floats = Z) -> Floats:
+    """The axis whose projections on the planes normal-feed and normal-right stand at lead and tilt, degrees."""
+    axis = normal + np.tan(lead * DEG) * feed + np.tan(tilt * DEG) * np.cross(feed, normal)
+    return np.asarray(axis / np.linalg.norm(axis))
+
+
+def oriented(path: Toolpath, limits: SetupFile, **options: object) -> tuple[OrientationChoice | None, list[Diagnostic]]:
+    return orient(path, machine("mikron-ucp710"), limits, Options(**options))
+
+
+def test_lead_and_tilt_are_angles_of_projections() -> None:
+    rng = np.random.default_rng(3)
+    for _ in range(20):
+        frame = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+        feed, normal = frame[0], frame[1]
+        lead, tilt = rng.uniform(-70.0, 70.0, 2)
+        at = Contact(normal[None], feed[None], np.array([1]))
+        axis = leaning(lead, tilt, feed, normal)[None]
+        assert at.lead(axis)[0, 0] / DEG == pytest.approx(lead)
+        assert at.tilt(axis)[0, 0] / DEG == pytest.approx(tilt)
+        assert np.cos(at.inclination(axis)[0, 0]) == pytest.approx(axis[0] @ normal)
+
+
+def test_signs_as_the_set_up_says() -> None:
+    """Feed along +x, normal +z: forward is +x, right of the feed is -y."""
+    at = only_pass(along_x()).contact
+    forward, right = np.array([[0.6, 0.0, 0.8]]), np.array([[0.0, -0.6, 0.8]])
+    assert (at.lead(forward) > 0.6).all() and (np.abs(at.tilt(forward)) < 1e-12).all()
+    assert (at.tilt(right) > 0.6).all() and (np.abs(at.lead(right)) < 1e-12).all()
+
+
+def test_feed_has_its_direction_at_both_ends_of_an_arc() -> None:
+    """A quarter turn from +x to +y about +z: the feed goes from +y to -x."""
+    start, end, up = 10.0 * X[None], 10.0 * np.eye(3)[1:2], Z[None]
+    arc = Curves(start, end, up, up, np.array([True]), np.zeros((1, 3)), up, np.array([np.pi / 2]))
+    at = contact_of(arc, np.array([[Z, Z]]), np.array([[6, 7]]))
+    np.testing.assert_allclose(at.way, [[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]], atol=1e-12)
+    assert at.line.tolist() == [6, 7]
+
+
+def test_the_feed_of_a_slope_lies_in_its_tangent_plane() -> None:
+    """The feed of a file is a chord; a plunge along the normal has none."""
+    none, both = np.zeros(1), np.array([[Z, Z]])
+    line = Curves(np.zeros((1, 3)), np.array([[1.0, 0.0, 0.2]]), Z[None], Z[None], none.astype(bool), np.zeros((1, 3)),
+                  np.zeros((1, 3)), none)
+    np.testing.assert_allclose(contact_of(line, both, np.array([[1, 2]])).way, np.tile(X, (2, 1)), atol=1e-12)
+    down = Curves(np.zeros((1, 3)), -Z[None], Z[None], Z[None], none.astype(bool), np.zeros((1, 3)), np.zeros((1, 3)), none)
+    at = contact_of(down, both, np.array([[1, 2]]))
+    assert len(at) == 2 and np.isnan(at.way).all()
+    limits = OrientationLimits(lead=(5.0, 10.0), off_centre=10.0)
+    allowed = Allowed(60.0 * DEG, None, limits)
+    assert allowed.mask(only_pass(along_x()), leaning(7.0, 30.0)[None])[0]
+
+
+def test_points_without_normal_do_not_count() -> None:
+    nan = np.full((2, 2, 3), np.nan)
+    line = Curves(np.zeros((2, 3)), np.tile(X, (2, 1)), np.tile(Z, (2, 1)), np.tile(Z, (2, 1)), np.zeros(2, dtype=bool),
+                  np.zeros((2, 3)), np.zeros((2, 3)), np.zeros(2))
+    assert len(contact_of(line, nan, np.array([[1, 2], [2, 3]]))) == 0
+
+
+@pytest.mark.parametrize(("keys", "axis", "told"), [
+    ({"lead": (5.0, 10.0)}, leaning(20.0, 0.0), "lead 20.000 degrees at line 10, allowed 5.000 to 10.000"),
+    ({"lead": (5.0, 10.0)}, leaning(-3.0, 0.0), "lead -3.000 degrees at line 10, allowed 5.000 to 10.000"),
+    ({"tilt": (-15.0, 0.0)}, leaning(0.0, 4.0), "sideways tilt 4.000 degrees at line 10, allowed -15.000 to 0.000"),
+    ({"off_centre": 12.0}, leaning(0.0, 4.0),
+     "tilt 4.000 degrees from the surface normal at line 10, allowed 12.000 to 60.000"),
+    ({"contact_radius": 4.0}, leaning(29.0, 0.0),
+     "tilt 29.000 degrees from the surface normal at line 10, allowed 30.000 to 60.000"),
+    ({}, leaning(0.0, 70.0), "tilt 70.000 degrees from the surface normal at line 10, allowed 60.000")])
+def test_a_refusal_says_where_what_and_what_is_allowed(keys: dict[str, object], axis: Floats, told: str) -> None:
+    setup = limited(**keys)
+    one = only_pass(along_x(), setup)
+    assert Allowed(60.0 * DEG, None, setup.orientation).refused(one, axis) == told
+
+
+def test_the_worst_point_decides() -> None:
+    """One normal of five leans 30 degrees back: a lead of 20 is 50 there."""
+    lines = ["MULTAX", "RAPID", "GOTO/0,0,30,0,0,1", "RAPID", "GOTO/0,0,0,0,0,1,0,0,1", "GOTO/10,0,0,0,0,1,0,0,1",
+             "GOTO/20,0,0,0,0,1,-0.5,0,0.8660254037844386", "GOTO/30,0,0,0,0,1,0,0,1", "RAPID", "GOTO/30,0,30,0,0,1"]
+    one = only_pass(toolpath(*lines, head=BALL))
+    allowed = Allowed(80.0 * DEG, None, OrientationLimits(lead=(-60.0, 40.0)))
+    assert allowed.refused(one, leaning(20.0, 0.0)) == "lead 50.000 degrees at line 12, allowed -60.000 to 40.000"
+    assert allowed.refused(one, leaning(9.0, 0.0)) == ""
+
+
+def test_own_axis_is_always_allowed() -> None:
+    one = only_pass(along_x())
+    allowed = Allowed(60.0 * DEG, None, OrientationLimits(off_centre=10.0))
+    assert allowed.refused(one, Z) == "" and "allowed 10.000" in allowed.outside(one, Z)
+
+
+def test_many_axes_at_once_as_one_by_one() -> None:
+    one = only_pass(along_x())
+    allowed = Allowed(50.0 * DEG, None, OrientationLimits(lead=(-20.0, 30.0), tilt=(-10.0, 35.0), off_centre=5.0))
+    axes = lattice(6.0 * DEG)
+    found = allowed.mask(one, axes)
+    assert 10 < found.sum() < len(axes)
+    assert found.tolist() == [not allowed.outside(one, axis) for axis in axes]
+    np.testing.assert_array_equal(allowed.among(one, 6.0 * DEG), axes[found])
+
+
+def test_without_normals_the_tilt_is_from_the_own_axis() -> None:
+    one = only_pass(along_x(normals=False))
+    assert not len(one.contact)
+    assert Allowed(20.0 * DEG).refused(one, leaning(25.0, 0.0)) == \
+        "tilt 25.000 degrees from the axis of the CL file, allowed 20.000"
+    assert Allowed(20.0 * DEG).refused(one, leaning(19.0, 0.0)) == ""
+
+
+def test_the_lattice_is_even() -> None:
+    axes = lattice(8.0 * DEG)
+    np.testing.assert_allclose(np.linalg.norm(axes, axis=1), 1.0)
+    dot = axes @ axes.T - 2.0 * np.eye(len(axes))
+    near = np.arccos(np.clip(dot.max(axis=1), -1.0, 1.0)) / DEG
+    assert near.min() > 4.0 and near.max() < 10.0
+    probes = np.random.default_rng(1).normal(size=(500, 3))
+    probes /= np.linalg.norm(probes, axis=1, keepdims=True)
+    assert np.degrees(np.arccos((probes @ axes.T).max(axis=1))).max() < 8.0
+
+
+def test_contact_radius_as_an_angle() -> None:
+    assert off_centre(OrientationLimits(contact_radius=4.0), 8.0) == pytest.approx(30.0 * DEG)
+    assert off_centre(OrientationLimits(off_centre=7.0), 8.0) == pytest.approx(7.0 * DEG)
+    assert off_centre(OrientationLimits(), 8.0) == 0.0
+
+
+def test_chosen_axes_are_inside_and_the_own_one_is_told() -> None:
+    """The own axis stands on the dead centre: it is named; what is chosen fulfils the set-up, and gains less than free."""
+    setup = limited(lead=(5.0, 50.0), tilt=(-50.0, -5.0), off_centre=10.0)
+    path = along_x(passes=2)
+    choice, found = oriented(path, setup)
+    assert choice is not None
+    told = [d for d in found if d.code == "orient.own_limits"]
+    assert len(told) == 1 and told[0].count == 2 and "tilt 0.000 degrees from the surface normal" in told[0].message
+    for made in choice.plans["per-pass"].picked:
+        at = made.one.contact
+        assert 5.0 <= at.lead(made.axis[None]).min() / DEG <= 50.0
+        assert -50.0 <= at.tilt(made.axis[None]).max() / DEG <= -5.0
+        assert made.seconds < choice.tried[0].own.seconds
+    free, _ = oriented(path, SetupFile())
+    assert free is not None
+    assert free.tried[0].best.seconds <= choice.tried[0].best.seconds * (1.0 + 1e-4)
+
+
+def test_operations_that_keep_their_axes() -> None:
+    path = along_x(name="FINISH")
+    assert any(op.name == "FINISH" for op in path.operations)
+    choice, found = oriented(path, limited(fixed_operations=("FINISH",)))
+    assert choice is not None and codes(found) >= {"orient.fixed"}
+    assert choice.tried[0].own.one.fixed == "the set-up keeps the axis of operation 'FINISH'"
+    choice, found = oriented(path, limited(fixed_operations=("FINSH",)))
+    assert choice is None
+    assert [(d.code, d.hint) for d in found] == [("orient.operation", "did you mean 'FINISH'?")]
+
+
+@pytest.mark.parametrize(("keys", "normals", "code"), [
+    ({"lead": (0.0, 10.0)}, False, "orient.normals"), ({"off_centre": 5.0}, False, "orient.normals"),
+    ({"contact_radius": 8.0}, True, "orient.contact_radius"), ({"lead": (0.0, 10.0)}, True, "")])
+def test_limits_that_cannot_be_held(keys: dict[str, object], normals: bool, code: str) -> None:
+    choice, found = oriented(along_x(normals), limited(**keys))
+    assert [d.code for d in found if d.code != "orient.own_limits"] == ([code] if code else [])
+    assert (choice is None) == bool(code)
+
+
+@pytest.mark.parametrize(("text", "line", "told"), [
+    ("lead = [10, 5]", 2, "write [least, greatest]"), ("lead = [0, 95]", 2, "less than or equal to 90"),
+    ("off_centre = 5\ncontact_radius = 1", 1, "give one of them"), ("led = [0, 5]", 2, "unknown key"),
+    ("off_centre = -1", 2, "greater than or equal to 0")])
+def test_set_up_files_that_are_wrong(tmp_path: Path, text: str, line: int, told: str) -> None:
+    file = tmp_path / "s.toml"
+    file.write_text(f"[orientation]\n{text}\n")
+    setup, found = load_setup(file)
+    assert setup is None and found[0].lines == (line,) and told in found[0].message
+
+
+def test_set_up_file_that_is_right(tmp_path: Path) -> None:
+    file = tmp_path / "s.toml"
+    file.write_text('[orientation]\nlead = [2, 30]\ntilt = [-30.0, 30.0]\ncontact_radius = 0.5\nfixed_operations = ["A"]\n')
+    setup, found = load_setup(file)
+    assert setup is not None and not found and setup.orientation.lead == (2.0, 30.0) and setup.orientation.need_normals
+    choice, found = oriented(along_x(), setup.model_copy(), setup=str(file))
+    told = next(d for d in found if d.code == "orient.operation")
+    assert choice is None and told.lines == (5,) and told.file == str(file)
