@@ -21,7 +21,7 @@ from postproc.corrected.arcs import fitted_arcs
 from postproc.corrected.cycles import whole_holes
 from postproc.corrected.points import divided
 from postproc.corrected.reversals import arcs_cut, starts_of
-from postproc.corrected.work import Work
+from postproc.corrected.work import CorrectedEnds, Work
 from postproc.groups import groups
 from postproc.modes import OutputModes
 from postproc.moves import Moves
@@ -92,15 +92,15 @@ def compensate(path: Path, moves: Moves, tools: Ints, kinematics: Callable[[int]
     cut = arcs_cut(path, work)
     path, before_cut = cut.path, len(path)
     work = Work(path, tools[cut.owner], kinematics, model, axis_tolerance, beyond, SHARE)
-    found = work.ends()
+    if work.two_way:
+        mean, _ = _at_ends(path, moves, modes, work, SHARE * tolerance)
+        work.way = work.ways_of(mean.q)
+    corrected, found = _at_ends(path, moves, modes, work, SHARE * tolerance)
     live = ~path.home
     diagnostics = _unmeasured(path, moves, modes.control, found.unmeasured & live[:, None], beyond, file)
     lost = live & ~np.isfinite(found.q).all(axis=1)
     if (diagnostics and not beyond) or lost.any():
         return None, None, diagnostics or [_lost(path, moves, lost, file)]
-    corrected = framed(replace(path, q=found.q), path, modes, work)
-    corrected = replace(corrected, q=kept_in_travel(corrected.q, path, modes.control))
-    corrected, work.whole = whole_holes(corrected, path, moves, work, SHARE * tolerance)
     starts = starts_of(corrected, path, work, SHARE * tolerance)
     corrected, resolved = fitted_arcs(corrected, path, work, starts.q, SHARE * tolerance)
     whole = divided(corrected, work, starts, SHARE * tolerance).of(cut)
@@ -114,6 +114,15 @@ def compensate(path: Path, moves: Moves, tools: Ints, kinematics: Callable[[int]
         partial=int(found.partial[live].sum()), moved=np.abs(found.q - path.q).max(axis=0, initial=0.0),
         owner=whole.owner, part=whole.part, doubt_tip=doubt_tip, doubt_axis=doubt_axis)
     return corrected, report, [*diagnostics, *(info("compensation", line, file=file) for line in report.lines())]
+
+
+def _at_ends(path: Path, moves: Moves, modes: OutputModes, work: Work, allowed: float) -> tuple[Path, CorrectedEnds]:
+    """The path with its block ends corrected by the ways of `work`, holes as a whole; and what the correction said."""
+    found = work.ends()
+    corrected = framed(replace(path, q=found.q), path, modes, work)
+    corrected = replace(corrected, q=kept_in_travel(corrected.q, path, modes.control))
+    corrected, work.whole = whole_holes(corrected, path, moves, work, allowed)
+    return corrected, found
 
 
 def kept_in_travel(q: Floats, path: Path, control: Control) -> Floats:

@@ -11,6 +11,7 @@ from abc import ABC, abstractmethod
 
 import numpy as np
 
+from machines.geometric_error.lost_motion import GRAIN
 from machines.kinematics.base import Kinematics
 from toolpaths.arrays import Bools, Floats
 
@@ -78,6 +79,13 @@ def moving_sign(step: Floats, rotary: Bools) -> Floats:
     """
     size = np.abs(step) * np.where(rotary, LEVER, 1.0)
     result: Floats = np.where(size > RESTS * size.max(axis=1, keepdims=True, initial=0.0), np.sign(step), 0.0)
+    return result
+
+
+def beyond_grain(step: Floats, rotary: Bools) -> Floats:
+    """Sign of motion (N, J) of joint steps (N, J): 0 for those that are less than the last decimal of a word."""
+    least = np.where(rotary, GRAIN[1], GRAIN[0])
+    result: Floats = np.where(np.abs(step) > least, np.sign(step), 0.0)
     return result
 
 

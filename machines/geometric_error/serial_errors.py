@@ -25,11 +25,13 @@ from typing import Literal, Self
 
 import numpy as np
 
-from machines.geometric_error.curves import Curve
+from machines.geometric_error.curves import Curve, Table
+from machines.geometric_error.lost_motion import GRAIN
 from machines.geometric_error.names import ErrorName, parse
 from toolpaths.arrays import Bools, Floats
 
 Frame = Literal["fixed", "moving"]
+ROTARY = "ABC"
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,13 +95,21 @@ class SerialErrors:
                 result[component.name.part] = result[component.name.part] + value
         return result
 
-    def gap(self, axis: str, x: Floats) -> Floats:
-        """Lost motion (N,) of an axis at positions (N,): how far its positioning error differs by the way of approach."""
-        result = np.zeros(x.shape)
-        for component in self.components:
-            if component.name.axis == axis and str(component.name)[1] == axis:
-                result += component.curve.at(x, 1.0) - component.curve.at(x, -1.0)
-        return np.abs(result)
+    def two_way(self, names: tuple[str, ...]) -> list[int]:
+        """Numbers of the axes `names` that have any error with two ways of approach."""
+        found = {c.name.axis for c in self.components if isinstance(c.curve, Table) and c.curve.both}
+        return [j for j, name in enumerate(names) if name in found]
+
+    def gaps(self, names: tuple[str, ...], q: Floats, joints: list[int]) -> Floats:
+        """Lost motion (N, len(joints)) of some axes at q (N, J): how far their positioning error differs by the way, and
+        no less than the grain of words."""
+        result = np.zeros((len(q), len(joints)))
+        for k, j in enumerate(joints):
+            for component in self.components:
+                if component.name.axis == names[j] and str(component.name)[1] == names[j]:
+                    result[:, k] += component.curve.at(q[:, j], 1.0) - component.curve.at(q[:, j], -1.0)
+        least = np.array([GRAIN[1 if names[j] in ROTARY else 0] for j in joints])
+        return np.maximum(np.abs(result), least)
 
     def outside(self, names: tuple[str, ...], q: Floats, margin: float = 0.0) -> Bools:
         """True (N, J) where a joint of q (N, J) stands outside what was measured of it, by more than `margin`."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from postproc.corrected.arcs import LOOKS, LOOSE
 from postproc.corrected.reversals import SHORTEST, Divided, Starts, inserted, reversals
-from postproc.corrected.work import MOMENT, Work
+from postproc.corrected.work import MOMENTS, Work
 from postproc.path import ARC, FEED, TRAVERSE, Path
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.units import DEG
@@ -30,10 +30,10 @@ def divided(path: Path, work: Work, starts: Starts, allowed: float) -> Divided:
         if not len(pieces.block):
             break
         middle = 0.5 * (pieces.t0 + pieces.t1)
-        there = work.nominal(pieces.block, middle)
-        q = work.corrected(there, pieces.block, work.way_at(pieces.block, middle), path)
+        there, way = work.nominal(pieces.block, middle), work.way_at(pieces.block, middle)
+        q = work.corrected(there, pieces.block, way, path)
         found.append((pieces.block, middle, q))
-        pieces = pieces.halved(middle, q)
+        pieces = pieces.halved(middle, q, way)
         pieces = pieces.rows(_long(pieces, work))
     where, share, joints = (np.concatenate(column) for column in zip(*found, strict=True))
     return inserted(path, where, share, joints)
@@ -41,22 +41,24 @@ def divided(path: Path, work: Work, starts: Starts, allowed: float) -> Divided:
 
 @dataclass(frozen=True)
 class Pieces:
-    """Parts t0..t1 (N,) of blocks (N,) with the corrected joints (N, J) at their ends."""
+    """Parts t0..t1 (N,) of blocks (N,) with the corrected joints (N, J) at their ends, and the ways (N, J) at t0."""
 
     block: Ints
     t0: Floats
     t1: Floats
     q0: Floats
     q1: Floats
+    way: Floats
 
     def rows(self, keep: Bools) -> Pieces:
         """Some of them."""
-        return Pieces(self.block[keep], self.t0[keep], self.t1[keep], self.q0[keep], self.q1[keep])
+        return Pieces(self.block[keep], self.t0[keep], self.t1[keep], self.q0[keep], self.q1[keep],
+                      self.way[keep])
 
-    def halved(self, middle: Floats, q: Floats) -> Pieces:
-        """Both halves of each, the joints in the middle being q."""
+    def halved(self, middle: Floats, q: Floats, way: Floats) -> Pieces:
+        """Both halves of each, joints and ways in the middle being q and way."""
         return Pieces(np.tile(self.block, 2), np.concatenate([self.t0, middle]), np.concatenate([middle, self.t1]),
-                       np.concatenate([self.q0, q]), np.concatenate([q, self.q1]))
+                       np.concatenate([self.q0, q]), np.concatenate([q, self.q1]), np.concatenate([self.way, way]))
 
 
 def _taken_up(path: Path, work: Work, starts: Starts, block: Ints,
@@ -68,15 +70,15 @@ def _taken_up(path: Path, work: Work, starts: Starts, block: Ints,
     zero = np.zeros(len(block))
     turning, at = reversals(work, block[path.code[block] == FEED])
     there = work.nominal(turning, at)
-    old, new = (work.corrected(there, turning, work.way_at(turning, t), path)
-                for t in (at, np.minimum(at + 2.0 * MOMENT, 1.0)))
+    before, after = (work.way_at(turning, t) for t in (at, np.minimum(at + 2.0 * MOMENTS[0], 1.0)))
+    old, new = (work.corrected(there, turning, way, path) for way in (before, after))
     cut = np.abs(new - old).max(axis=1, initial=0.0) > allowed
-    turning, at, old, new = turning[cut], at[cut], old[cut], new[cut]
+    turning, at, old, new, after = turning[cut], at[cut], old[cut], new[cut], after[cut]
     owner = np.concatenate([block, turning])
     t0, t1 = np.concatenate([zero, at]), np.concatenate([zero + 1.0, at])
     begins, ends = np.lexsort((t0, owner)), np.lexsort((t1, owner))
     pieces = Pieces(owner[begins], t0[begins], t1[ends], np.concatenate([starts.q[block], new])[begins],
-                     np.concatenate([path.q[block], old])[ends])
+                     np.concatenate([path.q[block], old])[ends], np.concatenate([starts.way[block], after])[begins])
     back = starts.block
     return pieces, [(back, np.zeros(len(back)), starts.q[back]), (turning, at, old), (turning, at, new)]
 
@@ -88,8 +90,8 @@ def _off(pieces: Pieces, path: Path, work: Work) -> Floats:
         t = np.full(len(worst), look)
         at = pieces.t0 + t * (pieces.t1 - pieces.t0)
         got = work.straight(path, pieces.q0, pieces.q1, pieces.block, t)
-        worst = np.maximum(worst, work.off(work.nominal(pieces.block, at), got, pieces.block,
-                                           work.way_at(pieces.block, at)))
+        way = work.played(pieces.way, pieces.q0, got)
+        worst = np.maximum(worst, work.off(work.nominal(pieces.block, at), got, pieces.block, way))
     return worst
 
 

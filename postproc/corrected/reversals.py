@@ -42,15 +42,17 @@ def arcs_cut(path: Path, work: Work) -> Divided:
 
 @dataclass(frozen=True)
 class Starts:
-    """Where blocks begin when corrected: (K, J); those of `block` (N,) after taking up what an axis has lost."""
+    """Joints (K, J) and ways (K, J) where blocks begin when corrected; those of `block` (N,) after taking up what an axis
+    has lost."""
 
     q: Floats
+    way: Floats
     block: Ints
 
 
 def starts_of(path: Path, nominal: Path, work: Work, allowed: float) -> Starts:
     """Corrected joints where blocks begin; cutting ones whose axis turns back begin by the new way."""
-    start = np.concatenate([path.q[:1], path.q[:-1]])
+    start, begun = (np.concatenate([x[:1], x[:-1]]) for x in (path.q, work.way))
     block = np.flatnonzero(((path.code == FEED) | (path.code == ARC)) & ~path.home & (np.arange(len(path)) > 0))
     block = block[~path.home[block - 1] & ~work.whole[block]]
     way = work.begin_way(block)
@@ -58,8 +60,8 @@ def starts_of(path: Path, nominal: Path, work: Work, allowed: float) -> Starts:
     back = block[turned]
     q = work.corrected(nominal.q[back - 1], back, way[turned], path)
     jump = np.abs(q - start[back]).max(axis=1, initial=0.0) > allowed
-    start[back[jump]] = q[jump]
-    return Starts(start, back[jump])
+    start[back[jump]], begun[back[jump]] = q[jump], way[turned][jump]
+    return Starts(start, begun, back[jump])
 
 
 def reversals(work: Work, block: Ints) -> tuple[Ints, Floats]:
@@ -78,10 +80,10 @@ def reversals(work: Work, block: Ints) -> tuple[Ints, Floats]:
 def _bisected(work: Work, block: Ints, edges: tuple[float, ...]) -> tuple[Ints, Floats]:
     """(block, fraction) of the places where the direction of a joint changes between two of the edges."""
     where, at = [np.zeros(0, dtype=np.int64)], [np.zeros(0)]
-    if not len(block) or not work.losing:
+    if not len(block) or not work.two_way:
         return where[0], at[0]
     signs = np.stack([work.moving(block, np.full(len(block), t)) for t in edges])
-    for j in work.losing:
+    for j in work.two_way:
         sign = carried_on(signs[:, :, j])
         for i, (one, two) in enumerate(pairwise(sign)):
             rows = np.flatnonzero(one * two < 0.0)

@@ -8,8 +8,9 @@ from functools import cached_property
 
 import numpy as np
 
-from machines.geometric_error.actual import Actual, carried_on, moving_sign
+from machines.geometric_error.actual import Actual, beyond_grain, carried_on, moving_sign
 from machines.geometric_error.correction import correct
+from machines.geometric_error.lost_motion import Steps
 from machines.geometric_error.model import ErrorModel
 from machines.kinematics.base import Kinematics
 from postproc.groups import groups
@@ -17,8 +18,8 @@ from postproc.path import ARC, Path
 from postproc.word_arcs import PLANE_COLUMNS
 from toolpaths.arrays import Bools, Floats, Ints
 
-MOMENT = 1e-3
-"""of a block: how far back its direction at a place is looked at"""
+MOMENTS = 1e-3, 1.0 / 16.0
+"""of a block: how far back its direction at a place is looked at, the second time where nothing is seen to move"""
 EDGES = tuple(k / 16.0 for k in range(17))
 """where the directions of the axes in a block are looked at"""
 ALONE = -1
@@ -37,7 +38,8 @@ class CorrectedEnds:
 
 
 class Work:
-    """What is needed throughout: the machine with errors by tool, groups of one orientation, ways of approach."""
+    """What is needed throughout: the machine with errors by tool, groups of one orientation; the blocks of holes that are
+    `whole`, and the `way` (K, J) that each joint last moved at the ends of the blocks, 0 for the mean of both."""
 
     def __init__(self, path: Path, tools: Ints, kinematics: Callable[[int], Kinematics], model: ErrorModel,
                  axis_tolerance: float, beyond: bool, share: float) -> None:
@@ -45,6 +47,7 @@ class Work:
         self.axis_tolerance, self.beyond, self.model = axis_tolerance, beyond, model
         self.axis_share = share * axis_tolerance
         self.whole: Bools = np.zeros(len(path), dtype=np.bool_)
+        self.way: Floats = np.zeros(path.q.shape)
         self.rotary = np.array(kinematics(int(tools[0])).rotary)
         self.group = one_orientation(path.q[:, self.rotary], tools, path.home)
         self._actual: dict[int, Actual] = {}
@@ -56,40 +59,78 @@ class Work:
         return self._actual[tool]
 
     @cached_property
-    def losing(self) -> list[int]:
-        """Joints whose positioning error differs by the way of approach."""
-        names = self.kinematics(int(self.tools[0])).axis_names
-        return [j for j, name in enumerate(names) if self.model.axes.gap(name, self.path.q[:, j]).any()]
+    def two_way(self) -> list[int]:
+        """Joints that have errors with two ways of approach."""
+        return self.model.axes.two_way(self.names)
 
     @cached_property
-    def way(self) -> Floats:
-        """(K, J) sign of each joint's last motion at the ends of the blocks; on arcs that of their last moment."""
-        q, block = self.path.q, np.arange(len(self.path))
+    def names(self) -> tuple[str, ...]:
+        """Letters of the joints."""
+        return self.kinematics(int(self.tools[0])).axis_names
+
+    def ways_of(self, q: Floats) -> Floats:
+        """(K, J) sign of each joint's last motion at the ends of the blocks that go to q (K, J), corrected by mean ways.
+
+        A joint that the correction alone moves turns back too: what it loses is more than what it moves by. Where joints do
+        not run straight it is the sign of the last moment.
+        """
         moved = np.zeros(q.shape)
-        moved[1:] = moving_sign(np.diff(q, axis=0), self.rotary)
-        arcs = block[self.path.code == ARC]
-        moved[arcs] = self.moving(arcs, np.ones(len(arcs)))
+        moved[1:] = beyond_grain(np.nan_to_num(np.diff(q, axis=0)), self.rotary)
+        bent = np.flatnonzero(self.bent)
+        last = self.moving(bent, np.ones(len(bent)))
+        moved[bent] = np.where(last != 0.0, last, moved[bent])
         return carried_on(moved)
 
+    @cached_property
+    def bent(self) -> Bools:
+        """(K,) blocks in which joints do not run straight: arcs, and those by the tip that turn an axis."""
+        path = self.path
+        by_tip = np.array([frame.control.law == "tcp" for frame in path.frames])[path.frame]
+        turns = np.concatenate([[False], (path.q[1:, self.rotary] != path.q[:-1, self.rotary]).any(axis=1)])
+        first = np.arange(len(path)) == 0
+        result: Bools = ((path.code == ARC) | (by_tip & (turns | (not self.rotary.any())))) & ~first
+        return result
+
     def moving(self, block: Ints, t: Floats) -> Floats:
-        """(N, J) sign of each joint's nominal motion at fraction t (N,) of blocks (N,); a moment after at their start."""
-        before = np.clip(t - MOMENT, 0.0, 1.0 - MOMENT)
-        return moving_sign(self.nominal(block, before + MOMENT) - self.nominal(block, before), self.rotary)
+        """(N, J) sign of each joint's nominal motion at fraction t (N,) of blocks (N,); a moment after at their start.
+
+        The moment is longer for a joint that barely moves in a short one: at the quadrants of arcs.
+        """
+        sign = np.zeros((len(block), self.path.q.shape[1]))
+        for moment in MOMENTS:
+            still = np.flatnonzero((sign[:, self.two_way] == 0.0).any(axis=1))
+            before = np.clip(t[still] - moment, 0.0, 1.0 - moment)
+            step = self.nominal(block[still], before + moment) - self.nominal(block[still], before)
+            sign[still] = np.where(sign[still] != 0.0, sign[still], moving_sign(step, self.rotary))
+        return sign
 
     def way_at(self, block: Ints, t: Floats) -> Floats:
-        """(N, J) sign of each joint's last motion inside blocks; a joint that rests has the sign of the block before."""
+        """(N, J) sign of each joint's last motion inside blocks; a joint that rests there has that of the block's end."""
+        if not self.two_way:
+            return np.zeros((len(block), self.path.q.shape[1]))
         moving = self.moving(block, t)
-        return np.asarray(np.where(moving != 0.0, moving, self.way[np.maximum(block - 1, 0)]))
+        return np.asarray(np.where(moving != 0.0, moving, self.way[block]))
 
     def begin_way(self, block: Ints) -> Floats:
         """(N, J) sign of each joint's first motion in blocks (N,); of a joint that rests, that of the block before."""
         first = np.zeros((len(block), self.path.q.shape[1]))
+        if not self.two_way:
+            return first
         arc = self.path.code[block] == ARC
         for rows, edges in ((np.flatnonzero(arc), EDGES), (np.flatnonzero(~arc), (0.0, 1.0))):
             for t in edges[::-1] if len(rows) else ():
                 sign = self.moving(block[rows], np.full(len(rows), t))
                 first[rows] = np.where(sign != 0.0, sign, first[rows])
         return np.asarray(np.where(first != 0.0, first, self.way[np.maximum(block - 1, 0)]))
+
+    def played(self, way: Floats, q0: Floats, q: Floats) -> Floats:
+        """Ways (N, J) of joints that have gone from q0 to q (N, J), `way` (N, J) at q0."""
+        result = np.array(way)
+        if self.two_way:
+            j = self.two_way
+            gaps = self.model.axes.gaps(self.names, np.nan_to_num(q), j)
+            result[:, j] = Steps.of(np.nan_to_num((q - q0)[:, j]), gaps).at(way[:, j])
+        return result
 
     def nominal(self, block: Ints, t: Floats) -> Floats:
         """Nominal joints (N, J) at fraction t (N,) of blocks (N,), along the arc of those that are arcs."""
@@ -115,7 +156,7 @@ class Work:
         return result
 
     def ends(self) -> CorrectedEnds:
-        """All block ends; home blocks as they are."""
+        """All block ends, by the ways `way`; home blocks as they are."""
         n, joints = self.path.q.shape
         out = CorrectedEnds(self.path.q.copy(), np.zeros((n, 2)), np.zeros((n, 2)), np.zeros((n, 6)),
                             np.zeros(n, dtype=bool), np.zeros((n, joints), dtype=bool))

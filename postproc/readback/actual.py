@@ -4,19 +4,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
-from machines.geometric_error.actual import Actual, carried_on, moving_sign
+from machines.geometric_error.actual import Actual
+from machines.geometric_error.lost_motion import Steps
 from machines.geometric_error.model import ErrorModel
 from postproc.readback.execute import Motion
-from postproc.readback.poses import Executed
-from toolpaths.arrays import Floats, Ints
+from postproc.readback.poses import Executed, begins
+from toolpaths.arrays import Bools, Floats, Ints
 
-MOMENT = 1e-3
-"""of a block: how far back the direction of an axis is looked at"""
-NO_GAP = 1e-9
-"""mm or rad: lost motion below which an axis has none"""
+ARC = 2
+LOOKS = 16
+"""parts of a block whose joints do not run straight, for the ways of its axes"""
 
 
 @dataclass(frozen=True)
@@ -40,28 +41,47 @@ class ActualExecuted(Executed):
     def _actual(self, number: int) -> Actual:
         return self.model.on(self.kinematics(number))
 
-    def _moving(self, motion: Motion, rows: Ints, t: float | Floats) -> Floats:
-        """(K, J) sign of each joint's motion at fraction t; at the start of a block a moment after it."""
-        before = np.clip(np.broadcast_to(t, len(rows)) - MOMENT, 0.0, 1.0 - MOMENT)
-        step = self.joints(motion, rows, before + MOMENT) - self.joints(motion, rows, before)
-        return moving_sign(step, np.array(self.control.machine.rotary))
+    @cached_property
+    def _two_way(self) -> list[int]:
+        return self.model.axes.two_way(self.control.machine.axis_names)
+
+    @cached_property
+    def _curved(self) -> Bools:
+        """(E,) blocks whose joints may turn back on the way: arcs, and those whose words are the tip while an axis turns."""
+        motion, turning = self.motion, self.control.rotary
+        by_tip = np.array([frame.law == "tcp" for frame in motion.frames])[motion.frame] | (self.control.base == "tcp")
+        turns = motion.end[:, turning] != begins(motion, np.arange(len(motion)))[:, turning]
+        return np.asarray((motion.code == ARC) | (by_tip & (turns.any(axis=1) | (not len(turning)))))
 
     @cached_property
     def _last(self) -> Floats:
-        """(E, J) sign of each joint's last motion at the ends of all blocks."""
-        every = np.arange(len(self.motion))
-        return carried_on(self._moving(self.motion, every, 1.0))
+        """(1 + E, T) the ways of the joints in `_two_way` before the program and at the ends of its blocks."""
+        every = self._steps(self.motion, np.arange(len(self.motion)), 1.0)
+        none = np.zeros((1, len(self._two_way)))
+        return np.concatenate([none, every.walked().at(none)])
 
     def _way(self, motion: Motion, rows: Ints, t: float | Floats) -> Floats:
         """(K, J) by which way each joint is where it is; one that has turned back has taken up what it loses by shares."""
-        moving, last = self._moving(motion, rows, t), self._last[np.maximum(rows - 1, 0)]
-        way: Floats = np.where(moving != 0.0, moving, last)
-        back = np.argwhere(moving * last < 0.0)
-        if len(back):
-            q, begin = self.joints(motion, rows, t), self.joints(motion, rows, 0.0)
-            for j in np.unique(back[:, 1]).tolist():
-                k = back[back[:, 1] == j, 0]
-                gap = np.maximum(self.model.axes.gap(self.control.machine.axis_names[j], q[k, j]), NO_GAP)
-                taken = np.minimum(np.abs(q[k, j] - begin[k, j]) / gap, 1.0)
-                way[k, j] = last[k, j] + taken * (moving[k, j] - last[k, j])
+        way = np.zeros((len(rows), len(self.control.machine.axis_names)))
+        if self._two_way:
+            way[:, self._two_way] = self._steps(motion, rows, t).at(self._last[rows])
         return way
+
+    def _steps(self, motion: Motion, rows: Ints, t: float | Floats) -> Steps:
+        """What the motion of blocks up to fraction t does to the ways (K, T)."""
+        share = np.broadcast_to(np.asarray(t, dtype=np.float64), len(rows))
+        result = self._between(motion, rows, np.zeros(len(rows)), share)
+        bent = np.flatnonzero(self._curved[rows])
+        if len(bent):
+            looks = [share[bent] * k / LOOKS for k in range(LOOKS + 1)]
+            whole, *rest = (self._between(motion, rows[bent], one, two) for one, two in pairwise(looks))
+            for piece in rest:
+                whole = whole.then(piece)
+            for name in ("shift", "low", "high"):
+                getattr(result, name)[bent] = getattr(whole, name)
+        return result
+
+    def _between(self, motion: Motion, rows: Ints, one: Floats, two: Floats) -> Steps:
+        q = self.joints(motion, rows, two)
+        step = np.nan_to_num((q - self.joints(motion, rows, one))[:, self._two_way])
+        return Steps.of(step, self.model.axes.gaps(self.control.machine.axis_names, q, self._two_way))

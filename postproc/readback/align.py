@@ -25,7 +25,7 @@ def align(tip: Floats, axis: Floats, sweep: Floats, curves: Curves, link: Bools,
 
     Args:
         tip, axis (E, 3): poses at the ends of the executed blocks
-        sweep (E,): rad, of blocks that are arcs, NaN for others
+        sweep (E,): rad, of blocks that are arcs, NaN for others: tells their turns, the tips tell the rest
         curves, link (M): the reference motion of each move; linked ones only have to arrive
         tolerance, axis_tolerance: mm, rad: how near to its end a move counts as done
         grain: mm, rad: moves below this may have vanished in the rounding of the words
@@ -123,7 +123,9 @@ def _walk(tip: Any, axis: Any, swept: Any, start: Any, end: Any, axis0: Any, axi
                 done = _apart(tip[k], end[i]) <= 2.0 * tol and _angle(axis[k], axis1[i]) <= 2.0 * axis_tol
             elif kind[i] == 1:
                 before = start[i] if k == j + 1 else tip[k - 1]
-                step = swept[k] if swept[k] > 0.0 else _turned(before, tip[k], center[i], normal[i])
+                step = _turned(before, tip[k], center[i], normal[i])
+                if swept[k] > 0.0:
+                    step += 2.0 * math.pi * math.floor((swept[k] - step) / (2.0 * math.pi) + 0.5)
                 angle += step
                 slack = max(0.5 * tol, grain) / max(_apart(start[i], center[i]), tol)
                 done = angle >= sweep[i] - slack and _angle(axis[k], axis1[i]) <= axis_tol

@@ -1,0 +1,56 @@
+"""Lost motion: by which way an axis is where it is, while it takes up what it loses by turning back.
+
+The way is a number per axis: +1 reached forwards, -1 backwards, between by shares. An axis that turns back first moves
+through the play g between its two ways: a step d changes the way by 2 d / g, held between -1 and 1 (the play operator;
+Brokate, Sprekels, Hysteresis and Phase Transitions, 1996, 2.1). Steps one after the other compose to one function of
+the way before them, again a shift held between two bounds, so that whole programs are walked in a few passes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from toolpaths.arrays import Floats
+
+GRAIN = 1e-4, 1e-6
+"""mm and rad: play below the last decimal of a word counts as that much, so that its rounding turns nothing"""
+
+
+@dataclass(frozen=True)
+class Steps:
+    """Functions of the way: clip(way + shift, low, high); arrays of one shape."""
+
+    shift: Floats
+    low: Floats
+    high: Floats
+
+    @classmethod
+    def of(cls, step: Floats, gap: Floats) -> Steps:
+        """Of steps mm or rad against plays (same shape, above 0)."""
+        return cls(2.0 * step / gap, np.full(step.shape, -1.0), np.full(step.shape, 1.0))
+
+    def then(self, after: Steps) -> Steps:
+        """These, then those."""
+        low, high = (np.clip(bound + after.shift, after.low, after.high) for bound in (self.low, self.high))
+        return Steps(self.shift + after.shift, low, high)
+
+    def at(self, way: Floats) -> Floats:
+        """The way after them."""
+        result: Floats = np.clip(way + self.shift, self.low, self.high)
+        return result
+
+    def rows(self, part: slice) -> Steps:
+        """Some of the rows."""
+        return Steps(self.shift[part], self.low[part], self.high[part])
+
+    def walked(self) -> Steps:
+        """Row k: all from the first to k, one after the other (prefix composition in log2 passes; Hillis, Steele, 1986)."""
+        done, n, reach = self, len(self.shift), 1
+        while reach < n:
+            later = done.rows(slice(None, -reach)).then(done.rows(slice(reach, None)))
+            done = Steps(*(np.concatenate([head[:reach], tail]) for head, tail in (
+                (done.shift, later.shift), (done.low, later.low), (done.high, later.high))))
+            reach *= 2
+        return done
