@@ -1,0 +1,111 @@
+"""Meshes of part, fixtures, table and holders: read from files, refused where they are no solid."""
+
+from __future__ import annotations
+
+import warnings
+from functools import lru_cache
+from pathlib import Path as FilePath
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolpaths.diagnostics import Diagnostic, error, has_errors, warning
+from toolpaths.units import MM_PER_INCH
+
+if TYPE_CHECKING:
+    from trimesh import Trimesh
+
+FORMATS = (".stl", ".ply", ".obj", ".off")
+"""by their ending; no other file is fetched or opened for them"""
+_SMALL, _LARGE = 1.0, 20000.0
+"""mm: a solid whose largest side is outside is likely in another unit"""
+
+
+def load_mesh(path: str | FilePath, units: str = "mm", key: str = "") -> tuple[Trimesh | None, list[Diagnostic]]:
+    """A closed triangle mesh in mm; None and why where the file holds none.
+
+    Args:
+        path: STL, PLY, OBJ or OFF
+        units: "mm" or "inch": what the numbers of the file are
+        key: what names the file in the set-up, for messages
+    """
+    path = FilePath(path)
+    what = f"{key}: " if key else ""
+    if path.suffix.lower() not in FORMATS:
+        return None, [error("mesh.format", f"{what}{path.name}: a mesh is read from {', '.join(FORMATS)}", file=str(path),
+                            hint="export the solid as STL, PLY, OBJ or OFF")]
+    try:
+        stat = path.stat()
+    except OSError as fault:
+        return None, [error("mesh.open", f"{what}cannot be read: {fault.strerror}", file=str(path),
+                            hint="paths are relative to the set-up file")]
+    mesh, found = _loaded(str(path), stat.st_mtime_ns, stat.st_size, units)
+    return mesh, [Diagnostic(d.severity, d.code, what + d.message, d.file, hint=d.hint) for d in found]
+
+
+@lru_cache(maxsize=32)
+def _loaded(path: str, _changed: int, _size: int, units: str) -> tuple[Trimesh | None, tuple[Diagnostic, ...]]:
+    """The mesh of a file as it was at a moment."""
+    import trimesh
+
+    try:
+        with warnings.catch_warnings(), np.errstate(all="ignore"):
+            warnings.simplefilter("ignore")
+            read = trimesh.load_mesh(path, process=False, **_reader(path))
+    except Exception as fault:  # the readers of the formats raise what comes up
+        why = "" if isinstance(fault, ImportError) else f" ({type(fault).__name__}: {fault})"
+        return None, (error("mesh.format", f"is no {FilePath(path).suffix[1:].upper()} file that can be read{why}", file=path,
+                            hint="export it anew"),)
+    faults = _broken(read, path)
+    if faults:
+        return None, faults
+    scale = MM_PER_INCH if units == "inch" else 1.0
+    mesh = trimesh.Trimesh(np.asarray(read.vertices, dtype=np.float64) * scale, read.faces, process=False)
+    mesh.merge_vertices(merge_tex=True, merge_norm=True)
+    mesh.update_faces(mesh.nondegenerate_faces(height=0.0))
+    mesh.remove_unreferenced_vertices()
+    found = _no_solid(mesh, path)
+    if has_errors(found):
+        return None, found
+    if mesh.volume < 0.0:
+        mesh.invert()
+    return mesh, found + _odd_size(mesh, path, units)
+
+
+def _reader(path: str) -> dict[str, bool]:
+    """Pictures and materials that an OBJ file names are not looked for."""
+    return {"skip_materials": True} if path.lower().endswith(".obj") else {}
+
+
+def _broken(mesh: Trimesh, path: str) -> tuple[Diagnostic, ...]:
+    """What stands against reading the vertices at all."""
+    if not hasattr(mesh, "faces") or not len(mesh.faces):
+        return (error("mesh.empty", "holds no triangle", file=path, hint="export the solid as a triangle mesh"),)
+    bad = np.flatnonzero(~np.isfinite(mesh.vertices).all(axis=1))
+    if len(bad):
+        return (error("mesh.number", f"{len(bad)} of {len(mesh.vertices)} vertices are no finite numbers", file=path,
+                      hint="export it anew"),)
+    return ()
+
+
+def _no_solid(mesh: Trimesh, path: str) -> tuple[Diagnostic, ...]:
+    """Holes, and faces that do not agree which side is out."""
+    if not mesh.is_watertight:
+        open_edges = np.unique(mesh.edges_sorted, axis=0, return_counts=True)[1] % 2 != 0
+        return (error("mesh.open_surface", f"is no closed solid: {int(open_edges.sum())} edges are not shared by two "
+                      "triangles", file=path, hint="close the holes, or export the body as a solid"),)
+    if not mesh.is_winding_consistent or mesh.volume == 0.0:
+        return (error("mesh.sides", "its triangles do not agree which side is out", file=path,
+                      hint="export the body as a solid"),)
+    if mesh.volume < 0.0:
+        return (warning("mesh.inside_out", "is inside out: its triangles were turned round", file=path),)
+    return ()
+
+
+def _odd_size(mesh: Trimesh, path: str, units: str) -> tuple[Diagnostic, ...]:
+    """Sizes that look like another unit."""
+    size = float(mesh.extents.max())
+    if _SMALL <= size <= _LARGE:
+        return ()
+    return (warning("mesh.size", f"is {size:g} mm long, read in {units}", file=path,
+                    hint="state units = \"mm\" or \"inch\" where the file is in another unit"),)
