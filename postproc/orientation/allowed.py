@@ -101,7 +101,7 @@ class Allowed:
         if limits.lead is not None:
             result.append(_Bound("lead", "", at.lead(axes), limits.lead[0] * DEG, limits.lead[1] * DEG))
         if limits.tilt is not None:
-            result.append(_Bound("sideways tilt", "", at.tilt(axes), limits.tilt[0] * DEG, limits.tilt[1] * DEG))
+            result.append(_Bound("tilt sideways", "", at.tilt(axes), limits.tilt[0] * DEG, limits.tilt[1] * DEG))
         return result
 
 

@@ -109,7 +109,7 @@ def test_points_without_normal_do_not_count() -> None:
 @pytest.mark.parametrize(("keys", "axis", "told"), [
     ({"lead": (5.0, 10.0)}, leaning(20.0, 0.0), "lead 20.000 degrees at line 10, allowed 5.000 to 10.000"),
     ({"lead": (5.0, 10.0)}, leaning(-3.0, 0.0), "lead -3.000 degrees at line 10, allowed 5.000 to 10.000"),
-    ({"tilt": (-15.0, 0.0)}, leaning(0.0, 4.0), "sideways tilt 4.000 degrees at line 10, allowed -15.000 to 0.000"),
+    ({"tilt": (-15.0, 0.0)}, leaning(0.0, 4.0), "tilt sideways 4.000 degrees at line 10, allowed -15.000 to 0.000"),
     ({"off_centre": 12.0}, leaning(0.0, 4.0),
      "tilt 4.000 degrees from the surface normal at line 10, allowed 12.000 to 60.000"),
     ({"contact_radius": 4.0}, leaning(29.0, 0.0),
