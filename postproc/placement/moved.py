@@ -1,0 +1,31 @@
+"""A toolpath that has been cut into passes, moved as one body: nothing is smoothed or cut again."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from postproc.links import safe_space
+from postproc.orientation.passes import Pass, Stretch, Work
+from postproc.setup import Placement
+
+
+def moved(work: Work, placement: Placement) -> Work:
+    """The passes of `work`, which stands with the part frame on the table frame, at another placement.
+
+    A smoothed cut is one of its points, wherever these stand: the sites along it stay what they are.
+    """
+    moves = work.moves.placed(placement)
+    return replace(work, placement=placement, moves=moves, space=safe_space(moves, work.setup, placement),
+                   passes=tuple(_pass(one, placement) for one in work.passes))
+
+
+def _pass(one: Pass, placement: Placement) -> Pass:
+    return replace(one, tip=placement.points(one.tip), axes=placement.directions(one.axes),
+                   axis=placement.directions(one.axis[None])[0],
+                   contact=replace(one.contact, normal=placement.directions(one.contact.normal),
+                                   way=placement.directions(one.contact.way)),
+                   stretches=tuple(_stretch(each, placement) for each in one.stretches))
+
+
+def _stretch(one: Stretch, placement: Placement) -> Stretch:
+    return replace(one, tip=placement.points(one.tip), axis=placement.directions(one.axis))

@@ -1,0 +1,158 @@
+"""The journey: passes once -> places that travel allows -> the one of least planned time -> a conversion that proves it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from machines.machine import Machine
+from postproc.controllers.model import load_controller
+from postproc.job import prepare
+from postproc.links import safe_space
+from postproc.options import Options
+from postproc.orientation.passes import Work, work_of
+from postproc.placement.search import Found, Progress, Search
+from postproc.placement.space import ANGLES, Space, space_of
+from postproc.placement.timed import Timer, Tried
+from postproc.setup import PartPlacement, SetupFile, part_placement
+from toolpaths.arrays import Floats
+from toolpaths.diagnostics import Diagnostic, error, has_errors, info, require, warning
+from toolpaths.toolpath import Toolpath
+from toolpaths.units import DEG
+
+LIMITS = ("state in the set-up where the part may stand, e.g. [placement] x = [-100, 100], y = [-100, 100] (mm, of the part "
+          "frame's origin or `point`), turn = [0, 360] or turns = [0, 90, 180, 270]")
+_PROOFS = 6
+"""places that are converted before giving up"""
+_APART = (10.0, 5.0 * DEG)
+"""mm, rad from a place whose conversion failed to the next that is tried"""
+
+
+@dataclass(frozen=True)
+class PlacementChoice:
+    """What was found.
+
+    Attributes:
+        work: the file with its part frame on the table frame
+        best: the place that is taken
+        planned, looked, pruned, refused: cuts that were planned; places that were looked at, that lost by their bound
+            alone, and where the part cannot stand
+    """
+
+    work: Work
+    space: Space
+    found: Found
+    best: Tried
+    planned: int
+    looked: int
+    pruned: int
+    refused: int
+    known: tuple[Tried, ...]
+
+    @property
+    def part(self) -> PartPlacement:
+        """[part] of the set-up."""
+        return self.space.part(self.best.place)
+
+
+def place(toolpath: Toolpath, machine: Machine, setup: SetupFile, options: Options | None = None,
+          controller: str | Path = "linuxcnc",
+          progress: Progress | None = None) -> tuple[PlacementChoice | None, list[Diagnostic]]:
+    """The place of least planned time inside [placement] of the set-up; None where a diagnostic is an ERROR.
+
+    The place is converted for the controller and read back before it is taken.
+    """
+    options = options or Options()
+    work, space, found = _begun(toolpath, machine, setup, options, controller)
+    if work is None or space is None:
+        return None, found
+    timer = Timer(work, space, setup.joints.singular_distance)
+    try:
+        result = Search(timer, space, progress).run()
+    except (ValueError, ArithmeticError) as fault:
+        return None, [*found, error("place.plan", f"no motion could be planned: {fault}", file=toolpath.file)]
+    if result.now.refused:
+        found.append(warning("place.now", f"where [part] has it the part cannot stand: {result.now.refused}",
+                             file=options.setup))
+    if result.best is None:
+        return None, [*found, _nowhere(result, timer, options)]
+    best, more = _proved(toolpath, machine, setup, options, controller, timer, result.best, progress)
+    if best is None:
+        return None, [*found, *more]
+    return PlacementChoice(work, space, result, best, timer.planned, timer.looked, timer.pruned, timer.refused,
+                           tuple(timer.known())), [*found, *more]
+
+
+def _begun(toolpath: Toolpath, machine: Machine, setup: SetupFile, options: Options,
+           controller: str | Path) -> tuple[Work | None, Space | None, list[Diagnostic]]:
+    """The passes with the part frame on the table frame, and the places that are allowed."""
+    spec, found = load_controller(controller)
+    require(found)
+    assert spec is not None
+    now, found = part_placement(setup, options.setup)
+    if now is None:
+        return None, None, found
+    _, found = prepare(toolpath, machine, spec, setup, options)
+    if has_errors(found):
+        return None, None, found
+    work, more = work_of(toolpath, machine, setup.model_copy(update={"part": PartPlacement()}), options, turning=False)
+    if work is None:
+        return None, None, [*found, *more]
+    safe = safe_space(work.moves, setup, work.placement)
+    space = space_of(setup.placement, now, (safe.corners.min(axis=0), safe.corners.max(axis=0)))
+    if not space.free:
+        return None, None, [error("place.limits", "[placement] of the set-up leaves the part no other place",
+                                  file=options.setup, hint=LIMITS)]
+    return work, space, found
+
+
+def _nowhere(result: Found, timer: Timer, options: Options) -> Diagnostic:
+    """Why the part can stand nowhere: the attitude that lacks least."""
+    known = [lack for lack in result.lacks if np.isfinite(lack[1])]
+    if known:
+        angles, margin, what = max(known, key=lambda lack: lack[1])
+        why = f"at best (turn {angles[0] / DEG:.3f} degrees) {what} lacks {-margin:.3f} mm"
+    elif result.lacks:
+        why = result.lacks[0][2]
+    else:
+        why = next(one.refused for one in timer.known() if one.refused)
+    return error("place.none", f"nowhere inside [placement] can the part stand: {why}", file=options.setup,
+                 hint="wider limits, another tool length, a lower clearance.margin or a machine with more travel")
+
+
+def _proved(toolpath: Toolpath, machine: Machine, setup: SetupFile, options: Options, controller: str | Path, timer: Timer,
+            best: Tried, progress: Progress | None) -> tuple[Tried | None, list[Diagnostic]]:
+    """The best place whose conversion is proved; what stood against better ones is told."""
+    from postproc.pipeline import convert
+
+    failed: list[tuple[Tried, Diagnostic]] = []
+    for one in _candidates(timer, best):
+        if any(_near(one.place, other.place) for other, _ in failed):
+            continue
+        here = setup.model_copy(update={"part": timer.space.part(one.place)})
+        result = convert(toolpath, machine, controller, here, options, progress=progress)
+        if result.ok:
+            return one, [_passed_over(*each, options) for each in failed]
+        failed.append((one, max(result.diagnostics, key=lambda d: d.severity)))
+        if len(failed) == _PROOFS:
+            break
+    return None, [error("place.proof", f"no place of {len(failed)} could be converted: {failed[0][1].message}",
+                        file=failed[0][1].file, lines=failed[0][1].lines, hint=failed[0][1].hint)]
+
+
+def _candidates(timer: Timer, best: Tried) -> list[Tried]:
+    """The best, then all others that are timed, in order."""
+    good = [one for one in timer.known() if np.isfinite(one.seconds) and timer.space.holds(one.place) and one is not best]
+    return [best, *sorted(good, key=lambda one: one.seconds)]
+
+
+def _near(a: Floats, b: Floats) -> bool:
+    apart = np.abs(a - b)
+    return bool((apart[:ANGLES] < _APART[0]).all() and (apart[ANGLES:] < _APART[1]).all())
+
+
+def _passed_over(one: Tried, why: Diagnostic, options: Options) -> Diagnostic:
+    return info("place.passed_over", f"a place of {one.seconds:.3f} s was passed over, its conversion fails: {why.message}",
+                file=options.setup)

@@ -1,0 +1,249 @@
+"""Where a part that is turned one way may stand: travel of all axes over all poses, before anything is planned.
+
+On a serial machine the rotary joints of a pose do not depend on where the part stands, and its slides are affine functions
+of that place: what travel allows is a convex polytope, and the place of most margin solves a linear program.
+On a parallel machine margins are looked at directly, at poses that stand for all.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+from scipy.optimize import linprog
+
+from machines import reach as clearances
+from machines.kinematics.base import Kinematics
+from machines.machine import Machine
+from machines.singular_distance import has_singular_distance, singular_distance
+from postproc.orientation.passes import Work
+from postproc.orientation.timed import Turned, turned
+from postproc.orientation.turns import ends
+from postproc.placement.moved import moved
+from postproc.placement.space import ANGLES, Space
+from postproc.reach import is_checked
+from toolpaths.arrays import Floats, Ints
+
+_MARGIN = 0.1
+"""share of the clearance margin that the safe planes need at least, as the links do"""
+_STEP = 100.0
+"""mm, over which slides are differenced"""
+_ROUNDS = 40
+_CHUNK = 2_000_000
+_POSES = 48
+"""of a kinematics and an axis that stand for all"""
+_MANY = 20_000
+"""rows, more are thinned out"""
+_LATTICE = 5
+_FINE = 0.5
+"""mm"""
+_NONE = -1e6
+_PER_RAD, _PER_SHARE = 100.0, 100.0
+"""mm that one radian, and the whole distance from a singular position, count as"""
+
+
+class Region(Protocol):
+    """Places (M, 3) of the set-up's point, of a part that is turned one way."""
+
+    def margins(self, places: Floats) -> Floats:
+        """(M,) mm that every axis stays inside travel there, negative where one lacks it."""
+
+    def deepest(self, low: Floats, high: Floats) -> tuple[Floats, float, str]:
+        """The place (3,) in a box with most margin, the margin, and what decides it."""
+
+
+@dataclass(frozen=True)
+class Slabs:
+    """A serial machine: each row is how far one end of travel of joint `joint` is from a pose, g . p + c, of p (3,).
+
+    Attributes:
+        g (K, 3), c (K,), joint (K,): the last numbers `names`
+    """
+
+    g: Floats
+    c: Floats
+    joint: Ints
+    names: tuple[str, ...]
+
+    def margins(self, places: Floats) -> Floats:
+        """See `Region`."""
+        count = max(1, _CHUNK // max(1, len(self.c)))
+        parts = [places[k:k + count] @ self.g.T + self.c for k in range(0, len(places), count)]
+        return np.concatenate([part.min(axis=1) for part in parts]) if parts else np.zeros(0)
+
+    def deepest(self, low: Floats, high: Floats) -> tuple[Floats, float, str]:
+        """The linear program max m, g . p + c >= m, low <= p <= high; rows are taken in as they are found to be broken."""
+        place = 0.5 * (low + high)
+        rows: list[int] = []
+        for _ in range(_ROUNDS):
+            values = self.g @ place + self.c
+            worst = self._worst(values)
+            new = [k for k in worst if k not in rows]
+            least = min(values[rows], default=np.inf)
+            if rows and (not new or float(values.min()) >= least - 1e-6):
+                break
+            rows += new
+            left = np.column_stack([-self.g[rows], np.ones(len(rows))])
+            found = linprog([0.0, 0.0, 0.0, -1.0], A_ub=left, b_ub=self.c[rows], method="highs",
+                            bounds=[*zip(low, high, strict=True), (None, None)])
+            if found.x is None:
+                raise ArithmeticError(f"no place of most margin: {found.message}")
+            place = np.clip(found.x[:ANGLES], low, high)
+        values = self.g @ place + self.c
+        return place, float(values.min()), f"axis {self.names[int(self.joint[int(values.argmin())])]}"
+
+    def _worst(self, values: Floats) -> list[int]:
+        """The row of least margin of each joint and direction."""
+        key = self.joint * 2 + (self.g.sum(axis=1) > 0.0)
+        return [int(k[values[k].argmin()]) for one in np.unique(key) if len(k := np.flatnonzero(key == one))]
+
+
+def region_of(work: Work, space: Space, angles: Floats, least: float) -> tuple[Region | None, str]:
+    """The region of a part turned by `angles` (3,), or why there is none.
+
+    Args:
+        work: with the part frame on the table frame
+        least: distance that a parallel machine keeps from its singular positions
+    """
+    if not work.machine.kinematics.slides_affine:
+        return sampled(moved(work, space.placement(np.append(np.zeros(ANGLES), angles))), least), ""
+    places = np.vstack([np.zeros((1, ANGLES)), _STEP * np.eye(ANGLES)])
+    joints = []
+    for place in places:
+        here = _unbounded(moved(work, space.placement(np.append(place, angles))))
+        made = [turned(one, one.axis, here.machine) for one in here.passes]
+        why = next((f"line {one.one.line}: {one.refused}" for one in made if one.refused), "")
+        if why:
+            return None, why
+        joints.append([_poses(one, here) for one in made])
+    return _slabs(joints, work.machine, space.room(angles)), ""
+
+
+def _unbounded(work: Work) -> Work:
+    """The same work on a machine whose slides never end, with the least safe planes."""
+    limits, slides = work.machine.limits, ~np.array(work.machine.rotary)
+    free = replace(limits, lower=np.where(slides, -np.inf, limits.lower), upper=np.where(slides, np.inf, limits.upper))
+    return replace(work, machine=replace(work.machine, limits=free),
+                   space=replace(work.space, margin=_MARGIN * work.space.margin))
+
+
+def _poses(made: Turned, work: Work) -> Floats:
+    """Joints (N, J) of all rows and sites of a pass, and above its ends."""
+    end = ends(made, work)
+    return np.concatenate([made.q, *made.sites, end.above_first[None], end.above_last[None]])
+
+
+def _slabs(joints: list[list[Floats]], machine: Machine, room: tuple[Floats, Floats]) -> Slabs:
+    """Margins of the slides from joints at the origin and one step along x, y, z from there, pass by pass."""
+    slides = np.flatnonzero(~np.array(machine.rotary))
+    parts = [_of_pass([each[n] for each in joints], machine, slides) for n in range(len(joints[0]))]
+    g, c, joint = (np.concatenate(column) for column in zip(*parts, strict=True))
+    keep = np.arange(len(c)) if len(c) <= _MANY else _lowest(g, c, joint, room)
+    return Slabs(g[keep], c[keep], joint[keep], machine.axis_names)
+
+
+def _of_pass(q: list[Floats], machine: Machine, slides: Ints) -> tuple[Floats, Floats, Ints]:
+    """Rows g (K, 3), c (K,), joint (K,) of one pass; only its outermost poses where no rotary joint turns."""
+    slope = np.stack([(other - q[0])[:, slides] / _STEP for other in q[1:]], axis=2)
+    still = not len(q[0]) or bool((np.ptp(q[0][:, np.array(machine.rotary)], axis=0) < 1e-9).all())
+    g, c, joint = [], [], []
+    for k, j in enumerate(slides.tolist()):
+        at = q[0][:, j]
+        for sign, rows in ((1.0, at.argmin()), (-1.0, at.argmax())):
+            pick = np.atleast_1d(rows) if still else np.arange(len(at))
+            edge = machine.limits.lower[j] if sign > 0.0 else machine.limits.upper[j]
+            g.append(sign * slope[pick, k])
+            c.append(sign * (at[pick] - edge))
+            joint.append(np.full(len(pick), j))
+    return np.concatenate(g), np.concatenate(c), np.concatenate(joint)
+
+
+def _lowest(g: Floats, c: Floats, joint: Ints, room: tuple[Floats, Floats]) -> Ints:
+    """Rows that are lowest of their joint somewhere on a lattice of places; the others are left to the exact check."""
+    lattice = np.stack(np.meshgrid(*np.linspace(*room, _LATTICE).T), axis=-1).reshape(-1, ANGLES)
+    found: set[int] = set()
+    for one in np.unique(joint):
+        rows = np.flatnonzero(joint == one)
+        for place in lattice:
+            found.add(int(rows[(g[rows] @ place + c[rows]).argmin()]))
+    return np.array(sorted(found))
+
+
+@dataclass(frozen=True)
+class Sampled:
+    """A parallel machine: margins at poses (tip, axis) (K, 3) that stand for all, by kinematics."""
+
+    machine: Machine
+    poses: tuple[tuple[Kinematics, Floats, Floats], ...]
+    least: float
+
+    def margins(self, places: Floats) -> Floats:
+        """See `Region`; the least of travel, reach and distance from singular positions."""
+        found = np.full(len(places), np.inf)
+        for kin, tip, axis in self.poses:
+            count = max(1, _CHUNK // (100 * len(tip)))
+            for k in range(0, len(places), count):
+                some = places[k:k + count]
+                found[k:k + count] = np.minimum(found[k:k + count], self._of(kin, tip, axis, some))
+        return found
+
+    def _of(self, kin: Kinematics, tip: Floats, axis: Floats, places: Floats) -> Floats:
+        """(M,) least margin of all poses, each on its best branch."""
+        tips = (tip[None] + places[:, None]).reshape(-1, 3)
+        q = kin.inverse(tips, np.tile(axis, (len(places), 1)), near=self.machine.home)
+        best = np.max([self._joints(kin, branch) for branch in q], axis=0)
+        return np.asarray(best.reshape(len(places), -1).min(axis=1))
+
+    def _joints(self, kin: Kinematics, q: Floats) -> Floats:
+        """(N,) of joints (N, J)."""
+        limits, rotary = self.machine.limits, np.array(self.machine.rotary)
+        travel = np.minimum(q - limits.lower, limits.upper - q) * np.where(rotary, _PER_RAD, 1.0)
+        result = np.asarray(travel.min(axis=1))
+        good = np.isfinite(q).all(axis=1)
+        result[~good] = _NONE
+        if is_checked(kin) and good.any():
+            found = clearances.reach(kin, q[good])  # type: ignore[arg-type]
+            result[good] = np.minimum(result[good], (found.values * np.where(found.angular, _PER_RAD, 1.0)).min(axis=1))
+        if has_singular_distance(kin) and good.any():
+            result[good] = np.minimum(result[good], _PER_SHARE * (singular_distance(kin, q[good]).min(axis=1) - self.least))
+        return np.where(np.isnan(result), _NONE, result)
+
+    def deepest(self, low: Floats, high: Floats) -> tuple[Floats, float, str]:
+        """The best of a lattice, then compass steps."""
+        lattice = np.stack(np.meshgrid(*np.linspace(low, high, _LATTICE).T), axis=-1).reshape(-1, ANGLES)
+        values = self.margins(np.unique(lattice, axis=0))
+        place, best = np.unique(lattice, axis=0)[values.argmax()], float(values.max())
+        step = 0.5 * (high - low) / (_LATTICE - 1)
+        while float(step.max()) > _FINE:
+            around = np.clip(place + np.vstack([np.diag(step), -np.diag(step)]), low, high)
+            values = self.margins(around)
+            if values.max() > best:
+                place, best = around[values.argmax()], float(values.max())
+            else:
+                step = 0.5 * step
+        return place, best, "travel, reach or a singular position of the parallel machine"
+
+
+def sampled(work: Work, least: float) -> Sampled:
+    """The region of a parallel machine from the poses of `work`, its point at the table's origin."""
+    groups: dict[tuple[int, bytes], list[tuple[Floats, Floats]]] = {}
+    kins = {id(one.kin): one.kin for one in work.passes}
+    for one in work.passes:
+        lift = max(0.0, work.space.plane(one.axis, True, _MARGIN) - float(one.axis @ (one.tip[-1] - work.space.centre)))
+        tips = [one.tip, one.tip[[0, -1]] + lift * one.axes[[0, -1]], *(each.tip for each in one.stretches)]
+        axes = [one.axes, one.axes[[0, -1]], *(each.axis for each in one.stretches)]
+        key = (id(one.kin), np.round(one.axis, 6).tobytes() if np.ptp(one.axes, axis=0).max() < 1e-9 else b"")
+        groups.setdefault(key, []).append((np.concatenate(tips), np.concatenate(axes)))
+    poses = [(kins[key[0]], *_outermost(*(np.concatenate(column) for column in zip(*rows, strict=True))))
+             for key, rows in groups.items()]
+    return Sampled(work.machine, tuple(poses), least)
+
+
+def _outermost(tip: Floats, axis: Floats) -> tuple[Floats, Floats]:
+    """Poses (K, 3) that reach farthest some way, and some between."""
+    ways = np.array([w for w in np.ndindex(3, 3, 3) if w != (1, 1, 1)], dtype=np.float64) - 1.0
+    picked = [*(tip @ ways.T).argmax(axis=0).tolist(), *np.linspace(0, len(tip) - 1, _POSES).astype(int).tolist(),
+              *axis.argmax(axis=0).tolist(), *axis.argmin(axis=0).tolist()]
+    rows = np.unique(picked)
+    return tip[rows], axis[rows]

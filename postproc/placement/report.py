@@ -1,0 +1,81 @@
+"""The choice as figures and as text."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from postproc.placement.place import PlacementChoice
+from postproc.placement.space import ANGLES, NAMES
+from postproc.placement.timed import Tried
+from toolpaths.arrays import Floats
+from toolpaths.units import DEG
+
+
+def as_dict(choice: PlacementChoice) -> dict[str, Any]:
+    """JSON figures: mm, degrees, seconds; null where the machine cannot run the file or an axis has no end."""
+    return {"machine": choice.work.machine.name,
+            "now": _place(choice, choice.found.now), "best": _place(choice, choice.best),
+            "part": {"origin": list(choice.part.origin), "x_axis": list(choice.part.x_axis),
+                     "y_axis": list(choice.part.y_axis)},
+            "gain": _finite(_gain(choice)), "attitudes": choice.found.attitudes, "places_screened": choice.found.screened,
+            "places_looked_at": choice.looked, "places_refused": choice.refused, "places_pruned": choice.pruned,
+            "cuts_planned": choice.planned,
+            "without_place": [_degrees(angles) | {"lacks_mm": _finite(-margin), "reason": why}
+                              for angles, margin, why in choice.found.lacks]}
+
+
+def _place(choice: PlacementChoice, one: Tried) -> dict[str, Any]:
+    machine = choice.work.machine
+    units = np.where(machine.rotary, 1.0 / DEG, 1.0)
+    margins = dict(zip(machine.axis_names, map(_finite, (one.margins(machine) * units).tolist()), strict=True))
+    return dict(zip(NAMES[:ANGLES], one.place[:ANGLES].tolist(), strict=True)) | _degrees(one.place[ANGLES:]) | {
+        "time_s": _finite(one.seconds), "cutting_s": _finite(one.cutting), "linking_s": _finite(one.linking),
+        "travel_margin": margins, "singular_distance": _finite(one.singular), "limiting_s": one.limiting,
+        "refused": one.refused}
+
+
+def _degrees(angles: Floats) -> dict[str, Any]:
+    return {f"{name}_deg": float(value) / DEG for name, value in zip(NAMES[ANGLES:], angles, strict=True)}
+
+
+def _gain(choice: PlacementChoice) -> float:
+    """Share of the time that is saved."""
+    return 1.0 - choice.best.seconds / choice.found.now.seconds if math.isfinite(choice.found.now.seconds) else math.nan
+
+
+def as_text(choice: PlacementChoice) -> str:
+    """Before and after, margins, what was tried."""
+    free = [NAMES[k] for k in choice.space.free]
+    lines = [f"{'':8} {'x mm':>10} {'y mm':>10} {'z mm':>10} {'turn deg':>10} {'seconds':>10} {'cuts':>10} {'linking':>10}"]
+    for name, one in (("[part]", choice.found.now), ("placed", choice.best)):
+        x, y, z, turn = one.place[:4]
+        figures = (f"{one.seconds:>10.3f} {one.cutting:>10.3f} {one.linking:>10.3f}" if math.isfinite(one.seconds)
+                   else f"  {one.refused}")
+        lines.append(f"{name:8} {x:>10.3f} {y:>10.3f} {z:>10.3f} {turn / DEG:>10.3f} {figures}")
+    gain = _gain(choice)
+    if math.isfinite(gain):
+        lines.append(f"gain {100.0 * gain:.2f} %")
+    lines.append("margin of travel: " + ", ".join(_margins(choice)))
+    if choice.best.limiting:
+        worst = max(choice.best.limiting, key=lambda name: choice.best.limiting[name])
+        lines.append(f"limited by {worst or 'nothing'} over {choice.best.limiting[worst]:.3f} s of the cuts")
+    lines.append(f"free: {', '.join(free)}; {choice.found.attitudes} ways to turn the part, {choice.looked} places looked "
+                 f"at, {choice.refused} refused, {choice.pruned} lost by their bound, {choice.planned} cuts planned")
+    return "\n".join(lines)
+
+
+def _margins(choice: PlacementChoice) -> list[str]:
+    machine = choice.work.machine
+    result = [f"{name} {value / DEG:.3f} deg" if rotary else f"{name} {value:.3f} mm"
+              for name, value, rotary in zip(machine.axis_names, choice.best.margins(machine).tolist(), machine.rotary,
+                                             strict=True) if math.isfinite(value)]
+    if math.isfinite(choice.best.singular):
+        result.append(f"singular positions {choice.best.singular:.3f}")
+    return result
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None

@@ -1,0 +1,198 @@
+"""The search: every way to turn the part, places on a low-discrepancy set inside travel, then compass steps.
+
+Places that travel rules out are never planned, nor are those whose bound is not below the best time so far.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from postproc.placement.region import Region, region_of
+from postproc.placement.space import ANGLES, FINE, Space
+from postproc.placement.timed import Timer, Tried
+from toolpaths.arrays import Floats
+from toolpaths.units import DEG
+
+Progress = Callable[[str, int, int], None]
+MOST = 400
+"""places that are looked at"""
+EQUAL = 2e-4
+"""part of the time by which places are equal; travel margin decides among them"""
+_SPREAD, _SEEDS = 128, 6
+"""places of each attitude that travel is asked about, and those of them that are timed"""
+_STARTS = 3
+"""attitudes that are refined"""
+_FINEST = (1.0, 0.25 * DEG)
+"""mm, rad: the last compass steps"""
+_POLISH = 60
+_SLACK = 1e-6
+
+
+@dataclass
+class Found:
+    """What a search found.
+
+    Attributes:
+        best: of least time, most travel margin among equals; None where the part can stand nowhere
+        lacks: (turn, tilt_y, tilt_x) with the margin that is missing at best, mm (nan: the attitude cannot be had
+            anywhere), and why, of attitudes without a place
+    """
+
+    now: Tried
+    best: Tried | None = None
+    lacks: list[tuple[Floats, float, str]] = field(default_factory=list)
+    attitudes: int = 0
+    screened: int = 0
+
+
+class Search:
+    """See the module; places are looked at in an order that depends on nothing but the file and the limits."""
+
+    def __init__(self, timer: Timer, space: Space, progress: Progress | None = None) -> None:
+        self.timer, self.space, self.progress = timer, space, progress
+        now = timer.tried(space.now)
+        self.found = Found(now, now if not now.refused and space.holds(space.now) else None)
+
+    @property
+    def spent(self) -> bool:
+        """True where no more places may be looked at."""
+        return self.timer.looked >= MOST
+
+    def run(self) -> Found:
+        """All of it."""
+        attitudes = self.space.attitudes()
+        self.found.attitudes = len(attitudes)
+        seeds = [seeds for k, angles in enumerate(attitudes) if (seeds := self._seeds(angles, k, len(attitudes)))]
+        for group in _in_turn(seeds):
+            for place in self._by_bound(group):
+                self._look(place)
+        for start in self._starts():
+            self._compass(start)
+        if self.found.best is not None:
+            self.found.best = self._roomiest()
+        return self.found
+
+    def _look(self, place: Floats) -> Tried | None:
+        """Time a place; it becomes the best where it is."""
+        if self.spent:
+            return None
+        if self.progress is not None:
+            self.progress("placing", self.timer.looked, MOST)
+        best = self.found.best
+        made = self.timer.tried(place, np.inf if best is None else best.seconds)
+        if best is None or made.seconds < best.seconds:
+            self.found.best = made if np.isfinite(made.seconds) else best
+        return made
+
+    def _seeds(self, angles: Floats, number: int, of: int) -> list[Floats]:
+        """Places (6,) of a part turned this way that are inside travel, that of most margin first."""
+        if self.progress is not None:
+            self.progress("travel", number, of)
+        low, high = self.space.room(angles)
+        if bool((low > high + _SLACK).any()):
+            self.found.lacks.append((angles, float((high - low).min()), "the table is too small"))
+            return []
+        region, why = region_of(self.timer.work, self.space, angles, self.timer.least)
+        if region is None:
+            self.found.lacks.append((angles, np.nan, why))
+            return []
+        high = np.maximum(low, high)
+        centre, margin, what = region.deepest(low, high)
+        if margin < -_SLACK:
+            self.found.lacks.append((angles, margin, what))
+            return []
+        return self._inside(region, centre, angles, low, high)
+
+    def _inside(self, region: Region, centre: Floats, angles: Floats, low: Floats, high: Floats) -> list[Floats]:
+        """The centre of a region, the present place where it is inside, and some spread over it."""
+        from scipy.stats import qmc
+
+        spread = low + (high - low) * qmc.Halton(ANGLES, scramble=False).random(_SPREAD)
+        places = np.vstack([centre, self.space.now[:ANGLES], np.clip(self.space.now[:ANGLES], low, high), spread])
+        every = np.array([self.space.snapped(np.append(place, angles)) for place in places])
+        good = np.array([self.space.holds(place) for place in every])
+        good[good] = region.margins(every[good][:, :ANGLES]) >= -_SLACK
+        self.found.screened += len(every)
+        kept: dict[bytes, Floats] = {}
+        for place in every[good]:
+            kept.setdefault((place + 0.0).tobytes(), place)
+        return list(kept.values())[:_SEEDS]
+
+    def _by_bound(self, places: list[Floats]) -> list[Floats]:
+        """The places by the least time that the file can take there."""
+        if self.found.best is None or len(places) < 2:
+            return places
+        bounds = [self.timer.tried(place, 0.0).bound for place in places if not self.spent]
+        return [places[k] for k in np.argsort(bounds, kind="stable").tolist()]
+
+    def _starts(self) -> list[Tried]:
+        """The best place of each of the best attitudes."""
+        good = sorted((one for one in self.timer.known() if np.isfinite(one.seconds) and self.space.holds(one.place)),
+                      key=lambda one: one.seconds)
+        taken: list[Tried] = []
+        for one in good:
+            if len(taken) < _STARTS and all(np.abs(one.place - other.place)[ANGLES:].max() > 0.1 for other in taken):
+                taken.append(one)
+        return taken
+
+    def _compass(self, start: Tried) -> None:
+        """Steps along each coordinate, halved where none gains."""
+        steps = self._first_steps()
+        at = start
+        while not self.spent and self._coarse(steps):
+            before = at
+            for place in list(self.space.neighbours(at.place, steps)):
+                made = self._nearer(place, at)
+                at = made if made is not None else at
+            if at is before:
+                steps = 0.5 * steps
+
+    def _nearer(self, place: Floats, at: Tried) -> Tried | None:
+        """The place where it is better than `at`."""
+        if self.spent:
+            return None
+        if self.progress is not None:
+            self.progress("placing", self.timer.looked, MOST)
+        made = self.timer.tried(place, at.seconds)
+        if self.found.best is None or made.seconds < self.found.best.seconds:
+            self.found.best = made if np.isfinite(made.seconds) else self.found.best
+        return made if made.seconds < at.seconds * (1.0 - 1e-6) else None
+
+    def _first_steps(self) -> Floats:
+        """A quarter of each range, at most 64 mm and a little over half the distance of the attitudes."""
+        most = np.array([64.0] * ANGLES + [8.0 * DEG] * ANGLES)
+        return np.array([max(min(0.25 * (one.high - one.low), top), fine)
+                         for one, top, fine in zip(self.space.dims, most, FINE, strict=True)])
+
+    def _coarse(self, steps: Floats) -> bool:
+        """True while some step is worth taking; lists are stepped through once."""
+        finest = np.array([_FINEST[0]] * ANGLES + [_FINEST[1]] * ANGLES)
+        return any(steps[k] >= finest[k] for k in self.space.free)
+
+    def _roomiest(self) -> Tried:
+        """Of the places that take as long as the best, that with most travel margin."""
+        best = self.found.best
+        assert best is not None
+        machine, most = self.timer.machine, best.seconds * (1.0 + EQUAL)
+        equal = [one for one in self.timer.known() if one.seconds <= most and self.space.holds(one.place)]
+        at = max(equal, key=lambda one: (one.shares(machine), -one.seconds))
+        steps, left = self._first_steps(), _POLISH
+        while left > 0 and self._coarse(steps):
+            before = at
+            for place in list(self.space.neighbours(at.place, steps)):
+                left -= 1
+                made = self.timer.tried(place, most / (1.0 - 2e-4))
+                if made.seconds <= most and made.shares(machine) > at.shares(machine):
+                    at = made
+            if at is before:
+                steps = 0.5 * steps
+        return at
+
+
+def _in_turn(groups: list[list[Floats]]) -> list[list[Floats]]:
+    """The first places of all attitudes, then all the others."""
+    rest = [place for group in groups for place in group[1:]]
+    return [[group[0] for group in groups], rest]
