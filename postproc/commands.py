@@ -76,11 +76,17 @@ class _Writing:
                 return
             self.starts.pop(0)
             self.compensation.off_before(move)
-            out = self.at(int(self.path.begin[move]))
             name = named.name or f"OPERATION {operation + 1}"
-            out.append(Command("OPERATION_START", (name, 1.0) if self.restart else (name,), named.line))
+            args = (name, 1.0) if self.restart else (name,)
+            self.at(self._label(move)).append(Command("OPERATION_START", args, named.line))
             if self.restart and self.loaded is not None:
-                self._restate(out, move, named.line)
+                self._restate(self.at(int(self.path.begin[move])), move, named.line)
+
+    def _label(self, move: int) -> int:
+        """The block that an operation begins with: the way home, where it leads there, so that a program taken up at the
+        operation goes home from wherever the tool is."""
+        block = int(self.path.begin[move])
+        return block - 1 if block > 0 and self.path.home[block - 1] else block
 
     def _restate(self, out: list[Command], move: int, line: int) -> None:
         """The tool in the spindle anew, unless the operation changes it."""

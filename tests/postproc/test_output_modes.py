@@ -280,18 +280,17 @@ def test_an_operation_that_is_not_there_is_an_error(tmp_path: Path) -> None:
 
 
 def test_every_operation_can_be_started_at(tmp_path: Path) -> None:
-    """Home before it; tool, length, speed and coolant behind its start; the axes all stated."""
+    """It begins with the way home; tool, length, speed and coolant behind that; the axes all stated."""
     path = operations(indexed()[-8:], indexed()[-8:])
     result = convert(path, "mikron-ucp710", shop(tmp_path), setup_of(tmp_path, "[output]\nrestart = true\n"))
     p = result.program
     starts = {c.args[0]: k for k, group in p.commands.items() for c in group if c.name == "OPERATION_START"}
     assert list(starts) == ["A", "B"]
-    group = names(result, starts["B"])
-    after = group[group.index("OPERATION_START"):]
-    assert [n for n in after if n != "SELECT_TOOL"] == [
-        "OPERATION_START", "STOP_SPINDLE_TURNING", "COOLANT_OFF", "CHANGE_TOOL", "USE_TOOL_LENGTH_OFFSET",
+    assert names(result, starts["B"])[-1] == "OPERATION_START"
+    assert [n for n in names(result, starts["B"] + 1) if n != "SELECT_TOOL"] == [
+        "STOP_SPINDLE_TURNING", "COOLANT_OFF", "CHANGE_TOOL", "USE_TOOL_LENGTH_OFFSET",
         "START_SPINDLE_CLOCKWISE", "FLOOD_ON"]
-    assert p.home[starts["B"] - 1]
+    assert p.home[starts["B"]] and not p.home[starts["B"] + 1]
     entered = next(s.first for s in p.sections if s.first > starts["B"] and s.law == "tilted")
     assert p.write[starts["B"]:entered].any(axis=0).all()
     follows(result)
