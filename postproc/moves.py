@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from machines.kinematics.frames import spin_about, tool_x
 from postproc.events import spindle_speed, tool_changes
 from postproc.holes import Phase as Phase
 from postproc.holes import hole_legs
@@ -37,6 +38,7 @@ class Moves:
         link (M,): True where the way from the row before is a linking move (retract, index, approach), free of form
         tool (M,): index into Toolpath.tools or -1
         line (M,): CL line
+        spin (M,): rad about the tool axis as in Toolpath, NaN where any will do
     """
 
     tip: Floats
@@ -52,6 +54,7 @@ class Moves:
     link: Bools
     tool: Array
     line: Ints
+    spin: Floats
     arcs: Arcs
 
     def __len__(self) -> int:
@@ -63,7 +66,8 @@ class Moves:
             return self
         arcs = Arcs(placement.points(self.arcs.center), placement.directions(self.arcs.normal), self.arcs.radius,
                     self.arcs.sweep)
-        return replace(self, tip=placement.points(self.tip), axis=placement.directions(self.axis), arcs=arcs)
+        return replace(self, tip=placement.points(self.tip), axis=placement.directions(self.axis), arcs=arcs,
+                       spin=_spin_in(placement, self.axis, self.spin))
 
     def without_pecks(self) -> Moves:
         """The rows but those of pecks: a hole is then one straight way to its bottom."""
@@ -86,13 +90,22 @@ class Moves:
         return Curves(self.tip[first], self.tip, self.axis[first], self.axis, is_arc, center, normal, sweep)
 
 
+def _spin_in(placement: Placement, axis: Floats, spin: Floats) -> Floats:
+    """Spins (M,) about axes (M, 3) in the outer frame."""
+    result, known = spin.copy(), np.flatnonzero(np.isfinite(spin))
+    if len(known):
+        side = placement.directions(tool_x(axis[known], spin[known]))
+        result[known] = spin_about(placement.directions(axis[known]), side)
+    return result
+
+
 def link_rows(toolpath: Toolpath, setup: SetupFile, axis_tolerance: float) -> Bools:
     """Rows (N,) that are reached by a linking move.
 
     The first motion, the first after a tool change, a bare GOHOME or a FROM elsewhere, the first of an operation whose
     tool axis differs from the last one's by more than `axis_tolerance` (rad), rapids that turn the axis by more than the
-    set-up's link_angle, and the first of an operation that begins anew (`begins_anew`). Where such a row cuts,
-    `build_moves` puts a linked row before it.
+    set-up's link_angle, rapids from or to where the tool is held about its axis, and the first of an operation that begins
+    anew (`begins_anew`). Where such a row cuts, `build_moves` puts a linked row before it.
     """
     n = len(toolpath)
     link = np.zeros(n, dtype=bool)
@@ -106,6 +119,7 @@ def link_rows(toolpath: Toolpath, setup: SetupFile, axis_tolerance: float) -> Bo
     boundary[1:] = np.diff(toolpath.operation[moving]) != 0
     rapid = toolpath.kind[moving] == Kind.RAPID
     linked = rapid & ((boundary & (turn > axis_tolerance)) | (turn > setup.clearance.link_angle * DEG))
+    linked |= rapid & _spins_anew(toolpath, moving)
     linked[0] = True
     linked |= boundary & begins_anew(toolpath, setup)[toolpath.operation[moving]]
     stops = [e.index for e in toolpath.events if e.word == "GOHOME"] + [c.index for c in tool_changes(toolpath)]
@@ -115,6 +129,15 @@ def link_rows(toolpath: Toolpath, setup: SetupFile, axis_tolerance: float) -> Bo
             linked[at] = True
     link[moving] = linked
     return link
+
+
+def _spins_anew(toolpath: Toolpath, moving: Ints) -> Bools:
+    """Rows of `moving` whose tool is held otherwise about its axis than in the row before."""
+    result = np.zeros(len(moving), dtype=bool)
+    if toolpath.spin is not None:
+        spin = toolpath.spin[moving]
+        result[1:] = (spin[1:] != spin[:-1]) & ~(np.isnan(spin[1:]) & np.isnan(spin[:-1]))
+    return result
 
 
 def begins_anew(toolpath: Toolpath, setup: SetupFile) -> Bools:
@@ -173,7 +196,8 @@ def build_moves(toolpath: Toolpath, setup: SetupFile, axis_tolerance: float) -> 
         hole[where] = np.repeat(np.arange(len(holes)), counts[holes])
         feed[where] = np.where(kind[where] == Kind.FEED, feed[where], np.nan)
     moves = Moves(tip, toolpath.axis[pose], kind, feed, seconds, arc, row, hole, phase, toolpath.cycle[row],
-                  link[row] & first, toolpath.tool[row], toolpath.line[row], toolpath.arcs)
+                  link[row] & first, toolpath.tool[row], toolpath.line[row],
+                  np.full(len(row), np.nan) if toolpath.spin is None else toolpath.spin[pose], toolpath.arcs)
     return moves, diagnostics + _missing_feeds(toolpath, moves) + _opposite_axes(toolpath, moves) + _lone_arcs(
         toolpath, moves)
 

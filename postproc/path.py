@@ -184,6 +184,7 @@ def _solve_run(road: _Road, kin: Kinematics, rows: Ints) -> tuple[_Run | None, l
     diagnostics += faults.unreachable(modes.control, kin, moves, rows, axis, q, road.file)
     if has_errors(diagnostics):
         return None, diagnostics
+    diagnostics += faults.spun(kin, moves, rows, axis, q, road.axis_tolerance, road.file)
     still = stands_still(axis, road.axis_tolerance)
     law = modes.law(int(modes.asked[road.operation[rows[-1]]]), still)
     if law == "tilted" and not still:

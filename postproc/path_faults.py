@@ -8,6 +8,7 @@ from machines.kinematics.base import Kinematics
 from machines.machine import Machine
 from postproc.control import Control
 from postproc.joint_path import TRAVEL_SLACK
+from postproc.joints.spin import spins_off
 from postproc.moves import Moves
 from toolpaths.arrays import Array, Bools, Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error, info
@@ -62,6 +63,18 @@ def unreachable(control: Control, kin: Kinematics, moves: Moves, rows: Ints, axi
     return [error("reach.position", f"{name} cannot reach the tip position ({x:.4f}, {y:.4f}, {z:.4f}) mm of the table "
                   "frame with that tool axis", file=file, lines=lines[:6].tolist(), count=len(bad),
                   hint="move the part in the set-up (part.origin)")]
+
+
+def spun(kin: Kinematics, moves: Moves, rows: Ints, axis: Floats, q: Floats, tolerance: float,
+         file: str) -> list[Diagnostic]:
+    """Poses at which the tool should be held about its axis, and no rotary joint can do so; `tolerance` in rad."""
+    off = spins_off(kin, q, moves.tip[rows], axis, moves.spin[rows])
+    bad = np.flatnonzero(off > tolerance)
+    if not len(bad):
+        return []
+    return [error("axis.spin", f"the tool is to be held about its own axis, which no rotary axis can do here: it stands "
+                  f"{off[bad].max() / DEG:.4f} degrees off", file=file, lines=moves.line[rows[bad]][:6].tolist(),
+                  count=len(bad), hint="leave Toolpath.spin out where the tool is not along a rotary axis all the pass")]
 
 
 def _elsewhere(kin: Kinematics, tip: Floats, q: Floats) -> Bools:

@@ -13,6 +13,7 @@ from postproc.joint_path import reachable_axes
 from postproc.joints.lattice import Run
 from postproc.joints.lead import Event, Led, lead_past, whole
 from postproc.joints.plan import Solution, Wishes, plan_runs
+from postproc.joints.spin import held_joints
 from postproc.moves import Moves
 from postproc.refined import Refined, cut, with_rewinds
 from toolpaths.arrays import Bools, Floats, Ints
@@ -96,11 +97,11 @@ def plan_moves(machine: Machine, kinematics: Callable[[int], Kinematics], moves:
     parts = []
     for first, last in zip(starts, [*starts[1:], len(moves)], strict=True):
         parts.append(_part(machine, kinematics(int(moves.tool[first])), moves, reference, np.arange(first, last), manner))
-    runs = [_run(part, moves, manner) for part in parts]
+    runs = [_run(part, moves, manner, machine.home) for part in parts]
     found = plan_runs(runs, machine.limits, machine.home, manner.wishes, manner.may_rewind, progress)
     if manner.may_rewind and any(s.outside for s in found):
         parts = [_finer(part, s) if s.outside else part for part, s in zip(parts, found, strict=True)]
-        runs = [_run(part, moves, manner) for part in parts]
+        runs = [_run(part, moves, manner, machine.home) for part in parts]
         found = plan_runs(runs, machine.limits, machine.home, manner.wishes, manner.may_rewind, progress)
     return _together(moves, parts, found, manner)
 
@@ -123,12 +124,14 @@ def _seconds(moves: Moves, rows: Ints, curves: Curves) -> Floats:
     return np.where((moves.kind[rows] == Kind.RAPID) | ~(time > 0.0), np.nan, time)
 
 
-def _run(part: _Part, moves: Moves, manner: Manner) -> Run:
+def _run(part: _Part, moves: Moves, manner: Manner, home: Floats) -> Run:
     tip, axis = part.poses()
     owner = np.concatenate([part.rows[:1], part.rows[1:][part.led.parent]])
     rapid = moves.kind[owner] == Kind.RAPID
     rest = rapid | np.append(rapid[1:], True)
-    return Run(part.kin, tip, axis, rest, manner.away(tip, axis))
+    spin = float(moves.spin[part.rows[0]])
+    held = held_joints(part.kin, tip[0], axis[0], spin, home) if np.isfinite(spin) else None
+    return Run(part.kin, tip, axis, rest, manner.away(tip, axis), held)
 
 
 def _finer(part: _Part, solution: Solution) -> _Part:

@@ -186,6 +186,8 @@ class Toolpath:
         line (N,): 1-based line of the file
         normal (N, 3) or None: unit surface normal, NaN where a point has none
         contact (N, 3) or None: contact point, NaN where a point has none
+        spin (N,) or None: rad about the tool axis from the x direction that the least rotation taking z to the axis carries
+            along to the tool's own x direction; NaN where any will do. No CL file says it.
         units: "mm" or "inch": what the file was written in (the arrays are mm)
     """
 
@@ -215,15 +217,16 @@ class Toolpath:
     file: str = ""
     faults: tuple[Diagnostic, ...] = ()
     """errors that reading met: what they stand for is missing, so that nothing may be written from the path"""
+    spin: Floats | None = None
 
     def __post_init__(self) -> None:
         n = len(self.tip)
         for name, (dtype, tail) in _COLUMNS.items():
             object.__setattr__(self, name, frozen(getattr(self, name), dtype, (n, *tail), f"Toolpath.{name}"))
-        for name in ("normal", "contact"):
+        for name, tail in (("normal", (3,)), ("contact", (3,)), ("spin", ())):
             value = getattr(self, name)
             if value is not None:
-                object.__setattr__(self, name, frozen(value, np.float64, (n, 3), f"Toolpath.{name}"))
+                object.__setattr__(self, name, frozen(value, np.float64, (n, *tail), f"Toolpath.{name}"))
         for name, count in (("arc", len(self.arcs)), ("cycle", len(self.cycles)), ("tool", len(self.tools)),
                             ("operation", len(self.operations))):
             column = getattr(self, name)

@@ -20,6 +20,12 @@ def reference_x(axis: Floats) -> Floats:
     return np.stack([1.0 - grow * x * x, -grow * x * y, -x], axis=1)
 
 
+def tool_x(axis: Floats, spin: Floats) -> Floats:
+    """The tool's own x direction (N, 3) at a spin (N,) about the unit `axis` (N, 3); undoes `spin_about`."""
+    reference = reference_x(axis)
+    return np.asarray(np.cos(spin)[:, None] * reference + np.sin(spin)[:, None] * np.cross(axis, reference))
+
+
 def spin_about(axis: Floats, tool_x: Floats) -> Floats:
     """Angle (N,) rad about the unit `axis` (N, 3) from `reference_x(axis)` to `tool_x` (N, 3)."""
     reference = reference_x(axis)

@@ -29,6 +29,7 @@ class Run:
         tip, axis: (N, 3) in the table frame
         rest: (N,) True where the tool does not cut, so that it may be drawn back; None: it cuts everywhere
         away: (N,) s that drawing back there and coming down again takes; None: nothing
+        held: (J,) where a rotary joint must stand that the tool lies along all the way; None: where it is best
     """
 
     kin: Kinematics
@@ -36,6 +37,7 @@ class Run:
     axis: Floats
     rest: Bools | None = None
     away: Floats | None = None
+    held: Floats | None = None
 
 
 @dataclass(frozen=True)

@@ -139,7 +139,7 @@ def _stages(runs: list[Run], limits: Limits, start: Floats, may_rewind: bool,
     """Every run with its states.
 
     A run whose tool lies along a rotary axis all the way may take that axis as it stands before or after it; where
-    neither is inside travel, at a quarter turn.
+    neither is inside travel, at a quarter turn. One that holds it has no choice.
     """
     result: list[_Stage] = []
     for k, run in enumerate(runs):
@@ -148,8 +148,8 @@ def _stages(runs: list[Run], limits: Limits, start: Floats, may_rewind: bool,
             near += list(runs[k + 1].kin.inverse(runs[k + 1].tip[:1], runs[k + 1].axis[:1], near=start)[:, 0])
         rotary = np.array(run.kin.rotary)
         near = _distinct(near, start, rotary)
-        stage = _stage(lattice_of(run, limits, np.stack(near)), may_rewind)
-        if stage.lattice.family.all() and not stage.tidy:
+        stage = _stage(lattice_of(run, limits, np.stack(near) if run.held is None else run.held[None]), may_rewind)
+        if stage.lattice.family.all() and not stage.tidy and run.held is None:
             quarters = [np.where(rotary, 0.5 * np.pi * i, start) for i in range(4)]
             stage = _stage(lattice_of(run, limits, np.stack(_distinct(near + quarters, start, rotary))), may_rewind)
         result.append(stage)

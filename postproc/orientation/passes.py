@@ -65,6 +65,7 @@ class Pass:
         contact: where the surface normal is known
         radius: of the ball, mm
         fixed: why the axis cannot be turned, "" where it can
+        spins: the pass may be turned about its tool axis, whatever the cutter
         by_home: the tool comes from home (first pass, tool change, GOHOME)
         tool: index into Toolpath.tools
     """
@@ -78,6 +79,7 @@ class Pass:
     contact: Contact
     radius: float
     fixed: str
+    spins: bool
     by_home: bool
     tool: int
     kin: Kinematics
@@ -92,6 +94,11 @@ class Pass:
     def normal(self) -> Floats:
         """Surface normals (K, 3) that are known in this pass."""
         return self.contact.normal
+
+    @property
+    def turns(self) -> bool:
+        """True where the tool axis turns within the pass."""
+        return bool((angle_between(self.axes, self.axis[None]) > TURNS).any())
 
     @property
     def longest(self) -> Stretch | None:
@@ -219,9 +226,11 @@ def _pass(number: int, rows: tuple[int, int], of: _Cutting) -> Pass:
     length = of.setup.tools.get(str(known.number if known else 0))
     kin = of.machine.kinematics.with_tool(length.gauge_length if length else 0.0)
     inside = [one for first in range(*rows) for one in of.stretches.get(first, ())]
-    fixed = _kept(of, cuts) or _fixed(moves, rows, cuts - rows[0], axis, radius)
+    stays = _kept(of, cuts) or _fixed(moves, rows, cuts - rows[0], axis)
+    fixed = stays or _by_cutter(radius)
     return Pass(number, rows, moves.tip[here], moves.axis[here], moves.kind[here] == Kind.RAPID, axis, of.contact(cuts),
-                radius or 0.0, fixed, not of.homes.isdisjoint(range(*rows)), tool, kin, tuple(inside), int(moves.line[lead]))
+                radius or 0.0, fixed, not stays, not of.homes.isdisjoint(range(*rows)), tool, kin, tuple(inside),
+                int(moves.line[lead]))
 
 
 def _kept(of: _Cutting, cuts: Ints) -> str:
@@ -232,8 +241,8 @@ def _kept(of: _Cutting, cuts: Ints) -> str:
     return "" if kept is None else f"the set-up keeps the axis of operation {kept!r}"
 
 
-def _fixed(moves: Moves, rows: tuple[int, int], cuts: Ints, axis: Floats, radius: float | None) -> str:
-    """Why the axis of a pass is fixed; "" where it may be turned."""
+def _fixed(moves: Moves, rows: tuple[int, int], cuts: Ints, axis: Floats) -> str:
+    """Why a pass stays as it is, whatever its cutter; "" where it need not."""
     here = slice(*rows)
     if not len(cuts):
         return "nothing is cut"
@@ -243,6 +252,11 @@ def _fixed(moves: Moves, rows: tuple[int, int], cuts: Ints, axis: Floats, radius
         return "the tool axis turns within the pass"
     if bool((moves.tool[here][cuts] != moves.tool[here][cuts[0]]).any()) or moves.kind[rows[0]] != Kind.RAPID:
         return "no rapid leads to it on which the tool could turn"
+    return ""
+
+
+def _by_cutter(radius: float | None) -> str:
+    """Why the axis of a pass is fixed by its cutter; "" where it may be turned."""
     if radius is None:
         return UNKNOWN
     return "the cutter is no ball: turned, it would touch elsewhere" if radius == 0.0 else ""

@@ -24,6 +24,7 @@ from postproc.readback.faults import Faults
 from postproc.readback.poses import SAMPLES, Executed, arc_sweeps
 from postproc.readback.rewinds import check_rewinds, rewinds
 from postproc.readback.slow import check_slow
+from postproc.readback.spins import check_spins
 from postproc.readback.taps import check_taps
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.diagnostics import Diagnostic
@@ -75,6 +76,7 @@ def compare(motion: Motion, job: Job, executed: Executed, gcode: str = "", plann
     worst_axis, axis_line = _worst((axis_off, tilt), (owner[rows], done), (rows, match[done]), moves, motion)
     diagnostics += _beyond("tip", "mm", worst_tip, tolerance, tip_line, faults)
     diagnostics += _beyond("axis", "degrees", worst_axis / DEG, axis_tolerance / DEG, axis_line, faults)
+    diagnostics += check_spins(motion, executed, moves, owner, tip, axis, axis_tolerance, faults)
     diagnostics += check_kinds(motion, moves, owner, tip, executed.control.rapids == "dog-leg", faults)
     diagnostics += check_states(motion, job, moves, owner, faults)
     diagnostics += check_holes(motion, job, moves, tip, owner, faults)

@@ -32,7 +32,7 @@ def text_of(p: Toolpath) -> str:
 
     Raises:
         ValueError: where `p` holds what a CL file cannot say (NaN positions, a feed that becomes unknown again, a
-            point with both a normal and a contact point).
+            point with both a normal and a contact point, a tool that must not turn about its axis).
     """
     _check(p)
     return "\n".join([*_header(p), *_body(p), "FINI", ""])
@@ -43,6 +43,8 @@ def _check(p: Toolpath) -> None:
         raise ValueError("the toolpath holds positions that are not finite numbers")
     if p.normal is not None and p.contact is not None and bool((~np.isnan(p.normal + p.contact)).any()):
         raise ValueError("a point has both a normal and a contact point")
+    if p.spin is not None and bool(np.isfinite(p.spin).any()):
+        raise ValueError("the tool is held about its own axis: no record says so")
 
 
 def _header(p: Toolpath) -> Iterator[str]:
