@@ -3,51 +3,144 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from postproc.console import Json, machine_of, progress_bar, refuse_overwriting, report, shown_errors
+
+if TYPE_CHECKING:
+    from machines.machine import Machine
+    from postproc.options import Options
+    from postproc.orientation.orient import OrientationChoice
+    from toolpaths.diagnostics import Diagnostic
 
 ORIENTATIONS = ("keep", "per-pass", "whole-part", "auto")
 MaxTilt = Annotated[float, typer.Option("--max-tilt", metavar="DEG", min=0.0, max=120.0, help="largest tilt of a chosen "
                                         "axis from the file's surface normals, or from its own axis")]
 Orient = Annotated[str, typer.Option("--orient", help="keep: the tool axes of the CL file; per-pass, whole-part, auto: "
                                      "turned for the least planned time (3+2 passes of ball cutters)")]
+EXAMPLES = """Examples:
+
+postproc orient part.cls -m mikron-ucp710 --max-tilt 45
+
+postproc orient part.cls -m mikron-ucp710 --figure part.svg --pass 3 --json part.json
+
+Then the program: postproc convert part.cls -m mikron-ucp710 -c linuxcnc --orient auto -o part.ngc"""
+MOST = 6
+"""passes drawn and listed in full"""
 
 
 def orient(file: Annotated[Path, typer.Argument(metavar="FILE", help="CL file (APT text)")],
            machine: Annotated[str, typer.Option("-m", "--machine", help="machine: a name from the list, or a TOML file")],
            max_tilt: MaxTilt = 60.0,
+           plan: Annotated[str, typer.Option("--orient", help="plan whose passes are shown: keep, per-pass, whole-part, "
+                                             "auto")] = "auto",
+           passes: Annotated[list[int] | None, typer.Option("--pass", metavar="N", min=0, help="show this pass in full "
+                                                            "(number of the table; may be repeated)")] = None,
+           figure: Annotated[Path | None, typer.Option("--figure", metavar="FILE", help="drawing of plans, passes and, of "
+                                                       "--pass, polytopes, reach, candidates; .png or .svg")] = None,
            setup: Annotated[str, typer.Option("--setup", metavar="S.toml", help="set-up file: placement, tools")] = "",
            tolerance: Annotated[float, typer.Option("--tolerance", metavar="MM", min=1e-6, max=10.0)] = 0.01,
            axis_tolerance: Annotated[float, typer.Option("--axis-tolerance", metavar="DEG", min=1e-6, max=10.0)] = 0.05,
+           error_model: Annotated[str, typer.Option("--error-model", metavar="E.toml", help="file of the machine's "
+                                                    "geometric errors: checked; it changes no choice")] = "",
            units: Annotated[str, typer.Option("--units", help="units of a CL file that states none: mm or inch")] = "",
+           dialect: Annotated[str, typer.Option("--dialect", help="read the CL file as this dialect instead of the "
+                                                "recognised one")] = "",
+           allow_unknown: Annotated[list[str] | None, typer.Option("--allow-unknown", metavar="WORD", help="leave this word "
+                                                                   "out although it looks like motion")] = None,
            json: Json = "") -> None:
-    """Choose the tool orientation of 3+2 passes for the least planned time."""
-    if units not in ("", "mm", "inch"):
-        raise typer.BadParameter(f"{units!r} is not available; choose from mm, inch", param_hint="--units")
-    refuse_overwriting({"--json": json}, {"the CL file": str(file), "the set-up": setup})
-    import toolpaths
+    """Choose the tool orientation of 3+2 passes for the least planned time, and say why."""
+    _check(plan, figure, units, dialect, passes or [])
+    refuse_overwriting({"--figure": str(figure or ""), "--json": json},
+                       {"the CL file": str(file), "the set-up": setup, "the error model": error_model})
     from postproc.options import Options
-    from postproc.orientation import report as figures
+
+    options = Options(tolerance, axis_tolerance, setup=setup, units=units, dialect=dialect, error_model=error_model,
+                      allow_unknown=tuple(w.upper() for w in allow_unknown or ()), max_tilt=max_tilt,
+                      orient=plan)  # type: ignore[arg-type]
+    values: dict[str, Any] = {}
+    text = ""
+    with shown_errors(json), progress_bar() as progress:
+        choice, found = _chosen(file, machine_of(machine), options, progress)
+        if choice is not None:
+            from postproc.orientation.report import as_dict
+            from postproc.orientation.text import as_text
+
+            shown = _known(passes or [], choice)
+            values, text = as_dict(choice, options.orient), as_text(choice, options.orient, shown)
+            if figure is not None:
+                from postproc.files import write_atomically
+                from postproc.orientation.figures.sheet import draw
+
+                write_atomically(figure, draw(choice, options.orient, shown, figure.suffix.lower()))
+    report(tuple(found), json, values | {"diagnostics": [d.as_dict() for d in found]}, text)
+
+
+def _check(plan: str, figure: Path | None, units: str, dialect: str, passes: list[int]) -> None:
+    """Wrong use."""
+    for option, value, known in (("--orient", plan, ORIENTATIONS), ("--units", units or "mm", ("mm", "inch"))):
+        if value not in known:
+            raise typer.BadParameter(f"{value!r} is not available; choose from {', '.join(known)}", param_hint=option)
+    if dialect:
+        from toolpaths.cl.dialects import DIALECTS
+
+        if dialect not in DIALECTS:
+            raise typer.BadParameter(f"{dialect!r} is not available; choose from {', '.join(DIALECTS)}",
+                                     param_hint="--dialect")
+    if figure is not None and figure.suffix.lower() not in (".png", ".svg"):
+        raise typer.BadParameter(f"{figure.name} is no .png or .svg file", param_hint="--figure")
+    if len(set(passes)) > MOST:
+        raise typer.BadParameter(f"{len(set(passes))} passes at once, at most {MOST} are shown in full; all are in --json",
+                                 param_hint="--pass")
+
+
+def _chosen(file: Path, machine: Machine, options: Options,
+            progress: Any) -> tuple[OrientationChoice | None, list[Diagnostic]]:
+    """The choice for a file; None where a diagnostic is an ERROR."""
+    import toolpaths
     from postproc.orientation.orient import orient as run
     from postproc.setup import load_setup
     from toolpaths.diagnostics import has_errors, require
 
-    options = Options(tolerance, axis_tolerance, setup=setup, units=units, max_tilt=max_tilt)
-    values: dict[str, Any] = {}
-    text = ""
-    with shown_errors(json), progress_bar() as progress:
-        m = machine_of(machine)
-        path, found = toolpaths.read(file, units=units or None)
-        settings, more = load_setup(setup or None)
-        require(more)
-        assert settings is not None
-        found = [*found, *(d for d in path.faults if d not in found)]
-        if not has_errors(found):
-            choice, more = run(path, m, settings, options, progress)
-            found += more
-            if choice is not None:
-                values, text = figures.as_dict(choice), figures.as_text(choice)
-    report(tuple(found), json, values | {"diagnostics": [d.as_dict() for d in found]}, text)
+    path, found = toolpaths.read(file, units=options.units or None, dialect=options.dialect or None,
+                                 allow_unknown=options.allow_unknown,
+                                 progress=lambda at, total: progress("reading", at, total))
+    settings, more = load_setup(options.setup or None)
+    require(more)
+    assert settings is not None
+    found = [*found, *(d for d in path.faults if d not in found), *_errors(options, machine)]
+    if has_errors(found):
+        return None, found
+    choice, more = run(path, machine, settings, options, progress)
+    return choice, found + more
+
+
+def _errors(options: Options, machine: Machine) -> list[Diagnostic]:
+    """What is wrong with the error model; else that it changes nothing here."""
+    if not options.error_model:
+        return []
+    from machines.geometric_error.loader import load_checked
+    from toolpaths.diagnostics import info
+
+    model, found = load_checked(options.error_model, machine)
+    told = info("orient.error_model", "times and travel are those of the machine without its geometric errors: corrections "
+                "of some micrometres change no choice", file=options.error_model, hint="convert corrects and proves them")
+    return [*found, told] if model is not None else list(found)
+
+
+def _known(passes: list[int], choice: OrientationChoice) -> list[int]:
+    """Numbers of passes, each once, that the file has.
+
+    Raises:
+        DiagnosticError: for another number.
+    """
+    from toolpaths.diagnostics import DiagnosticError, error
+
+    shown, count = list(dict.fromkeys(passes)), len(choice.tried)
+    wrong = [number for number in shown if number >= count]
+    if wrong:
+        raise DiagnosticError([error("orient.pass", f"there is no pass {wrong[0]}", file=choice.work.toolpath.file,
+                                     hint=f"passes are numbered 0 to {count - 1}")])
+    return shown

@@ -1,62 +1,101 @@
-"""The choice as figures and as text."""
+"""The choice as JSON figures: seconds, millimetres, degrees; null where the machine cannot run something."""
 
 from __future__ import annotations
 
 import math
-from itertools import pairwise
 from typing import Any
 
 from postproc.options import Orientation
+from postproc.orientation.candidates import Tried
+from postproc.orientation.losers import best_loser, grouped
 from postproc.orientation.orient import OrientationChoice
+from postproc.orientation.passes import Work
+from postproc.orientation.plans import OrientationPlan
+from postproc.orientation.reaches import binding, reaches
+from postproc.orientation.shares import shares_of
 from postproc.orientation.timed import Turned
+from toolpaths.rotations import angle_between
+from toolpaths.units import DEG
 
 NAMES: tuple[Orientation, ...] = ("keep", "per-pass", "whole-part", "auto")
 
 
 def as_dict(choice: OrientationChoice, plan: Orientation = "auto") -> dict[str, Any]:
-    """JSON figures: seconds, degrees; null where the machine cannot run it. Passes as `plan` has them."""
+    """The keys of `orient --json`; passes as `plan` has them."""
+    picked = choice.plans[plan].picked
+    plans = {name.replace("-", "_"): _plan(choice.plans[name], choice) for name in NAMES}
+    return {"machine": choice.work.machine.name, "plan": plan,
+            "passes": [_pass(tried, made, choice.work) for tried, made in zip(choice.tried, picked, strict=True)],
+            "plans": plans | {"paper_per_pass": _plan(choice.paper, choice)}}
+
+
+def chosen(choice: OrientationChoice, plan: Orientation) -> dict[str, Any]:
+    """What a conversion says about its tool axes: the plan, its seconds, and each pass."""
+    picked = choice.plans[plan].picked
     passes = [{"pass": tried.own.one.number, "line": tried.own.one.line, "fixed": tried.own.one.fixed,
-               "orientation_deg": made.rotary(), "time_s": _finite(made.seconds),
-               "reference_time_s": _finite(tried.own.seconds),
-               "limiting_axis": made.limiting[0], "limiting_order": made.limiting[1],
-               "axis": choice.work.placement.inverse().directions(made.axis[None])[0].tolist(),
-               "planned": tried.planned, "pruned": tried.pruned,
-               "rejected": [{"orientation_deg": _angles(other), "reason": why} for other, why in tried.rejected]}
-              for tried, made in zip(choice.tried, choice.plans[plan].picked, strict=True)]
-    plans = {name.replace("-", "_"): {"time_s": _finite(choice.plans[name].seconds),
-                                      "cutting_s": _finite(sum(made.seconds for made in choice.plans[name].picked)),
-                                      "turns": _turns(choice.plans[name].picked)} for name in NAMES}
-    plans["paper_per_pass"] = {"time_s": _finite(choice.paper.seconds),
-                               "cutting_s": _finite(sum(made.seconds for made in choice.paper.picked)),
-                               "turns": _turns(choice.paper.picked)}
-    return {"machine": choice.work.machine.name, "passes": passes, "plans": plans}
+               "axis": axis_of(made, choice.work), "orientation_deg": angles(made), "time_s": finite(made.seconds),
+               "reference_time_s": finite(tried.own.seconds)} for tried, made in zip(choice.tried, picked, strict=True)]
+    return {"plan": plan, "time_s": finite(choice.plans[plan].seconds),
+            "reference_time_s": finite(choice.plans["keep"].seconds), "passes": passes}
 
 
-def as_text(choice: OrientationChoice) -> str:
-    """A table of the passes as `auto` has them, and the plans."""
-    lines = [f"{'pass':>5} {'line':>7}  {'orientation':<26} {'time s':>9} {'CL axis s':>9} {'gain %':>7}  limited by"]
-    for tried, made in zip(choice.tried, choice.plans["auto"].picked, strict=True):
-        angles = " ".join(f"{name}{value:.3f}" for name, value in made.rotary().items())
-        before = tried.own.seconds
-        gain = 100.0 * (1.0 - made.seconds / before) if math.isfinite(before) and before > 0.0 else 0.0
-        why = tried.own.one.fixed or " ".join(made.limiting)
-        lines.append(f"{tried.own.one.number:>5} {tried.own.one.line:>7}  {angles:<26} {made.seconds:>9.4f} "
-                     f"{tried.own.seconds:>9.4f} {gain:>7.2f}  {why}")
-    for name in NAMES:
-        plan = choice.plans[name]
-        lines.append(f"{name:<11} {plan.seconds:10.3f} s, cutting {sum(made.seconds for made in plan.picked):.3f} s, "
-                     f"{_turns(plan.picked)} turns")
-    return "\n".join(lines)
+def gain(made: float, before: float) -> float | None:
+    """Percent of `before` saved; None where one of them is no time."""
+    return 100.0 * (1.0 - made / before) if math.isfinite(made) and math.isfinite(before) and before > 0.0 else None
 
 
-def _finite(value: float) -> float | None:
+def finite(value: float) -> float | None:
+    """None for inf and NaN."""
     return float(value) if math.isfinite(value) else None
 
 
-def _angles(made: Turned) -> dict[str, float | None]:
-    return {name: _finite(value) for name, value in made.rotary().items()}
+def angles(made: Turned) -> dict[str, float | None]:
+    """Rotary positions, degrees."""
+    return {name: finite(value) for name, value in made.rotary().items()}
 
 
-def _turns(picked: tuple[Turned, ...]) -> int:
-    """How often the axis changes between passes."""
-    return sum(bool(abs(a.axis - b.axis).max() > 1e-6) for a, b in pairwise(picked))
+def axis_of(made: Turned, work: Work) -> list[float]:
+    """The tool axis in the frame of the CL file."""
+    axis: list[float] = work.placement.inverse().directions(made.axis[None])[0].tolist()
+    return axis
+
+
+def _pass(tried: Tried, made: Turned, work: Work) -> dict[str, Any]:
+    one = tried.own.one
+    return {"pass": one.number, "line": one.line, "fixed": one.fixed, "orientation_deg": angles(made),
+            "time_s": finite(made.seconds), "reference_time_s": finite(tried.own.seconds),
+            "gain_percent": gain(made.seconds, tried.own.seconds),
+            "limiting_axis": made.limiting[0], "limiting_order": made.limiting[1],
+            "axis": axis_of(made, work), "turned_deg": float(angle_between(made.axis, one.axis)) / DEG,
+            "planned": tried.planned, "pruned": tried.pruned, "lost": grouped(tried),
+            "own": _short(tried.own), "best": _short(tried.best), "paper": _short(tried.aimed),
+            "next_best": _short(best_loser(tried)),
+            "reach": {name: _reach(it) for name, it in (("own", tried.own), ("paper", tried.aimed), ("chosen", made))
+                      if it is not None},
+            "rejected": [{"orientation_deg": angles(other), "kind": kind, "reason": why}
+                         for other, why, kind in tried.rejected]}
+
+
+def _short(made: Turned | None) -> dict[str, Any] | None:
+    """An orientation and its planned time."""
+    return None if made is None else {"orientation_deg": angles(made), "time_s": finite(made.seconds),
+                                      "touches": made.touching}
+
+
+def _reach(made: Turned) -> dict[str, Any]:
+    """What each order allows along the mean direction, and which takes longest."""
+    found = reaches(made)
+    slowest = binding(found)
+    rates = {one.order: {"rate": one.rate, "unit": UNITS[one.order], "axis": one.axis, "least_s": one.seconds}
+             for one in found}
+    return rates | {"binding": None if slowest is None else slowest.order}
+
+
+UNITS = {"velocity": "mm/s", "acceleration": "mm/s2", "jerk": "mm/s3"}
+
+
+def _plan(plan: OrientationPlan, choice: OrientationChoice) -> dict[str, Any]:
+    parts = shares_of(plan, choice.work)
+    return {"time_s": finite(plan.seconds), "gain_percent": gain(plan.seconds, choice.plans["keep"].seconds),
+            "cutting_s": finite(parts.cutting), "turning_s": finite(parts.turning), "other_s": finite(parts.other),
+            "turns": parts.turns}

@@ -1,0 +1,1 @@
+"""Pictures of the choice of orientations; matplotlib is imported only where one is drawn."""

@@ -1,0 +1,110 @@
+"""The part: plans side by side, the angles of the passes, what they gain."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from postproc.options import Orientation
+from postproc.orientation.orient import OrientationChoice
+from postproc.orientation.plans import OrientationPlan
+from postproc.orientation.report import NAMES, gain
+from postproc.orientation.shares import shares_of
+from postproc.orientation.timed import Turned
+from toolpaths.arrays import Floats
+from toolpaths.drawing import BESIDE
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+MANY = 60
+"""passes beyond which lines take the place of marks"""
+
+
+def plan_panel(place: Axes, choice: OrientationChoice) -> None:
+    """Bars: cutting, turning and other seconds of each plan."""
+    plans: dict[str, OrientationPlan] = {**{name: choice.plans[name] for name in NAMES}, "paper\nper pass": choice.paper}
+    parts = [shares_of(plan, choice.work) for plan in plans.values()]
+    left = np.zeros(len(parts))
+    for name, colour in (("cutting", "#1f5f8b"), ("turning", "#d08a3c"), ("other", "#bbbbbb")):
+        width = np.nan_to_num([getattr(one, name) for one in parts], posinf=0.0, neginf=0.0)
+        place.barh(list(plans), width, left=left, color=colour, label=WAYS[name])
+        left += width
+    before = choice.plans["keep"].seconds
+    for k, (plan, one) in enumerate(zip(plans.values(), parts, strict=True)):
+        saved = gain(plan.seconds, before)
+        told = "cannot be run" if not np.isfinite(plan.seconds) else f"{plan.seconds:.1f} s" + (
+            f", {abs(saved):.1f} % {'less' if saved > 0.0 else 'more'}" if saved is not None and abs(saved) >= 0.05 else "")
+        place.annotate(f"{told}, {one.turns} turns", (left[k], k), xytext=(4, 0), textcoords="offset points", va="center",
+                       fontsize="small")
+    place.invert_yaxis()
+    place.set_xlim(0.0, 1.3 * max(float(left.max()), 1e-9))
+    place.set_xlabel("seconds of the whole part")
+    place.set_title("plans", fontsize="medium")
+    place.grid(False, axis="y")
+    place.legend(**BESIDE)
+
+
+WAYS = {"cutting": "cutting", "turning": "turning: back,\nindex, approach", "other": "rapids, home,\ntool changes"}
+
+
+def angle_panel(place: Axes, choice: OrientationChoice, plan: Orientation) -> None:
+    """Rotary positions of the passes, those of the CL file beside."""
+    picked = choice.plans[plan].picked
+    number = np.arange(len(picked))
+    for name, colour in zip(picked[0].rotary(), COLOURS, strict=False):
+        own = _angles([one.own for one in choice.tried], name)
+        place.plot(number, own, color=colour, linestyle=":", linewidth=1.0, drawstyle="steps-mid", label=f"{name}, CL file")
+        place.plot(number, _angles(picked, name), color=colour, linewidth=1.0, drawstyle="steps-mid",
+                   marker=_mark(len(picked)), markersize=4.0, label=f"{name}, {plan}")
+    unit = "degrees" if any(choice.work.machine.rotary) else "tool axis, 1"
+    _labelled(place, "pass", unit, f"orientation of each pass: {plan}")
+    low, high = place.get_ylim()
+    if high - low < FLAT:
+        place.set_ylim(0.5 * (low + high - FLAT), 0.5 * (low + high + FLAT))
+    place.legend(**BESIDE)
+
+
+FLAT = 10.0
+"""least height of the panel of angles, degrees"""
+COLOURS = ("#1f5f8b", "#c2453a", "#3f8f4f")
+
+
+def gain_panel(place: Axes, choice: OrientationChoice, plan: Orientation) -> None:
+    """Percent of the cut's time saved in each pass: the best found, the paper's choice, the plan."""
+    tried, picked = choice.tried, choice.plans[plan].picked
+    own = np.array([one.own.seconds for one in tried])
+    number = np.arange(len(own))
+    sets = {"best of the pass": np.array([one.best.seconds for one in tried]),
+            "paper": np.array([np.inf if one.aimed is None else one.aimed.seconds for one in tried]),
+            plan: np.array([made.seconds for made in picked])}
+    for (name, made), mark, colour in zip(sets.items(), ("*", "^", "o"), ("#3f8f4f", "#7a4fa0", "#1f5f8b"), strict=True):
+        place.plot(number, _saved(made, own), label=name, marker=mark if len(own) <= MANY else "", markersize=5.0,
+                   linestyle="-" if len(own) > MANY or name == plan else "", linewidth=1.0, color=colour, alpha=0.8)
+    fixed = [k for k, one in enumerate(tried) if one.own.one.fixed]
+    if fixed:
+        place.plot(fixed, np.zeros(len(fixed)), linestyle="", marker="x", markersize=5.0, color="gray", label="axis is kept")
+    place.set_ylim(bottom=min(0.0, place.get_ylim()[0]))
+    _labelled(place, "pass", "% of the planned cut", "time saved in each pass, without turns")
+    place.legend(**BESIDE)
+
+
+def _saved(made: Floats, own: Floats) -> Floats:
+    good = np.isfinite(made) & np.isfinite(own) & (own > 0.0)
+    return np.where(good, 100.0 * (1.0 - np.where(good, made, 0.0) / np.where(good, own, 1.0)), np.nan)
+
+
+def _angles(made: tuple[Turned, ...] | list[Turned], name: str) -> Floats:
+    return np.array([one.rotary().get(name, np.nan) for one in made])
+
+
+def _mark(count: int) -> str:
+    return "o" if count <= MANY else ""
+
+
+def _labelled(place: Axes, x: str, y: str, title: str) -> None:
+    place.set_xlabel(x)
+    place.set_ylabel(y)
+    place.set_title(title, fontsize="medium")
+    place.locator_params(axis="x", integer=True)

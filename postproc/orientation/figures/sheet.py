@@ -1,0 +1,91 @@
+"""A sheet: the part as a whole, then passes in full."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from postproc.options import Orientation
+from postproc.orientation.candidates import Tried
+from postproc.orientation.figures.map import axes_map
+from postproc.orientation.figures.overview import angle_panel, gain_panel, plan_panel
+from postproc.orientation.figures.polytopes import box_panel, order_panel
+from postproc.orientation.figures.reach import reach_panel
+from postproc.orientation.orient import OrientationChoice
+from postproc.orientation.passes import Work
+from postproc.orientation.report import gain
+from postproc.orientation.text import orientation, percent, seconds
+from postproc.orientation.timed import Turned
+from toolpaths.drawing import image, plain
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from matplotlib.gridspec import GridSpec
+
+WIDTH = 10.0
+PART = (2.6, 2.3, 2.3)
+"""heights of the panels of the part; all in inches"""
+PASS = (0.3, 4.4, 4.4)
+"""heights of the headline and the panels of a pass"""
+
+
+def draw(choice: OrientationChoice, plan: Orientation, passes: Sequence[int], ending: str) -> bytes:
+    """An image file of the plans, the passes as `plan` has them, and `passes` (numbers) in full.
+
+    Without numbers the pass that can gain most is drawn.
+
+    Args:
+        ending: ".png" or ".svg"
+
+    Raises:
+        ValueError: for another ending.
+    """
+    shown = list(passes) or most_gaining(choice)
+    title = f"tool orientations of {Path(choice.work.toolpath.file).name} on {choice.work.machine.name}"
+
+    heights = [*PART, *(PASS * len(shown))]
+
+    def fill(sheet: Figure) -> None:
+        grid = sheet.add_gridspec(len(heights), 2, height_ratios=heights)
+        _part(sheet, grid, choice, plan)
+        for k, number in enumerate(shown):
+            made = choice.plans[plan].picked[number]
+            _pass(sheet, grid, len(PART) + len(PASS) * k, choice.tried[number], made, choice.work)
+
+    return image((WIDTH, sum(heights) + 0.4), title, fill, ending)
+
+
+def most_gaining(choice: OrientationChoice) -> list[int]:
+    """The pass that its best orientation saves most of; none where nothing can be turned."""
+    saved = [0.0 if one.own.one.fixed or not np.isfinite(one.own.seconds) else one.own.seconds - one.best.seconds
+             for one in choice.tried]
+    free = [k for k, one in enumerate(choice.tried) if not one.own.one.fixed]
+    return [max(free, key=lambda k: saved[k])] if free else []
+
+
+def _part(sheet: Figure, grid: GridSpec, choice: OrientationChoice, plan: Orientation) -> None:
+    plan_panel(sheet.add_subplot(grid[0, :]), choice)
+    angle_panel(sheet.add_subplot(grid[1, :]), choice, plan)
+    gain_panel(sheet.add_subplot(grid[2, :]), choice, plan)
+
+
+def _pass(sheet: Figure, grid: GridSpec, row: int, tried: Tried, made: Turned, work: Work) -> None:
+    head = sheet.add_subplot(grid[row, :])
+    head.set_axis_off()
+    head.text(0.5, 0.0, plain(_headline(tried)), ha="center", fontweight="bold", transform=head.transAxes)
+    box_panel(sheet.add_subplot(grid[row + 1, 0], projection="3d"), tried, work)
+    order_panel(sheet.add_subplot(grid[row + 1, 1], projection="3d"), tried, work)
+    axes_map(sheet, sheet.add_subplot(grid[row + 2, 0], projection="polar"), tried, made, work)
+    reach_panel(sheet.add_subplot(grid[row + 2, 1]), tried, made)
+
+
+def _headline(tried: Tried) -> str:
+    one = tried.own.one
+    if one.fixed:
+        return f"pass {one.number}, line {one.line}: axis kept, {one.fixed}"
+    saved = percent(gain(tried.best.seconds, tried.own.seconds))
+    return (f"pass {one.number}, line {one.line}: best {orientation(tried.best)}, {seconds(tried.best.seconds)} s instead "
+            f"of {seconds(tried.own.seconds)} s ({saved} % less)")

@@ -1,0 +1,117 @@
+"""The choice for people: the passes as a plan has them, one pass in full, the plans side by side."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from postproc.options import Orientation
+from postproc.orientation.candidates import Lost, Tried
+from postproc.orientation.losers import KINDS, best_loser, grouped, in_all, listed
+from postproc.orientation.orient import OrientationChoice
+from postproc.orientation.plans import OrientationPlan
+from postproc.orientation.reaches import Reach, binding, reaches
+from postproc.orientation.report import NAMES, UNITS, gain
+from postproc.orientation.shares import shares_of
+from postproc.orientation.timed import Turned
+from toolpaths.rotations import angle_between
+
+SHOWN = 40
+"""passes in the table; where there are more, those that gain most"""
+LOSERS = 20
+"""candidates of a pass in full"""
+
+
+def as_text(choice: OrientationChoice, plan: Orientation = "auto", passes: Sequence[int] = ()) -> str:
+    """Table of the passes as `plan` has them, `passes` (numbers) in full, and all plans."""
+    picked = choice.plans[plan].picked
+    rows = list(zip(choice.tried, picked, strict=True))
+    shown = sorted(sorted(rows, key=lambda row: _saved(*row))[:SHOWN], key=lambda row: row[0].own.one.number)
+    lines = [f"passes as {plan} has them",
+             f"{'pass':>5} {'line':>7}  {'orientation':<24} {'time s':>9} {'CL axis s':>9} {'gain %':>7}  "
+             f"{'limited by':<16} {'best alone s':>12} {'next s':>9}  others lost by"]
+    lines += [_row(tried, made) for tried, made in shown]
+    if len(rows) > len(shown):
+        lines.append(f"      and {len(rows) - len(shown)} passes that gain less; all are in --json")
+    for number in passes:
+        lines += ["", *_in_full(*rows[number])]
+    return "\n".join([*lines, "", *_totals(choice), *_plans(choice)])
+
+
+def _saved(tried: Tried, made: Turned) -> float:
+    """Minus the seconds saved; passes without a time last."""
+    saved = tried.own.seconds - made.seconds
+    return -saved if math.isfinite(saved) else math.inf
+
+
+def orientation(made: Turned) -> str:
+    """Angles in words: "A45.000 C-12.500"."""
+    return " ".join(f"{name}{value + 0.0:.3f}" for name, value in made.rotary().items())
+
+
+def seconds(value: float | None) -> str:
+    """Seconds; "-" where there are none."""
+    return f"{value:.4f}" if value is not None and math.isfinite(value) else "-"
+
+
+def percent(value: float | None) -> str:
+    """Percent; "-" where there is none."""
+    return "-" if value is None else f"{value + 0.0:.2f}"
+
+
+def _row(tried: Tried, made: Turned) -> str:
+    one, before = tried.own.one, tried.own.seconds
+    limit = " ".join(made.limiting).strip() or "-"
+    start = (f"{one.number:>5} {one.line:>7}  {orientation(made):<24} {seconds(made.seconds):>9} {seconds(before):>9} "
+             f"{percent(gain(made.seconds, before)):>7}  {limit:<16} ")
+    if one.fixed:
+        return f"{start}{'':>12} {'':>9}  kept: {one.fixed}"
+    after = best_loser(tried)
+    beaten = seconds(None if after is None else after.seconds)
+    return f"{start}{seconds(tried.best.seconds):>12} {beaten:>9}  {listed(grouped(tried)) or '-'}"
+
+
+def _in_full(tried: Tried, made: Turned) -> list[str]:
+    """One pass: what its orientations reach along the mean direction, and each loser with its reason."""
+    one = tried.own.one
+    lines = [f"pass {one.number}, line {one.line}" + (f", kept: {one.fixed}" if one.fixed else "")]
+    for name, it in (("CL axis", tried.own), ("paper", tried.aimed), ("best alone", tried.best), ("chosen", made)):
+        if it is not None:
+            lines += [f"  {name:<10} {orientation(it)}, {seconds(it.seconds)} s" + _reached(reaches(it))
+                      + (f", {it.touching}" if it.touching else "")]
+    losers = sorted(tried.rejected, key=lambda pair: (_rank(pair), angle_between(pair.made.axis, one.axis)))
+    for other, why, _ in losers[:LOSERS]:
+        lines.append(f"  {'lost':<10} {orientation(other)}: {why}")
+    return lines + ([f"  and {len(losers) - LOSERS} more in --json"] if len(losers) > LOSERS else [])
+
+
+def _rank(lost: Lost) -> tuple[int, float]:
+    """Planned losers first, by time."""
+    return -list(KINDS).index(lost.kind), lost.made.seconds if lost.kind == "slower" else 0.0
+
+
+def _reached(found: tuple[Reach, ...]) -> str:
+    slowest = binding(found)
+    if slowest is None:
+        return ""
+    parts = ", ".join(f"{one.rate:.0f} {UNITS[one.order]} ({one.axis})" for one in found)
+    return f"; along the mean direction {parts}: {slowest.order} binds"
+
+
+def _totals(choice: OrientationChoice) -> list[str]:
+    """What was tried, over all passes."""
+    planned, lost = sum(one.planned for one in choice.tried), in_all(choice.tried)
+    return [f"{planned} orientations planned; lost by: " + (", ".join(f"{KINDS[k]} {n}" for k, n in lost.items()) or "-")]
+
+
+def _plans(choice: OrientationChoice) -> list[str]:
+    lines = [f"{'plan':<16} {'time s':>10} {'gain %':>7} {'cutting s':>10} {'turning s':>10} {'other s':>10} {'turns':>6}"]
+    every: dict[str, OrientationPlan] = {**{name: choice.plans[name] for name in NAMES}, "paper per pass": choice.paper}
+    for name, plan in every.items():
+        parts = shares_of(plan, choice.work)
+        figures = (f"{value:.3f}" if math.isfinite(value) else "-" for value in
+                   (plan.seconds, parts.cutting, parts.turning, parts.other))
+        whole, cutting, turning, other = figures
+        lines.append(f"{name:<16} {whole:>10} {percent(gain(plan.seconds, choice.plans['keep'].seconds)):>7} {cutting:>10} "
+                     f"{turning:>10} {other:>10} {parts.turns:>6}")
+    return lines

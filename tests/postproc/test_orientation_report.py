@@ -1,0 +1,220 @@
+"""What is told of a choice of orientations: reaches, losers, shares, JSON, text, pictures, the command line."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner, Result
+
+import toolpaths
+from postproc.cli import app
+from postproc.options import Options
+from postproc.orientation import losers, reaches, report, shares, text
+from postproc.orientation.figures import polytopes, sheet
+from postproc.orientation.orient import OrientationChoice, orient
+from postproc.setup import SetupFile
+from tests.postproc.kit import SAMPLES, machine
+from toolpaths.rotations import angle_between
+
+PART = SAMPLES / "test_part.cls"
+BALL = ["UNITS/MM", "CUTTER/16,8", "LOADTL/1", "SPINDL/RPM,1000,CLW", "FEDRAT/MMPM,30000", "MULTAX"]
+SLACK = 1.0 - 1e-4
+"""a candidate that gains less is not taken"""
+
+
+def written(passes: int, cutter: str = "CUTTER/16,8") -> str:
+    """Level passes of 80 mm along x beside each other, rapids between."""
+    lines = [cutter if line.startswith("CUTTER") else line for line in BALL]
+    for y in range(passes):
+        lines += ["RAPID", f"GOTO/0,{y},5,0,0,1", "RAPID", f"GOTO/0,{y},0,0,0,1", f"GOTO/80,{y},0,0,0,1", "RAPID",
+                  f"GOTO/80,{y},5,0,0,1"]
+    return "\n".join([*lines, "FINI"]) + "\n"
+
+
+@cache
+def of_text(content: str, name: str = "passes.apt") -> OrientationChoice:
+    path, found = toolpaths.read_bytes(content.encode(), file=name)
+    assert not toolpaths.diagnostics.has_errors(found), found
+    choice, found = orient(path, machine("mikron-ucp710"), SetupFile(), Options())
+    assert choice is not None, found
+    return choice
+
+
+def part() -> OrientationChoice:
+    return of_text(PART.read_text(), "test_part.cls")
+
+
+def many() -> OrientationChoice:
+    """The part sixteen times."""
+    one = part()
+    return replace(one, tried=16 * one.tried, plans={k: replace(p, picked=16 * p.picked) for k, p in one.plans.items()},
+                   paper=replace(one.paper, picked=16 * one.paper.picked))
+
+
+def run(*arguments: object, code: int = 0) -> Result:
+    result = CliRunner().invoke(app, ["orient", *map(str, arguments), "-m", "mikron-ucp710"])
+    assert result.exit_code == code, result.output
+    return result
+
+
+def test_reaches_of_a_straight_pass() -> None:
+    """Along x with C at 0 every order ends at X's own limit; the jerk's seconds are those of the plan."""
+    one = of_text(written(2)).tried[0].own
+    found = {each.order: each for each in reaches.reaches(one)}
+    limits = one.machine.limits
+    assert [(each.order, each.axis) for each in found.values()] == [("velocity", "X"), ("acceleration", "X"), ("jerk", "X")]
+    assert [each.rate for each in found.values()] == pytest.approx(
+        [limits.velocity[0], limits.acceleration[0], limits.jerk[0]])
+    assert found["velocity"].seconds == pytest.approx(80.0 / limits.velocity[0])
+    assert found["acceleration"].seconds == pytest.approx(2.0 * math.sqrt(80.0 / limits.acceleration[0]))
+    slowest = reaches.binding(tuple(found.values()))
+    assert slowest is found["jerk"] and one.seconds == pytest.approx(slowest.seconds, rel=2e-3)
+
+
+def test_reach_of_an_axis_is_that_of_its_pass() -> None:
+    """The ground of the map at the axes of candidates that were solved."""
+    tried = part().tried[3]
+    made = [one for one, _, _ in tried.rejected if not one.refused][:8]
+    ground = reaches.least_under(tried.own, np.stack([one.axis for one in made]))
+    slowest = [reaches.binding(reaches.reaches(one)) for one in made]
+    assert ground == pytest.approx([one.seconds for one in slowest if one is not None], rel=1e-9)
+
+
+def test_every_loser_is_counted_once_and_each_kind_is_known() -> None:
+    for choice in (part(), of_text(written(2))):
+        for tried in choice.tried:
+            told = losers.grouped(tried)
+            assert sum(told.values()) == len([made for made, _, _ in tried.rejected if made is not tried.own])
+            assert told.get("bound", 0) == tried.pruned
+            for made, why, _ in tried.rejected:
+                assert (losers.kind_of(made, why) in ("travel", "reach")) == bool(made.refused), why
+            after = losers.best_loser(tried)
+            assert after is not None and after.seconds >= tried.best.seconds * SLACK
+
+
+def test_reasons_have_kinds() -> None:
+    own = part().tried[0].own
+    turned = replace(own, refused="out of reach"), replace(own, refused="travel: axis A at 125 degrees, allowed -30 to 120")
+    assert [losers.kind_of(made, made.refused) for made in turned] == ["reach", "travel"]
+    for why, kind in (("inclined to the axis of the CL file by 70 degrees", "limits"), ("takes at least 3 s", "bound"),
+                      ("takes 3 s", "slower"), ("the holder touches the vise by 3 mm", "touches")):
+        assert losers.kind_of(own, why) == kind
+
+
+def test_seconds_of_a_plan_add_up() -> None:
+    choice = part()
+    for plan in (*choice.plans.values(), choice.paper):
+        parts = shares.shares_of(plan, choice.work)
+        assert parts.cutting + parts.turning + parts.other == pytest.approx(plan.seconds)
+        apart = [bool(angle_between(a.axis, b.axis) > 1e-4) for a, b in zip(plan.picked, plan.picked[1:], strict=False)]
+        assert parts.turns == sum(apart) and (parts.turning > 0.0) == any(apart)
+        assert parts.other > 0.0
+    clamped = shares.shares_of(choice.plans["per-pass"], choice.work)
+    timing = choice.work.machine.timing
+    assert clamped.turning > clamped.turns * (timing.clamp + timing.unclamp) > 0.0
+
+
+def test_json_has_the_keys_that_others_read() -> None:
+    values = report.as_dict(part())
+    json.dumps(values, allow_nan=False)
+    assert {"machine", "passes", "plans"} <= set(values)
+    for one in values["passes"]:
+        assert {"pass", "orientation_deg", "time_s", "reference_time_s", "limiting_axis", "rejected"} <= set(one)
+        assert one["gain_percent"] == pytest.approx(100.0 * (1.0 - one["time_s"] / one["reference_time_s"]))
+        assert sum(one["lost"].values()) >= one["planned"] + one["pruned"] - 2
+        assert one["reach"]["own"]["binding"] == "jerk" and one["next_best"]["time_s"] >= one["best"]["time_s"] * SLACK
+        assert {it["kind"] for it in one["rejected"]} <= set(losers.KINDS)
+    assert {"keep", "per_pass", "whole_part", "auto"} <= set(values["plans"])
+    for plan in values["plans"].values():
+        assert plan["time_s"] == pytest.approx(plan["cutting_s"] + plan["turning_s"] + plan["other_s"])
+    per_pass = report.as_dict(part(), "per-pass")
+    assert per_pass["plan"] == "per-pass" and per_pass["passes"][4]["turned_deg"] == pytest.approx(45.0, abs=2.0)
+
+
+def test_text_says_why_others_lost() -> None:
+    told = text.as_text(part(), "per-pass", [4])
+    table = told.splitlines()
+    assert len([line for line in table if line.split()[:1] and line.split()[0].isdigit()]) == 8  # 7 passes, "N orientations"
+    assert "travel" in told and "slower" in told and "bound" in told
+    assert "jerk binds" in told and "takes 0.7269 s" in told and "lost       A" in told
+    assert any(line.startswith("paper per pass") for line in table)
+
+
+def test_text_of_many_passes_is_short_and_shows_those_that_gain() -> None:
+    told = text.as_text(many())
+    assert f"and {16 * 7 - text.SHOWN} passes that gain less" in told and len(told.splitlines()) < text.SHOWN + 15
+
+
+def test_fixed_passes_say_why() -> None:
+    choice = of_text(written(2, "CUTTER/16,0"))
+    told = text.as_text(choice, "auto", [1])
+    assert told.count("the cutter is no ball") == 3
+    assert report.as_dict(choice)["passes"][0]["paper"] is None
+    assert sheet.most_gaining(choice) == []
+    assert sheet.draw(choice, "auto", [1], ".svg").startswith(b"<?xml")
+
+
+def test_edges_of_a_box() -> None:
+    """Triangles of one face count as one: 12 edges of a turned box, none of a flat one."""
+    rng = np.random.default_rng(5)
+    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    corners = np.array([[x, y, z] for x in (-1, 1) for y in (-2, 2) for z in (-3, 3)]) @ turn.T
+    faces, edges = polytopes.hull(corners)
+    assert len(faces) == 12 and len(edges) == 12
+    assert sorted(np.round(np.linalg.norm(corners[edges[:, 0]] - corners[edges[:, 1]], axis=1), 9).tolist()) == [2.0] * 4 + [
+        4.0] * 4 + [6.0] * 4
+    assert len(polytopes.hull(corners * [1.0, 1.0, 0.0])[1]) == 0 and len(polytopes.hull(corners[:3])[1]) == 0
+
+
+@pytest.mark.parametrize("ending", [".svg", ".png"])
+def test_pictures_repeat_and_show_names_as_they_stand(ending: str) -> None:
+    name = "a$x$ <b> & c\n.apt"
+    drawn = [sheet.draw(of_text(written(2), name), "auto", [1], ending) for _ in range(2)]
+    assert drawn[0] == drawn[1]
+    if ending == ".svg":
+        whole = ElementTree.fromstring(drawn[0])
+        assert whole.tag.endswith("svg") and b"<dc:date>" not in drawn[0]
+        assert b"a$x$ &lt;b&gt; &amp; c\xef\xbf\xbd.apt" in drawn[0]
+    else:
+        assert drawn[0].startswith(b"\x89PNG")
+
+
+def test_many_passes_are_one_summary_and_one_pass_in_full(monkeypatch: pytest.MonkeyPatch) -> None:
+    sizes = []
+    kept: Callable[..., bytes] = sheet.image
+    monkeypatch.setattr(sheet, "image", lambda size, *rest: (sizes.append(size), kept(size, *rest))[1])
+    drawn = sheet.draw(many(), "auto", [], ".svg")
+    assert sizes == [(sheet.WIDTH, pytest.approx(sum(sheet.PART + sheet.PASS) + 0.4))] and len(drawn) < 600_000
+
+
+def test_command_writes_figure_and_json(tmp_path: Path) -> None:
+    file, figure, out = tmp_path / "p.apt", tmp_path / "p.svg", tmp_path / "p.json"
+    file.write_text(written(2))
+    result = run(file, "--figure", figure, "--json", out, "--pass", 1, "--orient", "per-pass", "--error-model",
+                 SAMPLES / "errors" / "mikron-ucp710.toml")
+    assert ElementTree.fromstring(figure.read_bytes()).tag.endswith("svg") and "pass 1, line 18" in result.output
+    values = json.loads(out.read_text())
+    assert values["plan"] == "per-pass"
+    assert "orient.error_model" in [d["code"] for d in values["diagnostics"]]
+
+
+def test_command_refuses_what_it_cannot_show(tmp_path: Path) -> None:
+    file = tmp_path / "p.apt"
+    file.write_text(written(2))
+    wrong = run(file, "--pass", 7, "--figure", tmp_path / "p.svg", code=1).output
+    assert "there is no pass 7" in wrong and "numbered 0 to 1" in wrong and not (tmp_path / "p.svg").exists()
+    assert "no .png or .svg" in run(file, "--figure", tmp_path / "p.pdf", code=2).output
+    assert "at most 6" in run(file, *(word for k in range(7) for word in ("--pass", k)), code=2).output
+    assert "choose from" in run(file, "--orient", "best", code=2).output
+    both = tmp_path / "p.svg"
+    assert "would replace" in run(file, "--figure", both, "--json", both, code=2).output
+    missing = run(file, "--error-model", tmp_path / "none.toml", code=1).output
+    assert "none.toml" in missing and "Traceback" not in missing

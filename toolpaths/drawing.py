@@ -1,0 +1,67 @@
+"""Sheets of drawings as PNG or SVG: the same bytes from the same figures, what comes from files as it stands.
+
+matplotlib is imported only where something is drawn, and needs no display.
+"""
+
+from __future__ import annotations
+
+import io
+import warnings
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+FORMATS = (".png", ".svg")
+"""by the ending of the file"""
+DOTS = 130
+"""per inch, of PNG"""
+BESIDE: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (1.0, 1.0), "fontsize": "small", "frameon": False}
+"""where legends stand"""
+TITLE = 90
+"""characters of a title"""
+_RULES: Any = {"svg.hashsalt": "postproc", "font.family": "DejaVu Sans", "axes.grid": True, "grid.alpha": 0.3,
+               "axes.formatter.use_mathtext": False, "text.parse_math": False}
+
+
+def image(size: tuple[float, float], title: str, fill: Callable[[Figure], None], ending: str) -> bytes:
+    """An image file of a sheet.
+
+    Args:
+        size: width and height, inches
+        fill: draws into the empty figure
+        ending: one of FORMATS
+
+    Raises:
+        ValueError: for another ending.
+    """
+    if ending not in FORMATS:
+        raise ValueError(f"no figure format {ending!r}; known: {', '.join(FORMATS)}")
+    import matplotlib
+    from matplotlib.figure import Figure
+
+    with matplotlib.rc_context(_RULES), warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="Glyph")
+        sheet = Figure(figsize=size, dpi=DOTS, layout="constrained")
+        sheet.suptitle(plain(title))
+        fill(sheet)
+        _settle(sheet)
+        out = io.BytesIO()
+        sheet.savefig(out, format=ending[1:], metadata={"Date": None} if ending == ".svg" else {"Software": None})
+    return out.getvalue()
+
+
+def _settle(sheet: Figure) -> None:
+    """Arrange the panels once, rounded: the solver's last digits change from run to run, and names in an SVG with them."""
+    sheet.draw_without_rendering()
+    sheet.set_layout_engine("none")
+    for place in sheet.axes:
+        left, low, width, height = place.get_position(original=True).bounds
+        place.set_position((round(left, 4), round(low, 4), round(width, 4), round(height, 4)))
+
+
+def plain(text: str) -> str:
+    """One line of printable characters; a label that began with _ would be left out of a legend."""
+    shown = "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text)[:TITLE]
+    return f" {shown}" if shown.startswith("_") else shown
