@@ -2,30 +2,39 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal, NamedTuple
 
 import numpy as np
 
-from machines.kinematics.base import Kinematics
 from machines.machine import Machine
-from machines.polytope import held_axis_polytope
 from postproc.orientation.allowed import SAME, Allowed
+from postproc.orientation.held import best_held
 from postproc.orientation.passes import Pass
-from postproc.orientation.timed import Turned, turned
-from postproc.orientation.vertices import vertex_angles
+from postproc.orientation.ranking import Ranking
+from postproc.orientation.seeds import across, aimed_axes, reaching_axes
+from postproc.orientation.timed import Turned, turned, turned_all
 from toolpaths.arrays import Floats
 from toolpaths.rotations import angle_between
 from toolpaths.units import DEG
 
-_SEEDS = 6
-_APART = 5.0 * DEG
 _NEAR = 1.0 * DEG
 """an axis that aims at the beginning or the end of a pass is tried where it is so far from all others"""
 _STEPS = (6.0 * DEG, 3.0 * DEG, 1.5 * DEG)
 """of the refinement"""
 _WORTH = 1e-4
 """least part of the time that a candidate must gain to be planned, or to be taken"""
+Kind = Literal["limits", "reach", "travel", "touches", "bound", "slower"]
+"""What a candidate can lose by."""
+
+
+class Lost(NamedTuple):
+    """A candidate that was not taken, why and by what kind of reason; `Turned.slim` but for the CL's own axis."""
+
+    made: Turned
+    why: str
+    kind: Kind
 
 
 @dataclass(frozen=True)
@@ -36,90 +45,108 @@ class Tried:
     own: Turned
     best: Turned
     aimed: Turned | None
-    rejected: tuple[tuple[Turned, str], ...]
+    rejected: tuple[Lost, ...]
     pruned: int
     planned: int
 
 
 class Search:
-    """Candidates of one pass, each solved once."""
+    """Candidates of one pass out of `passes`, each solved once, the runnable ones timed on the same knots."""
 
-    def __init__(self, one: Pass, machine: Machine, allowed: Allowed) -> None:
-        self.one, self.machine, self.allowed = one, machine, allowed
+    def __init__(self, one: Pass, machine: Machine, allowed: Allowed, passes: int = 1) -> None:
+        self.one, self.machine, self.allowed, self.passes = one, machine, allowed, passes
         self.own = turned(one, one.axis, machine, allowed.touching)
         self.known = [self.own]
-        self.lost: dict[int, str] = {}
-        self.pruned, self.counted = 0, 1
+        self.lost: dict[int, Lost] = {}
+        self.pruned, self.planned = 0, 0
+        self._times: dict[int, float] = {}
+        self._ranking: Ranking | None = None
 
-    def add(self, axis: Floats, apart: float = SAME) -> Turned | None:
-        """A new candidate; None where one within `apart` is known already or it is not to be had."""
-        if bool((angle_between(np.stack([other.axis for other in self.known]), axis) < apart).any()):
-            return None
-        made = turned(self.one, axis, self.machine, self.allowed.touching)
-        self.known.append(made)
-        why = self.allowed.refused(self.one, axis) or made.refused
-        if why:
-            self.lost[id(made)] = why
-            return None
-        return made
+    def seconds(self, made: Turned) -> float:
+        """As ranked; inf where the machine cannot run it or something is touched."""
+        if made.refused or made.touching:
+            return np.inf
+        if id(made) not in self._times:
+            self._ranking = self._ranking or Ranking(made, self.passes)
+            self._times[id(made)] = self._ranking.seconds(made)
+            self.planned += 1
+        return self._times[id(made)]
+
+    def add(self, axes: Floats, apart: float = SAME, held: float = np.nan) -> list[Turned]:
+        """New candidates of axes (S, 3); those within `apart` of a known one are none, nor those that are not to be had."""
+        fresh: list[Floats] = []
+        others = [made.axis for made in self.known if made.same(made.axis, held)]
+        for axis in axes:
+            if not bool((angle_between(np.array([*others, *fresh]).reshape(-1, 3), axis) < apart).any()):
+                fresh.append(axis)
+        made = turned_all(self.one, np.array(fresh), self.machine, self.allowed.touching, held) if fresh else []
+        self.known += made
+        return [one for one in made if self._runs(one)]
+
+    def _runs(self, made: Turned) -> bool:
+        """Whether a candidate is allowed and inside travel; why not is noted."""
+        why = self.allowed.refused(self.one, made.axis)
+        if why or made.refused:
+            kind: Kind = "limits" if why else "travel" if made.refused.startswith("travel") else "reach"
+            self.lose(made, why or made.refused, kind)
+        return not (why or made.refused)
+
+    def lose(self, made: Turned, why: str, kind: Kind) -> None:
+        """Note what a candidate lost by."""
+        told = made if made is self.own else made.slim(self._times.get(id(made), np.nan))
+        self.lost[id(made)] = Lost(told, why, kind)
 
     def better(self, best: Turned, made: Turned) -> Turned:
         """The better of two; a candidate whose bound already loses is not planned."""
-        if made.bound >= best.seconds_allowed * (1.0 - _WORTH):
+        least = self.seconds(best) * (1.0 - _WORTH)
+        if made.bound >= least:
             self.pruned += 1
-            self.lost[id(made)] = f"takes at least {made.bound:.4f} s"
+            self.lose(made, f"takes at least {made.bound:.4f} s", "bound")
             return best
-        self.counted += 1
-        if made.seconds < best.seconds_allowed * (1.0 - _WORTH) and made.touching:
-            self.lost[id(made)] = made.touching
+        if made.touching:
+            self.lose(made, made.touching, "touches")
             return best
-        winner, loser = (made, best) if made.seconds < best.seconds_allowed * (1.0 - _WORTH) else (best, made)
-        why = loser.touching if loser is not made else ""
-        self.lost[id(loser)] = why or f"takes {loser.seconds:.4f} s"
+        winner, loser = (made, best) if self.seconds(made) < least else (best, made)
+        if loser.touching:
+            self.lose(loser, loser.touching, "touches")
+        else:
+            self.lose(loser, f"takes {self.seconds(loser):.4f} s", "slower")
         self.lost.pop(id(winner), None)
         return winner
 
+    def settled(self, best: Turned) -> Turned:
+        """The best, unless planned on knots of its own it is slower than the CL's own axis."""
+        if best is self.own or best.seconds < self.own.seconds_allowed:
+            return best
+        self.lose(best, f"takes {best.seconds:.4f} s", "slower")
+        self.lost.pop(id(self.own), None)
+        return self.own
 
-def tried(one: Pass, machine: Machine, allowed: Allowed) -> Tried:
-    """All candidates of a pass, planned unless their bound says that they lose."""
-    search = Search(one, machine, allowed)
+    def tried(self, best: Turned, aimed: Turned | None) -> Tried:
+        """The result."""
+        rejected = tuple(self.lost[id(made)] for made in self.known if id(made) in self.lost)
+        return Tried(self.own, best, aimed, rejected, self.pruned, self.planned)
+
+
+def tried(one: Pass, machine: Machine, allowed: Allowed, passes: int = 1, hints: Sequence[Floats] = ()) -> Tried:
+    """All candidates of a pass out of `passes`, planned unless their bound says that they lose; `hints` are axes (3,) to try
+    as well."""
+    search = Search(one, machine, allowed, passes)
     if one.fixed:
-        return Tried(search.own, search.own, None, (), 0, 1)
-    aimed = _aimed(search)
-    seeds = [made for axes in aimed.values() for made in axes]
+        return search.tried(search.settled(best_held(search, search.own)), None)
+    aimed = aimed_axes(one, machine, search.own.q[0])
+    mean = search.add(aimed["mean"]) if "mean" in aimed else []
+    seeds = [*mean, *(made for name in ("initial", "final") if name in aimed for made in search.add(aimed[name], _NEAR))]
     if not seeds:
-        seeds = [made for axis in _by_reach(search) if (made := search.add(axis)) is not None]
+        tilt = np.pi / 2.0 if len(one.normal) else allowed.tilt
+        seeds = search.add(reaching_axes(one, machine, tilt, lambda axes: allowed.mask(one, axes)))
+    seeds += search.add(np.array(hints).reshape(-1, 3))
     best = search.own
     for made in sorted(seeds, key=lambda m: m.bound):
         best = search.better(best, made)
     for step in _STEPS:
         best = _refined(search, best, step)
-    rejected = tuple((made, search.lost[id(made)]) for made in search.known if id(made) in search.lost and made is not best)
-    return Tried(search.own, best, _least_turned(aimed.get("mean", [])), rejected, search.pruned, search.counted)
-
-
-def _aimed(search: Search) -> dict[str, list[Turned]]:
-    """Axes that aim a vertex along the mean, initial and final direction, inside travel and tilt."""
-    stretch = search.one.longest
-    if stretch is None or search.own.refused == "out of reach":
-        return {}
-    limits, kin = search.machine.limits, search.one.kin
-    limit = limits.jerk if np.isfinite(limits.jerk).all() else limits.acceleration
-    q = search.own.sites[0][0]
-    result: dict[str, list[Turned]] = {}
-    for name, direction in stretch.directions().items():
-        axes = _axes_at(kin, q, vertex_angles(kin, q, direction, limit))
-        apart = SAME if name == "mean" else _NEAR
-        result[name] = [made for axis in axes if (made := search.add(axis, apart)) is not None]
-    return result
-
-
-def _axes_at(kin: Kinematics, q: Floats, angles: Floats) -> Floats:
-    """Tool axes (S, 3) at rotary positions (S, 2)."""
-    joints = np.tile(q, (len(angles), 1))
-    if len(angles):
-        joints[:, np.flatnonzero(kin.rotary)] = angles
-    return kin.forward(joints)[1] if len(angles) else np.zeros((0, 3))
+    return search.tried(search.settled(best_held(search, best)), _least_turned(mean))
 
 
 def _least_turned(made: list[Turned]) -> Turned | None:
@@ -130,62 +157,13 @@ def _least_turned(made: list[Turned]) -> Turned | None:
     return min(made, key=angles, default=None)
 
 
-def _by_reach(search: Search) -> Iterator[Floats]:
-    """Axes within the tilt whose polytope reaches farthest along the mean direction, on any machine."""
-    one, machine, stretch = search.one, search.machine, search.one.longest
-    if stretch is None:
-        return
-    limits = machine.limits
-    limit = limits.jerk if np.isfinite(limits.jerk).all() else limits.acceleration
-    cap = search.allowed.tilt if not len(one.normal) else np.pi / 2
-    axes = one.kin.nearest_axis(_cap(one.axis, min(cap, np.pi - 0.1)))
-    middle = stretch.tip[len(stretch.tip) // 2] + one.radius * (one.axis - axes)
-    q = one.kin.inverse(middle, axes, near=machine.home)
-    direction = stretch.directions().get("mean")
-    if direction is None:
-        return
-    near = np.hstack((middle, axes))
-    reach = np.stack([held_axis_polytope(one.kin, branch, limit, near).reach(direction) for branch in q])
-    best = np.nan_to_num(reach, nan=-1.0).max(axis=0)
-    taken: list[Floats] = []
-    for k in np.argsort(-best, kind="stable").tolist():
-        if len(taken) == _SEEDS or best[k] <= 0.0:
-            return
-        if all(angle_between(axes[k], other) > _APART for other in taken) and not search.allowed.refused(one, axes[k]):
-            taken.append(axes[k])
-            yield axes[k]
-
-
-def _cap(axis: Floats, tilt: float) -> Floats:
-    """Directions (N, 3) within `tilt` of `axis`, some 5 degrees apart."""
-    x, y = _across(axis)
-    result = []
-    for ring in np.linspace(0.0, tilt, max(2, int(np.ceil(tilt / _APART)) + 1))[1:]:
-        count = max(6, int(np.ceil(2.0 * np.pi * np.sin(ring) / _APART)))
-        phi = np.arange(count) * 2.0 * np.pi / count
-        across = np.cos(phi)[:, None] * x + np.sin(phi)[:, None] * y
-        result.append(np.cos(ring) * axis + np.sin(ring) * across)
-    return np.concatenate(result)
-
-
-def _across(axis: Floats) -> tuple[Floats, Floats]:
-    """Two unit vectors square to `axis` and to each other."""
-    helper = np.eye(3)[int(np.argmin(np.abs(axis)))]
-    x = np.cross(helper, axis)
-    x /= np.linalg.norm(x)
-    return x, np.cross(axis, x)
-
-
 def _refined(search: Search, best: Turned, step: float) -> Turned:
     """The best of an axis and its four neighbours; where one gains, those further along."""
     for _ in range(3):
-        x, y = _across(best.axis)
-        start = best
-        for way in (x, -x, y, -y):
-            axis = search.one.kin.nearest_axis((np.cos(step) * start.axis + np.sin(step) * way)[None])[0]
-            made = search.add(axis)
-            if made is not None:
-                best = search.better(best, made)
+        start, (x, y) = best, across(best.axis)
+        ways = np.stack((x, -x, y, -y))
+        for made in search.add(search.one.kin.nearest_axis(np.cos(step) * start.axis + np.sin(step) * ways)):
+            best = search.better(best, made)
         if best is start:
             break
     return best

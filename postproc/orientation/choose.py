@@ -35,3 +35,25 @@ def seconds(picked: Sequence[int], states: Sequence[Floats], ways: Sequence[Floa
     for n in range(1, len(picked)):
         total = total + ways[n][picked[n - 1], picked[n]] + states[n][picked[n]]
     return float(total + ways[-1][picked[-1], 0])
+
+
+def groupwise(picked: Sequence[int], groups: Sequence[tuple[Sequence[int], Sequence[Sequence[int]]]],
+              states: Sequence[Floats], ways: Sequence[Floats]) -> list[int]:
+    """`picked` with the states of each group of passes moved together to that of its options which costs least.
+
+    Args:
+        groups: numbers of passes, and the options: a state for each of them
+        states, ways: seconds as of `shortest`
+    """
+    result = list(picked)
+    for members, options in groups:
+        beside = sorted({n for k in members for n in (k, k + 1)})
+
+        def local(option: Sequence[int], members: Sequence[int] = members, beside: Sequence[int] = beside) -> float:
+            for k, pick in zip(members, option, strict=True):
+                result[k] = pick
+            at = [0, *result, 0]
+            return float(sum(states[k][result[k]] for k in members) + sum(ways[n][at[n], at[n + 1]] for n in beside))
+
+        local(min(options, key=local))
+    return result

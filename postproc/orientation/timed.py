@@ -5,20 +5,22 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
+from math import isnan, sin
 
 import numpy as np
 
 from machines.machine import Machine
-from postproc import reach
 from postproc.feedrate.geometry import MachinePath
 from postproc.feedrate.limits import JointLimits
 from postproc.feedrate.motion import Plan
 from postproc.feedrate.plan import plan, plan_second_order
 from postproc.feedrate.rest_to_rest import Law, rest_seconds
-from postproc.joints.tracks import TRAVEL_SLACK
+from postproc.feedrate.shares import Shares
+from postproc.orientation.allowed import SAME
 from postproc.orientation.passes import Pass, Stretch
+from postproc.orientation.poses import held_poses, poses
 from postproc.planned import ORDERS, joint_limits
-from toolpaths.arrays import Bools, Floats
+from toolpaths.arrays import Floats
 from toolpaths.units import DEG
 
 _ROUND = 1.002
@@ -33,7 +35,8 @@ def no_bodies(one: Pass, axis: Floats) -> str:
 @dataclass(frozen=True)
 class Turned:
     """A pass turned to `axis` (3,) (the CL's own where it is fixed): joints of its rows `q` (n, J) and of the sites of
-    each stretch; `refused` says why the machine cannot run it, else ""."""
+    each stretch; `refused` says why the machine cannot run it, else ""; `held` is the angle, rad, asked for of the rotary
+    joint that the axis leaves free, NaN where none is; `told`: see `slim`."""
 
     one: Pass
     axis: Floats
@@ -42,13 +45,22 @@ class Turned:
     sites: tuple[Floats, ...]
     refused: str = ""
     collides: Callable[[Pass, Floats], str] = no_bodies
+    held: float = np.nan
+    told: float | None = None
+
+    def same(self, axis: Floats, held: float = np.nan, apart: float = SAME) -> bool:
+        """True where axis (3,) and held angle are within `apart` of those of this one."""
+        if isnan(held) != isnan(self.held) or abs(held - self.held) > apart:
+            return False
+        gap = self.axis - axis
+        return float(gap @ gap) < (2.0 * sin(0.5 * apart)) ** 2
 
     @cached_property
     def touching(self) -> str:
         """Which bodies touch and by how much, "" where none do; looked at once, when first asked for."""
         return self.collides(self.one, self.axis)
 
-    @property
+    @cached_property
     def limits(self) -> JointLimits:
         """of the machine's joints"""
         return joint_limits(self.machine.limits)
@@ -80,7 +92,7 @@ class Turned:
         for stretch, q in zip(self.one.stretches, self.sites, strict=True):
             axis = stretch.axis if self.one.fixed else np.tile(self.axis, (len(q), 1))
             path = MachinePath.through(stretch.s, np.hstack((q, stretch.tip + own, axis)), np.zeros(len(q), dtype=bool))
-            run = plan if np.isfinite(self.limits.jerk).all() else plan_second_order
+            run = plan if self.jerky else plan_second_order
             result.append(run(path, self.limits, stretch.feed))
         return tuple(result)
 
@@ -88,6 +100,11 @@ class Turned:
     def seconds(self) -> float:
         """Planned time of the cuts; inf where the machine cannot run them."""
         return self._planned[0]
+
+    @property
+    def knots(self) -> tuple[Floats, ...]:
+        """Of the plan of each stretch, along its eased parameter."""
+        return self._planned[2]
 
     @property
     def seconds_allowed(self) -> float:
@@ -101,24 +118,41 @@ class Turned:
         return self._planned[1]
 
     @cached_property
-    def _planned(self) -> tuple[float, tuple[str, str]]:
-        """Seconds, and what limits."""
+    def _planned(self) -> tuple[float, tuple[str, str], tuple[Floats, ...]]:
+        """Seconds, what limits, and the knots of the plans."""
+        if self.told is not None:
+            return self.told, ("", ""), ()
         if self.refused:
-            return np.inf, ("", "")
+            return np.inf, ("", ""), ()
         plans = self.plans()
         seconds = float(sum(made.seconds for made in plans))
-        if not plans or not np.isfinite(self.limits.jerk).all():
-            return seconds, ("", "")
-        shares = [made.shares for made in plans]
+        knots = tuple(made.pieces[0].profile.sigma for made in plans)
+        return seconds, self._binding([made.shares for made in plans] if self.jerky else []), knots
+
+    @property
+    def jerky(self) -> bool:
+        """Whether every joint has a limit of its jerk."""
+        return bool(np.isfinite(self.limits.jerk).all())
+
+    def _binding(self, shares: list[Shares]) -> tuple[str, str]:
+        """See `limiting`."""
+        if not shares:
+            return "", ""
         limits = np.sum([one.limits for one in shares], axis=0)[:, :len(self.machine.axis_names)]
         order, joint = np.unravel_index(int(limits.argmax()), limits.shape)
         if sum(one.feed for one in shares) >= float(limits.max()):
-            return seconds, ("feed", "")
-        return seconds, (self.machine.axis_names[int(joint)], ORDERS[int(order)])
+            return "feed", ""
+        return self.machine.axis_names[int(joint)], ORDERS[int(order)]
+
+    def slim(self, seconds: float) -> Turned:
+        """Without joints along the pass, but where its cuts begin: to be told about, not to be planned; with the `seconds`
+        known of it, NaN where it was not timed."""
+        first = int(np.argmin(self.one.rapid))
+        return replace(self, q=self.q[first:first + 1], sites=(), told=seconds)
 
     def rotary(self) -> dict[str, float]:
         """Rotary positions at the start of the cuts, degrees; of machines without rotary joints the axis as I, J, K."""
-        row = self.q[int(np.argmin(self.one.rapid))]
+        row = self.q[int(np.argmin(self.one.rapid)) if len(self.q) > 1 else 0]
         angles = {name: float(row[j]) / DEG for j, name in enumerate(self.machine.axis_names) if self.machine.rotary[j]}
         return angles or dict(zip("IJK", self.axis.tolist(), strict=True))
 
@@ -129,49 +163,23 @@ def _largest_feed(stretch: Stretch) -> float:
     return float(stretch.feed.values[first:max(last, first + 1)].max())
 
 
-def turned(one: Pass, axis: Floats, machine: Machine, collides: Callable[[Pass, Floats], str] = no_bodies) -> Turned:
+def turned(one: Pass, axis: Floats, machine: Machine, collides: Callable[[Pass, Floats], str] = no_bodies,
+           held: float = np.nan) -> Turned:
     """The pass with its tool along `axis` (3,), on the branch inside travel whose rotary joints are least turned."""
-    move = one.shift(axis)
-    tips = [one.tip + move, *(stretch.tip + move for stretch in one.stretches)]
-    axes = [one.axes, *(s.axis for s in one.stretches)] if one.fixed else [np.tile(axis, (len(tip), 1)) for tip in tips]
-    q, refused = _solved(one, machine, np.concatenate(tips), np.concatenate(axes))
-    rows, *sites = np.split(q, np.cumsum([len(tip) for tip in tips])[:-1])
-    return Turned(one, axis, machine, rows, tuple(sites), refused, collides)
+    return turned_all(one, axis[None], machine, collides, held)[0]
 
 
-def _solved(one: Pass, machine: Machine, tip: Floats, axis: Floats) -> tuple[Floats, str]:
-    """Joints (N, J) of poses that are run through, and what stands against them."""
-    found = one.kin.inverse(tip, one.kin.nearest_axis(axis), near=machine.home)
-    rotary = np.array(machine.rotary)
-    found[:, :, rotary] = np.unwrap(found[:, :, rotary], axis=1)
-    found = np.stack([_wound(q, machine, rotary) for q in found])
-    over = np.maximum(machine.limits.lower - found, found - machine.limits.upper).max(axis=1)
-    size = np.abs(found[:, :, rotary]).sum(axis=(1, 2)) + 1e6 * np.maximum(over, 0.0).max(axis=1)
-    best = int(np.argmin(np.where(np.isfinite(size), size, np.inf)))
-    if not np.isfinite(size[best]):
-        return found[best], "out of reach"
-    if over[best].max() > TRAVEL_SLACK:
-        return found[best], _outside(found[best], over[best], machine)
-    if reach.is_checked(one.kin) and not reach.inside(one.kin, found[best]):
-        return found[best], "out of the reach of the parallel machine"
-    return found[best], ""
-
-
-def _wound(q: Floats, machine: Machine, rotary: Bools) -> Floats:
-    """Joints (N, J) of one branch, each rotary joint by whole turns to where its travel is kept best."""
-    turns = 2.0 * np.pi * np.array([0.0, -1.0, 1.0])
-    result = q.copy()
-    for j in np.flatnonzero(rotary):
-        low, high = machine.limits.lower[j] - q[:, j].min(), q[:, j].max() - machine.limits.upper[j]
-        over = [max(float(low - t), float(high + t), 0.0) for t in turns]
-        result[:, j] += turns[int(np.argmin(over))]
+def turned_all(one: Pass, axes: Floats, machine: Machine, collides: Callable[[Pass, Floats], str] = no_bodies,
+               held: float = np.nan) -> list[Turned]:
+    """`turned` along each of `axes` (S, 3); a pass whose axis is fixed stays as it is."""
+    if one.fixed:
+        solved = [poses(one, machine, np.concatenate([one.tip, *(s.tip for s in one.stretches)]),
+                        np.concatenate([one.axes, *(s.axis for s in one.stretches)]), held)] * len(axes)
+    else:
+        solved = held_poses(one, machine, axes, held)
+    cuts = np.cumsum([len(one.tip), *(len(stretch.s) for stretch in one.stretches)])[:-1]
+    result = []
+    for axis, (q, refused) in zip(axes, solved, strict=True):
+        rows, *sites = np.split(q, cuts)
+        result.append(Turned(one, axis, machine, rows, tuple(sites), refused, collides, held))
     return result
-
-
-def _outside(q: Floats, over: Floats, machine: Machine) -> str:
-    j = int(over.argmax())
-    limits, unit, name = machine.limits, (1.0 / DEG if machine.rotary[j] else 1.0), "degrees" if machine.rotary[j] else "mm"
-    low, high = float(q[:, j].min()), float(q[:, j].max())
-    value = high if high > limits.upper[j] else low
-    return (f"travel: axis {machine.axis_names[j]} at {value * unit:.3f} {name}, allowed {limits.lower[j] * unit:.3f} to "
-            f"{limits.upper[j] * unit:.3f}")

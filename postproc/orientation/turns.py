@@ -14,10 +14,11 @@ from postproc.feedrate.rest_to_rest import Law, rest_seconds
 from postproc.joint_path import nearest_solution
 from postproc.joints.tracks import TRAVEL_SLACK
 from postproc.orientation.allowed import SAME
+from postproc.orientation.held import free_value
 from postproc.orientation.passes import Pass, Work
 from postproc.orientation.timed import Turned
 from postproc.planned import joint_limits
-from toolpaths.arrays import Floats
+from toolpaths.arrays import Bools, Floats
 from toolpaths.rotations import angle_between
 from toolpaths.units import DEG
 
@@ -30,9 +31,11 @@ _SHARES = (1.0, 0.4, 0.2, 0.1)
 @dataclass(frozen=True)
 class Ends:
     """A turned pass as its neighbours see it: joints (J,) where it begins, ends and stands above both, and the seconds of
-    its own rapids, of coming down and drawing back; inf where no height above is inside travel."""
+    its own rapids, of coming down and drawing back; inf where no height above is inside travel. `held` is where the rotary
+    joint stands that the axis leaves free, NaN where none is."""
 
     axis: Floats
+    held: float
     first: Floats
     last: Floats
     above_first: Floats
@@ -44,28 +47,55 @@ class Ends:
 
 def ends(made: Turned, work: Work) -> Ends:
     """The ends of a turned pass; its seconds are infinite where the machine cannot run it."""
-    limits, one = joint_limits(work.machine.limits), made.one
-    if made.refused:
-        none = np.full(len(made.q[0]), np.nan)
-        return Ends(made.axis, none, none, none, none, np.inf, np.inf, np.inf)
-    between = one.rapid[1:]
-    rapids = float(rest_seconds(made.q[:-1][between], made.q[1:][between], limits, Law.STRAIGHT).sum())
-    tip = one.tip + one.shift(made.axis)
-    axis = one.axes if one.fixed else np.tile(made.axis, (len(tip), 1))
-    first, down = _above(work, one, tip[0], axis[0], made.q[0])
-    last, up = _above(work, one, tip[-1], axis[-1], made.q[-1])
-    return Ends(made.axis, made.q[0], made.q[-1], first, last, down, up, rapids)
+    return all_ends([made], work)[0]
 
 
-def _above(work: Work, one: Pass, tip: Floats, axis: Floats, q: Floats) -> tuple[Floats, float]:
-    """Joints above a pose on its safe plane, and the seconds to there."""
+def all_ends(row: list[Turned], work: Work) -> list[Ends]:
+    """The ends of one pass turned to several axes."""
+    limits, one = joint_limits(work.machine.limits), row[0].one
+    axis = np.stack([one.axes[[0, -1]] if one.fixed else np.tile(made.axis, (2, 1)) for made in row])
+    tip = np.stack([(one.tip + one.shift(made.axis))[[0, -1]] for made in row])
+    q = np.stack([made.q[[0, -1]] for made in row])
+    above, way = _above(work, one, tip.reshape(-1, 3), axis.reshape(-1, 3), q.reshape(-1, q.shape[2]))
+    above, way = above.reshape(q.shape), way.reshape(-1, 2)
+    between = np.flatnonzero(one.rapid[1:])
+    result = []
+    for k, made in enumerate(row):
+        if made.refused:
+            none = np.full(q.shape[2], np.nan)
+            result.append(Ends(made.axis, made.held, none, none, none, none, np.inf, np.inf, np.inf))
+            continue
+        rapids = float(rest_seconds(made.q[between], made.q[between + 1], limits, Law.STRAIGHT).sum())
+        (first, last), (above_first, above_last), (down, up) = q[k], above[k], way[k].tolist()
+        result.append(Ends(made.axis, free_value(made), first, last, above_first, above_last, down, up, rapids))
+    return result
+
+
+def _above(work: Work, one: Pass, tip: Floats, axis: Floats, q: Floats) -> tuple[Floats, Floats]:
+    """Joints (N, J) above poses on the safe plane, and the seconds (N,) to there; NaN and inf where travel ends."""
     limits = work.machine.limits
+    above, way = np.full(q.shape, np.nan), np.full(len(q), np.inf)
     for share in _SHARES if work.space.distance is None else (1.0,):
-        lift = work.space.plane(axis, True, share) + _RISE - float(axis @ (tip - work.space.centre))
-        found = nearest_solution(one.kin, (tip + max(lift, 0.0) * axis)[None], one.kin.nearest_axis(axis[None]), q[None])
-        if bool(((found >= limits.lower - TRAVEL_SLACK) & (found <= limits.upper + TRAVEL_SLACK)).all()):
-            return found[0], float(rest_seconds(q[None], found, joint_limits(limits), Law.STRAIGHT)[0])
-    return np.full(len(q), np.nan), np.inf
+        left = np.flatnonzero(np.isinf(way) & np.isfinite(q).all(axis=1))
+        if not len(left):
+            break
+        lift = np.array([work.space.plane(a, True, share) + _RISE - float(a @ (t - work.space.centre))
+                         for a, t in zip(axis[left], tip[left], strict=True)])
+        at = tip[left] + np.maximum(lift, 0.0)[:, None] * axis[left]
+        found = nearest_solution(one.kin, at, one.kin.nearest_axis(axis[left]), q[left])
+        inside = ((found >= limits.lower - TRAVEL_SLACK) & (found <= limits.upper + TRAVEL_SLACK)).all(axis=1)
+        above[left[inside]] = found[inside]
+        way[left[inside]] = rest_seconds(q[left[inside]], found[inside], joint_limits(limits), Law.STRAIGHT)
+    return above, way
+
+
+def ways_between(work: Work, edge: list[list[Ends]]) -> list[Floats]:
+    """Seconds between the states of neighbouring passes, from home and back."""
+    passes = work.passes
+    ways = [between(None, edge[0], work, True, False)]
+    for n in range(1, len(edge)):
+        ways.append(between(edge[n - 1], edge[n], work, passes[n].by_home, passes[n].tool != passes[n - 1].tool))
+    return [*ways, between(edge[-1], None, work, True, False)]
 
 
 def between(before: list[Ends] | None, after: list[Ends] | None, work: Work, by_home: bool, changes_tool: bool) -> Floats:
@@ -84,7 +114,13 @@ def between(before: list[Ends] | None, after: list[Ends] | None, work: Work, by_
     linked = ups + _indexed(above, np.stack([e.above_first for e in after]), work.machine) + _downs(after)[None]
     straight = _indexed(np.stack([e.last for e in before]), np.stack([e.first for e in after]), work.machine)
     turn = angle_between(np.stack([e.axis for e in before])[:, None], np.stack([e.axis for e in after])[None])
-    return np.asarray(np.where(turn > work.setup.clearance.link_angle * DEG, linked, straight))
+    spun = _differ(np.array([e.held for e in before])[:, None], np.array([e.held for e in after])[None])
+    return np.asarray(np.where((turn > work.setup.clearance.link_angle * DEG) | spun, linked, straight))
+
+
+def _differ(a: Floats, b: Floats) -> Bools:
+    """Where held angles differ; none held is another than any."""
+    return np.asarray((np.isnan(a) != np.isnan(b)) | (np.abs(np.nan_to_num(a - b)) > SAME))
 
 
 def _downs(after: list[Ends] | None) -> Floats:

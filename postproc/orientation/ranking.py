@@ -1,0 +1,110 @@
+"""Times of one pass under many tool axes, on the knots of one plan: what all axes share is made once.
+
+The joints of every axis are splines through the same sites, so that their derivatives at the knots are one sparse matrix
+times the joints at the sites, and the solver starts from the motion of the axis before. A plan of `timed` has knots of its
+own for each axis; what is chosen here is planned so in the end.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from scipy.interpolate import BSpline, make_interp_spline
+from scipy.sparse import csr_matrix, diags, identity, vstack
+
+from postproc.feedrate.feed import Allowed
+from postproc.feedrate.geometry import DEGREE, MachinePath
+from postproc.feedrate.limits import JointLimits, squared_speed, steady_cap
+from postproc.feedrate.paths import Eased
+from postproc.feedrate.plan import Options
+from postproc.feedrate.problem import Problem
+from postproc.feedrate.rows import UNBOUND
+from postproc.feedrate.second_order import least_time, second_order
+from postproc.feedrate.spline import rest_basis
+from postproc.feedrate.windows import Method, solve_problem
+from postproc.orientation.timed import Turned
+from toolpaths.arrays import Floats
+
+_MOVES = 1e-9
+"""mm or rad: joints that move less along a stretch stand still"""
+_WAIT = 5
+"""solves of a pass for which the compiler is waited for as long as for one in full; a pass takes some 25"""
+LONG = 50_000
+"""knots of a pass from which each axis is planned in full, in windows"""
+
+
+class Ranking:
+    """Of one pass out of `passes`. `first`, which must be runnable, is planned in full and lends its knots."""
+
+    def __init__(self, first: Turned, passes: int = 1) -> None:
+        knots = sum(len(each) for each in first.knots)
+        method = Method().settled(_WAIT * passes * knots)
+        self._grids = [] if knots > LONG else [_Grid(stretch.s, each, Allowed(stretch.feed), first.jerky, method)
+                                               for stretch, each in zip(first.one.stretches, first.knots, strict=True)]
+
+    def seconds(self, made: Turned) -> float:
+        """Least time of the cuts; inf where the machine cannot run them."""
+        if made.refused or not self._grids:
+            return made.seconds
+        return float(sum(grid.seconds(q, made.limits) for grid, q in zip(self._grids, made.sites, strict=True)))
+
+
+class _Grid:
+    """Knots sigma (K,) of one stretch with sites s (N,)."""
+
+    def __init__(self, s: Floats, sigma: Floats, feed: Callable[[Floats], Floats], jerky: bool, method: Method) -> None:
+        self.s, self.sigma, self.jerky, self.method = s, sigma, jerky, method
+        path = MachinePath.through(s, np.zeros((len(s), 7)), np.zeros(len(s), dtype=bool))
+        self.eased = Eased.between(path, float(s[0]), float(s[-1]), Options().ease if jerky else 0.0)
+        at = self.eased.parameter(sigma)
+        self.slopes = _chained(path.fitted, self.eased.inside(at[0]), at)
+        with np.errstate(divide="ignore"):
+            self.cap = (feed(at[0]) / at[1]) ** 2
+        h = np.diff(sigma)
+        self.weight = 0.5 * (np.append(h, 0.0) + np.insert(h, 0, 0.0))
+        self.near: Floats | None = None
+
+    def seconds(self, q: Floats, limits: JointLimits) -> float:
+        """Least time for joints (N, J) at the sites."""
+        moving = np.ptp(q, axis=0) > _MOVES
+        limits = JointLimits(limits.velocity[moving], limits.acceleration[moving], limits.jerk[moving])
+        fitted = make_interp_spline(self.s, q[:, moving], k=DEGREE, check_finite=False).c
+        dq, d2q, d3q = (self.slopes @ fitted).reshape(3, len(self.sigma), -1)
+        cap = np.minimum(self.cap, squared_speed(dq, limits.velocity))
+        if not self.jerky:
+            return least_time(self.sigma, second_order(self.sigma, dq, d2q, limits.acceleration, cap, self.method.kernel))
+        free = np.isinf(cap)
+        cap[free] = UNBOUND * steady_cap(d2q[free], d3q[free], limits)
+        return self._third_order(dq, d2q, d3q, cap, limits)
+
+    def _third_order(self, dq: Floats, d2q: Floats, d3q: Floats, cap: Floats, limits: JointLimits) -> float:
+        """With jerk; derivatives (K, J) by sigma, `cap` (K,) of the squared speed."""
+        basis = rest_basis(self.sigma, self.eased.ease)
+        first, second, third = (np.ascontiguousarray(order.T) for order in (dq, d2q, d3q))
+        problem = Problem(basis, first, second, third, limits, cap, np.zeros(len(cap), dtype=np.int64), self.weight,
+                          np.ones((2, len(cap))))
+        found = solve_problem(problem, self.method.steps, self.near)
+        self.near = found.c
+        return float(np.sum(self.weight * basis.values(found.c)[0] ** -0.5))
+
+
+def _chained(fitted: BSpline, s: Floats, at: Floats) -> csr_matrix:
+    """(3K, N): from the coefficients of a spline to its first three derivatives by sigma at s (K,), by the chain rule;
+    `at` (4, K) as of `Eased.parameter`."""
+    first, second, third = (_slope(fitted.t, order, s) for order in (1, 2, 3))
+    s1, s2, s3 = (diags(values) for values in at[1:])
+    return csr_matrix(vstack([s1 @ first, s1 @ s1 @ second + s2 @ first,
+                              s1 @ s1 @ s1 @ third + 3.0 * (s1 @ s2 @ second) + s3 @ first]))
+
+
+def _slope(knots: Floats, order: int, s: Floats) -> csr_matrix:
+    """(K, N): from coefficients to a derivative at s (K,): differences of coefficients (de Boor, A Practical Guide to
+    Splines, 2001, chapter X, formula 15), then values of the basis of lower degree."""
+    made = csr_matrix(identity(len(knots) - DEGREE - 1))
+    for degree in range(DEGREE, DEGREE - order, -1):
+        inner = knots[DEGREE - degree:len(knots) - (DEGREE - degree)]
+        count = len(inner) - degree - 1
+        rate = degree / (inner[degree + 1:degree + count] - inner[1:count])
+        made = csr_matrix(diags(rate) @ (made[1:] - made[:-1]))
+    return csr_matrix(BSpline.design_matrix(s, knots[order:len(knots) - order], DEGREE - order) @ made)

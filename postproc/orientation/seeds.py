@@ -1,0 +1,93 @@
+"""Tool axes to begin with: those that aim a vertex of the polytope along the feed; where there is none, the best reach."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from machines.kinematics.base import Kinematics
+from machines.machine import Machine
+from machines.polytope import held_axis_polytope
+from postproc.orientation.passes import Pass
+from postproc.orientation.vertices import vertex_angles
+from toolpaths.arrays import Bools, Floats
+from toolpaths.rotations import angle_between
+from toolpaths.units import DEG
+
+_SEEDS = 6
+_APART = 5.0 * DEG
+
+
+def aimed_axes(one: Pass, machine: Machine, q: Floats) -> dict[str, Floats]:
+    """By the name of a direction (mean, initial, final), axes (S, 3) that aim a vertex along it; q (J,) joints there."""
+    stretch = one.longest
+    if stretch is None or not np.isfinite(q).all():
+        return {}
+    return {name: _axes_at(one.kin, q, vertex_angles(one.kin, q, direction, _sharpest(machine)))
+            for name, direction in stretch.directions().items()}
+
+
+def _sharpest(machine: Machine) -> Floats:
+    """Limits (J,) of jerk, of acceleration where a machine does not state all of them."""
+    limits = machine.limits
+    return limits.jerk if np.isfinite(limits.jerk).all() else limits.acceleration
+
+
+def _axes_at(kin: Kinematics, q: Floats, angles: Floats) -> Floats:
+    """Tool axes (S, 3) at rotary positions (S, 2)."""
+    if not len(angles):
+        return np.zeros((0, 3))
+    joints = np.tile(q, (len(angles), 1))
+    joints[:, np.flatnonzero(kin.rotary)] = angles
+    return kin.forward(joints)[1]
+
+
+def reaching_axes(one: Pass, machine: Machine, tilt: float, allowed: Callable[[Floats], Bools]) -> Floats:
+    """Some allowed axes (S, 3) whose polytope reaches farthest along the mean direction, on any machine.
+
+    Args:
+        tilt: rad, largest from the CL's own axis that is worth looking at
+        allowed: which of axes (M, 3) the pass may take
+    """
+    stretch = one.longest
+    direction = None if stretch is None else stretch.directions().get("mean")
+    if stretch is None or direction is None:
+        return np.zeros((0, 3))
+    axes = one.kin.nearest_axis(_cap(one.axis, min(tilt, np.pi - 0.1)))
+    axes = axes[allowed(axes)]
+    middle = stretch.tip[len(stretch.tip) // 2] + one.radius * (one.axis - axes)
+    near = np.hstack((middle, axes))
+    reach = np.stack([held_axis_polytope(one.kin, branch, _sharpest(machine), near).reach(direction)
+                      for branch in one.kin.inverse(middle, axes, near=machine.home)])
+    return _apart(axes, np.nan_to_num(reach, nan=-1.0).max(axis=0))
+
+
+def _apart(axes: Floats, reach: Floats) -> Floats:
+    """The axes (S, 3) of greatest reach that are not beside one another."""
+    taken = np.zeros((0, 3))
+    for k in np.argsort(-reach, kind="stable").tolist():
+        if len(taken) == _SEEDS or reach[k] <= 0.0:
+            break
+        if not len(taken) or bool((angle_between(taken, axes[k]) > _APART).all()):
+            taken = np.vstack((taken, axes[k]))
+    return taken
+
+
+def _cap(axis: Floats, tilt: float) -> Floats:
+    """Directions (N, 3) within `tilt` of `axis`, some 5 degrees apart."""
+    x, y = across(axis)
+    result = []
+    for ring in np.linspace(0.0, tilt, max(2, int(np.ceil(tilt / _APART)) + 1))[1:]:
+        count = max(6, int(np.ceil(2.0 * np.pi * np.sin(ring) / _APART)))
+        phi = np.arange(count) * 2.0 * np.pi / count
+        result.append(np.cos(ring) * axis + np.sin(ring) * (np.cos(phi)[:, None] * x + np.sin(phi)[:, None] * y))
+    return np.concatenate(result)
+
+
+def across(axis: Floats) -> tuple[Floats, Floats]:
+    """Two unit vectors square to `axis` and to each other."""
+    helper = np.eye(3)[int(np.argmin(np.abs(axis)))]
+    x = np.cross(helper, axis)
+    x /= np.linalg.norm(x)
+    return x, np.cross(axis, x)
