@@ -94,7 +94,7 @@ def compensate(path: Path, moves: Moves, tools: Ints, kinematics: Callable[[int]
     work = Work(path, tools[cut.owner], kinematics, model, axis_tolerance, beyond, SHARE)
     if work.two_way:
         mean, _ = _at_ends(path, moves, modes, work, SHARE * tolerance)
-        work.way = work.ways_of(mean.q)
+        work.take_ways(mean.q)
     corrected, found = _at_ends(path, moves, modes, work, SHARE * tolerance)
     live = ~path.home
     diagnostics = _unmeasured(path, moves, modes.control, found.unmeasured & live[:, None], beyond, file)
@@ -120,7 +120,7 @@ def _at_ends(path: Path, moves: Moves, modes: OutputModes, work: Work, allowed: 
     """The path with its block ends corrected by the ways of `work`, holes as a whole; and what the correction said."""
     found = work.ends()
     corrected = framed(replace(path, q=found.q), path, modes, work)
-    corrected = replace(corrected, q=kept_in_travel(corrected.q, path, modes.control))
+    corrected = replace(corrected, q=unstated(kept_in_travel(corrected.q, path, modes.control), path))
     corrected, work.whole = whole_holes(corrected, path, moves, work, allowed)
     return corrected, found
 
@@ -134,6 +134,24 @@ def kept_in_travel(q: Floats, path: Path, control: Control) -> Floats:
     nominal = (path.q >= limits.lower) & (path.q <= limits.upper)
     out = (q < limits.lower) | (q > limits.upper)
     result: Floats = np.where(np.isnan(path.u)[:, None] & nominal & out, path.q, q)
+    return result
+
+
+def unstated(q: Floats, path: Path) -> Floats:
+    """The joints (K, J), those that a block does not state being those of the block before.
+
+    Blocks that name their axes (after tool changes and home) write no others: the correction of an axis that the block
+    after the next moves no more is written where it is stated.
+    """
+    result = q.copy()
+    law = np.array([f.control.law == "axes" for f in path.frames])[path.frame]
+    rows = np.flatnonzero(path.state.any(axis=1) & law & (np.arange(len(path)) > 0))
+    for k in rows[::-1].tolist():
+        if not (path.home[k] or path.home[k - 1]):
+            kept = ~path.state[k] & (path.q[k] == path.q[k - 1])
+            result[k - 1, kept] = result[k, kept]
+    for k in rows.tolist():
+        result[k] = np.where(path.state[k], result[k], result[k - 1])
     return result
 
 

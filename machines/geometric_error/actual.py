@@ -11,14 +11,14 @@ from abc import ABC, abstractmethod
 
 import numpy as np
 
-from machines.geometric_error.lost_motion import GRAIN
+from machines.geometric_error.lost_motion import carried_on
 from machines.kinematics.base import Kinematics
 from toolpaths.arrays import Bools, Floats
 
 Placed = tuple[Floats, Floats, Floats]
 """tip, tool axis, x of the tool, each (N, 3), in the table frame"""
-RESTS = 1e-3
-"""part of the largest motion that counts as none; errors have slopes far below"""
+RESTS = 1e-6
+"""part of the largest motion that counts as none"""
 LEVER = 100.0
 """mm per rad"""
 
@@ -75,23 +75,8 @@ def approach(q: Floats) -> Floats:
 def moving_sign(step: Floats, rotary: Bools) -> Floats:
     """Sign of motion (N, J) of joint steps (N, J): 0 for joints that move by less than RESTS of the one that moves most.
 
-    What is left out are the drifts that a correction itself makes; rotary joints count with LEVER mm per rad.
+    Rotary joints count with LEVER mm per rad.
     """
     size = np.abs(step) * np.where(rotary, LEVER, 1.0)
     result: Floats = np.where(size > RESTS * size.max(axis=1, keepdims=True, initial=0.0), np.sign(step), 0.0)
-    return result
-
-
-def beyond_grain(step: Floats, rotary: Bools) -> Floats:
-    """Sign of motion (N, J) of joint steps (N, J): 0 for those that are less than the last decimal of a word."""
-    least = np.where(rotary, GRAIN[1], GRAIN[0])
-    result: Floats = np.where(np.abs(step) > least, np.sign(step), 0.0)
-    return result
-
-
-def carried_on(way: Floats) -> Floats:
-    """Signs (N, J) with every 0 replaced by the last sign before it."""
-    last = np.where(way != 0.0, np.arange(len(way))[:, None], 0)
-    np.maximum.accumulate(last, axis=0, out=last)
-    result: Floats = np.take_along_axis(way, last, axis=0)
     return result

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from toolpaths.arrays import Floats
+from toolpaths.arrays import Bools, Floats
 
-GRAIN = 1e-4, 1e-6
-"""mm and rad: play below the last decimal of a word counts as that much, so that its rounding turns nothing"""
+GRAIN = 5e-5, 1e-6
+"""mm and rad, half of a last decimal: motion below it turns nothing, and play below it counts as that much"""
 
 
 @dataclass(frozen=True)
@@ -54,3 +54,19 @@ class Steps:
                 (done.shift, later.shift), (done.low, later.low), (done.high, later.high))))
             reach *= 2
         return done
+
+
+def turning_sign(step: Floats, rotary: Bools) -> Floats:
+    """Sign (N, J) of the last motion of joints that go by steps (N, J) one after the other: what goes back by less than the
+    grain of words, in one step or in many, turns nothing; 0 before a joint has moved by that much."""
+    least = np.broadcast_to(np.where(rotary, GRAIN[1], GRAIN[0]), step.shape)
+    way = Steps.of(step, least).walked().at(np.zeros((1, step.shape[1])))
+    return carried_on(np.where(np.abs(way) == 1.0, way, 0.0))
+
+
+def carried_on(way: Floats) -> Floats:
+    """Signs (N, J) with every 0 replaced by the last sign before it."""
+    last = np.where(way != 0.0, np.arange(len(way))[:, None], 0)
+    np.maximum.accumulate(last, axis=0, out=last)
+    result: Floats = np.take_along_axis(way, last, axis=0)
+    return result

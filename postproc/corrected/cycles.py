@@ -19,9 +19,10 @@ SAME = 1e-6
 def whole_holes(path: Path, nominal: Path, moves: Moves, work: Work, allowed: float) -> tuple[Path, Bools]:
     """The path with holes corrected as a whole, and the blocks (K,) of those, which stay undivided.
 
-    Across the tool every block of a hole is corrected as its bottom is, along the tool as the mean of the bottoms of the
-    holes that follow each other. Holes that this takes farther than LOOSE times `allowed` mm from where they belong keep the
-    corrections of their blocks and are written out.
+    Every block of a hole is corrected as its bottom is, but for the levels above the plane that drilling begins at: along
+    the tool these get the correction of the block that the tool comes from to the first of the holes that follow each
+    other. So distances from plane to bottom, and with them the pecks, stay as they are. Holes that this takes farther than
+    LOOSE times `allowed` mm from where they belong keep the corrections of their blocks and are written out.
     """
     hole = np.where(np.isnan(path.u) | path.home, -1, moves.hole[path.move])
     runs = np.flatnonzero(np.concatenate([[True], np.diff(hole) != 0]))
@@ -53,29 +54,21 @@ def _one_place(path: Path, rows: Ints, work: Work) -> bool:
 def _correct_sequence(path: Path, nominal: Path, holes: list[Ints], work: Work, allowed: float, q: Floats,
                       whole: Bools) -> None:
     """Put the joints of the holes that stay whole into `q`, and mark them in `whole`."""
-    first = int(holes[0][0])
-    kin = work.kinematics(int(work.tools[first]))
-    new, old = (p.frames[int(p.frame[first])].control for p in (path, nominal))
-    xyz = new.xyz
-    bottoms = []
+    lead = int(holes[0][0]) - 1
+    kin = work.kinematics(int(work.tools[lead + 1]))
+    new, old = (p.frames[int(p.frame[lead + 1])].control for p in (path, nominal))
+    xyz, z = new.xyz, new.xyz[2]
+    came = float((new.words(path.q[[lead]], kin, 0.0) - old.words(nominal.q[[lead]], kin, 0.0))[0, z])
     for rows in holes:
-        wanted, got = old.words(nominal.q[rows], kin, 0.0), new.words(path.q[rows], kin, 0.0)
-        deepest = int(np.argmin(np.where(path.code[rows] == FEED, wanted[:, xyz[2]], np.inf)))
-        bottoms.append((got - wanted)[deepest, xyz])
-    along = float(np.mean([d[2] for d in bottoms]))
-    for rows, d in zip(holes, bottoms, strict=True):
-        rows = _with_lead(nominal, rows, old.words(nominal.q[[rows[0] - 1, rows[0]]], kin, 0.0)[:, xyz], path, work)
-        words = new.words(path.q[rows], kin, 0.0)
-        words[:, xyz] = old.words(nominal.q[rows], kin, 0.0)[:, xyz] + [d[0], d[1], along]
-        joints = new.joints(words, kin, 0.0)
-        if (work.off(nominal.q[rows], joints, rows, work.way[rows]) <= LOOSE * allowed).all():
+        wanted, got = old.words(nominal.q[rows], kin, 0.0)[:, xyz], new.words(path.q[rows], kin, 0.0)
+        feeds = np.flatnonzero(path.code[rows] == FEED)
+        if np.ptp(wanted[max(int(feeds[0]) - 1, 0):, :2], axis=0).max() > SAME:
+            continue  # not along Z of the words: no control drills it by itself
+        bottom = int(feeds[np.argmin(wanted[feeds, 2])])
+        plane = wanted[max(int(feeds[0]) - 1, 0), 2]
+        off = got[bottom, xyz] - wanted[bottom]
+        got[:, xyz] = wanted + off
+        got[:, z] = wanted[:, 2] + np.where(wanted[:, 2] <= plane + SAME, off[2], came)
+        joints, way = new.joints(got, kin, 0.0), np.tile(work.way[rows[bottom]], (len(rows), 1))
+        if (work.off(nominal.q[rows], joints, rows, way) <= LOOSE * allowed).all():
             q[rows], whole[rows] = joints, True
-
-
-def _with_lead(nominal: Path, rows: Ints, ends: Floats, path: Path, work: Work) -> Ints:
-    """The blocks of a hole, with the one before it where that comes down on the same line (ends (2, 3) of both)."""
-    lead = rows[0] - 1
-    same = np.abs(ends[1, :2] - ends[0, :2]).max() < SAME and not nominal.home[lead] and lead > 0
-    if same and path.code[lead] != FEED and _one_place(path, np.array([lead, rows[0]]), work):
-        return np.concatenate([[lead], rows])
-    return rows

@@ -8,7 +8,7 @@ import numpy as np
 
 from postproc.corrected.arcs import LOOKS, LOOSE
 from postproc.corrected.reversals import SHORTEST, Divided, Starts, inserted, reversals
-from postproc.corrected.work import MOMENTS, Work
+from postproc.corrected.work import MOMENT, Work
 from postproc.path import ARC, FEED, TRAVERSE, Path
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.units import DEG
@@ -70,7 +70,7 @@ def _taken_up(path: Path, work: Work, starts: Starts, block: Ints,
     zero = np.zeros(len(block))
     turning, at = reversals(work, block[path.code[block] == FEED])
     there = work.nominal(turning, at)
-    before, after = (work.way_at(turning, t) for t in (at, np.minimum(at + 2.0 * MOMENTS[0], 1.0)))
+    before, after = (work.way_at(turning, t) for t in (at, np.minimum(at + 2.0 * MOMENT, 1.0)))
     old, new = (work.corrected(there, turning, way, path) for way in (before, after))
     cut = np.abs(new - old).max(axis=1, initial=0.0) > allowed
     turning, at, old, new, after = turning[cut], at[cut], old[cut], new[cut], after[cut]

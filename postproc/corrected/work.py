@@ -8,9 +8,9 @@ from functools import cached_property
 
 import numpy as np
 
-from machines.geometric_error.actual import Actual, beyond_grain, carried_on, moving_sign
+from machines.geometric_error.actual import Actual, moving_sign
 from machines.geometric_error.correction import correct
-from machines.geometric_error.lost_motion import Steps
+from machines.geometric_error.lost_motion import GRAIN, Steps, turning_sign
 from machines.geometric_error.model import ErrorModel
 from machines.kinematics.base import Kinematics
 from postproc.groups import groups
@@ -18,8 +18,10 @@ from postproc.path import ARC, Path
 from postproc.word_arcs import PLANE_COLUMNS
 from toolpaths.arrays import Bools, Floats, Ints
 
-MOMENTS = 1e-3, 1.0 / 16.0
-"""of a block: how far back its direction at a place is looked at, the second time where nothing is seen to move"""
+MOMENT = 1e-3
+"""of a block: how far back its direction at a place is looked at"""
+LAST = 1.0 / 16.0
+"""of a block: the same at its ends; turning back later than that counts as none"""
 EDGES = tuple(k / 16.0 for k in range(17))
 """where the directions of the axes in a block are looked at"""
 ALONE = -1
@@ -39,7 +41,8 @@ class CorrectedEnds:
 
 class Work:
     """What is needed throughout: the machine with errors by tool, groups of one orientation; the blocks of holes that are
-    `whole`, and the `way` (K, J) that each joint last moved at the ends of the blocks, 0 for the mean of both."""
+    `whole`, the `way` (K, J) that each joint last moved at the ends of the blocks, 0 for the mean of both, and the
+    `drift` (K, J) of the correction over each block."""
 
     def __init__(self, path: Path, tools: Ints, kinematics: Callable[[int], Kinematics], model: ErrorModel,
                  axis_tolerance: float, beyond: bool, share: float) -> None:
@@ -48,6 +51,7 @@ class Work:
         self.axis_share = share * axis_tolerance
         self.whole: Bools = np.zeros(len(path), dtype=np.bool_)
         self.way: Floats = np.zeros(path.q.shape)
+        self.drift: Floats = np.zeros(path.q.shape)
         self.rotary = np.array(kinematics(int(tools[0])).rotary)
         self.group = one_orientation(path.q[:, self.rotary], tools, path.home)
         self._actual: dict[int, Actual] = {}
@@ -68,18 +72,18 @@ class Work:
         """Letters of the joints."""
         return self.kinematics(int(self.tools[0])).axis_names
 
-    def ways_of(self, q: Floats) -> Floats:
-        """(K, J) sign of each joint's last motion at the ends of the blocks that go to q (K, J), corrected by mean ways.
+    def take_ways(self, q: Floats) -> None:
+        """Find `way` and `drift` from the ends of the blocks corrected by mean ways, q (K, J).
 
         A joint that the correction alone moves turns back too: what it loses is more than what it moves by. Where joints do
         not run straight it is the sign of the last moment.
         """
-        moved = np.zeros(q.shape)
-        moved[1:] = beyond_grain(np.nan_to_num(np.diff(q, axis=0)), self.rotary)
+        step, change = (np.nan_to_num(np.diff(x, axis=0, prepend=x[:1])) for x in (q, q - self.path.q))
+        self.drift = np.where(np.abs(change) > np.where(self.rotary, GRAIN[1], GRAIN[0]), change, 0.0)
         bent = np.flatnonzero(self.bent)
-        last = self.moving(bent, np.ones(len(bent)))
-        moved[bent] = np.where(last != 0.0, last, moved[bent])
-        return carried_on(moved)
+        last = self.moving(bent, np.ones(len(bent)), LAST)
+        step[bent] = np.where(last != 0.0, last, step[bent])
+        self.way = turning_sign(step, self.rotary)
 
     @cached_property
     def bent(self) -> Bools:
@@ -91,18 +95,14 @@ class Work:
         result: Bools = ((path.code == ARC) | (by_tip & (turns | (not self.rotary.any())))) & ~first
         return result
 
-    def moving(self, block: Ints, t: Floats) -> Floats:
-        """(N, J) sign of each joint's nominal motion at fraction t (N,) of blocks (N,); a moment after at their start.
+    def moving(self, block: Ints, t: Floats, moment: float = MOMENT) -> Floats:
+        """(N, J) sign of each joint's motion at fraction t (N,) of blocks (N,), over a moment before; after it at their start.
 
-        The moment is longer for a joint that barely moves in a short one: at the quadrants of arcs.
+        The correction counts as changing evenly over a block.
         """
-        sign = np.zeros((len(block), self.path.q.shape[1]))
-        for moment in MOMENTS:
-            still = np.flatnonzero((sign[:, self.two_way] == 0.0).any(axis=1))
-            before = np.clip(t[still] - moment, 0.0, 1.0 - moment)
-            step = self.nominal(block[still], before + moment) - self.nominal(block[still], before)
-            sign[still] = np.where(sign[still] != 0.0, sign[still], moving_sign(step, self.rotary))
-        return sign
+        before = np.clip(t - moment, 0.0, 1.0 - moment)
+        step = self.nominal(block, before + moment) - self.nominal(block, before) + moment * self.drift[block]
+        return moving_sign(step, self.rotary)
 
     def way_at(self, block: Ints, t: Floats) -> Floats:
         """(N, J) sign of each joint's last motion inside blocks; a joint that rests there has that of the block's end."""
@@ -119,7 +119,7 @@ class Work:
         arc = self.path.code[block] == ARC
         for rows, edges in ((np.flatnonzero(arc), EDGES), (np.flatnonzero(~arc), (0.0, 1.0))):
             for t in edges[::-1] if len(rows) else ():
-                sign = self.moving(block[rows], np.full(len(rows), t))
+                sign = self.moving(block[rows], np.full(len(rows), t), LAST)
                 first[rows] = np.where(sign != 0.0, sign, first[rows])
         return np.asarray(np.where(first != 0.0, first, self.way[np.maximum(block - 1, 0)]))
 
