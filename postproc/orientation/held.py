@@ -26,7 +26,7 @@ _RING = 72
 _DIRECTIONS = 24
 _SEEDS = 4
 _STEPS = (2.5 * DEG, 1.25 * DEG, 0.6 * DEG, 0.3 * DEG)
-_TIE = 1e-6
+_TIE = 1e-4
 """relative: seeds that differ by less are equal, the least turned is tried first"""
 
 
