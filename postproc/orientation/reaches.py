@@ -97,10 +97,10 @@ def direction_of(stretch: Stretch | None) -> tuple[Floats, float]:
 def polytopes(made: Turned) -> dict[str, Polytope]:
     """By order, the polytope of tip rates in the middle of the longest stretch, table frame, mm and s.
 
-    Empty where the pass cannot be run, has no direction, or the machine cannot move the tip alone.
+    Empty where the pass cannot be run, has no direction, the machine cannot move the tip alone, or for a slim `Turned`.
     """
     one, stretch = made.one, made.one.longest
-    if stretch is None or made.refused or not direction_of(stretch)[1]:
+    if stretch is None or made.refused or not made.sites or not direction_of(stretch)[1]:
         return {}
     which = next(k for k, other in enumerate(one.stretches) if other is stretch)
     middle = len(stretch.tip) // 2

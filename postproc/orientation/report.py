@@ -22,11 +22,11 @@ NAMES: tuple[Orientation, ...] = ("keep", "per-pass", "whole-part", "auto")
 
 def as_dict(choice: OrientationChoice, plan: Orientation = "auto") -> dict[str, Any]:
     """The keys of `orient --json`; passes as `plan` has them."""
-    picked = choice.plans[plan].picked
-    plans = {name.replace("-", "_"): _plan(choice.plans[name], choice) for name in NAMES}
+    picked, keep = choice.plans[plan].picked, choice.plans["keep"].seconds
+    plans = {name.replace("-", "_"): _plan(choice.plans[name], keep) for name in NAMES}
     return {"machine": choice.work.machine.name, "plan": plan,
             "passes": [_pass(tried, made, choice.work) for tried, made in zip(choice.tried, picked, strict=True)],
-            "plans": plans | {"paper_per_pass": _plan(choice.paper, choice)}}
+            "plans": plans | {"paper_per_pass": _plan(choice.paper, keep)}}
 
 
 def chosen(choice: OrientationChoice, plan: Orientation) -> dict[str, Any]:
@@ -67,7 +67,7 @@ def _pass(tried: Tried, made: Turned, work: Work) -> dict[str, Any]:
             "gain_percent": gain(made.seconds, tried.own.seconds),
             "limiting_axis": made.limiting[0], "limiting_order": made.limiting[1],
             "axis": axis_of(made, work), "turned_deg": float(angle_between(made.axis, one.axis)) / DEG,
-            "planned": tried.planned, "pruned": tried.pruned, "lost": grouped(tried),
+            "planned": tried.planned, "pruned": tried.pruned, "lost": grouped([tried]),
             "own": _short(tried.own), "best": _short(tried.best), "paper": _short(tried.aimed),
             "next_best": _short(best_loser(tried)),
             "reach": {name: _reach(it) for name, it in (("own", tried.own), ("paper", tried.aimed), ("chosen", made))
@@ -94,8 +94,8 @@ def _reach(made: Turned) -> dict[str, Any]:
 UNITS = {"velocity": "mm/s", "acceleration": "mm/s2", "jerk": "mm/s3"}
 
 
-def _plan(plan: OrientationPlan, choice: OrientationChoice) -> dict[str, Any]:
-    parts = shares_of(plan, choice.work)
-    return {"time_s": finite(plan.seconds), "gain_percent": gain(plan.seconds, choice.plans["keep"].seconds),
+def _plan(plan: OrientationPlan, keep: float) -> dict[str, Any]:
+    parts = shares_of(plan)
+    return {"time_s": finite(plan.seconds), "gain_percent": gain(plan.seconds, keep),
             "cutting_s": finite(parts.cutting), "turning_s": finite(parts.turning), "other_s": finite(parts.other),
             "turns": parts.turns}

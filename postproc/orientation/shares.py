@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from itertools import pairwise
 
+import numpy as np
+
 from postproc.orientation.allowed import SAME
-from postproc.orientation.passes import Work
 from postproc.orientation.plans import OrientationPlan
 from postproc.orientation.timed import Turned
-from postproc.orientation.turns import between, ends
 from toolpaths.rotations import angle_between
 
 
@@ -19,9 +19,9 @@ class PlanShares:
 
     Attributes:
         cutting: planned cuts
-        turning: back, unclamp, index, clamp and approach wherever neighbouring passes differ in their axis
+        turning: back, unclamp, index, clamp and approach wherever a pass begins as the one before it did not end
         other: rapids inside and between passes, from home and back, tool changes
-        turns: how often neighbouring passes differ
+        turns: how often that is
     """
 
     cutting: float
@@ -30,20 +30,16 @@ class PlanShares:
     turns: int
 
 
-def shares_of(plan: OrientationPlan, work: Work) -> PlanShares:
+def shares_of(plan: OrientationPlan) -> PlanShares:
     """The parts of a plan's seconds."""
-    picked = plan.picked
-    cutting = float(sum(made.seconds for made in picked))
-    turned = [(a, b) for a, b in pairwise(picked) if turns(a, b)]
-    turning = float(sum(_way(a, b, work) for a, b in turned))
-    return PlanShares(cutting, turning, plan.seconds - cutting - turning, len(turned))
+    turned = np.array([turns(a, b) for a, b in pairwise(plan.picked)], dtype=np.bool_)
+    turning = float(plan.ways[1:-1][turned].sum())
+    cutting = float(plan.cuts.sum())
+    return PlanShares(cutting, turning, plan.seconds - cutting - turning, int(turned.sum()))
 
 
 def turns(a: Turned, b: Turned) -> bool:
-    """Whether the tool turns between two passes."""
-    return bool(angle_between(a.axis, b.axis) > SAME)
-
-
-def _way(a: Turned, b: Turned, work: Work) -> float:
-    """Seconds from the end of one pass to the beginning of the next."""
-    return float(between([ends(a, work)], [ends(b, work)], work, b.one.by_home, b.one.tool != a.one.tool)[0, 0])
+    """Whether tool or rotary joints turn from the end of one pass to the beginning of the next."""
+    rotary = np.array(a.machine.rotary)
+    apart = np.abs(np.exp(1j * a.q[-1, rotary]) - np.exp(1j * b.q[0, rotary])).max(initial=0.0)
+    return bool(apart > SAME or angle_between(a.axis, b.axis) > SAME)

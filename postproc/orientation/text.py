@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from postproc.options import Orientation
 from postproc.orientation.candidates import Lost, Tried
-from postproc.orientation.losers import KINDS, best_loser, grouped, in_all, listed
+from postproc.orientation.losers import KINDS, best_loser, grouped, listed
 from postproc.orientation.orient import OrientationChoice
 from postproc.orientation.plans import OrientationPlan
 from postproc.orientation.reaches import Reach, binding, reaches
@@ -35,7 +35,7 @@ def as_text(choice: OrientationChoice, plan: Orientation = "auto", passes: Seque
         lines.append(f"      and {len(rows) - len(shown)} passes that gain less; all are in --json")
     for number in passes:
         lines += ["", *_in_full(*rows[number])]
-    return "\n".join([*lines, "", *_totals(choice), *_plans(choice)])
+    return "\n".join([*lines, "", _totals(choice), *_plans(choice)])
 
 
 def _saved(tried: Tried, made: Turned) -> float:
@@ -68,7 +68,7 @@ def _row(tried: Tried, made: Turned) -> str:
         return f"{start}{'':>12} {'':>9}  kept: {one.fixed}"
     after = best_loser(tried)
     beaten = seconds(None if after is None else after.seconds)
-    return f"{start}{seconds(tried.best.seconds):>12} {beaten:>9}  {listed(grouped(tried)) or '-'}"
+    return f"{start}{seconds(tried.best.seconds):>12} {beaten:>9}  {listed(grouped([tried])) or '-'}"
 
 
 def _in_full(tried: Tried, made: Turned) -> list[str]:
@@ -79,14 +79,13 @@ def _in_full(tried: Tried, made: Turned) -> list[str]:
         if it is not None:
             lines += [f"  {name:<10} {orientation(it)}, {seconds(it.seconds)} s" + _reached(reaches(it))
                       + (f", {it.touching}" if it.touching else "")]
-    losers = sorted(tried.rejected, key=lambda pair: (_rank(pair), angle_between(pair.made.axis, one.axis)))
-    for other, why, _ in losers[:LOSERS]:
-        lines.append(f"  {'lost':<10} {orientation(other)}: {why}")
+    losers = sorted(tried.rejected, key=lambda lost: (_rank(lost), angle_between(lost.made.axis, one.axis)))
+    lines += [f"  {'lost':<10} {orientation(lost.made)}: {lost.why}" for lost in losers[:LOSERS]]
     return lines + ([f"  and {len(losers) - LOSERS} more in --json"] if len(losers) > LOSERS else [])
 
 
 def _rank(lost: Lost) -> tuple[int, float]:
-    """Planned losers first, by time."""
+    """Timed losers first, by time."""
     return -list(KINDS).index(lost.kind), lost.made.seconds if lost.kind == "slower" else 0.0
 
 
@@ -98,17 +97,18 @@ def _reached(found: tuple[Reach, ...]) -> str:
     return f"; along the mean direction {parts}: {slowest.order} binds"
 
 
-def _totals(choice: OrientationChoice) -> list[str]:
+def _totals(choice: OrientationChoice) -> str:
     """What was tried, over all passes."""
-    planned, lost = sum(one.planned for one in choice.tried), in_all(choice.tried)
-    return [f"{planned} orientations planned; lost by: " + (", ".join(f"{KINDS[k]} {n}" for k, n in lost.items()) or "-")]
+    planned, lost = sum(one.planned for one in choice.tried), grouped(choice.tried)
+    reasons = ", ".join(f"{text} {lost[kind]}" for kind, text in KINDS.items() if kind in lost)
+    return f"{planned} orientations planned; lost by: {reasons or '-'}"
 
 
 def _plans(choice: OrientationChoice) -> list[str]:
     lines = [f"{'plan':<16} {'time s':>10} {'gain %':>7} {'cutting s':>10} {'turning s':>10} {'other s':>10} {'turns':>6}"]
     every: dict[str, OrientationPlan] = {**{name: choice.plans[name] for name in NAMES}, "paper per pass": choice.paper}
     for name, plan in every.items():
-        parts = shares_of(plan, choice.work)
+        parts = shares_of(plan)
         figures = (f"{value:.3f}" if math.isfinite(value) else "-" for value in
                    (plan.seconds, parts.cutting, parts.turning, parts.other))
         whole, cutting, turning, other = figures

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from postproc.orientation.candidates import Tried
+from postproc.orientation.candidates import Kind, Tried
 from postproc.orientation.losers import KINDS
 from postproc.orientation.passes import Work
 from postproc.orientation.reaches import least_under
@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 PolarAxes = Any
-MARKS = {"limits": ("x", "#7a6a00"), "reach": ("v", "#555555"), "travel": ("+", "#c2453a"), "touches": ("X", "#000000"),
-         "bound": ("d", "#ffffff")}
+MARKS: dict[Kind, tuple[str, str]] = {"limits": ("x", "#7a6a00"), "reach": ("v", "#555555"), "travel": ("+", "#c2453a"),
+                                      "touches": ("X", "#000000"), "bound": ("d", "#ffffff")}
 """of candidates that were not planned"""
 WIDER = 1.5
 """of the tilt of the planned candidates: refused ones beyond are only counted"""
@@ -32,7 +32,7 @@ LEVELS = 12
 def axes_map(sheet: Figure, place: PolarAxes, tried: Tried, made: Turned, work: Work) -> None:
     """Candidates by what became of them; planned ones coloured by their time, on the ground of what the reach allows."""
     frame = _frame(tried, work)
-    groups: dict[str, list[Turned]] = {}
+    groups: dict[Kind, list[Turned]] = {}
     for other, _, kind in tried.rejected:
         groups.setdefault(kind, []).append(other)
     timed = _once([*groups.get("slower", []), *(one for one in (tried.own, tried.best, made) if np.isfinite(one.seconds))])

@@ -25,7 +25,7 @@ MANY = 60
 def plan_panel(place: Axes, choice: OrientationChoice) -> None:
     """Bars: cutting, turning and other seconds of each plan."""
     plans: dict[str, OrientationPlan] = {**{name: choice.plans[name] for name in NAMES}, "paper\nper pass": choice.paper}
-    parts = [shares_of(plan, choice.work) for plan in plans.values()]
+    parts = [shares_of(plan) for plan in plans.values()]
     left = np.zeros(len(parts))
     for name, colour in (("cutting", "#1f5f8b"), ("turning", "#d08a3c"), ("other", "#bbbbbb")):
         width = np.nan_to_num([getattr(one, name) for one in parts], posinf=0.0, neginf=0.0)
