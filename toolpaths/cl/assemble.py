@@ -107,11 +107,25 @@ def _fill_axis(b: Builder, rows: Rows) -> None:
     marks = dict(b.axis_marks)
     at = np.array([r for r in marks if r < n and not rows.given[r]], np.int64)
     source = np.where(rows.given, np.arange(n), -1)
+    if b.dialect.six_common:
+        plain = np.flatnonzero(~rows.given[1:] & rows.given[:-1] & ~np.isnan(rows.tip[1:, 0])) + 1
+        source[plain] = plain
+        rows.axis[plain] = (0.0, 0.0, 1.0)
     source[at] = at
     if len(at):
         rows.axis[at] = [marks[int(r)] for r in at]
     source = np.maximum.accumulate(source) if n else source
     rows.axis = np.where((source < 0)[:, None], [0.0, 0.0, 1.0], rows.axis[source])
+    _check_multax_off(b, rows, marks)
+
+
+def _check_multax_off(b: Builder, rows: Rows, marks: dict[int, tuple[float, float, float]]) -> None:
+    """Systems differ in what points of three numbers after MULTAX/OFF mean; CATIA documents the locked axis."""
+    for row, line in b.multax_off:
+        if row < len(rows) and not rows.given[row] and row not in marks and abs(rows.axis[row, 2] - 1.0) > UNIT_ROUNDING:
+            i, j, k = rows.axis[row].tolist()
+            b.log.warning("cl.multax-off", f"points of three numbers after MULTAX/OFF keep the tool axis ({i:.6g}, {j:.6g}, "
+                          f"{k:.6g}) of the point before", line, "state TLAXIS/0,0,1 where it is to be z")
 
 
 def _checked_axis(b: Builder, rows: Rows) -> Floats:

@@ -101,6 +101,8 @@ class Builder:
         self.maps: list[Map | None] = [None]
         self.map_index = {b"": 0}
         self.axis_marks: list[tuple[int, Triple]] = []
+        self.multax_off: list[tuple[int, int]] = []
+        """row and line of MULTAX/OFF where the system does not say what the axis is then"""
         self.rapids: list[int] = []
         self.roles: dict[int, Role] = {}
         self.deltas: list[tuple[int, Triple]] = []

@@ -9,7 +9,7 @@ import numpy as np
 
 from toolpaths.arrays import Floats
 from toolpaths.cl.build import Builder, Triple
-from toolpaths.cl.statements import Statement, words_of
+from toolpaths.cl.statements import TEXT, Statement, words_of
 from toolpaths.toolpath import Role
 
 SPLINE_CHORD = 0.001
@@ -138,15 +138,18 @@ def nurbs(b: Builder, s: Statement) -> None:
 
 
 def _gather(b: Builder) -> tuple[list[float], list[Triple]]:
-    """Knots and control points of the KNOT and CNTRL records that follow; passes them."""
+    """Knots and control points of the KNOT and CNTRL records that follow, knots also on lines of their own; passes them."""
     knots: list[float] = []
     control: list[Triple] = []
     statements = b.program.statements
-    while b.index + 1 < b.stop and statements[b.index + 1].major in ("KNOT", "CNTRL") \
-            and b.program.before[b.index + 1] == b.fast:
+    while b.index + 1 < b.stop and b.program.before[b.index + 1] == b.fast:
+        s = statements[b.index + 1]
+        n = s.numbers
+        more = s.major == TEXT and statements[b.index].major in ("KNOT", TEXT) and bool(n) and len(n) == len(s.words)
+        if s.major not in ("KNOT", "CNTRL") and not more:
+            break
         b.index += 1
-        n = statements[b.index].numbers
-        if statements[b.index].major == "KNOT":
+        if more or s.major == "KNOT":
             knots += n
         elif len(n) == 3:
             control.append((n[0], n[1], n[2]))

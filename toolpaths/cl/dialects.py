@@ -16,8 +16,7 @@ class Dialect:
         arc_sense: +1 the vector of CIRCLE is right-hand, -1 left-hand, 0 the word at its end decides
         full_circles: an arc that ends where it starts is a whole turn
         depth_sign: -1 where depths below the hole's top are written negative
-        six_common: points with six numbers are in the common frame, three in the local one
-        modal_axis: an axis holds until the next one
+        six_common: points with six numbers are in the common frame, three in the local one, whose z is then their axis
         insert_is_comment: INSERT is for people
         rotabl_radians: angles of ROTABL are rad
         axis_reset: the axis is the local z again at each operation

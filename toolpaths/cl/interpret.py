@@ -19,6 +19,8 @@ _MANY = 3
 _NO_SLASH = -1
 """in place of a count of numbers: text that begins with a known word and has no slash"""
 _WORD = re.compile(r"[A-Z0-9_-]+")
+_MOTION = re.compile(r"\W*(?:GOTO|GODLTA|RAPID|CIRCLE|MOVARC|GOHOME)\b|.*\b(?:GOTO|GODLTA|CIRCLE|MOVARC)\s*/", re.IGNORECASE)
+"""Text that is no record and yet names a motion: dropped, it would leave the tool elsewhere."""
 _DEEPEST = 8
 _MOST_ROWS = 50_000_000
 
@@ -101,8 +103,9 @@ HANDLERS.update({"DEFSUB": defsub, "CALSUB": calsub, "ENDSUB": structure.nothing
 
 
 def _other(b: Builder, s: Statement) -> None:
-    if s.major in UNSUPPORTED_MOTION:
-        _unsupported(b, s)
+    word = s.major.rpartition("=")[2].strip()
+    if word in UNSUPPORTED_MOTION:
+        _unsupported(b, s, word)
     elif s.major == TEXT:
         b.texts.append((b.line, b.row, sum(isinstance(w, float) for w in s.words), s.body))
     elif not s.major.startswith(DATA_COMMENT):
@@ -115,14 +118,14 @@ def _other(b: Builder, s: Statement) -> None:
             b.texts.append((b.line, b.row, _NO_SLASH, s.major))
 
 
-def _unsupported(b: Builder, s: Statement) -> None:
-    if s.major in b.allow_unknown:
-        b.note_unknown(s, s.major)
+def _unsupported(b: Builder, s: Statement, word: str) -> None:
+    if word in b.allow_unknown:
+        b.note_unknown(s, word)
         return
     if s.has("NOMORE") and len(s.words) == 1:
         return
-    b.log.error("cl.unsupported-motion", f"{s.major} moves the tool or changes how it moves, and is not supported",
-                b.line, f"--allow-unknown {s.major} leaves it out", key=s.major)
+    b.log.error("cl.unsupported-motion", f"{word} moves the tool or changes how it moves, and is not supported",
+                b.line, f"--allow-unknown {word} leaves it out", key=word)
 
 
 def _first_word(body: str) -> str:
@@ -130,8 +133,10 @@ def _first_word(body: str) -> str:
 
 
 def _is_motion(numbers: int, body: str) -> bool:
-    """True for text like `GOTO 1 2 3`, which is no listing text wherever it stands."""
-    return numbers == _NO_SLASH and _first_word(body) in motion.HANDLERS and body[-1:].isdigit()
+    """True for text like `GOTO 1 2 3` or `GOTO(1,2,3)`, which is no listing text wherever it stands."""
+    if numbers == _NO_SLASH:
+        return _first_word(body) in motion.HANDLERS and body[-1:].isdigit()
+    return _MOTION.match(body) is not None and any(c.isdigit() for c in body)
 
 
 def report_others(b: Builder) -> dict[str, int]:
@@ -149,6 +154,9 @@ def report_others(b: Builder) -> dict[str, int]:
             b.unknown.setdefault(body, []).append((line, row, numbers))
         elif numbers >= _MANY and 0 < row < b.row and "(TEXT)" not in b.allow_unknown:
             b.log.error("cl.text", f"no record: {body[:60]!r}, with numbers between motions", line)
+        elif _MOTION.match(body) and "(TEXT)" not in b.allow_unknown:
+            b.log.error("cl.text", f"no record: {body[:60]!r}, which names a motion", line, "write it as WORD/numbers, on a "
+                        "line of its own; --allow-unknown '(TEXT)' leaves such lines out", key="motion")
         else:
             b.log.warning("cl.text", f"no record: {body[:60]!r}", line)
     counts = {word: len(found) for word, found in b.unknown.items()}
@@ -161,8 +169,9 @@ def report_others(b: Builder) -> dict[str, int]:
 
 def _report_word(b: Builder, word: str, found: list[tuple[int, int, int]]) -> None:
     for line, row, numbers in found:
-        if numbers >= _MANY and 0 < row < b.row and word not in b.allow_unknown:
-            b.log.error("cl.unknown-motion", f"unknown word {word} with {numbers} numbers between motions", line,
+        moves = (numbers >= _MANY and 0 < row < b.row) or word.split(" ")[-1] in motion.HANDLERS
+        if moves and word not in b.allow_unknown:
+            b.log.error("cl.unknown-motion", f"unknown word {word} with {numbers} numbers, which may move the tool", line,
                         f"--allow-unknown {word} leaves it out", key=word)
         else:
             b.log.warning("cl.unknown-word", f"unknown word {word}, left out", line, key=word)

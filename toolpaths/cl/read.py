@@ -20,6 +20,11 @@ from toolpaths.diagnostics import Diagnostic, Severity, error
 from toolpaths.toolpath import Toolpath
 
 _OWN_HEAD = b"$$-> TOOLPATH /"
+_TAIL = 400
+"""bytes that hold the last two lines"""
+_ENDS = (b"FINI", b"END")
+_SENTENCE = 3
+"""words of a line behind the end that is the text of a listing"""
 
 
 @dataclass(frozen=True)
@@ -91,9 +96,11 @@ def read_bytes(data: bytes | str, *, file: str = "", units: str | None = None, d
 
 def _cut_off(data: bytes | str, lines: int, log: Log) -> None:
     """A warning where the last line has no end and is not one that ends a file."""
-    tail = data[-200:].encode("utf-8", "replace") if isinstance(data, str) else bytes(data[-200:])
-    last = tail.replace(b"\r", b"\n").rsplit(b"\n", 1)[-1].rstrip(b"\x1a\x00").strip()
-    if last and not last.upper().startswith((b"FINI", b"END", b"$$")):
+    tail = data[-_TAIL:].encode("utf-8", "replace") if isinstance(data, str) else bytes(data[-_TAIL:])
+    *before, last = (line.strip() for line in tail.replace(b"\r", b"\n").rstrip(b"\x1a\x00").split(b"\n"))
+    ended = next((line for line in reversed(before) if line), b"").upper().startswith(_ENDS)
+    text = ended and b"/" not in last and len(last.split()) >= _SENTENCE
+    if last and not text and not last.upper().startswith((*_ENDS, b"$$")):
         found = last[:60].decode("ascii", "replace")
         log.warning("cl.cut-off", f"the file ends behind {found!r} without a line end: it may "
                     "be cut off", lines, "compare the last line with the CAM system, or write the file anew")

@@ -14,7 +14,7 @@ from toolpaths.cl.words import BARE_STARTS, TEXT_WORDS
 Word = str | float
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?", re.ASCII)
 _MAJOR = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_ ,=*.+-]*", re.ASCII)
-_BLANKS = re.compile(r"[\s-]*[\s]+[\s-]*")
+_LABEL = re.compile(r"[A-Za-z0-9_]{1,32}\s*\)\s*", re.ASCII)
 COMMENT = "$$"
 DATA_COMMENT = "$$->"
 _RARELY_REPEATED = frozenset({"GOTO", "GODLTA", "CNTRL", "KNOT"})
@@ -173,11 +173,17 @@ class Lexer:
         if text.startswith(COMMENT):
             text = _closed(text)
             return _comment(self._joined(text, i) if text.startswith(DATA_COMMENT) else text)
+        text = self._unlabelled(text)
         fixed = _text_statement(text)
         if fixed is not None:
             return _text_statement(self._joined(text, i, text_word=True)) if text.endswith("$") else fixed
         joined = self._joined(text, i).strip()
         return statement_of(joined) if joined else None
+
+    def _unlabelled(self, text: str) -> str:
+        """`text` without the label of APT before a statement, as in `A10)GOTO/...`."""
+        label = _LABEL.match(text)
+        return text[label.end():] if label and self._begins(text[label.end():]) else text
 
     def _joined(self, text: str, i: int, text_word: bool = False) -> str:
         """`text` with the lines that continue it."""

@@ -104,7 +104,14 @@ def spindl(b: Builder, s: Statement) -> None:
 
 
 def nothing(b: Builder, s: Statement) -> None:
-    """Read elsewhere (UNITS), or of no meaning here (MULTAX: the points tell by themselves)."""
+    """Read elsewhere (UNITS), or of no meaning here."""
+
+
+def multax(b: Builder, s: Statement) -> None:
+    """MULTAX/ON, OFF: the points tell by themselves; after OFF those of three numbers keep the last axis (CATIA: APT
+    formats, MULTAX influence on output), which others may not mean."""
+    if s.has("OFF") and b.dialect.name != "catia":
+        b.multax_off.append((b.row, b.line))
 
 
 def fini(b: Builder, s: Statement) -> None:
@@ -213,7 +220,7 @@ def own_use(b: Builder, s: Statement) -> None:
 HANDLERS: dict[str, Callable[[Builder, Statement], None]] = {
     "TOOL PATH": tool_path, "END-OF-PATH": end_of_path, "$$->FEATNO": feature, "PARTNO": partno, "$$": comment,
     "PPRINT": text_event, "INSERT": text_event, "REMARK": nothing, "LPRINT": nothing, "PPLABEL": nothing,
-    "LETTER": nothing, "UNITS": nothing, "UNIT": nothing, "MULTAX": nothing, "FINI": fini, "SET": mode,
+    "LETTER": nothing, "UNITS": nothing, "UNIT": nothing, "MULTAX": multax, "FINI": fini, "SET": mode,
     "$$->TOOLPATH": own_header, "$$->FRAME": own_item, "$$->TOOL": own_item, "$$->OPERATION": own_item,
     "$$->USE": own_use, "$$->SPLINE": own_spline, **dict.fromkeys(EVENTS, plain_event), "SPINDL": spindl, "DWELL": dwell,
     "MODE": mode,

@@ -88,8 +88,8 @@ def loadtl(b: Builder, s: Statement) -> None:
 
 
 def load(b: Builder, s: Statement) -> None:
-    """LOAD/TOOL, number[, ADJUST, register]."""
-    number = s.after("TOOL")
+    """LOAD/TOOL | TURRET, number[, ADJUST, register]."""
+    number = s.after("TOOL", "TURRET")
     if number is None and s.has("WIRE"):
         b.log.warning("cl.wire", "LOAD/WIRE: this operation cuts with a wire, not with a tool", b.line)
         return

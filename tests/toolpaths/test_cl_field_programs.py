@@ -1,0 +1,106 @@
+"""Habits of part programs and their writers beyond the common: labels, splines over several lines, MULTAX, listings."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import toolpaths
+from toolpaths.cl.read import ReadResult, read_bytes
+from toolpaths.diagnostics import Severity
+from toolpaths.toolpath import Kind, Role
+
+ISO = "UNITS/MM\nFEDRAT/600\n"
+NX = "TOOL PATH/A,TOOL,T1\nMSYS/0,0,0,1,0,0,0,1,0\nFEDRAT/MMPM,600\n"
+CREO = "$$-> MFGNO / X\nUNITS / MM\nFEDRAT / 600, MMPM\n"
+CREO_TILTED = "$$-> CSYS / 1, 0, 0, 5, $\n 0, 0.6, -0.8, 0, $\n 0, 0.8, 0.6, 0\n"
+
+
+def errors(found: ReadResult) -> list[tuple[str, tuple[int, ...]]]:
+    return [(d.code, d.lines) for d in found.diagnostics if d.severity is Severity.ERROR]
+
+
+def codes(found: ReadResult) -> list[str]:
+    return sorted(d.code for d in found.diagnostics if d.severity is not Severity.INFO)
+
+
+@pytest.mark.parametrize("label", ["A10)", "10) ", "  start )", "l_1)\t"])
+def test_statements_behind_a_label_are_read(label: str) -> None:
+    lines = ("LOADTL/7", "RAPID", "GOTO/0,0,5", "goto / 1,2,3", "$$ no statement")
+    found = read_bytes(ISO + "".join(f"{label}{line}\n" for line in lines) + "GOTO/4,5,6\n")
+    assert codes(found) == ["cl.text"]
+    assert found.toolpath.tip.tolist() == [[0, 0, 5], [1, 2, 3], [4, 5, 6]]
+    assert found.toolpath.kind.tolist() == [Kind.RAPID, Kind.FEED, Kind.FEED]
+    assert [t.number for t in found.toolpath.tools] == [7]
+
+
+@pytest.mark.parametrize("line", ["GOTO(1,2,3)", "RAPID;1", "{GOTO/1,2,3}", "N10 GOTO/1,2,3", "@ CIRCLE/0,0,0,0,0,1,5",
+                                  '"GODLTA/1"'])
+@pytest.mark.parametrize("at", [0, 1, 2])
+@pytest.mark.parametrize("end", ["", "FINI\n"])
+def test_no_line_that_names_a_motion_is_left_out(line: str, at: int, end: str) -> None:
+    points = ["GOTO/0,0,0", "GOTO/9,0,0"]
+    points.insert(at, line)
+    found = read_bytes(ISO + "\n".join(points) + "\n" + end)
+    assert [(c in ("cl.text", "cl.unknown-motion"), lines) for c, lines in errors(found)] == [(True, (3 + at,))]
+
+
+def test_text_that_speaks_of_motion_is_no_motion() -> None:
+    found = read_bytes(ISO + "GOTO/0,0,0\n* next: rapid to the clearance plane\nGOTO/1,0,0\n")
+    assert errors(found) == [] and codes(found) == ["cl.text"]
+
+
+def test_a_macro_is_refused_where_it_is_defined() -> None:
+    found = read_bytes(ISO + "M1=MACRO/X\nGOTO/1,2,3\nTERMAC\nM2 = MACRO\nGOTO/1,2,3\nTERMAC\nGOTO/0,0,0\n")
+    assert errors(found) == [("cl.unsupported-motion", (3, 6))]
+
+
+@pytest.mark.parametrize("knots", ["KNOT/0.25,0.5,0.75,\n  1.0", "KNOT/0.25\n0.5,0.75\n1.0", "KNOT/0.25,0.5,0.75,1.0"])
+def test_knots_over_several_lines(knots: str) -> None:
+    control = "".join(f"CNTRL/{x},{x * x % 3},0\n" for x in range(1, 7))
+    found = read_bytes(f"{NX}GOTO/0,0,0\nNURBS/\n{knots}\n{control}END-OF-PATH\n")
+    assert codes(found) == []
+    tip = found.toolpath.tip[found.toolpath.role == Role.POINT]
+    assert tip.tolist() == [[0, 0, 0], [6, 0, 0]]
+
+
+def test_three_numbers_after_six_are_along_the_local_z_in_creo() -> None:
+    found = read_bytes(f"{CREO}{CREO_TILTED}MULTAX / ON\nGOTO / 5, 0, 0, 0.6, 0, 0.8\nMULTAX / OFF\n"
+                       "GOTO / 0, 0, 10\nGOTO / 1, 0, 10\nTLAXIS / 0, 1, 0\nGOTO / 1, 0, 10\n")
+    assert codes(found) == []
+    z = [0, -0.8, 0.6]
+    np.testing.assert_allclose(found.toolpath.axis, [[0.6, 0, 0.8], z, z, [0, 0.6, 0.8]], atol=1e-12)
+    np.testing.assert_allclose(found.toolpath.tip[:2], [[5, 0, 0], [5, -8, 6]], atol=1e-12)
+
+
+@pytest.mark.parametrize(("head", "after", "axis", "told"), [
+    (ISO, "GOTO/1,0,0", (0, 0.6, 0.8), ["cl.multax-off"]),
+    (ISO, "GOTO/1,0,0,0,0,1", (0, 0, 1), []),
+    (ISO, "TLAXIS/0,0,1\nGOTO/1,0,0", (0, 0, 1), []),
+    ("$$ CATIA APT\nUNITS/MM\nFEDRAT/600\n", "GOTO/1,0,0", (0, 0.6, 0.8), []),
+])
+def test_the_axis_after_multax_off_is_told_where_no_document_says_it(head: str, after: str, axis: tuple[float, ...],
+                                                                     told: list[str]) -> None:
+    found = read_bytes(f"{head}MULTAX/ON\nGOTO/0,0,0,0,.6,.8\nMULTAX/OFF\n{after}\n")
+    assert codes(found) == told
+    assert found.toolpath.axis[-1].tolist() == list(axis)
+
+
+def test_load_of_a_turret_station_is_a_tool_change() -> None:
+    found = read_bytes(f"{NX}LOAD/TURRET,4,ADJUST,9\nGOTO/0,0,0\nEND-OF-PATH\n")
+    assert errors(found) == []
+    assert [(t.number, t.length_register) for t in found.toolpath.tools] == [(4, 9)]
+
+
+@pytest.mark.parametrize(("tail", "told"), [
+    ("END-OF-PATH\nTool Path Listing has 5 lines.", []), ("END-OF-PATH\r\n\r\nTool Path Listing has 5 lines.", []),
+    ("END-OF-PATH\nTOOL PAT", ["cl.cut-off"]), ("GOTO/1,0,0\nGOTO/1 2 3.", ["cl.cut-off"]),
+    ("FINI\nPart of GOTO/1,2,3 here", ["cl.cut-off"]),
+])
+def test_the_text_of_a_listing_behind_its_end_needs_no_line_end(tail: str, told: list[str], tmp_path: Path) -> None:
+    file = tmp_path / "part.cls"
+    file.write_bytes(f"{NX}GOTO/0,0,0\n{tail}".encode())
+    _, diagnostics = toolpaths.read(file)
+    assert [d.code for d in diagnostics if d.code == "cl.cut-off"] == told
