@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from postproc.controllers.model import ControllerFile
+from postproc.coolant import written
 from postproc.cutter_compensation import Compensation
 from postproc.events import Spindle, ToolChange, numbers, register_changes, spindle_after, tool_changes, words
 from postproc.moves import Moves, Phase
@@ -116,7 +117,7 @@ class _Writing:
             self.spindle = spindle_after(event, self.spindle)
             out += self.state.spindle(_spindle(self.spindle, event), self._loads(at, event))
         elif event.word == "COOLNT":
-            out += self.state.coolant(Command(_coolant(words(event), self.controller), (), event.line),
+            out += self.state.coolant(Command(written(words(event), self.controller.codes), (), event.line),
                                       self._loads(at, event))
         elif event.word == "CUTCOM":
             self.compensation.begin(event, move)
@@ -188,14 +189,6 @@ def _simple(event: Event, spindle: Spindle) -> Command | None:
     if event.word == "SELECT" and values:
         return Command("SELECT_TOOL", (values[0],), event.line)
     return None
-
-
-def _coolant(said: list[str], controller: ControllerFile) -> str:
-    if "OFF" in said:
-        return "COOLANT_OFF"
-    if "MIST" in said or "AIR" in said:
-        return "MIST_ON"
-    return "THROUGH_ON" if "THRU" in said and controller.codes.through else "FLOOD_ON"
 
 
 def _dwells(toolpath: Toolpath, moves: Moves, path: Path, native: Bools) -> list[tuple[int, Command]]:

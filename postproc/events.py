@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.arrays import Floats, Ints
 from toolpaths.toolpath import Event, Toolpath
 from toolpaths.units import PER_MINUTE
 
@@ -103,11 +103,11 @@ def spindle_states(toolpath: Toolpath) -> tuple[Ints, Floats]:
         if event.word == "SPINDL":
             states.append(spindle_after(event, states[-1]))
             starts.append(event.index)
-    at = _state_at(starts, len(toolpath))
+    at = state_at(starts, len(toolpath))
     return np.array([s.direction for s in states])[at], np.array([s.rpm for s in states])[at]
 
 
-def _state_at(starts: list[int], count: int) -> Ints:
+def state_at(starts: list[int], count: int) -> Ints:
     """(count,) number of the state in force at each row; `starts` are in order, the last of equal ones counts."""
     return np.searchsorted(np.array(starts), np.arange(count), side="right") - 1
 
@@ -120,7 +120,7 @@ def spindle_speed(toolpath: Toolpath) -> Floats:
 def loaded_tools(toolpath: Toolpath) -> Ints:
     """(N,) number of the tool in the spindle at every row, -1 before any tool change."""
     changes = tool_changes(toolpath)
-    return np.array([-1, *(c.number for c in changes)])[_state_at([0, *(c.index for c in changes)], len(toolpath))]
+    return np.array([-1, *(c.number for c in changes)])[state_at([0, *(c.index for c in changes)], len(toolpath))]
 
 
 def compensation_side(event: Event) -> str:
@@ -131,7 +131,7 @@ def compensation_side(event: Event) -> str:
 def loaded_registers(toolpath: Toolpath) -> Ints:
     """(N,) length register that should be in force at every row, -1 before any tool change."""
     loads = tool_loads(toolpath)
-    return np.array([-1, *(r for _, r, _ in loads)])[_state_at([0, *(c.index for c, _, _ in loads)], len(toolpath))]
+    return np.array([-1, *(r for _, r, _ in loads)])[state_at([0, *(c.index for c, _, _ in loads)], len(toolpath))]
 
 
 def compensation_states(toolpath: Toolpath) -> Ints:
@@ -144,17 +144,7 @@ def compensation_states(toolpath: Toolpath) -> Ints:
         elif event.word in TOOL_WORDS:
             states.append(40)
             starts.append(event.index)
-    return np.where(toolpath.cycle >= 0, 40, np.array(states)[_state_at(starts, len(toolpath))])
+    return np.where(toolpath.cycle >= 0, 40, np.array(states)[state_at(starts, len(toolpath))])
 
 
 _SIDES = {"LEFT": 41, "RIGHT": 42, "OFF": 40}
-
-
-def coolant_states(toolpath: Toolpath) -> Bools:
-    """(N,) True where any coolant is on."""
-    states, starts = [False], [0]
-    for event in toolpath.events:
-        if event.word == "COOLNT":
-            states.append("OFF" not in words(event))
-            starts.append(event.index)
-    return np.array(states)[_state_at(starts, len(toolpath))]

@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from postproc.controllers.model import ControllerFile
+from postproc.coolant import COMMANDS, LABELS, asked, coolant_words, written
 from postproc.events import Spindle, numbers, speed_said, spindle_after, spindle_states, words
 from toolpaths.diagnostics import Diagnostic, Severity
 from toolpaths.toolpath import Event, Kind, Tool, Toolpath
@@ -21,12 +22,13 @@ from toolpaths.units import PER_MINUTE
 Report = Callable[[Severity, str, str, int, str], None]
 _SPINDLE = frozenset({"RPM", "CLW", "CCLW", "ON", "OFF", "SFM", "SMM", "NEUTRL", "NEUTRAL"})
 _RANGES = frozenset({"RANGE", "LOW", "MEDIUM", "HIGH"})
-_COOLANT = frozenset({"ON", "OFF", "FLOOD", "MIST", "THRU"})
+_COOLANT = frozenset({"ON", "OFF", "FLOOD", "MIST", "THRU", "AIR"})
 _SIDES = frozenset({"LEFT", "RIGHT", "OFF"})
 _PLAIN_CUTCOM = frozenset({*_SIDES, "XYPLAN", "DIAMET", "RADIUS", "TOOL", "OSETNO", "LENGTH", "ADJUST"})
 _BLOCK = re.compile(r"(?:[A-Z]\s*[-+]?(?:\d+\.?\d*|\.\d+)\s*)+")
 _WORD = re.compile(r"([A-Z])\s*([-+]?(?:\d+\.?\d*|\.\d+))")
-_SWITCHES: dict[tuple[str, float], tuple[str, tuple[str, ...]]] = {
+Switches = dict[tuple[str, float], tuple[str, tuple[str, ...]]]
+_SWITCHES: Switches = {
     ("M", 5): ("SPINDL", ("OFF",)), ("M", 7): ("COOLNT", ("MIST",)), ("M", 8): ("COOLNT", ("FLOOD",)),
     ("M", 9): ("COOLNT", ("OFF",)), ("M", 0): ("STOP", ()), ("M", 1): ("OPSTOP", ())}
 _OWN: dict[str, str] = {"G": "motion, planes, offsets and modes", "F": "feeds (FEDRAT)", "H": "length offsets (LOADTL)",
@@ -89,9 +91,10 @@ def _plain(event: Event, spindle: Spindle, controller: ControllerFile, report: R
     codes = {f"{letter}{value:g}" for letter, value in said}
     if codes & set(controller.program.passive):
         return [Event(event.index, "INSERT", (bare,), event.line)]
-    result = _switches(event, said, spindle)
+    switches = _SWITCHES | coolant_words(controller.codes)
+    result = _switches(event, said, spindle, switches)
     if result is None:
-        wrong = next(c for c in (f"{letter}{value:g}" for letter, value in said) if not _is_switch(c))
+        wrong = next(f"{letter}{value:g}" for letter, value in said if not _is_switch(letter, value, switches))
         own = _OWN.get(wrong) or _OWN.get(wrong[0])
         hint = f"the post writes {own} itself" if own else "where the code moves nothing, name it in the controller's " \
             "program.passive"
@@ -103,13 +106,13 @@ def _plain(event: Event, spindle: Spindle, controller: ControllerFile, report: R
     return result
 
 
-def _is_switch(code: str) -> bool:
-    return code[0] == "S" or code in ("M0", "M1", "M3", "M4", "M5", "M7", "M8", "M9")
+def _is_switch(letter: str, value: float, switches: Switches) -> bool:
+    return letter == "S" or (letter, value) in (("M", 3.0), ("M", 4.0)) or (letter, value) in switches
 
 
-def _switches(event: Event, said: list[tuple[str, float]], spindle: Spindle) -> list[Event] | None:
+def _switches(event: Event, said: list[tuple[str, float]], spindle: Spindle, switches: Switches) -> list[Event] | None:
     """Records for the words of a block that only switches; None where it does more, none for S alone at a standstill."""
-    if not all(_is_switch(f"{letter}{value:g}") for letter, value in said):
+    if not all(_is_switch(letter, value, switches) for letter, value in said):
         return None
     speed = [("RPM", value) for letter, value in said if letter == "S"]
     result = []
@@ -120,7 +123,7 @@ def _switches(event: Event, said: list[tuple[str, float]], spindle: Spindle) -> 
             result.append(Event(event.index, "SPINDL", (*(speed[0] if speed else ()), "CLW" if value == 3 else "CCLW"),
                                 event.line))
         elif letter == "M":
-            word, values = _SWITCHES[letter, value]
+            word, values = switches[letter, value]
             result.append(Event(event.index, word, values, event.line))
     if speed and not turning and spindle.direction:
         side = "CLW" if spindle.direction > 0 else "CCLW"
@@ -164,15 +167,14 @@ def _check_delay(event: Event, spindle: Spindle, report: Report) -> None:
 
 def _check_coolant(event: Event, controller: ControllerFile, report: Report) -> None:
     said = words(event)
-    if "OFF" in said:
-        return
-    if "THRU" in said and not controller.codes.through:
-        report(Severity.WARNING, "coolant.through", "COOLNT/THRU: the controller has no code for it, flood is written",
-               event.line, "set codes.through in the controller file")
-    for word in said:
+    wanted, got = asked(said), written(said, controller.codes)
+    if wanted != got:
+        key = wanted.removesuffix("_ON").lower()
+        report(Severity.WARNING, f"coolant.{key}", f"COOLNT/{','.join(said)}: the controller has no code for it, "
+               f"{LABELS[COMMANDS[got]]} is written", event.line, f"set codes.{key} in the controller file")
+    for word in said if got in COMMANDS else ():
         if word not in _COOLANT:
-            written = "mist" if word == "AIR" else "flood"
-            report(Severity.WARNING, "coolant.word", f"COOLNT/{word} is written as {written}", event.line, "")
+            report(Severity.WARNING, "coolant.word", f"COOLNT/{word} is written as {LABELS[COMMANDS[got]]}", event.line, "")
 
 
 def _check_compensation(event: Event, report: Report) -> None:

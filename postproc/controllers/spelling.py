@@ -82,6 +82,10 @@ class Frame(UserModel):
         return f"{named[2].strip().lower()} {named[1]}" if named else text
 
 
+Switch = Annotated[str, Field(pattern=r"^(M[0-9]+)?$")]
+"""an M code, which is read back too, or none"""
+
+
 class Codes(UserModel):
     """G and M codes by canonical function."""
 
@@ -110,11 +114,17 @@ class Codes(UserModel):
     flood: str = "M8"
     """coolant"""
     mist: str = "M7"
-    """coolant as mist"""
-    through: str = ""
+    """coolant as mist; empty: the controller has none, flood is used with a warning"""
+    through: Switch = ""
     """coolant through the tool; empty: the controller has none, flood is used with a warning"""
+    through_off: Switch = ""
+    """ends it; empty: coolant_off does"""
+    air: Switch = ""
+    """air blast; empty: the controller has none, mist is used with a warning"""
+    air_off: Switch = ""
+    """ends it; empty: coolant_off does"""
     coolant_off: str = "M9"
-    """all coolant off"""
+    """coolant off, but for what has a code of its own for that"""
     stop: str = "M0"
     """stop"""
     optional_stop: str = "M1"

@@ -21,7 +21,8 @@ class WriterState:
     register is not in force and waits for the next block that states Z; `speed` is the spindle's as it is written (1/min,
     negative: anti-clockwise, 0 unknown), `rounded` its ratio to what was asked. `files` are the subprograms in files of
     their own, by name, once the program is written. `turning` and `cooling` say whether spindle and coolant run, None where
-    nobody knows; `taken` are block numbers that subprograms bear.
+    nobody knows, `flowing` the kinds of coolant that may run (`postproc.coolant`); `taken` are block numbers that
+    subprograms bear.
     """
 
     def __init__(self, controller: ControllerFile, program: Program, cycles: tuple[Cycle, ...], length_offsets: bool,
@@ -41,6 +42,7 @@ class WriterState:
         self.plane, self.mode = 17, PER_MINUTE
         self.turning: bool | None = None
         self.cooling: bool | None = None
+        self.flowing = 0
         self.taken: set[int] = set()
         self.restate()
 

@@ -12,6 +12,7 @@ import numpy as np
 from postproc.controllers.model import Mode
 from postproc.controllers.state import WriterState
 from postproc.controllers.texts import blocks_of
+from postproc.coolant import COMMANDS, switching
 from postproc.program import PER_MINUTE, Command, Hole
 
 _LABEL = re.compile(r"%|[NO]\d")
@@ -84,7 +85,8 @@ class Writer(WriterState, ABC):
         codes = self.controller.codes
         off = {codes.spindle_stop} if self.turning is False else set()
         off |= {codes.coolant_off} if self.cooling is False else set()
-        return [block for block in self.controller.program.ending if not set(block.split()) <= off]
+        left = [code for code in self.coolant_off() if self.flowing and code != codes.coolant_off]
+        return left + [block for block in self.controller.program.ending if not set(block.split()) <= off]
 
     def start(self) -> Iterator[str]:
         """Safe start: modes that the program uses off, then the preamble."""
@@ -182,12 +184,14 @@ class Writer(WriterState, ABC):
     def command(self, command: Command) -> Iterator[str]:
         """The blocks of one canonical command."""
         codes = self.controller.codes
-        fixed = {"STOP_SPINDLE_TURNING": codes.spindle_stop, "FLOOD_ON": codes.flood, "MIST_ON": codes.mist,
-                 "THROUGH_ON": codes.through, "COOLANT_OFF": codes.coolant_off, "PROGRAM_STOP": codes.stop,
+        fixed = {"STOP_SPINDLE_TURNING": codes.spindle_stop, "PROGRAM_STOP": codes.stop,
                  "OPTIONAL_PROGRAM_STOP": codes.optional_stop, "CUTTER_COMPENSATION_OFF": codes.compensation_off}
         if command.name in fixed:
-            self.switch(command)
+            if command.name == "STOP_SPINDLE_TURNING":
+                self.turning = None if command.skip else False
             yield fixed[command.name]
+        elif command.name == "COOLANT_OFF" or command.name in COMMANDS:
+            yield from self.coolant(command)
         elif command.name in ("ENTER_SECTION", "LEAVE_SECTION"):
             section = self.program.sections[int(command.args[0])]
             yield from self.enter(section) if command.name == "ENTER_SECTION" else self.leave(section)
@@ -225,12 +229,23 @@ class Writer(WriterState, ABC):
         numbers = self.controller.format.sequence_step and self.controller.format.sequence_prefix == "N"
         yield from (f"{NEXT}{block}" if numbers and _HUNDRED.match(block) else block for block in blocks)
 
-    def switch(self, command: Command) -> None:
-        """Remember what stands for sure; what the block switch may leave out does not."""
-        if command.name == "STOP_SPINDLE_TURNING":
-            self.turning = None if command.skip else False
-        elif command.name in ("COOLANT_OFF", "FLOOD_ON", "MIST_ON", "THROUGH_ON"):
-            self.cooling = None if command.skip else command.name != "COOLANT_OFF"
+    def coolant(self, command: Command) -> Iterator[str]:
+        """One kind of coolant on, any other off before it; or all off. What the block switch may leave out is not known."""
+        wanted = COMMANDS.get(command.name, 0)
+        if not wanted or self.flowing & ~wanted:
+            yield from self.coolant_off()
+            self.flowing = self.flowing if command.skip else 0
+        if wanted:
+            yield switching(self.controller.codes)[command.name][0]
+        self.flowing |= wanted
+        self.cooling = None if command.skip else bool(wanted)
+
+    def coolant_off(self) -> list[str]:
+        """The codes that end what may flow: those of kinds that have one of their own, and the one for all others."""
+        own = {off: COMMANDS[name] for name, (_, off) in switching(self.controller.codes).items() if off}
+        result = [off for off, bits in own.items() if self.flowing & bits]
+        rest = self.cooling is None or not result or self.flowing & ~sum(own.values())
+        return [*result, self.controller.codes.coolant_off] if rest else result
 
     def spindle(self, command: Command) -> Iterator[str]:
         """The spindle's start, with its speed where one is given."""

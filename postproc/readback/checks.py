@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from postproc.control import Control
+from postproc.coolant import ANY, coolant_states, label
 from postproc.events import (
     compensation_side,
     compensation_states,
-    coolant_states,
     loaded_registers,
     loaded_tools,
     numbers,
@@ -127,7 +127,8 @@ def check_states(motion: Motion, job: Job, moves: Moves, owner: Ints, faults: Fa
     row = moves.row[owner[rows]]
     tool, register = loaded_tools(job.toolpath)[row], loaded_registers(job.toolpath)[row]
     direction, rpm = (a[row] for a in spindle_states(job.toolpath))
-    cooled, coolant = coolant_states(job.toolpath)[row], motion.flood[rows] | motion.mist[rows]
+    cooled, coolant = coolant_states(job.toolpath, job.controller.codes)[row], motion.coolant[rows]
+    as_asked = np.where(cooled == ANY, coolant > 0, coolant == cooled)
     side = compensation_states(job.toolpath)[row]
     same_speed = (np.abs(motion.rpm[rows] - rpm) <= 0.5) | np.isnan(rpm) | (direction == 0)
     given, radius, wanted_radius = motion.compensation[rows], motion.radius[rows], _radius_registers(job)[row]
@@ -143,7 +144,7 @@ def check_states(motion: Motion, job: Job, moves: Moves, owner: Ints, faults: Fa
             ("tool", motion.tool[rows] == tool, motion.tool[rows], tool, number),
             ("spindle", motion.spindle[rows] == direction, motion.spindle[rows], direction, _SPINDLE.__getitem__),
             ("spindle speed", same_speed, motion.rpm[rows], rpm, number),
-            ("coolant", coolant == cooled, coolant, cooled, lambda on: "on" if on else "off"),
+            ("coolant", as_asked, coolant, cooled, lambda bits: label(int(bits))),
             ("length register", (motion.register[rows] == register) | ~job.control.length_on_z, motion.register[rows],
              register, number),
             ("cutter compensation", given == side, given, side, lambda g: reader.sides[int(g)]),

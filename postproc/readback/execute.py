@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from postproc.control import Control
+from postproc.coolant import FLOOD, MIST
 from postproc.readback import frames
 from postproc.readback.canonical import CALL, LAW, REST, TURNS, Canonical, Law, Text, in_files, placed
 from postproc.readback.frames import AXES, Frame
@@ -30,7 +31,7 @@ class Motion:
         plane, ccw, center: of arcs; center (E, 3) in the coordinates X, Y, Z of the block's frame
         feed (E,): F word in force; inverse (E,): per 1/F minutes
         tool, register (E,): tool in the spindle, active length register (-1 none)
-        spindle (E,): -1, 0, 1; rpm (E,); flood, mist (E,)
+        spindle (E,): -1, 0, 1; rpm (E,); coolant (E,): bits of what flows (`postproc.coolant`)
         hole (E,): True inside a canned cycle
         missing_feed (E,): a cutting block without a feed in force
         dwell (E,): s that the tool rests at the end of the block
@@ -55,8 +56,7 @@ class Motion:
     register: Ints
     spindle: Array
     rpm: Floats
-    flood: Bools
-    mist: Bools
+    coolant: Ints
     hole: Bools
     missing_feed: Bools
     dwell: Floats
@@ -73,6 +73,16 @@ class Motion:
 
     def __len__(self) -> int:
         return len(self.line)
+
+    @property
+    def flood(self) -> Bools:
+        """(E,) flood coolant flows."""
+        return self.coolant & FLOOD > 0
+
+    @property
+    def mist(self) -> Bools:
+        """(E,) mist flows."""
+        return self.coolant & MIST > 0
 
 
 @dataclass(frozen=True)
@@ -169,8 +179,8 @@ def _motion(words: Words, modal: Modal, rows: Rows, code: Canonical, used: tuple
     pitch, floating = _threads(modal, rows, feed, call, code)
     return Motion(in_files(code.line[block], code.files), rows.code, rows.end, offsets.home, modal.plane[block],
                   modal.motion[block] == 3, rows.center, feed, modal.inverse[block], modal.tool[block],
-                  modal.length_register[block], modal.spindle[block], modal.rpm[block], modal.flood[block],
-                  modal.mist[block], rows.hole, missing, dwell,
+                  modal.length_register[block], modal.spindle[block], modal.rpm[block], modal.coolant[block],
+                  rows.hole, missing, dwell,
                   modal.compensation[block], modal.offset[block], modal.blend[block], rows.frame, block,
                   _radius_registers(words)[block], pitch, floating, modal.inch[block], used)
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from postproc.readback.canonical import LOADED, OFFSET, REGISTER, SMOOTH
+from postproc.readback.canonical import COOLANT, LOADED, OFFSET, REGISTER, SMOOTH
 from postproc.readback.words import Words
 from toolpaths.arrays import Array, Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
@@ -39,8 +39,8 @@ class Modal:
     spindle: Array
     """-1, 0, 1"""
     rpm: Floats
-    flood: Array
-    mist: Array
+    coolant: Ints
+    """bits of what flows (`postproc.coolant`)"""
     machine: Array
     """G53 in this block"""
     compensation: Array
@@ -104,12 +104,11 @@ def modal_state(words: Words) -> Modal:
     turn_line, turn = np.concatenate([change, turn_line]), np.concatenate([np.full(len(change), 5.0), turn])
     order = np.argsort(turn_line, kind="stable")
     spindle = fill(turn_line[order], np.where(turn == 3, 1, np.where(turn == 4, -1, 0))[order], n, 0.0)
-    coolant_line, coolant = codes(words, "M", (7, 8, 9))
     return Modal(group("motion", 1).astype(np.int16), group("plane", 17).astype(np.int8), feed_mode == 93, feed_mode == 95,
                  group("units", 21) == 20, group("level", 98).astype(np.int8),
                  fill(*words.pick(REGISTER), n, -1.0).astype(np.int64), fill(change, tool, n, -1.0).astype(np.int64),
-                 spindle.astype(np.int8), number_of(words, "S"), fill(coolant_line, coolant == 8, n, 0.0) > 0.5,
-                 fill(coolant_line, coolant == 7, n, 0.0) > 0.5, machine, group("compensation", 40).astype(np.int8),
+                 spindle.astype(np.int8), number_of(words, "S"), fill(*words.pick(COOLANT), n, 0.0).astype(np.int64),
+                 machine, group("compensation", 40).astype(np.int8),
                  fill_values(*words.pick(OFFSET), n), fill_values(*words.pick(SMOOTH), n))
 
 

@@ -29,7 +29,8 @@ READ_BACK = {"cycles.peck_relief"}
 """how the control moves inside a canned cycle, which the read-back follows and no block states"""
 OTHER: dict[str, Any] = {
     "writer": "iso", "format.line_length": 40, "program.passive": ["M19"], "program.path_tolerance": [],
-    "codes.planes": {"17": "G17", "18": "G18.0", "19": "G19"}, "codes.through": "M88", "codes.tool_select": "T0{number}",
+    "codes.planes": {"17": "G17", "18": "G18.0", "19": "G19"}, "codes.through": "M88", "codes.through_off": "M89",
+    "codes.air": "M83", "codes.air_off": "M84", "codes.tool_select": "T0{number}",
     "codes.tool_change": "M6 T{number}", "codes.length_offset": "G43.0 H{register}", "codes.dwell": "G04 P{seconds}",
     "codes.compensation_left": "G41.0 D{register}", "codes.compensation_right": "G42.0 D{register}",
     "arcs.largest_radius": 5.0, "cycles.planes": [18], "cycles.rigid_only": ["DEEP"], "feed.least_inverse_rate": 1e4,
@@ -40,14 +41,16 @@ OTHER: dict[str, Any] = {
     "kinematics.smoothing_share": 0.1, "format.trim_zeros": False, "format.decimal_point": True}
 WITH: dict[str, list[str]] = {
     "format.sequence_prefix": ["format.sequence_step = 5"], "program.number": ['program.begin = ["%", "O{number}"]'],
-    "codes.rigid_tap": ['program.passive = ["M19"]']}
+    "codes.rigid_tap": ['program.passive = ["M19"]'], "codes.through_off": ['codes.through = "M88"'],
+    "codes.air_off": ['codes.air = "M83"']}
 """values of other keys beside which a key counts"""
 HEAD = ["UNITS/MM", "LOADTL/1", "SPINDL/RPM,1000,CLW", "FEDRAT/MMPM,600"]
 FLAT = ["PPRINT/NOTE A LONG TEXT FOR PEOPLE", "COOLNT/FLOOD", "RAPID", "GOTO/0,0,50", "GOTO/10,0,5", "CUTCOM/LEFT,1",
         "GOTO/20.125,0,5",
         "CUTCOM/OFF", "CUTCOM/RIGHT,1", "GOTO/30,0,5", "CUTCOM/OFF", "COOLNT/MIST", "STOP", "OPSTOP", "DELAY/2",
         "SELECT/TOOL,2",
-        "COOLNT/THRU", "SPINDL/RPM,900.123456,CCLW", "GOTO/40,0,5", "SPINDL/OFF", "COOLNT/OFF", "SPINDL/RPM,700,CLW",
+        "COOLNT/THRU", "SPINDL/RPM,900.123456,CCLW", "GOTO/40,0,5", "COOLNT/AIR", "GOTO/41,0,5",
+        "SPINDL/OFF", "COOLNT/OFF", "SPINDL/RPM,700,CLW",
         "CYCLE/DRILL,DEPTH,5,MMPM,100,CLEAR,3", "GOTO/40,0,0", "CYCLE/DRILL,DEPTH,5,MMPM,100,CLEAR,3,DWELL,1", "GOTO/50,0,0",
         "CYCLE/DRILL,DEPTH,5,MMPM,100,RAPTO,3,RTRCTO,AUTO", "GOTO/60,0,0",
         "CYCLE/TAP,DEPTH,5,MMPM,700,CLEAR,3", "GOTO/70,0,0",

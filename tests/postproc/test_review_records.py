@@ -148,7 +148,7 @@ def test_a_speed_alone_does_not_start_the_spindle() -> None:
 # ---- coolant, compensation, states ------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("word", "code"), [("THRU", "coolant.through"), ("AIR", "coolant.word"), ("TAP", "coolant.word"),
+@pytest.mark.parametrize(("word", "code"), [("THRU", "coolant.through"), ("AIR", "coolant.air"), ("TAP", "coolant.word"),
                                             ("STEAM", "coolant.word")])
 def test_coolant_that_the_controller_lacks_is_told(word: str, code: str) -> None:
     result = good(made("SPINDL/RPM,500,CLW", f"COOLNT/{word}", *CUT))

@@ -11,7 +11,8 @@ from typing import ClassVar
 import numpy as np
 
 from postproc.controllers.model import ControllerFile
-from postproc.readback.canonical import EXTENDED_OFFSETS, Canonical, Text, offset_number, placed
+from postproc.coolant import switched_by
+from postproc.readback.canonical import COOLANT, EXTENDED_OFFSETS, Canonical, Text, added, offset_number, placed
 from postproc.readback.flow import Structure, expand
 from postproc.readback.modal import GROUPS, Groups, check_codes, check_end, codes, drop_passive
 from postproc.readback.words import Words
@@ -49,6 +50,8 @@ class Reader(ABC):
     def __init__(self, axes: tuple[str, ...], controller: ControllerFile | None = None, home: Floats | None = None) -> None:
         self.axes, self.controller, self.home = axes, controller, home
         self.main_file = ""
+        self.switches = switched_by(controller.codes if controller is not None else None)
+        """(bits on, bits off) by M number, see `postproc.coolant`"""
 
     @abstractmethod
     def tokens(self, data: bytes, file: str) -> tuple[Text, list[Diagnostic]]:
@@ -76,7 +79,7 @@ class Reader(ABC):
 
     def check(self, words: Words, file: str) -> list[Diagnostic]:
         """Codes and words that cannot be executed, as errors."""
-        return check_codes(words, self.groups, self.m_codes, self.letters, self.axes, file)
+        return check_codes(words, self.groups, (*self.m_codes, *self.switches), self.letters, self.axes, file)
 
     def read(self, data: bytes, file: str = "", others: Mapping[str, bytes] | None = None,
              ) -> tuple[Canonical | None, list[Diagnostic]]:
@@ -102,7 +105,18 @@ class Reader(ABC):
         if has_errors(more):
             return None, [*found, *more]
         code, last = self.canonical(text, line, file)
+        code = replace(code, words=self.cooled(code.words))
         return replace(code, files=files), [*found, *more, *placed([*self.units(code, file), *last], files)]
+
+    def cooled(self, words: Words) -> Words:
+        """The words with what flows from each block on that switches coolant, in the order of the codes."""
+        blocks, numbers = codes(words, "M", tuple(self.switches))
+        new, flowing = [], 0
+        for block, number in zip(blocks.tolist(), numbers.tolist(), strict=True):
+            on, off = self.switches[number]
+            flowing = flowing & ~off | on
+            new.append((block, COOLANT, float(flowing)))
+        return added(words, new)
 
     def units(self, code: Canonical, file: str) -> list[Diagnostic]:
         """Axis words before any code says whether they are mm."""
