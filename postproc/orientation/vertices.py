@@ -1,16 +1,18 @@
-"""Rotary positions that aim a vertex of the polytope along a direction: closed form on a table C on A, else by Newton steps.
+"""Rotary positions that aim a vertex of the polytope along a direction: closed form on a table that turns twice.
 
 In positioned machining the joint rates are G v (see `machines.polytope`). The direction f meets a vertex where every
 linear joint uses the same share of its limit, |G_j f| / l_j equal for all j (equation 6 of Grandguillaume, Lavernhe,
-Tournier 2017 read row by row).
+Tournier 2017 read row by row). Where G cannot be written as on such a table, Newton steps from a grid find the positions.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from machines.kinematics.base import Kinematics
-from machines.polytope import aim_table_ac, box_vertices, held_axis_rates
+from machines.polytope import box_vertices, held_axis_rates
 from toolpaths.arrays import Bools, Floats, Ints
 
 _GRID = 24
@@ -18,6 +20,26 @@ _GRID = 24
 _STEPS = 30
 _SAME = 1e-7
 _STEP = 1e-6
+_AGREES = 1e-9
+"""largest difference of G from that of a table that turns twice"""
+_CHECKED = np.array([[0.3, 0.7], [-0.8, 2.0], [1.9, -2.6]])
+"""rad, where G is looked at"""
+
+
+@dataclass(frozen=True)
+class Table:
+    """A part that turns about two axes, the slides standing as ever: G = rates Rot(second, -t2) Rot(first, -t1).
+
+    Attributes:
+        first, second (3,): unit axes, the first nearest to the part, in the table frame at zero
+        rates (3, 3): of the linear joints per rate of the tip at zero
+        swapped: the second axis is the machine's first rotary joint
+    """
+
+    first: Floats
+    second: Floats
+    rates: Floats
+    swapped: bool
 
 
 def vertex_angles(kin: Kinematics, q: Floats, direction: Floats, limit: Floats) -> Floats:
@@ -31,36 +53,91 @@ def vertex_angles(kin: Kinematics, q: Floats, direction: Floats, limit: Floats) 
     linear = np.flatnonzero(~np.array(kin.rotary))
     if len(rotary) != 2 or len(linear) != 3 or not kin.slides_affine:
         return np.zeros((0, 2))
-    if is_table_ac(kin, q):
-        return closed_form(direction, limit[linear])
-    return numeric(kin, q, direction, limit)
+    table = table_of(kin, q)
+    if table is not None:
+        return closed_form(table, direction, limit[linear])
+    return numeric(kin, q, direction, limit) if _turns_twice(kin, q) else np.zeros((0, 2))
 
 
-def closed_form(direction: Floats, limit: Floats) -> Floats:
-    """(A, C) (S, 2) of all eight vertices of the box `limit` (3,): at most 16 over a full turn of A."""
-    found = [aim_table_ac(direction, vertex) for vertex in box_vertices(limit)]
-    return _distinct(np.concatenate(found))
+def table_of(kin: Kinematics, q: Floats) -> Table | None:
+    """Where part and slides are related as on a table that turns twice, whatever its axes; None elsewhere."""
+    for swapped in (False, True):
+        order = -1 if swapped else 1
+        rates = _linear_rates(kin, q, np.vstack([np.zeros(2), np.eye(2)[::order], _CHECKED[:, ::order]]))
+        if not np.isfinite(rates).all() or abs(np.linalg.det(rates[0])) < _AGREES:
+            return None
+        first, second = (_axis_of(np.linalg.solve(rates[0], one)) for one in rates[1:3])
+        if not np.isfinite([first, second]).all():
+            return None
+        found = [rates[0] @ rotation(second, -t2) @ rotation(first, -t1) for t1, t2 in _CHECKED]
+        if np.abs(found - rates[3:]).max() < _AGREES:
+            return Table(first, second, rates[0], swapped)
+    return None
 
 
-def is_table_ac(kin: Kinematics, q: Floats) -> bool:
-    """True where slides and tip are related by Rz(C) Rx(A) (equation 7), rotary joints in the order A, C."""
+def _axis_of(turned: Floats) -> Floats:
+    """(3,) about which a matrix turns by -1 rad; NaN where it does not."""
+    skew = 0.5 * (turned.T - turned)
+    axis = np.array([skew[2, 1], skew[0, 2], skew[1, 0]]) / np.sin(1.0)
+    return axis if abs(np.linalg.norm(axis) - 1.0) < _AGREES else np.full(3, np.nan)
+
+
+def rotation(axis: Floats, angle: float) -> Floats:
+    """(3, 3) about a unit axis (3,), by Rodrigues' formula."""
+    x, y, z = axis
+    skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.asarray(np.eye(3) + np.sin(angle) * skew + (1.0 - np.cos(angle)) * skew @ skew)
+
+
+def _turns_twice(kin: Kinematics, q: Floats) -> bool:
+    """Whether both rotary joints turn the slides against the part; where one or none does, no direction can be aimed at."""
+    rates = _linear_rates(kin, q, np.array([[0.3, 0.7], [1.1, 0.7], [0.3, 1.5]]))
+    return bool((np.abs(rates[1:] - rates[0]).max(axis=(1, 2)) > _AGREES).all())
+
+
+def closed_form(table: Table, direction: Floats, limit: Floats) -> Floats:
+    """Rotary positions (S, 2) of all eight vertices of the box `limit` (3,), at most 16 over a full turn.
+
+    Rot(first, -t1) f = Rot(second, t2) u, u the unit vector of vertex over rates: the second subproblem of Paden (1986) and
+    Kahan. On a table C on A it is equation 7 of the paper.
+    """
+    w1, w2 = table.first, table.second
+    u = np.linalg.solve(table.rates, box_vertices(limit).T).T
+    u = u / np.linalg.norm(u, axis=1, keepdims=True)
+    f = np.broadcast_to(direction / np.linalg.norm(direction), u.shape)
+    c, a, b = float(w1 @ w2), f @ w1, u @ w2
+    if 1.0 - c * c < _AGREES:
+        return np.zeros((0, 2))
+    along = (np.outer(a - c * b, w1) + np.outer(b - c * a, w2)) / (1.0 - c * c)
+    left = (1.0 - np.einsum("ij,ij->i", along, along)) / (1.0 - c * c)
+    across = np.sqrt(np.maximum(left, 0.0))[:, None] * np.cross(w1, w2)
+    met = left > -1e-12
+    found = [np.column_stack((-_about(w1, f, along + side), _about(w2, u, along + side)))[met] for side in (across, -across)]
+    angles = _distinct(np.concatenate(found))
+    return angles[:, ::-1] if table.swapped else angles
+
+
+def _about(axis: Floats, start: Floats, end: Floats) -> Floats:
+    """Angles (N,) about a unit axis (3,) from vectors (N, 3) to others."""
+    flat = np.einsum("ij,ij->i", start, end) - (start @ axis) * (end @ axis)
+    return np.asarray(np.arctan2(np.cross(start, end) @ axis, flat))
+
+
+def _linear_rates(kin: Kinematics, q: Floats, angles: Floats) -> Floats:
+    """G (N, 3, 3) of the linear joints at rotary positions (N, 2)."""
     rotary, linear = np.flatnonzero(kin.rotary), np.flatnonzero(~np.array(kin.rotary))
-    angles = np.array([[0.3, 0.7], [-0.8, 2.0]])
-    found = held_axis_rates(kin, _turned(q, rotary, angles))[:, linear]
-    (ca, cc), (sa, sc), zero = np.cos(angles).T, np.sin(angles).T, np.zeros(2)
-    turn = np.array([[cc, -ca * sc, sa * sc], [sc, ca * cc, -sa * cc], [zero, sa, ca]])
-    return bool(np.abs(found - turn.transpose(2, 1, 0)).max() < 1e-9)
+    return held_axis_rates(kin, _turned(q, rotary, angles))[:, linear]
 
 
 def numeric(kin: Kinematics, q: Floats, direction: Floats, limit: Floats) -> Floats:
     """Rotary positions (S, 2) of vertices by damped Newton steps from a grid, for any two rotary joints."""
-    rotary, linear = np.flatnonzero(kin.rotary), np.flatnonzero(~np.array(kin.rotary))
+    linear = np.flatnonzero(~np.array(kin.rotary))
     ring = (np.arange(_GRID) + 0.5) * 2.0 * np.pi / _GRID - np.pi
     at = np.stack(np.meshgrid(ring, ring, indexing="ij"), axis=-1).reshape(-1, 2)
 
     def apart(angles: Floats) -> Floats:
         """(N, 2): differences of the shares of the limits that the slides use."""
-        rates = held_axis_rates(kin, _turned(q, rotary, angles))[:, linear] @ direction
+        rates = _linear_rates(kin, q, angles) @ direction
         share = np.abs(rates) / limit[linear] * limit[linear].min()
         return np.asarray(share[:, :2] - share[:, 1:])
 

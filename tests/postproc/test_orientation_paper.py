@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from machines.machine import Machine
-from machines.polytope import held_axis_polytope
+from machines.polytope import aim_table_ac, box_vertices, held_axis_polytope
 from postproc.options import Options
 from postproc.orientation.allowed import Allowed
 from postproc.orientation.candidates import tried
 from postproc.orientation.passes import Pass, work_of
 from postproc.orientation.timed import turned
-from postproc.orientation.vertices import closed_form, is_table_ac, numeric, vertex_angles
+from postproc.orientation.vertices import Table, closed_form, numeric, table_of, vertex_angles
 from postproc.setup import SetupFile
 from tests.postproc.kit import SAMPLES, machine
 from toolpaths.arrays import Floats
@@ -47,9 +47,16 @@ def part_passes(name: str = "mikron-ucp710") -> tuple[Machine, dict[int, Pass]]:
 
 
 
+def mikron() -> Table:
+    """The table C on A of the paper."""
+    table = table_of(machine("mikron-ucp710").kinematics, np.zeros(5))
+    assert table is not None
+    return table
+
+
 def test_printed_solutions() -> None:
     """f = (-1, 0, 0), equal limits: A of +-45 degrees, C of +-54.736 and +-125.264 (acceptance figure 13)."""
-    found = closed_form(np.array([-1.0, 0.0, 0.0]), np.full(3, 5000.0)) / DEG
+    found = closed_form(mikron(), np.array([-1.0, 0.0, 0.0]), np.full(3, 5000.0)) / DEG
     assert len(found) == 16
     small = found[np.abs(found[:, 0]) < 90.0]
     np.testing.assert_allclose(np.unique(np.round(small[:, 0], 6)), [-45.0, 45.0], atol=1e-9)
@@ -60,15 +67,16 @@ def test_printed_solutions() -> None:
 def test_newton_finds_the_closed_form(direction: tuple[float, float, float]) -> None:
     kin, f = machine("mikron-ucp710").kinematics, np.array(direction) / np.linalg.norm(direction)
     limit = np.array([5000.0, 4000.0, 6000.0, 1.0, 1.0])
-    assert is_table_ac(kin, np.zeros(5))
-    np.testing.assert_allclose(sorted_rows(numeric(kin, np.zeros(5), f, limit)), sorted_rows(closed_form(f, limit[:3])),
-                               atol=1e-5)
+    np.testing.assert_allclose(sorted_rows(numeric(kin, np.zeros(5), f, limit)),
+                               sorted_rows(closed_form(mikron(), f, limit[:3])), atol=1e-5)
+    printed = np.concatenate([aim_table_ac(f, vertex) for vertex in box_vertices(limit[:3])])
+    np.testing.assert_allclose(sorted_rows(closed_form(mikron(), f, limit[:3])), sorted_rows(printed), atol=1e-6)
 
 
 def test_no_vertex_on_a_steep_way() -> None:
     """|f_z| above sqrt(2/3) cannot be met (equal limits)."""
     steep = np.array([0.3, 0.48, 0.83])
-    assert len(closed_form(steep, np.full(3, 1.0))) == 0
+    assert len(closed_form(mikron(), steep / np.linalg.norm(steep), np.full(3, 1.0))) == 0
     assert len(numeric(machine("mikron-ucp710").kinematics, np.zeros(5), steep / np.linalg.norm(steep), np.ones(5))) == 0
 
 
