@@ -8,7 +8,7 @@ from postproc.control import Control
 from postproc.controllers.model import ControllerFile
 from postproc.events import spindle_states
 from postproc.moves import Moves, Phase
-from postproc.path import FEED, Path
+from postproc.path import FEED, TRAVERSE, Path
 from postproc.program import Hole
 from postproc.word_rows import WordRows
 from toolpaths.arrays import Bools, Ints
@@ -30,7 +30,8 @@ def holes_of(toolpath: Toolpath, moves: Moves, path: Path, words: WordRows, cont
     """Blocks of holes that the controller can drill by itself, and the holes; not among blocks that a switch may `skip`.
 
     Native where the tool stands along Z of the words, the kind is in the controller's table and the way out ends at
-    the clearance plane, at the level that the tool came from, or at one that the cycle states.
+    the clearance plane, at the level that the tool came from, or at one that the cycle states. Cycles that feed out and then
+    rise higher end at the clearance plane, the rest is a rapid behind them.
     """
     native = np.zeros(len(path), dtype=bool)
     holes: list[Hole] = []
@@ -51,8 +52,10 @@ def holes_of(toolpath: Toolpath, moves: Moves, path: Path, words: WordRows, cont
         first += _before_own_level(moves, path, words, z, first, last)
         level = float(words.start[first, z]) if first > 0 else np.inf
         initial = before_initial if previous_last == first - 1 else level
-        before_initial, previous_last = initial, last
         key = _key(toolpath.cycles[int(moves.cycle[path.move[first]])].kind, int(turning[moves.row[path.move[first]]]))
+        if not _states_retract(controller, key):
+            last -= _rises_beyond(moves, path, words, z, first, last, initial + _slack(path, controller, first))
+        before_initial, previous_last = initial, last
         found = _hole(toolpath, moves, path, words, control, controller, int(first), int(last), initial, key)
         if found is not None and allowed[first]:
             holes.append(found)
@@ -88,6 +91,27 @@ def _before_own_level(moves: Moves, path: Path, words: WordRows, z: int, first: 
     return int(found[-1]) + 1 if len(found) else 0
 
 
+def _rises_beyond(moves: Moves, path: Path, words: WordRows, z: int, first: int, last: int, initial: float) -> bool:
+    """True where block `last` goes on in rapid, from the plane that the cycle feeds out to, to above its initial level.
+
+    No code of a cycle goes there: it stays a block of its own behind the cycle.
+    """
+    fed_out = last > first and path.code[last - 1] == FEED and moves.phase[path.move[last - 1]] == Phase.RETRACT
+    return bool(fed_out and path.code[last] == TRAVERSE and words.end[last, z] > initial)
+
+
+def _states_retract(controller: ControllerFile, key: str) -> bool:
+    """True where the controller's cycle names the level that it retracts to."""
+    specs = [table[key] for table in (controller.cycles.table, controller.cycles.with_dwell) if key in table]
+    return any(name in spec.code for spec in specs for name in STATES_RETRACT)
+
+
+def _slack(path: Path, controller: ControllerFile, block: int) -> float:
+    """mm by which words of one level may differ."""
+    tilted = path.frames[int(path.frame[block])].control.law == "tilted"
+    return ROUNDED * 10.0 ** -controller.format.linear_decimals if tilted else 1e-9
+
+
 def _without_feeding_rapids(moves: Moves, path: Path, first: int, last: int) -> tuple[int, int]:
     """The blocks of a hole without rapids at its ends that are written at feed (`rapid_codes`).
 
@@ -112,9 +136,7 @@ def _hole(toolpath: Toolpath, moves: Moves, path: Path, rows: WordRows, control:
     z = int(control.xyz[2])
     words = np.concatenate([rows.start[first:first + 1], rows.end[first:last + 1]])
     start = int(np.flatnonzero(phases <= Phase.APPROACH)[-1]) + 1 if (phases <= Phase.APPROACH).any() else 0
-    slack = 1e-9
-    if path.frames[int(path.frame[first])].control.law == "tilted":
-        slack = ROUNDED * 10.0 ** -controller.format.linear_decimals
+    slack = _slack(path, controller, first)
     along = bool((np.abs(np.delete(words[start:], z, axis=1) - np.delete(words[start], z)) <= slack).all())
     plane, out, deepest = float(words[start, z]), float(words[-1, z]), float(words[bottom - first + 1, z])
     if feeding_rapid(moves, path, np.arange(first, last + 1)).any() or phases[-1] == Phase.DRILL:
@@ -122,7 +144,7 @@ def _hole(toolpath: Toolpath, moves: Moves, path: Path, rows: WordRows, control:
     if key not in spec or not along or deepest >= plane or len(set(cycle.steps)) > 1:
         return None
     near = [level for level in (plane, initial) if abs(out - level) <= slack]
-    if not near and not any(name in spec[key].code for name in STATES_RETRACT):
+    if not near and not _states_retract(controller, key):
         return None
     out = near[0] if near else out
     return Hole(first, last, int(moves.cycle[path.move[first]]), plane, deepest, out, initial, key, bottom)
@@ -147,8 +169,7 @@ def not_native(toolpath: Toolpath, moves: Moves, path: Path, native: Bools, cont
     for key in np.unique(keys):
         lines = moves.line[rows[keys == key]]
         known = str(key) in controller.cycles.table or str(key) in controller.cycles.with_dwell
-        hint = "the tool must stand along the machine's Z, the retract level must be the clearance plane or the level the " \
-            "tool comes from, a dwell needs an entry in cycles.with_dwell" if known else \
+        hint = "the tool must stand along the machine's Z, a dwell needs an entry in cycles.with_dwell" if known else \
             f"the controller's cycles.table has no {key}; take another cycle in the CAM system"
         result.append(error("cycle.not_native", f"a cycle {key} cannot be written as single moves, and this one not as a "
                             "canned cycle", file=toolpath.file, lines=lines[:6].tolist(), count=len(lines), hint=hint))

@@ -144,14 +144,6 @@ def test_a_tap_with_a_retract_level_of_its_own_is_a_cycle(controller: str, level
     assert result.comparison is not None and result.comparison.worst_tip < 1e-6
 
 
-@pytest.mark.parametrize(("controller", "written"), [("fanuc-30i", False), ("linuxcnc", False), ("siemens-840d", True),
-                                                     ("heidenhain-tnc640", True)])
-def test_a_tap_that_rises_above_where_it_came_from_needs_a_cycle_that_states_it(controller: str, written: bool) -> None:
-    path = toolpath("RAPID", "GOTO/0,0,20", "CYCLE/TAP,DEPTH,12,MMPR,1.0,CLEAR,3,RETURN,30", "GOTO/25,10,0", "CYCLE/OFF")
-    result = convert(path, "mill-3axis", controller)
-    assert result.ok is written and ("cycle.not_native" in {d.code for d in result.diagnostics}) is not written
-
-
 @pytest.mark.parametrize("controller", [*CONTROLLERS, "linuxcnc", "generic-iso"])
 def test_spindle_and_coolant_are_switched_off_once_at_the_end(controller: str) -> None:
     off = program([step("rapid", X=1.0)], {0: [command("START_SPINDLE_CLOCKWISE", 100.0), command("FLOOD_ON")],
