@@ -10,7 +10,7 @@ import typer
 
 from postproc.cli_calibrate import calibrate
 from postproc.cli_catalogue import controller_app, machine_app, setup_app
-from postproc.cli_orient import ORIENTATIONS, MaxTilt, Orient
+from postproc.cli_orient import EXAMPLES, ORIENTATIONS, MaxTilt, Orient
 from postproc.cli_orient import orient as orient_command
 from postproc.cli_place import place
 from postproc.cli_time import time
@@ -30,7 +30,7 @@ app.add_typer(setup_app, name="setup")
 app.add_typer(controller_app, name="controller")
 app.command(epilog="Example: postproc calibrate reversal.toml -o errors.toml")(calibrate)
 app.command(epilog="Example: postproc time part.cls -m mikron-ucp710 -c linuxcnc")(time)
-app.command("orient", epilog="Example: postproc orient part.cls -m mikron-ucp710 --max-tilt 45")(orient_command)
+app.command("orient", epilog=EXAMPLES)(orient_command)
 app.command(epilog="Example: postproc place part.cls -m mill-3axis --setup shop.toml -o placed.toml")(place)
 
 ClFile = Annotated[Path, typer.Argument(metavar="FILE", help="CL file (APT text)")]
@@ -127,10 +127,13 @@ def verify(gcode: Annotated[Path, typer.Argument(metavar="GCODE", help="G-code f
 def trace(file: ClFile, line: Annotated[int, typer.Option("--line", metavar="L", min=1, help="line of the CL file")],
           machine: MachineName, controller: ControllerName, setup: Setup = "", tolerance: Tolerance = 0.01,
           axis_tolerance: AxisTolerance = 0.05, units: Units = "", dialect: Dialect = "", allow_unknown: Allow = None,
-          error_model: Errors = "", beyond: Beyond = False, json: Json = "") -> None:
+          error_model: Errors = "", beyond: Beyond = False, orient: Orient = "keep", max_tilt: MaxTilt = 60.0,
+          json: Json = "") -> None:
     """Show one point of a CL file through every stage, from its record to its blocks and back."""
+    _choice("--orient", orient, ORIENTATIONS)
     options = replace(_options(tolerance, axis_tolerance, "auto", setup, units, dialect, allow_unknown),
-                      error_model=error_model, error_beyond=beyond)
+                      error_model=error_model, error_beyond=beyond, orient=orient,  # type: ignore[arg-type]
+                      max_tilt=max_tilt)
     refuse_overwriting({"--json": json}, {"the CL file": str(file), "the set-up": setup})
     from postproc.pipeline import convert as run
     from postproc.trace import as_text, trace_line

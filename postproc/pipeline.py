@@ -46,6 +46,7 @@ from toolpaths.units import DEG
 if TYPE_CHECKING:
     from postproc.compensation import Compensation
     from postproc.cycle_time.estimate import Estimate
+    from postproc.orientation.orient import OrientationChoice
 
 Progress = Callable[[str, int, int], None]
 MARGIN = 0.85
@@ -78,6 +79,8 @@ class PostResult:
     shares: dict[str, float] | None = None
     files: dict[str, str] | None = None
     """texts of subprograms in files of their own, by file name"""
+    choice: OrientationChoice | None = None
+    """of the tool axes that `toolpath` has instead of the CL file's, where --orient asked for one"""
 
     @property
     def ok(self) -> bool:
@@ -118,20 +121,23 @@ def convert(path: Toolpath, machine: Machine | str | FilePath, controller: str |
         toolpaths.diagnostics.require(more)
     assert spec is not None and setup is not None
     spec = spec.divided(setup.output.files)
-    path, known = _oriented(path, machine, setup, options, _reading(path, diagnostics), progress)
-    start = PostResult("", options, machine, spec, FilePath(controller).stem, setup, known, path)
+    path, choice, known = _oriented(path, machine, setup, options, _reading(path, diagnostics), progress)
+    start = PostResult("", options, machine, spec, FilePath(controller).stem, setup, known, path, choice=choice)
     return start if not start.ok else _stages(start, progress)
 
 
 def _oriented(path: Toolpath, machine: Machine, setup: SetupFile, options: Options, known: tuple[Diagnostic, ...],
-              progress: Progress | None) -> tuple[Toolpath, tuple[Diagnostic, ...]]:
-    """The path with the tool axes that --orient asks for, where it can be read at all."""
+              progress: Progress | None) -> tuple[Toolpath, OrientationChoice | None, tuple[Diagnostic, ...]]:
+    """The path with the tool axes that --orient asks for, where it can be read at all, and their choice."""
     if options.orient == "keep" or has_errors(known):
-        return path, known
+        return path, None, known
     from postproc.orientation.orient import orient
+    from postproc.orientation.report import slower
 
     choice, found = orient(path, machine, setup, options, progress)
-    return (path if choice is None else choice.toolpath(options.orient)), (*known, *found)
+    if choice is None:
+        return path, None, (*known, *found)
+    return choice.toolpath(options.orient), choice, (*known, *found, *slower(choice, options.orient))
 
 
 def _reading(path: Toolpath, diagnostics: list[Diagnostic] | None) -> tuple[Diagnostic, ...]:
@@ -274,7 +280,7 @@ def write_text(result: PostResult) -> tuple[str, dict[str, str]]:
               f"words: {_meanings(result.program)}",
               f"work offset {result.controller.program.offset_name(result.setup.work_offset_code)} in machine coordinates: "
               f"{offset}"]
-    header += _corrections(result)
+    header += _corrections(result) + _orientations(result)
     if result.toolpath.name:
         header.insert(1, f"part {result.toolpath.name}")
     shares = result.shares or {}
@@ -284,6 +290,15 @@ def write_text(result: PostResult) -> tuple[str, dict[str, str]]:
                         subprograms=result.setup.output.divided)
     text = "\n".join(writer.lines(header)) + "\n"
     return text, {name: "\n".join(blocks) + "\n" for name, blocks in writer.files.items()}
+
+
+def _orientations(result: PostResult) -> list[str]:
+    """Header lines that say which tool axes were chosen."""
+    if result.choice is None:
+        return []
+    from postproc.orientation.text import header
+
+    return header(result.choice, result.options.orient)
 
 
 def _corrections(result: PostResult) -> list[str]:
@@ -353,7 +368,7 @@ def verify(gcode: str | FilePath, path: Toolpath, machine: Machine | str | FileP
         data = FilePath(gcode).read_bytes()
     except OSError as fault:
         raise DiagnosticError([error("gcode.open", f"cannot be read: {fault.strerror}", file=str(gcode))]) from fault
-    path, known = _oriented(path, machine, setup, options, _reading(path, diagnostics), progress)
+    path, _, known = _oriented(path, machine, setup, options, _reading(path, diagnostics), progress)
     found = list(known)
     if has_errors(found):
         return VerifyResult(str(gcode), None, tuple(found))

@@ -37,6 +37,7 @@ def as_dict(result: PostResult, output: str) -> dict[str, Any]:
         "tolerance_shares": result.shares or {},
         "output_modes": output_modes(result),
         "geometric_errors": _errors(result),
+        "orientation": _orientation(result),
         "diagnostics": [d.as_dict() for d in result.diagnostics],
     }
 
@@ -63,8 +64,21 @@ def _errors(result: PostResult) -> dict[str, Any] | None:
             "tip_sigma_mm": found.doubt_tip, "axis_sigma_deg": None if found.doubt_axis is None else found.doubt_axis / DEG}
 
 
+def _orientation(result: PostResult) -> dict[str, Any] | None:
+    """The tool axes that were chosen; None where those of the CL file are kept."""
+    if result.choice is None:
+        return None
+    from postproc.orientation.report import chosen
+
+    return chosen(result.choice, result.options.orient)
+
+
 def _number(value: float) -> float | None:
     return value if math.isfinite(value) else None
+
+
+def _seconds(value: float | None) -> str:
+    return "no time" if value is None else f"{value:.3f} s"
 
 
 def _places(value: float) -> str:
@@ -110,6 +124,10 @@ def as_text(result: PostResult, output: str) -> str:
              f"rounding at most {shares['rounding']:.5f} mm"]
     if any(laws != ["axes"] for laws in d["output_modes"].values()):
         lines.append("output: " + ", ".join(f"{name} {' and '.join(laws)}" for name, laws in d["output_modes"].items()))
+    if d["orientation"] is not None:
+        told = d["orientation"]
+        lines.append(f"tool axes, {told['plan']}: {told['turned']} of {len(told['passes'])} passes turned; planned "
+                     f"{_seconds(told['time_s'])}, {_seconds(told['reference_time_s'])} with the axes of the CL file")
     if d["files"]:
         lines.append(f"subprograms beside it: {', '.join(Path(file).name for file in d['files'])}")
     if result.job is not None:

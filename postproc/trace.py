@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from postproc.options import Orientation
 from postproc.pipeline import PostResult
 from postproc.word_arcs import PLANE_AXIS
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.toolpath import Kind, Role
 from toolpaths.units import DEG
+
+if TYPE_CHECKING:
+    from postproc.orientation.orient import OrientationChoice
 
 
 def trace_line(result: PostResult, line: int) -> tuple[dict[str, Any], list[Diagnostic]]:
@@ -50,11 +54,24 @@ def _point(result: PostResult, row: int) -> dict[str, Any]:
         "toolpath": {"tip_mm": toolpath.tip[row].tolist(), "axis": toolpath.axis[row].tolist(),
                      "kind": Kind(int(toolpath.kind[row])).name, "role": Role(int(toolpath.role[row])).name,
                      "operation": operation.name, "pass": int(toolpath.pass_[row])}}
+    if result.choice is not None:
+        point["orientation"] = _turned(result.choice, result.options.orient, row)
     if result.job is None:
         return point
     moves = result.job.moves
     point["moves"] = [_move(result, int(m)) for m in np.flatnonzero(moves.row == row)]
     return point
+
+
+def _turned(choice: OrientationChoice, plan: Orientation, row: int) -> dict[str, Any]:
+    """What --orient made of a point: tip and axis of the CL file, and the pass that was turned."""
+    work = choice.work
+    move = int(np.searchsorted(work.moves.row, row))
+    k = int(np.searchsorted([one.rows[0] for one in work.passes], move, side="right")) - 1
+    made, before = choice.plans[plan].picked[k], choice.tried[k].own
+    return {"tip_mm": work.toolpath.tip[row].tolist(), "axis": work.toolpath.axis[row].tolist(), "pass": k,
+            "fixed": made.one.fixed, "orientation_deg": made.rotary(), "time_s": _finite(made.seconds),
+            "reference_time_s": _finite(before.seconds)}
 
 
 def _move(result: PostResult, m: int) -> dict[str, Any]:
@@ -125,9 +142,17 @@ def as_text(stages: dict[str, Any]) -> str:
         t = point["toolpath"]
         lines.append(f"  toolpath     tip {_vector(t['tip_mm'])}  axis {_vector(t['axis'])}  {t['kind']} {t['role']}  "
                      f"operation {t['operation'] or '-'}  pass {t['pass']}")
+        if "orientation" in point:
+            lines.append(_turned_text(point["orientation"]))
         for move in point.get("moves", []):
             lines += _move_text(move)
     return "\n".join(lines)
+
+
+def _turned_text(o: dict[str, Any]) -> str:
+    angles = " ".join(f"{name}{round(value, 3) + 0.0:.3f}" for name, value in o["orientation_deg"].items())
+    kept = f"  (axis kept: {o['fixed']})" if o["fixed"] else ""
+    return f"  CL file      tip {_vector(o['tip_mm'])}  axis {_vector(o['axis'])}  pass {o['pass']} at {angles}{kept}"
 
 
 def _move_text(move: dict[str, Any]) -> list[str]:

@@ -14,6 +14,7 @@ from postproc.orientation.plans import OrientationPlan
 from postproc.orientation.reaches import binding, reaches
 from postproc.orientation.shares import shares_of
 from postproc.orientation.timed import Turned
+from toolpaths.diagnostics import Diagnostic, warning
 from toolpaths.rotations import angle_between
 from toolpaths.units import DEG
 
@@ -33,10 +34,23 @@ def chosen(choice: OrientationChoice, plan: Orientation) -> dict[str, Any]:
     """What a conversion says about its tool axes: the plan, its seconds, and each pass."""
     picked = choice.plans[plan].picked
     passes = [{"pass": tried.own.one.number, "line": tried.own.one.line, "fixed": tried.own.one.fixed,
-               "axis": axis_of(made, choice.work), "orientation_deg": angles(made), "time_s": finite(made.seconds),
-               "reference_time_s": finite(tried.own.seconds)} for tried, made in zip(choice.tried, picked, strict=True)]
+               "axis": axis_of(made, choice.work), "orientation_deg": angles(made), "held_deg": held(made),
+               "time_s": finite(made.seconds), "reference_time_s": finite(tried.own.seconds)}
+              for tried, made in zip(choice.tried, picked, strict=True)]
     return {"plan": plan, "time_s": finite(choice.plans[plan].seconds),
-            "reference_time_s": finite(choice.plans["keep"].seconds), "passes": passes}
+            "reference_time_s": finite(choice.plans["keep"].seconds),
+            "turned": sum(not made.same(tried.own.axis, tried.own.held)
+                          for tried, made in zip(choice.tried, picked, strict=True)), "passes": passes}
+
+
+def slower(choice: OrientationChoice, plan: Orientation) -> list[Diagnostic]:
+    """A warning where a plan takes longer than the axes of the CL file."""
+    made, before = choice.plans[plan].seconds, choice.plans["keep"].seconds
+    if not made > before:
+        return []
+    return [warning("orient.slower", f"{plan} takes {made:.3f} s, the axes of the CL file {before:.3f} s: turning between "
+                    "passes costs more than it gives", file=choice.work.toolpath.file,
+                    hint="--orient auto is never slower than any other")]
 
 
 def gain(made: float, before: float) -> float | None:
@@ -54,6 +68,11 @@ def angles(made: Turned) -> dict[str, float | None]:
     return {name: finite(value) for name, value in made.rotary().items()}
 
 
+def held(made: Turned) -> float | None:
+    """The angle asked for of the rotary joint that the tool axis leaves free, degrees; None where none is."""
+    return finite(made.held / DEG)
+
+
 def axis_of(made: Turned, work: Work) -> list[float]:
     """The tool axis in the frame of the CL file."""
     axis: list[float] = work.placement.inverse().directions(made.axis[None])[0].tolist()
@@ -62,7 +81,8 @@ def axis_of(made: Turned, work: Work) -> list[float]:
 
 def _pass(tried: Tried, made: Turned, work: Work) -> dict[str, Any]:
     one = tried.own.one
-    return {"pass": one.number, "line": one.line, "fixed": one.fixed, "orientation_deg": angles(made),
+    return {"pass": one.number, "line": one.line, "fixed": one.fixed,
+            "orientation_deg": angles(made), "held_deg": held(made),
             "time_s": finite(made.seconds), "reference_time_s": finite(tried.own.seconds),
             "gain_percent": gain(made.seconds, tried.own.seconds),
             "limiting_axis": made.limiting[0], "limiting_order": made.limiting[1],
@@ -78,8 +98,8 @@ def _pass(tried: Tried, made: Turned, work: Work) -> dict[str, Any]:
 
 def _short(made: Turned | None) -> dict[str, Any] | None:
     """An orientation and its planned time."""
-    return None if made is None else {"orientation_deg": angles(made), "time_s": finite(made.seconds),
-                                      "touches": made.touching}
+    return None if made is None else {"orientation_deg": angles(made), "held_deg": held(made),
+                                      "time_s": finite(made.seconds), "touches": made.touching}
 
 
 def _reach(made: Turned) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from postproc.orientation.orient import OrientationChoice
 from postproc.orientation.plans import OrientationPlan
 from postproc.orientation.reaches import Reach, binding, reaches
 from postproc.orientation.report import NAMES, UNITS, gain
-from postproc.orientation.shares import shares_of
+from postproc.orientation.shares import shares_of, turns
 from postproc.orientation.timed import Turned
 from toolpaths.rotations import angle_between
 
@@ -20,6 +20,8 @@ SHOWN = 40
 """passes in the table; where there are more, those that gain most"""
 LOSERS = 20
 """candidates of a pass in full"""
+RUNS = 20
+"""lines of the head of a program"""
 
 
 def as_text(choice: OrientationChoice, plan: Orientation = "auto", passes: Sequence[int] = ()) -> str:
@@ -38,6 +40,20 @@ def as_text(choice: OrientationChoice, plan: Orientation = "auto", passes: Seque
     return "\n".join([*lines, "", _totals(choice), *_plans(choice)])
 
 
+def header(choice: OrientationChoice, plan: Orientation) -> list[str]:
+    """Lines for the head of a program: the plan, and what tool axes follow one another."""
+    picked = choice.plans[plan].picked
+    first = [k for k in range(len(picked)) if k == 0 or turns(picked[k - 1], picked[k])]
+    lines = [f"planned {seconds(choice.plans[plan].seconds)} s, {seconds(choice.plans['keep'].seconds)} s with the axes of "
+             "the CL file"]
+    for start, end in list(zip(first, [*first[1:], len(picked)], strict=True))[:RUNS]:
+        made, before = (sum(one.seconds for one in some) for some in (
+            picked[start:end], [tried.own for tried in choice.tried[start:end]]))
+        lines.append(f"pass {start}" + (f" to {end - 1}" if end - start > 1 else "") + f": {orientation(picked[start])}, "
+                     f"cuts {seconds(made)} s instead of {seconds(before)} s")
+    return lines + ([f"and {len(first) - RUNS} more turns"] if len(first) > RUNS else [])
+
+
 def _saved(tried: Tried, made: Turned) -> float:
     """Minus the seconds saved; passes without a time last."""
     saved = tried.own.seconds - made.seconds
@@ -46,7 +62,7 @@ def _saved(tried: Tried, made: Turned) -> float:
 
 def orientation(made: Turned) -> str:
     """Angles in words: "A45.000 C-12.500"."""
-    return " ".join(f"{name}{value + 0.0:.3f}" for name, value in made.rotary().items())
+    return " ".join(f"{name}{round(value, 3) + 0.0:.3f}" for name, value in made.rotary().items())
 
 
 def seconds(value: float | None) -> str:
@@ -62,19 +78,23 @@ def percent(value: float | None) -> str:
 def _row(tried: Tried, made: Turned) -> str:
     one, before = tried.own.one, tried.own.seconds
     limit = " ".join(made.limiting).strip() or "-"
+    if not one.stretches:
+        return f"{one.number:>5} {one.line:>7}  {orientation(made):<24} {'-':>9} {'-':>9} {'-':>7}  axis kept: {one.fixed}"
     start = (f"{one.number:>5} {one.line:>7}  {orientation(made):<24} {seconds(made.seconds):>9} {seconds(before):>9} "
              f"{percent(gain(made.seconds, before)):>7}  {limit:<16} ")
-    if one.fixed:
-        return f"{start}{'':>12} {'':>9}  kept: {one.fixed}"
+    kept = f"axis kept: {one.fixed}" if one.fixed else ""
+    if not tried.rejected:
+        return start + kept
     after = best_loser(tried)
     beaten = seconds(None if after is None else after.seconds)
-    return f"{start}{seconds(tried.best.seconds):>12} {beaten:>9}  {listed(grouped([tried])) or '-'}"
+    reasons = "; ".join(filter(None, (listed(grouped([tried])), kept)))
+    return f"{start}{seconds(tried.best.seconds):>12} {beaten:>9}  {reasons or '-'}"
 
 
 def _in_full(tried: Tried, made: Turned) -> list[str]:
     """One pass: what its orientations reach along the mean direction, and each loser with its reason."""
     one = tried.own.one
-    lines = [f"pass {one.number}, line {one.line}" + (f", kept: {one.fixed}" if one.fixed else "")]
+    lines = [f"pass {one.number}, line {one.line}" + (f", axis kept: {one.fixed}" if one.fixed else "")]
     for name, it in (("CL axis", tried.own), ("paper", tried.aimed), ("best alone", tried.best), ("chosen", made)):
         if it is not None:
             lines += [f"  {name:<10} {orientation(it)}, {seconds(it.seconds)} s" + _reached(reaches(it))

@@ -66,8 +66,8 @@ def many() -> OrientationChoice:
     return replace(one, tried=16 * one.tried, plans=plans, paper=repeated(one.paper))
 
 
-def run(*arguments: object, code: int = 0) -> Result:
-    result = CliRunner().invoke(app, ["orient", *map(str, arguments), "-m", "mikron-ucp710"])
+def run(*arguments: object, code: int = 0, command: str = "orient") -> Result:
+    result = CliRunner().invoke(app, [command, *map(str, arguments), "-m", "mikron-ucp710"])
     assert result.exit_code == code, result.output
     return result
 
@@ -215,3 +215,49 @@ def test_command_refuses_what_it_cannot_show(tmp_path: Path) -> None:
     assert "would replace" in run(file, "--figure", both, "--json", both, code=2).output
     missing = run(file, "--error-model", tmp_path / "none.toml", code=1).output
     assert "none.toml" in missing and "Traceback" not in missing
+
+
+def test_converted_program_says_which_axes_were_chosen(tmp_path: Path) -> None:
+    """Head and JSON: each pass with its orientation and seconds; what takes longer is told."""
+    file, out, figures = tmp_path / "p.apt", tmp_path / "p.ngc", tmp_path / "p.json"
+    file.write_text(written(3))
+    result = run(file, "-c", "linuxcnc", "-o", out, "--orient", "per-pass", "--json", figures, command="convert")
+    told = json.loads(figures.read_text())["orientation"]
+    assert told["plan"] == "per-pass" and told["turned"] == 3
+    assert [one["pass"] for one in told["passes"]] == [0, 1, 2]
+    assert all(one["time_s"] < one["reference_time_s"] for one in told["passes"])
+    angles = told["passes"][0]["orientation_deg"]
+    head = [line for line in out.read_text().splitlines() if line.startswith("(pass ")]
+    assert head[0].startswith(f"(pass 0 to 2: A{angles['A']:.3f} C{angles['C']:.3f}, cuts ")
+    assert "3 of 3 passes turned" in result.output
+    assert ("orient.slower" in result.output) == (told["time_s"] > told["reference_time_s"])
+
+
+def test_what_takes_longer_is_told() -> None:
+    slow, quick = report.slower(part(), "per-pass"), report.slower(part(), "auto")
+    assert [d.code for d in slow] == ["orient.slower"] and not quick
+    assert f"{part().plans['per-pass'].seconds:.3f} s" in slow[0].message
+
+
+def test_kept_axes_are_no_orientation(tmp_path: Path) -> None:
+    file, figures = tmp_path / "p.apt", tmp_path / "p.json"
+    file.write_text(written(1))
+    run(file, "-c", "linuxcnc", "-o", tmp_path / "p.ngc", "--json", figures, command="convert")
+    assert json.loads(figures.read_text())["orientation"] is None
+
+
+def test_trace_shows_the_point_of_the_file_and_its_pass(tmp_path: Path) -> None:
+    file, figures = tmp_path / "p.apt", tmp_path / "p.json"
+    file.write_text(written(3))
+    result = run(file, "--line", 18, "-c", "linuxcnc", "--orient", "per-pass", "--json", figures, command="trace")
+    point = json.loads(figures.read_text())["points"][0]
+    was, now = point["orientation"], point["toolpath"]
+    assert was["tip_mm"] == [80.0, 1.0, 0.0] and was["axis"] == [0.0, 0.0, 1.0] and was["pass"] == 1
+    centre = [np.array(at["tip_mm"]) + 8.0 * np.array(at["axis"]) for at in (was, now)]
+    assert centre[0] == pytest.approx(centre[1], abs=1e-7) and now["axis"] != was["axis"]
+    assert "CL file      tip (80.000000, 1.000000, 0.000000)" in result.output
+
+
+def test_head_of_many_turns_is_short() -> None:
+    lines = text.header(many(), "per-pass")
+    assert len(lines) == text.RUNS + 2 and lines[-1].startswith("and ") and lines[-1].endswith("more turns")
