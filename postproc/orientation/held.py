@@ -105,7 +105,7 @@ def _ways(one: Pass) -> Floats:
     """Ways (K, 3) that the cuts of a pass are made of, some of each stretch."""
     tips = [stretch.tip[_places(len(stretch.tip), len(one.stretches))] for stretch in one.stretches]
     way = np.concatenate([np.diff(tip, axis=0) for tip in tips])
-    return way[np.linalg.norm(way, axis=1) > 0.0]
+    return np.asarray(way[np.linalg.norm(way, axis=1) > 0.0])
 
 
 def _places(count: int, stretches: int) -> Ints:

@@ -7,7 +7,7 @@ from machines.user_file import nearest, read_toml
 from postproc.orientation.allowed import own_outside
 from postproc.orientation.passes import Pass, Work
 from postproc.setup_orientation import OrientationLimits
-from toolpaths.diagnostics import Diagnostic, error, warning
+from toolpaths.diagnostics import Diagnostic, error, info, warning
 
 _NORMALS = ("have the CAM system write surface normals (GOTO with nine numbers), or name the part mesh ([bodies] part), or "
             "limit the tilt from the CL's own axis alone (--max-tilt)")
@@ -18,7 +18,7 @@ def limit_faults(work: Work, file: str = "") -> list[Diagnostic]:
     limits = work.setup.orientation
     free = [one for one in work.passes if not one.fixed]
     return [*_unknown_operations(work, limits, file), *_no_normals(work, limits, free), *_too_wide(work, limits, free, file),
-            *_own(work, limits, free)]
+            *_no_contact(work, free), *_own(work, limits, free)]
 
 
 def _unknown_operations(work: Work, limits: OrientationLimits, file: str) -> list[Diagnostic]:
@@ -45,6 +45,18 @@ def _too_wide(work: Work, limits: OrientationLimits, free: list[Pass], file: str
     return [error("orient.contact_radius", f"contact_radius = {radius:g} mm, the ball of pass {bad[0].number} has a radius "
                   f"of {bad[0].radius:g} mm", file=file or work.toolpath.file, lines=_line(file, "contact_radius"),
                   count=len(bad), hint="a distance below the ball's radius, or off_centre in degrees")]
+
+
+def _no_contact(work: Work, free: list[Pass]) -> list[Diagnostic]:
+    """Places where the part says nothing: the ball is not on it, or too deep in it."""
+    some = [one for one in free if one.contact.unknown and work.toolpath.normal is None]
+    if not some or work.setup.bodies is None:
+        return []
+    unknown = sum(one.contact.unknown for one in some)
+    places = unknown + sum(len(one.contact) for one in some)
+    return [info("orient.no_contact", f"at {unknown} of {places} places on cutting moves the ball does not touch the part "
+                 f"mesh within {work.setup.bodies.gouge:g} mm and the tolerance: no lead or tilt is looked at there",
+                 file=work.toolpath.file, lines=[one.line for one in some][:6], count=len(some))]
 
 
 def _own(work: Work, limits: OrientationLimits, free: list[Pass]) -> list[Diagnostic]:

@@ -17,6 +17,7 @@ from postproc.moves import Moves, build_moves
 from postproc.options import Options
 from postproc.orientation.contact import Contact, contact_of
 from postproc.orientation.cutter import ball_radius
+from postproc.orientation.surface import Surface, surface_of
 from postproc.pass_geometry import chains, stops_of
 from postproc.setup import Placement, SetupFile, part_placement
 from toolpaths.arrays import Bools, Floats, Ints
@@ -136,20 +137,23 @@ def work_of(toolpath: Toolpath, machine: Machine, setup: SetupFile, options: Opt
         return None, [*found, *more]
     moves = moves.placed(placement)
     normals = None if toolpath.normal is None else placement.directions(toolpath.normal)[moves.row]
+    surface, faults = surface_of(setup, placement, options.tolerance, options.setup) if turning else (None, [])
+    if has_errors(faults):
+        return None, [*found, *more, *faults]
     by_home = [e.index for e in toolpath.events if e.word == "GOHOME"] + [c.index for c in tool_changes(toolpath)]
-    cutting = _Cutting(toolpath, moves, moves.curves(), normals, machine, setup,
+    cutting = _Cutting(toolpath, moves, moves.curves(), normals, surface, machine, setup,
                        frozenset({0, *np.searchsorted(moves.row, by_home).tolist()}),
                        _stretches(toolpath, moves, Tolerance(options.tolerance, options.axis_tolerance * DEG)))
     passes = [_pass(number, rows, cutting)
               for number, rows in enumerate(pairwise([*_beginnings(toolpath, moves).tolist(), len(moves)]))]
-    faults = _unknown_cutters(toolpath, passes) if turning else []
+    unknown = _unknown_cutters(toolpath, passes) if turning else []
     work = Work(toolpath, machine, setup, placement, moves, safe_space(moves, setup, placement), tuple(passes))
-    return (None if faults else work), [*found, *more, *faults]
+    return (None if unknown else work), [*found, *more, *faults, *unknown]
 
 
 @dataclass(frozen=True)
 class _Cutting:
-    """What all passes are cut from: moves in the table frame, normals (M, 3) at their ends, NaN where none is known.
+    """What all passes are cut from: moves in the table frame, normals (M, 3) of the file at their ends, NaN for none.
 
     Attributes:
         homes: rows that the tool comes to from home
@@ -160,17 +164,20 @@ class _Cutting:
     moves: Moves
     curves: Curves
     normals: Floats | None
+    surface: Surface | None
     machine: Machine
     setup: SetupFile
     homes: frozenset[int]
     stretches: dict[int, list[Stretch]]
 
-    def contact(self, cuts: Ints) -> Contact:
-        """Where the surface is known along the moves `cuts`."""
-        if self.normals is None:
+    def contact(self, cuts: Ints, radius: float) -> Contact:
+        """Where the surface is known along the moves `cuts` of a ball: from the file, else from the part; 0 for no ball."""
+        if self.normals is not None and bool(np.isfinite(self.normals[cuts]).any()):
+            ends = np.stack((np.maximum(cuts - 1, 0), cuts), axis=1)
+            return contact_of(self.curves.take(cuts), self.normals[ends], self.moves.line[ends])
+        if self.surface is None or radius == 0.0 or not len(cuts):
             return Contact.none()
-        ends = np.stack((np.maximum(cuts - 1, 0), cuts), axis=1)
-        return contact_of(self.curves.take(cuts), self.normals[ends], self.moves.line[ends])
+        return self.surface.contact(self.curves.take(cuts), self.moves.line[cuts], radius)
 
 
 def _beginnings(toolpath: Toolpath, moves: Moves) -> Ints:
@@ -228,7 +235,8 @@ def _pass(number: int, rows: tuple[int, int], of: _Cutting) -> Pass:
     inside = [one for first in range(*rows) for one in of.stretches.get(first, ())]
     stays = _kept(of, cuts) or _fixed(moves, rows, cuts - rows[0], axis)
     fixed = stays or _by_cutter(radius)
-    return Pass(number, rows, moves.tip[here], moves.axis[here], moves.kind[here] == Kind.RAPID, axis, of.contact(cuts),
+    contact = of.contact(cuts, 0.0 if fixed else radius or 0.0)
+    return Pass(number, rows, moves.tip[here], moves.axis[here], moves.kind[here] == Kind.RAPID, axis, contact,
                 radius or 0.0, fixed, not stays, not of.homes.isdisjoint(range(*rows)), tool, kin, tuple(inside),
                 int(moves.line[lead]))
 
