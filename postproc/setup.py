@@ -10,6 +10,7 @@ import numpy as np
 from pydantic import Field
 
 from machines.user_file import UserModel, load_toml, read_toml
+from postproc.setup_bodies import Bodies, ToolBody
 from postproc.setup_orientation import OrientationLimits
 from postproc.setup_place import PlacementLimits
 from toolpaths.arrays import Floats
@@ -43,7 +44,7 @@ class Clearance(UserModel):
     """a rapid that turns the tool axis by more than this is linked by the safe planes, degrees"""
 
 
-class ToolSetup(UserModel):
+class ToolSetup(ToolBody):
     """One tool in the machine."""
 
     gauge_length: float = Field(gt=0.0)
@@ -137,6 +138,8 @@ class SetupFile(UserModel):
     """by rotary axis, e.g. [control_pivots.A]: what the control's parameters say; default: as the machine file"""
     rewind: Rewind = Rewind()
     joints: Joints = Joints()
+    bodies: Bodies | None = None
+    """part, table and fixtures that the tools must not touch"""
     orientation: OrientationLimits = OrientationLimits()
 
 

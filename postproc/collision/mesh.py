@@ -54,7 +54,7 @@ def _loaded(path: str, _changed: int, _size: int, units: str) -> tuple[Trimesh |
             read = trimesh.load_mesh(path, process=False, **_reader(path))
     except Exception as fault:  # the readers of the formats raise what comes up
         why = "" if isinstance(fault, ImportError) else f" ({type(fault).__name__}: {fault})"
-        return None, (error("mesh.format", f"is no {FilePath(path).suffix[1:].upper()} file that can be read{why}", file=path,
+        return None, (error("mesh.format", f"is no {path.rpartition('.')[2].upper()} file that can be read{why}", file=path,
                             hint="export it anew"),)
     faults = _broken(read, path)
     if faults:

@@ -1,0 +1,142 @@
+"""Part, table and fixtures where they stand, and what of a tool comes too near to them on its way."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from postproc.collision.form import CUTTER, HOLDER, PARTS, SHANK, Form
+from postproc.collision.mesh import load_mesh
+from postproc.collision.search import Nearest, nearest
+from postproc.collision.solid import Solid, solid
+from postproc.collision.swept import Swept
+from postproc.setup import Placement, SetupFile
+from postproc.setup_bodies import Solid as Given
+from postproc.setup_bodies import Units
+from toolpaths.arrays import Floats
+from toolpaths.diagnostics import Diagnostic, error, has_errors
+
+PART = "the part"
+_TABLE = Placement(np.eye(3), np.zeros(3))
+
+
+@dataclass(frozen=True)
+class Body:
+    """A solid in the table frame, `name` as messages call it."""
+
+    name: str
+    solid: Solid
+
+    @property
+    def is_part(self) -> bool:
+        """True for what is cut."""
+        return self.name == PART
+
+
+@dataclass(frozen=True)
+class Scene:
+    """All bodies of a set-up, with what tools keep from them: `clearance`, and `gouge` that a cutter may reach into the
+    part, mm."""
+
+    bodies: tuple[Body, ...]
+    clearance: float
+    gouge: float
+
+    def pairs(self, form: Form) -> Iterator[tuple[int, Body, float]]:
+        """(CUTTER, SHANK or HOLDER, body, least distance in mm) of all pairs that are checked."""
+        for part in (CUTTER, SHANK, HOLDER):
+            if len(form.of(part)):
+                for body in self.bodies:
+                    yield part, body, -self.gouge if part == CUTTER and body.is_part else self.clearance
+
+
+@dataclass(frozen=True)
+class Touch:
+    """A pair that is nearer than allowed: `distance`, `limit` in mm; -inf where the tool is inside altogether.
+
+    `place` is a piece of the way.
+    """
+
+    tool: int
+    part: int
+    body: Body
+    distance: float
+    limit: float
+    place: int
+
+    def __str__(self) -> str:
+        who, what = f"{PARTS[self.part]} of T{self.tool}", self.body.name
+        if self.distance == -np.inf:
+            return f"{who} is inside {what}"
+        if self.limit < 0.0:
+            return f"{who} cuts {-self.distance:.3f} mm into {what}, allowed {-self.limit:.3f}"
+        if self.distance <= 0.0:
+            return f"{who} touches {what} by {-self.distance:.2f} mm"
+        return f"{who} comes within {self.distance:.2f} mm of {what}, allowed {self.limit:.2f}"
+
+
+def scene(setup: SetupFile, placement: Placement, file: str) -> tuple[Scene | None, list[Diagnostic]]:
+    """The bodies that a set-up names, the part standing at `placement`; None where it names none or one is no good.
+
+    `file` is that of the set-up.
+    """
+    given = setup.bodies
+    if given is None:
+        return None, []
+    part = Given(file=given.part) if given.part is not None else None
+    named = [(PART, "bodies.part", part, placement), ("the table", "bodies.table", given.table, _TABLE)]
+    named += [(f"fixture {one.name}", f"bodies.fixtures[{k}]", one, placement if one.frame == "part" else _TABLE)
+              for k, one in enumerate(given.fixtures)]
+    folder, found, bodies = Path(file).parent, [], []
+    for name, key, each, where in named:
+        if each is not None:
+            body, more = _solid(each, where, folder, given.units, key)
+            found += more
+            bodies += [] if body is None else [Body(name, body)]
+    if not bodies and not has_errors(found):
+        found.append(error("collision.no_bodies", "[bodies] names no part, table or fixture", file=file,
+                           hint="part = \"part.stl\", [bodies.table] or [[bodies.fixtures]]"))
+    return (None if has_errors(found) else Scene(tuple(bodies), given.clearance, given.gouge)), found
+
+
+def _solid(given: Given, where: Placement, folder: Path, units: Units,
+           key: str) -> tuple[Solid | None, list[Diagnostic]]:
+    """A mesh or box in the table frame."""
+    if given.file is not None:
+        mesh, found = load_mesh(folder / given.file, given.units or units, key)
+        return (None if mesh is None else solid(mesh, where)), found
+    import trimesh
+
+    assert given.box is not None
+    return solid(trimesh.creation.box(bounds=[given.box.low, given.box.high]), where), []
+
+
+def touches(all_bodies: Scene, form: Form, way: Swept, cutting: Swept | None = None,
+            known: dict[int, Nearest] | None = None) -> list[Touch]:
+    """What of a tool comes too near to what on a way; a pair once, at its worst.
+
+    Args:
+        cutting: the way on which the cutter is compared with the part, where it is not the whole
+        known: by body, what is known of the cutter's first piece already
+    """
+    result = []
+    for part, body, limit in all_bodies.pairs(form):
+        gouging = part == CUTTER and body.is_part
+        on = cutting if gouging and cutting is not None else way
+        if not len(on):
+            continue
+        found = nearest(body.solid, on, form.of(part), limit)
+        if found.place >= 0:
+            result.append(Touch(form.number, part, body, found.distance, limit, int(on.row[found.place])))
+    if not result:
+        result = [Touch(form.number, part, body, -np.inf, limit, int(way.row[0]))
+                  for part, body, limit in all_bodies.pairs(form) if body.solid.holds(_core(form.of(part), way))]
+    return result
+
+
+def _core(pieces: Floats, way: Swept) -> Floats:
+    """A point (3,) of the axis in the first piece, where the way begins: what no surface passes it never leaves."""
+    return np.asarray(way.tip[0, 0] + 0.5 * (pieces[0, 1] + pieces[0, 3]) * way.axis[0, 0])

@@ -1,0 +1,212 @@
+"""How near a moving tool comes to a solid: least signed distance over the whole way, by proved lower bounds.
+
+Two trees of boxes, round the triangles and round the pieces of the way, are gone through together. Over a pair of boxes
+the body's normal n at their middles bounds the distance from below (see `revolution`); so does, over a triangle, its own
+plane. A pair whose bound is not below the least distance found so far is done with; others are split, in the end the
+triangle and the piece themselves. What is left over is proved, not sampled: where nothing is found, the distance is
+nowhere on the way, between its points and between the corners of the mesh too, less than the limit by more than `EXACT`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from postproc.collision.revolution import around, bend, lever, support
+from postproc.collision.solid import Solid
+from postproc.collision.swept import Swept
+from toolpaths.arrays import Floats, Ints
+
+EXACT = 1e-3
+"""mm"""
+PART = 0.005
+"""of what is missing to the limit, where something is"""
+EFFORT = 50_000
+"""cells that are looked at once something is too near, to learn how much: the distance told is one that is had"""
+_BATCH = 4096
+_SMALL = 1e-5
+"""mm: smaller cells are not split"""
+_ROUND = 2.5
+"""(theta / chord)^2 of the longest turn, half a circle"""
+
+
+@dataclass(frozen=True)
+class Nearest:
+    """Least distance, mm, negative where the tool reaches into the solid; `limit` where nothing is nearer than that.
+
+    `piece` of the tool, `place` on the way (-1: nothing is nearer than the limit), `point` (3,) of the solid.
+    """
+
+    distance: float
+    piece: int = -1
+    place: int = -1
+    point: tuple[float, float, float] = (np.nan, np.nan, np.nan)
+
+
+def nearest(body: Solid, way: Swept, pieces: Floats, limit: float) -> Nearest:
+    """What of a tool's `pieces` (P, 5) comes nearest to a body, where that is less than `limit` mm."""
+    best = Nearest(limit)
+    for number, piece in enumerate(pieces):
+        best = _Search(body, way, piece, number, best, limit).run()
+    return best
+
+
+class _Search:
+    """One piece of the tool; `best` is what was found so far."""
+
+    def __init__(self, body: Solid, way: Swept, piece: Floats, number: int, best: Nearest, limit: float) -> None:
+        self.body, self.way, self.piece, self.number, self.best, self.limit = body, way, piece, number, best, limit
+        self.lever, self.looked = lever(piece), 0
+        self.body_first, self.way_first = body.tree.leaves - 1, way.tree.leaves - 1
+
+    @property
+    def enough(self) -> float:
+        """mm: pairs with a bound of this or more do not matter."""
+        if self.looked > EFFORT:
+            return -np.inf
+        return self.best.distance - max(EXACT, PART * (self.limit - self.best.distance))
+
+    def run(self) -> Nearest:
+        """Best first, in batches."""
+        pairs = np.zeros((1, 2), dtype=np.int64)
+        bound = self._bound(pairs)
+        while len(pairs):
+            pairs, bound, batch = _next(pairs, bound, self.enough)
+            leaf = (batch[:, 0] >= self.body_first) & (batch[:, 1] >= self.way_first)
+            if leaf.any():
+                self._cells(batch[leaf] - (self.body_first, self.way_first))
+            more = self._split(batch[~leaf])
+            pairs, bound = np.concatenate((pairs, more)), np.concatenate((bound, self._bound(more)))
+        return self.best
+
+    def _bound(self, pairs: Ints) -> Floats:
+        """Bounds (N,) over pairs (N, 2) of nodes of the solid and of the way."""
+        axes, chord = self.way.axes
+        body, way, (k, m) = self.body.tree, self.way.tree, pairs.T
+        distance, normal = around(self.piece, body.centre[k] - way.centre[m], axes[m])
+        return np.asarray(distance - (np.abs(normal) * (body.half[k] + way.half[m])).sum(axis=1) - self.lever * chord[m])
+
+    def _split(self, pairs: Ints) -> Ints:
+        """Children of pairs (N, 2), the larger of the two nodes split; those that hold nothing are left out."""
+        body, way, (k, m) = self.body.tree.half, self.way.tree.half, pairs.T
+        size = way[m].sum(axis=1) + self.lever * self.way.axes[1][m]
+        first = (m >= self.way_first) | ((k < self.body_first) & (body[k].sum(axis=1) >= size))
+        one = pairs.copy()
+        one[first, 0] = 2 * k[first] + 1
+        one[~first, 1] = 2 * m[~first] + 1
+        other = one.copy()
+        other[first, 0] += 1
+        other[~first, 1] += 1
+        both = np.concatenate((one, other))
+        return np.asarray(both[(body[both[:, 0], 0] >= 0.0) & (way[both[:, 1], 0] >= 0.0)])
+
+    def _cells(self, pairs: Ints) -> None:
+        """Triangles and pieces of the way themselves, halved until the least distance is known."""
+        cells = _Cells.of(self.body, self.way, pairs)
+        bound = self._look(cells)
+        while True:
+            keep = bound < self.enough
+            cells, bound = cells.take(keep), bound[keep]
+            if not len(bound):
+                return
+            order = np.argsort(bound, kind="stable")
+            now, later = order[:_BATCH], order[_BATCH:]
+            halves = cells.take(now).halved(self.lever)
+            cells, bound = halves.and_also(cells.take(later)), np.concatenate((self._look(halves), bound[later]))
+
+    def _look(self, cells: _Cells) -> Floats:
+        """Bounds (N,); the distance in the middle of each cell is one that is had."""
+        middle, tip, axis = cells.middles()
+        distance, normal = around(self.piece, middle - tip, axis)
+        bound = np.maximum(cells.apart(normal, self.piece), cells.apart(-cells.normal, self.piece))
+        bound -= cells.slack + self.lever * cells.twist
+        self.looked += len(distance) if self.best.distance < self.limit else 0
+        k = int(distance.argmin()) if len(distance) else 0
+        if len(distance) and distance[k] < self.best.distance:
+            x, y, z = middle[k].tolist()
+            self.best = Nearest(float(distance[k]), self.number, int(cells.place[k]), (x, y, z))
+        return np.where(cells.size(self.lever) > _SMALL, bound, np.inf)
+
+
+def _next(pairs: Ints, bound: Floats, enough: float) -> tuple[Ints, Floats, Ints]:
+    """(pairs that stay, their bounds, the batch to be looked at): those that cannot matter are dropped."""
+    keep = bound < enough
+    pairs, bound = pairs[keep], bound[keep]
+    if len(pairs) <= _BATCH:
+        return pairs[:0], bound[:0], pairs
+    order = np.argpartition(bound, _BATCH)
+    return pairs[order[_BATCH:]], bound[order[_BATCH:]], pairs[order[:_BATCH]]
+
+
+@dataclass(frozen=True)
+class _Cells:
+    """N pairs of a part of a triangle (N, 3, 3) with its normal and a part of a piece: tips and axes (N, 2, 3).
+
+    `slack` (N,) mm, `twist` (N,) chord as in Swept, `place` (N,) on the way.
+    """
+
+    corners: Floats
+    normal: Floats
+    tip: Floats
+    axis: Floats
+    slack: Floats
+    twist: Floats
+    place: Ints
+
+    @classmethod
+    def of(cls, body: Solid, way: Swept, pairs: Ints) -> _Cells:
+        k, m = pairs.T
+        return cls(body.corners[k], body.normal[k], way.tip[m], way.axis[m], way.slack[m], way.twist[m], m)
+
+    def take(self, which: Ints | np.ndarray[tuple[int], np.dtype[np.bool_]]) -> _Cells:
+        return _Cells(*(getattr(self, name)[which] for name in self.__dataclass_fields__))
+
+    def and_also(self, other: _Cells) -> _Cells:
+        return _Cells(*(np.concatenate((getattr(self, name), getattr(other, name))) for name in self.__dataclass_fields__))
+
+    def middles(self) -> tuple[Floats, Floats, Floats]:
+        """Middle of the triangle, tip and axis (N, 3) in the middle of the piece."""
+        total = self.axis.sum(axis=1)
+        return self.corners.mean(axis=1), self.tip.mean(axis=1), total / np.linalg.norm(total, axis=1, keepdims=True)
+
+    def apart(self, n: Floats, piece: Floats) -> Floats:
+        """Bounds (N,) mm by planes with the normals n (N, 3): the triangle's corners on one side, the tool on the other.
+
+        How far the tool reaches along n, tip and axis moving evenly, is nowhere more than at the ends of the way by more
+        than `bend` theta^2 / 8: its second derivative is no less than -bend theta^2 (|n x a|'' >= -|n x a|).
+        """
+        corner = np.einsum("nki,ni->nk", self.corners, n).min(axis=1)
+        reach = np.stack([np.einsum("ni,ni->n", self.tip[:, k], n)
+                          + support(piece, np.einsum("ni,ni->n", self.axis[:, k], n)) for k in (0, 1)])
+        chord = np.linalg.norm(self.axis[:, 1] - self.axis[:, 0], axis=1)
+        return np.asarray(corner - reach.max(axis=0) - _ROUND * bend(piece) * chord**2 / 8.0)
+
+    def size(self, reach: float) -> Floats:
+        """mm (N,): the larger of the triangle's longest edge and the way."""
+        return np.asarray(np.maximum(self._edges().max(axis=1), self._way(reach)))
+
+    def _edges(self) -> Floats:
+        return np.asarray(np.linalg.norm(self.corners - np.roll(self.corners, -1, axis=1), axis=2))
+
+    def _way(self, reach: float) -> Floats:
+        step = np.linalg.norm(self.tip[:, 1] - self.tip[:, 0], axis=1)
+        return np.asarray(step + reach * np.linalg.norm(self.axis[:, 1] - self.axis[:, 0], axis=1))
+
+    def halved(self, reach: float) -> _Cells:
+        """Both halves of each: the triangle by its longest edge, or the way in its middle."""
+        edges = self._edges()
+        longest = edges.argmax(axis=1)
+        by_edge = edges.max(axis=1) >= self._way(reach)
+        n, rows = len(edges), np.flatnonzero(by_edge)
+        corners, tip, axis = (np.concatenate((a, a)) for a in (self.corners, self.tip, self.axis))
+        a, b = longest[rows], (longest[rows] + 1) % 3
+        middle = 0.5 * (self.corners[rows, a] + self.corners[rows, b])
+        corners[rows, b], corners[n + rows, a] = middle, middle
+        rows = np.flatnonzero(~by_edge)
+        half, total = self.tip[rows].mean(axis=1), self.axis[rows].sum(axis=1)
+        turned = total / np.linalg.norm(total, axis=1, keepdims=True)
+        tip[rows, 1], tip[n + rows, 0] = half, half
+        axis[rows, 1], axis[n + rows, 0] = turned, turned
+        normal, slack, twist = (np.concatenate((v, v)) for v in (self.normal, self.slack, self.twist))
+        return _Cells(corners, normal, tip, axis, slack, twist, np.concatenate((self.place, self.place)))

@@ -1,0 +1,57 @@
+"""A mesh as the search sees it: triangles in the table frame, in an order that keeps near ones together, in a tree."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from postproc.collision.tree import Tree, tree, z_order
+from postproc.setup import Placement
+from toolpaths.arrays import Floats
+
+if TYPE_CHECKING:
+    from trimesh import Trimesh
+
+
+@dataclass(frozen=True)
+class Solid:
+    """Closed surface of T triangles.
+
+    Attributes:
+        corners (T, 3, 3): mm
+        normal (T, 3): unit, out of the material
+        tree: boxes round the triangles
+    """
+
+    corners: Floats
+    normal: Floats
+    tree: Tree
+
+    def __len__(self) -> int:
+        return len(self.corners)
+
+    def holds(self, point: Floats) -> bool:
+        """True where a point (3,) lies inside: the solid angles of all triangles add up to 4 pi.
+
+        Van Oosterom and Strackee, The solid angle of a plane triangle (1983), equation 8.
+        """
+        low, high = self.tree.centre[0] - self.tree.half[0], self.tree.centre[0] + self.tree.half[0]
+        if bool(((point < low) | (point > high)).any()):
+            return False
+        a, b, c = np.moveaxis(self.corners - point, 1, 0)
+        la, lb, lc = (np.linalg.norm(v, axis=1) for v in (a, b, c))
+        volume = np.einsum("ti,ti->t", a, np.cross(b, c))
+        below = la * lb * lc + (a * b).sum(axis=1) * lc + (b * c).sum(axis=1) * la + (c * a).sum(axis=1) * lb
+        return bool(abs(2.0 * np.arctan2(volume, below).sum()) > 2.0 * np.pi)
+
+
+def solid(mesh: Trimesh, placement: Placement) -> Solid:
+    """A closed mesh where `placement` puts it."""
+    corners = placement.points(np.asarray(mesh.vertices, dtype=np.float64))[np.asarray(mesh.faces)]
+    corners = corners[z_order(corners.mean(axis=1))]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    size = np.linalg.norm(normal, axis=1)
+    corners, normal = corners[size > 0.0], normal[size > 0.0] / size[size > 0.0, None]
+    return Solid(corners, normal, tree(corners.min(axis=1), corners.max(axis=1)))

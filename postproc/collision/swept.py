@@ -1,0 +1,102 @@
+"""The way of a tool as short pieces: tips straight, axes on great circles, and how far they may be off that."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from postproc.collision.tree import Tree, tree
+from toolpaths.arrays import Floats, Ints
+from toolpaths.shape import Curves
+
+SAGITTA = 1e-3
+"""mm by which pieces of an arc may be off it"""
+
+
+@dataclass(frozen=True)
+class Swept:
+    """N pieces in the table frame, in order.
+
+    Attributes:
+        tip (N, 2, 3), axis (N, 2, 3): at both ends; unit axes
+        slack (N,): mm by which a tip may be off its straight line
+        twist (N,): chord by which an axis may be off its great circle
+        row (N,): what the piece belongs to
+    """
+
+    tip: Floats
+    axis: Floats
+    slack: Floats
+    twist: Floats
+    row: Ints
+
+    def __len__(self) -> int:
+        return len(self.tip)
+
+    def take(self, which: Ints) -> Swept:
+        """Some of the pieces."""
+        return Swept(self.tip[which], self.axis[which], self.slack[which], self.twist[which], self.row[which])
+
+    def turned(self, shift: Floats, axis: Floats) -> Swept:
+        """The same pieces moved by `shift` (3,), the tool along `axis` (3,); the tree moves with them."""
+        made = replace(self, tip=self.tip + shift, axis=np.broadcast_to(axis, self.axis.shape).copy(),
+                       twist=np.zeros(len(self)))
+        made.__dict__["tree"] = replace(self.tree, centre=self.tree.centre + shift)
+        return made
+
+    @cached_property
+    def tree(self) -> Tree:
+        """Boxes round the tips, what they may be off included."""
+        return tree(self.tip.min(axis=1) - self.slack[:, None], self.tip.max(axis=1) + self.slack[:, None])
+
+    @cached_property
+    def axes(self) -> tuple[Floats, Floats]:
+        """Per node of the tree a unit axis (2 L - 1, 3), and the largest chord (2 L - 1,) from it to an axis within."""
+        leaves, n = self.tree.leaves, len(self)
+        middle = np.zeros((leaves, 3))
+        middle[:n] = self.axis.sum(axis=1)
+        middle[:n] /= np.linalg.norm(middle[:n], axis=1, keepdims=True)
+        off = np.zeros(leaves)
+        off[:n] = np.linalg.norm(self.axis[:, 0] - middle[:n], axis=1) + self.twist
+        middles, chords = [middle], [off]
+        while len(middles[-1]) > 1:
+            middle, off = _joined(middles[-1], chords[-1])
+            middles.append(middle)
+            chords.append(off)
+        return np.concatenate(middles[::-1]), np.concatenate(chords[::-1])
+
+
+def _joined(axis: Floats, off: Floats) -> tuple[Floats, Floats]:
+    """Axis and chord of the parents of nodes; nodes without axis hold nothing."""
+    pair, total = axis.reshape(-1, 2, 3), axis.reshape(-1, 2, 3).sum(axis=1)
+    size = np.linalg.norm(total, axis=1, keepdims=True)
+    middle = np.where(size > 1e-9, total / np.where(size > 1e-9, size, 1.0), pair[:, 0])
+    chord = np.linalg.norm(pair - middle[:, None], axis=2) + off.reshape(-1, 2)
+    held = (pair != 0.0).any(axis=2)
+    return middle, np.where(held, chord, 0.0).max(axis=1)
+
+
+def along_curves(curves: Curves, row: Ints) -> Swept:
+    """The pieces of N curves; `row` (N,) tells what each belongs to. Arcs are cut so that chords stay within SAGITTA."""
+    count, slack = np.ones(len(curves), dtype=np.int64), np.zeros(len(curves))
+    arc = np.flatnonzero(curves.is_arc)
+    if len(arc):
+        radial = np.cross(curves.start[arc] - curves.center[arc], curves.normal[arc])
+        radius = np.maximum(np.linalg.norm(radial, axis=1), 1e-9)
+        step = 2.0 * np.arccos(1.0 - np.minimum(SAGITTA / radius, 1.0))
+        count[arc] = np.ceil(np.maximum(curves.sweep[arc] / step, 1.0)).astype(np.int64)
+        slack[arc] = SAGITTA
+    piece = np.repeat(np.arange(len(curves)), count)
+    k = np.arange(len(piece)) - np.repeat(np.cumsum(count) - count, count)
+    each = curves.take(piece)
+    (tip0, axis0), (tip1, axis1) = each.at(k / count[piece]), each.at((k + 1) / count[piece])
+    return Swept(np.stack((tip0, tip1), axis=1), np.stack((axis0, axis1), axis=1), slack[piece], np.zeros(len(piece)),
+                 row[piece])
+
+
+def joined(parts: list[Swept]) -> Swept:
+    """Several as one, in order."""
+    return Swept(*(np.concatenate([getattr(part, name) for part in parts])
+                   for name in ("tip", "axis", "slack", "twist", "row")))

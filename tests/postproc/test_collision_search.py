@@ -1,0 +1,112 @@
+"""Least distances of a moving tool from solids: closed forms, dense points, the rib between two samples."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import trimesh
+
+from postproc.collision.revolution import around, signed, support
+from postproc.collision.search import EXACT, PART, nearest
+from postproc.collision.solid import Solid, solid
+from postproc.collision.swept import Swept
+from postproc.setup import Placement
+from toolpaths.arrays import Floats
+from toolpaths.rotations import slerp
+
+HERE = Placement(np.eye(3), np.zeros(3))
+BALL = np.array([[0.0, 8.0, 0.0, 8.0, 8.0]])
+CYLINDER = np.array([[6.0, 0.0, 6.0, 40.0, 0.0]])
+CONE = np.array([[0.0, 0.0, 10.0, 10.0, 0.0]])
+BULL = np.array([[4.0, 2.0, 4.0, 2.0, 2.0], [6.0, 2.0, 6.0, 40.0, 0.0]])
+UP = (0.0, 0.0, 1.0)
+
+
+def block() -> Solid:
+    """100 x 100 x 20 mm, its top at z = 10."""
+    return solid(trimesh.creation.box((100.0, 100.0, 20.0)), HERE)
+
+
+def way(*tips: tuple[float, float, float], axis: tuple[float, float, float] = UP) -> Swept:
+    points = np.array(tips)
+    n = len(points) - 1
+    return Swept(np.stack((points[:-1], points[1:]), axis=1), np.tile(np.array(axis), (n, 2, 1)), np.zeros(n), np.zeros(n),
+                 np.arange(n))
+
+
+@pytest.mark.parametrize("piece", [BALL, CYLINDER, BULL, CONE])
+@pytest.mark.parametrize("height", [0.7, 0.0, -0.05, -1.5])
+def test_over_a_plane_the_distance_is_the_height(piece: Floats, height: float) -> None:
+    """A sunken point of a cone is nearer to the cone's side than to its tip."""
+    z = 10.0 + height
+    found = nearest(block(), way((-40.0, -30.0, z), (40.0, -30.0, z), (40.0, 30.0, z)), piece, 1.0)
+    expected = height * np.sqrt(0.5) if piece is CONE and height < 0.0 else height
+    assert found.distance == pytest.approx(expected, abs=EXACT + PART * (1.0 - height))
+    assert found.distance >= expected - 1e-9
+
+
+def test_beside_a_wall_the_distance_is_that_of_the_cylinder() -> None:
+    found = nearest(block(), way((60.0, -30.0, 0.0), (56.4, 30.0, 0.0)), CYLINDER, 1.0)
+    assert found.distance == pytest.approx(0.4, abs=0.005) and found.place == 0
+    assert found.point[0] == pytest.approx(50.0) and found.point[1] == pytest.approx(30.0, abs=1.0)
+
+
+def test_over_a_ball_the_distance_is_that_of_the_centres() -> None:
+    ball = solid(trimesh.creation.icosphere(5, radius=30.0), HERE)
+    found = nearest(ball, way((-60.0, 5.0, 28.0), (60.0, 5.0, 28.0)), BALL, 1.0)
+    expected = np.hypot(5.0, 36.0) - 38.0
+    assert expected - 0.01 < found.distance < expected + 0.03  # the mesh lies inside the sphere by its chords
+
+
+def test_farther_than_the_limit_is_nothing() -> None:
+    assert nearest(block(), way((0.0, 0.0, 11.5), (9.0, 0.0, 11.5)), CYLINDER, 1.0).place == -1
+
+
+def test_a_thin_rib_between_two_points_of_the_way_is_found() -> None:
+    """0.2 mm thick, in the middle of a rapid of 1000 mm whose ends are far from it."""
+    rib = solid(trimesh.creation.box((0.2, 50.0, 40.0)), HERE)
+    found = nearest(rib, way((-500.0, 0.0, 19.0), (503.0, 0.0, 19.0)), CYLINDER, 0.5)
+    assert found.distance == pytest.approx(-1.0, abs=0.02)
+    assert nearest(rib, way((-500.0, 0.0, 20.6), (503.0, 0.0, 20.6)), CYLINDER, 0.5).place == -1
+
+
+def test_the_normal_is_where_the_body_reaches_farthest() -> None:
+    """f(p) = n . p - h(n), and no other direction gives more: the bound that everything rests on."""
+    rng = np.random.default_rng(3)
+    for piece in (BALL[0], CYLINDER[0], CONE[0], BULL[0], np.array([7.0, 3.0, 2.0, 30.0, 1.5])):
+        rho, z = rng.uniform(0.0, 30.0, 400), rng.uniform(-20.0, 60.0, 400)
+        distance, radial, axial = signed(piece, rho, z)
+        assert np.allclose(radial * rho + axial * z - support(piece, axial), distance, atol=1e-9)
+        for angle in np.linspace(0.0, np.pi, 181):
+            other = np.sin(angle) * rho + np.cos(angle) * z - support(piece, np.full(400, np.cos(angle)))
+            assert (other <= distance + 1e-9).all()
+
+
+def test_random_tools_that_turn_agree_with_dense_points() -> None:
+    """Independent: points all over the mesh, at many moments."""
+    rng = np.random.default_rng(0)
+    mesh = trimesh.creation.icosphere(2, radius=30.0)
+    body, points = solid(mesh, HERE), dense(mesh, 6)
+    for _ in range(12):
+        (r0, r1), z0 = rng.uniform(0.0, 12.0, 2), rng.uniform(0.0, 10.0)
+        piece = np.array([[r0, z0, r1, z0 + rng.uniform(0.5, 40.0), rng.uniform(0.0, 4.0)]])
+        a, b = rng.normal(size=(2, 3))
+        a /= np.linalg.norm(a)
+        b = a + 0.6 * b / np.linalg.norm(b)
+        b /= np.linalg.norm(b)
+        p, q = rng.uniform(-60.0, 60.0, (2, 3))
+        moving = Swept(np.array([[p, q]]), np.array([[a, b]]), np.zeros(1), np.zeros(1), np.zeros(1, dtype=np.int64))
+        found = nearest(body, moving, piece, 3.0)
+        seen = min(float(around(piece[0], points - (p + u * (q - p)), np.repeat(slerp(a[None], b[None], np.array([u])),
+                                                                              len(points), axis=0))[0].min())
+                   for u in np.linspace(0.0, 1.0, 40))
+        assert found.distance <= min(seen, 3.0) + EXACT + PART * max(3.0 - seen, 0.0)
+        assert found.distance >= min(seen - 1.5, 3.0)
+
+
+def dense(mesh: trimesh.Trimesh, parts: int) -> Floats:
+    """Points on all triangles."""
+    i, j = np.meshgrid(np.arange(parts + 1), np.arange(parts + 1), indexing="ij")
+    u, v = (i[i + j <= parts] / parts)[:, None, None], (j[i + j <= parts] / parts)[:, None, None]
+    a, b, c = np.moveaxis(np.asarray(mesh.triangles), 1, 0)
+    return np.asarray(((1.0 - u - v) * a + u * b + v * c).reshape(-1, 3))
