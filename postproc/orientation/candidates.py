@@ -51,10 +51,10 @@ class Tried:
 
 
 class Search:
-    """Candidates of one pass out of `passes`, each solved once, the runnable ones timed on the same knots."""
+    """Candidates of one pass, each solved once, the runnable ones timed on the same knots."""
 
-    def __init__(self, one: Pass, machine: Machine, allowed: Allowed, passes: int = 1) -> None:
-        self.one, self.machine, self.allowed, self.passes = one, machine, allowed, passes
+    def __init__(self, one: Pass, machine: Machine, allowed: Allowed) -> None:
+        self.one, self.machine, self.allowed = one, machine, allowed
         self.own = turned(one, one.axis, machine, allowed.touching)
         self.known = [self.own]
         self.lost: dict[int, Lost] = {}
@@ -64,10 +64,12 @@ class Search:
 
     def seconds(self, made: Turned) -> float:
         """As ranked; inf where the machine cannot run it or something is touched."""
-        if made.refused or made.touching:
-            return np.inf
+        return np.inf if made.refused or made.touching else self._ranked(made)
+
+    def _ranked(self, made: Turned) -> float:
+        """Seconds of a runnable candidate, whatever it touches."""
         if id(made) not in self._times:
-            self._ranking = self._ranking or Ranking(made, self.passes)
+            self._ranking = self._ranking or Ranking(made)
             self._times[id(made)] = self._ranking.seconds(made)
             self.planned += 1
         return self._times[id(made)]
@@ -97,22 +99,29 @@ class Search:
         self.lost[id(made)] = Lost(told, why, kind)
 
     def better(self, best: Turned, made: Turned) -> Turned:
-        """The better of two; a candidate whose bound already loses is not planned."""
+        """The better of two, `made` being runnable; where its bound already loses it is not planned, and what it touches is
+        looked at only where it would win."""
         least = self.seconds(best) * (1.0 - _WORTH)
         if made.bound >= least:
             self.pruned += 1
             self.lose(made, f"takes at least {made.bound:.4f} s", "bound")
-            return best
-        if made.touching:
+        elif self._ranked(made) >= least:
+            self.lose(made, f"takes {self._ranked(made):.4f} s", "slower")
+        elif made.touching:
             self.lose(made, made.touching, "touches")
-            return best
-        winner, loser = (made, best) if self.seconds(made) < least else (best, made)
-        if loser.touching:
-            self.lose(loser, loser.touching, "touches")
         else:
-            self.lose(loser, f"takes {self.seconds(loser):.4f} s", "slower")
-        self.lost.pop(id(winner), None)
-        return winner
+            self._beaten(best)
+            return made
+        return best
+
+    def _beaten(self, best: Turned) -> None:
+        """Note why one that was the best no longer is."""
+        if best.refused:
+            self.lose(best, best.refused, "travel" if best.refused.startswith("travel") else "reach")
+        elif best.touching:
+            self.lose(best, best.touching, "touches")
+        else:
+            self.lose(best, f"takes {self._ranked(best):.4f} s", "slower")
 
     def settled(self, best: Turned) -> Turned:
         """The best, unless planned on knots of its own it is slower than the CL's own axis."""
@@ -128,10 +137,9 @@ class Search:
         return Tried(self.own, best, aimed, rejected, self.pruned, self.planned)
 
 
-def tried(one: Pass, machine: Machine, allowed: Allowed, passes: int = 1, hints: Sequence[Floats] = ()) -> Tried:
-    """All candidates of a pass out of `passes`, planned unless their bound says that they lose; `hints` are axes (3,) to try
-    as well."""
-    search = Search(one, machine, allowed, passes)
+def tried(one: Pass, machine: Machine, allowed: Allowed, hints: Sequence[Floats] = ()) -> Tried:
+    """All candidates of a pass, planned unless their bound says that they lose; `hints` are axes (3,) to try as well."""
+    search = Search(one, machine, allowed)
     if one.fixed:
         return search.tried(search.settled(best_held(search, search.own)), None)
     aimed = aimed_axes(one, machine, search.own.q[0])

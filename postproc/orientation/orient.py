@@ -5,14 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from machines.machine import Machine
+from postproc.collision.passes import pass_bodies
 from postproc.options import Options, Orientation
 from postproc.orientation.allowed import Allowed
-from postproc.orientation.candidates import Tried
+from postproc.orientation.candidates import Tried, tried
 from postproc.orientation.limited import limit_faults
 from postproc.orientation.passes import Work, work_of
 from postproc.orientation.plans import OrientationPlan, plans_of
+from postproc.orientation.ranking import prepare
 from postproc.orientation.reoriented import reoriented
-from postproc.orientation.rounds import PassFault, Progress, search_all
+from postproc.orientation.rounds import PassFault, Progress, each_pass
 from postproc.setup import SetupFile
 from toolpaths.diagnostics import Diagnostic, error, has_errors, warning
 from toolpaths.toolpath import Toolpath
@@ -40,22 +42,29 @@ class OrientationChoice:
 
 
 def orient(toolpath: Toolpath, machine: Machine, setup: SetupFile, options: Options | None = None,
-           progress: Progress | None = None) -> tuple[OrientationChoice | None, list[Diagnostic]]:
-    """Orientations of all passes of a toolpath, within `options.max_tilt`; None where a diagnostic is an ERROR."""
+           progress: Progress | None = None,
+           workers: int | None = None) -> tuple[OrientationChoice | None, list[Diagnostic]]:
+    """Orientations of all passes of a toolpath, within `options.max_tilt`; None where a diagnostic is an ERROR.
+
+    Args:
+        workers: processes for many passes, None for as many as there are cores; the choice does not depend on it
+    """
     options = options or Options()
     work, found = work_of(toolpath, machine, setup, options)
     if work is None:
         return None, found
-    found += limit_faults(work, options.setup)
+    bodies, more = pass_bodies(work, options.setup)
+    found += limit_faults(work, options.setup) + more
     if has_errors(found):
         return None, found
-    allowed = Allowed(options.max_tilt * DEG, None, setup.orientation)
+    allowed = Allowed(options.max_tilt * DEG, bodies, setup.orientation)
     try:
-        results = search_all(work, allowed, progress)
+        prepare(work.passes)
+        results = each_pass(lambda k: tried(work.passes[k], machine, allowed), work, allowed, "orienting", progress, workers)
         found += _fixed(work) + _touching(work, results)
         if has_errors(found):
             return None, found
-        plans = plans_of(work, results, allowed, progress)
+        plans = plans_of(work, results, allowed, progress, workers)
     except PassFault as fault:
         return None, [*found, error("orient.plan", f"no motion could be planned: {fault}", file=toolpath.file,
                                     lines=[fault.line])]

@@ -12,9 +12,9 @@ from postproc.orientation.candidates import Tried
 from postproc.orientation.choose import groupwise, shortest
 from postproc.orientation.passes import Work
 from postproc.orientation.ranking import Ranking
-from postproc.orientation.rounds import Progress
+from postproc.orientation.rounds import Progress, each_pass
 from postproc.orientation.timed import Turned, turned_all
-from postproc.orientation.turns import all_ends, ways_between
+from postproc.orientation.turns import Ends, all_ends, ways_between
 from toolpaths.arrays import Floats
 from toolpaths.units import DEG
 
@@ -25,6 +25,8 @@ _EQUAL = 2e-4
 """part of the time of a cut by which its best orientations may differ; turns decide among them"""
 Axis = tuple[Floats, float]
 """Tool axis (3,) and held angle, see `Turned`."""
+_Row = tuple[list[Turned], Floats, list[Ends]]
+"""States of a pass, seconds (K,) of their cuts, their ends"""
 
 
 @dataclass(frozen=True)
@@ -88,12 +90,13 @@ class _Table:
         return OrientationPlan(made, cuts, rapids, ways, float(np.sum(cuts) + np.sum(rapids) + np.sum(ways)))
 
 
-def plans_of(work: Work, results: list[Tried], allowed: Allowed, progress: Progress | None = None) -> Plans:
+def plans_of(work: Work, results: list[Tried], allowed: Allowed, progress: Progress | None = None,
+             workers: int | None = None) -> Plans:
     """The plans; `auto` chooses among everything the others use, and is the least of them.
 
     `keep` is the CL file as it is, its time is told even where its tool touches something; no other plan takes such a state.
     """
-    table = _table(work, results, allowed, progress)
+    table = _table(work, results, allowed, progress, workers)
     cost = table.costs()
     keep = [0] * len(results)
     least = [float(np.where(np.isfinite(c), cut, np.inf).min()) for cut, c in zip(table.cuts, cost, strict=True)]
@@ -112,20 +115,27 @@ def _least(plans: list[OrientationPlan]) -> OrientationPlan:
     return min(reversed(plans), key=lambda plan: (plan.touches, plan.seconds))
 
 
-def _table(work: Work, results: list[Tried], allowed: Allowed, progress: Progress | None) -> _Table:
+def _table(work: Work, results: list[Tried], allowed: Allowed, progress: Progress | None, workers: int | None) -> _Table:
     """All states with their seconds."""
-    states, cuts, rapids, edges = [], [], [], []
-    for n, (one, pool) in enumerate(zip(results, _pools(results), strict=True)):
-        if progress is not None:
-            progress("comparing", n, len(results))
-        row = _states(one, allowed, pool)
-        edge = all_ends(row, work)
-        ranking = Ranking(next((made for made in row if not made.refused), row[0]), len(results)) if len(row) > 1 else None
-        states.append(row)
-        cuts.append(np.array([made.seconds if ranking is None else ranking.seconds(made) for made in row]))
-        rapids.append(np.array([each.rapids for each in edge]))
-        edges.append(edge)
-    return _Table(states, cuts, rapids, ways_between(work, edges))
+    pools = _pools(results)
+
+    def row(k: int) -> _Row:
+        states = _states(results[k], allowed, pools[k])
+        return states, _ranked(states), all_ends(states, work)
+
+    rows = each_pass(row, work, allowed, "comparing", progress, workers)
+    rapids = [np.array([each.rapids for each in edge]) for _, _, edge in rows]
+    return _Table([states for states, _, _ in rows], [cuts for _, cuts, _ in rows], rapids,
+                  ways_between(work, [edge for _, _, edge in rows]))
+
+
+def _ranked(states: list[Turned]) -> Floats:
+    """Seconds (K,) of the cuts of the states of one pass, on the same knots."""
+    runs = [made for made in states if not made.refused]
+    if len(runs) < 2:
+        return np.array([made.seconds for made in states])
+    ranking = Ranking(runs[0])
+    return np.array([ranking.seconds(made) for made in states])
 
 
 def _pools(results: list[Tried]) -> list[list[Axis]]:

@@ -7,14 +7,16 @@ own for each axis; what is chosen here is planned so in the end.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from scipy.interpolate import BSpline, make_interp_spline
 from scipy.sparse import csr_matrix, diags, identity, vstack
 
+from postproc.feedrate.compiled import compiled, wanted
 from postproc.feedrate.feed import Allowed
 from postproc.feedrate.geometry import DEGREE, MachinePath
+from postproc.feedrate.interior_kernel import pentadiagonal
 from postproc.feedrate.limits import JointLimits, squared_speed, steady_cap
 from postproc.feedrate.paths import Eased
 from postproc.feedrate.plan import Options
@@ -22,24 +24,31 @@ from postproc.feedrate.problem import Problem
 from postproc.feedrate.rows import UNBOUND
 from postproc.feedrate.second_order import least_time, second_order
 from postproc.feedrate.spline import rest_basis
-from postproc.feedrate.windows import Method, solve_problem
+from postproc.feedrate.windows import KERNEL_FROM, Method, solve_problem
+from postproc.orientation.passes import Pass
 from postproc.orientation.timed import Turned
 from toolpaths.arrays import Floats
 
 _MOVES = 1e-9
 """mm or rad: joints that move less along a stretch stand still"""
-_WAIT = 5
-"""solves of a pass for which the compiler is waited for as long as for one in full; a pass takes some 25"""
+_KNOTS = 20
+"""of all plans of a pass together that count for each of its sites, where it is asked whether a compiler pays"""
 LONG = 50_000
 """knots of a pass from which each axis is planned in full, in windows"""
 
 
-class Ranking:
-    """Of one pass out of `passes`. `first`, which must be runnable, is planned in full and lends its knots."""
+def prepare(passes: Sequence[Pass]) -> None:
+    """Load the compiler where so many passes are worth it; then all of them are planned by compiled loops, else none."""
+    if wanted(_KNOTS * sum(len(stretch.s) for one in passes for stretch in one.stretches), KERNEL_FROM):
+        compiled(pentadiagonal)
 
-    def __init__(self, first: Turned, passes: int = 1) -> None:
+
+class Ranking:
+    """Of one pass. `first`, which must be runnable, is planned in full and lends its knots."""
+
+    def __init__(self, first: Turned) -> None:
         knots = sum(len(each) for each in first.knots)
-        method = Method().settled(_WAIT * passes * knots)
+        method = Method().settled(knots)
         self._grids = [] if knots > LONG else [_Grid(stretch.s, each, Allowed(stretch.feed), first.jerky, method)
                                                for stretch, each in zip(first.one.stretches, first.knots, strict=True)]
 

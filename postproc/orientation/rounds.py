@@ -1,36 +1,131 @@
-"""What is done pass by pass."""
+"""The same done for every pass, on all cores where there are many; the results do not depend on how many cores there are.
+
+Workers are forked, so that they have passes, machine and bodies without copying; only results travel back, in which these
+are named instead of written (`_Packer`). Where a system cannot fork, one process does it all.
+"""
 
 from __future__ import annotations
 
+import io
+import os
+import pickle
+import signal
+import sys
 from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from itertools import repeat
+from multiprocessing import get_context
+from typing import Any, TypeVar
 
 from postproc.orientation.allowed import Allowed
-from postproc.orientation.candidates import Tried, tried
-from postproc.orientation.passes import Work
+from postproc.orientation.passes import Pass, Work
 
 Progress = Callable[[str, int, int], None]
+T = TypeVar("T")
+CHUNK = 8
+"""passes that are done one after the other"""
+_FEWEST = 4 * CHUNK
+"""passes from which processes pay"""
+_shared: list[tuple[Callable[[int], Any], Work, Allowed]] = []
+"""what the workers are to do; theirs by inheritance"""
 
 
 class PassFault(Exception):
     """No motion could be planned for the pass of a line."""
 
     def __init__(self, message: str, line: int) -> None:
-        super().__init__(message)
+        super().__init__(message, line)
         self.line = line
 
+    def __str__(self) -> str:
+        return str(self.args[0])
 
-def search_all(work: Work, allowed: Allowed, progress: Progress | None = None) -> list[Tried]:
-    """The search in each pass.
+
+def each_pass(function: Callable[[int], T], work: Work, allowed: Allowed, name: str, progress: Progress | None = None,
+              workers: int | None = None) -> list[T]:
+    """`function` of the numbers of all passes, in order; `progress` is told `name` and how far it is.
+
+    Args:
+        workers: processes, None for as many as there are cores; 1 for this one alone
 
     Raises:
         PassFault: where no motion can be planned.
     """
-    results = []
-    for one in work.passes:
+    count = len(work.passes)
+    chunks = [range(first, min(first + CHUNK, count)) for first in range(0, count, CHUNK)]
+    result: list[T] = []
+
+    def take(found: list[T]) -> None:
+        result.extend(found)
         if progress is not None:
-            progress("orienting", one.number, len(work.passes))
-        try:
-            results.append(tried(one, work.machine, allowed, len(work.passes)))
-        except (ValueError, ArithmeticError) as fault:
-            raise PassFault(str(fault), one.line) from fault
-    return results
+            progress(name, len(result) - 1, count)
+
+    workers = min(_cores() if workers is None else workers, len(chunks))
+    if workers < 2 or count < _FEWEST:
+        for k in range(count):
+            take([_guarded(function, work.passes[k])])
+        return result
+    _shared.append((function, work, allowed))
+    pool = ProcessPoolExecutor(workers, get_context("fork"), _ignore_interrupt)
+    try:
+        for packed in pool.map(_chunk, chunks, repeat(len(_shared) - 1)):
+            take(_unpacked(packed, work, allowed))
+    finally:
+        pool.shutdown(wait=False, cancel_futures=True)
+        _shared.pop()
+    return result
+
+
+def _cores() -> int:
+    """Cores that this process may use; 1 where it should not fork."""
+    return len(os.sched_getaffinity(0)) if sys.platform == "linux" else 1
+
+
+def _ignore_interrupt() -> None:
+    """Ctrl-C is the parent's business."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _chunk(passes: range, which: int) -> bytes:
+    """In a worker: results of some passes, packed."""
+    function, work, allowed = _shared[which]
+    out = io.BytesIO()
+    _Packer(out, work, allowed).dump([_guarded(function, work.passes[k]) for k in passes])
+    return out.getvalue()
+
+
+def _guarded(function: Callable[[int], T], one: Pass) -> T:
+    """Faults of planning, by the line of the pass."""
+    try:
+        return function(one.number)
+    except (ValueError, ArithmeticError) as fault:
+        raise PassFault(str(fault), one.line) from fault
+
+
+class _Packer(pickle.Pickler):
+    """Names passes, machine and what is allowed, which the parent has."""
+
+    def __init__(self, out: io.BytesIO, work: Work, allowed: Allowed) -> None:
+        super().__init__(out, pickle.HIGHEST_PROTOCOL)
+        self._names = {id(work.machine): "machine", id(allowed): "allowed"} | {id(one): one.number for one in work.passes}
+
+    def persistent_id(self, value: Any) -> str | int | None:
+        """Its name, None for all else."""
+        return self._names.get(id(value))
+
+
+class _Unpacker(pickle.Unpickler):
+    """The other way."""
+
+    def __init__(self, packed: bytes, work: Work, allowed: Allowed) -> None:
+        super().__init__(io.BytesIO(packed))
+        self._named: dict[str | int, Any] = {"machine": work.machine, "allowed": allowed}
+        self._named |= {one.number: one for one in work.passes}
+
+    def persistent_load(self, name: Any) -> Any:
+        """What has the name."""
+        return self._named[name]
+
+
+def _unpacked(packed: bytes, work: Work, allowed: Allowed) -> Any:
+    return _Unpacker(packed, work, allowed).load()
