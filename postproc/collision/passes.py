@@ -62,7 +62,7 @@ class PassBodies:
         space, ends = self.work.space, one.tip[[0, -1]] + one.shift(axis)
         lift = np.maximum(space.plane(axis, True, 1.0) - (ends - space.centre) @ axis, 0.0)
         tip = np.stack((ends, ends + lift[:, None] * axis), axis=1)
-        return Swept(tip, np.tile(axis, (2, 2, 1)), np.zeros(2), np.zeros(2), np.array(one.rows) - [0, 1])
+        return Swept(tip, np.tile(axis, (2, 2, 1)), np.array(one.rows) - [0, 1])
 
     @cached_property
     def _curves(self) -> Curves:

@@ -16,6 +16,7 @@ import numpy as np
 from postproc.collision.revolution import around, bend, lever, support
 from postproc.collision.solid import Solid
 from postproc.collision.swept import Swept
+from postproc.feedrate.compiled import compiled, wanted
 from toolpaths.arrays import Floats, Ints
 
 EXACT = 1e-3
@@ -24,6 +25,8 @@ PART = 0.005
 """of what is missing to the limit, where something is"""
 EFFORT = 50_000
 """cells that are looked at once something is too near, to learn how much: the distance told is one that is had"""
+_LONG = 500
+"""pieces of a way, from which on loops are compiled"""
 _BATCH = 4096
 _SMALL = 1e-5
 """mm: smaller cells are not split"""
@@ -46,10 +49,28 @@ class Nearest:
 
 def nearest(body: Solid, way: Swept, pieces: Floats, limit: float) -> Nearest:
     """What of a tool's `pieces` (P, 5) comes nearest to a body, where that is less than `limit` mm."""
+    if wanted(len(way), _LONG):
+        return _compiled(body, way, pieces, limit)
     best = Nearest(limit)
     for number, piece in enumerate(pieces):
         best = _Search(body, way, piece, number, best, limit).run()
     return best
+
+
+def _compiled(body: Solid, way: Swept, pieces: Floats, limit: float) -> Nearest:
+    """The same by the loops of `kernel`."""
+    from postproc.collision import kernel
+
+    run = compiled(kernel.search)
+    (solid_nodes, corners), (way_nodes, parts) = body.packed, way.packed
+    out, which = np.array([limit, -1.0, np.nan, np.nan, np.nan, 0.0]), -1
+    for number, piece in enumerate(pieces):
+        before, size = float(out[0]), np.array([lever(piece), bend(piece)])
+        out[5] = 0.0
+        run(piece, size, solid_nodes, corners, body.normal, way_nodes, parts, limit, np.array([EXACT, PART, EFFORT]), out)
+        which = number if out[0] < before else which
+    x, y, z = out[2:5].tolist()
+    return Nearest(float(out[0]), which, int(out[1]), (x, y, z))
 
 
 class _Search:
@@ -120,7 +141,6 @@ class _Search:
         middle, tip, axis = cells.middles()
         distance, normal = around(self.piece, middle - tip, axis)
         bound = np.maximum(cells.apart(normal, self.piece), cells.apart(-cells.normal, self.piece))
-        bound -= cells.slack + self.lever * cells.twist
         self.looked += len(distance) if self.best.distance < self.limit else 0
         k = int(distance.argmin()) if len(distance) else 0
         if len(distance) and distance[k] < self.best.distance:
@@ -143,21 +163,19 @@ def _next(pairs: Ints, bound: Floats, enough: float) -> tuple[Ints, Floats, Ints
 class _Cells:
     """N pairs of a part of a triangle (N, 3, 3) with its normal and a part of a piece: tips and axes (N, 2, 3).
 
-    `slack` (N,) mm, `twist` (N,) chord as in Swept, `place` (N,) on the way.
+    `place` (N,) on the way.
     """
 
     corners: Floats
     normal: Floats
     tip: Floats
     axis: Floats
-    slack: Floats
-    twist: Floats
     place: Ints
 
     @classmethod
     def of(cls, body: Solid, way: Swept, pairs: Ints) -> _Cells:
         k, m = pairs.T
-        return cls(body.corners[k], body.normal[k], way.tip[m], way.axis[m], way.slack[m], way.twist[m], m)
+        return cls(body.corners[k], body.normal[k], way.tip[m], way.axis[m], m)
 
     def take(self, which: Ints | np.ndarray[tuple[int], np.dtype[np.bool_]]) -> _Cells:
         return _Cells(*(getattr(self, name)[which] for name in self.__dataclass_fields__))
@@ -208,5 +226,5 @@ class _Cells:
         turned = total / np.linalg.norm(total, axis=1, keepdims=True)
         tip[rows, 1], tip[n + rows, 0] = half, half
         axis[rows, 1], axis[n + rows, 0] = turned, turned
-        normal, slack, twist = (np.concatenate((v, v)) for v in (self.normal, self.slack, self.twist))
-        return _Cells(corners, normal, tip, axis, slack, twist, np.concatenate((self.place, self.place)))
+        return _Cells(corners, np.concatenate((self.normal, self.normal)), tip, axis,
+                      np.concatenate((self.place, self.place)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -31,6 +32,11 @@ class Solid:
 
     def __len__(self) -> int:
         return len(self.corners)
+
+    @cached_property
+    def packed(self) -> tuple[Floats, Floats]:
+        """Nodes (2 L - 1, 6): centre, half; corners (T, 9)."""
+        return np.hstack((self.tree.centre, self.tree.half)), self.corners.reshape(-1, 9)
 
     def holds(self, point: Floats) -> bool:
         """True where a point (3,) lies inside: the solid angles of all triangles add up to 4 pi.

@@ -1,4 +1,4 @@
-"""The way of a tool as short pieces: tips straight, axes on great circles, and how far they may be off that."""
+"""The way of a tool as short pieces: tips straight, axes on great circles, nowhere off the true way by more than OFF."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from postproc.collision.tree import Tree, tree
 from toolpaths.arrays import Floats, Ints
 from toolpaths.shape import Curves
 
-SAGITTA = 1e-3
-"""mm by which pieces of an arc may be off it"""
+OFF = 2e-3
+"""mm that a point of a tool may be off its true place by what pieces leave out"""
 
 
 @dataclass(frozen=True)
@@ -21,15 +21,11 @@ class Swept:
 
     Attributes:
         tip (N, 2, 3), axis (N, 2, 3): at both ends; unit axes
-        slack (N,): mm by which a tip may be off its straight line
-        twist (N,): chord by which an axis may be off its great circle
         row (N,): what the piece belongs to
     """
 
     tip: Floats
     axis: Floats
-    slack: Floats
-    twist: Floats
     row: Ints
 
     def __len__(self) -> int:
@@ -37,19 +33,18 @@ class Swept:
 
     def take(self, which: Ints) -> Swept:
         """Some of the pieces."""
-        return Swept(self.tip[which], self.axis[which], self.slack[which], self.twist[which], self.row[which])
+        return Swept(self.tip[which], self.axis[which], self.row[which])
 
     def turned(self, shift: Floats, axis: Floats) -> Swept:
         """The same pieces moved by `shift` (3,), the tool along `axis` (3,); the tree moves with them."""
-        made = replace(self, tip=self.tip + shift, axis=np.broadcast_to(axis, self.axis.shape).copy(),
-                       twist=np.zeros(len(self)))
+        made = replace(self, tip=self.tip + shift, axis=np.broadcast_to(axis, self.axis.shape).copy())
         made.__dict__["tree"] = replace(self.tree, centre=self.tree.centre + shift)
         return made
 
     @cached_property
     def tree(self) -> Tree:
-        """Boxes round the tips, what they may be off included."""
-        return tree(self.tip.min(axis=1) - self.slack[:, None], self.tip.max(axis=1) + self.slack[:, None])
+        """Boxes round the tips."""
+        return tree(self.tip.min(axis=1), self.tip.max(axis=1))
 
     @cached_property
     def axes(self) -> tuple[Floats, Floats]:
@@ -59,13 +54,20 @@ class Swept:
         middle[:n] = self.axis.sum(axis=1)
         middle[:n] /= np.linalg.norm(middle[:n], axis=1, keepdims=True)
         off = np.zeros(leaves)
-        off[:n] = np.linalg.norm(self.axis[:, 0] - middle[:n], axis=1) + self.twist
+        off[:n] = np.linalg.norm(self.axis[:, 0] - middle[:n], axis=1)
         middles, chords = [middle], [off]
         while len(middles[-1]) > 1:
             middle, off = _joined(middles[-1], chords[-1])
             middles.append(middle)
             chords.append(off)
         return np.concatenate(middles[::-1]), np.concatenate(chords[::-1])
+
+    @cached_property
+    def packed(self) -> tuple[Floats, Floats]:
+        """Nodes (2 L - 1, 10): centre, half, axis, chord; pieces (N, 12): tips, axes."""
+        axes, chord = self.axes
+        return (np.hstack((self.tree.centre, self.tree.half, axes, chord[:, None])),
+                np.hstack((self.tip.reshape(-1, 6), self.axis.reshape(-1, 6))))
 
 
 def _joined(axis: Floats, off: Floats) -> tuple[Floats, Floats]:
@@ -79,24 +81,22 @@ def _joined(axis: Floats, off: Floats) -> tuple[Floats, Floats]:
 
 
 def along_curves(curves: Curves, row: Ints) -> Swept:
-    """The pieces of N curves; `row` (N,) tells what each belongs to. Arcs are cut so that chords stay within SAGITTA."""
-    count, slack = np.ones(len(curves), dtype=np.int64), np.zeros(len(curves))
+    """The pieces of N curves; `row` (N,) tells what each belongs to. Arcs are cut so that chords stay within OFF."""
+    count = np.ones(len(curves), dtype=np.int64)
     arc = np.flatnonzero(curves.is_arc)
     if len(arc):
         radial = np.cross(curves.start[arc] - curves.center[arc], curves.normal[arc])
         radius = np.maximum(np.linalg.norm(radial, axis=1), 1e-9)
-        step = 2.0 * np.arccos(1.0 - np.minimum(SAGITTA / radius, 1.0))
+        step = 2.0 * np.arccos(1.0 - np.minimum(OFF / radius, 1.0))
         count[arc] = np.ceil(np.maximum(curves.sweep[arc] / step, 1.0)).astype(np.int64)
-        slack[arc] = SAGITTA
     piece = np.repeat(np.arange(len(curves)), count)
     k = np.arange(len(piece)) - np.repeat(np.cumsum(count) - count, count)
     each = curves.take(piece)
     (tip0, axis0), (tip1, axis1) = each.at(k / count[piece]), each.at((k + 1) / count[piece])
-    return Swept(np.stack((tip0, tip1), axis=1), np.stack((axis0, axis1), axis=1), slack[piece], np.zeros(len(piece)),
-                 row[piece])
+    return Swept(np.stack((tip0, tip1), axis=1), np.stack((axis0, axis1), axis=1), row[piece])
 
 
 def joined(parts: list[Swept]) -> Swept:
     """Several as one, in order."""
     return Swept(*(np.concatenate([getattr(part, name) for part in parts])
-                   for name in ("tip", "axis", "slack", "twist", "row")))
+                   for name in ("tip", "axis", "row")))

@@ -30,8 +30,7 @@ def block() -> Solid:
 def way(*tips: tuple[float, float, float], axis: tuple[float, float, float] = UP) -> Swept:
     points = np.array(tips)
     n = len(points) - 1
-    return Swept(np.stack((points[:-1], points[1:]), axis=1), np.tile(np.array(axis), (n, 2, 1)), np.zeros(n), np.zeros(n),
-                 np.arange(n))
+    return Swept(np.stack((points[:-1], points[1:]), axis=1), np.tile(np.array(axis), (n, 2, 1)), np.arange(n))
 
 
 @pytest.mark.parametrize("piece", [BALL, CYLINDER, BULL, CONE])
@@ -95,7 +94,7 @@ def test_random_tools_that_turn_agree_with_dense_points() -> None:
         b = a + 0.6 * b / np.linalg.norm(b)
         b /= np.linalg.norm(b)
         p, q = rng.uniform(-60.0, 60.0, (2, 3))
-        moving = Swept(np.array([[p, q]]), np.array([[a, b]]), np.zeros(1), np.zeros(1), np.zeros(1, dtype=np.int64))
+        moving = Swept(np.array([[p, q]]), np.array([[a, b]]), np.zeros(1, dtype=np.int64))
         found = nearest(body, moving, piece, 3.0)
         seen = min(float(around(piece[0], points - (p + u * (q - p)), np.repeat(slerp(a[None], b[None], np.array([u])),
                                                                               len(points), axis=0))[0].min())
