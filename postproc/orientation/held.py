@@ -26,7 +26,7 @@ _RING = 72
 _DIRECTIONS = 24
 _SEEDS = 4
 _STEPS = (2.5 * DEG, 1.25 * DEG, 0.6 * DEG, 0.3 * DEG)
-_TIE = 1e-4
+_TIE = 1e-2
 """relative: seeds that differ by less are equal, the least turned is tried first"""
 
 
@@ -70,7 +70,7 @@ def held_angles(one: Pass, machine: Machine, axis: Floats) -> Floats:
                           & (slow <= np.roll(slow, -1)))
     if not len(dips) or np.ptp(slow[np.isfinite(slow)]) <= _TIE * slow[dips].min():
         return np.zeros(0)
-    grain = np.round(slow[dips] / (slow[dips].min() * _TIE)).astype(np.int64)
+    grain = ((slow[dips] / slow[dips].min() - 1.0) / _TIE).astype(np.int64)
     return np.asarray(ring[dips[np.lexsort((np.abs(ring[dips] - machine.home[joint]), grain))]][:_SEEDS])
 
 

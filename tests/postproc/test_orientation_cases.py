@@ -1,0 +1,186 @@
+"""Cases that decide: travel, indexing time, and the rotary axis that the tool leaves free. Each with its counterfactual."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+import postproc
+from machines.machine import Machine, Timing
+from postproc.options import Options
+from postproc.orientation.allowed import Allowed
+from postproc.orientation.held import free_value, held_angles
+from postproc.orientation.orient import OrientationChoice, orient
+from postproc.orientation.passes import work_of
+from postproc.orientation.timed import turned
+from postproc.pipeline import PostResult
+from postproc.setup import SetupFile, load_setup
+from tests.benchmarks.bench_orientation_limits import chosen, compared, strips, whole
+from tests.postproc.kit import SAMPLES, TOOLS, machine, toolpath
+from tests.postproc.test_orientation_paper import jerk_only
+from toolpaths.toolpath import Toolpath
+from toolpaths.units import DEG
+
+
+@cache
+def setup_of(name: str) -> SetupFile:
+    setup, _ = load_setup(SAMPLES / "h4a.setup.toml" if "h4a" in name else TOOLS)
+    assert setup is not None
+    return setup
+
+
+def on(name: str, path: Toolpath, m: Machine | None = None, max_tilt: float = 60.0) -> OrientationChoice:
+    return chosen(path, m or machine(name), setup_of(name), max_tilt)
+
+
+def quick(name: str, clamp: float = 0.05) -> Machine:
+    """A machine that clamps its rotary axes in no time, so that few passes show what many do."""
+    return replace(machine(name), timing=Timing(0.0, clamp, clamp))
+
+
+def written(name: str, path: Toolpath, controller: str = "linuxcnc") -> PostResult:
+    """Converted with `auto`, and read back."""
+    result = postproc.convert(path, quick(name), controller, setup_of(name), Options(orient="auto", max_tilt=40.0))
+    assert result.ok and result.comparison is not None, [str(d) for d in result.diagnostics]
+    return result
+
+
+def standing(result: PostResult, letter: str) -> set[float]:
+    """Where an axis stands in the cuts, degrees."""
+    assert result.path is not None
+    rows = np.isfinite(result.path.u)
+    return set(np.round(np.degrees(result.path.q[rows, result.machine.axis_names.index(letter)]), 3).tolist())
+
+
+def test_travel_decides() -> None:
+    """A level pass wants A = 45; a trunnion that tilts to 30 degrees leaves another axis, slower but better than the own."""
+    m = machine("mikron-ucp710")
+    upper = np.where([name == "A" for name in m.axis_names], 30.0 * DEG, m.limits.upper)
+    free = on("mikron-ucp710", strips([0.0])).tried[0]
+    narrow = on("mikron-ucp710", strips([0.0]), replace(m, limits=replace(m.limits, upper=upper))).tried[0]
+    assert free.best.rotary()["A"] == pytest.approx(45.0, abs=1.0)
+    assert 20.0 < abs(narrow.best.rotary()["A"]) <= 30.0 + 1e-6 and narrow.aimed is None
+    assert free.best.seconds < 0.999 * narrow.best.seconds < 0.95 * narrow.own.seconds
+    told = [lost.why for lost in narrow.rejected if lost.kind == "travel"]
+    assert any(why.startswith("travel: axis A at 45.000 degrees, allowed -30.000 to 30.000") for why in told)
+
+
+def test_indexing_time_decides() -> None:
+    """Ten strips gain a second by turning once: more than clamps of half a second cost, less than those of three."""
+    fast, slow = (on("", strips([0.0] * 10), quick("mikron-ucp710", clamp)) for clamp in (0.5, 3.0))
+    assert {made.rotary()["A"] for made in fast.plans["auto"].picked} != {0.0}
+    assert fast.plans["auto"].seconds < fast.plans["keep"].seconds - 0.3
+    assert {made.rotary()["A"] for made in slow.plans["auto"].picked} == {0.0}
+    assert slow.plans["auto"].seconds == slow.plans["keep"].seconds
+    assert slow.plans["per-pass"].seconds > slow.plans["keep"].seconds + 3.0
+    cuts = [choice.plans["per-pass"].cuts.sum() for choice in (fast, slow)]
+    assert cuts[0] == pytest.approx(cuts[1], rel=1e-9)
+
+
+def test_a_table_turned_under_a_standing_tool_gains_what_the_square_gives() -> None:
+    """Under equal jerks the level box reaches sqrt 2 farther along its diagonal: times go with the cube root."""
+    m = jerk_only(machine("mikron-ucp710"))
+    found = on("mikron-ucp710", strips([20.0], "16,1"), m).tried[0]
+    angle = (20.0 - found.best.held / DEG) % 90.0
+    assert found.own.one.fixed.startswith("the cutter is no ball") and angle == pytest.approx(45.0, abs=0.3)
+    level = turned(found.own.one, found.own.axis, m, held=20.0 * DEG)
+    assert found.best.seconds / level.seconds == pytest.approx(2.0 ** (-1.0 / 6.0), rel=1e-3)
+    assert found.best.axis.tolist() == found.own.axis.tolist()
+
+
+def test_angles_worth_holding() -> None:
+    """Equal ones the least turned first; none where no joint is free or where it turns nothing."""
+    def angles(name: str, lines: list[str] | None = None) -> list[float]:
+        path = toolpath(*lines) if lines else strips([30.0], "16,1")
+        work, found = work_of(path, machine(name), setup_of(name), Options())
+        assert work is not None, found
+        one = work.passes[0]
+        return np.round(held_angles(one, machine(name), one.axis) / DEG, 1).tolist()
+
+    assert angles("mikron-ucp710") == [-15.0, 75.0, -105.0, 165.0]
+    assert angles("h4a-c-table")[:2] == [30.0, -150.0]
+    assert angles("mill-4axis") == [] and angles("mill-3axis") == [] and angles("nutating-head") == []
+    leaning = ["CUTTER/16,1", "MULTAX", "RAPID", "GOTO/0,0,5,0,0.6,0.8", "GOTO/40,0,0,0,0.6,0.8"]
+    assert angles("mikron-ucp710", leaning) == []
+
+
+def test_a_ball_on_the_h4a_stands_up_and_the_table_turns() -> None:
+    """Of all axes within 40 degrees and all angles of the table: upright, strips along y turned along x."""
+    found = on("h4a-c-table", strips([90.0]), max_tilt=40.0).tried[0]
+    assert found.own.one.fixed == "" and abs(found.best.held / DEG) == pytest.approx(90.0, abs=0.5)
+    assert found.best.axis.tolist() == [0.0, 0.0, 1.0] and found.best.seconds < 0.8 * found.own.seconds
+    aside = on("h4a-c-table", strips([0.0]), max_tilt=40.0).tried[0]
+    assert aside.best is aside.own and aside.own.seconds == pytest.approx(found.best.seconds, rel=1e-2)
+
+
+def test_the_h4a_turns_its_table_once() -> None:
+    """Strips along y are slow on the H4a: turned by 90 degrees they run along x, worth it for twenty, not for three."""
+    many, few = (strips([90.0] * count, "16,1") for count in (20, 3))
+    choice = on("h4a-c-table", many, quick("h4a-c-table"), 40.0)
+    auto = choice.plans["auto"]
+    assert {abs(round(made.held / DEG, 1)) for made in auto.picked} == {90.0}
+    assert all(made.axis.tolist() == [0.0, 0.0, 1.0] for made in auto.picked)
+    assert auto.seconds < 0.99 * choice.plans["keep"].seconds and auto.cuts.sum() < 0.8 * choice.plans["keep"].cuts.sum()
+    kept = on("h4a-c-table", few, quick("h4a-c-table"), 40.0).plans
+    assert all(np.isnan(made.held) for made in kept["auto"].picked) and kept["per-pass"].seconds > kept["keep"].seconds
+
+
+def test_the_turned_table_is_written_and_proved() -> None:
+    """The program of the H4a holds C through all cuts; without `auto` it stays at home."""
+    path = strips([90.0] * 20, "16,1")
+    assert {abs(c) for c in standing(written("h4a-c-table", path), "C")} == {90.0}
+    plain = postproc.convert(path, machine("h4a-c-table"), "linuxcnc", setup_of("h4a"))
+    assert plain.ok and standing(plain, "C") == {0.0}
+
+
+@pytest.mark.parametrize("controller", ["siemens-840d", "heidenhain-tnc640", "linuxcnc"])
+def test_a_flat_cutter_on_a_trunnion(controller: str) -> None:
+    """C at 45 degrees, A at 0, in planes or as axis positions; tips and axes of the file are as they were."""
+    path = strips([0.0] * 12, "16,1")
+    result = written("mikron-ucp710", path, controller)
+    assert {abs(c) for c in standing(result, "C")} == {45.0} and standing(result, "A") == {0.0}
+    assert result.toolpath is not None
+    assert result.toolpath.tip.tolist() == path.tip.tolist() and result.toolpath.axis.tolist() == path.axis.tolist()
+
+
+def test_passes_that_keep_their_angle_are_held_where_they_were_counted() -> None:
+    """Behind a pass held at an angle a free axis would stay there: it is held where its time was counted."""
+    choice = on("mikron-ucp710", strips([0.0, 45.0], "16,1"))
+    picked = choice.plans["per-pass"].picked
+    assert np.isfinite(picked[0].held) and np.isnan(picked[1].held) and free_value(picked[1]) == 0.0
+    path = choice.toolpath("per-pass")
+    assert path.spin is not None and set(np.round(path.spin / DEG, 6)) == {round(picked[0].held / DEG, 6), 0.0}
+    assert choice.toolpath("keep").equals(choice.work.toolpath)
+
+
+def test_a_turned_part_is_held_as_a_straight_one() -> None:
+    """Turned by 20 degrees on the table, a pass gains as one that runs 20 degrees aside."""
+    setup = setup_of("").model_copy(update={"part": setup_of("").part.model_copy(update={
+        "x_axis": (np.cos(20.0 * DEG), np.sin(20.0 * DEG), 0.0), "y_axis": (-np.sin(20.0 * DEG), np.cos(20.0 * DEG), 0.0)})})
+    m = machine("mikron-ucp710")
+    placed, found = orient(strips([10.0], "16,1"), m, setup)
+    straight = on("mikron-ucp710", strips([30.0], "16,1"))
+    assert placed is not None, found
+    assert placed.tried[0].best.seconds == pytest.approx(straight.tried[0].best.seconds, rel=1e-6)
+    result = postproc.convert(placed.toolpath("per-pass"), m, "linuxcnc", setup)
+    assert result.ok and standing(result, "C") == {round(placed.tried[0].best.held / DEG, 3)}
+
+
+@pytest.mark.parametrize(("directions", "cutter", "cap"), [([25.0], "16,8", 4.0), ([0.0], "16,8", 2.5)])
+def test_search_beside_a_full_grid(directions: list[float], cutter: str, cap: float) -> None:
+    """Every axis of a coarse grid within the cap planned in full: none is better by more than half a percent."""
+    m = machine("mikron-ucp710")
+    work, _ = work_of(strips(directions, cutter), m, setup_of(""), Options())
+    assert work is not None
+    one = work.passes[0]
+    assert -0.02 < compared("strip", one, m, Allowed(cap * DEG), one.axis, cap * DEG, 0.5 * DEG) < 0.005
+
+
+def test_auto_beside_all_sequences() -> None:
+    """Three strips in three directions, every sequence of axes of a grid: `auto` is within half a percent of the best."""
+    free = replace(machine("mikron-ucp710"), timing=Timing(0.0, 0.0, 0.0))
+    auto, least = whole(free, strips([0.0, 20.0, 75.0]), 4.0 * DEG, 0.8 * DEG)
+    assert -0.03 < auto / least - 1.0 < 0.005
