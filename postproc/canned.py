@@ -169,7 +169,8 @@ def not_native(toolpath: Toolpath, moves: Moves, path: Path, native: Bools, cont
     for key in np.unique(keys):
         lines = moves.line[rows[keys == key]]
         known = str(key) in controller.cycles.table or str(key) in controller.cycles.with_dwell
-        hint = "the tool must stand along the machine's Z, a dwell needs an entry in cycles.with_dwell" if known else \
+        hint = "the tool must stand along Z of the words in a mode that has cycles (not tcp), a dwell needs an entry in " \
+            "cycles.with_dwell" if known else \
             f"the controller's cycles.table has no {key}; take another cycle in the CAM system"
         result.append(error("cycle.not_native", f"a cycle {key} cannot be written as single moves, and this one not as a "
                             "canned cycle", file=toolpath.file, lines=lines[:6].tolist(), count=len(lines), hint=hint))

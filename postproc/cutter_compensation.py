@@ -33,6 +33,7 @@ class Compensation:
         self.active, self.since = "", 0
         self.written: list[int] = []
         self.tilted: list[int] = []
+        self.lacking: list[int] = []
         self.left_on: list[int] = []
         self.own = np.isnan(path.u) | (moves.hole[path.move] >= 0)
         """(K,) blocks that compensation must not touch"""
@@ -67,7 +68,8 @@ class Compensation:
             return
         block += int(np.argmin(np.append(self.own[block:], False)))
         if move >= len(self.moves) or not self._possible(min(block, len(self.path) - 1), move):
-            self.tilted.append(event.line)
+            upright = move < len(self.moves) and self.moves.axis[move, 2] > UPRIGHT
+            (self.lacking if upright else self.tilted).append(event.line)
             return
         self.active, self.since = side, block
         self.written.append(event.line)
@@ -100,6 +102,10 @@ class Compensation:
             result.append(error("cutcom.left_on", "cutting goes on under CUTCOM after a linking move or a hole, which need "
                                 "it off", file=file, lines=self.left_on[:6], count=len(self.left_on),
                                 hint="write CUTCOM/OFF before the retract and CUTCOM/LEFT or RIGHT after the approach"))
+        if self.lacking:
+            result.append(error("cutcom.mode", "CUTCOM in an output mode in which the controller has no cutter compensation",
+                                file=file, lines=self.lacking[:6], count=len(self.lacking),
+                                hint="write the operation in axis positions or in a tilted plane (--output-mode)"))
         for code, lines, what in (("cutcom.tilted", self.tilted, "CUTCOM while the tool is tilted"),
                                   ("cutcom.turning", self.turning(), "the tool turns or leans while CUTCOM is on")):
             if lines:

@@ -29,6 +29,7 @@ _MARGINS = (1.0, 0.4, 0.2, 0.1)
 """shares of the set-up's margin that are tried where travel is short"""
 _STEPS = (0, 1, 3, 7, 15)
 _SAMPLES = 17
+_TURN = 2.0 * np.pi
 _LEG_TOLERANCE = 0.01
 """mm off the straight line for retract and approach"""
 
@@ -66,8 +67,7 @@ def safe_space(moves: Moves, setup: SetupFile, placement: Placement) -> SafeSpac
     used = cutting | np.append(starts[1:], False)
     tips = moves.tip[used] if used.any() else moves.tip
     if len(moves.arcs):
-        reach = moves.arcs.radius[:, None] * np.sqrt(np.maximum(1.0 - moves.arcs.normal**2, 0.0))
-        tips = np.concatenate([tips, moves.arcs.center - reach, moves.arcs.center + reach])
+        tips = np.concatenate([tips, _outermost(moves.curves())])
     low, high = tips.min(axis=0), tips.max(axis=0)
     centre = 0.5 * (low + high)
     if setup.clearance.centre is not None:
@@ -76,6 +76,26 @@ def safe_space(moves: Moves, setup: SetupFile, placement: Placement) -> SafeSpac
     corners = np.where(pick == 0, low, high)
     radius = float(np.sqrt(((tips - centre) ** 2).sum(axis=1).max()))
     return SafeSpace(centre, radius, corners, setup.clearance.distance, setup.clearance.margin)
+
+
+def _outermost(curves: Curves) -> Floats:
+    """(K, 3) places of the arcs where x, y or z is greatest or least, in their first turn and in their last.
+
+    Seen from the centre the tip is r cos t + (n x r) sin t, whose coordinate k turns back at atan2((n x r)_k, r_k) and
+    half a turn on; whole circles count only as far as the arc goes.
+    """
+    arcs = curves.take(np.flatnonzero(curves.is_arc))
+    radial = arcs.start - arcs.center
+    radial = radial - np.einsum("ni,ni->n", radial, arcs.normal)[:, None] * arcs.normal
+    across = np.cross(arcs.normal, radial)
+    found = [np.zeros((0, 3))]
+    for k, half in ((k, half) for k in range(3) for half in (0.0, np.pi)):
+        first = (np.arctan2(across[:, k], radial[:, k]) + half) % _TURN
+        last = first + _TURN * np.floor((arcs.sweep - first) / _TURN)
+        for angle in (first, last):
+            inside = np.flatnonzero((angle >= 0.0) & (angle <= arcs.sweep))
+            found.append(arcs.take(inside).at(angle[inside] / arcs.sweep[inside])[0])
+    return np.concatenate(found)
 
 
 @dataclass(frozen=True)

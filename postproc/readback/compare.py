@@ -84,7 +84,7 @@ def compare(motion: Motion, job: Job, executed: Executed, gcode: str = "", plann
     seconds = block_seconds(motion, executed.control, job.controller.feed.arc_inverse == "radius")
     diagnostics += check_speeds(motion, moves, curves, owner, match, seconds, tolerance, faults)
     if not planned:
-        diagnostics += check_slow(motion, executed, job, moves, curves, owner, match, seconds, faults)
+        diagnostics += check_slow(motion, executed, job, moves, curves, owner, match, tip, seconds, faults)
     diagnostics += check_links(motion, executed, moves, owner, job.space, tolerance, faults)
     diagnostics += check_rewinds(motion, executed, number, tip, axis, job.space, tolerance, grain[1] + _kept(job), faults)
     diagnostics += check_travel(motion, executed, moves, owner, faults)

@@ -30,28 +30,39 @@ def planned_feeds(data: bytes) -> bool:
 
 
 def check_slow(motion: Motion, executed: Executed, job: Job, moves: Moves, curves: Curves, owner: Ints, match: Ints,
-               seconds: Floats, faults: Faults) -> list[Diagnostic]:
+               tip: Floats, seconds: Floats, faults: Faults) -> list[Diagnostic]:
     """Moves that take longer than their programmed feed and the velocities of all axes ask for, once with their count.
 
-    `seconds` (E,) of the blocks at constant feed; pecks feed some of their way again, which counts once. Feeds that were
-    planned keep more limits, and are not judged.
+    `seconds` (E,) of the blocks at constant feed, `tip` (E, 3) at their ends; pecks feed some of their way again, which
+    counts once. Turns on the spot take what the axes need, beside the feed of the rest. Feeds that were planned keep more
+    limits, and are not judged.
     """
     cutting = (owner < len(moves)) & (motion.code > 0)
     asked = np.where(moves.seconds > 0.0, moves.seconds, curves.length() / moves.feed)
-    spent, least, fed = (np.bincount(owner[cutting], weights=w[cutting], minlength=len(moves) + 1)[:len(moves)]
-                          for w in (seconds, _least(motion, executed, cutting), seconds * motion.feed / 60.0))
+    needs = _least(motion, executed, cutting)
+    spot = np.where(_on_the_spot(motion, executed.control, tip, job.options.tolerance), needs, 0.0)
+    spent, least, turned, fed = (np.bincount(owner[cutting], weights=w[cutting], minlength=len(moves) + 1)[:len(moves)]
+                                 for w in (seconds, needs, spot, seconds * motion.feed / 60.0))
     again = np.where(moves.phase == Phase.DRILL, fed / np.fmax(curves.length(), 1e-9), 1.0)
     total, needed = (w / np.fmax(again, 1.0) for w in (spent, least))
     grain = 10.0 * 10.0**-job.controller.format.linear_decimals
     slack = 0.002 + grain / np.where(moves.feed > 0.0, moves.feed, np.inf)
     check = (moves.kind != Kind.RAPID) & ~moves.link & (match >= 0) & np.isfinite(asked) & np.isfinite(total)
-    slow = np.flatnonzero(check & (total > SLOW * np.fmax(asked, needed) + slack))
+    slow = np.flatnonzero(check & (total > SLOW * (turned + np.fmax(asked, needed - turned)) + slack))
     if not len(slow):
         return []
     k = slow[int((total[slow] / np.fmax(asked[slow], 1e-9)).argmax())]
     return [faults.warning("verify.slow", f"the move runs at {asked[k] / total[k]:.3f} times the programmed feed, and no "
                            "axis needs that", int(moves.line[k]), int(motion.line[match[k]]), len(slow),
                            "the F word, if it is not meant so")]
+
+
+def _on_the_spot(motion: Motion, control: Control, tip: Floats, tolerance: float) -> Bools:
+    """(E,) blocks between whose ends the tip stays, within the tolerance, while rotary axes turn."""
+    result = np.zeros(len(motion), dtype=bool)
+    turns = (motion.end[1:, control.rotary] != motion.end[:-1, control.rotary]).any(axis=1)
+    result[1:] = turns & (np.linalg.norm(np.diff(tip, axis=0), axis=1) <= tolerance)
+    return result
 
 
 def _least(motion: Motion, executed: Executed, cutting: Bools) -> Floats:

@@ -123,7 +123,7 @@ class KlartextReader(Reader):
                 calls[b] = Call(b, f"REP {name} {b}", int(s.keys["REP"]))
             elif s.name in ("CALL LBL", "CALL PGM"):
                 calls[b] = Call(b, f"{s.name[5:]} {name}")
-            elif s.name == "BEGIN PGM" and "INCH" in s.args:
+            elif s.name == "BEGIN PGM" and s.args[1] == "INCH":
                 found.append(error("gcode.units", "a program in inches", file=file, lines=[b], hint="BEGIN PGM ... MM"))
         if not any(s.name == "BEGIN PGM" and s.args[1] for _, s in here):
             found.append(self.unstated(file, 1))
