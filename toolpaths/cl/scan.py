@@ -88,6 +88,7 @@ def _scan_chunk(data: bytes, position: int, stop: int, lines_before: int, larges
     c = np.frombuffer(data, np.uint8, stop - position, position)
     if c[-1] != 10:
         c = np.append(c, np.uint8(10))
+    c = _uncommented(c)
     joined, marks = _joined(c)
     if len(marks):
         found = _split(joined, largest)
@@ -128,6 +129,31 @@ def _chunk(found: _Lines, line_ends: Ints, position: int, lines_before: int) -> 
                   found.ends[others] + position, line[others], np.cumsum(plain, dtype=np.int64)[others], len(line_ends))
 
 
+def _uncommented(c: Bytes) -> Bytes:
+    """`c` with blanks for what stands from `$$` on in lines that begin with GOTO."""
+    marks = np.flatnonzero((c[:-1] == 36) & (c[1:] == 36))
+    if not len(marks):
+        return c
+    ends = np.flatnonzero(c == 10)
+    line, first = np.unique(np.searchsorted(ends, marks), return_index=True)
+    starts = np.where(line > 0, ends[line - 1] + 1, 0)
+    good = _begins_goto(c, starts)
+    edge = np.zeros(len(c), np.int8)
+    edge[marks[first[good]]] = 1
+    edge[ends[line[good]]] = -1
+    c = c.copy()
+    c[np.cumsum(edge, dtype=np.int8).view(bool)] = 32
+    return c
+
+
+def _begins_goto(c: Bytes, starts: Ints) -> Bools:
+    """Where (K,) lines begin with GOTO in either case."""
+    good = np.ones(len(starts), bool)
+    for k, letter in enumerate(b"GOTO"):
+        good &= (c[np.minimum(starts + k, len(c) - 1)] & 0xDF) == letter
+    return good
+
+
 def _joined(c: Bytes) -> tuple[Bytes, Ints]:
     """(`c` with each GOTO line that ends in `$` joined to the line of numbers after it, positions of those marks)."""
     marks = np.flatnonzero(c == 36)
@@ -140,9 +166,7 @@ def _joined(c: Bytes) -> tuple[Bytes, Ints]:
     ink = np.append(0, np.cumsum(c > 32))
     after = np.minimum(line + 1, len(ends) - 1)
     good = (strange[line] == 6) & (ink[ends[line]] == ink[marks + 1]) & (line + 1 < len(ends)) \
-        & (strange[after] == 0) & (ink[ends[after]] > ink[starts[after]])
-    for k, letter in enumerate(b"GOTO"):
-        good &= (c[np.minimum(starts[line] + k, len(c) - 1)] & 0xDF) == letter
+        & (strange[after] == 0) & (ink[ends[after]] > ink[starts[after]]) & _begins_goto(c, starts[line])
     marks, line = marks[good], line[good]
     joined = c.copy()
     joined[marks] = 32
@@ -155,9 +179,7 @@ def _looks_plain(c: Bytes, starts: Ints, ends: Ints) -> Bools:
     letters = np.add.reduceat(~_NUMERIC[c], starts, dtype=np.int32)
     plain: Bools = (letters == 5) & (ends - starts >= 10)
     at = starts[plain]
-    good = np.ones(len(at), bool)
-    for k, letter in enumerate(b"GOTO"):
-        good &= (c[at + k] & 0xDF) == letter
+    good = _begins_goto(c, at)
     slash = at + 4
     for _ in range(_MAX_BLANKS):
         blank = good & (c[slash] == 32)

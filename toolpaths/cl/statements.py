@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -12,8 +13,12 @@ from toolpaths.cl.source import text_of
 from toolpaths.cl.words import BARE_STARTS, TEXT_WORDS
 
 Word = str | float
+_NUMBER_ENDS, _NUMBER_STARTS = "0123456789.", "+-.0123456789"
+"""of what float() reads as a NUMBER does: it takes inf, nan and underscores besides, and no D for the exponent"""
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?", re.ASCII)
 _MAJOR = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_ ,=*.+-]*", re.ASCII)
+_SIMPLE = re.compile(r"([A-Z]+)[ ]*/([^$()/]*)", re.ASCII)
+"""Most records: one major word, a slash, no comment, continuation or label."""
 _LABEL = re.compile(r"[A-Za-z0-9_]{1,32}\s*\)\s*", re.ASCII)
 COMMENT = "$$"
 DATA_COMMENT = "$$->"
@@ -83,6 +88,13 @@ def words_of(body: str) -> tuple[Word, ...]:
 
 
 def _word(text: str) -> Word:
+    if text[-1] in _NUMBER_ENDS and text[0] in _NUMBER_STARTS and "_" not in text:
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.inf
+        if abs(value) <= LARGEST_OWN:
+            return value
     if _NUMBER.fullmatch(text):
         value = float(text.replace("D", "E").replace("d", "e"))
         if abs(value) <= LARGEST_OWN:
@@ -170,6 +182,10 @@ class Lexer:
         text = text_of(raw).strip()
         if not text:
             return None
+        simple = _SIMPLE.fullmatch(text)
+        if simple is not None and not simple[1].startswith(TEXT_WORDS):
+            body = simple[2].strip()
+            return Statement(simple[1], body, words_of(body))
         if text.startswith(COMMENT):
             text = _closed(text)
             return _comment(self._joined(text, i) if text.startswith(DATA_COMMENT) else text)
