@@ -22,9 +22,9 @@ class Reach:
     """One order along the mean direction.
 
     Attributes:
-        order: "velocity", "acceleration" or "jerk"
+        order: "velocity", "acceleration", "jerk"; "feed" for the programmed one
         rate: mm/s, mm/s2 or mm/s3
-        axis: the joint that ends it
+        axis: the joint that ends it, "" for the feed
         seconds: least, from rest to rest straight over the length
     """
 
@@ -49,25 +49,45 @@ def reaches(made: Turned) -> tuple[Reach, ...]:
     return tuple(found)
 
 
-def least_under(made: Turned, axes: Floats) -> Floats:
+def feed_of(made: Turned) -> Reach | None:
+    """The largest feed of the longest stretch, as an order of its own; None where that has no direction."""
+    stretch = made.one.longest
+    length = direction_of(stretch)[1]
+    if stretch is None or not length:
+        return None
+    rate = float(stretch.feed(stretch.s).max())
+    return Reach("feed", rate, "", length / rate)
+
+
+def least_under(made: Turned, axes: Floats, near: Floats | None = None) -> Floats:
     """Seconds (N,) of the slowest order, as `Reach.seconds`, under tool axes (N, 3), table frame; NaN where out of reach.
 
     In the middle of the longest stretch of `made`, on the branch that is fastest; travel is not looked at.
+
+    Args:
+        near: (N, J) joints that say where a joint stands which the axis leaves free; default: home
     """
     one, limits, stretch = made.one, made.machine.limits, made.one.longest
     direction, length = direction_of(stretch)
     if stretch is None or not length:
         return np.full(len(axes), np.nan)
     tip = stretch.tip[len(stretch.tip) // 2] + one.radius * (one.axis - axes)
-    near, result = np.hstack((tip, axes)), np.full(len(axes), np.nan)
-    for q in one.kin.inverse(tip, axes, near=made.machine.home):
+    pose, result = np.hstack((tip, axes)), np.full(len(axes), np.nan)
+    for q in one.kin.inverse(tip, axes, near=made.machine.home if near is None else near):
         slowest = np.zeros(len(axes))
         for order, rate in zip(ORDERS, (limits.velocity, limits.acceleration, limits.jerk), strict=True):
             if np.isfinite(rate[~np.array(one.kin.rotary)]).any():
-                reach = held_axis_polytope(one.kin, q, rate, near).reach(direction)
+                reach = held_axis_polytope(one.kin, q, rate, pose).reach(direction)
                 slowest = np.maximum(slowest, least_seconds(order, reach, length))
         result = np.fmin(result, slowest)
     return result
+
+
+def least_held(made: Turned, joint: int, angles: Floats) -> Floats:
+    """As `least_under`, with the axis of `made` and its free rotary `joint` held at `angles` (N,), rad."""
+    near = np.tile(made.machine.home, (len(angles), 1))
+    near[:, joint] = angles
+    return least_under(made, np.tile(made.axis, (len(angles), 1)), near)
 
 
 def binding(found: tuple[Reach, ...]) -> Reach | None:

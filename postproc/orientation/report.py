@@ -11,7 +11,7 @@ from postproc.orientation.losers import best_loser, grouped
 from postproc.orientation.orient import OrientationChoice
 from postproc.orientation.passes import Work
 from postproc.orientation.plans import OrientationPlan
-from postproc.orientation.reaches import binding, reaches
+from postproc.orientation.reaches import binding, feed_of, reaches
 from postproc.orientation.shares import shares_of
 from postproc.orientation.timed import Turned
 from toolpaths.diagnostics import Diagnostic, warning
@@ -103,15 +103,16 @@ def _short(made: Turned | None) -> dict[str, Any] | None:
 
 
 def _reach(made: Turned) -> dict[str, Any]:
-    """What each order allows along the mean direction, and which takes longest."""
-    found = reaches(made)
-    slowest = binding(found)
+    """What each order and the feed allow along the mean direction, and which of them alone takes longest."""
+    found, feed = reaches(made), feed_of(made)
+    every = found if feed is None else (*found, feed)
+    slowest = binding(every)
     rates = {one.order: {"rate": one.rate, "unit": UNITS[one.order], "axis": one.axis, "least_s": one.seconds}
-             for one in found}
-    return rates | {"binding": None if slowest is None else slowest.order}
+             for one in every}
+    return rates | {"slowest": None if slowest is None else slowest.order}
 
 
-UNITS = {"velocity": "mm/s", "acceleration": "mm/s2", "jerk": "mm/s3"}
+UNITS = {"velocity": "mm/s", "acceleration": "mm/s2", "jerk": "mm/s3", "feed": "mm/s"}
 
 
 def _plan(plan: OrientationPlan, keep: float) -> dict[str, Any]:

@@ -7,9 +7,11 @@ from itertools import pairwise
 
 import numpy as np
 
+from machines.machine import Machine
 from postproc.orientation.allowed import SAME
 from postproc.orientation.plans import OrientationPlan
 from postproc.orientation.timed import Turned
+from toolpaths.arrays import Floats
 from toolpaths.rotations import angle_between
 
 
@@ -19,9 +21,9 @@ class PlanShares:
 
     Attributes:
         cutting: planned cuts
-        turning: back, unclamp, index, clamp and approach wherever a pass begins as the one before it did not end
-        other: rapids inside and between passes, from home and back, tool changes
-        turns: how often that is
+        turning: all ways on which a rotary joint turns: back, unclamp, index, clamp, approach; from home and back home too
+        other: rapids inside and between passes, other ways from home and back, tool changes
+        turns: how many ways turn
     """
 
     cutting: float
@@ -32,14 +34,20 @@ class PlanShares:
 
 def shares_of(plan: OrientationPlan) -> PlanShares:
     """The parts of a plan's seconds."""
-    turned = np.array([turns(a, b) for a, b in pairwise(plan.picked)], dtype=np.bool_)
-    turning = float(plan.ways[1:-1][turned].sum())
-    cutting = float(plan.cuts.sum())
+    picked, machine = plan.picked, plan.picked[0].machine
+    begins, ends = ([_apart(machine, machine.home, made.q[at]) for made in picked] for at in (0, -1))
+    between = [begins[n + 1] or ends[n] if b.one.by_home else turns(a, b) for n, (a, b) in enumerate(pairwise(picked))]
+    turned = np.array([begins[0], *between, ends[-1]])
+    turning, cutting = float(plan.ways[turned].sum()), float(plan.cuts.sum())
     return PlanShares(cutting, turning, plan.seconds - cutting - turning, int(turned.sum()))
 
 
 def turns(a: Turned, b: Turned) -> bool:
     """Whether tool or rotary joints turn from the end of one pass to the beginning of the next."""
-    rotary = np.array(a.machine.rotary)
-    apart = np.abs(np.exp(1j * a.q[-1, rotary]) - np.exp(1j * b.q[0, rotary])).max(initial=0.0)
-    return bool(apart > SAME or angle_between(a.axis, b.axis) > SAME)
+    return _apart(a.machine, a.q[-1], b.q[0]) or bool(angle_between(a.axis, b.axis) > SAME)
+
+
+def _apart(machine: Machine, a: Floats, b: Floats) -> bool:
+    """Whether rotary joints differ, whole turns aside."""
+    rotary = np.array(machine.rotary)
+    return bool(np.abs(np.exp(1j * a[rotary]) - np.exp(1j * b[rotary])).max(initial=0.0) > SAME)

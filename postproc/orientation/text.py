@@ -10,11 +10,12 @@ from postproc.orientation.candidates import Lost, Tried
 from postproc.orientation.losers import KINDS, best_loser, grouped, listed
 from postproc.orientation.orient import OrientationChoice
 from postproc.orientation.plans import OrientationPlan
-from postproc.orientation.reaches import Reach, binding, reaches
+from postproc.orientation.reaches import binding, feed_of, reaches
 from postproc.orientation.report import NAMES, UNITS, gain
 from postproc.orientation.shares import shares_of, turns
 from postproc.orientation.timed import Turned
 from toolpaths.rotations import angle_between
+from toolpaths.units import DEG
 
 SHOWN = 40
 """passes in the table; where there are more, those that gain most"""
@@ -31,7 +32,7 @@ def as_text(choice: OrientationChoice, plan: Orientation = "auto", passes: Seque
     shown = sorted(sorted(rows, key=lambda row: _saved(*row))[:SHOWN], key=lambda row: row[0].own.one.number)
     lines = [f"passes as {plan} has them",
              f"{'pass':>5} {'line':>7}  {'orientation':<24} {'time s':>9} {'CL axis s':>9} {'gain %':>7}  "
-             f"{'limited by':<16} {'best alone s':>12} {'next s':>9}  others lost by"]
+             f"{'limited by':<15} {'best alone s':>12} {'next s':>9}  others lost by"]
     lines += [_row(tried, made) for tried, made in shown]
     if len(rows) > len(shown):
         lines.append(f"      and {len(rows) - len(shown)} passes that gain less; all are in --json")
@@ -81,10 +82,10 @@ def _row(tried: Tried, made: Turned) -> str:
     if not one.stretches:
         return f"{one.number:>5} {one.line:>7}  {orientation(made):<24} {'-':>9} {'-':>9} {'-':>7}  axis kept: {one.fixed}"
     start = (f"{one.number:>5} {one.line:>7}  {orientation(made):<24} {seconds(made.seconds):>9} {seconds(before):>9} "
-             f"{percent(gain(made.seconds, before)):>7}  {limit:<16} ")
+             f"{percent(gain(made.seconds, before)):>7}  {limit:<15} ")
     kept = f"axis kept: {one.fixed}" if one.fixed else ""
     if not tried.rejected:
-        return start + kept
+        return start + (kept or "no other orientation in reach")
     after = best_loser(tried)
     beaten = seconds(None if after is None else after.seconds)
     reasons = "; ".join(filter(None, (listed(grouped([tried])), kept)))
@@ -95,13 +96,33 @@ def _in_full(tried: Tried, made: Turned) -> list[str]:
     """One pass: what its orientations reach along the mean direction, and each loser with its reason."""
     one = tried.own.one
     lines = [f"pass {one.number}, line {one.line}" + (f", axis kept: {one.fixed}" if one.fixed else "")]
-    for name, it in (("CL axis", tried.own), ("paper", tried.aimed), ("best alone", tried.best), ("chosen", made)):
-        if it is not None:
-            lines += [f"  {name:<10} {orientation(it)}, {seconds(it.seconds)} s" + _reached(reaches(it))
-                      + (f", {it.touching}" if it.touching else "")]
+    for name, it in _named(tried, made):
+        lines += [f"  {name}: {orientation(it)}, {seconds(it.seconds)} s" + (f", {it.touching}" if it.touching else ""),
+                  *_reached(it)]
     losers = sorted(tried.rejected, key=lambda lost: (_rank(lost), angle_between(lost.made.axis, one.axis)))
-    lines += [f"  {'lost':<10} {orientation(lost.made)}: {lost.why}" for lost in losers[:LOSERS]]
+    lines += [f"  {'lost':<10} {orientation(lost.made)}{_off(lost.made)}: {lost.why}" for lost in losers[:LOSERS]]
     return lines + ([f"  and {len(losers) - LOSERS} more in --json"] if len(losers) > LOSERS else [])
+
+
+def _named(tried: Tried, made: Turned) -> list[tuple[str, Turned]]:
+    """The orientations of a pass that have names, each once."""
+    names: list[list[str]] = []
+    kept: list[Turned] = []
+    for name, it in (("CL axis", tried.own), ("paper", tried.aimed), ("best alone", tried.best), ("chosen", made)):
+        if it is None:
+            continue
+        k = next((k for k, other in enumerate(kept) if other.same(it.axis, it.held)), len(kept))
+        if k == len(kept):
+            names.append([])
+            kept.append(it)
+        names[k].append(name)
+    return [(", ".join(some), it) for some, it in zip(names, kept, strict=True)]
+
+
+def _off(made: Turned) -> str:
+    """By how much a tool is turned off the CL's axis, where its angles do not say it."""
+    off = float(angle_between(made.axis, made.one.axis)) / DEG
+    return f", {off:.1f} degrees off" if off > 0.05 and sum(made.machine.rotary) < 2 else ""
 
 
 def _rank(lost: Lost) -> tuple[int, float]:
@@ -109,12 +130,16 @@ def _rank(lost: Lost) -> tuple[int, float]:
     return -list(KINDS).index(lost.kind), lost.made.seconds if lost.kind == "slower" else 0.0
 
 
-def _reached(found: tuple[Reach, ...]) -> str:
+def _reached(made: Turned) -> list[str]:
+    """What each order allows along the mean direction, and which of them alone is slowest."""
+    feed = feed_of(made)
+    found = (*reaches(made), *(() if feed is None else (feed,)))
     slowest = binding(found)
     if slowest is None:
-        return ""
-    parts = ", ".join(f"{one.rate:.0f} {UNITS[one.order]} ({one.axis})" for one in found)
-    return f"; along the mean direction {parts}: {slowest.order} binds"
+        return []
+    parts = ", ".join(f"{one.order} {one.rate:.0f} {UNITS[one.order]}" + (f" ({one.axis})" if one.axis else "")
+                      for one in found)
+    return [f"      along the mean direction {parts}; slowest alone: {slowest.order}"]
 
 
 def _totals(choice: OrientationChoice) -> str:

@@ -7,6 +7,7 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -18,13 +19,12 @@ import toolpaths
 from postproc.cli import app
 from postproc.options import Options
 from postproc.orientation import losers, reaches, report, shares, text
-from postproc.orientation.figures import polytopes, sheet
+from postproc.orientation.figures import held, polytopes, sheet
 from postproc.orientation.orient import OrientationChoice, orient
 from postproc.orientation.plans import OrientationPlan
 from postproc.orientation.timed import turned
 from postproc.setup import SetupFile
 from tests.postproc.kit import SAMPLES, machine
-from toolpaths.rotations import angle_between
 
 PART = SAMPLES / "test_part.cls"
 BALL = ["UNITS/MM", "CUTTER/16,8", "LOADTL/1", "SPINDL/RPM,1000,CLW", "FEDRAT/MMPM,30000", "MULTAX"]
@@ -111,7 +111,8 @@ def test_seconds_of_a_plan_add_up() -> None:
     for plan in (*choice.plans.values(), choice.paper):
         parts = shares.shares_of(plan)
         assert parts.cutting + parts.turning + parts.other == pytest.approx(plan.seconds)
-        apart = [bool(angle_between(a.axis, b.axis) > 1e-4) for a, b in zip(plan.picked, plan.picked[1:], strict=False)]
+        angles = [(0.0, 0.0), *(tuple(made.rotary().values()) for made in plan.picked), (0.0, 0.0)]
+        apart = [max(abs(x - y) for x, y in zip(a, b, strict=True)) > 0.01 for a, b in pairwise(angles)]
         assert parts.turns == sum(apart) and (parts.turning > 0.0) == any(apart)
         assert parts.other > 0.0
     clamped = shares.shares_of(choice.plans["per-pass"])
@@ -127,7 +128,7 @@ def test_json_has_the_keys_that_others_read() -> None:
         assert {"pass", "orientation_deg", "time_s", "reference_time_s", "limiting_axis", "rejected"} <= set(one)
         assert one["gain_percent"] == pytest.approx(100.0 * (1.0 - one["time_s"] / one["reference_time_s"]))
         assert sum(one["lost"].values()) >= one["planned"] + one["pruned"] - 2
-        assert one["reach"]["own"]["binding"] == "jerk" and one["next_best"]["time_s"] >= one["best"]["time_s"] * SLACK
+        assert one["reach"]["own"]["slowest"] == "jerk" and one["next_best"]["time_s"] >= one["best"]["time_s"] * SLACK
         assert {it["kind"] for it in one["rejected"]} <= set(losers.KINDS)
     assert {"keep", "per_pass", "whole_part", "auto"} <= set(values["plans"])
     for plan in values["plans"].values():
@@ -141,7 +142,8 @@ def test_text_says_why_others_lost() -> None:
     table = told.splitlines()
     assert len([line for line in table if line.split()[:1] and line.split()[0].isdigit()]) == 8  # 7 passes, "N orientations"
     assert "limits" in told and "slower" in told and "bound" in told
-    assert "jerk binds" in told and "takes 0.7269 s" in told and "lost       A" in told
+    assert "slowest alone: jerk" in told and "feed 1000 mm/s" in told
+    assert "lost       A45.000 C" in told and "takes 0.6119 s" in told
     assert any(line.startswith("paper per pass") for line in table)
 
 
@@ -151,12 +153,31 @@ def test_text_of_many_passes_is_short_and_shows_those_that_gain() -> None:
 
 
 def test_fixed_passes_say_why() -> None:
-    choice = of_text(written(2, "CUTTER/16,0"))
-    told = text.as_text(choice, "auto", [1])
-    assert told.count("the cutter is no ball") == 3
+    turning = ["RAPID", "GOTO/0,0,9,0,0,1", "GOTO/0,0,0,0,0,1", "GOTO/80,0,0,0,0.6,0.8", "RAPID", "GOTO/80,0,9,0,0.6,0.8"]
+    choice = of_text("\n".join([*BALL, *turning, "FINI"]))
+    told = text.as_text(choice, "auto", [0])
+    assert told.count("axis kept: the tool axis turns within the pass") == 2
     assert report.as_dict(choice)["passes"][0]["paper"] is None
     assert sheet.most_gaining(choice) == []
-    assert sheet.draw(choice, "auto", [1], ".svg").startswith(b"<?xml")
+    assert b"axis kept, the tool axis turns" in sheet.draw(choice, "auto", [0], ".svg")
+
+
+def test_held_angles_are_told_and_drawn() -> None:
+    """A flat cutter keeps its axis; the table turns under it."""
+    choice = of_text(written(2, "CUTTER/16,0"))
+    tried = choice.tried[0]
+    assert abs(abs(tried.best.rotary()["C"]) % 90.0 - 45.0) < 0.5
+    assert held.is_held(tried) and not held.is_held(part().tried[0])
+    told = text.as_text(choice, "per-pass", [0])
+    assert told.count("axis kept: the cutter is no ball") == 3 and "bound; axis kept" in told
+    one = report.as_dict(choice, "per-pass")["passes"][0]
+    assert abs(abs(one["held_deg"]) % 90.0 - 45.0) < 0.5 and one["turned_deg"] == 0.0
+    angle = np.array([0.3, tried.best.held])
+    slowest = [reaches.binding(reaches.reaches(turned(tried.own.one, tried.own.axis, tried.own.machine, held=float(x))))
+               for x in angle]
+    assert reaches.least_held(tried.best, 4, angle) == pytest.approx([it.seconds for it in slowest if it is not None])
+    assert sheet.most_gaining(choice) in ([0], [1])
+    assert b"angles at which C is held" in sheet.draw(choice, "per-pass", [0], ".svg")
 
 
 def test_edges_of_a_box() -> None:

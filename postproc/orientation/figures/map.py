@@ -66,7 +66,8 @@ def _ground(sheet: Figure, place: PolarAxes, tried: Tried, timed: list[Turned], 
     every = np.concatenate((times, least[np.isfinite(least)]))
     if not len(every):
         return
-    colours = {"cmap": "viridis", "vmin": float(every.min()), "vmax": float(max(every.max(), every.min() + 1e-9))}
+    low = float(every.min())
+    colours = {"cmap": "viridis", "vmin": low, "vmax": max(float(every.max()), 1.01 * low)}
     drawn: Any = None
     if np.isfinite(least).any() and np.ptp(least[np.isfinite(least)]) > 0.0:
         drawn = place.contourf(around, out, np.ma.masked_invalid(least), LEVELS, **colours)

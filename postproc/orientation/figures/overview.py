@@ -39,7 +39,7 @@ def plan_panel(place: Axes, choice: OrientationChoice) -> None:
         place.annotate(f"{told}, {one.turns} turns", (left[k], k), xytext=(4, 0), textcoords="offset points", va="center",
                        fontsize="small")
     place.invert_yaxis()
-    place.set_xlim(0.0, 1.3 * max(float(left.max()), 1e-9))
+    place.set_xlim(0.0, 1.42 * max(float(left.max()), 1e-9))
     place.set_xlabel("seconds of the whole part")
     place.set_title("plans", fontsize="medium")
     place.grid(False, axis="y")
@@ -58,11 +58,11 @@ def angle_panel(place: Axes, choice: OrientationChoice, plan: Orientation) -> No
         place.plot(number, own, color=colour, linestyle=":", linewidth=1.0, drawstyle="steps-mid", label=f"{name}, CL file")
         place.plot(number, _angles(picked, name), color=colour, linewidth=1.0, drawstyle="steps-mid",
                    marker=_mark(len(picked)), markersize=4.0, label=f"{name}, {plan}")
-    unit = "degrees" if any(choice.work.machine.rotary) else "tool axis, 1"
+    unit = "degrees" if any(choice.work.machine.rotary) else "i, j, k of the tool"
     _labelled(place, "pass", unit, f"orientation of each pass: {plan}")
-    low, high = place.get_ylim()
-    if high - low < FLAT:
-        place.set_ylim(0.5 * (low + high - FLAT), 0.5 * (low + high + FLAT))
+    (low, high), flat = place.get_ylim(), FLAT if any(choice.work.machine.rotary) else 2.2
+    if high - low < flat:
+        place.set_ylim(0.5 * (low + high - flat), 0.5 * (low + high + flat))
     place.legend(**BESIDE)
 
 
@@ -85,7 +85,8 @@ def gain_panel(place: Axes, choice: OrientationChoice, plan: Orientation) -> Non
     fixed = [k for k, one in enumerate(tried) if one.own.one.fixed]
     if fixed:
         place.plot(fixed, np.zeros(len(fixed)), linestyle="", marker="x", markersize=5.0, color="gray", label="axis is kept")
-    place.set_ylim(bottom=min(0.0, place.get_ylim()[0]))
+    low, high = place.get_ylim()
+    place.set_ylim(min(0.0, low), max(1.1 * high, 1.0))
     _labelled(place, "pass", "% of the planned cut", "time saved in each pass, without turns")
     place.legend(**BESIDE)
 

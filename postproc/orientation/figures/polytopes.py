@@ -16,10 +16,10 @@ from toolpaths.arrays import Floats, Ints
 
 Axes3D = Any
 """of mplot3d, which states no types"""
-SCALE = {"velocity": 1.0, "acceleration": 1e-3, "jerk": 1e-3}
-SHOWN = {"velocity": "mm/s", "acceleration": "m/s²", "jerk": "m/s³"}
+SCALE = {"velocity": 1.0, "acceleration": 1e-3, "jerk": 1e-3, "feed": 1.0}
+SHOWN = {"velocity": "mm/s", "acceleration": "m/s²", "jerk": "m/s³", "feed": "mm/s"}
 """units of the drawings"""
-COLOURS = {"velocity": "#3f8f4f", "acceleration": "#d08a3c", "jerk": "#1f5f8b"}
+COLOURS = {"velocity": "#3f8f4f", "acceleration": "#d08a3c", "jerk": "#1f5f8b", "feed": "#777777"}
 RAY, PALE = "#c2453a", "#888888"
 APART = 4.0
 """times the mean speed of the order that binds, beyond which another order is only named"""
@@ -32,14 +32,15 @@ def box_panel(place: Axes3D, tried: Tried, work: Work) -> None:
         _nothing(place, "no polytope: the pass cannot be run, has no direction,\nor the machine states no limits")
         return
     order, size = slowest.order, 0.0
-    both = ((tried.own, PALE, PALE, "CL axis"), (tried.best, COLOURS[order], RAY, "best"))
-    for made, colour, ray, name in both if tried.best is not tried.own else both[:1]:
+    alone = [(tried.own, COLOURS[order], RAY, "CL axis, best")]
+    both = [(tried.own, PALE, PALE, "CL axis"), (tried.best, COLOURS[order], RAY, "best")]
+    for made, colour, ray, name in both if tried.best is not tried.own else alone:
         shape = polytopes(made).get(order)
         if shape is None:
             continue
         corners = _corners(shape, work) * SCALE[order]
         rate = float(shape.reach(direction_of(made.one.longest)[0])[0]) * SCALE[order]
-        _solid(place, corners, colour, made is tried.best, f"{name}: {rate:.3g} {SHOWN[order]}")
+        _solid(place, corners, colour, made is tried.best, f"{name}: {short(rate)} {SHOWN[order]}")
         _ray(place, rate * _direction(made, work), ray)
         size = max(size, float(np.abs(corners).max(initial=0.0)), rate)
     _finish(place, size, f"{order} polytope [{SHOWN[order]}], frame of the part;\nlines: reach along the mean direction",
@@ -63,14 +64,19 @@ def order_panel(place: Axes3D, tried: Tried, work: Work) -> None:
     for order, one in found.items():
         speed, far = length / one.seconds, slowest.seconds > APART * one.seconds
         corners = np.zeros((0, 3)) if far else _corners(polytopes(made)[order], work) * (speed / one.rate)
-        _solid(place, corners, COLOURS[order], one is slowest, f"{order}: {speed:.3g} mm/s" + (", beyond the drawing" if far
-                                                                                              else ""))
+        _solid(place, corners, COLOURS[order], one is slowest, f"{order}: {short(speed)} mm/s"
+               + (", beyond the drawing" if far else ""))
         if not far:
             place.scatter(*(speed * _direction(made, work))[:, None], color=COLOURS[order], s=28)
             size = max(size, float(np.abs(corners).max(initial=0.0)), speed)
     _ray(place, 1.05 * size * _direction(made, work), RAY, marked=False)
     _finish(place, size, f"orders under the best axis, as mean speeds [mm/s] over {length:.0f} mm;\n"
             f"the innermost along the mean direction binds: {slowest.order}", tried, work)
+
+
+def short(value: float) -> str:
+    """Three digits, no exponent."""
+    return f"{float(f'{value:.3g}'):.12g}"
 
 
 def _corners(shape: Polytope, work: Work) -> Floats:

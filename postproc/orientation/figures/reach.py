@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from postproc.orientation.candidates import Tried
-from postproc.orientation.figures.polytopes import COLOURS, SCALE, SHOWN
-from postproc.orientation.reaches import reaches
+from postproc.orientation.figures.polytopes import COLOURS, SCALE, SHOWN, short
+from postproc.orientation.reaches import Reach, feed_of, reaches
 from postproc.orientation.timed import Turned
 from toolpaths.drawing import plain
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-HIGH = 0.26
+HIGH = 0.2
 """of a bar, where an orientation takes 1"""
 
 
@@ -24,19 +24,27 @@ def reach_panel(place: Axes, tried: Tried, made: Turned) -> None:
     rows = {"CL axis": tried.own, "paper": tried.aimed, "best": tried.best, "plan": made}
     kept = {name: it for name, it in rows.items() if it is not None}
     for at, it in enumerate(kept.values()):
-        for k, one in enumerate(reaches(it)):
-            y = at + (k - 1) * HIGH
-            place.barh(y, one.seconds, height=0.9 * HIGH, color=COLOURS[one.order], label=one.order if at == 0 else "")
-            told = plain(f"{one.rate * SCALE[one.order]:.3g} {SHOWN[one.order]}, {one.axis}")
-            behind = max(one.seconds, it.seconds) if abs(one.seconds - it.seconds) < 0.25 * it.seconds else one.seconds
-            place.annotate(told, (behind, y), xytext=(4, 0), textcoords="offset points", va="center", fontsize="x-small")
+        feed = feed_of(it)
+        found = (*reaches(it), *(() if feed is None else (feed,)))
+        behind = max([it.seconds if np.isfinite(it.seconds) else 0.0, *(one.seconds for one in found)])
+        for k, one in enumerate(found):
+            _bar(place, one, at + (k - 1.5) * HIGH, behind, named=at == 0)
         if np.isfinite(it.seconds):
-            place.plot([it.seconds] * 2, [at - 1.6 * HIGH, at + 1.6 * HIGH], color="black", linewidth=1.8,
+            place.plot([it.seconds] * 2, [at - 2.1 * HIGH, at + 2.1 * HIGH], color="black", linewidth=1.8,
                        label="planned" if at == 0 else "")
     place.set_yticks(range(len(kept)), list(kept))
     place.set_ylim(len(kept) - 0.4, -0.6)
-    place.set_xlim(0.0, 1.28 * max([place.dataLim.x1, 1e-9]))
-    place.set_xlabel("seconds: bars, the longest cut by one order alone;\nblack, all cuts as planned", fontsize="small")
+    place.set_xlim(0.0, 1.45 * max([place.dataLim.x1, 1e-9]))
+    place.set_xlabel("seconds: bars, the longest cut by one limit alone;\nblack, all cuts as planned", fontsize="small")
     place.set_title("reach along the mean direction, and the joint that ends it", fontsize="small")
     place.grid(False, axis="y")
-    place.legend(loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=4, fontsize="x-small", frameon=False)
+    place.legend(loc="upper center", bbox_to_anchor=(0.45, -0.2), ncols=5, fontsize="x-small", frameon=False,
+                 columnspacing=1.0, handlelength=1.4)
+
+
+def _bar(place: Axes, one: Reach, y: float, behind: float, named: bool) -> None:
+    """One order; its rate stands behind everything else of the orientation."""
+    place.barh(y, one.seconds, height=0.9 * HIGH, color=COLOURS[one.order], label=one.order if named else "")
+    joint = f", {one.axis}" if one.axis else ""
+    place.annotate(plain(f"{short(one.rate * SCALE[one.order])} {SHOWN[one.order]}{joint}"), (behind, y), xytext=(5, 0),
+                   textcoords="offset points", va="center", fontsize="x-small", color=COLOURS[one.order])

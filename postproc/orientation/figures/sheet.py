@@ -10,6 +10,7 @@ import numpy as np
 
 from postproc.options import Orientation
 from postproc.orientation.candidates import Tried
+from postproc.orientation.figures.held import held_panel, is_held
 from postproc.orientation.figures.map import axes_map
 from postproc.orientation.figures.overview import angle_panel, gain_panel, plan_panel
 from postproc.orientation.figures.polytopes import box_panel, order_panel
@@ -60,9 +61,8 @@ def draw(choice: OrientationChoice, plan: Orientation, passes: Sequence[int], en
 
 def most_gaining(choice: OrientationChoice) -> list[int]:
     """The pass that its best orientation saves most of; none where nothing can be turned."""
-    saved = [0.0 if one.own.one.fixed or not np.isfinite(one.own.seconds) else one.own.seconds - one.best.seconds
-             for one in choice.tried]
-    free = [k for k, one in enumerate(choice.tried) if not one.own.one.fixed]
+    saved = [one.own.seconds - one.best.seconds if np.isfinite(one.own.seconds) else 0.0 for one in choice.tried]
+    free = [k for k, one in enumerate(choice.tried) if not one.own.one.fixed or one.rejected]
     return [max(free, key=lambda k: saved[k])] if free else []
 
 
@@ -75,17 +75,22 @@ def _part(sheet: Figure, grid: GridSpec, choice: OrientationChoice, plan: Orient
 def _pass(sheet: Figure, grid: GridSpec, row: int, tried: Tried, made: Turned, work: Work) -> None:
     head = sheet.add_subplot(grid[row, :])
     head.set_axis_off()
-    head.text(0.5, 0.0, plain(_headline(tried)), ha="center", fontweight="bold", transform=head.transAxes)
+    head.text(0.5, 0.0, plain(_headline(tried)), ha="center", fontweight="bold", fontsize="medium", transform=head.transAxes)
     box_panel(sheet.add_subplot(grid[row + 1, 0], projection="3d"), tried, work)
     order_panel(sheet.add_subplot(grid[row + 1, 1], projection="3d"), tried, work)
-    axes_map(sheet, sheet.add_subplot(grid[row + 2, 0], projection="polar"), tried, made, work)
+    if is_held(tried):
+        held_panel(sheet.add_subplot(grid[row + 2, 0]), tried, made)
+    else:
+        axes_map(sheet, sheet.add_subplot(grid[row + 2, 0], projection="polar"), tried, made, work)
     reach_panel(sheet.add_subplot(grid[row + 2, 1]), tried, made)
 
 
 def _headline(tried: Tried) -> str:
-    one = tried.own.one
-    if one.fixed:
-        return f"pass {one.number}, line {one.line}: axis kept, {one.fixed}"
-    saved = percent(gain(tried.best.seconds, tried.own.seconds))
-    return (f"pass {one.number}, line {one.line}: best {orientation(tried.best)}, {seconds(tried.best.seconds)} s instead "
-            f"of {seconds(tried.own.seconds)} s ({saved} % less)")
+    one, own = tried.own.one, seconds(tried.own.seconds)
+    head = f"pass {one.number}, line {one.line}"
+    if one.fixed and not tried.rejected:
+        return f"{head}: axis kept, {one.fixed}"
+    if tried.best is tried.own:
+        return f"{head}: best is the CL file's own orientation, {own} s"
+    return (f"{head}{', axis kept' if one.fixed else ''}: best {orientation(tried.best)}, {seconds(tried.best.seconds)} s "
+            f"instead of {own} s ({percent(gain(tried.best.seconds, tried.own.seconds))} % less)")
