@@ -19,8 +19,8 @@ from machines.kinematics.base import Kinematics
 from postproc.control import Control
 from postproc.corrected.arcs import fitted_arcs
 from postproc.corrected.cycles import whole_holes
-from postproc.corrected.points import divided
-from postproc.corrected.reversals import arcs_cut, starts_of
+from postproc.corrected.points import between, divided
+from postproc.corrected.reversals import Divided, arcs_cut, inserted, starts_of
 from postproc.corrected.work import CorrectedEnds, Work
 from postproc.groups import groups
 from postproc.modes import OutputModes
@@ -88,22 +88,27 @@ def compensate(path: Path, moves: Moves, tools: Ints, kinematics: Callable[[int]
         tolerance, axis_tolerance: mm and rad of the whole conversion
         beyond: True corrects outside the measured range with the error at its end
     """
-    work = Work(path, tools, kinematics, model, axis_tolerance, beyond, SHARE)
+    allowed, before_cut = SHARE * tolerance, len(path)
+
+    def work_on(path: Path, owner: Ints, mean: bool = False) -> Work:
+        return Work(path, tools[owner], kinematics, model, axis_tolerance, beyond, SHARE, mean)
+
+    work = work_on(path, np.arange(len(path)))
     cut = arcs_cut(path, work)
-    path, before_cut = cut.path, len(path)
-    work = Work(path, tools[cut.owner], kinematics, model, axis_tolerance, beyond, SHARE)
     if work.two_way:
-        mean, _ = _at_ends(path, moves, modes, work, SHARE * tolerance)
-        work.take_ways(mean.q)
-    corrected, found = _at_ends(path, moves, modes, work, SHARE * tolerance)
+        cut = _points_by_mean(cut, moves, modes, work_on(cut.path, cut.owner, mean=True), allowed)
+    path, work = cut.path, work_on(cut.path, cut.owner)
+    if work.two_way:
+        work.take_ways(_at_ends(path, moves, modes, work, allowed)[0].q)
+    corrected, found = _at_ends(path, moves, modes, work, allowed)
     live = ~path.home
     diagnostics = _unmeasured(path, moves, modes.control, found.unmeasured & live[:, None], beyond, file)
     lost = live & ~np.isfinite(found.q).all(axis=1)
     if (diagnostics and not beyond) or lost.any():
         return None, None, diagnostics or [_lost(path, moves, lost, file)]
-    starts = starts_of(corrected, path, work, SHARE * tolerance)
-    corrected, resolved = fitted_arcs(corrected, path, work, starts.q, SHARE * tolerance)
-    whole = divided(corrected, work, starts, SHARE * tolerance).of(cut)
+    starts = starts_of(corrected, path, work, allowed)
+    corrected, resolved = fitted_arcs(corrected, path, work, starts.q, allowed)
+    whole = divided(corrected, work, starts, allowed).of(cut)
     corrected = whole.path
     (tip_before, axis_before), (tip_after, axis_after) = (x[live].max(axis=0, initial=0.0).tolist()
                                                           for x in (found.before, found.after))
@@ -114,6 +119,14 @@ def compensate(path: Path, moves: Moves, tools: Ints, kinematics: Callable[[int]
         partial=int(found.partial[live].sum()), moved=np.abs(found.q - path.q).max(axis=0, initial=0.0),
         owner=whole.owner, part=whole.part, doubt_tip=doubt_tip, doubt_axis=doubt_axis)
     return corrected, report, [*diagnostics, *(info("compensation", line, file=file) for line in report.lines())]
+
+
+def _points_by_mean(cut: Divided, moves: Moves, modes: OutputModes, work: Work, allowed: float) -> Divided:
+    """The nominal path with the points that the correction by mean ways needs, so that the ways are those of all points."""
+    corrected, _ = _at_ends(cut.path, moves, modes, work, allowed)
+    starts = starts_of(corrected, cut.path, work, allowed)
+    block, share, _ = between(corrected, work, starts, allowed)
+    return inserted(cut.path, block, share, work.nominal(block, share)).of(cut)
 
 
 def _at_ends(path: Path, moves: Moves, modes: OutputModes, work: Work, allowed: float) -> tuple[Path, CorrectedEnds]:

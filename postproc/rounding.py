@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from machines.kinematics.base import Kinematics
 from postproc.control import Control, Law
 from postproc.controllers.model import ControllerFile
 from postproc.moves import Moves
-from toolpaths.arrays import Ints
+from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.units import DEG
 
@@ -55,12 +56,18 @@ def rounding_bound(control: Control, kin: Kinematics, moves: Moves, places: Ints
     if "axes" not in laws:
         return Rounding(float(np.linalg.norm(step[control.slides])), float(axis.max()))
     slides, rotary = control.slides, control.rotary
-    tip = np.linalg.norm(jacobian[:, :3], axis=1)
-    linear = np.linalg.norm(tip[:, slides] * step[slides], axis=1)
-    lever = tip[:, rotary] @ step[rotary]
+    linear = _farthest(jacobian[:, :3][:, :, slides] * step[slides])
+    lever = np.linalg.norm(jacobian[:, :3][:, :, rotary], axis=1) @ step[rotary]
     if kin.slides_affine and lever.max() > LEVER * tolerance:
         return Rounding(float(linear.max()), float(axis.max()), True)
     return Rounding(float((linear + lever).max()), float(axis.max()))
+
+
+def _farthest(sides: Floats) -> Floats:
+    """(N,) half the longest diagonal of the boxes with the half sides (N, 3, K): slides of parallel machines run aslant."""
+    signs = np.array(list(product((1.0, -1.0), repeat=sides.shape[2])))
+    result: Floats = np.linalg.norm(sides @ signs.T, axis=1).max(axis=1)
+    return result
 
 
 def rounding_problem(bound: Rounding, tolerance: float, axis_tolerance: float) -> list[Diagnostic]:

@@ -58,10 +58,14 @@ def _errors(result: PostResult) -> dict[str, Any] | None:
     found = result.compensation
     if found is None or result.job is None or result.job.errors is None:
         return None
+    from postproc.corrected.proof import after_formatting
+
+    proof = after_formatting(result)
     return {"model": result.job.errors.name, "tip_before_mm": found.tip_before, "axis_before_deg": found.axis_before / DEG,
             "tip_residual_mm": found.tip_after, "axis_residual_deg": found.axis_after / DEG, "points_added": found.added,
             "arcs_resolved": found.resolved, "blocks_near_a_pole": found.partial,
-            "tip_sigma_mm": found.doubt_tip, "axis_sigma_deg": None if found.doubt_axis is None else found.doubt_axis / DEG}
+            **({} if proof is None else proof.figures()), "tip_sigma_mm": found.doubt_tip,
+            "axis_sigma_deg": None if found.doubt_axis is None else found.doubt_axis / DEG}
 
 
 def _orientation(result: PostResult) -> dict[str, Any] | None:
@@ -140,7 +144,10 @@ def as_text(result: PostResult, output: str) -> str:
         lines.append(text(result.estimate))
     lines.append("axes: " + ", ".join(f"{k} {_places(lo)} to {_places(hi)}" for k, (lo, hi) in d["axis_extents"].items()))
     if result.compensation is not None:
-        lines += result.compensation.lines()
+        from postproc.corrected.proof import after_formatting
+
+        proof = after_formatting(result)
+        lines += result.compensation.lines() + ([] if proof is None else [proof.line()])
     if d["feed_reduced_blocks"]:
         lines.append(f"feed reduced for an axis limit in {d['feed_reduced_blocks']} blocks")
     if d["singular_events"]:

@@ -109,7 +109,7 @@ class SerialErrors:
                 if component.name.axis == names[j] and str(component.name)[1] == names[j]:
                     result[:, k] += component.curve.at(q[:, j], 1.0) - component.curve.at(q[:, j], -1.0)
         least = np.array([GRAIN[1 if names[j] in ROTARY else 0] for j in joints])
-        return np.maximum(np.abs(result), least)
+        return np.asarray(np.maximum(np.abs(result), least))
 
     def outside(self, names: tuple[str, ...], q: Floats, margin: float = 0.0) -> Bools:
         """True (N, J) where a joint of q (N, J) stands outside what was measured of it, by more than `margin`."""

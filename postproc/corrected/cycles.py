@@ -7,17 +7,17 @@ from dataclasses import replace
 import numpy as np
 
 from postproc.corrected.arcs import LOOSE
-from postproc.corrected.work import Work
+from postproc.corrected.work import ALONE, Work
 from postproc.moves import Moves
 from postproc.path import FEED, Path
-from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.arrays import Floats, Ints
 
 SAME = 1e-6
 """mm: places nearer than this are one"""
 
 
-def whole_holes(path: Path, nominal: Path, moves: Moves, work: Work, allowed: float) -> tuple[Path, Bools]:
-    """The path with holes corrected as a whole, and the blocks (K,) of those, which stay undivided.
+def whole_holes(path: Path, nominal: Path, moves: Moves, work: Work, allowed: float) -> tuple[Path, Ints]:
+    """The path with holes corrected as a whole, and the hole (K,) that each block is of, ALONE for those of none.
 
     Every block of a hole is corrected as its bottom is, but for the levels above the plane that drilling begins at: along
     the tool these get the correction of the block that the tool comes from to the first of the holes that follow each
@@ -26,7 +26,7 @@ def whole_holes(path: Path, nominal: Path, moves: Moves, work: Work, allowed: fl
     """
     hole = np.where(np.isnan(path.u) | path.home, -1, moves.hole[path.move])
     runs = np.flatnonzero(np.concatenate([[True], np.diff(hole) != 0]))
-    whole, q = np.zeros(len(path), dtype=bool), path.q.copy()
+    whole, q = np.full(len(path), ALONE), path.q.copy()
     for rows in _sequences(path, hole, runs, work):
         _correct_sequence(path, nominal, rows, work, allowed, q, whole)
     return replace(path, q=q), whole
@@ -52,7 +52,7 @@ def _one_place(path: Path, rows: Ints, work: Work) -> bool:
 
 
 def _correct_sequence(path: Path, nominal: Path, holes: list[Ints], work: Work, allowed: float, q: Floats,
-                      whole: Bools) -> None:
+                      whole: Ints) -> None:
     """Put the joints of the holes that stay whole into `q`, and mark them in `whole`."""
     lead = int(holes[0][0]) - 1
     kin = work.kinematics(int(work.tools[lead + 1]))
@@ -71,4 +71,4 @@ def _correct_sequence(path: Path, nominal: Path, holes: list[Ints], work: Work, 
         got[:, z] = wanted[:, 2] + np.where(wanted[:, 2] <= plane + SAME, off[2], came)
         joints, way = new.joints(got, kin, 0.0), np.tile(work.way[rows[bottom]], (len(rows), 1))
         if (work.off(nominal.q[rows], joints, rows, way) <= LOOSE * allowed).all():
-            q[rows], whole[rows] = joints, True
+            q[rows], whole[rows] = joints, rows[0]

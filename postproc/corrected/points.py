@@ -8,7 +8,7 @@ import numpy as np
 
 from postproc.corrected.arcs import LOOKS, LOOSE
 from postproc.corrected.reversals import SHORTEST, Divided, Starts, inserted, reversals
-from postproc.corrected.work import MOMENT, Work
+from postproc.corrected.work import ALONE, MOMENT, Work
 from postproc.path import ARC, FEED, TRAVERSE, Path
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.units import DEG
@@ -21,9 +21,14 @@ LEAST = 0.2
 
 def divided(path: Path, work: Work, starts: Starts, allowed: float) -> Divided:
     """The path with its blocks halved until their motion is near enough to the nominal one (`allowed` mm, see `_bound`)."""
+    return inserted(path, *between(path, work, starts, allowed))
+
+
+def between(path: Path, work: Work, starts: Starts, allowed: float) -> tuple[Ints, Floats, Floats]:
+    """(block (M,), fraction (M,), joints (M, J)) of the points that `divided` inserts."""
     cl_rapid = (path.code == TRAVERSE) & np.isfinite(path.u)
     block = np.flatnonzero(((path.code == FEED) | cl_rapid) & ~path.home & (np.arange(len(path)) > 0))
-    block = block[~path.home[block - 1] & ~work.whole[block]]
+    block = block[~path.home[block - 1] & (work.whole[block] == ALONE)]
     pieces, found = _taken_up(path, work, starts, block, allowed)
     for _ in range(ROUNDS):
         pieces = pieces.rows(_off(pieces, path, work) > _bound(pieces, path, work, allowed))
@@ -36,7 +41,7 @@ def divided(path: Path, work: Work, starts: Starts, allowed: float) -> Divided:
         pieces = pieces.halved(middle, q, way)
         pieces = pieces.rows(_long(pieces, work))
     where, share, joints = (np.concatenate(column) for column in zip(*found, strict=True))
-    return inserted(path, where, share, joints)
+    return where, share, joints
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from machines.geometric_error.lost_motion import carried_on
-from postproc.corrected.work import EDGES, LAST, Work
+from postproc.corrected.work import ALONE, EDGES, LAST, Work
 from postproc.path import ARC, FEED, Path
 from postproc.word_arcs import PLANE_COLUMNS
 from toolpaths.arrays import Floats, Ints
@@ -54,7 +54,7 @@ def starts_of(path: Path, nominal: Path, work: Work, allowed: float) -> Starts:
     """Corrected joints where blocks begin; cutting ones whose axis turns back begin by the new way."""
     start, begun = (np.concatenate([x[:1], x[:-1]]) for x in (path.q, work.way))
     block = np.flatnonzero(((path.code == FEED) | (path.code == ARC)) & ~path.home & (np.arange(len(path)) > 0))
-    block = block[~path.home[block - 1] & ~work.whole[block]]
+    block = block[~path.home[block - 1] & (work.whole[block] == ALONE)]
     way = work.begin_way(block)
     turned = np.any(way * work.way[block - 1] < 0.0, axis=1)
     back = block[turned]

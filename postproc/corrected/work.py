@@ -40,16 +40,18 @@ class CorrectedEnds:
 
 
 class Work:
-    """What is needed throughout: the machine with errors by tool, groups of one orientation; the blocks of holes that are
-    `whole`, the `way` (K, J) that each joint last moved at the ends of the blocks, 0 for the mean of both, and the
-    `drift` (K, J) of the correction over each block."""
+    """What is needed throughout: the machine with errors by tool, groups of one orientation.
+
+    `whole`: (K,) the hole that a block is of where it is corrected as a whole; `way`: (K, J) sign of each joint's last
+    motion at the ends of the blocks, 0 for the mean of both; `drift`: (K, J) of the correction over each block.
+    """
 
     def __init__(self, path: Path, tools: Ints, kinematics: Callable[[int], Kinematics], model: ErrorModel,
-                 axis_tolerance: float, beyond: bool, share: float) -> None:
+                 axis_tolerance: float, beyond: bool, share: float, mean: bool = False) -> None:
         self.path, self.tools, self.kinematics = path, tools, kinematics
         self.axis_tolerance, self.beyond, self.model = axis_tolerance, beyond, model
-        self.axis_share = share * axis_tolerance
-        self.whole: Bools = np.zeros(len(path), dtype=np.bool_)
+        self.axis_share, self.mean = share * axis_tolerance, mean
+        self.whole: Ints = np.full(len(path), ALONE)
         self.way: Floats = np.zeros(path.q.shape)
         self.drift: Floats = np.zeros(path.q.shape)
         self.rotary = np.array(kinematics(int(tools[0])).rotary)
@@ -64,8 +66,8 @@ class Work:
 
     @cached_property
     def two_way(self) -> list[int]:
-        """Joints that have errors with two ways of approach."""
-        return self.model.axes.two_way(self.names)
+        """Joints that have errors with two ways of approach; none where all go by their `mean`."""
+        return [] if self.mean else self.model.axes.two_way(self.names)
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -75,14 +77,17 @@ class Work:
     def take_ways(self, q: Floats) -> None:
         """Find `way` and `drift` from the ends of the blocks corrected by mean ways, q (K, J).
 
-        A joint that the correction alone moves turns back too: what it loses is more than what it moves by. Where joints do
-        not run straight it is the sign of the last moment.
+        A joint that the correction alone moves turns back too: what it loses is more than what it moves by; not
+        inside a hole, which is moved as a whole. Where joints do not run straight it is the sign of the last moment.
         """
         step, change = (np.nan_to_num(np.diff(x, axis=0, prepend=x[:1])) for x in (q, q - self.path.q))
         self.drift = np.where(np.abs(change) > np.where(self.rotary, GRAIN[1], GRAIN[0]), change, 0.0)
         bent = np.flatnonzero(self.bent)
         last = self.moving(bent, np.ones(len(bent)), LAST)
         step[bent] = np.where(last != 0.0, last, step[bent])
+        inside = np.flatnonzero((self.whole[1:] != ALONE) & (self.whole[1:] == self.whole[:-1])) + 1
+        lateral = step[inside[:, None], self.two_way]
+        step[inside[:, None], self.two_way] = np.where(np.abs(lateral) >= self.gaps(q[inside]), lateral, 0.0)
         self.way = turning_sign(step, self.rotary)
 
     @cached_property
@@ -96,7 +101,7 @@ class Work:
         return result
 
     def moving(self, block: Ints, t: Floats, moment: float = MOMENT) -> Floats:
-        """(N, J) sign of each joint's motion at fraction t (N,) of blocks (N,), over a moment before; after it at their start.
+        """(N, J) sign of each joint's motion at fraction t (N,) of blocks (N,), over a moment before; after it at the start.
 
         The correction counts as changing evenly over a block.
         """
@@ -128,9 +133,12 @@ class Work:
         result = np.array(way)
         if self.two_way:
             j = self.two_way
-            gaps = self.model.axes.gaps(self.names, np.nan_to_num(q), j)
-            result[:, j] = Steps.of(np.nan_to_num((q - q0)[:, j]), gaps).at(way[:, j])
+            result[:, j] = Steps.of(np.nan_to_num((q - q0)[:, j]), self.gaps(q)).at(way[:, j])
         return result
+
+    def gaps(self, q: Floats) -> Floats:
+        """(N, T) lost motion of the joints in `two_way` at q (N, J)."""
+        return self.model.axes.gaps(self.names, np.nan_to_num(q), self.two_way)
 
     def nominal(self, block: Ints, t: Floats) -> Floats:
         """Nominal joints (N, J) at fraction t (N,) of blocks (N,), along the arc of those that are arcs."""

@@ -15,8 +15,6 @@ from toolpaths.diagnostics import Diagnostic
 
 AWAY = 0.01
 """mm or degrees beside home that rounding explains"""
-CORRECTED = 0.5
-"""mm or degrees beside home that the correction of geometric errors explains, at a retract as high as home"""
 
 
 def check_changes(code: Canonical, motion: Motion, job: Job, home: Floats, faults: Faults) -> list[Diagnostic]:
@@ -34,7 +32,7 @@ def check_changes(code: Canonical, motion: Motion, job: Job, home: Floats, fault
     away = np.where(np.isfinite(away), away, np.inf)
     spindle, coolant = _on(code, (3, 4, 5), 5.0, changes), _on(code, (7, 8, 9), 9.0, changes)
     lines = in_files(code.line[changes], code.files)
-    result, near = _others(code, job, faults), AWAY if job.errors is None else CORRECTED
+    result, near = _others(code, job, faults), AWAY + _corrected(job, place, motion.tool[np.maximum(before, 0)])[:, axes]
     for bad, what, hint in (
             ((away > near).any(axis=1), "the tool is changed away from home", "the retract to home before it is missing"),
             (spindle != 5.0, "the tool is changed while the spindle turns", "M5 before it"),
@@ -43,6 +41,28 @@ def check_changes(code: Canonical, motion: Motion, job: Job, home: Floats, fault
             k = int(bad.argmax())
             where = _distance(job, axes, away[k]) if what.endswith("home") else ""
             result.append(faults.error("verify.tool_change", what + where, 0, int(lines[k]), int(bad.sum()), hint))
+    return result
+
+
+def _corrected(job: Job, place: Floats, tool: Ints) -> Floats:
+    """(N, J) mm or degrees beside home that the correction of geometric errors explains.
+
+    A retract as high as home is corrected, home itself is not. It is what the machine with errors needs at the places
+    (N, J), its lost motion included.
+    """
+    if job.errors is None or job.errors.corrected_by != "post":
+        return np.zeros(place.shape)
+    from machines.geometric_error.correction import correct
+
+    control, gauge, names = job.control, job.machine.kinematics, job.machine.axis_names
+    two_way, result = job.errors.axes.two_way(names), np.zeros(place.shape)
+    for number in np.unique(tool).tolist():
+        k = np.flatnonzero((tool == number) & np.isfinite(place).all(axis=1))
+        kin, words = job.kinematics_of(number), place[k] - control.work_offset
+        q = control.joints(words, gauge, 0.0)
+        found = correct(job.errors.on(kin), q, *kin.forward(q), beyond=True).q
+        result[k] = np.abs(np.nan_to_num(control.words(found, gauge, 0.0) - words))
+        result[k[:, None], two_way] += job.errors.axes.gaps(names, q, two_way) * control.unit[two_way]
     return result
 
 

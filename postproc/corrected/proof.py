@@ -1,0 +1,91 @@
+"""What is left of geometric errors at the points of the CL file, in the program as it is read back."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from machines.geometric_error.lost_motion import GRAIN
+from postproc.holes import Phase
+from postproc.moves import Moves
+from postproc.readback.compare import Comparison
+from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.rotations import angle_between
+from toolpaths.toolpath import Kind
+from toolpaths.units import DEG
+
+if TYPE_CHECKING:
+    from postproc.pipeline import PostResult
+
+
+@dataclass(frozen=True)
+class AfterFormatting:
+    """Deviation of the machine with errors at the CL points of a written program, mm and rad.
+
+    Attributes:
+        tip, axis: (M,) at each of the `points`
+        points: (M,) numbers of the moves that come there
+        tip_bound, axis_bound: what correction, rounding of the words and lost motion may leave together
+    """
+
+    tip: Floats
+    axis: Floats
+    points: Ints
+    tip_bound: float
+    axis_bound: float
+
+    def line(self) -> str:
+        """One line for the summary."""
+        arcsec = DEG / 3600.0
+        return (f"geometric errors after formatting, at {len(self.points)} CL points: tip {_worst(self.tip) * 1e3:.2f} um, "
+                f"axis {_worst(self.axis) / arcsec:.2f} arcsec; bound {self.tip_bound * 1e3:.2f} um and "
+                f"{self.axis_bound / arcsec:.2f} arcsec")
+
+    def figures(self) -> dict[str, float]:
+        """The worst, and the bounds: mm and degrees."""
+        return {"tip_after_mm": _worst(self.tip), "axis_after_deg": _worst(self.axis) / DEG,
+                "tip_bound_mm": self.tip_bound, "axis_bound_deg": self.axis_bound / DEG}
+
+
+def after_formatting(result: PostResult) -> AfterFormatting | None:
+    """The deviations of a conversion that corrects geometric errors; None of one that does not or that is not proved.
+
+    CL points are where the tool cuts to: ends of feed moves and arcs, bottoms of holes. The
+    bound adds what the correction itself leaves (near poles, and where a machine cannot turn the tool), half a last
+    decimal in every word (`rounding_bound`), and for slides that lose motion the same once more and the grain below which
+    turning back is not made up for.
+    """
+    found, comparison, job = result.compensation, result.comparison, result.job
+    if found is None or comparison is None or job is None or job.errors is None:
+        return None
+    moves = job.moves.without_pecks()
+    tip, axis = _nearest(comparison, moves)
+    points = np.flatnonzero(_cl_points(moves) & np.isfinite(tip))
+    names, rotary = job.machine.axis_names, job.machine.rotary
+    losing = sum(not rotary[j] for j in job.errors.axes.two_way(names))
+    play = (job.rounding.tip + GRAIN[0] * np.sqrt(losing)) if losing else 0.0
+    return AfterFormatting(tip[points], axis[points], points, found.tip_after + job.rounding.tip + float(play),
+                           found.axis_after + job.rounding.axis)
+
+
+def _cl_points(moves: Moves) -> Bools:
+    return np.asarray((moves.kind != Kind.RAPID) & ((moves.hole < 0) | (moves.phase == Phase.DRILL)))
+
+
+def _nearest(comparison: Comparison, moves: Moves) -> tuple[Floats, Floats]:
+    """(tip, axis), each (M,), of the block that ends nearest to each move's end among its own; NaN where it has none."""
+    own, done = np.flatnonzero(comparison.owner < len(moves)), np.flatnonzero(comparison.match >= 0)
+    block, owner = np.concatenate([own, comparison.match[done]]), np.concatenate([comparison.owner[own], done])
+    off = np.linalg.norm(comparison.tip[block] - moves.tip[owner], axis=1)
+    order = np.lexsort((off, owner))
+    first = order[np.diff(owner[order], prepend=-1) > 0]
+    tip, axis = np.full(len(moves), np.nan), np.full(len(moves), np.nan)
+    tip[owner[first]] = off[first]
+    axis[owner[first]] = angle_between(comparison.axis[block[first]], moves.axis[owner[first]])
+    return tip, axis
+
+
+def _worst(values: Floats) -> float:
+    return float(values.max(initial=0.0))

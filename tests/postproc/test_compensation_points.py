@@ -1,0 +1,132 @@
+"""At the points of the CL file corrected programs come to the rounding of their words, lost motion included."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import postproc
+import toolpaths
+from postproc.cli import app
+from postproc.compensation import unstated
+from postproc.corrected.proof import after_formatting
+from postproc.options import Options
+from postproc.pipeline import PostResult
+from postproc.setup import load_setup
+from toolpaths.arrays import Floats
+
+SAMPLES = Path("samples")
+CASES = [("five_faces.cls", "mikron-ucp710", "fanuc-30i", "tools"),
+         ("five_faces.cls", "mikron-ucp710", "siemens-840d", "tools"),
+         ("five_faces.cls", "mikron-ucp710", "linuxcnc", "tools"), ("five_faces.cls", "mikron-ucp710", "haas-ngc", "tools"),
+         ("five_tilted.cls", "mikron-ucp710", "heidenhain-tnc640", "tools"),
+         ("tool_axis_tour.apt", "mikron-ucp710", "fanuc-30i", "tools"),
+         ("five_faces.cls", "linuxcnc-xyzac-trt", "linuxcnc", "tools"),
+         ("pocket.cls", "mikron-ucp710", "linuxcnc", "tools"), ("pocket.cls", "uranesx", "linuxcnc", "delta"),
+         ("h4a_indexed.cls", "h4a-c-table", "linuxcnc", "h4a")]
+
+
+def converted(sample: str, machine: str, controller: str, setup: str) -> PostResult:
+    path, found = toolpaths.read(SAMPLES / sample)
+    options = Options(setup=str(SAMPLES / f"{setup}.setup.toml"), error_model=str(SAMPLES / f"errors/{machine}.toml"))
+    return postproc.convert(path, machine, controller, options=options, diagnostics=found)
+
+
+@pytest.mark.parametrize(("sample", "machine", "controller", "setup"), CASES)
+def test_points_are_inside_the_rounding_of_their_words(sample: str, machine: str, controller: str, setup: str) -> None:
+    result = converted(sample, machine, controller, setup)
+    found = after_formatting(result)
+    assert result.ok and found is not None and result.job is not None and len(found.points) > 10
+    assert found.tip.max() <= min(1.1 * result.job.rounding.tip, found.tip_bound)
+    assert found.axis.max() <= found.axis_bound
+    assert np.median(found.tip) > 0.1 * result.job.rounding.tip
+
+
+def test_the_figures_stand_in_the_json_and_in_the_text(tmp_path: Path) -> None:
+    common = ["convert", "samples/h4a_indexed.cls", "-m", "h4a-c-table", "-c", "linuxcnc", "--setup",
+              "samples/h4a.setup.toml", "--error-model", "samples/errors/h4a-c-table.toml", "-o", str(tmp_path / "a.ngc")]
+    run = CliRunner().invoke(app, [*common, "--json", "-"])
+    figures = json.loads(run.stdout)["geometric_errors"]
+    assert figures["tip_before_mm"] > 0.02 > 100.0 * figures["tip_after_mm"] > 0.0
+    assert figures["tip_after_mm"] <= figures["tip_bound_mm"] and figures["axis_after_deg"] <= figures["axis_bound_deg"]
+    run = CliRunner().invoke(app, common)
+    assert re.search(r"after formatting, at \d+ CL points: tip 0\.\d\d um", run.stdout)
+
+
+PLAIN = """UNITS/MM
+LOADTL/1
+SPINDL/1000, CLW
+FEDRAT/300, MMPM
+RAPID
+GOTO/0, 0, 50
+GOTO/-40, -40, 0
+GOTO/40, -40, 0
+GOTO/40, 40, -1
+GOTO/40, -10, -1
+GOTO/41, -10, -1
+GOTO/40.5, 12, -2
+GOTO/40.5, 12, -3
+GOTO/40.5, 12, -2
+GOTO/-13, 12, -2
+FINI
+"""
+
+
+def axis_words(text: str) -> Floats:
+    """(N, 3) X Y Z after each block of a program of G0 and G1 in G90."""
+    rows, now = [], np.zeros(3)
+    for line in text.splitlines():
+        words = dict(re.findall(r"([XYZ])(-?[\d.]+)", "" if line[:1] in "(%" or "G53" in line else line))
+        if words:
+            now = np.array([float(words.get(k, v)) for k, v in zip("XYZ", now, strict=True)])
+            rows.append(now)
+    return np.array(rows)
+
+
+def test_the_sign_of_the_last_written_motion_tells_the_error_at_every_point(tmp_path: Path) -> None:
+    """A second reading: words by a pattern, ways by the plain sign of the last change of each word."""
+    (tmp_path / "s.apt").write_text(PLAIN)
+    rows = [f"{x}, {0.05 * x}, {0.05 * x + 4}, {0.01 * x * x / 10}" for x in (-60, -20, 0, 30, 60)]
+    (tmp_path / "x.csv").write_text("\n".join(["X [mm], EXX+ [um], EXX- [um], EYX [um]", *rows]))
+    (tmp_path / "y.csv").write_text("Y [mm], EYY+ [um], EYY- [um], EZY [um]\n-60, 0, 3, 0\n60, 6, 9, 12\n")
+    (tmp_path / "e.toml").write_text("".join(f'[components.{name}]\ntable = "{name[2].lower()}.csv"\n'
+                                             for name in ("EXX", "EYX", "EYY", "EZY")))
+    path, found = toolpaths.read(tmp_path / "s.apt")
+    result = postproc.convert(path, "mill-3axis", "linuxcnc", load_setup(None)[0],
+                              Options(error_model=str(tmp_path / "e.toml")), found)
+    assert result.ok, [str(d) for d in result.diagnostics]
+    q = axis_words(result.text)
+    way = np.zeros(3)
+    tips = []
+    x, y = np.array([-60.0, -20.0, 0.0, 30.0, 60.0]), np.array([-60.0, 60.0])
+    for before, here in zip(np.concatenate([np.zeros((1, 3)), q[:-1]]), q, strict=True):
+        way = np.where(here != before, np.sign(here - before), way)
+        tips.append(here + 1e-3 * np.array([np.interp(here[0], x, 0.05 * x + (4.0 if way[0] < 0 else 0.0)),
+                                            np.interp(here[0], x, 1e-3 * x * x)
+                                            + np.interp(here[1], y, [0.0, 6.0]) + (3.0 if way[1] < 0 else 0.0),
+                                            np.interp(here[1], y, [0.0, 12.0])]))
+    wanted = np.array([list(map(float, line[5:].split(","))) for line in PLAIN.splitlines() if line.startswith("GOTO")])
+    off = np.array([np.linalg.norm(np.array(tips) - point, axis=1).min() for point in wanted[1:]])
+    assert off.max() < 1e-4
+
+
+def test_holes_have_their_own_depth_and_stay_cycles() -> None:
+    result = converted("five_faces.cls", "mikron-ucp710", "fanuc-30i", "tools")
+    depths = [float(z) for z in re.findall(r"^[^(\n]*G8[123][^\n]* Z(-?[\d.]+)", result.text, re.M)]
+    assert result.program is not None and len(result.program.holes) == 15
+    deepest = sorted(round(hole.bottom, 4) for hole in result.program.holes)
+    assert len(set(deepest)) > 10 and set(depths) <= set(deepest)
+
+
+def test_blocks_that_name_their_axes_write_no_others() -> None:
+    result = converted("five_faces.cls", "mikron-ucp710", "fanuc-30i", "tools")
+    path, nominal = result.path, result.nominal
+    assert path is not None and nominal is not None
+    named = np.flatnonzero(path.state.any(axis=1) & (np.arange(len(path)) > 0))
+    assert len(named) > 5 and not (path.q[named] != path.q[named - 1])[~path.state[named]].any()
+    np.testing.assert_array_equal(unstated(path.q, path), path.q)
