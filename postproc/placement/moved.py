@@ -22,8 +22,7 @@ def moved(work: Work, placement: Placement) -> Work:
 def _pass(one: Pass, placement: Placement) -> Pass:
     return replace(one, tip=placement.points(one.tip), axes=placement.directions(one.axes),
                    axis=placement.directions(one.axis[None])[0],
-                   contact=replace(one.contact, normal=placement.directions(one.contact.normal),
-                                   way=placement.directions(one.contact.way)),
+                   contact=one.contact.turned(placement.rotation),
                    stretches=tuple(_stretch(each, placement) for each in one.stretches))
 
 

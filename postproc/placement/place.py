@@ -13,6 +13,7 @@ from postproc.job import prepare
 from postproc.links import safe_space
 from postproc.options import Options
 from postproc.orientation.passes import Work, work_of
+from postproc.placement.bodies import beside
 from postproc.placement.search import Found, Progress, Search
 from postproc.placement.space import ANGLES, Space, space_of
 from postproc.placement.timed import Timer, Tried
@@ -68,7 +69,11 @@ def place(toolpath: Toolpath, machine: Machine, setup: SetupFile, options: Optio
     work, space, found = _begun(toolpath, machine, setup, options, controller)
     if work is None or space is None:
         return None, found
-    timer = Timer(work, space, setup.joints.singular_distance)
+    bodies, more = beside(work, options.setup)
+    found += more
+    if has_errors(found):
+        return None, found
+    timer = Timer(work, space, setup.joints.singular_distance, bodies)
     try:
         result = Search(timer, space, progress).run()
     except (ValueError, ArithmeticError) as fault:

@@ -31,12 +31,13 @@ _STEP = 100.0
 """mm, over which slides are differenced"""
 _ROUNDS = 40
 _CHUNK = 2_000_000
-_POSES = 48
-"""of a kinematics and an axis that stand for all"""
+_POSES = 12
+"""of a tool and an axis that stand for all, beside the outermost"""
 _MANY = 20_000
 """rows, more are thinned out"""
-_LATTICE = 5
-_FINE = 0.5
+_LATTICE, _COARSE = 5, 3
+"""places along each axis: for thinning out, and to begin with on a parallel machine"""
+_FINE = 2.0
 """mm"""
 _NONE = -1e6
 _PER_RAD, _PER_SHARE = 100.0, 100.0
@@ -211,10 +212,10 @@ class Sampled:
 
     def deepest(self, low: Floats, high: Floats) -> tuple[Floats, float, str]:
         """The best of a lattice, then compass steps."""
-        lattice = np.stack(np.meshgrid(*np.linspace(low, high, _LATTICE).T), axis=-1).reshape(-1, ANGLES)
-        values = self.margins(np.unique(lattice, axis=0))
-        place, best = np.unique(lattice, axis=0)[values.argmax()], float(values.max())
-        step = 0.5 * (high - low) / (_LATTICE - 1)
+        lattice = np.unique(np.stack(np.meshgrid(*np.linspace(low, high, _COARSE).T), axis=-1).reshape(-1, ANGLES), axis=0)
+        values = self.margins(lattice)
+        place, best = lattice[values.argmax()], float(values.max())
+        step = 0.5 * (high - low) / (_COARSE - 1)
         while float(step.max()) > _FINE:
             around = np.clip(place + np.vstack([np.diag(step), -np.diag(step)]), low, high)
             values = self.margins(around)
@@ -227,13 +228,13 @@ class Sampled:
 
 def sampled(work: Work, least: float) -> Sampled:
     """The region of a parallel machine from the poses of `work`, its point at the table's origin."""
-    groups: dict[tuple[int, bytes], list[tuple[Floats, Floats]]] = {}
-    kins = {id(one.kin): one.kin for one in work.passes}
+    groups: dict[tuple[float, bytes], list[tuple[Floats, Floats]]] = {}
+    kins = {one.kin.tool_length: one.kin for one in work.passes}
     for one in work.passes:
         lift = max(0.0, work.space.plane(one.axis, True, _MARGIN) - float(one.axis @ (one.tip[-1] - work.space.centre)))
         tips = [one.tip, one.tip[[0, -1]] + lift * one.axes[[0, -1]], *(each.tip for each in one.stretches)]
         axes = [one.axes, one.axes[[0, -1]], *(each.axis for each in one.stretches)]
-        key = (id(one.kin), np.round(one.axis, 6).tobytes() if np.ptp(one.axes, axis=0).max() < 1e-9 else b"")
+        key = (one.kin.tool_length, np.round(one.axis, 6).tobytes() if np.ptp(one.axes, axis=0).max() < 1e-9 else b"")
         groups.setdefault(key, []).append((np.concatenate(tips), np.concatenate(axes)))
     poses = [(kins[key[0]], *_outermost(*(np.concatenate(column) for column in zip(*rows, strict=True))))
              for key, rows in groups.items()]

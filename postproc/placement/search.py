@@ -17,14 +17,14 @@ from toolpaths.arrays import Floats
 from toolpaths.units import DEG
 
 Progress = Callable[[str, int, int], None]
-MOST = 400
-"""places that are looked at"""
 EQUAL = 2e-4
 """part of the time by which places are equal; travel margin decides among them"""
-_SPREAD, _SEEDS = 128, 6
-"""places of each attitude that travel is asked about, and those of them that are timed"""
-_STARTS = 3
-"""attitudes that are refined"""
+_SPREAD, _SEEDS = 64, 6
+"""places of each attitude that travel is asked about, and those of them that may be timed"""
+_LIKELY = 6
+"""attitudes that are timed at all of them"""
+_STARTS, _DISTINCT = 3, 12.0 * DEG
+"""attitudes that are refined, and how far they are from each other"""
 _FINEST = (1.0, 0.25 * DEG)
 """mm, rad: the last compass steps"""
 _POLISH = 60
@@ -59,17 +59,21 @@ class Search:
     @property
     def spent(self) -> bool:
         """True where no more places may be looked at."""
-        return self.timer.looked >= MOST
+        return self.timer.looked >= self.timer.most
 
     def run(self) -> Found:
         """All of it."""
         attitudes = self.space.attitudes()
         self.found.attitudes = len(attitudes)
         seeds = [seeds for k, angles in enumerate(attitudes) if (seeds := self._seeds(angles, k, len(attitudes)))]
-        for group in _in_turn(seeds):
-            for place in self._by_bound(group):
-                self._look(place)
-        for start in self._starts():
+        for place in self._by_bound([group[0] for group in seeds]):
+            self._look(place)
+        likely = [one.place[ANGLES:] for one in self._starts(_LIKELY, 0.0)]
+        more = [place for group in seeds for place in group[1:]
+                if any(np.abs(place[ANGLES:] - angles).max() < 1e-9 for angles in likely)]
+        for place in self._by_bound(more):
+            self._look(place)
+        for start in self._starts(_STARTS, _DISTINCT):
             self._compass(start)
         if self.found.best is not None:
             self.found.best = self._roomiest()
@@ -80,7 +84,7 @@ class Search:
         if self.spent:
             return None
         if self.progress is not None:
-            self.progress("placing", self.timer.looked, MOST)
+            self.progress("placing", self.timer.looked, self.timer.most)
         best = self.found.best
         made = self.timer.tried(place, np.inf if best is None else best.seconds)
         if best is None or made.seconds < best.seconds:
@@ -128,13 +132,13 @@ class Search:
         bounds = [self.timer.tried(place, 0.0).bound for place in places if not self.spent]
         return [places[k] for k in np.argsort(bounds, kind="stable").tolist()]
 
-    def _starts(self) -> list[Tried]:
-        """The best place of each of the best attitudes."""
+    def _starts(self, count: int, apart: float) -> list[Tried]:
+        """The best place of each of the best attitudes that are more than `apart` rad from each other."""
         good = sorted((one for one in self.timer.known() if np.isfinite(one.seconds) and self.space.holds(one.place)),
                       key=lambda one: one.seconds)
         taken: list[Tried] = []
         for one in good:
-            if len(taken) < _STARTS and all(np.abs(one.place - other.place)[ANGLES:].max() > 0.1 for other in taken):
+            if len(taken) < count and all(np.abs(one.place - other.place)[ANGLES:].max() > apart for other in taken):
                 taken.append(one)
         return taken
 
@@ -155,7 +159,7 @@ class Search:
         if self.spent:
             return None
         if self.progress is not None:
-            self.progress("placing", self.timer.looked, MOST)
+            self.progress("placing", self.timer.looked, self.timer.most)
         made = self.timer.tried(place, at.seconds)
         if self.found.best is None or made.seconds < self.found.best.seconds:
             self.found.best = made if np.isfinite(made.seconds) else self.found.best
@@ -191,8 +195,3 @@ class Search:
                 steps = 0.5 * steps
         return at
 
-
-def _in_turn(groups: list[list[Floats]]) -> list[list[Floats]]:
-    """The first places of all attitudes, then all the others."""
-    rest = [place for group in groups for place in group[1:]]
-    return [[group[0] for group in groups], rest]

@@ -12,10 +12,11 @@ from machines.machine import Machine
 from machines.singular_distance import NAMES as SINGULAR
 from machines.singular_distance import has_singular_distance, singular_distance
 from postproc.orientation.choose import seconds
-from postproc.orientation.orient import ways_between
 from postproc.orientation.passes import Work
+from postproc.orientation.ranking import prepare
 from postproc.orientation.timed import Turned, turned
-from postproc.orientation.turns import Ends, ends
+from postproc.orientation.turns import Ends, ends, ways_between
+from postproc.placement.bodies import Beside
 from postproc.placement.moved import moved
 from postproc.placement.space import Space
 from toolpaths.arrays import Floats
@@ -79,13 +80,19 @@ class Timer:
 
     Args:
         work: the file with its part frame on the table frame
+        least: distance that a parallel machine keeps from its singular positions
+        bodies: that do not move with the part
     """
 
-    def __init__(self, work: Work, space: Space, least: float) -> None:
-        self.work, self.space, self.least = work, space, least
+    most = 300
+    """places that are looked at"""
+
+    def __init__(self, work: Work, space: Space, least: float, bodies: Beside | None = None) -> None:
+        self.work, self.space, self.least, self.bodies = work, space, least, bodies
         self.planned, self.looked, self.pruned, self.refused = 0, 0, 0, 0
         self._cuts: dict[tuple[int, bytes], _Cut] = {}
         self._known: dict[bytes, Tried] = {}
+        prepare(work.passes)
 
     @property
     def machine(self) -> Machine:
@@ -108,9 +115,9 @@ class Timer:
         return made
 
     def _tried(self, place: Floats, best: float) -> Tried:
-        over = self.space.overhang(place)
-        if over:
-            return self._refused(place, over)
+        why = self._stands(place)
+        if why:
+            return self._refused(place, why)
         work = moved(self.work, self.space.placement(place))
         made = [turned(one, one.axis, work.machine) for one in work.passes]
         low, high = _extents(made)
@@ -119,7 +126,7 @@ class Timer:
             return self._refused(place, why, low, high)
         singular, why = self._singular(made)
         edge = [ends(one, work) for one in made]
-        why = why or _no_height(edge, made)
+        why = why or _no_height(edge, made) or ("" if self.bodies is None else self.bodies.tool(work))
         if why:
             return self._refused(place, why, low, high, singular)
         linking = _linking(work, edge)
@@ -132,6 +139,11 @@ class Timer:
         for spent, name in cuts:
             limiting[name] = limiting.get(name, 0.0) + spent
         return Tried(place, cutting + linking, cutting, linking, bound + linking, low, high, singular, "", limiting)
+
+    def _stands(self, place: Floats) -> str:
+        """What the part would stand in or hang over, "" where it stands free."""
+        over = self.space.overhang(place)
+        return over or ("" if self.bodies is None else self.bodies.against(self.space.placement(place)))
 
     def _refused(self, place: Floats, why: str, low: Floats | None = None, high: Floats | None = None,
                  singular: float = np.nan) -> Tried:
