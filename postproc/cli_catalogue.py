@@ -82,8 +82,14 @@ def setup_check(file: Annotated[str, typer.Argument(help="TOML file")], json: Js
 
     refuse_overwriting({"--json": json}, {"the set-up": file})
     spec, found = load_setup(file)
-    found = list(found) + (part_placement(spec, file)[1] if spec else [])
-    good = "" if spec is None or has_errors(found) else f"{file}: good: {len(spec.tools)} tools"
+    placement, more = part_placement(spec, file) if spec else (None, [])
+    found, bodies = [*found, *more], ""
+    if spec is not None and placement is not None:
+        from postproc.collision.bodies import described
+
+        bodies, more = described(spec, placement, file)
+        found += more
+    good = "" if spec is None or has_errors(found) else f"{file}: good: {len(spec.tools)} tools{bodies}"
     report(tuple(found), json, {"diagnostics": [d.as_dict() for d in found]}, good)
 
 

@@ -11,12 +11,14 @@ from surfaces import bicubic_surface
 
 LOW, STEPS = -25.0, 30
 """mm, bottom of the part; squares along each side of the surface"""
+TABLE = -140.0
+"""mm, top of the table in the table frame"""
 
 SETUP = '''# The test part in a vise on a table, and the tool that cuts it with shank and holder: for orient and convert.
 description = "test part in a vise"
 
 [part]
-origin = [-30.0, -30.0, 85.0]
+origin = [-30.0, -30.0, -55.0]
 
 [bodies]
 part = "test_part.stl"
@@ -24,7 +26,7 @@ clearance = 0.5
 gouge = 0.03
 
 [bodies.table]
-box = {{low = [-200.0, -200.0, -60.0], high = [200.0, 200.0, 0.0]}}
+box = {{low = [-200.0, -200.0, -200.0], high = [200.0, 200.0, -140.0]}}
 
 [[bodies.fixtures]]
 name = "vise"
@@ -59,9 +61,9 @@ def quads(grid: Floats) -> Floats:
 
 
 def box(low: tuple[float, float, float], high: tuple[float, float, float]) -> Floats:
-    """Triangles (12, 3, 3) of a box."""
+    """Triangles (12, 3, 3) of a box that stands on the table; z counts from there."""
     x, y = np.meshgrid((low[0], high[0]), (low[1], high[1]), indexing="ij")
-    return prism(x, y, np.full((2, 2), high[2]), low[2])
+    return prism(x, y, np.full((2, 2), TABLE + high[2]), TABLE + low[2])
 
 
 def stl(name: str, triangles: Floats) -> bytes:

@@ -102,6 +102,22 @@ def scene(setup: SetupFile, placement: Placement, file: str) -> tuple[Scene | No
     return (None if has_errors(found) else Scene(tuple(bodies), given.clearance, given.gouge)), found
 
 
+def described(setup: SetupFile, placement: Placement, file: str) -> tuple[str, list[Diagnostic]]:
+    """(lines that say what stands where, what is wrong with the meshes of a set-up)."""
+    bodies, found = scene(setup, placement, file)
+    for number, tool in setup.tools.items():
+        if tool.holder_mesh is not None:
+            found += load_mesh(Path(file).parent / tool.holder_mesh, tool.holder_units, f"tools.{number}.holder_mesh")[1]
+    return "".join(f"\n{_where(body)}" for body in (bodies.bodies if bodies else ())), found
+
+
+def _where(body: Body) -> str:
+    """The place of a body in the table frame."""
+    low, high = body.solid.corners.min(axis=(0, 1)), body.solid.corners.max(axis=(0, 1))
+    spans = ", ".join(f"{name} {a:g} to {b:g}" for name, a, b in zip("xyz", low.round(3), high.round(3), strict=True))
+    return f"{body.name}: {len(body.solid)} triangles, {spans} mm of the table frame"
+
+
 def _solid(given: Given, where: Placement, folder: Path, units: Units,
            key: str) -> tuple[Solid | None, list[Diagnostic]]:
     """A mesh or box in the table frame."""
@@ -131,7 +147,7 @@ def touches(all_bodies: Scene, form: Form, way: Swept, cutting: Swept | None = N
         found = nearest(body.solid, on, form.of(part), limit)
         if found.place >= 0:
             result.append(Touch(form.number, part, body, found.distance, limit, int(on.row[found.place])))
-    if not result:
+    if not result and len(way):
         result = [Touch(form.number, part, body, -np.inf, limit, int(way.row[0]))
                   for part, body, limit in all_bodies.pairs(form) if body.solid.holds(_core(form.of(part), way))]
     return result

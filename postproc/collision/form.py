@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -48,13 +48,13 @@ class _Cutter:
     drill: bool
 
 
-def tool_form(number: int, tool: Tool | None, setup: ToolSetup | None, folder: Path) -> tuple[Form, list[Diagnostic]]:
+def tool_form(number: int, tool: Tool | None, setup: ToolSetup | None, file: str) -> tuple[Form, list[Diagnostic]]:
     """What is known of a tool's form; what is not is told, for it is not checked.
 
     Args:
         tool: as the CL file describes it
         setup: as the set-up does, which goes before it
-        folder: of the set-up file
+        file: the set-up file
     """
     given = setup or _ANY
     found = _differing(number, tool, given)
@@ -64,12 +64,13 @@ def tool_form(number: int, tool: Tool | None, setup: ToolSetup | None, folder: P
     pieces[SHANK], at = _sections(given.shank if placed else [], cutter.flutes or 0.0)
     pieces[HOLDER], top = _sections(given.holder if placed else [], at)
     if given.holder_mesh is not None:
-        mesh, more = load_mesh(folder / given.holder_mesh, given.holder_units, f"tools.{number}.holder_mesh")
+        mesh, more = load_mesh(Path(file).parent / given.holder_mesh, given.holder_units, f"tools.{number}.holder_mesh")
         found += more
         if mesh is not None:
             pieces[HOLDER] = spun(np.asarray(mesh.vertices), np.asarray(mesh.edges_unique))
             top = float(pieces[HOLDER][:, 3].max())
     found += _unknown(number, cutter, setup, pieces, top)
+    found = [replace(d, file=d.file or file) for d in found]
     rows = np.concatenate(list(pieces.values()))
     return Form(number, rows, np.repeat(list(pieces), [len(rows) for rows in pieces.values()])), found
 
@@ -153,3 +154,9 @@ def _unknown(number: int, cutter: _Cutter, setup: ToolSetup | None, pieces: dict
         found.append(warning("collision.corner", f"T{number}: its corner radius is not known, it is checked as sharp",
                              hint=f"add corner_radius = ... to [tools.{number}]"))
     return found
+
+
+def lever_of(form: Form) -> float:
+    """mm from the tip to the farthest point of the tool."""
+    r0, z0, r1, z1, c = form.pieces.T
+    return float((np.maximum(np.hypot(r0, z0), np.hypot(r1, z1)) + c).max())

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import cached_property
-from pathlib import Path
 
 import numpy as np
 
@@ -80,17 +79,17 @@ def pass_bodies(work: Work, file: str) -> tuple[PassBodies | None, list[Diagnost
     bodies, found = scene(work.setup, work.placement, file)
     if bodies is None:
         return None, found
-    forms, more = forms_of(work, Path(file).parent)
+    forms, more = forms_of(work, file)
     found += more
     return (None if has_errors(found) else PassBodies(work, bodies, forms)), found
 
 
-def forms_of(work: Work, folder: Path) -> tuple[dict[int, Form], list[Diagnostic]]:
+def forms_of(work: Work, file: str) -> tuple[dict[int, Form], list[Diagnostic]]:
     """The forms of all tools that passes use, by index."""
     forms, found = {}, []
     for index in sorted({one.tool for one in work.passes}):
         tool = work.toolpath.tools[index] if index >= 0 else None
         number = tool.number if tool else 0
-        forms[index], more = tool_form(number, tool, work.setup.tools.get(str(number)), folder)
+        forms[index], more = tool_form(number, tool, work.setup.tools.get(str(number)), file)
         found += more
     return forms, found

@@ -56,9 +56,19 @@ def read_back(data: bytes, job: Job, file: str, progress: Callable[[str, int, in
         planned = job.options.feed == "planned" or planned_feeds(data)
         comparison = compare(motion, job, executed, gcode, planned)
     faults = Faults(job.toolpath.file, gcode)
-    unseen = [*check_changes(code, motion, job, home, faults), *check_stops(code, motion, job, faults)]
+    unseen = [*check_changes(code, motion, job, home, faults), *check_stops(code, motion, job, faults),
+              *_bodies(motion, executed, job, comparison, faults)]
     told = sorted([*unseen, *comparison.diagnostics], key=lambda d: d.code not in CAUSES)
     return comparison, [*diagnostics, *told]
+
+
+def _bodies(motion: Motion, executed: Executed, job: Job, comparison: Comparison, faults: Faults) -> list[Diagnostic]:
+    """What the tools touch, where the set-up names bodies."""
+    if job.setup.bodies is None:
+        return []
+    from postproc.collision.program import check_bodies
+
+    return check_bodies(motion, executed, job, comparison.owner, faults)
 
 
 def _judged(d: Diagnostic, stays: bool) -> Diagnostic:
