@@ -237,6 +237,6 @@ def execute(words: Words, letters: tuple[str, ...], offsets: Offsets, file: str 
 
     reader = IsoReader(letters)
     found = reader.check(words, file)
-    canonical, more = reader.canonical(Text(words), np.arange(words.lines + 1), file)
+    canonical, more = reader.translated(Text(words), np.arange(words.lines + 1), file)
     motion, last = run(canonical, letters, offsets, file)
     return motion, [*found, *more, *last]

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 
@@ -19,6 +18,7 @@ import postproc
 import toolpaths
 from postproc.pipeline import PostResult
 from postproc.setup import SetupFile, load_setup
+from tests.postproc.peer import Peer, Step
 from toolpaths.diagnostics import has_errors
 from toolpaths.toolpath import Toolpath
 
@@ -82,182 +82,26 @@ def body(text: str) -> list[str]:
     return lines[first:last]
 
 
-# ---- executor ----------------------------------------------------------------------------------------------------
+# ---- what is shared by tests of the text -----------------------------------------------------------------------------
 
 
-@dataclass
-class Step:
-    """One elementary motion: line, kind ("rapid", "feed", "arc"), end (J,) machine mm/deg, dense points (K, J)."""
-
-    line: int
-    kind: str
-    end: np.ndarray
-    points: np.ndarray
-    feed: float
-    inverse: bool
-    tool: int
-    register: int
-    spindle: int
-    coolant: bool
-    level: float = math.nan
+def shop_file(folder: Path, text: str, base: str = "linuxcnc") -> Path:
+    """A shop's controller file that starts from a built-in one."""
+    path = folder / "shop.toml"
+    path.write_text(f'base = "{base}"\n{text}')
+    return path
 
 
-@dataclass
-class Peer:
-    """A modal executor of RS274/NGC as its manual tells it (sections 3.5, 3.5.16, 3.7), one block after the other."""
+def words_of(block: str) -> dict[str, str]:
+    """The words of a block by letter."""
+    return dict(re.findall(r"([A-Z])(-?[\d.]+)", block))
 
-    letters: tuple[str, ...]
-    work: np.ndarray
-    lengths: dict[int, float]
-    home: np.ndarray
-    on_z: bool = True
-    steps: list[Step] = field(default_factory=list)
 
-    def run(self, text: str, dense: int = 20) -> list[Step]:
-        at = self.home.astype(float).copy()
-        z = self.letters.index("Z")
-        plane, motion, inverse, feed, scale = 17, None, False, math.nan, 1.0
-        tool = picked = 0
-        register, spindle, coolant, retract = -1, 0, False, 98
-        sticky: dict[str, float] = {}
-        initial = math.nan
-        cycling = False
-        for number, raw in enumerate(text.splitlines(), 1):
-            block = re.sub(r"\([^()]*\)|;.*", "", raw).strip().upper()
-            if not block or block.startswith("%"):
-                continue
-            found = re.findall(r"([A-Z])\s*([-+]?(?:\d+\.?\d*|\.\d+))", block)
-            assert "".join(a + b for a, b in found) == re.sub(r"\s", "", block), f"line {number}: {raw!r}"
-            gs = [float(v) for a, v in found if a == "G"]
-            ms = [int(v) for a, v in found if a == "M"]
-            words = {a: float(v) for a, v in found if a not in "GMN"}
-            assert len(words) == sum(a not in "GMN" for a, _ in found), f"line {number}: a word twice"
-            once, new_motion = None, None
-            for g in gs:
-                if g in (17, 18, 19):
-                    plane = int(g)
-                elif g in (93, 94):
-                    if inverse != (g == 93):
-                        feed = math.nan
-                    inverse = g == 93
-                elif g in (20, 21):
-                    scale = 25.4 if g == 20 else 1.0
-                elif g in (98, 99):
-                    retract = int(g)
-                elif g == 43:
-                    register = int(words["H"])
-                elif g == 49:
-                    register = -1
-                elif g in (4, 53):
-                    once = int(g)
-                elif g in (0, 1, 2, 3, 73, 80, 81, 82, 83, 84, 85, 89):
-                    assert new_motion is None, f"line {number}: two motions"
-                    new_motion = int(g)
-                else:
-                    assert g in (40, 54, 64, 90), f"line {number}: G{g:g}"
-            if "T" in words:
-                picked = int(words["T"])
-            for m in ms:
-                if m == 6:
-                    tool = picked
-                spindle = {3: 1, 4: -1, 5: 0}.get(m, spindle)
-                coolant = {7: True, 8: True, 9: False}.get(m, coolant)
-            if new_motion is not None:
-                if new_motion != motion:
-                    sticky = {}
-                if new_motion < 73 or new_motion == 80:
-                    cycling = False
-                motion = new_motion
-            stated = [a for a in self.letters if a in words]
-            if "F" in words:
-                feed = words["F"]
-            if once == 4 or not (stated or any(k in words for k in "IJK")):
-                continue
-            assert motion not in (None, 80), f"line {number}: axis words without a motion code"
-            shift = self.work.copy()
-            if self.on_z and register >= 0:
-                shift[z] += self.lengths.get(register, 0.0)
-            target = at.copy()
-            for a in stated:
-                j = self.letters.index(a)
-                unit = scale if a in "XYZ" else 1.0
-                target[j] = words[a] * unit + (0.0 if once == 53 else shift[j])
-            state = (feed, inverse, tool, register, spindle, coolant)
-            if inverse and motion in (1, 2, 3):
-                assert "F" in words, f"line {number}: no F with inverse time"
-            if motion >= 73:
-                assert not inverse, f"line {number}: a cycle under inverse time"
-                first = not cycling
-                if first:
-                    initial, sticky = at[z], {}
-                cycling = True
-                sticky |= {k: words[k] for k in "ZRQP" if k in words}
-                at = self._cycle(number, motion, at, target, sticky, z, shift[z], scale, initial, retract, state, first)
-                continue
-            kind = {0: "rapid", 1: "feed"}.get(motion, "arc")
-            t = np.linspace(0.0, 1.0, dense + 1)[1:, None]
-            points = at + t * (target - at)
-            if kind == "arc":
-                points = self._arc(at, target, words, plane, motion == 3, scale, dense)
-            self.steps.append(Step(number, kind, target, points, *state))
-            at = target
-        return self.steps
-
-    def _arc(self, at: np.ndarray, target: np.ndarray, words: dict[str, float], plane: int, ccw: bool, scale: float,
-             dense: int) -> np.ndarray:
-        """Dense points of an arc; the radius may differ between the ends by what rounding explains."""
-        first, second = {17: "XY", 18: "ZX", 19: "YZ"}[plane]
-        a, b = self.letters.index(first), self.letters.index(second)
-        offset = {"X": "I", "Y": "J", "Z": "K"}
-        center = np.array([at[a], at[b]]) + scale * np.array([words.get(offset[first], 0.0), words.get(offset[second], 0.0)])
-        p, q = np.array([at[a], at[b]]) - center, np.array([target[a], target[b]]) - center
-        assert abs(np.hypot(*p) - np.hypot(*q)) < 0.002, "radius differs between start and end"
-        begin, end = math.atan2(p[1], p[0]), math.atan2(q[1], q[0])
-        turn = (end - begin) % (2 * math.pi) if ccw else -((begin - end) % (2 * math.pi))
-        if abs(turn) < 1e-12:
-            turn = 2 * math.pi if ccw else -2 * math.pi
-        t = np.linspace(0.0, 1.0, 4 * dense + 1)[1:]
-        points = at + t[:, None] * (target - at)
-        radius = np.hypot(*p) * (1 - t) + np.hypot(*q) * t
-        points[:, a] = center[0] + radius * np.cos(begin + t * turn)
-        points[:, b] = center[1] + radius * np.sin(begin + t * turn)
-        return points
-
-    def _cycle(self, number: int, code: int, at: np.ndarray, target: np.ndarray, sticky: dict[str, float], z: int,
-               shift: float, scale: float, initial: float, retract: int, state: tuple, first: bool) -> np.ndarray:
-        """LinuxCNC rises to R where it stands at the first hole of a sequence only; later ones it goes to aslant."""
-        bottom, plane = sticky["Z"] * scale + shift, sticky["R"] * scale + shift
-        over = target.copy()
-        legs: list[tuple[str, np.ndarray]] = []
-
-        def leg(kind: str, base: np.ndarray, height: float) -> None:
-            point = base.copy()
-            point[z] = height
-            legs.append((kind, point))
-
-        if at[z] < plane and first:
-            leg("rapid", at, plane)
-        leg("rapid", over, max(at[z], plane))
-        leg("rapid", over, plane)
-        if code in (73, 83):
-            assert sticky["Q"] > 0
-            depth = plane - sticky["Q"] * scale
-            while depth > bottom + 1e-9:
-                leg("feed", over, depth)
-                if code == 83:
-                    leg("rapid", over, plane)
-                leg("rapid", over, depth + 0.254)
-                depth -= sticky["Q"] * scale
-        leg("feed", over, bottom)
-        if code in (84, 85, 89):
-            leg("feed", over, plane)
-        leg("rapid", over, max(initial, plane) if retract == 98 else plane)
-        for kind, point in legs:
-            if not (point == at).all():
-                t = np.linspace(0.0, 1.0, 11)[1:, None]
-                self.steps.append(Step(number, kind, point, at + t * (point - at), *state, level=bottom))
-                at = point
-        return at
+def flat(*lines: str, controller: str | Path = "linuxcnc", name: str = "mill-3axis", **options: object) -> list[str]:
+    """The blocks from the first cut on, for a path that begins above the origin."""
+    result = good(convert(toolpath("RAPID", "GOTO/0,0,5", *lines), name, controller, **options))
+    blocks = body(result.text)
+    return blocks[next(i for i, b in enumerate(blocks) if re.search(r"G(0*[123]|8\d|73|93)\b", b)):]
 
 
 def execute(result: PostResult, text: str | None = None) -> list[Step]:

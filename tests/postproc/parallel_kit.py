@@ -1,6 +1,6 @@
 """An own look at programs for parallel machines: dense joints, assembly followed, distance from the CL path.
 
-The executor is kit.Peer, the path geometry is written out here; of the product only the kinematics' forward model is
+The executor is peer.Peer, the path geometry is written out here; of the product only the kinematics' forward model is
 used, without a hint, and what it gives must hang together from home on.
 """
 

@@ -1,4 +1,4 @@
-"""Text of programs: numbers, modality, feed modes, cycles, arcs, comments, by an own executor and by hand."""
+"""Text of programs: numbers, modality, feed modes, comments, lengths, by an own executor and by hand."""
 
 from __future__ import annotations
 
@@ -10,38 +10,21 @@ import pytest
 
 from postproc.setup import SetupFile
 from tests.postproc.kit import (
-    angle,
     body,
     codes,
     convert,
     execute,
+    flat,
     good,
     goto,
     sample,
+    shop_file,
     tilted,
     tool_poses,
     tool_setup,
     toolpath,
+    words_of,
 )
-
-
-def shop_file(folder: Path, text: str, base: str = "linuxcnc") -> Path:
-    """A shop's controller file that starts from a built-in one."""
-    path = folder / "shop.toml"
-    path.write_text(f'base = "{base}"\n{text}')
-    return path
-
-
-def words_of(block: str) -> dict[str, str]:
-    return dict(re.findall(r"([A-Z])(-?[\d.]+)", block))
-
-
-def flat(*lines: str, controller: str | Path = "linuxcnc", name: str = "mill-3axis", **options: object) -> list[str]:
-    """The blocks from the first cut on, for a path that begins above the origin."""
-    result = good(convert(toolpath("RAPID", "GOTO/0,0,5", *lines), name, controller, **options))
-    blocks = body(result.text)
-    return blocks[next(i for i, b in enumerate(blocks) if re.search(r"G(0*[123]|8\d|73|93)\b", b)):]
-
 
 # ---- numbers and modality --------------------------------------------------------------------------------------------
 
@@ -181,190 +164,6 @@ def test_axis_limits_are_kept_by_every_sample() -> None:
             if before is not None and s.kind == "feed" and s.inverse:
                 assert (np.abs(s.end - before) <= limit * 60 / s.feed * 1.001 + 1e-6).all(), s
             before = s.end
-
-
-# ---- arcs ------------------------------------------------------------------------------------------------------------
-
-
-def circle(center: list[float], normal: list[float], radius: float, times: str = "") -> str:
-    n = ",".join(f"{v:.12f}" for v in (*center, *normal))
-    return f"CIRCLE/{n},{radius},0.03,0.5,10,0{times}"
-
-
-NX = ["TOOL PATH/A,TOOL,T", "MSYS/0,0,0,1,0,0,0,1,0", "LOAD/TOOL,1", "SPINDL/RPM,1000,CLW"]
-
-
-def nx(*lines: str, name: str = "mill-3axis", setup: SetupFile | None = None, controller: str = "linuxcnc") -> list[str]:
-    path = toolpath(*lines, "END-OF-PATH", head=NX)
-    return body(good(convert(path, name, controller, setup)).text)
-
-
-def test_full_circle_states_both_words_of_the_plane() -> None:
-    """NX: TIMES 1 and equal ends is a whole turn; the direction is against the motion, so -z runs anti-clockwise."""
-    got = nx("RAPID", "GOTO/10,0,5,0,0,1", "FEDRAT/MMPM,600", "GOTO/10,0,0", circle([0, 0, 0], [0, 0, -1], 10, ",TIMES,1"),
-             "GOTO/10,0,0")
-    assert "G3 X10 Y0 I-10 J0" in got
-
-
-def test_clockwise_and_anticlockwise() -> None:
-    got = nx("RAPID", "GOTO/10,0,5,0,0,1", "FEDRAT/MMPM,600", "GOTO/10,0,0", circle([0, 0, 0], [0, 0, -1], 10),
-             "GOTO/0,10,0", circle([0, 0, 0], [0, 0, 1], 10), "GOTO/10,0,0")
-    assert got[got.index("G1 Z0 F600") + 1:][:2] == ["G3 X0 Y10 I-10 J0", "G2 X10 Y0 I0 J-10"]
-
-
-def test_helix_of_several_turns_is_cut_into_single_turns() -> None:
-    got = nx("RAPID", "GOTO/5,0,5,0,0,1", "FEDRAT/MMPM,600", "GOTO/5,0,0", circle([0, 0, -9], [0, 0, -1], 5, ",TIMES,3"),
-             "GOTO/5,0,-9")
-    arcs = [b for b in got if " I" in b]
-    assert arcs == ["G3 X5 Y0 Z-3 I-5 J0", "X5 Y0 Z-6 I-5 J0", "X5 Y0 Z-9 I-5 J0"]
-
-
-def test_helix_of_odd_turns_passes_its_height_at_every_angle() -> None:
-    """Two turns and a quarter: dense points of the text against height = pitch x angle."""
-    path = toolpath("RAPID", "GOTO/5,0,5,0,0,1", "FEDRAT/MMPM,600", "GOTO/5,0,0",
-                    circle([0, 0, -9], [0, 0, -1], 5, ",TIMES,2"), "GOTO/0,5,-9", "END-OF-PATH", head=NX)
-    result = good(convert(path, "mill-3axis"))
-    steps = execute(result)
-    tips = np.concatenate([p[0] for s, p in zip(steps, tool_poses(result, steps), strict=True) if s.kind == "arc"])
-    turned = np.unwrap(np.arctan2(tips[:, 1], tips[:, 0]))
-    assert turned[-1] == pytest.approx(4.5 * np.pi, abs=1e-3)
-    assert np.abs(tips[:, 2] + 9 * turned / (4.5 * np.pi)).max() < 0.002
-    assert np.abs(np.linalg.norm(tips[:, :2], axis=1) - 5).max() < 2e-4
-
-
-@pytest.mark.parametrize("tool_axis", [[0, 0, 1], [0, -1, 0], [0, 0, -1], [0, 1, 0], [0, 0.6, 0.8]])
-def test_arcs_square_to_the_tool_on_an_indexed_bar(tool_axis: list[float]) -> None:
-    """A 4-axis machine turns the face up: an arc in the face is an arc of X and Y; sense seen from the spindle."""
-    n = np.array(tool_axis, dtype=float)
-    x = np.array([1.0, 0, 0])
-    y = np.cross(n, x)
-    top = 20 * n
-    path = toolpath("RAPID", *goto([top + 10 * x + 30 * n], [n]), "FEDRAT/MMPM,600", *goto([top + 10 * x], [n]),
-                    circle(list(top), list(-n), 10), *goto([top + 10 * y], [n]), "END-OF-PATH", head=NX)
-    blocks = body(good(convert(path, "mill-4axis")).text)
-    arcs = [b for b in blocks if " I" in b]
-    assert len(arcs) == 1 and arcs[0].startswith("G3 X0 Y10 I-10 J0")
-    assert not [b for b in blocks if "G18" in b or "G19" in b]
-
-
-@pytest.mark.parametrize(("normal", "code"), [([0, 1, 0], "G18"), ([1, 0, 0], "G19")])
-def test_upright_arcs_use_the_other_planes(normal: list[float], code: str) -> None:
-    """Quarter circles in ZX and YZ of both senses, against dense points on the circle of the CL text."""
-    n, down = np.array(normal, dtype=float), np.array([0, 0, -1.0])
-    side = np.cross(n, down)
-    for sense in (1.0, -1.0):
-        start, end = 10 * side, 10 * down
-        along = -sense * n
-        first, last = (start, end) if sense < 0 else (end, start)
-        path = toolpath("RAPID", *goto([first - 4 * down * 10], [[0, 0, 1]]), "FEDRAT/MMPM,600", *goto([first], [[0, 0, 1]]),
-                        circle([0, 0, 0], list(along), 10), *goto([last], [[0, 0, 1]]), "END-OF-PATH", head=NX)
-        result = good(convert(path, "mill-3axis"))
-        steps = execute(result)
-        arc = [p[0] for s, p in zip(steps, tool_poses(result, steps), strict=True) if s.kind == "arc"]
-        assert len(arc) == 1
-        assert code in result.text
-        assert np.abs(np.linalg.norm(arc[0], axis=1) - 10).max() < 1e-3
-        assert np.abs(arc[0] @ n).max() < 1e-3
-        assert np.allclose(arc[0][-1], last, atol=1e-3)
-        swept = angle(arc[0][:1] / 10, arc[0][-1:] / 10)[0]
-        assert swept < np.pi / 2 + 0.01, "the short way round"
-
-
-def test_arc_in_a_slanting_plane_becomes_lines() -> None:
-    n = tilted(30, 40)
-    e = np.cross(n, [0, 0, 1.0])
-    e /= np.linalg.norm(e)
-    f = np.cross(n, e)
-    path = toolpath("RAPID", *goto([10 * e + [0, 0, 30]], [[0, 0, 1]]), "FEDRAT/MMPM,600", *goto([10 * e], [[0, 0, 1]]),
-                    circle([0, 0, 0], list(-n), 10), *goto([10 * f], [[0, 0, 1]]), "END-OF-PATH", head=NX)
-    result = good(convert(path, "mill-3axis"))
-    steps = execute(result)
-    assert not [s for s in steps if s.kind == "arc"]
-    tips = np.concatenate([p[0] for s, p in zip(steps, tool_poses(result, steps), strict=True) if s.kind == "feed"][1:])
-    assert np.abs(np.linalg.norm(tips, axis=1) - 10).max() < 0.01
-    assert np.abs(tips @ n).max() < 0.01
-
-
-# ---- canned cycles ---------------------------------------------------------------------------------------------------
-
-
-def cycle(*lines: str, controller: str = "linuxcnc", before: str = "GOTO/0,0,50") -> list[str]:
-    path = toolpath("RAPID", before, *lines)
-    return [b for b in body(good(convert(path, "mill-3axis", controller)).text) if re.search(r"G8|G73|G9[89]|^X", b)
-            and "G53" not in b and b != "G0 X0 Y0"]
-
-
-@pytest.mark.parametrize(("record", "want"), [
-    ("DRILL,DEPTH,12,MMPM,100,CLEAR,3", "G99 G81 X10 Y0 Z-12 R3 F100"),
-    ("DRILL,DEPTH,12,MMPM,100,CLEAR,3,DWELL,1.5", "G99 G82 X10 Y0 Z-12 R3 P1.5 F100"),
-    ("DRILL,DEPTH,12,RAPTO,3,RTRCTO,AUTO,MMPM,100", "G98 G81 X10 Y0 Z-12 R3 F100"),
-    ("DEEP,DEPTH,12,MMPM,100,CLEAR,3,STEP,4", "G99 G83 X10 Y0 Z-12 R3 Q4 F100"),
-    ("BRKCHP,DEPTH,12,MMPM,100,CLEAR,3,STEP,4", "G99 G73 X10 Y0 Z-12 R3 Q4 F100"),
-    ("TAP,DEPTH,12,MMPM,100,CLEAR,3", "G99 G84 X10 Y0 Z-12 R3 F100"),
-    ("BORE,DEPTH,12,MMPM,100,CLEAR,3", "G99 G85 X10 Y0 Z-12 R3 F100"),
-    ("REAM,DEPTH,12,MMPM,100,CLEAR,3,DWELL,2", "G99 G89 X10 Y0 Z-12 R3 P2 F100"),
-])
-def test_each_kind_of_cycle(record: str, want: str) -> None:
-    got = cycle(f"CYCLE/{record}", "GOTO/10,0,0", "GOTO/20,5,0", "CYCLE/OFF", "RAPID", "GOTO/20,5,50")
-    assert got == [want, "X20 Y5", "G80"]
-
-
-def test_cycle_words_are_restated_when_anything_changes() -> None:
-    """Another top, another depth, another feed: Z, R and F again; the same again: place alone; G80 at the end."""
-    got = cycle("CYCLE/DRILL,DEPTH,12,MMPM,100,CLEAR,3", "GOTO/10,0,0", "GOTO/20,0,-5",
-                "CYCLE/DRILL,DEPTH,6,MMPM,100,CLEAR,3", "GOTO/30,0,-5",
-                "CYCLE/DRILL,DEPTH,6,MMPM,80,CLEAR,3", "GOTO/40,0,-5", "GOTO/50,0,-5", "CYCLE/OFF",
-                "RAPID", "GOTO/50,0,50")
-    assert got == ["G99 G81 X10 Y0 Z-12 R3 F100", "G99 G81 X20 Y0 Z-17 R-2 F100", "G99 G81 X30 Y0 Z-11 R-2 F100",
-                   "G99 G81 X40 Y0 Z-11 R-2 F80", "X50 Y0", "G80"]
-
-
-def test_generic_iso_cycle() -> None:
-    got = cycle("CYCLE/DEEP,DEPTH,12,MMPM,100,CLEAR,3,STEP,4", "GOTO/10,0,0", controller="generic-iso")
-    assert got[0] == "G99 G83 X10. Y0. Z-12. R3. Q4. F100.", "Q4 without a point is 4 um on many controls"
-
-
-def test_retract_that_no_code_makes_is_written_as_single_moves() -> None:
-    """20 mm above each top is neither the plane nor the level the tool came from."""
-    path = toolpath("RAPID", "GOTO/0,0,50", "CYCLE/DRILL,DEPTH,12,RAPTO,3,RTRCTO,20,MANUAL,MMPM,100", "GOTO/10,0,0",
-                    "GOTO/20,0,0")
-    blocks = body(good(convert(path, "mill-3axis")).text)
-    at = blocks.index("X10")
-    assert blocks[at:at + 8] == ["X10", "Z3", "G1 Z-12 F100", "G0 Z20", "X20", "Z3", "G1 Z-12", "G0 Z20"]
-
-
-def test_pecks_that_grow_smaller_are_written_as_single_moves() -> None:
-    """5 first, then 2: from R3 to -2, -4, -6, -7; no code says that."""
-    path = toolpath("RAPID", "GOTO/0,0,50", "CYCLE/DEEP,DEPTH,7,MMPM,100,CLEAR,3,STEP,5,2", "GOTO/10,0,0")
-    blocks = body(good(convert(path, "mill-3axis")).text)
-    assert [b.split()[1] for b in blocks if b.startswith("G1")] == ["Z-2", "Z-4", "Z-6", "Z-7"]
-
-
-def test_tapping_is_never_written_as_single_moves() -> None:
-    result = convert(toolpath("RAPID", "GOTO/0,0,50", "CYCLE/TAP,DEPTH,12,RAPTO,3,RTRCTO,60,MANUAL,MMPM,100", "GOTO/10,0,0",
-                              "GOTO/20,0,0"), "mill-3axis")
-    assert "cycle.not_native" in codes(result.diagnostics) and not result.text
-
-
-def test_no_canned_cycle_under_inverse_time() -> None:
-    path = toolpath("RAPID", "GOTO/0,0,50", "GOTO/0,0,40", "CYCLE/DRILL,DEPTH,12,MMPM,100,CLEAR,3", "GOTO/10,0,0",
-                    "CYCLE/OFF", "RAPID", "GOTO/10,0,50", "FEDRAT/MMPM,500", "GOTO/20,0,50")
-    blocks = body(good(convert(path, "mill-3axis", feed_mode="inverse-time")).text)
-    at = next(i for i, b in enumerate(blocks) if "G81" in b)
-    assert "G94" in blocks[at - 1] or "G94" in blocks[at]
-    assert blocks[at + 1] == "G80"
-    assert next(b for b in blocks[at:] if "G1" in b.split()).startswith("G93")
-
-
-def test_cycles_on_a_head_at_an_angle_are_single_moves() -> None:
-    """A fork head leans: the hole does not run along the machine's Z, so there is no canned cycle."""
-    axis = tilted(30, 0)
-    path = toolpath("RAPID", *goto([50 * axis], [axis]), "CYCLE/DRILL,DEPTH,12,MMPM,100,CLEAR,3", *goto([[10, 0, 0]]))
-    result = good(convert(path, "fork-head-ab"))
-    assert not re.search(r"G8[1-9]", "\n".join(body(result.text)).replace("G80", ""))
-    steps = execute(result)
-    tips = [p[0] for s, p in zip(steps, tool_poses(result, steps), strict=True) if s.kind == "feed"]
-    assert np.allclose(tips[-1][-1], np.array([10, 0, 0]) - 12 * axis, atol=1e-3)
 
 
 # ---- comments and lengths --------------------------------------------------------------------------------------------

@@ -104,9 +104,13 @@ class Reader(ABC):
         files = tuple(zip(programs, before, strict=False)) if len(programs) > 1 else ()
         if has_errors(more):
             return None, [*found, *more]
-        code, last = self.canonical(text, line, file)
-        code = replace(code, words=self.cooled(code.words))
+        code, last = self.translated(text, line, file)
         return replace(code, files=files), [*found, *more, *placed([*self.units(code, file), *last], files)]
+
+    def translated(self, text: Text, line: Ints, file: str) -> tuple[Canonical, list[Diagnostic]]:
+        """Canonical words of blocks in running order, with what coolant flows."""
+        code, found = self.canonical(text, line, file)
+        return replace(code, words=self.cooled(code.words)), found
 
     def cooled(self, words: Words) -> Words:
         """The words with what flows from each block on that switches coolant, in the order of the codes."""

@@ -1,0 +1,90 @@
+"""Canned cycles in the text of programs, and the single moves that stand for them."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.postproc.kit import body, codes, convert, execute, good, goto, shop_file, tilted, tool_poses, toolpath
+
+
+def cycle(*lines: str, controller: str = "linuxcnc", before: str = "GOTO/0,0,50") -> list[str]:
+    path = toolpath("RAPID", before, *lines)
+    return [b for b in body(good(convert(path, "mill-3axis", controller)).text) if re.search(r"G8|G73|G9[89]|^X", b)
+            and "G53" not in b and b != "G0 X0 Y0"]
+
+
+@pytest.mark.parametrize(("record", "want"), [
+    ("DRILL,DEPTH,12,MMPM,100,CLEAR,3", "G99 G81 X10 Y0 Z-12 R3 F100"),
+    ("DRILL,DEPTH,12,MMPM,100,CLEAR,3,DWELL,1.5", "G99 G82 X10 Y0 Z-12 R3 P1.5 F100"),
+    ("DRILL,DEPTH,12,RAPTO,3,RTRCTO,AUTO,MMPM,100", "G98 G81 X10 Y0 Z-12 R3 F100"),
+    ("DEEP,DEPTH,12,MMPM,100,CLEAR,3,STEP,4", "G99 G83 X10 Y0 Z-12 R3 Q4 F100"),
+    ("BRKCHP,DEPTH,12,MMPM,100,CLEAR,3,STEP,4", "G99 G73 X10 Y0 Z-12 R3 Q4 F100"),
+    ("TAP,DEPTH,12,MMPM,100,CLEAR,3", "G99 G84 X10 Y0 Z-12 R3 F100"),
+    ("BORE,DEPTH,12,MMPM,100,CLEAR,3", "G99 G85 X10 Y0 Z-12 R3 F100"),
+    ("REAM,DEPTH,12,MMPM,100,CLEAR,3,DWELL,2", "G99 G89 X10 Y0 Z-12 R3 P2 F100"),
+])
+def test_each_kind_of_cycle(record: str, want: str) -> None:
+    got = cycle(f"CYCLE/{record}", "GOTO/10,0,0", "GOTO/20,5,0", "CYCLE/OFF", "RAPID", "GOTO/20,5,50")
+    assert got == [want, "X20 Y5", "G80"]
+
+
+def test_cycle_words_are_restated_when_anything_changes() -> None:
+    """Another top, another depth, another feed: Z, R and F again; the same again: place alone; G80 at the end."""
+    got = cycle("CYCLE/DRILL,DEPTH,12,MMPM,100,CLEAR,3", "GOTO/10,0,0", "GOTO/20,0,-5",
+                "CYCLE/DRILL,DEPTH,6,MMPM,100,CLEAR,3", "GOTO/30,0,-5",
+                "CYCLE/DRILL,DEPTH,6,MMPM,80,CLEAR,3", "GOTO/40,0,-5", "GOTO/50,0,-5", "CYCLE/OFF",
+                "RAPID", "GOTO/50,0,50")
+    assert got == ["G99 G81 X10 Y0 Z-12 R3 F100", "G99 G81 X20 Y0 Z-17 R-2 F100", "G99 G81 X30 Y0 Z-11 R-2 F100",
+                   "G99 G81 X40 Y0 Z-11 R-2 F80", "X50 Y0", "G80"]
+
+
+def test_generic_iso_cycle() -> None:
+    got = cycle("CYCLE/DEEP,DEPTH,12,MMPM,100,CLEAR,3,STEP,4", "GOTO/10,0,0", controller="generic-iso")
+    assert got[0] == "G99 G83 X10. Y0. Z-12. R3. Q4. F100.", "Q4 without a point is 4 um on many controls"
+
+
+def test_retract_that_no_code_makes_is_written_as_single_moves() -> None:
+    """20 mm above each top is neither the plane nor the level the tool came from."""
+    path = toolpath("RAPID", "GOTO/0,0,50", "CYCLE/DRILL,DEPTH,12,RAPTO,3,RTRCTO,20,MANUAL,MMPM,100", "GOTO/10,0,0",
+                    "GOTO/20,0,0")
+    blocks = body(good(convert(path, "mill-3axis")).text)
+    at = blocks.index("X10")
+    assert blocks[at:at + 8] == ["X10", "Z3", "G1 Z-12 F100", "G0 Z20", "X20", "Z3", "G1 Z-12", "G0 Z20"]
+
+
+def test_pecks_that_grow_smaller_are_written_as_single_moves() -> None:
+    """5 first, then 2: from R3 to -2, -4, -6, -7; no code says that."""
+    path = toolpath("RAPID", "GOTO/0,0,50", "CYCLE/DEEP,DEPTH,7,MMPM,100,CLEAR,3,STEP,5,2", "GOTO/10,0,0")
+    blocks = body(good(convert(path, "mill-3axis")).text)
+    assert [b.split()[1] for b in blocks if b.startswith("G1")] == ["Z-2", "Z-4", "Z-6", "Z-7"]
+
+
+def test_tapping_is_never_written_as_single_moves(tmp_path: Path) -> None:
+    result = convert(toolpath("RAPID", "GOTO/0,0,50", "CYCLE/TAP,DEPTH,12,RAPTO,3,RTRCTO,20,MANUAL,MMPM,100", "GOTO/10,0,0",
+                              "GOTO/20,0,0"), "mill-3axis", shop_file(tmp_path, "[cycles]\nenabled = false\n"))
+    assert "cycle.not_native" in codes(result.diagnostics) and not result.text
+
+
+def test_no_canned_cycle_under_inverse_time() -> None:
+    path = toolpath("RAPID", "GOTO/0,0,50", "GOTO/0,0,40", "CYCLE/DRILL,DEPTH,12,MMPM,100,CLEAR,3", "GOTO/10,0,0",
+                    "CYCLE/OFF", "RAPID", "GOTO/10,0,50", "FEDRAT/MMPM,500", "GOTO/20,0,50")
+    blocks = body(good(convert(path, "mill-3axis", feed_mode="inverse-time")).text)
+    at = next(i for i, b in enumerate(blocks) if "G81" in b)
+    assert "G94" in blocks[at - 1] or "G94" in blocks[at]
+    assert blocks[at + 1] == "G80"
+    assert next(b for b in blocks[at:] if "G1" in b.split()).startswith("G93")
+
+
+def test_cycles_on_a_head_at_an_angle_are_single_moves() -> None:
+    """A fork head leans: the hole does not run along the machine's Z, so there is no canned cycle."""
+    axis = tilted(30, 0)
+    path = toolpath("RAPID", *goto([50 * axis], [axis]), "CYCLE/DRILL,DEPTH,12,MMPM,100,CLEAR,3", *goto([[10, 0, 0]]))
+    result = good(convert(path, "fork-head-ab"))
+    assert not re.search(r"G8[1-9]", "\n".join(body(result.text)).replace("G80", ""))
+    steps = execute(result)
+    tips = [p[0] for s, p in zip(steps, tool_poses(result, steps), strict=True) if s.kind == "feed"]
+    assert np.allclose(tips[-1][-1], np.array([10, 0, 0]) - 12 * axis, atol=1e-3)
