@@ -9,7 +9,7 @@ from postproc.orientation.candidates import Kind, Tried
 from postproc.orientation.timed import Turned
 
 KINDS: dict[Kind, str] = {
-    "limits": "tilt, lead or distance from the ball's centre", "reach": "out of reach", "travel": "travel of an axis",
+    "limits": "outside the allowed angles", "reach": "out of reach", "travel": "travel of an axis",
     "touches": "touches part, fixture or table", "bound": "cannot be fast enough", "slower": "slower"}
 """What a candidate can lose by, in the order of the report."""
 

@@ -50,10 +50,11 @@ def reaches(made: Turned) -> tuple[Reach, ...]:
 
 
 def feed_of(made: Turned) -> Reach | None:
-    """The largest feed of the longest stretch, as an order of its own; None where that has no direction."""
+    """The largest feed of the longest stretch, as an order of its own; None where the pass cannot be run or has no
+    direction."""
     stretch = made.one.longest
     length = direction_of(stretch)[1]
-    if stretch is None or not length:
+    if stretch is None or made.refused or not length:
         return None
     rate = float(stretch.feed(stretch.s).max())
     return Reach("feed", rate, "", length / rate)

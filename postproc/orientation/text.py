@@ -45,8 +45,8 @@ def header(choice: OrientationChoice, plan: Orientation) -> list[str]:
     """Lines for the head of a program: the plan, and what tool axes follow one another."""
     picked = choice.plans[plan].picked
     first = [k for k in range(len(picked)) if k == 0 or turns(picked[k - 1], picked[k])]
-    lines = [f"planned {seconds(choice.plans[plan].seconds)} s, {seconds(choice.plans['keep'].seconds)} s with the axes of "
-             "the CL file"]
+    lines = [f"planned {seconds(choice.plans[plan].seconds)} s, with the axes of the CL file "
+             f"{seconds(choice.plans['keep'].seconds)} s"]
     for start, end in list(zip(first, [*first[1:], len(picked)], strict=True))[:RUNS]:
         made, before = (sum(one.seconds for one in some) for some in (
             picked[start:end], [tried.own for tried in choice.tried[start:end]]))
@@ -56,9 +56,8 @@ def header(choice: OrientationChoice, plan: Orientation) -> list[str]:
 
 
 def _saved(tried: Tried, made: Turned) -> float:
-    """Minus the seconds saved; passes without a time last."""
-    saved = tried.own.seconds - made.seconds
-    return -saved if math.isfinite(saved) else math.inf
+    """Minus the seconds saved: passes that only another axis can run first, those that none can last."""
+    return made.seconds - tried.own.seconds if math.isfinite(made.seconds) else math.inf
 
 
 def orientation(made: Turned) -> str:

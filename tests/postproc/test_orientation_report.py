@@ -180,6 +180,22 @@ def test_held_angles_are_told_and_drawn() -> None:
     assert b"angles at which C is held" in sheet.draw(choice, "per-pass", [0], ".svg")
 
 
+def test_axes_that_cannot_be_run_are_told() -> None:
+    """The CL's axis needs A at 127 degrees, travel ends at 120: no seconds before, none saved, and no figure fails."""
+    lean = written(2).replace(",0,0,1", ",0,0.79863551,-0.601815023")
+    choice = of_text(lean)
+    assert not math.isfinite(choice.tried[0].own.seconds) and sheet.most_gaining(choice) in ([0], [1])
+    values = report.as_dict(choice)
+    json.dumps(values, allow_nan=False)
+    assert values["passes"][0]["reference_time_s"] is None and values["passes"][0]["gain_percent"] is None
+    assert values["plans"]["keep"]["time_s"] is None and values["plans"]["auto"]["time_s"] > 0.0
+    told = text.as_text(choice, "auto", [1])
+    assert "travel: axis A at 127.000 degrees" in told and "keep                      -" in told
+    drawn = sheet.draw(choice, "auto", [1], ".svg")
+    assert drawn.count(b"<!-- cannot be run -->") >= 1 and b"the CL file's own cannot be run" in drawn
+    assert report.slower(choice, "auto") == [] and text.header(choice, "auto")[0].endswith("of the CL file - s")
+
+
 def test_edges_of_a_box() -> None:
     """Triangles of one face count as one: 12 edges of a turned box, none of a flat one."""
     rng = np.random.default_rng(5)

@@ -71,6 +71,7 @@ def _ground(sheet: Figure, place: PolarAxes, tried: Tried, timed: list[Turned], 
     drawn: Any = None
     if np.isfinite(least).any() and np.ptp(least[np.isfinite(least)]) > 0.0:
         drawn = place.contourf(around, out, np.ma.masked_invalid(least), LEVELS, **colours)
+        drawn.set_rasterized(True)
     if len(times):
         drawn = place.scatter(*_polar(timed, frame, work), c=times, s=34, edgecolors="black", linewidths=0.6,
                               label=f"planned ({len(times)})", zorder=3, **colours)

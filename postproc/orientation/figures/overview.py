@@ -34,16 +34,22 @@ def plan_panel(place: Axes, choice: OrientationChoice) -> None:
     before = choice.plans["keep"].seconds
     for k, (plan, one) in enumerate(zip(plans.values(), parts, strict=True)):
         saved = gain(plan.seconds, before)
-        told = "cannot be run" if not np.isfinite(plan.seconds) else f"{plan.seconds:.1f} s" + (
-            f", {abs(saved):.1f} % {'less' if saved > 0.0 else 'more'}" if saved is not None and abs(saved) >= 0.05 else "")
-        place.annotate(f"{told}, {one.turns} turns", (left[k], k), xytext=(4, 0), textcoords="offset points", va="center",
-                       fontsize="small")
+        place.annotate(_told(plan.seconds, saved, one.turns), (left[k], k), xytext=(4, 0), textcoords="offset points",
+                       va="center", fontsize="small")
     place.invert_yaxis()
     place.set_xlim(0.0, 1.42 * max(float(left.max()), 1e-9))
     place.set_xlabel("seconds of the whole part")
     place.set_title("plans", fontsize="medium")
     place.grid(False, axis="y")
     place.legend(**BESIDE)
+
+
+def _told(seconds: float, saved: float | None, turns: int) -> str:
+    """Behind a bar."""
+    if not np.isfinite(seconds):
+        return "cannot be run"
+    beside = "" if saved is None or abs(saved) < 0.05 else f", {abs(saved):.1f} % {'less' if saved > 0.0 else 'more'}"
+    return f"{seconds:.1f} s{beside}, {turns} turns"
 
 
 WAYS = {"cutting": "cutting", "turning": "turning: back,\nindex, approach", "other": "rapids, home,\ntool changes"}
@@ -58,6 +64,7 @@ def angle_panel(place: Axes, choice: OrientationChoice, plan: Orientation) -> No
         place.plot(number, own, color=colour, linestyle=":", linewidth=1.0, drawstyle="steps-mid", label=f"{name}, CL file")
         place.plot(number, _angles(picked, name), color=colour, linewidth=1.0, drawstyle="steps-mid",
                    marker=_mark(len(picked)), markersize=4.0, label=f"{name}, {plan}")
+    place.set_xlim(-0.5, len(picked) - 0.5)
     unit = "degrees" if any(choice.work.machine.rotary) else "i, j, k of the tool"
     _labelled(place, "pass", unit, f"orientation of each pass: {plan}")
     (low, high), flat = place.get_ylim(), FLAT if any(choice.work.machine.rotary) else 2.2
@@ -85,6 +92,11 @@ def gain_panel(place: Axes, choice: OrientationChoice, plan: Orientation) -> Non
     fixed = [k for k, one in enumerate(tried) if one.own.one.fixed]
     if fixed:
         place.plot(fixed, np.zeros(len(fixed)), linestyle="", marker="x", markersize=5.0, color="gray", label="axis is kept")
+    alone = np.flatnonzero(~np.isfinite(own))
+    if len(alone):
+        place.plot(alone, np.zeros(len(alone)), linestyle="", marker="+", markersize=7.0, color="#c2453a",
+                   label="CL file's own\ncannot be run")
+    place.set_xlim(-0.5, len(own) - 0.5)
     low, high = place.get_ylim()
     place.set_ylim(min(0.0, low), max(1.1 * high, 1.0))
     _labelled(place, "pass", "% of the planned cut", "time saved in each pass, without turns")

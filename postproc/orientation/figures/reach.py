@@ -28,10 +28,10 @@ def reach_panel(place: Axes, tried: Tried, made: Turned) -> None:
         found = (*reaches(it), *(() if feed is None else (feed,)))
         behind = max([it.seconds if np.isfinite(it.seconds) else 0.0, *(one.seconds for one in found)])
         for k, one in enumerate(found):
-            _bar(place, one, at + (k - 1.5) * HIGH, behind, named=at == 0)
+            _bar(place, one, at + (k - 1.5) * HIGH, behind)
         if np.isfinite(it.seconds):
             place.plot([it.seconds] * 2, [at - 2.1 * HIGH, at + 2.1 * HIGH], color="black", linewidth=1.8,
-                       label="planned" if at == 0 else "")
+                       label=_once(place, "planned"))
     place.set_yticks(range(len(kept)), list(kept))
     place.set_ylim(len(kept) - 0.4, -0.6)
     place.set_xlim(0.0, 1.45 * max([place.dataLim.x1, 1e-9]))
@@ -42,9 +42,14 @@ def reach_panel(place: Axes, tried: Tried, made: Turned) -> None:
                  columnspacing=1.0, handlelength=1.4)
 
 
-def _bar(place: Axes, one: Reach, y: float, behind: float, named: bool) -> None:
+def _bar(place: Axes, one: Reach, y: float, behind: float) -> None:
     """One order; its rate stands behind everything else of the orientation."""
-    place.barh(y, one.seconds, height=0.9 * HIGH, color=COLOURS[one.order], label=one.order if named else "")
+    place.barh(y, one.seconds, height=0.9 * HIGH, color=COLOURS[one.order], label=_once(place, one.order))
     joint = f", {one.axis}" if one.axis else ""
     place.annotate(plain(f"{short(one.rate * SCALE[one.order])} {SHOWN[one.order]}{joint}"), (behind, y), xytext=(5, 0),
                    textcoords="offset points", va="center", fontsize="x-small", color=COLOURS[one.order])
+
+
+def _once(place: Axes, label: str) -> str:
+    """A label for the legend, the first time."""
+    return "" if label in place.get_legend_handles_labels()[1] else label

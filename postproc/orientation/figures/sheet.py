@@ -60,8 +60,9 @@ def draw(choice: OrientationChoice, plan: Orientation, passes: Sequence[int], en
 
 
 def most_gaining(choice: OrientationChoice) -> list[int]:
-    """The pass that its best orientation saves most of; none where nothing can be turned."""
-    saved = [one.own.seconds - one.best.seconds if np.isfinite(one.own.seconds) else 0.0 for one in choice.tried]
+    """The pass that its best orientation saves most of, first of all one that only another can run; none where nothing can
+    be turned."""
+    saved = [one.own.seconds - one.best.seconds if np.isfinite(one.best.seconds) else 0.0 for one in choice.tried]
     free = [k for k, one in enumerate(choice.tried) if not one.own.one.fixed or one.rejected]
     return [max(free, key=lambda k: saved[k])] if free else []
 
@@ -92,5 +93,7 @@ def _headline(tried: Tried) -> str:
         return f"{head}: axis kept, {one.fixed}"
     if tried.best is tried.own:
         return f"{head}: best is the CL file's own orientation, {own} s"
-    return (f"{head}{', axis kept' if one.fixed else ''}: best {orientation(tried.best)}, {seconds(tried.best.seconds)} s "
-            f"instead of {own} s ({percent(gain(tried.best.seconds, tried.own.seconds))} % less)")
+    saved = gain(tried.best.seconds, tried.own.seconds)
+    beside = "the CL file's own cannot be run" if saved is None else f"instead of {own} s ({percent(saved)} % less)"
+    kept = ", axis kept" if one.fixed else ""
+    return f"{head}{kept}: best {orientation(tried.best)}, {seconds(tried.best.seconds)} s, {beside}"
