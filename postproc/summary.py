@@ -82,7 +82,7 @@ def _number(value: float) -> float | None:
 
 
 def _seconds(value: float | None) -> str:
-    return "no time" if value is None else f"{value:.3f} s"
+    return "not to be run" if value is None else f"{value:.3f} s"
 
 
 def _places(value: float) -> str:
@@ -131,7 +131,7 @@ def as_text(result: PostResult, output: str) -> str:
     if d["orientation"] is not None:
         told = d["orientation"]
         lines.append(f"tool axes, {told['plan']}: {told['turned']} of {len(told['passes'])} passes turned; planned "
-                     f"{_seconds(told['time_s'])}, {_seconds(told['reference_time_s'])} with the axes of the CL file")
+                     f"{_seconds(told['time_s'])}, with the axes of the CL file {_seconds(told['reference_time_s'])}")
     if d["files"]:
         lines.append(f"subprograms beside it: {', '.join(Path(file).name for file in d['files'])}")
     if result.job is not None:
