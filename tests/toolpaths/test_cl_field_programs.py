@@ -37,7 +37,7 @@ def test_statements_behind_a_label_are_read(label: str) -> None:
 
 
 @pytest.mark.parametrize("line", ["GOTO(1,2,3)", "RAPID;1", "{GOTO/1,2,3}", "N10 GOTO/1,2,3", "@ CIRCLE/0,0,0,0,0,1,5",
-                                  '"GODLTA/1"'])
+                                  '"GODLTA/1"', "IF (X1) L1,L2,L3"])
 @pytest.mark.parametrize("at", [0, 1, 2])
 @pytest.mark.parametrize("end", ["", "FINI\n"])
 def test_no_line_that_names_a_motion_is_left_out(line: str, at: int, end: str) -> None:
@@ -92,6 +92,19 @@ def test_load_of_a_turret_station_is_a_tool_change() -> None:
     found = read_bytes(f"{NX}LOAD/TURRET,4,ADJUST,9\nGOTO/0,0,0\nEND-OF-PATH\n")
     assert errors(found) == []
     assert [(t.number, t.length_register) for t in found.toolpath.tools] == [(4, 9)]
+
+
+@pytest.mark.parametrize("record", ["LOADTL/4,0", "LOAD/TOOL,4,ADJUST,0", "LOADTL/4,OSETNO,0", "TURRET/4,OSETNO,0"])
+def test_length_register_0_is_none(record: str) -> None:
+    found = read_bytes(f"{ISO}{record}\nGOTO/0,0,0\n")
+    assert codes(found) == ["cl.length-register"] and errors(found) == []
+    assert [(t.number, t.length_register) for t in found.toolpath.tools] == [(4, None)]
+    assert [e.values for e in found.toolpath.events] == [(4.0,)]
+
+
+@pytest.mark.parametrize("record", ["LOADTL/4,120.5", "LOADTL/4,-1", "LOAD/TOOL,4,ADJUST,1E10"])
+def test_what_is_no_length_register_is_refused(record: str) -> None:
+    assert errors(read_bytes(f"{ISO}{record}\nGOTO/0,0,0\n")) == [("cl.length-register", (3,))]
 
 
 @pytest.mark.parametrize(("tail", "told"), [

@@ -19,8 +19,9 @@ _MANY = 3
 _NO_SLASH = -1
 """in place of a count of numbers: text that begins with a known word and has no slash"""
 _WORD = re.compile(r"[A-Z0-9_-]+")
-_MOTION = re.compile(r"\W*(?:GOTO|GODLTA|RAPID|CIRCLE|MOVARC|GOHOME)\b|.*\b(?:GOTO|GODLTA|CIRCLE|MOVARC)\s*/", re.IGNORECASE)
-"""Text that is no record and yet names a motion: dropped, it would leave the tool elsewhere."""
+_MOTION = re.compile(r"\W*(?:GOTO|GODLTA|RAPID|CIRCLE|MOVARC|GOHOME)\b|IF\s*\(|.*\b(?:GOTO|GODLTA|CIRCLE|MOVARC)\s*/",
+                     re.IGNORECASE)
+"""Text that is no record and yet names a motion, or chooses one: dropped, it would leave the tool elsewhere."""
 _DEEPEST = 8
 _MOST_ROWS = 50_000_000
 

@@ -59,11 +59,25 @@ def _renumber(state: _State, number: int) -> None:
     state.number = number
 
 
+def _register(b: Builder, register: float | None) -> float | None:
+    """The length register that a record names; 0 is the one without a length on every control, so none is named."""
+    if register is None or (register == math.floor(register) and 0 < register < _MAX_NUMBER):
+        return register
+    if register == 0:
+        b.log.warning("cl.length-register", "length register 0 holds no length: that of the tool's number is taken", b.line,
+                      "state ADJUST with the register of the tool, or none")
+    else:
+        b.log.error("cl.length-register", f"{register:g} is no length register", b.line,
+                    "registers are whole numbers from 1 on")
+    return None
+
+
 def change(b: Builder, number: float, register: float | None, more: tuple[float, ...] = ()) -> None:
     """Load tool `number`; the event LOADTL and the tool index follow."""
     if number != math.floor(number) or not 0 <= number < _MAX_NUMBER:
         b.log.error("cl.tool-number", f"{number:g} is no tool number", b.line)
         return
+    register = _register(b, register)
     state = _state(b)
     _renumber(state, int(number))
     known = state.by_number.get(int(number), {})
