@@ -37,8 +37,8 @@ class Diagnostic:
             place += f":{self.lines[0]}"
         more = ""
         if self.count > 1:
-            shown = ", ".join(str(n) for n in self.lines[:6])
-            more = f" ({self.count} times, lines {shown}{', ...' if self.count > len(self.lines[:6]) else ''})"
+            shown = ", ".join(str(n) for n in self.lines[:6]) + (", ..." if self.count > len(self.lines[:6]) else "")
+            more = f" ({self.count} times, lines {shown})" if self.lines else f" ({self.count} times)"
         text = f"{place + ': ' if place else ''}{self.severity.name.lower()} [{self.code}] {self.message}{more}"
         return f"{text}; {self.hint}" if self.hint else text
 
@@ -74,19 +74,24 @@ def require(diagnostics: Sequence[Diagnostic]) -> None:
         raise DiagnosticError(diagnostics)
 
 
+def _stated(lines: Sequence[int]) -> tuple[int, ...]:
+    """Line 0 stands for what no line of the file says."""
+    return tuple(line for line in lines if line > 0)
+
+
 def error(code: str, message: str, *, file: str = "", lines: Sequence[int] = (), count: int = 1,
           hint: str = "") -> Diagnostic:
     """A Diagnostic that stops the work."""
-    return Diagnostic(Severity.ERROR, code, message, file, tuple(lines), count, hint)
+    return Diagnostic(Severity.ERROR, code, message, file, _stated(lines), count, hint)
 
 
 def warning(code: str, message: str, *, file: str = "", lines: Sequence[int] = (), count: int = 1,
             hint: str = "") -> Diagnostic:
     """A Diagnostic that lets the work go on but needs a look."""
-    return Diagnostic(Severity.WARNING, code, message, file, tuple(lines), count, hint)
+    return Diagnostic(Severity.WARNING, code, message, file, _stated(lines), count, hint)
 
 
 def info(code: str, message: str, *, file: str = "", lines: Sequence[int] = (), count: int = 1,
          hint: str = "") -> Diagnostic:
     """A Diagnostic that only tells."""
-    return Diagnostic(Severity.INFO, code, message, file, tuple(lines), count, hint)
+    return Diagnostic(Severity.INFO, code, message, file, _stated(lines), count, hint)

@@ -107,8 +107,9 @@ def _walk(tip: Any, axis: Any, swept: Any, start: Any, end: Any, axis0: Any, axi
     owner = np.full(count, moves, np.int64)
     j = -1
     for i in range(moves):
-        still = kind[i] == 0 and _apart(start[i], end[i]) < grain and _angle(axis0[i], axis1[i]) < axis_grain and j >= 0
-        there = kind[i] == 0 and j >= 0 and _apart(start[i], end[i]) < 2.0 * grain and (
+        short = kind[i] == 0 or (kind[i] == 1 and sweep[i] < math.pi)
+        still = short and _apart(start[i], end[i]) < grain and _angle(axis0[i], axis1[i]) < axis_grain and j >= 0
+        there = short and j >= 0 and _apart(start[i], end[i]) < 2.0 * grain and (
             _apart(tip[j], end[i]) <= grain and _angle(axis[j], axis1[i]) <= axis_grain)
         if (still or there) and (j + 1 >= count or _apart(tip[j + 1], end[i]) > grain
                                  or _angle(axis[j + 1], axis1[i]) > 10.0 * axis_grain):

@@ -52,12 +52,15 @@ def _around(k: int, rapid: Bools, tip: Floats, axis: Floats, stops: Floats, angl
             grain: tuple[float, float]) -> tuple[int, int] | None:
     """(first, last) block of the rewind round block k; the pose is that where block first - 1 ends.
 
-    On the way the tool stands in other poses twice too. The innermost that is a position of the CL file counts, for what
-    lies outside it is motion of the CL file; without any the outermost.
+    The tool comes back in one run of feed blocks: the next rapid behind them ends the search. On the way it stands in other
+    poses twice too. The innermost that is a position of the CL file counts, for what lies outside it is motion of the CL
+    file; without any the outermost.
     """
     low, high = max(k - _REACH, 1), min(k + _REACH, len(tip))
     stop = np.flatnonzero(~rapid[low:k])
     low += int(stop[-1]) if len(stop) else 0
+    again = np.flatnonzero(rapid[k:high - 1] < rapid[k + 1:high])
+    high = k + 1 + int(again[0]) if len(again) else high
     begin, end = np.arange(max(low - 1, 0), k), np.arange(k, high)
     same = (np.linalg.norm(tip[begin, None] - tip[None, end], axis=2) <= grain[0]) & (
         np.linalg.norm(axis[begin, None] - axis[None, end], axis=2) <= grain[1])

@@ -1,0 +1,53 @@
+"""Read-back of parts that are ordinary in shops and were once refused."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import toolpaths
+from tests.postproc.kit import convert, good
+from toolpaths.diagnostics import Diagnostic, Severity, warning
+from toolpaths.toolpath import Toolpath
+
+
+def ring() -> Toolpath:
+    """A vertical way in, holes on a cone all round, a vertical way out at the place of the way in: C has gone round."""
+    lines = ["TOOL PATH/D,TOOL,DR", "TLDATA/DRILL,5,0,75,118,50", "LOAD/TOOL,1", "SPINDL/RPM,1000,CLW", "RAPID",
+             "GOTO/0,0,80,0,0,1", "CYCLE/DRILL,RAPTO,2,FEDTO,-8,RTRCTO,20,MANUAL,MMPM,100"]
+    for phi in np.arange(8) * np.pi / 4.0:
+        x, y = np.cos(phi), np.sin(phi)
+        lines.append(f"GOTO/{20 * x:.4f},{20 * y:.4f},34.641,{0.5 * x:.7f},{0.5 * y:.7f},0.8660254")
+    return read([*lines, "CYCLE/OFF", "RAPID", "GOTO/0,0,80,0,0,1", "END-OF-PATH"])
+
+
+def tiny_arc() -> Toolpath:
+    """An arc shorter than the last decimal of a word, a long one behind it round the same centre."""
+    circle = "CIRCLE/0,0,0,0,0,-1,68.9,0.03,0.5,10,0"
+    return read(["TOOL PATH/CORE,TOOL,EM", "TLDATA/MILL,10,0,75,0,0", "LOAD/TOOL,1", "SPINDL/RPM,1000,CLW", "RAPID",
+                 "GOTO/68.9,0,20,0,0,1", "FEDRAT/MMPM,500", "GOTO/68.9,0,0", circle, "GOTO/68.9,0.0001,0", circle,
+                 "GOTO/0,68.9,0", "GOTO/0,80,0", "RAPID", "GOTO/0,80,20", "END-OF-PATH"])
+
+
+def read(lines: list[str]) -> Toolpath:
+    path, found = toolpaths.read_bytes("\n".join(lines).encode(), file="field.cls")
+    assert not toolpaths.diagnostics.has_errors(found), found
+    return path
+
+
+@pytest.mark.parametrize("controller", ["linuxcnc", "haas-ngc", "fanuc-30i", "heidenhain-tnc640"])
+def test_a_ring_of_tilted_holes_is_no_rewind(controller: str) -> None:
+    """Home and the way out are the same pose with C half a turn on, the whole program between them."""
+    result = good(convert(ring(), "mikron-ucp710", controller))
+    assert result.comparison is not None
+
+
+@pytest.mark.parametrize("controller", ["linuxcnc", "haas-ngc", "siemens-840d"])
+def test_an_arc_without_a_block_takes_no_other(controller: str) -> None:
+    result = good(convert(tiny_arc(), "mikron-ucp710", controller))
+    assert result.comparison is not None and result.comparison.worst_tip < 0.01
+
+
+def test_lines_that_nobody_knows_are_not_told() -> None:
+    assert str(Diagnostic(Severity.WARNING, "a.b", "seven", count=7)) == "warning [a.b] seven (7 times)"
+    assert str(warning("a.b", "none", file="part.cls", lines=[0])) == "part.cls: warning [a.b] none"
