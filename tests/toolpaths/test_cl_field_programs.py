@@ -28,7 +28,7 @@ def codes(found: ReadResult) -> list[str]:
 
 @pytest.mark.parametrize("label", ["A10)", "10) ", "  start )", "l_1)\t"])
 def test_statements_behind_a_label_are_read(label: str) -> None:
-    lines = ("LOADTL/7", "RAPID", "GOTO/0,0,5", "goto / 1,2,3", "$$ no statement")
+    lines = ("LOADTL/7", "MULTAX", "RAPID", "GOTO/0,0,5", "goto / 1,2,3", "$$ no statement")
     found = read_bytes(ISO + "".join(f"{label}{line}\n" for line in lines) + "GOTO/4,5,6\n")
     assert codes(found) == ["cl.text"]
     assert found.toolpath.tip.tolist() == [[0, 0, 5], [1, 2, 3], [4, 5, 6]]
@@ -57,7 +57,8 @@ def test_a_macro_is_refused_where_it_is_defined() -> None:
     assert errors(found) == [("cl.unsupported-motion", (3, 6))]
 
 
-@pytest.mark.parametrize("knots", ["KNOT/0.25,0.5,0.75,\n  1.0", "KNOT/0.25\n0.5,0.75\n1.0", "KNOT/0.25,0.5,0.75,1.0"])
+@pytest.mark.parametrize("knots", ["KNOT/0.25,0.5,0.75,\n  1.0", "KNOT/0.25\n0.5,0.75\n$$ end\n1.0",
+                                   "KNOT/0.25,0.5,0.75,1.0"])
 def test_knots_over_several_lines(knots: str) -> None:
     control = "".join(f"CNTRL/{x},{x * x % 3},0\n" for x in range(1, 7))
     found = read_bytes(f"{NX}GOTO/0,0,0\nNURBS/\n{knots}\n{control}END-OF-PATH\n")

@@ -9,7 +9,7 @@ import numpy as np
 
 from toolpaths.arrays import Floats
 from toolpaths.cl.build import Builder, Triple
-from toolpaths.cl.statements import TEXT, Statement, words_of
+from toolpaths.cl.statements import COMMENT, TEXT, Statement, words_of
 from toolpaths.toolpath import Role
 
 SPLINE_CHORD = 0.001
@@ -141,15 +141,18 @@ def _gather(b: Builder) -> tuple[list[float], list[Triple]]:
     """Knots and control points of the KNOT and CNTRL records that follow, knots also on lines of their own; passes them."""
     knots: list[float] = []
     control: list[Triple] = []
-    statements = b.program.statements
+    statements, last = b.program.statements, ""
     while b.index + 1 < b.stop and b.program.before[b.index + 1] == b.fast:
         s = statements[b.index + 1]
         n = s.numbers
-        more = s.major == TEXT and statements[b.index].major in ("KNOT", TEXT) and bool(n) and len(n) == len(s.words)
-        if s.major not in ("KNOT", "CNTRL") and not more:
+        major = "KNOT" if s.major == TEXT and last == "KNOT" and n and len(n) == len(s.words) else s.major
+        if major not in ("KNOT", "CNTRL", COMMENT):
             break
         b.index += 1
-        if more or s.major == "KNOT":
+        last = last if major == COMMENT else major
+        if major == COMMENT:
+            continue
+        if major == "KNOT":
             knots += n
         elif len(n) == 3:
             control.append((n[0], n[1], n[2]))

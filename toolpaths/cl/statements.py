@@ -199,7 +199,8 @@ class Lexer:
     def _unlabelled(self, text: str) -> str:
         """`text` without the label of APT before a statement, as in `A10)GOTO/...`."""
         label = _LABEL.match(text)
-        return text[label.end():] if label and self._begins(text[label.end():]) else text
+        rest = text[label.end():] if label else ""
+        return rest if rest and (self._begins(rest) or self.known(major_of(rest))) else text
 
     def _joined(self, text: str, i: int, text_word: bool = False) -> str:
         """`text` with the lines that continue it."""
