@@ -5,6 +5,7 @@ So any cutter keeps its contact, and passes may gain whose tool axis must not be
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
 _RING = 72
 """angles looked at round the free joint"""
 _DIRECTIONS = 24
+_SOME = 32
+"""passes that a common angle is found from"""
 _SEEDS = 4
 _STEPS = (2.5 * DEG, 1.25 * DEG, 0.6 * DEG, 0.3 * DEG)
 _TIE = 1e-2
@@ -62,9 +65,28 @@ def held_angles(one: Pass, machine: Machine, axis: Floats) -> Floats:
     joint = _free(one, axis, machine)
     if joint < 0 or not one.stretches:
         return np.zeros(0)
+    return _dips(_slowness(one, machine, axis, joint), machine, joint)
+
+
+def common_angles(owns: Sequence[Turned]) -> Floats:
+    """Angles (H,) rad at which the joint that all these passes leave free, as the CL file has them, should serve them best
+    together; some of them are looked at where they are many."""
+    some = [owns[k] for k in np.unique(np.linspace(0, len(owns) - 1, min(len(owns), _SOME)).astype(np.int64)).tolist()]
+    joints = {_free(made.one, made.axis, made.machine) for made in some}
+    if len(joints) != 1 or -1 in joints or not all(made.one.stretches for made in some):
+        return np.zeros(0)
+    joint, machine, total = joints.pop(), some[0].machine, np.zeros(_RING)
+    for made in some:
+        slow = _slowness(made.one, machine, made.axis, joint)
+        seconds = made.seconds if np.isfinite(made.seconds) else 1.0
+        total += seconds * slow / slow[_RING // 2]
+    return _dips(total, machine, joint)
+
+
+def _dips(slow: Floats, machine: Machine, joint: int) -> Floats:
+    """Angles inside travel, rad, where values all round `_ring` are least, the best first; none where they are even."""
     low, high = machine.limits.lower[joint], machine.limits.upper[joint]
-    ring = machine.home[joint] + 2.0 * np.pi * (np.arange(_RING) / _RING - 0.5)
-    slow = _slowness(one, machine, axis, joint, ring)
+    ring = _ring(machine, joint)
     ring = np.where(ring < low, ring + 2.0 * np.pi, np.where(ring > high, ring - 2.0 * np.pi, ring))
     dips = np.flatnonzero(np.isfinite(slow) & (ring >= low) & (ring <= high) & (slow <= np.roll(slow, 1))
                           & (slow <= np.roll(slow, -1)))
@@ -72,6 +94,11 @@ def held_angles(one: Pass, machine: Machine, axis: Floats) -> Floats:
         return np.zeros(0)
     grain = ((slow[dips] / slow[dips].min() - 1.0) / _TIE).astype(np.int64)
     return np.asarray(ring[dips[np.lexsort((np.abs(ring[dips] - machine.home[joint]), grain))]][:_SEEDS])
+
+
+def _ring(machine: Machine, joint: int) -> Floats:
+    """Angles all round that of home, which stands in the middle."""
+    return np.asarray(machine.home[joint] + 2.0 * np.pi * (np.arange(_RING) / _RING - 0.5))
 
 
 def _free(one: Pass, axis: Floats, machine: Machine) -> int:
@@ -84,9 +111,9 @@ def _axes(one: Pass) -> list[Floats]:
     return [one.axis] if one.fixed else [pole.frame[2] for pole in poles_of(one.kin)]
 
 
-def _slowness(one: Pass, machine: Machine, axis: Floats, joint: int, ring: Floats) -> Floats:
-    """Sum (H,) over the ways of a pass of length over cube root of reach (in its middle), the free joint at `ring` (H,)."""
-    stretch, ways = max(one.stretches, key=lambda s: s.length), _ways(one)
+def _slowness(one: Pass, machine: Machine, axis: Floats, joint: int) -> Floats:
+    """Sum over the ways of a pass of length over cube root of reach (in its middle), the free joint all round `_ring`."""
+    stretch, ways, ring = max(one.stretches, key=lambda s: s.length), _ways(one), _ring(machine, joint)
     limits = machine.limits
     limit = limits.jerk if np.isfinite(limits.jerk).all() else limits.acceleration
     near = np.tile(machine.home, (len(ring), 1))

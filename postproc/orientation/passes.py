@@ -260,6 +260,8 @@ def _fixed(moves: Moves, rows: tuple[int, int], cuts: Ints, axis: Floats) -> str
         return "the tool axis turns within the pass"
     if bool((moves.tool[here][cuts] != moves.tool[here][cuts[0]]).any()) or moves.kind[rows[0]] != Kind.RAPID:
         return "no rapid leads to it on which the tool could turn"
+    if rows[1] < len(moves) and moves.kind[rows[1]] != Kind.RAPID:
+        return "the cut after it begins where it ends, without a rapid"
     return ""
 
 
