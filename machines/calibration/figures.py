@@ -1,61 +1,44 @@
 """A calibration drawn: signatures (or parameters) with their doubt, residuals, condition number against set-ups.
 
-matplotlib is imported only here, when a figure is asked for. What comes from files is drawn as it stands, never as markup.
+matplotlib is imported only when a figure is asked for. What comes from files is drawn as it stands, never as markup.
 """
 
 from __future__ import annotations
 
-import io
-import warnings
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from toolpaths.drawing import BESIDE, image, plain
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
-FORMATS = (".png", ".svg")
-"""by the ending of the file"""
 SIZE = 8.0, 3.2
 """inches, of one panel"""
-DOTS = 120
-"""per inch, of PNG"""
 MANY = 40
 """parameters beyond which their names are left out"""
 BOUND = 1.96
 """standard deviations of the 95 % bounds drawn"""
-BESIDE: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (1.0, 1.0), "fontsize": "small", "frameon": False}
-"""where legends stand"""
-TITLE = 90
-"""characters of a title"""
 
 
 def draw(figures: dict[str, Any], title: str, ending: str) -> bytes:
     """The figures of a `Calibration` as an image file.
 
     Args:
-        ending: one of FORMATS
+        ending: ".png" or ".svg"
 
     Raises:
         ValueError: for another ending.
     """
-    if ending not in FORMATS:
-        raise ValueError(f"no figure format {ending!r}; known: {', '.join(FORMATS)}")
-    import matplotlib
-    from matplotlib.figure import Figure
-
     panels = _panels(figures)
-    rules: Any = {"svg.hashsalt": "postproc", "font.family": "DejaVu Sans", "axes.grid": True, "grid.alpha": 0.3,
-             "axes.formatter.use_mathtext": False, "text.parse_math": False}
-    with matplotlib.rc_context(rules), warnings.catch_warnings():
-        warnings.filterwarnings("ignore", message="Glyph")
-        sheet = Figure(figsize=(SIZE[0], SIZE[1] * len(panels)), dpi=DOTS, layout="constrained")
-        sheet.suptitle(_plain(title))
+
+    def fill(sheet: Figure) -> None:
         for place, (panel, given) in zip(np.ravel(sheet.subplots(len(panels), 1)), panels, strict=True):
             panel(place, given)
-        out = io.BytesIO()
-        sheet.savefig(out, format=ending[1:], metadata={"Date": None} if ending == ".svg" else {"Software": None})
-    return out.getvalue()
+
+    return image((SIZE[0], SIZE[1] * len(panels)), title, fill, ending)
 
 
 def _panels(figures: dict[str, Any]) -> list[tuple[Any, Any]]:
@@ -74,7 +57,7 @@ def _panels(figures: dict[str, Any]) -> list[tuple[Any, Any]]:
 def _signatures(place: Axes, curves: dict[str, Any]) -> None:
     for name, curve in curves.items():
         x, y, sigma = (_floats(curve[key]) for key in ("degrees", "values", "sigma"))
-        line, = place.plot(x, y, marker="." if len(x) < MANY else "", label=_plain(name))
+        line, = place.plot(x, y, marker="." if len(x) < MANY else "", label=plain(name))
         place.fill_between(x, y - BOUND * sigma, y + BOUND * sigma, color=line.get_color(), alpha=0.2, linewidth=0.0)
     _labelled(place, "position [deg]", f"signature [{next(iter(curves.values()))['unit']}], 95 % bounds")
     place.legend(**BESIDE)
@@ -85,13 +68,13 @@ def _parameters(place: Axes, chosen: dict[str, Any]) -> None:
     at = np.arange(len(values))
     place.errorbar(at, values, yerr=BOUND * sigma, fmt="o", markersize=3.0, capsize=3.0)
     if len(at) <= MANY:
-        place.set_xticks(at, [_plain(name) for name in chosen], rotation=90, fontsize="small")
+        place.set_xticks(at, [plain(name) for name in chosen], rotation=90, fontsize="small")
     _labelled(place, "parameter", f"value [{next(iter(chosen.values()))['unit']}], 95 % bounds")
 
 
 def _residuals(place: Axes, rows: dict[str, Any]) -> None:
     for name, row in rows.items():
-        place.plot(_floats(row), linestyle="", marker=".", label=_plain(name))
+        place.plot(_floats(row), linestyle="", marker=".", label=plain(name))
     for bound in (-BOUND, BOUND):
         place.axhline(bound, color="gray", linewidth=0.8, linestyle="--")
     _labelled(place, "reading", "residual [standard deviations]")
@@ -119,9 +102,3 @@ def _labelled(place: Axes, x: str, y: str) -> None:
 def _floats(values: list[float | None]) -> np.ndarray[Any, np.dtype[np.float64]]:
     """NaN for None."""
     return np.array([np.nan if v is None else v for v in values], dtype=np.float64)
-
-
-def _plain(text: str) -> str:
-    """One line of printable characters; a label that began with _ would be left out of a legend."""
-    shown = "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text)[:TITLE]
-    return f" {shown}" if shown.startswith("_") else shown

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 from postproc.options import Orientation
-from postproc.orientation.candidates import Lost, Tried
+from postproc.orientation.candidates import Kind, Lost, Tried
 from postproc.orientation.losers import KINDS, best_loser, grouped, listed
 from postproc.orientation.orient import OrientationChoice
 from postproc.orientation.plans import OrientationPlan
@@ -19,8 +19,8 @@ from toolpaths.units import DEG
 
 SHOWN = 40
 """passes in the table; where there are more, those that gain most"""
-LOSERS = 20
-"""candidates of a pass in full"""
+LOSERS: dict[Kind, int] = {"slower": 8, "bound": 3, "touches": 4, "travel": 3, "reach": 2, "limits": 3}
+"""candidates of a pass in full, by what they lost by"""
 RUNS = 20
 """lines of the head of a program"""
 
@@ -96,11 +96,20 @@ def _in_full(tried: Tried, made: Turned) -> list[str]:
     one = tried.own.one
     lines = [f"pass {one.number}, line {one.line}" + (f", axis kept: {one.fixed}" if one.fixed else "")]
     for name, it in _named(tried, made):
-        lines += [f"  {name}: {orientation(it)}, {seconds(it.seconds)} s" + (f", {it.touching}" if it.touching else ""),
-                  *_reached(it)]
-    losers = sorted(tried.rejected, key=lambda lost: (_rank(lost), angle_between(lost.made.axis, one.axis)))
-    lines += [f"  {'lost':<10} {orientation(lost.made)}{_off(lost.made)}: {lost.why}" for lost in losers[:LOSERS]]
-    return lines + ([f"  and {len(losers) - LOSERS} more in --json"] if len(losers) > LOSERS else [])
+        lines += [f"  {name}: {orientation(it)}, {_state(it)}", *_reached(it)]
+    losers = sorted(tried.rejected, key=_rank)
+    for kind, most in LOSERS.items():
+        some = [lost for lost in losers if lost.kind == kind]
+        lines += [f"  lost, {kind}: {orientation(lost.made)}{_off(lost.made)} {lost.why}" for lost in some[:most]]
+        lines += [f"  lost, {kind}: {len(some) - most} more, all in --json"] if len(some) > most else []
+    return lines
+
+
+def _state(made: Turned) -> str:
+    """Seconds of an orientation, or why it cannot be run."""
+    if made.refused:
+        return f"cannot be run ({made.refused})"
+    return f"{seconds(made.seconds)} s" + (f", {made.touching}" if made.touching else "")
 
 
 def _named(tried: Tried, made: Turned) -> list[tuple[str, Turned]]:
@@ -124,9 +133,10 @@ def _off(made: Turned) -> str:
     return f", {off:.1f} degrees off" if off > 0.05 and sum(made.machine.rotary) < 2 else ""
 
 
-def _rank(lost: Lost) -> tuple[int, float]:
-    """Timed losers first, by time."""
-    return -list(KINDS).index(lost.kind), lost.made.seconds if lost.kind == "slower" else 0.0
+def _rank(lost: Lost) -> tuple[float, float]:
+    """By time where that is known, then by how far the tool is turned."""
+    seconds = lost.made.seconds
+    return seconds if math.isfinite(seconds) else math.inf, float(angle_between(lost.made.axis, lost.made.one.axis))
 
 
 def _reached(made: Turned) -> list[str]:

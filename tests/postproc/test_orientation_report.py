@@ -143,7 +143,7 @@ def test_text_says_why_others_lost() -> None:
     assert len([line for line in table if line.split()[:1] and line.split()[0].isdigit()]) == 8  # 7 passes, "N orientations"
     assert "limits" in told and "slower" in told and "bound" in told
     assert "slowest alone: jerk" in told and "feed 1000 mm/s" in told
-    assert "lost       A45.000 C" in told and "takes 0.6119 s" in told
+    assert "lost, slower: A45.000 C" in told and "takes 0.6119 s" in told
     assert any(line.startswith("paper per pass") for line in table)
 
 
