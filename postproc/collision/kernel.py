@@ -162,11 +162,17 @@ def _leaf(piece: Any, size: Any, cells: Any, bounds: Any, normal: Any, place: An
 
 
 def _bound(piece: Any, size: Any, body: Any, way: Any, k: Any, m: Any) -> Any:
-    """`search._Search._bound` of one pair; body: centre and half, way: centre, half, axis and chord, by columns."""
-    distance, nx, ny, nz = around(piece, body[k, 0] - way[m, 0], body[k, 1] - way[m, 1], body[k, 2] - way[m, 2],
-                                  way[m, 6], way[m, 7], way[m, 8])
-    return (distance - abs(nx) * (body[k, 3] + way[m, 3]) - abs(ny) * (body[k, 4] + way[m, 4])
-            - abs(nz) * (body[k, 5] + way[m, 5]) - size[0] * way[m, 9])
+    """`search._Search._bound` of one pair; rows of body and way as `Solid.packed`, `Swept.packed` have them."""
+    b, w = body[k], way[m]
+    distance, nx, ny, nz = around(piece, b[0] - w[0], b[1] - w[1], b[2] - w[2], w[6], w[7], w[8])
+    middle, share = b[0] * b[6] + b[1] * b[7] + b[2] * b[8], nx * b[6] + ny * b[7] + nz * b[8]
+    thick = abs(share) * max(b[10] - middle, middle - b[9])
+    thick += math.sqrt(max(1.0 - share * share, 0.0)) * math.sqrt(b[3] * b[3] + b[4] * b[4] + b[5] * b[5])
+    thick = min(thick, abs(nx) * b[3] + abs(ny) * b[4] + abs(nz) * b[5])
+    beside = distance - thick - abs(nx) * w[3] - abs(ny) * w[4] - abs(nz) * w[5]
+    above = (w[0] * b[6] + w[1] * b[7] + w[2] * b[8] - abs(b[6]) * w[3] - abs(b[7]) * w[4] - abs(b[8]) * w[5] - b[10]
+             - support(piece, -(w[6] * b[6] + w[7] * b[7] + w[8] * b[8])))
+    return max(beside, above) - size[0] * w[9]
 
 
 leaf, bound_of = compiled(_leaf), compiled(_bound)
@@ -177,7 +183,7 @@ def search(piece: Any, size: Any, body: Any, corners: Any, normals: Any, way: An
     """One piece of a tool against a body; nearer pairs first, `out` is carried on.
 
     Args:
-        size (2,): lever and bend; body (2 L - 1, 6), way (2 M - 1, 10): the trees
+        size (2,): lever and bend; body (2 L - 1, 11), way (2 M - 1, 10): the trees
         corners (T, 9), normals (T, 3), pieces (N, 12): their leaves
     """
     pairs, bounds = np.empty((_DEPTH, 2), dtype=np.int64), np.empty(_DEPTH)

@@ -1,10 +1,11 @@
 """How near a moving tool comes to a solid: least signed distance over the whole way, by proved lower bounds.
 
 Two trees of boxes, round the triangles and round the pieces of the way, are gone through together. Over a pair of boxes
-the body's normal n at their middles bounds the distance from below (see `revolution`); so does, over a triangle, its own
-plane. A pair whose bound is not below the least distance found so far is done with; others are split, in the end the
-triangle and the piece themselves. What is left over is proved, not sampled: where nothing is found, the distance is
-nowhere on the way, between its points and between the corners of the mesh too, less than the limit by more than `EXACT`.
+the body's normal n at their middles bounds the distance from below (see `revolution`); so does the mean normal of the
+surface in the box, or the triangle's own. A pair whose bound is not below the least distance found so far is done with;
+others are split, in the end the triangle and the piece themselves. What is left over is proved, not sampled: where
+nothing is found, the distance is nowhere on the way, between its points and between the corners of the mesh too, less
+than the limit by more than `EXACT`.
 """
 
 from __future__ import annotations
@@ -102,11 +103,19 @@ class _Search:
         return self.best
 
     def _bound(self, pairs: Ints) -> Floats:
-        """Bounds (N,) over pairs (N, 2) of nodes of the solid and of the way."""
+        """Bounds (N,) over pairs (N, 2) of nodes of the solid and of the way: by the tool's normal between the middles, and
+        by the mean normal of the solid's surface there."""
         axes, chord = self.way.axes
         body, way, (k, m) = self.body.tree, self.way.tree, pairs.T
-        distance, normal = around(self.piece, body.centre[k] - way.centre[m], axes[m])
-        return np.asarray(distance - (np.abs(normal) * (body.half[k] + way.half[m])).sum(axis=1) - self.lever * chord[m])
+        flat, low, high = (of_node[k] for of_node in self.body.slabs)
+        distance, n = around(self.piece, body.centre[k] - way.centre[m], axes[m])
+        middle, share = np.einsum("ni,ni->n", body.centre[k], flat), np.einsum("ni,ni->n", n, flat)
+        thick = np.abs(share) * np.maximum(high - middle, middle - low)
+        thick += np.sqrt(np.maximum(1.0 - share**2, 0.0)) * np.linalg.norm(body.half[k], axis=1)
+        beside = distance - np.minimum((np.abs(n) * body.half[k]).sum(axis=1), thick) - (np.abs(n) * way.half[m]).sum(axis=1)
+        above = (np.einsum("ni,ni->n", way.centre[m], flat) - (np.abs(flat) * way.half[m]).sum(axis=1) - high
+                 - support(self.piece, -np.einsum("ni,ni->n", axes[m], flat)))
+        return np.asarray(np.maximum(beside, above) - self.lever * chord[m])
 
     def _split(self, pairs: Ints) -> Ints:
         """Children of pairs (N, 2), the larger of the two nodes split; those that hold nothing are left out."""

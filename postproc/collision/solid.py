@@ -35,8 +35,30 @@ class Solid:
 
     @cached_property
     def packed(self) -> tuple[Floats, Floats]:
-        """Nodes (2 L - 1, 6): centre, half; corners (T, 9)."""
-        return np.hstack((self.tree.centre, self.tree.half)), self.corners.reshape(-1, 9)
+        """Nodes (2 L - 1, 11): centre, half, normal, least and largest height of `slabs`; corners (T, 9)."""
+        normal, low, high = self.slabs
+        nodes = np.hstack((self.tree.centre, self.tree.half, normal, low[:, None], high[:, None]))
+        return nodes, self.corners.reshape(-1, 9)
+
+    @cached_property
+    def slabs(self) -> tuple[Floats, Floats, Floats]:
+        """Per node of the tree the mean normal (2 L - 1, 3) of its triangles, and between which heights (2 L - 1,) along it
+        they lie: how flat a surface is does not show in boxes along x, y and z."""
+        leaves, count = self.tree.leaves, len(self)
+        area = np.zeros((leaves, 3))
+        area[:count] = np.cross(self.corners[:, 1] - self.corners[:, 0], self.corners[:, 2] - self.corners[:, 0])
+        normals, lows, highs = [], [], []
+        for size in 2 ** np.arange(leaves.bit_length()):
+            total = area.reshape(-1, size, 3).sum(axis=1)
+            length = np.linalg.norm(total, axis=1, keepdims=True)
+            normal = np.where(length > 0.0, total / np.where(length > 0.0, length, 1.0), [0.0, 0.0, 1.0])
+            first = np.arange(0, count, size)
+            height = np.einsum("tki,ti->tk", self.corners, normal[np.arange(count) // size])
+            none = np.zeros(len(normal) - len(first))
+            normals.append(normal)
+            lows.append(np.append(np.minimum.reduceat(height.min(axis=1), first), none))
+            highs.append(np.append(np.maximum.reduceat(height.max(axis=1), first), none))
+        return tuple(np.concatenate(rows[::-1]) for rows in (normals, lows, highs))  # type: ignore[return-value]
 
     def holds(self, point: Floats) -> bool:
         """True where a point (3,) lies inside: the solid angles of all triangles add up to 4 pi.
