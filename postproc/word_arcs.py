@@ -18,7 +18,7 @@ PLANE_AXIS = {plane: 3 - i - j for plane, (i, j) in PLANE_COLUMNS.items()}
 _SQUARE = 1e-7
 """rad that the axis of an arc may be off the axis of the plane"""
 _FLAT = 0.0002
-"""mm by which an arc may leave a tilted plane, whose printed angles are rounded"""
+"""mm by which an arc may leave a tilted plane, whose printed angles are rounded, or rise in it and count as flat"""
 _SHORTEST = 0.01
 _RADIUS_SLACK = 0.002
 
@@ -61,7 +61,7 @@ def word_arcs(control: Control, kin: Kinematics, curves: Curves, q0: Floats, q1:
         ccw[rows] = along > 0.0
         rise = np.abs(np.einsum("nij,nj->ni", to_words, arc.end - arc.start)[np.arange(len(rows)), third])
         keep[rows] &= np.isin(plane[rows], control.arc_planes)
-        keep[rows] &= (rise <= 1e-9) | np.isin(plane[rows], control.helix_planes)
+        keep[rows] &= (rise <= (_FLAT if control.law == "tilted" else 1e-9)) | np.isin(plane[rows], control.helix_planes)
         center[rows] = np.einsum("nij,nj->ni", to_words, arc.center - arc.start)
         parts[rows] = np.maximum(np.ceil(arc.sweep / (2.0 * np.pi) - 1e-9), 1).astype(np.int64)
     return WordArcs(keep, plane, ccw, center, parts)

@@ -36,7 +36,7 @@ def word_rows(path: Path, moves: Moves, control: Control, kinematics: Callable[[
     tool = block_tools(path, moves)
     rounds = places if made_up else None
     exact = _words(path, path.q, np.arange(len(path)), tool, kinematics, lengths, rounds)
-    end = _rounded(_snapped(_rounded(exact, places), path, control, places), places)
+    end = _flat(_rounded(_snapped(_rounded(exact, places), path, control, places), places), path, control)
     start = np.concatenate([end[:1], end[:-1]])
     start[begins] = _rounded(_words(path, path.q[begins - 1], begins, tool, kinematics, lengths, rounds), places)
     return WordRows(end, start, _written(end, start, np.union1d(begins, anew), path, control))
@@ -105,6 +105,16 @@ def _snapped(words: Floats, path: Path, control: Control, places: Ints) -> Float
             k += 1
             if k >= len(words):
                 break
+    return words
+
+
+def _flat(words: Floats, path: Path, control: Control) -> Floats:
+    """Words whose arcs do not rise in planes in which the control has no helix: rounding may part their ends."""
+    goes_on = np.append(False, np.diff(path.frame) == 0)
+    for law, k in path.by_control():
+        for row in k[(path.code[k] == ARC) & ~np.isin(path.plane[k], law.helix_planes) & goes_on[k]].tolist():
+            third = int(control.xyz[PLANE_AXIS[int(path.plane[row])]])
+            words[row, third] = words[row - 1, third]
     return words
 
 

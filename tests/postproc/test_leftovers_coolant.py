@@ -9,7 +9,7 @@ import pytest
 
 from postproc.pipeline import PostResult
 from postproc.readback.verify import read_back
-from tests.postproc.kit import codes, convert, good, toolpath
+from tests.postproc.kit import codes, convert, good, shop_file, toolpath
 from toolpaths.diagnostics import DiagnosticError
 
 CONTROLLERS = ["linuxcnc", "generic-iso", "fanuc-30i", "haas-ngc", "siemens-840d", "heidenhain-tnc640"]
@@ -24,12 +24,6 @@ def cut(controller: str | Path, *lines: str) -> PostResult:
 def switches(text: str) -> list[str]:
     """The M codes of coolant, in order."""
     return re.findall(r"(?<![A-Z])M(?:[789]|51|6[01]|8[3489])(?!\d)", re.sub(r"\(.*?\)|;.*", "", text))
-
-
-def shop(folder: Path, base: str, more: str = SHOP) -> Path:
-    path = folder / "shop.toml"
-    path.write_text(f'base = "{base}"\n{more}')
-    return path
 
 
 def verified(result: PostResult, text: str) -> list[str]:
@@ -49,15 +43,15 @@ def test_haas_has_codes_of_its_own() -> None:
 @pytest.mark.parametrize("base", CONTROLLERS)
 def test_a_shops_codes_are_written_and_read_back(tmp_path: Path, base: str) -> None:
     mist = 'mist = "M7"\nthrough_off = ""\n' if base == "haas-ngc" else ""
-    result = good(cut(shop(tmp_path, base, SHOP + mist), "COOLNT/THRU", AT[0], "COOLNT/AIR", AT[1], "COOLNT/MIST", AT[2],
-                      "COOLNT/OFF", "GOTO/40,0,5"))
+    result = good(cut(shop_file(tmp_path, SHOP + mist, base), "COOLNT/THRU", AT[0], "COOLNT/AIR", AT[1], "COOLNT/MIST",
+                      AT[2], "COOLNT/OFF", "GOTO/40,0,5"))
     assert switches(result.text)[:6] == ["M51", "M9", "M60", "M61", "M7", "M9"]
     assert not [c for c in codes(result.diagnostics) if c.startswith("coolant")]
 
 
 @pytest.mark.parametrize("base", CONTROLLERS)
 def test_another_kind_is_missed(tmp_path: Path, base: str) -> None:
-    result = good(cut(shop(tmp_path, base), "COOLNT/THRU", AT[0], "COOLNT/OFF", AT[1]))
+    result = good(cut(shop_file(tmp_path, SHOP, base), "COOLNT/THRU", AT[0], "COOLNT/OFF", AT[1]))
     assert not verified(result, result.text)
     for other, flows in (("M8", "flood"), ("M60", "air"), ("M9", "off")):
         wrong = verified(result, result.text.replace("M51", other))
@@ -86,10 +80,10 @@ def test_a_code_put_in_counts_as_what_it_switches(record: str) -> None:
 
 
 def test_a_shops_through_the_tool_on_m7(tmp_path: Path) -> None:
-    result = good(cut(shop(tmp_path, "siemens-840d", '[codes]\nmist = ""\nthrough = "M7"\n'), "COOLNT/THRU,HIGH", *AT))
+    result = good(cut(shop_file(tmp_path, '[codes]\nmist = ""\nthrough = "M7"\n', "siemens-840d"), "COOLNT/THRU,HIGH", *AT))
     assert switches(result.text) == ["M7", "M9"] and "coolant.word" in codes(result.diagnostics)
 
 
 def test_a_code_that_cannot_be_read_back_is_refused(tmp_path: Path) -> None:
     with pytest.raises(DiagnosticError, match=r"codes\.through"):
-        cut(shop(tmp_path, "siemens-840d", '[codes]\nthrough = "H_COOL(1)"\n'), *AT)
+        cut(shop_file(tmp_path, '[codes]\nthrough = "H_COOL(1)"\n', "siemens-840d"), *AT)

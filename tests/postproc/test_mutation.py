@@ -192,7 +192,7 @@ def test_rapid_into_uncut_metal() -> None:
 
 
 @pytest.mark.parametrize(("old", "new", "code"), [
-    ("\nZ129.3733\nG53", "\nZ-129.3733\nG53", "verify.link"), ("G64 P0.002 Q0.001\n", "", "verify.smoothing"),
+    ("\nZ124.6932\nG53", "\nZ-124.6932\nG53", "verify.link"), ("G64 P0.002 Q0.001\n", "", "verify.smoothing"),
     ("G64 P0.002", "G64 P2", "verify.smoothing"), ("G53 G0 Z400", "G0 Z400", "verify.travel"), ("M2\n", "", "gcode.no_end")])
 def test_spoilt_beside_the_path(old: str, new: str, code: str) -> None:
     """The way out at the end, the control's smoothing, travel, the end itself."""
