@@ -1,7 +1,8 @@
-"""Cases that decide: travel, indexing time, and the rotary axis that the tool leaves free. Each with its counterfactual."""
+"""What decides: travel, holder, indexing time, the rotary axis that the tool leaves free; each with its counterfactual."""
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from functools import cache
 
@@ -10,12 +11,14 @@ import pytest
 
 import postproc
 from machines.machine import Machine, Timing
+from postproc.collision.passes import pass_bodies
 from postproc.options import Options
 from postproc.orientation.allowed import Allowed
+from postproc.orientation.candidates import Tried
 from postproc.orientation.held import free_value, held_angles
 from postproc.orientation.orient import OrientationChoice, orient
 from postproc.orientation.passes import work_of
-from postproc.orientation.timed import turned
+from postproc.orientation.timed import turned, turned_all
 from postproc.pipeline import PostResult
 from postproc.setup import SetupFile, load_setup
 from tests.benchmarks.bench_orientation_limits import chosen, compared, strips, whole
@@ -55,6 +58,11 @@ def standing(result: PostResult, letter: str) -> set[float]:
     return set(np.round(np.degrees(result.path.q[rows, result.machine.axis_names.index(letter)]), 3).tolist())
 
 
+def near(angle: float, found: set[float]) -> bool:
+    """One angle, the one expected within two degrees, either way round."""
+    return len(found) == 1 and abs(abs(next(iter(found))) - angle) < 2.0
+
+
 def test_travel_decides() -> None:
     """A level pass wants A = 45; a trunnion that tilts to 30 degrees leaves another axis, slower but better than the own."""
     m = machine("mikron-ucp710")
@@ -78,6 +86,48 @@ def test_indexing_time_decides() -> None:
     assert slow.plans["per-pass"].seconds > slow.plans["keep"].seconds + 3.0
     cuts = [choice.plans["per-pass"].cuts.sum() for choice in (fast, slow)]
     assert cuts[0] == pytest.approx(cuts[1], rel=1e-9)
+
+
+def walled(*walls: tuple[float, float], holder: float) -> SetupFile:
+    """Walls from y to y, 90 mm high, and a holder of that diameter 70 mm above the tip."""
+    fixtures = [{"name": f"wall at {low:g}", "box": {"low": (-150.0, low, -20.0), "high": (150.0, high, 90.0)}}
+                for low, high in walls]
+    tool = {"gauge_length": 140.0, "flute_length": 30.0, "shank": [{"diameter": 14.0, "length": 40.0}],
+            "holder": [{"diameter": holder, "length": 70.0}]}
+    return SetupFile.model_validate_json(json.dumps({"bodies": {"fixtures": fixtures}, "tools": {"1": tool}}))
+
+
+def behind(*walls: tuple[float, float], holder: float = 56.0) -> Tried:
+    """A strip along x between walls."""
+    return chosen(strips([0.0]), machine("mikron-ucp710"), walled(*walls, holder=holder)).tried[0]
+
+
+def test_the_holder_decides() -> None:
+    """Two axes are equally fast; a wall where the first leans to leaves the other, were the holder not so thick."""
+    right, left = (60.0, 80.0), (-80.0, -60.0)
+    first = behind(left).best
+    assert first.axis[1] > 0.3 and first.rotary()["A"] == pytest.approx(45.0, abs=1.0)
+    other = behind(right)
+    assert other.best.axis[1] < -0.3 and other.best.seconds == pytest.approx(first.seconds, rel=1e-3)
+    told = [lost.why for lost in other.rejected if lost.kind == "touches"]
+    assert any(why.startswith("holder of T1 touches fixture wall at 60 by ") for why in told)
+    assert behind(right, holder=14.0).best.same(first.axis)
+
+
+def test_between_two_walls_the_tool_leans_as_far_as_it_can() -> None:
+    """Neither vertex is free: the best is on the ridge between vertex and upright, as far out as the holder lets it."""
+    walls = ((-80.0, -60.0), (60.0, 80.0))
+    found = behind(*walls)
+    assert 20.0 < found.best.rotary()["A"] < 40.0 and not found.best.touching
+    work, _ = work_of(strips([0.0]), machine("mikron-ucp710"), walled(*walls, holder=56.0), Options())
+    assert work is not None
+    bodies, _ = pass_bodies(work, "")
+    one, allowed = work.passes[0], Allowed(60.0 * DEG, bodies)
+    a, c = (g.ravel() * DEG for g in np.meshgrid(np.arange(10.0, 45.0, 2.5), np.arange(30.0, 60.0, 2.5)))
+    axes = np.column_stack([np.sin(a) * np.sin(c), -np.sin(a) * np.cos(c), np.cos(a)])
+    grid = turned_all(one, np.vstack([axes, -axes * [1.0, 1.0, -1.0]]), machine("mikron-ucp710"), allowed.touching)
+    least = next(each.seconds for each in sorted(grid, key=lambda each: each.seconds) if not each.touching)
+    assert found.best.seconds < 1.002 * least
 
 
 def test_a_table_turned_under_a_standing_tool_gains_what_the_square_gives() -> None:
@@ -110,10 +160,11 @@ def test_angles_worth_holding() -> None:
 def test_a_ball_on_the_h4a_stands_up_and_the_table_turns() -> None:
     """Of all axes within 40 degrees and all angles of the table: upright, strips along y turned along x."""
     found = on("h4a-c-table", strips([90.0]), max_tilt=40.0).tried[0]
-    assert found.own.one.fixed == "" and abs(found.best.held / DEG) == pytest.approx(90.0, abs=0.5)
-    assert found.best.axis.tolist() == [0.0, 0.0, 1.0] and found.best.seconds < 0.8 * found.own.seconds
+    assert found.own.one.fixed == "" and near(90.0, {found.best.rotary()["C"]})
+    assert found.best.axis[2] > np.cos(2.0 * DEG) and found.best.seconds < 0.8 * found.own.seconds
     aside = on("h4a-c-table", strips([0.0]), max_tilt=40.0).tried[0]
-    assert aside.best is aside.own and aside.own.seconds == pytest.approx(found.best.seconds, rel=1e-2)
+    assert aside.best.seconds == pytest.approx(aside.own.seconds, rel=0.02)
+    assert aside.own.seconds == pytest.approx(found.best.seconds, rel=0.02)
 
 
 def test_the_h4a_turns_its_table_once() -> None:
@@ -121,17 +172,17 @@ def test_the_h4a_turns_its_table_once() -> None:
     many, few = (strips([90.0] * count, "16,1") for count in (20, 3))
     choice = on("h4a-c-table", many, quick("h4a-c-table"), 40.0)
     auto = choice.plans["auto"]
-    assert {abs(round(made.held / DEG, 1)) for made in auto.picked} == {90.0}
+    assert near(90.0, {made.held / DEG for made in auto.picked})
     assert all(made.axis.tolist() == [0.0, 0.0, 1.0] for made in auto.picked)
     assert auto.seconds < 0.99 * choice.plans["keep"].seconds and auto.cuts.sum() < 0.8 * choice.plans["keep"].cuts.sum()
-    kept = on("h4a-c-table", few, quick("h4a-c-table"), 40.0).plans
-    assert all(np.isnan(made.held) for made in kept["auto"].picked) and kept["per-pass"].seconds > kept["keep"].seconds
+    kept = on("h4a-c-table", few, max_tilt=40.0).plans
+    assert {free_value(made) for made in kept["auto"].picked} == {0.0} and kept["per-pass"].seconds > kept["keep"].seconds
 
 
 def test_the_turned_table_is_written_and_proved() -> None:
     """The program of the H4a holds C through all cuts; without `auto` it stays at home."""
     path = strips([90.0] * 20, "16,1")
-    assert {abs(c) for c in standing(written("h4a-c-table", path), "C")} == {90.0}
+    assert near(90.0, standing(written("h4a-c-table", path), "C"))
     plain = postproc.convert(path, machine("h4a-c-table"), "linuxcnc", setup_of("h4a"))
     assert plain.ok and standing(plain, "C") == {0.0}
 
@@ -141,7 +192,7 @@ def test_a_flat_cutter_on_a_trunnion(controller: str) -> None:
     """C at 45 degrees, A at 0, in planes or as axis positions; tips and axes of the file are as they were."""
     path = strips([0.0] * 12, "16,1")
     result = written("mikron-ucp710", path, controller)
-    assert {abs(c) for c in standing(result, "C")} == {45.0} and standing(result, "A") == {0.0}
+    assert near(45.0, standing(result, "C")) and standing(result, "A") == {0.0}
     assert result.toolpath is not None
     assert result.toolpath.tip.tolist() == path.tip.tolist() and result.toolpath.axis.tolist() == path.axis.tolist()
 
@@ -150,7 +201,7 @@ def test_passes_that_keep_their_angle_are_held_where_they_were_counted() -> None
     """Behind a pass held at an angle a free axis would stay there: it is held where its time was counted."""
     choice = on("mikron-ucp710", strips([0.0, 45.0], "16,1"))
     picked = choice.plans["per-pass"].picked
-    assert np.isfinite(picked[0].held) and np.isnan(picked[1].held) and free_value(picked[1]) == 0.0
+    assert near(45.0, {picked[0].held / DEG}) and free_value(picked[1]) == 0.0
     path = choice.toolpath("per-pass")
     assert path.spin is not None and set(np.round(path.spin / DEG, 6)) == {round(picked[0].held / DEG, 6), 0.0}
     assert choice.toolpath("keep").equals(choice.work.toolpath)
