@@ -47,6 +47,10 @@ class Actual(ABC):
             direction: (N, J) sign of each joint's last motion, for tables with two ways; without it their mean
         """
 
+    def aim(self, w: Floats, direction: Floats | None = None) -> tuple[Floats, Floats]:
+        """Tip and tool axis of `place`."""
+        return self.place(w, direction)[:2]
+
     @abstractmethod
     def rates(self, w: Floats) -> Floats:
         """d(tip, axis)/dw (N, 6, 3 + R) of the machine without errors; the first three columns do not move the axis."""

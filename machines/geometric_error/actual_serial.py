@@ -6,6 +6,7 @@ directions by columns, which is the product of the 4 x 4 matrices without their 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -61,19 +62,25 @@ class ActualSerial(Actual):
 
     def place(self, w: Floats, direction: Floats | None = None) -> Placed:
         """See the base class."""
-        result = np.empty((3, len(w), 3))
-        for part in columns.blocks(len(w)):
-            way = None if direction is None else direction[part]
-            for rows, vector in zip(result, self._sweep(w[part], way), strict=True):
-                rows[part] = columns.to_rows(vector, len(w[part]))
-        return result[0], result[1], result[2]
+        tip, axis, side = self._sweep(w, direction, self.tool())
+        return tip, axis, side
 
-    def _sweep(self, q: Floats, way: Floats | None) -> list[Columns]:
-        carried_along: list[Columns] = [columns.of_one(v) for v in self.tool()]
-        for line in reversed(self.lines):
-            last = 0.0 if way is None else way[:, line.index]
-            carried_along = driven(line, q[:, line.index], last, self.errors, carried_along)
-        return carried_along
+    def aim(self, w: Floats, direction: Floats | None = None) -> tuple[Floats, Floats]:
+        """See the base class."""
+        tip, axis = self._sweep(w, direction, self.tool()[:2])
+        return tip, axis
+
+    def _sweep(self, q: Floats, direction: Floats | None, tool: Sequence[Floats]) -> Floats:
+        """Point and directions (V, N, 3) of the tool."""
+        result = np.empty((len(tool), len(q), 3))
+        for part in columns.blocks(len(q)):
+            carried_along: list[Columns] = [columns.of_one(v) for v in tool]
+            for line in reversed(self.lines):
+                way = 0.0 if direction is None else direction[part, line.index]
+                carried_along = driven(line, q[part, line.index], way, self.errors, carried_along)
+            for rows, vector in zip(result, carried_along, strict=True):
+                rows[part] = columns.to_rows(vector, len(q[part]))
+        return result
 
     def tool(self) -> tuple[Floats, Floats, Floats]:
         """(tip, axis, x), each (3,), at q = 0, as the spindle's errors leave them."""

@@ -18,6 +18,8 @@ from machines.kinematics.serial import Joint, Serial
 from toolpaths.arrays import Floats
 
 X, Y, Z = np.eye(3)
+SERIES = 1e-5
+"""rad^2: below it the first terms of sine and cosine that are left out are less than 1e-17"""
 ALONG = 1e-9
 """sine below which a direction lies along an axis"""
 
@@ -79,10 +81,18 @@ def displaced(torsor: list[Floats | float], centre: Floats, carried_along: Seque
     for axis, angle in ((Z, torsor[5]), (Y, torsor[4]), (X, torsor[3])):
         if isinstance(angle, float):
             continue
-        cos, sin = np.cos(angle), np.sin(angle)
+        cos, sin = _small(angle)
         turned = [columns.turn(axis, cos, sin, v) for v in turned]
     point = columns.plus(carried_along[0], columns.minus(turned[0], arm))
     return [columns.plus(point, torsor[:3]), *turned[1:]]
+
+
+def _small(angle: Floats) -> tuple[Floats, Floats]:
+    """(cos, sin) of angles (N,): their series up to the fifth power where that is all their digits."""
+    square = angle * angle
+    if not square.max(initial=0.0) < SERIES:
+        return np.cos(angle), np.sin(angle)
+    return 1.0 - square * (0.5 - square / 24.0), angle * (1.0 - square * (1.0 / 6.0 - square / 120.0))
 
 
 def effect(name: ErrorName, kinematics: Kinematics) -> bool:

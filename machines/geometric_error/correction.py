@@ -80,24 +80,28 @@ def correct(actual: Actual, q: Floats, tip: Floats, axis: Floats, *, group: Ints
     nominal = actual.coordinates(q, np.concatenate([tip, axis], axis=1))
     unmeasured = actual.outside(nominal)
     w = nominal if beyond else np.where(np.any(unmeasured, axis=1, keepdims=True), np.nan, nominal)
-    placed, steps = actual.place(w, direction), 0
-    before = _deviation(placed[0], placed[1], tip, axis)
+    at_tip, at_axis = actual.aim(w, direction)
+    before = _deviation(at_tip, at_axis, tip, axis)
     rates = actual.rates(nominal)
     turns = _Turns(rates[:, 3:, 3:], w, group) if turn and actual.turns else None
-    while steps < STEPS:
-        turned = np.zeros((len(q), actual.turns)) if turns is None else turns.to(axis - placed[1])
+    slides, w, steps = _inverse(rates[:, :3, :3]), w.copy(), 0
+    rows: slice | Ints = slice(None)
+    while True:
+        turned = np.zeros((len(w[rows]), actual.turns)) if turns is None else turns.to(axis[rows] - at_axis[rows], rows)
         if turns is not None and steps == 0:
-            turned += turns.near_pole(axis - placed[1], axis_tolerance)
-        gap = tip - placed[0] - np.einsum("nij,nj->ni", rates[:, :3, 3:], turned)
-        step = np.concatenate([_displacements(rates[:, :3, :3], gap), turned], axis=1)
-        w, steps = w + step, steps + 1
-        placed = actual.place(w, direction)
-        if not any(np.nanmax(np.abs(part), initial=0.0) > small for part, small in zip(
-                (step[:, :3], step[:, 3:]), CLOSED, strict=True)):
+            turned += turns.near_pole(axis - at_axis, axis_tolerance)
+        gap = tip[rows] - at_tip[rows] - np.einsum("nij,nj->ni", rates[rows, :3, 3:], turned)
+        step = np.concatenate([np.einsum("nij,nj->ni", slides[rows], gap), turned], axis=1)
+        w[rows] += step
+        at_tip[rows], at_axis[rows] = actual.aim(w[rows], None if direction is None else direction[rows])
+        steps += 1
+        open_ = np.any(np.abs(step) > np.where(np.arange(step.shape[1]) < 3, *CLOSED), axis=1)
+        if steps == STEPS or not open_.any():
             break
+        rows = np.arange(len(w))[rows][open_] if group is None else rows
     partial = np.zeros(len(q), dtype=np.bool_) if turns is None else np.asarray(np.any(turns.weak, axis=1))
-    after = _deviation(placed[0], placed[1], tip, axis)
-    return Corrected(_wound(actual, w, q), *before, *after, placed[0] - tip, placed[1] - axis, partial, unmeasured, steps)
+    after = _deviation(at_tip, at_axis, tip, axis)
+    return Corrected(_wound(actual, w, q), *before, *after, at_tip - tip, at_axis - axis, partial, unmeasured, steps)
 
 
 def _wound(actual: Actual, w: Floats, q: Floats) -> Floats:
@@ -114,13 +118,15 @@ def _deviation(tip: Floats, axis: Floats, wanted_tip: Floats, wanted_axis: Float
     return np.linalg.norm(tip - wanted_tip, axis=1), 2.0 * np.arcsin(np.minimum(0.5 * chord, 1.0))
 
 
-def _displacements(rates: Floats, gap: Floats) -> Floats:
-    """x of rates (N, 3, 3) x = gap (N, 3), Cramer's rule; NaN where the slides depend."""
+def _inverse(rates: Floats) -> Floats:
+    """Inverse (N, 3, 3) of rates (N, 3, 3), Cramer's rule; NaN where the slides depend."""
     a, b, c = rates[:, :, 0], rates[:, :, 1], rates[:, :, 2]
-    sides = np.cross(b, c), np.cross(c, a), np.cross(a, b)
-    volume = np.einsum("ni,ni->n", a, sides[0])
-    volume = np.where(np.abs(volume) > BLIND, volume, np.nan)
-    result: Floats = np.stack([np.einsum("ni,ni->n", gap, side) for side in sides], axis=1) / volume[:, None]
+    result = np.empty(rates.shape)
+    for i, (j, k) in enumerate(((1, 2), (2, 0), (0, 1))):
+        for row, (one, two) in enumerate(((b, c), (c, a), (a, b))):
+            result[:, row, i] = one[:, j] * two[:, k] - one[:, k] * two[:, j]
+    volume = np.einsum("ni,ni->n", a, result[:, 0])
+    result /= np.where(np.abs(volume) > BLIND, volume, np.nan)[:, None, None]
     return result
 
 
@@ -147,27 +153,30 @@ class _Turns:
         result: Floats = means[self.member].reshape(values.shape)
         return result
 
-    def _parts(self, difference: Floats) -> Floats:
+    def _parts(self, difference: Floats, rows: slice | Ints) -> Floats:
         """A^T e along the principal directions (N, R)."""
-        right = self._mean(np.einsum("nik,ni->nk", self.rates, difference))
-        result: Floats = np.einsum("nkr,nk->nr", self.vectors, right)
+        right = np.einsum("nik,ni->nk", self.rates[rows], difference)
+        right = right if self.member is None else self._mean(right)
+        result: Floats = np.einsum("nkr,nk->nr", self.vectors[rows], right)
         return result
 
-    def to(self, difference: Floats) -> Floats:
+    def to(self, difference: Floats, rows: slice | Ints) -> Floats:
         """The turns (N, R) that change the axis by `difference` (N, 3), as far as strong directions do."""
-        return self._turns(np.where(self.weak, 0.0, self._parts(difference) / np.where(self.weak, 1.0, self.rate) ** 2))
+        weak = self.weak[rows]
+        along = np.where(weak, 0.0, self._parts(difference, rows) / np.where(weak, 1.0, self.rate[rows]) ** 2)
+        return self._turns(along, rows)
 
     def near_pole(self, difference: Floats, tolerance: float) -> Floats:
         """The turns (N, R) along the weak directions: see the head of this file."""
         rate = np.where(self.rate > BLIND, self.rate, np.inf)
-        error = np.where(self.weak, self._parts(difference) / rate, 0.0)
+        error = np.where(self.weak, self._parts(difference, slice(None)) / rate, 0.0)
         size = np.where(error != 0.0, np.abs(error), 1.0)
         gain = np.maximum((self.rate / POLE) ** 2, 1.0 - tolerance / size)
-        return self._turns(error / rate * np.minimum(gain, MOST_TURN * rate / size))
+        return self._turns(error / rate * np.minimum(gain, MOST_TURN * rate / size), slice(None))
 
-    def _turns(self, along: Floats) -> Floats:
+    def _turns(self, along: Floats, rows: slice | Ints) -> Floats:
         """(N, R) from amounts (N, R) along the principal directions."""
-        result: Floats = np.einsum("nkr,nr->nk", self.vectors, along)
+        result: Floats = np.einsum("nkr,nr->nk", self.vectors[rows], along)
         return result
 
 

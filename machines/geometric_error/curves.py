@@ -79,7 +79,7 @@ class Table(Curve):
 
     def at(self, x: Floats, direction: Floats | float = 0.0) -> Floats:
         """See the base class."""
-        inside = self._inside(x)
+        inside = self.inside(x)
         if not self.both:
             return self._way(inside, self.values)
         forward, backward = (self._way(inside, half) for half in np.split(self.values, 2))
@@ -89,36 +89,37 @@ class Table(Curve):
 
     def basis(self, x: Floats, direction: Floats) -> Floats:
         """See the base class."""
-        inside = self._inside(x)
+        inside = self.inside(x)
         hats = self._spline(np.eye(len(self.x)), inside) if self.rule == "spline" else self._hats(inside)
         if not self.both:
             return hats
         share = 0.5 * (1.0 + np.clip(direction, -1.0, 1.0))[:, None]
         return np.concatenate([share * hats, (1.0 - share) * hats], axis=1)
 
-    def _inside(self, x: Floats) -> Floats:
+    def inside(self, x: Floats) -> Floats:
+        """Positions (N,) within the table: carried into its period, or held at its ends."""
         if self.period:
             result: Floats = self.x[0] + np.mod(x - self.x[0], self.period)
             return result
         return np.clip(x, self.x[0], self.x[-1])
 
-    def _closed(self, values: Floats) -> tuple[Floats, Floats]:
+    def closed(self, values: Floats) -> tuple[Floats, Floats]:
         """Positions (M or M + 1,) and values that go with them, the first repeated one period on."""
         if not self.period:
             return self.x, values
         return np.append(self.x, self.x[0] + self.period), np.concatenate([values, values[:1]])
 
     def _way(self, x: Floats, values: Floats) -> Floats:
-        return self._spline(values, x) if self.rule == "spline" else np.interp(x, *self._closed(values))
+        return self._spline(values, x) if self.rule == "spline" else np.interp(x, *self.closed(values))
 
     def _spline(self, values: Floats, x: Floats) -> Floats:
         from scipy.interpolate import CubicSpline
 
-        result: Floats = CubicSpline(*self._closed(values), bc_type="periodic" if self.period else "not-a-knot")(x)
+        result: Floats = CubicSpline(*self.closed(values), bc_type="periodic" if self.period else "not-a-knot")(x)
         return result
 
     def _hats(self, x: Floats) -> Floats:
-        at_rest, n = self._closed(self.values[: len(self.x)])[0], len(self.x)
+        at_rest, n = self.closed(self.values[: len(self.x)])[0], len(self.x)
         result = np.zeros((len(x), n))
         if len(at_rest) == 1:
             result[:, 0] = 1.0

@@ -17,6 +17,7 @@ from typing import Self
 
 import numpy as np
 
+from machines.geometric_error.rods_loop import compiled, wanted
 from machines.geometric_error.transforms import turns
 from machines.kinematics.h4_linear import H4Linear
 from machines.kinematics.linear_delta import LinearDelta
@@ -108,18 +109,33 @@ class RodFrame:
 
     def carriage_joints(self, q: Floats, errors: RodErrors | None = None) -> Floats:
         """A (N, 6, 3) of slides q (N, K)."""
-        reach = q[:, self.leg, None] * self.direction[self.leg] + self.arm
+        base, along = self._carriages(errors)
+        return np.asarray(base + q[:, self.leg, None] * along)
+
+    def _carriages(self, errors: RodErrors | None) -> tuple[Floats, Floats]:
+        """(6, 3) each: the joints on the carriages at q = 0, and how they move with their slides."""
         if errors is None:
-            return np.asarray(self.rail[self.leg] + reach)
-        turned = np.stack([reach[:, r] @ matrix.T for r, matrix in enumerate(turns(errors.guide)[self.leg])], axis=1)
+            return self.rail[self.leg] + self.arm, self.direction[self.leg]
+        turned = turns(errors.guide)[self.leg]
+        base, along = (np.einsum("rij,rj->ri", turned, v) for v in (self.arm, self.direction[self.leg]))
         own = np.einsum("rij,rj->ri", self.guide[self.leg], errors.carriage)
-        return np.asarray((self.rail + errors.rail)[self.leg] + turned + own)
+        return (self.rail + errors.rail)[self.leg] + base + own, along
 
     def solve(self, q: Floats, place: Floats, turned: Floats, errors: RodErrors) -> tuple[Floats, Floats]:
         """The platform (X (N, 3), R (N, 3, 3)) that closes the six rods with their errors, exactly.
 
         Chord iteration from the nominal platform `place` (N, 3), `turned` (N, 3, 3); NaN where it does not close.
         """
+        if wanted(len(q)):
+            place, turned = np.array(place), np.array(turned)
+            worst = compiled()(np.ascontiguousarray(q), self.leg, *self._carriages(errors), self.joint + errors.platform,
+                               (self.length + errors.length) ** 2, place, turned, STEPS, CLOSED, LEAST_GAIN)
+            return _where_closed(place, turned, worst)
+        with np.errstate(over="ignore", invalid="ignore"):  # what does not close grows out of bounds
+            return self._by_chords(q, place, turned, errors)
+
+    def _by_chords(self, q: Floats, place: Floats, turned: Floats, errors: RodErrors) -> tuple[Floats, Floats]:
+        """`solve` without a compiler."""
         a, b, lengths = self.carriage_joints(q, errors), self.joint + errors.platform, self.length + errors.length
         inverse = inverted(self.twist_rows(self.carriage_joints(q), place, turned))
         turned, before = np.array(turned), np.full(len(q), np.inf)
@@ -133,8 +149,7 @@ class RodFrame:
             if not np.any((worst > CLOSED) & (worst < LEAST_GAIN * before)):
                 break
             before = worst
-        bad = ~(worst < 1e-12)
-        return np.where(bad[:, None], np.nan, place), np.where(bad[:, None, None], np.nan, turned)
+        return _where_closed(place, turned, worst)
 
     def twist_rows(self, carriages: Floats, place: Floats, turned: Floats) -> Floats:
         """T (N, 6, 6), E-16: rows (AB, DB x AB) that act on the platform's displacement and turn about X."""
@@ -166,6 +181,12 @@ class RodFrame:
         rows = self.twist_rows(self.carriage_joints(q), place, turned)
         result: Floats = inverted(rows) @ self.sensitivity(q, place, turned)
         return result
+
+
+def _where_closed(place: Floats, turned: Floats, worst: Floats) -> tuple[Floats, Floats]:
+    """NaN where the worst relative gap (N,) is not closed."""
+    bad = ~(worst < 1e-12)
+    return np.where(bad[:, None], np.nan, place), np.where(bad[:, None, None], np.nan, turned)
 
 
 def inverted(matrices: Floats) -> Floats:
@@ -227,8 +248,11 @@ def turned_by(vector: Floats) -> Floats:
 
 def platform_turn(tilt: Floats) -> Floats:
     """Rx(tilt) (N, 3, 3) of the nominal platform."""
-    angles = np.zeros((len(tilt), 3))
-    angles[:, 0] = tilt
-    return turns(angles)
+    result = np.zeros((len(tilt), 3, 3))
+    result[:, 0, 0] = 1.0
+    result[:, 1, 1] = result[:, 2, 2] = np.cos(tilt)
+    result[:, 2, 1] = np.sin(tilt)
+    result[:, 1, 2] = -result[:, 2, 1]
+    return result
 
 

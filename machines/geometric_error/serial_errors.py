@@ -21,10 +21,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Literal, Self
 
 import numpy as np
 
+from machines.geometric_error.curve_banks import Bank, banks
 from machines.geometric_error.curves import Curve, Table
 from machines.geometric_error.lost_motion import GRAIN
 from machines.geometric_error.names import ErrorName, parse
@@ -89,10 +91,18 @@ class SerialErrors:
     def torsors(self, axis: str, x: Floats, direction: Floats | float = 0.0) -> list[Floats | float]:
         """Six component errors of an axis at positions (N,), arrays (N,) or a plain 0.0."""
         result: list[Floats | float] = [0.0] * 6
-        for component in self.components:
-            if component.name.axis == axis:
-                value = component.curve.at(x, direction)
-                result[component.name.part] = result[component.name.part] + value
+        for parts, bank in self._banks.get(axis, ()):
+            for part, values in zip(parts, bank.at(x, direction), strict=True):
+                result[part] = result[part] + values
+        return result
+
+    @cached_property
+    def _banks(self) -> dict[str, list[tuple[list[int], Bank]]]:
+        """By axis: the parts of a torsor that curves of one bank are of."""
+        result = {}
+        for axis in {c.name.axis for c in self.components}:
+            mine = [c for c in self.components if c.name.axis == axis]
+            result[axis] = [([mine[k].name.part for k in numbers], bank) for numbers, bank in banks([c.curve for c in mine])]
         return result
 
     def two_way(self, names: tuple[str, ...]) -> list[int]:

@@ -233,7 +233,7 @@ class Work:
             tool = int(self.tools[blocks[k[0]]])
             actual, (tip, axis) = self.actual(tool), self.kinematics(tool).forward(nominal[k])
             w = actual.coordinates(q[k], np.concatenate([tip, axis], axis=1))
-            result[k] = np.linalg.norm(actual.place(w, way[k])[0] - tip, axis=1)
+            result[k] = np.linalg.norm(actual.aim(w, way[k])[0] - tip, axis=1)
         return result
 
 

@@ -7,6 +7,7 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from machines.geometric_error.actual import approach
+from machines.geometric_error.curve_banks import banks
 from machines.geometric_error.curves import Curve, Fourier, Polynomial, Table
 
 X = np.array([-100.0, 0.0, 50.0, 120.0])
@@ -68,3 +69,25 @@ def test_outside_tells_and_keeps_the_end_value() -> None:
 def test_approach_remembers_the_last_motion() -> None:
     q = np.array([[0.0, 5.0], [0.0, 4.0], [1.0, 4.0], [1.0, 4.0], [0.5, 6.0]])
     assert approach(q).tolist() == [[0, 0], [0, -1], [1, -1], [1, -1], [-1, 1]]
+
+
+def test_curves_of_one_basis_are_evaluated_together_as_one_by_one() -> None:
+    rng = np.random.default_rng(8)
+    x, turn = np.sort(rng.uniform(-1.0, 1.0, 9)), np.linspace(0.0, 6.0, 7)
+    curves: list[Curve] = []
+    for _ in range(2):
+        curves += [Table(x, rng.normal(size=9)), Table(x, rng.normal(size=18), both=True), Table(turn, rng.normal(size=7),
+                                                                                              period=2.0 * np.pi),
+                   Table(x, rng.normal(size=9), "spline"), Table(x, rng.normal(size=18), "spline", both=True),
+                   Table(turn, rng.normal(size=7), "spline", period=2.0 * np.pi), Table(x[:1], rng.normal(size=1)),
+                   Fourier(rng.normal(size=7)), Fourier(rng.normal(size=1)),
+                   Fourier(rng.normal(size=7), 0.7, 0.1, (-0.5, 0.5)),
+                   Polynomial(rng.normal(size=4), (-0.8, 0.9), 0.2, 0.5), Polynomial(rng.normal(size=1), (-1.0, 1.0))]
+    at, way = rng.uniform(-1.5, 1.5, 200), rng.uniform(-1.0, 1.0, 200)
+    at[:9] = x
+    found = banks(curves)
+    assert sorted(k for numbers, _ in found for k in numbers) == list(range(len(curves))) and len(found) < len(curves)
+    for direction in (way, 1.0):
+        for numbers, bank in found:
+            expected = [curves[k].at(at, direction) for k in numbers]
+            np.testing.assert_allclose(bank.at(at, direction), expected, rtol=0.0, atol=1e-13)

@@ -8,6 +8,7 @@ from scipy.optimize import root
 from scipy.spatial.transform import Rotation
 
 import machines
+from machines.geometric_error import rods, rods_loop
 from machines.geometric_error.actual_rods import ActualDelta, ActualH4
 from machines.geometric_error.model import ErrorModel
 from machines.geometric_error.rods import RodErrors, RodFrame, platform_turn, rod_frame
@@ -153,3 +154,31 @@ def test_rates_are_derivatives_of_the_nominal_place(name: str) -> None:
         step = 1e-5 * np.eye(w.shape[1])[k]
         up, down = (np.concatenate(actual.place(w + sign * step)[:2], axis=1) for sign in (1.0, -1.0))
         assert (up - down) / 2e-5 == pytest.approx(rates[:, :, k], abs=1e-6)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_compiled_closure_is_the_one_of_numpy(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    kin = kinematics(name)
+    frame, errors, (slides, place, turned) = rod_frame(kin), rod_errors(kin, length=0.5), platform(kin, 50)
+    place[3], slides[7] = np.nan, np.nan
+    slides[9] += 5000.0
+    found = []
+    for compiled in (False, True):
+        monkeypatch.setattr(rods, "wanted", lambda n, use=compiled: use)
+        before = place.copy(), turned.copy()
+        found.append(frame.solve(slides, place, turned, errors))
+        np.testing.assert_array_equal(before[0], place)
+        np.testing.assert_array_equal(before[1], turned)
+    good = np.isfinite(found[0][0]).all(axis=1)
+    assert good.sum() == 47 and not good[[3, 7, 9]].any()
+    np.testing.assert_allclose(found[1][0], found[0][0], rtol=0.0, atol=1e-9)
+    np.testing.assert_allclose(found[1][1], found[0][1], rtol=0.0, atol=1e-12)
+
+
+def test_the_loop_as_it_stands_closes_the_rods() -> None:
+    kin = kinematics("uranesx")
+    frame, errors, (slides, place, turned) = rod_frame(kin), rod_errors(kin), platform(kin, 3)
+    base, along = (frame.carriage_joints(q, errors)[0] for q in (np.zeros((1, 3)), np.ones((1, 3))))
+    off = rods_loop.close_all(slides, frame.leg, base, along - base, frame.joint + errors.platform,
+                              (frame.length + errors.length) ** 2, place, turned, 12, 1e-13, 0.5)
+    assert off.max() < 1e-12 and np.abs(closure(frame, slides, place, turned, errors)).max() < 1e-6

@@ -1,0 +1,137 @@
+"""Curves of one axis that share their positions, evaluated together: what all of them need is computed once."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Hashable, Sequence
+
+import numpy as np
+
+from machines.geometric_error.curves import Curve, Fourier, Polynomial, Table
+from toolpaths.arrays import Floats
+
+
+class Bank(ABC):
+    """C curves with the same basis."""
+
+    @abstractmethod
+    def at(self, x: Floats, direction: Floats | float) -> Floats:
+        """Values (C, N) at positions x (N,), as `Curve.at`."""
+
+
+def banks(curves: Sequence[Curve]) -> list[tuple[list[int], Bank]]:
+    """Curves in groups of the same basis: (their numbers, their bank)."""
+    groups: dict[Hashable, list[int]] = {}
+    for k, curve in enumerate(curves):
+        groups.setdefault(_key(curve, k), []).append(k)
+    return [(numbers, _bank([curves[k] for k in numbers])) for numbers in groups.values()]
+
+
+def _key(curve: Curve, number: int) -> Hashable:
+    size = len(curve.values)
+    if isinstance(curve, Table):
+        return Table, curve.x.tobytes(), curve.rule, curve.both, curve.period
+    if isinstance(curve, Fourier):
+        return Fourier, size, curve.period, curve.origin, curve.range
+    if isinstance(curve, Polynomial):
+        return Polynomial, size, curve.origin, curve.scale, curve.range
+    return number
+
+
+def _bank(curves: list[Curve]) -> Bank:
+    first, values = curves[0], np.array([curve.values for curve in curves])
+    if isinstance(first, Fourier):
+        return FourierBank(first, values)
+    if isinstance(first, Polynomial):
+        return PolynomialBank(first, values)
+    if isinstance(first, Table) and len(first.x) > 1:
+        return SplineBank(first, values) if first.rule == "spline" else LinearBank(first, values)
+    return OneByOne(curves)
+
+
+class OneByOne(Bank):
+    """Whatever has no bank of its own."""
+
+    def __init__(self, curves: list[Curve]) -> None:
+        self.curves = curves
+
+    def at(self, x: Floats, direction: Floats | float) -> Floats:
+        """See the base class."""
+        return np.stack([curve.at(x, direction) for curve in self.curves])
+
+
+class FourierBank(Bank):
+    """Series: the waves by addition of angles, then one product."""
+
+    def __init__(self, first: Fourier, values: Floats) -> None:
+        self.first, self.values = first, values
+
+    def at(self, x: Floats, direction: Floats | float) -> Floats:
+        """See the base class."""
+        first, count = self.first, self.values.shape[1] // 2
+        phase = (np.clip(x, *first.range) - first.origin) * (2.0 * np.pi / first.period)
+        waves = np.ones((1 + 2 * count, len(x)))
+        if count:
+            c, s = waves[1], waves[1 + count] = np.cos(phase), np.sin(phase)
+        for k in range(2, count + 1):
+            waves[k] = waves[k - 1] * c - waves[count + k - 1] * s
+            waves[count + k] = waves[count + k - 1] * c + waves[k - 1] * s
+        result: Floats = self.values @ waves
+        return result
+
+
+class PolynomialBank(Bank):
+    """Polynomials: Horner's rule on all of them."""
+
+    def __init__(self, first: Polynomial, values: Floats) -> None:
+        self.first, self.values = first, values
+
+    def at(self, x: Floats, direction: Floats | float) -> Floats:
+        """See the base class."""
+        t = (np.clip(x, *self.first.range) - self.first.origin) / self.first.scale
+        result: Floats = np.repeat(self.values[:, -1:], len(x), axis=1)
+        for column in self.values.T[-2::-1]:
+            result = result * t + column[:, None]
+        return result
+
+
+class LinearBank(Bank):
+    """Linear tables: the place between the rows is looked up once."""
+
+    def __init__(self, first: Table, values: Floats) -> None:
+        self.first = first
+        ways = [first.closed(half) for values_of in values for half in np.split(values_of, 2 if first.both else 1)]
+        self.x = ways[0][0]
+        self.y = np.array([y for _, y in ways])
+        self.slope = np.diff(self.y, axis=1) / np.diff(self.x)
+
+    def at(self, x: Floats, direction: Floats | float) -> Floats:
+        """See the base class."""
+        inside = self.first.inside(x)
+        row = np.clip(np.searchsorted(self.x, inside, side="right") - 1, 0, len(self.x) - 2)
+        found = self.y[:, row] + self.slope[:, row] * (inside - self.x[row])
+        return found if not self.first.both else _shared(found, direction)
+
+
+class SplineBank(Bank):
+    """Spline tables: one piecewise cubic with a value per curve and way."""
+
+    def __init__(self, first: Table, values: Floats) -> None:
+        from scipy.interpolate import CubicSpline
+
+        self.first = first
+        ways = [first.closed(half) for values_of in values for half in np.split(values_of, 2 if first.both else 1)]
+        self.cubic = CubicSpline(ways[0][0], np.array([y for _, y in ways]), axis=1,
+                                 bc_type="periodic" if first.period else "not-a-knot")
+
+    def at(self, x: Floats, direction: Floats | float) -> Floats:
+        """See the base class."""
+        found = np.asarray(self.cubic(self.first.inside(x)))
+        return found if not self.first.both else _shared(found, direction)
+
+
+def _shared(found: Floats, direction: Floats | float) -> Floats:
+    """(C, N) of values (2 C, N), forwards and backwards by turns, by shares of the way."""
+    share = 0.5 * (1.0 + np.clip(direction, -1.0, 1.0))
+    result: Floats = found[1::2] + share * (found[0::2] - found[1::2])
+    return result
