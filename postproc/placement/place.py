@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections import Counter
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from postproc.links import safe_space
 from postproc.options import Options
 from postproc.orientation.passes import Work, work_of
 from postproc.placement.bodies import beside
+from postproc.placement.oriented import OrientedTimer
 from postproc.placement.search import Found, Progress, Search
 from postproc.placement.space import ANGLES, Space, space_of
 from postproc.placement.timed import Timer, Tried
@@ -73,9 +75,14 @@ def place(toolpath: Toolpath, machine: Machine, setup: SetupFile, options: Optio
     found += more
     if has_errors(found):
         return None, found
-    timer = Timer(work, space, setup.joints.singular_distance, bodies)
+    timer: Timer = Timer(work, space, setup.joints.singular_distance, bodies)
     try:
-        result = Search(timer, space, progress).run()
+        search = Search(timer, space, progress)
+        result = search.run()
+        if options.orient != "keep":
+            timer = OrientedTimer(work, space, setup, options, bodies)
+            result = replace(Search(timer, space, progress).among(_likely(search)), lacks=result.lacks,
+                             attitudes=result.attitudes, screened=result.screened)
     except (ValueError, ArithmeticError) as fault:
         return None, [*found, error("place.plan", f"no motion could be planned: {fault}", file=toolpath.file)]
     if result.now.refused:
@@ -102,7 +109,8 @@ def _begun(toolpath: Toolpath, machine: Machine, setup: SetupFile, options: Opti
     _, found = prepare(toolpath, machine, spec, setup, options)
     if has_errors(found):
         return None, None, found
-    work, more = work_of(toolpath, machine, setup.model_copy(update={"part": PartPlacement()}), options, turning=False)
+    work, more = work_of(toolpath, machine, setup.model_copy(update={"part": PartPlacement()}), options,
+                         turning=options.orient != "keep")
     if work is None:
         return None, None, [*found, *more]
     safe = safe_space(work.moves, setup, work.placement)
@@ -113,16 +121,29 @@ def _begun(toolpath: Toolpath, machine: Machine, setup: SetupFile, options: Opti
     return work, space, found
 
 
+def _likely(search: Search) -> list[Tried]:
+    """Places to choose tool axes at: the best of each attitude with the axes of the file; where these cannot be run, the
+    middle of what is allowed."""
+    space = search.space
+    found = search.likely()
+    known = [one.place[ANGLES:] for one in found]
+    for angles in space.attitudes():
+        low, high = space.room(angles)
+        if not any(np.abs(angles - other).max() < 1e-9 for other in known) and not bool((low > high).any()):
+            middle = space.snapped(np.append(0.5 * (low + high), angles))
+            found.append(replace(search.found.now, place=middle))
+    return found
+
+
 def _nowhere(result: Found, timer: Timer, options: Options) -> Diagnostic:
     """Why the part can stand nowhere: the attitude that lacks least."""
     known = [lack for lack in result.lacks if np.isfinite(lack[1])]
     if known:
         angles, margin, what = max(known, key=lambda lack: lack[1])
         why = f"at best (turn {angles[0] / DEG:.3f} degrees) {what} lacks {-margin:.3f} mm"
-    elif result.lacks:
-        why = result.lacks[0][2]
     else:
-        why = next(one.refused for one in timer.known() if one.refused)
+        reasons = [why for _, _, why in result.lacks] + [one.refused for one in timer.known() if one is not result.now]
+        why = Counter(reasons or [result.now.refused]).most_common(1)[0][0]
     return error("place.none", f"nowhere inside [placement] can the part stand: {why}", file=options.setup,
                  hint="wider limits, another tool length, a lower clearance.margin or a machine with more travel")
 

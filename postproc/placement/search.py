@@ -76,7 +76,17 @@ class Search:
         for start in self._starts(_STARTS, _DISTINCT):
             self._compass(start)
         if self.found.best is not None:
-            self.found.best = self._roomiest()
+            self.found.best = self._roomiest(_POLISH)
+        return self.found
+
+    def among(self, likely: list[Tried]) -> Found:
+        """The best of places that another search found likely, and compass steps from it; few, where each costs much."""
+        for one in likely:
+            if self.timer.looked < self.timer.most // 2:
+                self._look(one.place)
+        if self.found.best is not None:
+            self._compass(self.found.best)
+            self.found.best = self._roomiest(0)
         return self.found
 
     def _look(self, place: Floats) -> Tried | None:
@@ -122,8 +132,14 @@ class Search:
         self.found.screened += len(every)
         kept: dict[bytes, Floats] = {}
         for place in every[good]:
-            kept.setdefault((place + 0.0).tobytes(), place)
-        return list(kept.values())[:_SEEDS]
+            key = (place + 0.0).tobytes()
+            if key not in kept and not self.timer.stands(place):
+                kept[key] = place
+            if len(kept) == _SEEDS:
+                break
+        if not kept and bool(good.any()):
+            self.found.lacks.append((angles, np.nan, self.timer.stands(every[good][0])))
+        return list(kept.values())
 
     def _by_bound(self, places: list[Floats]) -> list[Floats]:
         """The places by the least time that the file can take there."""
@@ -131,6 +147,10 @@ class Search:
             return places
         bounds = [self.timer.tried(place, 0.0).bound for place in places if not self.spent]
         return [places[k] for k in np.argsort(bounds, kind="stable").tolist()]
+
+    def likely(self) -> list[Tried]:
+        """The best place of each attitude, the best first."""
+        return self._starts(len(self.space.attitudes()), 0.0)
 
     def _starts(self, count: int, apart: float) -> list[Tried]:
         """The best place of each of the best attitudes that are more than `apart` rad from each other."""
@@ -176,14 +196,14 @@ class Search:
         finest = np.array([_FINEST[0]] * ANGLES + [_FINEST[1]] * ANGLES)
         return any(steps[k] >= finest[k] for k in self.space.free)
 
-    def _roomiest(self) -> Tried:
-        """Of the places that take as long as the best, that with most travel margin."""
+    def _roomiest(self, left: int) -> Tried:
+        """Of the places that take as long as the best, that with most travel margin; so many more are looked at."""
         best = self.found.best
         assert best is not None
         machine, most = self.timer.machine, best.seconds * (1.0 + EQUAL)
         equal = [one for one in self.timer.known() if one.seconds <= most and self.space.holds(one.place)]
         at = max(equal, key=lambda one: (one.shares(machine), -one.seconds))
-        steps, left = self._first_steps(), _POLISH
+        steps = self._first_steps()
         while left > 0 and self._coarse(steps):
             before = at
             for place in list(self.space.neighbours(at.place, steps)):

@@ -115,12 +115,12 @@ class Timer:
         return made
 
     def _tried(self, place: Floats, best: float) -> Tried:
-        why = self._stands(place)
+        why = self.stands(place)
         if why:
             return self._refused(place, why)
         work = moved(self.work, self.space.placement(place))
         made = [turned(one, one.axis, work.machine) for one in work.passes]
-        low, high = _extents(made)
+        low, high = extents(made)
         why = next((f"line {one.one.line}: {one.refused}" for one in made if one.refused), "")
         if why:
             return self._refused(place, why, low, high)
@@ -140,7 +140,7 @@ class Timer:
             limiting[name] = limiting.get(name, 0.0) + spent
         return Tried(place, cutting + linking, cutting, linking, bound + linking, low, high, singular, "", limiting)
 
-    def _stands(self, place: Floats) -> str:
+    def stands(self, place: Floats) -> str:
         """What the part would stand in or hang over, "" where it stands free."""
         over = self.space.overhang(place)
         return over or ("" if self.bodies is None else self.bodies.against(self.space.placement(place)))
@@ -194,7 +194,7 @@ def _no_height(edge: list[Ends], made: Sequence[Turned]) -> str:
     return "" if line is None else f"line {line}: no safe plane above the pass is inside travel"
 
 
-def _extents(made: Sequence[Turned]) -> tuple[Floats, Floats]:
+def extents(made: Sequence[Turned]) -> tuple[Floats, Floats]:
     """Least and greatest joints (J,) of all rows and sites."""
     every = [q for one in made for q in (one.q, *one.sites)]
     return (np.min([q.min(axis=0) for q in every], axis=0), np.max([q.max(axis=0) for q in every], axis=0))

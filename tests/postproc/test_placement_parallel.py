@@ -1,0 +1,130 @@
+"""Placing on parallel machines: against a grid of places that are all planned, inside reach, off singular positions."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+import pytest
+
+from machines.machine import Machine
+from machines.singular_distance import singular_distance
+from postproc.options import Options
+from postproc.orientation.passes import work_of
+from postproc.placement.region import region_of
+from postproc.placement.search import Search
+from postproc.placement.space import ANGLES, Space, matrix, space_of
+from postproc.placement.timed import Timer
+from postproc.setup import PartPlacement, Placement, SetupFile, part_placement
+from postproc.setup_place import PlacementLimits
+from tests.postproc.kit import machine
+from tests.postproc.test_placement import passes, placed, refused, setup_of
+
+DELTA = "uranesx"
+
+
+def on_delta(**limits: object) -> SetupFile:
+    return setup_of((0.0, 0.0, -270.0), **limits)
+
+
+def slow() -> Machine:
+    """The Delta with a tenth of its acceleration and jerk, so that no feed binds."""
+    m = machine(DELTA)
+    limits = replace(m.limits, velocity=0.2 * m.limits.velocity, acceleration=0.1 * m.limits.acceleration,
+                     jerk=0.1 * m.limits.jerk)
+    return replace(m, limits=limits)
+
+
+def timer_of(setup: SetupFile, m: Machine, space: Space, least: float = 0.05) -> Timer:
+    """A new one."""
+    work, _ = work_of(passes((1.0, 0.0), 2, 120.0), m, setup.model_copy(update={"part": PartPlacement()}), Options())
+    assert work is not None
+    return Timer(work, space, least)
+
+
+def test_as_good_as_a_grid() -> None:
+    """Dexterity varies over the workspace: no place of a grid, all planned, is better than what is found."""
+    setup = setup_of((-240.0, 0.0, -270.0), x=(-240.0, 120.0), y=(-240.0, 240.0), turns=[0.0, 30.0, 90.0])
+    choice = placed(passes((1.0, 0.0), 2, 120.0), slow(), setup)
+    timer = timer_of(setup, slow(), choice.space)
+    grid = [np.array([x, y, -270.0, turn, 0.0, 0.0]) for x, y, turn in
+            product(np.linspace(-240, 120, 5), np.linspace(-240, 240, 5), choice.space.dims[ANGLES].values)]
+    tried = [timer.tried(one) for one in grid]
+    times = [one.seconds for one in tried if np.isfinite(one.seconds)]
+    assert len(times) > 40
+    assert choice.best.seconds <= min(times)
+    assert max(one.cutting for one in tried if np.isfinite(one.seconds)) > 1.15 * min(one.cutting for one in tried)
+    assert choice.best.seconds < 0.95 * choice.found.now.seconds
+
+
+def test_from_outside_the_workspace() -> None:
+    choice = placed(passes((1.0, 0.0), 2, 120.0), machine(DELTA), setup_of((200.0, 0.0, -270.0), x=(-250.0, 250.0)))
+    assert "reach" in choice.found.now.refused
+    assert (choice.best.margins(choice.work.machine) > 0.0).all()
+    assert choice.best.singular >= 0.05
+
+
+def test_nowhere_in_the_workspace() -> None:
+    fault = refused(passes((1.0, 0.0), 2, 120.0), machine(DELTA), setup_of((200.0, 0.0, -270.0), x=(190.0, 250.0)))
+    assert fault.code == "place.none"
+    assert "lacks" in fault.message
+
+
+def test_stated_distance_from_singular_positions_is_kept() -> None:
+    """A part that comes nearer than is stated is moved away; where there is no more distance, it stands nowhere."""
+    m, limits = machine(DELTA), PlacementLimits(x=(-240.0, 120.0))
+    now = Placement(matrix(np.array([np.pi / 2, 0.0, 0.0])), np.array([-240.0, 0.0, -270.0]))
+    space = space_of(limits, now, (np.zeros(3), np.zeros(3)))
+    timer = timer_of(on_delta(), m, space, 0.518155)
+    found = Search(timer, space).run()
+    assert "platform (direct) comes to 0.5181 of a singular position" in found.now.refused
+    assert found.best is not None
+    assert found.best.singular >= 0.518155
+    assert Search(timer_of(on_delta(), m, space, 0.99), space).run().best is None
+
+
+@pytest.mark.parametrize("name", [DELTA, "mikron-ucp710", "trunnion-bc"])
+def test_margins_are_those_of_the_poses(name: str) -> None:
+    """What the region says of a place is what the joints of all poses have left there; serial ones exactly."""
+    setup = on_delta(x=(-150.0, 100.0), y=(-100.0, 100.0), turn=(0.0, 180.0)) if name == DELTA else \
+        setup_of(x=(-150.0, 100.0), y=(-100.0, 100.0), turn=(0.0, 180.0))
+    now, _ = part_placement(setup)
+    assert now is not None
+    space = space_of(setup.placement, now, (np.zeros(3), np.zeros(3)))
+    timer = timer_of(setup, machine(name), space)
+    rng = np.random.default_rng(5)
+    for turn in (0.0, 0.7):
+        region, why = region_of(timer.work, space, np.array([turn, 0.0, 0.0]), 0.05)
+        assert region is not None, why
+        places = np.column_stack([rng.uniform(-150, 100, 4), rng.uniform(-100, 100, 4), np.full(4, setup.part.origin[2])])
+        for at, margin in zip(places, region.margins(places), strict=True):
+            made = timer.tried(np.concatenate([at, [turn, 0.0, 0.0]]))
+            slides = made.margins(timer.machine)[~np.array(timer.machine.rotary)]
+            assert margin <= slides.min() + 1e-6
+            assert (margin >= 0.0) == (not made.refused)
+
+
+def test_deepest_is_no_worse_than_any_place() -> None:
+    limits = PlacementLimits(x=(-300.0, 300.0), y=(-300.0, 300.0), z=(-200.0, 200.0))
+    space = space_of(limits, Placement(np.eye(3), np.zeros(3)), (np.zeros(3), np.zeros(3)))
+    work = timer_of(setup_of(), machine("mikron-ucp710"), space).work
+    region, _ = region_of(work, space, np.array([0.4, 0.0, 0.0]), 0.05)
+    assert region is not None
+    low, high = space.room(np.array([0.4, 0.0, 0.0]))
+    centre, margin, _ = region.deepest(low, high)
+    rng = np.random.default_rng(6)
+    assert region.margins(centre[None])[0] == pytest.approx(margin)
+    assert region.margins(rng.uniform(low, high, (2000, 3))).max() <= margin + 1e-6
+
+
+def test_poses_that_stand_for_all_keep_their_distance() -> None:
+    """The singular distance of a placed part is that of its own joints."""
+    choice = placed(passes((1.0, 0.0), 2, 120.0), machine(DELTA), on_delta(x=(-100.0, 0.0)))
+    timer = timer_of(on_delta(), machine(DELTA), choice.space)
+    made = timer.tried(choice.best.place)
+    kin = choice.work.passes[0].kin
+    tips = choice.space.placement(choice.best.place).points(np.concatenate([one.tip for one in choice.work.passes]))
+    q = kin.inverse(tips, np.tile([0.0, 0.0, 1.0], (len(tips), 1)), near=machine(DELTA).home)[0]
+    assert made.singular <= singular_distance(kin, q).min() + 1e-9
+    assert made.singular == pytest.approx(choice.best.singular)
