@@ -57,6 +57,13 @@ def test_a_macro_is_refused_where_it_is_defined() -> None:
     assert errors(found) == [("cl.unsupported-motion", (3, 6))]
 
 
+@pytest.mark.parametrize(("record", "told"), [("INDEX/1,NOMORE", []), ("TRACUT/NOMORE", []),
+                                              ("COPY/1,SAME,NOMORE", ["COPY"]), ("INDEX/1", ["INDEX"])])
+def test_the_end_of_a_copy_alone_copies_nothing(record: str, told: list[str]) -> None:
+    found = read_bytes(f"{ISO}GOTO/0,0,0\n{record}\nGOTO/1,0,0\n")
+    assert [d.message.split()[0] for d in found.diagnostics if d.severity is Severity.ERROR] == told
+
+
 @pytest.mark.parametrize("knots", ["KNOT/0.25,0.5,0.75,\n  1.0", "KNOT/0.25\n0.5,0.75\n$$ end\n1.0",
                                    "KNOT/0.25,0.5,0.75,1.0"])
 def test_knots_over_several_lines(knots: str) -> None:

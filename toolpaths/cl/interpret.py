@@ -123,10 +123,11 @@ def _unsupported(b: Builder, s: Statement, word: str) -> None:
     if word in b.allow_unknown:
         b.note_unknown(s, word)
         return
-    if s.has("NOMORE") and len(s.words) == 1:
+    if s.words[-1:] == ("NOMORE",) and len(s.words) == 1 + len(s.numbers):
         return
     b.log.error("cl.unsupported-motion", f"{word} moves the tool or changes how it moves, and is not supported",
-                b.line, f"--allow-unknown {word} leaves it out", key=word)
+                b.line, f"have the CAM system write out the points it makes; --allow-unknown {word} leaves the record out",
+                key=word)
 
 
 def _first_word(body: str) -> str:
