@@ -85,7 +85,7 @@ apart = compiled(_apart)
 
 
 def _look(piece: Any, size: Any, cell: Any, normal: Any, place: Any, limit: Any, out: Any) -> Any:
-    """Bound of a cell; the distance in its middle counts as found. `size`: lever and bend of the piece."""
+    """Bound of a cell; the distance in its middle counts as found. `size` as in `search`."""
     mx = (cell[0] + cell[3] + cell[6]) / 3.0
     my = (cell[1] + cell[4] + cell[7]) / 3.0
     mz = (cell[2] + cell[5] + cell[8]) / 3.0
@@ -148,7 +148,7 @@ def _leaf(piece: Any, size: Any, cells: Any, bounds: Any, normal: Any, place: An
     bounds[0] = look(piece, size, cells[0], normal, place, limit, out)
     top = 0
     while top >= 0:
-        if bounds[top] >= enough(out, limit, rule) or top + 1 >= len(cells) or not halve(cells, top, size[0]):
+        if bounds[top] >= enough(out, limit, rule) or top + 1 >= len(cells) or not halve(cells, top, size[2]):
             top -= 1
             continue
         first = look(piece, size, cells[top], normal, place, limit, out)
@@ -178,18 +178,20 @@ def _bound(piece: Any, size: Any, body: Any, way: Any, k: Any, m: Any) -> Any:
 leaf, bound_of = compiled(_leaf), compiled(_bound)
 
 
-def search(piece: Any, size: Any, body: Any, corners: Any, normals: Any, way: Any, pieces: Any, limit: Any, rule: Any,
-           out: Any) -> None:
+def search(piece: Any, high: Any, size: Any, body: Any, corners: Any, normals: Any, way: Any, pieces: Any, limit: Any,
+           rule: Any, out: Any) -> None:
     """One piece of a tool against a body; nearer pairs first, `out` is carried on.
 
     Args:
-        size (2,): lever and bend; body (2 L - 1, 11), way (2 M - 1, 10): the trees
+        high: the piece as seen from its middle, which the boxes of the way are round
+        size (3,): its lever, bend and lever from the tip
+        body (2 L - 1, 11), way (2 M - 1, 10): the trees
         corners (T, 9), normals (T, 3), pieces (N, 12): their leaves
     """
     pairs, bounds = np.empty((_DEPTH, 2), dtype=np.int64), np.empty(_DEPTH)
     cells, inner = np.empty((_DEPTH, 21)), np.empty(_DEPTH)
     body_first, way_first = (len(body) + 1) // 2 - 1, (len(way) + 1) // 2 - 1
-    pairs[0, 0], pairs[0, 1], bounds[0] = 0, 0, bound_of(piece, size, body, way, 0, 0)
+    pairs[0, 0], pairs[0, 1], bounds[0] = 0, 0, bound_of(high, size, body, way, 0, 0)
     top = 0
     while top >= 0:
         k, m, bound = pairs[top, 0], pairs[top, 1], bounds[top]
@@ -203,9 +205,9 @@ def search(piece: Any, size: Any, body: Any, corners: Any, normals: Any, way: An
         spread = way[m, 3] + way[m, 4] + way[m, 5] + size[0] * way[m, 9]
         by_body = m >= way_first or (k < body_first and body[k, 3] + body[k, 4] + body[k, 5] >= spread)
         i, j, other_i, other_j = (2 * k + 1, m, 2 * k + 2, m) if by_body else (k, 2 * m + 1, k, 2 * m + 2)
-        first, other = bound_of(piece, size, body, way, i, j), np.inf
+        first, other = bound_of(high, size, body, way, i, j), np.inf
         if body[other_i, 3] >= 0.0 and way[other_j, 3] >= 0.0:
-            other = bound_of(piece, size, body, way, other_i, other_j)
+            other = bound_of(high, size, body, way, other_i, other_j)
         if other < first:
             i, j, first, other_i, other_j, other = other_i, other_j, other, i, j, first
         if other < np.inf:

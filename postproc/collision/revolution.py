@@ -77,3 +77,13 @@ def bend(piece: Floats) -> float:
     """mm: largest r + |z| of the corners, which bounds how their reach along a direction curves as the axis turns."""
     r0, z0, r1, z1, _ = piece.tolist()
     return float(max(r0 + abs(z0), r1 + abs(z1)))
+
+
+def middle(piece: Floats) -> float:
+    """Height of the piece's middle over the tip, mm."""
+    return float(0.5 * (piece[1] + piece[3]))
+
+
+def raised(piece: Floats, height: float) -> Floats:
+    """The piece (5,) as seen from a point `height` mm over the tip."""
+    return np.asarray(piece - np.array([0.0, height, 0.0, height, 0.0]))

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from postproc.collision.revolution import around, bend, lever, support
+from postproc.collision.revolution import around, bend, lever, middle, raised, support
 from postproc.collision.solid import Solid
-from postproc.collision.swept import Swept
+from postproc.collision.swept import TURN, Swept
 from postproc.feedrate.compiled import compiled, wanted
 from toolpaths.arrays import Floats, Ints
 
@@ -31,8 +31,6 @@ _LONG = 500
 _BATCH = 4096
 _SMALL = 1e-5
 """mm: smaller cells are not split"""
-_ROUND = 2.5
-"""(theta / chord)^2 of the longest turn, half a circle"""
 
 
 @dataclass(frozen=True)
@@ -63,12 +61,13 @@ def _compiled(body: Solid, way: Swept, pieces: Floats, limit: float) -> Nearest:
     from postproc.collision import kernel
 
     run = compiled(kernel.search)
-    (solid_nodes, corners), (way_nodes, parts) = body.packed, way.packed
+    (solid_nodes, corners), rule = body.packed, np.array([EXACT, PART, EFFORT])
     out, which = np.array([limit, -1.0, np.nan, np.nan, np.nan, 0.0]), -1
     for number, piece in enumerate(pieces):
-        before, size = float(out[0]), np.array([lever(piece), bend(piece)])
+        before, high = float(out[0]), raised(piece, middle(piece))
         out[5] = 0.0
-        run(piece, size, solid_nodes, corners, body.normal, way_nodes, parts, limit, np.array([EXACT, PART, EFFORT]), out)
+        run(piece, high, np.array([lever(high), bend(piece), lever(piece)]), solid_nodes, corners, body.normal,
+            way.packed(middle(piece)), way.poses, limit, rule, out)
         which = number if out[0] < before else which
     x, y, z = out[2:5].tolist()
     return Nearest(float(out[0]), which, int(out[1]), (x, y, z))
@@ -79,7 +78,8 @@ class _Search:
 
     def __init__(self, body: Solid, way: Swept, piece: Floats, number: int, best: Nearest, limit: float) -> None:
         self.body, self.way, self.piece, self.number, self.best, self.limit = body, way, piece, number, best, limit
-        self.lever, self.looked = lever(piece), 0
+        self.high, self.nodes = raised(piece, middle(piece)), way.tree_at(middle(piece))
+        self.lever, self.looked = lever(self.high), 0
         self.body_first, self.way_first = body.tree.leaves - 1, way.tree.leaves - 1
 
     @property
@@ -106,20 +106,20 @@ class _Search:
         """Bounds (N,) over pairs (N, 2) of nodes of the solid and of the way: by the tool's normal between the middles, and
         by the mean normal of the solid's surface there."""
         axes, chord = self.way.axes
-        body, way, (k, m) = self.body.tree, self.way.tree, pairs.T
+        body, way, (k, m) = self.body.tree, self.nodes, pairs.T
         flat, low, high = (of_node[k] for of_node in self.body.slabs)
-        distance, n = around(self.piece, body.centre[k] - way.centre[m], axes[m])
-        middle, share = np.einsum("ni,ni->n", body.centre[k], flat), np.einsum("ni,ni->n", n, flat)
-        thick = np.abs(share) * np.maximum(high - middle, middle - low)
+        distance, n = around(self.high, body.centre[k] - way.centre[m], axes[m])
+        height, share = np.einsum("ni,ni->n", body.centre[k], flat), np.einsum("ni,ni->n", n, flat)
+        thick = np.abs(share) * np.maximum(high - height, height - low)
         thick += np.sqrt(np.maximum(1.0 - share**2, 0.0)) * np.linalg.norm(body.half[k], axis=1)
         beside = distance - np.minimum((np.abs(n) * body.half[k]).sum(axis=1), thick) - (np.abs(n) * way.half[m]).sum(axis=1)
         above = (np.einsum("ni,ni->n", way.centre[m], flat) - (np.abs(flat) * way.half[m]).sum(axis=1) - high
-                 - support(self.piece, -np.einsum("ni,ni->n", axes[m], flat)))
+                 - support(self.high, -np.einsum("ni,ni->n", axes[m], flat)))
         return np.asarray(np.maximum(beside, above) - self.lever * chord[m])
 
     def _split(self, pairs: Ints) -> Ints:
         """Children of pairs (N, 2), the larger of the two nodes split; those that hold nothing are left out."""
-        body, way, (k, m) = self.body.tree.half, self.way.tree.half, pairs.T
+        body, way, (k, m) = self.body.tree.half, self.nodes.half, pairs.T
         size = way[m].sum(axis=1) + self.lever * self.way.axes[1][m]
         first = (m >= self.way_first) | ((k < self.body_first) & (body[k].sum(axis=1) >= size))
         one = pairs.copy()
@@ -142,20 +142,20 @@ class _Search:
                 return
             order = np.argsort(bound, kind="stable")
             now, later = order[:_BATCH], order[_BATCH:]
-            halves = cells.take(now).halved(self.lever)
+            halves = cells.take(now).halved(lever(self.piece))
             cells, bound = halves.and_also(cells.take(later)), np.concatenate((self._look(halves), bound[later]))
 
     def _look(self, cells: _Cells) -> Floats:
         """Bounds (N,); the distance in the middle of each cell is one that is had."""
-        middle, tip, axis = cells.middles()
-        distance, normal = around(self.piece, middle - tip, axis)
+        point, tip, axis = cells.middles()
+        distance, normal = around(self.piece, point - tip, axis)
         bound = np.maximum(cells.apart(normal, self.piece), cells.apart(-cells.normal, self.piece))
         self.looked += len(distance) if self.best.distance < self.limit else 0
         k = int(distance.argmin()) if len(distance) else 0
         if len(distance) and distance[k] < self.best.distance:
-            x, y, z = middle[k].tolist()
+            x, y, z = point[k].tolist()
             self.best = Nearest(float(distance[k]), self.number, int(cells.place[k]), (x, y, z))
-        return np.where(cells.size(self.lever) > _SMALL, bound, np.inf)
+        return np.where(cells.size(lever(self.piece)) > _SMALL, bound, np.inf)
 
 
 def _next(pairs: Ints, bound: Floats, enough: float) -> tuple[Ints, Floats, Ints]:
@@ -207,7 +207,7 @@ class _Cells:
         reach = np.stack([np.einsum("ni,ni->n", self.tip[:, k], n)
                           + support(piece, np.einsum("ni,ni->n", self.axis[:, k], n)) for k in (0, 1)])
         chord = np.linalg.norm(self.axis[:, 1] - self.axis[:, 0], axis=1)
-        return np.asarray(corner - reach.max(axis=0) - _ROUND * bend(piece) * chord**2 / 8.0)
+        return np.asarray(corner - reach.max(axis=0) - TURN * bend(piece) * chord**2 / 8.0)
 
     def size(self, reach: float) -> Floats:
         """mm (N,): the larger of the triangle's longest edge and the way."""

@@ -13,6 +13,10 @@ from toolpaths.shape import Curves
 
 OFF = 2e-3
 """mm that a point of a tool may be off its true place by what pieces leave out"""
+TURN = 2.5
+"""(theta / chord)^2 of the longest turn, half a circle"""
+_KEPT = 1_000_000
+"""pieces whose boxes are kept"""
 
 
 @dataclass(frozen=True)
@@ -46,6 +50,23 @@ class Swept:
         """Boxes round the tips."""
         return tree(self.tip.min(axis=1), self.tip.max(axis=1))
 
+    def tree_at(self, height: float) -> Tree:
+        """Boxes round the points of the axis `height` mm over the tips: where a tool turns about them, not about its tip.
+
+        On the way from end to end such a point leaves its straight line by no more than height theta^2 / 8.
+        """
+        chord = np.linalg.norm(self.axis[:, 1] - self.axis[:, 0], axis=1)
+        if height == 0.0 or not self.turns:
+            moved = self.axis[0, 0] * height
+            return self.tree if height == 0.0 else replace(self.tree, centre=self.tree.centre + moved)
+        point, off = self.tip + height * self.axis, (TURN * abs(height) / 8.0 * chord**2)[:, None]
+        return tree(point.min(axis=1) - off, point.max(axis=1) + off)
+
+    @property
+    def turns(self) -> bool:
+        """True where the tool is not along one and the same axis everywhere."""
+        return bool((self.axis != self.axis[0, 0]).any())
+
     @cached_property
     def axes(self) -> tuple[Floats, Floats]:
         """Per node of the tree a unit axis (2 L - 1, 3), and the largest chord (2 L - 1,) from it to an axis within."""
@@ -62,12 +83,20 @@ class Swept:
             chords.append(off)
         return np.concatenate(middles[::-1]), np.concatenate(chords[::-1])
 
+    def packed(self, height: float) -> Floats:
+        """Nodes (2 L - 1, 10) of `tree_at`: centre, half, axis, chord; kept, for all bodies are compared with the same."""
+        kept: dict[float, Floats] = self.__dict__.setdefault("_packed", {})
+        if height not in kept:
+            if len(self) * len(kept) > _KEPT:
+                kept.clear()
+            (axes, chord), nodes = self.axes, self.tree_at(height)
+            kept[height] = np.hstack((nodes.centre, nodes.half, axes, chord[:, None]))
+        return kept[height]
+
     @cached_property
-    def packed(self) -> tuple[Floats, Floats]:
-        """Nodes (2 L - 1, 10): centre, half, axis, chord; pieces (N, 12): tips, axes."""
-        axes, chord = self.axes
-        return (np.hstack((self.tree.centre, self.tree.half, axes, chord[:, None])),
-                np.hstack((self.tip.reshape(-1, 6), self.axis.reshape(-1, 6))))
+    def poses(self) -> Floats:
+        """(N, 12): both tips, both axes."""
+        return np.hstack((self.tip.reshape(-1, 6), self.axis.reshape(-1, 6)))
 
 
 def _joined(axis: Floats, off: Floats) -> tuple[Floats, Floats]:
