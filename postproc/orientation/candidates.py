@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
@@ -13,16 +12,24 @@ from postproc.orientation.allowed import SAME, Allowed
 from postproc.orientation.held import best_held
 from postproc.orientation.passes import Pass
 from postproc.orientation.ranking import Ranking
-from postproc.orientation.seeds import across, aimed_axes, reaching_axes
+from postproc.orientation.ridges import best_on_ridge
+from postproc.orientation.seeds import aimed_axes, around, reaching_axes
 from postproc.orientation.timed import Turned, turned, turned_all
 from toolpaths.arrays import Floats
-from toolpaths.rotations import angle_between
+from toolpaths.rotations import angle_between, slerp
 from toolpaths.units import DEG
 
 _NEAR = 1.0 * DEG
 """an axis that aims at the beginning or the end of a pass is tried where it is so far from all others"""
-_STEPS = (6.0 * DEG, 3.0 * DEG, 1.5 * DEG)
+_STEPS = (6.0 * DEG, 3.0 * DEG, 1.5 * DEG, 0.75 * DEG)
 """of the refinement"""
+_FINE = 2
+"""step from which the best axis of the pass before is refined"""
+_SWIFT = (3.0 * DEG, 1.5 * DEG)
+"""steps round the axis of least cuts and rapids together"""
+_ROUNDS = 3
+_SHARES = np.arange(15, 0, -1) / 16.0
+"""of the way to a neighbour that is not allowed"""
 _WORTH = 1e-4
 """least part of the time that a candidate must gain to be planned, or to be taken"""
 Kind = Literal["limits", "reach", "travel", "touches", "bound", "slower"]
@@ -39,12 +46,21 @@ class Lost(NamedTuple):
 
 @dataclass(frozen=True)
 class Tried:
-    """What was tried of a pass: `own`, the `best`, the paper's choice for the mean direction (None without a vertex in
-    travel), all candidates with what they lost by, and how many were discarded by the bound alone."""
+    """What was tried of a pass.
+
+    Attributes:
+        own, best, swift: the CL's axis, that of the least cuts, that of the least cuts and rapids together
+        aimed: the paper's choice for the mean direction, None without a vertex in travel
+        gains: seconds as ranked that `best` and `swift` gain over `own`
+        rejected: all candidates with what they lost by
+        pruned, planned: how many were discarded by the bound alone, how many timed
+    """
 
     own: Turned
     best: Turned
+    swift: Turned
     aimed: Turned | None
+    gains: tuple[float, float]
     rejected: tuple[Lost, ...]
     pruned: int
     planned: int
@@ -56,6 +72,7 @@ class Search:
     def __init__(self, one: Pass, machine: Machine, allowed: Allowed) -> None:
         self.one, self.machine, self.allowed = one, machine, allowed
         self.own = turned(one, one.axis, machine, allowed.touching)
+        self.swift = self.own
         self.known = [self.own]
         self.lost: dict[int, Lost] = {}
         self.pruned, self.planned = 0, 0
@@ -99,13 +116,17 @@ class Search:
         self.lost[id(made)] = Lost(told, why, kind)
 
     def better(self, best: Turned, made: Turned) -> Turned:
-        """The better of two, `made` being runnable; where its bound already loses it is not planned, and what it touches is
-        looked at only where it would win."""
+        """The better of two by their cuts, `made` being runnable.
+
+        Where its bound already loses it is not planned, and what it touches is looked at only where it would win.
+        """
         least = self.seconds(best) * (1.0 - _WORTH)
-        if made.bound >= least:
+        if made.bound >= least and made.bound + made.rapids >= self._least_whole():
             self.pruned += 1
             self.lose(made, f"takes at least {made.bound:.4f} s", "bound")
-        elif self._ranked(made) >= least:
+            return best
+        self._swifter(made)
+        if self._ranked(made) >= least:
             self.lose(made, f"takes {self._ranked(made):.4f} s", "slower")
         elif made.touching:
             self.lose(made, made.touching, "touches")
@@ -113,6 +134,22 @@ class Search:
             self._beaten(best)
             return made
         return best
+
+    def known_to_touch(self, made: Turned) -> bool:
+        """Whether something is touched, where that was looked at: a candidate that did not win was not."""
+        return id(made) in self.lost and self.lost[id(made)].kind == "touches"
+
+    def whole(self, made: Turned) -> float:
+        """Seconds of cuts and rapids together; inf as of `seconds`."""
+        return self.seconds(made) + made.rapids if np.isfinite(made.rapids) else np.inf
+
+    def _least_whole(self) -> float:
+        return self.whole(self.swift) * (1.0 - _WORTH)
+
+    def _swifter(self, made: Turned) -> None:
+        """Take note of a candidate whose cuts and rapids together are the least."""
+        if self._ranked(made) + made.rapids < self._least_whole() and not made.touching:
+            self.swift = made
 
     def _beaten(self, best: Turned) -> None:
         """Note why one that was the best no longer is."""
@@ -133,12 +170,22 @@ class Search:
 
     def tried(self, best: Turned, aimed: Turned | None) -> Tried:
         """The result."""
-        rejected = tuple(self.lost[id(made)] for made in self.known if id(made) in self.lost)
-        return Tried(self.own, best, aimed, rejected, self.pruned, self.planned)
+        rejected = tuple(self.lost[id(made)] for made in self.known if id(made) in self.lost and made is not best)
+        gains = _gain(self.seconds(self.own), self.seconds(best)), _gain(self.whole(self.own), self.whole(self.swift))
+        return Tried(self.own, best, self.swift, aimed, gains, rejected, self.pruned, self.planned)
 
 
-def tried(one: Pass, machine: Machine, allowed: Allowed, hints: Sequence[Floats] = ()) -> Tried:
-    """All candidates of a pass, planned unless their bound says that they lose; `hints` are axes (3,) to try as well."""
+def _gain(before: float, after: float) -> float:
+    """Seconds gained; 0 where neither can be run."""
+    return before - after if np.isfinite(after) else 0.0
+
+
+def tried(one: Pass, machine: Machine, allowed: Allowed, before: Tried | None = None) -> Tried:
+    """All candidates of a pass, planned unless their bound says that they lose.
+
+    Args:
+        before: of the pass before: its best axis is tried first, and refined by small steps where it is best
+    """
     search = Search(one, machine, allowed)
     if one.fixed:
         return search.tried(search.settled(best_held(search, search.own)), None)
@@ -148,12 +195,17 @@ def tried(one: Pass, machine: Machine, allowed: Allowed, hints: Sequence[Floats]
     if not seeds:
         tilt = np.pi / 2.0 if len(one.normal) else allowed.tilt
         seeds = search.add(reaching_axes(one, machine, tilt, lambda axes: allowed.mask(one, axes)))
-    seeds += search.add(np.array(hints).reshape(-1, 3))
+    seeds += [] if before is None else search.add(before.best.axis[None])
+    again = next((made for made in seeds if before is not None and made.same(before.best.axis)), None)
     best = search.own
-    for made in sorted(seeds, key=lambda m: m.bound):
+    for made in sorted(seeds, key=lambda made: -1.0 if made is again else made.bound):
         best = search.better(best, made)
-    for step in _STEPS:
+    if all(search.known_to_touch(made) for made in mean):
+        best = best_on_ridge(search, best)
+    for step in _STEPS[_FINE:] if best is again else _STEPS:
         best = _refined(search, best, step)
+    for step in _SWIFT:
+        best = _hastened(search, best, step)
     return search.tried(search.settled(best_held(search, best)), _least_turned(mean))
 
 
@@ -166,12 +218,32 @@ def _least_turned(made: list[Turned]) -> Turned | None:
 
 
 def _refined(search: Search, best: Turned, step: float) -> Turned:
-    """The best of an axis and its four neighbours; where one gains, those further along."""
-    for _ in range(3):
-        start, (x, y) = best, across(best.axis)
-        ways = np.stack((x, -x, y, -y))
-        for made in search.add(search.one.kin.nearest_axis(np.cos(step) * start.axis + np.sin(step) * ways)):
+    """The best of an axis and its neighbours; where one gains, those further along."""
+    for _ in range(_ROUNDS):
+        start = best
+        for made in search.add(search.one.kin.nearest_axis(_neighbours(search, start.axis, step))):
             best = search.better(best, made)
         if best is start:
             break
     return best
+
+
+def _hastened(search: Search, best: Turned, step: float) -> Turned:
+    """Neighbours of the swiftest so far, and of what is swifter; the best by cuts among all that."""
+    for _ in range(_ROUNDS):
+        start = search.swift
+        for made in search.add(search.one.kin.nearest_axis(_neighbours(search, start.axis, step))):
+            best = search.better(best, made)
+        if search.swift is start:
+            break
+    return best
+
+
+def _neighbours(search: Search, start: Floats, step: float) -> Floats:
+    """Axes (M, 3) beside one; those that are not allowed as far towards them as is."""
+    one, axes = search.one, around(start, search.one.axis, step)
+    for k in np.flatnonzero(~search.allowed.mask(one, axes)):
+        nearer = slerp(np.tile(start, (len(_SHARES), 1)), np.tile(axes[k], (len(_SHARES), 1)), _SHARES)
+        inside = np.flatnonzero(search.allowed.mask(one, nearer))
+        axes[k] = nearer[inside[0]] if len(inside) else axes[k]
+    return axes

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 from machines.machine import Machine
 from postproc.collision.passes import pass_bodies
@@ -60,7 +61,7 @@ def orient(toolpath: Toolpath, machine: Machine, setup: SetupFile, options: Opti
     allowed = Allowed(options.max_tilt * DEG, bodies, setup.orientation)
     try:
         prepare(work.passes)
-        results = each_pass(lambda k: tried(work.passes[k], machine, allowed), work, allowed, "orienting", progress, workers)
+        results = each_pass(partial(_tried, work, allowed), work, allowed, "orienting", progress, workers)
         found += _fixed(work) + _touching(work, results)
         if has_errors(found):
             return None, found
@@ -69,6 +70,13 @@ def orient(toolpath: Toolpath, machine: Machine, setup: SetupFile, options: Opti
         return None, [*found, error("orient.plan", f"no motion could be planned: {fault}", file=toolpath.file,
                                     lines=[fault.line])]
     return OrientationChoice(work, tuple(results), plans.named, plans.paper), found
+
+
+def _tried(work: Work, allowed: Allowed, number: int, before: Tried | None) -> Tried:
+    """The search in one pass; the pass before lends its axis where it is one of the same kind."""
+    one = work.passes[number]
+    alike = before is not None and not one.fixed and not before.own.one.fixed and before.own.same(one.axis)
+    return tried(one, work.machine, allowed, before if alike else None)
 
 
 def _fixed(work: Work) -> list[Diagnostic]:

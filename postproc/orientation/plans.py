@@ -10,6 +10,7 @@ from postproc.options import Orientation
 from postproc.orientation.allowed import Allowed
 from postproc.orientation.candidates import Tried
 from postproc.orientation.choose import groupwise, shortest
+from postproc.orientation.held import common_angles
 from postproc.orientation.passes import Work
 from postproc.orientation.ranking import Ranking
 from postproc.orientation.rounds import Progress, each_pass
@@ -119,7 +120,7 @@ def _table(work: Work, results: list[Tried], allowed: Allowed, progress: Progres
     """All states with their seconds."""
     pools = _pools(results)
 
-    def row(k: int) -> _Row:
+    def row(k: int, before: _Row | None) -> _Row:
         states = _states(results[k], allowed, pools[k])
         return states, _ranked(states), all_ends(states, work)
 
@@ -139,24 +140,29 @@ def _ranked(states: list[Turned]) -> Floats:
 
 
 def _pools(results: list[Tried]) -> list[list[Axis]]:
-    """Axes that every pass of one CL axis may take: the best ones of its passes, most gain first, and their means."""
+    """Axes that every pass of one CL axis may take: the best and the swiftest of its passes, most gain first, and means."""
     pools: list[list[Axis]] = [[] for _ in results]
     for group in _groups([one.own for one in results]):
-        clusters: list[tuple[Turned, float]] = []
-        gains = [(one.own.seconds - one.best.seconds, one.best) for k in group if (one := results[k])]
-        for gain, best in sorted(gains, key=lambda pair: -pair[0]):
-            near = next((k for k, (made, _) in enumerate(clusters) if made.same(best.axis, best.held, _CLUSTER)), None)
-            if near is None:
-                clusters.append((best, gain))
-            else:
-                clusters[near] = (clusters[near][0], clusters[near][1] + gain)
-        pool = [(made.axis, made.held) for made, _ in sorted(clusters, key=lambda c: -c[1])[:_POOL]]
         here = [results[k] for k in group]
+        pool = _common([(one.gains[0], one.best) for one in here]) + _common([(one.gains[1], one.swift) for one in here])
+        pool += [(here[0].own.axis, held) for held in common_angles([one.own for one in here]).tolist()]
         pool += [(axis, np.nan) for axis in _means([[one.aimed.axis for one in here if one.aimed is not None],
-                                                    [one.best.axis for one in here]])]
+                                                    [one.best.axis for one in here], [one.swift.axis for one in here]])]
         for k in group:
             pools[k] = pool
     return pools
+
+
+def _common(gains: list[tuple[float, Turned]]) -> list[Axis]:
+    """Axes round which passes gain most, in seconds."""
+    clusters: list[tuple[Turned, float]] = []
+    for gain, best in sorted(gains, key=lambda pair: -pair[0]):
+        near = next((k for k, (made, _) in enumerate(clusters) if made.same(best.axis, best.held, _CLUSTER)), None)
+        if near is None:
+            clusters.append((best, gain))
+        else:
+            clusters[near] = (clusters[near][0], clusters[near][1] + gain)
+    return [(made.axis, made.held) for made, _ in sorted(clusters, key=lambda c: -c[1])[:_POOL]]
 
 
 def _means(sets: list[list[Floats]]) -> list[Floats]:
@@ -180,9 +186,9 @@ def _groups(owns: list[Turned]) -> list[list[int]]:
 
 
 def _states(one: Tried, allowed: Allowed, pool: list[Axis]) -> list[Turned]:
-    """Own, best and aimed axes of a pass, then those of its pool that are allowed; no axis twice."""
+    """Own, best, aimed and swiftest axes of a pass, then those of its pool that are allowed; no axis twice."""
     result: list[Turned] = []
-    for made in (one.own, one.best, one.aimed):
+    for made in (one.own, one.best, one.aimed, one.swift):
         if made is not None and index(result, (made.axis, made.held), -1) < 0:
             result.append(made)
     for made in _turned_to(one.own, [axis for axis in pool if index(result, axis, -1) < 0], allowed):

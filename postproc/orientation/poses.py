@@ -9,6 +9,7 @@ import numpy as np
 
 from machines.machine import Machine
 from postproc import reach
+from postproc.joint_path import reachable_axes
 from postproc.joints.tracks import TRAVEL_SLACK
 from postproc.orientation.passes import Pass
 from toolpaths.arrays import Bools, Floats
@@ -16,6 +17,8 @@ from toolpaths.units import DEG
 
 Solved = tuple[Floats, str]
 """Joints (N, J), and why the machine cannot run through them, "" where it can."""
+_ROUNDED = 1e-4
+"""rad, by which an axis of a CL file may be off by its decimals"""
 _OVER = 1e6
 """weight of a joint outside travel beside angles of rotary joints"""
 
@@ -34,7 +37,7 @@ def held_poses(one: Pass, machine: Machine, axes: Floats, held: float = np.nan) 
                 for move, axis in zip(moves, axes, strict=True)]
     corners = _corners(tips)
     at = (corners + moves[:, None]).reshape(-1, 3)
-    found = one.kin.inverse(at, one.kin.nearest_axis(np.repeat(axes, 4, axis=0)), near=near)
+    found = one.kin.inverse(at, _reachable(one, np.repeat(axes, 4, axis=0)), near=near)
     found = found.reshape(len(found), len(axes), 4, -1)
     share = (tips - corners[0]) / (corners[1, 0] - corners[0, 0])
     return [_least_turned(one, machine, _affine(found[:, k], share, np.array(machine.rotary))) for k in range(len(axes))]
@@ -42,10 +45,15 @@ def held_poses(one: Pass, machine: Machine, axes: Floats, held: float = np.nan) 
 
 def poses(one: Pass, machine: Machine, tip: Floats, axis: Floats, held: float = np.nan) -> Solved:
     """Joints of poses (N, 3), (N, 3) that are run through."""
-    found = one.kin.inverse(tip, one.kin.nearest_axis(axis), near=_near(machine, held))
+    found = one.kin.inverse(tip, _reachable(one, axis), near=_near(machine, held))
     rotary = np.array(machine.rotary)
     found[:, :, rotary] = np.unwrap(found[:, :, rotary], axis=1)
     return _least_turned(one, machine, found)
+
+
+def _reachable(one: Pass, axis: Floats) -> Floats:
+    """Axes (N, 3), those that the machine misses by no more than their rounding moved onto what it reaches."""
+    return reachable_axes(one.kin, axis, _ROUNDED)[0]
 
 
 def _near(machine: Machine, held: float) -> Floats:

@@ -11,14 +11,14 @@ import os
 import pickle
 import signal
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from itertools import repeat
 from multiprocessing import get_context
 from typing import Any, TypeVar
 
 from postproc.orientation.allowed import Allowed
-from postproc.orientation.passes import Pass, Work
+from postproc.orientation.passes import Work
 
 Progress = Callable[[str, int, int], None]
 T = TypeVar("T")
@@ -26,7 +26,7 @@ CHUNK = 8
 """passes that are done one after the other"""
 _FEWEST = 4 * CHUNK
 """passes from which processes pay"""
-_shared: list[tuple[Callable[[int], Any], Work, Allowed]] = []
+_shared: list[tuple[Callable[[int, Any], Any], Work, Allowed]] = []
 """what the workers are to do; theirs by inheritance"""
 
 
@@ -41,11 +41,12 @@ class PassFault(Exception):
         return str(self.args[0])
 
 
-def each_pass(function: Callable[[int], T], work: Work, allowed: Allowed, name: str, progress: Progress | None = None,
-              workers: int | None = None) -> list[T]:
+def each_pass(function: Callable[[int, T | None], T], work: Work, allowed: Allowed, name: str,
+              progress: Progress | None = None, workers: int | None = None) -> list[T]:
     """`function` of the numbers of all passes, in order; `progress` is told `name` and how far it is.
 
     Args:
+        function: of the number and of what it gave for the pass before, None for the first of each CHUNK
         workers: processes, None for as many as there are cores; 1 for this one alone
 
     Raises:
@@ -62,8 +63,9 @@ def each_pass(function: Callable[[int], T], work: Work, allowed: Allowed, name: 
 
     workers = min(_cores() if workers is None else workers, len(chunks))
     if workers < 2 or count < _FEWEST:
-        for k in range(count):
-            take([_guarded(function, work.passes[k])])
+        for chunk in chunks:
+            for found in _in_turn(function, chunk, work):
+                take([found])
         return result
     _shared.append((function, work, allowed))
     pool = ProcessPoolExecutor(workers, get_context("fork"), _ignore_interrupt)
@@ -90,16 +92,19 @@ def _chunk(passes: range, which: int) -> bytes:
     """In a worker: results of some passes, packed."""
     function, work, allowed = _shared[which]
     out = io.BytesIO()
-    _Packer(out, work, allowed).dump([_guarded(function, work.passes[k]) for k in passes])
+    _Packer(out, work, allowed).dump(list(_in_turn(function, passes, work)))
     return out.getvalue()
 
 
-def _guarded(function: Callable[[int], T], one: Pass) -> T:
-    """Faults of planning, by the line of the pass."""
-    try:
-        return function(one.number)
-    except (ValueError, ArithmeticError) as fault:
-        raise PassFault(str(fault), one.line) from fault
+def _in_turn(function: Callable[[int, T | None], T], passes: range, work: Work) -> Iterator[T]:
+    """Of one pass after the other; faults of planning are told by the line of the pass."""
+    before: T | None = None
+    for one in work.passes[passes.start:passes.stop]:
+        try:
+            before = function(one.number, before)
+        except (ValueError, ArithmeticError) as fault:
+            raise PassFault(str(fault), one.line) from fault
+        yield before
 
 
 class _Packer(pickle.Pickler):

@@ -24,11 +24,11 @@ def aimed_axes(one: Pass, machine: Machine, q: Floats) -> dict[str, Floats]:
     stretch = one.longest
     if stretch is None or not np.isfinite(q).all():
         return {}
-    return {name: _axes_at(one.kin, q, vertex_angles(one.kin, q, direction, _sharpest(machine)))
+    return {name: _axes_at(one.kin, q, vertex_angles(one.kin, q, direction, sharpest(machine)))
             for name, direction in stretch.directions().items()}
 
 
-def _sharpest(machine: Machine) -> Floats:
+def sharpest(machine: Machine) -> Floats:
     """Limits (J,) of jerk, of acceleration where a machine does not state all of them."""
     limits = machine.limits
     return limits.jerk if np.isfinite(limits.jerk).all() else limits.acceleration
@@ -58,9 +58,16 @@ def reaching_axes(one: Pass, machine: Machine, tilt: float, allowed: Callable[[F
     axes = axes[allowed(axes)]
     middle = stretch.tip[len(stretch.tip) // 2] + one.radius * (one.axis - axes)
     near = np.hstack((middle, axes))
-    reach = np.stack([held_axis_polytope(one.kin, branch, _sharpest(machine), near).reach(direction)
-                      for branch in one.kin.inverse(middle, axes, near=machine.home)])
+    reach = np.stack([np.where(_in_travel(branch, machine), held_axis_polytope(one.kin, branch, sharpest(machine), near)
+                               .reach(direction), -1.0) for branch in one.kin.inverse(middle, axes, near=machine.home)])
     return _apart(axes, np.nan_to_num(reach, nan=-1.0).max(axis=0))
+
+
+def _in_travel(q: Floats, machine: Machine) -> Bools:
+    """(N,) where joints (N, J) are inside travel, rotary ones by a whole turn more or less."""
+    turns = 2.0 * np.pi * np.array(machine.rotary)
+    return np.asarray(np.logical_or.reduce([(q + k * turns >= machine.limits.lower) & (q + k * turns <= machine.limits.upper)
+                                            for k in (-1.0, 0.0, 1.0)]).all(axis=1))
 
 
 def _apart(axes: Floats, reach: Floats) -> Floats:
@@ -72,6 +79,21 @@ def _apart(axes: Floats, reach: Floats) -> Floats:
         if not len(taken) or bool((angle_between(taken, axes[k]) > _APART).all()):
             taken = np.vstack((taken, axes[k]))
     return taken
+
+
+def around(start: Floats, centre: Floats, step: float) -> Floats:
+    """Axes (M, 3) `step` rad beside `start`: nearer to `centre`, farther, and to both sides at the same angle from it; all
+    round where `start` is the centre."""
+    tilt = float(angle_between(start, centre))
+    if tilt < 0.5 * step:
+        x, y = across(centre)
+        phi = np.arange(8) * np.pi / 4.0
+        return np.asarray(np.cos(step) * centre + np.sin(step) * (np.cos(phi)[:, None] * x + np.sin(phi)[:, None] * y))
+    out = start - np.cos(tilt) * centre
+    out /= np.linalg.norm(out)
+    side, aside = np.cross(centre, out), min(step / np.sin(tilt), 0.5 * np.pi)
+    ways = [(max(tilt - step, 0.0), 0.0), (tilt + step, 0.0), (tilt, aside), (tilt, -aside)]
+    return np.stack([np.cos(a) * centre + np.sin(a) * (np.cos(b) * out + np.sin(b) * side) for a, b in ways])
 
 
 def _cap(axis: Floats, tilt: float) -> Floats:

@@ -85,6 +85,14 @@ class Turned:
         rest = float(rest_seconds(q[:1], q[-1:], limits, Law.DOG_LEG)[0])
         return max(rest, float(np.maximum(np.max(way / self.limits.velocity, axis=1), length / most).sum()))
 
+    @cached_property
+    def rapids(self) -> float:
+        """Seconds of the rapids of the pass, straight in the joints from rest to rest; inf where it cannot be run."""
+        if self.refused:
+            return np.inf
+        rows = np.flatnonzero(self.one.rapid[1:])
+        return float(rest_seconds(self.q[rows], self.q[rows + 1], self.limits, Law.STRAIGHT).sum())
+
     def plans(self) -> tuple[Plan, ...]:
         """The motion of each stretch, curvature included; planned anew at each call."""
         own = self.one.shift(self.axis)

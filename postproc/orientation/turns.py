@@ -52,22 +52,20 @@ def ends(made: Turned, work: Work) -> Ends:
 
 def all_ends(row: list[Turned], work: Work) -> list[Ends]:
     """The ends of one pass turned to several axes."""
-    limits, one = joint_limits(work.machine.limits), row[0].one
+    one = row[0].one
     axis = np.stack([one.axes[[0, -1]] if one.fixed else np.tile(made.axis, (2, 1)) for made in row])
     tip = np.stack([(one.tip + one.shift(made.axis))[[0, -1]] for made in row])
     q = np.stack([made.q[[0, -1]] for made in row])
     above, way = _above(work, one, tip.reshape(-1, 3), axis.reshape(-1, 3), q.reshape(-1, q.shape[2]))
     above, way = above.reshape(q.shape), way.reshape(-1, 2)
-    between = np.flatnonzero(one.rapid[1:])
     result = []
     for k, made in enumerate(row):
         if made.refused:
             none = np.full(q.shape[2], np.nan)
             result.append(Ends(made.axis, made.held, none, none, none, none, np.inf, np.inf, np.inf))
             continue
-        rapids = float(rest_seconds(made.q[between], made.q[between + 1], limits, Law.STRAIGHT).sum())
         (first, last), (above_first, above_last), (down, up) = q[k], above[k], way[k].tolist()
-        result.append(Ends(made.axis, free_value(made), first, last, above_first, above_last, down, up, rapids))
+        result.append(Ends(made.axis, free_value(made), first, last, above_first, above_last, down, up, made.rapids))
     return result
 
 
