@@ -12,6 +12,7 @@ from postproc.cli_calibrate import calibrate
 from postproc.cli_catalogue import controller_app, machine_app, setup_app
 from postproc.cli_orient import EXAMPLES, ORIENTATIONS, MaxTilt, Orient
 from postproc.cli_orient import orient as orient_command
+from postproc.cli_place import EXAMPLES as PLACES
 from postproc.cli_place import place
 from postproc.cli_time import time
 from postproc.console import Json, controller_of, machine_of, progress_bar, refuse_overwriting, report, shown_errors
@@ -31,7 +32,7 @@ app.add_typer(controller_app, name="controller")
 app.command(epilog="Example: postproc calibrate reversal.toml -o errors.toml")(calibrate)
 app.command(epilog="Example: postproc time part.cls -m mikron-ucp710 -c linuxcnc")(time)
 app.command("orient", epilog=EXAMPLES)(orient_command)
-app.command(epilog="Example: postproc place part.cls -m mill-3axis --setup shop.toml -o placed.toml")(place)
+app.command(epilog=PLACES)(place)
 
 ClFile = Annotated[Path, typer.Argument(metavar="FILE", help="CL file (APT text)")]
 MachineName = Annotated[str, typer.Option("-m", "--machine", help="machine: a name from the list, or a TOML file")]

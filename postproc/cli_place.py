@@ -3,12 +3,30 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from postproc.cli_orient import ORIENTATIONS, MaxTilt, Orient
 from postproc.console import Json, machine_of, progress_bar, refuse_overwriting, report, shown_errors
+
+if TYPE_CHECKING:
+    from machines.machine import Machine
+    from postproc.options import Options
+    from postproc.placement.place import PlacementChoice
+    from toolpaths.diagnostics import Diagnostic
+
+EXAMPLES = """Example: postproc place part.cls -m mill-3axis --setup shop.toml -o placed.toml
+
+shop.toml says where the part may stand:
+
+[placement]
+
+x = [-100, 100]
+
+y = [-100, 100]
+
+turns = [0, 90, 180, 270]"""
 
 
 def place(file: Annotated[Path, typer.Argument(metavar="FILE", help="CL file (APT text)")],
@@ -20,51 +38,77 @@ def place(file: Annotated[Path, typer.Argument(metavar="FILE", help="CL file (AP
           orient: Orient = "keep", max_tilt: MaxTilt = 60.0,
           tolerance: Annotated[float, typer.Option("--tolerance", metavar="MM", min=1e-6, max=10.0)] = 0.01,
           axis_tolerance: Annotated[float, typer.Option("--axis-tolerance", metavar="DEG", min=1e-6, max=10.0)] = 0.05,
+          error_model: Annotated[str, typer.Option("--error-model", metavar="E.toml", help="file of the machine's geometric "
+                                                   "errors, corrected where the place is proved")] = "",
           units: Annotated[str, typer.Option("--units", help="units of a CL file that states none: mm or inch")] = "",
+          dialect: Annotated[str, typer.Option("--dialect", help="read the CL file as this dialect instead of the "
+                                               "recognised one")] = "",
+          allow_unknown: Annotated[list[str] | None, typer.Option("--allow-unknown", metavar="WORD", help="leave this word "
+                                                                  "out although it looks like motion")] = None,
           figure: Annotated[Path | None, typer.Option("--figure", metavar="FILE", help="map of the places, .png or "
                                                       ".svg")] = None,
           json: Json = "") -> None:
     """Place and turn the part on the table for the least planned time, inside the limits of the set-up."""
-    if orient not in ORIENTATIONS:
-        raise typer.BadParameter(f"{orient!r} is not available; choose from {', '.join(ORIENTATIONS)}",
-                                 param_hint="--orient")
-    if units not in ("", "mm", "inch"):
-        raise typer.BadParameter(f"{units!r} is not available; choose from mm, inch", param_hint="--units")
+    _check(orient, units, dialect, setup, figure)
+    refuse_overwriting({"-o": str(output), "--json": json, "--figure": str(figure or "")},
+                       {"the CL file": str(file), "the set-up": str(setup), "the error model": error_model})
+    from postproc.files import write_atomically
+    from postproc.options import Options
+    from postproc.placement import report as figures
+    from postproc.placement.write import placed_text
+
+    options = Options(tolerance, axis_tolerance, setup=str(setup), units=units, dialect=dialect, error_model=error_model,
+                      allow_unknown=tuple(w.upper() for w in allow_unknown or ()), max_tilt=max_tilt,
+                      orient=orient)  # type: ignore[arg-type]
+    values: dict[str, Any] = {}
+    text = ""
+    with shown_errors(json), progress_bar() as progress:
+        choice, found = _chosen(file, machine_of(machine), controller, options, progress)
+        if choice is not None:
+            if figure is not None:
+                from postproc.placement.figure import placement_figure
+
+                write_atomically(figure, placement_figure(choice, figure.suffix.lower()))
+            write_atomically(output, placed_text(setup, output, choice.part))
+            values = figures.as_dict(choice) | {"output": str(output)}
+            text = figures.as_text(choice) + f"\nwritten: {output}"
+    report(tuple(found), json, values | {"diagnostics": [d.as_dict() for d in found]}, text)
+
+
+def _check(orient: str, units: str, dialect: str, setup: Path, figure: Path | None) -> None:
+    """Wrong use.
+
+    Raises:
+        typer.BadParameter: says what there is to choose from.
+    """
+    from toolpaths.cl.dialects import DIALECTS
+
+    for option, value, known in (("--orient", orient, ORIENTATIONS), ("--units", units or "mm", ("mm", "inch")),
+                                 ("--dialect", dialect or next(iter(DIALECTS)), tuple(DIALECTS))):
+        if value not in known:
+            raise typer.BadParameter(f"{value!r} is not available; choose from {', '.join(known)}", param_hint=option)
     if figure is not None and figure.suffix.lower() not in (".png", ".svg"):
         raise typer.BadParameter(f"{figure.name} is no .png or .svg file", param_hint="--figure")
     if setup.exists() and not setup.is_file():
         raise typer.BadParameter(f"{setup} is no regular file: its text is read twice", param_hint="--setup")
-    refuse_overwriting({"-o": str(output), "--json": json, "--figure": str(figure or "")},
-                       {"the CL file": str(file), "the set-up": str(setup)})
+
+
+def _chosen(file: Path, machine: Machine, controller: str, options: Options,
+            progress: Any) -> tuple[PlacementChoice | None, list[Diagnostic]]:
+    """The choice for a file; None where a diagnostic is an ERROR."""
     import toolpaths
-    from postproc.files import write_atomically
-    from postproc.options import Options
-    from postproc.placement import report as figures
     from postproc.placement.place import place as run
-    from postproc.placement.write import placed_text
     from postproc.setup import load_setup
     from toolpaths.diagnostics import has_errors, require
 
-    options = Options(tolerance, axis_tolerance, setup=str(setup), units=units, orient=orient,  # type: ignore[arg-type]
-                      max_tilt=max_tilt)
-    values: dict[str, Any] = {}
-    text = ""
-    with shown_errors(json), progress_bar() as progress:
-        m = machine_of(machine)
-        settings, more = load_setup(setup)
-        require(more)
-        assert settings is not None
-        path, found = toolpaths.read(file, units=units or None)
-        found = [*found, *(d for d in path.faults if d not in found)]
-        if not has_errors(found):
-            choice, more = run(path, m, settings, options, controller, progress)
-            found += more
-            if choice is not None:
-                write_atomically(output, placed_text(setup, output, choice.part))
-                if figure is not None:
-                    from postproc.placement.figure import placement_figure
-
-                    write_atomically(figure, placement_figure(choice, figure.suffix.lower()))
-                values = figures.as_dict(choice) | {"output": str(output)}
-                text = figures.as_text(choice) + f"\nwritten: {output}"
-    report(tuple(found), json, values | {"diagnostics": [d.as_dict() for d in found]}, text)
+    settings, found = load_setup(options.setup)
+    require(found)
+    assert settings is not None
+    path, found = toolpaths.read(file, units=options.units or None, dialect=options.dialect or None,
+                                 allow_unknown=options.allow_unknown,
+                                 progress=lambda at, total: progress("reading", at, total))
+    found = [*found, *(d for d in path.faults if d not in found)]
+    if has_errors(found):
+        return None, found
+    choice, more = run(path, machine, settings, options, controller, progress)
+    return choice, found + more

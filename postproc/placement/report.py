@@ -13,6 +13,9 @@ from postproc.placement.timed import Tried
 from toolpaths.arrays import Floats
 from toolpaths.units import DEG
 
+_SHOWN = 5
+_APART = 5.0 * DEG
+
 
 def as_dict(choice: PlacementChoice) -> dict[str, Any]:
     """JSON figures: mm, degrees, seconds; null where the machine cannot run the file or an axis has no end."""
@@ -23,6 +26,7 @@ def as_dict(choice: PlacementChoice) -> dict[str, Any]:
             "gain": _finite(_gain(choice)), "attitudes": choice.found.attitudes, "places_screened": choice.found.screened,
             "places_looked_at": choice.looked, "places_refused": choice.refused, "places_pruned": choice.pruned,
             "cuts_planned": choice.planned,
+            "turned": [_degrees(one.place[ANGLES:]) | {"time_s": _finite(one.seconds)} for one in _turned(choice)],
             "without_place": [_degrees(angles) | {"lacks_mm": _finite(-margin), "reason": why}
                               for angles, margin, why in choice.found.lacks]}
 
@@ -62,9 +66,23 @@ def as_text(choice: PlacementChoice) -> str:
     if choice.best.limiting:
         worst = max(choice.best.limiting, key=lambda name: choice.best.limiting[name])
         lines.append(f"limited by {worst or 'nothing'} over {choice.best.limiting[worst]:.3f} s of the cuts")
+    turned = _turned(choice)[1:_SHOWN]
+    if turned:
+        figures = (f"{one.place[ANGLES] / DEG:.3f} deg {one.seconds:.3f} s" for one in turned)
+        lines.append("turned otherwise: " + ", ".join(figures))
     lines.append(f"free: {', '.join(free)}; {choice.found.attitudes} ways to turn the part, {choice.looked} places looked "
                  f"at, {choice.refused} refused, {choice.pruned} lost by their bound, {choice.planned} cuts planned")
     return "\n".join(lines)
+
+
+def _turned(choice: PlacementChoice) -> list[Tried]:
+    """The best place of each way to turn the part, those within a few degrees as one; the best first."""
+    good = [one for one in choice.known if math.isfinite(one.seconds) and choice.space.holds(one.place)]
+    kept = [choice.best]
+    for one in sorted(good, key=lambda one: one.seconds):
+        if all(float(np.abs(one.place - other.place)[ANGLES:].max()) > _APART for other in kept):
+            kept.append(one)
+    return kept
 
 
 def _margins(choice: PlacementChoice) -> list[str]:

@@ -23,6 +23,8 @@ from toolpaths.arrays import Floats
 
 _WORTH = 1e-4
 """least part of the time that a place must gain to be planned"""
+_LEAST, _MOST, _SITES = 24, 300, 2_000_000
+"""places, and sites of cuts at all of them together"""
 _DIGITS = 7
 """of joint positions, mm or rad: cuts that differ by less are one"""
 
@@ -82,10 +84,12 @@ class Timer:
         work: the file with its part frame on the table frame
         least: distance that a parallel machine keeps from its singular positions
         bodies: that do not move with the part
-    """
 
-    most = 300
-    """places that are looked at"""
+    Attributes:
+        most: places that may be looked at, fewer of long files
+        looked, refused, pruned: places that were, where the part cannot stand, and that lost by their bound alone
+        planned: cuts
+    """
 
     def __init__(self, work: Work, space: Space, least: float, bodies: Beside | None = None) -> None:
         self.work, self.space, self.least, self.bodies = work, space, least, bodies
@@ -93,6 +97,8 @@ class Timer:
         self._cuts: dict[tuple[int, bytes], _Cut] = {}
         self._known: dict[bytes, Tried] = {}
         prepare(work.passes)
+        sites = sum(len(each.s) for one in work.passes for each in one.stretches)
+        self.most = min(_MOST, max(_LEAST, _SITES // max(1, sites)))
 
     @property
     def machine(self) -> Machine:

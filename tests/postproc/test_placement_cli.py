@@ -98,6 +98,25 @@ def test_a_base_file_is_still_found(tmp_path: Path) -> None:
     assert setup.part.origin == (1.0, 2.0, 3.0)
 
 
+def test_meshes_are_still_found(tmp_path: Path) -> None:
+    """Written into another folder, every file is named from there; absolute names stay."""
+    source = small(tmp_path, TEXT + '''holder_mesh = "meshes/holder.stl"
+[bodies]
+part = "part.stl"   # finished
+table = {file = "table.stl"}
+[[bodies.fixtures]]
+name = "vise"
+file = "/meshes/vise.stl"
+''')
+    target = tmp_path / "jobs" / "one" / "s2.toml"
+    made = tomllib.loads(placed_text(source, target, PartPlacement()))
+    assert made["bodies"]["part"] == "../../part.stl"
+    assert made["bodies"]["table"]["file"] == "../../table.stl"
+    assert made["bodies"]["fixtures"][0]["file"] == "/meshes/vise.stl"
+    assert made["tools"]["1"]["holder_mesh"] == "../../meshes/holder.stl"
+    assert tomllib.loads(placed_text(source, tmp_path / "s2.toml", PartPlacement()))["bodies"]["part"] == "part.stl"
+
+
 def test_the_input_is_never_replaced(tmp_path: Path) -> None:
     source = small(tmp_path, TEXT)
     run(cl_file(tmp_path), "-m", "mill-3axis", "--setup", source, "-o", source, code=2)
