@@ -27,10 +27,15 @@ FOREIGN = {"linuxcnc": "G91 G20 G93 G18 G42 D1", "generic-iso": "G91 G20 G93 G18
            "siemens-840d": "G91 G700 G93 G18 G42 G55", "heidenhain-tnc640": "L RR F100"}
 """modes that another program may have left"""
 
+FLAT = "UNITS/MM\n" + "".join(
+    f"TOOL PATH/OP{k},TOOL,T\nTLDATA/MILL,10,0,80,0,0\nMSYS/0,0,0,1,0,0,0,1,0\nLOAD/TOOL,1\nSPINDL/RPM,1000,CLW\nRAPID\n"
+    f"GOTO/{10 * k},0,40,0,0,1\nFEDRAT/MMPM,300\nGOTO/{10 * k},0,-1\nGOTO/{10 * k},9,-1\nRAPID\nGOTO/{10 * k},9,40\n"
+    f"END-OF-PATH\n" for k in range(2)) + "FINI\n"
+
 
 @cache
-def restartable(controller: str, machine: str) -> PostResult:
-    path, _ = toolpaths.read(GOLDEN / "three_laws.cls")
+def restartable(controller: str, machine: str, name: str = "") -> PostResult:
+    path, _ = toolpaths.read(GOLDEN / "three_laws.cls") if not name else toolpaths.read_bytes(FLAT.encode(), file=name)
     usual = tool_setup()
     return good(convert(path, machine, controller,
                         usual.model_copy(update={"output": usual.output.model_copy(update={"restart": True})})))
@@ -114,3 +119,16 @@ def test_from_an_arbitrary_pose_in_modes_of_another_program(controller: str, mac
         body = [n for n in lines[label:] if "END PGM" not in n]
         text = "\n".join([*head, FOREIGN[controller], *body, *tail])
         taken_up(result, text, len(head) + 1, start * result.job.control.unit, whole, label)
+
+
+@pytest.mark.parametrize("controller", ["generic-iso", "fanuc-30i"])
+def test_a_machine_on_rods_goes_home_with_all_axes(controller: str) -> None:
+    """No axis lifts the tool by itself: the first block behind the label states them all, in machine coordinates."""
+    result = restartable(controller, "uranesx", "flat.cls")
+    lines = result.text.split("\n")
+    label = [k for k, n in enumerate(lines) if n.startswith(LABELS[controller])][-1]
+    motion = executed(result, "\n".join(["%", FOREIGN[controller], *lines[label:]]), result.machine.home - [9.0, 5.0, 2.0])
+    whole = executed(result, result.text, result.machine.home)
+    first = int(np.searchsorted(motion.line, 3))
+    assert motion.code[first] == 0 and motion.end[first].tolist() == result.machine.home.tolist()
+    assert cuts(motion, first) == cuts(whole, int(np.searchsorted(whole.line, label + 1)))
