@@ -41,7 +41,7 @@ class ActualRods(Actual):
     @cached_property
     def frame(self) -> RodFrame:
         """Nominal rods."""
-        return rod_frame(self._slides_of)
+        return rod_frame(self._slides_of, self.rods.pairs)
 
     @property
     def any(self) -> bool:

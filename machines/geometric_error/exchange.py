@@ -133,10 +133,11 @@ def _constant_lines(axes: SerialErrors) -> list[str]:
 
 def _reference_lines(axes: SerialErrors) -> list[str]:
     lines: list[str] = []
-    for axis in sorted({*axes.reference, *(k for k, frame in axes.frame.items() if frame == "moving")}):
+    turning = {c.name.axis for c in axes.components if c.name.axis in ROTARY} | set(axes.frame)
+    for axis in sorted({*axes.reference, *turning}):
         lines += ["", f"[reference.{axis}]"]
         lines += [f"point = {_list(axes.reference[axis])}"] if axis in axes.reference else []
-        lines += ['frame = "moving"'] if axes.frame.get(axis) == "moving" else []
+        lines += [f'frame = "{axes.frame.get(axis, "fixed")}"'] if axis in turning else []
     return lines
 
 
@@ -145,7 +146,9 @@ def _leg_lines(rods: RodErrors) -> list[str]:
     length, angle = UNITS[LENGTH], UNITS[ANGLE]
     for k, leg in enumerate(rods.legs):
         mine = [r for r, name in enumerate(rods.rods) if name.startswith(leg)]
-        lines += ["", f"[legs.{leg}]", f"rail = {_list(rods.rail[k] / length)}", f"guide = {_list(rods.guide[k] / angle)}"]
+        pair = [f"pair = {_number(rods.pairs[k])}"] if rods.pairs else []
+        lines += ["", f"[legs.{leg}]", *pair, f"rail = {_list(rods.rail[k] / length)}",
+                  f"guide = {_list(rods.guide[k] / angle)}"]
         lines += [f"{what} = [{', '.join(_list(getattr(rods, what)[r] / length) for r in mine)}]"
                   for what in ("carriage", "platform")]
         lines.append(f"length = {_list(rods.length[mine] / length)}")

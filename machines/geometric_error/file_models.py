@@ -67,14 +67,17 @@ class ReferenceModel(UserModel):
 
     point: Vector | None = None
     """mm in machine coordinates at zero; for slides it travels along. Default: machine origin; point of a rotary axis"""
-    frame: Literal["fixed", "moving"] = "fixed"
-    """rotary axes: directions of the errors are those of the part's side of the axis, or of its tool's side; the bed is on
-    the part's side of an axis that carries the tool, on the tool's side of one that carries the part"""
+    frame: Literal["bed", "fixed", "moving"] = "bed"
+    """rotary axes: whose x, y, z the component errors are along and about: those of the bed, where a probe stands still (ISO
+    230-1, ISO 230-7); or those of the part's side of the axis ("fixed") or of its tool's side ("moving"). The bed is on the
+    part's side of an axis that carries the tool, on the tool's side of one that carries the part"""
 
 
 class LegModel(UserModel):
     """`[legs.LETTER]` of a parallel machine: dimensional errors of a slide and its rods (Company 2000, annex E)."""
 
+    pair: Positive | None = None
+    """mm: half the distance of the two rods of the leg, where the machine file gives no rods; in every leg then"""
     rail: Vector = (0.0, 0.0, 0.0)
     """place of the rail's point, machine frame"""
     guide: Vector = (0.0, 0.0, 0.0)

@@ -15,8 +15,9 @@ from machines.geometric_error.lattice import ErrorMap
 from machines.geometric_error.lattice_file import map_from_csv
 from machines.geometric_error.model import ErrorModel
 from machines.geometric_error.names import ErrorName, parse
-from machines.geometric_error.rods import RodErrors, rod_frame, rod_names
-from machines.geometric_error.serial_errors import Component, SerialErrors
+from machines.geometric_error.rods import RodErrors, gives_rods, rod_frame, rod_names
+from machines.geometric_error.serial_errors import Component, Frame, SerialErrors
+from machines.kinematics.h4_axes import H4TableAxis
 from machines.kinematics.h4_linear import H4Linear
 from machines.kinematics.linear_delta import LinearDelta
 from machines.kinematics.serial import Serial
@@ -109,7 +110,16 @@ class _Loader:
             elif letter not in ROTARY and "frame" in given.model_fields_set:
                 self._problem("error-model.axis", ("reference", letter, "frame"), f"{letter} is a slide, its frame does "
                               "not turn", "take frame out")
-        return SerialErrors(components, constants, reference, {k: v.frame for k, v in self.checked.reference.items()})
+        turning = {c.name.axis for c in components} | set(self.checked.reference)
+        return SerialErrors(components, constants, reference, {k: self._frame(k) for k in sorted(turning) if k in ROTARY})
+
+    def _frame(self, letter: str) -> Frame:
+        """The directions of an axis's errors; those of the bed are on the side that the axis does not carry."""
+        given = self.checked.reference.get(letter)
+        if given is not None and given.frame != "bed":
+            return given.frame
+        part = f"{letter}'" in self.machine.structure or isinstance(self.machine.kinematics, H4TableAxis)
+        return "moving" if part else "fixed"
 
     def _unit(self, name: ErrorName | None) -> float:
         return self.angle if name is not None and name.angular else self.length
@@ -200,8 +210,11 @@ class _Loader:
                 self._problem("error-model.legs", ("legs", letter), f"{self.machine.name} has no legs", "take [legs] out")
             return None
         slides = kinematics.axis_names[: len(kinematics.legs.points)]
-        frame = rod_frame(kinematics)
-        zero = RodErrors.none(slides, rod_names(frame, slides))
+        pairs = self._pairs(slides, gives_rods(kinematics))
+        if pairs is None:
+            return None
+        frame = rod_frame(kinematics, pairs)
+        zero = RodErrors.none(slides, rod_names(frame, slides), pairs)
         parts = {what: np.array(getattr(zero, what)) for what in ("rail", "guide", "carriage", "platform", "length")}
         for letter, given in self.checked.legs.items():
             if letter not in slides:
@@ -214,7 +227,24 @@ class _Loader:
             parts["guide"][leg] = np.multiply(given.guide, self.angle)
             for what in ("carriage", "platform", "length"):
                 self._per_rod(letter, what, getattr(given, what), parts[what], mine)
-        return RodErrors(**parts, legs=slides, rods=zero.rods)
+        return RodErrors(**parts, legs=slides, rods=zero.rods, pairs=pairs)
+
+    def _pairs(self, slides: tuple[str, ...], given: bool) -> tuple[float, ...] | None:
+        """Half distances of the pairs of rods that the machine file does not give; None where no errors ask for them."""
+        stated = {letter: leg.pair for letter, leg in self.checked.legs.items() if leg.pair is not None}
+        if given:
+            for letter in stated:
+                self._problem("error-model.legs", ("legs", letter, "pair"), f"the file of {self.machine.name} says where "
+                              "its rods are", "take pair out")
+            return ()
+        missing = [letter for letter in slides if letter not in stated]
+        if not self.checked.legs or missing:
+            if self.checked.legs:
+                self._problem("error-model.legs", ("legs",), f"the file of {self.machine.name} gives no rods, and legs "
+                              f"{', '.join(missing)} no pair", "write pair = half the distance of the two rods in mm in "
+                              "every [legs] table, or rods in the machine file")
+            return None
+        return tuple(stated[letter] for letter in slides)
 
     def _per_rod(self, letter: str, what: str, given: tuple[object, ...], into: Floats, rods: Ints) -> None:
         if given and len(given) != len(rods):

@@ -11,7 +11,7 @@ from machines.geometric_error.actual import Actual
 from machines.geometric_error.actual_rods import ActualDelta, ActualH4
 from machines.geometric_error.actual_serial import ActualSerial
 from machines.geometric_error.lattice import ActualByMap, ErrorMap
-from machines.geometric_error.rods import RodErrors, rod_frame, rod_names
+from machines.geometric_error.rods import RodErrors, gives_rods, rod_frame, rod_names
 from machines.geometric_error.serial_errors import SerialErrors
 from machines.kinematics.base import Kinematics
 from machines.kinematics.h4_linear import H4Linear
@@ -102,8 +102,9 @@ def _actual(kinematics: Kinematics, axes: SerialErrors, rods: RodErrors | None) 
     if not isinstance(kinematics, LinearDelta | H4Linear):
         raise ValueError(f"errors of {type(kinematics).__name__} machines cannot be modelled")
     slides = kinematics.axis_names[: len(kinematics.legs.points)]
-    own = rod_names(rod_frame(kinematics), slides)
-    rods = RodErrors.none(slides, own) if rods is None else rods
+    pairs = () if gives_rods(kinematics) else (1.0,) * len(slides) if rods is None else rods.pairs  # no errors: any will do
+    own = rod_names(rod_frame(kinematics, pairs), slides)
+    rods = RodErrors.none(slides, own, pairs) if rods is None else rods
     if rods.legs != slides or rods.rods != own:
         raise ValueError(f"the model's legs are {', '.join(rods.legs)}, those of this machine {', '.join(slides)}")
     if isinstance(kinematics, LinearDelta):

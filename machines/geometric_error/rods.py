@@ -43,6 +43,7 @@ class RodErrors:
         platform: (6, 3) dB, platform frame
         length: (6,) dl
         legs, rods: names of the legs, and of the rods ("X1", "X2" ...)
+        pairs: (K,) mm, half the distance of the rods of each leg where the machine file gives none, else empty
     """
 
     rail: Floats
@@ -52,6 +53,7 @@ class RodErrors:
     length: Floats
     legs: tuple[str, ...]
     rods: tuple[str, ...]
+    pairs: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         k = len(self.legs)
@@ -60,10 +62,11 @@ class RodErrors:
             object.__setattr__(self, name, frozen(getattr(self, name), np.float64, shape, f"RodErrors.{name}"))
 
     @classmethod
-    def none(cls, legs: tuple[str, ...], rods: tuple[str, ...]) -> Self:
+    def none(cls, legs: tuple[str, ...], rods: tuple[str, ...], pairs: tuple[float, ...] = ()) -> Self:
         """All zero."""
         k = len(legs)
-        return cls(np.zeros((k, 3)), np.zeros((k, 3)), np.zeros((RODS, 3)), np.zeros((RODS, 3)), np.zeros(RODS), legs, rods)
+        return cls(np.zeros((k, 3)), np.zeros((k, 3)), np.zeros((RODS, 3)), np.zeros((RODS, 3)), np.zeros(RODS), legs, rods,
+                   pairs)
 
     @property
     def names(self) -> list[str]:
@@ -200,23 +203,44 @@ def inverted(matrices: Floats) -> Floats:
         return result
 
 
-def rod_frame(kinematics: LinearDelta | H4Linear) -> RodFrame:
-    """The rods of a machine.
+def gives_rods(kinematics: LinearDelta | H4Linear) -> bool:
+    """Whether the machine file says where the rods are; one that does not gives the middle lines of pairs."""
+    return kinematics.clearance is not None and len(kinematics.clearance.leg) == RODS
+
+
+def rod_frame(kinematics: LinearDelta | H4Linear, pairs: tuple[float, ...] = ()) -> RodFrame:
+    """The rods of a machine; `pairs` as in `RodErrors`.
+
+    The joints of a pair whose place the file does not give lie square to its slide and, in the middle of the workspace, to
+    its rods.
 
     Raises:
-        ValueError: where its file does not give six rods.
+        ValueError: where neither its file nor `pairs` give six rods.
     """
     platform = kinematics.platform if isinstance(kinematics, LinearDelta) else kinematics.platform.joints
     legs, rods = kinematics.legs, kinematics.clearance
-    if rods is None or len(rods.leg) != RODS:
+    offset = np.zeros_like(legs.points) if rods is None or rods.rail_offset is None else rods.rail_offset
+    if rods is not None and gives_rods(kinematics):
+        leg, shift = rods.leg, rods.shift
+    elif 2 * len(pairs) == RODS:
+        leg, shift = np.repeat(np.arange(len(pairs)), 2), _pairs(kinematics, platform, pairs)
+    else:
         raise ValueError(f"the machine file gives {0 if rods is None else len(rods.leg)} rods, a platform needs {RODS}; "
                          "write rods = [[x, y, z], [x, y, z]] in its leg tables")
-    offset = np.zeros_like(legs.points) if rods.rail_offset is None else rods.rail_offset
     rail = legs.points + offset
     guide = np.stack([_guide(u, -o, kinematics.workspace.middle - p)
                       for u, o, p in zip(legs.directions, offset, rail, strict=True)])
-    return RodFrame(rods.leg, rail, legs.directions, rods.shift - offset[rods.leg], platform[rods.leg] + rods.shift,
-                    legs.lengths[rods.leg], guide)
+    return RodFrame(leg, rail, legs.directions, shift - offset[leg], platform[leg] + shift, legs.lengths[leg], guide)
+
+
+def _pairs(kinematics: LinearDelta | H4Linear, platform: Floats, pairs: tuple[float, ...]) -> Floats:
+    """(6, 3) from the middle line of each leg to its two rods."""
+    legs, ends = kinematics.legs, kinematics.workspace.middle + platform
+    rods = ends - legs.carriages(legs.inverse(ends[None]))[0]
+    across = np.cross(legs.directions, rods)
+    across *= (np.array(pairs) / np.linalg.norm(across, axis=1))[:, None]
+    result: Floats = np.stack([across, -across], axis=1).reshape(RODS, 3)
+    return result
 
 
 def rod_names(frame: RodFrame, legs: tuple[str, ...]) -> tuple[str, ...]:

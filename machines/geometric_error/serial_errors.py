@@ -10,8 +10,8 @@ x, y, z of the machine frame, so that primed axes need no rule of their own. Wit
   that the axis carries: at q = 0 it has no effect. That is what ISO 230-1 calls the axis average line.
 - E_i, component errors: displaced, then turned about x, y, z (C 1.14), about the reference point of the axis. "fixed"
   takes their directions on the part's side of the axis, "moving" on its tool's side, as C 1.11 and 1.14 have it:
-  those of the bed (ISO 230-7) are "fixed" for an axis that carries the tool, "moving" for one that carries the part. The
-  reference point of a slide travels with it.
+  those of the bed, which ISO 230-1 and ISO 230-7 mean (the probe stands still, the artefact turns), are "fixed" for an
+  axis that carries the tool, "moving" for one that carries the part. The reference point of a slide travels with it.
 - S, spindle: displaces and turns the tool about the gauge point.
 
 C: Oueslati 2004, with the chain of 1.11; the formula without errors is `kinematics/serial.py`.

@@ -15,7 +15,7 @@ from machines.geometric_error.exchange import save
 from machines.geometric_error.model import ErrorModel
 from machines.geometric_error.names import DIRECTIONS, parse
 from machines.geometric_error.rods import RodErrors, rod_frame, rod_names
-from machines.geometric_error.serial_errors import Component, SerialErrors
+from machines.geometric_error.serial_errors import Component, Frame, SerialErrors
 from toolpaths.units import DEG
 
 ARCSEC = DEG / 3600.0
@@ -50,7 +50,8 @@ def serial(name: str, seed: int) -> ErrorModel:
     constants = {"EC0Y": 6 * ARCSEC, "EB0Z": -4 * ARCSEC, "EA0Z": 5 * ARCSEC, "EY0A": 0.012, "EZ0A": -0.018,
                  "EB0A": 4 * ARCSEC, "EC0A": -5 * ARCSEC, "EX0C": 0.015, "EY0C": -0.010, "EA0C": 6 * ARCSEC,
                  "EB0C": -3 * ARCSEC, "EA0S": 5 * ARCSEC, "EB0S": -6 * ARCSEC}
-    return with_doubt(ErrorModel(SerialErrors(tuple(components), constants), name=name, machine=name))
+    bed: dict[str, Frame] = {"A": "moving", "C": "moving"}  # both carry the part
+    return with_doubt(ErrorModel(SerialErrors(tuple(components), constants, frame=bed), name=name, machine=name))
 
 
 def parallel(name: str, seed: int) -> ErrorModel:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scipy.optimize import root
@@ -10,6 +13,9 @@ from scipy.spatial.transform import Rotation
 import machines
 from machines.geometric_error import rods, rods_loop
 from machines.geometric_error.actual_rods import ActualDelta, ActualH4
+from machines.geometric_error.correction import correct
+from machines.geometric_error.exchange import save
+from machines.geometric_error.loader import load, load_checked
 from machines.geometric_error.model import ErrorModel
 from machines.geometric_error.rods import RodErrors, RodFrame, platform_turn, rod_frame
 from machines.kinematics.h4_linear import H4Linear
@@ -182,3 +188,50 @@ def test_the_loop_as_it_stands_closes_the_rods() -> None:
     off = rods_loop.close_all(slides, frame.leg, base, along - base, frame.joint + errors.platform,
                               (frame.length + errors.length) ** 2, place, turned, 12, 1e-13, 0.5)
     assert off.max() < 1e-12 and np.abs(closure(frame, slides, place, turned, errors)).max() < 1e-6
+
+
+DELTAS = [name for name in machines.names() if isinstance(machines.load(name).kinematics, LinearDelta)
+          and not rods.gives_rods(machines.load(name).kinematics)]
+
+
+def test_there_are_deltas_without_rods() -> None:
+    assert len(DELTAS) >= 9
+
+
+@pytest.mark.parametrize("name", DELTAS)
+def test_deltas_without_rods_take_the_distance_of_their_pairs(name: str, tmp_path: Path) -> None:
+    """Exact closure against the first order, and two rods of a pair that differ by dl tilt the platform by dl / distance."""
+    machine = machines.load(name)
+    legs = "".join(f"[legs.{leg}]\npair = 40\nlength = [10, {-10 if leg == 'X' else 10}]\n" for leg in machine.axis_names)
+    (tmp_path / "e.toml").write_text(f"{legs}[location]\nEA0S = 3.0\n")
+    found = load(tmp_path / "e.toml", machine)
+    kin = machine.kinematics.with_tool(TOOL)
+    assert isinstance(kin, LinearDelta) and found.rods is not None and found.rods.pairs == (40.0, 40.0, 40.0)
+    q = kin.random_slides(np.random.default_rng(5), 40)
+    tip, axis = kin.forward(q)
+    actual = found.on(kin)
+    w = actual.coordinates(q)
+    first, exact = actual.deviation(w, found.values), actual.place(w)[0] - tip
+    assert np.abs(first[:, :3] - exact).max() < 1e-4 and np.linalg.norm(exact, axis=1).max() > 0.005
+    turned = np.linalg.norm(first[:, 3:], axis=1)
+    assert turned.min() > 0.9 * 0.01 / 40.0
+    assert correct(actual, q, tip, axis).tip_after.max() < 1e-6
+    text = save(replace(found, name="again"), tmp_path)[0]
+    assert load(text, machine).rods.pairs == found.rods.pairs  # type: ignore[union-attr]
+
+
+def test_pairs_are_asked_for_where_they_are_missing_and_nowhere_else(tmp_path: Path) -> None:
+    for machine, text, line in (("delta-star", "[legs.X]\nlength = [1, 2]\n[legs.Y]\npair = 40\n", 1),
+                                ("uranesx", "[legs.X]\npair = 40\n", 2)):
+        (tmp_path / "e.toml").write_text(text)
+        found, faults = load_checked(tmp_path / "e.toml", machines.load(machine))
+        assert found is None and [(d.code, d.lines) for d in faults] == [("error-model.legs", (line,))]
+
+
+def test_a_delta_without_rods_takes_errors_of_its_spindle_alone(tmp_path: Path) -> None:
+    (tmp_path / "e.toml").write_text("[location]\nEX0S = 12\n")
+    machine = machines.load("linuxcnc-lineardelta")
+    actual = load(tmp_path / "e.toml", machine).on(machine.kinematics)
+    q = np.array([[470.0, 475.0, 480.0]])
+    np.testing.assert_allclose(actual.place(actual.coordinates(q))[0] - machine.kinematics.forward(q)[0], [[0.012, 0, 0]],
+                               atol=1e-12)
