@@ -133,7 +133,7 @@ def _halve(cells: Any, i: Any, reach: Any) -> Any:
 
 
 def _enough(out: Any, limit: Any, rule: Any) -> Any:
-    """`search._Search.enough`; rule: EXACT, PART, EFFORT."""
+    """`search._Search.enough`; rule: EXACT, PART, EFFORT, EACH."""
     if out[5] > rule[2]:
         return -np.inf
     return out[0] - max(rule[0], rule[1] * (limit - out[0]))
@@ -146,8 +146,8 @@ def _leaf(piece: Any, size: Any, cells: Any, bounds: Any, normal: Any, place: An
           out: Any) -> None:
     """Halves the cell that stands in cells[0] until its least distance is known."""
     bounds[0] = look(piece, size, cells[0], normal, place, limit, out)
-    top = 0
-    while top >= 0:
+    top, most = 0, out[5] + rule[3]
+    while top >= 0 and out[5] <= most:
         if bounds[top] >= enough(out, limit, rule) or top + 1 >= len(cells) or not halve(cells, top, size[2]):
             top -= 1
             continue

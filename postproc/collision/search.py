@@ -22,10 +22,11 @@ from toolpaths.arrays import Floats, Ints
 
 EXACT = 1e-3
 """mm"""
-PART = 0.005
+PART = 0.01
 """of what is missing to the limit, where something is"""
-EFFORT = 50_000
-"""cells that are looked at once something is too near, to learn how much: the distance told is one that is had"""
+EFFORT, EACH = 100_000, 300
+"""cells, in all and of one triangle beside one piece of the way, that are looked at once something is too near, to learn by
+how much: the distance told is one that is had"""
 _LONG = 500
 """pieces of a way, from which on loops are compiled"""
 _BATCH = 4096
@@ -61,7 +62,7 @@ def _compiled(body: Solid, way: Swept, pieces: Floats, limit: float) -> Nearest:
     from postproc.collision import kernel
 
     run = compiled(kernel.search)
-    (solid_nodes, corners), rule = body.packed, np.array([EXACT, PART, EFFORT])
+    (solid_nodes, corners), rule = body.packed, np.array([EXACT, PART, EFFORT, EACH])
     out, which = np.array([limit, -1.0, np.nan, np.nan, np.nan, 0.0]), -1
     for number, piece in enumerate(pieces):
         before, high = float(out[0]), raised(piece, middle(piece))
@@ -134,8 +135,8 @@ class _Search:
     def _cells(self, pairs: Ints) -> None:
         """Triangles and pieces of the way themselves, halved until the least distance is known."""
         cells = _Cells.of(self.body, self.way, pairs)
-        bound = self._look(cells)
-        while True:
+        bound, most = self._look(cells), self.looked + EACH * len(pairs)
+        while self.looked <= most:
             keep = bound < self.enough
             cells, bound = cells.take(keep), bound[keep]
             if not len(bound):

@@ -1,0 +1,181 @@
+"""Forms of tools and meshes as a set-up gives them: sizes, what is missing, what is no good."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from typer.testing import CliRunner
+
+from postproc.cli import app
+from postproc.collision.form import CUTTER, HOLDER, SHANK, Form, tool_form
+from postproc.collision.mesh import load_mesh
+from postproc.collision.revolution import signed
+from postproc.collision.spun import spun
+from postproc.setup import SetupFile, ToolSetup, load_setup
+from postproc.setup_bodies import Section
+from tests.postproc.kit import SAMPLES
+from toolpaths.arrays import Floats
+from toolpaths.toolpath import Tool
+
+FULL = ToolSetup(gauge_length=100.0, flute_length=20.0, shank=[Section(diameter=8.0, length=30.0)],
+                 holder=[Section(lower=20.0, upper=30.0, length=25.0), Section(diameter=40.0, length=30.0)])
+
+
+def form(tool: Tool | None, setup: ToolSetup | None = FULL) -> tuple[Form, list[str]]:
+    made, found = tool_form(7, tool, setup, "s.toml")
+    return made, [str(d) for d in found]
+
+
+def distance(pieces: Floats, rho: float, z: float) -> float:
+    """To the nearest of the pieces."""
+    return min(float(signed(piece, np.array([rho]), np.array([z]))[0][0]) for piece in pieces)
+
+
+def test_pieces_stand_on_each_other() -> None:
+    made, found = form(Tool(7, diameter=10.0, corner_radius=5.0))
+    assert not found
+    assert made.of(CUTTER).tolist() == [[0.0, 5.0, 0.0, 5.0, 5.0], [5.0, 5.0, 5.0, 20.0, 0.0]]
+    assert made.of(SHANK).tolist() == [[4.0, 20.0, 4.0, 50.0, 0.0]]
+    assert made.of(HOLDER).tolist() == [[10.0, 50.0, 15.0, 75.0, 0.0], [20.0, 75.0, 20.0, 105.0, 0.0]]
+
+
+@pytest.mark.parametrize("taper", [0.0, 3.0, 20.0])
+@pytest.mark.parametrize("corner", [0.0, 1.5])
+def test_a_tapered_side_meets_the_plane_of_the_tip_at_half_the_diameter(corner: float, taper: float) -> None:
+    made, _ = form(Tool(7, diameter=10.0, corner_radius=corner, taper=np.radians(taper)))
+    cutter = made.of(CUTTER)
+    for z in (4.0, 11.0, 19.0):
+        assert distance(cutter, 5.0 + z * np.tan(np.radians(taper)), z) == pytest.approx(0.0, abs=1e-9)
+    assert distance(cutter, 0.0, 0.0) == pytest.approx(0.0, abs=1e-9)
+    sharp = distance(cutter, 5.0, 0.0)
+    half = np.radians(90.0 + taper) / 2.0
+    assert sharp == pytest.approx(corner * (1.0 / np.sin(half) - 1.0), abs=1e-9)
+
+
+def test_a_drill_ends_in_a_cone() -> None:
+    made, found = form(Tool(7, shape="DRILL", diameter=10.0, corner_radius=0.0, tip_angle=np.radians(118.0)))
+    high = 5.0 / np.tan(np.radians(59.0))
+    assert not found and made.of(CUTTER)[0].tolist() == pytest.approx([0.0, 0.0, 5.0, high, 0.0])
+
+
+def test_the_setup_goes_before_the_cl_file_and_says_so() -> None:
+    made, found = form(Tool(7, diameter=10.0, corner_radius=5.0, flute_length=18.0))
+    assert made.of(CUTTER)[1, 3] == 20.0
+    assert len(found) == 1 and "flute_length is 20 mm in the set-up, 18 mm in the CL file" in found[0]
+
+
+@pytest.mark.parametrize(("tool", "setup", "words"), [
+    (None, FULL, ["the cutter is not known", "diameter = "]),
+    (Tool(7, diameter=10.0), FULL, ["corner radius is not known", "sharp"]),
+    (Tool(7, diameter=10.0, corner_radius=0.0), ToolSetup(gauge_length=90.0), ["above the cutter's corner", "flute_length"]),
+    (Tool(7, diameter=10.0, corner_radius=0.0, flute_length=20.0), None, ["shank and holder", "[tools.7]"]),
+    (Tool(7, diameter=10.0, corner_radius=0.0), FULL.model_copy(update={"holder": []}), ["the holder is not known"]),
+    (Tool(7, diameter=10.0, corner_radius=0.0), FULL.model_copy(update={"gauge_length": 120.0}), ["ends 105 mm", "120 mm"]),
+])
+def test_what_is_not_known_is_told(tool: Tool | None, setup: ToolSetup | None, words: list[str]) -> None:
+    _, found = form(tool, setup)
+    assert len(found) == 1 and all(word in found[0] for word in words), found
+
+
+def test_a_spun_mesh_holds_the_mesh_at_any_angle() -> None:
+    mesh = trimesh.util.concatenate([trimesh.creation.box(bounds=[(-10, -6, 40), (10, 6, 60)]),
+                                     trimesh.creation.cone(radius=30, height=40).apply_translation((0, 0, 60))])
+    pieces = spun(np.asarray(mesh.vertices), np.asarray(mesh.edges_unique))
+    i, j = np.meshgrid(np.arange(13), np.arange(13), indexing="ij")
+    u, v = (i[i + j <= 12] / 12)[:, None, None], (j[i + j <= 12] / 12)[:, None, None]
+    a, b, c = np.moveaxis(np.asarray(mesh.triangles), 1, 0)
+    points = ((1.0 - u - v) * a + u * b + v * c).reshape(-1, 3)
+    rho = np.hypot(points[:, 0], points[:, 1])
+    inside = np.min([signed(piece, rho, points[:, 2])[0] for piece in pieces], axis=0)
+    assert inside.max() < 1e-6
+    corner = np.hypot(10.0, 6.0)
+    assert distance(pieces, corner + 1.0, 50.0) == pytest.approx(1.0, abs=1e-6)
+    assert distance(pieces, 30.0, 80.0) == pytest.approx(15.0 * np.cos(np.arctan(0.75)), abs=0.05)
+
+
+@pytest.mark.parametrize("suffix", ["stl", "ply", "obj", "off"])
+def test_meshes_of_all_formats_are_read_in_their_unit(tmp_path: Path, suffix: str) -> None:
+    file = tmp_path / f"box.{suffix}"
+    trimesh.creation.box((1.0, 2.0, 4.0)).export(file)
+    mesh, found = load_mesh(file, "inch")
+    assert mesh is not None and not found
+    assert np.allclose(mesh.extents, [25.4, 50.8, 101.6]) and mesh.is_watertight
+
+
+def faulty(folder: Path, name: str) -> Path:
+    """A file that is no good."""
+    box, file = trimesh.creation.box((10.0, 10.0, 10.0)), folder / "x.stl"
+    if name == "empty":
+        file.write_bytes(b"")
+    elif name == "cut":
+        box.export(file)
+        file.write_bytes(file.read_bytes()[:300])
+    elif name == "open":
+        trimesh.Trimesh(box.vertices, box.faces[:-1], process=False).export(file)
+    elif name == "side":
+        faces = np.array(box.faces)
+        faces[0] = faces[0][::-1]
+        trimesh.Trimesh(box.vertices, faces, process=False).export(file)
+    elif name == "nan":
+        corners = np.array(box.vertices)
+        corners[0] = np.nan
+        trimesh.Trimesh(corners, box.faces, process=False).export(file)
+    elif name == "format":
+        file = folder / "x.3mf"
+        file.write_bytes(b"")
+    return file
+
+
+@pytest.mark.parametrize(("name", "code"), [("missing", "mesh.open"), ("empty", "mesh.empty"), ("cut", "mesh.format"),
+                                            ("open", "mesh.open_surface"), ("side", "mesh.sides"), ("nan", "mesh.number"),
+                                            ("format", "mesh.format")])
+def test_a_bad_mesh_is_a_diagnostic(tmp_path: Path, name: str, code: str) -> None:
+    file = faulty(tmp_path, name)
+    mesh, found = load_mesh(file, key="bodies.part")
+    assert mesh is None and [d.code for d in found] == [code]
+    assert found[0].file == str(file) and found[0].hint and "bodies.part" in found[0].message
+
+
+def test_a_mesh_inside_out_or_in_another_unit_is_told(tmp_path: Path) -> None:
+    box = trimesh.creation.box((0.4, 0.2, 0.1))
+    box.invert()
+    box.export(tmp_path / "x.stl")
+    mesh, found = load_mesh(tmp_path / "x.stl")
+    assert mesh is not None and mesh.volume > 0.0
+    assert [d.code for d in found] == ["mesh.inside_out", "mesh.size"] and "0.4 mm" in found[1].message
+
+
+FIXTURE = "[[bodies.fixtures]]\nname = 'a'\n"
+BOX = "box = {low = [0.0, 0.0, 0.0], high = [1.0, 1.0, 1.0]}\n"
+FIRST = "[tools.1]\ngauge_length = 1.0\n"
+
+
+@pytest.mark.parametrize(("text", "word"), [
+    ("[bodies.table]\n", "file or box"),
+    (FIXTURE + "file = 'x.stl'\n" + BOX, "file or box"),
+    (FIXTURE + "file = 'x.stl'\n" + FIXTURE + BOX, "name of its own"),
+    (FIRST + "shank = [{diameter = 3.0, lower = 2.0, upper = 4.0, length = 5.0}]\n", "diameter, or lower"),
+    (FIRST + "holder = [{lower = 2.0, length = 5.0}]\n", "diameter, or lower"),
+    (FIRST + "holder_mesh = 'x.stl'\nholder = [{diameter = 2.0, length = 5.0}]\n", "holder or holder_mesh"),
+    ("[bodies]\nclearence = 2.0\n", "clearance"),
+])
+def test_faults_of_the_setup_name_what_is_asked_for(tmp_path: Path, text: str, word: str) -> None:
+    file = tmp_path / "s.toml"
+    file.write_text(text)
+    setup, found = load_setup(file)
+    assert setup is None and word in " ".join(map(str, found)), found
+
+
+def test_setup_check_says_where_bodies_stand(tmp_path: Path) -> None:
+    done = CliRunner().invoke(app, ["setup", "check", str(SAMPLES / "bodies" / "test_part.setup.toml")])
+    assert done.exit_code == 0 and "the part: " in done.stdout and "z -80 to -45 mm of the table frame" in done.stdout
+    (tmp_path / "s.toml").write_text('[bodies]\npart = "no.stl"\n[tools.1]\ngauge_length = 9.0\nholder_mesh = "none.stl"\n')
+    done = CliRunner().invoke(app, ["setup", "check", str(tmp_path / "s.toml")])
+    assert done.exit_code == 1 and "no.stl" in done.output and "none.stl" in done.output
+
+
+def test_a_setup_without_bodies_has_none() -> None:
+    assert SetupFile().bodies is None
