@@ -116,7 +116,8 @@ def _named(tried: Tried, made: Turned) -> list[tuple[str, Turned]]:
     """The orientations of a pass that have names, each once."""
     names: list[list[str]] = []
     kept: list[Turned] = []
-    for name, it in (("CL axis", tried.own), ("paper", tried.aimed), ("best alone", tried.best), ("chosen", made)):
+    for name, it in (("CL axis", tried.own), ("paper", tried.aimed), ("best alone", tried.best),
+                     ("best with its rapids", tried.swift), ("chosen", made)):
         if it is None:
             continue
         k = next((k for k, other in enumerate(kept) if other.same(it.axis, it.held)), len(kept))
