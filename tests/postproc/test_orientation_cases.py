@@ -15,7 +15,7 @@ from postproc.collision.passes import pass_bodies
 from postproc.options import Options
 from postproc.orientation.allowed import Allowed
 from postproc.orientation.candidates import Tried
-from postproc.orientation.held import free_value, held_angles
+from postproc.orientation.held import common_angles, free_value, held_angles
 from postproc.orientation.orient import OrientationChoice, orient
 from postproc.orientation.passes import work_of
 from postproc.orientation.timed import turned, turned_all
@@ -185,6 +185,23 @@ def test_the_turned_table_is_written_and_proved() -> None:
     assert near(90.0, standing(written("h4a-c-table", path), "C"))
     plain = postproc.convert(path, machine("h4a-c-table"), "linuxcnc", setup_of("h4a"))
     assert plain.ok and standing(plain, "C") == {0.0}
+
+
+def test_an_angle_for_passes_in_many_directions() -> None:
+    """Each pass alone would stand elsewhere: common is the angle of the least time of all, planned at every 5 degrees."""
+    m, directions = machine("mikron-ucp710"), [0.0, 20.0, 75.0]
+    work, _ = work_of(strips(directions, "16,1"), m, setup_of(""), Options())
+    assert work is not None
+    owns = [turned(one, one.axis, m) for one in work.passes]
+    found = common_angles(owns) / DEG
+    angles = np.arange(-90.0, 90.0, 5.0)
+    planned = [sum(turned(one, one.axis, m, held=angle * DEG).seconds for one in work.passes) for angle in angles]
+    assert angles[int(np.argmin(planned))] in np.round(found, 6)
+    alone = {round(held_angles(one, m, one.axis)[0] / DEG) for one in work.passes}
+    assert len(alone) == 3
+    level, _ = work_of(strips(directions, "16,1"), machine("mill-4axis"), setup_of(""), Options())
+    assert level is not None
+    assert not len(common_angles([turned(one, one.axis, level.machine) for one in level.passes]))
 
 
 @pytest.mark.parametrize("controller", ["siemens-840d", "heidenhain-tnc640", "linuxcnc"])
