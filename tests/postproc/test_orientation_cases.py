@@ -77,8 +77,8 @@ def test_travel_decides() -> None:
 
 
 def test_indexing_time_decides() -> None:
-    """Ten strips gain a second by turning once: more than clamps of half a second cost, less than those of three."""
-    fast, slow = (on("", strips([0.0] * 10), quick("mikron-ucp710", clamp)) for clamp in (0.5, 3.0))
+    """Sixteen strips gain seconds by turning once: more than clamps of 0.1 s cost, less than those of 5 s."""
+    fast, slow = (on("", strips([0.0] * 16), quick("mikron-ucp710", clamp)) for clamp in (0.1, 5.0))
     assert {made.rotary()["A"] for made in fast.plans["auto"].picked} != {0.0}
     assert fast.plans["auto"].seconds < fast.plans["keep"].seconds - 0.3
     assert {made.rotary()["A"] for made in slow.plans["auto"].picked} == {0.0}
