@@ -100,20 +100,41 @@ def between(before: list[Ends] | None, after: list[Ends] | None, work: Work, by_
     """Seconds (K0, K1) from each end to each beginning; None stands for home."""
     home = work.machine.home
     if before is None:
-        return _indexed(home[None], np.stack([e.above_first for e in after or []]), work.machine) + _downs(after)[None]
+        return _from_home(home[None], np.stack([e.above_first for e in after or []]), work.machine) + _downs(after)[None]
     ups = np.array([e.up for e in before])[:, None]
     above = np.stack([e.above_last for e in before])
     if after is None:
-        return ups + _indexed(above, home[None], work.machine)
+        return np.asarray(ups + _lifted(above, work.machine)[1] + _level(above, work.machine))
     if by_home:
-        way = _indexed(above, home[None], work.machine) + _indexed(home[None], np.stack([e.above_first for e in after]),
-                                                                   work.machine)
+        lifted, lift = _lifted(above, work.machine)
+        way = lift + _from_home(lifted, np.stack([e.above_first for e in after]), work.machine)
         return np.asarray(ups + way + _downs(after)[None] + (work.machine.timing.tool_change if changes_tool else 0.0))
     linked = ups + _indexed(above, np.stack([e.above_first for e in after]), work.machine) + _downs(after)[None]
     straight = _indexed(np.stack([e.last for e in before]), np.stack([e.first for e in after]), work.machine)
     turn = angle_between(np.stack([e.axis for e in before])[:, None], np.stack([e.axis for e in after])[None])
     spun = _differ(np.array([e.held for e in before])[:, None], np.array([e.held for e in after])[None])
     return np.asarray(np.where((turn > work.setup.clearance.link_angle * DEG) | spun, linked, straight))
+
+
+def _lifted(q: Floats, machine: Machine) -> tuple[Floats, Floats]:
+    """Joints (K, J) with the retract axis at home, and the seconds (K, 1) to there; all joints at home without such an
+    axis."""
+    k = machine.retract_axis
+    lifted = np.tile(machine.home, (len(q), 1)) if k < 0 else q.copy()
+    lifted[:, k] = machine.home[k]
+    return lifted, np.diag(_indexed(q, lifted, machine))[:, None]
+
+
+def _level(q: Floats, machine: Machine) -> Floats:
+    """Seconds (K, 1) of all joints home once the retract axis is there."""
+    return _indexed(_lifted(q, machine)[0], machine.home[None], machine)
+
+
+def _from_home(q0: Floats, q1: Floats, machine: Machine) -> Floats:
+    """Seconds (K0, K1): rotary axes, then the slides but the retract axis, then that one, as the links go."""
+    rotary, last = np.array(machine.rotary), np.arange(q0.shape[1]) == machine.retract_axis
+    groups = [rotary, ~rotary & ~last, last] if last.any() else [np.ones(len(rotary), dtype=bool)]
+    return np.asarray(sum(_indexed(np.where(one, q0, 0.0), np.where(one, q1, 0.0), machine) for one in groups))
 
 
 def _differ(a: Floats, b: Floats) -> Bools:
