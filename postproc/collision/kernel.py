@@ -1,7 +1,7 @@
 """Plain loops of `search.py`, compiled for long ways and fine meshes; the numpy search there is the reference.
 
 A cell is a row of 21 numbers: the corners of a triangle, two tips, two axes. `out` holds the least distance so far, the
-place on the way, the point, and the cells looked at since something was too near.
+place on the way, the point, the cells looked at since something was too near, and whether a leaf was cut short.
 """
 
 from __future__ import annotations
@@ -159,6 +159,8 @@ def _leaf(piece: Any, size: Any, cells: Any, bounds: Any, normal: Any, place: An
             first, second = second, first
         bounds[top], bounds[top + 1] = first, second
         top += 1
+    if top >= 0:
+        out[6] = 1.0
 
 
 def _bound(piece: Any, size: Any, body: Any, way: Any, k: Any, m: Any) -> Any:

@@ -24,9 +24,9 @@ EXACT = 1e-3
 """mm"""
 PART = 0.01
 """of what is missing to the limit, where something is"""
-EFFORT, EACH = 100_000, 300
-"""cells, in all and of one triangle beside one piece of the way, that are looked at once something is too near, to learn by
-how much: the distance told is one that is had"""
+EFFORT, EACH = 100_000, (300, 10_000)
+"""cells, in all and of one triangle beside one piece of the way (in two rounds), that are looked at once something is too
+near, to learn by how much: the distance told is one that is had"""
 _LONG = 500
 """pieces of a way, from which on loops are compiled"""
 _BATCH = 4096
@@ -53,7 +53,11 @@ def nearest(body: Solid, way: Swept, pieces: Floats, limit: float) -> Nearest:
         return _compiled(body, way, pieces, limit)
     best = Nearest(limit)
     for number, piece in enumerate(pieces):
-        best = _Search(body, way, piece, number, best, limit).run()
+        for each in EACH:
+            run = _Search(body, way, piece, number, best, limit, each)
+            best = run.run()
+            if not run.cut:
+                break
     return best
 
 
@@ -62,13 +66,18 @@ def _compiled(body: Solid, way: Swept, pieces: Floats, limit: float) -> Nearest:
     from postproc.collision import kernel
 
     run = compiled(kernel.search)
-    (solid_nodes, corners), rule = body.packed, np.array([EXACT, PART, EFFORT, EACH])
-    out, which = np.array([limit, -1.0, np.nan, np.nan, np.nan, 0.0]), -1
+    (solid_nodes, corners), size = body.packed, np.zeros(3)
+    out, which = np.array([limit, -1.0, np.nan, np.nan, np.nan, 0.0, 0.0]), -1
     for number, piece in enumerate(pieces):
         before, high = float(out[0]), raised(piece, middle(piece))
+        size[:] = lever(high), bend(piece), lever(piece)
         out[5] = 0.0
-        run(piece, high, np.array([lever(high), bend(piece), lever(piece)]), solid_nodes, corners, body.normal,
-            way.packed(middle(piece)), way.poses, limit, rule, out)
+        for each in EACH:
+            out[6] = 0.0
+            run(piece, high, size, solid_nodes, corners, body.normal, way.packed(middle(piece)), way.poses, limit,
+                np.array([EXACT, PART, EFFORT, each]), out)
+            if not out[6]:
+                break
         which = number if out[0] < before else which
     x, y, z = out[2:5].tolist()
     return Nearest(float(out[0]), which, int(out[1]), (x, y, z))
@@ -77,10 +86,11 @@ def _compiled(body: Solid, way: Swept, pieces: Floats, limit: float) -> Nearest:
 class _Search:
     """One piece of the tool; `best` is what was found so far."""
 
-    def __init__(self, body: Solid, way: Swept, piece: Floats, number: int, best: Nearest, limit: float) -> None:
+    def __init__(self, body: Solid, way: Swept, piece: Floats, number: int, best: Nearest, limit: float,
+                 each: int) -> None:
         self.body, self.way, self.piece, self.number, self.best, self.limit = body, way, piece, number, best, limit
         self.high, self.nodes = raised(piece, middle(piece)), way.tree_at(middle(piece))
-        self.lever, self.looked = lever(self.high), 0
+        self.lever, self.looked, self.each, self.cut = lever(self.high), 0, each, False
         self.body_first, self.way_first = body.tree.leaves - 1, way.tree.leaves - 1
 
     @property
@@ -135,7 +145,7 @@ class _Search:
     def _cells(self, pairs: Ints) -> None:
         """Triangles and pieces of the way themselves, halved until the least distance is known."""
         cells = _Cells.of(self.body, self.way, pairs)
-        bound, most = self._look(cells), self.looked + EACH * len(pairs)
+        bound, most = self._look(cells), self.looked + self.each * len(pairs)
         while self.looked <= most:
             keep = bound < self.enough
             cells, bound = cells.take(keep), bound[keep]
@@ -145,6 +155,7 @@ class _Search:
             now, later = order[:_BATCH], order[_BATCH:]
             halves = cells.take(now).halved(lever(self.piece))
             cells, bound = halves.and_also(cells.take(later)), np.concatenate((self._look(halves), bound[later]))
+        self.cut = True
 
     def _look(self, cells: _Cells) -> Floats:
         """Bounds (N,); the distance in the middle of each cell is one that is had."""
