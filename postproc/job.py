@@ -55,8 +55,18 @@ class Job:
 
     def gauge_length(self, index: int) -> float:
         """Gauge length of the tool of that index, mm; 0 where the set-up does not tell."""
-        number = self.toolpath.tools[index].number if index >= 0 else 0
-        return self.length_of(number)
+        return self.length_of(self.number_of(index))
+
+    def number_of(self, index: int) -> int:
+        """Number of the tool of that index. Without one (-1) it is -1, no tool, before the first tool change; 0 in a
+        file that changes none, where the set-up's [tools.0] is what stands in the spindle."""
+        if index >= 0:
+            return self.toolpath.tools[index].number
+        return -1 if self._loads else 0
+
+    @cached_property
+    def _loads(self) -> bool:
+        return bool(tool_changes(self.toolpath))
 
     def length_of(self, number: int) -> float:
         """Gauge length of a tool by its number."""
@@ -65,7 +75,7 @@ class Job:
 
     def kinematics(self, index: int) -> Kinematics:
         """The kinematics at the tip of the tool of that index."""
-        return self.kinematics_of(self.toolpath.tools[index].number if index >= 0 else 0)
+        return self.kinematics_of(self.number_of(index))
 
     def kinematics_of(self, number: int) -> Kinematics:
         """The kinematics at the tip of a tool by its number."""
@@ -175,12 +185,12 @@ def _no_inverse_time(controller: ControllerFile, options: Options) -> list[Diagn
 def _tool_lengths(job: Job) -> list[Diagnostic]:
     """A missing gauge length is an error where program words depend on it, else a warning: travel leaves it out."""
     used = sorted({int(t) for t in np.unique(job.moves.tool)})
-    missing = [job.toolpath.tools[t].number if t >= 0 else 0 for t in used
-               if job.gauge_length(t) == 0.0]
+    missing = sorted({job.number_of(t) for t in used if job.gauge_length(t) == 0.0})
     if not missing:
         return []
-    names = ", ".join(f"T{n}" for n in sorted(set(missing)))
-    hint = f"add [tools.{missing[0]}] gauge_length = ... to the set-up"
+    names = ", ".join(f"T{n}" if n >= 0 else "what cuts before the first tool change" for n in missing)
+    hint = f"add [tools.{missing[-1]}] gauge_length = ... to the set-up" if missing[-1] >= 0 else ""
+    hint += ("; " if hint else "") + "load a tool before the first motion" if missing[0] < 0 else ""
     if words_depend_on_length(job.control, job.machine.kinematics, job.moves.axis):
         return [error("tool.length", f"no gauge length for {names}: on {job.machine.name} the axis positions depend on it",
                       file=job.toolpath.file, hint=hint)]
@@ -191,6 +201,7 @@ def _tool_lengths(job: Job) -> list[Diagnostic]:
 def _unused_tools(job: Job) -> list[Diagnostic]:
     """Tools of the set-up that the CL file never loads."""
     used = {str(t.number) for t in job.toolpath.tools} | {str(c.number) for c in tool_changes(job.toolpath)}
+    used |= {str(job.number_of(-1))}
     unused = [f"T{number}" for number in job.setup.tools if number not in used]
     return [info("setup.tool_unused", f"the CL file does not use {', '.join(unused)} of the set-up",
                  file=job.options.setup)] if unused else []

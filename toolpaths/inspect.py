@@ -113,7 +113,7 @@ def _tool_number(p: Toolpath, row: int) -> int | None:
 
 
 def summary(result: ReadResult) -> str:
-    """The same for people, a few lines."""
+    """The same for people, a few lines, without the diagnostics, which go to standard error."""
     p = result.toolpath
     found = inspect(result)
     title = DIALECTS[result.dialect].title
@@ -128,7 +128,7 @@ def summary(result: ReadResult) -> str:
     lines += [f"  tool {t.number}{' ' + t.name if t.name else ''}{_size(t)}" for t in p.tools]
     if result.unknown_words:
         lines.append("  unknown words: " + ", ".join(f"{w} ({n})" for w, n in result.unknown_words.items()))
-    return "\n".join([*lines, *(f"  {d}" for d in result.diagnostics)])
+    return "\n".join(lines)
 
 
 def lengths_of(p: Toolpath) -> list[float]:
