@@ -25,6 +25,8 @@ from toolpaths.toolpath import Toolpath
 SAMPLES = Path(__file__).parents[2] / "samples"
 TOOLS = SAMPLES / "tools.setup.toml"
 HEAD = ["UNITS/MM", "LOADTL/1", "SPINDL/RPM,1000,CLW", "FEDRAT/MMPM,600"]
+NX = ["TOOL PATH/A,TOOL,T", "MSYS/0,0,0,1,0,0,0,1,0", "LOAD/TOOL,1", "SPINDL/RPM,1000,CLW"]
+"""how a file of NX begins, behind its units"""
 
 
 def toolpath(*lines: str, head: list[str] | None = None) -> Toolpath:
@@ -38,6 +40,12 @@ def goto(tip: np.ndarray, axis: np.ndarray | None = None) -> list[str]:
     """GOTO records of tips (N, 3) and axes (N, 3), 12 decimals."""
     rows = np.asarray(tip) if axis is None else np.hstack([tip, axis])
     return ["GOTO/" + ",".join(f"{v:.12f}" for v in row) for row in rows]
+
+
+def circle(center: list[float], normal: list[float], radius: float, times: str = "") -> str:
+    """The CIRCLE record of NX; the normal is left-handed there."""
+    numbers = ",".join(f"{v:.12f}" for v in (*center, *normal))
+    return f"CIRCLE/{numbers},{radius},0.03,0.5,10,0{times}"
 
 
 @cache

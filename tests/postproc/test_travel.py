@@ -14,8 +14,7 @@ import machines
 from postproc.cli import app
 from postproc.pipeline import PostResult
 from postproc.setup import SetupFile
-from tests.postproc.kit import codes, convert, execute, goto, machine, sample, tilted, toolpath
-from tests.postproc.test_writer import NX, circle
+from tests.postproc.kit import NX, circle, codes, convert, execute, goto, machine, sample, tilted, toolpath
 
 HALF = ["TOOL PATH/A,TOOL,T", "MSYS/0,0,0,1,0,0,0,1,0", "LOAD/TOOL,1", "SPINDL/RPM,1000,CLW"]
 

@@ -6,15 +6,7 @@ import numpy as np
 import pytest
 
 from postproc.setup import SetupFile
-from tests.postproc.kit import angle, body, convert, execute, good, goto, tilted, tool_poses, toolpath
-
-
-def circle(center: list[float], normal: list[float], radius: float, times: str = "") -> str:
-    n = ",".join(f"{v:.12f}" for v in (*center, *normal))
-    return f"CIRCLE/{n},{radius},0.03,0.5,10,0{times}"
-
-
-NX = ["TOOL PATH/A,TOOL,T", "MSYS/0,0,0,1,0,0,0,1,0", "LOAD/TOOL,1", "SPINDL/RPM,1000,CLW"]
+from tests.postproc.kit import NX, angle, body, circle, convert, execute, good, goto, tilted, tool_poses, toolpath
 
 
 def nx(*lines: str, name: str = "mill-3axis", setup: SetupFile | None = None, controller: str = "linuxcnc") -> list[str]:
