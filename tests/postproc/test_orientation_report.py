@@ -55,8 +55,10 @@ def part() -> OrientationChoice:
 
 
 def repeated(plan: OrientationPlan) -> OrientationPlan:
-    return replace(plan, picked=16 * plan.picked, cuts=np.tile(plan.cuts, 16), rapids=np.tile(plan.rapids, 16),
-                   ways=np.append(np.tile(plan.ways[:-1], 16), plan.ways[-1]))
+    ways = np.append(np.tile(plan.ways[:-1], 16), plan.ways[-1])
+    cuts, rapids = np.tile(plan.cuts, 16), np.tile(plan.rapids, 16)
+    return replace(plan, picked=16 * plan.picked, cuts=cuts, rapids=rapids, ways=ways,
+                   seconds=float(cuts.sum() + rapids.sum() + ways.sum()))
 
 
 def many() -> OrientationChoice:
@@ -103,6 +105,7 @@ def test_every_loser_is_counted_once() -> None:
             assert told.get("bound", 0) == tried.pruned
             after = losers.best_loser(tried)
             assert after is not None and after.seconds >= tried.best.seconds * SLACK
+            assert after.seconds == min(lost.made.seconds for lost in tried.rejected if np.isfinite(lost.made.seconds))
         assert sum(losers.grouped(choice.tried).values()) == sum(sum(losers.grouped([one]).values()) for one in choice.tried)
 
 
@@ -120,8 +123,18 @@ def test_seconds_of_a_plan_add_up() -> None:
     assert clamped.turning > clamped.turns * (timing.clamp + timing.unclamp) > 0.0
 
 
+def test_a_tool_change_turns_home_and_back() -> None:
+    """Two tools, one leaning axis: out, home and out again for the other tool, home."""
+    one = written(1).replace(",0,0,1", ",0,0.6,0.8")
+    both = one.replace("FINI\n", "LOADTL/2\nCUTTER/16,8\n" + one.split("MULTAX\n")[1])
+    plan = of_text(both).plans["keep"]
+    parts = shares.shares_of(plan)
+    assert len(plan.picked) == 2 and parts.turns == 3
+    assert parts.turning == pytest.approx(plan.ways.sum()) and parts.other == pytest.approx(plan.rapids.sum())
+
+
 def test_json_has_the_keys_that_others_read() -> None:
-    values = report.as_dict(part())
+    values = report.as_dict(part(), "per-pass")
     json.dumps(values, allow_nan=False)
     assert {"machine", "passes", "plans"} <= set(values)
     for one in values["passes"]:
@@ -133,8 +146,7 @@ def test_json_has_the_keys_that_others_read() -> None:
     assert {"keep", "per_pass", "whole_part", "auto"} <= set(values["plans"])
     for plan in values["plans"].values():
         assert plan["time_s"] == pytest.approx(plan["cutting_s"] + plan["turning_s"] + plan["other_s"])
-    per_pass = report.as_dict(part(), "per-pass")
-    assert per_pass["plan"] == "per-pass" and per_pass["passes"][4]["turned_deg"] == pytest.approx(45.0, abs=2.0)
+    assert values["plan"] == "per-pass" and values["passes"][4]["turned_deg"] == pytest.approx(45.0, abs=2.0)
 
 
 def test_text_says_why_others_lost() -> None:
