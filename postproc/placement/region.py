@@ -30,6 +30,7 @@ _MARGIN = 0.1
 _STEP = 100.0
 """mm, over which slides are differenced"""
 _ROUNDS = 40
+_LITTLE = 1e-4
 _CHUNK = 2_000_000
 _POSES = 12
 """of a tool and an axis that stand for all, beside the outermost"""
@@ -74,7 +75,14 @@ class Slabs:
         return np.concatenate([part.min(axis=1) for part in parts]) if parts else np.zeros(0)
 
     def deepest(self, low: Floats, high: Floats) -> tuple[Floats, float, str]:
-        """The linear program max m, g . p + c >= m, low <= p <= high; rows are taken in as they are found to be broken."""
+        """The linear program max m, low <= p <= high, g . p + c >= m_j >= m, rows taken in as they are found to be broken.
+
+        The margins m_j of the joints count a little, so that those that do not decide are centred as well.
+        """
+        joints = np.unique(self.joint)
+        count = len(joints)
+        order = np.column_stack([np.zeros((count, ANGLES)), -np.eye(count), np.ones(count)])
+        cost = [0.0] * ANGLES + [-_LITTLE] * count + [-1.0]
         place = 0.5 * (low + high)
         rows: list[int] = []
         for _ in range(_ROUNDS):
@@ -85,9 +93,9 @@ class Slabs:
             if rows and (not new or float(values.min()) >= least - 1e-6):
                 break
             rows += new
-            left = np.column_stack([-self.g[rows], np.ones(len(rows))])
-            found = linprog([0.0, 0.0, 0.0, -1.0], A_ub=left, b_ub=self.c[rows], method="highs",
-                            bounds=[*zip(low, high, strict=True), (None, None)])
+            left = np.column_stack([-self.g[rows], self.joint[rows, None] == joints, np.zeros(len(rows))])
+            found = linprog(cost, A_ub=np.vstack([left, order]), b_ub=np.append(self.c[rows], np.zeros(count)),
+                            bounds=[*zip(low, high, strict=True), *[(None, None)] * (count + 1)], method="highs")
             if found.x is None:
                 raise ArithmeticError(f"no place of most margin: {found.message}")
             place = np.clip(found.x[:ANGLES], low, high)

@@ -68,8 +68,8 @@ def as_text(choice: PlacementChoice) -> str:
         lines.append(f"limited by {worst or 'nothing'} over {choice.best.limiting[worst]:.3f} s of the cuts")
     turned = _turned(choice)[1:_SHOWN]
     if turned:
-        figures = (f"{one.place[ANGLES] / DEG:.3f} deg {one.seconds:.3f} s" for one in turned)
-        lines.append("turned otherwise: " + ", ".join(figures))
+        others = (f"{one.place[ANGLES] / DEG:.3f} deg {one.seconds:.3f} s" for one in turned)
+        lines.append("turned otherwise: " + ", ".join(others))
     lines.append(f"free: {', '.join(free)}; {choice.found.attitudes} ways to turn the part, {choice.looked} places looked "
                  f"at, {choice.refused} refused, {choice.pruned} lost by their bound, {choice.planned} cuts planned")
     return "\n".join(lines)

@@ -21,6 +21,8 @@ EQUAL = 2e-4
 """part of the time by which places are equal; travel margin decides among them"""
 _SPREAD, _SEEDS = 64, 6
 """places of each attitude that travel is asked about, and those of them that may be timed"""
+_FIRST = 2
+"""of those, timed at all attitudes: most margin, and as near as can be to where the part stands"""
 _LIKELY = 6
 """attitudes that are timed at all of them"""
 _STARTS, _DISTINCT = 3, 12.0 * DEG
@@ -66,15 +68,15 @@ class Search:
         attitudes = self.space.attitudes()
         self.found.attitudes = len(attitudes)
         seeds = [seeds for k, angles in enumerate(attitudes) if (seeds := self._seeds(angles, k, len(attitudes)))]
-        for place in self._by_bound([group[0] for group in seeds]):
+        for place in self._by_bound([place for group in seeds for place in group[:_FIRST]]):
             self._look(place)
         likely = [one.place[ANGLES:] for one in self._starts(_LIKELY, 0.0)]
-        more = [place for group in seeds for place in group[1:]
+        more = [place for group in seeds for place in group[_FIRST:]
                 if any(np.abs(place[ANGLES:] - angles).max() < 1e-9 for angles in likely)]
         for place in self._by_bound(more):
             self._look(place)
         for start in self._starts(_STARTS, _DISTINCT):
-            self._compass(start)
+            self._compass(self.timer.tried(start.place))
         if self.found.best is not None:
             self.found.best = self._roomiest(_POLISH)
         return self.found
@@ -153,9 +155,12 @@ class Search:
         return self._starts(len(self.space.attitudes()), 0.0)
 
     def _starts(self, count: int, apart: float) -> list[Tried]:
-        """The best place of each of the best attitudes that are more than `apart` rad from each other."""
-        good = sorted((one for one in self.timer.known() if np.isfinite(one.seconds) and self.space.holds(one.place)),
-                      key=lambda one: one.seconds)
+        """The best place of each of the best attitudes that are more than `apart` rad from each other.
+
+        A place that lost by its bound counts with that: attitudes are likely by the least time they can take.
+        """
+        good = sorted((one for one in self.timer.known() if not one.refused and self.space.holds(one.place)),
+                      key=lambda one: one.seconds if np.isfinite(one.seconds) else one.bound)
         taken: list[Tried] = []
         for one in good:
             if len(taken) < count and all(np.abs(one.place - other.place)[ANGLES:].max() > apart for other in taken):
