@@ -12,12 +12,13 @@ import pytest
 import postproc
 from machines.machine import Machine, Timing
 from postproc.collision.passes import pass_bodies
-from postproc.options import Options
+from postproc.options import Options, Orientation
 from postproc.orientation.allowed import Allowed
 from postproc.orientation.candidates import Tried
 from postproc.orientation.held import common_angles, free_value, held_angles
 from postproc.orientation.orient import OrientationChoice, orient
 from postproc.orientation.passes import work_of
+from postproc.orientation.reoriented import reoriented
 from postproc.orientation.timed import turned, turned_all
 from postproc.pipeline import PostResult
 from postproc.setup import SetupFile, load_setup
@@ -44,9 +45,9 @@ def quick(name: str, clamp: float = 0.05) -> Machine:
     return replace(machine(name), timing=Timing(0.0, clamp, clamp))
 
 
-def written(name: str, path: Toolpath, controller: str = "linuxcnc") -> PostResult:
-    """Converted with `auto`, and read back."""
-    result = postproc.convert(path, quick(name), controller, setup_of(name), Options(orient="auto", max_tilt=40.0))
+def written(name: str, path: Toolpath, controller: str = "linuxcnc", plan: Orientation = "auto") -> PostResult:
+    """Converted with a plan, and read back."""
+    result = postproc.convert(path, quick(name), controller, setup_of(name), Options(orient=plan, max_tilt=40.0))
     assert result.ok and result.comparison is not None, [str(d) for d in result.diagnostics]
     return result
 
@@ -77,8 +78,8 @@ def test_travel_decides() -> None:
 
 
 def test_indexing_time_decides() -> None:
-    """Sixteen strips gain seconds by turning once: more than clamps of 0.1 s cost, less than those of 5 s."""
-    fast, slow = (on("", strips([0.0] * 16), quick("mikron-ucp710", clamp)) for clamp in (0.1, 5.0))
+    """Ten strips gain a second by turning once: more than nothing, less than clamps of 5 s cost."""
+    fast, slow = (on("", strips([0.0] * 10), quick("mikron-ucp710", clamp)) for clamp in (0.0, 5.0))
     assert {made.rotary()["A"] for made in fast.plans["auto"].picked} != {0.0}
     assert fast.plans["auto"].seconds < fast.plans["keep"].seconds - 0.3
     assert {made.rotary()["A"] for made in slow.plans["auto"].picked} == {0.0}
@@ -180,9 +181,9 @@ def test_the_h4a_turns_its_table_once() -> None:
 
 
 def test_the_turned_table_is_written_and_proved() -> None:
-    """The program of the H4a holds C through all cuts; without `auto` it stays at home."""
-    path = strips([90.0] * 20, "16,1")
-    assert near(90.0, standing(written("h4a-c-table", path), "C"))
+    """The program of the H4a holds C through all cuts; with the axes of the file it stays at home."""
+    path = strips([90.0] * 3, "16,1")
+    assert near(90.0, standing(written("h4a-c-table", path, plan="per-pass"), "C"))
     plain = postproc.convert(path, machine("h4a-c-table"), "linuxcnc", setup_of("h4a"))
     assert plain.ok and standing(plain, "C") == {0.0}
 
@@ -216,12 +217,17 @@ def test_a_flat_cutter_on_a_trunnion(controller: str) -> None:
 
 def test_passes_that_keep_their_angle_are_held_where_they_were_counted() -> None:
     """Behind a pass held at an angle a free axis would stay there: it is held where its time was counted."""
-    choice = on("mikron-ucp710", strips([0.0, 45.0], "16,1"))
-    picked = choice.plans["per-pass"].picked
-    assert near(45.0, {picked[0].held / DEG}) and free_value(picked[1]) == 0.0
-    path = choice.toolpath("per-pass")
-    assert path.spin is not None and set(np.round(path.spin / DEG, 6)) == {round(picked[0].held / DEG, 6), 0.0}
-    assert choice.toolpath("keep").equals(choice.work.toolpath)
+    m = machine("mikron-ucp710")
+    work, _ = work_of(strips([0.0, 45.0], "16,1"), m, setup_of(""), Options())
+    assert work is not None
+    first, second = work.passes
+    spun, own = turned(first, first.axis, m, held=45.0 * DEG), turned(second, second.axis, m)
+    assert np.isnan(own.held) and free_value(own) == 0.0
+    path = reoriented(work, (spun, own))
+    assert path.spin is not None and np.unique(np.round(path.spin / DEG, 6)).tolist() == [0.0, 45.0]
+    result = postproc.convert(path, m, "linuxcnc", setup_of(""))
+    assert result.ok and standing(result, "C") == {0.0, 45.0}
+    assert reoriented(work, (turned(first, first.axis, m), own)).equals(work.toolpath)
 
 
 def test_a_turned_part_is_held_as_a_straight_one() -> None:
