@@ -120,7 +120,7 @@ def verify(gcode: Annotated[Path, typer.Argument(metavar="GCODE", help="G-code f
     with shown_errors(json), progress_bar() as progress:
         m, spec = machine_of(machine), controller_of(controller)
         path, found = _read(file, options, progress)
-        result = run(gcode, path, m, spec, options, found, progress)
+        result = run(gcode, path, m, spec, options=options, diagnostics=found, progress=progress)
     report(result.diagnostics, json, summary.verify_dict(result), summary.verify_text(result))
 
 

@@ -22,6 +22,7 @@ from postproc.pivots import control_kinematics
 from postproc.records import plain_records
 from postproc.rounding import Rounding, decimals, rounding_bound
 from postproc.setup import Placement, SetupFile, part_placement, work_frame
+from postproc.stated_feeds import without_feed
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error, has_errors, info, warning
 from toolpaths.toolpath import Role, Toolpath
@@ -135,7 +136,7 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
         return None, diagnostics
     axis_tolerance = options.axis_tolerance * DEG
     moves, found = build_moves(toolpath, setup, axis_tolerance)
-    diagnostics += found
+    diagnostics += [*found, *_default_feed(toolpath, setup)]
     moves = moves.placed(placement)
     tip_law = machine.control_kinematics is not None and controller.kinematics.modules
     origin = placement.points(np.array([frame.origin]))[0]
@@ -174,6 +175,15 @@ def _refused(toolpath: Toolpath) -> list[Diagnostic]:
         result.append(error("convert.no_motion", "the file commands no motion", file=toolpath.file,
                             hint="it needs GOTO records"))
     return result
+
+
+def _default_feed(toolpath: Toolpath, setup: SetupFile) -> list[Diagnostic]:
+    """Cuts that run at the feed of the set-up, since the CL file states none."""
+    rows = np.flatnonzero(without_feed(toolpath))
+    if setup.output.feed is None or not len(rows):
+        return []
+    return [info("feed.of_setup", f"no feed is stated: {setup.output.feed:g} mm/min of the set-up is taken",
+                 file=toolpath.file, lines=toolpath.line[rows[:6]].tolist(), count=len(rows))]
 
 
 def _no_inverse_time(controller: ControllerFile, options: Options) -> list[Diagnostic]:

@@ -10,15 +10,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from machines.kinematics.frames import spin_about, tool_x
-from postproc.events import spindle_speed, tool_changes
+from postproc.events import tool_changes
 from postproc.holes import Phase as Phase
 from postproc.holes import hole_legs
 from postproc.setup import Placement, SetupFile
+from postproc.stated_feeds import feeds_of
 from toolpaths.arrays import Array, Bools, Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.rotations import angle_between
 from toolpaths.shape import Curves
-from toolpaths.toolpath import Arcs, FeedMode, Kind, Role, Toolpath
+from toolpaths.toolpath import Arcs, Kind, Role, Toolpath
 from toolpaths.units import DEG
 
 
@@ -169,7 +170,7 @@ def _begins(toolpath: Toolpath, link: Bools) -> Ints:
 def build_moves(toolpath: Toolpath, setup: SetupFile, axis_tolerance: float) -> tuple[Moves, list[Diagnostic]]:
     """The reference moves of a Toolpath, in the part frame."""
     link = link_rows(toolpath, setup, axis_tolerance)
-    feed, seconds, diagnostics = _feeds(toolpath)
+    feed, seconds, diagnostics = feeds_of(toolpath, setup.output.feed)
     begin = _begins(toolpath, link)
     counts = np.where(toolpath.role == Role.START, 0, 1 + (begin >= 0))
     holes = np.flatnonzero(toolpath.role == Role.HOLE)
@@ -211,40 +212,14 @@ def _lone_arcs(toolpath: Toolpath, moves: Moves) -> list[Diagnostic]:
                   lines=moves.line[bad][:6].tolist(), count=len(bad), hint="put FROM or a GOTO before CIRCLE")]
 
 
-def _feeds(toolpath: Toolpath) -> tuple[Floats, Floats, list[Diagnostic]]:
-    """(mm/s, seconds of inverse-time rows, diagnostics) per row; holes take the feed of their cycle."""
-    feed, mode = toolpath.feed.copy(), toolpath.feed_mode.copy()
-    holes = np.flatnonzero(toolpath.role == Role.HOLE)
-    if len(holes):
-        cycle_feed = np.array([c.feed for c in toolpath.cycles])
-        cycle_mode = np.array([int(c.feed_mode) for c in toolpath.cycles])
-        feed[holes] = cycle_feed[toolpath.cycle[holes]]
-        mode[holes] = cycle_mode[toolpath.cycle[holes]]
-    cutting = (toolpath.kind != Kind.RAPID) | (toolpath.role == Role.HOLE)
-    feed[~cutting] = np.nan
-    diagnostics: list[Diagnostic] = []
-    turning = cutting & (mode == FeedMode.PER_REVOLUTION)
-    if turning.any():
-        rev_per_s = spindle_speed(toolpath)
-        feed[turning] *= rev_per_s[turning]
-        bad = np.flatnonzero(turning & ~(rev_per_s > 0.0))
-        if len(bad):
-            diagnostics.append(error("feed.no_speed", "feed per revolution while the spindle speed is not known",
-                                     file=toolpath.file, lines=toolpath.line[bad][:6].tolist(), count=len(bad),
-                                     hint="state SPINDL/RPM,... before, or a feed per minute"))
-    inverse = cutting & (mode == FeedMode.INVERSE_TIME)
-    seconds = np.where(inverse, 1.0 / np.where(inverse & (feed > 0.0), feed, np.nan), np.nan)
-    feed[inverse] = np.nan
-    return feed, seconds, diagnostics
-
-
 def _missing_feeds(toolpath: Toolpath, moves: Moves) -> list[Diagnostic]:
     cutting = moves.kind != Kind.RAPID
     bad = np.flatnonzero(cutting & ~(moves.feed > 0.0) & ~(moves.seconds > 0.0))
     if not len(bad):
         return []
     return [error("feed.missing", "cutting motion before any feed is stated, or at feed 0", file=toolpath.file,
-                  lines=moves.line[bad][:6].tolist(), count=len(bad), hint="put FEDRAT before the first cut")]
+                  lines=moves.line[bad][:6].tolist(), count=len(bad),
+                  hint="put FEDRAT before the first cut, or state [output] feed = MM_PER_MIN in the set-up for what has none")]
 
 
 def _opposite_axes(toolpath: Toolpath, moves: Moves) -> list[Diagnostic]:

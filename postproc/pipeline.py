@@ -110,7 +110,15 @@ def convert(path: Toolpath, machine: Machine | str | FilePath, controller: str |
     Raises:
         DiagnosticError: where machine, controller or set-up cannot be loaded.
     """
-    options = options or Options()
+    spec, machine, setup, options = _loaded(controller, machine, setup, options or Options())
+    path, choice, known = _oriented(path, machine, setup, options, _reading(path, diagnostics), progress)
+    start = PostResult("", options, machine, spec, FilePath(controller).stem, setup, known, path, choice=choice)
+    return start if not start.ok else _stages(start, progress)
+
+
+def _loaded(controller: str | FilePath, machine: Machine | str | FilePath, setup: SetupFile | str | FilePath | None,
+            options: Options) -> tuple[ControllerFile, Machine, SetupFile, Options]:
+    """Controller, machine and set-up from their files; the options with the name of the set-up's."""
     spec, found = load_controller(controller)
     toolpaths.diagnostics.require(found)
     machine = machine if isinstance(machine, Machine) else machines.load(machine)
@@ -120,10 +128,7 @@ def convert(path: Toolpath, machine: Machine | str | FilePath, controller: str |
         setup, more = load_setup(options.setup or None)
         toolpaths.diagnostics.require(more)
     assert spec is not None and setup is not None
-    spec = spec.divided(setup.output.files)
-    path, choice, known = _oriented(path, machine, setup, options, _reading(path, diagnostics), progress)
-    start = PostResult("", options, machine, spec, FilePath(controller).stem, setup, known, path, choice=choice)
-    return start if not start.ok else _stages(start, progress)
+    return spec.divided(setup.output.files), machine, setup, options
 
 
 def _oriented(path: Toolpath, machine: Machine, setup: SetupFile, options: Options, known: tuple[Diagnostic, ...],
@@ -280,6 +285,8 @@ def write_text(result: PostResult) -> tuple[str, dict[str, str]]:
               f"words: {_meanings(result.program)}",
               f"work offset {result.controller.program.offset_name(result.setup.work_offset_code)} in machine coordinates: "
               f"{offset}"]
+    if any(d.code == "feed.of_setup" for d in result.diagnostics):
+        header.append(f"feed {result.setup.output.feed:g} mm/min of the set-up where the CL file states none")
     header += _corrections(result) + _orientations(result)
     if result.toolpath.name:
         header.insert(1, f"part {result.toolpath.name}")
@@ -349,21 +356,15 @@ class VerifyResult:
 
 
 def verify(gcode: str | FilePath, path: Toolpath, machine: Machine | str | FilePath,
-           controller: str | FilePath = "linuxcnc", options: Options | None = None,
-           diagnostics: list[Diagnostic] | None = None, progress: Progress | None = None) -> VerifyResult:
-    """A G-code file against a Toolpath on a machine.
+           controller: str | FilePath = "linuxcnc", setup: SetupFile | str | FilePath | None = None,
+           options: Options | None = None, diagnostics: list[Diagnostic] | None = None,
+           progress: Progress | None = None) -> VerifyResult:
+    """A G-code file against a Toolpath on a machine; the arguments that `convert` has too are as there.
 
     Raises:
         DiagnosticError: where machine, controller or set-up cannot be loaded, or the G-code file not be opened.
     """
-    options = options or Options()
-    spec, more = load_controller(controller)
-    toolpaths.diagnostics.require(more)
-    machine = machine if isinstance(machine, Machine) else machines.load(machine)
-    setup, more = load_setup(options.setup or None)
-    toolpaths.diagnostics.require(more)
-    assert spec is not None and setup is not None
-    spec = spec.divided(setup.output.files)
+    spec, machine, setup, options = _loaded(controller, machine, setup, options or Options())
     try:
         data = FilePath(gcode).read_bytes()
     except OSError as fault:

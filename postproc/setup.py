@@ -70,6 +70,8 @@ class Output(UserModel):
     """every operation is a subprogram in a file of its own beside the program, which calls them"""
     longest: int = Field(default=0, ge=0)
     """most CL points of one part: longer operations are cut at rapids, each part begins as with restart; 0: any"""
+    feed: float | None = Field(default=None, gt=0.0)
+    """of cuts for which the CL file has stated none (no FEDRAT before them) but taps, mm/min; default: they are refused"""
 
     @property
     def apart(self) -> bool:

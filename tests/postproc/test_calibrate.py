@@ -73,10 +73,10 @@ def test_the_whole_loop_gains_what_it_should(folder: Path) -> None:
     assert result.ok
     (folder / "p.ngc").write_text(result.text)
     on_truth = Options(setup=setup, error_model=str(folder / "truth.toml"))
-    assert verify(folder / "p.ngc", path, machine, "linuxcnc", on_truth, notes).ok
+    assert verify(folder / "p.ngc", path, machine, "linuxcnc", None, on_truth, notes).ok
     plain = postproc.convert(path, machine, "linuxcnc", options=Options(setup=setup), diagnostics=notes)
     (folder / "n.ngc").write_text(plain.text)
-    assert not verify(folder / "n.ngc", path, machine, "linuxcnc", on_truth, notes).ok
+    assert not verify(folder / "n.ngc", path, machine, "linuxcnc", None, on_truth, notes).ok
 
 
 FAULTS = [

@@ -94,9 +94,10 @@ def test_what_is_right_on_one_machine_is_wrong_on_the_other(corrected: bool, tmp
     (tmp_path / "a.ngc").write_text(result.text)
     path, found = toolpaths.read(SAMPLES / "five_faces.cls")
     options = Options(setup=str(SAMPLES / "tools.setup.toml"), error_model="" if corrected else MIKRON)
-    crossed = verify(tmp_path / "a.ngc", path, "mikron-ucp710", "linuxcnc", options, found)
+    crossed = verify(tmp_path / "a.ngc", path, "mikron-ucp710", "linuxcnc", options=options, diagnostics=found)
     assert not crossed.ok and any(d.code.startswith("verify.") for d in crossed.diagnostics)
-    same = verify(tmp_path / "a.ngc", path, "mikron-ucp710", "linuxcnc", replace(options, error_model=model), found)
+    same = verify(tmp_path / "a.ngc", path, "mikron-ucp710", "linuxcnc", None,
+                  replace(options, error_model=model), found)
     assert same.ok
 
 

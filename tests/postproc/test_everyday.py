@@ -10,7 +10,6 @@ from typer.testing import CliRunner
 import postproc
 import toolpaths
 from postproc.cli import app
-from postproc.controllers.model import load_controller
 from postproc.setup import SetupFile
 from tests.postproc.kit import machine
 from toolpaths.diagnostics import Diagnostic, Severity
@@ -58,3 +57,36 @@ def test_inspect_prints_a_diagnostic_once(tmp_path: Path) -> None:
     file.write_text("GOTO/0,0,0\nGOTO/1,0,0\nFINI\n")
     got = CliRunner().invoke(app, ["inspect", str(file)])
     assert got.stderr.count("cl.no-units") == 1 and "cl.no-units" not in got.stdout and "2 points" in got.stdout
+
+
+NO_FEED = "UNITS/MM\nLOADTL/1\nSPINDL/RPM,1000,CLW\n"
+HOLE = "CYCLE/DRILL,DEPTH,5,CLEAR,2\nGOTO/30,0,0\nCYCLE/OFF\n"
+
+
+@pytest.mark.parametrize("controller", ["linuxcnc", "fanuc-30i", "siemens-840d", "heidenhain-tnc640"])
+def test_the_feed_of_the_set_up_is_that_of_what_the_file_states_none_for(controller: str, tmp_path: Path) -> None:
+    of, text = setup(output={"feed": 432.0}), NO_FEED + CUT + HOLE + "FEDRAT/MMPM,600\nRAPID\nGOTO/0,0,5\n" + CUT
+    result = converted(text, controller=controller, of=of)
+    assert not errors(result)
+    assert said(result, "feed.of_setup").lines == (6, 7, 11) and "432 mm/min" in said(result, "feed.of_setup").message
+    assert "F432" in result.text and "F600" in result.text and "432 mm/min of the set-up" in result.text.lower()
+    path, _ = toolpaths.read_bytes((text + "FINI\n").encode(), file="t.apt")
+    program = tmp_path / "p.nc"
+    program.write_text(result.text)
+    assert postproc.verify(program, path, machine("mill-3axis"), controller, setup=of).ok
+    other = postproc.verify(program, path, machine("mill-3axis"), controller, setup=setup(output={"feed": 200.0}))
+    assert "verify.feed" in {d.code for d in other.diagnostics}
+
+
+def test_a_missing_feed_is_refused_and_the_set_up_is_named() -> None:
+    assert "[output] feed" in said(converted(NO_FEED + CUT + HOLE), "feed.missing").hint
+
+
+def test_the_feed_of_the_set_up_replaces_none_that_is_stated() -> None:
+    asked, plain = converted(HEAD + CUT, of=setup(output={"feed": 50.0})), converted(HEAD + CUT)
+    assert asked.ok and asked.text == plain.text
+
+
+def test_a_tap_takes_no_feed_of_the_set_up() -> None:
+    result = converted(NO_FEED + "CYCLE/TAP,DEPTH,5,CLEAR,2\nGOTO/30,0,0\nCYCLE/OFF\n", of=setup(output={"feed": 50.0}))
+    assert "cl.cycle-value" in {d.code for d in result.diagnostics if d.severity is Severity.ERROR}

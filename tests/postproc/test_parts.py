@@ -76,10 +76,10 @@ def test_parts_in_files_read_back_as_the_part(controller: str, tmp_path: Path) -
     file = tmp_path / "setup.toml"
     file.write_text((SAMPLES / "tools.setup.toml").read_text() + "\n[output]\nfiles = true\nlongest = 12\n")
     options = result.options.__class__(setup=str(file))
-    assert verify(main, read("five_faces.cls"), "mikron-ucp710", controller, options).ok
+    assert verify(main, read("five_faces.cls"), "mikron-ucp710", controller, options=options).ok
     last = sorted(result.files)[-1]
     (tmp_path / last).write_text(result.files[last].replace("17", "16", 1).replace("18", "13"))
-    assert not verify(main, read("five_faces.cls"), "mikron-ucp710", controller, options).ok
+    assert not verify(main, read("five_faces.cls"), "mikron-ucp710", controller, options=options).ok
 
 
 def test_restart_parts_in_one_program() -> None:

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pytest
 
-from postproc.options import Options
 from postproc.pipeline import verify
 from tests.postproc.kit import TOOLS, convert, good, toolpath
 from tests.postproc.program_kit import LOAD, blocks, command, drilled, lines, program, step
@@ -143,7 +142,7 @@ def test_stops_and_rests_are_missed(controller: str, code: str, fault: str, tmp_
     file = tmp_path / "TEST.nc"
     for lines_, expected in ((text.splitlines(), set()), (kept, {fault})):
         file.write_text("\n".join(lines_) + "\n")
-        result = verify(file, WAITS, "mill-3axis", controller, Options(setup=str(TOOLS)))
+        result = verify(file, WAITS, "mill-3axis", controller, TOOLS)
         assert {d.code for d in result.diagnostics if d.severity.name == "ERROR"} == expected
 
 

@@ -107,12 +107,12 @@ def test_the_read_back_sees_another_angle(tmp_path: Path) -> None:
     result = postproc.convert(path, machine("mikron-ucp710"), "linuxcnc", options=Options(setup=str(TOOLS)))
     assert result.ok, [str(d) for d in result.diagnostics]
     file.write_text(result.text)
-    same = postproc.pipeline.verify(file, path, machine("mikron-ucp710"), "linuxcnc", Options(setup=str(TOOLS)))
+    same = postproc.pipeline.verify(file, path, machine("mikron-ucp710"), "linuxcnc", TOOLS)
     assert same.ok, [str(d) for d in same.diagnostics]
     spin = path.spin
     assert spin is not None
     other = postproc.pipeline.verify(file, replace(path, spin=spin + np.radians(5.0)), machine("mikron-ucp710"), "linuxcnc",
-                                     Options(setup=str(TOOLS)))
+                                     TOOLS)
     told = [d for d in other.diagnostics if d.code == "verify.spin"]
     assert len(told) == 1 and "5.0000 degrees turned about its axis" in told[0].message
 

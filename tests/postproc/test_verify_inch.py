@@ -33,7 +33,7 @@ def test_feeds_in_inches(controller: str, tmp_path: Path) -> None:
     for share in (0.5, 1.0, 2.0):
         file = tmp_path / "inch.nc"
         file.write_text(in_inches(made.text, share))
-        result = verify(file, path, "mill-3axis", controller, options)
+        result = verify(file, path, "mill-3axis", controller, options=options)
         found[share] = {d.code for d in result.diagnostics if d.code.startswith("verify.")}
     assert found[1.0] == set()
     assert "verify.slow" in found[0.5] and "verify.feed" in found[2.0]

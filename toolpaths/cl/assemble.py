@@ -52,6 +52,7 @@ def assemble(b: Builder) -> Toolpath:
     kind[cycle >= 0] = Kind.RAPID
     cycle, cycles = _used_cycles(b, cycle)
     feed, mode = _feeds(b, rows, kind)
+    cycles = _fed_cycles(cycle, cycles, feed, mode)
     operation, operations, frames = _operations(b, n)
     tool, tools = _tools(b, n)
     pass_ = passes((kind == Kind.RAPID) & (role != Role.HOLE), operation, tool)
@@ -257,6 +258,15 @@ def _used_cycles(b: Builder, cycle: Array) -> tuple[Array, tuple[Cycle, ...]]:
     index = np.full(len(b.cycles) + 1, -1, np.int32)
     index[used] = np.arange(len(used))
     return index[cycle], tuple(b.cycles[i] for i in used)
+
+
+def _fed_cycles(cycle: Array, cycles: tuple[Cycle, ...], feed: Floats, mode: Array) -> tuple[Cycle, ...]:
+    """The cycles; those that state no feed, where none held yet, have that of their first hole."""
+    result = list(cycles)
+    for k in [k for k, c in enumerate(cycles) if np.isnan(c.feed)]:
+        row = int(np.flatnonzero(cycle == k)[0])
+        result[k] = replace(cycles[k], feed=float(feed[row]), feed_mode=FeedMode(int(mode[row])))
+    return tuple(result)
 
 
 def _feeds(b: Builder, rows: Rows, kind: Array) -> tuple[Floats, Array]:

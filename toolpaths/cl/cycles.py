@@ -234,8 +234,11 @@ def _cycle_feed(b: Builder, v: Values) -> tuple[float, FeedMode, float | None]:
     if v.kind == "TAP" and pitch is not None:
         return pitch, FeedMode.PER_REVOLUTION, pitch
     feed, mode = b.feed.now
-    if math.isnan(feed) and b.feed.values:
-        b.log.error("cl.cycle-value", f"CYCLE/{v.kind} states no feed and none holds", b.line)
+    if math.isnan(feed) and v.kind == "TAP":
+        b.log.error("cl.cycle-value", "CYCLE/TAP states neither pitch nor feed, and no feed holds", b.line,
+                    "write it with PITCH, or a feed per revolution")
+    elif math.isnan(feed):
+        b.log.warning("cl.no-feed", f"CYCLE/{v.kind} states no feed and none holds", b.line)
     else:
         b.log.info("cl.cycle-feed", f"CYCLE/{v.kind} states no feed, the one in force is taken", b.line)
     return feed, mode, pitch

@@ -213,7 +213,7 @@ def _cycles(p: Toolpath, add: Callable[..., None]) -> None:
 def _cycle(c: Cycle) -> list[str]:
     retract: str | float = "AUTO" if c.retract is None else c.retract
     words: list[str | float] = [c.kind, "DEPTH", c.depth, "CLEAR", c.clearance, "RETURN", retract]
-    words += feed_words(c.feed, c.feed_mode).split(",")[:1] if math.isnan(c.feed) else [feed_words(c.feed, c.feed_mode)]
+    words += [] if math.isnan(c.feed) else [feed_words(c.feed, c.feed_mode)]
     if c.steps:
         words += ["STEP", *c.steps]
     if c.dwell:
