@@ -1,0 +1,86 @@
+"""The whole program beside the bodies of the set-up: every block that is run, linking moves too, as the control runs it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from postproc.collision.bodies import Scene, Touch, scene, touches
+from postproc.collision.executed_way import way_of
+from postproc.collision.form import Form, lever_of, tool_form
+from postproc.collision.swept import Swept
+from postproc.moves import Moves, Phase
+from postproc.readback.execute import Motion
+from postproc.readback.faults import Faults
+from postproc.readback.poses import Executed, begins
+from toolpaths.arrays import Bools, Ints
+from toolpaths.diagnostics import Diagnostic, has_errors
+
+if TYPE_CHECKING:
+    from postproc.job import Job
+
+
+def check_bodies(motion: Motion, executed: Executed, job: Job, owner: Ints, faults: Faults) -> list[Diagnostic]:
+    """Errors where a tool comes nearer to part, table or fixture than the set-up allows; nothing without [bodies].
+
+    Args:
+        owner: (E,) the move that each block serves
+    """
+    if job.setup.bodies is None:
+        return []
+    file = job.options.setup
+    bodies, found = scene(job.setup, job.placement, file)
+    if bodies is None:
+        return found
+    moves = job.moves.without_pecks()
+    drilling = _drilling(moves)[np.minimum(owner, len(moves) - 1)] & (owner < len(moves))
+    known = {tool.number: tool for tool in job.toolpath.tools}
+    for number in np.unique(motion.tool[_moving(motion)]).tolist():
+        form, more = tool_form(max(number, 0), known.get(max(number, 0)), job.setup.tools.get(str(max(number, 0))), file)
+        found += more
+        if len(form.pieces) and not has_errors(more):
+            rows = np.flatnonzero(motion.tool == number)
+            way, lost = way_of(motion, executed, job.kinematics_of(number), rows, lever_of(form))
+            found += [] if not len(lost) else [_unbounded(motion, moves, owner, lost, faults)]
+            found += _told(bodies, form, way, drilling, motion, (moves, owner), faults)
+    return found
+
+
+def _moving(motion: Motion) -> Bools:
+    """(E,) blocks that move something."""
+    return np.asarray((motion.end != begins(motion, np.arange(len(motion)))).any(axis=1) | (motion.code == 2))
+
+
+def _drilling(moves: Moves) -> Bools:
+    """(M,) moves in a hole: a tap is larger than its core, a drill's tip deeper than a flat bottom."""
+    return np.asarray((moves.hole >= 0) & (moves.phase != Phase.POSITION))
+
+
+def _told(bodies: Scene, form: Form, way: Swept, drilling: Bools, motion: Motion, served: tuple[Moves, Ints],
+          faults: Faults) -> list[Diagnostic]:
+    """One error per pair, at its worst place."""
+    cutting = way.take(np.flatnonzero(~drilling[way.row])) if drilling.any() else None
+    result = []
+    for touch in touches(bodies, form, way, cutting):
+        code = "collision.gouge" if touch.limit < 0.0 else "collision.near" if touch.distance > 0.0 else "collision.touch"
+        result.append(faults.error(code, str(touch), *_lines(touch.place, motion, served), hint=_hint(touch)))
+    return result
+
+
+def _hint(touch: Touch) -> str:
+    if touch.limit < 0.0:
+        return "another tool axis or path; [bodies] gouge is what the tolerances of path and mesh may add up to"
+    return "another tool axis (postproc orient), a longer or slimmer tool, a higher clearance.distance, or move the fixture"
+
+
+def _lines(row: int, motion: Motion, served: tuple[Moves, Ints]) -> tuple[int, int]:
+    """(line of the CL file, line of the program); behind the last move the last one counts."""
+    moves, owner = served
+    return int(moves.line[min(int(owner[row]), len(moves) - 1)]), int(motion.line[row])
+
+
+def _unbounded(motion: Motion, moves: Moves, owner: Ints, rows: Ints, faults: Faults) -> Diagnostic:
+    return faults.warning("collision.bound", "between its ends a block is looked at in places only: the way of the tool "
+                          "has no bound there", *_lines(int(rows[0]), motion, (moves, owner)), count=len(rows),
+                          hint="it comes near to where the machine is singular")
