@@ -23,6 +23,7 @@ from postproc.records import plain_records
 from postproc.rounding import Rounding, decimals, rounding_bound
 from postproc.setup import Placement, SetupFile, part_placement, work_frame
 from postproc.stated_feeds import without_feed
+from postproc.tool_numbers import numbered
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error, has_errors, info, warning
 from toolpaths.toolpath import Role, Toolpath
@@ -124,7 +125,9 @@ class Job:
 def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, setup: SetupFile,
             options: Options) -> tuple[Job | None, list[Diagnostic]]:
     """The job (its path has plain records, see `plain_records`), or None and why there is none."""
-    toolpath, diagnostics = plain_records(toolpath, controller)
+    toolpath, diagnostics = numbered(toolpath, setup, options.setup)
+    toolpath, found = plain_records(toolpath, controller)
+    diagnostics += found
     toolpath, found = cut_operations(toolpath, setup.output.longest)
     diagnostics += found
     diagnostics += [*_refused(toolpath), *_no_inverse_time(controller, options)]

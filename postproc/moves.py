@@ -219,7 +219,7 @@ def _missing_feeds(toolpath: Toolpath, moves: Moves) -> list[Diagnostic]:
         return []
     return [error("feed.missing", "cutting motion before any feed is stated, or at feed 0", file=toolpath.file,
                   lines=moves.line[bad][:6].tolist(), count=len(bad),
-                  hint="put FEDRAT before the first cut, or state [output] feed = MM_PER_MIN in the set-up for what has none")]
+                  hint="put FEDRAT before the first cut, or state [output] feed = MM_PER_MIN in the set-up for such cuts")]
 
 
 def _opposite_axes(toolpath: Toolpath, moves: Moves) -> list[Diagnostic]:

@@ -285,6 +285,9 @@ def write_text(result: PostResult) -> tuple[str, dict[str, str]]:
               f"words: {_meanings(result.program)}",
               f"work offset {result.controller.program.offset_name(result.setup.work_offset_code)} in machine coordinates: "
               f"{offset}"]
+    if result.setup.tool_numbers:
+        numbers = dict.fromkeys(f"{t.name} = T{t.number}" for t in result.toolpath.tools if t.name)
+        header.append("tool numbers of the set-up: " + ", ".join(numbers))
     if any(d.code == "feed.of_setup" for d in result.diagnostics):
         header.append(f"feed {result.setup.output.feed:g} mm/min of the set-up where the CL file states none")
     header += _corrections(result) + _orientations(result)

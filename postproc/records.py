@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -15,11 +14,11 @@ import numpy as np
 from postproc.controllers.model import ControllerFile
 from postproc.coolant import COMMANDS, LABELS, asked, coolant_words, written
 from postproc.events import Spindle, numbers, speed_said, spindle_after, spindle_states, words
+from postproc.tool_numbers import Report, check_numbers
 from toolpaths.diagnostics import Diagnostic, Severity
-from toolpaths.toolpath import Event, Kind, Tool, Toolpath
+from toolpaths.toolpath import Event, Toolpath
 from toolpaths.units import PER_MINUTE
 
-Report = Callable[[Severity, str, str, int, str], None]
 _SPINDLE = frozenset({"RPM", "CLW", "CCLW", "ON", "OFF", "SFM", "SMM", "NEUTRL", "NEUTRAL"})
 _RANGES = frozenset({"RANGE", "LOW", "MEDIUM", "HIGH"})
 _COOLANT = frozenset({"ON", "OFF", "FLOOD", "MIST", "THRU", "AIR"})
@@ -67,7 +66,7 @@ def plain_records(toolpath: Toolpath, controller: ControllerFile) -> tuple[Toolp
             elif plain.word == "CUTCOM":
                 _check_compensation(plain, found.add)
             events.append(plain)
-    _check_tools(toolpath, found.add)
+    check_numbers(toolpath, found.add)
     plain_path = _dwells_in_seconds(replace(toolpath, events=tuple(events)), found.add)
     return plain_path, found.diagnostics()
 
@@ -188,40 +187,6 @@ def _check_compensation(event: Event, report: Report) -> None:
     for word in said:
         if word not in _PLAIN_CUTCOM and word not in planes:
             report(Severity.WARNING, "cutcom.word", f"CUTCOM/{word} is not carried out", event.line, "")
-
-
-def _check_tools(toolpath: Toolpath, report: Report) -> None:
-    """Different tools under one number that both cut."""
-    cutting = toolpath.tool[(toolpath.kind != Kind.RAPID) | (toolpath.cycle >= 0)]
-    lines = toolpath.line[(toolpath.kind != Kind.RAPID) | (toolpath.cycle >= 0)]
-    used, first = np.unique(cutting, return_index=True)
-    known: dict[int, list[tuple[Tool, int]]] = {}
-    for index, at in sorted(zip(used.tolist(), first.tolist(), strict=True), key=lambda pair: pair[1]):
-        if index < 0:
-            continue
-        tool, line = toolpath.tools[index], int(lines[at])
-        others = known.setdefault(tool.number, [])
-        other = next((o for o in others if _differ(o[0], tool)), None)
-        if other:
-            hint = f"cutting begins at lines {other[1]} and {line}; number the tools in the CAM system"
-            named = other[0].name or tool.name or other[0].shape or tool.shape
-            report(Severity.ERROR if named else Severity.WARNING, "tool.same_number", "different tools have the number "
-                   f"{tool.number}: {_called(other[0])} and {_called(tool)}", other[1], hint)
-        others.append((tool, line))
-
-
-def _differ(a: Tool, b: Tool) -> bool:
-    """True where a text or size that both state is not the same."""
-    pairs = ((a.diameter, b.diameter), (a.corner_radius, b.corner_radius), (a.tip_angle, b.tip_angle), (a.taper, b.taper))
-    stated = [abs(x - y) > 1e-6 for x, y in pairs if x is not None and y is not None]
-    names = a.name and b.name and a.name.upper() != b.name.upper() and not stated
-    shapes = a.shape and b.shape and a.shape != b.shape
-    return bool(names or shapes or any(stated))
-
-
-def _called(tool: Tool) -> str:
-    size = "" if tool.diameter is None else f" diameter {tool.diameter:g}"
-    return f"{tool.name or tool.shape or 'a tool'}{size}"
 
 
 def _dwells_in_seconds(toolpath: Toolpath, report: Report) -> Toolpath:

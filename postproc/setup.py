@@ -135,6 +135,10 @@ class SetupFile(UserModel):
     clearance: Clearance = Clearance()
     tools: dict[Annotated[str, Field(pattern=r"^(0|[1-9][0-9]*)$")], ToolSetup] = Field(default_factory=dict)
     """by tool number without leading zeros, e.g. [tools.1]"""
+    tool_numbers: dict[Annotated[str, Field(min_length=1)], Annotated[int, Field(ge=1, lt=10**9)]] = Field(
+        default_factory=dict)
+    """by name of the tool in the CL file (see inspect), e.g. [tool_numbers] "EM12" = 2: its number, whatever the file loads
+    it by; lengths in [tools.2] are then its"""
     output: Output = Output()
     control_pivots: dict[Annotated[str, Field(pattern="^[ABC]$")], Pivot] = Field(default_factory=dict)
     """by rotary axis, e.g. [control_pivots.A]: what the control's parameters say; default: as the machine file"""

@@ -20,8 +20,9 @@ from postproc.orientation.cutter import ball_radius
 from postproc.orientation.surface import Surface, surface_of
 from postproc.pass_geometry import chains, stops_of
 from postproc.setup import Placement, SetupFile, part_placement
+from postproc.tool_numbers import numbered
 from toolpaths.arrays import Bools, Floats, Ints
-from toolpaths.diagnostics import Diagnostic, error, has_errors
+from toolpaths.diagnostics import Diagnostic, Severity, error, has_errors
 from toolpaths.rotations import angle_between
 from toolpaths.shape import Curves
 from toolpaths.smoothing.smooth import Smooth, Tolerance, smooth_all
@@ -132,8 +133,10 @@ def work_of(toolpath: Toolpath, machine: Machine, setup: SetupFile, options: Opt
     if not bool((toolpath.role != Role.START).any()):
         return None, [error("orient.no_motion", "the file commands no motion", file=toolpath.file,
                             hint="it needs GOTO records")]
+    toolpath, more = numbered(toolpath, setup, options.setup)
+    found += [d for d in more if d.severity is Severity.ERROR]
     moves, more = build_moves(toolpath, setup, options.axis_tolerance * DEG)
-    if has_errors(more):
+    if has_errors([*found, *more]):
         return None, [*found, *more]
     moves = moves.placed(placement)
     normals = None if toolpath.normal is None else placement.directions(toolpath.normal)[moves.row]

@@ -90,3 +90,50 @@ def test_the_feed_of_the_set_up_replaces_none_that_is_stated() -> None:
 def test_a_tap_takes_no_feed_of_the_set_up() -> None:
     result = converted(NO_FEED + "CYCLE/TAP,DEPTH,5,CLEAR,2\nGOTO/30,0,0\nCYCLE/OFF\n", of=setup(output={"feed": 50.0}))
     assert "cl.cycle-value" in {d.code for d in result.diagnostics if d.severity is Severity.ERROR}
+
+
+TWO = "".join(f"TOOL PATH/OP_{name},TOOL,{name}\nTLDATA/MILL,{size},0,75,0,0\nMSYS/0,0,0,1,0,0,0,1,0\nLOAD/TOOL,0\n"
+              f"SPINDL/RPM,2500,CLW\nFEDRAT/MMPM,400\n{CUT}END-OF-PATH\n" for name, size in (("EM12", 12), ("EM6", 6)))
+NAMES = {"em12": 1, "EM6": 2}
+
+
+def test_two_tools_of_one_number_are_refused_and_the_set_up_is_named() -> None:
+    hint = said(converted(TWO), "tool.same_number").hint
+    assert '[tool_numbers] "EM12" = 1, "EM6" = 2' in hint
+
+
+@pytest.mark.parametrize("controller", ["linuxcnc", "fanuc-30i", "siemens-840d", "heidenhain-tnc640"])
+def test_the_set_up_numbers_tools_by_name(controller: str, tmp_path: Path) -> None:
+    of = setup(tool_numbers=NAMES)
+    result = converted(TWO, controller=controller, of=of)
+    assert not errors(result) and result.job is not None and "EM12 = T1, EM6 = T2" in result.text.upper()
+    plain = TWO.replace("LOAD/TOOL,0", "LOAD/TOOL,1", 1).replace("LOAD/TOOL,0", "LOAD/TOOL,2")
+    assert said_by(result.text) == said_by(converted(plain, controller=controller).text)
+    assert result.job.register_lengths() == {1: 100.0, 2: 80.0}
+    path, _ = toolpaths.read_bytes((TWO + "FINI\n").encode(), file="t.apt")
+    (tmp_path / "p.nc").write_text(result.text)
+    assert postproc.verify(tmp_path / "p.nc", path, machine("mill-3axis"), controller, setup=of).ok
+    swapped = setup(tool_numbers={"EM12": 2, "EM6": 1})
+    assert not postproc.verify(tmp_path / "p.nc", path, machine("mill-3axis"), controller, setup=swapped).ok
+
+
+def said_by(text: str) -> list[str]:
+    """The blocks of a program without their numbers and without comments."""
+    return [block.lstrip("0123456789 ") for block in text.splitlines() if "(" not in block and ";" not in block]
+
+
+def test_a_tool_that_is_never_loaded_is_not_numbered() -> None:
+    second = TWO.rindex("LOAD/TOOL,0\n")
+    found = said(converted(TWO[:second] + TWO[second + 12:], of=setup(tool_numbers=NAMES)), "tool.not_loaded")
+    assert "EM6 (T2)" in found.message
+
+
+def test_names_that_the_file_does_not_have_are_told() -> None:
+    found = said(converted(TWO, of=setup(tool_numbers={**NAMES, "BALL8": 3})), "setup.tool_name_unused")
+    assert "BALL8" in found.message and "EM12, EM6" in found.hint
+
+
+def test_a_selected_tool_is_that_which_is_loaded_next() -> None:
+    text = TWO.replace("END-OF-PATH\n", "SELECT/TOOL,0\nEND-OF-PATH\n", 1)
+    result = converted(text, of=setup(tool_numbers=NAMES))
+    assert not errors(result) and "T2" in result.text.splitlines()

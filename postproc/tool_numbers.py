@@ -1,0 +1,107 @@
+"""Numbers of tools: one for each, where a CAM system leaves all at 0 by the names that the set-up numbers."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from postproc.events import TOOL_WORDS, loaded_tools
+from postproc.setup import SetupFile
+from toolpaths.arrays import Ints
+from toolpaths.diagnostics import Diagnostic, Severity, error, info
+from toolpaths.toolpath import Event, Kind, Tool, Toolpath
+
+Word = str | float
+Report = Callable[[Severity, str, str, int, str], None]
+
+
+def numbered(toolpath: Toolpath, setup: SetupFile, file: str = "") -> tuple[Toolpath, list[Diagnostic]]:
+    """The path with the set-up's `[tool_numbers]` in its tools and in the records that load them; `file` is the set-up's.
+
+    A record loads the tool that the rows behind it are cut with; SELECT prepares the one that is loaded next.
+    """
+    if not setup.tool_numbers:
+        return toolpath, []
+    asked = {name.upper(): number for name, number in setup.tool_numbers.items()}
+    tools = tuple(replace(t, number=asked.get(t.name.upper(), t.number)) for t in toolpath.tools)
+    result = replace(toolpath, tools=tools, events=_events(toolpath, tools, asked))
+    known = {t.name.upper() for t in tools}
+    unknown = [name for name in setup.tool_numbers if name.upper() not in known]
+    found = [info("setup.tool_name_unused", f"[tool_numbers]: the CL file has no tool {', '.join(unknown)}", file=file,
+                  hint="its tools: " + (", ".join(sorted(t.name for t in tools if t.name)) or "none has a name"))
+             ] if unknown else []
+    return result, found + _not_loaded(result, asked)
+
+
+def _events(toolpath: Toolpath, tools: tuple[Tool, ...], asked: dict[str, int]) -> tuple[Event, ...]:
+    """The records in order, tools in their new numbers."""
+    result: list[Event] = []
+    next_one: tuple[Word, Word] = "", ""
+    for event in reversed(toolpath.events):
+        if event.word in TOOL_WORDS and event.values:
+            index = int(toolpath.tool[event.index]) if event.index < len(toolpath) else -1
+            own = index >= 0 and tools[index].name.upper() in asked
+            next_one = event.values[0], float(tools[index].number) if own else event.values[0]
+            event = replace(event, values=(next_one[1], *event.values[1:]))
+        elif event.word == "SELECT" and event.values[:1] == next_one[:1]:
+            event = replace(event, values=next_one[1:])
+        result.append(event)
+    return tuple(reversed(result))
+
+
+def _not_loaded(toolpath: Toolpath, asked: dict[str, int]) -> list[Diagnostic]:
+    """Cuts with a tool that the set-up numbers while the file has loaded another."""
+    own = np.array([t.number if t.name.upper() in asked else -1 for t in toolpath.tools] + [-1])[toolpath.tool]
+    cutting = (toolpath.kind != Kind.RAPID) | (toolpath.cycle >= 0)
+    rows: Ints = np.flatnonzero(cutting & (own >= 0) & (own != loaded_tools(toolpath)))
+    if not len(rows):
+        return []
+    tool = toolpath.tools[int(toolpath.tool[rows[0]])]
+    return [error("tool.not_loaded", f"the file cuts with {tool.name} (T{tool.number}) without a record that loads it",
+                  file=toolpath.file, lines=toolpath.line[rows[:6]].tolist(), count=len(rows),
+                  hint="put LOAD/TOOL or LOADTL before it in the CAM system")]
+
+
+def check_numbers(toolpath: Toolpath, report: Report) -> None:
+    """Different tools under one number that both cut."""
+    cutting = toolpath.tool[(toolpath.kind != Kind.RAPID) | (toolpath.cycle >= 0)]
+    lines = toolpath.line[(toolpath.kind != Kind.RAPID) | (toolpath.cycle >= 0)]
+    used, first = np.unique(cutting, return_index=True)
+    known: dict[int, list[tuple[Tool, int]]] = {}
+    for index, at in sorted(zip(used.tolist(), first.tolist(), strict=True), key=lambda pair: pair[1]):
+        if index < 0:
+            continue
+        tool, line = toolpath.tools[index], int(lines[at])
+        others = known.setdefault(tool.number, [])
+        other = next((o for o in others if _differ(o[0], tool)), None)
+        if other:
+            hint = f"cutting begins at lines {other[1]} and {line}; {_remedy(other[0], tool)}number them in the CAM system"
+            named = other[0].name or tool.name or other[0].shape or tool.shape
+            report(Severity.ERROR if named else Severity.WARNING, "tool.same_number", "different tools have the number "
+                   f"{tool.number}: {_called(other[0])} and {_called(tool)}", other[1], hint)
+        others.append((tool, line))
+
+
+def _remedy(a: Tool, b: Tool) -> str:
+    """How the set-up tells two tools of one number apart: by name, where they have different ones."""
+    if not a.name or not b.name or a.name.upper() == b.name.upper():
+        return ""
+    first, second = json.dumps(a.name, ensure_ascii=False), json.dumps(b.name, ensure_ascii=False)
+    return f"number them by name in the set-up ([tool_numbers] {first} = 1, {second} = 2, on lines of their own), or "
+
+
+def _differ(a: Tool, b: Tool) -> bool:
+    """True where a text or size that both state is not the same."""
+    pairs = ((a.diameter, b.diameter), (a.corner_radius, b.corner_radius), (a.tip_angle, b.tip_angle), (a.taper, b.taper))
+    stated = [abs(x - y) > 1e-6 for x, y in pairs if x is not None and y is not None]
+    names = a.name and b.name and a.name.upper() != b.name.upper() and not stated
+    shapes = a.shape and b.shape and a.shape != b.shape
+    return bool(names or shapes or any(stated))
+
+
+def _called(tool: Tool) -> str:
+    size = "" if tool.diameter is None else f" diameter {tool.diameter:g}"
+    return f"{tool.name or tool.shape or 'a tool'}{size}"
