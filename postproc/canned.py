@@ -17,8 +17,6 @@ from toolpaths.toolpath import Kind, Toolpath
 
 ROUNDED = 1.5
 """last decimals by which words along a hole may differ in a plane whose printed angles are rounded"""
-LOWERED = 0.05
-"""mm: what the correction of geometric errors may take a level below that of the hole before is less"""
 STATES_RETRACT = ("{retract}", "{second}")
 """one of them stands in cycles that state the level they retract to"""
 SINGLE_MOVES = frozenset({"DRILL", "THRU", "CSINK", "FACE", "DEEP", "BRKCHP", "BORE", "REAM"})
@@ -86,7 +84,7 @@ def _before_own_level(moves: Moves, path: Path, words: WordRows, z: int, first: 
     """How many blocks of a hole come down to the level that it retracts to: they stay blocks of their own."""
     placing = moves.phase[path.move[first:last + 1]] == Phase.POSITION
     level = np.abs(words.end[first:last + 1, z] - words.end[last, z]) < 1e-9
-    lowered = words.end[first:last + 1, z] < words.start[first:last + 1, z] - LOWERED
+    lowered = words.end[first:last + 1, z] < words.start[first:last + 1, z]
     found = np.flatnonzero(placing & level & lowered)
     return int(found[-1]) + 1 if len(found) else 0
 

@@ -131,11 +131,27 @@ def _points_by_mean(cut: Divided, moves: Moves, modes: OutputModes, work: Work, 
 
 def _at_ends(path: Path, moves: Moves, modes: OutputModes, work: Work, allowed: float) -> tuple[Path, CorrectedEnds]:
     """The path with its block ends corrected by the ways of `work`, holes as a whole; and what the correction said."""
-    found = work.ends()
+    found = _turned_in_travel(work.ends(), path, modes.control, work)
     corrected = framed(replace(path, q=found.q), path, modes, work)
     corrected = replace(corrected, q=unstated(kept_in_travel(corrected.q, path, modes.control), path))
     corrected, work.whole = whole_holes(corrected, path, moves, work, allowed)
     return corrected, found
+
+
+def _turned_in_travel(found: CorrectedEnds, path: Path, control: Control, work: Work) -> CorrectedEnds:
+    """The ends with no rotary joint beyond travel that the nominal one keeps: it stands at the end of travel, and what the
+    axis is then off by is residual."""
+    limits = control.machine.limits
+    inside = np.clip(found.q, limits.lower, limits.upper)
+    inside = np.where((path.q >= limits.lower) & (path.q <= limits.upper), inside, found.q)
+    rows = np.flatnonzero((inside != found.q)[:, work.rotary].any(axis=1) & ~path.home)
+    if not len(rows):
+        return found
+    q, after, residual = found.q.copy(), found.after.copy(), found.residual.copy()
+    q[rows] = work.at(path.q[rows], rows, work.way[rows], inside[rows][:, work.rotary])
+    residual[rows] = work.residual(path.q[rows], q[rows], rows, work.way[rows])
+    after[rows] = np.linalg.norm(residual[rows].reshape(-1, 2, 3), axis=2)
+    return replace(found, q=q, after=after, residual=residual)
 
 
 def kept_in_travel(q: Floats, path: Path, control: Control) -> Floats:

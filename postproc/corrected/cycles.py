@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from postproc.corrected.arcs import LOOSE
 from postproc.corrected.work import ALONE, Work
 from postproc.moves import Moves
 from postproc.path import FEED, Path
-from toolpaths.arrays import Floats, Ints
+from toolpaths.arrays import Bools, Floats, Ints
 
 SAME = 1e-6
 """mm: places nearer than this are one"""
@@ -19,10 +20,10 @@ SAME = 1e-6
 def whole_holes(path: Path, nominal: Path, moves: Moves, work: Work, allowed: float) -> tuple[Path, Ints]:
     """The path with holes corrected as a whole, and the hole (K,) that each block is of, ALONE for those of none.
 
-    Every block of a hole is corrected as its bottom is, but for the levels above the plane that drilling begins at: along
-    the tool these get the correction of the block that the tool comes from to the first of the holes that follow each
-    other. So distances from plane to bottom, and with them the pecks, stay as they are. Holes that this takes farther than
-    LOOSE times `allowed` mm from where they belong keep the corrections of their blocks and are written out.
+    Every block of a hole is corrected as its bottom is, but along the tool: the plane that drilling begins at gets the
+    least correction of the bottoms of the holes that follow each other, so that one plane serves all of them and no peck is
+    added, levels above it that of the block that the tool comes from to the first. Holes that this takes farther than LOOSE
+    times `allowed` mm from where they belong keep the corrections of their blocks and are written out.
     """
     hole = np.where(np.isnan(path.u) | path.home, -1, moves.hole[path.move])
     runs = np.flatnonzero(np.concatenate([[True], np.diff(hole) != 0]))
@@ -57,18 +58,62 @@ def _correct_sequence(path: Path, nominal: Path, holes: list[Ints], work: Work, 
     lead = int(holes[0][0]) - 1
     kin = work.kinematics(int(work.tools[lead + 1]))
     new, old = (p.frames[int(p.frame[lead + 1])].control for p in (path, nominal))
-    xyz, z = new.xyz, new.xyz[2]
-    came = float((new.words(path.q[[lead]], kin, 0.0) - old.words(nominal.q[[lead]], kin, 0.0))[0, z])
-    for rows in holes:
-        wanted, got = old.words(nominal.q[rows], kin, 0.0)[:, xyz], new.words(path.q[rows], kin, 0.0)
-        feeds = np.flatnonzero(path.code[rows] == FEED)
-        if np.ptp(wanted[max(int(feeds[0]) - 1, 0):, :2], axis=0).max() > SAME:
-            continue  # not along Z of the words: no control drills it by itself
-        bottom = int(feeds[np.argmin(wanted[feeds, 2])])
-        plane = wanted[max(int(feeds[0]) - 1, 0), 2]
-        off = got[bottom, xyz] - wanted[bottom]
-        got[:, xyz] = wanted + off
-        got[:, z] = wanted[:, 2] + np.where(wanted[:, 2] <= plane + SAME, off[2], came)
-        joints, way = new.joints(got, kin, 0.0), np.tile(work.way[rows[bottom]], (len(rows), 1))
-        if (work.off(nominal.q[rows], joints, rows, way) <= LOOSE * allowed).all():
-            q[rows], whole[rows] = joints, rows[0]
+    at = [_Hole(rows, old.words(nominal.q[rows], kin, 0.0)[:, new.xyz], new.words(path.q[rows], kin, 0.0)[:, new.xyz],
+                path.code[rows] == FEED) for rows in holes]
+    at = [hole for hole in at if hole.along_z]
+    if not at:
+        return
+    least = min(hole.off[2] for hole in at)
+    before, came = old.words(nominal.q[[lead]], kin, 0.0), new.words(path.q[[lead]], kin, 0.0)
+    z = new.xyz[2]
+    if abs(before[0, z] - at[0].plane) <= SAME and path.code[lead] != FEED and not path.home[lead]:
+        came[0, z] = before[0, z] + least
+        q[lead] = new.joints(came, kin, 0.0)[0]
+    for hole in at:
+        words = new.words(path.q[hole.rows], kin, 0.0)
+        words[:, new.xyz] = hole.corrected(least, float((came - before)[0, z]))
+        joints, way = new.joints(words, kin, 0.0), np.tile(work.way[hole.rows[hole.bottom]], (len(hole.rows), 1))
+        if (work.off(nominal.q[hole.rows], joints, hole.rows, way) <= LOOSE * allowed).all():
+            q[hole.rows], whole[hole.rows] = joints, hole.rows[0]
+
+
+@dataclass(frozen=True)
+class _Hole:
+    """A hole in words X, Y, Z: `wanted` (N, 3) nominal, `found` (N, 3) corrected block by block; `feeds` (N,) drill."""
+
+    rows: Ints
+    wanted: Floats
+    found: Floats
+    feeds: Bools
+
+    @cached_property
+    def bottom(self) -> int:
+        """Number of the deepest block."""
+        return int(np.argmin(np.where(self.feeds, self.wanted[:, 2], np.inf)))
+
+    @cached_property
+    def start(self) -> int:
+        """Number of the block that ends where drilling begins."""
+        return max(int(np.argmax(self.feeds)) - 1, 0)
+
+    @property
+    def along_z(self) -> bool:
+        """False where the tool does not stand along Z of the words: no control drills that by itself."""
+        return bool(np.ptp(self.wanted[self.start:, :2], axis=0).max() <= SAME)
+
+    @property
+    def plane(self) -> float:
+        """Level where drilling begins, nominal."""
+        return float(self.wanted[self.start, 2])
+
+    @property
+    def off(self) -> Floats:
+        """(3,) correction of the bottom."""
+        return np.asarray(self.found[self.bottom] - self.wanted[self.bottom])
+
+    def corrected(self, plane: float, above: float) -> Floats:
+        """(N, 3) all as the bottom, along the tool `plane` for the plane and `above` for what is above it."""
+        result = self.wanted + self.off
+        z = self.wanted[:, 2]
+        result[:, 2] = z + np.where(z < self.plane - SAME, self.off[2], np.where(z <= self.plane + SAME, plane, above))
+        return result

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from machines.geometric_error.lost_motion import GRAIN
 from postproc.holes import Phase
 from postproc.moves import Moves
 from postproc.readback.compare import Comparison
+from postproc.rounding import decimals
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.rotations import angle_between
 from toolpaths.toolpath import Kind
@@ -18,6 +18,9 @@ from toolpaths.units import DEG
 
 if TYPE_CHECKING:
     from postproc.pipeline import PostResult
+
+LOOKS = 500
+"""blocks at which lost motion is weighed"""
 
 
 @dataclass(frozen=True)
@@ -52,10 +55,10 @@ class AfterFormatting:
 def after_formatting(result: PostResult) -> AfterFormatting | None:
     """The deviations of a conversion that corrects geometric errors; None of one that does not or that is not proved.
 
-    CL points are where the tool cuts to: ends of feed moves and arcs, bottoms of holes. The
-    bound adds what the correction itself leaves (near poles, and where a machine cannot turn the tool), half a last
-    decimal in every word (`rounding_bound`), and for slides that lose motion the same once more and the grain below which
-    turning back is not made up for.
+    CL points are where the tool cuts to: ends of feed moves and arcs, bottoms of holes. The bound adds what the correction
+    itself leaves (near poles, and where a machine cannot turn the tool), half a last decimal in every word
+    (`rounding_bound`), and for joints that lose motion a whole one: rounded words may turn one back by that much, within
+    its play.
     """
     found, comparison, job = result.compensation, result.comparison, result.job
     if found is None or comparison is None or job is None or job.errors is None:
@@ -63,11 +66,27 @@ def after_formatting(result: PostResult) -> AfterFormatting | None:
     moves = job.moves.without_pecks()
     tip, axis = _nearest(comparison, moves)
     points = np.flatnonzero(_cl_points(moves) & np.isfinite(tip))
-    names, rotary = job.machine.axis_names, job.machine.rotary
-    losing = sum(not rotary[j] for j in job.errors.axes.two_way(names))
-    play = (job.rounding.tip + GRAIN[0] * np.sqrt(losing)) if losing else 0.0
-    return AfterFormatting(tip[points], axis[points], points, found.tip_after + job.rounding.tip + float(play),
-                           found.axis_after + job.rounding.axis)
+    tip_play, axis_play = _play(result)
+    return AfterFormatting(tip[points], axis[points], points, found.tip_after + job.rounding.tip + tip_play,
+                           found.axis_after + job.rounding.axis + axis_play)
+
+
+def _play(result: PostResult) -> tuple[float, float]:
+    """(mm, rad) that a last decimal of the words of joints with lost motion comes to, at up to LOOKS blocks."""
+    job, path = result.job, result.path
+    assert job is not None and job.errors is not None and path is not None
+    joints = job.errors.axes.two_way(job.machine.axis_names)
+    rows = np.flatnonzero(~path.home)
+    if not joints or not len(rows):
+        return 0.0, 0.0
+    q = path.q[rows[np.unique(np.linspace(0, len(rows) - 1, LOOKS).astype(np.int64))]]
+    step = (10.0 ** -decimals(job.control, job.controller) / job.control.unit)[joints]
+    worst = [0.0, 0.0]
+    for number in {tool.number for tool in job.toolpath.tools}:
+        rates = job.kinematics_of(number).jacobian(q)[:, :, joints]
+        for k, part in enumerate((rates[:, :3], rates[:, 3:])):
+            worst[k] = max(worst[k], float((np.linalg.norm(part, axis=1) @ step).max()))
+    return worst[0], worst[1]
 
 
 def _cl_points(moves: Moves) -> Bools:

@@ -77,8 +77,9 @@ class Work:
     def take_ways(self, q: Floats) -> None:
         """Find `way` and `drift` from the ends of the blocks corrected by mean ways, q (K, J).
 
-        A joint that the correction alone moves turns back too: what it loses is more than what it moves by; not
-        inside a hole, which is moved as a whole. Where joints do not run straight it is the sign of the last moment.
+        A joint that the correction alone moves turns back too: what it loses is more than what it moves by; inside a
+        hole, which is moved as a whole, it does so by shares. Where joints do not run straight it is the sign of the last
+        moment.
         """
         step, change = (np.nan_to_num(np.diff(x, axis=0, prepend=x[:1])) for x in (q, q - self.path.q))
         self.drift = np.where(np.abs(change) > np.where(self.rotary, GRAIN[1], GRAIN[0]), change, 0.0)
@@ -89,6 +90,9 @@ class Work:
         lateral = step[inside[:, None], self.two_way]
         step[inside[:, None], self.two_way] = np.where(np.abs(lateral) >= self.gaps(q[inside]), lateral, 0.0)
         self.way = turning_sign(step, self.rotary)
+        for rows in np.split(inside, np.flatnonzero(np.diff(inside, prepend=-2) > 1)[1:]) if len(inside) else []:
+            steps = Steps.of(np.diff(q[rows[0] - 1:rows[-1] + 1], axis=0)[:, self.two_way], self.gaps(q[rows]))
+            self.way[rows[:, None], self.two_way] = steps.walked().at(self.way[rows[:1] - 1][:, self.two_way])
 
     @cached_property
     def bent(self) -> Bools:
@@ -105,9 +109,12 @@ class Work:
 
         The correction counts as changing evenly over a block.
         """
+        return moving_sign(self._step(block, t, moment) + moment * self.drift[block], self.rotary)
+
+    def _step(self, block: Ints, t: Floats, moment: float) -> Floats:
         before = np.clip(t - moment, 0.0, 1.0 - moment)
-        step = self.nominal(block, before + moment) - self.nominal(block, before) + moment * self.drift[block]
-        return moving_sign(step, self.rotary)
+        result: Floats = self.nominal(block, before + moment) - self.nominal(block, before)
+        return result
 
     def way_at(self, block: Ints, t: Floats) -> Floats:
         """(N, J) sign of each joint's last motion inside blocks; a joint that rests there has that of the block's end."""
@@ -117,15 +124,19 @@ class Work:
         return np.asarray(np.where(moving != 0.0, moving, self.way[block]))
 
     def begin_way(self, block: Ints) -> Floats:
-        """(N, J) sign of each joint's first motion in blocks (N,); of a joint that rests, that of the block before."""
+        """(N, J) sign of each joint's first motion in blocks (N,).
+
+        That of the block before for one that rests, or that the correction alone moves: it has the whole block to take up
+        what it loses.
+        """
         first = np.zeros((len(block), self.path.q.shape[1]))
         if not self.two_way:
             return first
         arc = self.path.code[block] == ARC
         for rows, edges in ((np.flatnonzero(arc), EDGES), (np.flatnonzero(~arc), (0.0, 1.0))):
             for t in edges[::-1] if len(rows) else ():
-                sign = self.moving(block[rows], np.full(len(rows), t), LAST)
-                first[rows] = np.where(sign != 0.0, sign, first[rows])
+                step, drift = self._step(block[rows], np.full(len(rows), t), LAST), LAST * self.drift[block[rows]]
+                first[rows] = np.where(np.abs(step) > np.abs(drift), moving_sign(step + drift, self.rotary), first[rows])
         return np.asarray(np.where(first != 0.0, first, self.way[np.maximum(block - 1, 0)]))
 
     def played(self, way: Floats, q0: Floats, q: Floats) -> Floats:
@@ -228,12 +239,16 @@ class Work:
 
     def off(self, nominal: Floats, q: Floats, blocks: Ints, way: Floats) -> Floats:
         """Distance (N,) mm of the actual tip at q from the nominal one at `nominal` (N, J), inside blocks (N,)."""
-        result = np.empty(len(q))
+        return np.asarray(np.linalg.norm(self.residual(nominal, q, blocks, way)[:, :3], axis=1))
+
+    def residual(self, nominal: Floats, q: Floats, blocks: Ints, way: Floats) -> Floats:
+        """Tip and axis (N, 6) of the actual machine at q less those of the nominal one at `nominal` (N, J)."""
+        result = np.empty((len(q), 6))
         for k in groups(self.tools[blocks]):
             tool = int(self.tools[blocks[k[0]]])
-            actual, (tip, axis) = self.actual(tool), self.kinematics(tool).forward(nominal[k])
-            w = actual.coordinates(q[k], np.concatenate([tip, axis], axis=1))
-            result[k] = np.linalg.norm(actual.aim(w, way[k])[0] - tip, axis=1)
+            actual, wanted = self.actual(tool), np.concatenate(self.kinematics(tool).forward(nominal[k]), axis=1)
+            w = actual.coordinates(q[k], wanted)
+            result[k] = np.concatenate(actual.aim(w, way[k]), axis=1) - wanted
         return result
 
 

@@ -97,7 +97,8 @@ def _nearer(tip: Any, axis: Any, after: Any, axis_after: Any, end: Any, axis1: A
     if off <= grain and turn <= axis_grain:
         return False
     off_after, turn_after = _apart(after, end), _angle(axis_after, axis1)
-    return off_after <= max(off, grain) and turn_after <= max(turn, axis_grain)
+    comes = off_after < off - 0.1 * grain or turn_after < turn - 0.1 * axis_grain
+    return comes and off_after <= max(off, grain) and turn_after <= max(turn, axis_grain)
 
 
 def _walk(tip: Any, axis: Any, swept: Any, start: Any, end: Any, axis0: Any, axis1: Any, kind: Any, center: Any,
