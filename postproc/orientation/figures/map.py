@@ -27,6 +27,8 @@ WIDER = 1.5
 ROUND, OUT = 73, 25
 """grid of the ground"""
 LEVELS = 12
+FLAT = 1e-3
+"""part by which times differ that are not to be told apart"""
 
 
 def axes_map(sheet: Figure, place: PolarAxes, tried: Tried, made: Turned, work: Work) -> None:
@@ -38,45 +40,49 @@ def axes_map(sheet: Figure, place: PolarAxes, tried: Tried, made: Turned, work: 
     timed = _once([*groups.get("slower", []), *(one for one in (tried.own, tried.best, made) if np.isfinite(one.seconds))])
     most = WIDER * float(max([_polar(timed, frame, work)[1].max() if timed else 0.0, 20.0]))
     place.set_rlim(0.0, min(most, 180.0))
-    _ground(sheet, place, tried, timed, frame, work, most)
+    told = _ground(place, tried, frame, work, most)
+    _timed(sheet, place, timed, frame, work)
     for kind, (mark, colour) in MARKS.items():
         if kind in groups:
             azimuth, tilt = _polar(groups[kind], frame, work)
             out = int((tilt > most).sum())
-            told = f"{KINDS[kind]} ({len(tilt)}" + (f", {out} farther out)" if out else ")")
+            label = f"{KINDS[kind]} ({len(tilt)}" + (f", {out} farther out)" if out else ")")
             edge = {"edgecolors": "#333333"} if kind == "bound" else {}
             place.scatter(azimuth[tilt <= most], tilt[tilt <= most], marker=mark, s=26, color=colour, linewidths=1.0,
-                          label=told, **edge)
+                          label=label, **edge)
     for it, mark, name, size in ((tried.aimed, "^", "paper", 110), (tried.best, "*", "best", 190), (made, "o", "plan", 150)):
         if it is not None:
             place.scatter(*_polar([it], frame, work), marker=mark, s=size, facecolors="none", edgecolors="#c2453a",
                           linewidths=1.3, label=name, zorder=4)
     place.set_title("tool axes tried: degrees from the CL axis outwards,\n"
-                    f"azimuth about it from {_named(frame[1])} to {_named(frame[2])} of the part", fontsize="small")
+                    f"azimuth about it from {_named(frame[1])} to {_named(frame[2])} of the part{told}", fontsize="small")
     place.tick_params(labelsize="x-small")
     place.legend(loc="upper center", bbox_to_anchor=(0.6, -0.08), ncols=2, fontsize="x-small", frameon=False)
 
 
-def _ground(sheet: Figure, place: PolarAxes, tried: Tried, timed: list[Turned], frame: tuple[Floats, ...], work: Work,
-            most: float) -> None:
-    """What the reach along the mean direction allows, and over it the planned candidates, in one scale of colours."""
+def _ground(place: PolarAxes, tried: Tried, frame: tuple[Floats, ...], work: Work, most: float) -> str:
+    """What the reach along the mean direction allows, dark where it is fast; a line for the title."""
     around, out = np.meshgrid(np.linspace(0.0, 2.0 * np.pi, ROUND), np.linspace(0.0, most, OUT))
     least = _least(tried, frame, work, around, out)
-    times = np.array([one.seconds for one in timed])
-    every = np.concatenate((times, least[np.isfinite(least)]))
-    if not len(every):
+    known = least[np.isfinite(least)]
+    if not len(known) or np.ptp(known) <= FLAT * known.max():
+        return ""
+    low, high = float(known.min()), float(known.max())
+    drawn = place.contourf(around, out, np.ma.masked_invalid(least), LEVELS, cmap="Greys_r", vmin=low - 0.6 * (high - low),
+                           vmax=high)
+    drawn.set_rasterized(True)
+    return f"\nground: least seconds by the reach, {low:.3g} (dark) to {high:.3g}"
+
+
+def _timed(sheet: Figure, place: PolarAxes, timed: list[Turned], frame: tuple[Floats, ...], work: Work) -> None:
+    """The planned candidates, coloured by their time."""
+    if not timed:
         return
-    low = float(every.min())
-    colours = {"cmap": "viridis", "vmin": low, "vmax": max(float(every.max()), 1.01 * low)}
-    drawn: Any = None
-    if np.isfinite(least).any() and np.ptp(least[np.isfinite(least)]) > 0.0:
-        drawn = place.contourf(around, out, np.ma.masked_invalid(least), LEVELS, **colours)
-        drawn.set_rasterized(True)
-    if len(times):
-        drawn = place.scatter(*_polar(timed, frame, work), c=times, s=34, edgecolors="black", linewidths=0.6,
-                              label=f"planned ({len(times)})", zorder=3, **colours)
-    bar = sheet.colorbar(drawn, ax=place, shrink=0.75, pad=0.12)
-    bar.set_label("seconds: marks, as planned;\nground, least by the reach", fontsize="small")
+    times = np.array([one.seconds for one in timed])
+    drawn = place.scatter(*_polar(timed, frame, work), c=times, s=34, edgecolors="black", linewidths=0.6, zorder=3,
+                          cmap="viridis", vmin=times.min(), vmax=max(times.max(), (1.0 + FLAT) * times.min()),
+                          label=f"planned ({len(times)})")
+    sheet.colorbar(drawn, ax=place, shrink=0.75, pad=0.12).set_label("planned seconds", fontsize="small")
 
 
 def _least(tried: Tried, frame: tuple[Floats, ...], work: Work, around: Floats, out: Floats) -> Floats:
