@@ -13,6 +13,7 @@ from machines.machine import Machine
 from postproc.control import Control, Law
 from postproc.controllers.model import ControllerFile
 from postproc.events import register_changes, tool_changes
+from postproc.length_registers import own_registers
 from postproc.links import SafeSpace, safe_space
 from postproc.modes import OutputModes, output_modes
 from postproc.moves import Moves, build_moves
@@ -127,6 +128,8 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
     """The job (its path has plain records, see `plain_records`), or None and why there is none."""
     toolpath, diagnostics = numbered(toolpath, setup, options.setup)
     toolpath, found = plain_records(toolpath, controller)
+    diagnostics += found
+    toolpath, found = own_registers(toolpath, controller)
     diagnostics += found
     toolpath, found = cut_operations(toolpath, setup.output.longest)
     diagnostics += found

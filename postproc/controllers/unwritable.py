@@ -16,8 +16,8 @@ def unwritable(controller: ControllerFile, program: Program, cycles: tuple[Cycle
 
     `length_offsets` is False where the words hold the length of the tool already.
     """
-    return [*_own_length(controller, program, file, length_offsets), *_length_registers(controller, program, file),
-            *_radius_registers(controller, program, file), *_pitches(controller, program, cycles, file)]
+    return [*_own_length(controller, program, file, length_offsets), *_radius_registers(controller, program, file),
+            *_pitches(controller, program, cycles, file)]
 
 
 def _own_length(controller: ControllerFile, program: Program, file: str, length_offsets: bool) -> list[Diagnostic]:
@@ -37,24 +37,6 @@ def _commands(program: Program) -> Iterator[tuple[int, Command]]:
     for block, group in sorted(program.commands.items()):
         for command in group:
             yield block, command
-
-
-def _length_registers(controller: ControllerFile, program: Program, file: str) -> list[Diagnostic]:
-    """Another length register than the tool's, where a tool brings its own."""
-    if "{register}" in controller.codes.length_offset:
-        return []
-    tool, lines, example = 0.0, [], ""
-    for _, command in _commands(program):
-        if command.name == "CHANGE_TOOL":
-            tool = float(command.args[0])
-        elif command.name == "USE_TOOL_LENGTH_OFFSET" and float(command.args[0]) != tool:
-            lines.append(command.line)
-            example = f"T{tool:g} with length register {float(command.args[0]):g}"
-    if not lines:
-        return []
-    return [error("tool.register", f"{example}: this controller takes the length of the tool itself, there is no other "
-                  "register", file=file, lines=lines[:6], count=len(lines),
-                  hint="state no ADJUST, or the tool's number, in LOADTL")]
 
 
 def _radius_registers(controller: ControllerFile, program: Program, file: str) -> list[Diagnostic]:

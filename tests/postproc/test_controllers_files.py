@@ -91,14 +91,6 @@ def said(controller: str, made: Program, cycles: tuple[Cycle, ...] = ()) -> set[
 
 
 @pytest.mark.parametrize("name", ["siemens-840d", "heidenhain-tnc640"])
-def test_another_length_register_than_the_tools_is_refused(name: str) -> None:
-    own = program([step("rapid", X=1.0)], {0: LOAD})
-    other = program([step("rapid", X=1.0)], {0: [command("CHANGE_TOOL", 3.0), command("USE_TOOL_LENGTH_OFFSET", 13.0)]})
-    assert said(name, own) == set() and said(name, other) == {"ERROR tool.register"}
-    assert said("fanuc-30i", other) == set()
-
-
-@pytest.mark.parametrize("name", ["siemens-840d", "heidenhain-tnc640"])
 def test_a_radius_register_that_is_not_written_is_said(name: str) -> None:
     made = program([step("feed", X=1.0, F=1.0)], {0: [command("CUTTER_COMPENSATION_LEFT", 7.0)]})
     plain = program([step("feed", X=1.0, F=1.0)], {0: [command("CUTTER_COMPENSATION_LEFT")]})

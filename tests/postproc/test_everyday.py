@@ -137,3 +137,39 @@ def test_a_selected_tool_is_that_which_is_loaded_next() -> None:
     text = TWO.replace("END-OF-PATH\n", "SELECT/TOOL,0\nEND-OF-PATH\n", 1)
     result = converted(text, of=setup(tool_numbers=NAMES))
     assert not errors(result) and "T2" in result.text.splitlines()
+
+
+@pytest.mark.parametrize(("controller", "register", "code", "severity"), [
+    ("siemens-840d", 1, "D1", Severity.INFO), ("siemens-840d", 20, "D1", Severity.WARNING),
+    ("heidenhain-tnc640", 1, "TOOL CALL 10", Severity.WARNING), ("heidenhain-tnc640", 3, "TOOL CALL 10", Severity.WARNING)])
+def test_a_register_that_the_controller_does_not_have_is_told(controller: str, register: int, code: str,
+                                                              severity: Severity, tmp_path: Path) -> None:
+    of = setup(tools={"10": {"gauge_length": 70.0}})
+    text = HEAD.replace("LOADTL/1", f"LOADTL/10,ADJUST,{register}") + CUT
+    result = converted(text, controller=controller, of=of)
+    assert not errors(result) and code in result.text
+    found = said(result, "tool.register")
+    assert found.severity is severity and f"T10 (register {register})" in found.message and found.lines == (2,)
+    path, _ = toolpaths.read_bytes((text + "FINI\n").encode(), file="t.apt")
+    (tmp_path / "p.nc").write_text(result.text)
+    assert postproc.verify(tmp_path / "p.nc", path, machine("mill-3axis"), controller, setup=of).ok
+
+
+def test_a_register_that_may_be_a_cutting_edge_is_refused() -> None:
+    text = HEAD.replace("LOADTL/1", "LOADTL/10,ADJUST,2") + CUT
+    found = said(converted(text, controller="siemens-840d"), "tool.register")
+    assert found.severity is Severity.ERROR and "D2 to D9" in found.message
+    assert not [d for d in converted(text).diagnostics if d.code == "tool.register"]
+
+
+@pytest.mark.parametrize("controller", ["siemens-840d", "heidenhain-tnc640"])
+def test_two_registers_of_one_tool_are_refused_where_it_has_one_length(controller: str) -> None:
+    text = HEAD + CUT + "LOADTL/1,ADJUST,21\n" + CUT
+    assert said(converted(text, controller=controller), "tool.register").severity is Severity.ERROR
+    assert not errors(converted(text)) and "G43 H21" in converted(text).text
+
+
+@pytest.mark.parametrize("controller", ["siemens-840d", "heidenhain-tnc640"])
+def test_the_tools_own_number_as_register_is_nothing_to_tell(controller: str) -> None:
+    result = converted(HEAD.replace("LOADTL/1", "LOADTL/1,ADJUST,1") + CUT, controller=controller)
+    assert not errors(result) and "tool.register" not in {d.code for d in result.diagnostics}
