@@ -247,6 +247,8 @@ class Toolpath:
 
 
 def _same(a: object, b: object) -> bool:
+    if isinstance(a, np.ndarray) != isinstance(b, np.ndarray):
+        return False
     if isinstance(a, np.ndarray) and isinstance(b, np.ndarray):
         return a.shape == b.shape and bool(np.array_equal(a, b, equal_nan=a.dtype.kind == "f"))
     if isinstance(a, Arcs) and isinstance(b, Arcs):

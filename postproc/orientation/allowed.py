@@ -16,6 +16,7 @@ from toolpaths.units import DEG
 SAME = 1e-4
 """rad: axes nearer than this are one candidate"""
 _SLACK = 1e-9
+_FEW = 64
 NO_LIMITS = OrientationLimits()
 
 
@@ -72,13 +73,16 @@ class Allowed:
         return told
 
     def mask(self, one: Pass, axes: Floats) -> Bools:
-        """(M,) True for the axes (M, 3) that are inside the limits at every point of a pass (M x points at a time)."""
+        """(M,) True for the unit axes (M, 3) that are inside the limits at every point of a pass; memory for some of them at
+        a time. A few points are looked at first."""
         result = np.ones(len(axes), dtype=np.bool_)
-        step = one.contact.parts(len(axes))
-        for first in range(0, len(axes), max(1, step)):
-            some = axes[first:first + step]
-            for bound in self._bounds(one, some):
-                result[first:first + step] &= bound.over().max(axis=1, initial=-np.inf) <= _SLACK
+        few = np.unique(np.linspace(0, max(len(one.contact) - 1, 0), _FEW).astype(np.int64))
+        for planes, offset in self._planes(one):
+            for normals in (planes[few] if len(planes) > 2 * _FEW else planes, planes):
+                step, rows = one.contact.parts(len(axes)), np.flatnonzero(result)
+                for first in range(0, len(rows), step):
+                    some = rows[first:first + step]
+                    result[some] = np.fmax.reduce(axes[some] @ normals.T, axis=1, initial=-np.inf) <= offset + _SLACK
         return result
 
     def among(self, one: Pass, apart: float) -> Floats:
@@ -89,6 +93,20 @@ class Allowed:
     def touching(self, one: Pass, axis: Floats) -> str:
         """As `Bodies.touching`; the own axis of a pass can touch as well."""
         return "" if self.bodies is None else self.bodies.touching(one, axis)
+
+    def _planes(self, one: Pass) -> list[tuple[Floats, float]]:
+        """The limits as half-spaces: axes a with a . w <= offset for every row w (K, 3), NaN rows bound nothing.
+
+        An angle atan2(a . u, a . n) is at most h where a . (u cos h - n sin h) <= 0, for limits within +-90 degrees.
+        """
+        at, limits = one.contact, self.limits
+        if not len(at):
+            return [(-one.axis[None], -np.cos(self.tilt))]
+        result = [(-at.normal, -float(np.cos(self.tilt))), (at.normal, float(np.cos(off_centre(limits, one.radius))))]
+        for given, side in ((limits.lead, at.way), (limits.tilt, at.right)):
+            for angle, sign in ((given[0] * DEG, -1.0), (given[1] * DEG, 1.0)) if given is not None else ():
+                result.append((sign * (np.cos(angle) * side - np.sin(angle) * at.normal), 0.0))
+        return result
 
     def _bounds(self, one: Pass, axes: Floats) -> list[_Bound]:
         """What the limits make of unit axes (M, 3)."""

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from toolpaths.arrays import Floats, Ints
-from toolpaths.rotations import angle_between
 from toolpaths.shape import Curves
 from toolpaths.smoothing.tangents import rates
 
@@ -48,7 +48,7 @@ class Contact:
     def inclination(self, axes: Floats) -> Floats:
         """Angle (M, K) rad between unit axes (M, 3) and the normals; of a ball of radius R the contact is R sin of it
         away from the tool axis."""
-        return np.asarray(angle_between(self.normal[None], axes[:, None]))
+        return np.asarray(np.arccos(np.clip(axes @ self.normal.T, -1.0, 1.0)))
 
     def lead(self, axes: Floats) -> Floats:
         """Lead (M, K) rad of unit axes (M, 3): in the plane of feed and normal, positive towards the feed; NaN without a
@@ -57,7 +57,12 @@ class Contact:
 
     def tilt(self, axes: Floats) -> Floats:
         """Tilt (M, K) rad of unit axes (M, 3): in the plane square to the feed, positive to its right; NaN likewise."""
-        return np.asarray(np.arctan2(axes @ np.cross(self.way, self.normal).T, axes @ self.normal.T))
+        return np.asarray(np.arctan2(axes @ self.right.T, axes @ self.normal.T))
+
+    @cached_property
+    def right(self) -> Floats:
+        """(K, 3) unit directions to the right of the feed, the normal upwards; NaN likewise."""
+        return np.cross(self.way, self.normal)
 
     def parts(self, axes: int) -> int:
         """Axes to look at at a time, of so many."""

@@ -1,5 +1,6 @@
 """Axes of greatest reach at every tilt: where a vertex itself is outside travel or limits, or touches something, the best
-that is left lies on such a ridge, which steps in tilt or azimuth alone do not follow."""
+that is left lies on such a ridge, which steps in tilt or azimuth alone do not follow. And axes in narrow windows of limits.
+"""
 
 from __future__ import annotations
 
@@ -10,8 +11,7 @@ import numpy as np
 from machines.machine import Machine
 from machines.polytope import held_axis_polytope
 from postproc.orientation.passes import Pass
-from postproc.orientation.seeds import _sharpest as sharpest
-from postproc.orientation.seeds import across
+from postproc.orientation.seeds import across, sharpest
 from postproc.orientation.timed import Turned
 from toolpaths.arrays import Floats, Ints
 from toolpaths.rotations import angle_between
@@ -27,25 +27,42 @@ _AZIMUTHS = 72
 _PARTS = np.linspace(-1.0, 1.0, 11)
 _LEVELS = 3
 """of refinement, each to a fifth"""
+_LATTICES = (4.0 * DEG, 2.0 * DEG, 1.0 * DEG, 0.5 * DEG)
+_SOME = 12
 _LEAST = 1.01
 """reach that the best of a ring must have beside the CL's own axis to be worth anything"""
 
 
 def best_on_ridge(search: Search, best: Turned) -> Turned:
-    """The best of a candidate and of axes on ridges, ever farther from the CL's own axis, then finer where that ended."""
+    """The best of a candidate and of axes on ridges, ever farther from the CL's own axis, then finer where that ended; where
+    that finds nothing, of axes that lead and tilt allow."""
     one, allowed = search.one, search.allowed
     tilt = 0.5 * np.pi if len(one.contact) else min(allowed.tilt, 0.5 * np.pi)
     rings = tilt * np.arange(1, max(1, int(np.ceil(tilt / _RING))) + 1) / max(1, int(np.ceil(tilt / _RING)))
     before, best = best, _best_of(search, best, rings)
     if best is before:
-        return best
+        return _in_window(search, best) if best is search.own and allowed.limits.need_normals else best
     reached = float(angle_between(best.axis, one.axis))
     return _best_of(search, best, reached + rings[0] * np.arange(1, _FINER) / _FINER)
 
 
 def _best_of(search: Search, best: Turned, rings: Floats) -> Turned:
     axes = ridge_axes(search.one, search.machine, rings)
-    for made in sorted(search.add(axes[search.allowed.mask(search.one, axes)]), key=lambda made: made.bound):
+    return _better(search, best, axes[search.allowed.mask(search.one, axes)])
+
+
+def _in_window(search: Search, best: Turned) -> Turned:
+    """The best of a candidate and of some allowed axes, from the coarsest lattice that has any."""
+    for apart in _LATTICES:
+        axes = search.allowed.among(search.one, apart)
+        if len(axes):
+            some = np.unique(np.linspace(0, len(axes) - 1, min(len(axes), _SOME)).astype(np.int64))
+            return _better(search, best, search.one.kin.nearest_axis(axes[some]))
+    return best
+
+
+def _better(search: Search, best: Turned, axes: Floats) -> Turned:
+    for made in sorted(search.add(axes), key=lambda made: made.bound):
         best = search.better(best, made)
     return best
 

@@ -1,8 +1,8 @@
 """Choice of orientations beside all that it could choose, and what decides.
 
 python tests/benchmarks/bench_orientation_limits.py [brute | plans | cases]; brute: the search beside a grid of 0.25 degrees,
-every axis planned in full, on three passes of the test part; plans: `auto` beside all sequences of such axes on three short
-passes; cases: what travel, indexing time and a free rotary axis decide.
+every axis planned in full, on three passes of the test part; plans: `auto` beside all sequences of such axes on six strips;
+cases: what travel, indexing time and a free rotary axis decide.
 """
 
 from __future__ import annotations
@@ -114,25 +114,25 @@ def chosen(path: Toolpath, m: Machine, setup: SetupFile, max_tilt: float = 60.0)
     return choice
 
 
-def whole(m: Machine, path: Toolpath, cap: float, step: float) -> tuple[float, float]:
-    """(seconds of `auto`, least seconds of all sequences of axes of the grid), within `cap` of the CL's axes."""
+def whole(m: Machine, path: Toolpath, cap: float, step: float) -> tuple[float, float, float]:
+    """(seconds of `keep`, of `auto`, least seconds of all sequences of axes of the grid), within `cap` of the CL's axes."""
     choice = chosen(path, m, setup_of("tools.setup.toml"), cap / DEG)
     work, allowed = choice.work, Allowed(cap)
     states = [grid_of(one, m, allowed, one.axis, cap, step) for one in work.passes]
     edges = [all_ends(row, work) for row in states]
     cost = [np.array([made.seconds for made in row]) + np.array([e.rapids for e in edge])
             for row, edge in zip(states, edges, strict=True)]
-    return choice.plans["auto"].seconds, shortest(cost, ways_between(work, edges))[1]
+    return choice.plans["keep"].seconds, choice.plans["auto"].seconds, shortest(cost, ways_between(work, edges))[1]
 
 
 def plans() -> None:
-    """Three short passes in three directions, rotary axes that need no clamping: turning between them pays or does not."""
-    m = machines.load("mikron-ucp710")
-    for clamp in (0.0, 0.02):
+    """Six strips in two directions, rotary axes that need no clamping or little: turning between them pays or does not."""
+    m, path = machines.load("mikron-ucp710"), strips([0.0, 0.0, 0.0, 70.0, 70.0, 70.0], length=160.0)
+    for clamp in (0.0, 0.05):
         begin = time.perf_counter()
-        auto, least = whole(replace(m, timing=Timing(0.0, clamp, clamp)), strips([0.0, 20.0, 75.0]), SMALL_CAP, GRID)
-        print(f"clamp {clamp:g} s: auto {auto:.5f} s, all sequences {least:.5f} s, {100.0 * (auto / least - 1.0):+.3f} % "
-              f"({time.perf_counter() - begin:.0f} s)", flush=True)
+        keep, auto, least = whole(replace(m, timing=Timing(0.0, clamp, clamp)), path, SMALL_CAP, GRID)
+        print(f"clamp {clamp:g} s: keep {keep:.5f} s, auto {auto:.5f} s, all sequences {least:.5f} s, "
+              f"{100.0 * (auto / least - 1.0):+.3f} % ({time.perf_counter() - begin:.0f} s)", flush=True)
 
 
 def shown(name: str, choice: OrientationChoice) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from postproc.orientation.contact import Contact, contact_of
 from postproc.orientation.orient import OrientationChoice, orient
 from postproc.orientation.passes import Pass, work_of
 from postproc.orientation.surface import Surface
+from postproc.orientation.timed import turned_all
 from postproc.setup import Placement, SetupFile, load_setup
 from postproc.setup_orientation import OrientationLimits
 from tests.postproc.kit import codes, machine, toolpath
@@ -190,6 +192,39 @@ def test_chosen_axes_are_inside_and_the_own_one_is_told() -> None:
     free, _ = oriented(path, SetupFile())
     assert free is not None
     assert free.tried[0].best.seconds <= choice.tried[0].best.seconds * (1.0 + 1e-4)
+
+
+@pytest.mark.parametrize(("lead", "tilt"), [
+    ((10.0, 12.0), (3.0, 5.0)), ((20.0, 20.5), (0.0, 0.5)), ((30.0, 33.0), (-12.0, -10.0))])
+def test_narrow_windows_are_found(lead: tuple[float, float], tilt: tuple[float, float]) -> None:
+    """The own axis leans back, far from what is allowed: of a fine grid inside the window none is faster than the search."""
+    back = ",-0.28,0,0.96"
+    lines = ["MULTAX", "RAPID", f"GOTO/0,0,30{back}", "RAPID", f"GOTO/0,0,0{back},0,0,1", f"GOTO/80,0,0{back},0,0,1",
+             "RAPID", f"GOTO/80,0,30{back}"]
+    choice, found = oriented(toolpath(*lines, head=BALL), limited(lead=lead, tilt=tilt))
+    assert choice is not None, found
+    best = choice.tried[0].best
+    assert lead[0] - 1e-6 <= best.one.contact.lead(best.axis[None])[0, 0] / DEG <= lead[1] + 1e-6
+    assert tilt[0] - 1e-6 <= best.one.contact.tilt(best.axis[None])[0, 0] / DEG <= tilt[1] + 1e-6
+    axes = np.stack([leaning(a, b) for a in np.linspace(*lead, 7) for b in np.linspace(*tilt, 7)])
+    least = min(made.seconds for made in turned_all(best.one, axes, machine("mikron-ucp710")))
+    assert best.seconds < 1.003 * least < best.one.radius
+
+
+def test_limits_of_very_many_points() -> None:
+    """Half-spaces of ten thousand normals and feeds, some without feed, judge as the angles do."""
+    rng = np.random.default_rng(8)
+    normal = rng.normal(size=(10_000, 3)) * 0.15 + Z
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    way = np.cross(normal, rng.normal(size=normal.shape))
+    way /= np.linalg.norm(way, axis=1, keepdims=True)
+    way[::50] = np.nan
+    one = replace(only_pass(along_x()), contact=Contact(normal, way, np.arange(10_000)))
+    allowed = Allowed(50.0 * DEG, None, OrientationLimits(lead=(-48.0, 45.0), tilt=(-90.0, 46.0), off_centre=0.01))
+    axes = rng.normal(size=(300, 3)) * 0.3 + Z
+    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+    found = allowed.mask(one, axes)
+    assert 3 < found.sum() < 200 and found.tolist() == [not allowed.outside(one, axis) for axis in axes]
 
 
 def test_operations_that_keep_their_axes() -> None:

@@ -135,3 +135,4 @@ def test_no_cl_file_says_it() -> None:
     with pytest.raises(ValueError, match="held about its own axis"):
         toolpaths.write(held(0.5, 0.5, 0.5), "x.apt")
     assert not held(0.5, np.nan, 0.5).equals(held(0.5, 0.5, 0.5))
+    assert not toolpath(*LINES).equals(held(0.5, 0.5, 0.5)) and held(0.5, np.nan, 0.5).equals(held(0.5, np.nan, 0.5))
