@@ -4,9 +4,9 @@
 
 Realistic errors (all component errors and locations of serial machines, all dimensions of parallel ones: 10 to 50 um, 5 to
 20 arcsec and more at the tip). Joint commands before formatting; axis figures away from poles, where the turn is free, and
-over all points. Processor time, best of two. Then samples on machines with the models of samples/errors: worst deviation of
-block ends before and after, before formatting; and along the whole program as it is read back on the machine with errors,
-beside the bound of what formatting may add.
+over all points. Processor time, best of two. Then samples on machines, controllers and modes with the models of
+samples/errors: worst deviation of block ends before and after, before formatting; of the program as it is read back on the
+machine with errors at the CL points, beside the rounding of the words and the whole bound; and along the whole program.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ import machines
 import postproc
 import toolpaths
 from machines.geometric_error.correction import correct
+from postproc.corrected.proof import after_formatting
 from postproc.options import Options
 from tests.machines.error_models import joints, model
 from toolpaths.units import DEG
@@ -29,10 +30,12 @@ from toolpaths.units import DEG
 NAMES = ("mikron-ucp710", "nutating-head", "head-table", "mill-4axis", "mill-3axis", "uranesx", "h4a-c-table",
          "h4a-spindle-axis")
 SAMPLES = Path(__file__).parents[2] / "samples"
-CASES = [("five_faces.cls", "mikron-ucp710", "linuxcnc", "tools"), ("pocket.cls", "mikron-ucp710", "linuxcnc", "tools"),
-         ("five_tilted.cls", "mikron-ucp710", "heidenhain-tnc640", "tools"),
-         ("tool_axis_tour.apt", "mikron-ucp710", "linuxcnc", "tools"),
-         ("tool_axis_tour.apt", "mikron-ucp710", "fanuc-30i", "tools"),
+UCP, CONTROLLERS = "mikron-ucp710", ("linuxcnc", "fanuc-30i", "siemens-840d", "heidenhain-tnc640", "haas-ngc")
+CASES = [*(("five_faces.cls", UCP, controller, "tools") for controller in CONTROLLERS),
+         *(("tool_axis_tour.apt", UCP, controller, "tools") for controller in CONTROLLERS),
+         ("five_tilted.cls", UCP, "heidenhain-tnc640", "tools"), ("pocket.cls", UCP, "linuxcnc", "tools"),
+         ("pocket.cls", UCP, "fanuc-30i", "tools"), ("blade.cls", UCP, "fanuc-30i", "tools"),
+         ("bicubic.cls", UCP, "siemens-840d", "tools"), ("five_faces.cls", "linuxcnc-xyzac-trt", "linuxcnc", "tools"),
          ("tool_axis_tour.apt", "linuxcnc-xyzac-trt", "linuxcnc", "tools"), ("pocket.cls", "uranesx", "linuxcnc", "delta"),
          ("h4a_indexed.cls", "h4a-c-table", "linuxcnc", "h4a"), ("h4a_dome.cls", "h4a-c-table", "linuxcnc", "h4a")]
 TOOL, ARCSEC = 80.0, DEG / 3600.0
@@ -50,20 +53,23 @@ def seconds(run: Callable[[], object]) -> float:
 
 def samples() -> None:
     """Print samples on machines."""
-    print("\nsample on machine, controller                                tip um                    axis arcsec")
-    print("                                              before   after  proved  bound   before  after proved  bound")
+    print("\ntip in um before, after correcting; at the CL points median, worst, rounding, bound; in the whole program;\n"
+          "axis in arcsec before, after, at the CL points, bound")
     for sample, machine, controller, setup in CASES:
         path, found = toolpaths.read(SAMPLES / sample)
         options = Options(setup=str(SAMPLES / f"{setup}.setup.toml"), error_model=str(SAMPLES / f"errors/{machine}.toml"))
         result = postproc.convert(path, machine, controller, options=options, diagnostics=found)
         name = f"{sample.split('.')[0]} {machine} {controller}"
-        if not result.ok or result.compensation is None or result.comparison is None or result.shares is None:
-            print(f"{name[:44]:44} refused")
+        proof = after_formatting(result)
+        if proof is None or result.compensation is None or result.comparison is None or result.path is None:
+            print(f"{name[:46]:46} refused")
             continue
-        c, proof, shares = result.compensation, result.comparison, result.shares
-        print(f"{name[:44]:44} {1e3 * c.tip_before:7.1f} {1e3 * c.tip_after:7.1e} {1e3 * proof.worst_tip:7.2f} "
-              f"{1e3 * shares['rounding']:6.2f}  {c.axis_before / ARCSEC:7.1f} {c.axis_after / ARCSEC:6.2f} "
-              f"{proof.worst_axis / ARCSEC:6.1f} {3600.0 * shares['axis_rounding']:6.2f}")
+        c, laws = result.compensation, "+".join(dict.fromkeys(f.control.law for f in result.path.frames))
+        um = [c.tip_before, np.median(proof.tip), proof.tip.max(), result.job.rounding.tip if result.job else 0.0,
+              proof.tip_bound, result.comparison.worst_tip]
+        arcsec = [c.axis_before, c.axis_after, proof.axis.max(), proof.axis_bound]
+        print(f"{name + ' ' + laws:58.58} {1e3 * um[0]:5.1f} {1e3 * c.tip_after:7.1e} "
+              + " ".join(f"{1e3 * x:6.3f}" for x in um[1:]) + " " + " ".join(f"{x / ARCSEC:6.2f}" for x in arcsec))
 
 
 def main() -> None:
