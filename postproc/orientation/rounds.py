@@ -72,6 +72,7 @@ def each_pass(function: Callable[[int, T | None], T], work: Work, allowed: Allow
     try:
         for packed in pool.map(_chunk, chunks, repeat(len(_shared) - 1)):
             take(_unpacked(packed, work, allowed))
+        pool.shutdown()
     finally:
         pool.shutdown(wait=False, cancel_futures=True)
         _shared.pop()

@@ -1,11 +1,13 @@
-"""Figures of the choice of orientations: python tests/benchmarks/bench_orientation.py [part | full | brute | many].
+"""Figures of the choice of orientations: python tests/benchmarks/bench_orientation.py [part | full | brute | five | many |
+ranking].
 
 part: the paper's test part under its jerks alone; full: samples under all limits; brute: distance to a grid of orientations,
-all planned; many: seconds for 500 passes.
+all planned; five: five parts on two machines; many: seconds for 500 passes; ranking: what times on shared knots are off by.
 """
 
 from __future__ import annotations
 
+import resource
 import sys
 import time
 from dataclasses import replace
@@ -21,12 +23,16 @@ from postproc.orientation.allowed import Allowed
 from postproc.orientation.candidates import tried
 from postproc.orientation.orient import OrientationChoice, orient
 from postproc.orientation.passes import Pass, work_of
-from postproc.orientation.timed import turned
+from postproc.orientation.ranking import Ranking, prepare
+from postproc.orientation.timed import turned, turned_all
 from postproc.setup import load_setup
 from toolpaths.toolpath import Toolpath
 from toolpaths.units import DEG
 
 SAMPLES = Path(__file__).parents[2] / "samples"
+sys.path.insert(0, str(SAMPLES))
+import orientation as samples  # noqa: E402
+
 GRID = 8.0
 """degrees, of the brute force; the neighbourhood of its best is searched again at a fifth and a twenty-fifth"""
 
@@ -47,7 +53,7 @@ def chosen(path: Toolpath, m: Machine, setup: str) -> OrientationChoice:
     return choice
 
 
-def shown(name: str, choice: OrientationChoice, seconds: float) -> None:
+def shown(name: str, choice: OrientationChoice, seconds: float, cores: float) -> None:
     """The plans side by side, how many candidates the bound discarded."""
     plans = {"paper": choice.paper, **choice.plans}
     figures = ", ".join(f"{k} {v.seconds:.3f}" for k, v in plans.items())
@@ -55,14 +61,20 @@ def shown(name: str, choice: OrientationChoice, seconds: float) -> None:
     pruned, planned = (sum(getattr(one, what) for one in choice.tried) for what in ("pruned", "planned"))
     share = 100.0 * pruned / max(1, pruned + planned)
     print(f"{name}: seconds {figures}\n  cutting {cuts}\n  {share:.0f} % of {pruned + planned} candidates discarded by the "
-          f"bound, {seconds:.1f} s for {len(choice.tried)} passes")
+          f"bound, {seconds:.1f} s ({cores:.1f} s of cores) for {len(choice.tried)} passes")
 
 
 def timed(name: str, path: Toolpath, m: Machine, setup: str = "tools.setup.toml") -> None:
     """One file on one machine."""
-    begin = time.perf_counter()
+    begin, before = time.perf_counter(), _cores_spent()
     choice = chosen(path, m, setup)
-    shown(name, choice, time.perf_counter() - begin)
+    shown(name, choice, time.perf_counter() - begin, _cores_spent() - before)
+
+
+def _cores_spent() -> float:
+    """Seconds of this process and of its workers that have ended."""
+    spent = (resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+    return sum(one.ru_utime + one.ru_stime for one in spent)
 
 
 def part() -> None:
@@ -118,18 +130,49 @@ def brute() -> None:
         print(f"Xp = {one.tip[1, 0]:4.0f}: search {best:.4f} s, grid {grid:.4f} s, {100.0 * (best / grid - 1.0):+.2f} %")
 
 
+def five(names: tuple[str, ...] = ("mikron-ucp710", "trunnion-bc")) -> None:
+    """The five parts of samples/orientation.py on two machines."""
+    for name in names:
+        for part_name, make in samples.PARTS.items():
+            timed(f"{part_name} on {name}", _read(make()[0]), machines.load(name))
+
+
 def many(count: int = 500) -> None:
-    """Straight passes in directions that turn slowly."""
-    lines = ["UNITS/MM", "CUTTER/16,8", "LOADTL/1", "SPINDL/RPM,1000,CLW", "FEDRAT/MMPM,20000"]
-    for k in range(count):
-        x, y = 80.0 * np.cos(0.003 * k), 80.0 * np.sin(0.003 * k)
-        start, end = f"0,{0.2 * k:.4f}", f"{x:.4f},{y + 0.2 * k:.4f}"
-        lines += ["RAPID", f"GOTO/{start},5", "RAPID", f"GOTO/{start},0", f"GOTO/{end},0", "RAPID", f"GOTO/{end},5"]
-    path, _ = toolpaths.read_bytes("\n".join([*lines, "FINI"]).encode(), file="many.apt")
-    timed(f"{count} passes on mikron-ucp710", path, machines.load("mikron-ucp710"))
+    """Strips of the bicubic surface."""
+    timed(f"{count} strips on mikron-ucp710", _read(samples.surface(count)[0]), machines.load("mikron-ucp710"))
+
+
+def _read(text: str) -> Toolpath:
+    path, found = toolpaths.read_bytes(text.encode(), file="part.cls")
+    assert not toolpaths.diagnostics.has_errors(found), found
+    return path
+
+
+def ranking() -> None:
+    """Times on shared knots beside plans on knots of their own, random axes of 20 passes."""
+    m, rng, off, spent = machines.load("mikron-ucp710"), np.random.default_rng(1), [], [0.0, 0.0]
+    settings, _ = load_setup(SAMPLES / "tools.setup.toml")
+    assert settings is not None
+    for name in ("test_part.cls", "bicubic.cls"):
+        work, _ = work_of(toolpaths.read(SAMPLES / name)[0], m, settings, Options())
+        assert work is not None
+        prepare(work.passes * 100)
+        for one in work.passes[::max(1, len(work.passes) // 10)]:
+            axes = np.column_stack((rng.uniform(-0.7, 0.7, (20, 2)), np.ones(20)))
+            ranked = Ranking(turned(one, one.axis, m))
+            for made in turned_all(one, axes / np.linalg.norm(axes, axis=1, keepdims=True), m):
+                if not made.refused:
+                    begin = time.process_time()
+                    seconds = ranked.seconds(made)
+                    middle = time.process_time()
+                    off.append(abs(seconds / made.seconds - 1.0))
+                    spent[0] += middle - begin
+                    spent[1] += time.process_time() - middle
+    print(f"{len(off)} axes: shared knots off by {np.median(off):.1e} (median), {max(off):.1e} (most); a plan takes "
+          f"{spent[1] / spent[0]:.1f} times as long ({1e3 * spent[1] / len(off):.1f} ms)")
 
 
 if __name__ == "__main__":
-    known = {"part": part, "full": full, "brute": brute, "many": many}
+    known = {"part": part, "full": full, "brute": brute, "five": five, "many": many, "ranking": ranking}
     for name in sys.argv[1:] or known:
         known[name]()
