@@ -80,20 +80,39 @@ def test_what_is_not_known_is_told(tool: Tool | None, setup: ToolSetup | None, w
     assert len(found) == 1 and all(word in found[0] for word in words), found
 
 
-def test_a_spun_mesh_holds_the_mesh_at_any_angle() -> None:
-    mesh = trimesh.util.concatenate([trimesh.creation.box(bounds=[(-10, -6, 40), (10, 6, 60)]),
-                                     trimesh.creation.cone(radius=30, height=40).apply_translation((0, 0, 60))])
-    pieces = spun(np.asarray(mesh.vertices), np.asarray(mesh.edges_unique))
+def sunk(mesh: trimesh.Trimesh, pieces: Floats) -> float:
+    """Largest distance of points all over a mesh from the nearest of the pieces; negative inside."""
     i, j = np.meshgrid(np.arange(13), np.arange(13), indexing="ij")
     u, v = (i[i + j <= 12] / 12)[:, None, None], (j[i + j <= 12] / 12)[:, None, None]
     a, b, c = np.moveaxis(np.asarray(mesh.triangles), 1, 0)
     points = ((1.0 - u - v) * a + u * b + v * c).reshape(-1, 3)
     rho = np.hypot(points[:, 0], points[:, 1])
-    inside = np.min([signed(piece, rho, points[:, 2])[0] for piece in pieces], axis=0)
-    assert inside.max() < 1e-6
+    return float(np.min([signed(piece, rho, points[:, 2])[0] for piece in pieces], axis=0).max())
+
+
+def test_a_spun_mesh_holds_the_mesh_at_any_angle() -> None:
+    mesh = trimesh.util.concatenate([trimesh.creation.box(bounds=[(-10, -6, 40), (10, 6, 60)]),
+                                     trimesh.creation.cone(radius=30, height=40).apply_translation((0, 0, 60))])
+    pieces = spun(np.asarray(mesh.vertices), np.asarray(mesh.edges_unique))
+    assert sunk(mesh, pieces) < 1e-6
     corner = np.hypot(10.0, 6.0)
     assert distance(pieces, corner + 1.0, 50.0) == pytest.approx(1.0, abs=1e-6)
     assert distance(pieces, 30.0, 80.0) == pytest.approx(15.0 * np.cos(np.arctan(0.75)), abs=0.05)
+
+
+def test_a_spun_mesh_with_many_levels_is_held_by_few_pieces() -> None:
+    mesh = trimesh.creation.icosphere(4, radius=20.0).apply_translation((3.0, 1.0, 50.0))
+    pieces = spun(np.asarray(mesh.vertices), np.asarray(mesh.edges_unique))
+    assert len(pieces) <= 60 < len(np.unique(mesh.vertices[:, 2])) and sunk(mesh, pieces) < 1e-6
+
+
+def test_what_ends_between_two_levels_is_held_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A thorn to z = 20 beside a rod to z = 50, in one piece."""
+    monkeypatch.setattr("postproc.collision.spun._MOST", 1)
+    thorn = trimesh.convex.convex_hull(np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 2.0, 0.0], [20.0, 0.0, 20.0]]))
+    mesh = trimesh.util.concatenate([thorn, trimesh.creation.box(bounds=[(-2, -2, 0), (2, 2, 50)])])
+    pieces = spun(np.asarray(mesh.vertices), np.asarray(mesh.edges_unique))
+    assert len(pieces) == 1 and sunk(mesh, pieces) < 1e-6
 
 
 @pytest.mark.parametrize("suffix", ["stl", "ply", "obj", "off"])

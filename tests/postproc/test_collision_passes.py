@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -165,3 +167,11 @@ def test_the_sample_is_clear_as_it_is_and_not_with_a_longer_holder(tmp_path: Pat
     assert all(bodies.touching(one, one.axis) == "" for one in bodies.work.passes[::3])
     thick = {index: replace(form, pieces=form.pieces * [3.0, 0.1, 3.0, 0.1, 1.0]) for index, form in bodies.forms.items()}
     assert PassBodies(bodies.work, bodies.bodies, thick).touching(bodies.work.passes[0], bodies.work.passes[0].axis)
+
+
+def test_the_samples_are_what_their_script_writes(tmp_path: Path) -> None:
+    script = SAMPLES / "make_bodies.py"
+    subprocess.run([sys.executable, str(script), str(tmp_path)], check=True, cwd=SAMPLES)
+    kept = sorted((SAMPLES / "bodies").iterdir())
+    assert [file.name for file in kept] == sorted(file.name for file in tmp_path.iterdir())
+    assert all(file.read_bytes() == (tmp_path / file.name).read_bytes() for file in kept)

@@ -82,6 +82,29 @@ def test_the_normal_is_where_the_body_reaches_farthest() -> None:
             assert (other <= distance + 1e-9).all()
 
 
+def test_planes_part_triangle_and_turning_tool_wherever_it_stands() -> None:
+    """The bound of a cell, for any direction, against many moments of a tool that turns by up to 70 degrees."""
+    rng = np.random.default_rng(4)
+    moments = np.linspace(0.0, 1.0, 41)
+    over = 0
+    for _ in range(60):
+        a, b, n = rng.normal(size=(3, 3))
+        a /= np.linalg.norm(a)
+        b = a + rng.uniform(0.1, 1.0) * b / np.linalg.norm(b)
+        b /= np.linalg.norm(b)
+        n = a + b + 0.5 * n / np.linalg.norm(n)
+        n /= np.linalg.norm(n)
+        tips, corners = rng.uniform(-5.0, 5.0, (1, 2, 3)), rng.uniform(-30.0, 30.0, (1, 3, 3))
+        piece = np.array([rng.uniform(0.0, 9.0), rng.uniform(0.0, 9.0), rng.uniform(0.0, 9.0), rng.uniform(10.0, 90.0), 1.0])
+        cell = search._Cells(corners, n[None], tips, np.stack((a, b))[None], np.zeros(1, dtype=np.int64))
+        turning = slerp(np.repeat(a[None], 41, axis=0), np.repeat(b[None], 41, axis=0), moments)
+        reach = (tips[0, 0] + moments[:, None] * (tips[0, 1] - tips[0, 0])) @ n + support(piece, turning @ n)
+        true = float((corners[0] @ n).min() - reach.max())
+        assert float(cell.apart(n[None], piece)[0]) <= true + 1e-9
+        over += reach.max() > max(reach[0], reach[-1]) + 0.1
+    assert over > 10  # in these the tool reaches farthest on the way, not at its ends
+
+
 def test_random_tools_that_turn_agree_with_dense_points() -> None:
     """Independent: points all over the mesh, at many moments."""
     rng = np.random.default_rng(0)
@@ -145,3 +168,28 @@ def dense(mesh: trimesh.Trimesh, parts: int) -> Floats:
     u, v = (i[i + j <= parts] / parts)[:, None, None], (j[i + j <= parts] / parts)[:, None, None]
     a, b, c = np.moveaxis(np.asarray(mesh.triangles), 1, 0)
     return np.asarray(((1.0 - u - v) * a + u * b + v * c).reshape(-1, 3))
+
+
+def test_the_collision_manager_agrees_where_tools_stand_clear() -> None:
+    """Independent: fcl between the mesh and the tool as a polyhedron of 400 sides, standing still."""
+    rng = np.random.default_rng(11)
+    mesh = trimesh.creation.icosphere(2, radius=20.0)
+    manager = trimesh.collision.CollisionManager()
+    manager.add_object("ball", mesh)
+    body, seen = solid(mesh, HERE), 0
+    for _ in range(20):
+        axis = rng.normal(size=3)
+        axis /= np.linalg.norm(axis)
+        tip = rng.uniform(-45.0, 45.0, 3)
+        r0, r1, high = rng.uniform(1.0, 10.0, 3)
+        outline = [[0.0, 0.0], [r0, 0.0], [r1, 4.0 * high], [0.0, 4.0 * high]]
+        tool = trimesh.creation.revolve(outline, sections=400)
+        turn = trimesh.geometry.align_vectors([0.0, 0.0, 1.0], axis)
+        turn[:3, 3] = tip
+        expected = manager.min_distance_single(tool, transform=turn)
+        if expected > 0.0:
+            standing = Swept(np.tile(tip, (1, 2, 1)), np.tile(axis, (1, 2, 1)), np.zeros(1, dtype=np.int64))
+            found = nearest(body, standing, np.array([[r0, 0.0, r1, 4.0 * high, 0.0]]), expected + 0.3)
+            assert found.distance == pytest.approx(expected, abs=0.01)
+            seen += 1
+    assert seen > 8
