@@ -35,16 +35,36 @@ def check_bodies(motion: Motion, executed: Executed, job: Job, owner: Ints, faul
         return found
     moves = job.moves.without_pecks()
     drilling = _drilling(moves)[np.minimum(owner, len(moves) - 1)] & (owner < len(moves))
-    known = {tool.number: tool for tool in job.toolpath.tools}
-    for number in np.unique(motion.tool[_moving(motion)]).tolist():
-        form, more = tool_form(max(number, 0), known.get(max(number, 0)), job.setup.tools.get(str(max(number, 0))), file)
-        found += more
+    moving = _moving(motion)
+    index = _tools(motion, job, moves, owner)
+    for one in np.unique(index[moving]).tolist():
+        tool = job.toolpath.tools[one] if one >= 0 else None
+        number = tool.number if tool else 0
+        form, more = tool_form(number, tool, job.setup.tools.get(str(number)), file)
+        found += [d for d in more if d not in found]
         if len(form.pieces) and not has_errors(more):
-            rows = np.flatnonzero(motion.tool == number)
+            rows = np.flatnonzero(index == one)
             way, lost = way_of(motion, executed, job.kinematics_of(number), rows, lever_of(form))
             found += [] if not len(lost) else [_unbounded(motion, moves, owner, lost, faults)]
             found += _told(bodies, form, way, drilling, motion, (moves, owner), faults)
     return found
+
+
+def _tools(motion: Motion, job: Job, moves: Moves, owner: Ints) -> Ints:
+    """(E,) index of the tool in the spindle among those of the CL file: that of the move, else the last one of its number.
+
+    A file may describe several tools under one number.
+    """
+    numbers = np.array([tool.number for tool in job.toolpath.tools] + [0])
+    result = moves.tool[np.minimum(owner, len(moves) - 1)].astype(np.int64)
+    for number in np.unique(motion.tool).tolist():
+        rows = np.flatnonzero(motion.tool == number)
+        known = np.flatnonzero(numbers[:-1] == max(number, 0))
+        own = (result[rows] >= 0) & (numbers[result[rows]] == number)
+        last = np.maximum.accumulate(np.where(own, np.arange(len(rows)), -1))
+        first = int(known[0]) if len(known) else -1
+        result[rows] = np.where(last >= 0, result[rows[np.maximum(last, 0)]], first)
+    return result
 
 
 def _moving(motion: Motion) -> Bools:

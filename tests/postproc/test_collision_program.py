@@ -193,3 +193,17 @@ def test_dog_legs_are_followed(tmp_path: Path) -> None:
     options = postproc.Options(setup=str(corner))
     found = collisions(postproc.verify(program, path, machine("mill-3axis"), "fanuc-30i", options=options).diagnostics)
     assert found and found[0].message.startswith("cutter of T1 touches fixture clamp by ")
+
+
+def test_two_cutters_under_one_number_are_told_apart(tmp_path: Path) -> None:
+    """T1 with 16 mm, then T1 with 6 mm; a clamp that only the larger one would meet stands where the smaller one cuts."""
+    lines = ["RAPID", "GOTO/0,0,50", "RAPID", "GOTO/0,0,2", "GOTO/0,0,0", "RAPID", "GOTO/0,0,50", "CUTTER/6,3", "LOADTL/1",
+             "RAPID", "GOTO/60,0,50", "RAPID", "GOTO/60,0,2", "GOTO/60,0,0", "GOTO/70,0,0", "RAPID", "GOTO/70,0,50"]
+    tool = TOOL.replace("diameter = 16.0", "diameter = 6.0")
+    near = fixture((55, 5, -5), (75, 9, 10))
+    assert converted(toolpath(*lines, head=HEAD), setup_file(tmp_path, near, tool)).ok
+    swapped = [line.replace("CUTTER/6,3", "CUTTER/16,8") for line in lines]
+    assert not converted(toolpath(*swapped, head=HEAD), setup_file(tmp_path, near, tool)).ok
+    under = fixture((-5, 5, -5), (5, 9, 10))
+    found = collisions(converted(toolpath(*lines, head=HEAD), setup_file(tmp_path, under, tool)).diagnostics)
+    assert found and found[0].message.startswith("cutter of T1 touches fixture clamp")
