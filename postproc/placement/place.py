@@ -139,8 +139,8 @@ def _nowhere(result: Found, timer: Timer, options: Options) -> Diagnostic:
     """Why the part can stand nowhere: the attitude that lacks least."""
     known = [lack for lack in result.lacks if np.isfinite(lack[1])]
     if known:
-        angles, margin, what = max(known, key=lambda lack: lack[1])
-        why = f"at best (turn {angles[0] / DEG:.3f} degrees) {what} lacks {-margin:.3f} mm"
+        angles, _, what = max(known, key=lambda lack: lack[1])
+        why = f"at best (turn {angles[0] / DEG:.3f} degrees) {what}"
     else:
         reasons = [why for _, _, why in result.lacks] + [one.refused for one in timer.known() if one is not result.now]
         why = Counter(reasons or [result.now.refused]).most_common(1)[0][0]

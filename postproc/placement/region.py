@@ -16,6 +16,7 @@ from scipy.optimize import linprog
 from machines import reach as clearances
 from machines.kinematics.base import Kinematics
 from machines.machine import Machine
+from machines.singular_distance import NAMES as SINGULAR
 from machines.singular_distance import has_singular_distance, singular_distance
 from postproc.orientation.passes import Work
 from postproc.orientation.timed import Turned, turned
@@ -24,6 +25,7 @@ from postproc.placement.moved import moved
 from postproc.placement.space import ANGLES, Space
 from postproc.reach import is_checked
 from toolpaths.arrays import Floats, Ints
+from toolpaths.units import DEG
 
 _MARGIN = 0.1
 """share of the clearance margin that the safe planes need at least, as the links do"""
@@ -52,7 +54,7 @@ class Region(Protocol):
         """(M,) mm that every axis stays inside travel there, negative where one lacks it."""
 
     def deepest(self, low: Floats, high: Floats) -> tuple[Floats, float, str]:
-        """The place (3,) in a box with most margin, the margin, and what decides it."""
+        """The place (3,) in a box with most margin, the margin, and what lacks how much where that is negative."""
 
 
 @dataclass(frozen=True)
@@ -100,7 +102,8 @@ class Slabs:
                 raise ArithmeticError(f"no place of most margin: {found.message}")
             place = np.clip(found.x[:ANGLES], low, high)
         values = self.g @ place + self.c
-        return place, float(values.min()), f"axis {self.names[int(self.joint[int(values.argmin())])]}"
+        margin = float(values.min())
+        return place, margin, f"axis {self.names[int(self.joint[int(values.argmin())])]} lacks {-margin:.3f} mm"
 
     def _worst(self, values: Floats) -> list[int]:
         """The row of least margin of each joint and direction."""
@@ -231,7 +234,37 @@ class Sampled:
                 place, best = around[values.argmax()], float(values.max())
             else:
                 step = 0.5 * step
-        return place, best, "travel, reach or a singular position of the parallel machine"
+        return place, best, self._deciding(place)
+
+    def _deciding(self, place: Floats) -> str:
+        """What has least margin at a place (3,), as what it lacks."""
+        found: list[tuple[float, str, float, str]] = []
+        for kin, tip, axis in self.poses:
+            branches = kin.inverse(tip + place, axis, near=self.machine.home)
+            q = max(branches, key=lambda branch: float(self._joints(kin, branch).min()))
+            found += self._columns(kin, q)
+        margin, name, unit, of = min(found)
+        return f"{name} lacks {-margin / unit:.4g} {of}" if margin > _NONE else name
+
+    def _columns(self, kin: Kinematics, q: Floats) -> list[tuple[float, str, float, str]]:
+        """(least margin of joints (N, J), what it is of, what its unit counts as, the unit), one each."""
+        rad, mm = (_PER_RAD * DEG, "degrees"), (1.0, "mm")
+        share = (_PER_SHARE, "of the stated distance from singular positions")
+        limits = self.machine.limits
+        travel = np.minimum(q - limits.lower, limits.upper - q) * np.where(self.machine.rotary, _PER_RAD, 1.0)
+        if np.isnan(travel).any():
+            return [(_NONE, "the rods do not reach that far", *mm)]
+        result = [(float(column.min()), f"axis {name}", *(rad if rotary else mm)) for name, rotary, column in
+                  zip(self.machine.axis_names, self.machine.rotary, travel.T, strict=True)]
+        if is_checked(kin):
+            found = clearances.reach(kin, q)  # type: ignore[arg-type]
+            values = np.nanmin(found.values * np.where(found.angular, _PER_RAD, 1.0), axis=0)
+            result += [(value, name, *(rad if angular else mm)) for value, name, angular in
+                       zip(values.tolist(), found.names, found.angular.tolist(), strict=True)]
+        if has_singular_distance(kin):
+            away = np.nanmin(singular_distance(kin, q), axis=0) - self.least
+            result += [(value, name, *share) for value, name in zip((_PER_SHARE * away).tolist(), SINGULAR, strict=True)]
+        return result
 
 
 def sampled(work: Work, least: float) -> Sampled:

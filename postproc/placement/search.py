@@ -109,7 +109,8 @@ class Search:
             self.progress("travel", number, of)
         low, high = self.space.room(angles)
         if bool((low > high + _SLACK).any()):
-            self.found.lacks.append((angles, float((high - low).min()), "the table is too small"))
+            over = float((low - high).max())
+            self.found.lacks.append((angles, -over, f"the table is too small by {over:.3f} mm"))
             return []
         region, why = region_of(self.timer.work, self.space, angles, self.timer.least)
         if region is None:

@@ -10,7 +10,9 @@ import pytest
 import toolpaths
 from machines.machine import Machine
 from postproc.options import Options
+from postproc.orientation.contact import Contact
 from postproc.orientation.orient import orient
+from postproc.orientation.passes import work_of
 from postproc.placement.moved import moved
 from postproc.placement.place import PlacementChoice, place
 from postproc.placement.search import EQUAL
@@ -129,6 +131,14 @@ def test_limits_and_table_hold() -> None:
     assert (corners >= np.array(table.low) - 1e-6).all() and (corners <= np.array(table.high) + 1e-6).all()
 
 
+def test_a_part_beyond_its_table_is_told() -> None:
+    """It is within travel where it stands now, and still refused; the limits alone would let it stay."""
+    table = PlaceBox(low=(-100.0, -60.0, -50.0), high=(100.0, 60.0, 50.0))
+    choice = placed(passes((1.0, 0.0)), machine("mill-3axis"), setup_of((60.0, 0.0, 0.0), x=(-90.0, 90.0), table=table))
+    assert choice.found.now.refused == "the part stands 40.000 mm beyond the table in x"
+    assert choice.best.place[0] <= 20.0
+
+
 def test_steps_keep_to_the_bores() -> None:
     choice = placed(passes((1.0, 0.0)), machine("mill-3axis"), setup_of((300.0, 0.0, 0.0), x=(-110.0, 400.0), step=25.0))
     assert (choice.best.place[0] + 110.0) / 25.0 == pytest.approx(round((choice.best.place[0] + 110.0) / 25.0), abs=1e-9)
@@ -159,8 +169,6 @@ def test_angles_and_back() -> None:
 
 def test_a_moved_work_is_that_of_the_moved_part() -> None:
     """Cut and smoothed once and moved, or moved, cut and smoothed: the same poses."""
-    from postproc.orientation.passes import work_of
-
     path, m = passes((0.6, 0.8)), machine("mikron-ucp710")
     there = PartPlacement(origin=(10.0, -20.0, 30.0), x_axis=(0.6, 0.8, 0.0), y_axis=(-0.8, 0.6, 0.0))
     base, _ = work_of(path, m, setup_of(), Options())
@@ -174,6 +182,20 @@ def test_a_moved_work_is_that_of_the_moved_part() -> None:
         assert a.tip == pytest.approx(b.tip, abs=1e-9)
         for c, d in zip(a.stretches, b.stretches, strict=True):
             assert c.tip == pytest.approx(d.tip, abs=1e-9)
+
+
+def test_surfaces_are_moved_with_the_part() -> None:
+    """Lead and tilt of an axis against a known contact are the same before and after."""
+    base, _ = work_of(passes((0.6, 0.8)), machine("mikron-ucp710"), setup_of(), Options())
+    assert base is not None
+    rng = np.random.default_rng(8)
+    normal, way = (v / np.linalg.norm(v, axis=1, keepdims=True) for v in rng.normal(size=(2, 5, 3)))
+    known = replace(base, passes=tuple(replace(one, contact=Contact(normal, way, np.arange(5))) for one in base.passes))
+    there = Placement(matrix(np.array([0.7, 0.2, -0.4])), np.array([1.0, 2.0, 3.0]))
+    axes = rng.normal(size=(4, 3))
+    for a, b in zip(known.passes, moved(known, there).passes, strict=True):
+        assert b.contact.lead(there.directions(axes)) == pytest.approx(a.contact.lead(axes), abs=1e-12)
+        assert b.axis == pytest.approx(there.directions(a.axis[None])[0])
 
 
 def test_the_space_states_what_it_places() -> None:

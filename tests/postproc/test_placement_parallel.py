@@ -68,7 +68,11 @@ def test_from_outside_the_workspace() -> None:
 def test_nowhere_in_the_workspace() -> None:
     fault = refused(passes((1.0, 0.0), 2, 120.0), machine(DELTA), setup_of((200.0, 0.0, -270.0), x=(190.0, 250.0)))
     assert fault.code == "place.none"
-    assert "lacks" in fault.message
+    assert "workspace x lacks 60 mm" in fault.message
+    joints = SetupFile().joints.model_copy(update={"singular_distance": 0.6})
+    fault = refused(passes((1.0, 0.0), 2, 120.0), machine(DELTA), on_delta(x=(-90.0, 120.0)).model_copy(
+        update={"joints": joints}))
+    assert "platform (direct) lacks 0.08184 of the stated distance" in fault.message
 
 
 def test_stated_distance_from_singular_positions_is_kept() -> None:
