@@ -157,7 +157,7 @@ def _stages(result: PostResult, progress: Progress | None) -> PostResult:
     options, file = result.options, result.toolpath.file
     toolpath = result.toolpath
     job, found = prepare(toolpath, result.machine, result.controller, result.setup, options)
-    result = _with(result, found, job=job)
+    result = _with(result, [*found, *_bad_meshes(result.setup, options.setup)], job=job)
     if job is None or not result.ok:
         return result
     toolpath = job.toolpath
@@ -205,6 +205,15 @@ def _stages(result: PostResult, progress: Progress | None) -> PostResult:
                                   others={name: t.encode() for name, t in files.items()})
     result = _with(result, found, comparison=comparison)
     return replace(result, text=text, files=files) if result.ok else result
+
+
+def _bad_meshes(setup: SetupFile, file: str) -> list[Diagnostic]:
+    """Errors in the meshes of a set-up, told before anything is planned."""
+    if setup.bodies is None:
+        return []
+    from postproc.collision.bodies import mesh_errors
+
+    return mesh_errors(setup, file)
 
 
 def _with(result: PostResult, diagnostics: list[Diagnostic], **values: object) -> PostResult:

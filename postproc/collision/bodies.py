@@ -10,12 +10,12 @@ import numpy as np
 
 from postproc.collision.form import CUTTER, HOLDER, PARTS, SHANK, Form
 from postproc.collision.mesh import load_mesh
-from postproc.collision.search import Nearest, nearest
+from postproc.collision.search import nearest
 from postproc.collision.solid import Solid, solid
 from postproc.collision.swept import Swept
 from postproc.setup import Placement, SetupFile
+from postproc.setup_bodies import Bodies, Units
 from postproc.setup_bodies import Solid as Given
-from postproc.setup_bodies import Units
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic, error, has_errors
 
@@ -105,10 +105,31 @@ def scene(setup: SetupFile, placement: Placement, file: str) -> tuple[Scene | No
 def described(setup: SetupFile, placement: Placement, file: str) -> tuple[str, list[Diagnostic]]:
     """(lines that say what stands where, what is wrong with the meshes of a set-up)."""
     bodies, found = scene(setup, placement, file)
-    for number, tool in setup.tools.items():
-        if tool.holder_mesh is not None:
-            found += load_mesh(Path(file).parent / tool.holder_mesh, tool.holder_units, f"tools.{number}.holder_mesh")[1]
+    found += _holders(setup, file)
     return "".join(f"\n{_where(body)}" for body in (bodies.bodies if bodies else ())), found
+
+
+def mesh_errors(setup: SetupFile, file: str) -> list[Diagnostic]:
+    """What stands against reading the meshes that a set-up names."""
+    given = setup.bodies
+    if given is None:
+        return []
+    folder = Path(file).parent
+    files = [("bodies.part", given.part, given.units)]
+    files += [(key, one.file, one.units or given.units) for key, one in _others(given)]
+    found = [d for key, name, units in files if name is not None for d in load_mesh(folder / name, units, key)[1]]
+    return [d for d in [*found, *_holders(setup, file)] if has_errors([d])]
+
+
+def _holders(setup: SetupFile, file: str) -> list[Diagnostic]:
+    return [d for number, tool in setup.tools.items() if tool.holder_mesh is not None
+            for d in load_mesh(Path(file).parent / tool.holder_mesh, tool.holder_units, f"tools.{number}.holder_mesh")[1]]
+
+
+def _others(given: Bodies) -> list[tuple[str, Given]]:
+    """Table and fixtures with the keys that name them."""
+    table = [] if given.table is None else [("bodies.table", given.table)]
+    return [*table, *((f"bodies.fixtures[{k}]", one) for k, one in enumerate(given.fixtures))]
 
 
 def _where(body: Body) -> str:
@@ -130,13 +151,11 @@ def _solid(given: Given, where: Placement, folder: Path, units: Units,
     return solid(trimesh.creation.box(bounds=[given.box.low, given.box.high]), where), []
 
 
-def touches(all_bodies: Scene, form: Form, way: Swept, cutting: Swept | None = None,
-            known: dict[int, Nearest] | None = None) -> list[Touch]:
+def touches(all_bodies: Scene, form: Form, way: Swept, cutting: Swept | None = None) -> list[Touch]:
     """What of a tool comes too near to what on a way; a pair once, at its worst.
 
     Args:
         cutting: the way on which the cutter is compared with the part, where it is not the whole
-        known: by body, what is known of the cutter's first piece already
     """
     result = []
     for part, body, limit in all_bodies.pairs(form):
