@@ -35,7 +35,7 @@ _TIE = 1e-2
 
 def free_value(made: Turned) -> float:
     """Where the rotary joint stands that the tool axis leaves free, rad; NaN where it leaves none."""
-    if made.refused or made.one.turns:
+    if made.refused or made.one.turns or not bool(made.one.kin.singular(made.q[:1])[0]):
         return np.nan
     joint = _free(made.one, made.axis, made.machine)
     return float(made.q[0, joint]) if joint >= 0 else np.nan
