@@ -12,15 +12,12 @@ from postproc.path import FEED, TRAVERSE, Path
 from postproc.program import Hole
 from postproc.word_rows import WordRows
 from toolpaths.arrays import Bools, Ints
-from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.toolpath import Kind, Toolpath
 
 ROUNDED = 1.5
 """last decimals by which words along a hole may differ in a plane whose printed angles are rounded"""
 STATES_RETRACT = ("{retract}", "{second}")
 """one of them stands in cycles that state the level they retract to"""
-SINGLE_MOVES = frozenset({"DRILL", "THRU", "CSINK", "FACE", "DEEP", "BRKCHP", "BORE", "REAM"})
-"""kinds of cycles that rapids, feeds and dwells replace"""
 
 
 def holes_of(toolpath: Toolpath, moves: Moves, path: Path, words: WordRows, control: Control,
@@ -50,7 +47,7 @@ def holes_of(toolpath: Toolpath, moves: Moves, path: Path, words: WordRows, cont
         first += _before_own_level(moves, path, words, z, first, last)
         level = float(words.start[first, z]) if first > 0 else np.inf
         initial = before_initial if previous_last == first - 1 else level
-        key = _key(toolpath.cycles[int(moves.cycle[path.move[first]])].kind, int(turning[moves.row[path.move[first]]]))
+        key = cycle_key(toolpath.cycles[int(moves.cycle[path.move[first]])].kind, int(turning[moves.row[path.move[first]]]))
         if not _states_retract(controller, key):
             last -= _rises_beyond(moves, path, words, z, first, last, initial + _slack(path, controller, first))
         before_initial, previous_last = initial, last
@@ -148,28 +145,6 @@ def _hole(toolpath: Toolpath, moves: Moves, path: Path, rows: WordRows, control:
     return Hole(first, last, int(moves.cycle[path.move[first]]), plane, deepest, out, initial, key, bottom)
 
 
-def _key(kind: str, turning: int) -> str:
+def cycle_key(kind: str, turning: int) -> str:
     """The controller's table tells taps that turn anti-clockwise from the others; a tap that stands has no entry."""
     return kind if kind != "TAP" else {1: "TAP", -1: "TAP_LEFT"}.get(turning, "")
-
-
-def not_native(toolpath: Toolpath, moves: Moves, path: Path, native: Bools, controller: ControllerFile) -> list[Diagnostic]:
-    """Cycles that single moves do not replace and that could not be written as canned cycles."""
-    only = np.array([c.kind not in SINGLE_MOVES or c.kind in controller.cycles.rigid_only for c in toolpath.cycles],
-                    dtype=bool)
-    rows = np.flatnonzero((moves.phase == Phase.DRILL) & (moves.cycle >= 0))
-    rows = rows[only[moves.cycle[rows]]] if len(only) else rows[:0]
-    rows = rows[~native[np.minimum(path.begin[rows], len(native) - 1)]]
-    turning = spindle_states(toolpath)[0][moves.row[rows]]
-    keys = np.array([_key(toolpath.cycles[int(moves.cycle[m])].kind, int(t)) or "TAP without a turning spindle"
-                     for m, t in zip(rows, turning, strict=True)], dtype=str)
-    result = []
-    for key in np.unique(keys):
-        lines = moves.line[rows[keys == key]]
-        known = str(key) in controller.cycles.table or str(key) in controller.cycles.with_dwell
-        hint = "the tool must stand along Z of the words in a mode that has cycles (not tcp), a dwell needs an entry in " \
-            "cycles.with_dwell" if known else \
-            f"the controller's cycles.table has no {key}; take another cycle in the CAM system"
-        result.append(error("cycle.not_native", f"a cycle {key} cannot be written as single moves, and this one not as a "
-                            "canned cycle", file=toolpath.file, lines=lines[:6].tolist(), count=len(lines), hint=hint))
-    return result

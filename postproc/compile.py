@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from postproc.canned import holes_of, not_native
+from postproc.canned import holes_of
 from postproc.commands import commands_of
 from postproc.feed import Feeds, Planned, plan_feeds
 from postproc.job import Job
 from postproc.moves import Moves
+from postproc.not_canned import not_native
 from postproc.path import ARC, Path
 from postproc.program import Command, Commands, Hole, Program
 from postproc.rounding import decimals
@@ -46,7 +47,7 @@ def compile_program(job: Job, moves: Moves, path: Path,
                       placed, kept_holes, places, sections, skip[keep])
     return program, feeds, [*diagnostics, *found, *_slowed(feeds, moves, path, planned is not None, toolpath.file),
                             *_mapped(feeds, moves, path, job),
-                            *not_native(toolpath, moves, path, native, controller)]
+                            *not_native(toolpath, moves, path, native, controller, skip)]
 
 
 def _moved(commands: Commands, new: Ints) -> Commands:

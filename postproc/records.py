@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -32,6 +33,14 @@ _SWITCHES: Switches = {
     ("M", 9): ("COOLNT", ("OFF",)), ("M", 0): ("STOP", ()), ("M", 1): ("OPSTOP", ())}
 _OWN: dict[str, str] = {"G": "motion, planes, offsets and modes", "F": "feeds (FEDRAT)", "H": "length offsets (LOADTL)",
                         "T": "tools (LOADTL)", "M2": "the end", "M30": "the end", "M6": "tool changes (LOADTL)"}
+_INSTEAD: dict[str, str] = {
+    "G4": "write DELAY/seconds in its place",
+    **dict.fromkeys(("G28", "G30", "G53"), "write GOHOME in its place"),
+    **dict.fromkeys(("G9", "G60", "G61", "G61.1", "G64"), "the post writes the control's smoothing itself, from --tolerance "
+                    "and the controller file: take the record out"),
+    **dict.fromkeys(("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3"), "the post writes the work offset "
+                    "itself: state it as work_offset_code in the set-up, and take the record out")}
+"""what to do where a code has a record, or a key, of its own"""
 
 
 class _Found:
@@ -54,7 +63,7 @@ def plain_records(toolpath: Toolpath, controller: ControllerFile) -> tuple[Toolp
     found = _Found(toolpath.file)
     events: list[Event] = []
     spindle = Spindle()
-    for event in toolpath.events:
+    for event in _without_limits(toolpath.events, found.add):
         for plain in _plain(event, spindle, controller, found.add):
             if plain.word == "SPINDL":
                 _check_spindle(plain, found.add)
@@ -94,15 +103,20 @@ def _plain(event: Event, spindle: Spindle, controller: ControllerFile, report: R
     result = _switches(event, said, spindle, switches)
     if result is None:
         wrong = next(f"{letter}{value:g}" for letter, value in said if not _is_switch(letter, value, switches))
-        own = _OWN.get(wrong) or _OWN.get(wrong[0])
-        hint = f"the post writes {own} itself" if own else "where the code moves nothing, name it in the controller's " \
-            "program.passive"
-        report(Severity.ERROR, "insert.refused", f"{event.word}/{text[:60]}: {wrong} cannot be put in", event.line, hint)
+        report(Severity.ERROR, "insert.refused", f"{event.word}/{text[:60]}: {wrong} cannot be put in", event.line,
+               _instead(wrong))
         return []
     if not result:
         report(Severity.ERROR, "insert.refused", f"{event.word}/{text[:60]}: a speed while the spindle stands", event.line,
                "state SPINDL/RPM,n,CLW in the CAM system")
     return result
+
+
+def _instead(code: str) -> str:
+    """What to do about a code that cannot be put in."""
+    own = _OWN.get(code) or _OWN.get(code[0])
+    return _INSTEAD.get(code) or (f"the post writes {own} itself: take the record out" if own else "where the code moves "
+                                  "nothing, name it in the controller's program.passive; else take the record out")
 
 
 def _is_switch(letter: str, value: float, switches: Switches) -> bool:
@@ -130,6 +144,26 @@ def _switches(event: Event, said: list[tuple[str, float]], spindle: Spindle, swi
     elif speed and not turning:
         return []
     return result
+
+
+def _without_limits(events: tuple[Event, ...], report: Report) -> Iterator[Event]:
+    """The records without MAXRPM, which limits what a cutting speed (SFM, SMM) asks for; left out where it stands alone."""
+    for event in events:
+        if event.word != "SPINDL" or "MAXRPM" not in words(event):
+            yield event
+            continue
+        at = next(k for k, v in enumerate(event.values) if str(v).upper() == "MAXRPM")
+        limit = next((v for v in event.values[at + 1:at + 2] if isinstance(v, float)), None)
+        rest = event.values[:at] + event.values[at + (1 if limit is None else 2):]
+        bare = replace(event, values=rest)
+        speed = speed_said(bare)
+        if speed is not None and limit is not None and speed > limit:
+            report(Severity.ERROR, "spindle.limit", f"SPINDL: {speed:g} rev/min, but MAXRPM is {limit:g}", event.line,
+                   "state a speed below it")
+        report(Severity.WARNING, "spindle.limit", "SPINDL: MAXRPM is not carried out, it limits cutting speeds, and speeds "
+               "are in rev/min here", event.line, "")
+        if rest:
+            yield bare
 
 
 def _check_spindle(event: Event, report: Report) -> None:

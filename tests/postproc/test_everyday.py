@@ -173,3 +173,54 @@ def test_two_registers_of_one_tool_are_refused_where_it_has_one_length(controlle
 def test_the_tools_own_number_as_register_is_nothing_to_tell(controller: str) -> None:
     result = converted(HEAD.replace("LOADTL/1", "LOADTL/1,ADJUST,1") + CUT, controller=controller)
     assert not errors(result) and "tool.register" not in {d.code for d in result.diagnostics}
+
+
+@pytest.mark.parametrize(("record", "advice"), [
+    ("PREFUN/54", "work_offset_code in the set-up"), ("PREFUN/64", "from --tolerance"), ("INSERT/G4 P1", "DELAY/seconds"),
+    ("INSERT/G17", "take the record out"), ("AUXFUN/50", "program.passive"), ("INSERT/G53 Z0", "GOHOME")])
+def test_a_code_that_cannot_be_put_in_comes_with_what_to_do(record: str, advice: str) -> None:
+    found = said(converted(HEAD + record + "\n" + CUT), "insert.refused")
+    assert found.severity is Severity.ERROR and advice in found.hint
+
+
+@pytest.mark.parametrize("record", ["SPINDL/RPM,1200,MAXRPM,2000,CLW", "SPINDL/1200,MAXRPM,2000,CLW",
+                                    "SPINDL/MAXRPM,2000,RPM,1200,CLW"])
+def test_the_limit_of_a_speed_is_left_out(record: str) -> None:
+    result = converted(HEAD.replace("SPINDL/RPM,1000,CLW", record) + CUT)
+    assert not errors(result) and "S1200 M3" in result.text and "2000" not in result.text
+    assert said(result, "spindle.limit").severity is Severity.WARNING
+
+
+def test_a_limit_alone_starts_no_spindle() -> None:
+    result = converted(HEAD.replace("RPM,1000,CLW", "MAXRPM,2000") + CUT)
+    assert not errors(result) and "M3" not in result.text and said(result, "spindle.not_started")
+
+
+def test_a_speed_above_its_limit_is_refused() -> None:
+    found = errors(converted(HEAD.replace("RPM,1000", "RPM,1200,MAXRPM,1000") + CUT))
+    assert any("1200" in e and "1000" in e for e in found)
+
+
+def tap(options: str, spindle: str = "RPM,600,CLW", retract: str = "3") -> str:
+    return (f"UNITS/MM\nLOADTL/1\nSPINDL/{spindle}\nRAPID\nGOTO/0,0,50\nCYCLE/TAP,DEPTH,5,MMPM,600,RAPTO,3,RTRCTO,{retract}"
+            f"{options}\nGOTO/10,0,0\nCYCLE/OFF\n")
+
+
+@pytest.mark.parametrize(("text", "controller", "reason"), [
+    (tap(",DWELL,1"), "fanuc-30i", "it dwells for 1 s"), (tap("", "OFF"), "fanuc-30i", "its spindle stands"),
+    (tap("").replace("TAP", "BORE7"), "linuxcnc", "cycles.table has no BORE7"),
+    (tap("").replace("CYCLE/TAP", "OPSKIP/ON\nCYCLE/TAP"), "fanuc-30i", "between OPSKIP/ON and OPSKIP/OFF")])
+def test_a_cycle_that_cannot_be_written_names_the_reason(text: str, controller: str, reason: str) -> None:
+    found = said(converted(text, controller=controller), "cycle.not_native")
+    assert reason in found.message and found.hint
+    reasons = ["it dwells", "spindle stands", "has no BORE7", "OPSKIP", "along Z"]
+    assert [w for w in reasons if w in found.message] == [w for w in reasons if w in reason]
+
+
+def test_a_length_beside_the_tool_is_no_register() -> None:
+    result = converted(HEAD.replace("LOADTL/1", "LOADTL/1,LENGTH,120") + CUT)
+    assert not errors(result) and "G43 H1" in result.text.splitlines()
+    assert "gauge length of tool 1 in the set-up" in said(result, "cl.tool-length").hint
+    both = converted(HEAD.replace("LOADTL/1", "LOADTL/1,LENGTH,120,OFFSET,7") + CUT)
+    assert "G43 H7" in both.text.splitlines()
+    assert "G43 H5" in converted(HEAD.replace("LOADTL/1", "LOADTL/1,1,120,5") + CUT).text.splitlines()

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from itertools import takewhile
 from typing import Any
 
 from toolpaths.cl.build import Builder
@@ -90,14 +91,20 @@ def change(b: Builder, number: float, register: float | None, more: tuple[float,
 
 
 def loadtl(b: Builder, s: Statement) -> None:
-    """LOADTL/number[, register][, ADJUST | OSETNO | OFFSET, register], or number, pocket, length, register (ISO)."""
+    """LOADTL/number[, register][, LENGTH, length][, ADJUST | OSETNO | OFFSET, register], or number, pocket, length,
+    register (ISO): numbers behind a word belong to it."""
     numbers = s.numbers
     if not numbers:
         b.log.error("cl.tool-number", f"LOADTL/{s.body}: it takes a tool number", b.line)
         return
     register = s.after("ADJUST", "OSETNO", "OFFSET")
-    if register is None and len(numbers) > 1:
-        register = numbers[_ISO_REGISTER] if len(numbers) > _ISO_REGISTER else numbers[1]
+    placed = [w for w in takewhile(lambda w: isinstance(w, float) or not w, s.words) if isinstance(w, float)]
+    if register is None and len(placed) > 1:
+        register = placed[_ISO_REGISTER] if len(placed) > _ISO_REGISTER else placed[1]
+    length = s.after("LENGTH")
+    if length is not None:
+        b.log.info("cl.tool-length", f"LOADTL/{s.body}: the length is not used, it may be that of the cutter or of the tool with "
+                   "its holder", b.line, f"state the gauge length of tool {numbers[0]:g} in the set-up")
     change(b, numbers[0], register)
 
 
