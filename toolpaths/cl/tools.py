@@ -103,8 +103,8 @@ def loadtl(b: Builder, s: Statement) -> None:
         register = placed[_ISO_REGISTER] if len(placed) > _ISO_REGISTER else placed[1]
     length = s.after("LENGTH")
     if length is not None:
-        b.log.info("cl.tool-length", f"LOADTL/{s.body}: the length is not used, it may be that of the cutter or of the tool with "
-                   "its holder", b.line, f"state the gauge length of tool {numbers[0]:g} in the set-up")
+        b.log.info("cl.tool-length", f"LOADTL/{s.body}: the length is not used, it may be that of the cutter or of the "
+                   "whole tool", b.line, f"state the gauge length of tool {numbers[0]:g} in the set-up")
     change(b, numbers[0], register)
 
 
