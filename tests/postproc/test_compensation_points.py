@@ -16,7 +16,7 @@ from postproc.cli import app
 from postproc.compensation import unstated
 from postproc.corrected.proof import after_formatting
 from postproc.options import Options
-from postproc.pipeline import PostResult
+from postproc.pipeline import PostResult, verify
 from postproc.setup import load_setup
 from toolpaths.arrays import Floats
 
@@ -130,3 +130,12 @@ def test_blocks_that_name_their_axes_write_no_others() -> None:
     named = np.flatnonzero(path.state.any(axis=1) & (np.arange(len(path)) > 0))
     assert len(named) > 5 and not (path.q[named] != path.q[named - 1])[~path.state[named]].any()
     np.testing.assert_array_equal(unstated(path.q, path), path.q)
+
+
+def test_a_tool_is_changed_at_home_but_for_what_the_model_corrects_there(tmp_path: Path) -> None:
+    result = converted("five_faces.cls", "mikron-ucp710", "linuxcnc", "tools")
+    path, found = toolpaths.read(SAMPLES / "five_faces.cls")
+    for away, good in ((0.0, True), (0.03, True), (0.3, False)):
+        (tmp_path / "a.ngc").write_text(result.text.replace("G53 G0 Z250\n", f"G53 G0 Z{250.0 - away:g}\n"))
+        told = verify(tmp_path / "a.ngc", path, "mikron-ucp710", "linuxcnc", options=result.options, diagnostics=found)
+        assert ("verify.tool_change" not in {d.code for d in told.diagnostics}) == good
