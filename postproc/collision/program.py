@@ -8,14 +8,14 @@ import numpy as np
 
 from postproc.collision.bodies import Scene, Touch, scene, touches
 from postproc.collision.executed_way import way_of
-from postproc.collision.form import Form, lever_of, tool_form
+from postproc.collision.form import PARTS, Form, lever_of, tool_form
 from postproc.collision.swept import Swept
 from postproc.moves import Moves, Phase
 from postproc.readback.execute import Motion
 from postproc.readback.faults import Faults
 from postproc.readback.poses import Executed, begins
 from toolpaths.arrays import Bools, Ints
-from toolpaths.diagnostics import Diagnostic, has_errors
+from toolpaths.diagnostics import Diagnostic, has_errors, info
 
 if TYPE_CHECKING:
     from postproc.job import Job
@@ -79,13 +79,26 @@ def _drilling(moves: Moves) -> Bools:
 
 def _told(bodies: Scene, form: Form, way: Swept, drilling: Bools, motion: Motion, served: tuple[Moves, Ints],
           faults: Faults) -> list[Diagnostic]:
-    """One error per pair, at its worst place."""
+    """One error per pair, at its worst place; else what was compared."""
     cutting = way.take(np.flatnonzero(~drilling[way.row])) if drilling.any() else None
-    result = []
-    for touch in touches(bodies, form, way, cutting):
+    result: list[Diagnostic] = []
+    found = touches(bodies, form, way, cutting)
+    if not found and len(way):
+        return [_clear(bodies, form, faults)]
+    for touch in found:
         code = "collision.gouge" if touch.limit < 0.0 else "collision.near" if touch.distance > 0.0 else "collision.touch"
         result.append(faults.error(code, str(touch), *_lines(touch.place, motion, served), hint=_hint(touch)))
     return result
+
+
+def _clear(bodies: Scene, form: Form, faults: Faults) -> Diagnostic:
+    """What was compared with what."""
+    said: dict[str, list[str]] = {}
+    for part, body, limit in bodies.pairs(form):
+        kept = f"keeps {limit:g} mm from" if limit >= 0.0 else f"is at most {-limit:g} mm in"
+        said.setdefault(f"{PARTS[part]} {kept}", []).append(body.name)
+    text = "; ".join(f"{kept} {', '.join(names)}" for kept, names in said.items())
+    return info("collision.clear", f"T{form.number}, everywhere on its way: {text}", file=faults.gcode or faults.cl)
 
 
 def _hint(touch: Touch) -> str:

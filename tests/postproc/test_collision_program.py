@@ -53,7 +53,8 @@ def converted(path: Toolpath, setup: Path, name: str = "mikron-ucp710", controll
 
 
 def collisions(found: tuple[Diagnostic, ...]) -> list[Diagnostic]:
-    return [d for d in found if d.code.startswith("collision")]
+    """What stands against a program, and what was not checked."""
+    return [d for d in found if d.code.startswith("collision") and d.severity > 0]
 
 
 @pytest.mark.parametrize(("top", "depth"), [(-0.001, 0.0), (0.005, 0.0), (0.05, 0.05), (0.4, 0.4)])
@@ -174,6 +175,13 @@ def test_a_setup_that_does_not_know_the_holder_says_what_is_not_checked(tmp_path
     found = collisions(result.diagnostics)
     assert result.ok and {d.code for d in found} == {"collision.unchecked"}
     assert "flute_length" in found[0].hint and "T1" in found[0].message
+
+
+def test_what_was_compared_is_told(tmp_path: Path) -> None:
+    result = converted(line(), setup_file(tmp_path, block(tmp_path, 0.0) + fixture((115, -10, 0), (130, 10, 70))))
+    told = [d.message for d in result.diagnostics if d.code == "collision.clear"]
+    assert told == ["T1, everywhere on its way: cutter is at most 0.02 mm in the part; cutter keeps 0.5 mm from fixture "
+                    "clamp; shank keeps 0.5 mm from the part, fixture clamp; holder keeps 0.5 mm from the part, fixture clamp"]
 
 
 def test_a_bad_mesh_stops_the_conversion(tmp_path: Path) -> None:
