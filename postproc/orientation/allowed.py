@@ -144,8 +144,10 @@ def lattice(apart: float) -> Floats:
 def _told(one: Pass, bound: _Bound, k: int) -> str:
     """A broken limit in words."""
     where = f" at line {int(one.contact.line[k])}" if len(one.contact) else ""
-    least = f"{bound.low / DEG:.3f} to " if bound.low != 0.0 or not bound.what else ""
-    return f"{bound.name} {bound.values[0, k] / DEG:.3f} degrees{bound.what}{where}, allowed {least}{bound.high / DEG:.3f}"
+    low, high = f"{bound.low / DEG:.3f}", f"{bound.high / DEG:.3f}"
+    between = f"{low} to {high}" if bound.low != 0.0 or not bound.what else high
+    allowed = f"at least {low}" if bound.high >= np.pi else between
+    return f"{bound.name} {bound.values[0, k] / DEG:.3f} degrees{bound.what}{where}, allowed {allowed}"
 
 
 def own_outside(one: Pass, limits: OrientationLimits) -> str:

@@ -183,7 +183,8 @@ def test_chosen_axes_are_inside_and_the_own_one_is_told() -> None:
     choice, found = oriented(path, setup)
     assert choice is not None
     told = [d for d in found if d.code == "orient.own_limits"]
-    assert len(told) == 1 and told[0].count == 2 and "tilt 0.000 degrees from the surface normal" in told[0].message
+    assert len(told) == 1 and told[0].count == 2 and "tilt 0.000 degrees from the surface normal at line 10, " \
+        "allowed at least 10.000" in told[0].message
     for made in choice.plans["per-pass"].picked:
         at = made.one.contact
         assert 5.0 <= at.lead(made.axis[None]).min() / DEG <= 50.0
