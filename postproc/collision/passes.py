@@ -47,7 +47,8 @@ class PassBodies:
             way = along_curves(self._curves.take(rows), rows)
         else:
             way = joined([self._way(one).turned(one.shift(axis), axis), self._legs(one, axis)])
-        return touches(self.bodies, form, way, way.take(np.flatnonzero(~self._drilling[way.row])))
+        drilling = self._drilling[way.row]
+        return touches(self.bodies, form, way, way.take(np.flatnonzero(~drilling)) if drilling.any() else None)
 
     def _way(self, one: Pass) -> Swept:
         """From the first pose of a pass to its last, with the axis of the file."""

@@ -175,3 +175,27 @@ def test_the_samples_are_what_their_script_writes(tmp_path: Path) -> None:
     kept = sorted((SAMPLES / "bodies").iterdir())
     assert [file.name for file in kept] == sorted(file.name for file in tmp_path.iterdir())
     assert all(file.read_bytes() == (tmp_path / file.name).read_bytes() for file in kept)
+
+
+def test_a_drill_may_be_in_the_hole_that_it_makes(tmp_path: Path) -> None:
+    """Its pass is fixed; the part's mesh has no hole. A clamp beside the hole is met all the same."""
+    trimesh.creation.box(bounds=[(-20, -20, -40), (60, 20, 0)]).export(tmp_path / "part.stl")
+    path = toolpath("RAPID", "GOTO/0,0,50", "CYCLE/DRILL,DEPTH,15,MMPM,100,CLEAR,3", "GOTO/0,0,0", "GOTO/40,0,0",
+                    "CYCLE/OFF", "RAPID", "GOTO/40,0,60", head=["UNITS/MM", "CUTTER/6,0", *HEAD[2:]])
+    part = 'part = "part.stl"\nclearance = 0.5\n'
+    drill = TOOL.replace("diameter = 12.0", "diameter = 6.0")
+    free = bodies_of(path, setup_file(tmp_path, part, drill))
+    assert [free.touching(one, one.axis) for one in free.work.passes] == [""] * len(free.work.passes)
+    clamp = wall(np.array([18.0, -5.0, 0.0]), np.array([22.0, 5.0, 8.0]))
+    met = bodies_of(path, setup_file(tmp_path, part + clamp, drill))
+    assert any("cutter of T1 touches fixture wall" in met.touching(one, one.axis) for one in met.work.passes)
+
+
+def test_a_pass_whose_axis_turns_is_bounded_on_the_way(tmp_path: Path) -> None:
+    """The tip stands, the axis leans from -30 to 30 degrees: a wire over it is met by the holder half way."""
+    a, b = leaning(30.0, 180.0), leaning(30.0, 0.0)
+    lines = ["MULTAX", "RAPID", f"GOTO/0,0,0,{a[0]:.9f},0,{a[2]:.9f}", f"GOTO/0,0.001,0,{b[0]:.9f},0,{b[2]:.9f}"]
+    wire = setup_file(tmp_path, wall(np.array([-0.2, -60.0, 119.5]), np.array([0.2, 60.0, 119.9])))
+    bodies = bodies_of(toolpath(*lines, head=HEAD), wire)
+    one = bodies.work.passes[0]
+    assert one.fixed and "holder of T1 touches fixture wall" in bodies.touching(one, one.axis)
