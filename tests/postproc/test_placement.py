@@ -159,6 +159,17 @@ def test_the_same_again() -> None:
     assert first.looked == second.looked
 
 
+def test_among_equals_the_roomiest() -> None:
+    """Home is 200 mm away in X, so that up to that Y costs no time: the part goes where Y has most travel left."""
+    choice = placed(passes((1.0, 0.0)), machine("mill-3axis"), setup_of((200.0, 90.0, 0.0), y=(-100.0, 100.0)))
+    assert choice.best.place[1] == pytest.approx(-1.0, abs=2.0)
+    m = choice.work.machine
+    good = [one for one in choice.known if np.isfinite(one.seconds) and choice.space.holds(one.place)]
+    equal = [one for one in good if one.seconds <= min(one.seconds for one in good) * (1.0 + EQUAL)]
+    assert len({one.shares(m) for one in equal}) > 1
+    assert choice.best.shares(m) == max(one.shares(m) for one in equal)
+
+
 def test_angles_and_back() -> None:
     rng = np.random.default_rng(4)
     for angles in rng.uniform([-3.1, -1.5, -3.1], [3.1, 1.5, 3.1], (50, 3)):

@@ -12,7 +12,7 @@ from machines.machine import Machine
 from machines.singular_distance import singular_distance
 from postproc.options import Options
 from postproc.orientation.passes import work_of
-from postproc.placement.region import region_of
+from postproc.placement.region import Slabs, region_of
 from postproc.placement.search import Search
 from postproc.placement.space import ANGLES, Space, matrix, space_of
 from postproc.placement.timed import Timer
@@ -120,6 +120,22 @@ def test_deepest_is_no_worse_than_any_place() -> None:
     rng = np.random.default_rng(6)
     assert region.margins(centre[None])[0] == pytest.approx(margin)
     assert region.margins(rng.uniform(low, high, (2000, 3))).max() <= margin + 1e-6
+
+
+def test_most_margin_of_slabs_in_any_direction() -> None:
+    """Rows as they are where rotary joints turn: nowhere in the box is the least of all margins greater."""
+    rng = np.random.default_rng(9)
+    for _ in range(5):
+        slabs = Slabs(rng.normal(size=(300, 3)), rng.uniform(20.0, 200.0, 300), rng.integers(0, 3, 300), ("X", "Y", "Z"))
+        low, high = np.array([-80.0, -50.0, 0.0]), np.array([60.0, 50.0, 30.0])
+        centre, margin, what = slabs.deepest(low, high)
+        assert ((centre >= low) & (centre <= high)).all()
+        near = np.clip(centre + rng.normal(scale=3.0, size=(3000, 3)), low, high)
+        every = slabs.margins(np.vstack([rng.uniform(low, high, (3000, 3)), near]))
+        assert every.max() <= margin + 1e-3
+        assert every.max() >= margin - 3.0
+        values = slabs.g @ centre + slabs.c
+        assert what.startswith(f"axis {slabs.names[slabs.joint[values.argmin()]]} lacks")
 
 
 def test_poses_that_stand_for_all_keep_their_distance() -> None:
