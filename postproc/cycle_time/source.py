@@ -24,12 +24,9 @@ from toolpaths.diagnostics import Diagnostic, DiagnosticError, error, has_errors
 
 def from_conversion(result: PostResult) -> Blocks:
     """The blocks of a conversion that has succeeded, with operations and lines of its CL file."""
-    assert result.job is not None and result.comparison is not None and result.ok
+    assert result.job is not None and result.comparison is not None and result.comparison.executed is not None and result.ok
     job = result.job
-    lengths = job.register_lengths()
-    others = {name: text.encode() for name, text in (result.files or {}).items()}
-    code, motion, found = _executed(result.text.encode(), result.controller, job.control, lengths, "", others)
-    assert code is not None and motion is not None, found
+    code, motion = result.comparison.executed
     moves, path = job.moves.without_pecks(), job.toolpath
     owner = np.clip(result.comparison.owner, 0, len(moves) - 1)
     names = tuple(op.name or f"operation {k + 1}" for k, op in enumerate(path.operations))
@@ -72,7 +69,7 @@ def from_gcode(data: bytes, machine: Machine, controller: ControllerFile, setup:
 
 
 def _executed(data: bytes, controller: ControllerFile, control: Control, lengths: dict[int, float], file: str,
-              others: Mapping[str, bytes] | None = None) -> tuple[Canonical | None, Motion | None, list[Diagnostic]]:
+              others: Mapping[str, bytes] | None) -> tuple[Canonical | None, Motion | None, list[Diagnostic]]:
     """Text to canonical words to motion."""
     machine = control.machine
     home = control.words(machine.home[None, :], machine.kinematics, 0.0)[0] + control.work_offset

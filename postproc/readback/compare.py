@@ -9,6 +9,7 @@ import numpy as np
 from postproc.job import Job
 from postproc.moves import Moves, Phase
 from postproc.readback.align import align, unreached
+from postproc.readback.canonical import Canonical
 from postproc.readback.checks import (
     block_seconds,
     check_holes,
@@ -38,7 +39,8 @@ CHUNK = 50_000
 
 @dataclass(frozen=True)
 class Comparison:
-    """Worst deviations (mm, rad) with the CL line and program line of each, and the poses and matching they rest on."""
+    """Worst deviations (mm, rad) with the CL line and program line of each, and the poses and matching they rest on;
+    `executed` is what was compared, the words of the program and their motion, so that nothing reads it again."""
 
     worst_tip: float
     worst_axis: float
@@ -49,6 +51,7 @@ class Comparison:
     match: Ints
     owner: Ints
     diagnostics: tuple[Diagnostic, ...]
+    executed: tuple[Canonical, Motion] | None = None
 
 
 def compare(motion: Motion, job: Job, executed: Executed, gcode: str = "", planned: bool = False) -> Comparison:

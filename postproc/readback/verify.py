@@ -59,7 +59,7 @@ def read_back(data: bytes, job: Job, file: str, progress: Callable[[str, int, in
     unseen = [*check_changes(code, motion, job, home, faults), *check_stops(code, motion, job, faults),
               *_bodies(motion, executed, job, comparison, faults)]
     told = sorted([*unseen, *comparison.diagnostics], key=lambda d: d.code not in CAUSES)
-    return comparison, [*diagnostics, *told]
+    return replace(comparison, executed=(code, motion)), [*diagnostics, *told]
 
 
 def _bodies(motion: Motion, executed: Executed, job: Job, comparison: Comparison, faults: Faults) -> list[Diagnostic]:

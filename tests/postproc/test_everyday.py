@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,7 @@ from typer.testing import CliRunner
 import postproc
 import toolpaths
 from postproc.cli import app
+from postproc.cycle_time import source
 from postproc.setup import SetupFile
 from tests.postproc.kit import machine
 from toolpaths.diagnostics import Diagnostic, Severity
@@ -224,3 +226,20 @@ def test_a_length_beside_the_tool_is_no_register() -> None:
     both = converted(HEAD.replace("LOADTL/1", "LOADTL/1,LENGTH,120,OFFSET,7") + CUT)
     assert "G43 H7" in both.text.splitlines()
     assert "G43 H5" in converted(HEAD.replace("LOADTL/1", "LOADTL/1,1,120,5") + CUT).text.splitlines()
+
+
+@pytest.mark.parametrize("controller", ["linuxcnc", "heidenhain-tnc640"])
+def test_the_estimate_takes_what_the_read_back_has_executed(controller: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    result = converted(HEAD + CUT + HOLE.replace("CLEAR", "MMPM,100,CLEAR"), controller=controller)
+    assert result.ok and result.job is not None and result.comparison is not None
+    code, motion, _ = source._executed(result.text.encode(), result.controller, result.job.control,
+                                       result.job.register_lengths(), "", {})
+    assert code is not None and motion is not None
+    again = replace(result, comparison=replace(result.comparison, executed=(code, motion))).estimate
+
+    def read(*_: object) -> None:
+        raise AssertionError("the text is read again")
+
+    monkeypatch.setattr(source, "reader_for", read)
+    assert result.estimate is not None and again is not None and result.estimate.seconds == again.seconds > 0.0
+    assert result.estimate.band == again.band
