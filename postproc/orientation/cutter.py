@@ -12,7 +12,8 @@ def ball_radius(tool: Tool | None) -> float | None:
     """Radius of a ball-end mill in mm; 0 for cutters that are known to be of another form, None where the file does not say.
 
     A cutter with corner radius D/2 is a ball; one with a smaller corner radius has a flat end, and turning it moves the
-    contact.
+    contact. Where the file gives e and f, the place of the corner's centre beside the axis and above the tip (CUTTER/d, r, e,
+    f, ... of APT), these decide: the diameter of a tapered ball is not twice its radius.
     """
     if tool is None or tool.diameter is None:
         return None
@@ -20,5 +21,7 @@ def ball_radius(tool: Tool | None) -> float | None:
         return 0.0
     if tool.corner_radius is None:
         return None
-    half = 0.5 * tool.diameter
-    return half if half > 0.0 and abs(tool.corner_radius - half) <= _SAME * half else 0.0
+    radius, half = tool.corner_radius, 0.5 * tool.diameter
+    beside, above = tool.cutter[2:4] if len(tool.cutter) > 3 else (0.0, 0.0)
+    off = max(abs(beside), abs(above - radius)) if beside or above else abs(radius - half)
+    return radius if half > 0.0 and radius > 0.0 and off <= _SAME * radius else 0.0
