@@ -15,7 +15,8 @@ _LINES = "UNITS/MM\n{cutter}\nLOADTL/1\nRAPID\nGOTO/0,0,9,0,0,1\nFEDRAT/900,MMPM
     ("CUTTER/16,8,0,8,0,0,50", 8.0),
     ("CUTTER/14.6586,8,0,8,0,5,50", 8.0),   # tapered ball: side and tip plane meet inside the ball's radius
     ("CUTTER/16,8,0.67,8,0,5,50", 0.0),     # the same numbers with a flat end
-    ("CUTTER/16,85,-77,85", 0.0),
+    ("CUTTER/16,85,-77,85,0,0,50", 0.0),
+    ("CUTTER/16,8,75,0", 8.0),              # diameter, corner, height
     ("CUTTER/16,2,6,2,0,0,50", 0.0),
     ("CUTTER/16,0", 0.0),
     ("CUTTER/0,0", 0.0),
