@@ -12,6 +12,7 @@ import postproc
 import toolpaths
 from postproc.cli import app
 from postproc.cycle_time import source
+from postproc.orientation.passes import work_of
 from postproc.setup import SetupFile
 from tests.postproc.kit import machine
 from toolpaths.diagnostics import Diagnostic, Severity
@@ -90,8 +91,11 @@ def test_the_feed_of_the_set_up_replaces_none_that_is_stated() -> None:
 
 
 def test_a_tap_takes_no_feed_of_the_set_up() -> None:
-    result = converted(NO_FEED + "CYCLE/TAP,DEPTH,5,CLEAR,2\nGOTO/30,0,0\nCYCLE/OFF\n", of=setup(output={"feed": 50.0}))
-    assert "cl.cycle-value" in {d.code for d in result.diagnostics if d.severity is Severity.ERROR}
+    of, text = setup(output={"feed": 50.0}), NO_FEED + "CYCLE/TAP,DEPTH,5,CLEAR,2{}\nGOTO/30,0,0\nCYCLE/OFF\n"
+    assert said(converted(text.format(""), of=of), "cl.cycle-value").severity is Severity.ERROR
+    path, _ = toolpaths.read_bytes(text.format(",MMPM,500").encode(), file="t.apt")
+    unknown = replace(path, cycles=tuple(replace(c, feed=float("nan")) for c in path.cycles))
+    assert said(postproc.convert(unknown, machine("mill-3axis"), setup=of), "feed.missing").severity is Severity.ERROR
 
 
 TWO = "".join(f"TOOL PATH/OP_{name},TOOL,{name}\nTLDATA/MILL,{size},0,75,0,0\nMSYS/0,0,0,1,0,0,0,1,0\nLOAD/TOOL,0\n"
@@ -243,3 +247,21 @@ def test_the_estimate_takes_what_the_read_back_has_executed(controller: str, mon
     monkeypatch.setattr(source, "reader_for", read)
     assert result.estimate is not None and again is not None and result.estimate.seconds == again.seconds > 0.0
     assert result.estimate.band == again.band
+
+
+def test_a_feed_between_the_cycle_and_its_first_hole_is_the_cycles() -> None:
+    path, found = toolpaths.read_bytes((NO_FEED + HOLE.replace("\nGOTO", "\nFEDRAT/MMPM,120\nGOTO") + "FINI\n").encode())
+    assert "cl.no-feed" in {d.code for d in found} and path.cycles[0].feed == pytest.approx(2.0)
+
+
+def test_tool_0_of_the_set_up_is_used_where_no_tool_is_loaded() -> None:
+    of = setup(tools={"0": {"gauge_length": 10.0}})
+    unloaded = converted(HEAD.replace("LOADTL/1\n", "") + CUT, of=of)
+    assert unloaded.ok and "setup.tool_unused" not in {d.code for d in unloaded.diagnostics}
+    assert "T0" in said(converted(HEAD + CUT, of=of), "setup.tool_unused").message
+
+
+def test_chosen_tool_axes_see_the_numbers_of_the_set_up() -> None:
+    path, _ = toolpaths.read_bytes((TWO + "FINI\n").encode())
+    work, found = work_of(path, machine("mikron-ucp710"), setup(tool_numbers=NAMES), postproc.Options(), turning=False)
+    assert work is not None and not found and {t.number for t in work.toolpath.tools} == {1, 2}

@@ -52,7 +52,7 @@ def assemble(b: Builder) -> Toolpath:
     kind[cycle >= 0] = Kind.RAPID
     cycle, cycles = _used_cycles(b, cycle)
     feed, mode = _feeds(b, rows, kind)
-    cycles = _fed_cycles(cycle, cycles, feed, mode)
+    cycles = _fed_cycles(b, cycle, cycles)
     operation, operations, frames = _operations(b, n)
     tool, tools = _tools(b, n)
     pass_ = passes((kind == Kind.RAPID) & (role != Role.HOLE), operation, tool)
@@ -260,12 +260,13 @@ def _used_cycles(b: Builder, cycle: Array) -> tuple[Array, tuple[Cycle, ...]]:
     return index[cycle], tuple(b.cycles[i] for i in used)
 
 
-def _fed_cycles(cycle: Array, cycles: tuple[Cycle, ...], feed: Floats, mode: Array) -> tuple[Cycle, ...]:
-    """The cycles; those that state no feed, where none held yet, have that of their first hole."""
+def _fed_cycles(b: Builder, cycle: Array, cycles: tuple[Cycle, ...]) -> tuple[Cycle, ...]:
+    """The cycles; those that state no feed, where none held yet, have that which holds at their first hole."""
     result = list(cycles)
     for k in [k for k, c in enumerate(cycles) if np.isnan(c.feed)]:
         row = int(np.flatnonzero(cycle == k)[0])
-        result[k] = replace(cycles[k], feed=float(feed[row]), feed_mode=FeedMode(int(mode[row])))
+        feed, mode = b.feed.values[int(np.searchsorted(b.feed.starts, row, side="right")) - 1]
+        result[k] = replace(cycles[k], feed=feed, feed_mode=mode)
     return tuple(result)
 
 
