@@ -53,6 +53,8 @@ class PlacementChoice:
     pruned: int
     refused: int
     known: tuple[Tried, ...]
+    program: tuple[float, float]
+    """seconds of the program at [part] and at the best place; NaN where it cannot be written"""
 
     @property
     def part(self) -> PartPlacement:
@@ -65,7 +67,8 @@ def place(toolpath: Toolpath, machine: Machine, setup: SetupFile, options: Optio
           progress: Progress | None = None) -> tuple[PlacementChoice | None, list[Diagnostic]]:
     """The place of least planned time inside [placement] of the set-up; None where a diagnostic is an ERROR.
 
-    The place is converted for the controller and read back before it is taken.
+    The place is converted for the controller and read back before it is taken, and only where that program takes less time
+    than the one at [part] does, links included.
     """
     options = options or Options()
     work, space, found = _begun(toolpath, machine, setup, options, controller)
@@ -90,11 +93,17 @@ def place(toolpath: Toolpath, machine: Machine, setup: SetupFile, options: Optio
                              file=options.setup))
     if result.best is None:
         return None, [*found, _nowhere(result, timer, options)]
-    best, more = _proved(toolpath, machine, setup, options, controller, timer, result.best, progress)
+    proof = _Proof(toolpath, machine, setup, options, controller, space, progress)
+    best, more = _proved(proof, timer, result.best)
     if best is None:
         return None, [*found, *more]
+    program = proof.seconds(result.now), proof.seconds(best)
+    if best is not result.now and space.holds(result.now.place) and program[1] >= program[0]:
+        more.append(info("place.kept", f"at the best place found the program takes {program[1]:.3f} s, where [part] has the "
+                         f"part {program[0]:.3f} s: the part stays there", file=options.setup))
+        best, program = result.now, (program[0], program[0])
     return PlacementChoice(work, space, result, best, timer.planned, timer.looked, timer.pruned, timer.refused,
-                           tuple(timer.known())), [*found, *more]
+                           tuple(timer.known()), program), [*found, *more]
 
 
 def _begun(toolpath: Toolpath, machine: Machine, setup: SetupFile, options: Options,
@@ -148,20 +157,42 @@ def _nowhere(result: Found, timer: Timer, options: Options) -> Diagnostic:
                  hint="wider limits, another tool length, a lower clearance.margin or a machine with more travel")
 
 
-def _proved(toolpath: Toolpath, machine: Machine, setup: SetupFile, options: Options, controller: str | Path, timer: Timer,
-            best: Tried, progress: Progress | None) -> tuple[Tried | None, list[Diagnostic]]:
-    """The best place whose conversion is proved; what stood against better ones is told."""
-    from postproc.pipeline import convert
+class _Proof:
+    """Conversions at places, each made once; only their seconds and what stood against them is kept."""
 
+    def __init__(self, toolpath: Toolpath, machine: Machine, setup: SetupFile, options: Options, controller: str | Path,
+                 space: Space, progress: Progress | None) -> None:
+        self.toolpath, self.machine, self.setup, self.options = toolpath, machine, setup, options
+        self.controller, self.space, self.progress = controller, space, progress
+        self.done: dict[int, tuple[float, Diagnostic | None]] = {}
+
+    def of(self, one: Tried) -> tuple[float, Diagnostic | None]:
+        """Seconds of the program there (NaN where none is written), and the worst that stands against it."""
+        from postproc.pipeline import convert
+        from postproc.placement.program import program_seconds
+
+        if id(one) not in self.done:
+            here = self.setup.model_copy(update={"part": self.space.part(one.place)})
+            result = convert(self.toolpath, self.machine, self.controller, here, self.options, progress=self.progress)
+            why = None if result.ok else max(result.diagnostics, key=lambda d: d.severity)
+            self.done[id(one)] = program_seconds(result), why
+        return self.done[id(one)]
+
+    def seconds(self, one: Tried) -> float:
+        """Of the program there; NaN where the part cannot stand there."""
+        return np.nan if one.refused else self.of(one)[0]
+
+
+def _proved(proof: _Proof, timer: Timer, best: Tried) -> tuple[Tried | None, list[Diagnostic]]:
+    """The best place whose conversion is proved; what stood against better ones is told."""
     failed: list[tuple[Tried, Diagnostic]] = []
     for one in _candidates(timer, best):
         if any(_near(one.place, other.place) for other, _ in failed):
             continue
-        here = setup.model_copy(update={"part": timer.space.part(one.place)})
-        result = convert(toolpath, machine, controller, here, options, progress=progress)
-        if result.ok:
-            return one, [_passed_over(*each, options) for each in failed]
-        failed.append((one, max(result.diagnostics, key=lambda d: d.severity)))
+        why = proof.of(one)[1]
+        if why is None:
+            return one, [_passed_over(*each, proof.options) for each in failed]
+        failed.append((one, why))
         if len(failed) == _PROOFS:
             break
     return None, [error("place.proof", f"no place of {len(failed)} could be converted: {failed[0][1].message}",

@@ -23,7 +23,9 @@ def as_dict(choice: PlacementChoice) -> dict[str, Any]:
             "now": _place(choice, choice.found.now), "best": _place(choice, choice.best),
             "part": {"origin": list(choice.part.origin), "x_axis": list(choice.part.x_axis),
                      "y_axis": list(choice.part.y_axis)},
-            "gain": _finite(_gain(choice)), "attitudes": choice.found.attitudes, "places_screened": choice.found.screened,
+            "gain": _finite(_gain(choice)),
+            "program_s": dict(zip(("now", "best"), map(_finite, choice.program), strict=True)),
+            "attitudes": choice.found.attitudes, "places_screened": choice.found.screened,
             "places_looked_at": choice.looked, "places_refused": choice.refused, "places_pruned": choice.pruned,
             "cuts_planned": choice.planned,
             "turned": [_degrees(one.place[ANGLES:]) | {"time_s": _finite(one.seconds)} for one in _turned(choice)],
@@ -62,6 +64,9 @@ def as_text(choice: PlacementChoice) -> str:
     gain = _gain(choice)
     if math.isfinite(gain):
         lines.append(f"gain {100.0 * gain:.2f} %")
+    if all(map(math.isfinite, choice.program)):
+        before, after = choice.program
+        lines.append(f"the program, links included: {before:.3f} s at [part], {after:.3f} s as placed")
     lines.append("margin of travel: " + ", ".join(_margins(choice)))
     if choice.best.limiting:
         worst = max(choice.best.limiting, key=lambda name: choice.best.limiting[name])

@@ -8,17 +8,19 @@ from itertools import product
 import numpy as np
 import pytest
 
+import toolpaths
 from machines.machine import Machine
 from machines.singular_distance import singular_distance
 from postproc.options import Options
 from postproc.orientation.passes import work_of
+from postproc.placement.place import place
 from postproc.placement.region import Slabs, region_of
 from postproc.placement.search import Search
 from postproc.placement.space import ANGLES, Space, matrix, space_of
 from postproc.placement.timed import Timer
-from postproc.setup import PartPlacement, Placement, SetupFile, part_placement
+from postproc.setup import PartPlacement, Placement, SetupFile, load_setup, part_placement
 from postproc.setup_place import PlacementLimits
-from tests.postproc.kit import machine
+from tests.postproc.kit import SAMPLES, machine
 from tests.postproc.test_placement import passes, placed, refused, setup_of
 
 DELTA = "uranesx"
@@ -148,3 +150,17 @@ def test_poses_that_stand_for_all_keep_their_distance() -> None:
     q = kin.inverse(tips, np.tile([0.0, 0.0, 1.0], (len(tips), 1)), near=machine(DELTA).home)[0]
     assert made.singular <= singular_distance(kin, q).min() + 1e-9
     assert made.singular == pytest.approx(choice.best.singular)
+
+
+def test_a_place_that_only_its_links_make_worse_is_not_taken() -> None:
+    """On the UraneSX the cuts of the sample get faster away from [part], the links of the program longer: it is the program
+    that counts, and the part stays."""
+    setup, found = load_setup(SAMPLES / "delta.setup.toml")
+    assert setup is not None and not found
+    limits = PlacementLimits(x=(-100.0, 100.0), y=(-100.0, 100.0), turn=(0.0, 180.0))
+    path, _ = toolpaths.read(SAMPLES / "test_part.cls")
+    choice, more = place(path, machine(DELTA), setup.model_copy(update={"placement": limits}))
+    assert choice is not None, more
+    assert min(one.seconds for one in choice.known) < choice.found.now.seconds
+    assert choice.best is choice.found.now and "place.kept" in {d.code for d in more}
+    assert choice.program[0] == choice.program[1] > 0.0
