@@ -9,8 +9,9 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
-from machines.user_file import UserModel, load_toml, read_toml
+from machines.user_file import UserModel, read_toml, validate
 from postproc.setup_bodies import Bodies, ToolBody
+from postproc.setup_files import seen_from_here
 from postproc.setup_orientation import OrientationLimits
 from postproc.setup_place import PlacementLimits
 from toolpaths.arrays import Floats
@@ -183,7 +184,8 @@ def load_setup(path: str | Path | None) -> tuple[SetupFile | None, list[Diagnost
     """The set-up of a file, or the default without one."""
     if path is None:
         return SetupFile(), []
-    return load_toml(path, SetupFile, kind="set-up")
+    file, found = read_toml(path, kind="set-up")
+    return (None, found) if file is None else validate(seen_from_here(file), SetupFile)
 
 
 def part_placement(setup: SetupFile, file: str = "") -> tuple[Placement | None, list[Diagnostic]]:

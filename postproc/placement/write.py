@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-import os
+from functools import reduce
+from operator import getitem
 from pathlib import Path
 from typing import Any
 
 from postproc.setup import PartPlacement
+from postproc.setup_files import file_keys, renamed
 
 
 def placed_text(source: Path, target: Path, part: PartPlacement) -> str:
@@ -16,10 +18,12 @@ def placed_text(source: Path, target: Path, part: PartPlacement) -> str:
     """
     import tomlkit
 
-    document = tomlkit.parse(source.read_bytes().decode("utf-8-sig"))
-    for table, key in _named(document):
+    document: Any = tomlkit.parse(source.read_bytes().decode("utf-8-sig"))
+    here, there = source.parent, target.parent
+    for *tables, key in [("base",), *file_keys(document)]:
+        table = reduce(getitem, tables, document)
         if isinstance(table.get(key), str):
-            table[key] = _relative(source, target, table[key])
+            table[key] = renamed(table[key], here, there)
     if "part" not in document:
         document["part"] = tomlkit.table()
     table = document["part"]
@@ -27,16 +31,3 @@ def placed_text(source: Path, target: Path, part: PartPlacement) -> str:
         table[key] = list(values)
     return tomlkit.dumps(document)
 
-
-def _named(document: Any) -> list[tuple[Any, str]]:
-    """Tables of a set-up with the key that names a file in each."""
-    bodies = document.get("bodies", {})
-    tables = [(document, "base"), (bodies, "part"), (bodies.get("table", {}), "file")]
-    tables += [(fixture, "file") for fixture in bodies.get("fixtures", [])]
-    return tables + [(tool, "holder_mesh") for tool in document.get("tools", {}).values()]
-
-
-def _relative(source: Path, target: Path, name: str) -> str:
-    """A file that `source` names, as `target` names it; untouched where both stand in one folder."""
-    here, there = source.resolve().parent, target.resolve().parent
-    return name if here == there or Path(name).is_absolute() else Path(os.path.relpath(here / name, there)).as_posix()

@@ -1,13 +1,26 @@
-"""A second reading of the choice of orientations: forms of cutters that a CL file can give."""
+"""A second reading of the choice of orientations: forms of cutters that a CL file can give, files that set-ups name."""
 
 from __future__ import annotations
+
+from pathlib import Path
 
 import pytest
 
 import toolpaths
 from postproc.orientation.cutter import ball_radius
+from postproc.placement.write import placed_text
+from postproc.setup import PartPlacement, load_setup
 
 _LINES = "UNITS/MM\n{cutter}\nLOADTL/1\nRAPID\nGOTO/0,0,9,0,0,1\nFEDRAT/900,MMPM\nGOTO/9,0,9,0,0,1\nFINI\n"
+_BASE = """[bodies]
+part = "p.stl"
+[[bodies.fixtures]]
+name = "a"
+file = "meshes/a.stl"
+[tools.1]
+gauge_length = 90.0
+holder_mesh = "h.stl"
+"""
 
 
 @pytest.mark.parametrize(("cutter", "radius"), [
@@ -24,3 +37,21 @@ _LINES = "UNITS/MM\n{cutter}\nLOADTL/1\nRAPID\nGOTO/0,0,9,0,0,1\nFEDRAT/900,MMPM
 def test_corner_centre_says_what_a_ball_is(cutter: str, radius: float) -> None:
     path, _ = toolpaths.read_bytes(_LINES.format(cutter=cutter).encode(), file="part.apt")
     assert ball_radius(path.tools[0]) == radius
+
+
+def test_meshes_are_beside_the_file_that_names_them(tmp_path: Path) -> None:
+    for folder in ("shop", "job", "placed"):
+        (tmp_path / folder).mkdir()
+    (tmp_path / "shop/base.toml").write_text(_BASE)
+    job = tmp_path / "job/setup.toml"
+    job.write_text('base = "../shop/base.toml"\n[bodies]\npart = "own.stl"\n'
+                   '[tools.2]\ngauge_length = 80.0\nholder_mesh = "/h2.stl"\n')
+    placed = tmp_path / "placed/setup.toml"
+    placed.write_text(placed_text(job, placed, PartPlacement(origin=(1.0, 2.0, 3.0))))
+    for file in (job, placed):
+        setup, found = load_setup(file)
+        assert setup is not None and setup.bodies is not None, found
+        named = [setup.bodies.part, setup.bodies.fixtures[0].file, *(setup.tools[n].holder_mesh for n in "12")]
+        there = [(file.parent / str(name)).resolve() for name in named]
+        wanted = [tmp_path / "job/own.stl", tmp_path / "shop/meshes/a.stl", tmp_path / "shop/h.stl", Path("/h2.stl")]
+        assert there == [path.resolve() for path in wanted]
