@@ -93,7 +93,8 @@ class ToolBody(UserModel):
     """The form of a tool from its tip to the spindle. What the CL file says of the cutter need not be said again."""
 
     diameter: float | None = Field(default=None, gt=0.0)
-    """of the cutter, mm; of a tapered one at its tip, as if it had no corner radius; default: that of the CL file"""
+    """of the cutter, mm; of a tapered one at its tip, as if it had no corner radius, or twice the radius of its ball;
+    default: that of the CL file"""
     corner_radius: float | None = Field(default=None, ge=0.0)
     """of the cutter, half the diameter for a ball, mm; default: that of the CL file"""
     taper: float | None = Field(default=None, ge=0.0, lt=90.0)

@@ -9,6 +9,7 @@ import numpy as np
 
 from postproc.collision.mesh import load_mesh
 from postproc.collision.spun import spun
+from postproc.orientation.cutter import ball_radius
 from postproc.setup import ToolSetup
 from postproc.setup_bodies import Section
 from toolpaths.arrays import Floats, Ints
@@ -20,6 +21,10 @@ CUTTER, SHANK, HOLDER = 0, 1, 2
 PARTS = ("cutter", "shank", "holder")
 _DIFFERS = 1e-3
 """mm: more is another cutter, or a gap"""
+_ROUNDED = 0.01
+"""share of the radius that a corner may be too large by: sizes of tapered balls are rounded"""
+_APT = 7
+"""parameters of CUTTER; fewer follow other conventions"""
 _ANY = ToolSetup(gauge_length=1.0)
 
 
@@ -46,6 +51,25 @@ class _Cutter:
     tip_angle: float | None
     flutes: float | None
     drill: bool
+    ball: bool
+
+    @property
+    def centre(self) -> float:
+        """From the axis to the centre of the corner, mm; NaN where the corner does not fit the diameter.
+
+        A side that is inclined by the taper meets the plane of the tip at half the diameter; the corner touches both
+        (APT, CUTTER/d, r with e, f as they follow from the others). A tapered ball may be given by the diameter of its ball.
+        """
+        if self.ball or self.diameter is None:
+            return 0.0
+        radius, corner = 0.5 * self.diameter, self.corner or 0.0
+        centre = radius - corner * (1.0 - float(np.sin(self.taper))) / float(np.cos(self.taper))
+        return max(centre, 0.0) if centre >= -_ROUNDED * radius else np.nan
+
+    @property
+    def fits(self) -> bool:
+        """Whether there is such a cutter."""
+        return bool(np.isfinite(self.centre))
 
 
 def tool_form(number: int, tool: Tool | None, setup: ToolSetup | None, file: str) -> tuple[Form, list[Diagnostic]]:
@@ -76,12 +100,21 @@ def tool_form(number: int, tool: Tool | None, setup: ToolSetup | None, file: str
 
 
 def _cutter(tool: Tool | None, given: ToolSetup) -> _Cutter:
-    tool = tool or Tool(0)
+    tool = _as_given(tool or Tool(0), given)
     drill = "DRILL" in tool.shape.upper() or given.tip_angle is not None
-    taper = given.taper * DEG if given.taper is not None else 0.0 if drill else tool.taper or 0.0
     tip = given.tip_angle * DEG if given.tip_angle is not None else tool.tip_angle if drill else None
-    return _Cutter(_first(given.diameter, tool.diameter), _first(given.corner_radius, tool.corner_radius), taper, tip,
-                   _first(given.flute_length, tool.flute_length), drill)
+    return _Cutter(tool.diameter, tool.corner_radius, 0.0 if drill and given.taper is None else tool.taper or 0.0, tip,
+                   tool.flute_length, drill, (ball_radius(tool) or 0.0) > 0.0)
+
+
+def _as_given(tool: Tool, given: ToolSetup) -> Tool:
+    """The tool with what the set-up says of its cutter, else the taper of all seven parameters of CUTTER."""
+    own = given.diameter is not None or given.corner_radius is not None
+    params = () if own or len(tool.cutter) < _APT else tool.cutter
+    taper = given.taper * DEG if given.taper is not None else _first(tool.taper, params[5] * DEG if params else None)
+    return replace(tool, diameter=_first(given.diameter, tool.diameter), taper=taper, cutter=params,
+                   corner_radius=_first(given.corner_radius, tool.corner_radius),
+                   flute_length=_first(given.flute_length, tool.flute_length))
 
 
 def _first(*values: float | None) -> float | None:
@@ -89,20 +122,17 @@ def _first(*values: float | None) -> float | None:
 
 
 def _cutting(cutter: _Cutter) -> Floats:
-    """Pieces (P, 5) of the cutter: its corner, and the side above it up to the end of the flutes.
-
-    A side that is inclined by the taper meets the plane of the tip at half the diameter; the corner touches both
-    (APT, CUTTER/d, r with e, f as they follow from the others).
-    """
+    """Pieces (P, 5) of the cutter: its corner, and the side above it up to the end of the flutes; sharp where the corner
+    does not fit."""
     if cutter.diameter is None:
         return np.zeros((0, 5))
-    radius, corner = 0.5 * cutter.diameter, min(cutter.corner or 0.0, 0.5 * cutter.diameter)
+    radius, corner = 0.5 * cutter.diameter, (cutter.corner or 0.0) if cutter.fits else 0.0
     if cutter.tip_angle is not None:
         high = radius / np.tan(0.5 * cutter.tip_angle) if cutter.tip_angle < np.pi else 0.0
         rows = [(0.0, 0.0, radius, high, 0.0)] if high > 0.0 else []
         return np.array([*rows, _side(radius, high, 0.0, cutter.flutes)])
     sin, cos = np.sin(cutter.taper), np.cos(cutter.taper)
-    centre = max(radius - corner * (1.0 - sin) / cos, 0.0)
+    centre = cutter.centre if corner > 0.0 else radius
     rows = [(centre, corner, centre, corner, corner)] if corner > 0.0 else []
     low, start = corner * (1.0 - sin), centre + corner * cos
     return np.array([*rows, _side(start, low, np.tan(cutter.taper), cutter.flutes)])
@@ -150,9 +180,11 @@ def _unknown(number: int, cutter: _Cutter, setup: ToolSetup | None, pieces: dict
                         f"{setup.gauge_length:g} mm,", "more sections to holder"))
     found = [warning("collision.unchecked", f"T{number}: {what} is not known and not checked", hint=f"add {key} to "
                      f"[tools.{number}]") for what, key in missing]
-    if cutter.diameter is not None and cutter.corner is None and not cutter.drill:
-        found.append(warning("collision.corner", f"T{number}: its corner radius is not known, it is checked as sharp",
-                             hint=f"add corner_radius = ... to [tools.{number}]"))
+    if cutter.diameter is not None and not cutter.drill and (cutter.corner is None or not cutter.fits):
+        why = "its corner radius is not known" if cutter.corner is None else (
+            f"a corner radius of {cutter.corner:g} mm does not fit a diameter of {cutter.diameter:g} mm")
+        found.append(warning("collision.corner", f"T{number}: {why}, it is checked as sharp",
+                             hint=f"add diameter and corner_radius = ... to [tools.{number}]"))
     return found
 
 

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import toolpaths
+from postproc.collision.form import CUTTER, tool_form
 from postproc.orientation.cutter import ball_radius
 from postproc.placement.write import placed_text
-from postproc.setup import PartPlacement, load_setup
+from postproc.setup import PartPlacement, ToolSetup, load_setup
+from toolpaths.units import DEG
 
 _LINES = "UNITS/MM\n{cutter}\nLOADTL/1\nRAPID\nGOTO/0,0,9,0,0,1\nFEDRAT/900,MMPM\nGOTO/9,0,9,0,0,1\nFINI\n"
 _BASE = """[bodies]
@@ -55,3 +58,23 @@ def test_meshes_are_beside_the_file_that_names_them(tmp_path: Path) -> None:
         there = [(file.parent / str(name)).resolve() for name in named]
         wanted = [tmp_path / "job/own.stl", tmp_path / "shop/meshes/a.stl", tmp_path / "shop/h.stl", Path("/h2.stl")]
         assert there == [path.resolve() for path in wanted]
+
+
+@pytest.mark.parametrize("cutter", ["CUTTER/6,3,0,3,0,10,60", "CUTTER/5.03,3,0,3,0,10,60", "TLDATA/MILL,6,3,75,10,0"])
+def test_tapered_balls_are_as_wide_as_they_are(cutter: str) -> None:
+    """Whatever the diameter means: a ball of 3 mm about the axis, and a side at 10 degrees that touches it."""
+    path, _ = toolpaths.read_bytes(_LINES.format(cutter=cutter).encode(), file="part.apt")
+    form, found = tool_form(1, path.tools[0], ToolSetup(gauge_length=150.0, flute_length=60.0), "setup.toml")
+    ball, side = form.of(CUTTER)
+    sin, cos = np.sin(10.0 * DEG), np.cos(10.0 * DEG)
+    assert ball == pytest.approx([0.0, 3.0, 0.0, 3.0, 3.0], abs=1e-9)
+    assert side == pytest.approx([3.0 * cos, 3.0 - 3.0 * sin, 3.0 * cos + (57.0 + 3.0 * sin) * sin / cos, 60.0, 0.0])
+    assert "collision.corner" not in {d.code for d in found}
+
+
+@pytest.mark.parametrize("cutter", ["CUTTER/16,85,-77,85,0,0,50", "CUTTER/16,9"])
+def test_a_corner_that_does_not_fit_is_told_and_nothing_is_cut_off(cutter: str) -> None:
+    path, _ = toolpaths.read_bytes(_LINES.format(cutter=cutter).encode(), file="part.apt")
+    form, found = tool_form(1, path.tools[0], ToolSetup(gauge_length=150.0, flute_length=60.0), "setup.toml")
+    assert form.of(CUTTER) == pytest.approx(np.array([[8.0, 0.0, 8.0, 60.0, 0.0]]))
+    assert ["does not fit a diameter of 16 mm" in d.message for d in found if d.code == "collision.corner"] == [True]
