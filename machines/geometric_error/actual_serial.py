@@ -129,9 +129,10 @@ class ActualSerial(Actual):
         turned, shift = np.broadcast_to(np.eye(3), (len(w), 3, 3)), np.zeros((len(w), 3))
         for line in self.lines:
             before.append(turned)
+            centre = shift + turned @ line.reference
             turned, shift = _step(line.joint, w[:, line.index], turned, shift)
             after.append(turned)
-            centres.append(shift + turned @ line.reference)
+            centres.append(shift + turned @ line.reference if line.moving else centre)
         tip = shift + turned @ (-self.kinematics.tool_length * self.kinematics.tool_axis)
         return before, after, centres, tip
 

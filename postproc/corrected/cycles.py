@@ -16,6 +16,9 @@ from toolpaths.arrays import Bools, Floats, Ints
 SAME = 1e-6
 """mm: places nearer than this are one"""
 
+IN_AIR = 8.0
+"""times the share of the correction: what lost motion may leave at the levels of a hole that the tool comes back to"""
+
 
 def whole_holes(path: Path, nominal: Path, moves: Moves, work: Work, allowed: float) -> tuple[Path, Ints]:
     """The path with holes corrected as a whole, and the hole (K,) that each block is of, ALONE for those of none.
@@ -73,7 +76,8 @@ def _correct_sequence(path: Path, nominal: Path, holes: list[Ints], work: Work, 
         words = new.words(path.q[hole.rows], kin, 0.0)
         words[:, new.xyz] = hole.corrected(least, float((came - before)[0, z]))
         joints, way = new.joints(words, kin, 0.0), np.tile(work.way[hole.rows[hole.bottom]], (len(hole.rows), 1))
-        if (work.off(nominal.q[hole.rows], joints, hole.rows, way) <= LOOSE * allowed).all():
+        if (work.off(nominal.q[hole.rows], joints, hole.rows, way) <= LOOSE * allowed).all() and \
+                (work.off(nominal.q[hole.rows], joints, hole.rows, work.way[hole.rows]) <= IN_AIR * allowed).all():
             q[hole.rows], whole[hole.rows] = joints, hole.rows[0]
 
 

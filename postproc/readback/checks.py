@@ -42,16 +42,18 @@ ROUNDING_SLACK = 1e-3
 """mm or degrees by which rounded words may pass a limit that the exact ones keep"""
 
 
-def check_kinds(motion: Motion, moves: Moves, owner: Ints, tip: Floats, bent: bool, faults: Faults) -> list[Diagnostic]:
+def check_kinds(motion: Motion, moves: Moves, owner: Ints, tip: Floats, bent: bool, taken_up: Bools,
+                faults: Faults) -> list[Diagnostic]:
     """Rapids where the CL file cuts, cuts where it moves rapidly; pecks may return rapidly above what is drilled.
 
-    Where rapids are dog-legs (`bent`) a feed move may stand for one that must be straight.
+    Where rapids are dog-legs (`bent`) a feed move may stand for one that must be straight; blocks (K,) that only take up
+    lost motion where a rapid has ended may be feed moves.
     """
     rows = np.flatnonzero(owner < len(moves))
     m = owner[rows]
     cutting = (moves.kind[m] != Kind.RAPID) & ~moves.link[m]
     rapid = motion.code[rows] == 0
-    fed = ~cutting & ~rapid & ~moves.link[m] & (not bent)
+    fed = ~cutting & ~rapid & ~moves.link[m] & (not bent) & ~taken_up[rows]
     wrong = np.flatnonzero((cutting & rapid & ~_above_drilled(motion, moves, rows, m, tip)) | fed)
     diagnostics = []
     if len(wrong):

@@ -80,7 +80,7 @@ def compare(motion: Motion, job: Job, executed: Executed, gcode: str = "", plann
     diagnostics += _beyond("tip", "mm", worst_tip, tolerance, tip_line, faults)
     diagnostics += _beyond("axis", "degrees", worst_axis / DEG, axis_tolerance / DEG, axis_line, faults)
     diagnostics += check_spins(motion, executed, moves, owner, tip, axis, axis_tolerance, faults)
-    diagnostics += check_kinds(motion, moves, owner, tip, executed.control.rapids == "dog-leg", faults)
+    diagnostics += check_kinds(motion, moves, owner, tip, executed.control.rapids == "dog-leg", _taken_up(job, tip), faults)
     diagnostics += check_states(motion, job, moves, owner, faults)
     diagnostics += check_holes(motion, job, moves, tip, owner, faults)
     diagnostics += check_taps(motion, job, moves, owner, faults)
@@ -100,6 +100,16 @@ def _kept(job: Job) -> float:
     from postproc.compensation import SHARE
 
     return 0.0 if job.errors is None else SHARE * job.axis_tolerance
+
+
+def _taken_up(job: Job, tip: Floats) -> Bools:
+    """True (K,) for blocks that leave the tip, (K, 3), where it is although axes move: they take up lost motion."""
+    from postproc.compensation import SHARE
+
+    if job.errors is None:
+        return np.zeros(len(tip), dtype=np.bool_)
+    way = np.linalg.norm(np.diff(tip, axis=0, prepend=np.inf), axis=1)
+    return np.asarray(way <= SHARE * job.options.tolerance + 2.0 * job.rounding.tip)
 
 
 def _aligned(kept: Ints, tip: Floats, axis: Floats, sweep: Floats, curves: Curves, link: Bools, tolerance: float,
