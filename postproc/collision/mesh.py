@@ -94,7 +94,9 @@ def _no_solid(mesh: Trimesh, path: str) -> tuple[Diagnostic, ...]:
         open_edges = np.unique(mesh.edges_sorted, axis=0, return_counts=True)[1] % 2 != 0
         return (error("mesh.open_surface", f"is no closed solid: {int(open_edges.sum())} edges are not shared by two "
                       "triangles", file=path, hint="close the holes, or export the body as a solid"),)
-    if not mesh.is_winding_consistent or mesh.volume == 0.0:
+    with np.errstate(all="ignore"):
+        flat = mesh.volume == 0.0
+    if flat or not mesh.is_winding_consistent:
         return (error("mesh.sides", "its triangles do not agree which side is out", file=path,
                       hint="export the body as a solid"),)
     if mesh.volume < 0.0:

@@ -79,7 +79,8 @@ def _row(tried: Tried, made: Turned) -> str:
     one, before = tried.own.one, tried.own.seconds
     limit = " ".join(made.limiting).strip() or "-"
     if not one.stretches:
-        return f"{one.number:>5} {one.line:>7}  {orientation(made):<24} {'-':>9} {'-':>9} {'-':>7}  axis kept: {one.fixed}"
+        return f"{one.number:>5} {one.line:>7}  {orientation(made):<24} {'-':>9} {'-':>9} {'-':>7}  " + (
+            f"axis kept: {one.fixed or 'its cuts have no length'}")
     start = (f"{one.number:>5} {one.line:>7}  {orientation(made):<24} {seconds(made.seconds):>9} {seconds(before):>9} "
              f"{percent(gain(made.seconds, before)):>7}  {limit:<15} ")
     kept = f"axis kept: {one.fixed}" if one.fixed else ""

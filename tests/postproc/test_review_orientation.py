@@ -7,11 +7,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import machines
 import toolpaths
 from postproc.collision.form import CUTTER, tool_form
+from postproc.collision.mesh import load_mesh
 from postproc.orientation.cutter import ball_radius
+from postproc.orientation.orient import orient
+from postproc.orientation.text import as_text
 from postproc.placement.write import placed_text
-from postproc.setup import PartPlacement, ToolSetup, load_setup
+from postproc.setup import PartPlacement, SetupFile, ToolSetup, load_setup
 from toolpaths.units import DEG
 
 _LINES = "UNITS/MM\n{cutter}\nLOADTL/1\nRAPID\nGOTO/0,0,9,0,0,1\nFEDRAT/900,MMPM\nGOTO/9,0,9,0,0,1\nFINI\n"
@@ -78,3 +82,19 @@ def test_a_corner_that_does_not_fit_is_told_and_nothing_is_cut_off(cutter: str) 
     form, found = tool_form(1, path.tools[0], ToolSetup(gauge_length=150.0, flute_length=60.0), "setup.toml")
     assert form.of(CUTTER) == pytest.approx(np.array([[8.0, 0.0, 8.0, 60.0, 0.0]]))
     assert ["does not fit a diameter of 16 mm" in d.message for d in found if d.code == "collision.corner"] == [True]
+
+
+def test_why_a_pass_without_length_is_kept_is_told() -> None:
+    lines = _LINES.format(cutter="CUTTER/16,8").replace("GOTO/9,0,9,0,0,1", "GOTO/0,0,9,0,0,1")
+    path, _ = toolpaths.read_bytes(lines.encode(), file="part.apt")
+    choice, _ = orient(path, machines.load("mikron-ucp710"), SetupFile())
+    assert choice is not None
+    assert "axis kept: its cuts have no length" in as_text(choice, "auto", [])
+
+
+def test_a_sheet_is_no_solid(tmp_path: Path) -> None:
+    """Two triangles back to back enclose nothing: a diagnostic, and no warning of numpy (pytest makes errors of these)."""
+    file = tmp_path / "sheet.off"
+    file.write_text("OFF\n3 2 0\n0 0 0\n10 0 0\n0 10 0\n3 0 1 2\n3 0 2 1\n")
+    mesh, found = load_mesh(file, "mm", "bodies.part")
+    assert mesh is None and [d.code for d in found] == ["mesh.sides"]
