@@ -50,7 +50,9 @@ class Scene:
         for part in (CUTTER, SHANK, HOLDER):
             if len(form.of(part)):
                 for body in self.bodies:
-                    yield part, body, -self.gouge if part == CUTTER and body.is_part else self.clearance
+                    gouging = part == CUTTER and body.is_part
+                    if form.exact or not gouging:
+                        yield part, body, -self.gouge if gouging else self.clearance
 
 
 @dataclass(frozen=True)

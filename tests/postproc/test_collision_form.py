@@ -80,6 +80,87 @@ def test_what_is_not_known_is_told(tool: Tool | None, setup: ToolSetup | None, w
     assert len(found) == 1 and all(word in found[0] for word in words), found
 
 
+FLAT = ToolSetup(gauge_length=100.0, flute_length=20.0)
+
+
+@pytest.mark.parametrize(("params", "rows"), [
+    ((20.0, 0.0, 10.0, 6.008606, 31.0, 0.0, 215.0), [(0.0, 0.0, 10.0, 6.008606, 0.0), (10.0, 6.008606, 10.0, 20.0, 0.0)]),
+    ((6.8, 0.0, 3.4, 0.0, 31.0, 0.0, 75.0), [(0.0, 0.0, 3.4, 2.042926, 0.0), (3.4, 2.042926, 3.4, 20.0, 0.0)]),
+    ((10.0, 1.0, 4.0, 1.0, 0.0, 5.0, 75.0), [(4.0, 1.0, 4.0, 1.0, 1.0), (4.996195, 0.912844, 6.666104, 20.0, 0.0)]),
+    ((14.6586, 8.0, 0.0, 8.0, 0.0, 5.0, 50.0), [(0.0, 8.0, 0.0, 8.0, 8.0), (7.969558, 7.302754, 9.080423, 20.0, 0.0)]),
+])
+def test_all_seven_parameters_of_cutter_count(params: tuple[float, ...], rows: list[tuple[float, ...]]) -> None:
+    made, found = form(Tool(7, diameter=params[0], corner_radius=params[1], cutter=params))
+    assert not found and made.exact and made.of(CUTTER) == pytest.approx(np.array(rows), abs=1e-5)
+
+
+def test_point_and_corner_touch_each_other() -> None:
+    """A mill of 20 mm with a corner of 2 mm whose lower line rises by 10 degrees, its side leaning by 5."""
+    params = (20.0, 2.0, 0.0, 0.0, 10.0, 5.0, 50.0)
+    made, _ = form(Tool(7, diameter=20.0, corner_radius=2.0, cutter=params))
+    tip, side = np.radians(10.0), np.radians(5.0)
+    for rho in (1.0, 5.0, 7.0):
+        assert distance(made.of(CUTTER), rho, rho * np.tan(tip)) == pytest.approx(0.0, abs=1e-9)
+    for z in (5.0, 18.0):
+        at = 10.0 + (z - 10.0 * np.tan(tip)) * np.tan(side)
+        assert distance(made.of(CUTTER), at, z) == pytest.approx(0.0, abs=1e-9)
+    half = 0.5 * (np.pi / 2.0 + tip + side)
+    corner = distance(made.of(CUTTER), 10.0, 10.0 * np.tan(tip))
+    assert corner == pytest.approx(2.0 * (1.0 / np.sin(half) - 1.0), abs=1e-9)
+
+
+@pytest.mark.parametrize("tool", [
+    Tool(7, diameter=16.0, corner_radius=85.0, cutter=(16.0, 85.0, -77.0, 85.0, 0.0, 0.0, 50.0)),
+    Tool(7, diameter=16.0, corner_radius=85.0, cutter=(16.0, 85.0, 0.0, 85.0, 0.0, 0.0, 50.0)),
+    Tool(7, diameter=16.0, corner_radius=85.0),
+    Tool(7, diameter=16.0, corner_radius=1.0, cutter=(16.0, 1.0, 3.0, 1.0, 0.0, 0.0, 50.0)),
+    Tool(7, diameter=16.0, corner_radius=1.0, taper=np.radians(-60.0)),
+])
+def test_a_form_that_is_not_known_is_told_and_nothing_in_it_is_smaller(tool: Tool) -> None:
+    made, found = form(tool)
+    assert not made.exact and made.of(CUTTER).tolist() == [[8.0, 0.0, 8.0, 20.0, 0.0]]
+    assert len(found) == 1 and "does not fit a diameter of 16 mm" in found[0] and "not checked against the part" in found[0]
+
+
+def test_the_setup_states_the_form_of_what_the_file_does_not_fit() -> None:
+    barrel = Tool(7, diameter=16.0, corner_radius=85.0, cutter=(16.0, 85.0, -77.0, 85.0, 0.0, 0.0, 50.0))
+    made, found = form(barrel, FULL.model_copy(update={"corner_radius": 0.0}))
+    assert made.exact and len(found) == 1 and "85 mm in the CL file" in found[0]
+
+
+def test_a_cutter_has_a_height_where_nobody_states_its_flutes() -> None:
+    """Else a flat end is a disc, into which nothing reaches."""
+    bare = ToolSetup(gauge_length=90.0)
+    flat, _ = form(Tool(7, diameter=10.0, corner_radius=0.0), bare)
+    assert flat.of(CUTTER).tolist() == [[5.0, 0.0, 5.0, 1.0, 0.0]]
+    drawn, found = form(Tool(7, diameter=10.0, corner_radius=0.0, length=75.0), bare)
+    assert drawn.of(CUTTER)[0, 3] == 75.0 and "what stands above 75 mm over the tip" in found[0]
+    seven, _ = form(Tool(7, diameter=6.0, corner_radius=3.0, cutter=(6.0, 3.0, 0.0, 3.0, 0.0, 10.0, 60.0)), bare)
+    assert seven.of(CUTTER)[1, 2:4] == pytest.approx([13.0972, 60.0], abs=1e-3)
+
+
+def test_the_point_of_a_mill_counts_as_flat_and_is_told() -> None:
+    made, found = form(Tool(7, shape="MILL", diameter=10.0, corner_radius=0.0, tip_angle=np.radians(45.0)))
+    assert made.of(CUTTER).tolist() == [[5.0, 0.0, 5.0, 20.0, 0.0]] and len(found) == 1 and "counts as flat" in found[0]
+
+
+def test_a_drill_without_point_angle_is_flat() -> None:
+    made, _ = form(Tool(7, shape="DRILL", diameter=10.0, corner_radius=0.0, tip_angle=0.0))
+    assert made.of(CUTTER).tolist() == [[5.0, 0.0, 5.0, 20.0, 0.0]]
+
+
+def test_a_gap_below_a_holders_mesh_is_told(tmp_path: Path) -> None:
+    trimesh.creation.box(bounds=[(-20, -20, 60), (20, 20, 100)]).export(tmp_path / "h.stl")
+    mill = Tool(7, diameter=10.0, corner_radius=0.0)
+    for shank, told in (([], "between 20 mm over the tip and the holder, which begins at 60 mm"),
+                        ([Section(diameter=8.0, length=40.0)], "")):
+        setup = FLAT.model_copy(update={"holder_mesh": "h.stl", "shank": shank})
+        _, found = tool_form(7, mill, setup, str(tmp_path / "s.toml"))
+        assert [told in str(d) for d in found] == ([True] if told else [])
+    _, found = tool_form(7, mill, ToolSetup(gauge_length=100.0, holder_mesh="h.stl"), str(tmp_path / "s.toml"))
+    assert [d.code for d in found] == ["collision.unchecked"] and "below the holder at 60 mm" in found[0].message
+
+
 def sunk(mesh: trimesh.Trimesh, pieces: Floats) -> float:
     """Largest distance of points all over a mesh from the nearest of the pieces; negative inside."""
     i, j = np.meshgrid(np.arange(13), np.arange(13), indexing="ij")
