@@ -34,6 +34,8 @@ DOUBTS = 500
 """blocks at which the doubt of the correction is computed"""
 SHARE = 0.1
 """of the tolerances: what the correction may be off between corrected points"""
+SETTLED = 5
+"""how often the ways of the axes are looked for: a correction by new ways may turn other axes back"""
 
 
 @dataclass(frozen=True)
@@ -78,14 +80,15 @@ class Compensation:
 
 
 def compensate(path: Path, moves: Moves, tools: Ints, kinematics: Callable[[int], Kinematics], model: ErrorModel,
-               modes: OutputModes, tolerance: float, axis_tolerance: float, beyond: bool = False,
-               file: str = "") -> tuple[Path | None, Compensation | None, list[Diagnostic]]:
+               modes: OutputModes, tolerance: float, axis_tolerance: float, written: Callable[[Path], Floats],
+               beyond: bool = False, file: str = "") -> tuple[Path | None, Compensation | None, list[Diagnostic]]:
     """The path with corrected joints, points added where they are needed; None where the model does not reach.
 
     Args:
         tools: (K,) index of the tool of each block
         kinematics: nominal, at the tip of the tool of an index
         tolerance, axis_tolerance: mm and rad of the whole conversion
+        written: words (K, J) of a path's blocks at their ends, as they are written
         beyond: True corrects outside the measured range with the error at its end
     """
     allowed, before_cut = SHARE * tolerance, len(path)
@@ -98,9 +101,13 @@ def compensate(path: Path, moves: Moves, tools: Ints, kinematics: Callable[[int]
     if work.two_way:
         cut = _points_by_mean(cut, moves, modes, work_on(cut.path, cut.owner, mean=True), allowed)
     path, work = cut.path, work_on(cut.path, cut.owner)
-    if work.two_way:
-        work.take_ways(_at_ends(path, moves, modes, work, allowed)[0].q)
     corrected, found = _at_ends(path, moves, modes, work, allowed)
+    for k in range(SETTLED if work.two_way else 0):
+        before = work.way
+        work.take_ways(corrected, written(corrected), drift=k == 0)
+        if np.array_equal(work.way, before):
+            break
+        corrected, found = _at_ends(path, moves, modes, work, allowed)
     live = ~path.home
     diagnostics = _unmeasured(path, moves, modes.control, found.unmeasured & live[:, None], beyond, file)
     lost = live & ~np.isfinite(found.q).all(axis=1)

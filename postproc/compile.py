@@ -15,7 +15,7 @@ from postproc.program import Command, Commands, Hole, Program
 from postproc.rounding import decimals
 from postproc.sections import sections_of, with_sections
 from postproc.skips import after, skipped, with_skips
-from postproc.word_rows import word_rows
+from postproc.word_rows import WordRows, word_rows
 from toolpaths.arrays import Ints
 from toolpaths.diagnostics import Diagnostic, info
 
@@ -26,8 +26,7 @@ def compile_program(job: Job, moves: Moves, path: Path,
     toolpath, control, controller = job.toolpath, job.control, job.controller
     places = decimals(control, controller)
     skip = skipped(toolpath, moves, path)
-    words = word_rows(path, moves, control, job.kinematics, job.gauge_length, places, after(skip),
-                      job.rounding.made_up)
+    words = words_of(job, moves, path, after(skip))
     native, holes = holes_of(toolpath, moves, path, words, control, controller, skip)
     feeds = plan_feeds(path, control, words.end - words.start, moves.feed[path.move],
                        toolpath.pass_[moves.row[path.move]], native, job.options.feed_mode, controller.feed,
@@ -48,6 +47,12 @@ def compile_program(job: Job, moves: Moves, path: Path,
     return program, feeds, [*diagnostics, *found, *_slowed(feeds, moves, path, planned is not None, toolpath.file),
                             *_mapped(feeds, moves, path, job),
                             *not_native(toolpath, moves, path, native, controller, skip)]
+
+
+def words_of(job: Job, moves: Moves, path: Path, anew: Ints | None = None) -> WordRows:
+    """The words of a path's blocks; the blocks `anew` state every axis."""
+    return word_rows(path, moves, job.control, job.kinematics, job.gauge_length, decimals(job.control, job.controller),
+                     np.zeros(0, dtype=np.int64) if anew is None else anew, job.rounding.made_up, job.two_way)
 
 
 def _moved(commands: Commands, new: Ints) -> Commands:

@@ -113,6 +113,13 @@ class Job:
                               decimals(self.control, self.controller), self.modes.cutting_laws(), self.options.tolerance)
 
     @cached_property
+    def two_way(self) -> list[int]:
+        """Joints that lose motion, where the program corrects it."""
+        if self.errors is None or self.errors.corrected_by != "post":
+            return []
+        return self.errors.axes.two_way(self.machine.axis_names)
+
+    @cached_property
     def operation(self) -> Ints:
         """(M,) operation of each move."""
         return self.toolpath.operation[self.moves.row].astype(np.int64)

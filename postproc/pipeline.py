@@ -14,7 +14,7 @@ import machines
 import toolpaths
 from machines.machine import Machine
 from postproc import VERSION
-from postproc.compile import compile_program
+from postproc.compile import compile_program, words_of
 from postproc.controllers import writer_for
 from postproc.controllers.model import ControllerFile, load_controller
 from postproc.controllers.unwritable import unwritable
@@ -227,7 +227,9 @@ def _compensated(result: PostResult, job: Job, moves: Moves, path: Path) -> tupl
     assert job.errors is not None
     options = job.options
     corrected, report, found = compensate(path, moves, block_tools(path, moves), job.kinematics, job.errors, job.modes,
-                                          options.tolerance, job.axis_tolerance, options.error_beyond, job.toolpath.file)
+                                          options.tolerance, job.axis_tolerance,
+                                          lambda path: words_of(job, moves, path).end, options.error_beyond,
+                                          job.toolpath.file)
     return _with(result, found, path=corrected, nominal=path, compensation=report), corrected
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +12,7 @@ from postproc.control import Control
 from postproc.groups import groups
 from postproc.moves import Moves
 from postproc.path import ARC, FEED, Path
-from postproc.word_arcs import PLANE_AXIS
+from postproc.word_arcs import PLANE_AXIS, PLANE_COLUMNS
 from toolpaths.arrays import Bools, Floats, Ints
 
 SNAP = 2.5
@@ -29,14 +29,16 @@ class WordRows:
 
 
 def word_rows(path: Path, moves: Moves, control: Control, kinematics: Callable[[int], Kinematics],
-              lengths: Callable[[int], float], places: Ints, anew: Ints, made_up: bool = False) -> WordRows:
+              lengths: Callable[[int], float], places: Ints, anew: Ints, made_up: bool = False,
+              two_way: Sequence[int] = ()) -> WordRows:
     """The words of all blocks; `lengths` gives the gauge length of the tool of an index, `places` (J,) the decimals,
-    `anew` the blocks that state every axis, `made_up` as in `Rounding`."""
+    `anew` the blocks that state every axis, `made_up` as in `Rounding`; `two_way` joints lose motion, see `_held`."""
     begins = np.flatnonzero(np.diff(path.frame)) + 1
     tool = block_tools(path, moves)
     rounds = places if made_up else None
     exact = _words(path, path.q, np.arange(len(path)), tool, kinematics, lengths, rounds)
-    end = _flat(_rounded(_snapped(_rounded(exact, places), path, control, places), places), path, control)
+    end = _rounded(_snapped(_rounded(exact, places), path, control, places), places)
+    end = _flat(_rounded(_held(end, path, control, tool, places, two_way), places), path, control)
     start = np.concatenate([end[:1], end[:-1]])
     start[begins] = _rounded(_words(path, path.q[begins - 1], begins, tool, kinematics, lengths, rounds), places)
     return WordRows(end, start, _written(end, start, np.union1d(begins, anew), path, control))
@@ -106,6 +108,46 @@ def _snapped(words: Floats, path: Path, control: Control, places: Ints) -> Float
             if k >= len(words):
                 break
     return words
+
+
+def _held(words: Floats, path: Path, control: Control, tool: Ints, places: Ints, joints: Sequence[int]) -> Floats:
+    """Words (rounded) in which axis positions of `joints` never turn back by one last decimal: the word before stays.
+
+    An axis that loses motion would have another error there, more than the decimal is worth. What is left out never adds
+    up: each block is compared with the last written position. Arcs keep the words of their plane.
+    """
+    if not joints:
+        return words
+    same = np.append(False, (np.diff(path.frame) == 0) & (np.diff(tool) == 0))
+    same &= ~path.home & ~np.append(False, path.home[:-1])
+    same &= np.array([frame.control.law == "axes" for frame in path.frames])[path.frame]
+    result = words.copy()
+    for j in joints:
+        free = same.copy()
+        for plane, flat in PLANE_COLUMNS.items():
+            if j in control.xyz[list(flat)]:
+                free[(path.code == ARC) & (path.plane == plane)] = False
+        along = np.where(same, 0.0, np.diff(path.q[:, j], prepend=path.q[:1, j]))
+        counts = np.round(words[:, j] * 10.0 ** places[j])
+        result[:, j] = _walked(counts, free, same, np.sign(along)) / 10.0 ** places[j]
+    return result
+
+
+def _walked(counts: Floats, free: Bools, same: Bools, along: Floats) -> list[float]:
+    """Last decimals (K,) one after the other, those that turn back by one left out where they are `free`.
+
+    `same` (K,) False where a word means another place than the one before: there `along` (K,) says which way it went.
+    """
+    result, way, last = [], 0.0, 0.0
+    for count, may, goes_on, sign in zip(counts.tolist(), free.tolist(), same.tolist(), along.tolist(), strict=True):
+        step = count - last
+        if goes_on and may and abs(step) == 1.0 and step * way < 0.0:
+            count = last
+        elif (step if goes_on else sign) != 0.0:
+            way = 1.0 if (step if goes_on else sign) > 0.0 else -1.0
+        last = count
+        result.append(count)
+    return result
 
 
 def _flat(words: Floats, path: Path, control: Control) -> Floats:

@@ -74,15 +74,21 @@ class Work:
         """Letters of the joints."""
         return self.kinematics(int(self.tools[0])).axis_names
 
-    def take_ways(self, q: Floats) -> None:
-        """Find `way` and `drift` from the ends of the blocks corrected by mean ways, q (K, J).
+    def take_ways(self, path: Path, words: Floats, drift: bool = True) -> None:
+        """Find `way` from the corrected `path` and its words (K, J) at block ends, and `drift` where that is by mean ways.
 
+        Where words are axis positions their last change tells.
         A joint that the correction alone moves turns back too: what it loses is more than what it moves by; inside a
         hole, which is moved as a whole, it does so by shares. Where joints do not run straight it is the sign of the last
         moment.
         """
+        q = path.q
         step, change = (np.nan_to_num(np.diff(x, axis=0, prepend=x[:1])) for x in (q, q - self.path.q))
-        self.drift = np.where(np.abs(change) > np.where(self.rotary, GRAIN[1], GRAIN[0]), change, 0.0)
+        if drift:
+            self.drift = np.where(np.abs(change) > np.where(self.rotary, GRAIN[1], GRAIN[0]), change, 0.0)
+        stated = axis_positions(path, self.tools)
+        unit = path.frames[0].control.unit
+        step[stated] = np.nan_to_num(np.diff(words, axis=0, prepend=words[:1]) / unit)[stated]
         bent = np.flatnonzero(self.bent)
         last = self.moving(bent, np.ones(len(bent)), LAST)
         step[bent] = np.where(last != 0.0, last, step[bent])
@@ -250,6 +256,13 @@ class Work:
             w = actual.coordinates(q[k], wanted)
             result[k] = np.concatenate(actual.aim(w, way[k]), axis=1) - wanted
         return result
+
+
+def axis_positions(path: Path, tools: Ints) -> Bools:
+    """(K,) blocks whose words, and those of the block before, are axis positions with the same tool; home is left out."""
+    same = np.append(False, (np.diff(path.frame) == 0) & (np.diff(tools) == 0))
+    law = np.array([frame.control.law == "axes" for frame in path.frames])[path.frame]
+    return np.asarray(same & law & ~path.home & ~np.append(False, path.home[:-1]))
 
 
 def one_orientation(turns: Floats, tools: Ints, home: Bools) -> Ints:

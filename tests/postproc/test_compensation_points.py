@@ -115,6 +115,50 @@ def test_the_sign_of_the_last_written_motion_tells_the_error_at_every_point(tmp_
     assert off.max() < 1e-4
 
 
+def two_ways_of_all(folder: Path, machine: str, seed: int) -> Path:
+    """Models in which slides lose motion in place and in lean: by the way EXX, EYY, EZZ and EBX, EBY, EBZ."""
+    rng = np.random.default_rng(seed)
+    text = ""
+    for axis in "XYZ":
+        x, own, lean = np.linspace(-1000.0, 1000.0, 11), 10.0 * rng.normal(size=11), 2.5 * rng.normal(size=11)
+        play, rock = 1.0 + 3.0 * rng.random(), 0.5
+        rows = np.stack([x, own - play, own + play, lean - rock, lean + rock], axis=1)
+        (folder / f"{axis}.csv").write_text("\n".join([
+            f"{axis} [mm], E{axis}{axis}+ [um], E{axis}{axis}- [um], EB{axis}+ [arcsec], EB{axis}- [arcsec]",
+            *(",".join(f"{v:.5f}" for v in row) for row in rows)]))
+        text += f'[components.E{axis}{axis}]\ntable = "{axis}.csv"\n[components.EB{axis}]\ntable = "{axis}.csv"\n'
+    (folder / f"{machine}.toml").write_text(f'machine = "{machine}"\n{text}')
+    return folder / f"{machine}.toml"
+
+
+def turning_back(result: PostResult) -> int:
+    """Axis words that turn back by one last decimal; arcs and home apart."""
+    count, way, before = 0, np.zeros(3), np.zeros(3)
+    for line in result.text.splitlines():
+        words = dict(re.findall(r"([XYZ])(-?[\d.]+)", "" if line[:1] in "(%" or "G53" in line else line))
+        here = np.array([float(words.get(k, v)) for k, v in zip("XYZ", before, strict=True)])
+        step = np.round((here - before) * 1e4)
+        if not ({"G2", "G3", "G43"} & set(line.split())):
+            count += int((way * step == -1.0).sum())
+        way, before = np.where(step != 0.0, np.sign(step), way), here
+    return count
+
+
+@pytest.mark.parametrize(("sample", "machine", "seed"), [
+    ("five_faces.cls", "head-table", 1),
+    ("indexed_4axis.cls", "mill-4axis", 2)])
+def test_axes_with_lost_motion_never_turn_back_by_a_last_decimal(sample: str, machine: str, seed: int,
+                                                                 tmp_path: Path) -> None:
+    model = two_ways_of_all(tmp_path, machine, seed)
+    path, found = toolpaths.read(SAMPLES / sample)
+    options = Options(setup=str(SAMPLES / "tools.setup.toml"), error_model=str(model), output="axes")
+    result = postproc.convert(path, machine, "linuxcnc", options=options, diagnostics=found)
+    left = after_formatting(result)
+    assert result.ok and left is not None, [str(d) for d in result.diagnostics]
+    assert turning_back(result) == 0
+    assert left.tip.max() <= left.tip_bound and left.axis.max() <= left.axis_bound
+
+
 def test_holes_have_their_own_depth_and_stay_cycles() -> None:
     result = converted("five_faces.cls", "mikron-ucp710", "fanuc-30i", "tools")
     depths = [float(z) for z in re.findall(r"^[^(\n]*G8[123][^\n]* Z(-?[\d.]+)", result.text, re.M)]
