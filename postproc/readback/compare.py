@@ -144,14 +144,14 @@ def _deviations(motion: Motion, executed: Executed, moves: Moves, curves: Curves
     tip_off, axis_off = np.zeros(len(rows)), np.zeros(len(rows))
     if not len(rows):
         return tip_off, axis_off
-    first, blocks = _place(rows, owner)
+    begin, share = _place(motion, executed, rows, owner, curves)
     level = (moves.phase[owner[rows]] == Phase.POSITION) & executed.bent(motion, rows)
     for at in range(0, len(rows), CHUNK):
         part = slice(at, at + CHUNK)
         curve = curves.take(owner[rows[part]])
         for t in SAMPLES:
             tip, axis = executed.poses(motion, rows[part], t)
-            guess = np.minimum((first[part] + t) / blocks[part], 1.0)
+            guess = np.minimum(begin[part] + t * share[part], 1.0)
             d, e, _ = curve.deviation(tip, axis, guess, within)
             d = np.where(level[part], _off_level(curve, tip), d)
             tip_off[part] = np.fmax(tip_off[part], np.nan_to_num(d, nan=np.inf))
@@ -159,10 +159,21 @@ def _deviations(motion: Motion, executed: Executed, moves: Moves, curves: Curves
     return tip_off, axis_off
 
 
-def _place(rows: Ints, owner: Ints) -> tuple[Floats, Floats]:
-    """(how many blocks of the same move stand before, how many there are in all) for each block (K,)."""
-    _, start, inverse, size = np.unique(owner[rows], return_index=True, return_inverse=True, return_counts=True)
-    return (np.arange(len(rows)) - start[inverse]).astype(np.float64), size[inverse].astype(np.float64)
+def _place(motion: Motion, executed: Executed, rows: Ints, owner: Ints, curves: Curves) -> tuple[Floats, Floats]:
+    """Where on its move each block (K,) begins, and what part of it it is: by length along arcs, else by count."""
+    length = np.ones(len(rows))
+    on = np.flatnonzero(curves.is_arc[owner[rows]])
+    if len(on):
+        (begin, _), (end, _) = (executed.poses(motion, rows[on], t) for t in (0.0, 1.0))
+        arc = curves.take(owner[rows[on]])
+        around = arc_sweeps(motion, executed.control)[rows[on]] * np.linalg.norm(arc.start - arc.center, axis=1)
+        way = np.where(np.isnan(around), np.linalg.norm(end - begin, axis=1), around)
+        length[on] = np.maximum(np.nan_to_num(way), 1e-9)
+    _, start, inverse = np.unique(owner[rows], return_index=True, return_inverse=True)
+    total = np.cumsum(length)
+    before = total - length
+    whole = np.add.reduceat(length, start)[inverse]
+    return (before - before[start][inverse]) / whole, length / whole
 
 
 def _worst(values: tuple[Floats, Floats], move: tuple[Ints, Ints], block: tuple[Ints, Ints], moves: Moves,

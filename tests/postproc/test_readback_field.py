@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 import toolpaths
+from postproc.readback import compare
 from tests.postproc.kit import convert, good
 from toolpaths.diagnostics import Diagnostic, Severity, warning
+from toolpaths.shape import Curves
 from toolpaths.toolpath import Toolpath
 
 
@@ -51,3 +55,20 @@ def test_an_arc_without_a_block_takes_no_other(controller: str) -> None:
 def test_lines_that_nobody_knows_are_not_told() -> None:
     assert str(Diagnostic(Severity.WARNING, "a.b", "seven", count=7)) == "warning [a.b] seven (7 times)"
     assert str(warning("a.b", "none", file="part.cls", lines=[0])) == "part.cls: warning [a.b] none"
+
+
+def test_blocks_stand_on_a_helix_by_their_length(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Three turns, the second as sixty lines: the last arc begins at two thirds, not at 61 of 62."""
+    radius, phi = 10.0, np.linspace(0.0, 6.0 * np.pi, 181)
+    ends = np.concatenate([[60], np.arange(61, 121, 1), [180]])
+    points = np.stack([radius * np.cos(phi), radius * np.sin(phi), np.zeros(181)], axis=1)
+    begins = np.concatenate([[0], ends[:-1]])
+    executed = SimpleNamespace(control=None, poses=lambda motion, rows, t: (points[(ends if t else begins)[rows]], None))
+    sweeps = np.full(62, np.nan)
+    sweeps[[0, 61]] = 2.0 * np.pi
+    monkeypatch.setattr(compare, "arc_sweeps", lambda motion, control: sweeps)
+    up = np.array([[0.0, 0.0, 1.0]])
+    curves = Curves(points[:1], points[-1:], up, up, np.array([True]), np.zeros((1, 3)), up, np.array([6.0 * np.pi]))
+    begin, share = compare._place(None, executed, np.arange(62), np.zeros(62, dtype=int), curves)  # type: ignore[arg-type]
+    np.testing.assert_allclose(begin[[1, 61]], [1 / 3, 2 / 3], atol=1e-3)
+    np.testing.assert_allclose(share[[0, 61]], 1 / 3, atol=1e-3)
