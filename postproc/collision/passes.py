@@ -70,9 +70,10 @@ class PassBodies:
 
     @cached_property
     def _drilling(self) -> Bools:
-        """(M,) moves in a hole: a tap is larger than its core, a drill's tip deeper than a flat bottom."""
+        """(M,) moves in a hole: a tap is larger than its core, a drill's tip deeper than a flat bottom. The rapid
+        down to the hole is none of them."""
         moves = self.work.moves
-        return np.asarray((moves.hole >= 0) & (moves.phase != Phase.POSITION))
+        return np.asarray((moves.hole >= 0) & (moves.phase > Phase.APPROACH))
 
 
 def pass_bodies(work: Work, file: str) -> tuple[PassBodies | None, list[Diagnostic]]:

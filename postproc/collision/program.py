@@ -73,8 +73,9 @@ def _moving(motion: Motion) -> Bools:
 
 
 def _drilling(moves: Moves) -> Bools:
-    """(M,) moves in a hole: a tap is larger than its core, a drill's tip deeper than a flat bottom."""
-    return np.asarray((moves.hole >= 0) & (moves.phase != Phase.POSITION))
+    """(M,) moves in a hole: a tap is larger than its core, a drill's tip deeper than a flat bottom. The rapid
+    down to the hole is none of them."""
+    return np.asarray((moves.hole >= 0) & (moves.phase > Phase.APPROACH))
 
 
 def _told(bodies: Scene, form: Form, way: Swept, drilling: Bools, motion: Motion, served: tuple[Moves, Ints],

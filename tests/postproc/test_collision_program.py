@@ -137,6 +137,54 @@ def test_drills_may_cut_what_they_make_and_nothing_else(tmp_path: Path) -> None:
     assert [d.message.split(" by ")[0] for d in found] == ["cutter of T1 touches fixture clamp"]
 
 
+def test_the_rapid_down_to_a_hole_is_no_drilling(tmp_path: Path) -> None:
+    """Holes are said to begin on z = 0, the part's top is at 30: the drill comes down through it at rapid."""
+    hole = ["CYCLE/DRILL,DEPTH,5,MMPM,100,CLEAR,3,RTRCTO,50", "GOTO/0,0,0", "CYCLE/OFF", "RAPID", "GOTO/0,0,60"]
+    path = toolpath("RAPID", "GOTO/0,0,50", *hole, head=["UNITS/MM", "CUTTER/6,0", *HEAD[2:]])
+    tool = TOOL.replace("gauge", "tip_angle = 118.0\ngauge").replace("flute_length = 30.0", "flute_length = 70.0")
+    found = collisions(converted(path, setup_file(tmp_path, block(tmp_path, 30.0), tool)).diagnostics)
+    assert [d.code for d in found] == ["collision.gouge"]
+    assert converted(path, setup_file(tmp_path, block(tmp_path, 2.5), tool)).ok
+
+
+def test_a_flat_end_of_unknown_length_is_found_in_the_part(tmp_path: Path) -> None:
+    path = toolpath("RAPID", "GOTO/0,0,50", "GOTO/0,0,-10", "GOTO/80,0,-10", "RAPID", "GOTO/80,0,50",
+                    head=["UNITS/MM", "CUTTER/16,0", *HEAD[2:]])
+    result = converted(path, setup_file(tmp_path, block(tmp_path, 0.0), "[tools.1]\ngauge_length = 120.0\n"))
+    assert not result.ok and "collision.gouge" in {d.code for d in collisions(result.diagnostics)}
+
+
+def test_a_barrel_is_kept_from_fixtures_and_not_compared_with_the_part(tmp_path: Path) -> None:
+    path = toolpath("RAPID", "GOTO/0,0,50", "GOTO/0,0,-1", "GOTO/80,0,-1", "RAPID", "GOTO/80,0,50",
+                    head=["UNITS/MM", "CUTTER/16,85,-77,85,0,0,50", *HEAD[2:]])
+    result = converted(path, setup_file(tmp_path, block(tmp_path, 0.0)))
+    assert result.ok and [d.code for d in collisions(result.diagnostics)] == ["collision.corner"]
+    clear = next(d.message for d in result.diagnostics if d.code == "collision.clear")
+    assert "cutter" not in clear and "shank keeps 1 mm from the part" in clear
+    beside = setup_file(tmp_path, block(tmp_path, 0.0) + fixture((20, 7.5, -5), (30, 20, 10)))
+    assert "collision.touch" in {d.code for d in collisions(converted(path, beside).diagnostics)}
+
+
+@pytest.mark.parametrize(("x_axis", "y_axis"), [("[1, 0, 0]", "[0, 1, 0]"), ("[0, 1, 0]", "[-1, 0, 0]"),
+                                                ("[-1, 0, 0]", "[0, -1, 0]")])
+def test_the_part_is_where_it_is_placed_and_turned(tmp_path: Path, x_axis: str, y_axis: str) -> None:
+    """A rib of the part, turned with the path, is met wherever it stands; a clamp on the table only where it stands."""
+    rib = trimesh.creation.box(bounds=[(20.0, -5.0, -40.0), (20.5, 5.0, 0.4)])
+    rib.export(tmp_path / "part.stl")
+    rest = f"[part]\norigin = [10.0, 20.0, 30.0]\nx_axis = {x_axis}\ny_axis = {y_axis}\n" + TOOL
+    found = collisions(converted(line(), setup_file(tmp_path, 'part = "part.stl"\n', rest)).diagnostics)
+    told = float(found[0].message.split("cuts ")[1].split(" mm")[0])
+    assert [d.code for d in found] == ["collision.gouge"] and 0.38 < told < 0.401
+    clamp = fixture((60, 15, 20), (70, 25, 40))
+    assert converted(line(), setup_file(tmp_path, clamp, rest)).ok == (x_axis != "[1, 0, 0]")
+
+
+def test_the_first_way_from_home_is_looked_at(tmp_path: Path) -> None:
+    """A plate stands over the first point of the file, out of the way of all that follows."""
+    found = collisions(converted(line(), setup_file(tmp_path, fixture((-9, -9, 200), (9, 9, 202)))).diagnostics)
+    assert found and found[0].code == "collision.touch" and found[0].lines[0] == 7
+
+
 def test_verify_finds_what_a_program_touches(tmp_path: Path) -> None:
     """The set-up is told of a clamp only after the program was made."""
     path = line()
