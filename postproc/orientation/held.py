@@ -35,10 +35,15 @@ _TIE = 1e-2
 
 def free_value(made: Turned) -> float:
     """Where the rotary joint stands that the tool axis leaves free, rad; NaN where it leaves none."""
+    return free_angle(made)[1]
+
+
+def free_angle(made: Turned) -> tuple[int, float]:
+    """The rotary joint that the tool axis leaves free and where it stands, rad; -1 and NaN where it leaves none."""
     if made.refused or made.one.turns or not bool(made.one.kin.singular(made.q[:1])[0]):
-        return np.nan
+        return -1, np.nan
     joint = _free(made.one, made.axis, made.machine)
-    return float(made.q[0, joint]) if joint >= 0 else np.nan
+    return joint, float(made.q[0, joint]) if joint >= 0 else np.nan
 
 
 def best_held(search: Search, best: Turned) -> Turned:

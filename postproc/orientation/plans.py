@@ -15,7 +15,7 @@ from postproc.orientation.passes import Work
 from postproc.orientation.ranking import Ranking
 from postproc.orientation.rounds import Progress, each_pass
 from postproc.orientation.timed import Turned, turned_all
-from postproc.orientation.turns import Ends, all_ends, ways_between
+from postproc.orientation.turns import Ends, all_ends, unwinding, ways_between
 from toolpaths.arrays import Floats
 from toolpaths.units import DEG
 
@@ -66,10 +66,14 @@ class _Table:
     """States of each pass, by pass and state.
 
     Attributes:
+        edges: the ends of each state
         cuts: (K_n,) seconds as ranked
         rapids: (K_n,) seconds
         ways: seconds between, see `choose.shortest`
     """
+
+    work: Work
+    edges: list[list[Ends]]
 
     states: list[list[Turned]]
     cuts: list[Floats]
@@ -88,6 +92,7 @@ class _Table:
         rapids = np.array([row[k] for row, k in zip(self.rapids, picked, strict=True)])
         at = [0, *picked, 0]
         ways = np.array([way[a, b] for way, a, b in zip(self.ways, at[:-1], at[1:], strict=True)])
+        ways[-1] += unwinding([row[k] for row, k in zip(self.edges, picked, strict=True)], self.work, any(picked))
         return OrientationPlan(made, cuts, rapids, ways, float(np.sum(cuts) + np.sum(rapids) + np.sum(ways)))
 
 
@@ -125,9 +130,10 @@ def _table(work: Work, results: list[Tried], allowed: Allowed, progress: Progres
         return states, _ranked(states), all_ends(states, work)
 
     rows = each_pass(row, work, allowed, "comparing", progress, workers)
-    rapids = [np.array([each.rapids for each in edge]) for _, _, edge in rows]
-    return _Table([states for states, _, _ in rows], [cuts for _, cuts, _ in rows], rapids,
-                  ways_between(work, [edge for _, _, edge in rows]))
+    edges = [edge for _, _, edge in rows]
+    rapids = [np.array([each.rapids for each in edge]) for edge in edges]
+    return _Table(work, edges, [states for states, _, _ in rows], [cuts for _, cuts, _ in rows], rapids,
+                  ways_between(work, edges))
 
 
 def _ranked(states: list[Turned]) -> Floats:

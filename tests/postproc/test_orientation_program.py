@@ -1,0 +1,53 @@
+"""Seconds of whole plans beside those of the programs that are written for them, under the ideal control."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import toolpaths
+from postproc.options import Options
+from postproc.orientation.orient import orient
+from postproc.pipeline import convert
+from postproc.placement.program import program_seconds
+from postproc.setup import load_setup
+from tests.postproc.kit import SAMPLES, machine
+from toolpaths.toolpath import Toolpath
+from toolpaths.units import DEG
+
+HEAD = ["UNITS/MM", "CUTTER/10,5", "LOADTL/1", "SPINDL/RPM,1000,CLW", "MULTAX"]
+
+
+def strips() -> Toolpath:
+    """Three faces at 35 degrees, each a third of half a turn further round, then the top: strips with rapids off and on."""
+    lines = list(HEAD)
+    for turn, lean in [(0.0, 35.0), (120.0, 35.0), (240.0, 35.0), (0.0, 0.0)]:
+        c, s = np.cos(turn * DEG), np.sin(turn * DEG)
+        axis = np.array([np.sin(lean * DEG) * c, np.sin(lean * DEG) * s, np.cos(lean * DEG)])
+        level = np.array([-s, c, 0.0])
+        for k in range(2):
+            ends = [20.0 * np.array([c, s, 0.0]) + side * 25.0 * level + 4.0 * k * np.cross(level, axis)
+                    for side in (-1.0, 1.0)]
+            begin, end = ends
+            for word, at in (("RAPID", begin + 20.0 * axis), ("RAPID", begin + 3.0 * axis), ("FEDRAT/MMPM,9000", begin),
+                             ("FEDRAT/MMPM,9000", end), ("RAPID", end + 20.0 * axis)):
+                lines += [word, "GOTO/" + ",".join(f"{x:.6f}" for x in (*at, *axis))]
+    path, found = toolpaths.read_bytes("\n".join([*lines, "FINI"]).encode(), file="strips.apt")
+    assert not toolpaths.diagnostics.has_errors(found), found
+    return path
+
+
+@pytest.mark.parametrize("name", ["mikron-ucp710", "head-table"])
+def test_a_plan_takes_as_long_as_its_program(name: str) -> None:
+    """From home to home with the tool change: `keep` winds C up, which the way home undoes. The program rounds
+    corners between rapids, the count stops there, so that it is above by some percent at most."""
+    m, (setup, _) = machine(name), load_setup(SAMPLES / "tools.setup.toml")
+    assert setup is not None
+    choice, found = orient(strips(), m, setup, Options())
+    assert choice is not None, found
+    counted, written = {}, {}
+    for plan in ("keep", "auto"):
+        counted[plan] = choice.plans[plan].seconds
+        written[plan] = program_seconds(convert(choice.toolpath(plan), m, setup=setup, options=Options(feed="planned")))
+        assert counted[plan] == pytest.approx(written[plan], rel=0.025), plan
+    assert counted["keep"] - counted["auto"] == pytest.approx(written["keep"] - written["auto"], abs=0.3)
