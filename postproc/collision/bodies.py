@@ -20,6 +20,8 @@ from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic, error, has_errors
 
 PART = "the part"
+_APART = 1e-3
+"""mm between the end of a piece of the way and the beginning of the next: another stretch"""
 _TABLE = Placement(np.eye(3), np.zeros(3))
 
 
@@ -169,11 +171,14 @@ def touches(all_bodies: Scene, form: Form, way: Swept, cutting: Swept | None = N
         if found.place >= 0:
             result.append(Touch(form.number, part, body, found.distance, limit, int(on.row[found.place])))
     if not result and len(way):
-        result = [Touch(form.number, part, body, -np.inf, limit, int(way.row[0]))
-                  for part, body, limit in all_bodies.pairs(form) if body.solid.holds(_core(form.of(part), way))]
+        result = [Touch(form.number, part, body, -np.inf, limit, int(way.row[k]))
+                  for part, body, limit in all_bodies.pairs(form) for k in _inside(body, form.of(part), way)[:1]]
     return result
 
 
-def _core(pieces: Floats, way: Swept) -> Floats:
-    """A point (3,) of the axis in the first piece, where the way begins: what no surface passes it never leaves."""
-    return np.asarray(way.tip[0, 0] + 0.5 * (pieces[0, 1] + pieces[0, 3]) * way.axis[0, 0])
+def _inside(body: Body, pieces: Floats, way: Swept) -> list[int]:
+    """Places where a stretch of the way begins with a tool that is inside: what no surface passes it never leaves there."""
+    apart = np.linalg.norm(way.tip[1:, 0] - way.tip[:-1, 1], axis=1) > _APART
+    first = np.append(0, np.flatnonzero(apart) + 1)
+    core = way.tip[first, 0] + 0.5 * (pieces[0, 1] + pieces[0, 3]) * way.axis[first, 0]
+    return [k for k, point in zip(first.tolist(), core, strict=True) if body.solid.holds(point)]

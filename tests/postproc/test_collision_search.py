@@ -7,10 +7,12 @@ import pytest
 import trimesh
 
 from postproc.collision import search
+from postproc.collision.bodies import Body, Scene, touches
+from postproc.collision.form import CUTTER, Form
 from postproc.collision.revolution import around, signed, support
 from postproc.collision.search import EXACT, PART, Nearest, nearest
 from postproc.collision.solid import Solid, solid
-from postproc.collision.swept import Swept
+from postproc.collision.swept import Swept, joined
 from postproc.setup import Placement
 from toolpaths.arrays import Floats
 from toolpaths.rotations import slerp
@@ -168,6 +170,16 @@ def dense(mesh: trimesh.Trimesh, parts: int) -> Floats:
     u, v = (i[i + j <= parts] / parts)[:, None, None], (j[i + j <= parts] / parts)[:, None, None]
     a, b, c = np.moveaxis(np.asarray(mesh.triangles), 1, 0)
     return np.asarray(((1.0 - u - v) * a + u * b + v * c).reshape(-1, 3))
+
+
+def test_a_stretch_that_begins_inside_a_body_is_found() -> None:
+    """The first one passes far beside the body, the second one is in it altogether."""
+    scene = Scene((Body("fixture a", solid(trimesh.creation.box((300.0, 300.0, 300.0)), HERE)),), 1.0, 0.02)
+    form = Form(1, CYLINDER, np.array([CUTTER]))
+    outside, inside = way((400.0, 0.0, 0.0), (500.0, 0.0, 0.0)), way((0.0, 0.0, 0.0), (5.0, 0.0, 0.0))
+    assert not touches(scene, form, outside)
+    found = touches(scene, form, joined([outside, Swept(inside.tip, inside.axis, inside.row + 7)]))
+    assert [(touch.distance, touch.place) for touch in found] == [(-np.inf, 7)]
 
 
 def test_the_collision_manager_agrees_where_tools_stand_clear() -> None:
