@@ -29,7 +29,7 @@ from postproc.program import Program
 from postproc.reach import check_reach
 from postproc.readback.compare import Comparison
 from postproc.readback.files import Beside
-from postproc.readback.verify import read_back
+from postproc.readback.verify import other_axes, read_back
 from postproc.rewinds import drawing_of
 from postproc.rounding import rounding_problem
 from postproc.setup import SetupFile, load_setup
@@ -204,6 +204,10 @@ def _stages(result: PostResult, progress: Progress | None) -> PostResult:
     comparison, found = read_back(text.encode(), job, file, progress,
                                   others={name: t.encode() for name, t in files.items()})
     result = _with(result, found, comparison=comparison)
+    if result.compensation is not None:
+        from postproc.corrected.proof import beyond_bound
+
+        result = _with(result, beyond_bound(result))
     return replace(result, text=text, files=files) if result.ok else result
 
 
@@ -383,7 +387,10 @@ def verify(gcode: str | FilePath, path: Toolpath, machine: Machine | str | FileP
         data = FilePath(gcode).read_bytes()
     except OSError as fault:
         raise DiagnosticError([error("gcode.open", f"cannot be read: {fault.strerror}", file=str(gcode))]) from fault
-    path, _, known = _oriented(path, machine, setup, options, _reading(path, diagnostics), progress)
+    known = _reading(path, diagnostics)
+    if other := other_axes(data, options, str(gcode)):
+        return VerifyResult(str(gcode), None, (*other, *known))
+    path, _, known = _oriented(path, machine, setup, options, known, progress)
     found = list(known)
     if has_errors(found):
         return VerifyResult(str(gcode), None, tuple(found))

@@ -12,6 +12,7 @@ from postproc.moves import Moves
 from postproc.readback.compare import Comparison
 from postproc.rounding import decimals
 from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.diagnostics import Diagnostic, warning
 from toolpaths.rotations import angle_between
 from toolpaths.toolpath import Kind
 from toolpaths.units import DEG
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
 
 LOOKS = 500
 """blocks at which lost motion is weighed"""
+SLACK = 1e-6, 1e-9
+"""mm and rad beyond a bound that are numbers' own: errors change by as much over a last decimal"""
 
 
 @dataclass(frozen=True)
@@ -69,6 +72,26 @@ def after_formatting(result: PostResult) -> AfterFormatting | None:
     tip_play, axis_play = _play(result)
     return AfterFormatting(tip[points], axis[points], points, found.tip_after + job.rounding.tip + tip_play,
                            found.axis_after + job.rounding.axis + axis_play)
+
+
+def beyond_bound(result: PostResult) -> list[Diagnostic]:
+    """A warning where points of the CL file are farther off than `after_formatting` counts on."""
+    found, job = after_formatting(result), result.job
+    if found is None or job is None:
+        return []
+    tip, axis = found.tip - found.tip_bound, found.axis - found.axis_bound
+    off = np.flatnonzero((tip > SLACK[0]) | (axis > SLACK[1]))
+    if not len(off):
+        return []
+    arcsec = DEG / 3600.0
+    k = int(off[np.argmax(np.maximum(tip / SLACK[0], axis / SLACK[1])[off])])
+    lines = job.moves.without_pecks().line[found.points]
+    rest = np.setdiff1d(lines[off], lines[k]).tolist()
+    return [warning("geometric_errors.bound", f"errors corrected, {len(off)} of {len(lines)} CL points are farther off than "
+                    f"the bound: tip {1e3 * found.tip[k]:.2f} um of {1e3 * found.tip_bound:.2f} um, axis "
+                    f"{found.axis[k] / arcsec:.2f} arcsec of {found.axis_bound / arcsec:.2f} arcsec at the worst of them",
+                    file=job.toolpath.file, lines=[int(lines[k]), *rest[:5]], count=len(off),
+                    hint="an axis turns back by less than it loses; more decimals in the controller's [format] help")]
 
 
 def _play(result: PostResult) -> tuple[float, float]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,11 +15,12 @@ import postproc
 import toolpaths
 from postproc.cli import app
 from postproc.compensation import unstated
-from postproc.corrected.proof import after_formatting
+from postproc.corrected.proof import after_formatting, beyond_bound
 from postproc.options import Options
 from postproc.pipeline import PostResult, verify
 from postproc.setup import load_setup
 from toolpaths.arrays import Floats
+from toolpaths.diagnostics import Severity
 
 SAMPLES = Path("samples")
 CASES = [("five_faces.cls", "mikron-ucp710", "fanuc-30i", "tools"),
@@ -157,6 +159,20 @@ def test_axes_with_lost_motion_never_turn_back_by_a_last_decimal(sample: str, ma
     assert result.ok and left is not None, [str(d) for d in result.diagnostics]
     assert turning_back(result) == 0
     assert left.tip.max() <= left.tip_bound and left.axis.max() <= left.axis_bound
+
+
+def test_points_beyond_the_bound_are_told() -> None:
+    result = converted("h4a_indexed.cls", "h4a-c-table", "linuxcnc", "h4a")
+    found = after_formatting(result)
+    assert result.compensation is not None and found is not None and not beyond_bound(result)
+    assert "geometric_errors.bound" not in {d.code for d in result.diagnostics}
+    nearer = 0.5 * found.tip.max()
+    less = replace(result.compensation, tip_after=result.compensation.tip_after + float(nearer) - found.tip_bound)
+    [told] = beyond_bound(replace(result, compensation=less))
+    assert result.job is not None and told.severity == Severity.WARNING and told.code == "geometric_errors.bound"
+    assert int(result.job.moves.line[found.points[np.argmax(found.tip)]]) in told.lines
+    assert told.count == int((found.tip > nearer).sum())
+    assert f"tip {1e3 * found.tip.max():.2f} um of {1e3 * nearer:.2f} um" in told.message
 
 
 def test_holes_have_their_own_depth_and_stay_cycles() -> None:
