@@ -20,7 +20,6 @@ from postproc.placement.search import Found, Progress, Search
 from postproc.placement.space import ANGLES, Space, space_of
 from postproc.placement.timed import Timer, Tried
 from postproc.setup import PartPlacement, SetupFile, part_placement
-from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic, error, has_errors, info, require, warning
 from toolpaths.toolpath import Toolpath
 from toolpaths.units import DEG
@@ -94,7 +93,7 @@ def place(toolpath: Toolpath, machine: Machine, setup: SetupFile, options: Optio
     if result.best is None:
         return None, [*found, _nowhere(result, timer, options)]
     proof = _Proof(toolpath, machine, setup, options, controller, space, progress)
-    best, more = _proved(proof, timer, result.best)
+    best, more = _proved(proof, timer, result.best, result.now)
     if best is None:
         return None, [*found, *more]
     program = proof.seconds(result.now), proof.seconds(best)
@@ -183,18 +182,23 @@ class _Proof:
         return np.nan if one.refused else self.of(one)[0]
 
 
-def _proved(proof: _Proof, timer: Timer, best: Tried) -> tuple[Tried | None, list[Diagnostic]]:
-    """The best place whose conversion is proved; what stood against better ones is told."""
+def _proved(proof: _Proof, timer: Timer, best: Tried, now: Tried) -> tuple[Tried | None, list[Diagnostic]]:
+    """The best place whose conversion is proved; what stood against better ones is told.
+
+    After a failure come in turn the place farthest from all that failed and the fastest that is left: what stands against
+    one place (a link that leaves the workspace) stands against its neighbours too. At last the part may stay where it is.
+    """
     failed: list[tuple[Tried, Diagnostic]] = []
-    for one in _candidates(timer, best):
-        if any(_near(one.place, other.place) for other, _ in failed):
-            continue
+    left = _candidates(timer, best)
+    while left and len(failed) < _PROOFS:
+        one = min(left, key=lambda one: -_off(one, failed)) if len(failed) % 2 else left[0]
         why = proof.of(one)[1]
         if why is None:
             return one, [_passed_over(*each, proof.options) for each in failed]
         failed.append((one, why))
-        if len(failed) == _PROOFS:
-            break
+        left = [other for other in left if _off(other, [(one, why)]) >= 1.0]
+    if not now.refused and timer.space.holds(now.place) and proof.of(now)[1] is None:
+        return now, [_passed_over(*each, proof.options) for each in failed]
     return None, [error("place.proof", f"no place of {len(failed)} could be converted: {failed[0][1].message}",
                         file=failed[0][1].file, lines=failed[0][1].lines, hint=failed[0][1].hint)]
 
@@ -205,9 +209,10 @@ def _candidates(timer: Timer, best: Tried) -> list[Tried]:
     return [best, *sorted(good, key=lambda one: one.seconds)]
 
 
-def _near(a: Floats, b: Floats) -> bool:
-    apart = np.abs(a - b)
-    return bool((apart[:ANGLES] < _APART[0]).all() and (apart[ANGLES:] < _APART[1]).all())
+def _off(one: Tried, failed: list[tuple[Tried, Diagnostic]]) -> float:
+    """Least distance from places that failed, 1 where they count as another place."""
+    scale = np.repeat(_APART, ANGLES)
+    return min((float((np.abs(one.place - other.place) / scale).max()) for other, _ in failed), default=np.inf)
 
 
 def _passed_over(one: Tried, why: Diagnostic, options: Options) -> Diagnostic:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,13 +15,14 @@ from postproc.orientation.contact import Contact
 from postproc.orientation.orient import orient
 from postproc.orientation.passes import work_of
 from postproc.placement.moved import moved
-from postproc.placement.place import PlacementChoice, place
+from postproc.placement.place import PlacementChoice, _proved, place
 from postproc.placement.search import EQUAL
 from postproc.placement.space import ANGLES, angles_of, matrix, space_of
+from postproc.placement.timed import Tried
 from postproc.setup import Clearance, PartPlacement, Placement, SetupFile, ToolSetup, part_placement
 from postproc.setup_place import PlaceBox, PlacementLimits
 from tests.postproc.kit import machine
-from toolpaths.diagnostics import Diagnostic, has_errors
+from toolpaths.diagnostics import Diagnostic, error, has_errors
 from toolpaths.toolpath import Toolpath
 from toolpaths.units import DEG
 
@@ -221,3 +223,21 @@ def test_the_space_states_what_it_places() -> None:
     again = space_of(limits, back, (np.zeros(3), np.ones(3)))
     assert again.now == pytest.approx(there, abs=1e-8)
     assert there[1] == space.now[1]
+
+
+def tried_at(x: float, seconds: float) -> Tried:
+    return Tried(np.array([x, 0.0, 0.0, 0.0, 0.0, 0.0]), seconds, seconds, 0.0, seconds, np.zeros(3), np.zeros(3), np.inf)
+
+
+@pytest.mark.parametrize(("good_from", "taken", "failures"), [(-1.0, 0.0, 0), (250.0, 300.0, 1), (np.inf, 7.0, 6)])
+def test_places_that_cannot_be_converted_are_left(good_from: float, taken: float, failures: int) -> None:
+    """After a failure the farthest place is next, not the neighbour; at last the part stays where it is."""
+    known = [tried_at(25.0 * k, 1.0 + 0.01 * k) for k in range(13)]
+    now = tried_at(7.0, 9.0)
+    wrong = error("workspace.z", "passed by 61 mm")
+    proof = SimpleNamespace(options=Options(), of=lambda one: (
+        (1.0, None) if one is now or one.place[0] > good_from else (np.nan, wrong)))
+    timer = SimpleNamespace(known=lambda: known, space=SimpleNamespace(holds=lambda place: True))
+    best, found = _proved(proof, timer, known[0], now)  # type: ignore[arg-type]
+    assert best is not None and best.place[0] == taken
+    assert [d.code for d in found] == ["place.passed_over"] * failures
