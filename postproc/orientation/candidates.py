@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -30,6 +30,8 @@ _SWIFT = (3.0 * DEG, 1.5 * DEG)
 _ROUNDS = 3
 _SHARES = np.arange(15, 0, -1) / 16.0
 """of the way to a neighbour that is not allowed"""
+_APART = 0.1 * DEG
+"""of orientations that are told as two"""
 _WORTH = 1e-4
 """least part of the time that a candidate must gain to be planned, or to be taken"""
 Kind = Literal["limits", "reach", "travel", "touches", "bound", "slower"]
@@ -52,7 +54,8 @@ class Tried:
         own, best, swift: the CL's axis, that of the least cuts, that of the least cuts and rapids together
         aimed: the paper's choice for the mean direction, None without a vertex in travel
         gains: seconds as ranked that `best` and `swift` gain over `own`
-        rejected: all candidates with what they lost by
+        rejected: candidates with what they lost by, but those that stand where the best does; ranked times are told beside
+            the planned one of the best
         pruned, planned: how many were discarded by the bound alone, how many timed
     """
 
@@ -111,7 +114,7 @@ class Search:
         return not (why or made.refused)
 
     def lose(self, made: Turned, why: str, kind: Kind) -> None:
-        """Note what a candidate lost by."""
+        """Note what a candidate lost by; times are told at the end."""
         told = made if made is self.own else made.slim(self._times.get(id(made), np.nan))
         self.lost[id(made)] = Lost(told, why, kind)
 
@@ -127,7 +130,7 @@ class Search:
             return best
         self._swifter(made)
         if self._ranked(made) >= least:
-            self.lose(made, f"takes {self._ranked(made):.4f} s", "slower")
+            self.lose(made, "", "slower")
         elif made.touching:
             self.lose(made, made.touching, "touches")
         else:
@@ -158,21 +161,40 @@ class Search:
         elif best.touching:
             self.lose(best, best.touching, "touches")
         else:
-            self.lose(best, f"takes {self._ranked(best):.4f} s", "slower")
+            self.lose(best, "", "slower")
 
     def settled(self, best: Turned) -> Turned:
         """The best, unless planned on knots of its own it is slower than the CL's own axis."""
         if best is self.own or best.seconds < self.own.seconds_allowed:
             return best
-        self.lose(best, f"takes {best.seconds:.4f} s", "slower")
+        self.lose(best, "", "slower")
         self.lost.pop(id(self.own), None)
         return self.own
 
-    def tried(self, best: Turned, aimed: Turned | None) -> Tried:
-        """The result."""
-        rejected = tuple(self.lost[id(made)] for made in self.known if id(made) in self.lost and made is not best)
+    def tried(self, winner: Turned, aimed: Turned | None) -> Tried:
+        """The result, `winner` being the best as ranked."""
+        best = self.settled(winner)
+        lost = [made for made in self.known if id(made) in self.lost and made is not best]
+        rejected = tuple(self._told(made, winner) for made in lost if not self._beside(made, best))
         gains = _gain(self.seconds(self.own), self.seconds(best)), _gain(self.whole(self.own), self.whole(self.swift))
         return Tried(self.own, best, self.swift, aimed, gains, rejected, self.pruned, self.planned)
+
+    def _beside(self, made: Turned, best: Turned) -> bool:
+        """Whether a slower candidate is the best itself to all that can be told of it."""
+        return made is not self.own and self.lost[id(made)].kind == "slower" and made.same(best.axis, best.held, _APART)
+
+    def _told(self, made: Turned, winner: Turned) -> Lost:
+        """What a candidate lost by; a time as ranked by as much longer as the winner is when planned in full, and no gain
+        that is not worth to be taken."""
+        lost = self.lost[id(made)]
+        if lost.kind != "slower":
+            return lost
+        if made is self.own or made is winner:
+            return Lost(lost.made if made is self.own else replace(lost.made, told=made.seconds),
+                        f"takes {made.seconds:.4f} s", "slower")
+        longer = winner.seconds / self._ranked(winner) if self._ranked(winner) > 0.0 else 1.0
+        about = max(longer * self._ranked(made), winner.seconds)
+        return Lost(replace(lost.made, told=about), f"takes about {about:.4f} s", "slower")
 
 
 def _gain(before: float, after: float) -> float:
@@ -188,7 +210,7 @@ def tried(one: Pass, machine: Machine, allowed: Allowed, before: Tried | None = 
     """
     search = Search(one, machine, allowed)
     if one.fixed:
-        return search.tried(search.settled(best_held(search, search.own)), None)
+        return search.tried(best_held(search, search.own), None)
     aimed = aimed_axes(one, machine, search.own.q[0])
     mean = search.add(aimed["mean"]) if "mean" in aimed else []
     seeds = [*mean, *(made for name in ("initial", "final") if name in aimed for made in search.add(aimed[name], _NEAR))]
@@ -206,7 +228,7 @@ def tried(one: Pass, machine: Machine, allowed: Allowed, before: Tried | None = 
         best = _refined(search, best, step)
     for step in _SWIFT:
         best = _hastened(search, best, step)
-    return search.tried(search.settled(best_held(search, best)), _least_turned(mean))
+    return search.tried(best_held(search, best), _least_turned(mean))
 
 
 def _least_turned(made: list[Turned]) -> Turned | None:
