@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from postproc.job import Job
+from postproc.options import Options
 from postproc.readback.changes import check_changes
 from postproc.readback.compare import Comparison, compare
 from postproc.readback.dialects import reader_for
@@ -18,11 +19,31 @@ from postproc.readback.faults import Faults
 from postproc.readback.poses import Executed, poses_before
 from postproc.readback.slow import HEADER, planned_feeds
 from postproc.readback.stops import check_stops
-from toolpaths.diagnostics import Diagnostic, Severity, error, has_errors
+from toolpaths.diagnostics import Diagnostic, Severity, error, has_errors, warning
+from toolpaths.rotations import angle_between
+from toolpaths.units import DEG
 
 _CORRECTED = re.compile(rb"(?im)^[^\n]*geometric errors [^\n]*corrected in this program")
+_BY_CONTROL = re.compile(rb"(?im)^[^\n]*geometric errors [^\n]*corrected by the control")
+_ORIENTED = re.compile(rb"(?im)^[^\n]*tool axes chosen: orient ([a-z-]+), max tilt ([^ \n]+) degrees")
+_OURS = re.compile(rb"(?im)^[^\n]*postproc \d+\.\d[^\n]*\n(?:[^\n]*part [^\n]*\n)?[^\n]*source ")
 CAUSES = frozenset({"verify.tool", "verify.tool_change", "verify.state", "verify.tap", "verify.hole"})
 """told first: a path that is off follows from them"""
+
+
+def other_axes(data: bytes, options: Options, gcode: str) -> list[Diagnostic]:
+    """An error where the header of a program names other chosen tool axes than the options; nothing without our header."""
+    head = data[:HEADER]
+    stated, chosen = _ORIENTED.search(head), options.orient != "keep"
+    given = f"--orient {options.orient} --max-tilt {options.max_tilt:g}" if chosen else "no --orient"
+    if stated is None:
+        return [error("verify.orient", f"the header names no chosen tool axes, {given} is given", file=gcode,
+                      hint="verify without --orient")] if chosen and _OURS.search(head) else []
+    plan, tilt = (text.decode("ascii", "replace").lower() for text in stated.groups())
+    if chosen and (plan, tilt) == (options.orient, f"{options.max_tilt:g}"):
+        return []
+    return [error("verify.orient", f"the header says orient {plan}, max tilt {tilt} degrees, {given} is given", file=gcode,
+                  hint=f"verify with --orient {plan} --max-tilt {tilt}")]
 
 
 def read_back(data: bytes, job: Job, file: str, progress: Callable[[str, int, int], None] | None = None, gcode: str = "",
@@ -36,7 +57,7 @@ def read_back(data: bytes, job: Job, file: str, progress: Callable[[str, int, in
     reader = reader_for(job.controller, machine.axis_names, home)
     code, diagnostics = reader.read(data, gcode, others)
     diagnostics = [_located(_judged(d, reader.units_stay), job.toolpath.file) for d in diagnostics]
-    if gcode and (job.errors is None or job.errors.corrected_by != "post") and _CORRECTED.search(data[:HEADER]):
+    if gcode and not _by_post(job) and _CORRECTED.search(data[:HEADER]):
         return None, [error("verify.error_model", "the program corrects geometric errors, none are given here",
                             file=gcode, hint="verify with --error-model, the file that its header names"), *diagnostics]
     if code is None or has_errors(diagnostics):
@@ -59,7 +80,45 @@ def read_back(data: bytes, job: Job, file: str, progress: Callable[[str, int, in
     unseen = [*check_changes(code, motion, job, home, faults), *check_stops(code, motion, job, faults),
               *_bodies(motion, executed, job, comparison, faults)]
     told = sorted([*unseen, *comparison.diagnostics], key=lambda d: d.code not in CAUSES)
+    if gcode and has_errors(told) and _by_post(job):
+        told = [*_uncorrected(data[:HEADER], job, motion, executed, comparison, gcode), *told]
     return replace(comparison, executed=(code, motion)), [*diagnostics, *told]
+
+
+def _by_post(job: Job) -> bool:
+    """True where programs of the job are to correct the machine's geometric errors."""
+    return job.errors is not None and job.errors.corrected_by == "post"
+
+
+def _uncorrected(head: bytes, job: Job, motion: Motion, executed: Executed, comparison: Comparison,
+                 gcode: str) -> list[Diagnostic]:
+    """Why a program is off on the machine with errors: its header names none that it corrects.
+
+    A program of another post may correct them all the same, so that no amounts are known.
+    """
+    if _CORRECTED.search(head):
+        return []
+    by_control = _BY_CONTROL.search(head)
+    if not (by_control or _OURS.search(head)):
+        return [warning("verify.error_model", "the header of the program names no error model, it is verified on the "
+                        "machine with errors", file=gcode, hint="verify without --error-model, if it corrects none")]
+    why = "by its header the control does" if by_control else "its header names no error model"
+    return [error("verify.error_model", f"the program corrects no geometric errors ({why}): verified on the machine with "
+                  "errors" + _amounts(job, motion, executed, comparison), file=gcode,
+                  hint="verify without --error-model, or convert with it")]
+
+
+def _amounts(job: Job, motion: Motion, executed: Executed, comparison: Comparison) -> str:
+    """How far errors take the tool from where the nominal machine has it at ends of feed blocks; "" where not known."""
+    rows = np.flatnonzero(motion.code > 0)
+    nominal = Executed(job.control, job.kinematics_of, executed.lengths, executed.before)
+    tip, axis = nominal.poses(motion, rows, 1.0)
+    off = np.linalg.norm(comparison.tip[rows] - tip, axis=1)
+    tilt = angle_between(comparison.axis[rows], axis) / DEG
+    if not len(rows) or not (np.isfinite(off).all() and np.isfinite(tilt).all()):
+        return ""
+    return (f" the tip is off by up to {off.max():.6f} mm, allowed {job.options.tolerance:g} mm, the axis by "
+            f"{tilt.max():.6f} degrees, allowed {job.options.axis_tolerance:g} degrees")
 
 
 def _bodies(motion: Motion, executed: Executed, job: Job, comparison: Comparison, faults: Faults) -> list[Diagnostic]:
@@ -86,7 +145,7 @@ def _located(d: Diagnostic, file: str) -> Diagnostic:
 def _executed(job: Job, motion: Motion, lengths: dict[int, float]) -> Executed:
     """Poses of the machine as it is: with its errors where the program corrects them."""
     before = poses_before(motion, job.control)
-    if job.errors is None or job.errors.corrected_by != "post":
+    if job.errors is None or not _by_post(job):
         return Executed(job.control, job.kinematics_of, lengths, before)
     from postproc.readback.actual import ActualExecuted
 
