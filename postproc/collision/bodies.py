@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from postproc.collision.form import CUTTER, HOLDER, PARTS, SHANK, Form
+from postproc.collision.form import CUTTER, HOLDER, PARTS, SHANK, Form, stacked
 from postproc.collision.mesh import load_mesh
 from postproc.collision.search import nearest
 from postproc.collision.solid import Solid, solid
@@ -110,6 +110,8 @@ def described(setup: SetupFile, placement: Placement, file: str) -> tuple[str, l
     """(lines that say what stands where, what is wrong with the meshes of a set-up)."""
     bodies, found = scene(setup, placement, file)
     found += _holders(setup, file)
+    found += [replace(d, file=file) for number, tool in setup.tools.items()
+              for d in stacked(number, tool, tool.flute_length)]
     return "".join(f"\n{_where(body)}" for body in (bodies.bodies if bodies else ())), found
 
 

@@ -63,6 +63,7 @@ def tool_form(number: int, tool: Tool | None, setup: ToolSetup | None, file: str
             pieces[HOLDER] = spun(np.asarray(mesh.vertices), np.asarray(mesh.edges_unique))
             top = float(pieces[HOLDER][:, 3].max())
     found += _unformed(number, cutter) + _unknown(number, cutter, setup, pieces, (at, top))
+    found += stacked(number, setup, cutter.flutes) if setup is not None else []
     found = [replace(d, file=d.file or file) for d in found]
     rows = np.concatenate(list(pieces.values()))
     part = np.repeat(list(pieces), [len(rows) for rows in pieces.values()])
@@ -124,12 +125,28 @@ def _unknown(number: int, cutter: Cutter, setup: ToolSetup | None, pieces: dict[
         missing.append(one if len(pieces[SHANK]) else both)
     elif holder > at + _DIFFERS:
         missing.append((f"what is between {at:g} mm over the tip and the holder, which begins at {holder:g} mm,",
-                        "more sections to shank"))
+                        "more sections of shank"))
     if holder is not None and setup is not None and top < setup.gauge_length - _DIFFERS:
         missing.append((f"what is between the holder, which ends {top:g} mm over the tip, and the gauge point at "
-                        f"{setup.gauge_length:g} mm,", "more sections to holder"))
-    return [warning("collision.unchecked", f"T{number}: {what} is not known and not checked", hint=f"add {key} to "
+                        f"{setup.gauge_length:g} mm,", "more sections of holder"))
+    return [warning("collision.unchecked", f"T{number}: {what} is not known and not checked", hint=f"state {key} in "
                     f"[tools.{number}]") for what, key in missing]
+
+
+def stacked(number: int | str, given: ToolSetup, flutes: float | None) -> list[Diagnostic]:
+    """Where flutes, shank and holder of a set-up do not fit its gauge length; a holder may go on beyond the gauge point."""
+    found, holder = [], [one.length for one in given.holder]
+    at = (flutes or 0.0) + sum(one.length for one in given.shank)
+    last = at + sum(holder[:-1])
+    if last > given.gauge_length + _DIFFERS:
+        found.append(warning("collision.stack", f"T{number}: the last section of {'its holder' if holder else 'its tool'} "
+                             f"{'begins' if holder else 'ends'} {last:g} mm over the tip, above the gauge point at "
+                             f"{given.gauge_length:g} mm: flutes, shank and holder are {at + sum(holder):g} mm long",
+                             hint=f"lengths of tools.{number} are along its axis from the tip; or correct gauge_length"))
+    if flutes is not None and holder and not given.shank:
+        found.append(info("collision.shank", f"T{number}: no shank is stated: the holder begins at {flutes:g} mm, where the "
+                          "flutes end", hint=f"state shank = [...] in [tools.{number}] where there is one"))
+    return found
 
 
 def lever_of(form: Form) -> float:

@@ -90,18 +90,29 @@ def _broken(mesh: Trimesh, path: str) -> tuple[Diagnostic, ...]:
 
 def _no_solid(mesh: Trimesh, path: str) -> tuple[Diagnostic, ...]:
     """Holes, and faces that do not agree which side is out."""
-    if not mesh.is_watertight:
-        open_edges = np.unique(mesh.edges_sorted, axis=0, return_counts=True)[1] % 2 != 0
-        return (error("mesh.open_surface", f"is no closed solid: {int(open_edges.sum())} edges are not shared by two "
+    open_edges, one_sided = _edge_faults(mesh)
+    if open_edges:
+        return (error("mesh.open_surface", f"is no closed solid: {open_edges} edges are not shared by two "
                       "triangles", file=path, hint="close the holes, or export the body as a solid"),)
     with np.errstate(all="ignore"):
         flat = mesh.volume == 0.0
-    if flat or not mesh.is_winding_consistent:
+    if flat or one_sided:
         return (error("mesh.sides", "its triangles do not agree which side is out", file=path,
                       hint="export the body as a solid"),)
     if mesh.volume < 0.0:
         return (warning("mesh.inside_out", "is inside out: its triangles were turned round", file=path),)
     return ()
+
+
+def _edge_faults(mesh: Trimesh) -> tuple[int, int]:
+    """(edges with an odd number of triangles, edges that triangles do not pass as often one way as the other).
+
+    Bodies that touch along an edge share it: four triangles, two each way, are closed as well.
+    """
+    edges = np.asarray(mesh.edges)
+    _, number, count = np.unique(np.sort(edges, axis=1), axis=0, return_inverse=True, return_counts=True)
+    way = np.bincount(number.ravel(), np.where(edges[:, 0] < edges[:, 1], 1.0, -1.0))
+    return int((count % 2 != 0).sum()), int((way != 0.0).sum())
 
 
 def _odd_size(mesh: Trimesh, path: str, units: str) -> tuple[Diagnostic, ...]:

@@ -161,6 +161,27 @@ def test_a_gap_below_a_holders_mesh_is_told(tmp_path: Path) -> None:
     assert [d.code for d in found] == ["collision.unchecked"] and "below the holder at 60 mm" in found[0].message
 
 
+@pytest.mark.parametrize(("change", "code", "told"), [
+    ({"gauge_length": 60.0}, "collision.stack", "begins 75 mm over the tip, above the gauge point at 60 mm"),
+    ({"gauge_length": 75.0}, "", ""),
+    ({"gauge_length": 45.0}, "collision.stack", "begins 75 mm"),
+    ({"shank": []}, "collision.shank", "no shank is stated: the holder begins at 20 mm, where the flutes end"),
+])
+def test_a_stack_that_does_not_fit_its_gauge_length_is_told(tmp_path: Path, change: dict[str, object], code: str,
+                                                            told: str) -> None:
+    setup = FULL.model_copy(update={"gauge_length": 75.0} | change)
+    _, found = tool_form(7, Tool(7, diameter=10.0, corner_radius=0.0), setup, "s.toml")
+    assert [d.code for d in found] == ([code] if code else []) and all(told in d.message for d in found)
+
+
+def test_setup_check_tells_of_a_stack_longer_than_the_gauge_length(tmp_path: Path) -> None:
+    (tmp_path / "s.toml").write_text("[bodies.table]\n" + BOX + "[tools.1]\ngauge_length = 130.0\nflute_length = 30.0\n"
+                                     "shank = [{diameter = 16.0, length = 80.0}]\n"
+                                     "holder = [{diameter = 40.0, length = 100.0}, {diameter = 63.0, length = 100.0}]\n")
+    done = CliRunner().invoke(app, ["setup", "check", str(tmp_path / "s.toml")])
+    assert done.exit_code == 0 and "collision.stack" in done.output and "130 mm" in done.output
+
+
 def sunk(mesh: trimesh.Trimesh, pieces: Floats) -> float:
     """Largest distance of points all over a mesh from the nearest of the pieces; negative inside."""
     i, j = np.meshgrid(np.arange(13), np.arange(13), indexing="ij")
@@ -237,6 +258,15 @@ def test_a_bad_mesh_is_a_diagnostic(tmp_path: Path, name: str, code: str) -> Non
     mesh, found = load_mesh(file, key="bodies.part")
     assert mesh is None and [d.code for d in found] == [code]
     assert found[0].file == str(file) and found[0].hint and "bodies.part" in found[0].message
+
+
+def test_bodies_that_share_an_edge_are_a_solid_each(tmp_path: Path) -> None:
+    """A vise of a base and two jaws, the jaws flush with the ends of the base and with each other's edge."""
+    boxes = [((0, 0, 0), (90, 60, 20)), ((0, 0, 20), (45, 60, 50)), ((45, 60, 20), (90, 90, 50))]
+    mesh = trimesh.util.concatenate([trimesh.creation.box(bounds=pair) for pair in boxes])
+    mesh.export(tmp_path / "vise.stl")
+    made, found = load_mesh(tmp_path / "vise.stl")
+    assert made is not None and not found and made.volume == pytest.approx(mesh.volume)
 
 
 def test_a_mesh_inside_out_or_in_another_unit_is_told(tmp_path: Path) -> None:
