@@ -88,7 +88,7 @@ def _told(bodies: Scene, form: Form, way: Swept, drilling: Bools, motion: Motion
         return [_clear(bodies, form, faults)]
     for touch in found:
         code = "collision.gouge" if touch.limit < 0.0 else "collision.near" if touch.distance > 0.0 else "collision.touch"
-        result.append(faults.error(code, str(touch), *_lines(touch.place, motion, served), hint=_hint(touch)))
+        result.append(faults.error(code, str(touch), *_lines(touch.place, motion, served), hint=_hint(touch, motion)))
     return result
 
 
@@ -102,9 +102,12 @@ def _clear(bodies: Scene, form: Form, faults: Faults) -> Diagnostic:
     return info("collision.clear", f"T{form.number}, everywhere on its way: {text}", file=faults.gcode or faults.cl)
 
 
-def _hint(touch: Touch) -> str:
+def _hint(touch: Touch, motion: Motion) -> str:
     if touch.limit < 0.0:
         return "another tool axis or path; [bodies] gouge is what the tolerances of path and mesh may add up to"
+    if motion.code[touch.place] == 0:
+        return ("a higher clearance.distance, or move the fixture; ways between passes and from home are not compared by "
+                "orient, whose next plan may have others")
     return "another tool axis (postproc orient), a longer or slimmer tool, a higher clearance.distance, or move the fixture"
 
 
