@@ -34,7 +34,7 @@ def test_a_mode_without_compensation_or_cycles_is_named(controller: str) -> None
     result = convert(cut, "mikron-ucp710", controller, output="tcp")
     assert "cutcom.mode" in codes(result.diagnostics) and "cutcom.tilted" not in codes(result.diagnostics)
     [told] = [d for d in convert(tap, "mikron-ucp710", controller, output="tcp").diagnostics if d.code == "cycle.not_native"]
-    assert "tcp" in told.hint
+    assert "in output mode tcp" in told.message and "--output-mode" in told.hint
 
 
 @pytest.mark.parametrize("controller", ["linuxcnc", "fanuc-30i", "siemens-840d", "heidenhain-tnc640"])
