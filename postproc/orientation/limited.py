@@ -3,22 +3,28 @@ outside."""
 
 from __future__ import annotations
 
+import numpy as np
+
 from machines.user_file import nearest, read_toml
-from postproc.orientation.allowed import own_outside
+from postproc.orientation.allowed import off_centre, own_outside
 from postproc.orientation.passes import Pass, Work
 from postproc.setup_orientation import OrientationLimits
 from toolpaths.diagnostics import Diagnostic, error, info, warning
+from toolpaths.units import DEG
 
 _NORMALS = ("have the CAM system write surface normals (GOTO with nine numbers), or name the part mesh ([bodies] part), or "
             "limit the tilt from the CL's own axis alone (--max-tilt)")
 
 
-def limit_faults(work: Work, file: str = "") -> list[Diagnostic]:
-    """Diagnostics of the set-up's `[orientation]` for the passes of a toolpath; `file` is that of the set-up."""
+def limit_faults(work: Work, file: str = "", tilt: float = np.pi) -> list[Diagnostic]:
+    """Diagnostics of the set-up's `[orientation]` for the passes of a toolpath; `file` is that of the set-up, `tilt` the
+    largest from the surface normals, rad."""
     limits = work.setup.orientation
     free = [one for one in work.passes if not one.fixed]
-    return [*_unknown_operations(work, limits, file), *_no_normals(work, limits, free), *_too_wide(work, limits, free, file),
-            *_no_contact(work, free), *_own(work, limits, free)]
+    impossible = _too_wide(work, limits, free, file) or _too_steep(work, limits, free, file, tilt)
+    own = [] if impossible else [*_own(work, limits, free), *_own_tilt(work, free, tilt)]
+    return [*_unknown_operations(work, limits, file), *_no_normals(work, limits, free), *impossible,
+            *_no_contact(work, free), *own]
 
 
 def _unknown_operations(work: Work, limits: OrientationLimits, file: str) -> list[Diagnostic]:
@@ -45,6 +51,43 @@ def _too_wide(work: Work, limits: OrientationLimits, free: list[Pass], file: str
     return [error("orient.contact_radius", f"contact_radius = {radius:g} mm, the ball of pass {bad[0].number} has a radius "
                   f"of {bad[0].radius:g} mm", file=file or work.toolpath.file, lines=_line(file, "contact_radius"),
                   count=len(bad), hint="a distance below the ball's radius, or off_centre in degrees")]
+
+
+def _too_steep(work: Work, limits: OrientationLimits, free: list[Pass], file: str, tilt: float) -> list[Diagnostic]:
+    """Passes whose least angle to the normal is above the largest."""
+    bad = [one for one in free if len(one.contact) and off_centre(limits, one.radius) > tilt]
+    if not bad:
+        return []
+    least = off_centre(limits, bad[0].radius) / DEG
+    key, given = ("off_centre", f"{least:g} degrees is") if limits.contact_radius is None else (
+        "contact_radius", f"{limits.contact_radius:g} mm is an angle of {least:.3f} degrees to the normal,")
+    return [error("orient.max_tilt", f"{key} = {given} more than --max-tilt {tilt / DEG:g}: pass {bad[0].number} can take "
+                  "no axis", file=file or work.toolpath.file, lines=_line(file, key), count=len(bad),
+                  hint=f"--max-tilt {_above(least)} or more, or a smaller {key}")]
+
+
+def _own_tilt(work: Work, free: list[Pass], tilt: float) -> list[Diagnostic]:
+    """Passes whose own axis leans farther than the largest tilt."""
+    leans = {one.number: _lean(one) for one in free if len(one.contact)}
+    bad = [one for one in free if leans.get(one.number, 0.0) > tilt + 1e-9]
+    if not bad:
+        return []
+    worst = max(bad, key=lambda one: leans[one.number])
+    lean = leans[worst.number] / DEG
+    return [warning("orient.own_tilt", f"the CL file's own axis of pass {worst.number} stands {lean:.3f} degrees from the "
+                    f"surface normal, more than --max-tilt {tilt / DEG:g}", file=work.toolpath.file,
+                    lines=[one.line for one in bad][:6], count=len(bad),
+                    hint=f"it is kept where nothing better is found; --max-tilt {_above(lean)} allows axes round it")]
+
+
+def _lean(one: Pass) -> float:
+    """Largest angle of the own axis to the surface normals, rad."""
+    return float(one.contact.inclination(one.axis[None]).max())
+
+
+def _above(angle: float) -> str:
+    """A tenth of a degree that is not below an angle, degrees."""
+    return f"{np.floor(10.0 * angle + 1.0 - 1e-6) / 10.0:g}"
 
 
 def _no_contact(work: Work, free: list[Pass]) -> list[Diagnostic]:

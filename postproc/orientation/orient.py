@@ -56,7 +56,7 @@ def orient(toolpath: Toolpath, machine: Machine, setup: SetupFile, options: Opti
     if work is None:
         return None, found
     bodies, more = pass_bodies(work, options.setup)
-    found += limit_faults(work, options.setup) + more
+    found += limit_faults(work, options.setup, options.max_tilt * DEG) + more
     if has_errors(found):
         return None, found
     allowed = Allowed(options.max_tilt * DEG, bodies, setup.orientation)

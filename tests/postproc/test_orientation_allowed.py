@@ -361,3 +361,31 @@ def test_a_part_mesh_instead_of_normals(tmp_path: Path) -> None:
     assert setup is not None
     choice, found = oriented(along_x(normals=False), setup, setup=str(file))
     assert choice is None and "mesh.open" in codes(found)
+
+
+@pytest.mark.parametrize(("keys", "told"), [
+    ({"off_centre": 50.0}, "off_centre = 50 degrees is more than --max-tilt 45"),
+    ({"contact_radius": 6.0}, "contact_radius = 6 mm is an angle of 48.590 degrees to the normal, more than --max-tilt 45")])
+def test_a_least_angle_above_the_largest_is_an_error(keys: dict[str, object], told: str) -> None:
+    """No axis fulfils both: said once for both passes, and nothing of their own axes besides."""
+    choice, found = oriented(along_x(passes=2), limited(**keys), max_tilt=45.0)
+    assert choice is None and [(d.code, d.count) for d in found] == [("orient.max_tilt", 2)] and told in found[0].message
+    assert "orient.max_tilt" not in codes(oriented(along_x(), limited(**keys), max_tilt=60.0)[1])
+
+
+def test_own_axes_beyond_the_largest_tilt_are_told_once() -> None:
+    """They lean 30 degrees: kept where nothing better is found, and told with the least --max-tilt that allows them."""
+    lines = ["MULTAX", *(line for k in range(2) for line in (
+        "RAPID", f"GOTO/0,{k},30,0.5,0,0.8660254037844386", "RAPID", f"GOTO/0,{k},0,0.5,0,0.8660254037844386,0,0,1",
+        f"GOTO/80,{k},0,0.5,0,0.8660254037844386,0,0,1", "RAPID", f"GOTO/80,{k},30,0.5,0,0.8660254037844386"))]
+    path = toolpath(*lines, head=BALL)
+    _, found = oriented(path, SetupFile(), max_tilt=20.0)
+    told = [d for d in found if d.code == "orient.own_tilt"]
+    assert len(told) == 1 and told[0].count == 2 and "30.000 degrees from the surface normal" in told[0].message
+    assert "--max-tilt 30 allows" in told[0].hint
+    assert "orient.own_tilt" not in codes(oriented(path, SetupFile(), max_tilt=30.0)[1])
+
+
+def test_a_contact_beyond_the_ball_is_told_alone() -> None:
+    choice, found = oriented(along_x(), limited(contact_radius=9.0))
+    assert choice is None and codes(found) == {"orient.contact_radius"}
