@@ -154,8 +154,7 @@ def _reading(path: Toolpath, diagnostics: list[Diagnostic] | None) -> tuple[Diag
 def _stages(result: PostResult, progress: Progress | None) -> PostResult:
     """prepare -> solve, link, linearise -> travel -> compile -> write -> read back."""
     assert result.toolpath is not None
-    options, file = result.options, result.toolpath.file
-    toolpath = result.toolpath
+    options, toolpath, file = result.options, result.toolpath, result.toolpath.file
     job, found = prepare(toolpath, result.machine, result.controller, result.setup, options)
     result = _with(result, [*found, *_bad_meshes(result.setup, options.setup)], job=job)
     if job is None or not result.ok:
@@ -340,8 +339,7 @@ def _corrections(result: PostResult) -> list[str]:
 def _meanings(program: Program) -> str:
     """What the words of a program mean, in order of first use."""
     names = {"axes": "axis positions", "tcp": "tip in the work offset", "tilted": "tip in tilted planes"}
-    laws = list(dict.fromkeys(section.law for section in program.sections))
-    return ", ".join(names[law] for law in laws)
+    return ", ".join(dict.fromkeys(names[section.law] for section in program.sections))
 
 
 def long_blocks(text: str, most: int, file: str) -> list[Diagnostic]:
