@@ -89,7 +89,8 @@ def setup_check(file: Annotated[str, typer.Argument(help="TOML file")], json: Js
 
         bodies, more = described(spec, placement, file)
         found += more
-    good = "" if spec is None or has_errors(found) else f"{file}: good: {len(spec.tools)} tools{bodies}"
+    count = len(spec.tools) if spec else 0
+    good = "" if has_errors(found) else f"{file}: good: {count} tool{'s' * (count != 1)}{bodies}"
     report(tuple(found), json, {"diagnostics": [d.as_dict() for d in found]}, good)
 
 
