@@ -158,7 +158,7 @@ def test_all_six_errors_from_a_file(folder: Path) -> None:
     figures = run(folder, "six.toml", "six-model.toml")
     assert figures["parameters"]["EZC.cos2"]["value"] == pytest.approx(1.0, abs=0.05)
     assert figures["parameters"]["ECC.sin1"]["value"] == pytest.approx(4.0, abs=0.1)
-    assert load(folder / "six-model.toml", machines.load("mikron-ucp710")).axes.frame == {"C": "fixed"}  # it carries the part
+    assert load(folder / "six-model.toml", machines.load("mikron-ucp710")).axes.frame == {"C": "fixed"}
     (folder / "six.csv").write_text("\n".join((folder / "six.csv").read_text().splitlines()[:13]) + "\n")
     refused = run(folder, "six.toml", "none.toml", 1)
     assert refused["output"] is None and not (folder / "none.toml").exists()
