@@ -10,6 +10,7 @@ import typer
 
 from postproc.cli_calibrate import calibrate
 from postproc.cli_catalogue import controller_app, machine_app, setup_app
+from postproc.cli_options import Allow, AxisTolerance, ClFile, Dialect, MachineName, Tolerance, Units
 from postproc.cli_orient import EXAMPLES, ORIENTATIONS, MaxTilt, Orient
 from postproc.cli_orient import orient as orient_command
 from postproc.cli_place import EXAMPLES as PLACES
@@ -34,21 +35,12 @@ app.command(epilog="Example: postproc time part.cls -m mikron-ucp710 -c linuxcnc
 app.command("orient", epilog=EXAMPLES)(orient_command)
 app.command(epilog=PLACES)(place)
 
-ClFile = Annotated[Path, typer.Argument(metavar="FILE", help="CL file (APT text)")]
-MachineName = Annotated[str, typer.Option("-m", "--machine", help="machine: a name from the list, or a TOML file")]
 ControllerName = Annotated[str, typer.Option("-c", "--controller", help="controller: a name from the list, or a TOML file")]
 Setup = Annotated[str, typer.Option("--setup", metavar="S.toml", help="set-up file: placement, tools, safe distances")]
-Tolerance = Annotated[float, typer.Option("--tolerance", metavar="MM", min=1e-6, max=10.0, help="tolerance of the tip")]
-AxisTolerance = Annotated[float, typer.Option("--axis-tolerance", metavar="DEG", min=1e-6, max=10.0,
-                                               help="tolerance of the axis")]
 Errors = Annotated[str, typer.Option("--error-model", metavar="E.toml", help="file of the machine's geometric errors: "
                                      "corrected, and proved on the machine with them")]
 Beyond = Annotated[bool, typer.Option("--error-model-beyond", help="outside the range that was measured, take the error at "
                                       "its end")]
-Units = Annotated[str, typer.Option("--units", help="units of a CL file that states none: mm or inch")]
-Dialect = Annotated[str, typer.Option("--dialect", help="read the CL file as this dialect instead of the recognised one")]
-Allow = Annotated[list[str] | None, typer.Option("--allow-unknown", metavar="WORD",
-                                                 help="leave this word out although it looks like motion")]
 
 
 def _version(wanted: bool) -> None:

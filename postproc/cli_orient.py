@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from postproc.cli_options import Allow, AxisTolerance, ClFile, Dialect, MachineName, Tolerance, Units
 from postproc.console import Json, machine_of, progress_bar, refuse_overwriting, report, shown_errors
 
 if TYPE_CHECKING:
@@ -31,8 +32,8 @@ MOST = 6
 """passes drawn and listed in full"""
 
 
-def orient(file: Annotated[Path, typer.Argument(metavar="FILE", help="CL file (APT text)")],
-           machine: Annotated[str, typer.Option("-m", "--machine", help="machine: a name from the list, or a TOML file")],
+def orient(file: ClFile,
+           machine: MachineName,
            max_tilt: MaxTilt = 60.0,
            plan: Annotated[str, typer.Option("--orient", help="plan whose passes are shown: keep, per-pass, whole-part, "
                                              "auto")] = "auto",
@@ -41,15 +42,13 @@ def orient(file: Annotated[Path, typer.Argument(metavar="FILE", help="CL file (A
            figure: Annotated[Path | None, typer.Option("--figure", metavar="FILE", help="drawing of plans, passes and, of "
                                                        "--pass, polytopes, reach, candidates; .png or .svg")] = None,
            setup: Annotated[str, typer.Option("--setup", metavar="S.toml", help="set-up file: placement, tools")] = "",
-           tolerance: Annotated[float, typer.Option("--tolerance", metavar="MM", min=1e-6, max=10.0)] = 0.01,
-           axis_tolerance: Annotated[float, typer.Option("--axis-tolerance", metavar="DEG", min=1e-6, max=10.0)] = 0.05,
+           tolerance: Tolerance = 0.01,
+           axis_tolerance: AxisTolerance = 0.05,
            error_model: Annotated[str, typer.Option("--error-model", metavar="E.toml", help="file of the machine's "
                                                     "geometric errors: checked; it changes no choice")] = "",
-           units: Annotated[str, typer.Option("--units", help="units of a CL file that states none: mm or inch")] = "",
-           dialect: Annotated[str, typer.Option("--dialect", help="read the CL file as this dialect instead of the "
-                                                "recognised one")] = "",
-           allow_unknown: Annotated[list[str] | None, typer.Option("--allow-unknown", metavar="WORD", help="leave this word "
-                                                                   "out although it looks like motion")] = None,
+           units: Units = "",
+           dialect: Dialect = "",
+           allow_unknown: Allow = None,
            json: Json = "") -> None:
     """Choose the tool orientation of 3+2 passes for the least planned time, and say why."""
     _check(plan, figure, units, dialect, passes or [])

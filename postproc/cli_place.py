@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from postproc.cli_options import Allow, AxisTolerance, ClFile, Dialect, MachineName, Tolerance, Units
 from postproc.cli_orient import ORIENTATIONS, MaxTilt, Orient
 from postproc.console import Json, machine_of, progress_bar, refuse_overwriting, report, shown_errors
 
@@ -29,22 +30,20 @@ y = [-100, 100]
 turns = [0, 90, 180, 270]"""
 
 
-def place(file: Annotated[Path, typer.Argument(metavar="FILE", help="CL file (APT text)")],
-          machine: Annotated[str, typer.Option("-m", "--machine", help="machine: a name from the list, or a TOML file")],
+def place(file: ClFile,
+          machine: MachineName,
           setup: Annotated[Path, typer.Option("--setup", metavar="S.toml", help="set-up file; [placement] says where the "
                                               "part may stand")],
           output: Annotated[Path, typer.Option("-o", "--output", metavar="S2.toml", help="the same with [part] replaced")],
           controller: Annotated[str, typer.Option("-c", "--controller", help="for which the place is proved")] = "linuxcnc",
           orient: Orient = "keep", max_tilt: MaxTilt = 60.0,
-          tolerance: Annotated[float, typer.Option("--tolerance", metavar="MM", min=1e-6, max=10.0)] = 0.01,
-          axis_tolerance: Annotated[float, typer.Option("--axis-tolerance", metavar="DEG", min=1e-6, max=10.0)] = 0.05,
+          tolerance: Tolerance = 0.01,
+          axis_tolerance: AxisTolerance = 0.05,
           error_model: Annotated[str, typer.Option("--error-model", metavar="E.toml", help="file of the machine's geometric "
                                                    "errors, corrected where the place is proved")] = "",
-          units: Annotated[str, typer.Option("--units", help="units of a CL file that states none: mm or inch")] = "",
-          dialect: Annotated[str, typer.Option("--dialect", help="read the CL file as this dialect instead of the "
-                                               "recognised one")] = "",
-          allow_unknown: Annotated[list[str] | None, typer.Option("--allow-unknown", metavar="WORD", help="leave this word "
-                                                                  "out although it looks like motion")] = None,
+          units: Units = "",
+          dialect: Dialect = "",
+          allow_unknown: Allow = None,
           figure: Annotated[Path | None, typer.Option("--figure", metavar="FILE", help="map of the places, .png or "
                                                       ".svg")] = None,
           json: Json = "") -> None:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from postproc.cli_options import AxisTolerance, MachineName, Tolerance, Units
 from postproc.console import Json, machine_of, progress_bar, refuse_overwriting, report, shown_errors
 
 if TYPE_CHECKING:
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def time(file: Annotated[Path, typer.Argument(metavar="FILE", help="CL file, or G-code file of the controller")],
-         machine: Annotated[str, typer.Option("-m", "--machine", help="machine: a name from the list, or a TOML file")],
+         machine: MachineName,
          controller: Annotated[str, typer.Option("-c", "--controller", help="controller: name or TOML file")] = "linuxcnc",
          model: Annotated[str, typer.Option("--model", help="model of the control: ideal, lookahead, linuxcnc, or a TOML "
                                             "file; default: the controller's")] = "",
@@ -27,9 +28,9 @@ def time(file: Annotated[Path, typer.Argument(metavar="FILE", help="CL file, or 
                                                 "FILE: columns nc_line, time_s")] = "",
          output: Annotated[str, typer.Option("-o", "--output", metavar="MODEL.toml", help="write the fitted model")] = "",
          setup: Annotated[str, typer.Option("--setup", metavar="S.toml", help="set-up file: placement, tools")] = "",
-         tolerance: Annotated[float, typer.Option("--tolerance", metavar="MM", min=1e-6, max=10.0)] = 0.01,
-         axis_tolerance: Annotated[float, typer.Option("--axis-tolerance", metavar="DEG", min=1e-6, max=10.0)] = 0.05,
-         units: Annotated[str, typer.Option("--units", help="units of a CL file that states none: mm or inch")] = "",
+         tolerance: Tolerance = 0.01,
+         axis_tolerance: AxisTolerance = 0.05,
+         units: Units = "",
          dialect: Annotated[str, typer.Option("--dialect", help="read the CL file as this dialect")] = "",
          error_model: Annotated[str, typer.Option("--error-model", metavar="E.toml", help="a CL file is timed as it is "
                                                   "written with these geometric errors corrected")] = "",

@@ -45,12 +45,6 @@ class Refined:
         return np.where(u == 1.0, u1, u0 + u * (u1 - u0))
 
 
-def uncut(moves: Moves) -> Refined:
-    """The moves as they are."""
-    n = len(moves)
-    return Refined(moves, np.arange(n), np.zeros(n), np.ones(n), np.zeros(n, dtype=np.bool_))
-
-
 def cut(moves: Moves, origin: Ints, u0: Floats, u1: Floats, tip: Floats, axis: Floats) -> Refined:
     """Parts u0..u1 (R,) of the moves `origin` (R,), which end at tips and axes (R, 3)."""
     part = (u0 > 0.0) | (u1 < 1.0)

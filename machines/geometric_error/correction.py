@@ -34,8 +34,6 @@ BLIND = 1e-9
 CLOSED = 5e-5, 5e-7
 """mm and rad: steps that small are the last; they leave less than a hundredth of themselves"""
 STEPS = 8
-BEYOND = 1e-3
-"""mm and rad by which corrected joints may pass the measured range that the nominal ones keep"""
 
 
 @dataclass(frozen=True)

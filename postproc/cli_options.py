@@ -1,0 +1,18 @@
+"""Options and arguments that several commands share."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+ClFile = Annotated[Path, typer.Argument(metavar="FILE", help="CL file (APT text)")]
+MachineName = Annotated[str, typer.Option("-m", "--machine", help="machine: a name from the list, or a TOML file")]
+Tolerance = Annotated[float, typer.Option("--tolerance", metavar="MM", min=1e-6, max=10.0, help="tolerance of the tip")]
+AxisTolerance = Annotated[float, typer.Option("--axis-tolerance", metavar="DEG", min=1e-6, max=10.0,
+                                               help="tolerance of the axis")]
+Units = Annotated[str, typer.Option("--units", help="units of a CL file that states none: mm or inch")]
+Dialect = Annotated[str, typer.Option("--dialect", help="read the CL file as this dialect instead of the recognised one")]
+Allow = Annotated[list[str] | None, typer.Option("--allow-unknown", metavar="WORD",
+                                                 help="leave this word out although it looks like motion")]
