@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from postproc.corrected.reversals import LOOSE
 from postproc.corrected.work import Work, on_arc
 from postproc.groups import groups
 from postproc.path import ARC, FEED, Path
@@ -14,9 +15,6 @@ from toolpaths.arrays import Bools, Floats, Ints
 
 LOOKS = (0.25, 0.5, 0.75)
 """where the motion between two corrected points is looked at"""
-LOOSE = 4.0
-"""times the share of the correction for rapids of the CL file, and for arcs and the lines that replace them, which take no
-share of linearising; linking moves only have to come to their ends"""
 
 
 def fitted_arcs(path: Path, nominal: Path, work: Work, start: Floats, allowed: float) -> tuple[Path, Bools]:

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from postproc.corrected.arcs import LOOSE
+from postproc.corrected.reversals import LOOSE
 from postproc.corrected.work import ALONE, Work
 from postproc.moves import Moves
 from postproc.path import FEED, Path

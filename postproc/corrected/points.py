@@ -6,13 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from postproc.corrected.arcs import LOOKS, LOOSE
-from postproc.corrected.reversals import SHORTEST, Divided, Starts, inserted, reversals
+from postproc.corrected.arcs import LOOKS as ARC_LOOKS
+from postproc.corrected.reversals import LOOSE, SHORTEST, Divided, Starts, inserted, reversals, stretches
 from postproc.corrected.work import ALONE, MOMENT, Work
-from postproc.path import ARC, FEED, TRAVERSE, Path
+from postproc.path import ARC, FEED, Path
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.units import DEG
 
+LOOKS = (1.0 / 64.0, *ARC_LOOKS)
+"""where pieces are looked at; the first is past the corner of a dog-leg, where the correction of an axis has come"""
 ROUNDS = 20
 """how often a block is halved at most; SHORTEST ends it before"""
 LEAST = 0.2
@@ -26,8 +28,7 @@ def divided(path: Path, work: Work, starts: Starts, allowed: float) -> Divided:
 
 def between(path: Path, work: Work, starts: Starts, allowed: float) -> tuple[Ints, Floats, Floats]:
     """(block (M,), fraction (M,), joints (M, J)) of the points that `divided` inserts."""
-    cl_rapid = (path.code == TRAVERSE) & np.isfinite(path.u)
-    block = np.flatnonzero(((path.code == FEED) | cl_rapid) & ~path.home & (np.arange(len(path)) > 0))
+    block = np.flatnonzero(stretches(path))
     block = block[~path.home[block - 1] & (work.whole[block] == ALONE)]
     pieces, found = _taken_up(path, work, starts, block, allowed)
     for _ in range(ROUNDS):

@@ -9,12 +9,15 @@ import numpy as np
 
 from machines.geometric_error.lost_motion import carried_on
 from postproc.corrected.work import ALONE, EDGES, LAST, Work
-from postproc.path import ARC, FEED, Path
+from postproc.path import ARC, FEED, TRAVERSE, Path
 from postproc.word_arcs import PLANE_COLUMNS
-from toolpaths.arrays import Floats, Ints
+from toolpaths.arrays import Bools, Floats, Ints
 
 BISECTIONS = 14
 """halvings to find where between two looks an axis turns back"""
+LOOSE = 4.0
+"""times the share of the correction for rapids of the CL file, and for arcs and the lines that replace them, which take no
+share of linearising; linking moves only have to come to their ends"""
 SHORTEST = 0.05
 """mm of tip way or degrees of a rotary axis: a block that short is not divided"""
 
@@ -51,17 +54,25 @@ class Starts:
 
 
 def starts_of(path: Path, nominal: Path, work: Work, allowed: float) -> Starts:
-    """Corrected joints where blocks begin; cutting ones whose axis turns back begin by the new way."""
+    """Corrected joints where blocks begin; those in which an axis turns back begin by the new way, where that moves one by
+    more than `allowed` mm, rapids LOOSE times as much."""
     start, begun = (np.concatenate([x[:1], x[:-1]]) for x in (path.q, work.way))
-    block = np.flatnonzero(((path.code == FEED) | (path.code == ARC)) & ~path.home & (np.arange(len(path)) > 0))
-    block = block[~path.home[block - 1] & (work.whole[block] == ALONE)]
+    block = np.flatnonzero(stretches(path) | ((path.code == ARC) & (np.arange(len(path)) > 0)))
+    block = block[~path.home[block] & ~path.home[block - 1] & (work.whole[block] == ALONE)]
     way = work.begin_way(block)
     turned = np.any(way * work.way[block - 1] < 0.0, axis=1)
     back = block[turned]
     q = work.corrected(nominal.q[back - 1], back, way[turned], path)
-    jump = np.abs(q - start[back]).max(axis=1, initial=0.0) > allowed
+    loose = np.where(path.code[back] == TRAVERSE, LOOSE, 1.0)
+    jump = np.abs(q - start[back]).max(axis=1, initial=0.0) > loose * allowed
     start[back[jump]], begun[back[jump]] = q[jump], way[turned][jump]
     return Starts(start, begun, back[jump])
+
+
+def stretches(path: Path) -> Bools:
+    """(K,) feed moves and rapids of the CL file, straight ones: their way counts, not their ends alone."""
+    rapid = (path.code == TRAVERSE) & np.isfinite(path.u)
+    return np.asarray(((path.code == FEED) | rapid) & ~path.home & (np.arange(len(path)) > 0))
 
 
 def reversals(work: Work, block: Ints) -> tuple[Ints, Floats]:

@@ -14,7 +14,7 @@ from machines.geometric_error.lost_motion import GRAIN, Steps, turning_sign
 from machines.geometric_error.model import ErrorModel
 from machines.kinematics.base import Kinematics
 from postproc.groups import groups
-from postproc.path import ARC, Path
+from postproc.path import ARC, TRAVERSE, Path
 from postproc.word_arcs import PLANE_COLUMNS
 from toolpaths.arrays import Bools, Floats, Ints
 
@@ -173,11 +173,15 @@ class Work:
         return result
 
     def straight(self, path: Path, q0: Floats, q1: Floats, block: Ints, t: Floats) -> Floats:
-        """Joints (N, J) at fraction t (N,) of straight blocks from q0 to q1 (N, J), under the law of each in `path`."""
-        result = np.empty_like(q0)
+        """Joints (N, J) at fraction t (N,) of straight blocks from q0 to q1 (N, J), under the law of each in `path`.
+
+        Rapids are dog-legs where the control makes them that: what the correction adds to one axis comes at once.
+        """
+        result, rapid = np.empty_like(q0), path.code[block] == TRAVERSE
         for k in groups(path.frame[block], self.tools[block]):
             control = path.frames[int(path.frame[block[k[0]]])].control
-            result[k] = control.between(q0[k], q1[k], t[k], self.kinematics(int(self.tools[block[k[0]]])))[2]
+            kin = self.kinematics(int(self.tools[block[k[0]]]))
+            result[k] = control.between(q0[k], q1[k], t[k], kin, rapid[k])[2]
         return result
 
     def ends(self) -> CorrectedEnds:

@@ -47,14 +47,15 @@ def check_kinds(motion: Motion, moves: Moves, owner: Ints, tip: Floats, bent: bo
     """Rapids where the CL file cuts, cuts where it moves rapidly; pecks may return rapidly above what is drilled.
 
     Where rapids are dog-legs (`bent`) a feed move may stand for one that must be straight; blocks (K,) that only take up
-    lost motion where a rapid has ended may be feed moves.
+    lost motion may be either: feed moves where a rapid has ended, rapids where a cut has.
     """
     rows = np.flatnonzero(owner < len(moves))
     m = owner[rows]
     cutting = (moves.kind[m] != Kind.RAPID) & ~moves.link[m]
     rapid = motion.code[rows] == 0
-    fed = ~cutting & ~rapid & ~moves.link[m] & (not bent) & ~taken_up[rows]
-    wrong = np.flatnonzero((cutting & rapid & ~_above_drilled(motion, moves, rows, m, tip)) | fed)
+    fed = ~cutting & ~rapid & ~moves.link[m] & (not bent)
+    hurried = cutting & rapid & ~_above_drilled(motion, moves, rows, m, tip)
+    wrong = np.flatnonzero((hurried | fed) & ~taken_up[rows])
     diagnostics = []
     if len(wrong):
         k = wrong[0]
