@@ -13,8 +13,8 @@ from functools import cached_property
 import numpy as np
 
 from machines.geometric_error.actual import Actual, Placed
-from machines.geometric_error.axis_motion import Line, actual_line, actual_tool, driven
-from machines.geometric_error.names import SPINDLE
+from machines.geometric_error.axis_motion import Line, actual_line, actual_tool, along, driven
+from machines.geometric_error.names import SPINDLE, parse
 from machines.geometric_error.rods import RodErrors, RodFrame, platform_turn, rod_frame
 from machines.geometric_error.serial_errors import SerialErrors
 from machines.geometric_error.transforms import carried
@@ -221,10 +221,11 @@ class ActualH4(ActualRods):
             column = carried(after if self.line.moving else before, tip - reference)[:, :, component.name.part]
             found.append(column[:, :, None] * component.curve.basis(w[:, 4], way)[:, None, :])
         for text in self.chain.constants:
-            torsor = SerialErrors(constants={text: 1.0}).location(text[-1])
-            gauge = -self.kinematics.tool_length * axis
+            torsor, name = SerialErrors(constants={text: 1.0}).location(text[-1]), parse(text)
+            gauge, at_line = -self.kinematics.tool_length * axis, carried(before, tip - at_axis)
             effect = carried(spindle, gauge) @ torsor if text[-1] == SPINDLE else \
-                (carried(before, tip - at_axis) - carried(after, tip - at_axis)) @ torsor
+                at_line @ along(self.line.joint) if name is not None and name.zero_position else \
+                (at_line - carried(after, tip - at_axis)) @ torsor
             found.append(effect[:, :, None])
         return np.concatenate(found, axis=2)
 

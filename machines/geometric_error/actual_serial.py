@@ -13,8 +13,8 @@ from functools import cached_property
 import numpy as np
 
 from machines.geometric_error.actual import Actual, Placed
-from machines.geometric_error.axis_motion import Line, actual_line, actual_tool, driven
-from machines.geometric_error.names import SPINDLE
+from machines.geometric_error.axis_motion import Line, actual_line, actual_tool, along, driven
+from machines.geometric_error.names import SPINDLE, parse
 from machines.geometric_error.serial_errors import SerialErrors
 from machines.geometric_error.transforms import carried
 from machines.kinematics import columns
@@ -107,8 +107,10 @@ class ActualSerial(Actual):
         return result
 
     def _location_column(self, text: str, w: Floats, before: list[Floats], after: list[Floats], tip: Floats) -> Floats:
-        """Effect (N, 6) of one location error: what L does before the axis less what it undoes after it."""
-        axis, torsor = text[-1], SerialErrors(constants={text: 1.0}).location(text[-1])
+        """Effect (N, 6) of one location error: what L does before the axis less what it undoes after it; of a zero
+        position: the axis's own motion."""
+        axis, torsor, name = text[-1], SerialErrors(constants={text: 1.0}).location(text[-1]), parse(text)
+        assert name is not None
         if axis == SPINDLE:
             gauge = -self.kinematics.tool_length * self.kinematics.tool_axis
             arm = np.einsum("nij,j->ni", after[-1], gauge)
@@ -116,6 +118,9 @@ class ActualSerial(Actual):
             return spun
         k = next(k for k, line in enumerate(self.lines) if line.joint.name == axis)
         line = self.lines[k]
+        if name.zero_position:
+            on_line: Floats = carried(before[k], tip - self._origin(k, w, line.joint.point)) @ along(line.joint)
+            return on_line
         pivot = line.joint.point if line.joint.rotary else line.reference
         fixed = self._origin(k, w, pivot)
         at_rest = fixed if line.joint.rotary else fixed + np.einsum(

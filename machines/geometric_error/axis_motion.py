@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from machines.geometric_error.names import SPINDLE, ErrorName
+from machines.geometric_error.names import DIRECTIONS, OWN, SPINDLE, ErrorName
 from machines.geometric_error.serial_errors import SerialErrors
 from machines.geometric_error.transforms import homogeneous
 from machines.kinematics import columns
@@ -26,7 +26,8 @@ ALONG = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Line:
-    """An axis as its location errors leave it: direction (3,), a point of its line (3,), reference point (3,)."""
+    """An axis as its location errors leave it: direction (3,), a point of its line (3,), reference point (3,), and by how
+    much it stands farther than it counts."""
 
     joint: Joint
     index: int
@@ -34,15 +35,28 @@ class Line:
     point: Floats
     reference: Floats
     moving: bool
+    zero: float
 
 
 def actual_line(joint: Joint, index: int, errors: SerialErrors) -> Line:
-    """L M(q) L^-1 is the motion about or along the line that L has moved."""
+    """L M(q + z) L^-1 is the motion about or along the line that L has moved."""
     centre = np.asarray(errors.reference.get(joint.name, joint.point), dtype=np.float64)
     pivot = joint.point if joint.rotary else centre
     location = homogeneous(errors.location(joint.name)[None])[0]
     moving = not joint.rotary or errors.frame.get(joint.name, "fixed") == "moving"
-    return Line(joint, index, location[:3, :3] @ joint.direction, pivot + location[:3, 3], centre, moving)
+    return Line(joint, index, location[:3, :3] @ joint.direction, pivot + location[:3, 3], centre, moving,
+                sense(joint) * errors.zero_position(joint.name))
+
+
+def sense(joint: Joint) -> float:
+    """-1.0 where the axis counts against the machine axis that it is named after, else 1.0."""
+    return -1.0 if joint.direction[DIRECTIONS.index(OWN[joint.name]) % 3] < 0.0 else 1.0
+
+
+def along(joint: Joint) -> Floats:
+    """(6,) torsor of the axis's own motion per mm or rad, in the sense of the machine axis that it is named after."""
+    own = sense(joint) * joint.direction
+    return np.concatenate([np.zeros(3), own] if joint.rotary else [own, np.zeros(3)])
 
 
 def actual_tool(axis: Floats, length: float, errors: SerialErrors) -> tuple[Floats, Floats, Floats]:
@@ -62,8 +76,8 @@ def driven(line: Line, x: Floats, way: Floats | float, errors: SerialErrors,
 
 
 def moved(line: Line, x: Floats, carried_along: Sequence[Columns]) -> list[Columns]:
-    """A point and directions by the axis's motion along or about its actual line."""
-    point, *vectors = carried_along
+    """A point and directions by the axis's motion along or about its actual line, counted from its actual zero."""
+    (point, *vectors), x = carried_along, x + line.zero
     if not line.joint.rotary:
         return [columns.plus(point, [x * d if d != 0.0 else 0.0 for d in line.direction.tolist()]), *vectors]
     cos, sin, place = np.cos(x), np.sin(x), columns.of_one(line.point)
@@ -96,7 +110,12 @@ def _small(angle: Floats) -> tuple[Floats, Floats]:
 
 
 def effect(name: ErrorName, kinematics: Kinematics) -> bool:
-    """False where a location error moves nothing: shift of a slide, shift along or turn about an axis's own line."""
+    """False where a location error moves nothing: shift of a slide, shift along or turn about an axis's own line.
+
+    Its zero position, along or about its line, does.
+    """
+    if name.zero_position:
+        return True
     unit = np.eye(3)[name.part % 3]
     if name.axis == SPINDLE:
         along = kinematics.tool_axis if isinstance(kinematics, Serial) else np.array([0.0, 0.0, 1.0])

@@ -120,7 +120,7 @@ class ErrorFileModel(UserModel):
     components: dict[str, CurveModel] = Field(default_factory=dict)
     """component errors by ISO 230-1 name, EXX, EYX, ... ECC"""
     location: dict[str, float] = Field(default_factory=dict)
-    """location errors: EC0Y, EX0C, ... and of the spindle EX0S, EA0S, ..."""
+    """location errors: lines of axes, EC0Y, EX0C, ...; zero positions, EX0X, EC0C, ...; of the spindle, EX0S, EA0S, ..."""
     reference: dict[str, ReferenceModel] = Field(default_factory=dict)
     """by axis letter"""
     legs: dict[str, LegModel] = Field(default_factory=dict)

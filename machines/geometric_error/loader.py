@@ -14,7 +14,7 @@ from machines.geometric_error.file_models import CurveModel, ErrorFileModel
 from machines.geometric_error.lattice import ErrorMap
 from machines.geometric_error.lattice_file import map_from_csv
 from machines.geometric_error.model import ErrorModel
-from machines.geometric_error.names import ErrorName, parse
+from machines.geometric_error.names import SPINDLE, ErrorName, parse
 from machines.geometric_error.rods import RodErrors, gives_rods, rod_frame, rod_names
 from machines.geometric_error.serial_errors import Component, Frame, SerialErrors
 from machines.kinematics.h4_axes import H4TableAxis
@@ -194,12 +194,16 @@ class _Loader:
         return self.tables[name]
 
     def _check_effects(self) -> None:
-        """Location errors that move nothing: a shift of a slide, a turn about an axis of its own."""
-        for text in self.checked.location:
+        """Location errors that move nothing: a shift of a slide, a shift along or turn about an axis's own line."""
+        for text, value in self.checked.location.items():
             name = parse(text)
             if name is not None and not effect(name, self.machine.kinematics):
-                self._problem("error-model.no-effect", ("location", text), f"{text} moves nothing: it shifts or turns the "
-                              "axis along itself", "a zero error belongs into the component error of that direction")
+                component = text.replace("0", "", 1)
+                constant = f"mean = {value:g}" if name.axis in ROTARY else f"polynomial = [{value:g}] and its range"
+                instead = "a tool held turned about itself does nothing: take it out" if name.axis == SPINDLE else \
+                    f"a constant error belongs into [components.{component}]: {constant}"
+                self._problem("error-model.no-effect", ("location", text), f"{text} moves nothing: the line of a slide "
+                              "shifted, or of an axis shifted or turned along itself, is the same line", instead)
 
     # ---- parallel machines, maps -----------------------------------------------------------------------------------
 

@@ -1,7 +1,8 @@
 """Names of geometric errors after ISO 230-1 (2012), annex A: E, the direction, then the axis.
 
 EXY: straightness of Y along X; EYY: positioning; EAY: turn about x while Y moves. With a 0 before the axis, location:
-EC0Y: squareness of Y (turned about z), EX0C: place of the line of C. S is the spindle.
+EC0Y: squareness of Y (turned about z), EX0C: place of the line of C; EX0X, EC0C: zero position of X and of C, along or
+about the axis itself. S is the spindle.
 """
 
 from __future__ import annotations
@@ -12,6 +13,8 @@ from typing import NamedTuple
 DIRECTIONS = "XYZABC"
 """displacements along x, y, z, then turns about them: the order of a torsor"""
 SPINDLE = "S"
+OWN = dict(zip("XYZUVWABC", "XYZXYZABC", strict=True))
+"""direction along or about which an axis of this letter moves (ISO 841): its positioning error is E, this, the letter"""
 _NAME = re.compile(r"E([XYZABC])(0?)([XYZUVWABCS])$")
 
 
@@ -26,6 +29,16 @@ class ErrorName(NamedTuple):
     def angular(self) -> bool:
         """True for turns, in rad."""
         return self.part >= 3
+
+    @property
+    def zero_position(self) -> bool:
+        """True for EX0X, EC0C ...: where the axis counts from."""
+        return self.location and DIRECTIONS[self.part] == OWN.get(self.axis)
+
+    @property
+    def positioning(self) -> bool:
+        """True for EXX, ECC ...: how far along or about itself an axis is off."""
+        return not self.location and DIRECTIONS[self.part] == OWN.get(self.axis)
 
     def __str__(self) -> str:
         return f"E{DIRECTIONS[self.part]}{'0' if self.location else ''}{self.axis}"

@@ -3,11 +3,13 @@
 All of them, like all motions, are those of the tool's side of the axis relative to the workpiece's side, along and about
 x, y, z of the machine frame, so that primed axes need no rule of their own. With the nominal motion M_i(q_i) of axis i,
 
-    tip = T_1 T_2 ... T_J S tip_0,   T_i = E_i M'_i,  M'_i = L_i M_i L_i^-1   (turning axes, "fixed" frame)
+    tip = T_1 T_2 ... T_J S tip_0,   T_i = E_i M'_i,  M'_i = L_i M_i(q_i + z_i) L_i^-1   (turning axes, "fixed" frame)
                                      T_i = M'_i E_i                           (slides; turning axes, "moving" frame)
 
 - L_i, location: moves the line of the axis (about a point of it; for a slide about its reference point) and nothing
   that the axis carries: at q = 0 it has no effect. That is what ISO 230-1 calls the axis average line.
+- z_i, zero position (EX0X, EC0C ..., ISO 230-1): the axis stands so much farther along or about its own line than it
+  counts, in the sense of the machine axis that it is named after; on a nutated axis too. E_i goes by the count.
 - E_i, component errors: displaced, then turned about x, y, z (C 1.14), about the reference point of the axis. "fixed"
   takes their directions on the part's side of the axis, "moving" on its tool's side, as C 1.11 and 1.14 have it:
   those of the bed, which ISO 230-1 and ISO 230-7 mean (the probe stands still, the artefact turns), are "fixed" for an
@@ -29,7 +31,7 @@ import numpy as np
 from machines.geometric_error.curve_banks import Bank, banks
 from machines.geometric_error.curves import Curve, Table
 from machines.geometric_error.lost_motion import GRAIN
-from machines.geometric_error.names import ErrorName, parse
+from machines.geometric_error.names import OWN, ErrorName, parse
 from toolpaths.arrays import Bools, Floats
 
 Frame = Literal["fixed", "moving"]
@@ -134,6 +136,10 @@ class SerialErrors:
         result = np.zeros(6)
         for text, value in self.constants.items():
             name = parse(text)
-            if name is not None and name.axis == axis:
+            if name is not None and name.axis == axis and not name.zero_position:
                 result[name.part] = value
         return result
+
+    def zero_position(self, axis: str) -> float:
+        """z_i of an axis, mm or rad, in the sense of the machine axis of its letter."""
+        return self.constants.get(f"E{OWN[axis]}0{axis}", 0.0)

@@ -18,6 +18,7 @@ from machines.geometric_error.exchange import save
 from machines.geometric_error.loader import load, load_checked
 from machines.geometric_error.model import ErrorModel
 from machines.geometric_error.rods import RodErrors, RodFrame, platform_turn, rod_frame
+from machines.geometric_error.serial_errors import SerialErrors
 from machines.kinematics.h4_linear import H4Linear
 from machines.kinematics.linear_delta import LinearDelta
 from tests.machines.error_models import joints, model, rod_errors
@@ -148,6 +149,21 @@ def test_errors_of_the_rotary_axis_alone(name: str) -> None:
     moved = actual.deviation(w, np.concatenate([np.zeros(66), axes.values]))
     assert tip - kin.place(w[:, :4], w[:, 4])[0] == pytest.approx(moved[:, :3], abs=2e-5)
     assert np.abs(tip - kin.place(w[:, :4], w[:, 4])[0]).max() > 0.01
+
+
+@pytest.mark.parametrize("name", ["h4a-c-table", "h4a-spindle-axis"])
+def test_the_zero_of_a_rotary_axis_counts_about_its_machine_axis(name: str) -> None:
+    kin, step = kinematics(name), 1e-4
+    assert isinstance(kin, H4Linear)
+    zero = SerialErrors(constants={f"E{kin.axis_names[4]}0{kin.axis_names[4]}": step})
+    none = rod_errors(kin).with_values(np.zeros(len(rod_errors(kin).names)))
+    actual = ErrorModel(zero, none).on(kin)
+    w = actual.coordinates(joints(kin, 20))
+    tip, axis, _ = actual.place(w)
+    wanted = kin.place(w[:, :4], w[:, 4] + step * kin.sense)
+    assert tip == pytest.approx(wanted[0], abs=1e-8) and axis == pytest.approx(wanted[1], abs=1e-12)
+    moved = actual.deviation(w, np.append(none.values, step))
+    assert moved[:, :3] == pytest.approx(tip - kin.place(w[:, :4], w[:, 4])[0], abs=1e-5)
 
 
 @pytest.mark.parametrize("name", ["uranesx", "h4a-c-table", "h4a-spindle-axis"])

@@ -40,12 +40,14 @@ def dense(kin: Serial, errors: SerialErrors, q: Floats) -> tuple[Floats, Floats]
     chain = np.eye(4)
     for joint in kin.chain:
         x = q[kin.axis_names.index(joint.name)]
+        own = "XYZABC".index(joint.name)
+        zero = errors.constants.get(f"E{joint.name}0{joint.name}", 0.0) * (-1.0 if joint.direction[own % 3] < 0 else 1.0)
         motion = np.eye(4)
         if joint.rotary:
-            motion[:3, :3] = Rotation.from_rotvec(joint.direction * x).as_matrix()
+            motion[:3, :3] = Rotation.from_rotvec(joint.direction * (x + zero)).as_matrix()
             motion[:3, 3] = joint.point - motion[:3, :3] @ joint.point
         else:
-            motion[:3, 3] = joint.direction * x
+            motion[:3, 3] = joint.direction * (x + zero)
         centre = np.asarray(errors.reference.get(joint.name, joint.point))
         place = screw(errors.location(joint.name), joint.point if joint.rotary else centre)
         motion = place @ motion @ np.linalg.inv(place)
@@ -130,6 +132,30 @@ def test_place_of_a_rotary_axis_moves_nothing_at_zero_and_twice_at_half_a_turn()
     actual = ActualSerial(kin, SerialErrors(constants={"EX0C": 0.03}))
     q = np.array([[10.0, 20.0, 30.0, 0.0, 0.0], [10.0, 20.0, 30.0, 0.0, np.pi]])
     assert actual.place(q)[0] - kin.forward(q)[0] == pytest.approx(np.array([[0, 0, 0], [0.06, 0, 0]]), abs=1e-12)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_zero_position_is_a_constant_positioning_error(name: str) -> None:
+    """Also where the axis counts against its machine axis (linuxcnc-xyzac-trt); not where it leans (nutating-head B)."""
+    kin, q = kinematics(name), joints(kinematics(name), 40)
+    for letter in kin.axis_names:
+        joint = next(j for j in kin.chain if j.name == letter)
+        if np.abs(joint.direction).max() < 1.0:
+            continue
+        constant = Component(parse(f"E{letter}{letter}"), Polynomial(np.array([3e-4]), (-1e3, 1e3)))
+        for frame in ("fixed", "moving"):
+            zero = SerialErrors(constants={f"E{letter}0{letter}": 3e-4}, frame={letter: frame})
+            tip, axis, _ = ActualSerial(kin, zero).place(q)
+            wanted = ActualSerial(kin, SerialErrors((constant,), frame={letter: frame})).place(q)
+            assert np.abs(tip - kin.forward(q)[0]).max() > 1e-4
+            assert tip == pytest.approx(wanted[0], abs=1e-10) and axis == pytest.approx(wanted[1], abs=1e-13)
+
+
+def test_the_zero_of_a_nutated_axis_is_about_its_own_line() -> None:
+    kin, q = kinematics("nutating-head"), joints(kinematics("nutating-head"), 20)
+    tip, axis, _ = ActualSerial(kin, SerialErrors(constants={"EB0B": 2e-4})).place(q)
+    wanted = kin.forward(q + 2e-4 * (np.array(kin.axis_names) == "B"))
+    assert tip == pytest.approx(wanted[0], abs=1e-11) and axis == pytest.approx(wanted[1], abs=1e-14)
 
 
 def test_a_series_stays_in_the_bed_or_turns_with_the_table() -> None:
