@@ -11,6 +11,7 @@ import numpy as np
 from machines.geometric_error.covariance import angular, write_covariance
 from machines.geometric_error.csv_table import UNITS, write_csv
 from machines.geometric_error.curves import EVERYWHERE, Curve, Fourier, Polynomial, Table
+from machines.geometric_error.lattice import ErrorMap
 from machines.geometric_error.lattice_file import map_to_csv
 from machines.geometric_error.model import ErrorModel
 from machines.geometric_error.names import ErrorName
@@ -37,7 +38,7 @@ def write_model(model: ErrorModel, description: str = "") -> dict[str, str]:
     body += [] if model.rods is None else _leg_lines(model.rods)
     if model.map is not None:
         files[f"{stem}-map.csv"] = map_to_csv(model.map)
-        body += ["", "[map]", f'table = "{stem}-map.csv"']
+        body += _map_lines(model.map, f"{stem}-map.csv")
     body += _doubt_lines(model, stem, files)
     return {f"{stem}.toml": "\n".join([*head, *body, ""])} | files
 
@@ -139,6 +140,15 @@ def _reference_lines(axes: SerialErrors) -> list[str]:
         lines += [f"point = {_list(axes.reference[axis])}"] if axis in axes.reference else []
         lines += [f'frame = "{axes.frame.get(axis, "fixed")}"'] if axis in turning else []
     return lines
+
+
+def _map_lines(error_map: ErrorMap, table: str) -> list[str]:
+    unit = {letter: DEG if letter in ROTARY else 1.0 for letter in error_map.letters}
+    periods = [f"{letter} = {_number(period / unit[letter])}" for letter, period in
+               zip(error_map.letters, error_map.periods, strict=True) if period]
+    return ["", "[map]", f"table = {_quoted(table)}", f"tool_length = {_number(error_map.length)}",
+            f'directions = "{"machine" if error_map.bed else "table"}"',
+            *([f"repeats = {{ {', '.join(periods)} }}"] if periods else [])]
 
 
 def _leg_lines(rods: RodErrors) -> list[str]:

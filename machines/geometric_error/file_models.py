@@ -91,10 +91,22 @@ class LegModel(UserModel):
 
 
 class MapModel(UserModel):
-    """`[map]`: an error map."""
+    """`[map]`: an error map, computed or measured."""
 
     table: str
-    """CSV file: coordinates X [mm] ... C [deg] of axes, or x y z of the gauge point; dx dy dz, and rx ry rz if measured"""
+    """CSV file: coordinates X [mm] ... C [deg] of axes, or x y z of the point in the table frame; dx dy dz, and rx ry rz if
+    measured. One row per node of a full lattice, in any order"""
+    tool_length: Annotated[float, Field(ge=0)] = 0.0
+    """mm: the displacements are those of the tip of a tool this long; 0: of the gauge point"""
+    directions: Literal["table", "machine"] = "table"
+    """what dx ... rz are along and about: x, y, z of the table, which turns with the rotary axes under the part, or of the
+    machine"""
+    sign: Literal[1, -1] = 1
+    """-1 where the numbers say how the part moves relative to the tool, or what the control is to add"""
+    repeats: dict[str, Positive] = Field(default_factory=dict)
+    """by coordinate that goes round: degrees (mm) after which it repeats, e.g. { C = 360 }"""
+    zero: dict[str, float] = Field(default_factory=dict)
+    """place, all coordinates in mm and degrees, at which the map is to be 0: what it says there is taken off everywhere"""
 
 
 class CovarianceModel(UserModel):

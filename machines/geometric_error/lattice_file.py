@@ -2,22 +2,31 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
 import numpy as np
 
 from machines.geometric_error.csv_table import ANGLES, LENGTHS, CsvTable, write_csv
-from machines.geometric_error.lattice import COLUMNS, GAUGE, ErrorMap
+from machines.geometric_error.lattice import COLUMNS, POINT, ROTARY, ErrorMap
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.units import DEG
 
-ROTARY = "ABC"
-COORDINATES = "XYZUVWABC" + GAUGE
+COORDINATES = "XYZUVWABC" + POINT
 SAME = 1e-6
 """mm or rad: positions nearer than this are one"""
+CROWDED = 50
+"""a lattice of more nodes than this many times its rows is none"""
 
 
-def map_from_csv(table: CsvTable) -> tuple[ErrorMap | None, list[Diagnostic]]:
-    """The map of a table; None where rows are missing, twice, or columns are not understood."""
+def map_from_csv(table: CsvTable, periods: Mapping[str, float] | None = None) -> tuple[ErrorMap | None, list[Diagnostic]]:
+    """The map of a table; None where rows are missing, twice, or columns are not understood.
+
+    Args:
+        periods: mm or rad, by coordinate that goes round; its first and last level may be one place
+    """
     letters = tuple(name for name in table.columns if name in COORDINATES)
     faults = _column_faults(table, letters)
     if faults:
@@ -25,24 +34,65 @@ def map_from_csv(table: CsvTable) -> tuple[ErrorMap | None, list[Diagnostic]]:
     places = np.stack([table.columns[letter] for letter in letters], axis=1)
     nodes, index = zip(*(_levels(column) for column in places.T), strict=True)
     shape = tuple(map(len, nodes))
+    if math.prod(shape) > CROWDED * len(table):
+        return None, [error("error-map.scattered", "the rows are no lattice: " + _levels_of(letters, shape) + " levels need "
+                            f"{math.prod(shape)} rows, there are {len(table)}", file=table.file,
+                            hint="write the commanded positions, the same levels of each coordinate in every row")]
     flat = np.ravel_multi_index(index, shape)
-    count = np.bincount(flat, minlength=int(np.prod(shape)))
-    if (count > 1).any():
-        rows = np.flatnonzero(flat == int(np.argmax(count > 1)))
-        lines = [table.lines[k] for k in rows]
-        return None, [error("error-map.twice", f"lines {lines[0]} and {lines[1]} are the same node", file=table.file,
-                            lines=lines[:6])]
-    if (count == 0).any():
-        at = np.unravel_index(int(np.argmin(count)), shape)
-        where = ", ".join(f"{x} {nodes[k][i] / (DEG if x in ROTARY else 1.0):g}"
-                          for k, (x, i) in enumerate(zip(letters, at, strict=True)))
-        return None, [error("error-map.missing", f"node {where} is missing: {' x '.join(map(str, shape))} levels need "
-                            f"{count.size} rows, there are {len(table)}", file=table.file, hint="give every node once")]
-    values = np.zeros((count.size, 6))
+    values = np.zeros((math.prod(shape), 6))
     for k, column in enumerate(COLUMNS):
         if column in table.columns:
             values[flat, k] = table.columns[column]
-    return ErrorMap(letters, nodes, values.reshape(*shape, 6)), []
+    lattice = ErrorMap(letters, nodes, values.reshape(*shape, 6))
+    faults = _row_faults(table, lattice, flat)
+    return (None, faults) if faults else round_about(lattice, periods or {}, table.file)
+
+
+def _row_faults(table: CsvTable, lattice: ErrorMap, flat: Ints) -> list[Diagnostic]:
+    """Nodes that are given twice or not at all; `flat` (N,): the node of each row."""
+    count = np.bincount(flat, minlength=lattice.table.size // 6)
+    if (count > 1).any():
+        node = int(np.argmax(count > 1))
+        lines = [table.lines[k] for k in np.flatnonzero(flat == node)]
+        return [error("error-map.twice", f"lines {lines[0]} and {lines[1]} are the same node, {lattice.described(node)}; "
+                      f"{int((count > 1).sum())} nodes are there more than once", file=table.file, lines=lines[:6],
+                      hint="give every node once; the mean where it was measured several times")]
+    if (count == 0).any():
+        where, levels = lattice.described(int(np.argmin(count))), _levels_of(lattice.letters, lattice.table.shape[:-1])
+        return [error("error-map.missing", f"node {where} is missing: {levels} levels need {count.size} rows, there are "
+                      f"{len(table)}", file=table.file, hint="give every node once")]
+    return []
+
+
+def _levels_of(letters: Sequence[str], shape: Sequence[int]) -> str:
+    return " x ".join(f"{letter} {n}" for letter, n in zip(letters, shape, strict=True))
+
+
+def round_about(lattice: ErrorMap, periods: Mapping[str, float], file: str) -> tuple[ErrorMap | None, list[Diagnostic]]:
+    """The lattice with coordinates that go round; what keeps them from it."""
+    nodes, table, found = list(lattice.nodes), lattice.table, []
+    for letter, period in periods.items():
+        if letter not in lattice.letters:
+            found.append(error("error-map.period", f"{letter} is no coordinate of the map", file=file,
+                               hint="its coordinates are " + ", ".join(lattice.letters)))
+            continue
+        k = lattice.letters.index(letter)
+        unit, span = DEG if letter in ROTARY else 1.0, float(nodes[k][-1] - nodes[k][0])
+        if span > period + SAME:
+            found.append(error("error-map.period", f"the levels of {letter} span {span / unit:g}, more than its period "
+                               f"{period / unit:g}", file=file, hint="give one period"))
+        elif span > period - SAME:
+            apart = np.abs(np.take(table, 0, k) - np.take(table, -1, k)).max(axis=tuple(range(table.ndim - 2)))
+            if (apart > SAME * np.where(np.arange(6) < 3, 1.0, DEG)).any():
+                found.append(error("error-map.period", f"the first and last level of {letter} are one place, but their "
+                                   f"values differ by up to {1e3 * apart[:3].max():.3g} um and "
+                                   f"{apart[3:].max() / ANGLES['arcsec']:.3g} arcsec", file=file,
+                                   hint="write the same values in both, or leave the last level out"))
+            nodes[k], table = nodes[k][:-1], np.delete(table, -1, axis=k)
+    if found:
+        return None, found
+    round_ = tuple(periods.get(letter, 0.0) for letter in lattice.letters)
+    return replace(lattice, nodes=tuple(nodes), table=table, periods=round_), []
 
 
 def _levels(column: Floats) -> tuple[Floats, Ints]:
@@ -73,9 +123,11 @@ def _column_faults(table: CsvTable, letters: tuple[str, ...]) -> list[Diagnostic
 
 def map_to_csv(error_map: ErrorMap, length: str = "um", angle: str = "arcsec") -> str:
     """The text of a map; what `map_from_csv` reads back."""
-    mesh = [m.ravel() for m in np.meshgrid(*error_map.nodes, indexing="ij")]
     columns = {letter: ("deg" if letter in ROTARY else "mm", column)
-               for letter, column in zip(error_map.letters, mesh, strict=True)}
+               for letter, column in zip(error_map.letters, error_map.places().T, strict=True)}
     values = error_map.table.reshape(-1, 6)
     columns |= {name: (angle if k >= 3 else length, values[:, k]) for k, name in enumerate(COLUMNS)}
-    return write_csv(columns, ["error map: gauge point and tool, actual less commanded, table frame"])
+    point = f"tip of a tool of {error_map.length:g} mm" if error_map.length else "gauge point"
+    directions = "machine" if error_map.bed else "table"
+    return write_csv(columns, [f"error map: {point}, actual less commanded, tool relative to part, directions of the "
+                               f"{directions}"])

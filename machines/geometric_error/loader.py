@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from machines.geometric_error.actual_map import part_side
 from machines.geometric_error.axis_motion import effect
 from machines.geometric_error.covariance import covariance_of
 from machines.geometric_error.csv_table import ANGLES, LENGTHS, UNITS, CsvTable, read_csv
@@ -260,14 +262,32 @@ class _Loader:
     def _map(self) -> ErrorMap | None:
         if self.checked.map is None:
             return None
-        table = self._csv(self.checked.map.table, ("map", "table"))
+        given, table = self.checked.map, self._csv(self.checked.map.table, ("map", "table"))
         if table is None:
             return None
-        result, found = map_from_csv(table)
+        periods = {k: v * (DEG if k in ROTARY else 1.0) for k, v in given.repeats.items()}
+        result, found = map_from_csv(table, periods)
         self.found += found
-        return result
+        if result is None:
+            return None
+        bed = part_side(self.machine.kinematics, self.machine.structure) if given.directions == "machine" else ()
+        result = replace(result, length=given.tool_length, bed=bed, table=given.sign * result.table)
+        return self._zeroed(result) if given.zero else result
 
-
+    def _zeroed(self, error_map: ErrorMap) -> ErrorMap:
+        """The map less what it says at its stated zero."""
+        zero, letters = self.checked.map.zero if self.checked.map else {}, error_map.letters
+        if set(zero) != set(letters):
+            self._problem("error-map.zero", ("map", "zero"), f"zero gives {', '.join(zero)}, the map has "
+                          f"{', '.join(letters)}", "give every coordinate of the map once")
+            return error_map
+        place = np.array([[zero[letter] * (DEG if letter in ROTARY else 1.0) for letter in letters]])
+        if error_map.outside(place, CLOSES).any():
+            self._problem("error-map.zero", ("map", "zero"), "the place lies outside the map", "; ".join(
+                f"{letter} is from {nodes[0] / unit:g} to {nodes[-1] / unit:g}" for letter, nodes in
+                zip(letters, error_map.nodes, strict=True) for unit in (DEG if letter in ROTARY else 1.0,)))
+            return error_map
+        return replace(error_map, table=error_map.table - error_map.at(place)[0])
 
 
 def _period_fault(x: Floats, values: list[Floats], period: float, unit: float) -> tuple[str, str] | None:

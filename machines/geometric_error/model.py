@@ -8,9 +8,10 @@ from typing import Literal, Self
 import numpy as np
 
 from machines.geometric_error.actual import Actual
+from machines.geometric_error.actual_map import ActualByMap
 from machines.geometric_error.actual_rods import ActualDelta, ActualH4
 from machines.geometric_error.actual_serial import ActualSerial
-from machines.geometric_error.lattice import ActualByMap, ErrorMap
+from machines.geometric_error.lattice import ErrorMap
 from machines.geometric_error.rods import RodErrors, gives_rods, rod_frame, rod_names
 from machines.geometric_error.serial_errors import SerialErrors
 from machines.kinematics.base import Kinematics
@@ -89,7 +90,7 @@ class ErrorModel:
         unknown = [x for x in self.map.letters if x not in (*kinematics.axis_names, "x", "y", "z")]
         if unknown:
             raise ValueError(f"the map's coordinate {unknown[0]!r} is no axis of this machine; it has "
-                             f"{', '.join(kinematics.axis_names)}, and x y z of the gauge point")
+                             f"{', '.join(kinematics.axis_names)}, and x y z of the point that is displaced")
         return ActualByMap(nominal, self.map)
 
 

@@ -11,18 +11,21 @@ import numpy as np
 import pytest
 
 import machines
+from machines.geometric_error.actual_map import ActualByMap
 from machines.geometric_error.covariance import read_covariance
 from machines.geometric_error.csv_table import read_csv, write_csv
 from machines.geometric_error.curves import Fourier, Table
 from machines.geometric_error.exchange import from_linuxcnc, sampled, save, table_to_csv, to_linuxcnc, with_component
-from machines.geometric_error.lattice import ActualByMap, ErrorMap, deviations, map_loss, map_of
+from machines.geometric_error.lattice import ErrorMap
 from machines.geometric_error.lattice_file import map_from_csv, map_to_csv
+from machines.geometric_error.lattice_making import deviations, map_loss, map_of
 from machines.geometric_error.loader import error_model_schema, load, load_checked
 from machines.geometric_error.model import ErrorModel, doubt
 from machines.geometric_error.names import parse
 from machines.geometric_error.serial_errors import Component, SerialErrors
 from machines.machine import Machine
 from tests.machines.error_models import ARCSEC, joints, model
+from toolpaths.arrays import Floats
 from toolpaths.units import DEG
 
 SAMPLES = Path(__file__).parents[2] / "samples" / "errors"
@@ -267,6 +270,10 @@ def test_linuxcnc_holds_positioning_errors_of_256_rows() -> None:
     assert to_linuxcnc(positioning, fewer).count("\n") == 81
 
 
+def empty(letters: tuple[str, ...], nodes: tuple[Floats, ...], **how: object) -> ErrorMap:
+    return ErrorMap(letters, nodes, np.zeros((*map(len, nodes), 6)), **how)  # type: ignore[arg-type]
+
+
 # ---- maps ----------------------------------------------------------------------------------------------------------
 
 def test_a_map_of_a_mill_loses_little_and_less_when_it_is_finer() -> None:
@@ -276,7 +283,7 @@ def test_a_map_of_a_mill_loses_little_and_less_when_it_is_finer() -> None:
     probe, losses = joints(kin, 400, 9), []
     for count in (4, 8, 16):
         nodes = (np.linspace(-150.0, 150.0, count),) * 3
-        made = map_of(actual, nominal, ("X", "Y", "Z"), nodes, np.zeros(3))
+        made = map_of(actual, nominal, empty(("X", "Y", "Z"), nodes), np.zeros(3))
         losses.append(map_loss(ActualByMap(nominal, made), actual, probe))
     before = np.linalg.norm(deviations(actual, nominal, probe)[:, :3], axis=1).max()
     assert losses[0].tip_worst > losses[1].tip_worst > losses[2].tip_worst
@@ -289,7 +296,7 @@ def test_a_map_holds_at_its_nodes_with_any_tool_and_reads_back(tmp_path: Path) -
     full = model(kin, 5)
     actual, nominal = full.on(kin), full.zero().on(kin)
     nodes = (np.array([-100.0, 50.0]), np.array([0.0, 10.0, 30.0]), np.linspace(-0.5, 0.5, 3), np.array([0.1, 1.0]))
-    made = map_of(actual, nominal, ("X", "Z", "A", "C"), nodes, np.array([0.0, 20.0, 0.0, 0.0, 0.0]))
+    made = map_of(actual, nominal, empty(("X", "Z", "A", "C"), nodes), np.array([0.0, 20.0, 0.0, 0.0, 0.0]))
     back = load(save(ErrorModel(map=made, name="m"), tmp_path)[0], machine)
     assert back.map is not None and back.map.table == pytest.approx(made.table, abs=1e-11)
     longer = kin.with_tool(150.0)

@@ -1,0 +1,127 @@
+"""A machine with an error map: the nominal machine, its tool displaced and turned by what the map says."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from machines.geometric_error.actual import Actual, Placed
+from machines.geometric_error.lattice import POINT, ErrorMap
+from machines.kinematics.base import Kinematics
+from machines.kinematics.h4_axes import H4TableAxis
+from machines.kinematics.serial import Serial
+from toolpaths.arrays import Bools, Floats
+from toolpaths.rotations import rotation
+
+
+@dataclass(frozen=True, eq=False)
+class ActualByMap(Actual):
+    """A machine with an error map; `nominal` gives its coordinates (a model with no errors)."""
+
+    nominal: Actual
+    map: ErrorMap
+
+    @property
+    def kinematics(self) -> Kinematics:  # type: ignore[override]
+        """Of the nominal machine."""
+        return self.nominal.kinematics
+
+    @property
+    def turns(self) -> int:  # type: ignore[override]
+        """Of the nominal machine."""
+        return self.nominal.turns
+
+    def coordinates(self, q: Floats, near: Floats | None = None) -> Floats:
+        """See the base class."""
+        return self.nominal.coordinates(q, near)
+
+    def joints(self, w: Floats) -> Floats:
+        """See the base class."""
+        return self.nominal.joints(w)
+
+    def rates(self, w: Floats) -> Floats:
+        """See the base class."""
+        return self.nominal.rates(w)
+
+    @property
+    def arm(self) -> float:
+        """mm along the tool from the tip to the point that the map displaces."""
+        return self.kinematics.tool_length - self.map.length
+
+    def directions(self, q: Floats) -> Floats:
+        """(N, 3, 3) that take the map's directions into those of the table at joints q (N, J)."""
+        turned, names = np.broadcast_to(np.eye(3), (len(q), 3, 3)), self.kinematics.axis_names
+        for letter in self.map.bed:
+            turned = turned @ rotation(_direction(self.kinematics, letter), q[:, names.index(letter)])
+        return turned
+
+    def lattice_places(self, w: Floats) -> Floats:
+        """Coordinates of the lattice (N, D)."""
+        tip, axis, _ = self.nominal.place(w)
+        q, names = self.joints(w), self.kinematics.axis_names
+        point = tip + self.arm * axis
+        return np.stack([point[:, POINT.index(letter)] if letter in POINT else q[:, names.index(letter)]
+                         for letter in self.map.letters], axis=1)
+
+    def place(self, w: Floats, direction: Floats | None = None) -> Placed:
+        """See the base class."""
+        tip, axis, side = self.nominal.place(w)
+        error = self.map.at(self.lattice_places(w))
+        if self.map.bed:
+            turned = self.directions(self.joints(w))
+            error = np.concatenate([np.einsum("nij,nj->ni", turned, v) for v in (error[:, :3], error[:, 3:])], axis=1)
+        arm = -self.arm * axis
+        return (tip + error[:, :3] + (spun(arm, error[:, 3:]) - arm), spun(axis, error[:, 3:]), spun(side, error[:, 3:]))
+
+    def sensitivity(self, w: Floats, direction: Floats | None = None) -> Floats:
+        """See the base class."""
+        _, axis, _ = self.nominal.place(w)
+        turned, arm = self.directions(self.joints(w)), -self.arm * axis
+        columns = np.zeros((len(w), 6, 6))
+        columns[:, :3, :3] = columns[:, 3:, 3:] = turned
+        columns[:, :3, 3:] = np.cross(np.swapaxes(turned, 1, 2), arm[:, None, :]).swapaxes(1, 2)
+        node, weight = self.map.weights(self.lattice_places(w))
+        result = np.zeros((len(w), 6, len(self.map.values) // 6, 6))
+        rows = np.arange(len(w))
+        for k in range(node.shape[1]):
+            result[rows, :, node[:, k], :] += weight[:, k, None, None] * columns
+        return result.reshape(len(w), 6, -1)
+
+    def outside(self, w: Floats, margin: float = 0.0) -> Bools:
+        """See the base class; a coordinate of the point counts for every slide."""
+        found = self.map.outside(self.lattice_places(w), margin)
+        names, rotary = self.kinematics.axis_names, np.array(self.kinematics.rotary)
+        result = np.zeros((len(w), len(names)), dtype=np.bool_)
+        for letter, column in zip(self.map.letters, found.T, strict=True):
+            if letter in POINT:
+                result |= column[:, None] & ~rotary
+            else:
+                result[:, names.index(letter)] |= column
+        return result
+
+
+def part_side(kinematics: Kinematics, structure: str) -> tuple[str, ...]:
+    """Rotary axes between the part and the bed, from the part on; `structure` as in the machine file."""
+    if isinstance(kinematics, Serial):
+        return tuple(joint.name for joint in kinematics.chain if joint.rotary and f"{joint.name}'" in structure)
+    return kinematics.axis_names[4:] if isinstance(kinematics, H4TableAxis) else ()
+
+
+def _direction(kinematics: Kinematics, letter: str) -> Floats:
+    """(3,) that a rotary axis of `part_side` turns about."""
+    if isinstance(kinematics, Serial):
+        return next(joint.direction for joint in kinematics.chain if joint.name == letter)
+    assert isinstance(kinematics, H4TableAxis)
+    return np.array([0.0, 0.0, kinematics.sense])
+
+
+def spun(v: Floats, by: Floats) -> Floats:
+    """Vectors (N, 3) turned by rotation vectors (N, 3) (Rodrigues); a zero vector leaves them to the last digit."""
+    angle = np.linalg.norm(by, axis=1)
+    safe = np.where(angle > 0.0, angle, 1.0)
+    half = np.sin(0.5 * angle) / safe
+    across = np.cross(by, v)
+    result: Floats = v + (np.where(angle > 0.0, np.sin(angle) / safe, 1.0)[:, None] * across
+                          + (2.0 * half**2)[:, None] * np.cross(by, across))
+    return result

@@ -1,0 +1,84 @@
+"""The volume that an error model is looked at in: travel or workspace of its machine, as far as the model reaches."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from machines.geometric_error.actual import Actual
+from machines.geometric_error.model import ErrorModel
+from machines.kinematics.h4_linear import H4Linear
+from machines.kinematics.linear_delta import LinearDelta
+from machines.machine import Machine
+from toolpaths.arrays import Floats
+
+TURN = np.pi
+"""rad either way from 0 of an unlimited rotary axis"""
+CORNERS = 4
+"""one place of so many is at a corner"""
+INSIDE = 1e-9
+"""mm or rad"""
+
+
+def ranges(model: ErrorModel, machine: Machine) -> tuple[Floats, Floats]:
+    """(lower, upper) (J,) of each joint: its travel, as far as the model was measured; empty where lower > upper."""
+    lower, upper = (np.array(x) for x in (machine.limits.lower, machine.limits.upper))
+    free = np.array(machine.rotary) & ~(np.isfinite(lower) & np.isfinite(upper))
+    lower[free], upper[free] = -TURN, TURN
+    for letter, (least, most) in _measured(model):
+        if letter in machine.axis_names:
+            j = machine.axis_names.index(letter)
+            lower[j], upper[j] = max(lower[j], least), min(upper[j], most)
+    return lower, upper
+
+
+def _measured(model: ErrorModel) -> list[tuple[str, tuple[float, float]]]:
+    found = [(c.name.axis, c.curve.range) for c in model.axes.components]
+    if model.map is not None:
+        found += [(letter, (float(nodes[0]), float(nodes[-1]))) for letter, nodes, period in
+                  zip(model.map.letters, model.map.nodes, model.map.periods, strict=True) if not period]
+    return found
+
+
+def samples(model: ErrorModel, machine: Machine, actual: Actual, count: int, seed: int = 0) -> Floats:
+    """Coordinates w (N, 3 + R), N <= count, spread over the volume and at its corners; only where the model holds."""
+    lower, upper = ranges(model, machine)
+    if np.any(lower > upper):
+        return np.zeros((0, 3 + actual.turns))
+    w = actual.coordinates(_joints(machine, lower, upper, np.random.default_rng(seed), count))
+    w = w[np.isfinite(actual.aim(w)[0]).all(axis=1)]
+    return np.asarray(w[~actual.outside(w, INSIDE).any(axis=1)])
+
+
+def middle(machine: Machine) -> Floats:
+    """(J,) joints in the middle of the workspace of a machine on rods, at 0 within travel of a serial one."""
+    kinematics = machine.kinematics
+    zero = np.clip(np.zeros(len(machine.axis_names)), machine.limits.lower, machine.limits.upper)
+    if not isinstance(kinematics, LinearDelta | H4Linear):
+        return zero
+    box = kinematics.workspace
+    at = np.append(box.middle, np.clip(0.0, *box.tilt))[None]
+    return np.asarray(_of_platform(kinematics, at, zero[None, 4:])[0])
+
+
+def _joints(machine: Machine, lower: Floats, upper: Floats, rng: np.random.Generator, count: int) -> Floats:
+    kinematics = machine.kinematics
+    if not isinstance(kinematics, LinearDelta | H4Linear):
+        return _spread(lower, upper, rng, count)
+    box = kinematics.workspace
+    low, high = (np.append(ends, tilt) for ends, tilt in zip((box.lower, box.upper), box.tilt, strict=True))
+    return _of_platform(kinematics, _spread(low, high, rng, count), _spread(lower[4:], upper[4:], rng, count))
+
+
+def _of_platform(kinematics: LinearDelta | H4Linear, platform: Floats, turn: Floats) -> Floats:
+    """Joints (N, J) of places and tilts of the platform (N, 4) and rotary axes (N, J - 4)."""
+    if isinstance(kinematics, LinearDelta):
+        return kinematics.legs.inverse(platform[:, None, :3] + kinematics.platform)
+    return np.column_stack([kinematics.platform.inverse(platform), turn])
+
+
+def _spread(lower: Floats, upper: Floats, rng: np.random.Generator, count: int) -> Floats:
+    """(count, K) even between the ends, every CORNERS-th row at some ends."""
+    rows = rng.uniform(lower, upper, (count, len(lower)))
+    ends = np.where(rng.random((count, len(lower))) < 0.5, lower, upper)
+    rows[::CORNERS] = ends[::CORNERS]
+    return rows
