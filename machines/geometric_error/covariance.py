@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from machines.geometric_error.csv_table import UNITS
+from machines.geometric_error.csv_table import UNITS, read_text
 from machines.geometric_error.file_models import ErrorFileModel
 from machines.geometric_error.model import ErrorModel
 from machines.geometric_error.names import parse
@@ -58,26 +59,50 @@ def covariance_of(model: ErrorModel, file: UserFile, checked: ErrorFileModel) ->
 
 def read_covariance(path: Path, names: list[str], cited: tuple[str, int]) -> tuple[Floats | None, list[Diagnostic]]:
     """(P, P) in the order of `names`, in the units of the table; parameters that it leaves out have none."""
-    try:
-        lines = [(n, x) for n, x in enumerate(path.read_text("utf-8-sig").splitlines(), 1) if x.strip() and x[0] != "#"]
-    except (OSError, UnicodeDecodeError) as fault:
-        return None, [error("error-table.unreadable", f"cannot read covariance table {path.name!r}: {fault}",
-                            file=cited[0], lines=[cited[1]])]
+    text, found = read_text(path, cited)
+    if text is None:
+        return None, found
+    lines = [(n, x) for n, x in enumerate(text.splitlines(), 1) if x.strip() and not x.startswith("#")]
     head = [cell.strip() for cell in _cells(lines[0][1])[1:]] if lines else []
-    if not head or len(lines) - 1 != len(head):
-        return None, [error("error-table.row", f"{len(lines) - 1} rows for {len(head)} parameters; the table is square",
-                            file=str(path))]
+    fault = _head_fault(head, [n for n, _ in lines], names)
+    if fault:
+        return None, [error("error-table.row", fault[0], file=str(path), lines=[n for n, _ in lines[:1]], hint=fault[1])]
     index, matrix = {name: k for k, name in enumerate(names)}, np.zeros((len(names), len(names)))
-    for (line, text), name in zip(lines[1:], head, strict=True):
-        row, *cells = _cells(text)
-        if row.strip() != name or name not in index or len(cells) != len(head):
-            return None, [error("error-table.row", f"row {row.strip()!r}: expected parameter {name!r} and {len(head)} "
-                                "numbers", file=str(path), lines=[line], hint=nearest(name, names))]
-        try:
-            matrix[index[name], [index[other] for other in head]] = [float(cell) for cell in cells]
-        except (ValueError, KeyError) as fault:
-            return None, [error("error-table.row", f"cannot read the row: {fault}", file=str(path), lines=[line])]
-    return _checked(matrix, path)
+    columns = [index[name] for name in head]
+    for (line, row), name in zip(lines[1:], head, strict=True):
+        values = _row(row, name, len(head))
+        if isinstance(values, tuple):
+            return None, [error("error-table.row", values[0], file=str(path), lines=[line], hint=values[1])]
+        matrix[index[name], columns] = values
+    return _checked(matrix, path, names)
+
+
+def _head_fault(head: list[str], lines: list[int], names: list[str]) -> tuple[str, str] | None:
+    """What is wrong with the first row, and what to do."""
+    if not head or len(lines) - 1 != len(head):
+        return (f"{max(len(lines) - 1, 0)} rows for {len(head)} parameters", "the table is square: the parameters in the first "
+                "row, then a row for each in the same order")
+    known, count = set(names), Counter(head)
+    for name in head:
+        if name not in known:
+            return f"the model has no parameter {name[:40]!r}", nearest(name, names)
+        if count[name] > 1:
+            return f"parameter {name!r} appears twice", "name each parameter once"
+    return None
+
+
+def _row(text: str, name: str, count: int) -> list[float] | tuple[str, str]:
+    """The numbers of a row, or what is wrong and what to do."""
+    row, *cells = _cells(text)
+    if row.strip() != name:
+        return f"row {row.strip()[:40]!r}, expected parameter {name!r}", "the rows have the order of the columns"
+    if len(cells) != count:
+        return f"row {name!r} has {len(cells)} numbers for {count} parameters", "the table is square"
+    try:
+        values = [float(cell) for cell in cells]
+    except ValueError as fault:
+        return f"row {name!r}: {fault}", "write numbers with a decimal point"
+    return values if np.isfinite(values).all() else (f"row {name!r} holds a number that is not finite", "write 0 for none")
 
 
 def _cells(text: str) -> list[str]:
@@ -92,17 +117,25 @@ def _cells(text: str) -> list[str]:
     return cells
 
 
-def _checked(matrix: Floats, path: Path) -> tuple[Floats | None, list[Diagnostic]]:
+def _checked(matrix: Floats, path: Path, names: list[str]) -> tuple[Floats | None, list[Diagnostic]]:
     size = float(np.abs(matrix).max(initial=0.0))
-    scale = np.sqrt(np.abs(np.diag(matrix)))
-    scale = np.where(scale > 0.0, scale, 1.0)
-    correlation = matrix / np.outer(scale, scale)
-    if not np.isfinite(size) or np.abs(matrix - matrix.T).max(initial=0.0) > SYMMETRIC * size:
-        return None, [error("error-table.covariance", "the covariance is not symmetric", file=str(path))]
+    apart = np.abs(matrix - matrix.T)
+    if apart.max(initial=0.0) > SYMMETRIC * size:
+        i, j = sorted(np.unravel_index(int(np.argmax(apart)), apart.shape))
+        return None, [error("error-table.covariance", f"the covariance is not symmetric: {names[i]} with {names[j]} is "
+                            f"{matrix[i, j]:g}, the other way round {matrix[j, i]:g}", file=str(path),
+                            hint="write the same number in both")]
+    negative = np.flatnonzero(np.diag(matrix) < 0.0)
+    if len(negative):
+        return None, [error("error-table.covariance", f"the variance of {names[negative[0]]} is "
+                            f"{matrix[negative[0], negative[0]]:g}", file=str(path), hint="a variance is 0 or more")]
+    scale = np.sqrt(np.diag(matrix))
+    correlation = matrix / np.outer(*(np.where(scale > 0.0, scale, 1.0),) * 2)
     least = float(np.linalg.eigvalsh(0.5 * (correlation + correlation.T)).min(initial=0.0))
     if least < -SYMMETRIC * len(matrix):
-        return None, [error("error-table.covariance", f"the covariance has a negative eigenvalue ({least:.3g} of the "
-                            "correlation)", file=str(path), hint="write more digits")]
+        return None, [error("error-table.covariance", f"no parameters can have this covariance: an eigenvalue of its "
+                            f"correlation is {least:.3g}, less than 0", file=str(path),
+                            hint="correlations lie between -1 and 1 and go together; write more digits")]
     return 0.5 * (matrix + matrix.T), []
 
 

@@ -1,6 +1,7 @@
 """CSV tables with units in their headers: `X [mm], EXX+ [um], EXX- [um]`.
 
-Numbers with a decimal point, separated by commas, semicolons or tabs; `#` begins a comment line. Inside mm and rad.
+Numbers with a decimal point, separated by commas, semicolons or tabs; between semicolons or tabs a decimal comma will do
+where the table has no point. `#` begins a comment line. Inside mm and rad.
 """
 
 from __future__ import annotations
@@ -19,6 +20,10 @@ from toolpaths.units import DEG, MM_PER_INCH
 LENGTHS = {"mm": 1.0, "um": 1e-3, "m": 1e3, "in": MM_PER_INCH}
 ANGLES = {"deg": DEG, "arcsec": DEG / 3600.0, "arcmin": DEG / 60.0, "urad": 1e-6, "mrad": 1e-3, "rad": 1.0}
 UNITS = {**LENGTHS, **ANGLES}
+_ALIASES = {"\u00b5m": "um", "\u03bcm": "um", "\u00b0": "deg", "\u00b5rad": "urad", "\u03bcrad": "urad"}
+_THOUSANDS = re.compile(r"-?\d{1,3}(,\d{3})+$")
+MOST = 8
+"""faults of a header that are told"""
 _HEAD = re.compile(r"(?P<name>[^\[\]]+?)\s*(?:\[(?P<unit>[^\]]*)\])?$")
 
 
@@ -30,6 +35,8 @@ class CsvTable:
     columns: Mapping[str, Floats]
     unit: Mapping[str, str]
     lines: tuple[int, ...]
+    head: int = 1
+    """line of the header"""
 
     def __len__(self) -> int:
         return len(self.lines)
@@ -41,67 +48,115 @@ def read_csv(path: Path, cited: tuple[str, int] = ("", 0)) -> tuple[CsvTable | N
     Args:
         cited: file and line that named it, for a message where it is missing
     """
-    try:
-        text = path.read_bytes().decode("utf-8-sig")
-    except FileNotFoundError:
-        return None, [error("error-table.not-found", f"there is no table {path.name!r}", file=cited[0] or str(path),
-                            lines=[cited[1]] if cited[1] else [], hint=f"looked in {path.parent or '.'}")]
-    except (OSError, UnicodeDecodeError) as fault:
-        return None, [error("error-table.unreadable", f"cannot read it: {fault}", file=str(path), hint="save it as UTF-8")]
+    text, found = read_text(path, cited)
+    if text is None:
+        return None, found
     rows = [(n, line) for n, line in enumerate(text.splitlines(), 1) if line.strip() and not line.lstrip().startswith("#")]
     if len(rows) < 2:
-        return None, [error("error-table.empty", "a header line and at least one row of numbers are needed", file=str(path))]
+        return None, [error("error-table.empty", "a header line and at least one row of numbers are needed, there "
+                            + ("is the header alone" if rows else "is nothing"), file=str(path),
+                            lines=[n for n, _ in rows], hint="write e.g. X [mm], EXX [um], then a row per position")]
     return _table(str(path), rows)
+
+
+def read_text(path: Path, cited: tuple[str, int] = ("", 0)) -> tuple[str | None, list[Diagnostic]]:
+    """The text of a file that another one cites; arguments as `read_csv`."""
+    def fault(code: str, message: str, hint: str) -> tuple[None, list[Diagnostic]]:
+        return None, [error(code, message, file=cited[0] or str(path), lines=[cited[1]], hint=hint)]
+
+    try:
+        if path.exists() and not path.is_file():
+            return fault("error-table.unreadable", f"{path} is no regular file", "name a CSV file")
+        return path.read_bytes().decode("utf-8-sig"), []
+    except FileNotFoundError:
+        return fault("error-table.not-found", f"there is no table {path.name!r}", f"looked in {path.parent or '.'}")
+    except UnicodeDecodeError as bad:
+        return fault("error-table.unreadable", f"byte {bad.start} of {path.name} is not UTF-8", "save it as UTF-8 text")
+    except (OSError, ValueError) as bad:
+        return fault("error-table.unreadable", f"cannot read {path.name[:60]!r}: {getattr(bad, 'strerror', None) or bad}",
+                     "name a CSV file")
 
 
 def _table(file: str, rows: list[tuple[int, str]]) -> tuple[CsvTable | None, list[Diagnostic]]:
     (first, head), *body = rows
     mark = next((m for m in ";\t" if m in head), ",")
-    found = [_HEAD.match(cell.strip()) for cell in head.split(mark)]
-    diagnostics = _head_faults(file, first, head.split(mark), found)
+    cells = [cell.strip().strip('"').strip() for cell in head.split(mark)]
+    found = [_HEAD.match(cell) for cell in cells]
+    diagnostics = _head_faults(file, first, cells, found)
     if diagnostics:
         return None, diagnostics
     names = [m["name"] for m in found if m]
-    unit = {m["name"]: m["unit"] or "" for m in found if m}
-    values = np.empty((len(body), len(names)))
-    for k, (line, text) in enumerate(body):
-        fault = _fill(values[k], text.split(mark), names)
-        if fault:
-            diagnostics.append(error("error-table.row", fault, file=file, lines=[line],
-                                     hint=f"columns are {', '.join(names)}"))
-    if diagnostics:
-        return None, diagnostics
+    unit = {m["name"]: _ALIASES.get(m["unit"] or "", m["unit"] or "") for m in found if m}
+    values, faults = _numbers(body, mark, names)
+    if faults:
+        fault, hint = faults[0][1:]
+        return None, [error("error-table.row", fault, file=file, lines=[n for n, _, _ in faults[:6]], count=len(faults),
+                            hint=hint or f"columns are {', '.join(names)}")]
     scaled = {name: values[:, k] * UNITS.get(unit[name], 1.0) for k, name in enumerate(names)}
-    return CsvTable(file, scaled, unit, tuple(line for line, _ in body)), []
+    return CsvTable(file, scaled, unit, tuple(line for line, _ in body), first), []
 
 
 def _head_faults(file: str, line: int, cells: Sequence[str], found: Sequence[re.Match[str] | None]) -> list[Diagnostic]:
     result = []
     for cell, match in zip(cells, found, strict=True):
         if match is None or not match["name"]:
-            result.append(error("error-table.header", f"{cell.strip()!r} is no column", file=file, lines=[line],
-                                hint="write NAME [unit]"))
-        elif match["unit"] is not None and match["unit"] not in UNITS:
-            result.append(error("error-table.unit", f"unit {match['unit']!r} of column {match['name']} is not known",
-                                file=file, lines=[line], hint="known: " + ", ".join(UNITS)))
+            hint = "write NAME [unit]" if cell else "take the separator without a column out, or name the column"
+            result.append(error("error-table.header", f"{cell[:40]!r} is no column", file=file, lines=[line], hint=hint))
+        elif match["unit"] is not None and _ALIASES.get(match["unit"], match["unit"]) not in UNITS:
+            result.append(error("error-table.unit", f"unit {match['unit'][:20]!r} of column {match['name'][:40]} is not "
+                                "known", file=file, lines=[line], hint="known: " + ", ".join(UNITS)))
+    if not result and all(_number(cell, False) is not None for cell in cells):
+        result.append(error("error-table.header", "the first line holds numbers", file=file, lines=[line],
+                            hint="write a header line first, e.g. X [mm], EXX [um]"))
     names = [m["name"] for m in found if m]
     twice = sorted({name for name in names if names.count(name) > 1})
-    result += [error("error-table.header", f"column {name} appears twice", file=file, lines=[line]) for name in twice]
-    return result
+    result += [error("error-table.header", f"column {name} appears twice", file=file, lines=[line],
+                     hint="name every column once") for name in twice]
+    return result[:MOST]
 
 
-def _fill(row: Floats, cells: Sequence[str], names: Sequence[str]) -> str:
-    """Put the numbers of a line in `row`; what is wrong, "" for nothing."""
+def _numbers(body: Sequence[tuple[int, str]], mark: str,
+             names: Sequence[str]) -> tuple[Floats, list[tuple[int, str, str]]]:
+    """(values (N, C), faults as (line, what, hint)) of rows (line, text)."""
+    values, faults = np.empty((len(body), len(names))), []
+    comma = mark != "," and not any("." in text for _, text in body)
+    for k, (line, text) in enumerate(body):
+        fault = _fill(values[k], text.split(mark), names, comma)
+        if fault:
+            faults.append((line, *fault))
+    if comma and not faults and any("," in text for _, text in body) and _thousands(body, mark):
+        faults.append((body[0][0], "commas before three digits each: decimals or thousands?",
+                       "write decimal points, and no marks between thousands"))
+    return values, faults
+
+
+def _thousands(body: Sequence[tuple[int, str]], mark: str) -> bool:
+    """True where every comma may be one between thousands."""
+    return all(_THOUSANDS.match(cell.strip()) for _, text in body for cell in text.split(mark) if "," in cell)
+
+
+def _fill(row: Floats, cells: Sequence[str], names: Sequence[str], comma: bool) -> tuple[str, str] | None:
+    """Put the numbers of a line in `row`; what is wrong and what to do, None for nothing."""
     if len(cells) != len(names):
-        return f"{len(cells)} values, {len(names)} columns"
+        hint = "write decimal points where commas separate the columns" if len(cells) == 2 * len(names) else ""
+        return f"{len(cells)} values, {len(names)} columns", hint
     for k, cell in enumerate(cells):
-        try:
-            row[k] = float(cell)
-        except ValueError:
-            return f"{cell.strip()!r} in column {names[k]} is not a number"
-        if not np.isfinite(row[k]):
-            return f"{cell.strip()} in column {names[k]} is not finite"
-    return ""
+        number = _number(cell, comma)
+        if number is None:
+            shown = f"{cell.strip()[:40]!r} in column {names[k]}"
+            return f"{shown} is not a number", "write decimal points throughout" if "," in cell else ""
+        if not np.isfinite(number):
+            return f"{cell.strip()} in column {names[k]} is not finite", "take the row out where nothing was measured"
+        row[k] = number
+    return None
+
+
+def _number(cell: str, comma: bool) -> float | None:
+    text = cell.strip().strip('"')
+    try:
+        return None if "_" in text else float(text.replace(",", ".") if comma else text)
+    except ValueError:
+        return None
 
 
 def write_csv(columns: Mapping[str, tuple[str, Floats]], comment: Sequence[str] = ()) -> str:

@@ -10,8 +10,8 @@ import numpy as np
 from machines.geometric_error.actual_map import part_side
 from machines.geometric_error.axis_motion import effect
 from machines.geometric_error.covariance import covariance_of
-from machines.geometric_error.csv_table import ANGLES, LENGTHS, UNITS, CsvTable, read_csv
-from machines.geometric_error.curves import EVERYWHERE, Curve, Fourier, Polynomial, Table
+from machines.geometric_error.csv_table import UNITS, CsvTable, read_csv
+from machines.geometric_error.curves import EVERYWHERE, Curve, Fourier, Polynomial
 from machines.geometric_error.file_models import CurveModel, ErrorFileModel
 from machines.geometric_error.lattice import ErrorMap
 from machines.geometric_error.lattice_file import map_from_csv
@@ -19,6 +19,7 @@ from machines.geometric_error.model import ErrorModel
 from machines.geometric_error.names import SPINDLE, ErrorName, parse
 from machines.geometric_error.rods import RodErrors, gives_rods, rod_frame, rod_names
 from machines.geometric_error.serial_errors import Component, Frame, SerialErrors
+from machines.geometric_error.table_curves import CLOSES, ROTARY, Fault, table_curve
 from machines.kinematics.h4_axes import H4TableAxis
 from machines.kinematics.h4_linear import H4Linear
 from machines.kinematics.linear_delta import LinearDelta
@@ -30,9 +31,6 @@ from toolpaths.diagnostics import Diagnostic, has_errors, require
 from toolpaths.units import DEG
 
 KIND = "error model"
-ROTARY = "ABC"
-CLOSES = 1e-6
-"""share of a period, and part of a unit, that counts as nothing"""
 
 
 def load(source: str | Path, machine: Machine) -> ErrorModel:
@@ -147,46 +145,12 @@ class _Loader:
         table = self._csv(str(given.table), path)
         if table is None:
             return None
-        columns = self._columns(name, table, path)
-        if not columns or not self._ascending(table, name.axis, path):
-            return None
-        x, values = table.columns[name.axis], [table.columns[c] * given.sign for c in columns]
         period = 0.0 if given.repeats is None else given.repeats * position
-        if period:
-            fault = _period_fault(x / position, values, period / position, self._unit(name))
-            if fault:
-                self._problem("error-model.period", path, *fault)
-                return None
-            inside = x < x[0] + period * (1.0 - CLOSES)
-            x, values = x[inside], [v[inside] for v in values]
-        if given.interpolation == "spline" and len(x) < 4:
-            self._problem("error-model.spline", path, f"a spline needs 4 rows, the table has {len(x)}", "write linear")
+        found = table_curve(name, table, given.interpolation, period, given.sign)
+        if isinstance(found, Fault):
+            self._problem(found.code, path, found.message, found.hint)
             return None
-        return Table(x, np.concatenate(values), given.interpolation, len(values) == 2, period)
-
-    def _columns(self, name: ErrorName, table: CsvTable, path: tuple[str, ...]) -> list[str]:
-        both = [f"{name}+", f"{name}-"]
-        wanted = both if both[0] in table.columns else [str(name)]
-        for column in (name.axis, *wanted):
-            if column not in table.columns:
-                self._problem("error-model.column", path, f"{Path(table.file).name} has no column {column!r}",
-                              "it has " + ", ".join(table.columns))
-                return []
-            angular = (column == name.axis and name.axis in ROTARY) or (column != name.axis and name.angular)
-            known = ANGLES if angular else LENGTHS
-            if table.unit[column] not in known:
-                self._problem("error-model.unit", path, f"column {column!r} of {Path(table.file).name} has unit "
-                              f"{table.unit[column]!r}", f"write {column} [unit] with one of " + ", ".join(known))
-                return []
-        return wanted
-
-    def _ascending(self, table: CsvTable, column: str, path: tuple[str, ...]) -> bool:
-        down = np.flatnonzero(np.diff(table.columns[column]) <= 0.0)
-        if len(down):
-            line = table.lines[int(down[0]) + 1]
-            self._problem("error-model.order", path, f"{Path(table.file).name}, line {line}: positions of {column} do not "
-                          "ascend", "sort the rows, each position once")
-        return not len(down)
+        return found
 
     def _csv(self, name: str, path: tuple[str, ...]) -> CsvTable | None:
         if name not in self.tables:
@@ -288,15 +252,3 @@ class _Loader:
                 zip(letters, error_map.nodes, strict=True) for unit in (DEG if letter in ROTARY else 1.0,)))
             return error_map
         return replace(error_map, table=error_map.table - error_map.at(place)[0])
-
-
-def _period_fault(x: Floats, values: list[Floats], period: float, unit: float) -> tuple[str, str] | None:
-    """What keeps a table at x (file's units) from repeating: (message, hint)."""
-    span = float(x[-1] - x[0])
-    if span > period * (1.0 + CLOSES):
-        return f"the table spans {span:g}, more than its period {period:g}", "give one period"
-    apart = max(abs(float(v[0] - v[-1])) for v in values) / unit
-    if span > period * (1.0 - CLOSES) and apart > CLOSES:
-        return (f"first and last row are one place, but their values differ by {apart:.6g}",
-                "close the table: write the same values in both")
-    return None
