@@ -84,12 +84,13 @@ class Clt(Spelling):
 
     def begin(self, op: Operation) -> None:
         self.operation, t = op, op.tool
-        tilt = -atan2(op.frame.rotation[0, 2], op.frame.rotation[2, 2])
+        normal = op.frame.rotation[:, 2]
+        tilt = atan2(normal[0], normal[2])
         turns = [f"ROTABL/ {v:.15f},{a}AXIS,TABLE,CCLW" for a, v in zip("ABC", (0.0, tilt, 0.0), strict=True)]
         self.table = tilt
         self.lines += [f"OPFEATSTART/ {op.name}", f"CUTTER/ {self.text_of((t.diameter, 0, 0, 0, 0, t.length))},",
-                       f"LOAD/ TOOL,{t.number}", f"SPINDL/ {op.rpm},RPM, CLW", "COOLNT/ FLOOD", *turns,
-                       "MOVE_ATTRIB/LEADIN,1"]
+                       f"TLAXIS/ {','.join(f'{v:.6f}' for v in normal + 0.0)} ", f"LOAD/ TOOL,{t.number}",
+                       f"SPINDL/ {op.rpm},RPM, CLW", "COOLNT/ FLOOD", *turns, "MOVE_ATTRIB/LEADIN,1"]
 
     def local(self, point: Triple) -> Floats:
         assert self.operation is not None
@@ -109,8 +110,8 @@ class Clt(Spelling):
     def cycle(self, depth: float, clear: float, back: float, rate: float, step: float = 0.0) -> None:
         peck = f"PECKING,{self.text_of((step,))},{self.text_of((step,))}," if step else ""
         planes = f"{self.text_of((back,))} {self.text_of((back,))}"
-        self.lines.append(f"CYCLE/ DRILL,G98,{self.text_of((depth,))},{peck}{self.feed_unit},{self.text_of((rate,))},"
-                          f"{self.text_of((clear,))},{planes} DWELL,0.0")
+        self.lines += ["CYCLE/ ON ", f"CYCLE/ DRILL,G98,{self.text_of((depth,))},{peck}{self.feed_unit},"
+                       f"{self.text_of((rate,))},{self.text_of((clear,))},{planes} DWELL,0.0"]
 
     def cycle_off(self) -> None:
         self.lines.append("CYCLE/ OFF")

@@ -257,7 +257,7 @@ def test_catia_axis_system_and_operation_names() -> None:
 def test_clt_rotabl_is_in_radians() -> None:
     p = read("MOVE_ATTRIB/LEADIN\nUNIT/MM\nFEDRAT/1,MMPM\nGOTO/0,0,1\nROTABL/ 1.570796326794897,AAXIS,TABLE,CCLW\n"
              "GOTO/0,0,1\n")
-    assert p.tip[1] == pytest.approx([0, 1, 0], abs=1e-12)
+    assert p.tip[1] == pytest.approx([0, -1, 0], abs=1e-12)
 
 
 @pytest.mark.parametrize(("text", "dialect", "evidence"), [

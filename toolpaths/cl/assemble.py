@@ -10,10 +10,12 @@ import numpy as np
 from toolpaths.arrays import Array, Bools, Floats, Ints
 from toolpaths.cl.arcs import UNIT_ROUNDING, Records, arcs_of, unit
 from toolpaths.cl.build import Builder, Track
+from toolpaths.cl.heights import height_of, place
 from toolpaths.diagnostics import Severity
 from toolpaths.toolpath import Arcs, Cycle, FeedMode, Frame, Kind, Operation, Role, Tool, Toolpath
 
 NORMAL_ROUNDING = 1e-3
+AXIS_AGREES = 2e-3
 T = TypeVar("T")
 
 
@@ -42,12 +44,16 @@ def assemble(b: Builder) -> Toolpath:
         rows.tip *= b.scale
     normal, contact = _normals(b, rows)
     rows.axis = _checked_axis(b, rows)
+    height = height_of(rows.tip, rows.axis) if b.heights else None
     _to_part_frame(b, rows, normal, contact)
+    _check_world_axes(b, rows)
     _add_deltas(b, rows)
     role, kind, arc = _kinds(b, n)
     arcs = _arcs(b, rows, kind, arc)
     cycle = spread(b.cycle, n, np.int32)
     cycle[(role != Role.POINT) | (arc >= 0)] = -1
+    if height is not None:
+        cycle = place(b, rows.tip, rows.axis, height, cycle, rows.line)
     role[cycle >= 0] = Role.HOLE
     kind[cycle >= 0] = Kind.RAPID
     cycle, cycles = _used_cycles(b, cycle)
@@ -127,6 +133,17 @@ def _check_multax_off(b: Builder, rows: Rows, marks: dict[int, tuple[float, floa
             i, j, k = rows.axis[row].tolist()
             b.log.warning("cl.multax-off", f"points of three numbers after MULTAX/OFF keep the tool axis ({i:.6g}, {j:.6g}, "
                           f"{k:.6g}) of the point before", line, "state TLAXIS/0,0,1 where it is to be z")
+
+
+def _check_world_axes(b: Builder, rows: Rows) -> None:
+    """`.clt`: the tool axis of the first point after TLAXIS and ROTABL must be what TLAXIS says."""
+    ends = [*(row for row, _, _ in b.world_axes[1:]), len(rows)]
+    for (row, stated, line), end in zip(b.world_axes, ends, strict=False):
+        if row < end and not np.abs(rows.axis[row] - unit(np.array([stated]))[0]).max() <= AXIS_AGREES:
+            i, j, k = rows.axis[row].tolist()
+            b.log.error("cl.tlaxis", f"TLAXIS states the tool axis ({stated[0]:.6g}, {stated[1]:.6g}, {stated[2]:.6g}), by "
+                        f"ROTABL it is ({i:.6g}, {j:.6g}, {k:.6g}): no telling where the points are", line,
+                        "write the file anew in the CAM system")
 
 
 def _checked_axis(b: Builder, rows: Rows) -> Floats:

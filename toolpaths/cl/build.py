@@ -63,6 +63,18 @@ class Declared:
     tool: Track[int] = field(default_factory=lambda: Track(-1))
 
 
+@dataclass(frozen=True)
+class Heights:
+    """Planes of a cycle as heights (mm) over the origin of the system, along the tool axis; NaN: `Cycle.clearance` holds.
+
+    from_bottom: the GOTO is the hole's bottom
+    """
+
+    start: float
+    retract: float
+    from_bottom: bool
+
+
 class Extras:
     """Points that are not plain GOTO lines, as written; NaN where a record has no numbers of that kind."""
 
@@ -101,6 +113,8 @@ class Builder:
         self.maps: list[Map | None] = [None]
         self.map_index = {b"": 0}
         self.axis_marks: list[tuple[int, Triple]] = []
+        self.world_axes: list[tuple[int, Triple, int]] = []
+        """row, axis in the part frame and line of TLAXIS where ROTABL must agree with it (`.clt`)"""
         self.multax_off: list[tuple[int, int]] = []
         """row and line of MULTAX/OFF where the system does not say what the axis is then"""
         self.rapids: list[int] = []
@@ -112,6 +126,8 @@ class Builder:
         self.frame_index: dict[object, int] = {}
         self.operations: list[Operation] = []
         self.cycles: list[Cycle] = []
+        self.heights: dict[int, Heights] = {}
+        """by cycle, where the file states its planes as heights"""
         self.turning: set[int] = set()
         self.declared: Declared | None = None
         self.zsurf: float | None = None
@@ -208,6 +224,11 @@ class Builder:
                 return statements[i].major == "GOTO"
         end = before[self.stop] if self.stop < len(before) else len(self.points)
         return end > self.fast
+
+    def next_statement_is(self, major: str) -> bool:
+        """True where the very next record is of that word, without a point before it."""
+        i = self.index + 1
+        return i < self.stop and self.program.statements[i].major == major and self.program.before[i] == self.fast
 
     def note_unknown(self, statement: Statement, word: str) -> None:
         """Count a word that the reader does not know."""

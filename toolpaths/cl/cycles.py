@@ -6,7 +6,8 @@ import json
 import math
 from dataclasses import dataclass, field, replace
 
-from toolpaths.cl.build import Builder
+from toolpaths.cl.build import Builder, Heights
+from toolpaths.cl.dialects import Planes
 from toolpaths.cl.feeds import UNITS, feed_in
 from toolpaths.cl.statements import Statement, Word
 from toolpaths.toolpath import Cycle, FeedMode
@@ -22,8 +23,6 @@ _RETRACT = frozenset({"RTRCTO", "RETURN"})
 _PECKS = frozenset({"STEP", "INCR", "PECKING", "1STPECK", "SUBPECK"})
 _OTHER = frozenset({"DIAMET", "TLANGL", "TIMES", "BACK", "OFFSET", "REPEAT", "PARAMS", "ORIENT", "CSKDIA", "PLUNGE"})
 _PLAIN = frozenset({"G98", "G99", "AUTO", "MANUAL", "ON", "REV", "", "SEC", "NEXT"})
-_START = ("RAPTO", "CLEAR")
-"""where both stand, RAPTO is the start plane"""
 _WORDS = "words"
 _LAST = "cycle"
 
@@ -35,7 +34,10 @@ class Values:
     kind: str
     words: tuple[Word, ...]
     depth: float = math.nan
+    rapto: float = math.nan
+    clear: float = math.nan
     clearance: float = math.nan
+    """start plane above the GOTO, of the two above it"""
     retract: float | None = math.nan
     feed: tuple[float, str] | None = None
     threads: float = math.nan
@@ -72,7 +74,10 @@ def cycle(b: Builder, s: Statement) -> None:
 
 
 def _again(b: Builder, s: Statement) -> None:
+    """CYCLE/ON arms the last cycle again; right before another cycle (`.clt`) it arms nothing."""
     last = b.memory.get(_LAST)
+    if len(s.words) == 1 and b.next_statement_is("CYCLE"):
+        return
     if not isinstance(last, Values):
         b.log.error("cl.cycle", "CYCLE/ON before any cycle", b.line)
         return
@@ -108,7 +113,8 @@ def _values(v: Values, words: tuple[Word, ...], b: Builder) -> Values:
         taken = _label(word, [float(x) for x in numbers], words[i] if i < len(words) else "", found, free, steps, empty,
                        strange)
         free.extend(float(x) for x in numbers[taken:])
-    found.pop("start", None)
+    if "clear" in found:
+        found.setdefault("rapto", math.nan)
     if steps:
         found["steps"] = tuple(steps)
     return replace(v, **found, free=tuple(free), empty=tuple(empty), strange=tuple(strange))  # type: ignore[arg-type]
@@ -128,10 +134,7 @@ def _label(word: str, n: list[float], following: Word, found: dict[str, object],
     elif word in ("REV", "ON") and n:
         found["revolutions" if word == "REV" else "dwell"] = n[0]
     elif word in _SIMPLE and n:
-        if word != "CLEAR" or found.get("start") != "RAPTO":
-            found[_SIMPLE[word]] = n[0]
-        if word in _START:
-            found["start"] = word
+        found[_SIMPLE[word]] = n[0]
     elif word in _OTHER:
         return len(n)
     elif word not in _PLAIN and word not in KINDS and word not in _SIMPLE:
@@ -143,7 +146,7 @@ def _label(word: str, n: list[float], following: Word, found: dict[str, object],
     return min(1, len(n)) if word in _SIMPLE or word in ("DWELL", "REV") else 0
 
 
-_SIMPLE = {"FEDTO": "depth", "DEPTH": "depth", "RAPTO": "clearance", "CLEAR": "clearance", "TPI": "threads",
+_SIMPLE = {"FEDTO": "depth", "DEPTH": "depth", "RAPTO": "rapto", "CLEAR": "clear", "TPI": "threads",
            "PITCH": "pitch", "DIAMET": "diameter", "TLANGL": "angle"}
 
 
@@ -178,7 +181,7 @@ def _retract(word: str, n: list[float], following: Word, found: dict[str, object
 
 def _arm(b: Builder, v: Values) -> None:
     """Check what was stated and make the cycle current. `.clt` names pecking in a word of its own."""
-    v = _placed(v)
+    v = _with_planes(b, _placed(v, b.dialect.planes))
     if v.kind == "DRILL" and "PECKING" in v.words and any(v.steps):
         v = replace(v, kind="DEEP")
     b.memory[_LAST] = v
@@ -195,19 +198,39 @@ def _arm(b: Builder, v: Values) -> None:
     b.cycles.append(_made(b, v))
 
 
-def _placed(v: Values) -> Values:
-    """Numbers without a word by their place: depth, then feed where no unit stands, then clearance and retract."""
+def _placed(v: Values, planes: Planes) -> Values:
+    """Numbers without a word by their place: depth, then feed where no unit stands, then clearance and retract; in the
+    posts that tell RAPTO from the clearance, this stands beside it, and goes without a retract plane."""
     free = list(v.free)
     found: dict[str, object] = {}
     if math.isnan(v.depth) and free:
         found["depth"], found["placed"] = free.pop(0), True
         if v.feed is None and free:
             found["feed"] = (free.pop(0), "")
-    if math.isnan(v.clearance) and free:
-        found["clearance"] = free.pop(0)
-    if v.retract is not None and math.isnan(v.retract) and free:
+    if math.isnan(v.clear) and free and (math.isnan(v.rapto) or planes in _COUNTED_DOWN):
+        found["clear"] = free.pop(0)
+    if planes not in _COUNTED_DOWN and v.retract is not None and math.isnan(v.retract) and free:
         found["retract"] = free.pop(0)
     return replace(v, **found, free=())  # type: ignore[arg-type]
+
+
+_COUNTED_DOWN = (Planes.BOTTOM, Planes.DOWN, Planes.OVER_BOTTOM)
+
+
+def _with_planes(b: Builder, v: Values) -> Values:
+    """Start and retract plane above the hole's top (`Planes`); those that hang on the hole's height, `heights` finds."""
+    planes = b.dialect.planes
+    down = 0.0 if math.isnan(v.rapto) else v.rapto
+    if planes is Planes.RELATIVE or math.isnan(v.clear):
+        return replace(v, clearance=v.clear if math.isnan(v.rapto) else v.rapto)
+    if planes is Planes.DOWN:
+        return replace(v, clearance=v.clear - down)
+    if planes is Planes.OVER_BOTTOM:
+        return replace(v, clearance=v.clear - v.depth - down, retract=v.clear - v.depth)
+    start = v.clear - down if planes is Planes.BOTTOM else v.clear if math.isnan(v.rapto) else math.nan
+    bottom = planes is Planes.BOTTOM
+    b.heights[len(b.cycles)] = Heights(start * b.scale, v.clear * b.scale, bottom)
+    return replace(v, clearance=0.0 if math.isnan(v.rapto) or bottom else v.rapto, retract=0.0)
 
 
 def _depth(b: Builder, v: Values) -> float:

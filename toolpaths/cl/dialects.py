@@ -3,9 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import Enum
 
 from toolpaths.cl.statements import COMMENT, DATA_COMMENT, Program, Statement
 from toolpaths.units import MM_PER_INCH
+
+
+class Planes(Enum):
+    """How a CYCLE states the planes above a hole: c by CLEAR or by place, r by RAPTO, d the depth.
+
+    Four are those of Autodesk's posts for APT (onCycle and onCyclePoint of "CAMplete APT" and "MANUSnc APT", "Common ISO
+    4343 APT", "MfgSuite APT", "Generative Machining APT"), which take c from the clearance height of the operation.
+    """
+
+    RELATIVE = "the GOTO is the hole's top; the tool starts r above it, or c where r is not stated"
+    HEIGHTS = "the GOTO is the hole's top; the tool starts r above it and goes back to the height c over the origin"
+    BOTTOM = "the GOTO is the hole's bottom; the tool starts at the height c - r over the origin and goes back to c"
+    DOWN = "the GOTO is the hole's top; the tool starts c - r above it and goes back to c"
+    OVER_BOTTOM = "the GOTO is the hole's top, c counts from its bottom; the tool starts c - r above that, goes back to c"
 
 
 @dataclass(frozen=True)
@@ -19,7 +34,9 @@ class Dialect:
         six_common: points with six numbers are in the common frame, three in the local one, whose z is then their axis
         insert_is_comment: INSERT is for people
         rotabl_radians: angles of ROTABL are rad
+        frame_turns: ROTABL turns the frame of the points by its angle, not the table
         axis_reset: the axis is the local z again at each operation
+        planes: how cycles state their planes
     """
 
     name: str
@@ -30,7 +47,9 @@ class Dialect:
     six_common: bool = False
     insert_is_comment: bool = False
     rotabl_radians: bool = False
+    frame_turns: bool = False
     axis_reset: bool = False
+    planes: Planes = Planes.RELATIVE
 
 
 DIALECTS = {d.name: d for d in (
@@ -40,12 +59,18 @@ DIALECTS = {d.name: d for d in (
     Dialect("creo", "PTC Creo", six_common=True),
     Dialect("solidworks", "SolidWorks CAM .apt", six_common=True, insert_is_comment=True),
     Dialect("solidworks-clt", "SolidWorks CAM .clt", arc_sense=0, six_common=True, insert_is_comment=True,
-            rotabl_radians=True),
+            rotabl_radians=True, frame_turns=True),
     Dialect("catia", "CATIA"),
     Dialect("ncl", "NCL"),
+    Dialect("camplete", "Autodesk APT for CAMplete or MANUSnc", arc_sense=-1, planes=Planes.HEIGHTS),
+    Dialect("mfgsuite", "Autodesk APT for MfgSuite", planes=Planes.DOWN),
+    Dialect("autodesk-iso", "Autodesk Common ISO 4343 APT", planes=Planes.BOTTOM),
+    Dialect("hsmworks", "HSMWorks Generative Machining APT", planes=Planes.OVER_BOTTOM),
 )}
 
 _MAJORS = (
+    ("camplete", ("MCS",)),
+    ("mfgsuite", ("MCSYS",)),
     ("solidworks-clt", ("MOVE_ATTRIB", "OPFEATSTART", "OPFEATEND", "BOX")),
     ("solidworks", ("CSI_SET_FLUTE_LENGTH", "CSI_SET_EXTENSION_LENGTH", "TRNTYP", "SETUP")),
     ("nx", ("TOOL PATH", "END-OF-PATH", "TLDATA", "MSYS", "PAINT")),
@@ -55,7 +80,7 @@ _MAJORS = (
 )
 _TEXTS = (("makino", "MAKINO-FF"), ("makino", "FF/CAM"),
           ("catia", "CATIA"), ("catia", "TOOLCHANGEBEGINNING"), ("nx", "CENTERLINE DATA"),
-          ("ncl", "NCL"), ("creo", "PRO/NC"), ("creo", "PRO/CLFILE"), ("creo", "CREO"))
+          ("ncl", "NCL"), ("ncl", "NCLCAM"), ("creo", "PRO/NC"), ("creo", "PRO/CLFILE"), ("creo", "CREO"))
 OWN = DATA_COMMENT + "TOOLPATH"
 """Mark of the text that `write` makes."""
 
@@ -82,6 +107,9 @@ def detect(program: Program) -> tuple[Dialect, str]:
     for major, line in majors.items():
         if major.startswith(DATA_COMMENT):
             return DIALECTS["creo"], f"{major} in line {line}"
+    autodesk = _autodesk(program)
+    if autodesk is not None:
+        return autodesk
     if text is not None:
         return DIALECTS[text[0]], text[1]
     return DIALECTS["generic"], "no word that only one system writes"
@@ -92,6 +120,23 @@ def _clockwise_word(program: Program) -> int:
         if statement.major == "CIRCLE" and statement.has("CLOCKWISE", "COUNTERCLOCKWISE"):
             return line
     return 0
+
+
+_ISO_LOADTL = 4
+
+
+def _autodesk(program: Program) -> tuple[Dialect, str] | None:
+    """Posts of Autodesk that write no word of their own: PARTNO in quotes, and the form of LOADTL; MODE in ISO 4343."""
+    first = {s.major: s for s in reversed(program.first)}
+    load = first.get("LOADTL")
+    if load is None or "PARTNO" not in first or not first["PARTNO"].body.startswith("'"):
+        return None
+    line = program.first[load]
+    if load.has("IN") and load.has("LENGTH") and load.has("OSETNO"):
+        return DIALECTS["hsmworks"], f"LOADTL with IN, LENGTH and OSETNO in line {line}"
+    if "MODE" in first and len(load.numbers) == len(load.words) == _ISO_LOADTL:
+        return DIALECTS["autodesk-iso"], f"MODE, PARTNO in quotes and LOADTL of four numbers in line {line}"
+    return None
 
 
 def _by_text(program: Program) -> tuple[str, str] | None:

@@ -1,4 +1,4 @@
-"""Systems of the file and how points in them reach the part frame: MSYS, CSYS, CAMERA, CATIA axis rows, TRANS."""
+"""Systems of the file and how points in them reach the part frame: MSYS, CSYS, MCS, CATIA axis rows, TRANS, ROTABL."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from toolpaths.toolpath import Frame
 from toolpaths.units import DEG
 
 _ORTHOGONAL = 2e-3
+_WORK_OFFSET = "work offset"
 
 
 def set_system(b: Builder, name: str, matrix: Floats, origin: Floats) -> None:
@@ -80,6 +81,51 @@ def csys(b: Builder, s: Statement) -> None:
         set_system(b, "CSYS", *found)
 
 
+def mcs(b: Builder, s: Statement) -> None:
+    """MCS/X axis, Y axis, Z axis, origin (12 numbers): the work plane of Autodesk's posts for CAMplete and MANUSnc."""
+    if len(s.numbers) != 12:
+        b.log.error("cl.frame", f"MCS has {len(s.numbers)} numbers, it takes X, Y and Z axis and origin (12)", b.line)
+        return
+    axes = np.array(s.numbers).reshape(4, 3)
+    matrix = rotation_of(axes[0], axes[1])
+    if matrix is None or float(matrix[:, 2] @ axes[2]) < 1.0 - _ORTHOGONAL:
+        b.log.error("cl.frame", "the axes of MCS are not three right-handed unit vectors at right angles", b.line)
+        return
+    set_system(b, "MCS", matrix, axes[3] * b.scale)
+
+
+def mcsys(b: Builder, s: Statement) -> None:
+    """MCSYS/NUM, offset, POINT, origin, VECTOR, X axis, VECTOR, Y axis: the work plane of Autodesk's post for MfgSuite."""
+    n = [w for w in s.words if isinstance(w, float)]
+    shape = tuple(w for w in s.words if isinstance(w, str))
+    if shape != ("NUM", "POINT", "VECTOR", "VECTOR") or len(n) != 10:
+        b.log.error("cl.frame", f"MCSYS/{s.body[:60]}: it takes NUM, a number, POINT, origin, VECTOR, X axis, VECTOR, "
+                    "Y axis", b.line)
+        return
+    work_offset(b, n[0])
+    matrix = rotation_of(np.array(n[4:7]), np.array(n[7:10]))
+    if matrix is None:
+        b.log.error("cl.frame", "the axes of MCSYS are not unit vectors at right angles", b.line)
+    else:
+        set_system(b, "MCSYS", matrix, np.array(n[1:4]) * b.scale)
+
+
+def zero(b: Builder, s: Statement) -> None:
+    """ZERO/n: the work offset of the control that the points after it are in."""
+    if len(s.numbers) != 1:
+        b.log.error("cl.frame", f"ZERO/{s.body}: it takes the number of a work offset", b.line)
+    else:
+        work_offset(b, s.numbers[0])
+
+
+def work_offset(b: Builder, number: float) -> None:
+    """The file tells nothing of where work offsets lie, so all its points must be in one."""
+    first = b.memory.setdefault(_WORK_OFFSET, number)
+    if first != number:
+        b.log.error("cl.work-offset", f"points in work offset {number:g} after points in {first:g}: nothing in the file "
+                    "says how one lies to the other", b.line, "write one file for each work offset", key=_WORK_OFFSET)
+
+
 def trans(b: Builder, s: Statement) -> None:
     """TRANS/x, y, z: points from here on are shifted by it; the next TRANS replaces it."""
     if len(s.numbers) != 3 or len(s.words) != 3:
@@ -122,6 +168,8 @@ def comment(b: Builder, s: Statement) -> None:
                 set_system(b, "CATIA0", *found)
 
 
+_RADIAN_ROUNDING = 5.1e-7
+_SAME_FRAME = 1e-9
 _AXES = {"AAXIS": 0, "BAXIS": 1, "CAXIS": 2, "A": 0, "B": 1, "C": 2, "XAXIS": 0, "YAXIS": 1, "ZAXIS": 2}
 _TURNED = frozenset({"creo", "solidworks-clt"})
 _NO_AXIS_WORDS = frozenset({"CLW", "CCLW", "INCR", "ATANGL", "TABLE", "HEAD", "NEXT", "ROTREF", "AXIS"})
@@ -129,7 +177,8 @@ _NO_AXIS_WORDS = frozenset({"CLW", "CCLW", "INCR", "ATANGL", "TABLE", "HEAD", "N
 
 def rotate(b: Builder, s: Statement) -> None:
     """ROTATE, ROTABL, ROTHED: an event. In Creo and `.clt`, points after it are in the turned frame, unless a system
-    (CSYS) follows, which then says where they are: turning the table by a makes the frame turn by -a in the part."""
+    (CSYS) follows, which then says where they are. In Creo the table turns by the angle, so the frame turns by less that
+    angle in the part; in `.clt` the frame itself does, as the TLAXIS of the same operation shows."""
     b.event(s.major, tuple(w for w in s.words if w != ""))
     axis = next((_AXES[w] for w in s.words if isinstance(w, str) and w in _AXES), None)
     angle = s.after("ATANGL", "INCR")
@@ -143,8 +192,14 @@ def rotate(b: Builder, s: Statement) -> None:
     if axis is None:
         b.log.error("cl.table", f"{s.major}/{s.body}: no axis named", b.line, "AAXIS, BAXIS or CAXIS")
         return
-    turn = angle if b.dialect.rotabl_radians and s.major != "ROTATE" else angle * DEG
+    turn = _radians(angle) if b.dialect.rotabl_radians and s.major != "ROTATE" else angle * DEG
     _turn(b, axis, -turn if s.has("CLW") else turn, not s.has("ATANGL"))
+
+
+def _radians(angle: float) -> float:
+    """An angle written with six decimals of a radian: the thousandth of a degree that rounds to it, where there is one."""
+    near = round(angle / DEG, 3) * DEG
+    return near if abs(near - angle) <= _RADIAN_ROUNDING else angle
 
 
 def _turn(b: Builder, axis: int, angle: float, incremental: bool) -> None:
@@ -152,9 +207,20 @@ def _turn(b: Builder, axis: int, angle: float, incremental: bool) -> None:
     step = angle if incremental else angle - angles[axis]
     angles[axis] += step
     if step != 0.0:
-        b.turned = b.turned @ rotation(np.eye(3)[axis], np.array([-step]))[0]
+        sense = 1.0 if b.dialect.frame_turns else -1.0
+        b.turned = b.turned @ rotation(np.eye(3)[axis], np.array([sense * step]))[0]
         _refresh(b)
+    if b.dialect.frame_turns:
+        use_world_axis(b)
 
 
-HANDLERS = {"MSYS": msys, "CSYS": csys, "$$->CSYS": csys, "CAMERA": csys, "TRANS": trans, "ORIGIN": origin,
+def use_world_axis(b: Builder) -> None:
+    """`.clt`: points of three numbers are along the z of the turned frame, along TLAXIS where the frame is not turned."""
+    stated = b.world_axes[-1][1] if b.world_axes else (0.0, 0.0, 1.0)
+    turned = bool(np.abs(b.turned - np.eye(3)).max() > _SAME_FRAME)
+    b.axis_marks.append((b.row, (0.0, 0.0, 1.0) if turned else stated))
+
+
+HANDLERS = {"MSYS": msys, "CSYS": csys, "$$->CSYS": csys, "CAMERA": csys, "MCS": mcs, "MCSYS": mcsys, "ZERO": zero,
+            "TRANS": trans, "ORIGIN": origin,
             "ROTATE": rotate, "ROTABL": rotate, "ROTHED": rotate}

@@ -5,13 +5,17 @@ from __future__ import annotations
 import math
 
 from toolpaths.cl.build import NO_NUMBERS, Builder, Triple
+from toolpaths.cl.dialects import Planes
 from toolpaths.cl.feeds import feed_in
+from toolpaths.cl.frames import use_world_axis
 from toolpaths.cl.statements import Statement
 from toolpaths.toolpath import Role
 
 _NAN = math.nan
 _CLOCKWISE = {"CLOCKWISE": -1, "CLW": -1, "COUNTERCLOCKWISE": 1, "CCLW": 1}
 _NX_COUNT = 11
+_HALF_TURN = 1e-3
+"""degrees"""
 _NO_LONG_CIRCLES = ("generic", "solidworks")
 """Systems that write fewer numbers themselves: 11 are those of NX, which others (CAMplete's APT) have taken over."""
 
@@ -88,11 +92,14 @@ def rapid(b: Builder, s: Statement) -> None:
 
 
 def tlaxis(b: Builder, s: Statement) -> None:
-    """The tool axis of points of three numbers from here on."""
+    """The tool axis of points of three numbers from here on. In `.clt` it is that in the part, whatever ROTABL says."""
     if len(s.numbers) != 3:
         b.log.error("cl.tlaxis", f"TLAXIS/{s.body}: only three numbers are understood", b.line)
-        return
-    b.axis_marks.append((b.row, _triple(s.numbers, 0)))
+    elif b.dialect.frame_turns:
+        b.world_axes.append((b.row, _triple(s.numbers, 0), b.line))
+        use_world_axis(b)
+    else:
+        b.axis_marks.append((b.row, _triple(s.numbers, 0)))
 
 
 def zsurf(b: Builder, s: Statement) -> None:
@@ -153,6 +160,9 @@ def movarc(b: Builder, s: Statement) -> None:
     angle, numbers = s.after("ANGLE"), _labelled(s) if s.has("CENTER") else s.numbers
     if len(numbers) != 7 or (angle is None and not s.has("CENTER")):
         b.log.error("cl.circle", f"MOVARC/{s.body[:60]}: it takes center, axis, radius, ANGLE, degrees", b.line)
+    elif b.dialect.planes is Planes.OVER_BOTTOM and angle is not None and abs(abs(angle) - 180.0) < _HALF_TURN:
+        b.log.error("cl.circle", f"MOVARC/...ANGLE, {angle:g}: this post does not tell the sense of half a turn", b.line,
+                    "write the file with the post Common ISO 4343 APT")
     elif not b.next_is_point():
         b.log.error("cl.circle-end", "MOVARC is not followed by a GOTO, which gives its end", b.line)
     else:

@@ -64,9 +64,20 @@ def feature(b: Builder, s: Statement) -> None:
     begin_operation(b, f"FEATNO {s.body}")
 
 
+def named_operation(b: Builder, s: Statement) -> None:
+    """CSI_TOOL_PATH/name (CAMplete, MANUSnc) and OPNAME/'name' (MfgSuite) begin an operation."""
+    begin_operation(b, s.body.strip("' "))
+
+
+def apply(b: Builder, s: Statement) -> None:
+    """APPLY/MILL or TURN (MfgSuite)."""
+    if s.has("TURN"):
+        b.turning.add(b.operation.now)
+
+
 def partno(b: Builder, s: Statement) -> None:
     """The name of the part; the first one counts."""
-    b.name = b.name or s.body
+    b.name = b.name or s.body.strip("'")
 
 
 def comment(b: Builder, s: Statement) -> None:
@@ -223,5 +234,5 @@ HANDLERS: dict[str, Callable[[Builder, Statement], None]] = {
     "LETTER": nothing, "UNITS": nothing, "UNIT": nothing, "MULTAX": multax, "FINI": fini, "SET": mode,
     "$$->TOOLPATH": own_header, "$$->FRAME": own_item, "$$->TOOL": own_item, "$$->OPERATION": own_item,
     "$$->USE": own_use, "$$->SPLINE": own_spline, **dict.fromkeys(EVENTS, plain_event), "SPINDL": spindl, "DWELL": dwell,
-    "MODE": mode,
+    "MODE": mode, "CSI_TOOL_PATH": named_operation, "OPNAME": named_operation, "APPLY": apply,
 }

@@ -131,20 +131,37 @@ def turret(b: Builder, s: Statement) -> None:
 def toolno(b: Builder, s: Statement) -> None:
     """CATIA: TOOLNO/number, kind[, diameter[, corner radius[, length]]] describes, LOADTL loads.
 
-    The longer forms follow a table of the user: their numbers are left alone, CUTTER has the sizes.
+    The longer forms follow a table of the user: their numbers are left alone, CUTTER has the sizes. MfgSuite: TOOLNO/number,
+    kind, OSETNO, length register, radius register.
     """
     if s.has(*TURNING):
         b.turning.add(b.operation.now)
     kind = next((w for w in s.words if isinstance(w, str) and w), "")
     size = [w for w in s.words[1:] if isinstance(w, float)]
     fields: dict[str, Any] = {"shape": kind} if kind else {}
-    if kind not in TURNING and size and len(s.words) <= _SHORT_TOOLNO:
+    register = s.after("OSETNO")
+    if kind not in TURNING and size and register is None and len(s.words) <= _SHORT_TOOLNO:
         fields["diameter"] = size[0] * b.scale
         if len(size) > 1:
             fields["corner_radius"] = size[1] * b.scale
     if s.numbers and 0 <= s.numbers[0] < _MAX_NUMBER:
         _renumber(_state(b), int(s.numbers[0]))
-    describe(b, **fields)
+    describe(b, **fields, **_register_field(b, register))
+
+
+def _register_field(b: Builder, register: float | None) -> dict[str, Any]:
+    found = _register(b, register)
+    return {} if found is None else {"length_register": int(found)}
+
+
+def cutcom(b: Builder, s: Statement) -> None:
+    """An event, but for CUTCOM/ON, LENGTH, register, which names the length register of the tool (MfgSuite), and CUTCOM/ON
+    right before the CUTCOM that says the side."""
+    register = s.after("LENGTH")
+    if register is not None and s.words[0] == "ON":
+        describe(b, **_register_field(b, register))
+    elif s.words != ("ON",) or not b.next_statement_is("CUTCOM"):
+        b.event("CUTCOM", tuple(w for w in s.words if w != ""))
 
 
 def tldata(b: Builder, s: Statement) -> None:
@@ -198,4 +215,5 @@ def select(b: Builder, s: Statement) -> None:
 
 
 HANDLERS = {"LOADTL": loadtl, "LOAD": load, "TURRET": turret, "TOOLNO": toolno, "TLDATA": tldata, "CUTTER": cutter,
-            "$$->CUTTER": cutter, "CSI_SET_FLUTE_LENGTH": flute_length, "TPRINT": tprint, "SELECT": select}
+            "$$->CUTTER": cutter, "CSI_SET_FLUTE_LENGTH": flute_length, "TPRINT": tprint, "SELECT": select,
+            "CUTCOM": cutcom}

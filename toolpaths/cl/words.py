@@ -50,7 +50,7 @@ SILENT = frozenset({
     "PAINT", "PPWORD", "PPFUN", "SYN", "OPFEATSTART", "OPFEATEND", "MOVE_ATTRIB", "BOX", "SETUP", "SWITCH", "DISPLY",
     "AUTOPS", "PSIS", "INTOL", "OUTTOL", "TOLER", "LINTOL", "MACHIN", "ALIGN", "PLABEL", "CLPRNT", "NOPOST", "PLOT",
     "TRNTYP", "CSI_SET_EXTENSION_LENGTH", "MCHTOL", "CUT", "START_OP", "END_OP", "TOOLPATH_TYPE",
-    "ARCSLP", "CSI_TOOL_PATH",
+    "ARCSLP", "MCS2", "START", "OPERATION", "BEGIN", "MATERL", "TCP", "CSI_PATH_TOLERANCE", "CSI_SET_PATH_PARAM",
 })
 """Display, listing, tolerance and bookkeeping: no motion, nothing for the machine."""
 

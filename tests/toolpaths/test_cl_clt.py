@@ -1,0 +1,72 @@
+"""SolidWorks CAM .clt: ROTABL turns the frame of the points, TLAXIS says where to, CYCLE/ON stands before each cycle."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from toolpaths.cl.read import ReadResult, read_bytes
+from toolpaths.diagnostics import Severity
+
+HEAD = "UNITS/ MM \nCUTTER/ 6.0,0.0,3.0,0.0,0.0,0.0,80.0,\nFEDRAT/ MMPM,100.0\n"
+TURNS = ("ROTABL/ {},AAXIS,TABLE,CCLW \nROTABL/ {},BAXIS,TABLE,CCLW \nROTABL/ {},CAXIS,TABLE,CCLW \n")
+
+
+def feature(axis: str, turns: tuple[float, float, float], points: str) -> str:
+    back = "".join(f"ROTABL/ {-a:.6f},{w}AXIS,TABLE,CCLW \n" for w, a in zip("CBA", reversed(turns), strict=True))
+    return (f"TLAXIS/ {axis} \nOPFEATSTART/Mill1-Pocket1\n" + TURNS.format(*(f"{a:.6f}" for a in turns)) + points + back
+            + "OPFEATEND/Mill1-Pocket1\n")
+
+
+def read(text: str, *codes: str) -> ReadResult:
+    found = read_bytes(HEAD + text + "FINI \n")
+    assert found.dialect == "solidworks-clt"
+    assert [d.code for d in found.diagnostics if d.severity is not Severity.INFO] == list(codes)
+    return found
+
+
+def test_the_axis_by_rotabl_is_that_of_tlaxis() -> None:
+    """A by 90 degrees: local z is -y of the part, local y its z; the file has six decimals of a radian."""
+    p = read(feature("0.0,-1.0,0.0", (math.pi / 2, 0.0, 0.0), "GOTO/ 67.5,120.5,25.0 \nGOTO/ 67.5,120.5,-20.0 \n")
+             + feature("0.0,0.0,1.0", (0.0, 0.0, 0.0), "GOTO/ 1.0,2.0,3.0 \n")).toolpath
+    assert p.tip == pytest.approx(np.array([[67.5, -25, 120.5], [67.5, 20, 120.5], [1, 2, 3]]), abs=1e-9)
+    assert p.axis == pytest.approx(np.array([[0, -1, 0], [0, -1, 0], [0, 0, 1]]), abs=1e-12)
+
+
+def test_angles_that_are_no_thousandth_of_a_degree_stay_as_written() -> None:
+    p = read(feature("0.0,-0.479426,0.877583", (0.5, 0.0, 0.0), "GOTO/ 0.0,0.0,100.0 \n")).toolpath
+    assert p.tip[0] == pytest.approx([0, -100 * math.sin(0.5), 100 * math.cos(0.5)], abs=1e-9)
+
+
+def test_turns_about_two_axes_follow_each_other() -> None:
+    """B by 90 degrees and then C by 90: local z is the part's x."""
+    p = read(feature("1.0,0.0,0.0", (0.0, math.pi / 2, math.pi / 2), "GOTO/ 1.0,2.0,3.0 \n")).toolpath
+    assert p.tip[0] == pytest.approx([3, 1, 2], abs=1e-9)
+
+
+@pytest.mark.parametrize("axis", ["0.0,1.0,0.0", "0.0,0.0,1.0"])
+def test_an_axis_that_contradicts_rotabl_is_refused(axis: str) -> None:
+    read(feature(axis, (math.pi / 2, 0.0, 0.0), "GOTO/ 1.0,2.0,3.0 \n"), "cl.tlaxis")
+
+
+def test_a_tool_axis_without_a_turned_table_holds_as_it_stands() -> None:
+    p = read(feature("0.0,-1.0,0.0", (0.0, 0.0, 0.0), "GOTO/ 1.0,2.0,3.0 \n")).toolpath
+    assert (p.tip[0].tolist(), p.axis[0].tolist()) == ([1, 2, 3], [0, -1, 0])
+
+
+DRILL = "CYCLE/ DRILL,G98,12.0,PECKING,5.0,2.0,MMPM,187.0,3.0,46.0 46.0 DWELL,0.0 \n"
+
+
+def test_cycle_on_before_a_cycle_arms_nothing() -> None:
+    points = f"RAPID/ \nGOTO/ 0.0,0.0,25.0 \nCYCLE/ ON \n{DRILL}GOTO/ 0.0,0.0,0.0 \nCYCLE/ OFF \n"
+    found = read(feature("0.0,0.0,1.0", (0.0, 0.0, 0.0), points + points))
+    assert [(c.kind, c.depth, c.clearance, c.retract, c.steps) for c in found.toolpath.cycles] == [
+        ("DEEP", 12, 3, 46, (5.0, 2.0))] * 2
+    assert "cl.cycle-empty" not in [d.code for d in found.diagnostics]
+
+
+def test_cycle_on_before_a_point_needs_a_cycle() -> None:
+    read(feature("0.0,0.0,1.0", (0.0, 0.0, 0.0), f"CYCLE/ ON \nGOTO/ 0.0,0.0,0.0 \n{DRILL}GOTO/ 1.0,0.0,0.0 \n"
+                 "CYCLE/ OFF \n"), "cl.cycle")
