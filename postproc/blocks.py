@@ -13,7 +13,7 @@ from postproc.linearise import family_turns, linearise
 from postproc.modes import WordFrame
 from postproc.moves import Moves, Phase
 from postproc.word_arcs import PLANE_COLUMNS, WordArcs, word_arcs
-from toolpaths.arrays import Array, Bools, Floats, Ints
+from toolpaths.arrays import Array, Bools, Floats, Ints, joined, repeated, taken
 from toolpaths.rotations import angle_between
 from toolpaths.shape import Curves
 from toolpaths.toolpath import Kind
@@ -45,11 +45,11 @@ class Builder:
             return
         self.count += n
         for name, value in (("q", q), ("move", move), ("u", u), ("code", code), ("seconds", seconds),
-                            ("home", np.full(n, home)), ("frame", np.full(n, self.frame(frame))),
-                            ("plane", np.full(n, 17, dtype=np.int8) if plane is None else plane),
-                            ("ccw", np.zeros(n, dtype=bool) if ccw is None else ccw),
-                            ("center", np.zeros((n, 3)) if center is None else center),
-                            ("state", np.zeros((n, self.joints), dtype=bool) if state is None else state)):
+                            ("home", repeated(home, n)), ("frame", repeated(self.frame(frame), n)),
+                            ("plane", repeated(np.int8(17), n) if plane is None else plane),
+                            ("ccw", repeated(False, n) if ccw is None else ccw),
+                            ("center", repeated(np.zeros(3), n) if center is None else center),
+                            ("state", repeated(np.zeros(self.joints, dtype=bool), n) if state is None else state)):
             self.columns[name].append(value)
 
     def link(self, frame: WordFrame, q: Floats, move: int, home: bool = False, state: Array | None = None,
@@ -61,8 +61,9 @@ class Builder:
                  np.full(n, np.nan) if seconds is None else seconds, home, state=state)
 
     def joined(self, name: str) -> Array:
-        """One column of all blocks."""
-        return np.concatenate(self.columns[name]) if self.columns[name] else np.zeros(0)
+        """One column of all blocks, whose parts are forgotten."""
+        parts = self.columns.pop(name)
+        return joined(parts) if parts else np.zeros(0)
 
 
 def rapid_codes(control: Control, kin: Kinematics, q0: Floats, q1: Floats, tolerance: float,
@@ -149,8 +150,8 @@ def _emit(out: Builder, frame: WordFrame, moves: Moves, rows: Ints, kin: Kinemat
                               axis_tolerance, level[rapid])
     seconds = np.where(cutting, seconds, np.where(code == TRAVERSE, np.nan, 0.0))
     turned = np.where(keep & ~first, np.concatenate([[0.0], u[:-1]]) * curves.sweep[curve], 0.0)
-    center = _turned_centers(arcs, curve, turned)
-    out.add(frame, q, row, u, code, seconds, False, arcs.plane[curve], arcs.ccw[curve], center)
+    center = _turned_centers(arcs, curve, turned) if keep.any() else repeated(np.zeros(3), len(curve))
+    out.add(frame, q, row, u, code, seconds, False, taken(arcs.plane, curve), taken(arcs.ccw, curve), center)
 
 
 def _turned_centers(arcs: WordArcs, curve: Ints, angle: Floats) -> Floats:

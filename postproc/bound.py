@@ -44,8 +44,7 @@ class Stretch:
 
     def take(self, rows: slice | Bools) -> Stretch:
         """Some of the blocks."""
-        every = np.arange(len(self))[rows]
-        return Stretch(self.curves.take(every), self.u0[rows], self.u1[rows], self.q0[rows], self.q1[rows],
+        return Stretch(self.curves.take(rows), self.u0[rows], self.u1[rows], self.q0[rows], self.q1[rows],
                        (self.start[0][rows], self.start[1][rows]), (self.end[0][rows], self.end[1][rows]))
 
 

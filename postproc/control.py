@@ -8,6 +8,7 @@ tip in the frame of a plane.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
@@ -244,6 +245,15 @@ class Control:
             return tip, kin.forward(q)[1], q
         axis = kin.forward(q0)[1]
         return tip, axis, kin.inverse(tip, axis)[0]
+
+    def bent(self, q0: Floats, q1: Floats, places: Floats, kin: Kinematics) -> Iterator[Floats]:
+        """Joints (N, J) at each of the fractions `places` of the way from q0 to q1 (N, J), under the law "tcp"."""
+        tip0, tip1 = kin.forward(q0)[0], kin.forward(q1)[0]
+        for t in places.tolist():
+            if kin.slides_affine:
+                yield self.slides_for(kin, tip0 + t * (tip1 - tip0), q0 + t * (q1 - q0))
+            else:
+                yield self.between(q0, q1, np.full(len(q0), t), kin)[2]
 
     def _toward(self, q0: Floats, q1: Floats, t: Floats, rapid: Bools | None) -> Floats:
         """Joints at fraction t (N,) of the time: all at once, or each axis at its own rapid speed until it is there."""

@@ -9,7 +9,7 @@ from machines.machine import Limits
 from postproc.joints.lattice import Run
 from postproc.joints.plan import Solution, plan_runs
 from postproc.joints.tracks import TRAVEL_SLACK, distance, wrap
-from toolpaths.arrays import Floats, Ints
+from toolpaths.arrays import Floats, Ints, repeated
 from toolpaths.rotations import angle_between
 
 __all__ = ["TRAVEL_SLACK", "Solution", "branch_of", "nearest_solution", "reachable_axes", "solve", "wrap"]
@@ -24,6 +24,8 @@ def reachable_axes(kin: Kinematics, axis: Floats, tolerance: float) -> tuple[Flo
     nearest = kin.nearest_axis(axis)
     off = angle_between(nearest, axis)
     use = (off > 0.0) & (off <= tolerance)
+    if not use.any():
+        return axis, repeated(0.0, len(axis))
     return np.where(use[:, None], nearest, axis), np.where(use, off, 0.0)
 
 

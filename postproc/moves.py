@@ -6,6 +6,7 @@ This is the reference that output is made from and that read-back compares with.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from postproc.holes import Phase as Phase
 from postproc.holes import hole_legs
 from postproc.setup import Placement, SetupFile
 from postproc.stated_feeds import feeds_of
-from toolpaths.arrays import Array, Bools, Floats, Ints
+from toolpaths.arrays import Array, Bools, Floats, Ints, as_slice, repeated, shared, taken
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.rotations import angle_between
 from toolpaths.shape import Curves
@@ -67,7 +68,7 @@ class Moves:
             return self
         arcs = Arcs(placement.points(self.arcs.center), placement.directions(self.arcs.normal), self.arcs.radius,
                     self.arcs.sweep)
-        return replace(self, tip=placement.points(self.tip), axis=placement.directions(self.axis), arcs=arcs,
+        return replace(self, tip=placement.points(self.tip), axis=shared(placement.directions(self.axis)), arcs=arcs,
                        spin=_spin_in(placement, self.axis, self.spin))
 
     def without_pecks(self) -> Moves:
@@ -75,20 +76,29 @@ class Moves:
         keep = self.phase != Phase.PECK
         if bool(keep.all()):
             return self
-        columns = {name: getattr(self, name)[keep] for name in self.__dataclass_fields__ if name != "arcs"}
+        names = [name for name in self.__dataclass_fields__ if name != "arcs"]
+        columns: dict[str, Any] = {name: taken(getattr(self, name), keep) for name in names}
         return replace(self, **columns)
 
     def curves(self) -> Curves:
         """The reference motion of every row; linked rows stand still at their end."""
-        first = np.maximum(np.arange(len(self)) - 1, 0)
-        first = np.where(self.link, np.arange(len(self)), first)
-        is_arc = (self.arc >= 0) & ~self.link
-        if len(self.arcs):
-            index = np.maximum(self.arc, 0)
-            center, normal, sweep = self.arcs.center[index], self.arcs.normal[index], self.arcs.sweep[index]
-        else:
-            center, normal, sweep = np.zeros_like(self.tip), np.zeros_like(self.tip), np.zeros(len(self))
-        return Curves(self.tip[first], self.tip, self.axis[first], self.axis, is_arc, center, normal, sweep)
+        every = np.arange(len(self))
+        first = np.where(self.link, every, np.maximum(every - 1, 0))
+        return Curves(self.tip[first], self.tip, taken(self.axis, first), self.axis, *self._arcs_of(slice(None)))
+
+    def run(self, first: int, last: int) -> Curves:
+        """Those of the rows behind `first` to before `last`, none of them linked, without a copy of tips and axes."""
+        ends, starts = slice(first + 1, last), slice(first, last - 1)
+        return Curves(self.tip[starts], self.tip[ends], self.axis[starts], self.axis[ends], *self._arcs_of(ends))
+
+    def _arcs_of(self, rows: slice) -> tuple[Bools, Floats, Floats, Floats]:
+        """(is_arc, center, normal, sweep) of `Curves`."""
+        arc = self.arc[rows]
+        is_arc = (arc >= 0) & ~self.link[rows]
+        if not is_arc.any():
+            return is_arc, repeated(np.zeros(3), len(arc)), repeated(np.zeros(3), len(arc)), repeated(0.0, len(arc))
+        index = np.maximum(arc, 0)
+        return is_arc, self.arcs.center[index], self.arcs.normal[index], self.arcs.sweep[index]
 
 
 def _spin_in(placement: Placement, axis: Floats, spin: Floats) -> Floats:
@@ -184,21 +194,24 @@ def build_moves(toolpath: Toolpath, setup: SetupFile, axis_tolerance: float) -> 
     # A position to return to may be in the material: the way down to it is made at the feed of the cut.
     again = back & (toolpath.role[pose] != Role.START)
     kind = np.where(back, np.where(again, Kind.FEED, Kind.RAPID), toolpath.kind[row]).astype(np.int8)
-    tip = toolpath.tip[pose]
+    there = as_slice(pose)
+    tip = toolpath.tip[there]
     arc = np.where(back, -1, toolpath.arc[row])
     hole, phase = np.full(len(row), -1), np.zeros(len(row), dtype=np.int8)
     feed, seconds = np.where(back & ~again, np.nan, feed[row]), np.where(back & ~again, np.nan, seconds[row])
     if len(holes):
         where = np.flatnonzero(toolpath.role[row] == Role.HOLE)
         flat = [leg for of_hole in legs for leg in of_hole]
+        tip = tip.copy()
         tip[where] = [point for point, _, _ in flat]
         phase[where] = [p for _, p, _ in flat]
         kind[where] = [k for _, _, k in flat]
         hole[where] = np.repeat(np.arange(len(holes)), counts[holes])
         feed[where] = np.where(kind[where] == Kind.FEED, feed[where], np.nan)
-    moves = Moves(tip, toolpath.axis[pose], kind, feed, seconds, arc, row, hole, phase, toolpath.cycle[row],
-                  link[row] & first, toolpath.tool[row], toolpath.line[row],
-                  np.full(len(row), np.nan) if toolpath.spin is None else toolpath.spin[pose], toolpath.arcs)
+    moves = Moves(tip, taken(toolpath.axis, there), kind, feed, shared(seconds), shared(arc), row, shared(hole),
+                  shared(phase), taken(toolpath.cycle, row), link[row] & first, taken(toolpath.tool, row),
+                  toolpath.line[as_slice(row)],
+                  repeated(np.nan, len(row)) if toolpath.spin is None else toolpath.spin[pose], toolpath.arcs)
     return moves, diagnostics + _missing_feeds(toolpath, moves) + _opposite_axes(toolpath, moves) + _lone_arcs(
         toolpath, moves)
 

@@ -116,7 +116,7 @@ def build_path(modes: OutputModes, kinematics: Callable[[int], Kinematics], move
     frame, kin = modes.base, kinematics(int(moves.tool[0]))
     diagnostics: list[Diagnostic] = []
     worst, turns = np.zeros(2), [np.zeros(0, dtype=np.int64)]
-    starts, reference = np.flatnonzero(moves.link), moves.curves()
+    starts = np.flatnonzero(moves.link)
     for first, last in zip(starts, [*starts[1:], len(moves)], strict=True):
         before, kin = kin, kinematics(int(moves.tool[first]))
         rows = np.arange(first, last)
@@ -133,7 +133,7 @@ def build_path(modes: OutputModes, kinematics: Callable[[int], Kinematics], move
         if not link.clear:
             diagnostics.append(faults.no_way(moves, int(first), file))
         if len(rows) > 1:
-            curves = reference.take(rows[1:])
+            curves = moves.run(int(first), int(last))
             left, turned, broken = add_run(out, run.frame, kin, moves, rows[1:], _with_axes(curves, run.axis), run.q,
                                            tolerance, run.left)
             worst = np.maximum(worst, left)
@@ -147,7 +147,7 @@ def build_path(modes: OutputModes, kinematics: Callable[[int], Kinematics], move
     if state is not None:
         _add_end(out, modes, frame, kin, space, state, len(moves) - 1)
     out.begin[len(moves)] = out.count
-    columns = {k: out.joined(k) for k in out.columns}
+    columns = {k: out.joined(k) for k in [*out.columns]}
     path = _of_given(columns, out, plan, len(given), np.concatenate(turns), worst)
     diagnostics += joint_faults.planned(plan, machine, given, file)
     return path, faults.merged(diagnostics) + faults.rapid_as_feed(path.code, path.move, path.seconds, given, file)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from postproc.moves import Moves
-from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.arrays import Bools, Floats, Ints, as_slice, repeated, shared, taken
 from toolpaths.toolpath import Arcs, Kind
 
 
@@ -47,12 +47,13 @@ class Refined:
 
 def cut(moves: Moves, origin: Ints, u0: Floats, u1: Floats, tip: Floats, axis: Floats) -> Refined:
     """Parts u0..u1 (R,) of the moves `origin` (R,), which end at tips and axes (R, 3)."""
-    part = (u0 > 0.0) | (u1 < 1.0)
-    columns: dict[str, Any] = {name: getattr(moves, name)[origin] for name in moves.__dataclass_fields__ if name != "arcs"}
+    part, given = (u0 > 0.0) | (u1 < 1.0), as_slice(origin)
+    names = [name for name in moves.__dataclass_fields__ if name != "arcs"]
+    columns: dict[str, Any] = {name: taken(getattr(moves, name), given) for name in names}
     arc, arcs = _arcs(moves, columns["arc"], u1 - u0, part)
-    columns |= {"tip": tip, "axis": axis, "seconds": columns["seconds"] * (u1 - u0), "link": columns["link"] & (u0 == 0.0),
-                "arc": arc}
-    return Refined(replace(moves, **columns, arcs=arcs), origin, u0, u1, np.zeros(len(origin), dtype=np.bool_))
+    columns |= {"tip": tip, "axis": axis, "seconds": shared(columns["seconds"] * (u1 - u0)),
+                "link": columns["link"] & (u0 == 0.0), "arc": arc}
+    return Refined(replace(moves, **columns, arcs=arcs), origin, u0, u1, repeated(False, len(origin)))
 
 
 def _arcs(moves: Moves, arc: Ints, share: Floats, part: Bools) -> tuple[Ints, Arcs]:

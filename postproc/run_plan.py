@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from postproc.joints.plan import Solution, Wishes, plan_runs
 from postproc.joints.spin import held_joints
 from postproc.moves import Moves
 from postproc.refined import Refined, cut, with_rewinds
-from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.arrays import Bools, Floats, Ints, shared
 from toolpaths.shape import Curves
 from toolpaths.toolpath import Kind
 from toolpaths.units import DEG
@@ -55,7 +55,7 @@ class RunPlan:
     Attributes:
         left: (R,) rad of the axis tolerance that linearising may use
         events: passages by singular directions, with the moves (first, last) of each
-        solutions: of the runs of the CL file, in order
+        solutions: of the runs of the CL file, in order, without their joints, which are in `q`
     """
 
     refined: Refined
@@ -79,24 +79,26 @@ class _Part:
 
     def poses(self) -> tuple[Floats, Floats]:
         """Tips and axes (N, 3) that the run goes through."""
+        if self.led.is_whole:
+            return self._tip, self.axis
         return (np.concatenate([self.first[:, :3], self.led.curves.end]),
                 np.concatenate([self.first[:, 3:], self.led.curves.axis1]))
 
     @property
     def first(self) -> Floats:
         """(1, 6) the pose that the run begins at."""
-        return np.concatenate([self._tip, self.axis[:1]], axis=1)
+        return np.concatenate([self._tip[:1], self.axis[:1]], axis=1)
 
     _tip: Floats
+    """(N, 3) as given"""
 
 
 def plan_moves(machine: Machine, kinematics: Callable[[int], Kinematics], moves: Moves, manner: Manner,
                progress: Callable[[int], None] | None = None) -> RunPlan:
     """The joints of all moves (in the table frame), run by run as `moves.link` divides them."""
-    starts, reference = np.flatnonzero(moves.link), moves.curves()
-    parts = []
+    starts, parts = np.flatnonzero(moves.link), []
     for first, last in zip(starts, [*starts[1:], len(moves)], strict=True):
-        parts.append(_part(machine, kinematics(int(moves.tool[first])), moves, reference, np.arange(first, last), manner))
+        parts.append(_part(machine, kinematics(int(moves.tool[first])), moves, int(first), int(last), manner))
     runs = [_run(part, moves, manner, machine.home) for part in parts]
     found = plan_runs(runs, machine.limits, machine.home, manner.wishes, manner.may_rewind, progress)
     if manner.may_rewind and any(s.outside for s in found):
@@ -106,15 +108,15 @@ def plan_moves(machine: Machine, kinematics: Callable[[int], Kinematics], moves:
     return _together(moves, parts, found, manner)
 
 
-def _part(machine: Machine, kin: Kinematics, moves: Moves, reference: Curves, rows: Ints, manner: Manner) -> _Part:
-    axis, moved = reachable_axes(kin, moves.axis[rows], AXIS_SHARE * manner.tolerance)
-    curves = reference.take(rows[1:])
+def _part(machine: Machine, kin: Kinematics, moves: Moves, first: int, last: int, manner: Manner) -> _Part:
+    rows, curves = np.arange(first, last), moves.run(first, last)
+    axis, moved = reachable_axes(kin, moves.axis[first:last], AXIS_SHARE * manner.tolerance)
     curves = Curves(curves.start, curves.end, axis[:-1], axis[1:], curves.is_arc, curves.center, curves.normal, curves.sweep)
     led = whole(curves)
     if len(curves) and any(kin.rotary):
         allowed = LEAD_SHARE * (manner.tolerance - float(moved.max()))
         led = lead_past(kin, curves, _seconds(moves, rows[1:], curves), allowed, machine.limits.velocity)
-    return _Part(kin, rows, axis, moved, led, moves.tip[rows[:1]])
+    return _Part(kin, rows, axis, moved, led, moves.tip[first:last])
 
 
 def _seconds(moves: Moves, rows: Ints, curves: Curves) -> Floats:
@@ -155,23 +157,31 @@ def _finer(part: _Part, solution: Solution) -> _Part:
 def _together(moves: Moves, parts: list[_Part], found: list[Solution], manner: Manner) -> RunPlan:
     """All runs one after the other, cut where there are rewinds."""
     owner = [np.append(0, 1 + p.led.parent) for p in parts]
-    poses = [p.poses() for p in parts]
     refined = cut(moves, np.concatenate([p.rows[k] for p, k in zip(parts, owner, strict=True)]),
-                  np.concatenate([np.append(0.0, p.led.u0) for p in parts]),
-                  np.concatenate([np.append(1.0, p.led.u1) for p in parts]),
-                  np.concatenate([tip for tip, _ in poses]), np.concatenate([axis for _, axis in poses]))
+                  shared(np.concatenate([np.append(0.0, p.led.u0) for p in parts])),
+                  shared(np.concatenate([np.append(1.0, p.led.u1) for p in parts])),
+                  *_joined(moves, parts))
     begin = np.cumsum([0, *(len(k) for k in owner)])
     rewinds = [(int(b) + r.row, r) for b, s in zip(begin, found, strict=False) for r in s.rewinds]
     rows = np.array([row for row, _ in rewinds], dtype=np.int64)
     refined = with_rewinds(refined, rows, np.array([r.cuts for _, r in rewinds], dtype=np.bool_), manner.feed)
     q, singular = np.concatenate([s.q for s in found]), np.concatenate([s.singular for s in found])
-    moved = np.concatenate([p.moved[k] for p, k in zip(parts, owner, strict=True)])
-    left = np.repeat([_left(p, manner) for p in parts], np.diff(begin))
+    moved = shared(np.concatenate([p.moved[k] for p, k in zip(parts, owner, strict=True)]))
+    left = shared(np.repeat([_left(p, manner) for p in parts], np.diff(begin)))
     if rewinds:
         q = np.insert(q, rows + 1, np.stack([r.after for _, r in rewinds]), axis=0)
         singular, moved, left = (np.insert(x, rows + 1, x[rows]) for x in (singular, moved, left))
     events = tuple((int(p.rows[1 + e.first]), int(p.rows[1 + e.last]), e) for p in parts for e in p.led.events)
-    return RunPlan(refined, q, singular, moved, left, events, tuple(found))
+    solutions = tuple(replace(s, q=q[:0], singular=singular[:0]) for s in found)
+    return RunPlan(refined, q, singular, moved, left, events, solutions)
+
+
+def _joined(moves: Moves, parts: list[_Part]) -> tuple[Floats, Floats]:
+    """Tips and axes (R, 3) of all runs."""
+    poses, whole = [p.poses() for p in parts], all(p.led.is_whole for p in parts)
+    tip = moves.tip if whole else np.concatenate([tip for tip, _ in poses])
+    same = whole and all(not p.moved.any() for p in parts)
+    return tip, moves.axis if same else shared(np.concatenate([axis for _, axis in poses]))
 
 
 def _left(part: _Part, manner: Manner) -> float:

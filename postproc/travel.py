@@ -8,6 +8,7 @@ import numpy as np
 
 from machines.kinematics.base import Kinematics
 from postproc.control import Control
+from postproc.groups import groups
 from postproc.joint_path import TRAVEL_SLACK
 from postproc.moves import Moves
 from postproc.path import ARC, Path
@@ -16,17 +17,21 @@ from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.units import DEG
 
+PART = 50_000
+"""blocks that are looked at together"""
 
-def _arc_extremes(path: Path, law: Control, before: Floats, k: Ints, low: Floats, high: Floats) -> None:
-    """Widen the joints `low`, `high` (K, J) of the arc blocks k to where they are extreme between the ends.
+
+def _arc_extremes(path: Path, law: Control, k: Ints, at_start: Floats, low: Floats, high: Floats) -> None:
+    """Widen the joints `low`, `high` (K, J) of the arc blocks k (K,) to where they are extreme between the ends; they begin
+    at joints `at_start` (K, J).
 
     Rotary joints stand still, so that the slides are a linear function of the words X, Y, Z. On the circle first cos a +
     across sin a of the plane each is extreme where its derivative vanishes; what runs along the axis of the arc is added
     whole.
     """
     kin, slides = law.machine.kinematics, law.slides
-    q0 = before[k][:, slides]
-    slides_of = np.linalg.inv(kin.jacobian(before[k])[:, :3][:, :, slides]) @ np.linalg.inv(law.tip_to_words(kin, before[k]))
+    q0 = at_start[:, slides]
+    slides_of = np.linalg.inv(kin.jacobian(at_start)[:, :3][:, :, slides]) @ np.linalg.inv(law.tip_to_words(kin, at_start))
     step = np.linalg.solve(slides_of, (path.q[k][:, slides] - q0)[..., None])[..., 0]
     for plane, (i, j) in PLANE_COLUMNS.items():
         rows = np.flatnonzero(path.plane[k] == plane)
@@ -44,7 +49,7 @@ def _arc_extremes(path: Path, law: Control, before: Floats, k: Ints, low: Floats
             angle = np.mod(np.arctan2(s, p) + extra, 2.0 * np.pi)
             value = q0[rows] + p * (np.cos(angle) - 1.0) + s * np.sin(angle)
             passed = (angle <= sweep[:, None]) & (np.hypot(p, s) > 0.0)
-            at = np.ix_(k[rows], slides)
+            at = np.ix_(rows, slides)
             low[at] = np.where(passed, np.minimum(low[at], value + np.minimum(rise, 0.0)), low[at])
             high[at] = np.where(passed, np.maximum(high[at], value + np.maximum(rise, 0.0)), high[at])
 
@@ -52,48 +57,62 @@ def _arc_extremes(path: Path, law: Control, before: Floats, k: Ints, low: Floats
 def check_travel(path: Path, moves: Moves, control: Control, kinematics: Callable[[int], Kinematics],
                  file: str = "") -> tuple[list[Diagnostic], dict[str, tuple[float, float]]]:
     """(excesses as errors, extents of each axis in mm or degrees)."""
-    low, high = extremes(path, moves, control, kinematics)
     machine, limits = control.machine, control.machine.limits
+    lowest, highest = np.full(len(limits.lower), np.inf), np.full(len(limits.lower), -np.inf)
+    beyond: list[tuple[Ints, Floats, Floats]] = []
+    for first in range(0, len(path), PART):
+        rows = np.arange(first, min(first + PART, len(path)))
+        low, high = extremes(path, moves, control, kinematics, rows)
+        lowest, highest = np.minimum(lowest, low.min(axis=0)), np.maximum(highest, high.max(axis=0))
+        bad = (np.maximum(limits.lower - low, high - limits.upper) > TRAVEL_SLACK).any(axis=1)
+        beyond.append((rows[bad], low[bad], high[bad]))
+    rows, low, high = (np.concatenate(column) for column in zip(*beyond, strict=True))
     diagnostics, extents = [], {}
     for j, name in enumerate(machine.axis_names):
         unit = 1.0 / DEG if machine.rotary[j] else 1.0
-        extents[name] = (float(low[:, j].min() * unit), float(high[:, j].max() * unit))
+        extents[name] = (float(lowest[j] * unit), float(highest[j] * unit))
         over = np.maximum(limits.lower[j] - low[:, j], high[:, j] - limits.upper[j])
-        bad = np.flatnonzero(over > TRAVEL_SLACK)
-        if len(bad):
-            diagnostics.append(_excess(path, moves, control, j, low, high, over, bad, file))
+        bad = over > TRAVEL_SLACK
+        if bad.any():
+            diagnostics.append(_excess(path, moves, control, j, rows[bad], low[bad, j], high[bad, j], over[bad], file))
     return diagnostics, extents
 
 
-def extremes(path: Path, moves: Moves, control: Control,
-             kinematics: Callable[[int], Kinematics]) -> tuple[Floats, Floats]:
-    """(lowest, highest) joints (K, J) of each block.
+def extremes(path: Path, moves: Moves, control: Control, kinematics: Callable[[int], Kinematics],
+             rows: Ints | None = None) -> tuple[Floats, Floats]:
+    """(lowest, highest) joints (K, J) of each block, or of each of `rows` (K,).
 
     Straight joints are extreme at their ends and in arcs. Where the control runs the kinematics joints bend between the
     ends: there the blocks are sampled.
     """
-    before = np.concatenate([control.machine.home[None, :], path.q[:-1]])
-    low, high = np.minimum(before, path.q), np.maximum(before, path.q)
-    tool = moves.tool[path.move]
-    for law, k in path.by_control():
-        arcs = k[path.code[k] == ARC]
+    rows = np.arange(len(path)) if rows is None else rows
+    end = path.q[rows]
+    before = np.where((rows == 0)[:, None], control.machine.home, path.q[np.maximum(rows - 1, 0)])
+    low, high = np.minimum(before, end), np.maximum(before, end)
+    frame, tool = path.frame[rows], moves.tool[path.move[rows]]
+    for k in groups(frame):
+        law = path.frames[int(frame[k[0]])].control
+        arcs = k[path.code[rows[k]] == ARC]
         if len(arcs) and law.machine.kinematics.slides_affine:
-            _arc_extremes(path, law, before, arcs, low, high)
+            low_arc, high_arc = low[arcs], high[arcs]
+            _arc_extremes(path, law, rows[arcs], before[arcs], low_arc, high_arc)
+            low[arcs], high[arcs] = low_arc, high_arc
         for index in np.unique(tool[k]) if law.tip_law else ():
-            kin, part = kinematics(int(index)), k[tool[k] == index]
-            for t in np.linspace(0.1, 0.9, 9):
-                _, _, q = law.between(before[part], path.q[part], np.full(len(part), t), kin)
+            part = k[tool[k] == index]
+            for q in law.bent(before[part], end[part], np.linspace(0.1, 0.9, 9), kinematics(int(index))):
                 low[part], high[part] = np.fmin(low[part], q), np.fmax(high[part], q)
     return low, high
 
 
-def _excess(path: Path, moves: Moves, control: Control, j: int, low: Floats, high: Floats, over: Floats, bad: Ints,
+def _excess(path: Path, moves: Moves, control: Control, j: int, bad: Ints, low: Floats, high: Floats, over: Floats,
             file: str) -> Diagnostic:
+    """Axis j goes beyond its travel in the blocks `bad` (K,), to `low`, `high`, by `over` (K,)."""
     machine = control.machine
     rotary = machine.rotary[j]
     unit, name = (1.0 / DEG, "degrees") if rotary else (1.0, "mm")
-    worst = bad[over[bad].argmax()]
-    value = high[worst, j] if high[worst, j] > machine.limits.upper[j] + TRAVEL_SLACK else low[worst, j]
+    at = int(over.argmax())
+    worst = bad[at]
+    value = high[at] if high[at] > machine.limits.upper[j] + TRAVEL_SLACK else low[at]
     lower, upper = machine.limits.lower[j] * unit, machine.limits.upper[j] * unit
     lines = np.unique(moves.line[path.move[bad]])
     first = int(moves.line[path.move[worst]])

@@ -8,7 +8,7 @@ import numpy as np
 
 from machines.kinematics.base import Kinematics
 from postproc.control import Control
-from toolpaths.arrays import Array, Bools, Floats, Ints
+from toolpaths.arrays import Array, Bools, Floats, Ints, repeated
 from toolpaths.shape import Curves
 
 PLANE_COLUMNS = {17: (0, 1), 18: (2, 0), 19: (1, 2)}
@@ -39,11 +39,13 @@ class WordArcs:
 def word_arcs(control: Control, kin: Kinematics, curves: Curves, q0: Floats, q1: Floats) -> WordArcs:
     """Which of the curves, run at fixed rotary joints between q0 and q1 (N, J), are arcs in a plane of the words."""
     n = len(curves)
+    rows = np.flatnonzero(curves.is_arc)
+    if not len(rows):
+        return _no_arcs(n)
     keep, center = np.zeros(n, dtype=bool), np.zeros((n, 3))
     plane, ccw = np.full(n, 17, dtype=np.int8), np.zeros(n, dtype=bool)
     parts = np.ones(n, dtype=np.int64)
-    rows = np.flatnonzero(curves.is_arc)
-    if len(rows) and control.tips_straight and (control.xyz >= 0).all():
+    if control.tips_straight and (control.xyz >= 0).all():
         arc = curves.take(rows)
         rotary = np.array(kin.rotary)
         fixed = (q0[rows][:, rotary] == q1[rows][:, rotary]).all(axis=1) & (arc.axis0 == arc.axis1).all(axis=1)
@@ -65,6 +67,10 @@ def word_arcs(control: Control, kin: Kinematics, curves: Curves, q0: Floats, q1:
         center[rows] = np.einsum("nij,nj->ni", to_words, arc.center - arc.start)
         parts[rows] = np.maximum(np.ceil(arc.sweep / (2.0 * np.pi) - 1e-9), 1).astype(np.int64)
     return WordArcs(keep, plane, ccw, center, parts)
+
+
+def _no_arcs(n: int) -> WordArcs:
+    return WordArcs(*(repeated(one, n) for one in (False, np.int8(17), False, np.zeros(3), 1)))
 
 
 def _well_shaped(arc: Curves) -> Bools:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,50 @@ Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 Bools = npt.NDArray[np.bool_]
 Array = npt.NDArray[Any]
+
+
+def shared(values: Array) -> Array:
+    """The same rows; where all are bit for bit the first one, it is kept once and stands for all, read-only."""
+    if not len(values) or values.strides[0] == 0:
+        return values
+    if not (np.array_equal(_bits(values[-1:]), _bits(values[:1])) and (_bits(values) == _bits(values[:1])).all()):
+        return values
+    return repeated(values[0], len(values))
+
+
+def repeated(row: npt.ArrayLike, count: int) -> Array:
+    """`count` times the same row, which is kept once, read-only."""
+    one = np.array(row)
+    return np.broadcast_to(one, (count, *one.shape))
+
+
+def _bits(values: Array) -> Array:
+    return values if values.dtype.kind != "f" else np.ascontiguousarray(values).view(np.int64)
+
+
+def taken(values: Array, index: Array | slice) -> Array:
+    """Rows of an array; those of one row that is kept once (`shared`) are kept once again."""
+    if isinstance(index, slice) or not len(values) or values.strides[0] != 0:
+        return np.asarray(values[index])
+    count = int(np.count_nonzero(index)) if index.dtype == np.bool_ else len(index)
+    return np.broadcast_to(values[0], (count, *values.shape[1:]))
+
+
+def joined(parts: Sequence[Array]) -> Array:
+    """Arrays one behind the other; where all hold one and the same row, it is kept once."""
+    rows = [part[:1] for part in parts if len(part)]
+    if rows and all(not len(part) or part.strides[0] == 0 for part in parts):
+        ends = shared(np.concatenate(rows))
+        if ends.strides[0] == 0 or len(rows) == 1:
+            return repeated(ends[0], sum(map(len, parts)))
+    return np.concatenate(parts)
+
+
+def as_slice(index: Ints) -> Ints | slice:
+    """The same index; one that counts up by one is a slice, which copies nothing."""
+    if not len(index) or index[-1] - index[0] != len(index) - 1 or (np.diff(index) != 1).any():
+        return index
+    return slice(int(index[0]), int(index[-1]) + 1)
 
 
 def frozen(values: npt.ArrayLike, dtype: npt.DTypeLike, shape: tuple[int, ...], name: str) -> Array:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.arrays import Bools, Floats, Ints, taken
 from toolpaths.rotations import angle_between, slerp
 
 _EPS = 1e-12
@@ -42,9 +42,9 @@ class Curves:
     def __len__(self) -> int:
         return len(self.start)
 
-    def take(self, index: Ints) -> Curves:
-        """The curves with these indices, in this order."""
-        return Curves(*(getattr(self, name)[index] for name in self.__dataclass_fields__))
+    def take(self, index: Ints | Bools | slice) -> Curves:
+        """The curves with these indices, in this order; a slice copies nothing."""
+        return Curves(*(taken(getattr(self, name), index) for name in self.__dataclass_fields__))
 
     def at(self, u: Floats) -> tuple[Floats, Floats]:
         """(tip (N, 3), axis (N, 3)) at u (N,). The ends are the given ends to the last bit."""

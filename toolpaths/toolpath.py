@@ -7,7 +7,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from toolpaths.arrays import Array, Floats, frozen
+from toolpaths.arrays import Array, Floats, frozen, shared
 from toolpaths.diagnostics import Diagnostic
 
 
@@ -222,7 +222,7 @@ class Toolpath:
     def __post_init__(self) -> None:
         n = len(self.tip)
         for name, (dtype, tail) in _COLUMNS.items():
-            object.__setattr__(self, name, frozen(getattr(self, name), dtype, (n, *tail), f"Toolpath.{name}"))
+            object.__setattr__(self, name, shared(frozen(getattr(self, name), dtype, (n, *tail), f"Toolpath.{name}")))
         for name, tail in (("normal", (3,)), ("contact", (3,)), ("spin", ())):
             value = getattr(self, name)
             if value is not None:

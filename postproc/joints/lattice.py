@@ -15,7 +15,7 @@ import numpy as np
 from machines.kinematics.base import Kinematics
 from machines.machine import Limits
 from postproc.joints.tracks import TRAVEL_SLACK, TWO_PI, branches_of, following, wrap
-from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.arrays import Array, Bools, Floats, Ints
 
 _MANY = 1 << 30
 
@@ -56,12 +56,12 @@ class Lattice:
 
     values: Floats
     family: Bools
-    leads: Ints
+    leads: Array
     free: Bools
     inside: Bools
     wound: Ints
-    least: Ints
-    most: Ints
+    least: Array
+    most: Array
     limits: Limits
     rotary: Bools
     rest: Bools
@@ -147,10 +147,10 @@ def carried_on(angles: Floats) -> Floats:
     return result
 
 
-def _turns(values: Floats, lower: Floats, upper: Floats) -> tuple[Ints, Ints]:
+def _turns(values: Floats, lower: Floats, upper: Floats) -> tuple[Array, Array]:
     """(least, most) whole turns that bring values (..., W) into travel; least > most where none does."""
     with np.errstate(invalid="ignore"):
         least = np.ceil((lower - TRAVEL_SLACK - values) / TWO_PI)
         most = np.floor((upper + TRAVEL_SLACK - values) / TWO_PI)
     least, most = (np.where(np.isnan(values), none, turns) for none, turns in ((1.0, least), (0.0, most)))
-    return tuple(np.clip(x, -_MANY, _MANY).astype(np.int64) for x in (least, most))  # type: ignore[return-value]
+    return tuple(np.clip(x, -_MANY, _MANY).astype(np.int32) for x in (least, most))  # type: ignore[return-value]

@@ -18,7 +18,7 @@ import numpy as np
 from machines.kinematics.base import Kinematics
 from postproc.joints.poles import Pole, passages, poles_of, stretches
 from postproc.joints.taut import taut_string
-from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.arrays import Bools, Floats, Ints, repeated
 from toolpaths.rotations import angle_between
 from toolpaths.shape import Curves
 
@@ -64,12 +64,14 @@ class Led:
     u0: Floats
     u1: Floats
     events: tuple[Event, ...]
+    is_whole: bool = False
+    """the curves as they were given"""
 
 
 def whole(curves: Curves) -> Led:
     """The curves as they are."""
     n = len(curves)
-    return Led(curves, np.arange(n), np.zeros(n), np.ones(n), ())
+    return Led(curves, np.arange(n), repeated(0.0, n), repeated(1.0, n), (), True)
 
 
 def lead_past(kin: Kinematics, curves: Curves, seconds: Floats, tolerance: float, velocity: Floats) -> Led:

@@ -98,9 +98,10 @@ def plan_runs(runs: list[Run], limits: Limits, start: Floats, wishes: Wishes | N
         wrong = wrong_side(stage.lattice, dict(wishes.side))
         stage.value, stage.choices = cheapest(stage.lattice, stage.segments, end(stage), stage.rewinds, wrong)
         end = _before(stage)
-    solutions, at = [], start
-    for stage in stages:
-        solutions.append(_solution(stage, at))
+    solutions, at, end = [], start, _free_end
+    stages.reverse()
+    while stages:
+        solutions.append(_solution(stages.pop(), at))
         at = _last(solutions[-1].q, at)
     return solutions
 

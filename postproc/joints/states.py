@@ -8,7 +8,7 @@ from itertools import product
 import numpy as np
 
 from postproc.joints.lattice import Lattice
-from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.arrays import Array, Bools, Floats, Ints
 
 State = tuple[int, tuple[int, ...]]
 """branch, turns of each wound joint"""
@@ -76,7 +76,7 @@ def _structure(lattice: Lattice) -> Bools:
     return np.asarray((lattice.leads != own).any(axis=0) | lattice.free)
 
 
-def _windings(branch: int, least: Ints, most: Ints) -> list[State]:
+def _windings(branch: int, least: Array, most: Array) -> list[State]:
     return [(branch, turns) for turns in product(*(range(int(a), int(b) + 1) for a, b in zip(least, most, strict=True)))]
 
 

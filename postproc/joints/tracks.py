@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from machines.kinematics.base import Kinematics
-from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.arrays import Array, Bools, Floats
 from toolpaths.rotations import slerp
 
 TWO_PI = 2.0 * np.pi
@@ -61,16 +61,17 @@ def distance(a: Floats, b: Floats, rotary: Bools) -> Floats:
     return result
 
 
-def following(kin: Kinematics, tip: Floats, axis: Floats, branches: Floats, family: Bools) -> tuple[Ints, Bools]:
+def following(kin: Kinematics, tip: Floats, axis: Floats, branches: Floats,
+              family: Bools) -> tuple[Array, Bools]:
     """(B, N - 1) the branch that a branch of each pose leads to at the next, and (N - 1,) where it may change on the spot.
 
     It is the nearest where the step is small or one end is free; elsewhere it is found by walking there. It may change
     where the tool leaves the direction of a rotary axis.
     """
     count, n, _ = branches.shape
-    own = np.broadcast_to(np.arange(count)[:, None], (count, n - 1))
+    own = np.broadcast_to(np.arange(count, dtype=np.int8)[:, None], (count, n - 1))
     if count == 1 or n == 1 or bool(family.all()):
-        return own.copy(), np.zeros(n - 1, dtype=np.bool_)
+        return own, np.zeros(n - 1, dtype=np.bool_)
     rotary = np.array(kin.rotary)
     step = np.stack([[distance(branches[b, :-1], branches[c, 1:], rotary) for c in range(count)]
                      for b in range(count)])
@@ -84,7 +85,7 @@ def following(kin: Kinematics, tip: Floats, axis: Floats, branches: Floats, fami
     for b, i in np.argwhere(doubtful):
         end = _walk(kin, tip[i:i + 2], axis[i:i + 2], branches[b, i], int(b))
         best[b, i] = int(distance(end, branches[:, i + 1], rotary).argmin())
-    return best, there[:-1] & ~there[1:]
+    return best.astype(np.int8), there[:-1] & ~there[1:]
 
 
 def _walk(kin: Kinematics, tip: Floats, axis: Floats, q: Floats, branch: int) -> Floats:

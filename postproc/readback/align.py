@@ -46,18 +46,27 @@ def _fast() -> Callable[..., Any]:
     if not _compiled:
         for name in ("_apart", "_angle", "_turned", "_line_done", "_nearer"):
             globals()[name] = _jit(globals()[name])
-        _compiled.append(_jit(_walk))
+        _compiled.append(_jit(_walk, _signature()))
     return _compiled[0]
 
 
-def _jit(function: Callable[..., Any]) -> Callable[..., Any]:
+def _signature() -> Any:
+    """Of `_walk`: one for arrays of any layout, so that no file waits for a compiler that another did not."""
+    from numba import types
+
+    rows, numbers, kinds = (types.Array(kind, n, "A", readonly=True) for kind, n in (
+        (types.float64, 2), (types.float64, 1), (types.int8, 1)))
+    return (rows, rows, numbers, rows, rows, rows, rows, kinds, rows, rows, numbers, *[types.float64] * 4)
+
+
+def _jit(function: Callable[..., Any], signature: Any = None) -> Callable[..., Any]:
     """Compiled when first called; kept on disk where the package's folder can be written."""
     from numba import njit
 
     try:
-        return cast(Callable[..., Any], njit(function, cache=True))
+        return cast(Callable[..., Any], njit(signature, cache=True)(function))
     except RuntimeError:
-        return cast(Callable[..., Any], njit(function))
+        return cast(Callable[..., Any], njit(signature)(function))
 
 
 def _apart(a: Any, b: Any) -> Any:

@@ -129,6 +129,10 @@ class Canonical:
     drills: tuple[Drill, ...] = ()
     files: Files = ()
 
+    def without(self, letters: tuple[str, ...]) -> Canonical:
+        """The same without the words of some letters."""
+        return replace(self, words=self.words.take(~np.isin(self.words.letter, [ord(letter) for letter in letters])))
+
 
 def placed(found: list[Diagnostic], files: Files) -> list[Diagnostic]:
     """Diagnostics whose lines count through all files, with the file and line of each."""
@@ -153,11 +157,11 @@ def added(words: Words, new: list[tuple[int, str, float]], drop: Bools | None = 
     kept = words if drop is None else words.take(~drop)
     if not new:
         return kept
-    letter = np.concatenate([kept.letter, np.array([ord(n[1]) for n in new], dtype=np.uint8)])
-    value = np.concatenate([kept.value, np.array([n[2] for n in new])])
-    line = np.concatenate([kept.line, np.array([n[0] for n in new], dtype=np.int64)])
-    order = np.argsort(line, kind="stable")
-    return Words(letter[order], value[order], line[order], words.lines)
+    new = sorted(new, key=lambda n: n[0])
+    line = np.array([n[0] for n in new], dtype=np.int64)
+    behind = np.searchsorted(kept.line, line, side="right")
+    return Words(np.insert(kept.letter, behind, np.array([ord(n[1]) for n in new], dtype=np.uint8)),
+                 np.insert(kept.value, behind, [n[2] for n in new]), np.insert(kept.line, behind, line), words.lines)
 
 
 def offset_number(code: str) -> float:

@@ -32,6 +32,8 @@ from toolpaths.toolpath import Kind
 ALLOWED_SPEED = 1.02
 """share of the programmed feed above which a move counts as too fast (short blocks carry rounding)"""
 
+CHUNK = 50_000
+"""blocks that are sampled at a time, so that memory does not grow with the samples"""
 STILL = 1e-7
 """mm or degrees that come of reckoning, not of motion"""
 
@@ -182,22 +184,36 @@ def _radius_registers(job: Job) -> Floats:
 def check_travel(motion: Motion, executed: Executed, moves: Moves, owner: Ints, faults: Faults) -> list[Diagnostic]:
     """Travel of every axis at the ends of all blocks and between them, whatever the blocks are for."""
     limits, machine = executed.control.machine.limits, executed.control.machine
-    rows = np.arange(len(motion))
-    worst = np.full((len(rows), len(machine.axis_names)), -np.inf)
-    for t in executed.times(motion, rows):
-        q = executed.joints(motion, rows, t)
-        worst = np.fmax(worst, np.maximum(limits.lower - q, q - limits.upper))
+    slack = ROUNDING_SLACK / executed.control.unit
+    rows, worst = _beyond_travel(motion, executed, slack)
     result = []
     for j, name in enumerate(machine.axis_names):
-        unit, slack = executed.control.unit[j], ROUNDING_SLACK / executed.control.unit[j]
-        bad = np.flatnonzero(worst[:, j] > slack)
+        unit = executed.control.unit[j]
+        bad = np.flatnonzero(worst[:, j] > slack[j])
         if len(bad):
-            k = int(bad[worst[bad, j].argmax()])
+            at = int(bad[worst[bad, j].argmax()])
+            k = int(rows[at])
             line = int(moves.line[owner[k]]) if owner[k] < len(moves) else 0
             lower, upper = limits.lower[j] * unit, limits.upper[j] * unit
-            result.append(faults.error("verify.travel", f"axis {name} goes {worst[k, j] * unit:.4f} beyond its travel "
+            result.append(faults.error("verify.travel", f"axis {name} goes {worst[at, j] * unit:.4f} beyond its travel "
                                        f"{lower:g} to {upper:g}", line, int(motion.line[k]), len(bad)))
     return result
+
+
+def _beyond_travel(motion: Motion, executed: Executed, slack: Floats) -> tuple[Ints, Floats]:
+    """(blocks (K,) in which an axis goes more than its slack (J,) beyond its travel, by how much (K, J) all of them do)."""
+    limits, names = executed.control.machine.limits, executed.control.machine.axis_names
+    found, excess = [np.zeros(0, dtype=np.int64)], [np.zeros((0, len(names)))]
+    for first in range(0, len(motion), CHUNK):
+        rows = np.arange(first, min(first + CHUNK, len(motion)))
+        worst = np.full((len(rows), len(names)), -np.inf)
+        for t in executed.times(motion, rows):
+            q = executed.joints(motion, rows, t)
+            worst = np.fmax(worst, np.maximum(limits.lower - q, q - limits.upper))
+        bad = (worst > slack).any(axis=1)
+        found.append(rows[bad])
+        excess.append(worst[bad])
+    return np.concatenate(found), np.concatenate(excess)
 
 
 def check_smoothing(motion: Motion, job: Job, moves: Moves, owner: Ints, faults: Faults) -> list[Diagnostic]:
@@ -247,26 +263,34 @@ def block_seconds(motion: Motion, control: Control, by_radius: bool = False) -> 
     the feed (degrees where no linear axis moves). Inverse time
     counts whole blocks, in arcs 1/(minutes per radian) where the control has it so (`by_radius`).
     """
-    rows = np.arange(len(motion))
+    sweep, result = arc_sweeps(motion, control), np.empty(len(motion))
+    for first in range(0, len(motion), CHUNK):
+        rows = np.arange(first, min(first + CHUNK, len(motion)))
+        result[rows] = _seconds(motion, control, by_radius, rows, sweep[rows])
+    return result
+
+
+def _seconds(motion: Motion, control: Control, by_radius: bool, rows: Ints, sweep: Floats) -> Floats:
+    """Those of the blocks `rows` (K,), whose sweeps are `sweep` (K,)."""
     before, end = coordinates(motion, rows)
     step = end - before
     length = control.feed_length(step)
-    tips = np.flatnonzero(motion.frame > 0)
+    tips = np.flatnonzero(motion.frame[rows] > 0)
     if len(tips):
         length[tips] = control.under("tcp").feed_length(np.where(np.abs(step[tips]) > STILL, step[tips], 0.0))
-    sweep = arc_sweeps(motion, control)
     for plane, (i, j) in PLANE_COLUMNS.items():
-        k = np.flatnonzero(np.isfinite(sweep) & (motion.plane == plane))
+        k = np.flatnonzero(np.isfinite(sweep) & (motion.plane[rows] == plane))
         if len(k):
             columns = [int(control.xyz[i]), int(control.xyz[j])]
-            radius = np.linalg.norm(before[k][:, columns] - motion.center[k][:, (i, j)], axis=1)
+            radius = np.linalg.norm(before[k][:, columns] - motion.center[rows[k]][:, (i, j)], axis=1)
             rise = step[k, int(control.xyz[3 - i - j])]
             length[k] = np.hypot(radius * sweep[k], rise)
     linear = np.isfinite(sweep) | (step[:, control.slides] != 0.0).any(axis=1)
-    length = np.where(motion.inch & linear, length / INCH, length)
+    length = np.where(motion.inch[rows] & linear, length / INCH, length)
     share = np.where(np.isfinite(sweep), sweep, 1.0) if by_radius else 1.0
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray(np.where(motion.inverse, 60.0 * share / motion.feed, 60.0 * length / motion.feed))
+        feed = motion.feed[rows]
+        return np.asarray(np.where(motion.inverse[rows], 60.0 * share / feed, 60.0 * length / feed))
 
 
 def check_links(motion: Motion, executed: Executed, moves: Moves, owner: Ints, space: SafeSpace, tolerance: float,

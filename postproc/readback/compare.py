@@ -11,6 +11,7 @@ from postproc.moves import Moves, Phase
 from postproc.readback.align import align, unreached
 from postproc.readback.canonical import Canonical
 from postproc.readback.checks import (
+    CHUNK,
     block_seconds,
     check_holes,
     check_kinds,
@@ -27,14 +28,11 @@ from postproc.readback.rewinds import check_rewinds, rewinds
 from postproc.readback.slow import check_slow
 from postproc.readback.spins import check_spins
 from postproc.readback.taps import check_taps
-from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.arrays import Bools, Floats, Ints, shared
 from toolpaths.diagnostics import Diagnostic
 from toolpaths.rotations import angle_between
 from toolpaths.shape import Curves
 from toolpaths.units import DEG
-
-CHUNK = 50_000
-"""blocks that are sampled at a time, so that memory does not grow with the samples"""
 
 
 @dataclass(frozen=True)
@@ -62,7 +60,7 @@ def compare(motion: Motion, job: Job, executed: Executed, gcode: str = "", plann
     tolerance, axis_tolerance = job.options.tolerance, job.axis_tolerance
     moves, faults = job.moves.without_pecks(), Faults(job.toolpath.file, gcode)
     curves = moves.curves()
-    tip, axis = executed.poses(motion, np.arange(len(motion)), 1.0)
+    tip, axis = _ends(motion, executed)
     words = job.controller.format
     grain = max(1e-3, 1.5 * 10.0**-words.linear_decimals), max(1e-6, 1.5 * DEG * 10.0**-words.rotary_decimals)
     number = rewinds(motion, tip, axis, moves.tip, executed.control.rotary, (2.0 * tolerance, 2.0 * axis_tolerance))
@@ -95,19 +93,30 @@ def compare(motion: Motion, job: Job, executed: Executed, gcode: str = "", plann
     return Comparison(worst_tip, worst_axis, tip_line, axis_line, tip, axis, match, owner, tuple(diagnostics))
 
 
+def _ends(motion: Motion, executed: Executed) -> tuple[Floats, Floats]:
+    """(tip, axis) (E, 3) at the ends of all blocks."""
+    tip, axis = np.empty((len(motion), 3)), np.empty((len(motion), 3))
+    for at in range(0, len(motion), CHUNK):
+        rows = np.arange(at, min(at + CHUNK, len(motion)))
+        tip[rows], axis[rows] = executed.poses(motion, rows, 1.0)
+    return tip, shared(axis)
+
+
 def _kept(job: Job) -> float:
     """rad: what the correction of geometric errors may turn the tool by between blocks, 0 without errors."""
+    if job.errors is None:
+        return 0.0
     from postproc.compensation import SHARE
 
-    return 0.0 if job.errors is None else SHARE * job.axis_tolerance
+    return SHARE * job.axis_tolerance
 
 
 def _taken_up(job: Job, tip: Floats) -> Bools:
     """True (K,) for blocks that leave the tip, (K, 3), where it is although axes move: they take up lost motion."""
-    from postproc.compensation import SHARE
-
     if job.errors is None:
         return np.zeros(len(tip), dtype=np.bool_)
+    from postproc.compensation import SHARE
+
     way = np.linalg.norm(np.diff(tip, axis=0, prepend=np.inf), axis=1)
     return np.asarray(way <= SHARE * job.options.tolerance + 2.0 * job.rounding.tip)
 
@@ -148,9 +157,10 @@ def _deviations(motion: Motion, executed: Executed, moves: Moves, curves: Curves
     level = (moves.phase[owner[rows]] == Phase.POSITION) & executed.bent(motion, rows)
     for at in range(0, len(rows), CHUNK):
         part = slice(at, at + CHUNK)
-        curve = curves.take(owner[rows[part]])
+        here = rows[part]
+        curve = curves.take(owner[here])
         for t in SAMPLES:
-            tip, axis = executed.poses(motion, rows[part], t)
+            tip, axis = executed.poses(motion, here, t)
             guess = np.minimum(begin[part] + t * share[part], 1.0)
             d, e, _ = curve.deviation(tip, axis, guess, within)
             d = np.where(level[part], _off_level(curve, tip), d)
@@ -169,7 +179,8 @@ def _place(motion: Motion, executed: Executed, rows: Ints, owner: Ints, curves: 
         around = arc_sweeps(motion, executed.control)[rows[on]] * np.linalg.norm(arc.start - arc.center, axis=1)
         way = np.where(np.isnan(around), np.linalg.norm(end - begin, axis=1), around)
         length[on] = np.maximum(np.nan_to_num(way), 1e-9)
-    _, start, inverse = np.unique(owner[rows], return_index=True, return_inverse=True)
+    new = np.diff(owner[rows], prepend=-1) != 0
+    start, inverse = np.flatnonzero(new), np.cumsum(new) - 1
     total = np.cumsum(length)
     before = total - length
     whole = np.add.reduceat(length, start)[inverse]

@@ -22,7 +22,7 @@ def spell_holes(state: State, moving: Bools, drilling: Ints, code: Canonical, fi
     motion_lines = np.flatnonzero(moving)
     previous, plane, before = -1, 0, np.zeros((0, 0))
     known, walked, out = np.zeros(0, dtype=np.int64), np.zeros(0), 0.0
-    state.steps *= np.where(np.isfinite(section.repeats), section.repeats, 1.0)[:, None]
+    state.steps = state.steps * np.where(np.isfinite(section.repeats), section.repeats, 1.0)[:, None]
     for n in drilling.tolist():
         z = int(offsets.xyz[PLANE_AXIS[int(section.plane[n])]])
         if section.plane[n] != plane:

@@ -17,7 +17,7 @@ from postproc.readback.modal import Modal, codes, columns, fill, fill_values, mo
 from postproc.readback.rows import INCH, Rows, Section
 from postproc.readback.sections import run_section
 from postproc.readback.words import Words
-from toolpaths.arrays import Array, Bools, Floats, Ints
+from toolpaths.arrays import Array, Bools, Floats, Ints, repeated, shared, taken
 from toolpaths.diagnostics import Diagnostic, error
 
 
@@ -154,9 +154,8 @@ def _blocks(words: Words, modal: Modal, letters: tuple[str, ...], offsets: Offse
     rest[words.pick(REST)[0]] = True
     small = tuple(a.lower() for a in letters)
     lengths = np.unique(modal.length_register)
-    length = np.array([offsets.length(int(r)) for r in lengths])[np.searchsorted(lengths, modal.length_register)]
-    relative = np.isin(words.letter, [ord(a) for a in small])
-    steps = columns(words, small) if relative.any() else np.full((n + 1, len(letters)), np.nan)
+    length = shared(np.array([offsets.length(int(r)) for r in lengths])[np.searchsorted(lengths, modal.length_register)])
+    steps = columns(words, small)
     return Section(0, modal.motion, modal.plane, modal.machine, modal.level, modal.inch, columns(words, letters), steps,
                    rest, length, columns(words, "ijk"), columns(words, "IJK"), columns(words, "ZRQPIJK"),
                    columns(words, ("z", "r", TURNS)), columns(words, "L")[:, 0], columns(words, CALL)[:, 0])
@@ -177,12 +176,13 @@ def _motion(words: Words, modal: Modal, rows: Rows, code: Canonical, used: tuple
     feed, missing = _feeds(words, modal, rows)
     dwell = _dwell(block, rows.code, rows.hole, rows.dwell, rests)
     pitch, floating = _threads(modal, rows, feed, call, code)
-    return Motion(in_files(code.line[block], code.files), rows.code, rows.end, offsets.home, modal.plane[block],
-                  modal.motion[block] == 3, rows.center, feed, modal.inverse[block], modal.tool[block],
-                  modal.length_register[block], modal.spindle[block], modal.rpm[block], modal.coolant[block],
-                  rows.hole, missing, dwell,
-                  modal.compensation[block], modal.offset[block], modal.blend[block], rows.frame, block,
-                  _radius_registers(words)[block], pitch, floating, modal.inch[block], used)
+    state = {k: taken(getattr(modal, k), block) for k in (
+        "plane", "inverse", "tool", "spindle", "rpm", "coolant", "compensation", "offset", "blend", "inch")}
+    return Motion(in_files(code.line[block], code.files), rows.code, rows.end, offsets.home,
+                  ccw=shared(taken(modal.motion, block) == 3), center=rows.center, feed=shared(feed),
+                  register=taken(modal.length_register, block), hole=rows.hole, missing_feed=shared(missing),
+                  dwell=shared(dwell), frame=rows.frame, block=block, radius=taken(_radius_registers(words), block),
+                  pitch=pitch, floating=floating, frames=used, **state)
 
 
 def _radius_registers(words: Words) -> Floats:
@@ -193,6 +193,8 @@ def _radius_registers(words: Words) -> Floats:
 
 def _threads(modal: Modal, rows: Rows, feed: Floats, call: Floats, code: Canonical) -> tuple[Floats, Bools]:
     """(mm per turn of taps (E,), negative for left-hand ones, NaN for other rows; floating (E,)): G84 and G74 by F and S."""
+    if not rows.hole.any():
+        return repeated(np.nan, len(rows.block)), repeated(False, len(rows.block))
     motion, rpm = modal.motion[rows.block], modal.rpm[rows.block]
     hand = np.where(motion == 84, 1.0, np.where(motion == 74, -1.0, np.nan))
     called = np.where(rows.hole, call[rows.block], np.nan)
@@ -219,15 +221,19 @@ def _feeds(words: Words, modal: Modal, rows: Rows) -> tuple[Floats, Bools]:
     """(F in force, cutting rows without one): inverse time holds for its own block only, a change of mode clears F."""
     n, block = words.lines, rows.block
     stated = columns(words, "F")[:, 0]
-    mode = modal.inverse.astype(np.int8) + 2 * modal.per_turn
+    mode = modal.inverse.astype(np.int8) + np.int8(2) * modal.per_turn
     clear = np.full(n + 1, np.nan)
     clear[np.flatnonzero(np.diff(mode)) + 1] = -1.0
     with_clear = np.where(np.isfinite(stated), stated, clear)
     lines = np.flatnonzero(np.isfinite(with_clear))
     force = fill_values(lines, with_clear[lines], n)
-    value = np.where(modal.inverse[block], stated[block], force[block])
-    value = np.where(modal.per_turn[block], value * modal.rpm[block], value)
-    value = np.where(np.isfinite(rows.feed), rows.feed, value)
+    value = taken(force, block)
+    if modal.inverse.any():
+        value = np.where(modal.inverse[block], stated[block], value)
+    if modal.per_turn.any():
+        value = np.where(modal.per_turn[block], value * modal.rpm[block], value)
+    if rows.hole.any():
+        value = np.where(np.isfinite(rows.feed), rows.feed, value)
     return value, (rows.code > 0) & ~(value > 0.0)
 
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from postproc.readback.canonical import COOLANT, LOADED, OFFSET, REGISTER, SMOOTH
 from postproc.readback.words import Words
-from toolpaths.arrays import Array, Floats, Ints
+from toolpaths.arrays import Array, Floats, Ints, repeated, shared
 from toolpaths.diagnostics import Diagnostic, error
 
 MOTION = (0, 1, 2, 3, 73, 74, 80, 81, 82, 83, 84, 85, 86, 89)
@@ -20,6 +21,8 @@ GROUPS: Groups = {
     "compensation": (40, 41, 42), "path": (61, 61.1, 64), "once": (4, 53), "arc_distance": (90.1, 91.1),
 }
 """of NIST RS274/NGC and LinuxCNC; a dialect adds its own"""
+_PART = 200_000
+"""words that are looked at together"""
 
 
 @dataclass(frozen=True)
@@ -53,6 +56,8 @@ class Modal:
 
 def fill(lines: Array, values: Array, count: int, initial: float) -> Floats:
     """(count + 1,) the value stated last at or before each block."""
+    if not len(lines):
+        return repeated(float(initial), count + 1)
     result = np.full(count + 1, np.nan)
     result[0] = initial
     result[lines] = values
@@ -63,6 +68,8 @@ def fill(lines: Array, values: Array, count: int, initial: float) -> Floats:
 
 def fill_values(lines: Ints, values: Floats, count: int) -> Floats:
     """(count + 1,) the value stated last, NaN before the first."""
+    if not len(lines):
+        return repeated(np.nan, count + 1)
     index = np.zeros(count + 1, dtype=np.int64)
     index[lines] = np.arange(1, len(lines) + 1)
     filled: Floats = np.concatenate([[np.nan], values])[np.maximum.accumulate(index)]
@@ -82,6 +89,8 @@ def number_of(words: Words, letter: str) -> Floats:
 
 def columns(words: Words, letters: str | tuple[str, ...]) -> Floats:
     """(B + 1, len(letters)) numbers by block, NaN where a block does not state the word."""
+    if not np.isin(words.letter, [ord(letter) for letter in letters]).any():
+        return repeated(np.full(len(letters), np.nan), words.lines + 1)
     result = np.full((words.lines + 1, len(letters)), np.nan)
     for j, letter in enumerate(letters):
         line, value = words.pick(letter)
@@ -98,18 +107,19 @@ def modal_state(words: Words) -> Modal:
 
     machine = np.zeros(n + 1, dtype=bool)
     machine[codes(words, "G", (53,))[0]] = True
-    feed_mode = group("feed_mode", 94)
+    feed_mode = group("feed_mode", 94).astype(np.int8)
     change, tool = words.pick(LOADED)
     turn_line, turn = codes(words, "M", (3, 4, 5))
     turn_line, turn = np.concatenate([change, turn_line]), np.concatenate([np.full(len(change), 5.0), turn])
     order = np.argsort(turn_line, kind="stable")
     spindle = fill(turn_line[order], np.where(turn == 3, 1, np.where(turn == 4, -1, 0))[order], n, 0.0)
-    return Modal(group("motion", 1).astype(np.int16), group("plane", 17).astype(np.int8), feed_mode == 93, feed_mode == 95,
-                 group("units", 21) == 20, group("level", 98).astype(np.int8),
-                 fill(*words.pick(REGISTER), n, -1.0).astype(np.int64), fill(change, tool, n, -1.0).astype(np.int64),
-                 spindle.astype(np.int8), number_of(words, "S"), fill(*words.pick(COOLANT), n, 0.0).astype(np.int64),
-                 machine, group("compensation", 40).astype(np.int8),
-                 fill_values(*words.pick(OFFSET), n), fill_values(*words.pick(SMOOTH), n))
+    state = (group("motion", 1).astype(np.int16), group("plane", 17).astype(np.int8), feed_mode == 93, feed_mode == 95,
+             group("units", 21) == 20, group("level", 98).astype(np.int8),
+             fill(*words.pick(REGISTER), n, -1.0).astype(np.int64), fill(change, tool, n, -1.0).astype(np.int64),
+             spindle.astype(np.int8), number_of(words, "S"), fill(*words.pick(COOLANT), n, 0.0).astype(np.int8),
+             machine, group("compensation", 40).astype(np.int8),
+             fill_values(*words.pick(OFFSET), n), fill_values(*words.pick(SMOOTH), n))
+    return Modal(*map(shared, state))
 
 
 def drop_passive(words: Words, passive: tuple[str, ...]) -> Words:
@@ -118,7 +128,7 @@ def drop_passive(words: Words, passive: tuple[str, ...]) -> Words:
     for code in passive:
         lines = words.line[(words.letter == ord(code[0])) & (words.value == float(code[1:]))]
         drop |= np.isin(words.line, lines)
-    return words.take(~drop) if passive else words
+    return words.take(~drop)
 
 
 def check_end(words: Words, file: str, called: tuple[tuple[int, int], ...] = ()) -> list[Diagnostic]:
@@ -161,16 +171,30 @@ def check_codes(words: Words, groups: Groups, m_codes: tuple[float, ...], letter
 
 def _repeated(words: Words, groups: Groups, file: str) -> list[Diagnostic]:
     """A word stated twice in a block, or two codes of one group."""
-    group = np.zeros(len(words.letter), dtype=np.int64)
+    group = np.zeros(len(words.letter), dtype=np.int8)
     is_g = words.letter == ord("G")
     for k, numbers in enumerate(groups.values(), 1):
         group[is_g & np.isin(words.value, numbers)] = k
-    single = words.letter != ord("M")
-    key = (words.line[single] * 256 + words.letter[single]) * 64 + group[single]
-    order = np.argsort(key, kind="stable")
-    twice = np.flatnonzero(np.diff(key[order]) == 0)
-    if not len(twice):
+    twice = [_twice(words.line[part], words.letter[part], group[part]) for part in by_lines(words)]
+    lines = np.unique(np.concatenate([words.line[:0], *twice]))
+    if not len(lines):
         return []
-    lines = np.unique(words.line[single][order][twice])
     return [error("gcode.repeated", "a word, or a code of one group, stands twice in a block", file=file,
                   lines=lines[:6].tolist(), count=len(lines), hint="one of each in a block")]
+
+
+def _twice(line: Ints, letter: Array, group: Array) -> Ints:
+    """Lines in which a word but M, or a code of a group, stands twice, as often as it does so again."""
+    single = letter != ord("M")
+    key = np.sort((line[single] * 256 + letter[single]) * 64 + group[single])
+    return np.asarray(key[1:][key[1:] == key[:-1]] // (256 * 64))
+
+
+def by_lines(words: Words) -> Iterator[slice]:
+    """The words some whole lines at a time."""
+    at, count = 0, len(words.line)
+    while at < count:
+        last = words.line[min(at + _PART, count) - 1]
+        stop = int(np.searchsorted(words.line, last, side="right"))
+        yield slice(at, stop)
+        at = stop

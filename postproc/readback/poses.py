@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -11,8 +11,9 @@ from machines.kinematics.base import Kinematics
 from postproc.control import Control
 from postproc.readback import assembly
 from postproc.readback.execute import Motion
+from postproc.readback.frames import Frame
 from postproc.word_arcs import PLANE_COLUMNS
-from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.arrays import Bools, Floats, Ints, as_slice, repeated, taken
 
 SAMPLES = (0.2, 0.4, 0.6, 0.8, 1.0)
 """where each block is looked at; other places than those that linearising looks at"""
@@ -29,10 +30,17 @@ class Executed:
     kinematics: Callable[[int], Kinematics]
     lengths: dict[int, float]
     before: Floats | None = None
+    _asked: list[tuple[Motion, Ints, Ways]] = field(default_factory=list, init=False, repr=False, compare=False)
+
+    def _ways(self, motion: Motion, rows: Ints) -> Ways:
+        """Those of the blocks asked for last are kept: the same ones are asked for at several fractions."""
+        if not self._asked or self._asked[0][0] is not motion or self._asked[0][1] is not rows:
+            self._asked[:] = [(motion, rows, Ways.of(motion, self.control, rows))]
+        return self._asked[0][2]
 
     def poses(self, motion: Motion, rows: Ints, t: float | Floats) -> tuple[Floats, Floats]:
         """(tip, axis) (K, 3) of the blocks `rows` at fraction t."""
-        position = positions(motion, self.control, rows, t)
+        position = motion.end[rows] if _whole(t) else self._ways(motion, rows).at(t)
         tip, axis = np.empty((len(rows), 3)), np.empty((len(rows), 3))
         tool, register = motion.tool[rows], motion.register[rows]
         for number, h in {*zip(tool.tolist(), register.tolist(), strict=True)}:
@@ -46,7 +54,7 @@ class Executed:
 
     def joints(self, motion: Motion, rows: Ints, t: float | Floats) -> Floats:
         """Joints (K, J) of the blocks `rows` at fraction t."""
-        position = positions(motion, self.control, rows, t)
+        position = motion.end[rows] if _whole(t) else self._ways(motion, rows).at(t)
         if self.control.base != "tcp":
             return np.asarray(position / self.control.unit)
         q = np.empty_like(position)
@@ -108,20 +116,45 @@ def begins(motion: Motion, rows: Ints) -> Floats:
 
 def positions(motion: Motion, control: Control, rows: Ints, t: float | Floats) -> Floats:
     """Machine coordinates (K, J) of blocks at fraction t, one or (K,): as the law of each block has it."""
-    end = motion.end[rows]
-    if isinstance(t, float) and t == 1.0:
-        return end
-    before, share = begins(motion, rows), np.broadcast_to(np.asarray(t), len(rows))
-    result = np.empty_like(end)
-    numbers = motion.frame[rows]
-    for number in np.unique(numbers).tolist():
-        k, frame = np.flatnonzero(numbers == number), motion.frames[number]
-        first, last = frame.coordinates(before[k]), frame.coordinates(end[k])
-        result[k] = frame.position(_along(motion, control.xyz, rows[k], first, last, share[k]))
-    k = np.flatnonzero(_bent(motion, control, rows))
-    if len(k):
-        result[k] = _dog_leg(before[k], end[k], share[k], control.machine.limits.velocity * control.unit)
-    return result
+    return motion.end[rows] if _whole(t) else Ways.of(motion, control, rows).at(t)
+
+
+def _whole(t: float | Floats) -> bool:
+    return isinstance(t, float) and t == 1.0
+
+
+@dataclass(frozen=True)
+class Ways:
+    """Blocks `rows` (K,) with what of their motion does not depend on the fraction: machine coordinates (K, J) at both ends,
+    and by law the blocks (of those) with their coordinates at both ends."""
+
+    motion: Motion
+    control: Control
+    rows: Ints
+    before: Floats
+    end: Floats
+    laws: tuple[tuple[Ints | slice, Frame, Floats, Floats], ...]
+
+    @classmethod
+    def of(cls, motion: Motion, control: Control, rows: Ints) -> Ways:
+        """What `at` needs."""
+        before, end, numbers = begins(motion, rows), motion.end[rows], taken(motion.frame, rows)
+        laws = []
+        for number in np.unique(numbers).tolist():
+            k, frame = as_slice(np.flatnonzero(numbers == number)), motion.frames[number]
+            laws.append((k, frame, frame.coordinates(before[k]), frame.coordinates(end[k])))
+        return cls(motion, control, rows, before, end, tuple(laws))
+
+    def at(self, t: float | Floats) -> Floats:
+        """Machine coordinates (K, J) at fraction t, one or (K,)."""
+        share, result = np.broadcast_to(np.asarray(t), len(self.rows)), np.empty_like(self.end)
+        for k, frame, first, last in self.laws:
+            result[k] = frame.position(_along(self.motion, self.control.xyz, self.rows[k], first, last, share[k]))
+        k = np.flatnonzero(_bent(self.motion, self.control, self.rows))
+        if len(k):
+            speed = self.control.machine.limits.velocity * self.control.unit
+            result[k] = _dog_leg(self.before[k], self.end[k], share[k], speed)
+        return result
 
 
 def _bent(motion: Motion, control: Control, rows: Ints) -> Bools:
@@ -180,8 +213,10 @@ def coordinates(motion: Motion, rows: Ints) -> tuple[Floats, Floats]:
 
 def arc_sweeps(motion: Motion, control: Control) -> Floats:
     """(E,) sweep of arc blocks, rad, positive; NaN for others."""
-    result = np.full(len(motion), np.nan)
     arcs = np.flatnonzero(motion.code == 2)
+    if not len(arcs):
+        return repeated(np.nan, len(motion))
+    result = np.full(len(motion), np.nan)
     before, end = coordinates(motion, arcs)
     for plane, (i, j) in PLANE_COLUMNS.items():
         k = np.flatnonzero(motion.plane[arcs] == plane)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from toolpaths.arrays import Array, Bools, Floats, Ints
+from toolpaths.arrays import Array, Bools, Floats, Ints, joined
 
 if TYPE_CHECKING:
     from postproc.readback.execute import Offsets
@@ -51,12 +51,13 @@ class Section:
     @cached_property
     def has_steps(self) -> bool:
         """True where any word is relative."""
-        return bool(np.isfinite(self.steps).any())
+        return bool(np.isfinite(self.steps[:1] if self.steps.strides[0] == 0 else self.steps).any())
 
     @property
     def stated(self) -> Bools:
         """(N, J) axes that a block moves."""
-        return np.isfinite(self.columns) | np.isfinite(self.steps)
+        stated = np.isfinite(self.columns)
+        return stated | np.isfinite(self.steps) if self.has_steps else stated
 
     @property
     def scale(self) -> Floats:
@@ -87,7 +88,7 @@ class Rows:
             none = np.zeros(0)
             return Rows(none.astype(np.int64), none.astype(np.int8), np.zeros((0, width)), np.zeros((0, 3)),
                         none.astype(np.int64), none.astype(bool), none, none)
-        return Rows(*(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(Rows)))
+        return Rows(*(joined([getattr(p, f.name) for p in parts]) for f in fields(Rows)))
 
 
 @dataclass

@@ -15,7 +15,7 @@ from postproc.readback.frames import Frame
 from postproc.readback.modal import CYCLES
 from postproc.readback.rows import Rows, Section, State
 from postproc.word_arcs import PLANE_AXIS
-from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.arrays import Bools, Floats, Ints, repeated, shared
 from toolpaths.diagnostics import Diagnostic, error
 
 if TYPE_CHECKING:
@@ -43,8 +43,8 @@ def run_section(section: Section, frame: Frame, number: int, position: Floats, c
     end = state.carried()[1:][line]
     motion = section.motion[line]
     kind = np.where(motion == 0, 0, np.where(np.isin(motion, (2, 3)), 2, 1)).astype(np.int8)
-    rows = Rows(line + section.first, kind, end, np.zeros((len(line), 3)), np.full(len(line), number),
-                np.zeros(len(line), dtype=bool), np.full(len(line), np.nan), np.zeros(len(line)))
+    rows = Rows(line + section.first, kind, end, *(repeated(one, len(line)) for one in (
+        np.zeros(3), number, False, np.nan, 0.0)))
     if spelt:
         rows = _with_legs(rows, line, spelt)
     rows = _with_arcs(rows, state, line, code.line, file, found)
@@ -54,23 +54,37 @@ def run_section(section: Section, frame: Frame, number: int, position: Floats, c
 
 def _state(section: Section, frame: Frame, position: Floats, offsets: Offsets) -> State:
     """Words in the coordinates of the law."""
-    columns, steps = section.columns.copy(), section.steps.copy()
     xyz = offsets.xyz[offsets.xyz >= 0]
-    scale = section.scale[:, None]
-    columns[:, xyz] *= scale
-    steps[:, xyz] *= scale
-    shift = np.tile(offsets.work, (len(columns), 1))
-    if frame.control is not None:
-        shift[:, xyz] = 0.0
-    elif offsets.on_z and offsets.xyz[2] >= 0:
-        shift[:, offsets.xyz[2]] += section.length
-    columns += np.where(section.machine[:, None], 0.0, shift)
-    for plane in np.unique(section.plane).tolist():
+    drilling = np.isin(section.motion, CYCLES)
+    steps = np.array(section.steps) if section.has_steps or drilling.any() else section.steps
+    if section.inch.any():
+        columns = section.columns.copy()
+        columns[:, xyz] *= section.scale[:, None]
+        steps = np.array(steps)
+        steps[:, xyz] *= section.scale[:, None]
+    else:
+        columns = section.columns
+    shift = _shift(section, frame, offsets)
+    columns = columns + (np.where(section.machine[:, None], 0.0, shift) if section.machine.any() else shift)
+    for plane in np.unique(section.plane[drilling]).tolist():
         z = int(offsets.xyz[PLANE_AXIS[plane]])
-        drills = np.isin(section.motion, CYCLES) & (section.plane == plane)
+        drills = drilling & (section.plane == plane)
         columns[drills, z] = steps[drills, z] = np.nan
     start = frame.coordinates(position[None, :])[0]
     return State(section, columns, steps, start, shift, offsets)
+
+
+def _shift(section: Section, frame: Frame, offsets: Offsets) -> Floats:
+    """(N, J) from the program's words to coordinates."""
+    row, xyz = offsets.work.copy(), offsets.xyz[offsets.xyz >= 0]
+    if frame.control is not None:
+        row[xyz] = 0.0
+    shift = repeated(row, len(section.columns))
+    if frame.control is None and offsets.on_z and offsets.xyz[2] >= 0 and section.length.any():
+        shift = np.array(shift)
+        shift[:, offsets.xyz[2]] += section.length
+        shift = shared(shift)
+    return shift
 
 
 def _refused(section: Section, frame: Frame, moving: Bools, line: Ints, file: str, found: list[Diagnostic]) -> None:

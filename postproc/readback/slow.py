@@ -9,6 +9,7 @@ import numpy as np
 from postproc.control import Control
 from postproc.job import Job
 from postproc.moves import Moves, Phase
+from postproc.readback.checks import CHUNK
 from postproc.readback.execute import Motion
 from postproc.readback.faults import Faults
 from postproc.readback.poses import Executed
@@ -68,10 +69,12 @@ def _on_the_spot(motion: Motion, control: Control, tip: Floats, tolerance: float
 def _least(motion: Motion, executed: Executed, cutting: Bools) -> Floats:
     """(E,) s that the velocities of the axes ask of each cutting block, from joints at a few places of it."""
     control: Control = executed.control
-    rows, result = np.flatnonzero(cutting), np.zeros(len(motion))
-    q = executed.joints(motion, rows, 0.0)
-    for t in (0.25, 0.5, 0.75, 1.0):
-        after = executed.joints(motion, rows, t)
-        result[rows] = np.fmax(result[rows], 4.0 * (np.abs(after - q) / control.machine.limits.velocity).max(axis=1))
-        q = after
+    every, result = np.flatnonzero(cutting), np.zeros(len(motion))
+    for first in range(0, len(every), CHUNK):
+        rows = every[first:first + CHUNK]
+        q = executed.joints(motion, rows, 0.0)
+        for t in (0.25, 0.5, 0.75, 1.0):
+            after = executed.joints(motion, rows, t)
+            result[rows] = np.fmax(result[rows], 4.0 * (np.abs(after - q) / control.machine.limits.velocity).max(axis=1))
+            q = after
     return result

@@ -65,6 +65,7 @@ def read_back(data: bytes, job: Job, file: str, progress: Callable[[str, int, in
     offsets = Offsets(control.work_offset, control.xyz, job.register_lengths(), home, control.length_on_z,
                       job.controller.cycles.peck_relief, control, reader.rises_first, reader.arc_slack)
     motion, found = run(code, machine.axis_names, offsets, gcode)
+    code = code.without((*machine.axis_names, *(a.lower() for a in machine.axis_names), *"IJKijk"))
     diagnostics += [_located(d, job.toolpath.file) for d in found]
     if has_errors(diagnostics):
         return None, diagnostics

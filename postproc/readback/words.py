@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +16,9 @@ _WORD = re.compile(rb"\s*([A-Za-z])\s*([-+]?(?:\d+\.?\d*|\.\d+))\s*")
 _SWITCH = re.compile(rb"(?m)^([ \t]*(?:N?[ \t]*\d+[ \t]*)?)/\d?(?=[ \t]*[A-Z\n])")
 _LETTERS = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz"
 _BLANKS = bytes.maketrans(_LETTERS + b"\n", b" " * 53)
+_NO_LETTERS = bytes(c for c in range(256) if c not in _LETTERS)
+_STRETCH = 1_000_000
+"""characters that are read at a time"""
 _NUMBER = np.zeros(256, dtype=bool)
 _NUMBER[list(b"0123456789.+- \t\n")] = True
 
@@ -35,7 +39,9 @@ class Words:
     point: Bools | None = None
 
     def take(self, keep: Bools | Ints) -> Words:
-        """Some of the words, in the order asked for."""
+        """Some of the words, in the order asked for; all of them are not copied."""
+        if keep.dtype == np.bool_ and keep.all():
+            return self
         point = None if self.point is None else self.point[keep]
         return Words(self.letter[keep], self.value[keep], self.line[keep], self.lines, point)
 
@@ -51,9 +57,10 @@ def tokenise(data: bytes, file: str = "") -> tuple[Words, list[Diagnostic]]:
     Comments and % lines are taken out; what is no word is an error. Blocks with "/" are words like others, with a
     warning: the switch at the control that leaves them out counts as off.
     """
-    text = plain(data).upper()
+    text = plain(data)
+    text = text if text.isupper() else text.upper()
     ends = _tape_marks(text)
-    text = re.sub(rb"(?m)^[ \t]*%[^\n]*", b"", text)
+    text = re.sub(rb"(?m)^[ \t]*%[^\n]*", b"", text) if b"%" in text else text
     text, found = block_delete(text, file)
     words, more = read_words(text, file)
     return words, [*more, *found, *_early_end(ends, file)]
@@ -74,17 +81,43 @@ def read_words(text: bytes, file: str = "") -> tuple[Words, list[Diagnostic]]:
     """The words of text that holds nothing but letters, each with a number."""
     if not text.endswith(b"\n"):
         text += b"\n"
+    count = len(text.translate(None, _NO_LETTERS))
+    words = Words(np.empty(count, dtype=np.uint8), np.empty(count), np.empty(count, dtype=np.int64), text.count(b"\n"),
+                  np.zeros(count, dtype=bool))
+    at, lines = 0, 0
+    for stretch in _stretches(text):
+        here = _quickly(stretch)
+        if here is None:
+            return _slowly(text, file)
+        stop = at + len(here.letter)
+        words.letter[at:stop], words.value[at:stop], words.line[at:stop] = here.letter, here.value, here.line + lines
+        if words.point is not None and here.point is not None:
+            words.point[at:stop] = here.point
+        at, lines = stop, lines + here.lines
+    return words, []
+
+
+def _stretches(text: bytes) -> Iterator[bytes]:
+    """Whole lines, some at a time: what is made of them on the way stays small."""
+    at = 0
+    while at < len(text):
+        stop = text.find(b"\n", min(at + _STRETCH, len(text) - 1)) + 1
+        yield text[at:stop]
+        at = stop
+
+
+def _quickly(text: bytes) -> Words | None:
+    """The words of whole lines by arrays; None where something is no word."""
     codes = np.frombuffer(text, dtype=np.uint8)
     folded = codes & 0xDF
     is_letter = (folded >= 65) & (folded <= 90)
-    strange = bool((~is_letter & ~_NUMBER[codes]).any())
-    newline = codes == 10
-    where = np.flatnonzero(is_letter)
-    line = (np.cumsum(newline) + 1)[where]
-    values = _numbers(text) if not strange else None
+    if bool((~is_letter & ~_NUMBER[codes]).any()):
+        return None
+    where, ends = np.flatnonzero(is_letter), np.flatnonzero(codes == 10)
+    values = _numbers(text)
     if values is None or len(values) != len(where) or not _each_has_number(codes, where):
-        return _slowly(text, file)
-    return Words(codes[where], values, line, int(newline.sum()), _points(codes, where)), []
+        return None
+    return Words(codes[where], values, np.searchsorted(ends, where) + 1, len(ends), _points(codes, where))
 
 
 def _points(codes: Array, where: Ints) -> Bools:
@@ -126,24 +159,10 @@ def block_delete(text: bytes, file: str) -> tuple[bytes, list[Diagnostic]]:
 
 
 def _numbers(text: bytes) -> Floats | None:
-    blank = text.translate(_BLANKS)
-    if not blank.strip():
-        return np.zeros(0)
     try:
-        return np.array(blank.split(), dtype=np.float64) if len(blank) < 4096 else _chunks(blank)
+        return np.array(text.translate(_BLANKS).split(), dtype=np.float64)
     except ValueError:
         return None
-
-
-def _chunks(blank: bytes) -> Floats:
-    """Numbers of a long text, a stretch at a time, so that no list of all of them is made."""
-    parts, at = [], 0
-    while at < len(blank):
-        stop = blank.find(b" ", min(at + 1_000_000, len(blank)))
-        stop = len(blank) if stop < 0 else stop
-        parts.append(np.array(blank[at:stop].split(), dtype=np.float64))
-        at = stop
-    return np.concatenate(parts)
 
 
 def _each_has_number(codes: Array, where: Ints) -> bool:

@@ -50,7 +50,7 @@ class Run:
         self.pole: dict[str, float] = {}
         self.track = Track(text.words)
         self.state, self.cycle = "axes", -1
-        self.speed = number_of(text.words, "S")
+        self.speed = np.array(number_of(text.words, "S"))
 
     def fault(self, code: str, b: int, message: str, hint: str) -> None:
         """An ERROR at a block."""
