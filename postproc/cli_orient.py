@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from postproc.cli_options import Allow, AxisTolerance, ClFile, Dialect, MachineName, Tolerance, Units
-from postproc.console import Json, machine_of, progress_bar, refuse_overwriting, report, shown_errors
+from postproc.console import Json, controller_of, machine_of, progress_bar, refuse_overwriting, report, shown_errors
 
 if TYPE_CHECKING:
     from machines.machine import Machine
@@ -34,6 +34,7 @@ MOST = 6
 
 def orient(file: ClFile,
            machine: MachineName,
+           controller: Annotated[str, typer.Option("-c", "--controller", help="for which the plan is proved")] = "linuxcnc",
            max_tilt: MaxTilt = 60.0,
            plan: Annotated[str, typer.Option("--orient", help="plan whose passes are shown: keep, per-pass, whole-part, "
                                              "auto")] = "auto",
@@ -62,7 +63,7 @@ def orient(file: ClFile,
     values: dict[str, Any] = {}
     text = ""
     with shown_errors(json), progress_bar() as progress:
-        choice, found = _chosen(file, machine_of(machine), options, progress)
+        choice, found = _chosen(file, machine_of(machine), controller_of(controller), options, progress)
         if choice is not None:
             from postproc.orientation.report import as_dict
             from postproc.orientation.text import as_text
@@ -95,25 +96,17 @@ def _check(plan: str, figure: Path | None, units: str, dialect: str, passes: lis
                                  param_hint="--pass")
 
 
-def _chosen(file: Path, machine: Machine, options: Options,
+def _chosen(file: Path, machine: Machine, controller: str, options: Options,
             progress: Any) -> tuple[OrientationChoice | None, list[Diagnostic]]:
     """The choice for a file; None where a diagnostic is an ERROR."""
     import toolpaths
-    from postproc.orientation.orient import orient as run
-    from postproc.setup import load_setup
-    from toolpaths.diagnostics import has_errors, require
+    from postproc.pipeline import choose_axes
 
     path, found = toolpaths.read(file, units=options.units or None, dialect=options.dialect or None,
                                  allow_unknown=options.allow_unknown,
                                  progress=lambda at, total: progress("reading", at, total))
-    settings, more = load_setup(options.setup or None)
-    require(more)
-    assert settings is not None
-    found = [*found, *(d for d in path.faults if d not in found), *_errors(options, machine)]
-    if has_errors(found):
-        return None, found
-    choice, more = run(path, machine, settings, options, progress)
-    return choice, found + more
+    result = choose_axes(path, machine, controller, options, [*found, *_errors(options, machine)], progress)
+    return result.choice, list(result.diagnostics)
 
 
 def _errors(options: Options, machine: Machine) -> list[Diagnostic]:

@@ -13,7 +13,6 @@ import numpy as np
 import machines
 import toolpaths
 from machines.machine import Machine
-from postproc import VERSION
 from postproc.compile import compile_program, words_of
 from postproc.controllers import writer_for
 from postproc.controllers.model import ControllerFile, load_controller
@@ -26,6 +25,7 @@ from postproc.pass_geometry import stops_of
 from postproc.path import Path, build_path
 from postproc.planned import PlannedMotion, Source, planned_motion
 from postproc.program import Program
+from postproc.program_header import header_lines
 from postproc.reach import check_reach
 from postproc.readback.compare import Comparison
 from postproc.readback.files import Beside
@@ -111,9 +111,9 @@ def convert(path: Toolpath, machine: Machine | str | FilePath, controller: str |
         DiagnosticError: where machine, controller or set-up cannot be loaded.
     """
     spec, machine, setup, options = _loaded(controller, machine, setup, options or Options())
-    path, choice, known = _oriented(path, machine, setup, options, _reading(path, diagnostics), progress)
-    start = PostResult("", options, machine, spec, FilePath(controller).stem, setup, known, path, choice=choice)
-    return start if not start.ok else _stages(start, progress)
+    start = PostResult("", options, machine, spec, FilePath(controller).stem, setup, _reading(path, diagnostics), path)
+    start, done = _oriented(start, progress)
+    return start if not start.ok else done or _stages(start, progress)
 
 
 def _loaded(controller: str | FilePath, machine: Machine | str | FilePath, setup: SetupFile | str | FilePath | None,
@@ -131,18 +131,29 @@ def _loaded(controller: str | FilePath, machine: Machine | str | FilePath, setup
     return spec.divided(setup.output.files), machine, setup, options
 
 
-def _oriented(path: Toolpath, machine: Machine, setup: SetupFile, options: Options, known: tuple[Diagnostic, ...],
-              progress: Progress | None) -> tuple[Toolpath, OrientationChoice | None, tuple[Diagnostic, ...]]:
-    """The path with the tool axes that --orient asks for, where it can be read at all, and their choice."""
-    if options.orient == "keep" or has_errors(known):
-        return path, None, known
-    from postproc.orientation.orient import orient
+def _oriented(start: PostResult, progress: Progress | None) -> tuple[PostResult, PostResult | None]:
+    """With the tool axes that --orient asks for, where the path can be read at all; its program where that is known."""
+    if start.options.orient == "keep" or not start.ok:
+        return start, None
+    from postproc.orientation.programs import oriented, written
     from postproc.orientation.report import slower
 
-    choice, found = orient(path, machine, setup, options, progress)
-    if choice is None:
-        return path, None, (*known, *found)
-    return choice.toolpath(options.orient), choice, (*known, *found, *slower(choice, options.orient))
+    start = oriented(start, _stages, progress)
+    if start.choice is not None:
+        start = _with(start, slower(start.choice, start.options.orient))
+    return start, written(start)
+
+
+def choose_axes(path: Toolpath, machine: Machine, controller: str | FilePath, options: Options,
+                diagnostics: list[Diagnostic], progress: Progress | None = None) -> PostResult:
+    """The tool axes of a path as `options.orient` has them, in `choice` (None where an ERROR stands against them), proved by
+    the program for a controller; arguments and errors as of `convert`."""
+    from postproc.orientation.programs import oriented
+
+    spec, machine, setup, options = _loaded(controller, machine, None, options)
+    known = _reading(path, diagnostics)
+    start = PostResult("", options, machine, spec, FilePath(controller).stem, setup, known, path)
+    return oriented(start, _stages, progress) if start.ok else start
 
 
 def _reading(path: Toolpath, diagnostics: list[Diagnostic] | None) -> tuple[Diagnostic, ...]:
@@ -291,22 +302,8 @@ def plan_motion(job: Job, moves: Moves, path: Path) -> tuple[PlannedMotion | Non
 def write_text(result: PostResult) -> tuple[str, dict[str, str]]:
     """The text of the program, header with what made it, and of its subprograms in files of their own by file name."""
     assert result.program is not None and result.toolpath is not None and result.job is not None
-    job, machine = result.job, result.machine
-    letters = zip(machine.axis_names, job.control.work_offset, strict=True)
-    offset = " ".join(f"{k}{v:.4f}" for k, v in letters)
-    header = [f"postproc {VERSION}", f"source {FilePath(result.toolpath.file).name}", f"machine {machine.name}",
-              f"controller {result.controller_name}", *result.options.header(),
-              f"words: {_meanings(result.program)}",
-              f"work offset {result.controller.program.offset_name(result.setup.work_offset_code)} in machine coordinates: "
-              f"{offset}"]
-    if result.setup.tool_numbers:
-        numbers = dict.fromkeys(f"{t.name} = T{t.number}" for t in result.toolpath.tools if t.name)
-        header.append("tool numbers of the set-up: " + ", ".join(numbers))
-    if any(d.code == "feed.of_setup" for d in result.diagnostics):
-        header.append(f"feed {result.setup.output.feed:g} mm/min of the set-up where the CL file states none")
-    header += _corrections(result) + _orientations(result)
-    if result.toolpath.name:
-        header.insert(1, f"part {result.toolpath.name}")
+    job = result.job
+    header = header_lines(result)
     shares = result.shares or {}
     writer = writer_for(result.controller, result.program, result.toolpath.cycles, job.control.length_on_z,
                         shares["smoothing"], result.setup.work_offset_code, axis_smoothing=shares["axis_smoothing"],
@@ -314,32 +311,6 @@ def write_text(result: PostResult) -> tuple[str, dict[str, str]]:
                         subprograms=result.setup.output.divided)
     text = "\n".join(writer.lines(header)) + "\n"
     return text, {name: "\n".join(blocks) + "\n" for name, blocks in writer.files.items()}
-
-
-def _orientations(result: PostResult) -> list[str]:
-    """Header lines that say which tool axes were chosen."""
-    if result.choice is None:
-        return []
-    from postproc.orientation.text import header
-
-    return header(result.choice, result.options.orient)
-
-
-def _corrections(result: PostResult) -> list[str]:
-    """Header lines that say who corrects geometric errors."""
-    if result.job is None or result.job.errors is None:
-        return []
-    name = result.job.errors.name
-    if result.compensation is None:
-        return [f"geometric errors {name}: corrected by the control, not in this program"]
-    return [f"geometric errors {name}: corrected in this program; the control must not correct them again",
-            *result.compensation.lines()]
-
-
-def _meanings(program: Program) -> str:
-    """What the words of a program mean, in order of first use."""
-    names = {"axes": "axis positions", "tcp": "tip in the work offset", "tilted": "tip in tilted planes"}
-    return ", ".join(dict.fromkeys(names[section.law] for section in program.sections))
 
 
 def long_blocks(text: str, most: int, file: str) -> list[Diagnostic]:
@@ -388,8 +359,9 @@ def verify(gcode: str | FilePath, path: Toolpath, machine: Machine | str | FileP
     known = _reading(path, diagnostics)
     if other := other_axes(data, options, str(gcode)):
         return VerifyResult(str(gcode), None, (*other, *known))
-    path, _, known = _oriented(path, machine, setup, options, known, progress)
-    found = list(known)
+    start = PostResult("", options, machine, spec, FilePath(controller).stem, setup, known, path)
+    start, _ = _oriented(start, progress)
+    path, found = start.toolpath or path, list(start.diagnostics)
     if has_errors(found):
         return VerifyResult(str(gcode), None, tuple(found))
     job, more = prepare(path, machine, spec, setup, options)

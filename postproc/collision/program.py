@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -27,13 +28,63 @@ def check_bodies(motion: Motion, executed: Executed, job: Job, owner: Ints, faul
     Args:
         owner: (E,) the move that each block serves
     """
+    ways, found = _ways(motion, executed, job, owner)
+    for one in ways:
+        lost = one.unbounded
+        found += [] if not len(lost) else [_unbounded(motion, one.moves, owner, lost, faults)]
+        found += _told(one, motion, owner, faults)
+    return found
+
+
+def touching_parts(motion: Motion, executed: Executed, job: Job, owner: Ints, part: Ints) -> dict[int, Touch]:
+    """What tools come nearest to being through in each part of a program; parts where they keep clear are not in it.
+
+    Args:
+        part: (E,) the part of the program that each block belongs to
+    """
+    result: dict[int, Touch] = {}
+    for one in _ways(motion, executed, job, owner)[0]:
+        of = part[one.way.row]
+        order = np.argsort(of, kind="stable")
+        for pieces in np.split(order, np.flatnonzero(np.diff(of[order])) + 1):
+            for touch in one.touches(pieces):
+                k = int(of[pieces[0]])
+                result[k] = min(touch, result.get(k, touch), key=lambda each: each.distance - each.limit)
+    return result
+
+
+@dataclass(frozen=True)
+class _Way:
+    """All that one tool does in a program: its way beside the bodies.
+
+    Attributes:
+        moves: the reference, a hole without pecks
+        drilling (E,): blocks in a hole
+        unbounded: blocks for which the pieces of the way are no proof
+    """
+
+    bodies: Scene
+    form: Form
+    way: Swept
+    moves: Moves
+    drilling: Bools
+    unbounded: Ints
+
+    def touches(self, pieces: Ints) -> list[Touch]:
+        """What comes too near on some pieces of the way."""
+        way, drilling = self.way.take(pieces), self.drilling[self.way.row[pieces]]
+        return touches(self.bodies, self.form, way, way.take(np.flatnonzero(~drilling)) if drilling.any() else None)
+
+
+def _ways(motion: Motion, executed: Executed, job: Job, owner: Ints) -> tuple[list[_Way], list[Diagnostic]]:
+    """The way of each tool whose form is known; none without [bodies]."""
     if job.setup.bodies is None:
-        return []
+        return [], []
     file = job.options.setup
     bodies, found = scene(job.setup, job.placement, file)
     if bodies is None:
-        return found
-    moves = job.moves.without_pecks()
+        return [], found
+    moves, result = job.moves.without_pecks(), []
     drilling = _drilling(moves)[np.minimum(owner, len(moves) - 1)] & (owner < len(moves))
     moving = _moving(motion)
     index = _tools(motion, job, moves, owner)
@@ -45,9 +96,8 @@ def check_bodies(motion: Motion, executed: Executed, job: Job, owner: Ints, faul
         if len(form.pieces) and not has_errors(more):
             rows = np.flatnonzero(index == one)
             way, lost = way_of(motion, executed, job.kinematics_of(number), rows, lever_of(form))
-            found += [] if not len(lost) else [_unbounded(motion, moves, owner, lost, faults)]
-            found += _told(bodies, form, way, drilling, motion, (moves, owner), faults)
-    return found
+            result.append(_Way(bodies, form, way, moves, drilling, lost))
+    return result, found
 
 
 def _tools(motion: Motion, job: Job, moves: Moves, owner: Ints) -> Ints:
@@ -78,17 +128,16 @@ def _drilling(moves: Moves) -> Bools:
     return np.asarray((moves.hole >= 0) & (moves.phase > Phase.APPROACH))
 
 
-def _told(bodies: Scene, form: Form, way: Swept, drilling: Bools, motion: Motion, served: tuple[Moves, Ints],
-          faults: Faults) -> list[Diagnostic]:
+def _told(one: _Way, motion: Motion, owner: Ints, faults: Faults) -> list[Diagnostic]:
     """One error per pair, at its worst place; else what was compared."""
-    cutting = way.take(np.flatnonzero(~drilling[way.row])) if drilling.any() else None
     result: list[Diagnostic] = []
-    found = touches(bodies, form, way, cutting)
-    if not found and len(way):
-        return [_clear(bodies, form, faults)]
+    found = one.touches(np.arange(len(one.way)))
+    if not found and len(one.way):
+        return [_clear(one.bodies, one.form, faults)]
     for touch in found:
         code = "collision.gouge" if touch.limit < 0.0 else "collision.near" if touch.distance > 0.0 else "collision.touch"
-        result.append(faults.error(code, str(touch), *_lines(touch.place, motion, served), hint=_hint(touch, motion)))
+        where = _lines(touch.place, motion, (one.moves, owner))
+        result.append(faults.error(code, str(touch), *where, hint=_hint(touch, motion)))
     return result
 
 
@@ -106,8 +155,7 @@ def _hint(touch: Touch, motion: Motion) -> str:
     if touch.limit < 0.0:
         return "another tool axis or path; [bodies] gouge is what the tolerances of path and mesh may add up to"
     if motion.code[touch.place] == 0:
-        return ("a higher clearance.distance, or move the fixture; ways between passes and from home are not compared by "
-                "orient, whose next plan may have others")
+        return "a higher clearance.distance, or move the fixture; --orient auto avoids ways that touch, where it can"
     return "another tool axis (postproc orient), a longer or slimmer tool, a higher clearance.distance, or move the fixture"
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,7 +15,8 @@ from postproc.orientation.allowed import Allowed
 from postproc.orientation.candidates import Tried, tried
 from postproc.orientation.limited import limit_faults
 from postproc.orientation.passes import Work, work_of
-from postproc.orientation.plans import OrientationPlan, plans_of
+from postproc.orientation.plans import OrientationPlan, StateTable, plans_of, table_of
+from postproc.orientation.proved import Convert, proved
 from postproc.orientation.ranking import prepare
 from postproc.orientation.reoriented import reoriented
 from postproc.orientation.rounds import PassFault, Progress, each_pass
@@ -24,19 +26,26 @@ from toolpaths.diagnostics import Diagnostic, error, has_errors, warning
 from toolpaths.toolpath import Toolpath
 from toolpaths.units import DEG
 
+if TYPE_CHECKING:
+    from postproc.pipeline import PostResult
+
 
 @dataclass(frozen=True)
 class OrientationChoice:
     """What was found: per pass what was tried, and the plans side by side.
 
     Attributes:
+        table: the states out of which the plans are made
         paper: the paper's choice in each pass (a vertex along the mean direction, smallest angles), elsewhere the own axis
+        program: the conversion of the plan that was asked for, written or refused; None where none was made
     """
 
     work: Work
     tried: tuple[Tried, ...]
+    table: StateTable
     plans: dict[Orientation, OrientationPlan]
     paper: OrientationPlan
+    program: PostResult | None = None
 
     def toolpath(self, name: Orientation) -> Toolpath:
         """The CL path with the axes of a plan."""
@@ -44,12 +53,14 @@ class OrientationChoice:
 
 
 def orient(toolpath: Toolpath, machine: Machine, setup: SetupFile, options: Options | None = None,
-           progress: Progress | None = None,
-           workers: int | None = None) -> tuple[OrientationChoice | None, list[Diagnostic]]:
+           progress: Progress | None = None, workers: int | None = None,
+           convert: Convert | None = None) -> tuple[OrientationChoice | None, list[Diagnostic]]:
     """Orientations of all passes of a toolpath, within `options.max_tilt`; None where a diagnostic is an ERROR.
 
     Args:
         workers: processes for many passes, None for as many as there are cores; the choice does not depend on it
+        convert: makes the program of the plan `options.orient` of a choice; where it is refused that plan avoids what it
+            was refused for. None: no program is made
     """
     options = options or Options()
     work, found = work_of(toolpath, machine, setup, options)
@@ -66,12 +77,19 @@ def orient(toolpath: Toolpath, machine: Machine, setup: SetupFile, options: Opti
         found += _fixed(work) + unfit(work, results)
         if has_errors(found):
             return None, found
-        plans = plans_of(work, results, allowed, progress, workers)
+        table = table_of(work, results, allowed, progress, workers)
+        plans = plans_of(table)
     except PassFault as fault:
         return None, [*found, error("orient.plan", f"no motion could be planned: {fault}", file=toolpath.file,
                                     lines=[fault.line])]
     found += _unlinked(work, plans.named["auto"], any(np.isfinite(one.seconds) for one in plans.named.values()))
-    return None if has_errors(found) else OrientationChoice(work, tuple(results), plans.named, plans.paper), found
+    if has_errors(found):
+        return None, found
+    choice = OrientationChoice(work, tuple(results), table, plans.named, plans.paper)
+    if convert is None:
+        return choice, found
+    choice, more = proved(choice, options.orient, convert)
+    return choice, found + more
 
 
 def _tried(work: Work, allowed: Allowed, number: int, before: Tried | None) -> Tried:

@@ -25,7 +25,9 @@ def as_dict(choice: OrientationChoice, plan: Orientation = "auto") -> dict[str, 
     """The keys of `orient --json`; passes as `plan` has them."""
     picked, keep = choice.plans[plan].picked, choice.plans["keep"].seconds
     plans = {name.replace("-", "_"): _plan(choice.plans[name], keep) for name in NAMES}
-    return {"machine": choice.work.machine.name, "plan": plan,
+    program = choice.program
+    return {"machine": choice.work.machine.name, "plan": plan, "controller": program.controller_name if program else None,
+            "proved": program.ok if program else None,
             "passes": [_pass(tried, made, choice.work) for tried, made in zip(choice.tried, picked, strict=True)],
             "plans": plans | {"paper_per_pass": _plan(choice.paper, keep)}}
 

@@ -183,7 +183,7 @@ def test_the_first_way_from_home_is_looked_at(tmp_path: Path) -> None:
     """A plate stands over the first point of the file, out of the way of all that follows."""
     found = collisions(converted(line(), setup_file(tmp_path, fixture((-9, -9, 200), (9, 9, 202)))).diagnostics)
     assert found and found[0].code == "collision.touch" and found[0].lines[0] == 7
-    assert "ways between passes and from home are not compared by orient" in found[0].hint
+    assert "--orient auto avoids ways that touch" in found[0].hint
 
 
 def test_verify_finds_what_a_program_touches(tmp_path: Path) -> None:

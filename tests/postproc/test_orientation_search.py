@@ -18,7 +18,7 @@ from postproc.orientation.candidates import tried
 from postproc.orientation.choose import groupwise, seconds
 from postproc.orientation.orient import OrientationChoice, orient
 from postproc.orientation.passes import Pass, Work, work_of
-from postproc.orientation.plans import plans_of
+from postproc.orientation.plans import plans_of, table_of
 from postproc.orientation.poses import held_poses
 from postproc.orientation.ranking import Ranking
 from postproc.orientation.rounds import CHUNK, PassFault, each_pass
@@ -232,6 +232,6 @@ def test_states_that_touch_are_in_no_plan_but_keep() -> None:
 
     made, allowed = work(strips([0.0, 30.0, 60.0]), machine("mikron-ucp710")), Allowed(60.0 * DEG, Ceiling())
     results = [tried(one, made.machine, allowed) for one in made.passes]
-    plans = plans_of(made, results, allowed, workers=1).named
+    plans = plans_of(table_of(made, results, allowed, workers=1)).named
     assert plans["keep"].touches and not any(plans[name].touches for name in ("per-pass", "whole-part", "auto"))
     assert all(one.gains[0] == np.inf for one in results)

@@ -1,0 +1,168 @@
+"""The plan that is asked for, proved as `convert` does: its program, ways between passes and from home included.
+
+What is counted in `turns` says how long ways take, not what the tool touches on them. Where the program of a plan is
+refused, the ways and states that it was refused for are barred, and the plan is chosen anew, until one passes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from postproc.options import Orientation
+from postproc.orientation.passes import Work
+from postproc.orientation.plans import OrientationPlan, plans_of
+from toolpaths.arrays import Ints
+from toolpaths.diagnostics import Diagnostic, Severity, info, warning
+
+if TYPE_CHECKING:
+    from postproc.orientation.orient import OrientationChoice
+    from postproc.pipeline import PostResult
+
+Convert = Callable[["OrientationChoice"], "PostResult"]
+_ROUNDS = 24
+"""programs that are made of plans chosen anew"""
+_TOLD = 3
+_OF_BODIES = "collision."
+
+
+@dataclass(frozen=True)
+class _Blame:
+    """What a program was refused for: `ways` (number n leads to pass n, the last one home) and `passes`, and why; `bodies`
+    where it is what tools touch."""
+
+    ways: frozenset[int]
+    passes: frozenset[int]
+    why: str
+    bodies: bool
+
+
+def proved(choice: OrientationChoice, plan: Orientation, convert: Convert) -> tuple[OrientationChoice, list[Diagnostic]]:
+    """The choice with the program of `plan`, chosen anew where it was refused; what was passed over is told.
+
+    Where nothing else is left, `auto` is the fastest of the other plans whose program is written; where none is, the first
+    choice stands, with a warning: the conversion will tell its errors.
+    """
+    passed: list[tuple[OrientationPlan, str]] = []
+    now = replace(choice, program=convert(choice))
+    first = now
+    for _ in range(_ROUNDS):
+        assert now.program is not None
+        if now.program.ok:
+            return now, _told(passed, now, plan)
+        blame = _blame(now, now.program)
+        passed.append((now.plans[plan], blame.why))
+        if not blame.bodies and _of_the_file(now, plan, convert):
+            return first, [_unproved(first, plan, passed)]
+        after = _anew(now, plan, blame)
+        if after is None:
+            break
+        now = replace(after, program=convert(after))
+    for other in _others(now, first) if plan == "auto" else ():
+        made = replace(first, plans=first.plans | {"auto": other})
+        made = replace(made, program=convert(made))
+        assert made.program is not None
+        if made.program.ok:
+            return made, _told(passed, made, plan)
+    return first, [_unproved(first, plan, passed)]
+
+
+def _anew(choice: OrientationChoice, plan: Orientation, blame: _Blame) -> OrientationChoice | None:
+    """The choice without what a program was refused for; None where the plan stays what it was."""
+    if plan == "keep" or not (blame.ways or blame.passes):
+        return None
+    table = choice.table.without(choice.plans[plan], set(blame.ways), set(blame.passes))
+    plans = plans_of(table)
+    if plans.named[plan].barred:
+        return None
+    return replace(choice, table=table, plans=plans.named, paper=plans.paper)
+
+
+def _others(now: OrientationChoice, first: OrientationChoice) -> list[OrientationPlan]:
+    """Plans that have not been refused, the fastest first."""
+    every = {plan.states: plan for choice in (now, first) for plan in choice.plans.values()}
+    refused = {first.plans["auto"].states, now.plans["auto"].states}
+    left = [plan for states, plan in every.items() if states not in refused and np.isfinite(plan.seconds)]
+    return sorted(left, key=lambda plan: (plan.touches, plan.seconds))
+
+
+def _blame(choice: OrientationChoice, program: PostResult) -> _Blame:
+    """Where a program was refused: by bodies wherever they are touched, else by the lines of its errors."""
+    errors = [d for d in program.diagnostics if d.severity is Severity.ERROR]
+    bodies = [d for d in errors if d.code.startswith(_OF_BODIES)]
+    if bodies and program.comparison is not None and program.comparison.executed is not None:
+        return _touched(choice.work, program)
+    rows = [int(row) for d in errors for row in np.flatnonzero(np.isin(choice.work.moves.line, d.lines))[:1]]
+    ways, passes = _split(_parts(choice.work, choice.work.moves.row[rows]))
+    return _Blame(ways, passes, errors[0].message + (f" (line {errors[0].lines[0]})" if errors[0].lines else ""), False)
+
+
+def _touched(work: Work, program: PostResult) -> _Blame:
+    """Every way and pass on which a tool touches something."""
+    from postproc.collision.program import touching_parts
+    from postproc.readback.poses import Executed, poses_before
+
+    job, comparison = program.job, program.comparison
+    assert job is not None and comparison is not None and comparison.executed is not None
+    motion, moves = comparison.executed[1], job.moves.without_pecks()
+    executed = Executed(job.control, job.kinematics_of, job.register_lengths(), poses_before(motion, job.control))
+    serves = np.minimum(comparison.owner, len(moves) - 1)
+    first = np.append(True, np.diff(moves.row) != 0)[serves]
+    part = np.where(comparison.owner < len(moves), _parts(work, moves.row[serves], first), len(work.passes))
+    touched = touching_parts(motion, executed, job, comparison.owner, part)
+    worst = min(touched, key=lambda part: touched[part].distance - touched[part].limit)
+    ways, passes = _split(np.array(sorted(touched), dtype=np.int64))
+    return _Blame(ways, passes, f"{touched[worst]} {_where(work, worst)}", True)
+
+
+def _parts(work: Work, rows: Ints, first: Ints | bool = True) -> Ints:
+    """Parts (K,) of a program by rows of the CL path: n >= 0 for the way to pass n, which serves its first row (`first`: the
+    first move of a row), -1 - n inside it."""
+    begins = work.moves.row[[one.rows[0] for one in work.passes]]
+    n = np.maximum(np.searchsorted(begins, rows, side="right") - 1, 0)
+    return np.where((begins[n] == rows) & first, n, -1 - n)
+
+
+def _split(parts: Ints) -> tuple[frozenset[int], frozenset[int]]:
+    """(ways, passes) of parts."""
+    return frozenset(parts[parts >= 0].tolist()), frozenset((-1 - parts[parts < 0]).tolist())
+
+
+def _where(work: Work, part: int) -> str:
+    """Part of a program in words."""
+    if part == len(work.passes):
+        return "on the way home"
+    n = part if part >= 0 else -1 - part
+    return f"{'on the way to' if part >= 0 else 'in'} pass {n} (line {work.passes[n].line})"
+
+
+def _of_the_file(choice: OrientationChoice, plan: Orientation, convert: Convert) -> bool:
+    """Whether a program is refused for what the file says, whatever its tool axes: the CL's own are refused alike."""
+    assert choice.program is not None
+    own = convert(replace(choice, plans=choice.plans | {plan: choice.plans["keep"]}))
+    mine, keep = ({d.code for d in made.diagnostics if d.severity is Severity.ERROR} for made in (choice.program, own))
+    return not mine.isdisjoint(keep)
+
+
+def _told(passed: list[tuple[OrientationPlan, str]], choice: OrientationChoice, plan: Orientation) -> list[Diagnostic]:
+    """What was passed over before a plan whose program is written."""
+    if not passed:
+        return []
+    reasons = [f"{one.seconds:.3f} s, {why}" for one, why in passed]
+    more = f"; and {len(reasons) - _TOLD} more" if len(reasons) > _TOLD else ""
+    taken = choice.plans[plan].seconds
+    return [info("orient.passed_over", f"passed over for the {taken:.3f} s of {plan}, as their programs are refused: "
+                 f"{'; '.join(reasons[:_TOLD])}{more}", file=choice.work.toolpath.file)]
+
+
+def _unproved(choice: OrientationChoice, plan: Orientation, passed: list[tuple[OrientationPlan, str]]) -> Diagnostic:
+    """No plan was found whose program is written."""
+    program = choice.program
+    assert program is not None
+    tried = f", nor are those of {len(passed) - 1} other plans" if len(passed) > 1 else ""
+    return warning("orient.unproved", f"the program of {plan} for {program.controller_name} is refused{tried}: "
+                   f"{passed[0][1]}", file=choice.work.toolpath.file,
+                   hint="convert tells all that stands against it; --orient keep leaves the axes of the CL file")
