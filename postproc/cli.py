@@ -10,6 +10,7 @@ import typer
 
 from postproc.cli_calibrate import calibrate
 from postproc.cli_catalogue import controller_app, machine_app, setup_app
+from postproc.cli_errors import errors_app
 from postproc.cli_options import Allow, AxisTolerance, ClFile, Dialect, MachineName, Tolerance, Units
 from postproc.cli_orient import EXAMPLES, ORIENTATIONS, MaxTilt, Orient
 from postproc.cli_orient import orient as orient_command
@@ -30,6 +31,7 @@ app = typer.Typer(name="postproc", no_args_is_help=True, add_completion=False, r
 app.add_typer(machine_app, name="machine")
 app.add_typer(setup_app, name="setup")
 app.add_typer(controller_app, name="controller")
+app.add_typer(errors_app, name="errors")
 app.command(epilog="Example: postproc calibrate reversal.toml -o errors.toml")(calibrate)
 app.command(epilog="Example: postproc time part.cls -m mikron-ucp710 -c linuxcnc")(time)
 app.command("orient", epilog=EXAMPLES)(orient_command)

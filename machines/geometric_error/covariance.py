@@ -80,8 +80,8 @@ def read_covariance(path: Path, names: list[str], cited: tuple[str, int]) -> tup
 def _head_fault(head: list[str], lines: list[int], names: list[str]) -> tuple[str, str] | None:
     """What is wrong with the first row, and what to do."""
     if not head or len(lines) - 1 != len(head):
-        return (f"{max(len(lines) - 1, 0)} rows for {len(head)} parameters", "the table is square: the parameters in the first "
-                "row, then a row for each in the same order")
+        return (f"{max(len(lines) - 1, 0)} rows for {len(head)} parameters", "the table is square: the parameters in the "
+                "first row, then a row for each in the same order")
     known, count = set(names), Counter(head)
     for name in head:
         if name not in known:

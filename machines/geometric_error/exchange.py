@@ -1,16 +1,15 @@
-"""Writing error models, and exchange with controls: tables per axis with ISO 230-1 names, LinuxCNC screw compensation."""
+"""Writing error models: a TOML file, and beside it tables per axis with ISO 230-1 names, maps, covariance."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from machines.geometric_error.covariance import angular, write_covariance
 from machines.geometric_error.csv_table import UNITS, write_csv
-from machines.geometric_error.curves import EVERYWHERE, Curve, Fourier, Polynomial, Table
+from machines.geometric_error.curves import EVERYWHERE, Fourier, Polynomial, Table
 from machines.geometric_error.lattice import ErrorMap
 from machines.geometric_error.lattice_file import map_to_csv
 from machines.geometric_error.model import ErrorModel
@@ -18,13 +17,10 @@ from machines.geometric_error.names import ErrorName
 from machines.geometric_error.rods import RodErrors
 from machines.geometric_error.serial_errors import Component, SerialErrors
 from toolpaths.arrays import Floats
-from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.units import DEG
 
 ROTARY = "ABC"
 LENGTH, ANGLE = "um", "arcsec"
-LINUXCNC_ROWS = 256
-"""entries that LinuxCNC's motion module holds per joint (EMCMOT_COMP_SIZE)"""
 
 
 def write_model(model: ErrorModel, description: str = "") -> dict[str, str]:
@@ -177,71 +173,3 @@ def _number(value: float) -> str:
 
 def _scales(name: ErrorName) -> tuple[float, float]:
     return DEG if name.axis in ROTARY else 1.0, UNITS[ANGLE if name.angular else LENGTH]
-
-
-def sampled(curve: Curve, positions: Floats) -> Table:
-    """Any curve as a linear table at positions (M,), mm or rad, both ways where it has them; what controls can hold."""
-    both = isinstance(curve, Table) and curve.both
-    ways = (1.0, -1.0) if both else (0.0,)
-    return Table(positions, np.concatenate([curve.at(positions, way) for way in ways]), "linear", both)
-
-
-# ---- LinuxCNC -------------------------------------------------------------------------------------------------------
-
-def to_linuxcnc(name: ErrorName, table: Table, sense: float = 1.0) -> str:
-    """A screw compensation file (COMP_FILE with COMP_FILE_TYPE = 0) of a positioning error: nominal, forward, reverse.
-
-    Type 0 holds where the axis really is when it is sent to the nominal position; LinuxCNC adds nominal less actual to
-    the motor's command, linearly between the rows, by the way of the last motion (LinuxCNC, Integrator's manual, INI
-    configuration, [JOINT_n]). mm and degrees.
-
-    Args:
-        sense: -1 where the axis counts against the direction of ISO 841
-
-    Raises:
-        ValueError: where LinuxCNC cannot hold it.
-    """
-    if name.location or name.part != "XYZABC".find(name.axis):
-        raise ValueError(f"{name} is no positioning error; LinuxCNC's screw compensation holds EXX, EYY, ... ECC")
-    if table.rule != "linear" or table.period:
-        raise ValueError(f"{name} is no plain linear table; take `sampled` at the positions that you want")
-    if len(table.x) > LINUXCNC_ROWS:
-        raise ValueError(f"{name} has {len(table.x)} rows, LinuxCNC holds {LINUXCNC_ROWS}; take `sampled` at fewer")
-    unit = DEG if name.axis in ROTARY else 1.0
-    forward, backward = np.split(table.values, 2) if table.both else (table.values, table.values)
-    rows = np.stack([table.x, table.x + sense * forward, table.x + sense * backward], axis=1) / unit
-    return "\n".join([*(" ".join(f"{x:.9f}" for x in row) for row in rows), ""])
-
-
-def from_linuxcnc(text: str, name: ErrorName, sense: float = 1.0, kind: int = 0,
-                  file: str = "") -> tuple[Table | None, list[Diagnostic]]:
-    """The table of a screw compensation file; None and what is wrong.
-
-    Args:
-        kind: COMP_FILE_TYPE: 0 actual positions, 1 trims (nominal less actual)
-    """
-    rows: list[list[float]] = []
-    for n, line in enumerate(text.splitlines(), 1):
-        if not line.strip() or line.lstrip().startswith("#"):
-            continue
-        try:
-            row = [float(word) for word in line.split()]
-        except ValueError:
-            row = []
-        if len(row) != 3 or not np.isfinite(row).all() or (rows and row[0] <= rows[-1][0]):
-            return None, [error("error-table.row", f"{line.strip()!r}: expected nominal, forward, reverse, nominal "
-                                "ascending", file=file, lines=[n])]
-        rows.append(row)
-    if not rows or kind not in (0, 1):
-        return None, [error("error-table.empty", f"no rows, or COMP_FILE_TYPE = {kind} is neither 0 nor 1", file=file)]
-    nominal, forward, backward = np.array(rows).T * (DEG if name.axis in ROTARY else 1.0)
-    errors = [sense * (way - nominal if kind == 0 else -way) for way in (forward, backward)]
-    if np.array_equal(errors[0], errors[1]):
-        return Table(nominal, errors[0]), []
-    return Table(nominal, np.concatenate(errors), both=True), []
-
-
-def with_component(model: ErrorModel, name: ErrorName, curve: Curve) -> ErrorModel:
-    """The model with one component error put in or replaced; its covariance no longer fits and is taken out."""
-    kept = tuple(c for c in model.axes.components if c.name != name)
-    return replace(model, axes=replace(model.axes, components=(*kept, Component(name, curve))), covariance=None)

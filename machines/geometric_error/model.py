@@ -150,7 +150,8 @@ def doubt(model: ErrorModel, actual: Actual, w: Floats, direction: Floats | None
     for first in range(0, len(w), BLOCK):
         part = slice(first, first + BLOCK)
         rows = actual.sensitivity(w[part], None if direction is None else direction[part])
-        spread = rows @ model.covariance @ np.swapaxes(rows, 1, 2)
+        half = (rows.reshape(-1, rows.shape[2]) @ model.covariance).reshape(rows.shape)  # one product of matrices, not N
+        spread = half @ np.swapaxes(rows, 1, 2)
         tip[part] = np.sqrt(np.diagonal(spread[:, :3, :3], axis1=1, axis2=2))
         worst[part] = np.sqrt(np.linalg.eigvalsh(spread[:, :3, :3])[:, -1])
         _, along, _ = actual.place(w[part])

@@ -54,6 +54,9 @@ def table_curve(name: ErrorName, table: CsvTable, rule: Literal["linear", "splin
             return fault
         inside = x < x[0] + period * (1.0 - CLOSES)
         x, values = x[inside], [v[inside] for v in values]
+    if len(x) == 1 and not period:
+        return Fault("error-model.rows", f"{Path(table.file).name} has one row: nothing is known of other positions",
+                     f"write at least two rows, or [components.{name}] with polynomial = [value] and its range")
     if rule == "spline" and len(x) < 4:
         return Fault("error-model.spline", f"a spline needs 4 rows, the table has {len(x)}", "write linear")
     return Table(x, np.concatenate(values), rule, len(values) == 2, period)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 
 from machines.geometric_error.actual import Actual
@@ -58,6 +60,18 @@ def middle(machine: Machine) -> Floats:
     box = kinematics.workspace
     at = np.append(box.middle, np.clip(0.0, *box.tilt))[None]
     return np.asarray(_of_platform(kinematics, at, zero[None, 4:])[0])
+
+
+def corners(machine: Machine, lower: Floats, upper: Floats, fixed: Floats) -> Floats:
+    """Joints (M, J) with the slides at their ends, or the platform at the corners of its box; the rest as `fixed` (J,)."""
+    kinematics = machine.kinematics
+    if isinstance(kinematics, LinearDelta | H4Linear):
+        ends = np.array(list(product(*zip(kinematics.workspace.lower, kinematics.workspace.upper, strict=True))))
+        tilt = np.full((len(ends), 1), np.clip(0.0, *kinematics.workspace.tilt))
+        return _of_platform(kinematics, np.hstack([ends, tilt]), np.tile(fixed[4:], (len(ends), 1)))
+    rotary = np.array(machine.rotary)
+    ends = np.array(list(product(*zip(np.where(rotary, fixed, lower), np.where(rotary, fixed, upper), strict=True))))
+    return np.unique(ends, axis=0)
 
 
 def _joints(machine: Machine, lower: Floats, upper: Floats, rng: np.random.Generator, count: int) -> Floats:

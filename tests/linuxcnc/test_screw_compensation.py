@@ -10,8 +10,8 @@ import pytest
 
 import machines
 from machines.geometric_error.curves import Table
-from machines.geometric_error.exchange import to_linuxcnc
 from machines.geometric_error.names import parse
+from machines.geometric_error.screw_tables import to_linuxcnc
 from tests.linuxcnc import config
 from toolpaths.arrays import Floats
 

@@ -15,14 +15,16 @@ from machines.geometric_error.actual_map import ActualByMap
 from machines.geometric_error.covariance import read_covariance
 from machines.geometric_error.csv_table import read_csv, write_csv
 from machines.geometric_error.curves import Fourier, Table
-from machines.geometric_error.exchange import from_linuxcnc, sampled, save, table_to_csv, to_linuxcnc, with_component
+from machines.geometric_error.exchange import save, table_to_csv
 from machines.geometric_error.lattice import ErrorMap
 from machines.geometric_error.lattice_file import map_from_csv, map_to_csv
 from machines.geometric_error.lattice_making import deviations, map_loss, map_of
 from machines.geometric_error.loader import error_model_schema, load, load_checked
 from machines.geometric_error.model import ErrorModel, doubt
 from machines.geometric_error.names import parse
+from machines.geometric_error.screw_tables import from_linuxcnc, to_linuxcnc
 from machines.geometric_error.serial_errors import Component, SerialErrors
+from machines.geometric_error.tabulate import merged, sampled
 from machines.machine import Machine
 from tests.machines.error_models import ARCSEC, joints, model
 from toolpaths.arrays import Floats
@@ -349,9 +351,16 @@ def test_lattice_csv_round_trip_in_any_order(tmp_path: Path) -> None:
     assert two is not None and np.array_equal(one.table, two.table)
 
 
-def test_a_component_can_be_put_in() -> None:
+def test_a_component_can_be_put_in_and_the_doubt_of_the_others_stays() -> None:
     name = parse("EXX")
     assert name is not None
-    start = ErrorModel(SerialErrors(constants={"EC0Y": 1e-5}), covariance=np.eye(1))
-    more = with_component(start, name, Table(np.array([0.0, 1.0]), np.zeros(2)))
-    assert more.names == ["EXX[0]", "EXX[1]", "EC0Y"] and more.covariance is None
+    old = Component(name, Table(np.array([0.0, 9.0]), np.ones(2)))
+    start = ErrorModel(SerialErrors((old,), {"EC0Y": 1e-5, "EB0Z": 1e-5}),
+                       covariance=np.diag([1.0, 1.0, 4.0, 9.0]) + np.eye(4)[:, ::-1])
+    new = ErrorModel(SerialErrors((Component(name, Table(np.array([0.0, 1.0]), np.zeros(2))),), {"EB0Z": 3e-5}))
+    more = merged(start, new)
+    assert more.names == ["EXX[0]", "EXX[1]", "EC0Y", "EB0Z"] and more.values.tolist() == [0.0, 0.0, 1e-5, 3e-5]
+    assert more.covariance is not None and more.covariance.tolist() == np.diag([0.0, 0.0, 4.0, 0.0]).tolist()
+    known = merged(start, ErrorModel(new.axes, covariance=np.diag([5.0, 6.0, 7.0])))
+    assert known.covariance is not None and np.diag(known.covariance).tolist() == [5.0, 6.0, 4.0, 7.0]
+    assert merged(ErrorModel(start.axes), new).covariance is None

@@ -1,0 +1,234 @@
+"""From a model to what controls and other programs hold: tables per axis, a map, screw compensation; the losses told."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from machines.geometric_error.actual import Actual
+from machines.geometric_error.actual_map import ActualByMap, part_side
+from machines.geometric_error.axis_motion import sense
+from machines.geometric_error.covariance import angular
+from machines.geometric_error.csv_table import UNITS, write_csv
+from machines.geometric_error.curves import Table
+from machines.geometric_error.lattice import POINT, ErrorMap
+from machines.geometric_error.lattice_making import MapLoss, map_loss, map_of, nodes_of, probes, refined
+from machines.geometric_error.model import ErrorModel
+from machines.geometric_error.screw_tables import LINUXCNC_ROWS, to_linuxcnc
+from machines.geometric_error.survey import apart
+from machines.geometric_error.tabulate import loss, rows_for, sampled, tabulated, without
+from machines.geometric_error.volume import corners, middle, ranges, samples
+from machines.kinematics.serial import Serial
+from machines.machine import Machine
+from toolpaths.arrays import Floats
+from toolpaths.units import DEG
+
+MOST_ROWS = 20_000
+"""of a table per axis"""
+MOST_NODES = 200_000
+"""of a map"""
+MOST_DOUBT = 1200
+"""parameters whose covariance is written: a square table"""
+TURN = 13
+"""levels of one turn, where nothing says how many"""
+PLACES = 5000
+"""of the work volume at which an export is compared with its model"""
+Steps = Mapping[str, float]
+
+
+# ---- tables per axis --------------------------------------------------------------------------------------------------
+
+def to_tables(model: ErrorModel, machine: Machine, step: Steps, length: float,
+              angle: float) -> tuple[ErrorModel, dict[str, float]]:
+    """The model with every component a linear table, and what each loses (mm or rad), by name.
+
+    Args:
+        step: mm or rad between rows, by axis; without it as few as lose no more than `length` mm and `angle` rad
+
+    Raises:
+        ValueError: no component there, or more rows would be needed than `MOST_ROWS`.
+    """
+    if not model.axes.components:
+        raise ValueError("the model has no component errors: a map or dimensions of legs have no tables per axis")
+    rows = rows_for(model, travel(machine), step, length, angle, MOST_ROWS)
+    losses = {str(c.name): loss(c.curve, rows[str(c.name)]) for c in model.axes.components}
+    return tabulated(model, rows), losses
+
+
+def location_csv(model: ErrorModel) -> str:
+    """Location errors as a table of one row, by their names."""
+    columns = {name: ("arcsec" if angular(name) else "um", np.array([value]))
+               for name, value in model.axes.constants.items()}
+    return write_csv(columns, ["location errors: actual less commanded, tool relative to part"])
+
+
+def travel(machine: Machine) -> dict[str, tuple[float, float]]:
+    """mm or rad by axis letter: travel, a turn either way where it is unlimited."""
+    lower, upper = ranges(ErrorModel(), machine)
+    return {letter: (float(a), float(b)) for letter, a, b in zip(machine.axis_names, lower, upper, strict=True)}
+
+
+# ---- screw compensation -----------------------------------------------------------------------------------------------
+
+@dataclass(frozen=True)
+class Screws:
+    """Screw compensation of LinuxCNC: text per joint letter, tables, losses (mm or rad), and the model without them."""
+
+    texts: dict[str, str]
+    tables: dict[str, Table]
+    losses: dict[str, float]
+    rest: ErrorModel
+
+
+def to_screws(model: ErrorModel, machine: Machine, step: Steps, length: float, angle: float) -> Screws:
+    """Positioning errors as LinuxCNC's files; arguments as `to_tables`, axes that go round over a turn either way.
+
+    Raises:
+        ValueError: no positioning error there, or more rows than LinuxCNC holds would be needed.
+    """
+    mine = tuple(c for c in model.axes.components if c.name.positioning)
+    if not mine:
+        raise ValueError("the model has no positioning error of an axis (EXX, EYY, ... ECC); LinuxCNC's screw compensation "
+                         "holds nothing else")
+    only = replace(model, axes=replace(model.axes, components=mine), covariance=None)
+    rows = rows_for(only, travel(machine), step, length, angle, LINUXCNC_ROWS, repeat=False)
+    tables = {c.name.axis: sampled(c.curve, rows[str(c.name)].x) for c in mine}
+    texts = {c.name.axis: to_linuxcnc(c.name, tables[c.name.axis], joint_sense(machine, c.name.axis)) for c in mine}
+    losses = {str(c.name): loss(c.curve, rows[str(c.name)]) for c in mine}
+    return Screws(texts, tables, losses, without(model, [c.name for c in mine]))
+
+
+def joint_sense(machine: Machine, letter: str) -> float:
+    """-1.0 where the joint counts against the machine axis of its letter."""
+    if isinstance(machine.kinematics, Serial):
+        return sense(next(joint for joint in machine.kinematics.chain if joint.name == letter))
+    return float(getattr(machine.kinematics, "sense", 1.0))
+
+
+def ini_lines(machine: Machine, names: Mapping[str, str]) -> list[str]:
+    """What LinuxCNC's INI file says of the files, by joint letter."""
+    lines = []
+    for letter, name in names.items():
+        lines += [f"[JOINT_{machine.axis_names.index(letter)}]", f"COMP_FILE = {name}", "COMP_FILE_TYPE = 0"]
+    return lines
+
+
+# ---- error map -----------------------------------------------------------------------------------------------------
+
+@dataclass(frozen=True)
+class MadeMap:
+    """A map of a model: inside its lattice, the other joints as fixed, it loses `inside`; over the work volume `volume`."""
+
+    model: ErrorModel
+    inside: MapLoss
+    volume: MapLoss | None
+    doubt_lost: bool
+
+
+def lattice_for(model: ErrorModel, machine: Machine, letters: str, step: Steps, at: Mapping[str, float], length: float,
+                directions: str) -> tuple[ErrorMap, Floats]:
+    """(an empty lattice, fixed joints (J,)).
+
+    Args:
+        letters: coordinates; "" for the slides of a serial machine, x y z of one on rods
+        step: mm or rad between nodes, by coordinate; without it the rows that the model's own tables have of it, else its
+            ends, or every 30 degrees of a turn
+        at: mm or rad, joints that the lattice does not name and that do not stand in the middle of the volume
+        length: mm, of the tool whose tip is displaced
+        directions: "machine" or "table"
+    """
+    letters = letters or ("".join(x for x, turns in zip(machine.axis_names, machine.rotary, strict=True) if not turns)
+                          if isinstance(machine.kinematics, Serial) else POINT)
+    fixed = middle(machine)
+    for letter, value in at.items():
+        fixed[machine.axis_names.index(letter)] = value
+    bed = part_side(machine.kinematics, machine.structure) if directions == "machine" else ()
+    ends = _box(model, machine, fixed, length)
+    levels = [_levels(model, machine, letter, ends[letter], step.get(letter)) for letter in letters]
+    empty = np.zeros((*(len(nodes) for nodes, _ in levels), 6))
+    nodes, periods = zip(*levels, strict=True)
+    return ErrorMap(tuple(letters), nodes, empty, periods, length, bed), fixed
+
+
+def _box(model: ErrorModel, machine: Machine, fixed: Floats, length: float) -> dict[str, tuple[float, float]]:
+    """Ends of every joint, and of the point x y z when the slides are at their ends and the rest is fixed."""
+    lower, upper = ranges(model, machine)
+    ends = {letter: (float(a), float(b)) for letter, a, b in zip(machine.axis_names, lower, upper, strict=True)}
+    tip = machine.kinematics.with_tool(length).forward(corners(machine, lower, upper, fixed))[0]
+    return ends | {x: (float(tip[:, k].min()), float(tip[:, k].max())) for k, x in enumerate(POINT)}
+
+
+def _levels(model: ErrorModel, machine: Machine, letter: str, ends: tuple[float, float],
+            step: float | None) -> tuple[Floats, float]:
+    """(nodes, period) of one coordinate."""
+    whole = letter in machine.axis_names and not np.isfinite(machine.limits.lower[machine.axis_names.index(letter)])
+    own = [c.curve.x for c in model.axes.components if c.name.axis == letter and isinstance(c.curve, Table)]
+    if whole:
+        count = TURN if step is None else 1 + max(int(np.ceil(2.0 * np.pi / step - 1e-9)), 3)
+        return np.linspace(0.0, 2.0 * np.pi, count)[:-1], 2.0 * np.pi
+    if step is not None:
+        return np.linspace(*ends, 1 + max(int(np.ceil((ends[1] - ends[0]) / step - 1e-9)), 1)), 0.0
+    inner = np.concatenate(own) if own else np.zeros(0)
+    return np.unique(np.concatenate([ends, inner[(inner > ends[0]) & (inner < ends[1])]])), 0.0
+
+
+def to_map(model: ErrorModel, machine: Machine, lattice: ErrorMap, fixed: Floats, tolerance: float | None) -> MadeMap:
+    """The map of a model; where a `tolerance` (mm) is given its cells are divided until it loses no more inside.
+
+    Raises:
+        ValueError: a node is out of reach, or more than MOST_NODES are needed.
+    """
+    kinematics = machine.kinematics.with_tool(lattice.length)
+    actual, nominal = model.on(kinematics), model.zero().on(kinematics)
+    if lattice.table.size // 6 > MOST_NODES:
+        raise ValueError(f"{lattice.table.size // 6} nodes, at most {MOST_NODES}; take longer steps or fewer coordinates")
+    if tolerance is None:
+        made = map_of(actual, nominal, lattice, fixed)
+        places = nodes_of(ActualByMap(nominal, made), probes(made, np.random.default_rng(0)), fixed)
+        inside = map_loss(ActualByMap(nominal, made), actual, places)
+    else:
+        made, inside = refined(actual, nominal, lattice, fixed, tolerance, MOST_NODES)
+    result = ErrorModel(map=made, corrected_by=model.corrected_by, name=model.name, machine=model.machine)
+    volume = samples(model, machine, actual, PLACES)
+    volume = volume[~result.on(kinematics).outside(volume).any(axis=1)]
+    lost = map_loss(result.on(kinematics), actual, volume) if len(volume) else None
+    if model.covariance is None or made.table.size > MOST_DOUBT:
+        return MadeMap(result, inside, lost, model.covariance is not None)
+    rows = _rows(ActualByMap(nominal, made), actual, fixed)
+    return MadeMap(replace(result, covariance=rows @ model.covariance @ rows.T), inside, lost, False)
+
+
+def _rows(by_map: ActualByMap, actual: Actual, fixed: Floats) -> Floats:
+    """(6 N, P): values of a map per parameter of its model, first order."""
+    w = nodes_of(by_map, by_map.map.places(), fixed)
+    turned = by_map.directions(by_map.joints(w))
+    rows = actual.sensitivity(w).reshape(len(w), 2, 3, -1)
+    result: Floats = np.einsum("nji,nkjp->nkip", turned, rows).reshape(6 * len(w), -1)
+    return result
+
+
+# ---- what stays ----------------------------------------------------------------------------------------------------
+
+def worst(model: ErrorModel, machine: Machine, tool_length: float, places_of: ErrorModel) -> tuple[float, float]:
+    """Worst tip (um) and axis (arcsec) of a model where `places_of` holds; 0 where that is nowhere."""
+    kinematics = machine.kinematics.with_tool(tool_length)
+    w = samples(places_of, machine, places_of.on(kinematics), PLACES)
+    tip, axis = apart(model.on(kinematics), model.zero().on(kinematics), w)
+    return float(tip.max(initial=0.0)) / UNITS["um"], float(axis.max(initial=0.0)) / UNITS["arcsec"]
+
+
+def correlated(model: ErrorModel) -> bool:
+    """True where the covariance is more than one standard deviation for each parameter."""
+    return model.covariance is not None and bool(np.count_nonzero(model.covariance - np.diag(np.diag(model.covariance))))
+
+
+def named(values: Mapping[str, float]) -> dict[str, float]:
+    """Losses in um and arcsec, by component."""
+    return {name: value / UNITS["arcsec" if angular(name) else "um"] for name, value in values.items()}
+
+
+def in_units(values: Mapping[str, float]) -> dict[str, float]:
+    """mm and degrees by axis or coordinate, as mm and rad."""
+    return {letter: value * (DEG if letter in "ABC" else 1.0) for letter, value in values.items()}

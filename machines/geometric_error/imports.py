@@ -1,0 +1,229 @@
+"""From tables of others to a model: CSV per axis with ISO 230-1 names, location errors, lattices, LinuxCNC's screw files."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from machines.geometric_error.actual_map import part_side
+from machines.geometric_error.axis_motion import effect
+from machines.geometric_error.covariance import angular, read_covariance
+from machines.geometric_error.csv_table import ANGLES, LENGTHS, UNITS, CsvTable, read_csv, read_text
+from machines.geometric_error.exports import joint_sense
+from machines.geometric_error.lattice_file import map_from_csv
+from machines.geometric_error.model import ErrorModel
+from machines.geometric_error.names import DIRECTIONS, OWN, ErrorName, parse
+from machines.geometric_error.screw_tables import from_linuxcnc
+from machines.geometric_error.serial_errors import Component, Frame, SerialErrors
+from machines.geometric_error.table_curves import Fault, table_curve
+from machines.kinematics.serial import Serial
+from machines.machine import Machine
+from machines.user_file import nearest
+from toolpaths.diagnostics import Diagnostic, error, has_errors
+
+_SCREW = re.compile(r"([A-Z])=(.+)$")
+MAP_COLUMNS = {"dx", "dy", "dz"}
+
+
+@dataclass(frozen=True)
+class How:
+    """How sources are to be read.
+
+    Attributes:
+        rule: between the rows of tables per axis
+        periods: mm or rad, by axis or coordinate that goes round
+        sign: -1 where the numbers say how the part moves relative to the tool
+        kind: COMP_FILE_TYPE of LinuxCNC's files
+        tool_length: mm, of the tool whose tip a map displaces
+        directions: of a map
+    """
+
+    rule: Literal["linear", "spline"] = "linear"
+    periods: Mapping[str, float] = field(default_factory=dict)
+    sign: float = 1.0
+    kind: int = 0
+    tool_length: float = 0.0
+    directions: Literal["table", "machine"] = "table"
+
+
+def read_sources(sources: Sequence[str], machine: Machine, how: How) -> tuple[ErrorModel | None, list[Diagnostic]]:
+    """The model that all sources make together; None where any has a fault.
+
+    Args:
+        sources: `x.csv`: tables per axis, location errors or a lattice, told by their columns; `X=x.comp`: LinuxCNC's
+            screw compensation of the joint X
+    """
+    model, found = ErrorModel(machine=machine.name), []
+    places: dict[str, str] = {}
+    for source in sources:
+        screw = _SCREW.match(source)
+        part, faults = _screw(screw[1], Path(screw[2]), machine, how) if screw else _csv(Path(source), machine, how)
+        found += faults
+        if part is None:
+            continue
+        found += _twice(part, places, source)
+        model = replace(part, machine=machine.name) if part.map is not None else \
+            replace(model, axes=_joined(model.axes, part.axes))
+        if part.map is not None and len(sources) > 1:
+            found.append(error("error-import.map", "a map stands alone", file=source,
+                               hint=f"import it without the other {len(sources) - 1} sources"))
+    if not has_errors(found):
+        found += fits(model, machine)
+    return (None if has_errors(found) else model), found
+
+
+def _joined(one: SerialErrors, other: SerialErrors) -> SerialErrors:
+    return SerialErrors((*one.components, *other.components), {**one.constants, **other.constants}, one.reference,
+                        {**one.frame, **other.frame})
+
+
+def _twice(part: ErrorModel, places: dict[str, str], source: str) -> list[Diagnostic]:
+    found = []
+    for name in [*(str(c.name) for c in part.axes.components), *part.axes.constants]:
+        if name in places:
+            found.append(error("error-import.twice", f"{name} is in {places[name]} too", file=source,
+                               hint="give every error once"))
+        places[name] = source
+    return found
+
+
+def fits(model: ErrorModel, machine: Machine) -> list[Diagnostic]:
+    """Why a model is none of this machine."""
+    try:
+        model.on(machine.kinematics)
+    except ValueError as fault:
+        return [error("error-model.machine", str(fault), hint=f"this machine is {machine.name}")]
+    return [error("error-model.no-effect", f"{text} moves nothing", hint="a constant error belongs into the component "
+                  + text.replace("0", "", 1)) for text in model.axes.constants
+            if (name := parse(text)) is not None and not effect(name, machine.kinematics)]
+
+
+def with_covariance(model: ErrorModel, path: Path) -> tuple[ErrorModel | None, list[Diagnostic]]:
+    """The model with the covariance of a square table, um and arcsec; parameters that it leaves out have none."""
+    names = model.names
+    matrix, found = read_covariance(path, names, ("", 0))
+    if matrix is None:
+        return None, found
+    scale = [UNITS["arcsec" if angular(name) else "um"] for name in names]
+    return replace(model, covariance=matrix * np.outer(scale, scale)), []
+
+
+# ---- CSV ------------------------------------------------------------------------------------------------------------
+
+def _csv(path: Path, machine: Machine, how: How) -> tuple[ErrorModel | None, list[Diagnostic]]:
+    table, found = read_csv(path)
+    if table is None:
+        return None, found
+    if MAP_COLUMNS & set(table.columns):
+        return _map(table, machine, how)
+    positions = [name for name in table.columns if name in OWN]
+    if positions:
+        return _axis(table, positions, machine, how)
+    return _location(table, how)
+
+
+def _map(table: CsvTable, machine: Machine, how: How) -> tuple[ErrorModel | None, list[Diagnostic]]:
+    periods = {letter: period for letter, period in how.periods.items() if letter in table.columns}
+    result, found = map_from_csv(table, periods)
+    if result is None:
+        return None, found
+    bed = part_side(machine.kinematics, machine.structure) if how.directions == "machine" else ()
+    return ErrorModel(map=replace(result, length=how.tool_length, bed=bed, table=how.sign * result.table)), []
+
+
+def _axis(table: CsvTable, positions: list[str], machine: Machine, how: How) -> tuple[ErrorModel | None, list[Diagnostic]]:
+    """Component errors over the positions of one axis."""
+    letter = positions[0]
+    if len(positions) > 1:
+        return None, [error("error-import.axis", f"columns {' and '.join(positions)} are positions of several axes",
+                            file=table.file, lines=[table.head], hint="write a table for each axis; a map has dx, dy, dz")]
+    if letter not in machine.axis_names:
+        return None, [error("error-model.axis", f"{machine.name} has no axis {letter!r}", file=table.file,
+                            lines=[table.head], hint="its axes are " + ", ".join(machine.axis_names))]
+    names, found = _names(table, letter)
+    components = []
+    for name in names:
+        curve = table_curve(name, table, how.rule, how.periods.get(letter, 0.0), how.sign)
+        if isinstance(curve, Fault):
+            found.append(curve.at(table))
+        else:
+            components.append(Component(name, curve))
+    if not names and not found:
+        found.append(error("error-model.column", f"no errors of {letter}", file=table.file, lines=[table.head],
+                           hint=f"write columns {', '.join(f'E{d}{letter} [{_unit(d)}]' for d in DIRECTIONS)}"))
+    frame: dict[str, Frame] = {letter: bed_frame(machine, letter)} if letter in "ABC" else {}
+    model = ErrorModel(SerialErrors(tuple(components), frame=frame))
+    return (None if found else model), found
+
+
+def _unit(direction: str) -> str:
+    return "arcsec" if direction in "ABC" else "um"
+
+
+def bed_frame(machine: Machine, letter: str) -> Frame:
+    """The side of a rotary axis that the bed is on: directions of ISO 230-1."""
+    part = letter in part_side(machine.kinematics, machine.structure)
+    return "moving" if part else "fixed"
+
+
+def _names(table: CsvTable, letter: str) -> tuple[list[ErrorName], list[Diagnostic]]:
+    """Components of the axis that the columns hold; columns that are none of them are faults."""
+    names: dict[str, ErrorName] = {}
+    found = []
+    for column in table.columns:
+        name = parse(column.rstrip("+-"))
+        if column == letter:
+            continue
+        if name is None or name.location or name.axis != letter:
+            known = [f"E{d}{letter}" for d in DIRECTIONS]
+            found.append(error("error-model.column", f"column {column[:40]!r} is no component error of {letter}",
+                               file=table.file, lines=[table.head], hint=nearest(column, known)))
+            continue
+        names[str(name)] = name
+    return list(names.values()), found
+
+
+def _location(table: CsvTable, how: How) -> tuple[ErrorModel | None, list[Diagnostic]]:
+    """Location errors: one row, a column each."""
+    found, constants = [], {}
+    for column, values in table.columns.items():
+        name = parse(column)
+        if name is None or not name.location:
+            found.append(error("error-import.columns", f"column {column[:40]!r} is neither the position of an axis, nor a "
+                               "coordinate or value of a map, nor a location error", file=table.file, lines=[table.head],
+                               hint="write e.g. X [mm], EXX [um]; or X [mm], dx [um], dy [um], dz [um]; or EC0Y [arcsec]"))
+            continue
+        known = ANGLES if name.angular else LENGTHS
+        if table.unit[column] not in known:
+            found.append(error("error-model.unit", f"column {column!r} has unit {table.unit[column]!r}", file=table.file,
+                               lines=[table.head], hint="write one of " + ", ".join(known)))
+        constants[column] = how.sign * float(values[0])
+    if not found and len(table) > 1:
+        found.append(error("error-import.rows", f"location errors are constants, the table has {len(table)} rows",
+                           file=table.file, lines=list(table.lines[1:7]), hint="keep one row"))
+    return (None if found else ErrorModel(SerialErrors(constants=constants))), found
+
+
+# ---- LinuxCNC ----------------------------------------------------------------------------------------------------------
+
+def _screw(letter: str, path: Path, machine: Machine, how: How) -> tuple[ErrorModel | None, list[Diagnostic]]:
+    rotary = dict(zip(machine.axis_names, machine.rotary, strict=True))
+    if letter not in rotary or (not isinstance(machine.kinematics, Serial) and not rotary[letter]):
+        mine = [x for x in machine.axis_names if isinstance(machine.kinematics, Serial) or rotary[x]]
+        return None, [error("error-model.axis", f"{machine.name} has no axis {letter!r} with a positioning error",
+                            file=str(path), hint="it has " + (", ".join(mine) or "none"))]
+    text, found = read_text(path)
+    if text is None:
+        return None, found
+    name = parse(f"E{OWN[letter]}{letter}")
+    assert name is not None
+    table, found = from_linuxcnc(text, name, how.sign * joint_sense(machine, letter), how.kind, str(path))
+    if table is None:
+        return None, found
+    frame: dict[str, Frame] = {letter: bed_frame(machine, letter)} if rotary[letter] else {}
+    return ErrorModel(SerialErrors((Component(name, table),), frame=frame)), []

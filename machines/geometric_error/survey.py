@@ -1,0 +1,164 @@
+"""What an error model holds and does: ranges, largest values, worst tip and axis over the work volume, doubt."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from machines.geometric_error.actual import Actual
+from machines.geometric_error.covariance import angular
+from machines.geometric_error.csv_table import UNITS
+from machines.geometric_error.curves import Curve, Fourier, Polynomial, Table
+from machines.geometric_error.lattice import COLUMNS, ErrorMap
+from machines.geometric_error.model import ErrorModel, doubt
+from machines.geometric_error.names import DIRECTIONS, SPINDLE, parse
+from machines.geometric_error.rods import RodErrors
+from machines.geometric_error.volume import ranges, samples
+from machines.machine import Machine
+from toolpaths.arrays import Floats
+from toolpaths.diagnostics import Diagnostic, warning
+from toolpaths.units import DEG
+
+ROTARY = "ABC"
+UM, ARCSEC = UNITS["um"], UNITS["arcsec"]
+PLACES = 20_000
+"""of the work volume at which the model is looked at"""
+DOUBT_WORK = 4e8
+"""multiplications that looking for the largest doubt may take at one place after the other"""
+FINE = 4001
+"""positions along a curve at which its largest value is looked for"""
+SHORT = 1e-6
+"""mm or rad of travel that counts as none"""
+
+
+def survey(model: ErrorModel, machine: Machine, tool_length: float) -> dict[str, Any]:
+    """Figures of a model, um and arcsec, positions mm and degrees; tool length mm."""
+    return {"machine": machine.name, "corrected_by": model.corrected_by, "parameters": len(model.names),
+            "components": {str(c.name): _curve(c.curve, c.name.angular, c.name.axis, model, machine)
+                           for c in model.axes.components},
+            "absent": absent(model, machine),
+            "location": {name: _value(name, value) for name, value in model.axes.constants.items()},
+            "legs": _legs(model.rods), "map": None if model.map is None else _map(model.map),
+            "covariance": _covariance(model), "volume": _volume(model, machine, tool_length)}
+
+
+def absent(model: ErrorModel, machine: Machine) -> list[str]:
+    """Component errors of axes that the model has some of, but not these: they count as 0."""
+    given = {str(c.name) for c in model.axes.components}
+    axes = {c.name.axis for c in model.axes.components}
+    return [name for axis in machine.axis_names if axis in axes for d in DIRECTIONS if (name := f"E{d}{axis}") not in given]
+
+
+def unmeasured(model: ErrorModel, machine: Machine, file: str) -> list[Diagnostic]:
+    """Warnings where the model does not reach the ends of travel: positions beyond are refused, or taken as at its end."""
+    lower, upper = ranges(model, machine)
+    found = []
+    for j, letter in enumerate(machine.axis_names):
+        least, most = float(machine.limits.lower[j]), float(machine.limits.upper[j])
+        if lower[j] <= max(least, -np.pi if machine.rotary[j] else -np.inf) + SHORT and upper[j] >= min(
+                most, np.pi if machine.rotary[j] else np.inf) - SHORT:
+            continue
+        unit = DEG if machine.rotary[j] else 1.0
+        travel = "goes round" if not np.isfinite(least) else f"travels from {least / unit:g} to {most / unit:g}"
+        found.append(warning("error-model.range", f"{letter} {travel}, the model holds from {lower[j] / unit:g} to "
+                             f"{upper[j] / unit:g}", file=file, hint="beyond, conversions stop unless "
+                             "--error-model-beyond is given"))
+    return found
+
+
+def _value(name: str, value: float) -> dict[str, Any]:
+    turn = angular(name)
+    found = parse(name)
+    kind = "spindle" if name.endswith(SPINDLE) else "zero position" if found and found.zero_position else "line"
+    return {"value": value / (ARCSEC if turn else UM), "unit": "arcsec" if turn else "um", "kind": kind}
+
+
+def _curve(curve: Curve, turn: bool, axis: str, model: ErrorModel, machine: Machine) -> dict[str, Any]:
+    position, unit = DEG if axis in ROTARY else 1.0, ARCSEC if turn else UM
+    j = machine.axis_names.index(axis)
+    lower, upper = (float(x[j]) for x in ranges(model, machine))
+    x = np.linspace(lower, upper, FINE)
+    if isinstance(curve, Table):
+        x = np.concatenate([x, curve.x])
+    ways = (1.0, -1.0) if isinstance(curve, Table) and curve.both else (0.0,)
+    values = np.array([curve.at(x, way) for way in ways])
+    at = np.unravel_index(int(np.argmax(np.abs(values))), values.shape)
+    span = [v / position if np.isfinite(v) else None for v in curve.range]
+    kind = "series" if isinstance(curve, Fourier) else "polynomial" if isinstance(curve, Polynomial) else \
+        f"{curve.rule} table" if isinstance(curve, Table) else ""
+    apart = float(np.abs(np.diff(values, axis=0)).max(initial=0.0)) / unit
+    return {"kind": kind, "values": len(curve.values), "range": span, "both_ways": len(ways) == 2,
+            "unit": "arcsec" if turn else "um", "largest": float(values[at]) / unit, "at": float(x[at[1]]) / position,
+            "lost_motion": apart}
+
+
+def _legs(rods: RodErrors | None) -> dict[str, Any]:
+    if rods is None or not rods.values.any():
+        return {}
+    found: dict[str, Any] = {}
+    for name, value in zip(rods.names, rods.values, strict=True):
+        turn = angular(name)
+        kind = name.split(".")[1]
+        size = abs(float(value)) / (ARCSEC if turn else UM)
+        if size > found.get(kind, {"largest": -1.0})["largest"]:
+            found[kind] = {"largest": size, "unit": "arcsec" if turn else "um", "parameter": name}
+    return found
+
+
+def _map(error_map: ErrorMap) -> dict[str, Any]:
+    worst, coordinates = np.abs(error_map.table.reshape(-1, 6)).max(axis=0), {}
+    for letter, nodes, period in zip(error_map.letters, error_map.nodes, error_map.periods, strict=True):
+        unit = DEG if letter in ROTARY else 1.0
+        coordinates[letter] = {"nodes": len(nodes), "range": [float(nodes[0]) / unit, float(nodes[-1]) / unit],
+                               "repeats": period / unit or None}
+    return {"coordinates": coordinates, "nodes": error_map.table.size // 6, "tool_length_mm": error_map.length,
+            "directions": "machine" if error_map.bed else "table",
+            "largest": {name: float(worst[k]) / (ARCSEC if k >= 3 else UM) for k, name in enumerate(COLUMNS)}}
+
+
+def _covariance(model: ErrorModel) -> dict[str, Any] | None:
+    if model.covariance is None:
+        return None
+    sigma = np.sqrt(np.diag(model.covariance))
+    turn = np.array([angular(name) for name in model.names], dtype=np.bool_)
+    correlated = bool(np.count_nonzero(model.covariance - np.diag(np.diag(model.covariance))))
+    return {"correlated": correlated, "without": [n for n, s in zip(model.names, sigma, strict=True) if s == 0.0],
+            "largest_um": float(sigma[~turn].max(initial=0.0)) / UM,
+            "largest_arcsec": float(sigma[turn].max(initial=0.0)) / ARCSEC}
+
+
+def _volume(model: ErrorModel, machine: Machine, tool_length: float) -> dict[str, Any] | None:
+    """Worst and root mean square over the volume; None where the model holds nowhere in it."""
+    kinematics = machine.kinematics.with_tool(tool_length)
+    actual, nominal = model.on(kinematics), model.zero().on(kinematics)
+    w = samples(model, machine, actual, PLACES)
+    if not len(w):
+        return None
+    tip, axis = apart(actual, nominal, w)
+    one, other = int(np.argmax(tip)), int(np.argmax(axis))
+    found = {"tool_length_mm": tool_length, "places": len(w), "tip_worst_um": float(tip[one]) / UM,
+             "tip_rms_um": float(np.sqrt(np.mean(tip**2))) / UM, "tip_worst_at": _joints(machine, actual, w[one]),
+             "axis_worst_arcsec": float(axis[other]) / ARCSEC, "axis_rms_arcsec": float(np.sqrt(np.mean(axis**2))) / ARCSEC,
+             "axis_worst_at": _joints(machine, actual, w[other])}
+    return found | _doubt(model, actual, w)
+
+
+def apart(one: Actual, other: Actual, w: Floats) -> tuple[Floats, Floats]:
+    """Distance of the tips (N,) mm and angle between the axes (N,) rad of two machines commanded alike."""
+    (t0, a0), (t1, a1) = other.aim(w), one.aim(w)
+    return np.linalg.norm(t1 - t0, axis=1), 2.0 * np.arcsin(np.minimum(0.5 * np.linalg.norm(a1 - a0, axis=1), 1.0))
+
+
+def _doubt(model: ErrorModel, actual: Actual, w: Floats) -> dict[str, Any]:
+    if model.covariance is None:
+        return {}
+    count = int(np.clip(DOUBT_WORK / (6.0 * len(model.names) ** 2 + 1.0), 4, 2000))
+    found = doubt(model, actual, w[:count])
+    return {"doubt_tip_um": float(found.tip_worst.max()) / UM, "doubt_axis_arcsec": float(found.axis.max()) / ARCSEC}
+
+
+def _joints(machine: Machine, actual: Actual, w: Floats) -> dict[str, float]:
+    q = actual.joints(w[None])[0]
+    return {letter: round(float(v) / (DEG if turns else 1.0), 4) for letter, v, turns in
+            zip(machine.axis_names, q, machine.rotary, strict=True)}

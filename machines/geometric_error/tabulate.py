@@ -1,0 +1,178 @@
+"""Any curves as linear tables, as controls and tables per axis hold them; the covariance goes along, the loss is told."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from machines.geometric_error.curves import Curve, Fourier, Table
+from machines.geometric_error.model import ErrorModel
+from machines.geometric_error.names import ErrorName
+from machines.geometric_error.serial_errors import Component
+from toolpaths.arrays import Floats
+
+PROBES = 16
+"""places in each cell of a table at which it is compared with its curve"""
+ROUND = 12
+"""cells of one turn to begin with, where no table has rows"""
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Positions (M,) mm or rad of a table, and the period after which it repeats (0 for never)."""
+
+    x: Floats
+    period: float = 0.0
+
+    @property
+    def closed(self) -> Floats:
+        """The positions, of one that repeats with the end of its period."""
+        return np.append(self.x, self.x[0] + self.period) if self.period else self.x
+
+
+def sampled(curve: Curve, x: Floats, period: float = 0.0) -> Table:
+    """A curve as a linear table at positions (M,), mm or rad, both ways where it has them."""
+    both = isinstance(curve, Table) and curve.both
+    ways = (1.0, -1.0) if both else (0.0,)
+    return Table(x, np.concatenate([curve.at(x, way) for way in ways]), "linear", both, period)
+
+
+def loss(curve: Curve, rows: Rows) -> float:
+    """Largest difference of a curve and its table between the rows, mm or rad, the worse way."""
+    closed, table = rows.closed, sampled(curve, rows.x, rows.period)
+    places = np.interp(np.arange((len(closed) - 1) * PROBES + 1) / PROBES, np.arange(len(closed)), closed)
+    ways = (1.0, -1.0) if table.both else (0.0,)
+    return max(float(np.abs(table.at(places, way) - curve.at(places, way)).max(initial=0.0)) for way in ways)
+
+
+def rows_for(model: ErrorModel, travel: Mapping[str, tuple[float, float]], step: Mapping[str, float], length: float,
+             angle: float, most: int, repeat: bool = True) -> dict[str, Rows]:
+    """Rows for each component, by its name: the same for those of one axis that were measured over the same range.
+
+    Args:
+        travel: mm or rad, of axes whose curves hold everywhere and do not repeat
+        step: mm or rad between rows, by axis letter; else the rows of the components' own linear tables, their cells
+            divided evenly until no component loses more than `length` mm or `angle` rad
+        most: rows of a table
+        repeat: False where tables cannot repeat: then over the travel
+
+    Raises:
+        ValueError: more rows would be needed.
+    """
+    groups: dict[tuple[str, tuple[float, float], float], list[Component]] = {}
+    for component in model.axes.components:
+        period = _period(component.curve) if repeat else 0.0
+        groups.setdefault((component.name.axis, component.curve.range, period), []).append(component)
+    found: dict[str, Rows] = {}
+    for (axis, span, period), mine in groups.items():
+        lower, upper = (0.0, period) if period else span if np.isfinite(span).all() else travel[axis]
+        ends = _ends(mine, lower, upper, period)
+        rows = _even(ends, step[axis], period) if axis in step else _fine(mine, ends, period, length, angle, most)
+        if len(rows.x) > most:
+            raise ValueError(f"{len(rows.x)} rows for {axis}, {most} are held; take a longer step")
+        found |= {str(component.name): rows for component in mine}
+    return found
+
+
+def _period(curve: Curve) -> float:
+    return curve.period if isinstance(curve, Table | Fourier) and not np.isfinite(curve.range).any() else 0.0
+
+
+def _ends(components: Sequence[Component], lower: float, upper: float, period: float) -> Floats:
+    """Rows that the components' own tables have, closed where they repeat; else an even few."""
+    tables = [c.curve for c in components if isinstance(c.curve, Table) and c.curve.period == period]
+    own = [Rows(table.x, period).closed for table in tables]
+    if own and len({x[0] for x in own}) == 1:
+        return np.unique(np.concatenate(own))
+    return np.linspace(lower, upper, ROUND + 1 if period else 2)
+
+
+def _even(ends: Floats, step: float, period: float) -> Rows:
+    x = np.linspace(ends[0], ends[-1], 1 + max(int(np.ceil((ends[-1] - ends[0]) / step - 1e-9)), 1))
+    return Rows(x[:-1] if period else x, period)
+
+
+def _fine(components: Sequence[Component], ends: Floats, period: float, length: float, angle: float, most: int) -> Rows:
+    parts = 1
+    while True:
+        x = np.interp(np.arange((len(ends) - 1) * parts + 1) / parts, np.arange(len(ends)), ends)
+        rows = Rows(x[:-1] if period else x, period)
+        worst = max(loss(c.curve, rows) / (angle if c.name.angular else length) for c in components)
+        if worst <= 1.0:
+            return rows
+        if len(x) > most:
+            raise ValueError(f"{components[0].name.axis}: {len(x)} rows still lose {worst:.3g} times what was asked for, "
+                             f"{most} are held; allow a greater loss")
+        parts = max(parts + 1, min(2 * parts, int(parts * np.sqrt(worst))))
+
+
+def tabulated(model: ErrorModel, rows: Mapping[str, Rows]) -> ErrorModel:
+    """The model with the components named in `rows` as linear tables there, and the covariance of their values.
+
+    The values of a table are linear in the parameters of its curve, so that covariance is A Sigma A^T.
+    """
+    components, blocks = [], [np.eye(0 if model.rods is None else len(model.rods.names))]
+    for component in model.axes.components:
+        mine, curve = rows.get(str(component.name)), component.curve
+        table = curve if mine is None else sampled(curve, mine.x, mine.period)
+        components.append(Component(component.name, table))
+        blocks.append(np.eye(len(curve.values)) if mine is None else _basis(curve, mine.x))
+    blocks.append(np.eye(len(model.axes.constants)))
+    covariance = None if model.covariance is None else carried(model.covariance, blocks)
+    return replace(model, axes=replace(model.axes, components=tuple(components)), covariance=covariance)
+
+
+def _basis(curve: Curve, x: Floats) -> Floats:
+    both = isinstance(curve, Table) and curve.both
+    return np.concatenate([curve.basis(x, np.full(len(x), way)) for way in ((1.0, -1.0) if both else (0.0,))])
+
+
+def carried(covariance: Floats, blocks: Sequence[Floats]) -> Floats:
+    """A Sigma A^T with A the blocks (P'_k, P_k) along a diagonal."""
+    columns = np.cumsum([0, *(b.shape[1] for b in blocks)])
+    half = np.concatenate([b @ covariance[a:e] for b, a, e in zip(blocks, columns[:-1], columns[1:], strict=True)])
+    return np.concatenate([half[:, a:e] @ b.T for b, a, e in zip(blocks, columns[:-1], columns[1:], strict=True)], axis=1)
+
+
+# ---- parts of models ---------------------------------------------------------------------------------------------------
+
+def without(model: ErrorModel, names: Sequence[ErrorName]) -> ErrorModel:
+    """The model less some components; the covariance of the others stays."""
+    kept = tuple(c for c in model.axes.components if c.name not in names)
+    return _with_axes(model, replace(model, axes=replace(model.axes, components=kept), covariance=None))
+
+
+def merged(model: ErrorModel, more: ErrorModel) -> ErrorModel:
+    """The model with the components and constants of `more` put in or replaced.
+
+    Covariances stay where either has one; parameters of the other have none, and no correlation is known between the two.
+    """
+    new = {c.name for c in more.axes.components}
+    components = (*(c for c in model.axes.components if c.name not in new), *more.axes.components)
+    axes = replace(model.axes, components=components, constants={**model.axes.constants, **more.axes.constants},
+                   reference={**model.axes.reference, **more.axes.reference},
+                   frame={**model.axes.frame, **more.axes.frame})
+    result = _with_axes(model, replace(model, axes=axes, covariance=None), replaced(model, more))
+    return _with_axes(more, result)
+
+
+def replaced(model: ErrorModel, more: ErrorModel) -> set[str]:
+    """Parameters of a model that another one gives anew."""
+    whole = {str(c.name) for c in more.axes.components}
+    mine = [(str(c.name), label) for c in model.axes.components for label in c.curve.labels()]
+    return {name + label for name, label in mine if name in whole} | (set(model.axes.constants) & set(more.axes.constants))
+
+
+def _with_axes(source: ErrorModel, target: ErrorModel, lost: set[str] | frozenset[str] = frozenset()) -> ErrorModel:
+    """`target` with the covariance that `source` has of the parameters that both have, apart from those `lost`."""
+    if source.covariance is None:
+        return target
+    names = target.names
+    place = {name: k for k, name in enumerate(names)}
+    shared = [(k, place[name]) for k, name in enumerate(source.names) if name in place and name not in lost]
+    old, new = (np.array(x, dtype=np.int64) for x in zip(*shared, strict=True)) if shared else (np.zeros(0, int),) * 2
+    covariance = np.zeros((len(names), len(names))) if target.covariance is None else target.covariance.copy()
+    covariance[np.ix_(new, new)] = source.covariance[np.ix_(old, old)]
+    return replace(target, covariance=covariance)

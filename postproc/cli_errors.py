@@ -1,0 +1,139 @@
+"""Commands on error models: check, export, import, schema. Heavy packages are imported inside, so that --help is instant."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from postproc.cli_errors_import import EXAMPLE, import_
+from postproc.cli_options import MachineName
+from postproc.console import Json, machine_of, print_json, refuse_overwriting, report, shown_errors
+from postproc.error_files import finish, loaded, model_files, or_refused, pairs, writable
+
+errors_app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Error models: check, export to tables, maps and "
+                         "LinuxCNC's screw compensation, import, schema.")
+errors_app.command("import", epilog=EXAMPLE)(import_)
+
+ModelFile = Annotated[Path, typer.Argument(metavar="MODEL.toml", help="error model")]
+Folder = Annotated[Path, typer.Option("-o", "--output", metavar="FOLDER", help="folder to write into")]
+ToolLength = Annotated[float, typer.Option("--tool-length", metavar="MM", min=0.0, max=10_000.0,
+                                           help="gauge length of the tool that is looked at")]
+Step = Annotated[list[str] | None, typer.Option("--step", metavar="AXIS=STEP", help="mm or degrees between rows or nodes, "
+                                                "e.g. X=50; may be repeated")]
+Loss = Annotated[float, typer.Option("--loss", metavar="UM", min=1e-4, max=1e4,
+                                     help="what a table may lose between its rows, um")]
+AngleLoss = Annotated[float, typer.Option("--angle-loss", metavar="ARCSEC", min=1e-4, max=1e5,
+                                          help="the same of angles, arcsec")]
+Rest = Annotated[Path | None, typer.Option("--rest", metavar="REST.toml",
+                                           help="model of what LinuxCNC does not correct, for --error-model")]
+MapFile = Annotated[Path, typer.Option("-o", "--output", metavar="MAP.toml",
+                                       help="model to write; its lattice is put beside it")]
+Over = Annotated[str, typer.Option("--over", metavar="LETTERS", help="coordinates: axes, e.g. XYZ or XYZAC, or x y z of the "
+                                   "point in the table frame; default the slides, xyz of machines on rods")]
+MapLoss = Annotated[float | None, typer.Option("--loss", metavar="UM", min=1e-3, max=1e4, help="divide cells until the map "
+                                               "loses no more inside its lattice, um")]
+At = Annotated[list[str] | None, typer.Option("--at", metavar="AXIS=POSITION", help="where an axis stands that is no "
+                                              "coordinate, mm or degrees")]
+MapTool = Annotated[float, typer.Option("--tool-length", metavar="MM", min=0.0, max=10_000.0, help="displacements are those "
+                                        "of the tip of this tool; 0: of the gauge point")]
+Directions = Annotated[str, typer.Option("--directions", help="of the map's values: machine, or table (turns with the "
+                                         "rotary axes under the part)")]
+
+
+@errors_app.command("check", epilog="Example: postproc errors check errors.toml -m mikron-ucp710 --tool-length 120")
+def check(file: ModelFile, machine: MachineName, tool_length: ToolLength = 100.0, json: Json = "") -> None:
+    """Check an error model: what it holds, how far it reaches, worst tip and axis over the work volume, doubt."""
+    refuse_overwriting({"--json": json}, {"the error model": str(file)})
+    from machines.geometric_error.survey import survey, unmeasured
+    from postproc.error_text import check_text
+
+    with shown_errors(json):
+        m = machine_of(machine)
+        model, found = loaded(file, m)
+        figures = survey(model, m, tool_length)
+        found += unmeasured(model, m, str(file))
+    report(tuple(found), json, figures | {"diagnostics": [d.as_dict() for d in found]}, check_text(str(file), figures))
+
+
+@errors_app.command("to-tables", epilog="Example: postproc errors to-tables errors.toml -m mikron-ucp710 -o tables")
+def to_tables(file: ModelFile, machine: MachineName, output: Folder, step: Step = None, loss: Loss = 0.1,
+              angle_loss: AngleLoss = 0.1, json: Json = "") -> None:
+    """Write every component error as a table per axis with ISO 230-1 names, and a model that reads them."""
+    refuse_overwriting({"--json": json}, {"the error model": str(file)})
+    from machines.geometric_error import exports
+    from machines.geometric_error.csv_table import UNITS
+    from postproc.error_text import table_figures
+
+    with shown_errors(json):
+        m = machine_of(machine)
+        model, found = loaded(file, m)
+        steps = exports.in_units(pairs("--step", step, m.axis_names))
+        allowed = loss * UNITS["um"], angle_loss * UNITS["arcsec"]
+        made, losses = or_refused(lambda: exports.to_tables(model, m, steps, *allowed), file)
+        made, told = writable(made)
+        files = model_files(made, file.stem, f"tables of {file.name}")
+        files |= {f"{file.stem}-location.csv": exports.location_csv(made)} if made.axes.constants else {}
+    figures, lost = table_figures(made, exports.named(losses))
+    finish(files, output, [file], json, found, [*lost, *told], figures)
+
+
+@errors_app.command("to-linuxcnc", epilog="Example: postproc errors to-linuxcnc e.toml -m mill-3axis -o comp --rest r.toml")
+def to_linuxcnc(file: ModelFile, machine: MachineName, output: Folder, rest: Rest = None, step: Step = None,
+                loss: Loss = 0.1, angle_loss: AngleLoss = 0.1, tool_length: ToolLength = 100.0, json: Json = "") -> None:
+    """Write positioning errors as LinuxCNC's screw compensation, one file per joint, and say what they leave."""
+    refuse_overwriting({"--rest": str(rest or ""), "--json": json}, {"the error model": str(file)})
+    from machines.geometric_error import exports
+    from machines.geometric_error.csv_table import UNITS
+    from postproc.error_text import screw_figures, screw_warning
+
+    with shown_errors(json):
+        m = machine_of(machine)
+        model, found = loaded(file, m)
+        steps = exports.in_units(pairs("--step", step, m.axis_names))
+        allowed = loss * UNITS["um"], angle_loss * UNITS["arcsec"]
+        screws = or_refused(lambda: exports.to_screws(model, m, steps, *allowed), file)
+        names = {letter: f"{file.stem}-{letter}.comp" for letter in screws.texts}
+        worst = [exports.worst(x, m, tool_length, model) for x in (model, screws.rest)]
+        beside = {} if rest is None else {rest.parent / name: text for name, text in model_files(
+            screws.rest, rest.stem, f"{file.name} less what LinuxCNC corrects", rest.name).items()}
+    figures, told = screw_figures(screws, names, exports.named(screws.losses), worst)
+    found.append(screw_warning(list(figures["losses"]), str(file), rest))
+    finish({names[letter]: text for letter, text in screws.texts.items()}, output, [file], json, found,
+           [*told, "for the INI file:", *exports.ini_lines(m, names)], figures, beside)
+
+
+@errors_app.command("to-map", epilog="Example: postproc errors to-map e.toml -m mikron-ucp710 -o map.toml --loss 2")
+def to_map(file: ModelFile, machine: MachineName, output: MapFile, over: Over = "", step: Step = None, loss: MapLoss = None,
+           at: At = None, tool_length: MapTool = 0.0, directions: Directions = "machine", json: Json = "") -> None:
+    """Write an error map of a model, as controls hold it, and say what it loses."""
+    refuse_overwriting({"-o": str(output), "--json": json}, {"the error model": str(file)})
+    if directions not in ("machine", "table"):
+        raise typer.BadParameter(f"{directions!r} is not available; choose from machine, table", param_hint="--directions")
+    from machines.geometric_error import exports
+    from machines.geometric_error.csv_table import UNITS
+    from postproc.error_text import map_figures
+
+    with shown_errors(json):
+        m = machine_of(machine)
+        known = (*m.axis_names, *"xyz")
+        if not set(over) <= set(known) or len(set(over)) < len(over):
+            raise typer.BadParameter(f"{over!r}: coordinates are {', '.join(known)}, each once", param_hint="--over")
+        model, found = loaded(file, m)
+        steps = exports.in_units(pairs("--step", step, known))
+        stands = exports.in_units(pairs("--at", at, m.axis_names))
+        lattice, fixed = exports.lattice_for(model, m, over, steps, stands, tool_length, directions)
+        allowed = None if loss is None else loss * UNITS["um"]
+        made = or_refused(lambda: exports.to_map(model, m, lattice, fixed, allowed), file)
+        files = model_files(made.model, output.stem, f"map of {file.name}", output.name)
+    figures, told = map_figures(model, made)
+    finish(files, output.parent, [file], json, found, told, figures)
+
+
+@errors_app.command("schema")
+def errors_schema() -> None:
+    """Print the JSON schema of an error model file."""
+    from machines.geometric_error.loader import error_model_schema
+
+    print_json(error_model_schema())

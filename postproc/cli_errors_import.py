@@ -1,0 +1,62 @@
+"""The command `postproc errors import`. Heavy packages are imported inside, so that --help is instant."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from postproc.cli_options import MachineName
+from postproc.console import Json, machine_of, refuse_overwriting, shown_errors
+from postproc.error_files import doubted, finish, merged_into, model_files, pairs, required
+
+EXAMPLE = "Example: postproc errors import X=x.comp y.csv -m mill-3axis -o errors.toml"
+Sources = Annotated[list[str], typer.Argument(metavar="SOURCE...", help="tables per axis or of location errors (x.csv), a "
+                                              "lattice (map.csv), LinuxCNC's files (X=x.comp)")]
+Output = Annotated[Path, typer.Option("-o", "--output", metavar="MODEL.toml", help="model to write; its tables are put "
+                                      "beside it")]
+Into = Annotated[Path | None, typer.Option("--into", metavar="MODEL.toml", help="model whose other errors stay, with their "
+                                           "covariance")]
+Covariance = Annotated[Path | None, typer.Option("--covariance", metavar="C.csv", help="square table of what is imported, "
+                                                 "um and arcsec")]
+Interpolation = Annotated[str, typer.Option("--interpolation", help="between rows: linear or spline")]
+Repeats = Annotated[list[str] | None, typer.Option("--repeats", metavar="AXIS=PERIOD", help="degrees or mm after which a "
+                                                   "table or map repeats, e.g. C=360")]
+Sign = Annotated[int, typer.Option("--sign", help="-1 where the numbers say how the part moves relative to the tool")]
+Kind = Annotated[int, typer.Option("--type", min=0, max=1, help="COMP_FILE_TYPE of LinuxCNC's files")]
+MapTool = Annotated[float, typer.Option("--tool-length", metavar="MM", min=0.0, max=10_000.0, help="of the tool whose tip a "
+                                        "map displaces; 0: the gauge point")]
+Directions = Annotated[str, typer.Option("--directions", help="of a map's values: machine or table")]
+
+
+def import_(sources: Sources, machine: MachineName, output: Output, into: Into = None, covariance: Covariance = None,
+            interpolation: Interpolation = "linear", repeats: Repeats = None, sign: Sign = 1, kind: Kind = 0,
+            tool_length: MapTool = 0.0, directions: Directions = "table", json: Json = "") -> None:
+    """Make an error model of tables that others wrote."""
+    for option, value, allowed in (("--interpolation", interpolation, ("linear", "spline")),
+                                   ("--sign", str(sign), ("1", "-1")), ("--directions", directions, ("machine", "table"))):
+        if value not in allowed:
+            raise typer.BadParameter(f"{value!r} is not available; choose from {', '.join(allowed)}", param_hint=option)
+    files_of = [source.split("=", 1)[-1] for source in sources]
+    refuse_overwriting({"-o": str(output), "--json": json}, {name: name for name in files_of})
+    from machines.geometric_error.exports import in_units
+    from machines.geometric_error.imports import How, read_sources, with_covariance
+
+    with shown_errors(json):
+        m = machine_of(machine)
+        periods = in_units(pairs("--repeats", repeats, (*m.axis_names, *"xyz")))
+        how = How(interpolation, periods, float(sign), kind, tool_length, directions)  # type: ignore[arg-type]
+        read, found = read_sources(sources, m, how)
+        model, told = required(read, found), [f"read: {', '.join(files_of)}"]
+        if covariance is not None:
+            model = required(*with_covariance(model, covariance))
+        if into is not None:
+            model, lost = merged_into(model, into, m)
+            told += lost
+        files = model_files(model, output.stem, ("imported from " + ", ".join(Path(s).name for s in files_of))[:200],
+                            output.name)
+    told.append(f"{len(model.names)} parameters, {doubted(model)} with a doubt")
+    inputs = [Path(name) for name in (*files_of, into, covariance) if name is not None]
+    finish(files, output.parent, inputs, json, found, told,
+           {"parameters": len(model.names), "covariance": model.covariance is not None})

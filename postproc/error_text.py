@@ -1,0 +1,125 @@
+"""Figures of error models and of their exchange, as text for people."""
+
+from __future__ import annotations
+
+from typing import Any
+
+
+def check_text(file: str, found: dict[str, Any]) -> str:
+    """What `machines.geometric_error.survey` gives."""
+    who = {"post": "corrected by the post-processor", "control": "corrected by the control"}[found["corrected_by"]]
+    lines = [f"{file}: good: errors of {found['machine']}, {found['parameters']} parameters, {who}", *_components(found)]
+    for kind in ("line", "zero position", "spindle"):
+        mine = [f"{n} {v['value']:.3g} {v['unit']}" for n, v in found["location"].items() if v["kind"] == kind]
+        lines += [f"{kind}: {', '.join(mine)}"] if mine else []
+    lines += [f"legs: largest {kind} {v['largest']:.3g} {v['unit']} ({v['parameter']})" for kind, v in found["legs"].items()]
+    lines += _map(found["map"]) if found["map"] else []
+    return "\n".join([*lines, *_covariance(found["covariance"]), *_volume(found["volume"])])
+
+
+def _components(found: dict[str, Any]) -> list[str]:
+    lines = []
+    if found["components"]:
+        lines.append("error  kind           values  range                  largest          at   lost motion")
+    for name, c in found["components"].items():
+        span = "everywhere" if c["range"][0] is None else f"{c['range'][0]:g} to {c['range'][1]:g}"
+        lost = f"{c['lost_motion']:8.2f}" if c["both_ways"] else "        "
+        lines.append(f"{name:5}  {c['kind']:13} {c['values']:7}  {span:20} {c['largest']:9.2f} {c['unit']:6} {c['at']:9.2f} "
+                     f"{lost}".rstrip())
+    return lines + ([f"not given, so 0: {', '.join(found['absent'])}"] if found["absent"] else [])
+
+
+def _map(found: dict[str, Any]) -> list[str]:
+    point = f"tip of a tool of {found['tool_length_mm']:g} mm" if found["tool_length_mm"] else "gauge point"
+    where = "; ".join(f"{letter} {c['nodes']} from {c['range'][0]:g} to {c['range'][1]:g}"
+                      + (f", repeats after {c['repeats']:g}" if c["repeats"] else "")
+                      for letter, c in found["coordinates"].items())
+    largest = ", ".join(f"{name} {v:.3g}" for name, v in found["largest"].items())
+    return [f"map of {found['nodes']} nodes ({where}), {point}, directions of the {found['directions']}",
+            f"largest {largest} (um, arcsec)"]
+
+
+def _covariance(found: dict[str, Any] | None) -> list[str]:
+    if found is None:
+        return ["covariance: none, so no doubt can be told"]
+    kind = "correlated parameters" if found["correlated"] else "independent parameters"
+    without = f"; {len(found['without'])} parameters have none" if found["without"] else ""
+    return [f"covariance: {kind}, largest standard deviation {found['largest_um']:.3g} um, {found['largest_arcsec']:.3g} "
+            f"arcsec{without}"]
+
+
+def _volume(found: dict[str, Any] | None) -> list[str]:
+    if found is None:
+        return ["the model holds nowhere within travel"]
+    lines = [f"over the work volume, tool of {found['tool_length_mm']:g} mm, {found['places']} places:",
+             f"  tip  worst {found['tip_worst_um']:.2f} um at {_at(found['tip_worst_at'])}, rms "
+             f"{found['tip_rms_um']:.2f} um",
+             f"  axis worst {found['axis_worst_arcsec']:.2f} arcsec at {_at(found['axis_worst_at'])}, rms "
+             f"{found['axis_rms_arcsec']:.2f} arcsec"]
+    if "doubt_tip_um" in found:
+        lines.append(f"  doubt (one standard deviation): tip {found['doubt_tip_um']:.3g} um, axis "
+                     f"{found['doubt_axis_arcsec']:.3g} arcsec")
+    return lines
+
+
+def _at(joints: dict[str, float]) -> str:
+    return " ".join(f"{letter}{value:g}" for letter, value in joints.items())
+
+
+def export_text(found: dict[str, Any]) -> str:
+    """What was written, what it loses and what it leaves."""
+    return "\n".join([*(f"{name}: written" for name in found["files"]), *found["told"]])
+
+
+def table_figures(model: Any, lost: dict[str, float]) -> tuple[dict[str, Any], list[str]]:
+    """(figures, text) of tables per axis of a model that lose `lost`, um and arcsec by component."""
+    told = ["dimensions of legs stay in the model file: they have no tables per axis"] if model.rods is not None else []
+    for unit, names in (("um", "XYZ"), ("arcsec", "ABC")):
+        mine = {name: value for name, value in lost.items() if name[1] in names}
+        worst = max(mine, key=lambda name: mine[name], default="")
+        told += [f"lost between the rows: at most {mine[worst]:.3g} {unit} ({worst})"] if worst else []
+    return {"losses": lost}, told
+
+
+def screw_figures(screws: Any, names: dict[str, str], lost: dict[str, float],
+                  worst: list[tuple[float, float]]) -> tuple[dict[str, Any], list[str]]:
+    """(figures, text) of `Screws` in files of these names; `worst` tip (um) and axis (arcsec) before and after."""
+    before, left = worst
+    told = [f"{name}: {len(screws.tables[letter].x)} rows" + (", both ways" if screws.tables[letter].both else "")
+            for letter, name in names.items()]
+    told += [f"lost between the rows: {', '.join(f'{name} {value:.3g}' for name, value in lost.items())} (um, arcsec)",
+             f"worst over the work volume: tip {before[0]:.2f} um, {left[0]:.2f} um after; axis {before[1]:.2f} arcsec, "
+             f"{left[1]:.2f} arcsec after"]
+    return {"losses": lost, "worst_tip_um": [before[0], left[0]], "worst_axis_arcsec": [before[1], left[1]]}, told
+
+
+def screw_warning(names: list[str], file: str, rest: object) -> Any:
+    """That the control now corrects these, and which model the post-processor then takes."""
+    from toolpaths.diagnostics import warning
+
+    hint = f"convert with --error-model {rest}" if rest else "write a model of the rest with --rest, and convert with that"
+    return warning("error-export.control", f"LinuxCNC then corrects {', '.join(names)}: the post-processor must not do it "
+                   "again", file=file, hint=hint)
+
+
+def map_figures(model: Any, made: Any) -> tuple[dict[str, Any], list[str]]:
+    """(figures, text) of a `MadeMap` of a model."""
+    from machines.geometric_error.csv_table import UNITS
+
+    um, arcsec = UNITS["um"], UNITS["arcsec"]
+    lattice = made.model.map
+    figures: dict[str, Any] = {"nodes": {x: len(n) for x, n in zip(lattice.letters, lattice.nodes, strict=True)}}
+    told = [f"{lattice.table.size // 6} nodes: " + ", ".join(f"{x} {n}" for x, n in figures["nodes"].items())]
+    for where, loss in (("inside the lattice", made.inside), ("over the work volume", made.volume)):
+        key = where.split()[-1]
+        figures[key] = None if loss is None else {
+            "tip_worst_um": loss.tip_worst / um, "tip_rms_um": loss.tip_rms / um,
+            "axis_worst_arcsec": loss.axis_worst / arcsec, "axis_rms_arcsec": loss.axis_rms / arcsec}
+        told += [] if loss is None else [
+            f"lost {where}: tip worst {loss.tip_worst / um:.3g} um, rms {loss.tip_rms / um:.3g} um; axis worst "
+            f"{loss.axis_worst / arcsec:.3g} arcsec, rms {loss.axis_rms / arcsec:.3g} arcsec"]
+    ways = [str(c.name) for c in model.axes.components if getattr(c.curve, "both", False)]
+    told += [f"lost: the two ways of {', '.join(ways)}; a map holds their mean"] if ways else []
+    if model.covariance is not None:
+        told.append("lost: the covariance, of more values than are written" if made.doubt_lost else "covariance kept")
+    return figures, told
