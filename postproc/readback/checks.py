@@ -102,8 +102,7 @@ def check_holes(motion: Motion, job: Job, moves: Moves, tip: Floats, owner: Ints
         if cycle.kind in PECKING and cycle.steps:
             depth = (moves.tip[m[at]] - tip[part]) @ moves.axis[m[at]]
             total = cycle.depth + cycle.clearance
-            deeper = np.diff(depth, prepend=-np.inf, append=-np.inf)
-            pecks = (deeper[:-1] > 0.0) & (deeper[1:] < -_TURNS_BACK)
+            pecks = _turning_points(depth)
             deepest = np.maximum.accumulate(np.concatenate([[-cycle.depth], depth[pecks]]))
             out = int((depth <= 0.01 - total).sum())
             if np.diff(deepest).max(initial=0.0) > max(cycle.steps) + 0.01:
@@ -119,6 +118,14 @@ def check_holes(motion: Motion, job: Job, moves: Moves, tip: Floats, owner: Ints
             result.append(faults.error("verify.hole", what, int(moves.line[owner[bad[0]]]), int(motion.line[bad[0]]),
                                        len(bad)))
     return result
+
+
+def _turning_points(depth: Floats) -> Bools:
+    """True (N,) where the tool turns back after going deeper, (N,) mm; what is less than _TURNS_BACK goes neither way."""
+    step = np.diff(depth, prepend=-np.inf, append=-np.inf)
+    last = np.maximum.accumulate(np.where(np.abs(step) > _TURNS_BACK, np.arange(len(step)), 0))
+    way = np.sign(step[last])
+    return np.asarray((way[:-1] > 0.0) & (way[1:] < 0.0))
 
 
 _SPINDLE = {-1: "anti-clockwise (M4)", 0: "stopped (M5)", 1: "clockwise (M3)"}
