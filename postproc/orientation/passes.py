@@ -17,6 +17,7 @@ from postproc.moves import Moves, build_moves
 from postproc.options import Options
 from postproc.orientation.contact import Contact, contact_of
 from postproc.orientation.cutter import ball_radius
+from postproc.orientation.drilled import Drilled, drilled_of
 from postproc.orientation.surface import Surface, surface_of
 from postproc.pass_geometry import chains, stops_of
 from postproc.setup import Placement, SetupFile, part_placement
@@ -70,6 +71,7 @@ class Pass:
         spins: the pass may be turned about its tool axis, whatever the cutter
         by_home: the tool comes from home (first pass, tool change, GOHOME)
         tool: index into Toolpath.tools
+        drilled: what is cut in holes
     """
 
     number: int
@@ -87,6 +89,7 @@ class Pass:
     kin: Kinematics
     stretches: tuple[Stretch, ...]
     line: int
+    drilled: Drilled
 
     def shift(self, axis: Floats) -> Floats:
         """(3,) by which the tip moves so that the ball stays where it is: tip' = tip + R (axis - axis')."""
@@ -241,7 +244,7 @@ def _pass(number: int, rows: tuple[int, int], of: _Cutting) -> Pass:
     contact = of.contact(cuts, 0.0 if fixed else radius or 0.0)
     return Pass(number, rows, moves.tip[here], moves.axis[here], moves.kind[here] == Kind.RAPID, axis, contact,
                 radius or 0.0, fixed, not stays, not of.homes.isdisjoint(range(*rows)), tool, kin, tuple(inside),
-                int(moves.line[lead]))
+                int(moves.line[lead]), drilled_of(of.toolpath, moves, rows))
 
 
 def _kept(of: _Cutting, cuts: Ints) -> str:

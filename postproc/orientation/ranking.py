@@ -56,7 +56,8 @@ class Ranking:
         """Least time of the cuts; inf where the machine cannot run them."""
         if made.refused or not self._grids:
             return made.seconds
-        return float(sum(grid.seconds(q, made.limits) for grid, q in zip(self._grids, made.sites, strict=True)))
+        return made.drilling + float(sum(grid.seconds(q, made.limits) for grid, q in
+                                         zip(self._grids, made.sites, strict=True)))
 
 
 class _Grid:

@@ -79,7 +79,8 @@ def _row(tried: Tried, made: Turned) -> str:
     one, before = tried.own.one, tried.own.seconds
     limit = " ".join(made.limiting).strip() or "-"
     if not one.stretches:
-        return f"{one.number:>5} {one.line:>7}  {orientation(made):<24} {'-':>9} {'-':>9} {'-':>7}  " + (
+        taken = (seconds(value if value > 0.0 else None) for value in (made.seconds, before))
+        return f"{one.number:>5} {one.line:>7}  {orientation(made):<24} {next(taken):>9} {next(taken):>9} {'-':>7}  " + (
             f"axis kept: {one.fixed or 'its cuts have no length'}")
     start = (f"{one.number:>5} {one.line:>7}  {orientation(made):<24} {seconds(made.seconds):>9} {seconds(before):>9} "
              f"{percent(gain(made.seconds, before)):>7}  {limit:<15} ")

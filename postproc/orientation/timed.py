@@ -75,7 +75,8 @@ class Turned:
         """
         if self.refused:
             return np.inf
-        return float(sum(self._least(stretch, q) for stretch, q in zip(self.one.stretches, self.sites, strict=True)))
+        return self.drilling + float(sum(self._least(stretch, q) for stretch, q in
+                                         zip(self.one.stretches, self.sites, strict=True)))
 
     def _least(self, stretch: Stretch, q: Floats) -> float:
         way, length = np.abs(np.diff(q, axis=0)), np.diff(stretch.s)
@@ -93,6 +94,11 @@ class Turned:
         rows = np.flatnonzero(self.one.rapid[1:])
         return float(rest_seconds(self.q[rows], self.q[rows + 1], self.limits, Law.STRAIGHT).sum())
 
+    @cached_property
+    def drilling(self) -> float:
+        """Seconds at feed in holes, dwells with them; inf where the pass cannot be run."""
+        return np.inf if self.refused else self.one.drilled.seconds(self.q, self.limits)
+
     def plans(self) -> tuple[Plan, ...]:
         """The motion of each stretch, curvature included; planned anew at each call."""
         own = self.one.shift(self.axis)
@@ -106,7 +112,7 @@ class Turned:
 
     @property
     def seconds(self) -> float:
-        """Planned time of the cuts; inf where the machine cannot run them."""
+        """Planned time of the cuts, those of holes too; inf where the machine cannot run them."""
         return self._planned[0]
 
     @property
@@ -133,7 +139,7 @@ class Turned:
         if self.refused:
             return np.inf, ("", ""), ()
         plans = self.plans()
-        seconds = float(sum(made.seconds for made in plans))
+        seconds = self.drilling + float(sum(made.seconds for made in plans))
         knots = tuple(made.pieces[0].profile.sigma for made in plans)
         return seconds, self._binding([made.shares for made in plans] if self.jerky else []), knots
 

@@ -209,6 +209,7 @@ def extents(made: Sequence[Turned]) -> tuple[Floats, Floats]:
 def _way(made: Turned) -> bytes:
     """A mark of how the joints go along the cuts of a pass, whatever they begin at."""
     mark = blake2b(digest_size=16)
-    for q in made.sites:
-        mark.update((np.round(q - q[0], _DIGITS) + 0.0).tobytes())
+    rows = made.one.drilled.rows
+    for way in (*(q - q[0] for q in made.sites), made.q[rows] - made.q[rows - 1]):
+        mark.update((np.round(way, _DIGITS) + 0.0).tobytes())
     return mark.digest()

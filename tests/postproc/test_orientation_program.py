@@ -51,3 +51,40 @@ def test_a_plan_takes_as_long_as_its_program(name: str) -> None:
         written[plan] = program_seconds(convert(choice.toolpath(plan), m, setup=setup, options=Options(feed="planned")))
         assert counted[plan] == pytest.approx(written[plan], rel=0.025), plan
     assert counted["keep"] - counted["auto"] == pytest.approx(written["keep"] - written["auto"], abs=0.3)
+
+
+def drilled(*cycles: str) -> Toolpath:
+    """Two holes by each cycle from above, two on a face at 30 degrees."""
+    lines = list(HEAD)
+    for cycle in cycles:
+        for side, lean in ((-1.0, 0.0), (1.0, 30.0)):
+            axis = f"{np.sin(lean * DEG):.9f},0,{np.cos(lean * DEG):.9f}"
+            lines += ["RAPID", f"GOTO/{side * 40.0},0,20,{axis}", f"CYCLE/{cycle}", f"GOTO/{side * 20.0},0,0,{axis}",
+                      f"GOTO/{side * 20.0},30,0,{axis}", "CYCLE/OFF", "RAPID", f"GOTO/{side * 40.0},0,20,{axis}"]
+    path, found = toolpaths.read_bytes("\n".join([*lines, "FINI"]).encode(), file="holes.apt")
+    assert not toolpaths.diagnostics.has_errors(found), found
+    return path
+
+
+@pytest.mark.parametrize("name", ["mikron-ucp710", "head-table"])
+def test_holes_take_as_long_as_in_the_program(name: str) -> None:
+    path = drilled("DRILL,DEPTH,12,MMPM,600,CLEAR,3,DWELL,0.5", "DEEP,DEPTH,12,STEP,5,MMPM,900,CLEAR,2", "BORE,DEPTH,6,MMPM,"
+                   "600,CLEAR,3")
+    m, (setup, _) = machine(name), load_setup(SAMPLES / "tools.setup.toml")
+    assert setup is not None
+    choice, found = orient(path, m, setup, Options())
+    assert choice is not None, found
+    drilling = sum(tried.own.drilling for tried in choice.tried)
+    fed = 4 * (15.0 / 10.0 + 0.5) + 4 * 14.0 / 15.0 + 4 * 2 * 9.0 / 10.0
+    assert fed < drilling < 1.15 * fed and choice.plans["keep"].cuts.sum() == pytest.approx(drilling)
+    written = program_seconds(convert(path, m, setup=setup, options=Options(feed="planned")))
+    assert choice.plans["keep"].seconds == pytest.approx(written, rel=0.03)
+
+
+def test_a_hole_is_timed_from_rest_to_rest() -> None:
+    """15 mm down at 600 mm/min: what the feed takes, and a little for the start and the stop."""
+    choice, _ = orient(drilled("DRILL,DEPTH,12,MMPM,600,CLEAR,3"), machine("mikron-ucp710"), load_setup(
+        SAMPLES / "tools.setup.toml")[0] or pytest.fail(), Options())
+    assert choice is not None
+    one = choice.tried[0].own
+    assert 1.5 * 2 < one.drilling < 1.6 * 2 and one.bound == pytest.approx(one.seconds) and not one.one.stretches
