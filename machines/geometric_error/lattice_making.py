@@ -121,7 +121,7 @@ def refined(actual: Actual, nominal: Actual, base: ErrorMap, fixed: Floats, tole
     """The map on the coarsest of the lattices that were tried, cells of `base` divided evenly, that loses no more than
     `tolerance` mm at the tip, at places inside it.
 
-    Where it lies between the nodes of one coordinate alone says which one to divide: the losses of all add up.
+    What interpolating along one coordinate alone loses says which one to divide.
 
     Raises:
         ValueError: it would take more than `most` nodes.
@@ -134,8 +134,8 @@ def refined(actual: Actual, nominal: Actual, base: ErrorMap, fixed: Floats, tole
         lattice = divided(base, parts)
         if np.prod([float(len(nodes)) for nodes in lattice.nodes]) > most:
             raise ValueError(f"a loss of {1e3 * tolerance:g} um takes more than {most} nodes: at {_counts(lattice)} it is "
-                             f"still {1e3 * sum(losses):.3g} um")
-        if sum(losses) <= tolerance:
+                             f"still about {1e3 * float(np.linalg.norm(losses)):.3g} um; allow more, or fewer coordinates")
+        if np.linalg.norm(losses) <= tolerance:
             found = map_of(actual, nominal, lattice, fixed)
             loss = map_loss(ActualByMap(nominal, found), actual, w)
             if loss.tip_worst <= tolerance:

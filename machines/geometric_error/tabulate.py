@@ -15,6 +15,8 @@ from toolpaths.arrays import Floats
 
 PROBES = 16
 """places in each cell of a table at which it is compared with its curve"""
+LEAST = 4096
+"""such places at least"""
 ROUND = 12
 """cells of one turn to begin with, where no table has rows"""
 
@@ -35,6 +37,8 @@ class Rows:
 def sampled(curve: Curve, x: Floats, period: float = 0.0) -> Table:
     """A curve as a linear table at positions (M,), mm or rad, both ways where it has them."""
     both = isinstance(curve, Table) and curve.both
+    if isinstance(curve, Table) and curve.rule == "linear" and curve.period == period and np.array_equal(x, curve.x):
+        return curve
     ways = (1.0, -1.0) if both else (0.0,)
     return Table(x, np.concatenate([curve.at(x, way) for way in ways]), "linear", both, period)
 
@@ -42,7 +46,11 @@ def sampled(curve: Curve, x: Floats, period: float = 0.0) -> Table:
 def loss(curve: Curve, rows: Rows) -> float:
     """Largest difference of a curve and its table between the rows, mm or rad, the worse way."""
     closed, table = rows.closed, sampled(curve, rows.x, rows.period)
-    places = np.interp(np.arange((len(closed) - 1) * PROBES + 1) / PROBES, np.arange(len(closed)), closed)
+    count = max(PROBES * (len(closed) - 1), LEAST)
+    jitter = np.random.default_rng(0).uniform(0.0, 1.0, count)  # a series would hide between even places
+    places = np.interp((np.arange(count) + jitter) / count * (len(closed) - 1), np.arange(len(closed)), closed)
+    if isinstance(curve, Table):
+        places = np.concatenate([places, curve.x[(curve.x >= closed[0]) & (curve.x <= closed[-1])]])
     ways = (1.0, -1.0) if table.both else (0.0,)
     return max(float(np.abs(table.at(places, way) - curve.at(places, way)).max(initial=0.0)) for way in ways)
 

@@ -1,0 +1,304 @@
+"""Exchange of error models: any curves as tables with their covariance, LinuxCNC's files both ways, tables of others."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import machines
+from machines.geometric_error.covariance import write_covariance
+from machines.geometric_error.curves import Fourier, Polynomial, Table
+from machines.geometric_error.exchange import save, write_model
+from machines.geometric_error.exports import ini_lines, lattice_for, location_csv, to_map, to_screws, to_tables, worst
+from machines.geometric_error.imports import How, read_sources, with_covariance
+from machines.geometric_error.loader import load
+from machines.geometric_error.model import ErrorModel, doubt
+from machines.geometric_error.names import parse
+from machines.geometric_error.serial_errors import Component, SerialErrors
+from machines.geometric_error.survey import absent, survey, unmeasured
+from machines.geometric_error.tabulate import without
+from machines.kinematics.serial import Serial
+from machines.machine import Machine
+from tests.machines.error_models import ARCSEC, joints, model
+from toolpaths.arrays import Floats
+from toolpaths.units import DEG
+
+SAMPLES = Path(__file__).parents[2] / "samples" / "errors"
+
+
+def correlated(full: ErrorModel, seed: int = 0) -> ErrorModel:
+    root = np.random.default_rng(seed).normal(size=(len(full.names), 6)) * 1e-6
+    return replace(full, covariance=root @ root.T + np.diag(np.full(len(full.names), 1e-14)))
+
+
+def component(text: str, curve: Table | Fourier | Polynomial) -> Component:
+    name = parse(text)
+    assert name is not None
+    return Component(name, curve)
+
+
+# ---- tables ----------------------------------------------------------------------------------------------------------
+
+@pytest.mark.parametrize("name", ["mikron-ucp710", "nutating-head", "h4a-c-table"])
+def test_curves_become_tables_that_lose_what_is_told_and_keep_the_doubt(name: str) -> None:
+    machine = machines.load(name)
+    full = correlated(model(machine.kinematics, 3))
+    length, angle = 2e-4, 0.05 * ARCSEC
+    made, losses = to_tables(full, machine, {}, length, angle)
+    for old, new in zip(full.axes.components, made.axes.components, strict=True):
+        assert isinstance(new.curve, Table) and new.curve.rule == "linear"
+        low, high = old.curve.range if np.isfinite(old.curve.range).all() else (-7.0, 7.0)
+        x, lost = np.random.default_rng(1).uniform(low, high, 4000), losses[str(old.name)]
+        apart = np.abs(new.curve.at(x) - old.curve.at(x)).max()
+        assert apart <= 1.02 * lost + 1e-15 and lost <= (angle if old.name.angular else length)
+    kin = machine.kinematics.with_tool(60.0)
+    one, two = full.on(kin), made.on(kin)
+    w = one.coordinates(joints(kin, 10))
+    for c in made.axes.components:  # at rows of the tables the doubt is the same to the last digits
+        j = kin.axis_names.index(c.name.axis)
+        k = j - len(kin.axis_names) + w.shape[1]
+        w[:, k] = c.curve.x[len(c.curve.x) // 2]
+    before, after = doubt(full, one, w), doubt(made, two, w)
+    assert after.tip == pytest.approx(before.tip, rel=0.02) and before.tip.min() > 1e-6
+    assert after.axis == pytest.approx(before.axis, rel=0.02)
+
+
+def test_tables_keep_their_own_rows_and_stay_as_they_are() -> None:
+    machine = machines.load("mikron-ucp710")
+    full = load(SAMPLES / "mikron-ucp710.toml", machine)
+    made, losses = to_tables(full, machine, {}, 1e-4, 0.1 * ARCSEC)
+    for old, new in zip(full.axes.components, made.axes.components, strict=True):
+        if isinstance(old.curve, Table):
+            assert np.array_equal(old.curve.values, new.curve.values) and losses[str(old.name)] < 1e-15
+    assert {type(c.curve) for c in full.axes.components} == {Table, Fourier}
+    stepped, _ = to_tables(full, machine, {"X": 100.0, "C": 45.0 * DEG}, 1e-4, 0.1 * ARCSEC)
+    curves = {str(c.name): c.curve for c in stepped.axes.components}
+    assert curves["EXX"].x.tolist() == pytest.approx(np.linspace(-355, 355, 9).tolist())
+    assert curves["ECC"].x == pytest.approx(np.arange(8) * 45.0 * DEG)
+    assert curves["ECC"].period == pytest.approx(2.0 * np.pi)
+
+
+def test_what_cannot_be_a_table_is_refused() -> None:
+    machine = machines.load("mikron-ucp710")
+    with pytest.raises(ValueError, match="no component errors"):
+        to_tables(ErrorModel(), machine, {}, 1e-4, 1e-7)
+    wild = ErrorModel(SerialErrors((component("EXX", Fourier(np.ones(3), 0.01, 0.0, (0.0, 300.0))),)))
+    with pytest.raises(ValueError, match="rows still lose"):
+        to_tables(wild, machine, {}, 1e-4, 1e-7)
+    with pytest.raises(ValueError, match="256 are held"):
+        flat = ErrorModel(SerialErrors((component("EXX", Polynomial(np.ones(1), (0.0, 300.0))),)))
+        to_screws(flat, machine, {"X": 1.0}, 1.0, 1.0)
+
+
+# ---- LinuxCNC ----------------------------------------------------------------------------------------------------------
+
+def as_linuxcnc(machine: Machine, texts: dict[str, str], q: Floats, way: float) -> Floats:
+    """Motor positions of commanded joints q, as LinuxCNC makes them: plus nominal less actual, linear between rows."""
+    result = q.copy()
+    for letter, text in texts.items():
+        rows = np.array([[float(x) for x in line.split()] for line in text.splitlines()])
+        j = machine.axis_names.index(letter)
+        unit = DEG if machine.rotary[j] else 1.0
+        nominal, actual = rows[:, 0] * unit, rows[:, 1 if way > 0 else 2] * unit
+        result[:, j] += np.interp(q[:, j], nominal, nominal - actual)
+    return result
+
+
+@pytest.mark.parametrize("name", ["mikron-ucp710", "linuxcnc-xyzac-trt", "nutating-head", "mill-3axis"])
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_linuxcnc_with_the_files_leaves_the_rest(name: str, way: float) -> None:
+    """Also where joints count against the machine's axes (linuxcnc-xyzac-trt)."""
+    machine = machines.load(name)
+    kin = machine.kinematics
+    assert isinstance(kin, Serial)
+    full = model(kin, 3)
+    two_way = Table(np.linspace(-900.0, 900.0, 9), np.linspace(-0.02, 0.03, 18) ** 2 * 30.0, both=True)
+    rest = tuple(c for c in full.axes.components if str(c.name) != "EXX")
+    full = replace(full, axes=replace(full.axes, components=(*rest, component("EXX", two_way))))
+    screws = to_screws(full, machine, {}, 1e-4, 0.02 * ARCSEC)
+    assert set(screws.texts) == set(kin.axis_names) and all(text.count("\n") <= 256 for text in screws.texts.values())
+    assert not any(c.name.positioning for c in screws.rest.axes.components)
+    q = np.clip(joints(kin, 50), machine.limits.lower, machine.limits.upper)
+    ways = np.full(q.shape, way)
+    tip, axis, _ = full.on(kin).place(as_linuxcnc(machine, screws.texts, q, way), ways)
+    wanted = screws.rest.on(kin).place(q, ways)
+    uncorrected = full.on(kin).place(q, ways)
+    # B of the nutated head leans: EBB is about y, the joint about its own line
+    allowed = 3e-4 if name != "nutating-head" else 8e-3
+    assert np.abs(tip - wanted[0]).max() < allowed < 0.5 * np.abs(uncorrected[0] - wanted[0]).max()
+    assert np.abs(axis - wanted[1]).max() < (2e-7 if name != "nutating-head" else 3e-5)
+
+
+@pytest.mark.parametrize("name", ["mikron-ucp710", "linuxcnc-xyzac-trt"])
+def test_linuxcnc_files_come_back_to_their_resolution(name: str, tmp_path: Path) -> None:
+    machine = machines.load(name)
+    full = load(SAMPLES / f"{name}.toml", machine)
+    screws = to_screws(full, machine, {}, 1e-3, ARCSEC)
+    sources = []
+    for letter, text in screws.texts.items():
+        (tmp_path / f"{letter}.comp").write_text(text)
+        sources.append(f"{letter}={tmp_path / letter}.comp")
+    back, found = read_sources(sources, machine, How())
+    assert back is not None and not found
+    for c in back.axes.components:
+        table = screws.tables[c.name.axis]
+        assert isinstance(c.curve, Table) and c.curve.both == table.both
+        assert c.curve.x == pytest.approx(table.x, abs=1e-9) and c.curve.values == pytest.approx(table.values, abs=2e-9)
+    trims = tmp_path / "X1.comp"
+    rows = np.array([[float(x) for x in line.split()] for line in screws.texts["X"].splitlines()])
+    trims.write_text("\n".join(f"{a} {a - b:.9f} {a - c:.9f}" for a, b, c in rows))
+    same, _ = read_sources([f"X={trims}"], machine, How(kind=1))
+    assert same is not None and same.values == pytest.approx(back.values[: len(same.values)], abs=2e-9)
+    wrong, found = read_sources([f"X={trims}"], machine, How(kind=0))
+    assert wrong is None and found[0].code == "error-table.kind" and "type 1" in found[0].hint
+
+
+def test_ini_lines_name_the_joint() -> None:
+    assert ini_lines(machines.load("mikron-ucp710"), {"Y": "y.comp", "C": "c.comp"}) == [
+        "[JOINT_1]", "COMP_FILE = y.comp", "COMP_FILE_TYPE = 0", "[JOINT_4]", "COMP_FILE = c.comp", "COMP_FILE_TYPE = 0"]
+
+
+STEPS = {"X": 200.0, "Y": 200.0, "Z": 200.0, "A": 90.0 * DEG, "C": 60.0 * DEG}
+
+
+# ---- tables of others ------------------------------------------------------------------------------------------------
+
+def test_tables_per_axis_come_back_with_location_and_covariance(tmp_path: Path) -> None:
+    machine = machines.load("mikron-ucp710")
+    full = correlated(load(SAMPLES / "mikron-ucp710.toml", machine))
+    made, _ = to_tables(replace(full, name="t"), machine, STEPS, 1.0, 1.0)
+    more = {"t-location.csv": location_csv(made), "t-covariance.csv": write_covariance(made)}
+    for name, text in {**write_model(made), **more}.items():
+        (tmp_path / name).write_text(text)
+    sources = [str(tmp_path / f"t-{x}.csv") for x in ("X", "Y", "Z", "A", "C", "location")]
+    back, found = read_sources(sources, machine, How(periods={"A": 2 * np.pi, "C": 2 * np.pi}))
+    assert back is not None and not found and back.names == made.names
+    assert back.values == pytest.approx(made.values, rel=1e-10, abs=1e-14)
+    assert back.axes.frame == {"A": "moving", "C": "moving"}  # the bed: both carry the part
+    doubted, found = with_covariance(back, tmp_path / "t-covariance.csv")
+    assert doubted is not None and doubted.covariance is not None and not found
+    assert doubted.covariance == pytest.approx(made.covariance, rel=1e-9, abs=1e-22)
+    again = load(save(replace(doubted, name="again"), tmp_path)[0], machine)
+    assert again.names == made.names and again.covariance == pytest.approx(made.covariance, rel=1e-9, abs=1e-22)
+
+
+def test_a_lattice_of_others_comes_in_as_they_say(tmp_path: Path) -> None:
+    (tmp_path / "m.csv").write_text("C [deg];dx [um];dy [um];dz [um]\n0;1,5;2;3\n120;2;2;3\n240;1;2;3\n")
+    machine = machines.load("mikron-ucp710")
+    how = How(periods={"C": 2 * np.pi}, sign=-1.0, tool_length=80.0, directions="machine")
+    found, faults = read_sources([str(tmp_path / "m.csv")], machine, how)
+    assert found is not None and found.map is not None and not faults
+    assert found.map.table[0, :3].tolist() == pytest.approx([-0.0015, -0.002, -0.003])
+    assert found.map.bed == ("C", "A") and found.map.length == 80.0 and found.map.periods == (2 * np.pi,)
+
+
+AXIS = "X [mm],EXX [um],EYX [um]\n0,1,2\n100,3,4\n"
+SOURCES = [
+    ("another axis", {"a.csv": "B [deg],EXB [um]\n0,1\n9,2\n"}, "error-model.axis", "no axis 'B'"),
+    ("two axes", {"a.csv": "X [mm],Y [mm],EXX [um]\n0,0,1\n1,1,2\n"}, "error-import.axis", "X and Y"),
+    ("error of another axis", {"a.csv": AXIS.replace("EYX", "EYY")}, "error-model.column", "'EYY' is no component error"),
+    ("misspelt", {"a.csv": AXIS.replace("EYX", "EQX")}, "error-model.column", "'EQX'"),
+    ("no errors", {"a.csv": "X [mm]\n0\n1\n"}, "error-model.column", "no errors of X"),
+    ("order", {"a.csv": AXIS.replace("100,3", "-5,3")}, "error-model.order", "-5 after 0"),
+    ("repeated", {"a.csv": AXIS + "100,3,4\n"}, "error-model.order", "100 after 100"),
+    ("one row", {"a.csv": "X [mm],EXX [um]\n0,1\n"}, "error-model.rows", "one row"),
+    ("unit", {"a.csv": AXIS.replace("EYX [um]", "EYX [arcsec]")}, "error-model.unit", "'arcsec'"),
+    ("no unit", {"a.csv": AXIS.replace("X [mm]", "X", 1)}, "error-model.unit", "column 'X'"),
+    ("half", {"a.csv": AXIS.replace("EYX", "EYX+")}, "error-model.column", "no column 'EYX-'"),
+    ("both and one", {"a.csv": "X [mm],EXX+ [um],EXX- [um],EXX [um]\n0,1,2,3\n1,1,2,3\n"}, "error-model.column",
+     "beside"),
+    ("twice", {"a.csv": AXIS, "b.csv": AXIS}, "error-import.twice", "is in"),
+    ("map and tables", {"a.csv": AXIS, "b.csv": "X [mm],dx [um],dy [um],dz [um]\n0,1,2,3\n"}, "error-import.map", "alone"),
+    ("location rows", {"a.csv": "EC0Y [arcsec]\n1\n2\n"}, "error-import.rows", "2 rows"),
+    ("location unit", {"a.csv": "EC0Y [um]\n1\n"}, "error-model.unit", "'um'"),
+    ("neither", {"a.csv": "foo [um]\n1\n"}, "error-import.columns", "'foo'"),
+    ("no effect", {"a.csv": "EX0Y [um]\n1\n"}, "error-model.no-effect", "EX0Y"),
+    ("no such axis", {"a.csv": "EC0V [arcsec]\n1\n"}, "error-model.machine", "errors of V"),
+    ("missing", {}, "error-table.not-found", "no table"),
+]
+
+
+@pytest.mark.parametrize(("files", "code", "word"), [s[1:] for s in SOURCES], ids=[s[0] for s in SOURCES])
+def test_faults_of_sources(tmp_path: Path, files: dict[str, str], code: str, word: str) -> None:
+    for name, text in files.items():
+        (tmp_path / name).write_text(text)
+    sources = [str(tmp_path / name) for name in files or {"a.csv": ""}]
+    found, faults = read_sources(sources, machines.load("mikron-ucp710"), How())
+    assert found is None
+    first = next(d for d in faults if d.code == code)
+    assert word in first.message and first.hint and len(faults) <= 2
+
+
+SCREWS = [("a b c\n0 0 0\n", "error-table.row"), ("0 0 0\n0 0 0\n", "error-table.row"), ("0 0 0\n", "error-table.empty"),
+          ("0 nan 0\n1 1 1\n", "error-table.row"), ("", "error-table.empty"), ("0 0\n1 1\n", "error-table.row"),
+          ("-100 0 0\n100 0 0\n", "error-table.kind")]
+
+
+@pytest.mark.parametrize(("text", "code"), SCREWS)
+def test_faults_of_screw_files(tmp_path: Path, text: str, code: str) -> None:
+    (tmp_path / "x.comp").write_text(text)
+    found, faults = read_sources([f"X={tmp_path / 'x.comp'}"], machines.load("mill-3axis"), How())
+    assert found is None and [d.code for d in faults] == [code] and faults[0].hint and faults[0].file.endswith("x.comp")
+    none, faults = read_sources([f"B={tmp_path / 'x.comp'}"], machines.load("mill-3axis"), How())
+    assert none is None and faults[0].code == "error-model.axis"
+    rods, faults = read_sources([f"X={tmp_path / 'x.comp'}"], machines.load("uranesx"), How())
+    assert rods is None and faults[0].code == "error-model.axis" and "it has none" in faults[0].hint
+
+
+# ---- maps and figures ----------------------------------------------------------------------------------------------
+
+@pytest.mark.parametrize(("name", "over"), [("mill-3axis", ""), ("mill-4axis", "XYZA"), ("uranesx", ""),
+                                            ("h4a-spindle-axis", "")])
+def test_a_map_of_all_coordinates_loses_as_much_everywhere_as_inside(name: str, over: str) -> None:
+    machine = machines.load(name)
+    full = model(machine.kinematics, 5)
+    lattice, fixed = lattice_for(full, machine, over, {"A": 30 * DEG}, {}, 0.0, "machine")
+    made = to_map(full, machine, lattice, fixed, 0.006)
+    assert made.inside.tip_worst <= 0.006 and made.volume is not None
+    if name != "h4a-spindle-axis":  # its tilt and B are no coordinates
+        assert made.volume.tip_worst < 0.0065
+    assert made.model.names and made.model.on(machine.kinematics) is not None
+
+
+def test_a_map_carries_the_doubt_of_its_model_at_its_nodes() -> None:
+    machine = machines.load("mikron-ucp710")
+    full = correlated(load(SAMPLES / "mikron-ucp710.toml", machine))
+    steps = {"X": 400.0, "Y": 300.0, "Z": 500.0}
+    lattice, fixed = lattice_for(full, machine, "", steps, {"A": 0.4, "C": 1.0}, 0.0, "machine")
+    made = to_map(full, machine, lattice, fixed, None)
+    assert made.model.covariance is not None and lattice.table.size == 6 * 3 * 3 * 2 and not made.doubt_lost
+    kin = machine.kinematics.with_tool(90.0)
+    q = np.column_stack([lattice.places(), np.tile([0.4, 1.0], (18, 1))])
+    before, after = doubt(full, full.on(kin), q), doubt(made.model, made.model.on(kin), q)
+    assert after.tip == pytest.approx(before.tip, rel=1e-3) and after.axis == pytest.approx(before.axis, rel=1e-3)
+    finer, _ = lattice_for(full, machine, "", {}, {}, 0.0, "machine")
+    assert to_map(full, machine, finer, fixed, None).doubt_lost
+
+
+def test_figures_of_a_model() -> None:
+    machine = machines.load("mikron-ucp710")
+    full = load(SAMPLES / "mikron-ucp710.toml", machine)
+    found = survey(full, machine, 80.0)
+    assert found["components"]["EXX"]["lost_motion"] == pytest.approx(3.0) and found["components"]["EXX"]["both_ways"]
+    assert found["components"]["ECY"]["unit"] == "arcsec"
+    peak = max(abs(float(x.split(",")[3])) for x in (SAMPLES / "mikron-ucp710-X.csv").read_text().splitlines()[2:])
+    assert abs(found["components"]["EYX"]["largest"]) == pytest.approx(peak)
+    assert found["location"]["EC0Y"] == {"value": pytest.approx(6.0), "unit": "arcsec", "kind": "line"}
+    assert found["covariance"]["largest_um"] == pytest.approx(0.5) and not found["covariance"]["correlated"]
+    volume = found["volume"]
+    q = np.array([[volume["tip_worst_at"][x] for x in machine.axis_names]]) * np.where(machine.rotary, DEG, 1.0)
+    kin = machine.kinematics.with_tool(80.0)
+    moved = np.linalg.norm(full.on(kin).place(q)[0] - kin.forward(q)[0])
+    assert volume["tip_worst_um"] == pytest.approx(1e3 * moved, rel=1e-4) and volume["tip_rms_um"] < volume["tip_worst_um"]
+    tip, axis = worst(full, machine, 80.0, full)
+    assert [tip, axis] == pytest.approx([volume["tip_worst_um"], volume["axis_worst_arcsec"]], rel=0.05)
+    less = without(full, [n for n in map(parse, ("EXX", "EZC")) if n])
+    assert absent(less, machine) == ["EXX", "EZC"] and len(less.names) == len(full.names) - 35
+    assert less.covariance is not None and np.diag(less.covariance)[0] == pytest.approx((0.5e-3) ** 2)
+    assert unmeasured(full, machine, "e") == []
+    short = ErrorModel(SerialErrors((component("EXX", Table(np.array([0.0, 10.0]), np.zeros(2))),)))
+    told = unmeasured(short, machine, "e.toml")
+    assert len(told) == 1 and "X travels from -355 to 355, the model holds from 0 to 10" in told[0].message
