@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+import toolpaths
 from toolpaths.cl.read import ReadResult, read_bytes
 from toolpaths.diagnostics import Severity
 
@@ -70,3 +71,23 @@ def test_cycle_on_before_a_cycle_arms_nothing() -> None:
 def test_cycle_on_before_a_point_needs_a_cycle() -> None:
     read(feature("0.0,0.0,1.0", (0.0, 0.0, 0.0), f"CYCLE/ ON \nGOTO/ 0.0,0.0,0.0 \n{DRILL}GOTO/ 1.0,0.0,0.0 \n"
                  "CYCLE/ OFF \n"), "cl.cycle")
+
+
+def test_features_are_operations_and_tools_without_numbers_are_named_and_loaded() -> None:
+    mill = "CUTTER/ 14.0,7.0,0.0,7.0,0.0,0.0,73.0,\n"
+    level = feature("0.0,0.0,1.0", (0.0, 0.0, 0.0), "GOTO/ 0.0,0.0,0.0 \n")
+    found = read("CUTTER/ 6.0,0.0,3.0,1.8,31.0,0.0,102.0,\n" + level + mill + level.replace("Mill1", "Mill2") + mill + level)
+    p = found.toolpath
+    assert [op.name for op in p.operations] == ["Mill1-Pocket1", "Mill2-Pocket1", "Mill1-Pocket1"]
+    assert [(t.number, t.name) for t in p.tools] == [(0, "D6 TIP118"), (0, "D14 R7")]
+    assert [(e.index, e.values) for e in p.events if e.word == "LOADTL"] == [(0, (0.0,)), (1, (0.0,))]
+    assert toolpaths.read_bytes(toolpaths.write(p))[0].equals(p)
+
+
+def test_one_tool_or_numbered_tools_are_left_as_they_are() -> None:
+    level = feature("0.0,0.0,1.0", (0.0, 0.0, 0.0), "GOTO/ 0.0,0.0,0.0 \n")
+    one = read(level).toolpath
+    two = read("LOAD/TOOL,1\n" + level + "CUTTER/ 14.0,7.0\nLOAD/TOOL,2\n" + level).toolpath
+    assert ([t.name for t in one.tools], [e for e in one.events if e.word == "LOADTL"]) == ([""], [])
+    assert [t.name for t in two.tools] == ["", ""]
+    assert [e.values for e in two.events if e.word == "LOADTL"] == [(1.0,), (2.0,)]

@@ -11,6 +11,7 @@ from toolpaths.arrays import Array, Bools, Floats, Ints
 from toolpaths.cl.arcs import UNIT_ROUNDING, Records, arcs_of, unit
 from toolpaths.cl.build import Builder, Track
 from toolpaths.cl.heights import height_of, place
+from toolpaths.cl.unnumbered import loaded, named
 from toolpaths.diagnostics import Severity
 from toolpaths.toolpath import Arcs, Cycle, FeedMode, Frame, Kind, Operation, Role, Tool, Toolpath
 
@@ -61,9 +62,10 @@ def assemble(b: Builder) -> Toolpath:
     cycles = _fed_cycles(b, cycle, cycles)
     operation, operations, frames = _operations(b, n)
     tool, tools = _tools(b, n)
+    events = b.events if b.declared else loaded(b.events, tools, tool, rows.line)
     pass_ = passes((kind == Kind.RAPID) & (role != Role.HOLE), operation, tool)
     return Toolpath(rows.tip, rows.axis, feed, mode, kind, role, arc, cycle, tool, operation, pass_, rows.line, arcs,
-                    cycles, tools, operations, frames, tuple(b.events), normal, contact,
+                    cycles, tools, operations, frames, tuple(events), normal, contact,
                     b.declared.units if b.declared else b.units, b.name, b.log.file)
 
 
@@ -331,7 +333,7 @@ def _tools(b: Builder, n: int) -> tuple[Array, tuple[Tool, ...]]:
     index: Track[int] = Track(-1)
     for start, tool in zip(b.tool.starts, b.tool.values, strict=True):
         index.set(start, -1 if tool is None else order.setdefault(tool, len(order)))
-    return spread(index, n, np.int32), tuple(order)
+    return spread(index, n, np.int32), named(tuple(order))
 
 
 def passes(free: Bools, operation: Array, tool: Array) -> Array:

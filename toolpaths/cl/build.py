@@ -214,6 +214,15 @@ class Builder:
         x, y, z = self.points.xyz[high - 1].tolist()
         return x, y, z
 
+    def next_point(self) -> Triple | None:
+        """Coordinates of the plain point that is the very next record, as written; None where there is none."""
+        i = self.index + 1
+        before = self.program.before[i] if i < len(self.program.before) else len(self.points)
+        if i > self.stop or before <= self.fast:
+            return None
+        x, y, z = self.points.xyz[self.fast].tolist()
+        return x, y, z
+
     def next_is_point(self) -> bool:
         """True where the next record that moves the tool or changes how it moves (`BETWEEN` apart) is a GOTO."""
         statements, before = self.program.statements, self.program.before

@@ -9,7 +9,7 @@ import numpy as np
 
 from toolpaths.arrays import Floats
 from toolpaths.cl.build import Builder, Triple
-from toolpaths.cl.statements import COMMENT, TEXT, Statement, words_of
+from toolpaths.cl.statements import COMMENT, TEXT, Statement, Word, words_of
 from toolpaths.toolpath import Role
 
 SPLINE_CHORD = 0.001
@@ -60,6 +60,37 @@ def tlon(b: Builder, s: Statement) -> None:
     b.arcs.add(b.row, tuple(arc[:6]), b.line, arc[6])
     b.toward = None
     b.add_point(end)
+
+
+_HELICAL = {"CENTER": 3, "INDIRV": 3, "AXIS": 3, "PITCH": 1, "RADIUS": 1, "ANGLE": 1, "HEIGHT": 1, "ROUND": 1, "END": 3}
+
+
+def helical(b: Builder, s: Statement) -> None:
+    """CATIA: HELICAL/CENTER, x, y, z, INDIRV, i, j, k, AXIS, i, j, k, PITCH, p, RADIUS, r, ANGLE, a, HEIGHT, h, ROUND, n,
+    END, x, y, z: a helix that turns by h / p turns (by a degrees where it does not rise) and carries its end."""
+    b.arc_records += 1
+    found = _labelled(s.words)
+    if {word: len(n) for word, n in found.items()} != _HELICAL:
+        b.log.error("cl.circle", f"HELICAL/{s.body[:60]}: it takes " + ", ".join(_HELICAL) + " with their numbers", b.line)
+        return
+    pitch, height = abs(found["PITCH"][0]), abs(found["HEIGHT"][0])
+    sweep = 2.0 * math.pi * height / pitch if pitch > 0.0 and height > 0.0 else math.radians(abs(found["ANGLE"][0]))
+    x, y, z = found["INDIRV"]
+    b.arcs.toward[len(b.arcs.row)] = (x, y, z)
+    b.arcs.add(b.row, (*found["CENTER"], *found["AXIS"]), b.line, found["RADIUS"][0], sweep=sweep)
+    x, y, z = found["END"]
+    b.add_point((x, y, z))
+
+
+def _labelled(words: tuple[Word, ...]) -> dict[str, list[float]]:
+    """The numbers behind each word."""
+    found: dict[str, list[float]] = {}
+    label = ""
+    for word in words:
+        if isinstance(word, str):
+            label = word
+        found.setdefault(label, []).extend([word] if isinstance(word, float) else [])
+    return found
 
 
 def _arc_numbers(found: list[tuple[str, list[float]]]) -> list[float] | None:
@@ -203,4 +234,4 @@ def de_boor(control: Floats, knots: Floats, at: Floats, degree: int) -> Floats:
     return result
 
 
-HANDLERS = {"INDIRV": indirv, "INDIRP": indirp, "TLON,GOFWD": tlon, "NURBS": nurbs}
+HANDLERS = {"INDIRV": indirv, "INDIRP": indirp, "TLON,GOFWD": tlon, "HELICAL": helical, "NURBS": nurbs}

@@ -23,6 +23,8 @@ _RETRACT = frozenset({"RTRCTO", "RETURN"})
 _PECKS = frozenset({"STEP", "INCR", "PECKING", "1STPECK", "SUBPECK"})
 _OTHER = frozenset({"DIAMET", "TLANGL", "TIMES", "BACK", "OFFSET", "REPEAT", "PARAMS", "ORIENT", "CSKDIA", "PLUNGE"})
 _PLAIN = frozenset({"G98", "G99", "AUTO", "MANUAL", "ON", "REV", "", "SEC", "NEXT"})
+_APPROACH = 1e-4
+"""file units between the second number of a cycle of CATIA and the way from the point before the cycle to its hole"""
 _WORDS = "words"
 _LAST = "cycle"
 
@@ -181,7 +183,7 @@ def _retract(word: str, n: list[float], following: Word, found: dict[str, object
 
 def _arm(b: Builder, v: Values) -> None:
     """Check what was stated and make the cycle current. `.clt` names pecking in a word of its own."""
-    v = _with_planes(b, _placed(v, b.dialect.planes))
+    v = _with_planes(b, _placed(_approached(b, v), b.dialect.planes))
     if v.kind == "DRILL" and "PECKING" in v.words and any(v.steps):
         v = replace(v, kind="DEEP")
     b.memory[_LAST] = v
@@ -196,6 +198,16 @@ def _arm(b: Builder, v: Values) -> None:
                       "their order is that of the user's table in CATIA")
     b.cycle.set(b.row, len(b.cycles))
     b.cycles.append(_made(b, v))
+
+
+def _approached(b: Builder, v: Values) -> Values:
+    """CATIA's cycle of two numbers, depth and another: the start plane where the tool stands so far above the hole."""
+    last, hole = b.last_point(), b.next_point()
+    if b.dialect.name != "catia" or len(v.free) != 2 or last is None or hole is None:
+        return v
+    if abs(math.dist(last, hole) - v.free[1]) > _APPROACH:
+        return v
+    return replace(v, clear=v.free[1], depth=v.free[0], free=(), placed=True)
 
 
 def _placed(v: Values, planes: Planes) -> Values:

@@ -69,6 +69,11 @@ def named_operation(b: Builder, s: Statement) -> None:
     begin_operation(b, s.body.strip("' "))
 
 
+def solidworks_feature(b: Builder, s: Statement) -> None:
+    """`.clt`: OPFEATSTART/operation-feature begins an operation."""
+    begin_operation(b, s.body.strip())
+
+
 def apply(b: Builder, s: Statement) -> None:
     """APPLY/MILL or TURN (MfgSuite)."""
     if s.has("TURN"):
@@ -235,4 +240,5 @@ HANDLERS: dict[str, Callable[[Builder, Statement], None]] = {
     "$$->TOOLPATH": own_header, "$$->FRAME": own_item, "$$->TOOL": own_item, "$$->OPERATION": own_item,
     "$$->USE": own_use, "$$->SPLINE": own_spline, **dict.fromkeys(EVENTS, plain_event), "SPINDL": spindl, "DWELL": dwell,
     "MODE": mode, "CSI_TOOL_PATH": named_operation, "OPNAME": named_operation, "APPLY": apply,
+    "OPFEATSTART": solidworks_feature,
 }
