@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial import HalfspaceIntersection, QhullError
 
 from machines.kinematics.base import Kinematics
-from toolpaths.arrays import Array, Bools, Floats, Ints
+from toolpaths.arrays import Bools, Floats, Ints
 
 _SMALL = 1e-12
 _HELD = 1e-9
@@ -110,30 +110,6 @@ def held_axis_polytope(kin: Kinematics, q: Floats, limit: Floats, near: Floats |
     normals = np.concatenate([rates[:, joints], -rates[:, joints]], axis=1)
     offsets = np.tile(np.concatenate([limit[joints], limit[joints]]), (len(q), 1))
     return Polytope(normals, offsets, np.concatenate([joints, joints]))
-
-
-def aim_table_ac(direction: Floats, vertex: Floats) -> Floats:
-    """Angles (A, C) (S, 2) in rad that turn vertex (3,) of the slides' polytope into the feed direction (3,).
-
-    For a table C on a table A, J = Rz(C) Rx(A): the third line of equation 7 gives A, the others C (closed form in the
-    corrections to the paper). A over a full turn: two solutions, one where they fall together, none where the direction
-    rises more steeply than the vertex can be turned; principal values.
-    """
-    f, v = direction / np.linalg.norm(direction), vertex / np.linalg.norm(vertex)
-    size = float(np.hypot(v[1], v[2]))
-    if size < _SMALL or abs(f[2]) > size * (1.0 + 1e-12):
-        return np.zeros((0, 2))
-    rise, lean = np.arcsin(np.clip(f[2] / size, -1.0, 1.0)), np.arctan2(v[2], v[1])
-    tilt = np.array([rise, np.pi - rise]) if abs(f[2]) < size * (1.0 - 1e-15) else np.array([rise])
-    tilt = tilt - lean
-    across = np.cos(tilt) * v[1] - np.sin(tilt) * v[2]
-    turn = np.arctan2(f[1], f[0]) - np.arctan2(across, v[0])
-    return np.asarray(_principal(np.column_stack([tilt, turn])))
-
-
-def _principal(angle: Array) -> Array:
-    result: Array = -(np.mod(-angle + np.pi, 2.0 * np.pi) - np.pi)
-    return result
 
 
 def box_vertices(limit: Floats) -> Floats:

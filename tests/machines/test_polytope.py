@@ -1,4 +1,4 @@
-"""Polytopes of tip rates: half-spaces against vertices, all machines, and the angles printed in the paper."""
+"""Polytopes of tip rates: half-spaces against vertices, all machines."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 import machines
 from machines.loader import names
 from machines.machine import Machine
-from machines.polytope import aim_table_ac, box_vertices, held_axis_polytope, held_axis_rates
+from machines.polytope import box_vertices, held_axis_polytope, held_axis_rates
 from toolpaths.arrays import Floats
 
 NAMES = names()
@@ -88,44 +88,12 @@ def test_serial_vertices_are_the_turned_box() -> None:
     assert np.linalg.norm(found[:, None] - turned[None], axis=2).min(axis=1).max() < 1e-6
 
 
-def test_angles_printed_in_the_paper() -> None:
-    """f = (-1, 0, 0), equal limits: A in +-45, C in +-54.736, +-125.264 degrees."""
-    angles = np.degrees(np.concatenate([aim_table_ac(np.array([-1.0, 0.0, 0.0]), v) for v in box_vertices(np.ones(3))]))
-    assert len(angles) == 16
-    small = angles[np.abs(angles[:, 0]) <= 90.0]
-    assert len(small) == 8
-    assert np.abs(np.abs(small[:, 0]) - 45.0).max() < 1e-9
-    assert sorted(np.round(small[:, 1], 3)) == [-125.264, -125.264, -54.736, -54.736, 54.736, 54.736, 125.264, 125.264]
-
-
-def test_aimed_vertices_lie_along_the_feed_direction_on_the_machine() -> None:
-    machine = machines.load("mikron-ucp710")
-    limit = machine.limits.jerk
-    for _ in range(50):
-        f = RNG.normal(size=3)
-        f /= np.linalg.norm(f)
-        for vertex in box_vertices(limit[:3]):
-            angles = aim_table_ac(f, vertex)
-            assert len(angles) == (2 if abs(f[2]) < np.hypot(*vertex[1:]) / np.linalg.norm(vertex) else 0)
-            for a, c in angles:
-                q = np.array([[0.0, 0.0, 0.0, a, c]])
-                reach = held_axis_polytope(machine.kinematics, q, limit).reach(f)
-                assert reach[0] == pytest.approx(np.linalg.norm(vertex), rel=1e-9)
-
-
 def test_nothing_reaches_farther_than_an_aimed_vertex() -> None:
     machine = machines.load("mikron-ucp710")
     q = np.zeros((2000, 5))
     q[:, 3:] = RNG.uniform(-np.pi, np.pi, (2000, 2))
     reach = held_axis_polytope(machine.kinematics, q, machine.limits.jerk).reach(np.array([0.6, -0.48, 0.64]))
     assert reach.max() <= np.linalg.norm(machine.limits.jerk[:3]) * (1.0 + 1e-12)
-
-
-def test_steep_directions_have_no_vertex_to_aim() -> None:
-    limit = np.sqrt(2.0 / 3.0)
-    for rise, count in ((limit - 1e-6, 2), (limit + 1e-6, 0)):
-        f = np.array([np.sqrt(1.0 - rise**2), 0.0, rise])
-        assert len(aim_table_ac(f, np.ones(3))) == count
 
 
 def test_unbounded_and_missing_poses() -> None:

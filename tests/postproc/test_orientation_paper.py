@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from machines.machine import Machine
-from machines.polytope import aim_table_ac, box_vertices, held_axis_polytope
+from machines.polytope import box_vertices, held_axis_polytope
 from postproc.options import Options
 from postproc.orientation.allowed import Allowed
 from postproc.orientation.candidates import tried
 from postproc.orientation.passes import Pass, work_of
 from postproc.orientation.timed import turned
-from postproc.orientation.vertices import Table, closed_form, numeric, table_of, vertex_angles
+from postproc.orientation.vertices import Table, closed_form, numeric, rotation, table_of, vertex_angles
 from postproc.setup import SetupFile
 from tests.postproc.kit import SAMPLES, machine
 from toolpaths.arrays import Floats
@@ -69,12 +69,30 @@ def test_newton_finds_the_closed_form(direction: tuple[float, float, float]) -> 
     limit = np.array([5000.0, 4000.0, 6000.0, 1.0, 1.0])
     np.testing.assert_allclose(sorted_rows(numeric(kin, np.zeros(5), f, limit)),
                                sorted_rows(closed_form(mikron(), f, limit[:3])), atol=1e-5)
-    printed = np.concatenate([aim_table_ac(f, vertex) for vertex in box_vertices(limit[:3])])
-    np.testing.assert_allclose(sorted_rows(closed_form(mikron(), f, limit[:3])), sorted_rows(printed), atol=1e-6)
+
+
+def test_every_solution_turns_a_vertex_into_the_direction() -> None:
+    """Equation 7 of the paper: f along J v with J = Rz(C) Rx(A), two solutions of each vertex that f rises less than
+    it can be turned to, and the reach there is the vertex."""
+    rng, kin = np.random.default_rng(9), machine("mikron-ucp710").kinematics
+    limit = np.array([5000.0, 4000.0, 6000.0])
+    size = float(np.linalg.norm(limit))
+    for f in rng.normal(size=(50, 3)):
+        f /= np.linalg.norm(f)
+        angles = closed_form(mikron(), f, limit)
+        assert len(angles) == (16 if abs(f[2]) < np.hypot(*limit[1:]) / size else 0)
+        for a, c in angles:
+            turned = rotation(np.eye(3)[2], c) @ rotation(np.eye(3)[0], a) @ box_vertices(limit / size).T
+            assert np.abs(turned - f[:, None]).max(axis=0).min() < 1e-9
+            reach = held_axis_polytope(kin, np.array([[0.0, 0.0, 0.0, a, c]]), np.append(limit, [1.0, 1.0])).reach(f)
+            assert reach[0] == pytest.approx(size, rel=1e-9)
 
 
 def test_no_vertex_on_a_steep_way() -> None:
     """|f_z| above sqrt(2/3) cannot be met (equal limits)."""
+    for off, count in ((-1e-6, 16), (1e-6, 0)):
+        rise = np.sqrt(2.0 / 3.0) + off
+        assert len(closed_form(mikron(), np.array([np.sqrt(1.0 - rise**2), 0.0, rise]), np.ones(3))) == count
     steep = np.array([0.3, 0.48, 0.83])
     assert len(closed_form(mikron(), steep / np.linalg.norm(steep), np.full(3, 1.0))) == 0
     assert len(numeric(machine("mikron-ucp710").kinematics, np.zeros(5), steep / np.linalg.norm(steep), np.ones(5))) == 0
