@@ -74,6 +74,34 @@ def test_taps_pecks_and_dwells() -> None:
     assert one("CYCLE/FACE,DEPTH,10,MMPM,60,CLEAR,3,RETURN,5,DWELL,3,REV").dwell_revolutions == 3.0
 
 
+@pytest.mark.parametrize(("record", "severity"), [
+    ("CYCLE/BORE,BACK,RAPTO,3,FEDTO,-5,MMPM,60", Severity.ERROR),
+    ("CYCLE/DRILL,BORE,BACK,RAPTO,3,FEDTO,-5,MMPM,60", Severity.ERROR),
+    ("CYCLE/DRILL,TAP,DEEP,RAPTO,3,FEDTO,-5,STEP,2,MMPR,1", Severity.ERROR),
+    ("CYCLE/TAP,BRKCHP,RAPTO,3,FEDTO,-5,STEP,2,MMPR,1", Severity.ERROR),
+    ("CYCLE/BORE,NODRAG,RAPTO,3,FEDTO,-5,MMPM,60", Severity.WARNING),
+    ("CYCLE/BORE,DRAG,RAPTO,3,FEDTO,-5,MMPM,60", Severity.WARNING),
+    ("CYCLE/BORE,MANUAL,RAPTO,3,FEDTO,-5,RTRCTO,9,MANUAL,MMPM,60", Severity.WARNING),
+    ("CYCLE/FACE,RAPTO,3,FEDTO,-5,MMPM,60,DWELL,ON", Severity.WARNING),
+    ("CYCLE/BORE,RAPTO,3,FEDTO,-5,RTRCTO,9,MANUAL,MMPM,60", None),
+    ("CYCLE/DRILL,BRKCHP,RAPTO,3,FEDTO,-5,STEP,2,MMPM,60", None),
+    ("CYCLE/FACE,RAPTO,3,FEDTO,-5,MMPM,60,DWELL,REV,4", None),
+])
+def test_variants_of_cycles_are_carried_out_told_or_refused(record: str, severity: Severity | None) -> None:
+    found = read_bytes(NX + f"RAPID\nGOTO/0,0,9\n{record}\nGOTO/0,0,0\nCYCLE/OFF\nEND-OF-PATH\n")
+    told = [(d.severity, d.code) for d in found.diagnostics if d.severity is not Severity.INFO]
+    code = "cl.cycle" if severity is Severity.ERROR else "cl.cycle-option"
+    assert told == ([(severity, code)] if severity else [])
+    assert (found.toolpath.cycles[0].depth, found.toolpath.cycles[0].clearance) == (5, 3)
+
+
+@pytest.mark.parametrize("record", ["CYCLE81/10,0,2,-25,0", "CALLSUB/1001", "CYCLE83 / 10"])
+@pytest.mark.parametrize("end", ["", "GOTO/1,0,0\n"])
+def test_words_that_begin_as_a_cycle_or_a_call_are_never_left_out(record: str, end: str) -> None:
+    found = read_bytes(f"UNITS/MM\nFEDRAT/60\nGOTO/0,0,0\n{record}\n{end}FINI\n")
+    assert [d.code for d in found.diagnostics if d.severity is Severity.ERROR] == ["cl.unknown-motion"]
+
+
 def test_cycle_on_takes_the_last_values_and_the_changed_ones() -> None:
     p = read(NX + "CYCLE/DRILL,FEDTO,-33,RAPTO,3,RTRCTO,20,MMPM,60\nGOTO/0,0,0\nCYCLE/OFF\nRAPID\nGOTO/9,9,9\n"
              "CYCLE/ON,FEDTO,-74.5,RTRCTO,AUTO\nGOTO/1,0,0\nCYCLE/OFF\n")

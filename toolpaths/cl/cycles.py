@@ -4,56 +4,24 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 from toolpaths.cl.build import Builder, Heights
+from toolpaths.cl.cycle_words import KINDS, Values, kind_of, values
 from toolpaths.cl.dialects import Planes
-from toolpaths.cl.feeds import UNITS, feed_in
+from toolpaths.cl.feeds import feed_in
 from toolpaths.cl.statements import Statement, Word
 from toolpaths.toolpath import Cycle, FeedMode
 from toolpaths.units import MM_PER_INCH
 
-KINDS = {"DRILL": "DRILL", "DEEP": "DEEP", "DEEP2": "DEEP", "PECK": "DEEP", "BRKCHP": "BRKCHP", "BREAKCHP": "BRKCHP",
-         "TAP": "TAP", "RIGID": "TAP", "BORE": "BORE", "BORE7": "BORE7", "BORE8": "BORE8", "BORE9": "BORE9", "REAM": "REAM",
-         "FACE": "FACE", "CSINK": "CSINK", "THRU": "THRU", "MILL": "MILL", "REVERS": "REVERS", "SHIFT": "SHIFT",
-         "CIRCUL": "CIRCUL", "THREAD": "THREAD", "SPOT": "DRILL"}
 _OFF = frozenset({"OFF", "NOMORE"})
 _DEPTH = frozenset({"FEDTO", "DEPTH"})
-_RETRACT = frozenset({"RTRCTO", "RETURN"})
-_PECKS = frozenset({"STEP", "INCR", "PECKING", "1STPECK", "SUBPECK"})
-_OTHER = frozenset({"DIAMET", "TLANGL", "TIMES", "BACK", "OFFSET", "REPEAT", "PARAMS", "ORIENT", "CSKDIA", "PLUNGE"})
-_PLAIN = frozenset({"G98", "G99", "AUTO", "MANUAL", "ON", "REV", "", "SEC", "NEXT"})
+_IN_STEPS = frozenset({"DEEP", "DEEP2", "PECK", "BRKCHP", "BREAKCHP"})
+_BORES = frozenset({"DRAG", "NODRAG", "MANUAL"})
 _APPROACH = 1e-4
 """file units between the second number of a cycle of CATIA and the way from the point before the cycle to its hole"""
 _WORDS = "words"
 _LAST = "cycle"
-
-
-@dataclass(frozen=True)
-class Values:
-    """What a CYCLE record states, file units; NaN or None where it does not."""
-
-    kind: str
-    words: tuple[Word, ...]
-    depth: float = math.nan
-    rapto: float = math.nan
-    clear: float = math.nan
-    clearance: float = math.nan
-    """start plane above the GOTO, of the two above it"""
-    retract: float | None = math.nan
-    feed: tuple[float, str] | None = None
-    threads: float = math.nan
-    pitch: float = math.nan
-    steps: tuple[float, ...] = ()
-    dwell: float = math.nan
-    revolutions: float = math.nan
-    diameter: float = math.nan
-    angle: float = math.nan
-    free: tuple[float, ...] = ()
-    placed: bool = False
-    """the depth has no word of its own: numbers by their place"""
-    empty: tuple[str, ...] = field(default=(), compare=False)
-    strange: tuple[str, ...] = field(default=(), compare=False)
 
 
 def cycle(b: Builder, s: Statement) -> None:
@@ -67,8 +35,9 @@ def cycle(b: Builder, s: Statement) -> None:
         _again(b, s)
     elif isinstance(first, str) and first in KINDS:
         b.cycle_records += 1
-        kind, rest = _kind(s.words)
-        _arm(b, _values(Values(kind, s.words), rest, b))
+        kind, rest = kind_of(s.words)
+        rest = _variant(b, kind, s.words, rest)
+        _arm(b, values(Values(kind, s.words), rest))
     else:
         b.cycle_records += 1
         b.log.error("cl.cycle", f"CYCLE/{s.body[:60]}: {first or 'nothing'} is no kind of cycle", b.line,
@@ -83,102 +52,25 @@ def _again(b: Builder, s: Statement) -> None:
     if not isinstance(last, Values):
         b.log.error("cl.cycle", "CYCLE/ON before any cycle", b.line)
         return
-    _arm(b, _values(replace(last, empty=()), s.words[1:], b))
+    _arm(b, values(replace(last, empty=()), s.words[1:]))
 
 
-def _kind(words: tuple[Word, ...]) -> tuple[str, tuple[Word, ...]]:
-    """(kind, the words after it): of several the one that says more than DRILL."""
-    n = 0
-    while n < len(words) and isinstance(words[n], str) and words[n] in KINDS:
-        n += 1
-    kinds = [KINDS[str(w)] for w in words[:n]]
-    return next((k for k in kinds if k != "DRILL"), "DRILL"), words[n:]
-
-
-def _values(v: Values, words: tuple[Word, ...], b: Builder) -> Values:
-    """`v` with the parameters `words`; numbers without a word go to `free` in their order."""
-    found: dict[str, object] = {}
-    free: list[float] = []
-    steps: list[float] = []
-    empty: list[str] = []
-    strange: list[str] = []
-    i = 0
-    while i < len(words):
-        word, i = words[i], i + 1
-        if isinstance(word, float):
-            free.append(word)
-            continue
-        numbers = []
-        while i < len(words) and isinstance(words[i], float):
-            numbers.append(words[i])
-            i += 1
-        taken = _label(word, [float(x) for x in numbers], words[i] if i < len(words) else "", found, free, steps, empty,
-                       strange)
-        free.extend(float(x) for x in numbers[taken:])
-    if "clear" in found:
-        found.setdefault("rapto", math.nan)
-    if steps:
-        found["steps"] = tuple(steps)
-    return replace(v, **found, free=tuple(free), empty=tuple(empty), strange=tuple(strange))  # type: ignore[arg-type]
-
-
-def _label(word: str, n: list[float], following: Word, found: dict[str, object], free: list[float],
-           steps: list[float], empty: list[str], strange: list[str]) -> int:
-    """Take the numbers `n` that belong to `word`; how many were taken."""
-    if word in _PECKS:
-        steps.extend(n)
-    elif word in UNITS:
-        return _feed(word, n, found, free, empty)
-    elif word in _RETRACT or word in ("AUTO", "MANUAL"):
-        return _retract(word, n, following, found, empty)
-    elif word == "DWELL":
-        found["revolutions" if following == "REV" else "dwell"] = n[0] if n else math.nan
-    elif word in ("REV", "ON") and n:
-        found["revolutions" if word == "REV" else "dwell"] = n[0]
-    elif word in _SIMPLE and n:
-        found[_SIMPLE[word]] = n[0]
-    elif word in _OTHER:
-        return len(n)
-    elif word not in _PLAIN and word not in KINDS and word not in _SIMPLE:
-        strange.append(word)
-    if not n and (word in _SIMPLE or word in _PECKS):
-        empty.append(word)
-    if word in _PECKS:
-        return len(n)
-    return min(1, len(n)) if word in _SIMPLE or word in ("DWELL", "REV") else 0
-
-
-_SIMPLE = {"FEDTO": "depth", "DEPTH": "depth", "RAPTO": "rapto", "CLEAR": "clear", "TPI": "threads",
-           "PITCH": "pitch", "DIAMET": "diameter", "TLANGL": "angle"}
-
-
-def _feed(word: str, n: list[float], found: dict[str, object], free: list[float], empty: list[str]) -> int:
-    """f, unit where two or more free numbers stand before the unit (depth, feed), else unit, f."""
-    if "depth" not in found and len(free) >= 2:
-        found["feed"] = (free.pop(), word)
-        return 0
-    if "depth" in found and free and not n:
-        found["feed"] = (free.pop(), word)
-        return 0
-    if not n:
-        empty.append(word)
-        return 0
-    found["feed"] = (n[0], word)
-    return 1
-
-
-def _retract(word: str, n: list[float], following: Word, found: dict[str, object], empty: list[str]) -> int:
-    if word == "AUTO":
-        found["retract"] = None
-        return 0
-    if word == "MANUAL":
-        return 0
-    if n:
-        found["retract"] = n[0]
-        return 1
-    if following not in ("AUTO", "MANUAL"):
-        empty.append(word)
-    return 0
+def _variant(b: Builder, kind: str, words: tuple[Word, ...], rest: tuple[Word, ...]) -> tuple[Word, ...]:
+    """`rest` without the word that makes another cycle of a bore (NX: DRAG, NODRAG, MANUAL); what cannot be carried out as
+    the cycle of its kind, a bore from below and a tap in steps, is refused."""
+    steps = [str(w) for w in words[:len(words) - len(rest)] if w in _IN_STEPS]
+    if kind == "TAP" and steps:
+        b.log.error("cl.cycle", f"CYCLE/TAP,{steps[0]}: tapping in steps is not supported", b.line,
+                    "tap in one go, or have the CAM system write out the moves")
+    if kind != "BORE" or not rest:
+        return rest
+    if rest[0] == "BACK":
+        b.log.error("cl.cycle", "CYCLE/BORE,BACK: boring from below is not supported", b.line,
+                    "have the CAM system write out the moves")
+    elif rest[0] in _BORES:
+        b.log.warning("cl.cycle-option", f"CYCLE/BORE,{rest[0]}: bored in and out at the feed instead", b.line,
+                      key=str(rest[0]))
+    return rest[1:] if rest[0] in _BORES or rest[0] == "BACK" else rest
 
 
 def _arm(b: Builder, v: Values) -> None:

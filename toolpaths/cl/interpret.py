@@ -22,6 +22,8 @@ _WORD = re.compile(r"[A-Z0-9_-]+")
 _MOTION = re.compile(r"\W*(?:GOTO|GODLTA|RAPID|CIRCLE|MOVARC|GOHOME)\b|IF\s*\(|.*\b(?:GOTO|GODLTA|CIRCLE|MOVARC)\s*/",
                      re.IGNORECASE)
 """Text that is no record and yet names a motion, or chooses one: dropped, it would leave the tool elsewhere."""
+_MOVING = ("CYCLE", "CALL")
+"""Beginnings of words that drill or call a program, whatever a system makes of them (CYCLE81, CALLSUB)."""
 _DEEPEST = 8
 _MOST_ROWS = 50_000_000
 
@@ -171,7 +173,8 @@ def report_others(b: Builder) -> dict[str, int]:
 
 def _report_word(b: Builder, word: str, found: list[tuple[int, int, int]]) -> None:
     for line, row, numbers in found:
-        moves = (numbers >= _MANY and 0 < row < b.row) or word.split(" ")[-1] in motion.HANDLERS
+        moves = (numbers >= _MANY and 0 < row < b.row) or word.split(" ")[-1] in motion.HANDLERS or (
+            numbers > 0 and word.startswith(_MOVING))
         if moves and word not in b.allow_unknown:
             b.log.error("cl.unknown-motion", f"unknown word {word} with {numbers} numbers, which may move the tool", line,
                         f"--allow-unknown {word} leaves it out", key=word)
