@@ -91,7 +91,7 @@ def _table(file: str, rows: list[tuple[int, str]]) -> tuple[CsvTable | None, lis
     if faults:
         fault, hint = faults[0][1:]
         return None, [error("error-table.row", fault, file=file, lines=[n for n, _, _ in faults[:6]], count=len(faults),
-                            hint=hint or f"columns are {', '.join(names)}")]
+                            hint=hint or f"columns are {', '.join(names)[:200]}")]
     scaled = {name: values[:, k] * UNITS.get(unit[name], 1.0) for k, name in enumerate(names)}
     return CsvTable(file, scaled, unit, tuple(line for line, _ in body), first), []
 
@@ -142,11 +142,13 @@ def _fill(row: Floats, cells: Sequence[str], names: Sequence[str], comma: bool) 
         return f"{len(cells)} values, {len(names)} columns", hint
     for k, cell in enumerate(cells):
         number = _number(cell, comma)
+        if not cell.strip():
+            return f"no number in column {names[k][:40]}", "take the row out where nothing was measured"
         if number is None:
-            shown = f"{cell.strip()[:40]!r} in column {names[k]}"
+            shown = f"{cell.strip()[:40]!r} in column {names[k][:40]}"
             return f"{shown} is not a number", "write decimal points throughout" if "," in cell else ""
         if not np.isfinite(number):
-            return f"{cell.strip()} in column {names[k]} is not finite", "take the row out where nothing was measured"
+            return f"{cell.strip()} in column {names[k][:40]} is not finite", "take the row out where nothing was measured"
         row[k] = number
     return None
 

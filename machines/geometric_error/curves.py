@@ -200,3 +200,10 @@ class Polynomial(Curve):
         t = (np.clip(x, *self.range) - self.origin) / self.scale
         result: Floats = np.vander(t, len(self.values), increasing=True)
         return result
+
+
+def largest(curve: Curve) -> float:
+    """A bound of a curve's absolute values, mm or rad, which linear tables reach."""
+    if isinstance(curve, Polynomial):
+        return float(np.abs(curve.at(np.linspace(*curve.range, 101))).max())
+    return float(np.abs(curve.values).max() if isinstance(curve, Table) else np.abs(curve.values).sum())

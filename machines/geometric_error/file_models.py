@@ -148,6 +148,8 @@ class ErrorFileModel(UserModel):
     def _fits(self) -> ErrorFileModel:
         if self.map is not None and (self.components or self.location or self.legs):
             raise ValueError("[map] stands alone; take out components, location and legs")
+        if self.sigma and self.covariance is not None:
+            raise ValueError("give [sigma] or [covariance], not both")
         for name in self.components:
             _named(name, "components", location=False)
         for name in self.location:

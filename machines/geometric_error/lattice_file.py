@@ -108,15 +108,16 @@ def _column_faults(table: CsvTable, letters: tuple[str, ...]) -> list[Diagnostic
     found = []
     if not letters or not {"dx", "dy", "dz"} <= set(table.columns):
         found.append(error("error-map.column", "a map needs coordinates and dx, dy, dz; it has " + ", ".join(table.columns),
-                           file=table.file, hint="write e.g. X [mm], Y [mm], Z [mm], dx [um], dy [um], dz [um]"))
+                           file=table.file, lines=[table.head],
+                           hint="write e.g. X [mm], Y [mm], Z [mm], dx [um], dy [um], dz [um]"))
     for name, unit in table.unit.items():
         known = name in COORDINATES or name in COLUMNS
         angular = name in ROTARY or name in COLUMNS[3:]
         if not known:
-            found.append(error("error-map.column", f"column {name!r} is not known", file=table.file,
+            found.append(error("error-map.column", f"column {name[:40]!r} is not known", file=table.file, lines=[table.head],
                                hint="coordinates " + " ".join(COORDINATES) + "; values " + " ".join(COLUMNS)))
         elif unit not in (ANGLES if angular else LENGTHS):
-            found.append(error("error-map.unit", f"column {name!r} has unit {unit!r}", file=table.file,
+            found.append(error("error-map.unit", f"column {name!r} has unit {unit!r}", file=table.file, lines=[table.head],
                                hint="write one of " + ", ".join(ANGLES if angular else LENGTHS)))
     return found
 

@@ -9,11 +9,11 @@ import numpy as np
 
 from machines.geometric_error.actual_map import part_side
 from machines.geometric_error.axis_motion import effect
-from machines.geometric_error.covariance import covariance_of
+from machines.geometric_error.covariance import angular, covariance_of
 from machines.geometric_error.csv_table import UNITS, CsvTable, read_csv
-from machines.geometric_error.curves import EVERYWHERE, Curve, Fourier, Polynomial
+from machines.geometric_error.curves import EVERYWHERE, Curve, Fourier, Polynomial, largest
 from machines.geometric_error.file_models import CurveModel, ErrorFileModel
-from machines.geometric_error.lattice import ErrorMap
+from machines.geometric_error.lattice import COLUMNS, ErrorMap
 from machines.geometric_error.lattice_file import map_from_csv
 from machines.geometric_error.model import ErrorModel
 from machines.geometric_error.names import SPINDLE, ErrorName, parse
@@ -27,10 +27,12 @@ from machines.kinematics.serial import Serial
 from machines.machine import Machine
 from machines.user_file import UserFile, nearest, read_toml, schema, validate
 from toolpaths.arrays import Floats, Ints
-from toolpaths.diagnostics import Diagnostic, has_errors, require
+from toolpaths.diagnostics import Diagnostic, Severity, has_errors, require, warning
 from toolpaths.units import DEG
 
 KIND = "error model"
+LARGE = {False: (1.0, 100.0), True: (0.5 * DEG, 10.0 * DEG)}
+"""mm, and rad of angles: errors that are told, and that no machine has"""
 
 
 def load(source: str | Path, machine: Machine) -> ErrorModel:
@@ -73,6 +75,7 @@ class _Loader:
     def model(self) -> tuple[ErrorModel | None, list[Diagnostic]]:
         """The model, or None and the faults."""
         self._check_machine()
+        self._check_letters()
         axes, rods, error_map = self._axes(), self._rods(), self._map()
         if has_errors(self.found):
             return None, self.found
@@ -83,6 +86,7 @@ class _Loader:
             self._problem("error-model.machine", (), str(fault), f"this machine is {self.machine.name}")
             return None, self.found
         self._check_effects()
+        self._check_sizes(model)
         model, faults = covariance_of(model, self.file, self.checked)
         self.found += faults
         return (None if has_errors(self.found) else model), self.found
@@ -95,6 +99,40 @@ class _Loader:
         if wanted and wanted != self.machine.name:
             self._problem("error-model.machine", ("machine",), f"the model was made for machine {wanted!r}, this is "
                           f"{self.machine.name!r}", "take the right file, or the key out where the machine is a copy")
+
+    def _check_letters(self) -> None:
+        """Errors of axes that the machine has not, or whose errors are those of its legs."""
+        serial = isinstance(self.machine.kinematics, Serial)
+        known = [x for x, turns in zip(self.machine.axis_names, self.machine.rotary, strict=True) if serial or turns]
+        for table, names in (("components", self.checked.components), ("location", self.checked.location)):
+            for text in names:
+                if (name := parse(text)) and name.axis not in (*known, SPINDLE):
+                    kind = "axis" if serial else "rotary axis"
+                    self._problem("error-model.axis", (table, text), f"{self.machine.name} has no {kind} {name.axis!r}",
+                                  f"it has {', '.join(known) or 'none'}" + ("" if serial else "; slides are in [legs]"))
+
+    def _check_sizes(self, model: ErrorModel) -> None:
+        """Errors too large to be any: a wrong unit, most likely; none at all."""
+        given = self.checked
+        if not (given.components or given.location or given.legs or given.map):
+            self.found.append(warning("error-model.empty", "the file holds no errors: the machine is taken as nominal",
+                                      file=self.file.file, hint="write [components], [location], [legs] or [map]"))
+        sizes: dict[tuple[str, ...], tuple[float, bool]] = {
+            ("components", str(c.name)): (largest(c.curve), c.name.angular) for c in model.axes.components}
+        sizes |= {("location", name): (abs(value), angular(name)) for name, value in model.axes.constants.items()}
+        if model.rods is not None:
+            for name, value in zip(model.rods.names, model.rods.values.tolist(), strict=True):
+                sizes["legs", name.split(".")[0].rstrip("12"), name] = abs(value), angular(name)
+        if model.map is not None:
+            for k, name in enumerate(COLUMNS):
+                sizes["map", "table", name] = float(np.abs(model.map.table[..., k]).max()), k >= 3
+        for path, (size, turn) in sizes.items():
+            doubtful, never = LARGE[turn]
+            if size > doubtful:
+                shown = f"{size / DEG:.4g} degrees" if turn else f"{size:.4g} mm"
+                found = self.file.problem("error-model.large", path, f"{path[-1]} is up to {shown}: is the unit right?",
+                                          "it is length_unit or angle_unit, in tables what their headers say")
+                self.found.append(found if size > never else replace(found, severity=Severity.WARNING))
 
     # ---- axes ------------------------------------------------------------------------------------------------------
 
@@ -148,7 +186,10 @@ class _Loader:
         period = 0.0 if given.repeats is None else given.repeats * position
         found = table_curve(name, table, given.interpolation, period, given.sign)
         if isinstance(found, Fault):
-            self._problem(found.code, path, found.message, found.hint)
+            if found.line:
+                self.found.append(found.at(table))
+            else:
+                self._problem(found.code, path, found.message, found.hint)
             return None
         return found
 

@@ -20,7 +20,7 @@ CLOSES = 1e-6
 
 
 class Fault(NamedTuple):
-    """What is wrong, without its place: code, message, hint, line of the table (0 for its header)."""
+    """What is wrong: code, message, hint, line of the table; 0 where the fault is in what the table was asked for."""
 
     code: str
     message: str
@@ -28,7 +28,7 @@ class Fault(NamedTuple):
     line: int = 0
 
     def at(self, table: CsvTable) -> Diagnostic:
-        """The fault at its place in the table."""
+        """The fault at its place in the table, the header where it has none."""
         return error(self.code, self.message, file=table.file, lines=[self.line or table.head], hint=self.hint)
 
 
@@ -51,12 +51,12 @@ def table_curve(name: ErrorName, table: CsvTable, rule: Literal["linear", "splin
         unit = DEG if name.axis in ROTARY else 1.0
         fault = _period_fault(x / unit, values, period / unit, UNITS["arcsec" if name.angular else "um"])
         if fault:
-            return fault
+            return fault._replace(line=table.lines[-1])
         inside = x < x[0] + period * (1.0 - CLOSES)
         x, values = x[inside], [v[inside] for v in values]
     if len(x) == 1 and not period:
-        return Fault("error-model.rows", f"{Path(table.file).name} has one row: nothing is known of other positions",
-                     f"write at least two rows, or [components.{name}] with polynomial = [value] and its range")
+        return Fault("error-model.rows", f"{name} has one row: nothing is known of other positions",
+                     f"write two rows or more, or [components.{name}] polynomial = [value] and its range", table.lines[0])
     if rule == "spline" and len(x) < 4:
         return Fault("error-model.spline", f"a spline needs 4 rows, the table has {len(x)}", "write linear")
     return Table(x, np.concatenate(values), rule, len(values) == 2, period)
@@ -68,8 +68,7 @@ def _order(table: CsvTable, axis: str, row: int) -> Fault:
     line = table.lines[row + 1]
     hint = "give each position once; the mean where it was measured several times, or EXX+ and EXX- for two ways" \
         if before == after else "sort the rows by position"
-    return Fault("error-model.order", f"{Path(table.file).name}, line {line}: positions of {axis} do not ascend, "
-                 f"{after:g} after {before:g}", hint, line)
+    return Fault("error-model.order", f"positions of {axis} do not ascend: {after:g} after {before:g}", hint, line)
 
 
 def _columns(name: ErrorName, table: CsvTable) -> list[str] | Fault:
@@ -78,7 +77,7 @@ def _columns(name: ErrorName, table: CsvTable) -> list[str] | Fault:
     wanted = both if both[0] in table.columns or both[1] in table.columns else [str(name)]
     if wanted == both and str(name) in table.columns:
         return Fault("error-model.column", f"{Path(table.file).name} has {name} beside {name}+ or {name}-",
-                     f"write {name}+ and {name}- where both ways were measured, else {name} alone")
+                     f"write {name}+ and {name}- where both ways were measured, else {name} alone", table.head)
     for column in (name.axis, *wanted):
         if column not in table.columns:
             return Fault("error-model.column", f"{Path(table.file).name} has no column {column!r}",
@@ -87,7 +86,7 @@ def _columns(name: ErrorName, table: CsvTable) -> list[str] | Fault:
         known = ANGLES if angular else LENGTHS
         if table.unit[column] not in known:
             return Fault("error-model.unit", f"column {column!r} of {Path(table.file).name} has unit "
-                         f"{table.unit[column]!r}", f"write {column} [unit] with one of " + ", ".join(known))
+                         f"{table.unit[column]!r}", f"write {column} [unit] with one of " + ", ".join(known), table.head)
     return wanted
 
 

@@ -105,7 +105,7 @@ FAULTS = [
     ("machine", 'machine = "mikron-ucp710"', 'machine = "another"', "error-model.machine", 1),
     ("key", "scale = 100", "scael = 100", "file.unknown-key", 9),
     ("name", "[components.EZY]", "[components.EZQ]", "file.value", 1),
-    ("axis", "[components.EZY]", "[components.EZB]", "error-model.machine", 1),
+    ("axis", "[components.EZY]", "[components.EZB]", "error-model.axis", 7),
     ("no range", "range = [-250, 250]", "", "file.value", 7),
     ("two kinds", "scale = 100", 'table = "x.csv"', "file.value", 7),
     ("no table", 'table = "x.csv"\n[components.EAX]', 'table = "y.csv"\n[components.EAX]', "error-table.not-found", 3),
@@ -134,8 +134,8 @@ TABLE_FAULTS = [
     ("count", "100, 7, 10, 2.5", "100, 7, 10", "error-table.row", 5),
     ("nan", "100, 7,", "100, nan,", "error-table.row", 5), ("unit", "EXX+ [um]", "EXX+ [parsec]", "error-table.unit", 2),
     ("twice", "EXX- [um]", "EXX+ [um]", "error-table.header", 2),
-    ("angle", "EAX [arcsec]", "EAX [um]", "error-model.unit", 5), ("no unit", "EXX+ [um]", "EXX+", "error-model.unit", 3),
-    ("order", "-100, 4", "-400, 4", "error-model.order", 3), ("half", "EXX- [um]", "other [um]", "error-model.column", 3),
+    ("angle", "EAX [arcsec]", "EAX [um]", "error-model.unit", 2), ("no unit", "EXX+ [um]", "EXX+", "error-model.unit", 2),
+    ("order", "-100, 4", "-400, 4", "error-model.order", 4), ("half", "EXX- [um]", "other [um]", "error-model.column", 3),
     ("empty", TABLE, "# nothing\n", "error-table.empty", None),
 ]
 
