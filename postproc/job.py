@@ -25,7 +25,7 @@ from postproc.rounding import Rounding, decimals, rounding_bound
 from postproc.setup import Placement, SetupFile, part_placement, work_frame
 from postproc.stated_feeds import without_feed
 from postproc.tool_numbers import numbered
-from toolpaths.arrays import Floats, Ints, taken
+from toolpaths.arrays import Floats, Ints, shared, taken
 from toolpaths.diagnostics import Diagnostic, error, has_errors, info, warning
 from toolpaths.toolpath import Role, Toolpath
 from toolpaths.units import DEG
@@ -122,7 +122,7 @@ class Job:
     @cached_property
     def operation(self) -> Ints:
         """(M,) operation of each move."""
-        return taken(self.toolpath.operation, self.moves.row).astype(np.int64)
+        return shared(taken(self.toolpath.operation, self.moves.row).astype(np.int64))
 
     def operation_starts(self) -> list[int]:
         """The linked moves that operations begin with."""

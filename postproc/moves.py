@@ -23,6 +23,9 @@ from toolpaths.shape import Curves
 from toolpaths.toolpath import Arcs, Kind, Role, Toolpath
 from toolpaths.units import DEG
 
+_PART = 50_000
+"""rows that are looked at together"""
+
 
 @dataclass(frozen=True)
 class Moves:
@@ -80,21 +83,30 @@ class Moves:
         columns: dict[str, Any] = {name: taken(getattr(self, name), keep) for name in names}
         return replace(self, **columns)
 
-    def curves(self) -> Curves:
-        """The reference motion of every row; linked rows stand still at their end."""
-        every = np.arange(len(self))
-        first = np.where(self.link, every, np.maximum(every - 1, 0))
-        return Curves(self.tip[first], self.tip, taken(self.axis, first), self.axis, *self._arcs_of(slice(None)))
+    def curves(self, rows: Ints | slice = slice(None)) -> Curves:
+        """The reference motion of every row, or of some; linked rows stand still at their end."""
+        ends = np.arange(len(self))[rows]
+        first = np.where(self.link[rows], ends, np.maximum(ends - 1, 0))
+        return Curves(self.tip[first], self.tip[rows], taken(self.axis, first), taken(self.axis, rows), *self._arcs_of(rows))
+
+    def lengths(self) -> Floats:
+        """(M,) mm that the tip goes in every row."""
+        parts = [slice(at, at + _PART) for at in range(0, len(self), _PART)]
+        return np.concatenate([np.zeros(0), *(self.curves(part).length() for part in parts)])
+
+    def sweeps(self) -> Floats:
+        """(M,) rad of the rows that are arcs, 0 for others."""
+        return np.asarray(np.where((self.arc >= 0) & ~self.link, self._arcs_of(slice(None))[3], 0.0))
 
     def run(self, first: int, last: int) -> Curves:
         """Those of the rows behind `first` to before `last`, none of them linked, without a copy of tips and axes."""
         ends, starts = slice(first + 1, last), slice(first, last - 1)
         return Curves(self.tip[starts], self.tip[ends], self.axis[starts], self.axis[ends], *self._arcs_of(ends))
 
-    def _arcs_of(self, rows: slice) -> tuple[Bools, Floats, Floats, Floats]:
+    def _arcs_of(self, rows: Ints | slice) -> tuple[Bools, Floats, Floats, Floats]:
         """(is_arc, center, normal, sweep) of `Curves`."""
         arc = self.arc[rows]
-        is_arc = (arc >= 0) & ~self.link[rows]
+        is_arc = np.asarray((arc >= 0) & ~self.link[rows])
         if not is_arc.any():
             return is_arc, repeated(np.zeros(3), len(arc)), repeated(np.zeros(3), len(arc)), repeated(0.0, len(arc))
         index = np.maximum(arc, 0)

@@ -18,6 +18,7 @@ from postproc.control import Control
 from postproc.groups import groups
 from postproc.joints.lead import Event
 from postproc.links import Link, Pose, SafeSpace, plan_link
+from postproc.memory import give_back
 from postproc.modes import OutputModes, WordFrame, stands_still, turning_run
 from postproc.moves import Moves
 from postproc.rewinds import Drawing
@@ -148,6 +149,7 @@ def build_path(modes: OutputModes, kinematics: Callable[[int], Kinematics], move
         _add_end(out, modes, frame, kin, space, state, len(moves) - 1)
     out.begin[len(moves)] = out.count
     columns = {k: out.joined(k) for k in [*out.columns]}
+    give_back()
     path = _of_given(columns, out, plan, len(given), np.concatenate(turns), worst)
     diagnostics += joint_faults.planned(plan, machine, given, file)
     return path, faults.merged(diagnostics) + faults.rapid_as_feed(path.code, path.move, path.seconds, given, file)

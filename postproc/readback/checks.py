@@ -1,19 +1,10 @@
-"""What a program must keep besides its path: kind of motion, feed, tool, spindle, coolant, room at linking moves."""
+"""What a program must keep besides its path: kind of motion, holes, travel, feed, smoothing, room at linking moves."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from postproc.control import Control
-from postproc.coolant import ANY, coolant_states, label
-from postproc.events import (
-    compensation_side,
-    compensation_states,
-    loaded_registers,
-    loaded_tools,
-    numbers,
-    spindle_states,
-)
 from postproc.holes import PECKING, Phase
 from postproc.job import Job
 from postproc.links import SafeSpace
@@ -26,12 +17,10 @@ from postproc.readback.rows import INCH
 from postproc.word_arcs import PLANE_COLUMNS
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.diagnostics import Diagnostic
-from toolpaths.shape import Curves
 from toolpaths.toolpath import Kind
 
 ALLOWED_SPEED = 1.02
 """share of the programmed feed above which a move counts as too fast (short blocks carry rounding)"""
-
 CHUNK = 50_000
 """blocks that are sampled at a time, so that memory does not grow with the samples"""
 STILL = 1e-7
@@ -128,66 +117,6 @@ def _turning_points(depth: Floats) -> Bools:
     return np.asarray((way[:-1] > 0.0) & (way[1:] < 0.0))
 
 
-_SPINDLE = {-1: "anti-clockwise (M4)", 0: "stopped (M5)", 1: "clockwise (M3)"}
-
-
-def check_states(motion: Motion, job: Job, moves: Moves, owner: Ints, faults: Faults) -> list[Diagnostic]:
-    """Tool, spindle, coolant, compensation and work offset while cutting, against the CL file and the set-up, in the
-    order of the program."""
-    rows = np.flatnonzero((owner < len(moves)) & (motion.code > 0))
-    rows = rows[moves.kind[owner[rows]] != Kind.RAPID]
-    row = moves.row[owner[rows]]
-    tool, register = loaded_tools(job.toolpath)[row], loaded_registers(job.toolpath)[row]
-    direction, rpm = (a[row] for a in spindle_states(job.toolpath))
-    cooled, coolant = coolant_states(job.toolpath, job.controller.codes)[row], motion.coolant[rows]
-    as_asked = np.where(cooled == ANY, coolant > 0, coolant == cooled)
-    side = compensation_states(job.toolpath)[row]
-    same_speed = (np.abs(motion.rpm[rows] - rpm) <= 0.5) | np.isnan(rpm) | (direction == 0)
-    given, radius, wanted_radius = motion.compensation[rows], motion.radius[rows], _radius_registers(job)[row]
-    reader = reader_for(job.controller, job.machine.axis_names)
-    offset = reader.offset_of(job.controller.program.work_offsets.get(job.setup.work_offset_code,
-                                                                         job.setup.work_offset_code))
-    code = np.full(len(rows), offset)
-
-    def number(value: float) -> str:
-        return f"{value:g}" if np.isfinite(value) and value >= 0 else "none"
-    result: list[tuple[int, Diagnostic]] = []
-    for what, good, found, wanted, name in (
-            ("tool", motion.tool[rows] == tool, motion.tool[rows], tool, number),
-            ("spindle", motion.spindle[rows] == direction, motion.spindle[rows], direction, _SPINDLE.__getitem__),
-            ("spindle speed", same_speed, motion.rpm[rows], rpm, number),
-            ("coolant", as_asked, coolant, cooled, lambda bits: label(int(bits))),
-            ("length register", (motion.register[rows] == register) | ~job.control.length_on_z, motion.register[rows],
-             register, number),
-            ("cutter compensation", given == side, given, side, lambda g: reader.sides[int(g)]),
-            ("register of the cutter compensation", (radius == wanted_radius) | np.isnan(wanted_radius) | (given == 40),
-             radius, wanted_radius, number),
-            ("work offset", motion.offset[rows] == code, motion.offset[rows], code,
-             lambda g: reader.offset_name(g) if np.isfinite(g) else "not stated")):
-        bad = np.flatnonzero(~np.asarray(good))
-        if len(bad):
-            k = int(bad[0])
-            result.append((int(rows[k]), faults.error(
-                "verify.state", f"{what} is {name(found[k])}, it should be {name(wanted[k])}",
-                int(moves.line[owner[rows[k]]]), int(motion.line[rows[k]]), len(bad))))
-    return [d for _, d in sorted(result, key=lambda one: one[0])]
-
-
-def _radius_registers(job: Job) -> Floats:
-    """(N,) register of the cutter compensation that CUTCOM names at every row, NaN where it names none or the control's
-    code takes none."""
-    starts, values = [0], [np.nan]
-    for event in job.toolpath.events:
-        if event.word == "CUTCOM" and compensation_side(event):
-            code = job.controller.codes.compensation_right if compensation_side(event) == "RIGHT" else \
-                job.controller.codes.compensation_left
-            starts.append(event.index)
-            values.append((numbers(event) or [np.nan])[0] if "{register}" in code else np.nan)
-    at = np.searchsorted(np.array(starts), np.arange(len(job.toolpath)), side="right") - 1
-    result: Floats = np.array(values, dtype=np.float64)[at]
-    return result
-
-
 def check_travel(motion: Motion, executed: Executed, moves: Moves, owner: Ints, faults: Faults) -> list[Diagnostic]:
     """Travel of every axis at the ends of all blocks and between them, whatever the blocks are for."""
     limits, machine = executed.control.machine.limits, executed.control.machine
@@ -241,7 +170,7 @@ def check_smoothing(motion: Motion, job: Job, moves: Moves, owner: Ints, faults:
                          hint=reader_for(job.controller, job.machine.axis_names).smoothing_hint)]
 
 
-def check_speeds(motion: Motion, moves: Moves, curves: Curves, owner: Ints, match: Ints, seconds: Floats,
+def check_speeds(motion: Motion, moves: Moves, owner: Ints, match: Ints, seconds: Floats,
                  tolerance: float, faults: Faults) -> list[Diagnostic]:
     """Moves that the F words run faster than programmed, over the whole move; `seconds` (E,) of each block.
 
@@ -250,9 +179,8 @@ def check_speeds(motion: Motion, moves: Moves, curves: Curves, owner: Ints, matc
     """
     cutting = (owner < len(moves)) & (motion.code > 0)
     total = np.bincount(owner[cutting], weights=seconds[cutting], minlength=len(moves) + 1)[:len(moves)]
-    length = curves.length()
-    asked = np.where(moves.seconds > 0.0, moves.seconds, length / moves.feed)
-    shorter = 0.002 + np.where(curves.is_arc, np.abs(curves.sweep) * tolerance / 3.0, 0.0)
+    asked = np.where(moves.seconds > 0.0, moves.seconds, moves.lengths() / moves.feed)
+    shorter = 0.002 + moves.sweeps() * tolerance / 3.0
     slack = shorter / np.where(moves.feed > 0.0, moves.feed, np.inf)
     check = (moves.kind != Kind.RAPID) & ~moves.link & (match >= 0) & (total > 0.0)
     fast = np.flatnonzero(check & (total * ALLOWED_SPEED + slack < asked))

@@ -18,7 +18,6 @@ from postproc.readback.checks import (
     check_links,
     check_smoothing,
     check_speeds,
-    check_states,
     check_travel,
 )
 from postproc.readback.execute import Motion
@@ -27,8 +26,9 @@ from postproc.readback.poses import SAMPLES, Executed, arc_sweeps
 from postproc.readback.rewinds import check_rewinds, rewinds
 from postproc.readback.slow import check_slow
 from postproc.readback.spins import check_spins
+from postproc.readback.states import check_states
 from postproc.readback.taps import check_taps
-from toolpaths.arrays import Bools, Floats, Ints, shared
+from toolpaths.arrays import Bools, Floats, Ints, as_slice, shared
 from toolpaths.diagnostics import Diagnostic
 from toolpaths.rotations import angle_between
 from toolpaths.shape import Curves
@@ -59,22 +59,15 @@ def compare(motion: Motion, job: Job, executed: Executed, gcode: str = "", plann
     """
     tolerance, axis_tolerance = job.options.tolerance, job.axis_tolerance
     moves, faults = job.moves.without_pecks(), Faults(job.toolpath.file, gcode)
-    curves = moves.curves()
     tip, axis = _ends(motion, executed)
     words = job.controller.format
     grain = max(1e-3, 1.5 * 10.0**-words.linear_decimals), max(1e-6, 1.5 * DEG * 10.0**-words.rotary_decimals)
     number = rewinds(motion, tip, axis, moves.tip, executed.control.rotary, (2.0 * tolerance, 2.0 * axis_tolerance))
-    match, owner = _aligned(np.flatnonzero(number < 0), tip, axis, arc_sweeps(motion, executed.control), curves, moves.link,
+    match, owner = _aligned(as_slice(np.flatnonzero(number < 0)), tip, axis, arc_sweeps(motion, executed.control), moves,
                             tolerance, axis_tolerance, grain)
     lost = unreached(match)
     diagnostics = [] if lost < 0 else [_not_reached(motion, moves, match, lost, faults)]
-    rows = np.flatnonzero((owner < len(moves)) & ~moves.link[np.minimum(owner, len(moves) - 1)])
-    tip_off, axis_off = _deviations(motion, executed, moves, curves, rows, owner, tolerance)
-    done = np.flatnonzero(match >= 0)
-    visit = np.linalg.norm(tip[match[done]] - moves.tip[done], axis=1)
-    tilt = angle_between(axis[match[done]], moves.axis[done])
-    worst_tip, tip_line = _worst((tip_off, visit), (owner[rows], done), (rows, match[done]), moves, motion)
-    worst_axis, axis_line = _worst((axis_off, tilt), (owner[rows], done), (rows, match[done]), moves, motion)
+    (worst_tip, tip_line), (worst_axis, axis_line) = _farthest(motion, executed, moves, tip, axis, match, owner, tolerance)
     diagnostics += _beyond("tip", "mm", worst_tip, tolerance, tip_line, faults)
     diagnostics += _beyond("axis", "degrees", worst_axis / DEG, axis_tolerance / DEG, axis_line, faults)
     diagnostics += check_spins(motion, executed, moves, owner, tip, axis, axis_tolerance, faults)
@@ -83,9 +76,9 @@ def compare(motion: Motion, job: Job, executed: Executed, gcode: str = "", plann
     diagnostics += check_holes(motion, job, moves, tip, owner, faults)
     diagnostics += check_taps(motion, job, moves, owner, faults)
     seconds = block_seconds(motion, executed.control, job.controller.feed.arc_inverse == "radius")
-    diagnostics += check_speeds(motion, moves, curves, owner, match, seconds, tolerance, faults)
+    diagnostics += check_speeds(motion, moves, owner, match, seconds, tolerance, faults)
     if not planned:
-        diagnostics += check_slow(motion, executed, job, moves, curves, owner, match, tip, seconds, faults)
+        diagnostics += check_slow(motion, executed, job, moves, owner, match, tip, seconds, faults)
     diagnostics += check_links(motion, executed, moves, owner, job.space, tolerance, faults)
     diagnostics += check_rewinds(motion, executed, number, tip, axis, job.space, tolerance, grain[1] + _kept(job), faults)
     diagnostics += check_travel(motion, executed, moves, owner, faults)
@@ -121,13 +114,30 @@ def _taken_up(job: Job, tip: Floats) -> Bools:
     return np.asarray(way <= SHARE * job.options.tolerance + 2.0 * job.rounding.tip)
 
 
-def _aligned(kept: Ints, tip: Floats, axis: Floats, sweep: Floats, curves: Curves, link: Bools, tolerance: float,
+def _aligned(kept: Ints | slice, tip: Floats, axis: Floats, sweep: Floats, moves: Moves, tolerance: float,
              axis_tolerance: float, grain: tuple[float, float]) -> tuple[Ints, Ints]:
     """`align` without the blocks of rewinds, which get no move (M + 1): but for them the tool only rests there."""
-    match, short = align(tip[kept], axis[kept], sweep[kept], curves, link, tolerance, axis_tolerance, grain)
-    owner = np.full(len(tip), len(link) + 1)
+    match, short = align(tip[kept], axis[kept], sweep[kept], moves.curves(), moves.link, tolerance, axis_tolerance, grain)
+    owner = np.full(len(tip), len(moves) + 1)
     owner[kept] = short
-    return np.where(match >= 0, kept[match], match), owner
+    return np.where(match >= 0, np.arange(len(tip))[kept][match], match), owner
+
+
+Worst = tuple[float, tuple[int, int]]
+"""a deviation and where it is: CL line, program line"""
+
+
+def _farthest(motion: Motion, executed: Executed, moves: Moves, tip: Floats, axis: Floats, match: Ints, owner: Ints,
+              tolerance: float) -> tuple[Worst, Worst]:
+    """The worst deviations of tip and axis, between the points and at them."""
+    rows = np.flatnonzero((owner < len(moves)) & ~moves.link[np.minimum(owner, len(moves) - 1)])
+    tip_off, axis_off = _deviations(motion, executed, moves, rows, owner, tolerance)
+    done = as_slice(np.flatnonzero(match >= 0))
+    there = as_slice(match[done])
+    visit = np.linalg.norm(tip[there] - moves.tip[done], axis=1)
+    tilt = angle_between(axis[there], moves.axis[done])
+    at = (owner[rows], np.arange(len(match))[done]), (rows, match[done])
+    return _worst((tip_off, visit), *at, moves, motion), _worst((axis_off, tilt), *at, moves, motion)
 
 
 def _not_reached(motion: Motion, moves: Moves, match: Ints, lost: int, faults: Faults) -> Diagnostic:
@@ -144,8 +154,8 @@ def _off_level(curve: Curves, tip: Floats) -> Floats:
     return np.asarray(np.maximum(np.maximum(np.minimum(first, last) - height, height - np.maximum(first, last)), 0.0))
 
 
-def _deviations(motion: Motion, executed: Executed, moves: Moves, curves: Curves, rows: Ints,
-                owner: Ints, within: float) -> tuple[Floats, Floats]:
+def _deviations(motion: Motion, executed: Executed, moves: Moves, rows: Ints, owner: Ints,
+                within: float) -> tuple[Floats, Floats]:
     """Worst (tip, axis) deviation (K,) over samples of each block from the curve of its move; `within` mm of its tip.
 
     Where rapids are dog-legs, those from hole to hole only keep their height.
@@ -153,12 +163,12 @@ def _deviations(motion: Motion, executed: Executed, moves: Moves, curves: Curves
     tip_off, axis_off = np.zeros(len(rows)), np.zeros(len(rows))
     if not len(rows):
         return tip_off, axis_off
-    begin, share = _place(motion, executed, rows, owner, curves)
+    begin, share = _place(motion, executed, rows, owner, moves)
     level = (moves.phase[owner[rows]] == Phase.POSITION) & executed.bent(motion, rows)
     for at in range(0, len(rows), CHUNK):
         part = slice(at, at + CHUNK)
         here = rows[part]
-        curve = curves.take(owner[here])
+        curve = moves.curves(owner[here])
         for t in SAMPLES:
             tip, axis = executed.poses(motion, here, t)
             guess = np.minimum(begin[part] + t * share[part], 1.0)
@@ -169,13 +179,13 @@ def _deviations(motion: Motion, executed: Executed, moves: Moves, curves: Curves
     return tip_off, axis_off
 
 
-def _place(motion: Motion, executed: Executed, rows: Ints, owner: Ints, curves: Curves) -> tuple[Floats, Floats]:
+def _place(motion: Motion, executed: Executed, rows: Ints, owner: Ints, moves: Moves) -> tuple[Floats, Floats]:
     """Where on its move each block (K,) begins, and what part of it it is: by length along arcs, else by count."""
     length = np.ones(len(rows))
-    on = np.flatnonzero(curves.is_arc[owner[rows]])
+    on = np.flatnonzero(((moves.arc >= 0) & ~moves.link)[owner[rows]])
     if len(on):
         (begin, _), (end, _) = (executed.poses(motion, rows[on], t) for t in (0.0, 1.0))
-        arc = curves.take(owner[rows[on]])
+        arc = moves.curves(owner[rows[on]])
         around = arc_sweeps(motion, executed.control)[rows[on]] * np.linalg.norm(arc.start - arc.center, axis=1)
         way = np.where(np.isnan(around), np.linalg.norm(end - begin, axis=1), around)
         length[on] = np.maximum(np.nan_to_num(way), 1e-9)

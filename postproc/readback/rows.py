@@ -46,7 +46,7 @@ class Section:
         """Blocks first to before last."""
         values = {f.name: getattr(self, f.name) for f in fields(self)}
         parts: dict[str, Any] = {name: value[first:last] for name, value in values.items() if isinstance(value, np.ndarray)}
-        return replace(self, first=first, **parts)
+        return replace(self, first=self.first + first, **parts)
 
     @cached_property
     def has_steps(self) -> bool:

@@ -23,24 +23,46 @@ if TYPE_CHECKING:
 
 _STILL = 1e-6
 """degrees"""
+_PART = 100_000
+"""blocks that are run together, where nothing asks for what came long before"""
 
 
 def run_section(section: Section, frame: Frame, number: int, position: Floats, code: Canonical, offsets: Offsets,
                 file: str, found: list[Diagnostic]) -> Rows:
     """Rows of the blocks of one law, begun at machine position (J,)."""
-    state = _state(section, frame, position, offsets)
-    cycle = np.isin(section.motion, CYCLES)
+    start, moving = frame.coordinates(position[None, :])[0], _moving(section)
+    _refused(section, frame, moving, code.line, file, found)
+    cycles = bool((moving & np.isin(section.motion, CYCLES)).any() or np.isfinite(section.call).any())
+    size = len(moving) if cycles or section.has_steps else _PART
+    parts: list[Rows] = []
+    for first in range(0, len(moving), size):
+        part = slice(first, first + size)
+        rows, start = _rows(section.cut(first, first + size), frame, number, start, moving[part], code, offsets, file, found)
+        parts.append(rows)
+    rows = Rows.joined(parts, len(position))
+    _still(rows, position, frame, code.line, file, found)
+    return rows
+
+
+def _moving(section: Section) -> Bools:
+    """(N,) blocks that move, or drill where the tool stands."""
     moving = section.stated.any(axis=1) & ~section.rest
     arc = np.isin(section.motion, (2, 3)) & ~section.rest
-    moving |= arc & (np.isfinite(section.relative) | np.isfinite(section.absolute)).any(axis=1)
-    drilling = np.flatnonzero((moving & cycle) | np.isfinite(section.call))
-    _refused(section, frame, moving, code.line, file, found)
+    return np.asarray(moving | (arc & (np.isfinite(section.relative) | np.isfinite(section.absolute)).any(axis=1)))
+
+
+def _rows(section: Section, frame: Frame, number: int, start: Floats, moving: Bools, code: Canonical, offsets: Offsets,
+          file: str, found: list[Diagnostic]) -> tuple[Rows, Floats]:
+    """(rows of blocks, begun at `start` (J,) in the coordinates of the frame, where they end in those)."""
+    state = _state(section, start, frame, offsets)
+    drilling = np.flatnonzero((moving & np.isin(section.motion, CYCLES)) | np.isfinite(section.call))
     spelt = spell_holes(state, moving, drilling, code, file, found) if len(drilling) else {}
     moving[list(spelt)] = True
     lines = np.flatnonzero(moving)
     counts = np.array([len(spelt[n]) if n in spelt else 1 for n in lines.tolist()], dtype=np.int64) if spelt else None
     line = lines if counts is None else np.repeat(lines, counts)
-    end = state.carried()[1:][line]
+    ends = state.carried()[1:]
+    end = ends[line]
     motion = section.motion[line]
     kind = np.where(motion == 0, 0, np.where(np.isin(motion, (2, 3)), 2, 1)).astype(np.int8)
     rows = Rows(line + section.first, kind, end, *(repeated(one, len(line)) for one in (
@@ -48,11 +70,10 @@ def run_section(section: Section, frame: Frame, number: int, position: Floats, c
     if spelt:
         rows = _with_legs(rows, line, spelt)
     rows = _with_arcs(rows, state, line, code.line, file, found)
-    _still(rows, state, frame, code.line, file, found)
-    return replace(rows, end=frame.position(rows.end))
+    return replace(rows, end=frame.position(rows.end)), ends[-1]
 
 
-def _state(section: Section, frame: Frame, position: Floats, offsets: Offsets) -> State:
+def _state(section: Section, start: Floats, frame: Frame, offsets: Offsets) -> State:
     """Words in the coordinates of the law."""
     xyz = offsets.xyz[offsets.xyz >= 0]
     drilling = np.isin(section.motion, CYCLES)
@@ -70,7 +91,6 @@ def _state(section: Section, frame: Frame, position: Floats, offsets: Offsets) -
         z = int(offsets.xyz[PLANE_AXIS[plane]])
         drills = drilling & (section.plane == plane)
         columns[drills, z] = steps[drills, z] = np.nan
-    start = frame.coordinates(position[None, :])[0]
     return State(section, columns, steps, start, shift, offsets)
 
 
@@ -96,12 +116,12 @@ def _refused(section: Section, frame: Frame, moving: Bools, line: Ints, file: st
                            hint="leave the mode before it"))
 
 
-def _still(rows: Rows, state: State, frame: Frame, line: Ints, file: str, found: list[Diagnostic]) -> None:
+def _still(rows: Rows, position: Floats, frame: Frame, line: Ints, file: str, found: list[Diagnostic]) -> None:
     """Rotary axes that move while a tilted plane is in force."""
     if frame.law != "tilted" or frame.control is None:
         return
     rotary = frame.control.rotary
-    bad = np.flatnonzero((np.abs(rows.end[:, rotary] - state.start[rotary]) > _STILL).any(axis=1))
+    bad = np.flatnonzero((np.abs(rows.end[:, rotary] - position[rotary]) > _STILL).any(axis=1))
     if len(bad):
         found.append(error("gcode.rotary_in_plane", "a rotary axis moves while a tilted plane is in force", file=file,
                            lines=line[rows.block[bad]][:6].tolist(), count=len(bad),

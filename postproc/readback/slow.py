@@ -15,7 +15,6 @@ from postproc.readback.faults import Faults
 from postproc.readback.poses import Executed
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.diagnostics import Diagnostic
-from toolpaths.shape import Curves
 from toolpaths.toolpath import Kind
 
 SLOW = 1.25
@@ -30,8 +29,8 @@ def planned_feeds(data: bytes) -> bool:
     return bool(_PLANNED.search(data[:HEADER]))
 
 
-def check_slow(motion: Motion, executed: Executed, job: Job, moves: Moves, curves: Curves, owner: Ints, match: Ints,
-               tip: Floats, seconds: Floats, faults: Faults) -> list[Diagnostic]:
+def check_slow(motion: Motion, executed: Executed, job: Job, moves: Moves, owner: Ints, match: Ints, tip: Floats,
+               seconds: Floats, faults: Faults) -> list[Diagnostic]:
     """Moves that take longer than their programmed feed and the velocities of all axes ask for, once with their count.
 
     `seconds` (E,) of the blocks at constant feed, `tip` (E, 3) at their ends; pecks feed some of their way again, which
@@ -39,16 +38,26 @@ def check_slow(motion: Motion, executed: Executed, job: Job, moves: Moves, curve
     limits, and are not judged.
     """
     cutting = (owner < len(moves)) & (motion.code > 0)
-    asked = np.where(moves.seconds > 0.0, moves.seconds, curves.length() / moves.feed)
-    needs = _least(motion, executed, cutting)
-    spot = np.where(_on_the_spot(motion, executed.control, tip, job.options.tolerance), needs, 0.0)
-    spent, least, turned, fed = (np.bincount(owner[cutting], weights=w[cutting], minlength=len(moves) + 1)[:len(moves)]
-                                 for w in (seconds, needs, spot, seconds * motion.feed / 60.0))
-    again = np.where(moves.phase == Phase.DRILL, fed / np.fmax(curves.length(), 1e-9), 1.0)
-    total, needed = (w / np.fmax(again, 1.0) for w in (spent, least))
+    length = moves.lengths()
+    asked = np.where(moves.seconds > 0.0, moves.seconds, length / moves.feed)
+    total = _by_move(owner, cutting, seconds, len(moves))
+    again = np.ones(1)
+    if (moves.phase == Phase.DRILL).any():
+        fed = _by_move(owner, cutting, seconds * motion.feed / 60.0, len(moves))
+        again = np.fmax(np.where(moves.phase == Phase.DRILL, fed / np.fmax(length, 1e-9), 1.0), 1.0)
+        total = total / again
     grain = 10.0 * 10.0**-job.controller.format.linear_decimals
     slack = 0.002 + grain / np.where(moves.feed > 0.0, moves.feed, np.inf)
     check = (moves.kind != Kind.RAPID) & ~moves.link & (match >= 0) & np.isfinite(asked) & np.isfinite(total)
+    # What the axes need only adds to what is allowed: it is looked at where the feed alone would not explain the time.
+    check &= total > SLOW * asked + slack
+    if not check.any():
+        return []
+    cutting &= check[np.minimum(owner, len(moves) - 1)]
+    needs = _least(motion, executed, cutting)
+    spot = np.where(_on_the_spot(motion, executed.control, tip, job.options.tolerance), needs, 0.0)
+    turned = _by_move(owner, cutting, spot, len(moves))
+    needed = _by_move(owner, cutting, needs, len(moves)) / again
     slow = np.flatnonzero(check & (total > SLOW * (turned + np.fmax(asked, needed - turned)) + slack))
     if not len(slow):
         return []
@@ -56,6 +65,11 @@ def check_slow(motion: Motion, executed: Executed, job: Job, moves: Moves, curve
     return [faults.warning("verify.slow", f"the move runs at {asked[k] / total[k]:.3f} times the programmed feed, and no "
                            "axis needs that", int(moves.line[k]), int(motion.line[match[k]]), len(slow),
                            "the F word, if it is not meant so")]
+
+
+def _by_move(owner: Ints, which: Bools, values: Floats, moves: int) -> Floats:
+    """(M,) sums of values (E,) of some blocks over the moves that they serve."""
+    return np.asarray(np.bincount(owner[which], weights=values[which], minlength=moves + 1)[:moves])
 
 
 def _on_the_spot(motion: Motion, control: Control, tip: Floats, tolerance: float) -> Bools:

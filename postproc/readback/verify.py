@@ -9,11 +9,12 @@ from dataclasses import replace
 import numpy as np
 
 from postproc.job import Job
+from postproc.memory import give_back
 from postproc.options import Options
 from postproc.readback.changes import check_changes
 from postproc.readback.compare import Comparison, compare
 from postproc.readback.dialects import reader_for
-from postproc.readback.dialects.base import UNITS_UNSTATED
+from postproc.readback.dialects.base import UNITS_UNSTATED, as_bytes
 from postproc.readback.execute import Motion, Offsets, run
 from postproc.readback.faults import Faults
 from postproc.readback.poses import Executed, poses_before
@@ -46,18 +47,22 @@ def other_axes(data: bytes, options: Options, gcode: str) -> list[Diagnostic]:
                   hint=f"verify with --orient {plan} --max-tilt {tilt}")]
 
 
-def read_back(data: bytes, job: Job, file: str, progress: Callable[[str, int, int], None] | None = None, gcode: str = "",
-              others: Mapping[str, bytes] | None = None) -> tuple[Comparison | None, list[Diagnostic]]:
+def read_back(data: bytes | str, job: Job, file: str, progress: Callable[[str, int, int], None] | None = None,
+              gcode: str = "", others: Mapping[str, bytes] | None = None) -> tuple[Comparison | None, list[Diagnostic]]:
     """Execute a program on the job's machine and compare its motion with the job's CL file.
+
+    A text becomes bytes only where it is read, so that memory holds it once.
 
     `others`: files of its subprograms, by the names that the program calls them by.
     """
+    give_back()
     machine, control = job.machine, job.control
     home = control.words(machine.home[None, :], machine.kinematics, 0.0)[0] + control.work_offset
     reader = reader_for(job.controller, machine.axis_names, home)
     code, diagnostics = reader.read(data, gcode, others)
+    head = as_bytes(data[:HEADER])
     diagnostics = [_located(_judged(d, reader.units_stay), job.toolpath.file) for d in diagnostics]
-    if gcode and not _by_post(job) and _CORRECTED.search(data[:HEADER]):
+    if gcode and not _by_post(job) and _CORRECTED.search(head):
         return None, [error("verify.error_model", "the program corrects geometric errors, none are given here",
                             file=gcode, hint="verify with --error-model, the file that its header names"), *diagnostics]
     if code is None or has_errors(diagnostics):
@@ -65,6 +70,7 @@ def read_back(data: bytes, job: Job, file: str, progress: Callable[[str, int, in
     offsets = Offsets(control.work_offset, control.xyz, job.register_lengths(), home, control.length_on_z,
                       job.controller.cycles.peck_relief, control, reader.rises_first, reader.arc_slack)
     motion, found = run(code, machine.axis_names, offsets, gcode)
+    give_back()
     code = code.without((*machine.axis_names, *(a.lower() for a in machine.axis_names), *"IJKijk"))
     diagnostics += [_located(d, job.toolpath.file) for d in found]
     if has_errors(diagnostics):
@@ -75,14 +81,14 @@ def read_back(data: bytes, job: Job, file: str, progress: Callable[[str, int, in
         progress("read back", 0, len(motion))
     executed = _executed(job, motion, offsets.lengths)
     with np.errstate(invalid="ignore"):
-        planned = job.options.feed == "planned" or planned_feeds(data)
+        planned = job.options.feed == "planned" or planned_feeds(head)
         comparison = compare(motion, job, executed, gcode, planned)
     faults = Faults(job.toolpath.file, gcode)
     unseen = [*check_changes(code, motion, job, home, faults), *check_stops(code, motion, job, faults),
               *_bodies(motion, executed, job, comparison, faults)]
     told = sorted([*unseen, *comparison.diagnostics], key=lambda d: d.code not in CAUSES)
     if gcode and has_errors(told) and _by_post(job):
-        told = [*_uncorrected(data[:HEADER], job, motion, executed, comparison, gcode), *told]
+        told = [*_uncorrected(head, job, motion, executed, comparison, gcode), *told]
     return replace(comparison, executed=(code, motion)), [*diagnostics, *told]
 
 

@@ -81,17 +81,18 @@ class Reader(ABC):
         """Codes and words that cannot be executed, as errors."""
         return check_codes(words, self.groups, (*self.m_codes, *self.switches), self.letters, self.axes, file)
 
-    def read(self, data: bytes, file: str = "", others: Mapping[str, bytes] | None = None,
+    def read(self, data: bytes | str, file: str = "", others: Mapping[str, bytes] | None = None,
              ) -> tuple[Canonical | None, list[Diagnostic]]:
         """A program, with the files of its subprograms by name, as canonical words; None where it cannot be read."""
         self.main_file = file
         found: list[Diagnostic] = []
         programs: dict[str, Program] = {}
-        waiting, others = {file: data}, others or {}
+        waiting: dict[str, bytes | str] = {file: data}
+        others = others or {}
         stems = {PurePath(name).stem.upper(): name for name in others}
         while waiting:
             name = next(iter(waiting))
-            read, more = self.program(waiting.pop(name), name)
+            read, more = self.program(as_bytes(waiting.pop(name)), name)
             found += more
             if read is None:
                 return None, found
@@ -139,6 +140,7 @@ class Reader(ABC):
     def program(self, data: bytes, name: str) -> tuple[Program | None, list[Diagnostic]]:
         """Words and programs of one file; None where its text cannot be read."""
         text, found = self.tokens(data, name)
+        del data
         if has_errors(found):
             return None, found
         if self.controller is not None:
@@ -153,6 +155,11 @@ class Reader(ABC):
     def stems(self, call: str) -> tuple[str, ...]:
         """Names that the file of a subprogram may bear, in capitals, without their ending."""
         return (call,)
+
+
+def as_bytes(text: bytes | str) -> bytes:
+    """The bytes of a text."""
+    return text if isinstance(text, bytes) else text.encode()
 
 
 def _to_end(words: Words, main: tuple[int, int]) -> tuple[int, int]:

@@ -27,7 +27,7 @@ from postproc.readback.canonical import (
     Text,
     added,
 )
-from postproc.readback.dialects.base import M_CODES, Reader
+from postproc.readback.dialects.base import M_CODES, Reader, as_bytes
 from postproc.readback.dialects.iso import New, relative_words
 from postproc.readback.dialects.siemens_cycles import CYCLES
 from postproc.readback.dialects.siemens_run import LENGTH_AXIS, Run
@@ -70,11 +70,11 @@ class SiemensReader(Reader):
     arc_slack = 0.01
     """MD21000 CIRCLE_ERROR_CONST, its default"""
 
-    def read(self, data: bytes, file: str = "", others: Mapping[str, bytes] | None = None,
+    def read(self, data: bytes | str, file: str = "", others: Mapping[str, bytes] | None = None,
              ) -> tuple[Canonical | None, list[Diagnostic]]:
         """As every dialect; names of other files are names of subprograms."""
         self.names = {PurePath(name).stem.upper().removesuffix("_SPF").removeprefix("_N_") for name in others or {}}
-        self.names |= {m[1].decode() for m in _PROGRAM.finditer(data.upper())}
+        self.names |= {m[1].decode() for m in _PROGRAM.finditer(as_bytes(data).upper())}
         return super().read(data, file, others)
 
     def tokens(self, data: bytes, file: str) -> tuple[Text, list[Diagnostic]]:

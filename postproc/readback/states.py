@@ -1,0 +1,119 @@
+"""What is in force while a program cuts: tool, spindle, coolant, compensation, work offset."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from postproc.coolant import ANY, coolant_states, label
+from postproc.events import (
+    compensation_side,
+    compensation_states,
+    loaded_registers,
+    loaded_tools,
+    numbers,
+    spindle_states,
+)
+from postproc.job import Job
+from postproc.moves import Moves
+from postproc.readback.checks import CHUNK
+from postproc.readback.dialects import reader_for
+from postproc.readback.dialects.base import Reader
+from postproc.readback.execute import Motion
+from postproc.readback.faults import Faults
+from toolpaths.arrays import Array, Bools, Floats, Ints, shared
+from toolpaths.diagnostics import Diagnostic
+from toolpaths.toolpath import Kind
+
+_SPINDLE = {-1: "anti-clockwise (M4)", 0: "stopped (M5)", 1: "clockwise (M3)"}
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """What the CL file asks for while it cuts: by row of the Toolpath, the work offset of the set-up."""
+
+    offset: float
+    tool: Ints
+    register: Ints
+    direction: Ints
+    rpm: Floats
+    coolant: Ints
+    side: Ints
+    radius: Floats
+
+    @classmethod
+    def of(cls, job: Job, reader: Reader) -> _Asked:
+        """That of a job."""
+        direction, rpm = spindle_states(job.toolpath)
+        code = job.setup.work_offset_code
+        offset = reader.offset_of(job.controller.program.work_offsets.get(code, code))
+        coolant = coolant_states(job.toolpath, job.controller.codes)
+        columns = (loaded_tools(job.toolpath), loaded_registers(job.toolpath), direction, rpm, coolant,
+                   compensation_states(job.toolpath), _radius_registers(job))
+        return cls(offset, *map(shared, columns))
+
+
+def check_states(motion: Motion, job: Job, moves: Moves, owner: Ints, faults: Faults) -> list[Diagnostic]:
+    """Tool, spindle, coolant, compensation and work offset while cutting, against the CL file and the set-up, in the
+    order of the program."""
+    rows = np.flatnonzero((owner < len(moves)) & (motion.code > 0))
+    rows = rows[moves.kind[owner[rows]] != Kind.RAPID]
+    reader = reader_for(job.controller, job.machine.axis_names)
+    asked, first, count = _Asked.of(job, reader), dict[str, tuple[int, str]](), Counter[str]()
+    for at in range(0, len(rows), CHUNK):
+        here = rows[at:at + CHUNK]
+        for what, good, found, wanted, name in _states(motion, job, asked, here, moves.row[owner[here]], reader):
+            bad = np.flatnonzero(~np.asarray(good))
+            if len(bad):
+                k = int(bad[0])
+                first.setdefault(what, (int(here[k]), f"{what} is {name(found[k])}, it should be {name(wanted[k])}"))
+                count[what] += len(bad)
+    return [faults.error("verify.state", said, int(moves.line[owner[k]]), int(motion.line[k]), count[what])
+            for what, (k, said) in sorted(first.items(), key=lambda one: (one[1][0], _ORDER.index(one[0])))]
+
+
+_ORDER = ("tool", "spindle", "spindle speed", "coolant", "length register", "cutter compensation",
+          "register of the cutter compensation", "work offset")
+
+
+def _states(motion: Motion, job: Job, asked: _Asked, rows: Ints, row: Ints,
+            reader: Reader) -> Iterator[tuple[str, Bools, Array, Array, Callable[[Any], str]]]:
+    """(what, True where it is as asked for, what is found, what is wanted, the name of either) in the blocks `rows` (K,),
+    which serve the rows `row` (K,) of the Toolpath."""
+    def number(value: float) -> str:
+        return f"{value:g}" if np.isfinite(value) and value >= 0 else "none"
+    tool, register, direction, rpm = asked.tool[row], asked.register[row], asked.direction[row], asked.rpm[row]
+    cooled, coolant, side, given = asked.coolant[row], motion.coolant[rows], asked.side[row], motion.compensation[rows]
+    radius, wanted_radius, code = motion.radius[rows], asked.radius[row], np.full(len(rows), asked.offset)
+    same_speed = (np.abs(motion.rpm[rows] - rpm) <= 0.5) | np.isnan(rpm) | (direction == 0)
+    yield "tool", motion.tool[rows] == tool, motion.tool[rows], tool, number
+    yield "spindle", motion.spindle[rows] == direction, motion.spindle[rows], direction, _SPINDLE.__getitem__
+    yield "spindle speed", same_speed, motion.rpm[rows], rpm, number
+    yield ("coolant", np.where(cooled == ANY, coolant > 0, coolant == cooled), coolant, cooled,
+           lambda bits: label(int(bits)))
+    yield ("length register", (motion.register[rows] == register) | ~job.control.length_on_z, motion.register[rows],
+           register, number)
+    yield "cutter compensation", given == side, given, side, lambda g: reader.sides[int(g)]
+    yield ("register of the cutter compensation", (radius == wanted_radius) | np.isnan(wanted_radius) | (given == 40),
+           radius, wanted_radius, number)
+    yield ("work offset", motion.offset[rows] == code, motion.offset[rows], code,
+           lambda g: reader.offset_name(g) if np.isfinite(g) else "not stated")
+
+
+def _radius_registers(job: Job) -> Floats:
+    """(N,) register of the cutter compensation that CUTCOM names at every row, NaN where it names none or the control's
+    code takes none."""
+    starts, values = [0], [np.nan]
+    for event in job.toolpath.events:
+        if event.word == "CUTCOM" and compensation_side(event):
+            code = job.controller.codes.compensation_right if compensation_side(event) == "RIGHT" else \
+                job.controller.codes.compensation_left
+            starts.append(event.index)
+            values.append((numbers(event) or [np.nan])[0] if "{register}" in code else np.nan)
+    at = np.searchsorted(np.array(starts), np.arange(len(job.toolpath)), side="right") - 1
+    result: Floats = np.array(values, dtype=np.float64)[at]
+    return result
