@@ -76,3 +76,11 @@ def test_tools_that_are_numbered_and_not_loaded_stay_so() -> None:
     p = read("TOOLNO/1,MILL,10.0\nGOTO  /0,0,0\nTOOLNO/2,MILL,12.0\nGOTO  /0,0,1\n").toolpath
     assert [(t.number, t.name) for t in p.tools] == [(1, ""), (2, "")]
     assert "LOADTL" not in [e.word for e in p.events]
+
+
+def test_the_register_of_an_operation_belongs_to_the_change_before_it() -> None:
+    p = read("LOADTL/2\nCOOLNT/ON\nLOADTL/2,1\nGOTO  /0,0,0\nLOADTL/2,1\nGOTO  /1,0,0\nLOADTL/3\nLOADTL/4\nLOADTL/4,5\n"
+             "GOTO  /2,0,0\nLOADTL/4\nGOTO  /3,0,0\n").toolpath
+    assert [(e.index, e.values) for e in p.events if e.word == "LOADTL"] == [
+        (0, (2.0, 1.0)), (1, (2.0, 1.0)), (2, (3.0,)), (2, (4.0, 5.0)), (3, (4.0,))]
+    assert [(t.number, t.length_register) for t in p.tools] == [(2, 1), (4, 5)]

@@ -85,9 +85,22 @@ def change(b: Builder, number: float, register: float | None, more: tuple[float,
     state.fields = {**known, **state.fields} if set(state.fields) <= _NOT_SHAPE else state.fields
     if register is not None:
         state.fields["length_register"] = int(register)
+    _drop_plain_load(b, number)
     b.event("LOADTL", (number,) + (() if register is None else (register,)) + more)
     if b.declared is None:
         _use(b, state)
+
+
+def _drop_plain_load(b: Builder, number: float) -> None:
+    """Drop LOADTL/number right before another of the same tool: CATIA writes one at the change, and one with the register
+    at each operation (NC_COMPENSATION in its tables of post-processor words)."""
+    for k in range(len(b.events) - 1, -1, -1):
+        if b.events[k].index != b.row:
+            return
+        if b.events[k].word == "LOADTL":
+            if b.events[k].values == (number,):
+                del b.events[k]
+            return
 
 
 def loadtl(b: Builder, s: Statement) -> None:
