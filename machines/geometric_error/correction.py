@@ -31,8 +31,8 @@ AXIS_TOLERANCE = 0.05 * DEG
 """rad, unless another is given"""
 BLIND = 1e-9
 """axis rate below which a turn does not move the axis"""
-CLOSED = 5e-5, 5e-7
-"""mm and rad: steps that small are the last; they leave less than a hundredth of themselves"""
+CLOSED = 2e-6, 5e-8
+"""mm and rad: steps that small are the last; they leave less than a hundredth of themselves, near a pole a tenth"""
 STEPS = 8
 
 
