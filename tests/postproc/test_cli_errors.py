@@ -1,0 +1,179 @@
+"""`postproc errors`: check, export, import from the command line; what it writes, says and refuses."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner, Result
+
+import machines
+from machines.geometric_error.loader import load
+from postproc.cli import app
+
+SAMPLES = Path(__file__).parents[2] / "samples" / "errors"
+MIKRON = SAMPLES / "mikron-ucp710.toml"
+
+
+def run(*arguments: object, code: int = 0) -> Result:
+    done = CliRunner().invoke(app, ["errors", *map(str, arguments)])
+    assert done.exit_code == code, done.output
+    assert done.exception is None or isinstance(done.exception, SystemExit)
+    return done
+
+
+def figures(*arguments: object, code: int = 0) -> dict:
+    return json.loads(run(*arguments, "--json", "-", code=code).stdout)
+
+
+def test_check_tells_what_a_model_holds_and_does() -> None:
+    done = run("check", MIKRON, "-m", "mikron-ucp710", "--tool-length", 80)
+    for word in ("good: errors of mikron-ucp710, 339 parameters", "EXX    linear table       30  -355 to 355", "3.00",
+                 "EC0Y 6 arcsec", "spindle: EA0S 5 arcsec", "independent parameters", "tool of 80 mm", "tip  worst"):
+        assert word in done.stdout
+    found = figures("check", SAMPLES / "h4a-c-table.toml", "-m", "h4a-c-table")
+    assert found["components"] == {} and found["legs"]["rail"]["parameter"] == "X.rail.z" and found["diagnostics"] == []
+    assert 50.0 < found["volume"]["tip_worst_um"] < 150.0 and found["volume"]["doubt_tip_um"] < 10.0
+
+
+def test_check_tells_where_a_model_ends(tmp_path: Path) -> None:
+    (tmp_path / "e.toml").write_text("[location]\nEC0C = 20\nEX0X = 5\n[components.EXX]\npolynomial = [3]\n"
+                                     "range = [-100, 100]\n")
+    done = run("check", tmp_path / "e.toml", "-m", "mikron-ucp710")
+    assert "zero position: EC0C 20 arcsec, EX0X 5 um" in done.stdout and "not given, so 0: EYX, EZX" in done.stdout
+    assert "the model holds from -100 to 100" in done.stderr and "covariance: none" in done.stdout
+
+
+@pytest.mark.parametrize(("text", "machine", "word"), [
+    ("[location]\nEC0B = 1\n", "mikron-ucp710", ":2: error [error-model.axis]"),
+    ("[loc]\n", "mikron-ucp710", "file.unknown-key"), ("", "nonesuch", "no machine is called 'nonesuch'")])
+def test_check_refuses_with_the_line(tmp_path: Path, text: str, machine: str, word: str) -> None:
+    (tmp_path / "e.toml").write_text(text)
+    done = run("check", tmp_path / "e.toml", "-m", machine, code=1)
+    assert word in done.stderr and done.stdout == ""
+    assert figures("check", tmp_path / "e.toml", "-m", machine, code=1)["diagnostics"][0]["severity"] == "error"
+
+
+def test_tables_per_axis_go_out_and_come_back(tmp_path: Path) -> None:
+    found = figures("to-tables", MIKRON, "-m", "mikron-ucp710", "-o", tmp_path, "--loss", 1, "--angle-loss", 1)
+    names = {Path(x).name for x in found["files"]}
+    tables = {f"mikron-ucp710-{x}.csv" for x in ("X", "Y", "Z", "A", "C", "location", "covariance")}
+    assert names == {*tables, "mikron-ucp710.toml"}
+    assert Path(found["files"][-1]).name == "mikron-ucp710.toml"  # the model is there when its tables are
+    assert max(found["losses"].values()) < 1.0 and "covariance kept" in found["told"]
+    machine = machines.load("mikron-ucp710")
+    made = load(tmp_path / "mikron-ucp710.toml", machine)
+    sources = [tmp_path / f"mikron-ucp710-{x}.csv" for x in ("X", "Y", "Z", "A", "C", "location")]
+    told = run("import", *sources, "-m", "mikron-ucp710", "-o", tmp_path / "back.toml", "--repeats", "A=360", "--repeats",
+               "C=360", "--covariance", tmp_path / "mikron-ucp710-covariance.csv").stdout
+    assert f"{len(made.names)} parameters, {len(made.names)} with a doubt" in told
+    back = load(tmp_path / "back.toml", machine)
+    assert back.names == made.names and back.values == pytest.approx(made.values, rel=1e-10, abs=1e-14)
+    assert back.covariance == pytest.approx(made.covariance, rel=1e-9, abs=1e-22)
+
+
+def test_linuxcnc_goes_out_with_the_rest_and_comes_back(tmp_path: Path) -> None:
+    done = run("to-linuxcnc", MIKRON, "-m", "mikron-ucp710", "-o", tmp_path / "comp", "--rest", tmp_path / "rest.toml")
+    assert "the post-processor must not do it again" in done.stderr and "rest.toml" in done.stderr
+    assert "[JOINT_4]\nCOMP_FILE = mikron-ucp710-C.comp\nCOMP_FILE_TYPE = 0" in done.stdout
+    machine = machines.load("mikron-ucp710")
+    full, rest = load(MIKRON, machine), load(tmp_path / "rest.toml", machine)
+    assert {str(c.name) for c in full.axes.components} - {str(c.name) for c in rest.axes.components} == {
+        "EXX", "EYY", "EZZ", "EAA", "ECC"}
+    assert rest.covariance is not None and len(rest.covariance) == len(rest.names)
+    screws = [f"{x}={tmp_path}/comp/mikron-ucp710-{x}.comp" for x in "XYZ"]
+    run("import", *screws, "-m", "mikron-ucp710", "-o", tmp_path / "all.toml", "--into", tmp_path / "rest.toml")
+    whole = load(tmp_path / "all.toml", machine)
+    q = np.random.default_rng(0).uniform(-200.0, 200.0, (50, 5)) * [1, 1, 1, 0.002, 0.01]
+    for name in ("EXX", "EYY", "EZZ"):
+        one, two = (next(c.curve for c in m.axes.components if str(c.name) == name) for m in (full, whole))
+        for way in (1.0, -1.0):
+            assert two.at(q[:, 0], way) == pytest.approx(one.at(q[:, 0], way), abs=2e-9)
+
+
+def test_a_map_goes_out_and_comes_back(tmp_path: Path) -> None:
+    found = figures("to-map", MIKRON, "-m", "mikron-ucp710", "-o", tmp_path / "m.toml", "--over", "XYC", "--step", "X=355",
+                    "--step", "Y=275", "--step", "C=90", "--at", "Z=50", "--at", "A=20", "--tool-length", 100)
+    assert found["nodes"] == {"X": 3, "Y": 3, "C": 4}
+    assert 0.0 < found["lattice"]["tip_worst_um"] < found["volume"]["tip_worst_um"]
+    assert {"lost: the two ways of EXX, EYY, EZZ; a map holds their mean", "covariance kept"} < set(found["told"])
+    machine = machines.load("mikron-ucp710")
+    made = load(tmp_path / "m.toml", machine)
+    assert made.map is not None and made.map.length == 100.0 and made.map.bed == ("C", "A") and made.covariance is not None
+    kin = machine.kinematics.with_tool(100.0)
+    q = np.array([[355.0, 0.0, 50.0, np.radians(20), np.radians(450.0)]])
+    assert made.on(kin).place(q)[0] == pytest.approx(load(MIKRON, machine).on(kin).place(q)[0], abs=1e-9)
+    run("import", tmp_path / "m-map.csv", "-m", "mikron-ucp710", "-o", tmp_path / "b.toml", "--repeats", "C=360",
+        "--directions", "machine", "--tool-length", 100)
+    back = load(tmp_path / "b.toml", machine)
+    assert back.map is not None and back.map.table == pytest.approx(made.map.table, rel=1e-10, abs=1e-15)
+    assert back.map.periods == pytest.approx(made.map.periods) and back.map.bed == made.map.bed
+
+
+def test_a_loss_is_kept_or_refused(tmp_path: Path) -> None:
+    found = figures("to-map", SAMPLES / "uranesx.toml", "-m", "uranesx", "-o", tmp_path / "u.toml", "--loss", 0.5)
+    assert 0.05 < found["lattice"]["tip_worst_um"] <= 0.5 and list(found["nodes"]) == ["x", "y", "z"]
+    done = run("to-map", MIKRON, "-m", "mikron-ucp710", "-o", tmp_path / "n.toml", "--over", "XYZAC", "--loss", 0.01, code=1)
+    assert "takes more than 200000 nodes" in done.stderr and not (tmp_path / "n.toml").exists()
+
+
+def test_outputs_never_replace_inputs(tmp_path: Path) -> None:
+    shutil.copytree(SAMPLES, tmp_path / "e")
+    model = tmp_path / "e" / "mikron-ucp710.toml"
+    before = {p: p.read_bytes() for p in (tmp_path / "e").iterdir()}
+    done = run("to-tables", model, "-m", "mikron-ucp710", "-o", tmp_path / "e", code=1)
+    assert "error-export.input" in done.stderr
+    table = tmp_path / "e" / "mikron-ucp710-X.csv"
+    run("import", table, "-m", "mikron-ucp710", "-o", tmp_path / "e" / "mikron-ucp710.toml", "--into", model, code=1)
+    run("import", table, "-m", "mikron-ucp710", "-o", tmp_path / "e" / "other.toml", "--into", model)
+    run("import", table, "-m", "mikron-ucp710", "-o", table, code=2)
+    run("to-map", model, "-m", "mikron-ucp710", "-o", model, code=2)
+    assert all(p.read_bytes() == text for p, text in before.items())
+
+
+def test_a_fault_writes_nothing(tmp_path: Path) -> None:
+    (tmp_path / "x.csv").write_text("X [mm],EXX [um]\n0,1\n0,2\n")
+    done = run("import", tmp_path / "x.csv", "-m", "mill-3axis", "-o", tmp_path / "out" / "e.toml", code=1)
+    assert "x.csv:3: error [error-model.order]" in done.stderr and not (tmp_path / "out").exists()
+    (tmp_path / "out").write_text("a file")
+    done = run("to-tables", MIKRON, "-m", "mikron-ucp710", "-o", tmp_path / "out", code=1)
+    assert "cannot be written" in done.stderr
+
+
+def test_errors_taken_in_keep_the_doubt_of_the_others_and_tell_whose_is_gone(tmp_path: Path) -> None:
+    (tmp_path / "x.csv").write_text("X [mm],EXX [um],EAX [arcsec]\n-355,1,2\n355,2,3\n")
+    done = run("import", tmp_path / "x.csv", "-m", "mikron-ucp710", "-o", tmp_path / "e.toml", "--into", MIKRON)
+    assert "no doubt is known of EAX, EXX any more" in done.stdout
+    found = load(tmp_path / "e.toml", machines.load("mikron-ucp710"))
+    assert found.covariance is not None
+    sigma = dict(zip(found.names, np.sqrt(np.diag(found.covariance)), strict=True))
+    assert sigma["EXX[0]"] == 0.0 and sigma["EYX[0]"] == pytest.approx(0.0005)
+
+
+WRONG = [("to-map", "-o", "m.toml", "--over", "XQ"), ("to-map", "-o", "m.toml", "--over", "XX"),
+         ("to-map", "-o", "m.toml", "--step", "X"), ("to-map", "-o", "m.toml", "--step", "X=0"),
+         ("to-map", "-o", "m.toml", "--step", "X=1e99"), ("to-map", "-o", "m.toml", "--at", "Q=1"),
+         ("to-map", "-o", "m.toml", "--directions", "bed"), ("to-tables", "-o", "t", "--loss", "-1"),
+         ("to-tables", "-o", "t", "--step", "X=1", "--step", "X=2"), ("import", "-o", "m.toml", "--sign", "2"),
+         ("import", "-o", "m.toml", "--type", "3"), ("import", "-o", "m.toml", "--interpolation", "cubic"), ("nothing",)]
+
+
+@pytest.mark.parametrize("arguments", WRONG, ids=[" ".join(w) for w in WRONG])
+def test_wrong_use_is_exit_code_2(tmp_path: Path, arguments: tuple[str, ...], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    run(arguments[0], MIKRON, "-m", "mikron-ucp710", *arguments[1:], code=2)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_schema_and_help() -> None:
+    assert "components" in json.loads(run("schema").stdout)["properties"]
+    for command in ("check", "to-tables", "to-map", "to-linuxcnc", "import"):
+        assert "Example: postproc errors" in run(command, "--help").stdout
+    got = subprocess.run([sys.executable, "-X", "importtime", "-m", "postproc.cli", "errors", "--help"], capture_output=True,
+                         text=True, check=True, timeout=60)
+    assert not {"numpy", "scipy", "numba"} & {line.split("|")[-1].strip() for line in got.stderr.splitlines()}
