@@ -76,7 +76,7 @@ def to_tables(file: ModelFile, machine: MachineName, output: Folder, step: Step 
         files = model_files(made, file.stem, f"tables of {file.name}")
         files |= {f"{file.stem}-location.csv": exports.location_csv(made)} if made.axes.constants else {}
     figures, lost = table_figures(made, exports.named(losses))
-    finish(files, output, [file], json, found, [*lost, *told], figures)
+    finish(files, output, [file], json, found, [*lost, *told, *exports.notices(made, m)], figures)
 
 
 @errors_app.command("to-linuxcnc", epilog="Example: postproc errors to-linuxcnc e.toml -m mill-3axis -o comp --rest r.toml")
@@ -101,7 +101,7 @@ def to_linuxcnc(file: ModelFile, machine: MachineName, output: Folder, rest: Res
     figures, told = screw_figures(screws, names, exports.named(screws.losses), worst)
     found.append(screw_warning(list(figures["losses"]), str(file), rest))
     finish({names[letter]: text for letter, text in screws.texts.items()}, output, [file], json, found,
-           [*told, "for the INI file:", *exports.ini_lines(m, names)], figures, beside)
+           [*told, *exports.notices(screws.held, m), "for the INI file:", *exports.ini_lines(m, names)], figures, beside)
 
 
 @errors_app.command("to-map", epilog="Example: postproc errors to-map e.toml -m mikron-ucp710 -o map.toml --loss 2")

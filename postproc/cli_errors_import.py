@@ -27,12 +27,17 @@ Sign = Annotated[int, typer.Option("--sign", help="-1 where the numbers say how 
 Kind = Annotated[int, typer.Option("--type", min=0, max=1, help="COMP_FILE_TYPE of LinuxCNC's files")]
 MapTool = Annotated[float, typer.Option("--tool-length", metavar="MM", min=0.0, max=10_000.0, help="of the tool whose tip a "
                                         "map displaces; 0: the gauge point")]
+Zero = Annotated[list[str] | None, typer.Option("--zero", metavar="AXIS=POSITION", help="place at which a map is to be 0, "
+                                                "all its coordinates, mm or degrees")]
+Average = Annotated[bool, typer.Option("--average", help="rows at the same place are readings of it: their mean "
+                                       "counts, their scatter is the doubt")]
 Directions = Annotated[str, typer.Option("--directions", help="of a map's values: machine or table")]
 
 
 def import_(sources: Sources, machine: MachineName, output: Output, into: Into = None, covariance: Covariance = None,
             interpolation: Interpolation = "linear", repeats: Repeats = None, sign: Sign = 1, kind: Kind = 0,
-            tool_length: MapTool = 0.0, directions: Directions = "table", json: Json = "") -> None:
+            tool_length: MapTool = 0.0, directions: Directions = "table", zero: Zero = None, average: Average = False,
+            json: Json = "") -> None:
     """Make an error model of tables that others wrote."""
     for option, value, allowed in (("--interpolation", interpolation, ("linear", "spline")),
                                    ("--sign", str(sign), ("1", "-1")), ("--directions", directions, ("machine", "table"))):
@@ -45,8 +50,9 @@ def import_(sources: Sources, machine: MachineName, output: Output, into: Into =
 
     with shown_errors(json):
         m = machine_of(machine)
-        periods = in_units(pairs("--repeats", repeats, (*m.axis_names, *"xyz")))
-        how = How(interpolation, periods, float(sign), kind, tool_length, directions)  # type: ignore[arg-type]
+        known = (*m.axis_names, *"xyz")
+        periods, at = in_units(pairs("--repeats", repeats, known)), in_units(pairs("--zero", zero, known))
+        how = How(interpolation, periods, float(sign), kind, tool_length, directions, at, average)  # type: ignore[arg-type]
         read, found = read_sources(sources, m, how)
         model, told = required(read, found), [f"read: {', '.join(files_of)}"]
         if covariance is not None:

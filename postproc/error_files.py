@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from toolpaths.diagnostics import Diagnostic
 
 T = TypeVar("T")
+PLACES = ("--at", "--zero")
+"""options whose numbers are positions; those of others are sizes, more than 0"""
 
 
 def loaded(file: Path, machine: Machine) -> tuple[ErrorModel, list[Diagnostic]]:
@@ -71,10 +73,10 @@ def pairs(option: str, given: Sequence[str] | None, known: Sequence[str]) -> dic
             value = float(number)
         except ValueError:
             value = float("nan")
-        wrong = not (-1e9 < value < 1e9) or (option != "--at" and value <= 0.0)
+        wrong = not (-1e9 < value < 1e9) or (option not in PLACES and value <= 0.0)
         if letter not in known or letter in found or wrong:
             raise typer.BadParameter(f"{text!r}: write AXIS=NUMBER, each of {', '.join(known)} at most once"
-                                     + ("" if option == "--at" else ", more than 0"), param_hint=option)
+                                     + ("" if option in PLACES else ", more than 0"), param_hint=option)
         found[letter] = value
     return found
 

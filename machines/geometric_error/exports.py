@@ -13,10 +13,11 @@ from machines.geometric_error.axis_motion import sense
 from machines.geometric_error.covariance import angular
 from machines.geometric_error.csv_table import UNITS, write_csv
 from machines.geometric_error.curves import Table
-from machines.geometric_error.lattice import POINT, ErrorMap
+from machines.geometric_error.lattice import POINT, ROTARY, ErrorMap
 from machines.geometric_error.lattice_making import MapLoss, map_loss, map_of, nodes_of, probes, refined
 from machines.geometric_error.model import ErrorModel
 from machines.geometric_error.screw_tables import LINUXCNC_ROWS, to_linuxcnc
+from machines.geometric_error.serial_errors import Component, Frame, SerialErrors
 from machines.geometric_error.survey import apart
 from machines.geometric_error.tabulate import loss, rows_for, sampled, tabulated, without
 from machines.geometric_error.volume import corners, middle, ranges, samples
@@ -74,11 +75,13 @@ def travel(machine: Machine) -> dict[str, tuple[float, float]]:
 
 @dataclass(frozen=True)
 class Screws:
-    """Screw compensation of LinuxCNC: text per joint letter, tables, losses (mm or rad), and the model without them."""
+    """Screw compensation of LinuxCNC: text per joint letter, tables, losses (mm or rad), the model that the tables are, and
+    the model without them."""
 
     texts: dict[str, str]
     tables: dict[str, Table]
     losses: dict[str, float]
+    held: ErrorModel
     rest: ErrorModel
 
 
@@ -97,7 +100,8 @@ def to_screws(model: ErrorModel, machine: Machine, step: Steps, length: float, a
     tables = {c.name.axis: sampled(c.curve, rows[str(c.name)].x) for c in mine}
     texts = {c.name.axis: to_linuxcnc(c.name, tables[c.name.axis], joint_sense(machine, c.name.axis)) for c in mine}
     losses = {str(c.name): loss(c.curve, rows[str(c.name)]) for c in mine}
-    return Screws(texts, tables, losses, without(model, [c.name for c in mine]))
+    held = ErrorModel(SerialErrors(tuple(Component(c.name, tables[c.name.axis]) for c in mine)))
+    return Screws(texts, tables, losses, held, without(model, [c.name for c in mine]))
 
 
 def joint_sense(machine: Machine, letter: str) -> float:
@@ -113,6 +117,23 @@ def ini_lines(machine: Machine, names: Mapping[str, str]) -> list[str]:
     for letter, name in names.items():
         lines += [f"[JOINT_{machine.axis_names.index(letter)}]", f"COMP_FILE = {name}", "COMP_FILE_TYPE = 0"]
     return lines
+
+
+def notices(model: ErrorModel, machine: Machine) -> list[str]:
+    """What else tables per axis do not say: where they end, and along what the errors of a rotary axis are."""
+    lower = dict(zip(machine.axis_names, machine.limits.lower, strict=True))
+    sides = {"fixed": "the part's side of the axis", "moving": "the tool's side of the axis"}
+    own = {letter: frame for letter, frame in model.axes.frame.items() if frame != bed_frame(machine, letter)}
+    ends = [f"{c.name.axis} goes round, its table holds from {c.curve.range[0] / DEG:g} to {c.curve.range[1] / DEG:g} "
+            "degrees" for c in model.axes.components if c.name.axis in ROTARY and np.isfinite(c.curve.range).all()
+            and not np.isfinite(lower[c.name.axis])]
+    return [*dict.fromkeys(ends), *(f"errors of {letter} are along x, y, z of {sides[frame]}, not of the bed as in ISO 230-1"
+                                    for letter, frame in sorted(own.items()))]
+
+
+def bed_frame(machine: Machine, letter: str) -> Frame:
+    """The side of a rotary axis that the bed is on: directions of ISO 230-1."""
+    return "moving" if letter in part_side(machine.kinematics, machine.structure) else "fixed"
 
 
 # ---- error map -----------------------------------------------------------------------------------------------------

@@ -11,20 +11,24 @@ from typing import Literal
 import numpy as np
 
 from machines.geometric_error.actual_map import part_side
+from machines.geometric_error.averages import Averaged, averaged, levels_of
 from machines.geometric_error.axis_motion import effect
 from machines.geometric_error.covariance import angular, read_covariance
 from machines.geometric_error.csv_table import ANGLES, LENGTHS, UNITS, CsvTable, read_csv, read_text
-from machines.geometric_error.exports import joint_sense
-from machines.geometric_error.lattice_file import map_from_csv
+from machines.geometric_error.exports import MOST_DOUBT, bed_frame, joint_sense
+from machines.geometric_error.lattice import COLUMNS
+from machines.geometric_error.lattice_file import COORDINATES, map_from_csv, zeroed
 from machines.geometric_error.model import ErrorModel
 from machines.geometric_error.names import DIRECTIONS, OWN, ErrorName, parse
 from machines.geometric_error.screw_tables import from_linuxcnc
 from machines.geometric_error.serial_errors import Component, Frame, SerialErrors
 from machines.geometric_error.table_curves import Fault, table_curve
+from machines.geometric_error.tabulate import merged
 from machines.kinematics.serial import Serial
 from machines.machine import Machine
 from machines.user_file import nearest
-from toolpaths.diagnostics import Diagnostic, error, has_errors
+from toolpaths.arrays import Floats
+from toolpaths.diagnostics import Diagnostic, error, has_errors, info
 
 _SCREW = re.compile(r"([A-Z])=(.+)$")
 MAP_COLUMNS = {"dx", "dy", "dz"}
@@ -41,6 +45,8 @@ class How:
         kind: COMP_FILE_TYPE of LinuxCNC's files
         tool_length: mm, of the tool whose tip a map displaces
         directions: of a map
+        zero: mm or rad by coordinate: the place at which a map is to be 0; {} takes it as it is
+        average: rows at the same place are readings of it: their mean counts, and their scatter is the doubt
     """
 
     rule: Literal["linear", "spline"] = "linear"
@@ -49,6 +55,8 @@ class How:
     kind: int = 0
     tool_length: float = 0.0
     directions: Literal["table", "machine"] = "table"
+    zero: Mapping[str, float] = field(default_factory=dict)
+    average: bool = False
 
 
 def read_sources(sources: Sequence[str], machine: Machine, how: How) -> tuple[ErrorModel | None, list[Diagnostic]]:
@@ -67,19 +75,13 @@ def read_sources(sources: Sequence[str], machine: Machine, how: How) -> tuple[Er
         if part is None:
             continue
         found += _twice(part, places, source)
-        model = replace(part, machine=machine.name) if part.map is not None else \
-            replace(model, axes=_joined(model.axes, part.axes))
+        model = replace(part, machine=machine.name) if part.map is not None else merged(model, part)
         if part.map is not None and len(sources) > 1:
             found.append(error("error-import.map", "a map stands alone", file=source,
                                hint=f"import it without the other {len(sources) - 1} sources"))
     if not has_errors(found):
         found += fits(model, machine)
     return (None if has_errors(found) else model), found
-
-
-def _joined(one: SerialErrors, other: SerialErrors) -> SerialErrors:
-    return SerialErrors((*one.components, *other.components), {**one.constants, **other.constants}, one.reference,
-                        {**one.frame, **other.frame})
 
 
 def _twice(part: ErrorModel, places: dict[str, str], source: str) -> list[Diagnostic]:
@@ -119,12 +121,45 @@ def _csv(path: Path, machine: Machine, how: How) -> tuple[ErrorModel | None, lis
     table, found = read_csv(path)
     if table is None:
         return None, found
+    places = [name for name in table.columns if name in COORDINATES]
+    read = averaged(table, places) if how.average and places else None
+    table = table if read is None else read.table
     if MAP_COLUMNS & set(table.columns):
-        return _map(table, machine, how)
-    positions = [name for name in table.columns if name in OWN]
-    if positions:
-        return _axis(table, positions, machine, how)
-    return _location(table, how)
+        model, found = _map(table, machine, how)
+    elif places:
+        model, found = _axis(table, places, machine, how)
+    else:
+        return _location(table, how)
+    if model is None or read is None or not read.scatter:
+        return model, found
+    model, told = _scattered(model, read)
+    return model, [*found, told]
+
+
+def _scattered(model: ErrorModel, read: Averaged) -> tuple[ErrorModel, Diagnostic]:
+    """The model with the doubt of its means."""
+    units = {name: UNITS["arcsec" if name[0] == "r" or name[1] in "ABC" else "um"] for name in read.scatter}
+    spread = ", ".join(f"{name} {value / units[name]:.3g}" for name, value in read.scatter.items())
+    told = info("error-import.averaged", f"{int(read.runs.sum())} readings at {len(read.runs)} places; standard deviation "
+                f"of one: {spread} (um, arcsec)", file=read.table.file)
+    if len(model.names) > MOST_DOUBT:
+        return model, replace(told, message=f"{told.message}; the doubt of {len(model.names)} values is not written")
+    return replace(model, covariance=np.diag(_variances(model, read))), told
+
+
+def _variances(model: ErrorModel, read: Averaged) -> Floats:
+    """(P,) of the means: those of a lattice by node, those of an axis by row and way."""
+    if model.map is not None:
+        whole = [len(levels_of(read.table.columns[letter])[0]) for letter in model.map.letters]
+        inner = tuple(slice(len(nodes)) for nodes in model.map.nodes)  # less the end of a period
+        parts = [read.variance(c) if c in read.scatter else np.zeros(len(read.runs)) for c in COLUMNS]
+        return np.stack([part.reshape(whole)[inner].ravel() for part in parts], axis=1).ravel()
+    found = []
+    for component in model.axes.components:
+        rows = len(component.curve.values) // (2 if f"{component.name}+" in read.scatter else 1)
+        ways = [f"{component.name}{way}" for way in "+-"]
+        found += [read.variance(c)[:rows] for c in (ways if ways[0] in read.scatter else [str(component.name)])]
+    return np.concatenate(found)
 
 
 def _map(table: CsvTable, machine: Machine, how: How) -> tuple[ErrorModel | None, list[Diagnostic]]:
@@ -133,7 +168,11 @@ def _map(table: CsvTable, machine: Machine, how: How) -> tuple[ErrorModel | None
     if result is None:
         return None, found
     bed = part_side(machine.kinematics, machine.structure) if how.directions == "machine" else ()
-    return ErrorModel(map=replace(result, length=how.tool_length, bed=bed, table=how.sign * result.table)), []
+    made = replace(result, length=how.tool_length, bed=bed, table=how.sign * result.table)
+    moved = zeroed(made, how.zero) if how.zero else made
+    if isinstance(moved, tuple):
+        return None, [error("error-map.zero", moved[0], file=table.file, hint=moved[1])]
+    return ErrorModel(map=moved), []
 
 
 def _axis(table: CsvTable, positions: list[str], machine: Machine, how: How) -> tuple[ErrorModel | None, list[Diagnostic]]:
@@ -163,12 +202,6 @@ def _axis(table: CsvTable, positions: list[str], machine: Machine, how: How) -> 
 
 def _unit(direction: str) -> str:
     return "arcsec" if direction in "ABC" else "um"
-
-
-def bed_frame(machine: Machine, letter: str) -> Frame:
-    """The side of a rotary axis that the bed is on: directions of ISO 230-1."""
-    part = letter in part_side(machine.kinematics, machine.structure)
-    return "moving" if part else "fixed"
 
 
 def _names(table: CsvTable, letter: str) -> tuple[list[ErrorName], list[Diagnostic]]:

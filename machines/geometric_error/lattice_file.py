@@ -8,15 +8,14 @@ from dataclasses import replace
 
 import numpy as np
 
+from machines.geometric_error.averages import SAME, levels_of
 from machines.geometric_error.csv_table import ANGLES, LENGTHS, CsvTable, write_csv
 from machines.geometric_error.lattice import COLUMNS, POINT, ROTARY, ErrorMap
-from toolpaths.arrays import Floats, Ints
+from toolpaths.arrays import Ints
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.units import DEG
 
 COORDINATES = "XYZUVWABC" + POINT
-SAME = 1e-6
-"""mm or rad: positions nearer than this are one"""
 CROWDED = 50
 """a lattice of more nodes than this many times its rows is none"""
 
@@ -32,7 +31,7 @@ def map_from_csv(table: CsvTable, periods: Mapping[str, float] | None = None) ->
     if faults:
         return None, faults
     places = np.stack([table.columns[letter] for letter in letters], axis=1)
-    nodes, index = zip(*(_levels(column) for column in places.T), strict=True)
+    nodes, index = zip(*(levels_of(column) for column in places.T), strict=True)
     shape = tuple(map(len, nodes))
     if math.prod(shape) > CROWDED * len(table):
         return None, [error("error-map.scattered", "the rows are no lattice: " + _levels_of(letters, shape) + " levels need "
@@ -95,15 +94,6 @@ def round_about(lattice: ErrorMap, periods: Mapping[str, float], file: str) -> t
     return replace(lattice, nodes=tuple(nodes), table=table, periods=round_), []
 
 
-def _levels(column: Floats) -> tuple[Floats, Ints]:
-    """(ascending distinct positions, index of each row's)."""
-    order = np.argsort(column, kind="stable")
-    new = np.concatenate([[True], np.diff(column[order]) > SAME])
-    index = np.empty(len(column), dtype=np.int64)
-    index[order] = np.cumsum(new) - 1
-    return column[order][new], index
-
-
 def _column_faults(table: CsvTable, letters: tuple[str, ...]) -> list[Diagnostic]:
     found = []
     if not letters or not {"dx", "dy", "dz"} <= set(table.columns):
@@ -132,3 +122,16 @@ def map_to_csv(error_map: ErrorMap, length: str = "um", angle: str = "arcsec") -
     directions = "machine" if error_map.bed else "table"
     return write_csv(columns, [f"error map: {point}, actual less commanded, tool relative to part, directions of the "
                                f"{directions}"])
+
+
+def zeroed(error_map: ErrorMap, zero: Mapping[str, float]) -> ErrorMap | tuple[str, str]:
+    """The map less what it says at the place `zero` (mm or rad by coordinate); or what is wrong, and what to do."""
+    letters = error_map.letters
+    if set(zero) != set(letters):
+        return (f"zero gives {', '.join(zero)}, the map has {', '.join(letters)}", "give every coordinate of the map once")
+    place = np.array([[zero[letter] for letter in letters]])
+    if error_map.outside(place, SAME).any():
+        return "the place lies outside the map", "; ".join(
+            f"{letter} is from {nodes[0] / unit:g} to {nodes[-1] / unit:g}" for letter, nodes in
+            zip(letters, error_map.nodes, strict=True) for unit in (DEG if letter in ROTARY else 1.0,))
+    return replace(error_map, table=error_map.table - error_map.at(place)[0])

@@ -9,8 +9,8 @@ import numpy as np
 
 from machines.geometric_error.actual import Actual
 from machines.geometric_error.actual_map import ActualByMap
+from machines.geometric_error.averages import SAME
 from machines.geometric_error.lattice import POINT, ErrorMap
-from machines.geometric_error.lattice_file import SAME
 from toolpaths.arrays import Floats
 
 STEPS = 8

@@ -14,12 +14,12 @@ from machines.geometric_error.csv_table import UNITS, CsvTable, read_csv
 from machines.geometric_error.curves import EVERYWHERE, Curve, Fourier, Polynomial, largest
 from machines.geometric_error.file_models import CurveModel, ErrorFileModel
 from machines.geometric_error.lattice import COLUMNS, ErrorMap
-from machines.geometric_error.lattice_file import map_from_csv
+from machines.geometric_error.lattice_file import map_from_csv, zeroed
 from machines.geometric_error.model import ErrorModel
 from machines.geometric_error.names import SPINDLE, ErrorName, parse
 from machines.geometric_error.rods import RodErrors, gives_rods, rod_frame, rod_names
 from machines.geometric_error.serial_errors import Component, Frame, SerialErrors
-from machines.geometric_error.table_curves import CLOSES, ROTARY, Fault, table_curve
+from machines.geometric_error.table_curves import ROTARY, Fault, table_curve
 from machines.kinematics.h4_axes import H4TableAxis
 from machines.kinematics.h4_linear import H4Linear
 from machines.kinematics.linear_delta import LinearDelta
@@ -277,19 +277,11 @@ class _Loader:
             return None
         bed = part_side(self.machine.kinematics, self.machine.structure) if given.directions == "machine" else ()
         result = replace(result, length=given.tool_length, bed=bed, table=given.sign * result.table)
-        return self._zeroed(result) if given.zero else result
-
-    def _zeroed(self, error_map: ErrorMap) -> ErrorMap:
-        """The map less what it says at its stated zero."""
-        zero, letters = self.checked.map.zero if self.checked.map else {}, error_map.letters
-        if set(zero) != set(letters):
-            self._problem("error-map.zero", ("map", "zero"), f"zero gives {', '.join(zero)}, the map has "
-                          f"{', '.join(letters)}", "give every coordinate of the map once")
-            return error_map
-        place = np.array([[zero[letter] * (DEG if letter in ROTARY else 1.0) for letter in letters]])
-        if error_map.outside(place, CLOSES).any():
-            self._problem("error-map.zero", ("map", "zero"), "the place lies outside the map", "; ".join(
-                f"{letter} is from {nodes[0] / unit:g} to {nodes[-1] / unit:g}" for letter, nodes in
-                zip(letters, error_map.nodes, strict=True) for unit in (DEG if letter in ROTARY else 1.0,)))
-            return error_map
-        return replace(error_map, table=error_map.table - error_map.at(place)[0])
+        if not given.zero:
+            return result
+        zero = {letter: value * (DEG if letter in ROTARY else 1.0) for letter, value in given.zero.items()}
+        made = zeroed(result, zero)
+        if isinstance(made, tuple):
+            self._problem("error-map.zero", ("map", "zero"), *made)
+            return None
+        return made

@@ -12,7 +12,16 @@ import machines
 from machines.geometric_error.covariance import write_covariance
 from machines.geometric_error.curves import Fourier, Polynomial, Table
 from machines.geometric_error.exchange import save, write_model
-from machines.geometric_error.exports import ini_lines, lattice_for, location_csv, to_map, to_screws, to_tables, worst
+from machines.geometric_error.exports import (
+    ini_lines,
+    lattice_for,
+    location_csv,
+    notices,
+    to_map,
+    to_screws,
+    to_tables,
+    worst,
+)
 from machines.geometric_error.imports import How, read_sources, with_covariance
 from machines.geometric_error.loader import load
 from machines.geometric_error.model import ErrorModel, doubt
@@ -193,6 +202,60 @@ def test_a_lattice_of_others_comes_in_as_they_say(tmp_path: Path) -> None:
     assert found is not None and found.map is not None and not faults
     assert found.map.table[0, :3].tolist() == pytest.approx([-0.0015, -0.002, -0.003])
     assert found.map.bed == ("C", "A") and found.map.length == 80.0 and found.map.periods == (2 * np.pi,)
+
+
+def test_readings_of_the_same_place_are_averaged_and_scatter_is_the_doubt(tmp_path: Path) -> None:
+    """Five runs there and back, as ISO 230-2 has them: means in order, s / sqrt(5) each."""
+    rng, x = np.random.default_rng(5), np.linspace(-300.0, 300.0, 13)
+    truth = np.stack([0.02 * x, 0.01 * x + 3.0], axis=1)
+    runs = [truth + rng.normal(size=truth.shape) * [0.5, 0.8] for _ in range(5)]
+    rows = [f"{x[k]},{run[k, 0]:.6f},{run[k, 1]:.6f}" for n, run in enumerate(runs) for k in range(13)[:: 1 - 2 * (n % 2)]]
+    (tmp_path / "x.csv").write_text("X [mm],EXX+ [um],EXX- [um]\n" + "\n".join(rows))
+    machine = machines.load("mikron-ucp710")
+    found, told = read_sources([str(tmp_path / "x.csv")], machine, How(average=True))
+    assert found is not None and found.covariance is not None
+    assert found.values == pytest.approx(np.mean(runs, axis=0).T.ravel() * 1e-3, abs=1e-9)
+    sigma = np.sqrt(np.diag(found.covariance)) * 1e3
+    assert np.ptp(sigma[:13]) == 0.0 and sigma[0] == pytest.approx(0.5 / np.sqrt(5), rel=0.25)
+    assert sigma[13] == pytest.approx(0.8 / np.sqrt(5), rel=0.25)
+    pooled = np.sqrt(np.var([r[:, 0] for r in runs], axis=0, ddof=1).mean() / 5)
+    assert sigma[0] == pytest.approx(pooled, rel=1e-6)
+    assert [d.code for d in told] == ["error-import.averaged"] and "65 readings at 13 places" in told[0].message
+    plain, faults = read_sources([str(tmp_path / "x.csv")], machine, How())
+    assert plain is None and faults[0].code == "error-model.order"
+
+
+def test_a_lattice_of_several_readings_that_goes_round_has_a_doubt_by_node(tmp_path: Path) -> None:
+    rng = np.random.default_rng(2)
+    nodes = [(z, c) for z in (0.0, 100.0) for c in (0.0, 90.0, 180.0, 270.0, 360.0)]
+    value = {(z, c): z / 100.0 + np.cos(np.radians(c)) for z, c in nodes}
+    rows = [f"{z},{c},{value[z, c]:.6f},{d:.6f},2,5" for z, c in nodes for d in ([1.0, 3.0] if z else [1.0, 3.0, 2.0, 2.0])]
+    head = "Z [mm],C [deg],dx [um],dy [um],dz [um],rx [arcsec]"
+    (tmp_path / "m.csv").write_text("\n".join([head, *rng.permutation(rows)]))
+    how = How(average=True, periods={"C": 2 * np.pi}, zero={"Z": 100.0, "C": np.pi / 2})
+    found, told = read_sources([str(tmp_path / "m.csv")], machines.load("mikron-ucp710"), how)
+    assert found is not None and found.map is not None and found.covariance is not None
+    assert found.map.table.shape == (2, 4, 6)
+    assert found.map.table[1, :, 0] * 1e3 == pytest.approx([1.0, 0.0, -1.0, 0.0], abs=1e-6)
+    assert found.map.table[0, :, 0] * 1e3 == pytest.approx([0.0, -1.0, -2.0, -1.0], abs=1e-6)
+    variance = np.diag(found.covariance).reshape(2, 4, 6) * 1e6
+    scatter = 5 * (2.0 + 2.0) / (30 - 10)  # sum of squares about the means over readings less places
+    assert variance[:, :, 1] == pytest.approx(np.array([[scatter / 4] * 4, [scatter / 2] * 4]))
+    assert variance[:, :, [0, 2, 3]] == pytest.approx(0.0, abs=1e-12) and "30 readings at 10 places" in told[0].message
+    outside, faults = read_sources([str(tmp_path / "m.csv")], machines.load("mikron-ucp710"),
+                                   replace(how, zero={"Z": 101.0, "C": 0.0}))
+    assert outside is None and faults[0].code == "error-map.zero"
+
+
+def test_what_tables_do_not_say_is_told() -> None:
+    machine = machines.load("mikron-ucp710")
+    full = load(SAMPLES / "mikron-ucp710.toml", machine)
+    assert notices(to_tables(full, machine, {}, 1.0, 1.0)[0], machine) == []
+    assert notices(to_screws(full, machine, {}, 1.0, 1.0).held, machine) == [
+        "C goes round, its table holds from -180 to 180 degrees"]
+    fixed = replace(full, axes=replace(full.axes, frame={"A": "moving", "C": "fixed"}))
+    assert notices(fixed, machine) == [
+        "errors of C are along x, y, z of the part's side of the axis, not of the bed as in ISO 230-1"]
 
 
 AXIS = "X [mm],EXX [um],EYX [um]\n0,1,2\n100,3,4\n"

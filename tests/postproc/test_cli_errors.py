@@ -155,6 +155,15 @@ def test_errors_taken_in_keep_the_doubt_of_the_others_and_tell_whose_is_gone(tmp
     assert sigma["EXX[0]"] == 0.0 and sigma["EYX[0]"] == pytest.approx(0.0005)
 
 
+def test_measured_readings_become_means_with_their_doubt(tmp_path: Path) -> None:
+    (tmp_path / "x.csv").write_text("X [mm],EXX [um]\n300,5\n-300,1\n300,7\n-300,1\n")
+    done = run("import", tmp_path / "x.csv", "-m", "mill-3axis", "-o", tmp_path / "e.toml", "--average")
+    assert "4 readings at 2 places; standard deviation of one: EXX 1" in done.stderr and "2 with a doubt" in done.stdout
+    found = load(tmp_path / "e.toml", machines.load("mill-3axis"))
+    assert found.values == pytest.approx([0.001, 0.006]) and found.covariance is not None
+    assert np.sqrt(np.diag(found.covariance)) == pytest.approx([0.001 / np.sqrt(2)] * 2)
+
+
 WRONG = [("to-map", "-o", "m.toml", "--over", "XQ"), ("to-map", "-o", "m.toml", "--over", "XX"),
          ("to-map", "-o", "m.toml", "--step", "X"), ("to-map", "-o", "m.toml", "--step", "X=0"),
          ("to-map", "-o", "m.toml", "--step", "X=1e99"), ("to-map", "-o", "m.toml", "--at", "Q=1"),
