@@ -1,4 +1,4 @@
-"""What the joints allow at the tip: polytopes of velocity, acceleration and jerk, and the rotary angles that aim a vertex.
+"""What the joints allow at the tip: polytopes of velocity, acceleration and jerk.
 
 In positioned (3+2) machining the rotary joints stand and the tool axis is kept, so that joint rates follow the tip's
 linearly, dq = G v, and each limit |dq_j| <= l_j is a pair of half-spaces of the tip's rate v (Grandguillaume, Lavernhe,

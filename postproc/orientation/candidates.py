@@ -15,6 +15,7 @@ from postproc.orientation.ranking import Ranking
 from postproc.orientation.ridges import best_on_ridge
 from postproc.orientation.seeds import aimed_axes, around, reaching_axes
 from postproc.orientation.timed import Turned, turned, turned_all
+from postproc.orientation.travel import nearest_inside
 from toolpaths.arrays import Floats
 from toolpaths.rotations import angle_between, slerp
 from toolpaths.units import DEG
@@ -218,6 +219,8 @@ def tried(one: Pass, machine: Machine, allowed: Allowed, before: Tried | None = 
         tilt = np.pi / 2.0 if len(one.normal) else allowed.tilt
         seeds = search.add(reaching_axes(one, machine, tilt, lambda axes: allowed.mask(one, axes)))
     seeds += [] if before is None else search.add(before.best.axis[None])
+    if search.own.refused.startswith("travel") and not seeds:
+        seeds = search.add(nearest_inside(one, machine, allowed).axis[None])
     again = next((made for made in seeds if before is not None and made.same(before.best.axis)), None)
     best = search.own
     for made in sorted(seeds, key=lambda made: -1.0 if made is again else made.bound):

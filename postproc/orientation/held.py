@@ -51,7 +51,7 @@ def best_held(search: Search, best: Turned) -> Turned:
     one, machine = search.one, search.machine
     if one.fixed and not one.spins:
         return best
-    for axis in _axes(one):
+    for axis in poles(one):
         for angle in held_angles(one, machine, axis).tolist():
             for made in search.add(axis[None], held=angle):
                 best = search.better(best, made)
@@ -88,6 +88,12 @@ def common_angles(owns: Sequence[Turned]) -> Floats:
     return _dips(total, machine, joint)
 
 
+def ring_of(one: Pass, machine: Machine) -> Floats:
+    """Angles (H,) rad all round at which the joint may be held that the own axis of a pass leaves free; none without one."""
+    joint = _free(one, one.axis, machine)
+    return np.zeros(0) if joint < 0 else _ring(machine, joint)
+
+
 def _dips(slow: Floats, machine: Machine, joint: int) -> Floats:
     """Angles inside travel, rad, where values all round `_ring` are least, the best first; none where they are even."""
     low, high = machine.limits.lower[joint], machine.limits.upper[joint]
@@ -111,7 +117,7 @@ def _free(one: Pass, axis: Floats, machine: Machine) -> int:
     return free_joint(one.kin, one.tip[0] + one.shift(axis), axis, machine.home)
 
 
-def _axes(one: Pass) -> list[Floats]:
+def poles(one: Pass) -> list[Floats]:
     """Axes of a pass along a rotary joint: of a fixed one only its own."""
     return [one.axis] if one.fixed else [pole.frame[2] for pole in poles_of(one.kin)]
 

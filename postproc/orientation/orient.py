@@ -20,7 +20,7 @@ from postproc.orientation.proved import Convert, proved
 from postproc.orientation.ranking import prepare
 from postproc.orientation.reoriented import reoriented
 from postproc.orientation.rounds import PassFault, Progress, each_pass
-from postproc.orientation.unfit import REACH, unfit
+from postproc.orientation.unfit import REACH, out_of_travel, unfit
 from postproc.setup import SetupFile
 from toolpaths.diagnostics import Diagnostic, error, has_errors, warning
 from toolpaths.toolpath import Toolpath
@@ -71,6 +71,9 @@ def orient(toolpath: Toolpath, machine: Machine, setup: SetupFile, options: Opti
     if has_errors(found):
         return None, found
     allowed = Allowed(options.max_tilt * DEG, bodies, setup.orientation)
+    found += out_of_travel(work, allowed)
+    if has_errors(found):
+        return None, found
     try:
         prepare(work.passes)
         results = each_pass(partial(_tried, work, allowed), work, allowed, "orienting", progress, workers)

@@ -107,6 +107,6 @@ def _outside(q: Floats, over: Floats, machine: Machine) -> str:
     j = int(over.argmax())
     limits, unit, name = machine.limits, (1.0 / DEG if machine.rotary[j] else 1.0), "degrees" if machine.rotary[j] else "mm"
     low, high = float(q[:, j].min()), float(q[:, j].max())
-    value = high if high > limits.upper[j] else low
+    value, beyond = (high, "too high") if high > limits.upper[j] else (low, "too low")
     return (f"travel: axis {machine.axis_names[j]} at {value * unit:.3f} {name}, allowed {limits.lower[j] * unit:.3f} to "
-            f"{limits.upper[j] * unit:.3f}")
+            f"{limits.upper[j] * unit:.3f}: {over[j] * unit:.3f} {beyond}")

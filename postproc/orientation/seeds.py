@@ -54,7 +54,7 @@ def reaching_axes(one: Pass, machine: Machine, tilt: float, allowed: Callable[[F
     direction = None if stretch is None else stretch.directions().get("mean")
     if stretch is None or direction is None:
         return np.zeros((0, 3))
-    axes = one.kin.nearest_axis(_cap(one.axis, min(tilt, np.pi - 0.1)))
+    axes = one.kin.nearest_axis(cap(one.axis, min(tilt, np.pi - 0.1), _APART))
     axes = axes[allowed(axes)]
     middle = stretch.tip[len(stretch.tip) // 2] + one.radius * (one.axis - axes)
     near = np.hstack((middle, axes))
@@ -96,15 +96,17 @@ def around(start: Floats, centre: Floats, step: float) -> Floats:
     return np.stack([np.cos(a) * centre + np.sin(a) * (np.cos(b) * out + np.sin(b) * side) for a, b in ways])
 
 
-def _cap(axis: Floats, tilt: float) -> Floats:
-    """Directions (N, 3) within `tilt` of `axis`, some 5 degrees apart."""
+def cap(axis: Floats, tilt: float, apart: float) -> Floats:
+    """Directions (N, 3) within `tilt` of `axis`, some `apart` rad from each other."""
+    return np.concatenate([ring(axis, lean, max(6, int(np.ceil(2.0 * np.pi * np.sin(lean) / apart))))
+                           for lean in np.linspace(0.0, tilt, max(2, int(np.ceil(tilt / apart)) + 1))[1:].tolist()])
+
+
+def ring(axis: Floats, lean: float, count: int) -> Floats:
+    """Directions (count, 3) at `lean` rad from `axis`, evenly all round."""
     x, y = across(axis)
-    result = []
-    for ring in np.linspace(0.0, tilt, max(2, int(np.ceil(tilt / _APART)) + 1))[1:]:
-        count = max(6, int(np.ceil(2.0 * np.pi * np.sin(ring) / _APART)))
-        phi = np.arange(count) * 2.0 * np.pi / count
-        result.append(np.cos(ring) * axis + np.sin(ring) * (np.cos(phi)[:, None] * x + np.sin(phi)[:, None] * y))
-    return np.concatenate(result)
+    phi = np.arange(count)[:, None] * 2.0 * np.pi / count
+    return np.asarray(np.cos(lean) * axis + np.sin(lean) * (np.cos(phi) * x + np.sin(phi) * y))
 
 
 def across(axis: Floats) -> tuple[Floats, Floats]:

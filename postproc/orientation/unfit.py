@@ -6,14 +6,52 @@ import re
 from collections import Counter
 from collections.abc import Callable
 
+import numpy as np
+
+from postproc.orientation.allowed import Allowed
 from postproc.orientation.candidates import Lost, Tried
 from postproc.orientation.losers import KINDS
-from postproc.orientation.passes import Work
+from postproc.orientation.passes import Pass, Work
+from postproc.orientation.timed import turned
+from postproc.orientation.travel import Lack, nearest_inside
 from toolpaths.diagnostics import Diagnostic, error, warning
 
 REACH = "move or turn the part in the set-up, or run `postproc place`"
 _APART = "check part, fixtures and holder of the set-up, allow more tilt (--max-tilt) or take a longer tool"
 _BY = re.compile(r"(.+) by ([\d.]+) mm")
+_BEYOND = re.compile(r"(travel: axis \w+) at .*: ([\d.]+) (too \w+)$")
+_SURE = 5.0
+"""mm that every axis lacks at least: where it is less, the search decides"""
+
+
+def out_of_travel(work: Work, allowed: Allowed) -> list[Diagnostic]:
+    """Errors, before any search, where travel rules out passes whatever their tool axis: of those whose own axis is outside
+    alike, the one that is farthest is looked at."""
+    alike: dict[tuple[str, str], list[tuple[Pass, str]]] = {}
+    for one in work.passes:
+        own = turned(one, one.axis, work.machine).refused
+        if own.startswith("travel"):
+            alike.setdefault((_pair(own), one.fixed), []).append((one, own))
+    found = []
+    for some in alike.values():
+        one, own = max(some, key=lambda each: _depth(each[1]))
+        least = nearest_inside(one, work.machine, allowed)
+        if _SURE < least.size < np.inf:
+            found.append(_hopeless(work, some, one, f"{own}; {_no_other(one, least)}"))
+    return found
+
+
+def _hopeless(work: Work, some: list[tuple[Pass, str]], one: Pass, why: str) -> Diagnostic:
+    more = f"; the CL's axis is outside alike in {len(some) - 1} more passes" if len(some) > 1 else ""
+    return error("orient.travel", f"pass {one.number} with the axis of the CL file: {why}{more}", file=work.toolpath.file,
+                 lines=[one.line, *(each.line for each, _ in some if each is not one)][:6], count=len(some), hint=REACH)
+
+
+def _no_other(one: Pass, least: Lack) -> str:
+    """Why no other axis is left."""
+    if one.fixed:
+        return f"no other axis is allowed ({one.fixed})"
+    return f"no other axis is inside travel, the nearest to it has {least.why.removeprefix('travel: ')}"
 
 
 def unfit(work: Work, results: list[Tried]) -> list[Diagnostic]:
@@ -25,7 +63,7 @@ def unfit(work: Work, results: list[Tried]) -> list[Diagnostic]:
 
 
 def _told(work: Work, bad: list[Tried], codes: tuple[str, str], hint: str, why: Callable[[Tried], str]) -> list[Diagnostic]:
-    """One diagnostic per kind; of what touches, the deepest stands for all."""
+    """One diagnostic per kind; the deepest and the farthest beyond travel stands for all."""
     alike: dict[tuple[bool, str, str], list[Tried]] = {}
     for one in bad:
         alike.setdefault((one.best is not one.own, _pair(why(one)), one.own.one.fixed), []).append(one)
@@ -58,12 +96,12 @@ def _nearest(lost: list[Lost]) -> str:
 
 
 def _pair(why: str) -> str:
-    """What touches, without by how much and where; another reason as it stands."""
-    found = _BY.match(why)
-    return found[1] if found else why
+    """What touches, which axis ends, without by how much and where; another reason as it stands."""
+    found, beyond = _BY.match(why), _BEYOND.match(why)
+    return f"{beyond[1]} {beyond[3]}" if beyond else found[1] if found else why
 
 
 def _depth(why: str) -> float:
-    """mm that something touches by; 0 where the reason is another."""
-    found = _BY.match(why)
+    """mm that something touches by, mm or degrees that an axis is beyond its travel; 0 where the reason is another."""
+    found = _BY.match(why) or _BEYOND.match(why)
     return float(found[2]) if found else 0.0
