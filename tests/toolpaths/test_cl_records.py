@@ -160,9 +160,36 @@ def test_events_keep_their_words() -> None:
 
 @pytest.mark.parametrize("text", ["TOOL PATH/A,TOOL,T\nTLDATA/TURN,0.8,1,2,3\nGOTO/1,2,3\n",
                                   "UNITS/MM\nSPINDL/ 500.0,SFM,CCLW\nGOTO/1,2,3\n",
-                                  "TOOLNO/1,TURN,,,80.,$\n5.,ON,0.0,NOTE\nGOTO/1,2,3\n"])
+                                  "TOOLNO/1,TURN,,,80.,$\n5.,ON,0.0,NOTE\nGOTO/1,2,3\n",
+                                  "LOADTL/3,ADJUST,9,TURN\nGOTO/1,2,3\n"])
 def test_turning_is_told(text: str) -> None:
     assert [op.turning for op in read(text).operations] == [True]
+
+
+@pytest.mark.parametrize("text", ["SPINDL/ 500.0,SMM,CCLW\nTRNTYP/WORLD,0,0,0\nGOTO/1,2,3\n",
+                                  "$$*CATIA0\nSPINDL/ 500.0,SMM,CCLW\n$$ OPERATION NAME : Face.1\nGOTO/1,2,3\n"])
+def test_turning_told_before_its_operation_begins_is_of_that_operation(text: str) -> None:
+    assert [op.turning for op in read(text).operations] == [True]
+
+
+def test_turning_told_after_the_last_point_is_of_the_last_operation() -> None:
+    p = read("TRNTYP/WORLD,0,0,0\nGOTO/1,2,3\nTRNTYP/WORLD,0,0,0\nGOTO/1,2,3\nSPINDL/ 500.0,SMM,CCLW\nFINI\n")
+    assert [op.turning for op in p.operations] == [False, True]
+
+
+def test_each_operation_of_solidworks_begins_at_its_trntyp() -> None:
+    p = read("UNIT/MM\nCUTTER/12\nLOAD/TOOL,3\nSPINDL/900,RPM,CLW\nTRNTYP/WORLD,0,0,0\nCSYS/1.,0,0,0,0,1.,0,0,0,0,1.,0\n"
+             "FEDRAT/80,MMPM\nGOTO/0,0,1\nGOTO/4,0,1\nSPINDL/700,RPM,CLW\nTRNTYP/WORLD,0,0,0\n"
+             "CSYS/1.,0,0,0,0,0,1.,0,0,-1.,0,7.\nGOTO/0,0,1\nFINI\n")
+    assert [op.name for op in p.operations] == ["OP 1", "OP 2"]
+    assert p.operation.tolist() == [0, 0, 1]
+    assert [p.frames[op.frame].origin for op in p.operations] == [(0, 0, 0), (0, 0, 7)]
+    assert [(e.index, e.word) for e in p.events] == [(0, "LOADTL"), (0, "SPINDL"), (2, "SPINDL")]
+
+
+def test_trntyp_means_nothing_outside_solidworks() -> None:
+    p = read("CSI_TOOL_PATH/A\nMCS/1,0,0,0,1,0,0,0,1,0,0,0\nTRNTYP/WORLD,0,0,0\nGOTO/0,0,1\n")
+    assert [op.name for op in p.operations] == ["A"]
 
 
 @pytest.mark.parametrize("name", sorted(EXPECTED))

@@ -308,9 +308,10 @@ def _operations(b: Builder, n: int) -> tuple[Array, tuple[Operation, ...], tuple
     column = spread(b.operation, n, np.int32)
     if b.declared is not None and b.declared.operations:
         return np.maximum(column, 0), tuple(b.declared.operations), tuple(b.declared.frames) or (Frame("absolute"),)
-    operations = [replace(op, turning=i in b.turning) for i, op in enumerate(b.operations)]
+    turning = {int(column[row]) if row < n else op for op, row in b.turning}
+    operations = [replace(op, turning=i in turning) for i, op in enumerate(b.operations)]
     if not operations or (n and column[0] < 0):
-        operations.insert(0, Operation(turning=-1 in b.turning))
+        operations.insert(0, Operation(turning=-1 in turning))
         column = column + 1
     used, first = np.unique(column, return_index=True)
     system = spread(b.system, n, np.int32)

@@ -128,7 +128,8 @@ class Builder:
         self.cycles: list[Cycle] = []
         self.heights: dict[int, Heights] = {}
         """by cycle, where the file states its planes as heights"""
-        self.turning: set[int] = set()
+        self.turning: set[tuple[int, int]] = set()
+        """(operation, row) where words of turning stood"""
         self.declared: Declared | None = None
         self.zsurf: float | None = None
         self.subprograms: dict[float, tuple[int, int]] | None = None
@@ -200,6 +201,10 @@ class Builder:
     def event(self, word: str, values: tuple[str | float, ...] = ()) -> None:
         """Note an event before the next row."""
         self.events.append(Event(self.row, word, values, self.line))
+
+    def turns(self) -> None:
+        """The operation of the next row is turning, whatever still begins before that row."""
+        self.turning.add((self.operation.now, self.row))
 
     def last_point(self) -> Triple | None:
         """Coordinates of the row before, as written; None where there is none."""

@@ -74,10 +74,16 @@ def solidworks_feature(b: Builder, s: Statement) -> None:
     begin_operation(b, s.body.strip())
 
 
+def turn_type(b: Builder, s: Statement) -> None:
+    """SolidWorks CAM's `.apt` has TRNTYP at the head of each operation, before its CSYS, and names none of them."""
+    if b.dialect.name == "solidworks":
+        begin_operation(b, f"OP {len(b.operations) + 1}")
+
+
 def apply(b: Builder, s: Statement) -> None:
     """APPLY/MILL or TURN (MfgSuite)."""
     if s.has("TURN"):
-        b.turning.add(b.operation.now)
+        b.turns()
 
 
 def partno(b: Builder, s: Statement) -> None:
@@ -115,7 +121,7 @@ def dwell(b: Builder, s: Statement) -> None:
 def spindl(b: Builder, s: Statement) -> None:
     """An event; a surface speed belongs to turning."""
     if s.has("SFM", "SMM"):
-        b.turning.add(b.operation.now)
+        b.turns()
     plain_event(b, s)
 
 
@@ -240,5 +246,5 @@ HANDLERS: dict[str, Callable[[Builder, Statement], None]] = {
     "$$->TOOLPATH": own_header, "$$->FRAME": own_item, "$$->TOOL": own_item, "$$->OPERATION": own_item,
     "$$->USE": own_use, "$$->SPLINE": own_spline, **dict.fromkeys(EVENTS, plain_event), "SPINDL": spindl, "DWELL": dwell,
     "MODE": mode, "CSI_TOOL_PATH": named_operation, "OPNAME": named_operation, "APPLY": apply,
-    "OPFEATSTART": solidworks_feature,
+    "OPFEATSTART": solidworks_feature, "TRNTYP": turn_type,
 }

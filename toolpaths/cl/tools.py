@@ -104,8 +104,8 @@ def _drop_plain_load(b: Builder, number: float) -> None:
 
 
 def loadtl(b: Builder, s: Statement) -> None:
-    """LOADTL/number[, register][, LENGTH, length][, ADJUST | OSETNO | OFFSET, register], or number, pocket, length,
-    register (ISO): numbers behind a word belong to it."""
+    """LOADTL/number[, register][, LENGTH, length][, ADJUST | OSETNO | OFFSET, register][, MILL | TURN], or number, pocket,
+    length, register (ISO): numbers behind a word belong to it."""
     numbers = s.numbers
     if not numbers:
         b.log.error("cl.tool-number", f"LOADTL/{s.body}: it takes a tool number", b.line)
@@ -118,6 +118,8 @@ def loadtl(b: Builder, s: Statement) -> None:
     if length is not None:
         b.log.info("cl.tool-length", f"LOADTL/{s.body}: the length is not used, it may be that of the cutter or of the "
                    "whole tool", b.line, f"state the gauge length of tool {numbers[0]:g} in the set-up")
+    if s.has("TURN"):
+        b.turns()
     change(b, numbers[0], register)
 
 
@@ -148,7 +150,7 @@ def toolno(b: Builder, s: Statement) -> None:
     kind, OSETNO, length register, radius register.
     """
     if s.has(*TURNING):
-        b.turning.add(b.operation.now)
+        b.turns()
     kind = next((w for w in s.words if isinstance(w, str) and w), "")
     size = [w for w in s.words[1:] if isinstance(w, float)]
     fields: dict[str, Any] = {"shape": kind} if kind else {}
@@ -183,7 +185,7 @@ def tldata(b: Builder, s: Statement) -> None:
     n = [w for w in s.words if isinstance(w, float)]
     shape = kinds[0] if kinds else ""
     if shape in TURNING:
-        b.turning.add(b.operation.now)
+        b.turns()
         describe(b, shape=shape)
         return
     names = ("diameter", "corner_radius", "length")

@@ -49,7 +49,7 @@ LENGTH_EVENTS = frozenset({"RETRCT", "CLEARP", "CLRSRF", "LEADER"})
 SILENT = frozenset({
     "PAINT", "PPWORD", "PPFUN", "SYN", "OPFEATEND", "MOVE_ATTRIB", "BOX", "SETUP", "SWITCH", "DISPLY",
     "AUTOPS", "PSIS", "INTOL", "OUTTOL", "TOLER", "LINTOL", "MACHIN", "ALIGN", "PLABEL", "CLPRNT", "NOPOST", "PLOT",
-    "TRNTYP", "CSI_SET_EXTENSION_LENGTH", "MCHTOL", "CUT", "START_OP", "END_OP", "TOOLPATH_TYPE",
+    "CSI_SET_EXTENSION_LENGTH", "MCHTOL", "CUT", "START_OP", "END_OP", "TOOLPATH_TYPE",
     "ARCSLP", "MCS2", "START", "OPERATION", "BEGIN", "MATERL", "TCP", "CSI_PATH_TOLERANCE", "CSI_SET_PATH_PARAM",
 })
 """Display, listing, tolerance and bookkeeping: no motion, nothing for the machine."""
