@@ -1,4 +1,4 @@
-"""Write the sample error models of this folder: `python samples/errors/make_errors.py [FOLDER]`. Figures are invented."""
+"""Write the error models and readings of this folder: `python samples/errors/make_errors.py [FOLDER]`. All invented."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 
 import machines
 from machines.geometric_error.covariance import angular
+from machines.geometric_error.csv_table import write_csv
 from machines.geometric_error.curves import Curve, Fourier, Table
 from machines.geometric_error.exchange import save
 from machines.geometric_error.model import ErrorModel
@@ -71,12 +72,41 @@ def with_doubt(model: ErrorModel) -> ErrorModel:
     return replace(model, covariance=np.diag([DOUBT[angular(name)] ** 2 for name in model.names]))
 
 
+def runs(rng: np.random.Generator) -> str:
+    """Readings of X of mill-3axis as ISO 230-2 has them: five times there and back, each way its own column; any order."""
+    x = np.linspace(-500.0, 500.0, 11)
+    there = 0.012 * x / 500.0 + 0.004 * np.sin(x / 90.0)
+    truth = np.stack([there, there - 0.003], axis=1)
+    rows = []
+    for k in range(5):
+        read = truth + rng.normal(size=truth.shape) * 5e-4
+        rows.append(np.column_stack([x, read])[:: 1 if k % 2 == 0 else -1])
+    found = np.concatenate(rows)
+    return write_csv({"X": ("mm", found[:, 0]), "EXX+": ("um", found[:, 1].round(5)), "EXX-": ("um", found[:, 2].round(5))},
+                     ["readings of a laser, five runs: postproc errors import runs-mill-3axis-X.csv --average ..."])
+
+
+def measured_map(rng: np.random.Generator) -> str:
+    """Displacements of a ball 120 mm below the gauge point of mikron-ucp710 over X, Y and C, as read by a laser tracker."""
+    levels = np.meshgrid([-300.0, 0.0, 300.0], [-250.0, 0.0, 250.0], np.radians([0.0, 90.0, 180.0, 270.0]), indexing="ij")
+    x, y, c = (level.ravel() for level in levels)
+    moved = [0.010 * x / 300.0 - 0.004 * y / 250.0 + 0.012 * np.cos(c), 0.008 * y / 250.0 + 0.012 * np.sin(c),
+             0.006 * (x / 300.0) ** 2 - 0.005 * np.cos(2.0 * c)]
+    read = [(values + rng.normal(size=len(x)) * 3e-4).round(5) for values in moved]
+    columns = {"X": ("mm", x), "Y": ("mm", y), "C": ("deg", c)}
+    columns |= {name: ("um", values) for name, values in zip(("dx", "dy", "dz"), read, strict=True)}
+    return write_csv(columns, ["readings of a tracker, tool of 120 mm, machine axes: postproc errors import "
+                               "map-mikron-ucp710.csv --tool-length 120 --directions machine --repeats C=360 ..."])
+
+
 def main() -> None:
     """Write all."""
     folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent
     for made in (serial("mikron-ucp710", 1), serial("linuxcnc-xyzac-trt", 2), parallel("uranesx", 3),
                  parallel("h4a-c-table", 4)):
         save(made, folder, f"invented errors of {made.machine}, 10 to 50 um and 5 to 20 arcsec")
+    (folder / "runs-mill-3axis-X.csv").write_text(runs(np.random.default_rng(5)), encoding="utf-8")
+    (folder / "map-mikron-ucp710.csv").write_text(measured_map(np.random.default_rng(6)), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -164,6 +164,25 @@ def test_measured_readings_become_means_with_their_doubt(tmp_path: Path) -> None
     assert np.sqrt(np.diag(found.covariance)) == pytest.approx([0.001 / np.sqrt(2)] * 2)
 
 
+def test_sample_readings_become_models(tmp_path: Path) -> None:
+    run("import", SAMPLES / "runs-mill-3axis-X.csv", "-m", "mill-3axis", "-o", tmp_path / "x.toml", "--average")
+    found = load(tmp_path / "x.toml", machines.load("mill-3axis"))
+    assert found.covariance is not None and len(found.names) == 22
+    assert np.sqrt(np.diag(found.covariance)) == pytest.approx(0.0005 / np.sqrt(5), rel=0.3)
+    x = np.linspace(-500.0, 500.0, 11)
+    truth = 0.012 * x / 500.0 + 0.004 * np.sin(x / 90.0)
+    assert found.axes.components[0].curve.at(x, 1.0) == pytest.approx(truth, abs=0.0008)
+    assert found.axes.components[0].curve.at(x, -1.0) == pytest.approx(truth - 0.003, abs=0.0008)
+    run("import", SAMPLES / "map-mikron-ucp710.csv", "-m", "mikron-ucp710", "-o", tmp_path / "m.toml", "--tool-length", 120,
+        "--directions", "machine", "--repeats", "C=360", "--zero", "X=0", "--zero", "Y=0", "--zero", "C=0")
+    machine = machines.load("mikron-ucp710")
+    kin = machine.kinematics.with_tool(120.0)
+    q = np.array([[0.0, 0.0, 9.0, 0.0, 0.0], [0.0, 0.0, 9.0, 0.0, np.radians(-180.0)]])
+    moved = load(tmp_path / "m.toml", machine).on(kin).place(q)[0] - kin.forward(q)[0]
+    assert moved[0] == pytest.approx(np.zeros(3), abs=1e-12)
+    assert moved[1] == pytest.approx([0.024, 0.0, 0.0], abs=0.0015)  # -24 um along the bed's x, seen from a table half round
+
+
 WRONG = [("to-map", "-o", "m.toml", "--over", "XQ"), ("to-map", "-o", "m.toml", "--over", "XX"),
          ("to-map", "-o", "m.toml", "--step", "X"), ("to-map", "-o", "m.toml", "--step", "X=0"),
          ("to-map", "-o", "m.toml", "--step", "X=1e99"), ("to-map", "-o", "m.toml", "--at", "Q=1"),
