@@ -123,9 +123,9 @@ def to_map(file: ModelFile, machine: MachineName, output: MapFile, over: Over = 
         model, found = loaded(file, m)
         steps = exports.in_units(pairs("--step", step, known))
         stands = exports.in_units(pairs("--at", at, m.axis_names))
-        lattice, fixed = exports.lattice_for(model, m, over, steps, stands, tool_length, directions)
+        empty = or_refused(lambda: exports.lattice_for(model, m, over, steps, stands, tool_length, directions), file)
         allowed = None if loss is None else loss * UNITS["um"]
-        made = or_refused(lambda: exports.to_map(model, m, lattice, fixed, allowed), file)
+        made = or_refused(lambda: exports.to_map(model, m, *empty, allowed), file)
         files = model_files(made.model, output.stem, f"map of {file.name}", output.name)
     figures, told = map_figures(model, made)
     finish(files, output.parent, [file], json, found, told, figures)

@@ -9,6 +9,7 @@ import numpy as np
 
 from machines.geometric_error.actual import Actual
 from machines.geometric_error.actual_map import ActualByMap, part_side
+from machines.geometric_error.averages import SAME
 from machines.geometric_error.axis_motion import sense
 from machines.geometric_error.covariance import angular
 from machines.geometric_error.csv_table import UNITS, write_csv
@@ -159,12 +160,22 @@ def lattice_for(model: ErrorModel, machine: Machine, letters: str, step: Steps, 
         at: mm or rad, joints that the lattice does not name and that do not stand in the middle of the volume
         length: mm, of the tool whose tip is displaced
         directions: "machine" or "table"
+
+    Raises:
+        ValueError: a step for what is no coordinate, or a place to stand for what is one or outside travel.
     """
     letters = letters or ("".join(x for x, turns in zip(machine.axis_names, machine.rotary, strict=True) if not turns)
                           if isinstance(machine.kinematics, Serial) else POINT)
     fixed = middle(machine)
     for letter, value in at.items():
-        fixed[machine.axis_names.index(letter)] = value
+        j = machine.axis_names.index(letter)
+        fixed[j] = value
+        if not machine.limits.lower[j] <= value <= machine.limits.upper[j]:
+            raise ValueError(f"{letter} cannot stand there: it is outside its travel")
+    for what, names, wrong in (("step", step, set(step) - set(letters)), ("place to stand", at, set(at) & set(letters))):
+        if wrong:
+            raise ValueError(f"a {what} is given for {', '.join(x for x in names if x in wrong)}; the map's coordinates are "
+                             f"{', '.join(letters)}")
     bed = part_side(machine.kinematics, machine.structure) if directions == "machine" else ()
     ends = _box(model, machine, fixed, length)
     levels = [_levels(model, machine, letter, ends[letter], step.get(letter)) for letter in letters]
@@ -186,6 +197,8 @@ def _levels(model: ErrorModel, machine: Machine, letter: str, ends: tuple[float,
     """(nodes, period) of one coordinate."""
     whole = letter in machine.axis_names and not np.isfinite(machine.limits.lower[machine.axis_names.index(letter)])
     own = [c.curve.x for c in model.axes.components if c.name.axis == letter and isinstance(c.curve, Table)]
+    if model.map is not None and letter in model.map.letters:
+        own = [model.map.nodes[model.map.letters.index(letter)]]
     if whole:
         count = TURN if step is None else 1 + max(int(np.ceil(2.0 * np.pi / step - 1e-9)), 3)
         return np.linspace(0.0, 2.0 * np.pi, count)[:-1], 2.0 * np.pi
@@ -211,6 +224,7 @@ def to_map(model: ErrorModel, machine: Machine, lattice: ErrorMap, fixed: Floats
         inside = map_loss(ActualByMap(nominal, made), actual, places)
     else:
         made, inside = refined(actual, nominal, lattice, fixed, tolerance, MOST_NODES)
+    _measured(actual, nodes_of(ActualByMap(nominal, made), made.places(), fixed))
     result = ErrorModel(map=made, corrected_by=model.corrected_by, name=model.name, machine=model.machine)
     volume = samples(model, machine, actual, PLACES)
     volume = volume[~result.on(kinematics).outside(volume).any(axis=1)]
@@ -219,6 +233,18 @@ def to_map(model: ErrorModel, machine: Machine, lattice: ErrorMap, fixed: Floats
         return MadeMap(result, inside, lost, model.covariance is not None)
     rows = _rows(ActualByMap(nominal, made), actual, fixed)
     return MadeMap(replace(result, covariance=rows @ model.covariance @ rows.T), inside, lost, False)
+
+
+def _measured(actual: Actual, w: Floats) -> None:
+    """Nothing where all of w (N, 3 + R) was measured.
+
+    Raises:
+        ValueError: else, naming the axes.
+    """
+    beyond = np.asarray(actual.outside(w, SAME).any(axis=0))
+    if beyond.any():
+        axes = [x for x, bad in zip(actual.kinematics.axis_names, beyond.tolist(), strict=True) if bad]
+        raise ValueError(f"nodes lie beyond what was measured of {', '.join(axes)}; take --at inside it")
 
 
 def _rows(by_map: ActualByMap, actual: Actual, fixed: Floats) -> Floats:

@@ -80,8 +80,21 @@ def read_sources(sources: Sequence[str], machine: Machine, how: How) -> tuple[Er
             found.append(error("error-import.map", "a map stands alone", file=source,
                                hint=f"import it without the other {len(sources) - 1} sources"))
     if not has_errors(found):
-        found += fits(model, machine)
+        found += [*fits(model, machine), *_unused(how, model)]
     return (None if has_errors(found) else model), found
+
+
+def _unused(how: How, model: ErrorModel) -> list[Diagnostic]:
+    """What was asked for and concerns none of the sources."""
+    letters = {c.name.axis for c in model.axes.components} if model.map is None else set(model.map.letters)
+    asked = [f"{letter} repeats" for letter in how.periods if letter not in letters]
+    if model.map is None:
+        given = {"tool length": how.tool_length, "zero": how.zero, "directions of the machine": how.directions == "machine"}
+        asked += [f"a map's {what}" for what, value in given.items() if value]
+    elif how.rule == "spline":
+        asked.append("splines")
+    return [error("error-import.unused", f"no source takes that {what}" if "repeats" in what else f"no source takes {what}",
+                  hint="leave it out, or add what it is for") for what in asked]
 
 
 def _twice(part: ErrorModel, places: dict[str, str], source: str) -> list[Diagnostic]:

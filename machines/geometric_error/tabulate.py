@@ -67,12 +67,15 @@ def rows_for(model: ErrorModel, travel: Mapping[str, tuple[float, float]], step:
         repeat: False where tables cannot repeat: then over the travel
 
     Raises:
-        ValueError: more rows would be needed.
+        ValueError: more rows would be needed, or a step is for an axis without components.
     """
     groups: dict[tuple[str, tuple[float, float], float], list[Component]] = {}
     for component in model.axes.components:
         period = _period(component.curve) if repeat else 0.0
         groups.setdefault((component.name.axis, component.curve.range, period), []).append(component)
+    unknown = [axis for axis in step if axis not in {key[0] for key in groups}]
+    if unknown:
+        raise ValueError(f"a step is given for {', '.join(unknown)}, of which the model has no errors that are written")
     found: dict[str, Rows] = {}
     for (axis, span, period), mine in groups.items():
         lower, upper = (0.0, period) if period else span if np.isfinite(span).all() else travel[axis]

@@ -183,6 +183,41 @@ def test_sample_readings_become_models(tmp_path: Path) -> None:
     assert moved[1] == pytest.approx([0.024, 0.0, 0.0], abs=0.0015)  # -24 um along the bed's x, seen from a table half round
 
 
+REFUSED = [
+    (("to-map", "-o", "m.toml", "--step", "A=30"), "a step is given for A; the map's coordinates are X, Y, Z"),
+    (("to-map", "-o", "m.toml", "--at", "X=30"), "a place to stand is given for X"),
+    (("to-map", "-o", "m.toml", "--at", "A=300"), "A cannot stand there"),
+    (("to-map", "-o", "m.toml", "--step", "X=0.1"), "at most 200000"),
+    (("to-linuxcnc", "-o", "t", "--step", "X=1"), "711 rows for X, 256 are held")]
+
+
+@pytest.mark.parametrize(("arguments", "word"), REFUSED, ids=[" ".join(r[0]) for r in REFUSED])
+def test_what_cannot_be_had_is_refused(tmp_path: Path, arguments: tuple[str, ...], word: str,
+                                       monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    done = run(arguments[0], MIKRON, "-m", "mikron-ucp710", *arguments[1:], code=1)
+    assert word in done.stderr and "error-export.refused" in done.stderr and list(tmp_path.iterdir()) == []
+
+
+def test_a_map_stays_within_what_was_measured(tmp_path: Path) -> None:
+    (tmp_path / "e.toml").write_text("[components.EXA]\npolynomial = [3, 1]\nrange = [0, 30]\n")
+    done = run("to-map", tmp_path / "e.toml", "-m", "mikron-ucp710", "-o", tmp_path / "m.toml", "--at", "A=45", code=1)
+    assert "beyond what was measured of A" in done.stderr
+    run("to-map", tmp_path / "e.toml", "-m", "mikron-ucp710", "-o", tmp_path / "m.toml", "--over", "ZA", "--step", "A=10")
+    found = load(tmp_path / "m.toml", machines.load("mikron-ucp710")).map
+    assert found is not None and np.degrees(found.nodes[1]) == pytest.approx([0.0, 10.0, 20.0, 30.0])
+    again = figures("to-map", tmp_path / "m.toml", "-m", "mikron-ucp710", "-o", tmp_path / "again.toml", "--over", "ZA")
+    assert again["nodes"] == {"Z": 2, "A": 4} and again["lattice"]["tip_worst_um"] < 1e-6  # the map's own nodes
+
+
+def test_options_that_concern_no_source_are_told(tmp_path: Path) -> None:
+    done = run("import", SAMPLES / "mikron-ucp710-X.csv", "-m", "mikron-ucp710", "-o", tmp_path / "e.toml", "--repeats",
+               "C=360", "--tool-length", 10, "--zero", "X=0", "--directions", "machine", code=1)
+    for word in ("C repeats", "a map's tool length", "a map's zero", "a map's directions"):
+        assert word in done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
 WRONG = [("to-map", "-o", "m.toml", "--over", "XQ"), ("to-map", "-o", "m.toml", "--over", "XX"),
          ("to-map", "-o", "m.toml", "--step", "X"), ("to-map", "-o", "m.toml", "--step", "X=0"),
          ("to-map", "-o", "m.toml", "--step", "X=1e99"), ("to-map", "-o", "m.toml", "--at", "Q=1"),
