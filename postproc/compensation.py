@@ -21,7 +21,8 @@ from postproc.corrected.arcs import fitted_arcs
 from postproc.corrected.cycles import whole_holes
 from postproc.corrected.points import between, divided
 from postproc.corrected.reversals import Divided, arcs_cut, inserted, starts_of
-from postproc.corrected.work import CorrectedEnds, Work
+from postproc.corrected.settled import Writing, settled
+from postproc.corrected.work import ALONE, CorrectedEnds, Work
 from postproc.groups import groups
 from postproc.modes import OutputModes
 from postproc.moves import Moves
@@ -49,6 +50,7 @@ class Compensation:
         added: points added; resolved: arcs that became lines
         partial: blocks near a pole, whose axis is corrected in part
         moved: (J,) largest correction of each joint
+        apart: (K,) True for blocks that no canned cycle may stand for: each has its own correction
         owner, part: block of the nominal path that each block is of, and part of its time
         doubt_tip, doubt_axis: largest standard deviation that the model's covariance gives; None where it has none
     """
@@ -65,6 +67,7 @@ class Compensation:
     moved: Floats
     owner: Ints
     part: Floats
+    apart: Bools
     doubt_tip: float | None = None
     doubt_axis: float | None = None
 
@@ -80,7 +83,7 @@ class Compensation:
 
 
 def compensate(path: Path, moves: Moves, tools: Ints, kinematics: Callable[[int], Kinematics], model: ErrorModel,
-               modes: OutputModes, tolerance: float, axis_tolerance: float, written: Callable[[Path], Floats],
+               modes: OutputModes, tolerance: float, axis_tolerance: float, writing: Writing, always: Bools,
                beyond: bool = False, file: str = "") -> tuple[Path | None, Compensation | None, list[Diagnostic]]:
     """The path with corrected joints, points added where they are needed; None where the model does not reach.
 
@@ -88,7 +91,8 @@ def compensate(path: Path, moves: Moves, tools: Ints, kinematics: Callable[[int]
         tools: (K,) index of the tool of each block
         kinematics: nominal, at the tip of the tool of an index
         tolerance, axis_tolerance: mm and rad of the whole conversion
-        written: words (K, J) of a path's blocks at their ends, as they are written
+        writing: how a path is written
+        always: (C,) cycles that stay canned cycles: single moves do not replace them
         beyond: True corrects outside the measured range with the error at its end
     """
     allowed, before_cut = SHARE * tolerance, len(path)
@@ -99,15 +103,15 @@ def compensate(path: Path, moves: Moves, tools: Ints, kinematics: Callable[[int]
     work = work_on(path, np.arange(len(path)))
     cut = arcs_cut(path, work)
     if work.two_way:
-        cut = _points_by_mean(cut, moves, modes, work_on(cut.path, cut.owner, mean=True), allowed)
+        cut = _points_by_mean(cut, moves, modes, work_on(cut.path, cut.owner, mean=True), allowed, always)
     path, work = cut.path, work_on(cut.path, cut.owner)
-    corrected, found = _at_ends(path, moves, modes, work, allowed)
+    corrected, found = _at_ends(path, moves, modes, work, allowed, always)
     for k in range(SETTLED if work.two_way else 0):
         before = work.way
-        work.take_ways(corrected, written(corrected), drift=k == 0)
+        work.take_ways(corrected, writing.words(corrected), drift=k == 0)
         if np.array_equal(work.way, before):
             break
-        corrected, found = _at_ends(path, moves, modes, work, allowed)
+        corrected, found = _at_ends(path, moves, modes, work, allowed, always)
     live = ~path.home
     diagnostics = _unmeasured(path, moves, modes.control, found.unmeasured & live[:, None], beyond, file)
     lost = live & ~np.isfinite(found.q).all(axis=1)
@@ -115,8 +119,9 @@ def compensate(path: Path, moves: Moves, tools: Ints, kinematics: Callable[[int]
         return None, None, diagnostics or [_lost(path, moves, lost, file)]
     starts = starts_of(corrected, path, work, allowed)
     corrected, resolved = fitted_arcs(corrected, path, work, starts.q, allowed)
-    whole = divided(corrected, work, starts, allowed).of(cut)
-    corrected = whole.path
+    whole = divided(corrected, work, starts, allowed)
+    corrected, apart = settled(whole, work, writing, allowed), work.whole[whole.owner] == ALONE
+    whole = replace(whole, path=corrected).of(cut)
     (tip_before, axis_before), (tip_after, axis_after) = (x[live].max(axis=0, initial=0.0).tolist()
                                                           for x in (found.before, found.after))
     doubt_tip, doubt_axis = _doubt(path, live, work, model)
@@ -124,24 +129,25 @@ def compensate(path: Path, moves: Moves, tools: Ints, kinematics: Callable[[int]
         tip_before, axis_before, tip_after, axis_after, residual_tip=found.residual[:, :3],
         residual_axis=found.residual[:, 3:], added=len(corrected) - before_cut, resolved=int(resolved.sum()),
         partial=int(found.partial[live].sum()), moved=np.abs(found.q - path.q).max(axis=0, initial=0.0),
-        owner=whole.owner, part=whole.part, doubt_tip=doubt_tip, doubt_axis=doubt_axis)
+        owner=whole.owner, part=whole.part, apart=apart, doubt_tip=doubt_tip, doubt_axis=doubt_axis)
     return corrected, report, [*diagnostics, *(info("compensation", line, file=file) for line in report.lines())]
 
 
-def _points_by_mean(cut: Divided, moves: Moves, modes: OutputModes, work: Work, allowed: float) -> Divided:
+def _points_by_mean(cut: Divided, moves: Moves, modes: OutputModes, work: Work, allowed: float, always: Bools) -> Divided:
     """The nominal path with the points that the correction by mean ways needs, so that the ways are those of all points."""
-    corrected, _ = _at_ends(cut.path, moves, modes, work, allowed)
+    corrected, _ = _at_ends(cut.path, moves, modes, work, allowed, always)
     starts = starts_of(corrected, cut.path, work, allowed)
     block, share, _ = between(corrected, work, starts, allowed)
     return inserted(cut.path, block, share, work.nominal(block, share)).of(cut)
 
 
-def _at_ends(path: Path, moves: Moves, modes: OutputModes, work: Work, allowed: float) -> tuple[Path, CorrectedEnds]:
+def _at_ends(path: Path, moves: Moves, modes: OutputModes, work: Work, allowed: float,
+             always: Bools) -> tuple[Path, CorrectedEnds]:
     """The path with its block ends corrected by the ways of `work`, holes as a whole; and what the correction said."""
     found = _turned_in_travel(work.ends(), path, modes.control, work)
     corrected = framed(replace(path, q=found.q), path, modes, work)
     corrected = replace(corrected, q=unstated(kept_in_travel(corrected.q, path, modes.control), path))
-    corrected, work.whole = whole_holes(corrected, path, moves, work, allowed)
+    corrected, work.whole = whole_holes(corrected, path, moves, work, allowed, always)
     return corrected, found
 
 

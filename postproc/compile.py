@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from postproc.canned import holes_of
@@ -15,19 +17,25 @@ from postproc.program import Command, Commands, Hole, Program
 from postproc.rounding import decimals
 from postproc.sections import sections_of, with_sections
 from postproc.skips import after, skipped, with_skips
-from postproc.word_rows import WordRows, word_rows
-from toolpaths.arrays import Ints
+from postproc.word_rows import WordRows, block_tools, joints_of, with_turns, word_rows
+from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.diagnostics import Diagnostic, info
+
+if TYPE_CHECKING:
+    from postproc.corrected.settled import Writing
 
 
 def compile_program(job: Job, moves: Moves, path: Path,
-                    planned: Planned | None = None) -> tuple[Program, Feeds, list[Diagnostic]]:
-    """The canonical program of a path along `moves`; `planned` are the feeds that the plan allows."""
+                    planned: Planned | None = None,
+                    apart: Bools | None = None) -> tuple[Program, Feeds, list[Diagnostic]]:
+    """The canonical program of a path along `moves`; `planned` are the feeds that the plan allows, blocks that are `apart`
+    (K,) no part of canned cycles."""
     toolpath, control, controller = job.toolpath, job.control, job.controller
     places = decimals(control, controller)
     skip = skipped(toolpath, moves, path)
     words = words_of(job, moves, path, after(skip))
-    native, holes = holes_of(toolpath, moves, path, words, control, controller, skip)
+    native, holes = holes_of(toolpath, moves, path, words, control, controller,
+                             skip if apart is None else skip | apart)
     feeds = plan_feeds(path, control, words.end - words.start, moves.feed[path.move],
                        toolpath.pass_[moves.row[path.move]], native, job.options.feed_mode, controller.feed,
                        planned)
@@ -53,6 +61,20 @@ def words_of(job: Job, moves: Moves, path: Path, anew: Ints | None = None) -> Wo
     """The words of a path's blocks; the blocks `anew` state every axis."""
     return word_rows(path, moves, job.control, job.kinematics, job.gauge_length, decimals(job.control, job.controller),
                      np.zeros(0, dtype=np.int64) if anew is None else anew, job.rounding.made_up, job.two_way)
+
+
+def writing_of(job: Job, moves: Moves) -> Writing:
+    """How paths along `moves` are written, for the correction of geometric errors."""
+    from postproc.corrected.settled import Writing
+
+    def joints(path: Path, words: Floats, rows: Ints) -> Floats:
+        return joints_of(path, words, rows, block_tools(path, moves), job.kinematics, job.gauge_length)
+
+    def turned(path: Path, q: Floats, rows: Ints) -> Floats:
+        return with_turns(q, path.q[rows], path, rows, block_tools(path, moves), job.kinematics, job.rounding.made_up)
+
+    grain = np.asarray(10.0 ** -decimals(job.control, job.controller).astype(np.float64))
+    return Writing(lambda path: words_of(job, moves, path).end, joints, turned, grain)
 
 
 def _moved(commands: Commands, new: Ints) -> Commands:

@@ -38,10 +38,15 @@ def not_native(toolpath: Toolpath, moves: Moves, path: Path, native: Bools, cont
             for (key, why, hint), lines in sorted(found.items())]
 
 
+def only_canned(toolpath: Toolpath, controller: ControllerFile) -> Bools:
+    """(C,) cycles that single moves do not replace."""
+    return np.array([c.kind not in SINGLE_MOVES or c.kind in controller.cycles.rigid_only for c in toolpath.cycles],
+                    dtype=bool)
+
+
 def _rows(toolpath: Toolpath, moves: Moves, path: Path, native: Bools, controller: ControllerFile) -> Ints:
     """The moves down such holes."""
-    only = np.array([c.kind not in SINGLE_MOVES or c.kind in controller.cycles.rigid_only for c in toolpath.cycles],
-                    dtype=bool)
+    only = only_canned(toolpath, controller)
     rows = np.flatnonzero((moves.phase == Phase.DRILL) & (moves.cycle >= 0))
     rows = rows[only[moves.cycle[rows]]] if len(only) else rows[:0]
     return rows[~native[np.minimum(path.begin[rows], len(native) - 1)]]

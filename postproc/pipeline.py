@@ -13,13 +13,14 @@ import numpy as np
 import machines
 import toolpaths
 from machines.machine import Machine
-from postproc.compile import compile_program, words_of
+from postproc.compile import compile_program, writing_of
 from postproc.controllers import writer_for
 from postproc.controllers.model import ControllerFile, load_controller
 from postproc.controllers.unwritable import unwritable
 from postproc.feed import Feeds, Planned
 from postproc.job import Job, prepare
 from postproc.moves import Moves
+from postproc.not_canned import only_canned
 from postproc.options import Options
 from postproc.pass_geometry import stops_of
 from postproc.path import Path, build_path
@@ -201,7 +202,8 @@ def _stages(result: PostResult, progress: Progress | None) -> PostResult:
     if not result.ok:
         return result
     planned = None if motion is None else Planned(_on_path(result, motion.needed), options.merge_feeds)
-    program, feeds, found = compile_program(job, moves, path, planned)
+    program, feeds, found = compile_program(job, moves, path, planned,
+                                            None if result.compensation is None else result.compensation.apart)
     found += unwritable(result.controller, program, toolpath.cycles, file, job.control.length_on_z)
     result = _with(result, found, program=program, feeds=feeds)
     if not result.ok:
@@ -241,9 +243,8 @@ def _compensated(result: PostResult, job: Job, moves: Moves, path: Path) -> tupl
     assert job.errors is not None
     options = job.options
     corrected, report, found = compensate(path, moves, block_tools(path, moves), job.kinematics, job.errors, job.modes,
-                                          options.tolerance, job.axis_tolerance,
-                                          lambda path: words_of(job, moves, path).end, options.error_beyond,
-                                          job.toolpath.file)
+                                          options.tolerance, job.axis_tolerance, writing_of(job, moves),
+                                          only_canned(job.toolpath, job.controller), options.error_beyond, job.toolpath.file)
     return _with(result, found, path=corrected, nominal=path, compensation=report), corrected
 
 

@@ -12,7 +12,7 @@ from postproc.control import Control
 from postproc.groups import groups
 from postproc.moves import Moves
 from postproc.path import ARC, FEED, Path
-from postproc.word_arcs import PLANE_AXIS, PLANE_COLUMNS
+from postproc.word_arcs import PLANE_AXIS
 from toolpaths.arrays import Bools, Floats, Ints
 
 SNAP = 2.5
@@ -72,6 +72,27 @@ def _words(path: Path, q: Floats, rows: Ints, tool: Ints, kinematics: Callable[[
     return words
 
 
+def joints_of(path: Path, words: Floats, rows: Ints, tool: Ints, kinematics: Callable[[int], Kinematics],
+              lengths: Callable[[int], float]) -> Floats:
+    """Joints (N, J) that words (N, J) under the law and with the tool of the blocks `rows` (N,) mean; tool (K,)."""
+    q = np.empty_like(words)
+    for k in groups(path.frame[rows], tool[rows]):
+        index = int(tool[rows[k[0]]])
+        q[k] = path.frames[int(path.frame[rows[k[0]]])].control.joints(words[k], kinematics(index), lengths(index))
+    return q
+
+
+def with_turns(q: Floats, turns: Floats, path: Path, rows: Ints, tool: Ints, kinematics: Callable[[int], Kinematics],
+               made_up: bool) -> Floats:
+    """Joints (N, J) with the rotary joints of `turns` (N, J) that are written as q (N, J) is, by blocks `rows` (N,)."""
+    result = np.where(path.frames[0].control.machine.rotary, turns, q)
+    for k in groups(path.frame[rows], tool[rows]):
+        law, kin = path.frames[int(path.frame[rows[k[0]]])].control, kinematics(int(tool[rows[k[0]]]))
+        if law.law != "axes" or made_up:
+            result[k] = law.slides_for(kin, kin.forward(q[k])[0], result[k]) if kin.slides_affine else q[k]
+    return result
+
+
 def _made_up(q: Floats, law: Control, kin: Kinematics, places: Ints) -> Floats:
     """Joints with rounded rotary words and the tip of q (K, J)."""
     turned, rotary = q.copy(), law.rotary
@@ -111,37 +132,34 @@ def _snapped(words: Floats, path: Path, control: Control, places: Ints) -> Float
 
 
 def _held(words: Floats, path: Path, control: Control, tool: Ints, places: Ints, joints: Sequence[int]) -> Floats:
-    """Words (rounded) in which axis positions of `joints` never turn back by one last decimal: the word before stays.
+    """Words (rounded) in which rotary axes among `joints` never turn back by one last decimal: the word before stays.
 
     An axis that loses motion would have another error there, more than the decimal is worth. What is left out never adds
-    up: each block is compared with the last written position. Arcs keep the words of their plane.
+    up: each block is compared with the last written position. Slides have their words from `postproc.corrected.settled`.
     """
-    if not joints:
+    turning = [j for j in joints if j in control.rotary]
+    if not turning:
         return words
     same = np.append(False, (np.diff(path.frame) == 0) & (np.diff(tool) == 0))
     same &= ~path.home & ~np.append(False, path.home[:-1])
-    same &= np.array([frame.control.law == "axes" for frame in path.frames])[path.frame]
+    same &= np.array([frame.control.law != "tilted" for frame in path.frames])[path.frame]
     result = words.copy()
-    for j in joints:
-        free = same.copy()
-        for plane, flat in PLANE_COLUMNS.items():
-            if j in control.xyz[list(flat)]:
-                free[(path.code == ARC) & (path.plane == plane)] = False
+    for j in turning:
         along = np.where(same, 0.0, np.diff(path.q[:, j], prepend=path.q[:1, j]))
         counts = np.round(words[:, j] * 10.0 ** places[j])
-        result[:, j] = _walked(counts, free, same, np.sign(along)) / 10.0 ** places[j]
+        result[:, j] = _walked(counts, same, np.sign(along)) / 10.0 ** places[j]
     return result
 
 
-def _walked(counts: Floats, free: Bools, same: Bools, along: Floats) -> list[float]:
-    """Last decimals (K,) one after the other, those that turn back by one left out where they are `free`.
+def _walked(counts: Floats, same: Bools, along: Floats) -> list[float]:
+    """Last decimals (K,) one after the other, those that turn back by one left out.
 
     `same` (K,) False where a word means another place than the one before: there `along` (K,) says which way it went.
     """
     result, way, last = [], 0.0, 0.0
-    for count, may, goes_on, sign in zip(counts.tolist(), free.tolist(), same.tolist(), along.tolist(), strict=True):
+    for count, goes_on, sign in zip(counts.tolist(), same.tolist(), along.tolist(), strict=True):
         step = count - last
-        if goes_on and may and abs(step) == 1.0 and step * way < 0.0:
+        if goes_on and abs(step) == 1.0 and step * way < 0.0:
             count = last
         elif (step if goes_on else sign) != 0.0:
             way = 1.0 if (step if goes_on else sign) > 0.0 else -1.0

@@ -28,7 +28,7 @@ def fitted_arcs(path: Path, nominal: Path, work: Work, start: Floats, allowed: f
         n0, n1, c0, c1 = (control.words(q, kin, 0.0) for control, q in ((old, nominal.q[k - 1]), (old, nominal.q[k]),
                                                                         (new, start[k]), (new, path.q[k])))
         xyz = new.xyz
-        center[k] = _new_centers(path, k, n0[:, xyz], n1[:, xyz], c0[:, xyz], c1[:, xyz])
+        center[k] = new_centers(path, k, n0[:, xyz], n1[:, xyz], c0[:, xyz], c1[:, xyz])
         for t in LOOKS:
             share = np.full(len(k), t)
             got = new.joints(on_arc(path.plane[k], path.ccw[k], center[k], c0, c1, share, xyz), kin, 0.0)
@@ -36,8 +36,11 @@ def fitted_arcs(path: Path, nominal: Path, work: Work, start: Floats, allowed: f
     return replace(path, center=center, code=np.where(resolved, FEED, path.code).astype(path.code.dtype)), resolved
 
 
-def _new_centers(path: Path, k: Ints, n0: Floats, n1: Floats, c0: Floats, c1: Floats) -> Floats:
-    """Centres (N, 3) relative to the corrected start: as the ends have moved, then at the same distance from both."""
+def new_centers(path: Path, k: Ints, n0: Floats, n1: Floats, c0: Floats, c1: Floats) -> Floats:
+    """Centres (N, 3), relative to the start, of arcs k (N,) whose ends go from words n0, n1 to c0, c1 (N, 3).
+
+    They go as the ends have gone, then to the same distance from both.
+    """
     result = path.center[k] + 0.5 * (c1 - n1 - (c0 - n0))
     for plane, (i, j) in PLANE_COLUMNS.items():
         rows = np.flatnonzero(path.plane[k] == plane)

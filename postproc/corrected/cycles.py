@@ -7,10 +7,11 @@ from functools import cached_property
 
 import numpy as np
 
+from postproc.corrected.arcs import LOOKS
 from postproc.corrected.reversals import LOOSE
 from postproc.corrected.work import ALONE, Work
 from postproc.moves import Moves
-from postproc.path import FEED, Path
+from postproc.path import FEED, TRAVERSE, Path
 from toolpaths.arrays import Bools, Floats, Ints
 
 SAME = 1e-6
@@ -20,19 +21,21 @@ IN_AIR = 8.0
 """times the share of the correction: what lost motion may leave at the levels of a hole that the tool comes back to"""
 
 
-def whole_holes(path: Path, nominal: Path, moves: Moves, work: Work, allowed: float) -> tuple[Path, Ints]:
+def whole_holes(path: Path, nominal: Path, moves: Moves, work: Work, allowed: float, always: Bools) -> tuple[Path, Ints]:
     """The path with holes corrected as a whole, and the hole (K,) that each block is of, ALONE for those of none.
 
     Every block of a hole is corrected as its bottom is, but along the tool: the plane that drilling begins at gets the
     least correction of the bottoms of the holes that follow each other, so that one plane serves all of them and no peck is
     added, levels above it that of the block that the tool comes from to the first. Holes that this takes farther than LOOSE
-    times `allowed` mm from where they belong keep the corrections of their blocks and are written out.
+    times `allowed` mm from where they belong keep the corrections of their blocks and are written out, but for those of
+    cycles that `always` (C,) stay cycles.
     """
     hole = np.where(np.isnan(path.u) | path.home, -1, moves.hole[path.move])
     runs = np.flatnonzero(np.concatenate([[True], np.diff(hole) != 0]))
     whole, q = np.full(len(path), ALONE), path.q.copy()
+    kept = np.append(always, False)[moves.cycle[path.move]]
     for rows in _sequences(path, hole, runs, work):
-        _correct_sequence(path, nominal, rows, work, allowed, q, whole)
+        _correct_sequence(path, nominal, rows, work, np.where(kept, np.inf, allowed), q, whole)
     return replace(path, q=q), whole
 
 
@@ -55,9 +58,9 @@ def _one_place(path: Path, rows: Ints, work: Work) -> bool:
                 and (turns == turns[0]).all())
 
 
-def _correct_sequence(path: Path, nominal: Path, holes: list[Ints], work: Work, allowed: float, q: Floats,
+def _correct_sequence(path: Path, nominal: Path, holes: list[Ints], work: Work, allowed: Floats, q: Floats,
                       whole: Ints) -> None:
-    """Put the joints of the holes that stay whole into `q`, and mark them in `whole`."""
+    """Put the joints of the holes that stay whole into `q`, and mark them in `whole`; allowed (K,) mm."""
     lead = int(holes[0][0]) - 1
     kin = work.kinematics(int(work.tools[lead + 1]))
     new, old = (p.frames[int(p.frame[lead + 1])].control for p in (path, nominal))
@@ -71,14 +74,27 @@ def _correct_sequence(path: Path, nominal: Path, holes: list[Ints], work: Work, 
     z = new.xyz[2]
     if abs(before[0, z] - at[0].plane) <= SAME and path.code[lead] != FEED and not path.home[lead]:
         came[0, z] = before[0, z] + least
-        q[lead] = new.joints(came, kin, 0.0)[0]
+        q[lead] = np.where(work.rotary, path.q[lead], new.joints(came, kin, 0.0)[0])
     for hole in at:
         words = new.words(path.q[hole.rows], kin, 0.0)
         words[:, new.xyz] = hole.corrected(least, float((came - before)[0, z]))
-        joints, way = new.joints(words, kin, 0.0), np.tile(work.way[hole.rows[hole.bottom]], (len(hole.rows), 1))
-        if (work.off(nominal.q[hole.rows], joints, hole.rows, way) <= LOOSE * allowed).all() and \
-                (work.off(nominal.q[hole.rows], joints, hole.rows, work.way[hole.rows]) <= IN_AIR * allowed).all():
+        joints = np.where(work.rotary, path.q[hole.rows], new.joints(words, kin, 0.0))
+        way = np.tile(work.way[hole.rows[hole.bottom]], (len(hole.rows), 1))
+        share = allowed[hole.rows]
+        if _approach_off(path, work, q, joints, int(hole.rows[0])) <= IN_AIR * share[0] and (
+                work.off(nominal.q[hole.rows], joints, hole.rows, way) <= LOOSE * share).all() and (
+                work.off(nominal.q[hole.rows], joints, hole.rows, work.way[hole.rows]) <= IN_AIR * share).all():
             q[hole.rows], whole[hole.rows] = joints, hole.rows[0]
+
+
+def _approach_off(path: Path, work: Work, q: Floats, joints: Floats, row: int) -> float:
+    """mm, largest distance from the nominal motion on the way to a hole (block `row`), which gets no points."""
+    if path.code[row] != TRAVERSE:
+        return 0.0
+    block, t = np.full(len(LOOKS), row), np.array(LOOKS)
+    got = work.straight(path, np.tile(q[row - 1], (len(t), 1)), np.tile(joints[0], (len(t), 1)), block, t)
+    way = np.tile(work.way[row], (len(t), 1))
+    return float(work.off(work.nominal(block, t), got, block, way).max())
 
 
 @dataclass(frozen=True)
@@ -102,8 +118,9 @@ class _Hole:
 
     @property
     def along_z(self) -> bool:
-        """False where the tool does not stand along Z of the words: no control drills that by itself."""
-        return bool(np.ptp(self.wanted[self.start:, :2], axis=0).max() <= SAME)
+        """False where the tool does not come down along Z of the words: no control drills that by itself."""
+        down = self.wanted[self.bottom, 2] < self.wanted[self.start, 2]
+        return bool(down and np.ptp(self.wanted[self.start:, :2], axis=0).max() <= SAME)
 
     @property
     def plane(self) -> float:

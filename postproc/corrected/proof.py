@@ -117,15 +117,24 @@ def _cl_points(moves: Moves) -> Bools:
 
 
 def _nearest(comparison: Comparison, moves: Moves) -> tuple[Floats, Floats]:
-    """(tip, axis), each (M,), of the block that ends nearest to each move's end among its own; NaN where it has none."""
+    """(tip, axis), each (M,), of the block that ends nearest to each move's end; NaN where the move has none.
+
+    Those that come into question: its own, and all from the end of the move before to that of the move after: a point where
+    lost motion is taken up, or one within the tolerance of the end, may have passed for the end.
+    """
     own, done = np.flatnonzero(comparison.owner < len(moves)), np.flatnonzero(comparison.match >= 0)
-    block, owner = np.concatenate([own, comparison.match[done]]), np.concatenate([comparison.owner[own], done])
+    at = comparison.match[done]
+    other = np.concatenate([[0], at, [len(comparison.tip)]])
+    first = other[np.searchsorted(at, at)]
+    count = np.maximum(other[np.searchsorted(at, at, side="right") + 1] - first, 0)
+    near = np.repeat(first - np.cumsum(count) + count, count) + np.arange(count.sum())
+    block, owner = np.concatenate([own, near, at]), np.concatenate([comparison.owner[own], np.repeat(done, count), done])
     off = np.linalg.norm(comparison.tip[block] - moves.tip[owner], axis=1)
     order = np.lexsort((off, owner))
-    first = order[np.diff(owner[order], prepend=-1) > 0]
+    best = order[np.diff(owner[order], prepend=-1) > 0]
     tip, axis = np.full(len(moves), np.nan), np.full(len(moves), np.nan)
-    tip[owner[first]] = off[first]
-    axis[owner[first]] = angle_between(comparison.axis[block[first]], moves.axis[owner[first]])
+    tip[owner[best]] = off[best]
+    axis[owner[best]] = angle_between(comparison.axis[block[best]], moves.axis[owner[best]])
     return tip, axis
 
 

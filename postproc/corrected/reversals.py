@@ -117,6 +117,14 @@ class Divided:
     owner: Ints
     part: Floats
 
+    @property
+    def until(self) -> Floats:
+        """(K,) part of the time of its block of the other path that has gone when a block ends."""
+        gone = np.cumsum(self.part)
+        first = np.flatnonzero(np.diff(self.owner, prepend=-1))
+        before = np.repeat((gone - self.part)[first], np.diff(first, append=len(gone)))
+        return np.asarray(np.clip(gone - before, 0.0, 1.0))
+
     def of(self, before: Divided) -> Divided:
         """The same, told of the path that `before` was made from."""
         return Divided(self.path, before.owner[self.owner], before.part[self.owner] * self.part)

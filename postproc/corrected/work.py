@@ -102,13 +102,8 @@ class Work:
 
     @cached_property
     def bent(self) -> Bools:
-        """(K,) blocks in which joints do not run straight: arcs, and those by the tip that turn an axis."""
-        path = self.path
-        by_tip = np.array([frame.control.law == "tcp" for frame in path.frames])[path.frame]
-        turns = np.concatenate([[False], (path.q[1:, self.rotary] != path.q[:-1, self.rotary]).any(axis=1)])
-        first = np.arange(len(path)) == 0
-        result: Bools = ((path.code == ARC) | (by_tip & (turns | (not self.rotary.any())))) & ~first
-        return result
+        """(K,) blocks in which joints do not run straight."""
+        return bent_blocks(self.path, self.rotary)
 
     def moving(self, block: Ints, t: Floats, moment: float = MOMENT) -> Floats:
         """(N, J) sign of each joint's motion at fraction t (N,) of blocks (N,), over a moment before; after it at the start.
@@ -172,15 +167,17 @@ class Work:
                 result[k] = control.joints(words, kin, 0.0)
         return result
 
-    def straight(self, path: Path, q0: Floats, q1: Floats, block: Ints, t: Floats) -> Floats:
+    def straight(self, path: Path, q0: Floats, q1: Floats, block: Ints, t: Floats, owner: Ints | None = None) -> Floats:
         """Joints (N, J) at fraction t (N,) of straight blocks from q0 to q1 (N, J), under the law of each in `path`.
 
-        Rapids are dog-legs where the control makes them that: what the correction adds to one axis comes at once.
+        Rapids are dog-legs where the control makes them that: what the correction adds to one axis comes at once. In a
+        path made of others `owner` (N,) are the blocks here that its blocks are of.
         """
         result, rapid = np.empty_like(q0), path.code[block] == TRAVERSE
-        for k in groups(path.frame[block], self.tools[block]):
+        tools = self.tools[block if owner is None else owner]
+        for k in groups(path.frame[block], tools):
             control = path.frames[int(path.frame[block[k[0]]])].control
-            kin = self.kinematics(int(self.tools[block[k[0]]]))
+            kin = self.kinematics(int(tools[k[0]]))
             result[k] = control.between(q0[k], q1[k], t[k], kin, rapid[k])[2]
         return result
 
@@ -260,6 +257,15 @@ class Work:
             w = actual.coordinates(q[k], wanted)
             result[k] = np.concatenate(actual.aim(w, way[k]), axis=1) - wanted
         return result
+
+
+def bent_blocks(path: Path, rotary: Bools) -> Bools:
+    """(K,) blocks in which joints do not run straight: arcs, and those by the tip that turn an axis."""
+    by_tip = np.array([frame.control.law == "tcp" for frame in path.frames])[path.frame]
+    turns = np.concatenate([[False], (path.q[1:, rotary] != path.q[:-1, rotary]).any(axis=1)])
+    first = np.arange(len(path)) == 0
+    result: Bools = ((path.code == ARC) | (by_tip & (turns | (not rotary.any())))) & ~first
+    return result
 
 
 def axis_positions(path: Path, tools: Ints) -> Bools:

@@ -1,0 +1,213 @@
+"""The last step of correction: words by whose own ways the machine brings the tip where it should be."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from machines.geometric_error.lost_motion import Steps
+from postproc.corrected.arcs import new_centers
+from postproc.corrected.reversals import Divided
+from postproc.corrected.walk import Ends, walk
+from postproc.corrected.work import ALONE, Work, axis_positions, bent_blocks, on_arc
+from postproc.path import ARC, FEED, TRAVERSE, Path
+from postproc.word_arcs import PLANE_COLUMNS
+from toolpaths.arrays import Floats, Ints
+
+PARTS = 16
+"""parts of a block whose joints do not run straight, for the ways of its axes"""
+BEGINS = 0.01
+"""weight of what the beginning of a block is off by beside what the end before it is, at points of the CL file"""
+CLOSED = 0.05
+"""mm between the ends of arcs that count as closed circles"""
+ROUNDED = 2.5
+"""times what rounding may leave: words that leave more are looked for farther off"""
+
+
+@dataclass(frozen=True)
+class Writing:
+    """How a path is written.
+
+    words: rounded words (K, J) of its blocks at their ends
+    joints: (N, J) of words (N, J) of the blocks (N,) of a path
+    turned: joints (N, J) that are written as others are, with the exact rotary joints of the blocks (N,) of a path
+    grain: (J,) a last decimal of each word
+    """
+
+    words: Callable[[Path], Floats]
+    joints: Callable[[Path, Floats, Ints], Floats]
+    turned: Callable[[Path, Floats, Ints], Floats]
+    grain: Floats
+
+
+def settled(made: Divided, work: Work, writing: Writing, allowed: float) -> Path:
+    """The path made of the blocks of `work`, with words by which axes that lose motion stand where they should.
+
+    Blocks keep their words where these bring the tip as near as rounding lets them. Closed circles, linking moves and blocks
+    that name their axes keep them anyway, points between ends and rapids where they are off by no more than `allowed` mm.
+    A hole that is corrected as a whole is moved as a whole, so that its bottom is where it should be; centres of arcs go
+    with their ends.
+    """
+    path = made.path
+    if not work.two_way:
+        return path
+    written = _Written(made, work, writing)
+    n = walk(written.ends(allowed))
+    changed = np.flatnonzero(n.any(axis=1))
+    if not len(changed):
+        return path
+    chosen, xyz = written.words.copy(), path.frames[0].control.xyz
+    chosen[:, xyz] += n * writing.grain[xyz]
+    q = path.q.copy()
+    q[changed] = writing.turned(path, writing.joints(path, chosen[changed], changed), changed)
+    arcs = np.flatnonzero((path.code == ARC) & (n.any(axis=1) | np.append(False, n[:-1].any(axis=1))))
+    center = path.center.copy()
+    center[arcs] = new_centers(path, arcs, *(words[rows][:, xyz] for words in (written.words, chosen)
+                                             for rows in (arcs - 1, arcs)))
+    return replace(path, q=q, center=center)
+
+
+class _Written:
+    """A path with its rounded words (K, J), the joints (K, J) that these mean, and what joints lose there (K, T)."""
+
+    def __init__(self, made: Divided, work: Work, writing: Writing) -> None:
+        self.made, self.path, self.work, self.writing = made, made.path, work, writing
+        self.words = writing.words(self.path)
+        found = writing.joints(self.path, self.words, np.arange(len(self.path)))
+        self.q = np.where(self.path.home[:, None], self.path.q, found)
+        self.gap = work.gaps(self.q)
+
+    def ends(self, allowed: float) -> Ends:
+        """What `walk` takes."""
+        path, size = self.path, len(self.path)
+        first, bottom = self._holes()
+        bend, last, begin = self._motion()
+        free, counts = self._free(), np.arange(size)
+        free[first] = np.isfinite(self.q[bottom]).all(axis=1, keepdims=True) * np.array([1.0, 1.0, 0.0])
+        counts[first] = bottom
+        back, tip_rates, off, by_way = self._rates(np.flatnonzero(free.any(axis=1)), counts)
+        near = 0.5 * np.linalg.norm(tip_rates, axis=(1, 2))
+        between = ((self.made.until < 1.0) | (path.code == TRAVERSE)) & (counts == np.arange(size))
+        goes_on = np.append(begin[1:], np.zeros((1, begin.shape[1])), axis=0)
+        goes_on[first] = 0.0
+        goes_on[np.append(self.made.part[1:] == 0.0, False)] = 0.0  # what is lost is taken up next
+        later = _none(3, *self.gap.shape)
+        for one, other in zip(first.tolist(), bottom.tolist(), strict=True):
+            later[:, one] = _composed(bend, last, one + 1, other + 1)
+        weight, enough = np.where(between, 1.0, BEGINS), np.maximum(ROUNDED * near, np.where(between, allowed, 0.0))
+        near = np.where(between, enough, near)
+        plain = axis_positions(path, self.work.tools[self.made.owner])
+        return Ends(off, by_way, tip_rates, back, self.gap, bend, last, later, goes_on, weight, plain, near, enough, free,
+                    self._like(first))
+
+    def _like(self, first: Ints) -> Ints:
+        """(K,) first block of the hole that a block is of, -1 for those and for blocks of none."""
+        hole = self.work.whole[self.made.owner]
+        result = np.where(hole == ALONE, -1, np.maximum.accumulate(np.where(np.isin(np.arange(len(hole)), first),
+                                                                            np.arange(len(hole)), 0)))
+        result[first] = -1
+        return result
+
+    def _holes(self) -> tuple[Ints, Ints]:
+        """First blocks and bottoms of the holes that are corrected as a whole."""
+        hole = self.work.whole[self.made.owner]
+        runs = np.flatnonzero((hole != ALONE) & (np.diff(hole, prepend=ALONE) != 0))
+        depth = np.where(self.path.code == FEED, self.words[:, self.path.frames[0].control.xyz[2]], np.inf)
+        ends = [int(np.flatnonzero(hole == hole[row])[-1]) + 1 for row in runs.tolist()]
+        bottom = [row + int(np.argmin(depth[row:end])) for row, end in zip(runs.tolist(), ends, strict=True)]
+        return runs, np.array(bottom, dtype=np.int64)
+
+    def _free(self) -> Floats:
+        """(K, 3) words that may be others, those of arcs and before them in their planes; not those of closed circles."""
+        path, words = self.path, self.words
+        fixed = path.home | np.isnan(path.u) | path.state.any(axis=1) | (self.work.whole[self.made.owner] != ALONE)
+        result = np.where(fixed | ~np.isfinite(self.q).all(axis=1), 0.0, 1.0)[:, None] * np.ones(3)
+        xyz = path.frames[0].control.xyz
+        for plane, flat in PLANE_COLUMNS.items():
+            arcs = np.flatnonzero((path.code == ARC) & (path.plane == plane))
+            chord = np.linalg.norm((words[arcs] - words[arcs - 1])[:, xyz[list(flat)]], axis=1)
+            open_ = (chord > CLOSED) & (path.frame[arcs] == path.frame[arcs - 1])
+            for rows in (arcs, arcs - 1):
+                result[rows] *= open_[:, None] * np.isin(np.arange(3), flat)
+        return result
+
+    def _motion(self) -> tuple[Floats, Floats, Floats]:
+        """`bend` and `last` of `Ends`, by pieces on arcs and where the words are the tip that turns; and the ways (K, T) by
+        which blocks begin, 0 for joints that move by less than they lose."""
+        t = self.work.two_way
+        last = 2.0 * np.nan_to_num(np.diff(self.q, axis=0, prepend=self.q[:1]))[:, t] / self.gap
+        bend, begin = _none(3, *self.gap.shape), np.where(np.abs(last) >= 2.0, np.sign(last), 0.0)
+        bent = np.flatnonzero(bent_blocks(self.path, self.work.rotary))
+        if len(bent):
+            places = (self._along(bent, k / PARTS) for k in range(PARTS + 1))
+            bend[:, bent], last[bent], begin[bent] = _runs(
+                2.0 * np.nan_to_num(two - one)[:, t] / self.gap[bent] for one, two in pairwise(places))
+        return bend, last, begin
+
+    def _along(self, rows: Ints, share: float) -> Floats:
+        """Joints (N, J) at a share of blocks (N,) as they are written."""
+        path, work, words = self.path, self.work, self.words
+        at, owner = np.full(len(rows), share), self.made.owner[rows]
+        result = work.straight(path, self.q[rows - 1], self.q[rows], rows, at, owner)
+        arcs = np.flatnonzero(path.code[rows] == ARC)
+        block = rows[arcs]
+        start = np.where((path.frame[block - 1] == path.frame[block])[:, None], words[block - 1], words[block])
+        here = on_arc(path.plane[block], path.ccw[block], path.center[block], start, words[block], at[arcs],
+                      path.frames[0].control.xyz)
+        result[arcs] = self.writing.joints(path, here, block)
+        return result
+
+    def _rates(self, k: Ints, counts: Ints) -> tuple[Floats, Floats, Floats, Floats]:
+        """back, tip_rates, off, by_way of `Ends`, 0 but for the blocks k (N,); the tip counts at those of `counts` (K,)."""
+        path, work, at = self.path, self.work, counts[k]
+        lossy, size = len(work.two_way), len(path)
+        back, tip_rates = np.zeros((size, lossy, 3)), np.zeros((size, 3, 3))
+        off, by_way = np.zeros((size, 3)), np.zeros((size, 3, lossy))
+        owner = self.made.owner[at]
+        here = work.poses(self.q[at], owner)[0]
+        for i, column in enumerate(path.frames[0].control.xyz.tolist()):
+            beside = self.words[at]
+            beside[:, column] += self.writing.grain[column]
+            moved = self.writing.joints(path, beside, at)
+            back[k, :, i] = (moved - self.q[at])[:, work.two_way]
+            tip_rates[k, :, i] = work.poses(moved, owner)[0] - here
+        wanted, way = work.nominal(owner, self.made.until[at]), np.zeros((len(k), path.q.shape[1]))
+        off[k] = work.residual(wanted, self.q[at], owner, way)[:, :3]
+        for i, j in enumerate(work.two_way):
+            forward = way.copy()
+            forward[:, j] = 1.0
+            by_way[k, :, i] = work.residual(wanted, self.q[at], owner, forward)[:, :3] - off[k]
+        return back, tip_rates, off, by_way
+
+
+def _runs(pieces: Iterable[Floats]) -> tuple[Floats, Floats, Floats]:
+    """(3, N, T), (N, T), (N, T) of motion in pieces (N, T), 2 being what a joint loses: shift, low and high of all but the
+    last run one way, that run, and the way of the first run, 0 where it is shorter than what the joint loses."""
+    first, *rest = pieces
+    whole, run, gone, most = Steps(*_none(3, *first.shape)), first, first, np.abs(first)
+    for piece in rest:
+        turns = run * piece < 0.0
+        then = whole.then(Steps(run, np.full(run.shape, -1.0), np.full(run.shape, 1.0)))
+        whole = Steps(*(np.where(turns, getattr(then, name), getattr(whole, name)) for name in ("shift", "low", "high")))
+        run, gone = np.where(turns, piece, run + piece), gone + piece
+        most = np.maximum(most, gone * np.sign(first))
+    return np.stack([whole.shift, whole.low, whole.high]), run, np.where(most >= 2.0, np.sign(first), 0.0)
+
+
+def _none(*shape: int) -> Floats:
+    """Shift, low and high (3, K, T) of no motion."""
+    result = np.zeros(shape)
+    result[1], result[2] = -np.inf, np.inf
+    return result
+
+
+def _composed(bend: Floats, last: Floats, first: int, end: int) -> Floats:
+    """Shift, low, high (3, T) of blocks one after the other."""
+    whole = Steps(*_none(3, bend.shape[2]))
+    for k in range(first, end):
+        ones = np.ones(bend.shape[2])
+        whole = whole.then(Steps(*bend[:, k])).then(Steps(last[k], -ones, ones))
+    return np.stack([whole.shift, whole.low, whole.high])
