@@ -1,0 +1,141 @@
+"""Corrected programs of every control, read and put on the machine with errors a second time, against the CL file.
+
+The words are read by `independent_reader`, the machine and its errors come from their files by `independent_machine`; of
+the product only the CL points and the bound that it prints are taken.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+import postproc
+import toolpaths
+from postproc.corrected.proof import after_formatting
+from postproc.holes import Phase
+from postproc.options import Options
+from postproc.pipeline import PostResult
+from tests.machines.independent_machine import Errors, Machine
+from tests.machines.random_error_files import Draw
+from tests.postproc.independent_reader import End, read
+from toolpaths.arrays import Floats, Ints
+from toolpaths.toolpath import Kind
+from toolpaths.units import DEG
+
+Case = tuple[str, str, str, str, int]
+"""sample, machine, controller, output mode, seed of the errors"""
+ARCSEC = DEG / 3600.0
+SAMPLES = Path(__file__).parents[2] / "samples"
+ARM = 30.0
+"""mm: how far along the tool a second point is looked at when positions are compared"""
+SAME = 2e-6
+"""mm: two readings of one program"""
+
+CASES: list[Case] = [
+    ("five_faces.cls", "mikron-ucp710", "linuxcnc", "auto", 10),
+    ("five_faces.cls", "mikron-ucp710", "fanuc-30i", "auto", 11),
+    ("five_tilted.cls", "trunnion-bc", "siemens-840d", "auto", 12),
+    ("five_faces.cls", "head-table", "heidenhain-tnc640", "auto", 13),
+    ("five_faces.cls", "mikron-ucp710", "haas-ngc", "auto", 11),
+    ("tool_axis_tour.apt", "trunnion-bc", "fanuc-30i", "tcp", 14),
+    ("tool_axis_tour.apt", "mikron-ucp710", "siemens-840d", "auto", 10),
+    ("tool_axis_tour.apt", "linuxcnc-xyzac-trt", "heidenhain-tnc640", "tcp", 12),
+    ("tool_axis_tour.apt", "fork-head-ab", "haas-ngc", "auto", 13),
+    ("tool_axis_tour.apt", "nutating-head", "linuxcnc", "auto", 12),
+    ("indexed_4axis.cls", "mill-4axis", "linuxcnc", "auto", 11),
+    ("inch_plate.apt", "mill-3axis", "siemens-840d", "auto", 11),
+    ("pocket.cls", "uranesx", "linuxcnc", "auto", 11),
+    ("h4a_indexed.cls", "h4a-c-table", "linuxcnc", "auto", 12),
+    ("h4a_indexed.cls", "h4a-spindle-axis", "generic-iso", "auto", 11),
+]
+
+
+def name(case: Case) -> str:
+    return "-".join(map(str, case))
+
+
+@dataclass(frozen=True)
+class Run:
+    """A conversion, its own machine with errors, and at which of the program's ends each CL point is reached.
+
+    Attributes:
+        rows: (P,) moves of the CL file whose ends are cut to: ends of feeds, bottoms of holes
+        at: (P,) numbers of the ends that are nearest, on the machine with errors
+        tip, axis: (P,) mm and rad off
+    """
+
+    result: PostResult
+    own: Machine
+    ends: list[End]
+    rows: Ints
+    at: Ints
+    tip: Floats
+    axis: Floats
+
+
+def run_of(result: PostResult, own: Machine, errors: Errors, controller: str) -> Run:
+    assert result.ok and result.job is not None, [str(d) for d in result.diagnostics]
+    lengths = {int(k): v.gauge_length for k, v in result.setup.tools.items()}
+    ends = [end for end in read(result.text, controller, own, lengths) if end.tool > 0.0 and end.cuts]
+    moves = result.job.moves.without_pecks()
+    rows = np.flatnonzero((moves.kind != Kind.RAPID) & ((moves.hole < 0) | (moves.phase == Phase.DRILL)))
+    wanted, nominal = np.hstack([moves.tip[rows], ARM * moves.axis[rows]]), np.empty((len(ends), 6))
+    for tool in {end.tool for end in ends}:
+        k = [k for k, end in enumerate(ends) if end.tool == tool]
+        nominal[k] = np.hstack(result.machine.kinematics.with_tool(tool).forward(np.array([ends[i].q for i in k])))
+    _, few = cKDTree(nominal * np.repeat([1.0, ARM], 3)).query(wanted, k=3)  # the machine with errors is not far from there
+    real = np.full((len(ends), 6), np.inf)
+    for k in np.unique(few):
+        real[k] = np.concatenate(own.pose(ends[k].q, ends[k].tool, errors, near=nominal[k]))
+    off = np.linalg.norm(real[few] * np.repeat([1.0, ARM], 3) - wanted[:, None], axis=2)
+    at = few[np.arange(len(few)), off.argmin(axis=1)]
+    return Run(result, own, ends, rows, at, np.linalg.norm(real[at, :3] - moves.tip[rows], axis=1),
+               np.linalg.norm(real[at, 3:] - moves.axis[rows], axis=1))
+
+
+@cache
+def converted(case: Case, corrected: bool = True) -> Run:
+    sample, machine, controller, mode, seed = case
+    own = Machine(machine)
+    setup = "h4a" if machine.startswith("h4a") else "delta" if machine == "uranesx" else "tools"
+    with TemporaryDirectory() as folder:
+        file = Draw(Path(folder), own, seed).write()
+        path, found = toolpaths.read(SAMPLES / sample)
+        options = Options(setup=str(SAMPLES / f"{setup}.setup.toml"), output=mode,
+                          error_model=str(file) if corrected else "")
+        result = postproc.convert(path, machine, controller, options=options, diagnostics=found)
+        return run_of(result, own, Errors(file), controller)
+
+
+@pytest.mark.parametrize("case", CASES, ids=name)
+def test_the_second_reading_finds_the_points_inside_the_printed_bound(case: Case) -> None:
+    """What the product's own read-back finds is what this one finds."""
+    run = converted(case)
+    told = after_formatting(run.result)
+    assert told is not None and len(run.tip) == len(told.tip)
+    assert run.tip.max() <= told.tip_bound + SAME and run.tip.max() == pytest.approx(told.tip.max(), abs=SAME)
+    assert run.axis.max() <= told.axis_bound + 0.01 * ARCSEC
+
+
+@pytest.mark.parametrize("case", [case for case in CASES if case[0] in ("five_faces.cls", "pocket.cls")], ids=name)
+def test_without_correction_the_points_are_as_far_off_as_is_told(case: Case) -> None:
+    found, bare = converted(case).result.compensation, converted(case, corrected=False)
+    assert found is not None and 0.01 < bare.tip.max() <= found.tip_before + 1e-3
+
+
+@pytest.mark.parametrize("case", [case for case in CASES if case[0].startswith(("five", "h4a_indexed"))], ids=name)
+def test_rotary_axes_stand_still_where_the_tool_axis_does(case: Case) -> None:
+    """At neighbouring CL points of one orientation the words of the rotary axes are the same, to the last decimal."""
+    run = converted(case)
+    assert run.result.job is not None
+    axis = run.result.job.moves.without_pecks().axis[run.rows]
+    turning = [k for k, letter in enumerate(run.own.letters) if letter in "ABC"]
+    rotary = np.array([run.ends[k].q[turning] for k in run.at])
+    same = (axis[1:] == axis[:-1]).all(axis=1)
+    assert same.sum() > 10 and np.array_equal(rotary[1:][same], rotary[:-1][same])
