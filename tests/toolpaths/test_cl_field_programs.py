@@ -57,6 +57,15 @@ def test_a_macro_is_refused_where_it_is_defined() -> None:
     assert errors(found) == [("cl.unsupported-motion", (3, 6))]
 
 
+@pytest.mark.parametrize("word", ["CONT", "MOVE", "ARC"])
+@pytest.mark.parametrize("at", [0, 1, 2])
+def test_motions_of_other_processors_are_refused_wherever_they_stand(word: str, at: int) -> None:
+    points = ["GOTO/0,0,0", "GOTO/9,0,0"]
+    points.insert(at, f"ISN/7\n{word}/1,2,3")
+    found = read_bytes(ISO + "\n".join(points) + "\nFINI\n")
+    assert errors(found) == [("cl.unsupported-motion", (4 + at,))] and codes(found) == ["cl.unsupported-motion"]
+
+
 @pytest.mark.parametrize(("record", "told"), [("INDEX/1,NOMORE", []), ("TRACUT/NOMORE", []),
                                               ("COPY/1,SAME,NOMORE", ["COPY"]), ("INDEX/1", ["INDEX"])])
 def test_the_end_of_a_copy_alone_copies_nothing(record: str, told: list[str]) -> None:

@@ -118,6 +118,24 @@ def test_card_numbers_are_left_out() -> None:
     assert [d.code for d in result.diagnostics] == ["cl.card-numbers"]
 
 
+def test_numbers_of_points_in_columns_73_to_80_are_left_out() -> None:
+    arc = f"{'TLON,GOFWD/ (CIRCLE/    0.00000,    0.00000,    0.00000,$':<72}CIR    1\n   10.00000),ON,$\n" \
+          "(LINE/    0.00000,    0.00000,    0.00000,    0.00000,   10.00000,    0.00000)\n"
+    text = ("$$*CATIA0\nUNITS/MM\nFEDRAT/100,MMPM\n" + f"{'GOTO/   10.00000,    0.00000,    0.00000':<72}PT     1\n"
+            + "INDIRV/    0.00000,    1.00000,    0.00000\n" + arc
+            + f"{'GOTO/   -5.00000,   10.00000,    0.00000':<72}PT  4711\nPPRINT PT     3\n")
+    result = read(text)
+    assert result.toolpath.tip.tolist() == [[10, 0, 0], [0, 10, 0], [-5, 10, 0]]
+    assert [(d.code, d.lines) for d in result.diagnostics] == [("cl.card-numbers", (4,))]
+    assert result.toolpath.events[-1].values == ("PT     3",)
+
+
+@pytest.mark.parametrize("tail", ["PT     1,", "PT 1", "XY     1", "9PT     1"])
+def test_what_only_resembles_numbers_of_points_stays(tail: str) -> None:
+    data = f"UNITS/MM\n{'PPRINT':<72}{tail}\n{'PPRINT':<71}PT     1\n".encode()
+    assert normalise(data, Log()) == data
+
+
 def test_long_lines_are_not_cut() -> None:
     numbers = ",".join(["1.00000000000000000000000"] * 3) + ",0.00000000000000000000,0.0000000000000000,1.000000000000"
     log = Log()

@@ -11,6 +11,8 @@ from toolpaths.cl.log import Log
 _BOMS = ((codecs.BOM_UTF32_LE, "utf-32"), (codecs.BOM_UTF32_BE, "utf-32"), (codecs.BOM_UTF8, "utf-8-sig"),
          (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))
 _CARD = re.compile(rb"^(.{72})([A-Za-z ]{0,4}\d{4,8})$")
+_LABEL = re.compile(rb"^([^\n]{72})(?=[^\n]{8} *$)PT  *\d{1,5} *$", re.MULTILINE)
+_LABEL_SAMPLE = 1 << 17
 _DECK_SAMPLE = 200
 _DECK_LEAST = 5
 
@@ -29,7 +31,7 @@ def normalise(data: bytes, log: Log) -> bytes:
         data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     if b"\x1a" in data:
         data = data.replace(b"\x1a", b" ")
-    return _without_card_numbers(data, log)
+    return _without_labels(_without_card_numbers(data, log), log)
 
 
 def text_of(raw: bytes) -> str:
@@ -50,6 +52,16 @@ def _decode_wide(data: bytes) -> bytes:
     if len(head) >= 8 and head[::2].count(0) > 0.8 * len(head[::2]):
         return data.decode("utf-16-be", "replace").encode("utf-8", "replace")
     return data
+
+
+def _without_labels(data: bytes, log: Log) -> bytes:
+    """Columns 73 to 80 removed from lines that count their points there (CATIA: `PT     7`), where one of the first does."""
+    found = _LABEL.search(data, 0, _LABEL_SAMPLE)
+    if found is None:
+        return data
+    line = data.count(b"\n", 0, found.start()) + 1
+    log.info("cl.card-numbers", "columns 73 to 80 hold the numbers of points, left out", line)
+    return _LABEL.sub(rb"\1", data)
 
 
 def _without_card_numbers(data: bytes, log: Log) -> bytes:

@@ -50,7 +50,7 @@ SILENT = frozenset({
     "PAINT", "PPWORD", "PPFUN", "SYN", "OPFEATEND", "MOVE_ATTRIB", "BOX", "SETUP", "SWITCH", "DISPLY",
     "AUTOPS", "PSIS", "INTOL", "OUTTOL", "TOLER", "LINTOL", "MACHIN", "ALIGN", "PLABEL", "CLPRNT", "NOPOST", "PLOT",
     "CSI_SET_EXTENSION_LENGTH", "MCHTOL", "CUT", "START_OP", "END_OP", "TOOLPATH_TYPE",
-    "ARCSLP", "MCS2", "START", "OPERATION", "BEGIN", "MATERL", "TCP", "CSI_PATH_TOLERANCE", "CSI_SET_PATH_PARAM",
+    "ISN", "ARCSLP", "MCS2", "START", "OPERATION", "BEGIN", "MATERL", "TCP", "CSI_PATH_TOLERANCE", "CSI_SET_PATH_PARAM",
 })
 """Display, listing, tolerance and bookkeeping: no motion, nothing for the machine."""
 
@@ -58,7 +58,7 @@ UNSUPPORTED_MOTION = frozenset({
     "DNTCUT", "COPY", "TRACUT", "GOFWD", "GOLFT", "GORGT", "GOBACK", "GOUP", "GODOWN", "GO",
     "MOVNRB", "THREAD", "POCKET", "SCURV", "RMILL", "SMILL", "FMILL", "CALL", "INDEX",
     "MACRO", "LOOPST", "LOOPND", "JUMPTO", "TLLFT", "TLRGT", "TLON", "MOVETO", "KNOT", "CNTRL",
-    "ARCDAT", "MIRROR", "XFORM", "MATRIX", "BSPLINE", "SPLINE", "ELLIPS",
+    "ARCDAT", "ARC", "CONT", "MOVE", "MIRROR", "XFORM", "MATRIX", "BSPLINE", "SPLINE", "ELLIPS",
 })
 """Words that move the tool or change how it moves, and that this reader does not carry out: an error."""
 
