@@ -19,7 +19,7 @@ from machines.kinematics.jets import ZERO, Angle, Jet
 from machines.straight_blocks import in_blocks, pose_jets, tip_rule_jets
 from postproc.control import Control
 from toolpaths.arrays import Bools, Floats
-from toolpaths.rotations import angle_between
+from toolpaths.rotations import angle_between, cross, lengths
 from toolpaths.shape import Curves
 
 SHORT = 0.1
@@ -83,8 +83,7 @@ class _Seen:
     @classmethod
     def at(cls, tip: Floats, axis: Floats, chord: Floats) -> _Seen:
         """From e itself, (N, 3) each."""
-        return cls(np.linalg.norm(tip, axis=1).astype(np.float64), np.linalg.norm(axis, axis=1).astype(np.float64),
-                   np.abs(_dot(tip, chord)))
+        return cls(lengths(tip), lengths(axis), np.abs(_dot(tip, chord)))
 
     def __or__(self, other: _Seen) -> _Seen:
         return _Seen(np.maximum(self.tip, other.tip), np.maximum(self.axis, other.axis),
@@ -141,7 +140,7 @@ class _Offset:
         along = self.seen.along + share * self.bend.along
         arc = np.flatnonzero(curves.is_arc)
         if len(arc):
-            radius = np.linalg.norm(np.cross(curves.start[arc] - curves.center[arc], curves.normal[arc]), axis=1)
+            radius = lengths(cross(curves.start[arc] - curves.center[arc], curves.normal[arc]))
             along[arc] = 0.5 * np.pi * tip[arc]
             extent[arc] = np.where(np.isfinite(extent[arc]), radius * curves.sweep[arc], np.inf)
         return np.asarray(along / extent, dtype=np.float64)
@@ -196,7 +195,7 @@ def _turned_back(curves: Curves) -> Floats:
     offset, normal, sweep = curves.end[arc] - curves.center[arc], curves.normal[arc], curves.sweep[arc]
     c, s = np.cos(sweep)[:, None], np.sin(sweep)[:, None]
     along = _dot(offset, normal)[:, None] * normal
-    result[arc] = along + c * (offset - along) - s * np.cross(normal, offset)
+    result[arc] = along + c * (offset - along) - s * cross(normal, offset)
     return result
 
 
@@ -208,7 +207,7 @@ def _run(start: Floats, span: Floats, way: Angle) -> Jet:
 
 def _axis_reference(curves: Curves, way: Angle, turn: Floats) -> Jet:
     """The tool axis on the great circle."""
-    normal = np.cross(curves.axis0, curves.axis1)
+    normal = cross(curves.axis0, curves.axis1)
     size = np.linalg.norm(normal, axis=1, keepdims=True)
     normal = np.where(size > 0.0, normal / np.where(size > 0.0, size, 1.0), [0.0, 0.0, 1.0])
     whole = np.where(size[:, 0] > 0.0, turn, 0.0)

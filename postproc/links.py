@@ -272,8 +272,9 @@ def _lifted(kin: Kinematics, space: SafeSpace, q: Floats, floor: float, slack: f
 
 
 def _stays_clear(control: Control, kin: Kinematics, space: SafeSpace, q: Floats, slack: float) -> bool:
-    for t in np.linspace(0.0, 1.0, _SAMPLES):
-        tip, axis, _ = control.between(q[:-1], q[1:], np.full(len(q) - 1, t), kin, np.ones(len(q) - 1, dtype=bool))
-        if not bool(space.clear(tip, axis, slack).all()):
-            return False
-    return True
+    """True where the tool is clear at even places of all ways between the joints q (K, J), looked at together."""
+    count = len(q) - 1
+    t = np.repeat(np.linspace(0.0, 1.0, _SAMPLES), count)
+    begin, end = np.tile(q[:-1], (_SAMPLES, 1)), np.tile(q[1:], (_SAMPLES, 1))
+    tip, axis, _ = control.between(begin, end, t, kin, np.ones(len(t), dtype=bool))
+    return bool(space.clear(tip, axis, slack).all())

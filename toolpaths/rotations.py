@@ -18,9 +18,21 @@ def rotation(direction: Floats, angle: Floats) -> Floats:
     return result
 
 
+def lengths(v: Floats) -> Floats:
+    """Lengths (...,) of vectors (..., 3): column by column, several times as fast as a sum over the last axis."""
+    x, y, z = v[..., 0], v[..., 1], v[..., 2]
+    result: Floats = np.sqrt(x * x + y * y + z * z)
+    return result
+
+
+def cross(a: Floats, b: Floats) -> Floats:
+    """a x b (..., 3), column by column."""
+    return np.stack([a[..., j] * b[..., k] - a[..., k] * b[..., j] for j, k in ((1, 2), (2, 0), (0, 1))], axis=-1)
+
+
 def angle_between(a: Floats, b: Floats) -> Floats:
     """Angle (N,) rad between unit vectors `a` and `b` (N, 3), accurate near 0 and pi (Kahan)."""
-    result: Floats = 2.0 * np.arctan2(np.linalg.norm(a - b, axis=-1), np.linalg.norm(a + b, axis=-1))
+    result: Floats = 2.0 * np.arctan2(lengths(a - b), lengths(a + b))
     return result
 
 
@@ -35,5 +47,5 @@ def slerp(a: Floats, b: Floats, t: Floats) -> Floats:
     wa = np.where(small, 1.0 - t, np.sin((1.0 - t) * angle) / s)[..., None]
     wb = np.where(small, t, np.sin(t * angle) / s)[..., None]
     v = wa * a + wb * b
-    result: Floats = v / np.linalg.norm(v, axis=-1, keepdims=True)
+    result: Floats = v / lengths(v)[..., None]
     return result

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from toolpaths.arrays import Bools, Floats, Ints, taken
-from toolpaths.rotations import angle_between, slerp
+from toolpaths.rotations import angle_between, cross, lengths, slerp
 
 _EPS = 1e-12
 
@@ -16,7 +16,7 @@ def turn_about(vector: Floats, normal: Floats, angle: Floats) -> Floats:
     """`vector` (N, 3) turned by `angle` (N,) rad about unit `normal` (N, 3) (Rodrigues)."""
     c, s = np.cos(angle)[:, None], np.sin(angle)[:, None]
     along = np.einsum("ni,ni->n", vector, normal)[:, None] * normal
-    result: Floats = along + c * (vector - along) + s * np.cross(normal, vector)
+    result: Floats = along + c * (vector - along) + s * cross(normal, vector)
     return result
 
 
@@ -48,17 +48,24 @@ class Curves:
 
     def at(self, u: Floats) -> tuple[Floats, Floats]:
         """(tip (N, 3), axis (N, 3)) at u (N,). The ends are the given ends to the last bit."""
+        return self.tip_at(u), self.axis_at(u)
+
+    def tip_at(self, u: Floats) -> Floats:
+        """tip (N, 3) at u (N,)."""
         tip = self.start + u[:, None] * (self.end - self.start)
         arc = np.flatnonzero(self.is_arc)
         if len(arc):
             tip[arc] = self._arc_tip(arc, u[arc])
-        tip = np.where((u == 1.0)[:, None], self.end, tip)
+        return np.where((u == 1.0)[:, None], self.end, tip)
+
+    def axis_at(self, u: Floats) -> Floats:
+        """axis (N, 3) at u (N,)."""
         turning = (self.axis0 != self.axis1).any(axis=1)
         axis = self.axis0.copy()
         where = np.flatnonzero(turning)
         if len(where):
             axis[where] = slerp(self.axis0[where], self.axis1[where], u[where])
-        return tip, np.where((u == 1.0)[:, None], self.axis1, axis)
+        return np.where((u == 1.0)[:, None], self.axis1, axis)
 
     def _arc_tip(self, arc: Ints, u: Floats) -> Floats:
         """Helix through both ends: radius and height run linearly with the angle (ends may differ by rounding)."""
@@ -71,13 +78,13 @@ class Curves:
 
     def length(self) -> Floats:
         """Path length (N,) of the tip, mm; helices by their true length."""
-        chord: Floats = np.linalg.norm(self.end - self.start, axis=1).astype(np.float64)
+        chord: Floats = lengths(self.end - self.start)
         arc = np.flatnonzero(self.is_arc)
         if len(arc):
             normal, radial = self.normal[arc], self.start[arc] - self.center[arc]
             radial = radial - np.einsum("ni,ni->n", radial, normal)[:, None] * normal
             rise = np.einsum("ni,ni->n", self.end[arc] - self.start[arc], normal)
-            chord[arc] = np.hypot(np.linalg.norm(radial, axis=1) * self.sweep[arc], rise)
+            chord[arc] = np.hypot(lengths(radial) * self.sweep[arc], rise)
         return chord
 
     def project(self, tip: Floats, guess: Floats) -> Floats:
@@ -99,7 +106,7 @@ class Curves:
         """u (N,) in [0, 1] where axes (N, 3) stand on their great circles; `guess` (N,) where the axis does not turn."""
         turn = angle_between(self.axis0, self.axis1)
         turns = turn > 1e-6
-        across = np.cross(np.cross(self.axis0, self.axis1), self.axis0) / np.sin(np.where(turns, turn, 1.0))[:, None]
+        across = cross(cross(self.axis0, self.axis1), self.axis0) / np.sin(np.where(turns, turn, 1.0))[:, None]
         angle = np.arctan2((axis * across).sum(axis=1), (axis * self.axis0).sum(axis=1))
         result: Floats = np.where(turns, np.clip(angle / np.where(turns, turn, 1.0), 0.0, 1.0), guess)
         return result
@@ -108,7 +115,7 @@ class Curves:
         normal, center, sweep = self.normal[arc], self.center[arc], self.sweep[arc]
         radial = self.start[arc] - center
         radial = radial - np.einsum("ni,ni->n", radial, normal)[:, None] * normal
-        across = np.cross(normal, radial)
+        across = cross(normal, radial)
         offset = tip - center
         angle = np.arctan2(np.einsum("ni,ni->n", offset, across), np.einsum("ni,ni->n", offset, radial))
         angle = angle + 2.0 * np.pi * np.round((guess * sweep - angle) / (2.0 * np.pi))
@@ -123,8 +130,7 @@ class Curves:
         curve has both near. With 0 that is the nearest point.
         """
         u = self.project(tip, guess)
-        on_tip, _ = self.at(u)
-        off = np.linalg.norm(tip - on_tip, axis=1)
+        off = lengths(tip - self.tip_at(u))
         reach = np.sqrt(np.maximum(within**2 - off**2, 0.0)) / np.maximum(self.length(), 1e-12)
-        _, on_axis = self.at(np.clip(np.clip(self.turned(axis, u), u - reach, u + reach), 0.0, 1.0))
+        on_axis = self.axis_at(np.clip(np.clip(self.turned(axis, u), u - reach, u + reach), 0.0, 1.0))
         return off, angle_between(axis, on_axis), u

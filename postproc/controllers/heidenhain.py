@@ -37,6 +37,11 @@ class KlartextWriter(Writer):
         self.count += 1
         return f"{self.count} {block}"
 
+    @property
+    def numbers_blocks(self) -> bool:
+        """Every block has its number."""
+        return True
+
     def first_number(self) -> None:
         """Begin to number blocks anew."""
         self.count = -1

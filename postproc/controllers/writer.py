@@ -27,12 +27,24 @@ OF_PROGRAM = "of program"
 """begins the comment by which a subprogram's file names the program that calls it"""
 FULL_TURN = 360.0
 """degrees"""
+_TOGETHER = 10_000
+"""blocks that are put together at a time, so that a long program is never a list of all its blocks"""
 NEXT = "\1"
 """before an operation's number, which is the next hundred of the running numbers"""
 
 
 class Writer(WriterState, ABC):
     """Writes one program."""
+
+    def text(self, header: list[str]) -> str:
+        """The whole program; subprograms of files of their own go into `files`."""
+        parts, some = list[str](), list[str]()
+        for block in self.lines(header):
+            some.append(block)
+            if len(some) >= _TOGETHER:
+                parts.append("\n".join(some))
+                some.clear()
+        return "\n".join([*parts, *some, ""])
 
     def lines(self, header: list[str]) -> Iterator[str]:
         """The blocks of the whole program, without line ends; subprograms of files of their own go into `files`."""
@@ -43,7 +55,7 @@ class Writer(WriterState, ABC):
         yield from (self.framed(block.format(**named)) for block in frame.begin)
         yield from map(self.framed, map(self.comment, (*header, *self.relies_on())))
         yield from map(self.numbered, inside if place == "before" else [])
-        yield from map(self.numbered, main)
+        yield from map(self.numbered, main) if self.numbers_blocks else main
         yield from map(self.numbered, self.ending())
         yield from map(self.numbered, inside if place == "after" else [])
         yield from (self.framed(block.format(**named)) for block in frame.end)
@@ -71,6 +83,11 @@ class Writer(WriterState, ABC):
         for number, blocks in subs.items():
             blocks += [text.format(name=self.name, number=number) for text in spec.end]
         return main, subs
+
+    @property
+    def numbers_blocks(self) -> bool:
+        """False where no block of the body gets a number: `numbered` then leaves all as they are."""
+        return bool(self.controller.format.sequence_step)
 
     def first_number(self) -> None:
         """Begin to number blocks anew."""

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
 from machines.kinematics.base import Kinematics
 from toolpaths.arrays import Bools, Floats
-from toolpaths.rotations import angle_between
+from toolpaths.rotations import angle_between, cross, lengths
 from toolpaths.shape import Curves
 
 
@@ -36,9 +37,14 @@ def poles_of(kin: Kinematics) -> list[Pole]:
 
     That axis is the one whose turning direction, seen from the part, does not depend on the joints.
     """
+    return list(_poles(kin))
+
+
+@lru_cache(maxsize=64)
+def _poles(kin: Kinematics) -> tuple[Pole, ...]:
     rotary = np.flatnonzero(np.array(kin.rotary))
     if len(rotary) == 0 or kin.branches < 2:
-        return []
+        return ()
     q = np.zeros((2, kin.joints))
     tip, axis = np.zeros((2, 3)), kin.nearest_axis(np.array([[0.1, 0.2, 1.0], [-0.3, 0.15, 1.0]]))
     found = kin.inverse(tip, axis)[0] if kin.slides_affine else q
@@ -54,7 +60,7 @@ def poles_of(kin: Kinematics) -> list[Pole]:
                 unit = way / np.linalg.norm(way)
                 if angle_between(kin.nearest_axis(unit[None]), unit[None])[0] < 1e-9:
                     result.append(Pole(_frame(unit), int(j)))
-    return result
+    return tuple(result)
 
 
 def _within(kin: Kinematics, q: Floats) -> Floats:
@@ -73,12 +79,12 @@ def _frame(unit: Floats) -> Floats:
 
 def passages(pole: Pole, curves: Curves, near: float) -> tuple[Bools, Floats]:
     """(N,) curves that come within `near` rad of the pole, and how near (N,) they come."""
-    normal = np.cross(curves.axis0, curves.axis1)
-    size = np.linalg.norm(normal, axis=1)
+    normal = cross(curves.axis0, curves.axis1)
+    size = lengths(normal)
     turning = size > 1e-12
     normal = np.where(turning[:, None], normal / np.where(turning, size, 1.0)[:, None], 0.0)
     unit = pole.frame[2]
-    along = np.arctan2(np.einsum("ni,i->n", np.cross(normal, curves.axis0), unit), curves.axis0 @ unit)
+    along = np.arctan2(np.einsum("ni,i->n", cross(normal, curves.axis0), unit), curves.axis0 @ unit)
     inside = turning & (along > 0.0) & (along < angle_between(curves.axis0, curves.axis1))
     ends = np.minimum(pole.polar(curves.axis0)[0], pole.polar(curves.axis1)[0])
     foot = np.abs(np.arcsin(np.clip(normal @ unit, -1.0, 1.0)))

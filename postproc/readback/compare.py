@@ -30,7 +30,7 @@ from postproc.readback.states import check_states
 from postproc.readback.taps import check_taps
 from toolpaths.arrays import Bools, Floats, Ints, as_slice, shared
 from toolpaths.diagnostics import Diagnostic
-from toolpaths.rotations import angle_between
+from toolpaths.rotations import angle_between, lengths
 from toolpaths.shape import Curves
 from toolpaths.units import DEG
 
@@ -134,7 +134,7 @@ def _farthest(motion: Motion, executed: Executed, moves: Moves, tip: Floats, axi
     tip_off, axis_off = _deviations(motion, executed, moves, rows, owner, tolerance)
     done = as_slice(np.flatnonzero(match >= 0))
     there = as_slice(match[done])
-    visit = np.linalg.norm(tip[there] - moves.tip[done], axis=1)
+    visit = lengths(tip[there] - moves.tip[done])
     tilt = angle_between(axis[there], moves.axis[done])
     at = (owner[rows], np.arange(len(match))[done]), (rows, match[done])
     return _worst((tip_off, visit), *at, moves, motion), _worst((axis_off, tilt), *at, moves, motion)

@@ -78,8 +78,9 @@ def fill_values(lines: Ints, values: Floats, count: int) -> Floats:
 
 def codes(words: Words, letter: str, numbers: tuple[float, ...]) -> tuple[Ints, Floats]:
     """(blocks, numbers) of those G or M codes."""
-    pick = (words.letter == ord(letter)) & np.isin(words.value, numbers)
-    return words.line[pick], words.value[pick]
+    line, value = words.pick(letter)
+    pick = np.isin(value, numbers)
+    return line[pick], value[pick]
 
 
 def number_of(words: Words, letter: str) -> Floats:

@@ -15,6 +15,7 @@ from postproc.readback.faults import Faults
 from postproc.readback.poses import Executed
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.diagnostics import Diagnostic
+from toolpaths.rotations import lengths
 from toolpaths.toolpath import Kind
 
 SLOW = 1.25
@@ -76,7 +77,7 @@ def _on_the_spot(motion: Motion, control: Control, tip: Floats, tolerance: float
     """(E,) blocks between whose ends the tip stays, within the tolerance, while rotary axes turn."""
     result = np.zeros(len(motion), dtype=bool)
     turns = (motion.end[1:, control.rotary] != motion.end[:-1, control.rotary]).any(axis=1)
-    result[1:] = turns & (np.linalg.norm(np.diff(tip, axis=0), axis=1) <= tolerance)
+    result[1:] = turns & (lengths(np.diff(tip, axis=0)) <= tolerance)
     return result
 
 

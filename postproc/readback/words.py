@@ -11,12 +11,13 @@ import numpy as np
 from toolpaths.arrays import Array, Bools, Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error, warning
 
-_COMMENTS = re.compile(rb"\([^()\n]*\)|;[^\n]*")
+_COMMENT = re.compile(rb"\([^()\n]*\)|;[^\n]*")
 _WORD = re.compile(rb"\s*([A-Za-z])\s*([-+]?(?:\d+\.?\d*|\.\d+))\s*")
 _SWITCH = re.compile(rb"(?m)^([ \t]*(?:N?[ \t]*\d+[ \t]*)?)/\d?(?=[ \t]*[A-Z\n])")
 _LETTERS = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz"
 _BLANKS = bytes.maketrans(_LETTERS + b"\n", b" " * 53)
 _NO_LETTERS = bytes(c for c in range(256) if c not in _LETTERS)
+_NEAR = 10_000
 _STRETCH = 1_000_000
 """characters that are read at a time"""
 _NUMBER = np.zeros(256, dtype=bool)
@@ -66,9 +67,30 @@ def tokenise(data: bytes, file: str = "") -> tuple[Words, list[Diagnostic]]:
     return words, [*more, *found, *_early_end(ends, file)]
 
 
-def plain(data: bytes, comments: re.Pattern[bytes] = _COMMENTS) -> bytes:
+def plain(data: bytes) -> bytes:
     """Text with line feeds alone and without comments."""
-    return comments.sub(b"", lines_of(data))
+    text = lines_of(data)
+    kept, done, at = [], 0, _opening(text, 0)
+    while at >= 0:
+        match = _COMMENT.match(text, at)
+        if match is not None:
+            kept.append(text[done:at])
+            done = match.end()
+        at = _opening(text, at + 1 if match is None else done)
+    return b"".join([*kept, text[done:]]) if done else text
+
+
+def _opening(text: bytes, at: int) -> int:
+    """Where the next comment may begin, -1 nowhere.
+
+    It is looked for in short stretches: where one sign is rare and the other is not, none is looked for again and again.
+    """
+    while at < len(text):
+        found = [k for k in (text.find(mark, at, at + _NEAR) for mark in (b"(", b";")) if k >= 0]
+        if found:
+            return min(found)
+        at += _NEAR
+    return -1
 
 
 def lines_of(data: bytes) -> bytes:
