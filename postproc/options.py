@@ -48,8 +48,7 @@ class Options:
         if self.feed != "programmed":
             lines.append(f"feed {self.feed}, merged within {100.0 * self.merge_feeds:g} %")
         if self.orient != "keep":
-            lines += [f"tool axes chosen: orient {self.orient}, max tilt {self.max_tilt:g} degrees",
-                      "proved against the CL file with these axes, its tips moved to keep the ball's contact"]
+            lines.append(f"tool axes chosen: orient {self.orient}, max tilt {self.max_tilt:g} degrees")
         if self.smooth:
             lines.append("points smoothed")
         if self.error_model:

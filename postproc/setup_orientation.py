@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from machines.user_file import UserModel
+from postproc.setup_ranges import pair
 
 Angle = Annotated[float, Field(ge=-90.0, le=90.0)]
 
@@ -17,7 +18,7 @@ def _ordered(values: tuple[float, float]) -> tuple[float, float]:
     return values
 
 
-Range = Annotated[tuple[Angle, Angle], AfterValidator(_ordered)]
+Range = Annotated[tuple[Angle, Angle], BeforeValidator(pair), AfterValidator(_ordered)]
 
 
 class OrientationLimits(UserModel):

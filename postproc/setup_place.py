@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from machines.user_file import UserModel
+from postproc.setup_ranges import pair
 
 Place = Annotated[tuple[float, float, float], Field(description="x, y, z")]
-Range = Annotated[tuple[float, float], Field(description="least, greatest")]
+Range = Annotated[tuple[float, float], BeforeValidator(pair), Field(description="least, greatest")]
 
 
 class PlaceBox(UserModel):

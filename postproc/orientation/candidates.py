@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
@@ -31,7 +32,7 @@ _SWIFT = (3.0 * DEG, 1.5 * DEG)
 _ROUNDS = 3
 _SHARES = np.arange(15, 0, -1) / 16.0
 """of the way to a neighbour that is not allowed"""
-_APART = 0.1 * DEG
+APART = 0.1 * DEG
 """of orientations that are told as two"""
 _WORTH = 1e-4
 """least part of the time that a candidate must gain to be planned, or to be taken"""
@@ -57,6 +58,7 @@ class Tried:
         gains: seconds as ranked that `best` and `swift` gain over `own`
         rejected: candidates with what they lost by, but those that stand where the best does; ranked times are told beside
             the planned one of the best
+        unaimed: why there is no `aimed`, "" where there is one and where none is looked for
         pruned, planned: how many were discarded by the bound alone, how many timed
     """
 
@@ -68,6 +70,7 @@ class Tried:
     rejected: tuple[Lost, ...]
     pruned: int
     planned: int
+    unaimed: str = ""
 
 
 class Search:
@@ -172,17 +175,17 @@ class Search:
         self.lost.pop(id(self.own), None)
         return self.own
 
-    def tried(self, winner: Turned, aimed: Turned | None) -> Tried:
+    def tried(self, winner: Turned, aimed: Turned | None, unaimed: str = "") -> Tried:
         """The result, `winner` being the best as ranked."""
         best = self.settled(winner)
         lost = [made for made in self.known if id(made) in self.lost and made is not best]
         rejected = tuple(self._told(made, winner) for made in lost if not self._beside(made, best))
         gains = _gain(self.seconds(self.own), self.seconds(best)), _gain(self.whole(self.own), self.whole(self.swift))
-        return Tried(self.own, best, self.swift, aimed, gains, rejected, self.pruned, self.planned)
+        return Tried(self.own, best, self.swift, aimed, gains, rejected, self.pruned, self.planned, unaimed)
 
     def _beside(self, made: Turned, best: Turned) -> bool:
         """Whether a slower candidate is the best itself to all that can be told of it."""
-        return made is not self.own and self.lost[id(made)].kind == "slower" and made.same(best.axis, best.held, _APART)
+        return made is not self.own and self.lost[id(made)].kind == "slower" and made.same(best.axis, best.held, APART)
 
     def _told(self, made: Turned, winner: Turned) -> Lost:
         """What a candidate lost by; a time as ranked by as much longer as the winner is when planned in full, and no gain
@@ -231,7 +234,24 @@ def tried(one: Pass, machine: Machine, allowed: Allowed, before: Tried | None = 
         best = _refined(search, best, step)
     for step in _SWIFT:
         best = _hastened(search, best, step)
-    return search.tried(best_held(search, best), _least_turned(mean))
+    paper = _least_turned(mean)
+    return search.tried(best_held(search, best), paper, "" if paper is not None else _unaimed(search, aimed))
+
+
+def _unaimed(search: Search, aimed: dict[str, Floats]) -> str:
+    """Why no vertex is aimed along the mean direction."""
+    if "mean" not in aimed:
+        return "the pass has no mean direction" if search.one.longest is None else "the cut's own axis is out of reach"
+    wanted = search.one.kin.nearest_axis(aimed["mean"])
+    lost = [each for each in search.lost.values() if (angle_between(wanted, each.made.axis) < SAME).any()]
+    count = Counter(each.kind for each in lost if each.kind in ("limits", "travel", "reach"))
+    if not count:
+        return "no vertex can be turned into the mean direction"
+    return "of the axes that aim a vertex " + ", ".join(f"{number} {WHY[kind]}" for kind, number in count.items())
+
+
+WHY: dict[Kind, str] = {"limits": "are outside the allowed angles", "travel": "are outside travel",
+                        "reach": "are out of reach"}
 
 
 def _least_turned(made: list[Turned]) -> Turned | None:

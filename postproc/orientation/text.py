@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 
 from postproc.options import Orientation
@@ -21,6 +22,8 @@ SHOWN = 40
 """passes in the table; where there are more, those that gain most"""
 LOSERS: dict[Kind, int] = {"slower": 8, "bound": 3, "touches": 4, "travel": 3, "reach": 2, "limits": 3}
 """candidates of a pass in full, by what they lost by"""
+_WHYS = 3
+"""reasons of the paper's choice missing"""
 RUNS = 20
 """lines of the head of a program"""
 
@@ -45,7 +48,7 @@ def header(choice: OrientationChoice, plan: Orientation) -> list[str]:
     """Lines for the head of a program: the plan, and what tool axes follow one another."""
     picked = choice.plans[plan].picked
     first = [k for k in range(len(picked)) if k == 0 or turns(picked[k - 1], picked[k])]
-    lines = [f"planned {seconds(choice.plans[plan].seconds)} s, with the axes of the CL file "
+    lines = [_against(choice, plan), f"planned {seconds(choice.plans[plan].seconds)} s, with the axes of the CL file "
              f"{seconds(choice.plans['keep'].seconds)} s"]
     for start, end in list(zip(first, [*first[1:], len(picked)], strict=True))[:RUNS]:
         made, before = (sum(one.seconds for one in some) for some in (
@@ -53,6 +56,16 @@ def header(choice: OrientationChoice, plan: Orientation) -> list[str]:
         lines.append(f"pass {start}" + (f" to {end - 1}" if end - start > 1 else "") + f": {orientation(picked[start])}, "
                      f"cuts {seconds(made)} s instead of {seconds(before)} s")
     return lines + ([f"and {len(first) - RUNS} more turns"] if len(first) > RUNS else [])
+
+
+def _against(choice: OrientationChoice, plan: Orientation) -> str:
+    """What the program is proved against."""
+    pairs = list(zip(choice.tried, choice.plans[plan].picked, strict=True))
+    if any(not one.same(tried.own.axis, one.held) for tried, one in pairs):
+        return "proved against the CL file with these axes, its tips moved to keep the ball's contact"
+    if any(not one.same(tried.own.axis, tried.own.held) for tried, one in pairs):
+        return "proved against the CL file as it is, rotary axes held that the tool axis leaves free"
+    return "proved against the CL file as it is: no tool axis was turned"
 
 
 def _saved(tried: Tried, made: Turned) -> float:
@@ -99,6 +112,7 @@ def _in_full(tried: Tried, made: Turned) -> list[str]:
     lines = [f"pass {one.number}, line {one.line}" + (f", axis kept: {one.fixed}" if one.fixed else "")]
     for name, it in _named(tried, made):
         lines += [f"  {name}: {orientation(it)}, {_state(it)}", *_reached(it)]
+    lines += [f"  paper: none, {tried.unaimed}"] if tried.unaimed else []
     losers = sorted(tried.rejected, key=_rank)
     for kind, most in LOSERS.items():
         some = [lost for lost in losers if lost.kind == kind]
@@ -170,5 +184,12 @@ def _plans(choice: OrientationChoice) -> list[str]:
                    (plan.seconds, parts.cutting, parts.turning, parts.other))
         whole, cutting, turning, other = figures
         lines.append(f"{name:<16} {whole:>10} {percent(gain(plan.seconds, choice.plans['keep'].seconds)):>7} {cutting:>10} "
-                     f"{turning:>10} {other:>10} {parts.turns:>6}")
-    return lines
+                     f"{turning:>10} {other:>10} {parts.turns:>6}" + ("  takes what is refused" if plan.touches else ""))
+    return lines + _unaimed(choice)
+
+
+def _unaimed(choice: OrientationChoice) -> list[str]:
+    """Passes in which the paper chooses nothing, by why."""
+    count = Counter(one.unaimed for one in choice.tried if one.unaimed)
+    return [f"paper per pass keeps the CL axis in {number} of {len(choice.tried)} passes: {why}"
+            for why, number in count.most_common(_WHYS)]

@@ -389,3 +389,14 @@ def test_own_axes_beyond_the_largest_tilt_are_told_once() -> None:
 def test_a_contact_beyond_the_ball_is_told_alone() -> None:
     choice, found = oriented(along_x(), limited(contact_radius=9.0))
     assert choice is None and codes(found) == {"orient.contact_radius"}
+
+
+@pytest.mark.parametrize("value", ["5.0", "[5.0]", '["a", 2]', "[1, 2, 3]", "true"])
+@pytest.mark.parametrize("key", ["orientation.lead", "placement.x"])
+def test_what_is_no_range_says_what_is_expected(tmp_path: Path, key: str, value: str) -> None:
+    table, name = key.split(".")
+    file = tmp_path / "s.toml"
+    file.write_text(f"[{table}]\n{name} = {value}\n")
+    setup, found = load_setup(file)
+    assert setup is None and [(d.code, d.lines) for d in found] == [("file.value", (2,))]
+    assert f"{key}" in found[0].message and "expected two numbers, [least, greatest], e.g. [-30, 30]" in found[0].message
