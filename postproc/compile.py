@@ -60,7 +60,7 @@ def compile_program(job: Job, moves: Moves, path: Path,
 def words_of(job: Job, moves: Moves, path: Path, anew: Ints | None = None) -> WordRows:
     """The words of a path's blocks; the blocks `anew` state every axis."""
     return word_rows(path, moves, job.control, job.kinematics, job.gauge_length, decimals(job.control, job.controller),
-                     np.zeros(0, dtype=np.int64) if anew is None else anew, job.rounding.made_up, job.two_way)
+                     np.zeros(0, dtype=np.int64) if anew is None else anew, job.rounding.made_up, job.two_way, job.corrects)
 
 
 def writing_of(job: Job, moves: Moves) -> Writing:

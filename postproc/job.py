@@ -112,10 +112,15 @@ class Job:
         return rounding_bound(self.control, self.kinematics(int(self.moves.tool[0])), self.moves,
                               decimals(self.control, self.controller), self.modes.cutting_laws(), self.options.tolerance)
 
+    @property
+    def corrects(self) -> bool:
+        """True where the program corrects geometric errors."""
+        return self.errors is not None and self.errors.corrected_by == "post"
+
     @cached_property
     def two_way(self) -> list[int]:
         """Joints that lose motion, where the program corrects it."""
-        if self.errors is None or self.errors.corrected_by != "post":
+        if self.errors is None or not self.corrects:
             return []
         return self.errors.axes.two_way(self.machine.axis_names)
 

@@ -30,14 +30,15 @@ class WordRows:
 
 def word_rows(path: Path, moves: Moves, control: Control, kinematics: Callable[[int], Kinematics],
               lengths: Callable[[int], float], places: Ints, anew: Ints, made_up: bool = False,
-              two_way: Sequence[int] = ()) -> WordRows:
+              two_way: Sequence[int] = (), exact: bool = False) -> WordRows:
     """The words of all blocks; `lengths` gives the gauge length of the tool of an index, `places` (J,) the decimals,
-    `anew` the blocks that state every axis, `made_up` as in `Rounding`; `two_way` joints lose motion, see `_held`."""
+    `anew` the blocks that state every axis, `made_up` as in `Rounding`; `two_way` joints lose motion, see
+    `_held`; `exact` ends of CL moves keep the last decimals of their words."""
     begins = np.flatnonzero(np.diff(path.frame)) + 1
     tool = block_tools(path, moves)
     rounds = places if made_up else None
-    exact = _words(path, path.q, np.arange(len(path)), tool, kinematics, lengths, rounds)
-    end = _rounded(_snapped(_rounded(exact, places), path, control, places), places)
+    unrounded = _words(path, path.q, np.arange(len(path)), tool, kinematics, lengths, rounds)
+    end = _rounded(_snapped(_rounded(unrounded, places), path, control, places, exact), places)
     end = _flat(_rounded(_held(end, path, control, tool, places, two_way), places), path, control)
     start = np.concatenate([end[:1], end[:-1]])
     start[begins] = _rounded(_words(path, path.q[begins - 1], begins, tool, kinematics, lengths, rounds), places)
@@ -102,19 +103,19 @@ def _made_up(q: Floats, law: Control, kin: Kinematics, places: Ints) -> Floats:
     return turned
 
 
-def _snapped(words: Floats, path: Path, control: Control, places: Ints) -> Floats:
+def _snapped(words: Floats, path: Path, control: Control, places: Ints, exact: bool) -> Floats:
     """Words (rounded) without tiny X, Y, Z residues beside a rotary move.
 
     Under inverse time LinuxCNC takes the length of X, Y, Z alone where any of them moves, so that a residue of
     rounding would set the speed of the whole block. What is left out is at most SNAP last decimals, and never adds up:
-    each block is compared with the last written position.
+    each block is compared with the last written position. Ends of CL moves that must be `exact` keep them.
     """
     slides, rotary = control.slides, control.rotary
     if not len(rotary) or len(words) < 2:
         return words
     snap = SNAP * 10.0 ** -places[slides]
     turning = (words[1:, rotary] != words[:-1, rotary]).any(axis=1) & (path.code[1:] == FEED)
-    turning &= path.frame[1:] == path.frame[:-1]
+    turning &= (path.frame[1:] == path.frame[:-1]) & ~(exact & (path.u[1:] == 1.0))
     step = np.abs(words[1:, slides] - words[:-1, slides])
     rows = np.flatnonzero(turning & (step <= snap).all(axis=1) & (step > 0.0).any(axis=1)) + 1
     wanted = words.copy()

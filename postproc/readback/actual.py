@@ -38,6 +38,11 @@ class ActualExecuted(Executed):
             tip[k], axis[k], _ = actual.place(actual.coordinates(q[k], near[k]), way[k])
         return tip, axis
 
+    def corrected_on_the_way(self, motion: Motion, rows: Ints) -> Floats:
+        """(K,) mm: what errors come to at both ends together; axes with rapids of their own take it up one by one."""
+        return np.asarray(sum(np.linalg.norm(self.poses(motion, rows, t)[0] - super(ActualExecuted, self).poses(
+            motion, rows, t)[0], axis=1) for t in (0.0, 1.0)))
+
     def _actual(self, number: int) -> Actual:
         return self.model.on(self.kinematics(number))
 

@@ -231,19 +231,20 @@ def _seconds(motion: Motion, control: Control, by_radius: bool, rows: Ints, swee
 def check_links(motion: Motion, executed: Executed, moves: Moves, owner: Ints, space: SafeSpace, tolerance: float,
            faults: Faults) -> list[Diagnostic]:
     """Linking blocks, those after the last point too, stay on the line of retract, clear of the path, or on the line of
-    approach."""
+    approach; within what corrections of geometric errors change on the way, besides the tolerance."""
     rows = np.flatnonzero((owner == len(moves)) | ((owner < len(moves)) & moves.link[np.minimum(owner, len(moves) - 1)]))
     rows = rows[rows > 0]
     bad = np.zeros(len(rows), dtype=bool)
     m = owner[rows]
     ends = m >= len(moves)
     to = np.minimum(m, len(moves) - 1)
+    near = tolerance + executed.corrected_on_the_way(motion, rows)
     for t in executed.times(motion, rows):
         tip, axis = executed.poses(motion, rows, t)
         low = ~space.clear(tip, axis, -tolerance)
-        approach = (_off_line(tip, moves.tip[to], moves.axis[to]) <= tolerance) & ~ends
+        approach = (_off_line(tip, moves.tip[to], moves.axis[to]) <= near) & ~ends
         before = np.maximum(m - 1, 0)
-        retract = (_off_line(tip, moves.tip[before], moves.axis[before]) <= tolerance) & (m > 0)
+        retract = (_off_line(tip, moves.tip[before], moves.axis[before]) <= near) & (m > 0)
         bad |= low & ~approach & ~retract
     if not bad.any():
         return []

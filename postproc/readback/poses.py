@@ -63,6 +63,10 @@ class Executed:
             q[k] = self._held(position[k], self.lengths.get(h, 0.0) if h >= 0 else 0.0)
         return q
 
+    def corrected_on_the_way(self, motion: Motion, rows: Ints) -> Floats:
+        """(K,) mm that the corrections of the tip may change by in blocks: none on the machine without errors."""
+        return np.zeros(len(rows))
+
     def bent(self, motion: Motion, rows: Ints) -> Bools:
         """(K,) True for rapids that are dog-legs."""
         return _bent(motion, self.control, rows)
