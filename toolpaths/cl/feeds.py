@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from toolpaths.arrays import Floats
 from toolpaths.cl.build import Builder
 from toolpaths.cl.statements import Statement, Word
 from toolpaths.toolpath import FeedMode
@@ -53,6 +54,17 @@ def fedrat(b: Builder, s: Statement) -> None:
     unit = unit_of(s.words)
     value = s.after(unit)
     b.feed.set(b.row, feed_in(numbers[0] if value is None else value, unit, b.scale))
+
+
+def many(b: Builder, s: Statement, numbers: Floats) -> None:
+    """Set the modal feed by neighbouring statements (`feed_lines`) from the current one on, `s` but for their numbers."""
+    unit, at = unit_of(s.words), b.index
+    feeds = [feed_in(number, unit, b.scale) for number in numbers.tolist()]
+    for before, feed in zip(b.program.before[at:at + len(numbers)], feeds, strict=True):
+        b.row += before - b.fast
+        b.fast = before
+        b.feed.set(b.row, feed)
+    b.index += len(numbers) - 1
 
 
 def _feeds(words: tuple[Word, ...]) -> list[float]:

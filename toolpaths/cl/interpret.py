@@ -46,7 +46,9 @@ def run(b: Builder, start: int, stop: int) -> None:
         b.line = lines[i]
         statement = statements[i]
         handler = handlers.get(statement.major)
-        if handler is not None:
+        if i in b.program.feeds:
+            feeds.many(b, statement, b.program.feeds[i][:stop - i])
+        elif handler is not None:
             handler(b, statement)
         else:
             _other(b, statement)

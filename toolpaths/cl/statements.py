@@ -7,6 +7,8 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
+from toolpaths.arrays import Floats
+from toolpaths.cl.feed_lines import FeedLines, feed_lines
 from toolpaths.cl.log import Log
 from toolpaths.cl.scan import LARGEST, LARGEST_OWN, Scan
 from toolpaths.cl.source import text_of
@@ -67,13 +69,16 @@ class Statement:
 class Program:
     """The slow part of a file in order: statement, its first line, and how many plain points stand before it.
 
-    `first` tells for each different statement (points apart) the line where it stands first.
+    `first` tells for each different statement (points apart) the line where it stands first. `feeds` holds, by the index of
+    the first of them, the numbers of neighbouring FEDRAT statements that differ in nothing else: for all of them stands the
+    first of the file.
     """
 
     statements: list[Statement] = field(default_factory=list)
     lines: list[int] = field(default_factory=list)
     before: list[int] = field(default_factory=list)
     first: dict[Statement, int] = field(default_factory=dict)
+    feeds: dict[int, Floats] = field(default_factory=dict)
 
 
 def words_of(body: str) -> tuple[Word, ...]:
@@ -151,9 +156,12 @@ class Lexer:
     def program(self) -> Program:
         """All statements of the file."""
         out, scan, memo, data = Program(), self.scan, self.memo, self.data
-        total = len(scan.start)
+        total, feeds = len(scan.start), feed_lines(self.data, self.scan, self.largest)
         while self.next < total:
             i = self.next
+            if feeds is not None and feeds.stop[i]:
+                self._feeds(out, feeds, i, int(feeds.stop[i]))
+                continue
             self.next = i + 1
             raw = data[scan.start[i]:scan.end[i]]
             if raw in memo:
@@ -170,6 +178,20 @@ class Lexer:
                 out.lines.append(scan.line[i])
                 out.before.append(scan.before[i])
         return out
+
+    def _feeds(self, out: Program, feeds: FeedLines, i: int, stop: int) -> None:
+        """Slow lines i to before `stop`, which state feeds in the form of one line."""
+        scan, first = self.scan, feeds.first
+        raw = self.data[scan.start[first]:scan.end[first]]
+        statement = self.memo.get(raw) or self._read(raw, first)
+        if statement is not None:
+            self.memo[raw] = statement
+            out.first.setdefault(statement, scan.line[i])
+            out.feeds[len(out.statements)] = feeds.value[i:stop]
+            out.statements.extend([statement] * (stop - i))
+            out.lines.extend(scan.line[i:stop])
+            out.before.extend(scan.before[i:stop])
+        self.next = stop
 
     def _limited(self, statement: Statement | None) -> Statement | None:
         """Numbers beyond the limit are words, which no record takes for a number."""
