@@ -52,6 +52,8 @@ if TYPE_CHECKING:
 Progress = Callable[[str, int, int], None]
 MARGIN = 0.85
 """of what is left for linearising: deviations are looked at in samples, the read-back looks at others"""
+_STRETCH = 1_000_000
+"""characters of a program that are looked at together"""
 POINTS = 0.5
 """of the share for linearising that --smooth may move points by"""
 
@@ -213,7 +215,7 @@ def _stages(result: PostResult, progress: Progress | None) -> PostResult:
     result = _with(result, [d for t in (text, *files.values()) for d in long_blocks(t, most, file)])
     if not result.ok:
         return result
-    comparison, found = read_back(text.encode(), job, file, progress,
+    comparison, found = read_back(text, job, file, progress,
                                   others={name: t.encode() for name, t in files.items()})
     result = _with(result, found, comparison=comparison)
     if result.compensation is not None:
@@ -310,13 +312,18 @@ def write_text(result: PostResult) -> tuple[str, dict[str, str]]:
                         shares["smoothing"], result.setup.work_offset_code, axis_smoothing=shares["axis_smoothing"],
                         name=result.options.name or FilePath(result.toolpath.file).stem,
                         subprograms=result.setup.output.divided)
-    text = "\n".join(writer.lines(header)) + "\n"
+    text = writer.text(header)
     return text, {name: "\n".join(blocks) + "\n" for name, blocks in writer.files.items()}
 
 
 def long_blocks(text: str, most: int, file: str) -> list[Diagnostic]:
     """Blocks with more characters than the controller reads."""
-    long = [(n, line) for n, line in enumerate(text.splitlines(), 1) if len(line) > most]
+    long, at, before = list[tuple[int, str]](), 0, 0
+    while at < len(text):
+        stop = text.find("\n", min(at + _STRETCH, len(text) - 1)) + 1 or len(text)
+        lines = text[at:stop].splitlines()
+        long += [(before + n, line) for n, line in enumerate(lines, 1) if len(line) > most]
+        at, before = stop, before + len(lines)
     if not long:
         return []
     number, line = long[0]
