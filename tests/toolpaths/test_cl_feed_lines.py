@@ -15,8 +15,8 @@ FORMS = ("FEDRAT/MMPM,{}", "FEDRAT / {} , IPM", "FEDRAT/{}", "FEDRAT/MMPR, {}  "
 ODD = ("FEDRAT/MMPM,1E2", "FEDRAT/MMPM,1.2.3", "FEDRAT/MMPM,1-2", "FEDRAT/MMPM,+", "FEDRAT/MMPM,", "FEDRAT/MMPM,-5.",
        "FEDRAT/MMPM,.5", "FEDRAT/MMPM,00012345678901234567890123456789012345", "FEDRAT/MMPM,9999999999999",
        "FEDRAT/MMPM,100,200", "FEDRAT/LENGTH,5", "FEDRAT/MMPM,100 $$ note", "FEDRAT/IPM,5", "fedrat/mmpm,70",
-       "FEDRAT/MMPM,$", "FEDRAT/INVERS,2", "RAPID", "SPINDL/900,CLW", "$$ words", "COOLNT/ON", "FEDRAT/MMPM, 7", "FEDRATE/MMPM,7", "FEDRAT",
-       "CALSUB/1", "UNITS/MM")
+       "FEDRAT/MMPM,$", "FEDRAT/INVERS,2", "RAPID", "SPINDL/900,CLW", "$$ words", "COOLNT/ON",
+       "FEDRAT/MMPM, 7", "FEDRATE/MMPM,7", "FEDRAT", "CALSUB/1", "UNITS/MM")
 
 
 def text_of(form: str, rng: np.random.Generator, odd: tuple[str, ...], count: int = 60) -> str:
