@@ -72,7 +72,7 @@ def to_tables(file: ModelFile, machine: MachineName, output: Folder, step: Step 
         steps = exports.in_units(pairs("--step", step, m.axis_names))
         allowed = loss * UNITS["um"], angle_loss * UNITS["arcsec"]
         made, losses = or_refused(lambda: exports.to_tables(model, m, steps, *allowed), file)
-        made, told = writable(made)
+        made, told = writable(model, made)
         files = model_files(made, file.stem, f"tables of {file.name}")
         files |= {f"{file.stem}-location.csv": exports.location_csv(made)} if made.axes.constants else {}
     figures, lost = table_figures(made, exports.named(losses))

@@ -81,14 +81,16 @@ def pairs(option: str, given: Sequence[str] | None, known: Sequence[str]) -> dic
     return found
 
 
-def writable(model: ErrorModel) -> tuple[ErrorModel, list[str]]:
-    """The model with a covariance that a table can hold, and what that loses."""
+def writable(model: ErrorModel, made: ErrorModel) -> tuple[ErrorModel, list[str]]:
+    """A model made of another one, with a covariance that a table can hold, and what that loses."""
     from machines.geometric_error.exports import MOST_DOUBT, correlated
 
-    if model.covariance is None or len(model.names) <= MOST_DOUBT or not correlated(model):
-        return model, [] if model.covariance is None else ["covariance kept"]
-    return replace(model, covariance=None), [f"the covariance is lost: {len(model.names)} correlated parameters, at most "
-                                             f"{MOST_DOUBT} are written; take longer steps"]
+    if model.covariance is None:
+        return made, []
+    if made.covariance is not None and (len(made.names) <= MOST_DOUBT or not correlated(made)):
+        return made, ["covariance kept"]
+    return replace(made, covariance=None), [f"lost: the covariance; {len(made.names)} correlated parameters, at most "
+                                            f"{MOST_DOUBT} are written: take longer steps or greater losses"]
 
 
 def model_files(model: ErrorModel, stem: str, description: str, name: str = "") -> dict[str, str]:

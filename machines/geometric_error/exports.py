@@ -11,6 +11,7 @@ from machines.geometric_error.actual import Actual
 from machines.geometric_error.actual_map import ActualByMap, part_side
 from machines.geometric_error.averages import SAME
 from machines.geometric_error.axis_motion import sense
+from machines.geometric_error.bed_frame import bed_side, in_bed_frame
 from machines.geometric_error.covariance import angular
 from machines.geometric_error.csv_table import UNITS, write_csv
 from machines.geometric_error.curves import Table
@@ -18,7 +19,7 @@ from machines.geometric_error.lattice import POINT, ROTARY, ErrorMap
 from machines.geometric_error.lattice_making import MapLoss, map_loss, map_of, nodes_of, probes, refined
 from machines.geometric_error.model import ErrorModel
 from machines.geometric_error.screw_tables import LINUXCNC_ROWS, to_linuxcnc
-from machines.geometric_error.serial_errors import Component, Frame, SerialErrors
+from machines.geometric_error.serial_errors import Component, SerialErrors
 from machines.geometric_error.survey import apart
 from machines.geometric_error.tabulate import loss, rows_for, sampled, tabulated, without
 from machines.geometric_error.volume import corners, middle, ranges, samples
@@ -44,7 +45,7 @@ Steps = Mapping[str, float]
 
 def to_tables(model: ErrorModel, machine: Machine, step: Steps, length: float,
               angle: float) -> tuple[ErrorModel, dict[str, float]]:
-    """The model with every component a linear table, and what each loses (mm or rad), by name.
+    """The model with every component a linear table along x, y, z of the bed (ISO 230-1), and what each loses (mm or rad).
 
     Args:
         step: mm or rad between rows, by axis; without it as few as lose no more than `length` mm and `angle` rad
@@ -54,9 +55,10 @@ def to_tables(model: ErrorModel, machine: Machine, step: Steps, length: float,
     """
     if not model.axes.components:
         raise ValueError("the model has no component errors: a map or dimensions of legs have no tables per axis")
-    rows = rows_for(model, travel(machine), step, length, angle, MOST_ROWS)
-    losses = {str(c.name): loss(c.curve, rows[str(c.name)]) for c in model.axes.components}
-    return tabulated(model, rows), losses
+    components, frame = in_bed_frame(model, machine)
+    rows = rows_for(components, travel(machine), step, length, angle, MOST_ROWS)
+    losses = {str(c.name): loss(c.curve, rows[str(c.name)]) for c in components}
+    return tabulated(model, components, frame, rows, MOST_DOUBT), losses
 
 
 def location_csv(model: ErrorModel) -> str:
@@ -96,8 +98,7 @@ def to_screws(model: ErrorModel, machine: Machine, step: Steps, length: float, a
     if not mine:
         raise ValueError("the model has no positioning error of an axis (EXX, EYY, ... ECC); LinuxCNC's screw compensation "
                          "holds nothing else")
-    only = replace(model, axes=replace(model.axes, components=mine), covariance=None)
-    rows = rows_for(only, travel(machine), step, length, angle, LINUXCNC_ROWS, repeat=False)
+    rows = rows_for(mine, travel(machine), step, length, angle, LINUXCNC_ROWS, repeat=False)
     tables = {c.name.axis: sampled(c.curve, rows[str(c.name)].x) for c in mine}
     texts = {c.name.axis: to_linuxcnc(c.name, tables[c.name.axis], joint_sense(machine, c.name.axis)) for c in mine}
     losses = {str(c.name): loss(c.curve, rows[str(c.name)]) for c in mine}
@@ -124,17 +125,13 @@ def notices(model: ErrorModel, machine: Machine) -> list[str]:
     """What else tables per axis do not say: where they end, and along what the errors of a rotary axis are."""
     lower = dict(zip(machine.axis_names, machine.limits.lower, strict=True))
     sides = {"fixed": "the part's side of the axis", "moving": "the tool's side of the axis"}
-    own = {letter: frame for letter, frame in model.axes.frame.items() if frame != bed_frame(machine, letter)}
+    axes, frames = {c.name.axis for c in model.axes.components}, model.axes.frame
+    own = {letter: frame for letter, frame in frames.items() if letter in axes and frame != bed_side(machine, letter)}
     ends = [f"{c.name.axis} goes round, its table holds from {c.curve.range[0] / DEG:g} to {c.curve.range[1] / DEG:g} "
             "degrees" for c in model.axes.components if c.name.axis in ROTARY and np.isfinite(c.curve.range).all()
             and not np.isfinite(lower[c.name.axis])]
     return [*dict.fromkeys(ends), *(f"errors of {letter} are along x, y, z of {sides[frame]}, not of the bed as in ISO 230-1"
                                     for letter, frame in sorted(own.items()))]
-
-
-def bed_frame(machine: Machine, letter: str) -> Frame:
-    """The side of a rotary axis that the bed is on: directions of ISO 230-1."""
-    return "moving" if letter in part_side(machine.kinematics, machine.structure) else "fixed"
 
 
 # ---- error map -----------------------------------------------------------------------------------------------------

@@ -13,9 +13,10 @@ import numpy as np
 from machines.geometric_error.actual_map import part_side
 from machines.geometric_error.averages import Averaged, averaged, levels_of
 from machines.geometric_error.axis_motion import effect
+from machines.geometric_error.bed_frame import bed_side
 from machines.geometric_error.covariance import angular, read_covariance
 from machines.geometric_error.csv_table import ANGLES, LENGTHS, UNITS, CsvTable, read_csv, read_text
-from machines.geometric_error.exports import MOST_DOUBT, bed_frame, joint_sense
+from machines.geometric_error.exports import MOST_DOUBT, joint_sense
 from machines.geometric_error.lattice import COLUMNS
 from machines.geometric_error.lattice_file import COORDINATES, map_from_csv, zeroed
 from machines.geometric_error.model import ErrorModel
@@ -208,7 +209,7 @@ def _axis(table: CsvTable, positions: list[str], machine: Machine, how: How) -> 
     if not names and not found:
         found.append(error("error-model.column", f"no errors of {letter}", file=table.file, lines=[table.head],
                            hint=f"write columns {', '.join(f'E{d}{letter} [{_unit(d)}]' for d in DIRECTIONS)}"))
-    frame: dict[str, Frame] = {letter: bed_frame(machine, letter)} if letter in "ABC" else {}
+    frame: dict[str, Frame] = {letter: bed_side(machine, letter)} if letter in "ABC" else {}
     model = ErrorModel(SerialErrors(tuple(components), frame=frame))
     return (None if found else model), found
 
@@ -271,5 +272,5 @@ def _screw(letter: str, path: Path, machine: Machine, how: How) -> tuple[ErrorMo
     table, found = from_linuxcnc(text, name, how.sign * joint_sense(machine, letter), how.kind, str(path))
     if table is None:
         return None, found
-    frame: dict[str, Frame] = {letter: bed_frame(machine, letter)} if rotary[letter] else {}
+    frame: dict[str, Frame] = {letter: bed_side(machine, letter)} if rotary[letter] else {}
     return ErrorModel(SerialErrors((Component(name, table),), frame=frame)), []

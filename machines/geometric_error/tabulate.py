@@ -7,10 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from machines.geometric_error.bed_frame import Turned
 from machines.geometric_error.curves import Curve, Fourier, Table
 from machines.geometric_error.model import ErrorModel
 from machines.geometric_error.names import ErrorName
-from machines.geometric_error.serial_errors import Component
+from machines.geometric_error.serial_errors import Component, Frame
 from toolpaths.arrays import Floats
 
 PROBES = 16
@@ -36,11 +37,16 @@ class Rows:
 
 def sampled(curve: Curve, x: Floats, period: float = 0.0) -> Table:
     """A curve as a linear table at positions (M,), mm or rad, both ways where it has them."""
-    both = isinstance(curve, Table) and curve.both
     if isinstance(curve, Table) and curve.rule == "linear" and curve.period == period and np.array_equal(x, curve.x):
         return curve
+    both = both_ways(curve)
     ways = (1.0, -1.0) if both else (0.0,)
     return Table(x, np.concatenate([curve.at(x, way) for way in ways]), "linear", both, period)
+
+
+def both_ways(curve: Curve) -> bool:
+    """True for a curve with two ways of approach."""
+    return isinstance(curve, Table | Turned) and curve.both
 
 
 def loss(curve: Curve, rows: Rows) -> float:
@@ -55,8 +61,8 @@ def loss(curve: Curve, rows: Rows) -> float:
     return max(float(np.abs(table.at(places, way) - curve.at(places, way)).max(initial=0.0)) for way in ways)
 
 
-def rows_for(model: ErrorModel, travel: Mapping[str, tuple[float, float]], step: Mapping[str, float], length: float,
-             angle: float, most: int, repeat: bool = True) -> dict[str, Rows]:
+def rows_for(components: Sequence[Component], travel: Mapping[str, tuple[float, float]], step: Mapping[str, float],
+             length: float, angle: float, most: int, repeat: bool = True) -> dict[str, Rows]:
     """Rows for each component, by its name: the same for those of one axis that were measured over the same range.
 
     Args:
@@ -70,7 +76,7 @@ def rows_for(model: ErrorModel, travel: Mapping[str, tuple[float, float]], step:
         ValueError: more rows would be needed, or a step is for an axis without components.
     """
     groups: dict[tuple[str, tuple[float, float], float], list[Component]] = {}
-    for component in model.axes.components:
+    for component in components:
         period = _period(component.curve) if repeat else 0.0
         groups.setdefault((component.name.axis, component.curve.range, period), []).append(component)
     unknown = [axis for axis in step if axis not in {key[0] for key in groups}]
@@ -88,7 +94,7 @@ def rows_for(model: ErrorModel, travel: Mapping[str, tuple[float, float]], step:
 
 
 def _period(curve: Curve) -> float:
-    return curve.period if isinstance(curve, Table | Fourier) and not np.isfinite(curve.range).any() else 0.0
+    return curve.period if isinstance(curve, Table | Fourier | Turned) and not np.isfinite(curve.range).any() else 0.0
 
 
 def _ends(components: Sequence[Component], lower: float, upper: float, period: float) -> Floats:
@@ -119,32 +125,50 @@ def _fine(components: Sequence[Component], ends: Floats, period: float, length: 
         parts = max(parts + 1, min(2 * parts, int(parts * np.sqrt(worst))))
 
 
-def tabulated(model: ErrorModel, rows: Mapping[str, Rows]) -> ErrorModel:
-    """The model with the components named in `rows` as linear tables there, and the covariance of their values.
+def tabulated(model: ErrorModel, components: Sequence[Component], frame: Mapping[str, Frame], rows: Mapping[str, Rows],
+              most: int) -> ErrorModel:
+    """The model with components as linear tables, and the covariance of their values.
 
-    The values of a table are linear in the parameters of its curve, so that covariance is A Sigma A^T.
+    The values of a table are linear in the parameters of its curve, so that covariance is A Sigma A^T. It is left out where
+    tables differ from their curves and there are more than `most` parameters.
+
+    Args:
+        components: the model's own, or `Turned` of them, in directions of `frame`
+        rows: by name of the component
     """
-    components, blocks = [], [np.eye(0 if model.rods is None else len(model.rods.names))]
-    for component in model.axes.components:
-        mine, curve = rows.get(str(component.name)), component.curve
-        table = curve if mine is None else sampled(curve, mine.x, mine.period)
-        components.append(Component(component.name, table))
-        blocks.append(np.eye(len(curve.values)) if mine is None else _basis(curve, mine.x))
-    blocks.append(np.eye(len(model.axes.constants)))
-    covariance = None if model.covariance is None else carried(model.covariance, blocks)
-    return replace(model, axes=replace(model.axes, components=tuple(components)), covariance=covariance)
+    made = [Component(c.name, sampled(c.curve, rows[str(c.name)].x, rows[str(c.name)].period)) for c in components]
+    axes = replace(model.axes, components=tuple(made), frame=frame)
+    result = replace(model, axes=axes, covariance=None)
+    if model.covariance is None or all(a.curve is b.curve for a, b in zip(made, model.axes.components, strict=False)):
+        return replace(result, covariance=model.covariance)
+    if len(result.names) > most:
+        return result
+    by = _derivatives(model, components, made)
+    return replace(result, covariance=by @ model.covariance @ by.T)
+
+
+def _derivatives(model: ErrorModel, components: Sequence[Component], made: Sequence[Component]) -> Floats:
+    """(P', P) of the values of tables `made` of `components` by the parameters of the model."""
+    first = 0 if model.rods is None else len(model.rods.names)
+    starts, at = {}, first
+    for old in model.axes.components:
+        starts[old.name] = np.arange(at, at + len(old.curve.values))
+        at += len(old.curve.values)
+    constants = len(model.axes.constants)
+    result = np.zeros((first + sum(len(c.curve.values) for c in made) + constants, at + constants))
+    result[:first, :first], row = np.eye(first), first
+    for component, table in zip(components, made, strict=True):
+        curve = component.curve
+        own = [part.name for _, part in curve.parts] if isinstance(curve, Turned) else [component.name]
+        block = _basis(curve, table.curve.x) if isinstance(table.curve, Table) else np.eye(len(curve.values))
+        result[row:row + len(block), np.concatenate([starts[name] for name in own])] = block
+        row += len(block)
+    result[row:, at:] = np.eye(constants)
+    return result
 
 
 def _basis(curve: Curve, x: Floats) -> Floats:
-    both = isinstance(curve, Table) and curve.both
-    return np.concatenate([curve.basis(x, np.full(len(x), way)) for way in ((1.0, -1.0) if both else (0.0,))])
-
-
-def carried(covariance: Floats, blocks: Sequence[Floats]) -> Floats:
-    """A Sigma A^T with A the blocks (P'_k, P_k) along a diagonal."""
-    columns = np.cumsum([0, *(b.shape[1] for b in blocks)])
-    half = np.concatenate([b @ covariance[a:e] for b, a, e in zip(blocks, columns[:-1], columns[1:], strict=True)])
-    return np.concatenate([half[:, a:e] @ b.T for b, a, e in zip(blocks, columns[:-1], columns[1:], strict=True)], axis=1)
+    return np.concatenate([curve.basis(x, np.full(len(x), way)) for way in ((1.0, -1.0) if both_ways(curve) else (0.0,))])
 
 
 # ---- parts of models ---------------------------------------------------------------------------------------------------
