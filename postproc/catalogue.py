@@ -33,11 +33,28 @@ def machine_dict(machine: Machine) -> dict[str, Any]:
         axes.append(row)
     control = machine.control_kinematics
     return {"name": machine.name, "description": machine.description, "structure": machine.structure,
-            "file": machine.file, "axes": axes,
+            "file": machine.file, "axes": axes, "rotary_axes": rotary_lines(machine),
             "retract_axis": machine.axis_names[machine.retract_axis] if machine.retract_axis >= 0 else None,
             "timing_s": {"tool_change": machine.timing.tool_change, "clamp": machine.timing.clamp,
                          "unclamp": machine.timing.unclamp},
             "control": {"module": control.module, "pins": dict(control.pins)} if control else None}
+
+
+def rotary_lines(machine: Machine) -> list[dict[str, Any]]:
+    """Where the rotary axes lie with all rotary joints at zero (a serial machine's slides too): `point` (mm) and `direction`
+    of each in the table frame, which then is the machine's; the point is that of the line nearest to the origin."""
+    kin = machine.kinematics
+    q = np.where(np.array(machine.rotary) | kin.slides_affine, 0.0, machine.home)[None]
+    (tip,), rates = kin.forward(q)[0], kin.twist_jacobian(q)[0]
+    lines = []
+    for j in np.flatnonzero(machine.rotary).tolist():
+        turn = rates[3:, j] / np.linalg.norm(rates[3:, j])
+        turn = turn * np.sign(turn[np.abs(turn).argmax()])
+        at = tip + np.cross(rates[3:, j], rates[:3, j]) / float(rates[3:, j] @ rates[3:, j])
+        at = at - (at @ turn) * turn
+        lines.append({"letter": machine.axis_names[j], "point": (at.round(6) + 0.0).tolist(),
+                      "direction": (turn.round(6) + 0.0).tolist()})
+    return lines
 
 
 def machine_text(machine: Machine) -> str:
@@ -50,6 +67,12 @@ def machine_text(machine: Machine) -> str:
         lines.append(f"{row['letter']:4}  {travel:28} {row['velocity']:9g} {row['acceleration']:13g} {row['jerk']:10g} "
                      f"{row['home']:5g}" + (f"  (assumed: {', '.join(row['assumed'])})" if row["assumed"] else ""))
     lines.append("velocity per s, acceleration per s2, jerk per s3, in mm or degrees")
+    zero = "all" if machine.kinematics.slides_affine else "all rotary"
+    lines.append(f"table frame: carries the part; with {zero} axes at zero it is the machine's" + (
+        ", and" if d["rotary_axes"] else ""))
+    for row in d["rotary_axes"]:
+        point, along = (", ".join(f"{v:g}" for v in row[key]) for key in ("point", "direction"))
+        lines.append(f"  {row['letter']} turns about the line through ({point}) mm along ({along})")
     if d["control"]:
         pins = ", ".join(f"{k} {v:g}" for k, v in d["control"]["pins"].items())
         lines.append(f"the control runs the kinematics {d['control']['module']} ({pins})")

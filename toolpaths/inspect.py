@@ -28,7 +28,7 @@ def inspect(result: ReadResult) -> dict[str, object]:
     the CYCLE records that name a kind, `rapids` the rapid moves; `arcs_over_180_deg` tells whether the sense of the
     arcs fits the dialect: few arcs of a real path sweep more than half a turn (whole turns apart); `axis_motion` is
     fixed, indexed (between cuts only) or continuous, and `five_axis` is true unless it is fixed; `extents` are those
-    of the commanded positions.
+    of the commanded positions; `normals` counts the positions that give a surface normal (GOTO with nine numbers).
     """
     p = result.toolpath
     point = is_point(p)
@@ -38,6 +38,7 @@ def inspect(result: ReadResult) -> dict[str, object]:
         "file": p.file, "name": p.name, "dialect": result.dialect, "evidence": result.evidence,
         "points": int(point.sum()), "rapids": int((point & (p.kind == Kind.RAPID) & (p.role != Role.HOLE)).sum()),
         "arcs": result.arc_records, "arcs_over_180_deg": over_half(p), "holes": int((p.role == Role.HOLE).sum()),
+        "normals": 0 if p.normal is None else int(np.isfinite(p.normal).all(axis=1).sum()),
         "cycles": result.cycle_records,
         "operations": _operations(p, point, lengths), "tools": [tool_dict(t) for t in p.tools],
         "frames": [asdict(f) for f in p.frames], "units": p.units, "five_axis": motion != "fixed",
@@ -120,6 +121,8 @@ def summary(result: ReadResult) -> str:
     lines = [f"{p.file or 'CL text'}: {title} ({result.evidence}), {p.units}, {result.lines} lines",
              f"  {found['points']} points ({found['rapids']} rapid, {found['arcs']} arcs, {found['holes']} holes of "
              f"{found['cycles']} cycles), {sum(lengths_of(p)):.1f} mm of cutting, tool axis {found['axis_motion']}"]
+    if found["normals"]:
+        lines.append(f"  surface normals at {found['normals']} points")
     if len(p.arcs):
         lines.append(f"  sense of the arcs: {found['arcs_over_180_deg']} of {len(p.arcs)} sweep more than 180 degrees")
     lines += [f"  {name} {low:.3f} to {high:.3f} mm" for name, (low, high) in extents(p).items()]

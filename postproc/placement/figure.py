@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,8 +30,17 @@ def placement_figure(choice: PlacementChoice, ending: str) -> bytes:
     Args:
         ending: ".png" or ".svg"
     """
-    title = f"{choice.work.toolpath.name or 'part'} on {choice.work.machine.name}: places and planned seconds"
+    name = choice.work.toolpath.name or Path(choice.work.toolpath.file).stem or "part"
+    title = f"{name} on {choice.work.machine.name}: places of the part and planned seconds{_beside(choice)}"
     return image(_SIZE, title, lambda sheet: _fill(sheet, choice), ending)
+
+
+def _beside(choice: PlacementChoice) -> str:
+    """Coordinates that are free and not drawn: points that differ only in them lie on each other."""
+    drawn = coordinates(choice)
+    others = [f"{NAMES[k]} {_shown(choice.best.place[None], k)[0] + 0.0:.3f} {'degrees' if k >= ANGLES else 'mm'}"
+              for k in choice.space.free if k not in drawn]
+    return f"\nnot drawn, chosen: {', '.join(others)}" if others else ""
 
 
 def _fill(sheet: Figure, choice: PlacementChoice) -> None:
@@ -42,13 +52,13 @@ def _fill(sheet: Figure, choice: PlacementChoice) -> None:
     lost = [one for one in every if not one.refused and not np.isfinite(one.seconds)]
     timed = sorted((one for one in every if np.isfinite(one.seconds)), key=lambda one: -one.seconds)
     _points(place, refused, across, up, marker="x", color=_REFUSED, s=28, label=f"cannot stand there ({len(refused)})")
-    _points(place, lost, across, up, marker=".", color=_LOST, s=28, label=f"lost by its bound ({len(lost)})")
+    _points(place, lost, across, up, marker=".", color=_LOST, s=28, label=f"cannot be faster, not planned ({len(lost)})")
     if timed:
         dots = _points(place, timed, across, up, c=[one.seconds for one in timed], cmap="viridis_r", s=46,
-                       edgecolors="#333333", linewidths=0.4, label=f"timed ({len(timed)})")
+                       edgecolors="#333333", linewidths=0.4, label=f"planned ({len(timed)})")
         sheet.colorbar(dots, ax=place, label="planned seconds of the file", location="bottom", shrink=0.7)
     _points(place, [choice.found.now], across, up, marker="s", facecolors="none", edgecolors="#333333", s=150,
-            label="[part] of the set-up")
+            label="now: [part] of the set-up")
     _points(place, [choice.best], across, up, marker="*", color=_CHOSEN, s=230, label="chosen", zorder=4)
     place.set_xlabel(_named(across))
     place.set_ylabel("" if up is None else _named(up))
@@ -96,6 +106,8 @@ def _spread(choice: PlacementChoice, k: int) -> float:
 
 def _points(place: Any, tried: list[Tried], across: int, up: int | None, **how: Any) -> Any:
     at = np.array([one.place for one in tried]).reshape(-1, len(NAMES))
+    if not len(at):
+        return None
     return place.scatter(_shown(at, across), np.zeros(len(at)) if up is None else _shown(at, up), **how)
 
 
@@ -104,4 +116,4 @@ def _shown(at: Floats, k: int) -> Floats:
 
 
 def _named(k: int) -> str:
-    return f"{NAMES[k]}, degrees" if k >= ANGLES else f"{NAMES[k]} of the point, mm"
+    return f"{NAMES[k]}, degrees" if k >= ANGLES else f"{NAMES[k]} of the placed point in the table frame, mm"

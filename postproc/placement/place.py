@@ -25,9 +25,12 @@ from toolpaths.toolpath import Toolpath
 from toolpaths.units import DEG
 
 LIMITS = ("state in the set-up where the part may stand, e.g. [placement] x = [-100, 100], y = [-100, 100] (mm, of the part "
-          "frame's origin or `point`), turn = [0, 360] or turns = [0, 90, 180, 270]")
+          "frame's origin or `point`), turn = [0, 360] or turns = [0, 90, 180, 270]; step = 25 where the table has bores or "
+          "slots; a range shorter than step leaves one place")
 _PROOFS = 6
 """places that are converted before giving up"""
+_LIFT = 1e-3
+"""mm"""
 _APART = (10.0, 5.0 * DEG)
 """mm, rad from a place whose conversion failed to the next that is tried"""
 
@@ -101,8 +104,21 @@ def place(toolpath: Toolpath, machine: Machine, setup: SetupFile, options: Optio
         more.append(info("place.kept", f"at the best place found the program takes {program[1]:.3f} s, where [part] has the "
                          f"part {program[0]:.3f} s: the part stays there", file=options.setup))
         best, program = result.now, (program[0], program[0])
+    more += _lifted(space, best, options.setup)
     return PlacementChoice(work, space, result, best, timer.planned, timer.looked, timer.pruned, timer.refused,
                            tuple(timer.known()), program), [*found, *more]
+
+
+def _lifted(space: Space, best: Tried, file: str) -> list[Diagnostic]:
+    """What must go under a part that is placed higher than it stands, or come away where it is lower."""
+    here, there = (space.placement(place).points(space.corners)[:, 2].min() for place in (space.now, best.place))
+    lift = float(there - here)
+    if abs(lift) < _LIFT:
+        return []
+    what = "higher than [part] has it: it needs a support of that height" if lift > 0.0 else (
+        "lower than [part] has it: what it stands on must be as much lower")
+    return [info("place.lifted", f"the part stands {abs(lift):.3f} mm {what}", file=file,
+                 hint="fix z in [placement] (leave it out) where the part stays on its support")]
 
 
 def _begun(toolpath: Toolpath, machine: Machine, setup: SetupFile, options: Options,

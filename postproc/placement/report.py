@@ -60,10 +60,11 @@ def as_text(choice: PlacementChoice) -> str:
         x, y, z, turn = one.place[:4]
         figures = (f"{one.seconds:>10.3f} {one.cutting:>10.3f} {one.linking:>10.3f}" if math.isfinite(one.seconds)
                    else f"  {one.refused}")
-        lines.append(f"{name:8} {x:>10.3f} {y:>10.3f} {z:>10.3f} {turn / DEG:>10.3f} {figures}")
+        row = " ".join(f"{round(value, 3) + 0.0:>10.3f}" for value in (x, y, z, turn / DEG))
+        lines.append(f"{name:8} {row} {figures}")
     gain = _gain(choice)
     if math.isfinite(gain):
-        lines.append(f"gain {100.0 * gain:.2f} %")
+        lines.append(f"planned time saved: {100.0 * gain:.2f} %")
     if all(map(math.isfinite, choice.program)):
         before, after = choice.program
         lines.append(f"the program, links included: {before:.3f} s at [part], {after:.3f} s as placed")
@@ -74,9 +75,10 @@ def as_text(choice: PlacementChoice) -> str:
     turned = _turned(choice)[1:_SHOWN]
     if turned:
         others = (f"{one.place[ANGLES] / DEG:.3f} deg {one.seconds:.3f} s" for one in turned)
-        lines.append("turned otherwise: " + ", ".join(others))
-    lines.append(f"free: {', '.join(free)}; {choice.found.attitudes} ways to turn the part, {choice.looked} places looked "
-                 f"at, {choice.refused} refused, {choice.pruned} lost by their bound, {choice.planned} cuts planned")
+        lines.append("best places turned otherwise: " + ", ".join(others))
+    lines.append(f"free: {', '.join(free)}; {choice.found.attitudes} ways to turn the part; {choice.looked} places looked "
+                 f"at: at {choice.refused} it cannot stand, {choice.pruned} cannot be faster than the best; "
+                 f"{choice.planned} cuts planned")
     return "\n".join(lines)
 
 
