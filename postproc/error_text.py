@@ -90,6 +90,7 @@ def screw_figures(screws: Any, names: dict[str, str], lost: dict[str, float],
     told += [f"lost between the rows: {', '.join(f'{name} {value:.3g}' for name, value in lost.items())} (um, arcsec)",
              f"worst over the work volume: tip {before[0]:.2f} um, {left[0]:.2f} um after; axis {before[1]:.2f} arcsec, "
              f"{left[1]:.2f} arcsec after"]
+    told += [f"{name} is left: its axis leans, and the error is not about the axis" for name in screws.left]
     return {"losses": lost, "worst_tip_um": [before[0], left[0]], "worst_axis_arcsec": [before[1], left[1]]}, told
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from machines.geometric_error.actual import Actual
 from machines.geometric_error.actual_map import ActualByMap, part_side
 from machines.geometric_error.averages import SAME
-from machines.geometric_error.axis_motion import sense
+from machines.geometric_error.axis_motion import ALONG, sense
 from machines.geometric_error.bed_frame import bed_side, in_bed_frame
 from machines.geometric_error.covariance import angular
 from machines.geometric_error.csv_table import UNITS, write_csv
@@ -18,6 +18,7 @@ from machines.geometric_error.curves import Table
 from machines.geometric_error.lattice import POINT, ROTARY, ErrorMap
 from machines.geometric_error.lattice_making import MapLoss, map_loss, map_of, nodes_of, probes, refined
 from machines.geometric_error.model import ErrorModel
+from machines.geometric_error.names import DIRECTIONS, OWN
 from machines.geometric_error.screw_tables import LINUXCNC_ROWS, to_linuxcnc
 from machines.geometric_error.serial_errors import Component, SerialErrors
 from machines.geometric_error.survey import apart
@@ -86,6 +87,8 @@ class Screws:
     losses: dict[str, float]
     held: ErrorModel
     rest: ErrorModel
+    left: tuple[str, ...]
+    """positioning errors of axes that lean: they are not along or about the joint"""
 
 
 def to_screws(model: ErrorModel, machine: Machine, step: Steps, length: float, angle: float) -> Screws:
@@ -94,16 +97,25 @@ def to_screws(model: ErrorModel, machine: Machine, step: Steps, length: float, a
     Raises:
         ValueError: no positioning error there, or more rows than LinuxCNC holds would be needed.
     """
-    mine = tuple(c for c in model.axes.components if c.name.positioning)
+    mine = tuple(c for c in model.axes.components if c.name.positioning and not leans(machine, c.name.axis))
     if not mine:
-        raise ValueError("the model has no positioning error of an axis (EXX, EYY, ... ECC); LinuxCNC's screw compensation "
-                         "holds nothing else")
+        raise ValueError("the model has no positioning error of an axis (EXX, EYY, ... ECC) that moves along or about its "
+                         "machine axis; LinuxCNC's screw compensation holds nothing else")
     rows = rows_for(mine, travel(machine), step, length, angle, LINUXCNC_ROWS, repeat=False)
     tables = {c.name.axis: sampled(c.curve, rows[str(c.name)].x) for c in mine}
     texts = {c.name.axis: to_linuxcnc(c.name, tables[c.name.axis], joint_sense(machine, c.name.axis)) for c in mine}
     losses = {str(c.name): loss(c.curve, rows[str(c.name)]) for c in mine}
     held = ErrorModel(SerialErrors(tuple(Component(c.name, tables[c.name.axis]) for c in mine)))
-    return Screws(texts, tables, losses, held, without(model, [c.name for c in mine]))
+    left = tuple(str(c.name) for c in model.axes.components if c.name.positioning and c not in mine)
+    return Screws(texts, tables, losses, held, without(model, [c.name for c in mine]), left)
+
+
+def leans(machine: Machine, letter: str) -> bool:
+    """True for an axis that is not along the machine axis of its letter: its EBB is not about itself."""
+    if not isinstance(machine.kinematics, Serial):
+        return False
+    joint = next(joint for joint in machine.kinematics.chain if joint.name == letter)
+    return bool(abs(joint.direction[DIRECTIONS.index(OWN[letter]) % 3]) < 1.0 - ALONG)
 
 
 def joint_sense(machine: Machine, letter: str) -> float:

@@ -16,7 +16,7 @@ from machines.geometric_error.axis_motion import effect
 from machines.geometric_error.bed_frame import bed_side
 from machines.geometric_error.covariance import angular, read_covariance
 from machines.geometric_error.csv_table import ANGLES, LENGTHS, UNITS, CsvTable, read_csv, read_text
-from machines.geometric_error.exports import MOST_DOUBT, joint_sense
+from machines.geometric_error.exports import MOST_DOUBT, joint_sense, leans
 from machines.geometric_error.lattice import COLUMNS
 from machines.geometric_error.lattice_file import COORDINATES, map_from_csv, zeroed
 from machines.geometric_error.model import ErrorModel
@@ -264,6 +264,9 @@ def _screw(letter: str, path: Path, machine: Machine, how: How) -> tuple[ErrorMo
         mine = [x for x in machine.axis_names if isinstance(machine.kinematics, Serial) or rotary[x]]
         return None, [error("error-model.axis", f"{machine.name} has no axis {letter!r} with a positioning error",
                             file=str(path), hint="it has " + (", ".join(mine) or "none"))]
+    if leans(machine, letter):
+        return None, [error("error-model.axis", f"{letter} of {machine.name} leans: E{OWN[letter]}{letter} is along or "
+                            "about an axis of the machine, the screw file along or about the joint", file=str(path), hint="write its components along and about x, y, z as a table")]
     text, found = read_text(path)
     if text is None:
         return None, found
