@@ -266,7 +266,8 @@ def _screw(letter: str, path: Path, machine: Machine, how: How) -> tuple[ErrorMo
                             file=str(path), hint="it has " + (", ".join(mine) or "none"))]
     if leans(machine, letter):
         return None, [error("error-model.axis", f"{letter} of {machine.name} leans: E{OWN[letter]}{letter} is along or "
-                            "about an axis of the machine, the screw file along or about the joint", file=str(path), hint="write its components along and about x, y, z as a table")]
+                            "about an axis of the machine, the screw file along or about the joint", file=str(path),
+                            hint="write its components along and about x, y, z as a table")]
     text, found = read_text(path)
     if text is None:
         return None, found
