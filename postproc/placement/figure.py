@@ -31,7 +31,7 @@ def placement_figure(choice: PlacementChoice, ending: str) -> bytes:
         ending: ".png" or ".svg"
     """
     name = choice.work.toolpath.name or Path(choice.work.toolpath.file).stem or "part"
-    title = f"{name} on {choice.work.machine.name}: places of the part and planned seconds{_beside(choice)}"
+    title = f"{name} on {choice.work.machine.name}: places of the part and planned seconds"
     return image(_SIZE, title, lambda sheet: _fill(sheet, choice), ending)
 
 
@@ -40,7 +40,7 @@ def _beside(choice: PlacementChoice) -> str:
     drawn = coordinates(choice)
     others = [f"{NAMES[k]} {_shown(choice.best.place[None], k)[0] + 0.0:.3f} {'degrees' if k >= ANGLES else 'mm'}"
               for k in choice.space.free if k not in drawn]
-    return f"\nnot drawn, chosen: {', '.join(others)}" if others else ""
+    return f"chosen besides, not drawn: {', '.join(others)}" if others else ""
 
 
 def _fill(sheet: Figure, choice: PlacementChoice) -> None:
@@ -60,6 +60,7 @@ def _fill(sheet: Figure, choice: PlacementChoice) -> None:
     _points(place, [choice.found.now], across, up, marker="s", facecolors="none", edgecolors="#333333", s=150,
             label="now: [part] of the set-up")
     _points(place, [choice.best], across, up, marker="*", color=_CHOSEN, s=230, label="chosen", zorder=4)
+    place.set_title(_beside(choice), fontsize="medium")
     place.set_xlabel(_named(across))
     place.set_ylabel("" if up is None else _named(up))
     place.legend(**BESIDE)
