@@ -71,8 +71,8 @@ def starts_of(path: Path, nominal: Path, work: Work, allowed: float) -> Starts:
 
 def stretches(path: Path) -> Bools:
     """(K,) feed moves and rapids of the CL file, straight ones: their way counts, not their ends alone."""
-    rapid = (path.code == TRAVERSE) & np.isfinite(path.u)
-    return np.asarray(((path.code == FEED) | rapid) & ~path.home & (np.arange(len(path)) > 0))
+    straight = (path.code == FEED) | (path.code == TRAVERSE)
+    return np.asarray(straight & np.isfinite(path.u) & ~path.home & (np.arange(len(path)) > 0))
 
 
 def reversals(work: Work, block: Ints) -> tuple[Ints, Floats]:

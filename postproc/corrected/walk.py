@@ -22,8 +22,8 @@ from toolpaths.arrays import Bools, Floats, Ints
 
 ENOUGH = 20_000
 """blocks from which on the compiled walk pays"""
-PLAIN = 0.05
-"""least weight of what the tip is off by on a machine whose ways are the signs of the last steps"""
+PLAIN, BETWEEN = 0.05, 0.25
+"""weight of what the tip is off by on a machine whose ways are the signs of the last steps; between points of the CL file"""
 RESTS = 1e-9
 """part of its lost motion that is no step of a joint"""
 REACH = 32.0, 8.0, 2.0, 1.0
@@ -98,15 +98,15 @@ def _walk(off: Any, by_way: Any, tip_rates: Any, back: Any, gap: Any, bend: Any,
     for k in range(blocks):
         start = _clip(way - 2.0 * shifted / gap[k] + bend[0, k], bend[1, k], bend[2, k]) + last[k]
         case = (start, back[k], tip_rates[k], off[k], by_way[k], gap[k], goes_on[k], weight[k], later[:, k], free[k], way,
-                max(PLAIN, weight[k]) if plain[k] else 0.0)
+                max(PLAIN, BETWEEN * weight[k]) if plain[k] else 0.0)
         n = np.zeros(3)
         if free[k].any():
             if _cost(n, case) > near[k]:
                 n = _toward(n, case)
             if _cost(n, case) > enough[k]:
-                n = _by_ways(n, way, case)
-            if _cost(n, case) > enough[k]:
                 n = _beside(n, case)
+            if _cost(n, case) > enough[k]:
+                n = _beside(_by_ways(n, way, case), case)
         elif like[k] >= 0:
             n = result[like[k]]
         result[k] = n

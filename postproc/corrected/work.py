@@ -25,6 +25,8 @@ LAST = 1.0 / 16.0
 EDGES = tuple(k / 16.0 for k in range(17))
 """where the directions of the axes in a block are looked at"""
 ALONE = -1
+STANDS = 1e-9
+"""rad that rotary joints of one orientation may differ by: inverse kinematics of points on one line of retract"""
 
 
 @dataclass(frozen=True)
@@ -277,7 +279,7 @@ def axis_positions(path: Path, tools: Ints) -> Bools:
 
 def one_orientation(turns: Floats, tools: Ints, home: Bools) -> Ints:
     """(K,) number of the run of blocks at the same rotary joints (K, R) with the same tool; ALONE for single blocks."""
-    same = (turns[1:] == turns[:-1]).all(axis=1) & (tools[1:] == tools[:-1]) & ~home[1:] & ~home[:-1]
+    same = (np.abs(turns[1:] - turns[:-1]) <= STANDS).all(axis=1) & (tools[1:] == tools[:-1]) & ~home[1:] & ~home[:-1]
     run = np.concatenate([[0], np.cumsum(~same)])
     count = np.bincount(run)
     result: Ints = np.where(count[run] > 1, run, ALONE)
