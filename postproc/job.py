@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -21,7 +21,7 @@ from postproc.options import Options
 from postproc.parts import cut_operations
 from postproc.pivots import control_kinematics
 from postproc.records import plain_records
-from postproc.rounding import Rounding, decimals, rounding_bound
+from postproc.rounding import Rounding, decimals, helix_bound, rounding_bound
 from postproc.setup import Placement, SetupFile, part_placement, work_frame
 from postproc.stated_feeds import without_feed
 from postproc.tool_numbers import numbered
@@ -108,9 +108,14 @@ class Job:
 
     @cached_property
     def rounding(self) -> Rounding:
-        """What the rounding of the words may cost."""
-        return rounding_bound(self.control, self.kinematics(int(self.moves.tool[0])), self.moves,
-                              decimals(self.control, self.controller), self.modes.cutting_laws(), self.options.tolerance)
+        """What the rounding of the words may cost, helices by angle (Klartext) counted besides."""
+        found = rounding_bound(self.control, self.kinematics(int(self.moves.tool[0])), self.moves,
+                               decimals(self.control, self.controller), self.modes.cutting_laws(), self.options.tolerance)
+        if self.controller.writer != "heidenhain" or not self.controller.arcs.enabled:
+            return found
+        places = self.controller.format
+        return replace(found, tip=found.tip + helix_bound(self.moves, 10.0 ** -places.linear_decimals,
+                                                          10.0 ** -places.rotary_decimals, self.corrects))
 
     @property
     def corrects(self) -> bool:

@@ -63,6 +63,20 @@ def rounding_bound(control: Control, kin: Kinematics, moves: Moves, places: Ints
     return Rounding(float((linear + lever).max()), float(axis.max()))
 
 
+def helix_bound(moves: Moves, grain: float, angle_grain: float, climbing: bool) -> float:
+    """mm that the ends of arcs by pole and angle may be off besides (`polar_arc`); 0 without any.
+
+    Args:
+        grain, angle_grain: last decimals of lengths in mm, of angles in degrees
+        climbing: True where plane arcs may climb too, by what a correction lifts their ends
+    """
+    rows = np.flatnonzero((moves.arc >= 0) & ~moves.link)
+    arc = moves.arc[rows]
+    rise = np.abs(np.einsum("ni,ni->n", moves.tip[rows] - moves.tip[rows - 1], moves.arcs.normal[arc]))
+    radius = moves.arcs.radius[arc[climbing | (rise > 0.5 * grain)]]
+    return float(np.hypot(grain, 0.5 * angle_grain * DEG * radius.max())) if len(radius) else 0.0
+
+
 def _farthest(sides: Floats) -> Floats:
     """(N,) half the longest diagonal of the boxes with the half sides (N, 3, K): slides of parallel machines run aslant."""
     signs = np.array(list(product((1.0, -1.0), repeat=sides.shape[2])))

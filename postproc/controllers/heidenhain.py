@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from postproc.controllers.iso import CHUNK
+from postproc.controllers.polar_arc import polar_arc
 from postproc.controllers.writer import SKIP, Writer
 from postproc.program import Command, Hole
 from postproc.word_arcs import PLANE_AXIS
@@ -22,13 +23,15 @@ LONGEST_DWELL = 3600.0
 class KlartextWriter(Writer):
     """Blocks L, CC, C, CP; FMAX for rapids, R0, RL, RR where it changes, M91 for machine coordinates, M99 for cycles.
 
-    `side` is the radius compensation in force, `asked` the one that the next line takes up.
+    `side` is the radius compensation in force, `asked` the one that the next line takes up; `helix` the block of the last
+    CP and where in X, Y it ends, which is not to the last digit where its words say.
     """
 
     side, asked = "", "R0"
     called = 0.0
     """spindle speed of the last TOOL CALL, 1/min"""
     count = -1
+    helix: tuple[int, Floats] | None = None
 
     def numbered(self, block: str) -> str:
         """The block with its number; comments are blocks too."""
@@ -99,16 +102,35 @@ class KlartextWriter(Writer):
         third = PLANE_AXIS[int(p.plane[k])]
         columns = [p.letters.index(letter) for letter in "XYZ"]
         start, end = p.words[k - 1, columns], p.words[k, columns]
-        centre = self.number_text(start + p.center[k], self.controller.format.linear_decimals)
         sense = "DR+" if p.ccw[k] else "DR-"
-        yield "CC" + "".join(f" {'XYZ'[i]}{centre[i]}" for i in range(3) if i != third)
-        if end[third] == start[third]:
-            yield f"C{text} {sense}{feed}"
+        if end[third] != start[third]:
+            yield from self.climbing(k, start, end, f"{sense}{feed}")
             return
-        centre_xy = (start + p.center[k])[:2]
-        angle = sweep(start[:2] - centre_xy, end[:2] - centre_xy, bool(p.ccw[k])) * (1.0 if p.ccw[k] else -1.0)
-        turned, climbed = self.number_text(np.array([angle, end[2] - start[2]]), self.controller.format.linear_decimals)
-        yield f"CP IPA{turned} IZ{climbed} {sense}{feed}"
+        centre = self.number_text(start + p.center[k], self.controller.format.linear_decimals)
+        yield "CC" + "".join(f" {'XYZ'[i]}{centre[i]}" for i in range(3) if i != third)
+        yield f"C{text} {sense}{feed}"
+
+    def climbing(self, k: int, start: Floats, end: Floats, rest: str) -> Iterator[str]:
+        """CC and CP of block k from `start` to `end` (3,), by the last decimals that end nearest, from where the tool is."""
+        p, f = self.program, self.controller.format
+        centre = (start + p.center[k])[:2]
+        turn = sweep(start[:2] - centre, end[:2] - centre, bool(p.ccw[k])) * (1.0 if p.ccw[k] else -1.0)
+        arc = polar_arc(self.begins(k, start[:2]), end[:2], centre, turn, 10.0 ** -f.linear_decimals,
+                        10.0 ** -f.rotary_decimals)
+        self.helix = k, arc.end
+        pole = self.number_text(arc.pole, f.linear_decimals)
+        turned, = self.number_text(np.array([arc.angle]), f.rotary_decimals)
+        climbed, = self.number_text(np.array([end[2] - start[2]]), f.linear_decimals)
+        yield f"CC X{pole[0]} Y{pole[1]}"
+        yield f"CP IPA{turned} IZ{climbed} {rest}"
+
+    def begins(self, k: int, stated: Floats) -> Floats:
+        """X, Y (2,) where the tool is before block k: as stated, or where the last CP has left it."""
+        if self.helix is None:
+            return stated
+        at, left = self.helix
+        columns = [self.program.letters.index(letter) for letter in "XY"]
+        return np.asarray(np.where(self.program.write[at + 1:k, columns].any(axis=0), stated, left))
 
     def hole(self, hole: Hole) -> Iterator[str]:
         """CYCL DEF where anything but the place of the hole changes, then the place with M99."""
