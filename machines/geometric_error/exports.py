@@ -204,7 +204,8 @@ def _box(model: ErrorModel, machine: Machine, fixed: Floats, length: float) -> d
 def _levels(model: ErrorModel, machine: Machine, letter: str, ends: tuple[float, float],
             step: float | None) -> tuple[Floats, float]:
     """(nodes, period) of one coordinate."""
-    whole = letter in machine.axis_names and not np.isfinite(machine.limits.lower[machine.axis_names.index(letter)])
+    unlimited = letter in machine.axis_names and not np.isfinite(machine.limits.lower[machine.axis_names.index(letter)])
+    whole = unlimited and ends == travel(machine)[letter]
     own = [c.curve.x for c in model.axes.components if c.name.axis == letter and isinstance(c.curve, Table)]
     if model.map is not None and letter in model.map.letters:
         own = [model.map.nodes[model.map.letters.index(letter)]]

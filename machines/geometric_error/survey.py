@@ -52,17 +52,19 @@ def absent(model: ErrorModel, machine: Machine) -> list[str]:
 
 def unmeasured(model: ErrorModel, machine: Machine, file: str) -> list[Diagnostic]:
     """Warnings where the model does not reach the ends of travel: positions beyond are refused, or taken as at its end."""
-    lower, upper = ranges(model, machine)
+    (lower, upper), (first, last) = ranges(model, machine), ranges(ErrorModel(), machine)
     found = []
     for j, letter in enumerate(machine.axis_names):
-        least, most = float(machine.limits.lower[j]), float(machine.limits.upper[j])
-        if lower[j] <= max(least, -np.pi if machine.rotary[j] else -np.inf) + SHORT and upper[j] >= min(
-                most, np.pi if machine.rotary[j] else np.inf) - SHORT:
+        round_about = not np.isfinite(machine.limits.lower[j])
+        whole = (lower[j], upper[j]) == (first[j], last[j]) if round_about else \
+            lower[j] <= first[j] + SHORT and upper[j] >= last[j] - SHORT
+        if whole:
             continue
         unit = DEG if machine.rotary[j] else 1.0
-        travel = "goes round" if not np.isfinite(least) else f"travels from {least / unit:g} to {most / unit:g}"
+        travel = "goes round" if round_about else f"travels from {first[j] / unit:g} to {last[j] / unit:g}"
+        hint = "write repeats = 360 where it closes after a turn; else" if round_about else "beyond,"
         found.append(warning("error-model.range", f"{letter} {travel}, the model holds from {lower[j] / unit:g} to "
-                             f"{upper[j] / unit:g}", file=file, hint="beyond, conversions stop unless "
+                             f"{upper[j] / unit:g}", file=file, hint=f"{hint} conversions stop there unless "
                              "--error-model-beyond is given"))
     return found
 

@@ -14,7 +14,7 @@ from machines.machine import Machine
 from toolpaths.arrays import Floats
 
 TURN = np.pi
-"""rad either way from 0 of an unlimited rotary axis"""
+"""rad either way from 0 of an axis that goes round"""
 CORNERS = 4
 """one place of so many is at a corner"""
 INSIDE = 1e-9
@@ -22,15 +22,16 @@ INSIDE = 1e-9
 
 
 def ranges(model: ErrorModel, machine: Machine) -> tuple[Floats, Floats]:
-    """(lower, upper) (J,) of each joint: its travel, as far as the model was measured; empty where lower > upper."""
+    """(lower, upper) (J,) of each joint: its travel, as far as the model was measured; empty where lower > upper.
+
+    Axes that go round are taken over what was measured of them, else half a turn either way.
+    """
     lower, upper = (np.array(x) for x in (machine.limits.lower, machine.limits.upper))
-    free = np.array(machine.rotary) & ~(np.isfinite(lower) & np.isfinite(upper))
-    lower[free], upper[free] = -TURN, TURN
     for letter, (least, most) in _measured(model):
         if letter in machine.axis_names:
             j = machine.axis_names.index(letter)
             lower[j], upper[j] = max(lower[j], least), min(upper[j], most)
-    return lower, upper
+    return np.where(np.isfinite(lower), lower, -TURN), np.where(np.isfinite(upper), upper, TURN)
 
 
 def _measured(model: ErrorModel) -> list[tuple[str, tuple[float, float]]]:

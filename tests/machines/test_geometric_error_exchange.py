@@ -30,6 +30,7 @@ from machines.geometric_error.names import parse
 from machines.geometric_error.serial_errors import Component, SerialErrors
 from machines.geometric_error.survey import absent, survey, unmeasured
 from machines.geometric_error.tabulate import without
+from machines.geometric_error.volume import ranges
 from machines.kinematics.serial import Serial
 from machines.machine import Machine
 from tests.machines.error_models import ARCSEC, joints, model
@@ -372,6 +373,16 @@ def test_a_map_carries_the_doubt_of_its_model_at_its_nodes() -> None:
     assert to_map(full, machine, finer, fixed, None).doubt_lost
 
 
+def test_a_map_goes_round_where_its_model_does() -> None:
+    machine = machines.load("mikron-ucp710")
+    for curve, period, last in ((Fourier(np.array([0.0, 0.01, 0.0])), 2 * np.pi, 330.0),
+                                (Table(np.array([0.0, 1.0, 4.0]), np.zeros(3)), 0.0, np.degrees(4.0))):
+        full = ErrorModel(SerialErrors((component("EXC", curve),)))
+        lattice, fixed = lattice_for(full, machine, "C", {}, {}, 0.0, "machine")
+        assert lattice.periods == (period,) and np.degrees(lattice.nodes[0][-1]) == pytest.approx(last)
+        assert to_map(full, machine, lattice, fixed, None).model.map is not None
+
+
 def test_figures_of_a_model() -> None:
     machine = machines.load("mikron-ucp710")
     full = load(SAMPLES / "mikron-ucp710.toml", machine)
@@ -394,5 +405,9 @@ def test_figures_of_a_model() -> None:
     assert less.covariance is not None and np.diag(less.covariance)[0] == pytest.approx((0.5e-3) ** 2)
     assert unmeasured(full, machine, "e") == []
     short = ErrorModel(SerialErrors((component("EXX", Table(np.array([0.0, 10.0]), np.zeros(2))),)))
+    turn = ErrorModel(SerialErrors((component("EXC", Table(np.array([0.0, 2 * np.pi]), np.zeros(2))),)))
+    told = unmeasured(turn, machine, "e.toml")
+    assert len(told) == 1 and "C goes round, the model holds from 0 to 360" in told[0].message and "repeats" in told[0].hint
+    assert ranges(turn, machine)[1][4] == pytest.approx(2 * np.pi)
     told = unmeasured(short, machine, "e.toml")
     assert len(told) == 1 and "X travels from -355 to 355, the model holds from 0 to 10" in told[0].message
