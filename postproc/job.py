@@ -184,7 +184,13 @@ def _error_model(machine: Machine, options: Options) -> tuple[ErrorModel | None,
         return None, []
     from machines.geometric_error.loader import load_checked
 
-    return load_checked(options.error_model, machine)
+    model, found = load_checked(options.error_model, machine)
+    if model is not None and model.corrected_by == "control":
+        found = [*found, info("compensation.control", f'the geometric errors {model.name} are left to the control, as their '
+                              'file says (corrected_by = "control"): the program does not correct them, and is proved on '
+                              "the machine without them", file=options.error_model,
+                              hint='corrected_by = "post", if the control has no such model in force')]
+    return model, found
 
 
 def _refused(toolpath: Toolpath) -> list[Diagnostic]:

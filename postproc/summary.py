@@ -54,14 +54,17 @@ def _bound(result: PostResult) -> dict[str, float] | None:
 
 
 def _errors(result: PostResult) -> dict[str, Any] | None:
-    """What the correction of geometric errors did; None without it."""
-    found = result.compensation
-    if found is None or result.job is None or result.job.errors is None:
+    """What the correction of geometric errors did, or that the control does it; None without an error model."""
+    found, job = result.compensation, result.job
+    if job is None or job.errors is None:
         return None
+    who = {"model": job.errors.name, "corrected_by": job.errors.corrected_by}
+    if found is None:
+        return who
     from postproc.corrected.proof import after_formatting
 
     proof = after_formatting(result)
-    return {"model": result.job.errors.name, "tip_before_mm": found.tip_before, "axis_before_deg": found.axis_before / DEG,
+    return {**who, "tip_before_mm": found.tip_before, "axis_before_deg": found.axis_before / DEG,
             "tip_residual_mm": found.tip_after, "axis_residual_deg": found.axis_after / DEG, "points_added": found.added,
             "arcs_resolved": found.resolved, "blocks_near_a_pole": found.partial,
             **({} if proof is None else proof.figures()), "tip_sigma_mm": found.doubt_tip,
@@ -143,6 +146,8 @@ def as_text(result: PostResult, output: str) -> str:
 
         lines.append(text(result.estimate))
     lines.append("axes: " + ", ".join(f"{k} {_places(lo)} to {_places(hi)}" for k, (lo, hi) in d["axis_extents"].items()))
+    if d["geometric_errors"] is not None and d["geometric_errors"]["corrected_by"] == "control":
+        lines.append(f"geometric errors {d['geometric_errors']['model']}: left to the control, not corrected here")
     if result.compensation is not None:
         from postproc.corrected.proof import after_formatting
 

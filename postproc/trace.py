@@ -31,6 +31,8 @@ def trace_line(result: PostResult, line: int) -> tuple[dict[str, Any], list[Diag
         hint = f"points stand at lines {', '.join(map(str, sorted(near)))}" if near else ""
         return stages, [error("trace.no_point", f"line {line} commands no position", file=toolpath.file, lines=[line],
                               hint=hint)]
+    if result.job is not None and result.job.errors is not None:
+        stages["geometric_errors"] = {"model": result.job.errors.name, "corrected_by": result.job.errors.corrected_by}
     stages["points"] = [_point(result, int(row)) for row in rows]
     return stages, []
 
@@ -138,6 +140,10 @@ def _trimmed(value: float, places: int) -> str:
 def as_text(stages: dict[str, Any]) -> str:
     """The stages for people."""
     lines = [f"line {stages['line']}: {stages['record']}"]
+    if "geometric_errors" in stages:
+        model, who = stages["geometric_errors"]["model"], stages["geometric_errors"]["corrected_by"]
+        lines.append(f"  geometric errors {model}: " + ("left to the control, joints are nominal" if who == "control" else
+                                                         "corrected in the joints"))
     for point in stages["points"]:
         t = point["toolpath"]
         lines.append(f"  toolpath     tip {_vector(t['tip_mm'])}  axis {_vector(t['axis'])}  {t['kind']} {t['role']}  "

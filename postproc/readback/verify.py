@@ -63,8 +63,7 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Callable[[str, i
     head = as_bytes(data[:HEADER])
     diagnostics = [_located(_judged(d, reader.units_stay), job.toolpath.file) for d in diagnostics]
     if gcode and not _by_post(job) and _CORRECTED.search(head):
-        return None, [error("verify.error_model", "the program corrects geometric errors, none are given here",
-                            file=gcode, hint="verify with --error-model, the file that its header names"), *diagnostics]
+        return None, [_twice(job, gcode), *diagnostics]
     if code is None or has_errors(diagnostics):
         return None, diagnostics
     offsets = Offsets(control.work_offset, control.xyz, job.register_lengths(), home, control.length_on_z,
@@ -95,6 +94,16 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Callable[[str, i
 def _by_post(job: Job) -> bool:
     """True where programs of the job are to correct the machine's geometric errors."""
     return job.errors is not None and job.errors.corrected_by == "post"
+
+
+def _twice(job: Job, gcode: str) -> Diagnostic:
+    """That a program corrects errors that are not given here, or that the control is to correct."""
+    if job.errors is None:
+        return error("verify.error_model", "the program corrects geometric errors, none are given here", file=gcode,
+                     hint="verify with --error-model, the file that its header names")
+    return error("verify.error_model", f"the program corrects geometric errors, and the control is to correct those of "
+                 f"{job.errors.name}: both would", file=gcode, hint='convert with this file, or write corrected_by = "post" '
+                 "into it and take its errors out of the control")
 
 
 def _uncorrected(head: bytes, job: Job, motion: Motion, executed: Executed, comparison: Comparison,
