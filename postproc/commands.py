@@ -10,7 +10,16 @@ import numpy as np
 from postproc.controllers.model import ControllerFile
 from postproc.coolant import written
 from postproc.cutter_compensation import Compensation
-from postproc.events import Spindle, ToolChange, numbers, register_changes, spindle_after, tool_changes, words
+from postproc.events import (
+    Spindle,
+    ToolChange,
+    loaded_registers,
+    numbers,
+    register_changes,
+    spindle_after,
+    tool_changes,
+    words,
+)
 from postproc.moves import Moves, Phase
 from postproc.path import Path
 from postproc.program import Command, Commands
@@ -58,7 +67,7 @@ class _Writing:
         self.selects = controller.tools.preload and not any(e.word == "SELECT" for e in toolpath.events)
         self.loaded: ToolChange | None = None
         self.spindle, self.state = Spindle(), Switched()
-        self.compensation = Compensation(moves, path, self.result, controller.modes)
+        self.compensation = Compensation(moves, path, self.result, controller, loaded_registers(toolpath))
         self.starts = operation_starts(toolpath, moves)
         self.lost: dict[str, list[int]] = {}
         self.skipping = False

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from postproc.controllers.model import Modes
+from postproc.controllers.model import ControllerFile
 from postproc.events import compensation_side, numbers
 from postproc.moves import Moves
 from postproc.path import TRAVERSE, Path
 from postproc.program import Command
-from toolpaths.arrays import Bools
+from toolpaths.arrays import Bools, Ints
 from toolpaths.diagnostics import Diagnostic, error, warning
 from toolpaths.toolpath import Event, Kind
 
@@ -25,11 +25,17 @@ class Compensation:
 
     The points are written as the file has them; what the control adds depends on its register. It adds it in the plane of
     the words (Fanuc B-63944EN-2, cutter compensation: in the plane that G17 to G19 select), so that plane must be square
-    to the tool all the while: a tilted plane, or the tool along Z and no rotary axis turning.
+    to the tool all the while: a tilted plane, or the tool along Z and no rotary axis turning. Where D is modal and CUTCOM
+    names none, that of the tool's length register is written: `registers` (N,) by row of the Toolpath, -1 for none.
     """
 
-    def __init__(self, moves: Moves, path: Path, commands: dict[int, list[Command]], modes: Modes) -> None:
+    def __init__(self, moves: Moves, path: Path, commands: dict[int, list[Command]], controller: ControllerFile,
+                 registers: Ints) -> None:
         self.moves, self.path, self.out = moves, path, commands
+        self.modal, self.registers = controller.cutter_compensation.modal_register, registers
+        self.without_tool: list[int] = []
+        self.chosen: dict[int, list[int]] = {}
+        """lines by register that is written though CUTCOM names none"""
         self.active, self.since = "", 0
         self.written: list[int] = []
         self.tilted: list[int] = []
@@ -38,7 +44,7 @@ class Compensation:
         self.own = np.isnan(path.u) | (moves.hole[path.move] >= 0)
         """(K,) blocks that compensation must not touch"""
         self.breaks = np.flatnonzero(self.own & ~np.concatenate([[False], self.own[:-1]]))
-        tcp, tilted = modes.tcp, modes.tilted
+        tcp, tilted = controller.modes.tcp, controller.modes.tilted
         self.in_tcp = path.frames[0].control.tip_law or (tcp is not None and tcp.compensation)
         self.in_plane = tilted is not None and tilted.compensation
         self.cut = np.append(np.flatnonzero((moves.kind != Kind.RAPID) & (moves.hole < 0)), len(moves))
@@ -73,8 +79,20 @@ class Compensation:
             return
         self.active, self.since = side, block
         self.written.append(event.line)
-        command = Command(f"CUTTER_COMPENSATION_{side}", tuple(numbers(event)[:1]), event.line)
+        command = Command(f"CUTTER_COMPENSATION_{side}", self._register(event, move), event.line)
         self.out.setdefault(block, []).append(command)
+
+    def _register(self, event: Event, move: int) -> tuple[float, ...]:
+        """The register that CUTCOM names, else where D is modal that of the tool; none where the control takes its own."""
+        named = tuple(numbers(event)[:1])
+        if named or not self.modal:
+            return named
+        register = int(self.registers[self.moves.row[move]])
+        if register < 0:
+            self.without_tool.append(event.line)
+            return ()
+        self.chosen.setdefault(register, []).append(event.line)
+        return (float(register),)
 
     def _possible(self, block: int, move: int) -> bool:
         """True where the control can compensate square to the tool: in a tilted plane, or with the tool along Z."""
@@ -95,9 +113,17 @@ class Compensation:
         result = []
         if self.written:
             result.append(warning("cutcom.register", "cutter compensation is written and proved as the programmed contour: "
-                                  "the control adds what its register holds", file=file, lines=self.written[:6],
+                                  "the control adds what its register holds" + self._chosen(), file=file,
+                                  lines=self.written[:6],
                                   count=len(self.written), hint="points of the tool centre: the register holds the wear "
-                                  "only; points of the contour: the radius"))
+                                  "only; points of the contour: the radius" + (
+                                      "; where lengths and radii share one table, name another register in CUTCOM"
+                                      if self.chosen else "")))
+        if self.without_tool:
+            result.append(error("tool.missing", "CUTCOM names no register, and the file has loaded no tool whose register "
+                                "could be taken: D holds until another is stated", file=file,
+                                lines=self.without_tool[:6], count=len(self.without_tool),
+                                hint="write LOADTL before it, or the register: CUTCOM/LEFT,1"))
         if self.left_on:
             result.append(error("cutcom.left_on", "cutting goes on under CUTCOM after a linking move or a hole, which need "
                                 "it off", file=file, lines=self.left_on[:6], count=len(self.left_on),
@@ -114,6 +140,13 @@ class Compensation:
                                     hint="write the operation in a tilted plane (--output-mode tilted, where the controller "
                                     "has it), or take CUTCOM out and let the CAM system offset the path"))
         return result
+
+    def _chosen(self) -> str:
+        """Which registers are written where CUTCOM names none."""
+        if not self.chosen:
+            return ""
+        names = ", ".join(f"D{register}" for register in sorted(self.chosen))
+        return f"; where CUTCOM names none that is {names}, by the number of the tool's length register"
 
     def turning(self) -> list[int]:
         """Lines of cuts under compensation that lean off Z, or turn rotary axes between axis positions."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -117,3 +118,9 @@ class Program:
 
     def __len__(self) -> int:
         return len(self.words)
+
+    def ordered(self) -> Iterator[tuple[int, Command]]:
+        """(block that it stands before, command) in the order of the program."""
+        for block, group in sorted(self.commands.items()):
+            for command in group:
+                yield block, command

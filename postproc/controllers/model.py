@@ -85,6 +85,18 @@ class Feed(UserModel):
     """inverse time in arcs: speed by length, speed by radius, or not allowed"""
 
 
+class CutterCompensation(UserModel):
+    """Rules of cutter compensation beside its codes; moves are those in the plane of the words."""
+
+    begins_on_arc: bool = False
+    """the first move behind G41 or G42 may be an arc"""
+    ends_on_arc: bool = False
+    """the first move behind G40 may be an arc"""
+    modal_register: bool = False
+    """D holds until another is stated, whatever tool is loaded: where CUTCOM names none, the number of the tool's length
+    register is written"""
+
+
 class Kinematics(UserModel):
     """Which motion lies between two blocks."""
 
@@ -183,6 +195,7 @@ class ControllerFile(UserModel):
     arcs: Arcs = Arcs()
     cycles: Cycles = Cycles()
     feed: Feed = Feed()
+    cutter_compensation: CutterCompensation = CutterCompensation()
     kinematics: Kinematics = Kinematics()
     modes: Modes = Modes()
 

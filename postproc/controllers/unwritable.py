@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
+from postproc.controllers.compensated import compensated_arcs
 from postproc.controllers.model import ControllerFile
-from postproc.program import Command, Program
+from postproc.program import Program
 from toolpaths.diagnostics import Diagnostic, error, warning
 from toolpaths.toolpath import Cycle
 
@@ -17,6 +16,7 @@ def unwritable(controller: ControllerFile, program: Program, cycles: tuple[Cycle
     `length_offsets` is False where the words hold the length of the tool already.
     """
     return [*_own_length(controller, program, file, length_offsets), *_radius_registers(controller, program, file),
+            *compensated_arcs(controller, program, file), *_no_tool(controller, program, file),
             *_pitches(controller, program, cycles, file)]
 
 
@@ -24,7 +24,7 @@ def _own_length(controller: ControllerFile, program: Program, file: str, length_
     """A length that a tool change puts in force for good, where the words hold it already."""
     if length_offsets or not controller.tools.length_automatic or controller.codes.length_cancel:
         return []
-    tools = sorted({float(command.args[0]) for _, command in _commands(program) if command.name == "CHANGE_TOOL"})
+    tools = sorted({float(command.args[0]) for _, command in program.ordered() if command.name == "CHANGE_TOOL"})
     if not tools:
         return []
     names = ", ".join(f"T{tool:g}" for tool in tools)
@@ -33,16 +33,10 @@ def _own_length(controller: ControllerFile, program: Program, file: str, length_
                     hint="L and DL of these tools must be 0 in the control's tool table")]
 
 
-def _commands(program: Program) -> Iterator[tuple[int, Command]]:
-    for block, group in sorted(program.commands.items()):
-        for command in group:
-            yield block, command
-
-
 def _radius_registers(controller: ControllerFile, program: Program, file: str) -> list[Diagnostic]:
     """A radius register, where the tool brings its own."""
     codes = {"LEFT": controller.codes.compensation_left, "RIGHT": controller.codes.compensation_right}
-    lines = [command.line for _, command in _commands(program)
+    lines = [command.line for _, command in program.ordered()
              if command.name.startswith("CUTTER_COMPENSATION") and command.args
              and "{register}" not in codes[command.name.rsplit("_", 1)[1]]]
     if not lines:
@@ -58,7 +52,7 @@ def _pitches(controller: ControllerFile, program: Program, cycles: tuple[Cycle, 
     stating = {key for table in tables for key, spec in table.items() if "{pitch}" in spec.code}
     if not stating:
         return []
-    starts = [block for block, command in _commands(program) if command.name.startswith("START_SPINDLE") and command.args]
+    starts = [block for block, command in program.ordered() if command.name.startswith("START_SPINDLE") and command.args]
     first = min(starts, default=len(program) + 1)
     lines = [cycles[hole.cycle].line for hole in program.holes
              if hole.key in stating and not cycles[hole.cycle].pitch and first > hole.first]
@@ -67,3 +61,26 @@ def _pitches(controller: ControllerFile, program: Program, cycles: tuple[Cycle, 
     return [error("cycle.pitch", "a tap without pitch or spindle speed: this controller's cycle states the pitch", file=file,
                   lines=sorted(set(lines))[:6], count=len(lines),
                   hint="state the pitch in CYCLE/TAP, or SPINDL/RPM before it")]
+
+
+def _no_tool(controller: ControllerFile, program: Program, file: str) -> list[Diagnostic]:
+    """Sections whose code states a length register, while no tool is loaded that names one."""
+    modes = {"tcp": controller.modes.tcp, "tilted": controller.modes.tilted}
+    stating = {law: block for law, mode in modes.items() if mode for block in mode.enter if "{register}" in block}
+    register, lines, laws = False, list[int](), list[str]()
+    for block, command in program.ordered():
+        if command.name == "USE_TOOL_LENGTH_OFFSET":
+            register = True
+        elif command.name == "CHANGE_TOOL":
+            register = False
+        elif command.name == "ENTER_SECTION" and not register:
+            law = program.sections[int(command.args[0])].law
+            if law in stating:
+                lines.append(int(program.line[min(block, len(program) - 1)]))
+                laws.append(law)
+    if not lines:
+        return []
+    code = stating[laws[0]].partition("{")[0].strip()
+    return [error("tool.missing", f"the control runs the tool tip with a length register ({code}), and the file has loaded "
+                  "no tool", file=file, lines=lines[:6], count=len(lines),
+                  hint="write LOADTL/1 before the first GOTO, or --output-mode axes")]

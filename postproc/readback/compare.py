@@ -20,6 +20,7 @@ from postproc.readback.checks import (
     check_speeds,
     check_travel,
 )
+from postproc.readback.compensated import check_compensated
 from postproc.readback.execute import Motion
 from postproc.readback.faults import Faults
 from postproc.readback.poses import SAMPLES, Executed, arc_sweeps
@@ -73,6 +74,7 @@ def compare(motion: Motion, job: Job, executed: Executed, gcode: str = "", plann
     diagnostics += check_spins(motion, executed, moves, owner, tip, axis, axis_tolerance, faults)
     diagnostics += check_kinds(motion, moves, owner, tip, executed.control.rapids == "dog-leg", _taken_up(job, tip), faults)
     diagnostics += check_states(motion, job, moves, owner, faults)
+    diagnostics += check_compensated(motion, job, faults)
     diagnostics += check_holes(motion, job, moves, tip, owner, faults)
     diagnostics += check_taps(motion, job, moves, owner, faults)
     seconds = block_seconds(motion, executed.control, job.controller.feed.arc_inverse == "radius")

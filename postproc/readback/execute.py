@@ -13,7 +13,7 @@ from postproc.coolant import FLOOD, MIST
 from postproc.readback import frames
 from postproc.readback.canonical import CALL, LAW, REST, TURNS, Canonical, Law, Text, in_files, placed
 from postproc.readback.frames import AXES, Frame
-from postproc.readback.modal import Modal, codes, columns, fill, fill_values, modal_state, number_of
+from postproc.readback.modal import Modal, columns, fill, fill_values, modal_state, number_of
 from postproc.readback.rows import INCH, Rows, Section
 from postproc.readback.sections import run_section
 from postproc.readback.words import Words
@@ -37,8 +37,7 @@ class Motion:
         dwell (E,): s that the tool rests at the end of the block
         compensation (E,): 40, 41, 42; offset (E,): work offset code; blend (E,): mm of the control's smoothing (Modal)
         frame (E,): index into frames: the law that the block runs under
-        block (E,): running number of the block; radius (E,): register that the compensation in force was stated with, NaN
-            for none
+        block (E,): running number of the block; radius (E,): register of the radius in force (D), NaN for none
         pitch (E,): mm per turn of a tapping cycle, negative for left-hand ones, NaN outside; floating (E,): not coupled
         inch (E,): `feed` counts inches where it counts a length
     """
@@ -181,14 +180,8 @@ def _motion(words: Words, modal: Modal, rows: Rows, code: Canonical, used: tuple
     return Motion(in_files(code.line[block], code.files), rows.code, rows.end, offsets.home,
                   ccw=shared(taken(modal.motion, block) == 3), center=rows.center, feed=shared(feed),
                   register=taken(modal.length_register, block), hole=rows.hole, missing_feed=shared(missing),
-                  dwell=shared(dwell), frame=rows.frame, block=block, radius=taken(_radius_registers(words), block),
+                  dwell=shared(dwell), frame=rows.frame, block=block, radius=taken(number_of(words, "D"), block),
                   pitch=pitch, floating=floating, frames=used, **state)
-
-
-def _radius_registers(words: Words) -> Floats:
-    """(B + 1,) D word of the block that switches the compensation on, or in force there; NaN where there is none."""
-    blocks, _ = codes(words, "G", (40, 41, 42))
-    return fill_values(blocks, number_of(words, "D")[blocks], words.lines)
 
 
 def _threads(modal: Modal, rows: Rows, feed: Floats, call: Floats, code: Canonical) -> tuple[Floats, Bools]:

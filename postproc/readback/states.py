@@ -17,6 +17,7 @@ from postproc.events import (
     loaded_tools,
     numbers,
     spindle_states,
+    state_at,
 )
 from postproc.job import Job
 from postproc.moves import Moves
@@ -105,15 +106,15 @@ def _states(motion: Motion, job: Job, asked: _Asked, rows: Ints, row: Ints,
 
 
 def _radius_registers(job: Job) -> Floats:
-    """(N,) register of the cutter compensation that CUTCOM names at every row, NaN where it names none or the control's
-    code takes none."""
+    """(N,) register of the cutter compensation that holds at every row: that which CUTCOM names, else that of the tool's
+    length where D is modal, the tool where it is not; NaN where the control's code takes none, or before any tool."""
+    path, codes = job.toolpath, job.controller.codes
+    own = loaded_registers(path) if job.controller.cutter_compensation.modal_register else loaded_tools(path)
     starts, values = [0], [np.nan]
-    for event in job.toolpath.events:
-        if event.word == "CUTCOM" and compensation_side(event):
-            code = job.controller.codes.compensation_right if compensation_side(event) == "RIGHT" else \
-                job.controller.codes.compensation_left
+    for event in path.events:
+        if event.word == "CUTCOM" and (side := compensation_side(event)) and event.index < len(path):
+            code = codes.compensation_right if side == "RIGHT" else codes.compensation_left
+            named = (*numbers(event), float(own[event.index]))[0]
             starts.append(event.index)
-            values.append((numbers(event) or [np.nan])[0] if "{register}" in code else np.nan)
-    at = np.searchsorted(np.array(starts), np.arange(len(job.toolpath)), side="right") - 1
-    result: Floats = np.array(values, dtype=np.float64)[at]
-    return result
+            values.append(named if "{register}" in code and named >= 0 else np.nan)
+    return np.array(values, dtype=np.float64)[state_at(starts, len(path))]

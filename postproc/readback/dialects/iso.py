@@ -18,7 +18,7 @@ from postproc.readback.canonical import (
 )
 from postproc.readback.dialects.base import Reader, whole
 from postproc.readback.flow import Structure
-from postproc.readback.modal import CYCLES, GROUPS, codes, fill, number_of
+from postproc.readback.modal import CYCLES, GROUPS, codes, columns, fill, number_of
 from postproc.readback.words import Words, tokenise
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
@@ -53,6 +53,7 @@ class IsoReader(Reader):
         self.rests(words, new, drop, line, file, found)
         self.paths(words, new)
         self.levels(words, new)
+        self.radii(words, new)
         blocks, value = codes(words, "G", self.groups["offset"])
         new += [(int(b), OFFSET, float(v)) for b, v in zip(blocks, value, strict=True)]
         self.others(words, new, drop, line, file, found)
@@ -113,6 +114,17 @@ class IsoReader(Reader):
         stated = codes(words, "G", GROUPS["level"])[0]
         if not (stated <= cycles[0]).any():
             new.append((int(cycles[0]), "G", 99.0))
+
+    def radii(self, words: Words, new: New) -> None:
+        """Where D is not modal, G41 and G42 without it, or with D0, take the radius of the tool in the spindle (LinuxCNC,
+        G-code reference)."""
+        blocks, _ = codes(words, "G", (41, 42))
+        if self.controller is None or self.controller.cutter_compensation.modal_register or not len(blocks):
+            return
+        change = codes(words, "M", (6,))[0]
+        tool = fill(change, number_of(words, "T")[change], words.lines, np.nan)
+        stated = columns(words, "D")[blocks, 0]
+        new += [(b, "D", float(tool[b])) for b in blocks[~(stated > 0.0)].tolist() if tool[b] >= 0]
 
     def others(self, words: Words, new: New, drop: Bools, line: Ints, file: str, found: list[Diagnostic]) -> None:
         """What a dialect has besides."""
