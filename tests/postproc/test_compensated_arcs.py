@@ -66,7 +66,8 @@ def test_a_change_of_side_on_an_arc_is_told_once() -> None:
 
 @pytest.mark.parametrize("controller", NAMES)
 def test_an_arc_out_of_the_plane_is_refused(controller: str) -> None:
-    lines = [*DOWN, "CUTCOM/LEFT", "GOTO/20,0,2", "GOTO/0,0,2", "CIRCLE/0,0,12,0,1,0,10", "GOTO/-10,0,12", "CUTCOM/OFF", *OUT]
+    arc = ["CIRCLE/0,0,12,0,1,0,10", "GOTO/-10,0,12"]
+    lines = [*DOWN, "CUTCOM/LEFT", "GOTO/20,0,2", "GOTO/0,0,2", *arc, "CUTCOM/OFF", *OUT]
     assert [(d.code, d.lines) for d in errors(made(controller, *lines))] == [("cutcom.arc_plane", (13,))]
 
 
