@@ -106,7 +106,8 @@ class MapModel(UserModel):
     repeats: dict[str, Positive] = Field(default_factory=dict)
     """by coordinate that goes round: degrees (mm) after which it repeats, e.g. { C = 360 }"""
     zero: dict[str, float] = Field(default_factory=dict)
-    """place, all coordinates in mm and degrees, at which the map is to be 0: what it says there is taken off everywhere"""
+    """place, all coordinates in mm and degrees, at which the map is to be 0: what it says there is taken off everywhere;
+    [sigma] and [covariance] are those of the table as it stands"""
 
 
 class CovarianceModel(UserModel):

@@ -18,7 +18,7 @@ from machines.geometric_error.covariance import angular, read_covariance
 from machines.geometric_error.csv_table import ANGLES, LENGTHS, UNITS, CsvTable, read_csv, read_text
 from machines.geometric_error.exports import MOST_DOUBT, joint_sense, leans
 from machines.geometric_error.lattice import COLUMNS
-from machines.geometric_error.lattice_file import COORDINATES, map_from_csv, zeroed
+from machines.geometric_error.lattice_file import COORDINATES, map_from_csv, zeroed, zeroed_covariance
 from machines.geometric_error.model import ErrorModel
 from machines.geometric_error.names import DIRECTIONS, OWN, ErrorName, parse
 from machines.geometric_error.screw_tables import from_linuxcnc
@@ -146,11 +146,11 @@ def _csv(path: Path, machine: Machine, how: How) -> tuple[ErrorModel | None, lis
         return _location(table, how)
     if model is None or read is None or not read.scatter:
         return model, found
-    model, told = _scattered(model, read)
+    model, told = _scattered(model, read, how.zero)
     return model, [*found, told]
 
 
-def _scattered(model: ErrorModel, read: Averaged) -> tuple[ErrorModel, Diagnostic]:
+def _scattered(model: ErrorModel, read: Averaged, zero: Mapping[str, float]) -> tuple[ErrorModel, Diagnostic]:
     """The model with the doubt of its means."""
     units = {name: UNITS["arcsec" if name[0] == "r" or name[1] in "ABC" else "um"] for name in read.scatter}
     spread = ", ".join(f"{name} {value / units[name]:.3g}" for name, value in read.scatter.items())
@@ -158,7 +158,10 @@ def _scattered(model: ErrorModel, read: Averaged) -> tuple[ErrorModel, Diagnosti
                 f"of one: {spread} (um, arcsec)", file=read.table.file)
     if len(model.names) > MOST_DOUBT:
         return model, replace(told, message=f"{told.message}; the doubt of {len(model.names)} values is not written")
-    return replace(model, covariance=np.diag(_variances(model, read))), told
+    covariance = np.diag(_variances(model, read))
+    if model.map is not None and zero:
+        covariance = zeroed_covariance(covariance, model.map, zero)
+    return replace(model, covariance=covariance), told
 
 
 def _variances(model: ErrorModel, read: Averaged) -> Floats:

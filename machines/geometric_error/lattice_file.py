@@ -11,7 +11,7 @@ import numpy as np
 from machines.geometric_error.averages import SAME, levels_of
 from machines.geometric_error.csv_table import ANGLES, LENGTHS, CsvTable, write_csv
 from machines.geometric_error.lattice import COLUMNS, POINT, ROTARY, ErrorMap
-from toolpaths.arrays import Ints
+from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.units import DEG
 
@@ -135,3 +135,15 @@ def zeroed(error_map: ErrorMap, zero: Mapping[str, float]) -> ErrorMap | tuple[s
             f"{letter} is from {nodes[0] / unit:g} to {nodes[-1] / unit:g}" for letter, nodes in
             zip(letters, error_map.nodes, strict=True) for unit in (DEG if letter in ROTARY else 1.0,))
     return replace(error_map, table=error_map.table - error_map.at(place)[0])
+
+
+def zeroed_covariance(covariance: Floats, error_map: ErrorMap, zero: Mapping[str, float]) -> Floats:
+    """Covariance (P, P) of the values of a map less what it says at `zero` (as in `zeroed`), from that of the values."""
+    node, weight = error_map.weights(np.array([[zero[letter] for letter in error_map.letters]]))
+    taken = np.zeros((6, len(covariance)))
+    for k, share in zip(node[0], weight[0], strict=True):
+        taken[range(6), range(6 * k, 6 * k + 6)] += share
+    by = np.eye(len(covariance)) - np.tile(taken, (len(covariance) // 6, 1))
+    result: Floats = by @ covariance @ by.T
+    np.fill_diagonal(result, np.maximum(result.diagonal(), 0.0))  # round-off
+    return result

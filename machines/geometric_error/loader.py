@@ -14,7 +14,7 @@ from machines.geometric_error.csv_table import UNITS, CsvTable, read_csv
 from machines.geometric_error.curves import EVERYWHERE, Curve, Fourier, Polynomial, largest
 from machines.geometric_error.file_models import CurveModel, ErrorFileModel
 from machines.geometric_error.lattice import COLUMNS, ErrorMap
-from machines.geometric_error.lattice_file import map_from_csv, zeroed
+from machines.geometric_error.lattice_file import map_from_csv, zeroed, zeroed_covariance
 from machines.geometric_error.model import ErrorModel
 from machines.geometric_error.names import SPINDLE, ErrorName, parse
 from machines.geometric_error.rods import RodErrors, gives_rods, rod_frame, rod_names
@@ -89,6 +89,8 @@ class _Loader:
         self._check_sizes(model)
         model, faults = covariance_of(model, self.file, self.checked)
         self.found += faults
+        if model.map is not None and model.covariance is not None and self._zero():
+            model = replace(model, covariance=zeroed_covariance(model.covariance, model.map, self._zero()))
         return (None if has_errors(self.found) else model), self.found
 
     def _problem(self, code: str, path: tuple[str | int, ...], message: str, hint: str = "") -> None:
@@ -279,9 +281,13 @@ class _Loader:
         result = replace(result, length=given.tool_length, bed=bed, table=given.sign * result.table)
         if not given.zero:
             return result
-        zero = {letter: value * (DEG if letter in ROTARY else 1.0) for letter, value in given.zero.items()}
-        made = zeroed(result, zero)
+        made = zeroed(result, self._zero())
         if isinstance(made, tuple):
             self._problem("error-map.zero", ("map", "zero"), *made)
             return None
         return made
+
+    def _zero(self) -> dict[str, float]:
+        """Stated zero of the map, mm and rad."""
+        given = {} if self.checked.map is None else self.checked.map.zero
+        return {letter: value * (DEG if letter in ROTARY else 1.0) for letter, value in given.items()}

@@ -152,9 +152,9 @@ def doubt(model: ErrorModel, actual: Actual, w: Floats, direction: Floats | None
         rows = actual.sensitivity(w[part], None if direction is None else direction[part])
         half = (rows.reshape(-1, rows.shape[2]) @ model.covariance).reshape(rows.shape)  # one product of matrices, not N
         spread = half @ np.swapaxes(rows, 1, 2)
-        tip[part] = np.sqrt(np.diagonal(spread[:, :3, :3], axis1=1, axis2=2))
-        worst[part] = np.sqrt(np.linalg.eigvalsh(spread[:, :3, :3])[:, -1])
+        tip[part] = np.sqrt(np.maximum(np.diagonal(spread[:, :3, :3], axis1=1, axis2=2), 0.0))
+        worst[part] = np.sqrt(np.maximum(np.linalg.eigvalsh(spread[:, :3, :3])[:, -1], 0.0))
         _, along, _ = actual.place(w[part])
         across = np.eye(3) - along[:, :, None] * along[:, None, :]
-        axis[part] = np.sqrt(np.linalg.eigvalsh(across @ spread[:, 3:, 3:] @ across)[:, -1])
+        axis[part] = np.sqrt(np.maximum(np.linalg.eigvalsh(across @ spread[:, 3:, 3:] @ across)[:, -1], 0.0))
     return Doubt(tip, worst, axis)

@@ -16,7 +16,7 @@ from machines.geometric_error.lattice import ErrorMap
 from machines.geometric_error.lattice_file import map_from_csv
 from machines.geometric_error.lattice_making import map_loss, map_of, nodes_of, refined
 from machines.geometric_error.loader import load, load_checked
-from machines.geometric_error.model import ErrorModel
+from machines.geometric_error.model import ErrorModel, doubt
 from machines.geometric_error.serial_errors import SerialErrors
 from machines.geometric_error.volume import middle, samples
 from tests.machines.error_models import ARCSEC, joints, model
@@ -81,6 +81,17 @@ def test_zero_and_sign_of_a_measured_map(tmp_path: Path) -> None:
     assert found.map.table[1, 0] == pytest.approx(np.zeros(6), abs=1e-15)
     assert found.map.table[0, 0] == pytest.approx([0.001, 0, 0, 0, 0, 0], abs=1e-15)
     assert found.map.table[1, 1] == pytest.approx([0.001, 0, -0.001, 0, 0, 0], abs=1e-15)
+
+
+def test_the_doubt_at_the_stated_zero_is_none_and_elsewhere_that_of_both(tmp_path: Path) -> None:
+    table = "X [mm],dx [um],dy [um],dz [um]\n0,1,2,3\n10,2,2,3\n30,1,2,3\n"
+    found, _ = loaded(tmp_path, table, "zero = { X = 5.0 }\n[sigma]\nnode = 2.0\n")
+    assert found is not None and found.covariance is not None
+    kin = machines.load("mikron-ucp710").kinematics
+    q = np.array([[5.0, 0, 0, 0, 0], [30.0, 0, 0, 0, 0]])
+    spread = doubt(found, found.on(kin), q).tip
+    assert spread[0] == pytest.approx(np.zeros(3), abs=1e-12)  # the mean of the first two nodes, less itself
+    assert spread[1] == pytest.approx(np.full(3, 0.002 * np.sqrt(1.5)))
 
 
 def test_the_stated_point_is_displaced_whatever_the_tool(tmp_path: Path) -> None:
