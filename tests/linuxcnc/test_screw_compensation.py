@@ -10,8 +10,10 @@ import pytest
 
 import machines
 from machines.geometric_error.curves import Table
+from machines.geometric_error.exports import to_screws
+from machines.geometric_error.model import ErrorModel
 from machines.geometric_error.names import parse
-from machines.geometric_error.screw_tables import to_linuxcnc
+from machines.geometric_error.serial_errors import Component, SerialErrors
 from tests.linuxcnc import config
 from toolpaths.arrays import Floats
 
@@ -27,7 +29,8 @@ def compensated(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[[bo
     write = config.write
     name = parse("EXX")
     assert name is not None
-    (tmp_path / "x.comp").write_text(to_linuxcnc(name, TABLE))
+    model = ErrorModel(SerialErrors((Component(name, TABLE),)))
+    (tmp_path / "x.comp").write_text(to_screws(model, machines.load("mill-3axis"), {}, 1e-4, 1e-7).texts["X"])
     (tmp_path / "x.comp").chmod(0o644)
     tmp_path.chmod(0o755)
 
