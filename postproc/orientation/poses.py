@@ -17,6 +17,7 @@ from toolpaths.units import DEG
 
 Solved = tuple[Floats, str]
 """Joints (N, J), and why the machine cannot run through them, "" where it can."""
+OUT_OF_REACH = "out of reach"
 _ROUNDED = 1e-4
 """rad, by which an axis of a CL file may be off by its decimals"""
 _OVER = 1e6
@@ -83,7 +84,7 @@ def _least_turned(one: Pass, machine: Machine, found: Floats) -> Solved:
     size = np.abs(found[:, :, rotary]).mean(axis=1).sum(axis=1) + _OVER * np.maximum(over, 0.0).max(axis=1)
     best = int(np.argmin(np.where(np.isfinite(size), size, np.inf)))
     if not np.isfinite(size[best]):
-        return found[best], "out of reach"
+        return found[best], OUT_OF_REACH
     if over[best].max() > TRAVEL_SLACK:
         return found[best], _outside(found[best], over[best], machine)
     if reach.is_checked(one.kin) and not reach.inside(one.kin, found[best]):

@@ -185,7 +185,16 @@ def _plans(choice: OrientationChoice) -> list[str]:
         whole, cutting, turning, other = figures
         lines.append(f"{name:<16} {whole:>10} {percent(gain(plan.seconds, choice.plans['keep'].seconds)):>7} {cutting:>10} "
                      f"{turning:>10} {other:>10} {parts.turns:>6}" + ("  takes what is refused" if plan.touches else ""))
-    return lines + _unaimed(choice)
+    return lines + _proof(choice) + _unaimed(choice)
+
+
+def _proof(choice: OrientationChoice) -> list[str]:
+    """Whether the program of the plan that was asked for is written."""
+    program = choice.program
+    if program is None:
+        return []
+    said = "proved" if program.ok else "refused"
+    return [f"the program of {program.options.orient} for {program.controller_name} is {said}"]
 
 
 def _unaimed(choice: OrientationChoice) -> list[str]:

@@ -12,11 +12,17 @@ from postproc.orientation.allowed import Allowed
 from postproc.orientation.candidates import Lost, Tried
 from postproc.orientation.losers import KINDS
 from postproc.orientation.passes import Pass, Work
-from postproc.orientation.timed import turned
+from postproc.orientation.poses import OUT_OF_REACH
+from postproc.orientation.timed import Turned, turned
 from postproc.orientation.travel import Lack, nearest_inside
 from toolpaths.diagnostics import Diagnostic, error, warning
+from toolpaths.rotations import angle_between
+from toolpaths.units import DEG
 
 REACH = "move or turn the part in the set-up, or run `postproc place`"
+_TURN = ("turn the part in the set-up (part.x_axis, part.y_axis) or use another machine: rotary axes stand where they do "
+         "wherever the part is")
+_APART_FIXED = "check part, fixtures and holder of the set-up, turn the part in it, or take a longer tool"
 _APART = "check part, fixtures and holder of the set-up, allow more tilt (--max-tilt) or take a longer tool"
 _BY = re.compile(r"(.+) by ([\d.]+) mm")
 _BEYOND = re.compile(r"(travel: axis \w+) at .*: ([\d.]+) (too \w+)$")
@@ -43,8 +49,9 @@ def out_of_travel(work: Work, allowed: Allowed) -> list[Diagnostic]:
 
 def _hopeless(work: Work, some: list[tuple[Pass, str]], one: Pass, why: str) -> Diagnostic:
     more = f"; the CL's axis is outside alike in {len(some) - 1} more passes" if len(some) > 1 else ""
+    lines = [one.line, *(each.line for each, _ in some if each is not one)]
     return error("orient.travel", f"pass {one.number} with the axis of the CL file: {why}{more}", file=work.toolpath.file,
-                 lines=[one.line, *(each.line for each, _ in some if each is not one)][:6], count=len(some), hint=REACH)
+                 lines=lines[:6], count=len(some), hint=_hint(why, one.fixed))
 
 
 def _no_other(one: Pass, least: Lack) -> str:
@@ -56,13 +63,31 @@ def _no_other(one: Pass, least: Lack) -> str:
 
 def unfit(work: Work, results: list[Tried]) -> list[Diagnostic]:
     """Warnings where another axis was found, else errors."""
-    return [*_told(work, [one for one in results if one.own.refused], ("orient.own_reach", "orient.reach"), REACH,
-                   lambda one: one.own.refused),
-            *_told(work, [one for one in results if one.own.touching], ("orient.own_touches", "orient.touches"), _APART,
+    reached = [one for one in results if not one.own.refused]
+    return [*_told(work, [one for one in results if one.own.refused], ("orient.own_reach", "orient.reach"),
+                   lambda one: one.own.refused + _off(one.own)),
+            *_told(work, [one for one in reached if one.own.touching], ("orient.own_touches", "orient.touches"),
                    lambda one: one.own.touching)]
 
 
-def _told(work: Work, bad: list[Tried], codes: tuple[str, str], hint: str, why: Callable[[Tried], str]) -> list[Diagnostic]:
+def _off(own: Turned) -> str:
+    """By how much a serial machine misses an axis that it cannot take at all."""
+    if own.refused != OUT_OF_REACH or not own.one.kin.slides_affine:
+        return ""
+    off = angle_between(own.one.kin.nearest_axis(own.one.axes), own.one.axes)
+    return f": the rotary axes bring the tool no nearer to it than {off.max() / DEG:.3f} degrees" if off.max() > 0.0 else ""
+
+
+def _hint(why: str, fixed: str) -> str:
+    """What to do about it."""
+    if why.startswith(OUT_OF_REACH) or (why.startswith("travel") and " degrees, " in why):
+        return _TURN
+    if why.startswith("travel") or "reach" in why:
+        return REACH
+    return _APART_FIXED if fixed else _APART
+
+
+def _told(work: Work, bad: list[Tried], codes: tuple[str, str], why: Callable[[Tried], str]) -> list[Diagnostic]:
     """One diagnostic per kind; the deepest and the farthest beyond travel stands for all."""
     alike: dict[tuple[bool, str, str], list[Tried]] = {}
     for one in bad:
@@ -76,7 +101,7 @@ def _told(work: Work, bad: list[Tried], codes: tuple[str, str], hint: str, why: 
         make, code = (warning, codes[0]) if other else (error, codes[1])
         result.append(make(code, f"pass {first.number}{more} with the axis of the CL file: {why(worst)}{left}",
                            file=work.toolpath.file, lines=[one.own.one.line for one in some][:6], count=len(some),
-                           hint=hint))
+                           hint=_hint(why(worst), fixed)))
     return result
 
 

@@ -186,6 +186,7 @@ def test_the_command_proves_for_a_control(tmp_path: Path) -> None:
     assert CliRunner().invoke(app, [*arguments, "-c", "fanuc-30i"]).exit_code == 0
     values = json.loads(out.read_text())
     assert (values["controller"], values["proved"]) == ("fanuc-30i", True)
+    assert "\nthe program of auto for fanuc-30i is proved" in CliRunner().invoke(app, [*arguments, "-c", "fanuc-30i"]).output
     failed = CliRunner().invoke(app, [*arguments, "-c", "fanuk-30i"])
     assert failed.exit_code == 1 and "fanuc-30i" in failed.output
 

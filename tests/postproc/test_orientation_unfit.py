@@ -129,3 +129,25 @@ def test_travel_that_ends_alike_is_told_once() -> None:
     told = [d for d in found if d.code == "orient.own_reach"]
     assert [(d.count, d.severity) for d in told] == [(3, Severity.WARNING)]
     assert "380.000 mm, allowed -355.000 to 355.000: 25.000 too high" in told[0].message
+
+
+def test_what_helps_is_said_by_what_is_against_it() -> None:
+    """Slides: elsewhere on the table; rotary axes: not that. Another axis only where one may be had."""
+    under = toolpath("MULTAX", "RAPID", "GOTO/0,0,-9,0,0,-1", "RAPID", "GOTO/0,0,0,0,0,-1", "GOTO/80,0,0,0,0,-1", "RAPID",
+                     "GOTO/80,0,-9,0,0,-1", head=["UNITS/MM", "CUTTER/16,0", *BALL[2:]])
+    turned_over = "turn the part in the set-up (part.x_axis, part.y_axis) or use another machine"
+    for name, code, said in (("mikron-ucp710", "orient.travel", "axis A at 180.000 degrees"),
+                             ("nutating-head", "orient.reach", "bring the tool no nearer to it than 90.000 degrees")):
+        _, found = orient(under, machine(name), SetupFile(tools={"1": ToolSetup(gauge_length=100.0)}))
+        assert [d.code for d in found if d.severity is Severity.ERROR] == [code]
+        assert said in found[-1].message and found[-1].hint.startswith(turned_over)
+    _, found = orient(ball_passes(0.0), machine("mikron-ucp710"), at(700.0))
+    assert found[0].hint.startswith("move or turn the part")
+
+
+def test_a_pass_out_of_reach_is_not_told_to_touch_too() -> None:
+    path, m = toolpath(*LINES, head=BALL), machine("mikron-ucp710")
+    work, _ = work_of(path, m, at(300.0), Options())
+    assert work is not None
+    results = [tried(one, m, Allowed(5.0 * DEG, Everywhere())) for one in work.passes]
+    assert {d.code for d in unfit(work, results)} == {"orient.reach"}
