@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, fields, replace
 from enum import IntEnum
+from typing import Any
 
 import numpy as np
 
 from machines.machine import Machine
-from toolpaths.arrays import Array, Bools, Floats, Ints, frozen
+from toolpaths.arrays import Array, Bools, Floats, Ints, as_slice, frozen, shared, taken
 
 
 class Path(IntEnum):
@@ -148,7 +149,7 @@ class Blocks:
         for name in ("start", "end"):
             object.__setattr__(self, name, frozen(getattr(self, name), np.float64, (n, a), f"Blocks.{name}"))
         for name, (kind, tail) in _COLUMNS.items():
-            object.__setattr__(self, name, frozen(getattr(self, name), kind, (n, *tail), f"Blocks.{name}"))
+            object.__setattr__(self, name, shared(frozen(getattr(self, name), kind, (n, *tail), f"Blocks.{name}")))
 
     def __len__(self) -> int:
         return len(self.line)
@@ -157,8 +158,10 @@ class Blocks:
         """Some of the blocks; the pauses stay with the last block that is left before them."""
         rows = np.arange(len(self))[rows]
         moved = replace(self.pauses, block=np.searchsorted(rows, self.pauses.block, side="right") - 1)
-        return replace(self, pauses=moved, **{f.name: getattr(self, f.name)[rows] for f in fields(self)
-                                              if isinstance(getattr(self, f.name), np.ndarray)})
+        here = as_slice(rows)
+        columns: dict[str, Any] = {f.name: taken(getattr(self, f.name), here) for f in fields(self)
+                                   if isinstance(getattr(self, f.name), np.ndarray)}
+        return replace(self, pauses=moved, **columns)
 
     @property
     def xyz(self) -> Floats:

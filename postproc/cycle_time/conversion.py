@@ -8,6 +8,7 @@ from postproc.cycle_time.estimate import Estimate, estimate
 from postproc.cycle_time.model import load_model, model_name
 from postproc.cycle_time.report import as_dict, clock
 from postproc.cycle_time.source import from_conversion
+from postproc.memory import give_back
 from postproc.pipeline import PostResult
 from toolpaths.diagnostics import require
 
@@ -22,7 +23,9 @@ def estimate_of(result: PostResult) -> Estimate | None:
     model, found = load_model(model_name(result.controller_name, result.controller.writer))
     require(found)
     assert model is not None
+    give_back()
     blocks = from_conversion(result)
+    give_back()
     return estimate(blocks, result.machine, model, with_band=len(blocks) <= BAND_UP_TO) if len(blocks) else None
 
 

@@ -20,6 +20,7 @@ from postproc.cycle_time.linuxcnc_segments import KERNEL_FROM, NORMAL_SHARE, Seg
 from postproc.cycle_time.phases import Ramps, Timed, ramps, summed
 from postproc.cycle_time.shape import NOTHING, shape
 from postproc.feedrate.compiled import compiled
+from postproc.memory import give_back
 from toolpaths.arrays import Array, Bools, Floats, Ints
 from toolpaths.units import DEG
 
@@ -35,6 +36,8 @@ GAP_CYCLES = 4.0
 """servo cycles below which what blends leave of a line goes to the blend ([TRAJ] ARC_BLEND_GAP_CYCLES)"""
 
 
+_TOGETHER = 100_000
+"""corners that are looked at together"""
 COMMAND = {Cause.DWELL: 0.004, Cause.TOOL_CHANGE: 0.038, Cause.SPINDLE: 0.005, Cause.OTHER: 0.007, Cause.INDEXING: 0.0}
 """s that a command takes beside its own time, measured: the task's cycle is 1 ms, that of tool changes (io) 10 ms"""
 SETTLED = 0.003
@@ -78,6 +81,7 @@ def linuxcnc(blocks: Blocks, settings: Settings | None = None) -> Timed:
     settings = settings or Settings()
     s = segments(blocks, settings.override, settings.rapid)
     row = in_a_row(s, settings.cycle)
+    give_back()
     return _timed(blocks, s, row, settings)
 
 
@@ -193,8 +197,10 @@ def _put_together(s: Segments, c: Corners, ends: Array, at: Ints, arcs: Blends, 
     here = np.flatnonzero((ends[:-1] == OVERLAP) & joined)
     overlap = np.zeros(count)
     last = np.append(~joined[1:], True)[here]
-    overlap[here] = _overlap(s, here, (length[here], length[here + 1]), (1.0, np.where(last, 0.5, 1.0)),
-                             np.minimum(s.asked, most), rate, share)[0]
+    target = np.minimum(s.asked, most)
+    for first in range(0, len(here), _TOGETHER):
+        one, part = here[first:first + _TOGETHER], np.where(last[first:first + _TOGETHER], 0.5, 1.0)
+        overlap[one] = _overlap(s, one, (length[one], length[one + 1]), (1.0, part), target, rate, share)[0]
     fresh = s.fresh.copy()
     fresh_blend = fresh[arc_at] & used
     return Row(both(np.arange(count), arc_at), both(length, blend_length), both(s.asked, arcs.asked[arc]),
@@ -297,7 +303,7 @@ def _by_block(blocks: Blocks, s: Segments, row: Row, ramp: Floats, steady: Float
     missing = ~np.isfinite(merged_begin)
     merged_begin[missing] = merged_end[missing] = 0.0
     owner = np.searchsorted(s.block, np.arange(count))
-    own = shape(blocks).length
+    own = s.shape.length if len(s) == count else shape(blocks).length
     total = summed(own, owner, len(s))
     part = own / np.where(total[owner] > 0.0, total[owner], 1.0)
     done = np.cumsum(part)

@@ -83,13 +83,15 @@ def merge(blocks: Blocks) -> tuple[Blocks, Ints]:
         same &= np.concatenate([[False], column[1:] == column[:-1]])
     joins = line & ~turns & same & np.concatenate([[False], (line & ~turns & ~blocks.forced)[:-1]])
     loop = compiled(chain_ends) if len(blocks) >= KERNEL_FROM else chain_ends
-    keep = np.flatnonzero(loop(np.ascontiguousarray(blocks.xyz), joins, blocks.chain))
+    keep = np.flatnonzero(loop(np.ascontiguousarray(blocks.xyz), joins, np.array(blocks.chain)))
     start = np.concatenate([blocks.start[:1], blocks.end[keep[:-1]]])
     return replace(blocks.take(keep), start=start), rows[keep]
 
 
 def _flat_arcs(blocks: Blocks, rows: Ints) -> tuple[Blocks, Ints]:
     """Arcs in XY that rise over their chord by less than the chain tolerance, as two lines through their middle."""
+    if not blocks.arc.any():
+        return blocks, rows
     form = shape(blocks)
     flat = blocks.arc & (blocks.path == Path.BLEND) & (np.abs(blocks.normal[:, 2]) > 0.5)
     flat &= form.radius * (1.0 - np.cos(blocks.sweep / 2.0)) < blocks.chain

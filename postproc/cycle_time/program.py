@@ -15,7 +15,7 @@ from postproc.readback.execute import Motion
 from postproc.readback.modal import columns, fill_values, modal_state
 from postproc.readback.poses import arc_sweeps, coordinates, positions
 from postproc.readback.words import Words
-from toolpaths.arrays import Array, Bools, Floats, Ints
+from toolpaths.arrays import Array, Bools, Floats, Ints, repeated
 from toolpaths.units import DEG
 
 RESTING_M = (0.0, 1.0, 3.0, 4.0, 5.0, 7.0, 8.0, 9.0)
@@ -96,9 +96,10 @@ def _block_of(code: Canonical, motion: Motion) -> Ints:
 
 def _arcs(motion: Motion, control: Control, arc: Bools, start: Floats) -> tuple[Floats, Floats, Floats]:
     """normal (E, 3), sweep (E,) and center (E, 3) of arcs, the center at the height of the start."""
-    normal, center, at = np.zeros((len(motion), 3)), np.zeros((len(motion), 3)), np.flatnonzero(arc)
+    at = np.flatnonzero(arc)
     if not len(at):
-        return normal, np.zeros(len(motion)), center
+        return repeated(np.zeros(3), len(motion)), repeated(0.0, len(motion)), repeated(np.zeros(3), len(motion))
+    normal, center = np.zeros((len(motion), 3)), np.zeros((len(motion), 3))
     height = np.array([2, 1, 0])[motion.plane[at] - 17]
     normal[at, height] = np.where(motion.ccw[at], 1.0, -1.0)
     center[at] = motion.center[at]
@@ -108,8 +109,10 @@ def _arcs(motion: Motion, control: Control, arc: Bools, start: Floats) -> tuple[
 
 def _tip_lengths(motion: Motion, control: Control) -> Floats:
     """(E,) way of the tip where X, Y, Z are the tip and the joints follow; NaN elsewhere."""
-    result = np.full(len(motion), np.nan)
     rows = np.flatnonzero(motion.frame > 0)
+    if not len(rows):
+        return repeated(np.nan, len(motion))
+    result = np.full(len(motion), np.nan)
     if len(rows):
         before, end = coordinates(motion, rows)
         result[rows] = control.under("tcp").feed_length(end - before)

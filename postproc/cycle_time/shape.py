@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from postproc.cycle_time.blocks import Axes, Blocks
-from toolpaths.arrays import Bools, Floats
+from toolpaths.arrays import Bools, Floats, repeated
+from toolpaths.rotations import lengths
 
 NOTHING = 1e-9
 """mm or rad below which an axis does not move (LinuxCNC: 1e-8 of its units)"""
@@ -36,7 +37,7 @@ class Shape:
 
 def unit(vectors: Floats) -> Floats:
     """Rows (N, 3) as unit vectors, 0 where there is nothing."""
-    size = np.linalg.norm(vectors, axis=1, keepdims=True)
+    size = lengths(vectors)[:, None]
     return np.asarray(vectors / np.where(size > 0.0, size, 1.0))
 
 
@@ -59,11 +60,11 @@ def shape(blocks: Blocks) -> Shape:
         length = np.where(blocks.given > NOTHING, blocks.given, length)
     others = np.setdiff1d(np.arange(step.shape[1]), axes.xyz)
     turns = (step[:, others] != 0.0).any(axis=1)
-    radius, climb = np.zeros(len(step)), np.zeros(len(step))
-    first, last = direction, direction.copy()
+    radius = climb = repeated(0.0, len(step))
+    first = last = direction
     share = np.abs(step)
     if blocks.arc.any():
-        first = direction.copy()
+        radius, climb, first = np.zeros(len(step)), np.zeros(len(step)), direction.copy()
         _arcs(blocks, length, radius, climb, first, last, share)
     return Shape(length, turns, radius, climb, first, last, share / np.where(length > 0.0, length, 1.0)[:, None])
 
