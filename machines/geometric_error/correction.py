@@ -33,7 +33,8 @@ BLIND = 1e-9
 """axis rate below which a turn does not move the axis"""
 CLOSED = 2e-6, 5e-8
 """mm and rad: steps that small are the last; they leave less than a hundredth of themselves, near a pole a tenth"""
-STEPS = 8
+STEPS = 20
+"""at most; realistic errors take 3 or 4, only the points that are open go on"""
 
 
 @dataclass(frozen=True)
