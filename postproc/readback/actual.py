@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from itertools import pairwise
 
 import numpy as np
 
@@ -18,6 +17,8 @@ from toolpaths.arrays import Bools, Floats, Ints
 ARC = 2
 LOOKS = 16
 """parts of a block whose joints do not run straight, for the ways of its axes"""
+AT_ONCE = 50_000
+"""such blocks that are looked at together"""
 
 
 @dataclass(frozen=True)
@@ -77,16 +78,37 @@ class ActualExecuted(Executed):
         share = np.broadcast_to(np.asarray(t, dtype=np.float64), len(rows))
         result = self._between(motion, rows, np.zeros(len(rows)), share)
         bent = np.flatnonzero(self._curved[rows])
-        if len(bent):
-            looks = [share[bent] * k / LOOKS for k in range(LOOKS + 1)]
-            whole, *rest = (self._between(motion, rows[bent], one, two) for one, two in pairwise(looks))
-            for piece in rest:
-                whole = whole.then(piece)
+        for at in range(0, len(bent), AT_ONCE):
+            k = bent[at:at + AT_ONCE]
+            looks = self._looked_at(motion, rows[k])
+            last = np.minimum((share[k] * LOOKS).astype(np.int64), LOOKS - 1)
+            gone = Steps(*(steps[last, np.arange(len(k))] for steps in looks))
+            whole = gone.then(self._between(motion, rows[k], last / LOOKS, share[k]))
             for name in ("shift", "low", "high"):
-                getattr(result, name)[bent] = getattr(whole, name)
+                getattr(result, name)[k] = getattr(whole, name)
         return result
 
+    def _looked_at(self, motion: Motion, rows: Ints) -> tuple[Floats, Floats, Floats]:
+        """Shift, low and high, each (LOOKS, K, T), from the beginning of blocks to each look; kept for the next time."""
+        known = self._kept.get("rows")
+        if known is None or not np.array_equal(known[0], rows):
+            whole = self._between(motion, rows, np.zeros(len(rows)), np.zeros(len(rows)))
+            stages, q = [whole], self.joints(motion, rows, np.zeros(len(rows)))
+            for k in range(1, LOOKS):
+                before, q = q, self.joints(motion, rows, np.full(len(rows), k / LOOKS))
+                whole = whole.then(self._of(before, q))
+                stages.append(whole)
+            shift, low, high = (np.stack([getattr(stage, name) for stage in stages]) for name in ("shift", "low", "high"))
+            known = self._kept["rows"] = rows, shift, low, high
+        return known[1:]
+
+    @cached_property
+    def _kept(self) -> dict[str, tuple[Ints, Floats, Floats, Floats]]:
+        return {}
+
     def _between(self, motion: Motion, rows: Ints, one: Floats, two: Floats) -> Steps:
-        q = self.joints(motion, rows, two)
-        step = np.nan_to_num((q - self.joints(motion, rows, one))[:, self._two_way])
+        return self._of(self.joints(motion, rows, one), self.joints(motion, rows, two))
+
+    def _of(self, before: Floats, q: Floats) -> Steps:
+        step = np.nan_to_num((q - before)[:, self._two_way])
         return Steps.of(step, self.model.axes.gaps(self.control.machine.axis_names, q, self._two_way))
