@@ -1,0 +1,241 @@
+"""Words of machines that lose motion: chosen block by block, holes and rapids with them, in every output mode."""
+
+from __future__ import annotations
+
+import importlib.util
+import re
+import sys
+from dataclasses import replace
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+import postproc
+import toolpaths
+from machines.geometric_error.exchange import save
+from machines.geometric_error.model import ErrorModel
+from machines.geometric_error.serial_errors import SerialErrors
+from postproc.corrected import walk as walking
+from postproc.corrected.proof import after_formatting
+from postproc.corrected.walk import Ends
+from postproc.options import Options
+from postproc.path import TRAVERSE
+from postproc.pipeline import PostResult
+from postproc.readback.checks import _turning_points
+from postproc.setup import SetupFile, load_setup
+from tests.postproc.test_compensation_points import two_ways_of_all
+from toolpaths.arrays import Floats
+from toolpaths.toolpath import Kind
+from toolpaths.units import DEG
+
+SAMPLES = Path("samples")
+GRAIN = 1e-4
+
+
+# ---- the walk ---------------------------------------------------------------------------------------------------------
+
+def no_motion(*shape: int) -> Floats:
+    """Shift, low and high that leave the ways as they are."""
+    result = np.zeros((3, *shape))
+    result[1], result[2] = -np.inf, np.inf
+    return result
+
+
+def random_ends(rng: np.random.Generator, blocks: int, lossy: int, near: float, single: bool = False) -> Ends:
+    """Ends that are some micrometres off, joints that lose 1 to 6 um, steps around that."""
+    i, size = np.arange(lossy), (blocks, lossy)
+    gap = np.tile(rng.uniform(1e-3, 6e-3, lossy), (blocks, 1))
+    back = rng.normal(size=(blocks, lossy, 3)) * 0.02 * GRAIN
+    back[:, i, i] += GRAIN
+    by_way = rng.normal(size=(blocks, 3, lossy)) * 2e-4
+    by_way[:, i, i] += 0.5 * gap
+    bend, later = no_motion(*size), no_motion(*size)
+    if not single:
+        bend[0], later[0] = rng.normal(size=size) * (rng.random(size) < 0.3), 0.5 * rng.normal(size=size)
+        later[1], later[2] = -1.0, 1.0
+    likes = np.where(rng.random(blocks) < 0.1, np.arange(blocks) - 1, -1)
+    free = np.where(likes >= 0, 0.0, 1.0)[:, None] * (rng.random((blocks, 3)) < (1.0 if single else 0.95))
+    nears = np.where(rng.random(blocks) < (0.0 if single else 0.2), 1.0, near)
+    return Ends(off=rng.normal(size=(blocks, 3)) * 1e-3, by_way=by_way,
+                tip_rates=np.eye(3) * GRAIN + rng.normal(size=(blocks, 3, 3)) * 0.05 * GRAIN, back=back, gap=gap, bend=bend,
+                last=2.0 * rng.choice([0.0, 1e-4, -1e-4, 5e-4, -5e-4, 3e-3, -3e-3, 1.0, -1.0], size) / gap, later=later,
+                goes_on=rng.choice([-1.0, 0.0, 1.0], size), weight=np.where(rng.random(blocks) < 0.3, 1.0, 0.01),
+                plain=(rng.random(blocks) < 0.5) & (not single), near=nears,
+                enough=nears * (1.0 if single else 2.5), free=free,
+                like=np.full(blocks, -1) if single else likes)
+
+
+def plain_walk() -> ModuleType:
+    """The module once more, of which nothing is compiled."""
+    spec = importlib.util.spec_from_file_location("plain_walk", str(walking.__file__))
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules["plain_walk"] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.parametrize("lossy", [1, 3])
+def test_the_compiled_walk_is_the_plain_one(lossy: int) -> None:
+    ends = random_ends(np.random.default_rng(lossy), 40, lossy, 8.7e-5)
+    plain = np.asarray(plain_walk()._walk(*vars(ends).values()))
+    np.testing.assert_array_equal(walking._compiled()(*vars(ends).values()), plain)
+    assert np.abs(plain).max() > 3.0 and (plain == 0.0).all(axis=1).any()
+    likes = np.flatnonzero(ends.like >= 0)
+    np.testing.assert_array_equal(plain[likes], plain[ends.like[likes]])
+    assert not plain[(ends.free == 0.0) & (ends.like < 0)[:, None]].any()
+
+
+def costs(ends: Ends, steps: Floats) -> tuple[Floats, Floats]:
+    """(N,) mm that the tip is off by after steps (N, 3) in the block of `ends`, and with what the next begins off by.
+
+    From the play operator: the way 0 takes up a step by 2 / gap of it, held between -1 and 1; ways count by their share.
+    """
+    way = np.clip(ends.last[0] + 2.0 * steps @ ends.back[0].T / ends.gap[0], -1.0, 1.0)
+    off = np.linalg.norm(ends.off[0] + way @ ends.by_way[0].T + steps @ ends.tip_rates[0].T, axis=1)
+    late = np.where(ends.goes_on[0] != 0.0, ends.goes_on[0] - way, 0.0) @ ends.by_way[0].T
+    return off, off + ends.weight[0] * np.linalg.norm(late, axis=1)
+
+
+def test_no_steps_around_bring_a_block_nearer() -> None:
+    reach = np.arange(-18.0, 19.0)
+    grid = np.stack(np.meshgrid(reach, reach, reach, indexing="ij"), axis=-1).reshape(-1, 3)
+    rng, nearest, walk = np.random.default_rng(12), [], plain_walk().walk
+    for k in range(18):
+        ends = random_ends(rng, 1, 1 + k % 3, 1e-5, single=True)
+        off, cost = costs(ends, walk(ends))
+        assert cost[0] <= costs(ends, grid)[1].min() + 5e-5
+        nearest.append(off[0])
+        assert off[0] < costs(ends, np.zeros((1, 3)))[0][0] or not walk(ends).any()
+    assert np.median(nearest) < 1.5e-4
+
+
+def test_words_stay_where_rounding_leaves_as_much() -> None:
+    walk = plain_walk().walk
+    ends = random_ends(np.random.default_rng(3), 1, 2, 8.7e-5, single=True)
+    still = replace(ends, off=-(ends.by_way @ np.clip(ends.last, -1.0, 1.0)[..., None])[..., 0] + [[6e-5, 0.0, 6e-5]],
+                    goes_on=np.zeros((1, 2)))
+    assert costs(still, np.zeros((1, 3)))[0][0] == pytest.approx(6e-5 * np.sqrt(2.0))
+    assert not walk(still).any()
+    assert walk(replace(still, off=still.off + np.array([0.0, 4e-4, 0.0]))).any()
+
+
+# ---- whole programs ----------------------------------------------------------------------------------------------------
+
+def converted(sample: str | Path, machine: str, controller: str, model: str | Path, output: str = "auto",
+              setup: SetupFile | None = None) -> PostResult:
+    path, found = toolpaths.read(SAMPLES / sample)
+    options = Options(setup="" if setup else str(SAMPLES / "tools.setup.toml"), error_model=str(model),
+                      output=output)  # type: ignore[arg-type]
+    return postproc.convert(path, machine, controller, setup, options, found)
+
+
+@pytest.mark.parametrize(("sample", "machine", "controller", "output", "law", "seed"), [
+    ("five_faces.cls", "mikron-ucp710", "linuxcnc", "axes", "axes", 3),
+    ("five_faces.cls", "mikron-ucp710", "fanuc-30i", "auto", "tilted", 4),
+    ("five_faces.cls", "mikron-ucp710", "haas-ngc", "auto", "tilted", 7),
+    ("pocket.cls", "nutating-head", "siemens-840d", "auto", "tilted", 4),
+    ("pocket.cls", "mikron-ucp710", "fanuc-30i", "tcp", "tcp", 8),
+    ("pocket.cls", "mill-4axis", "linuxcnc", "axes", "axes", 3),
+    ("tool_axis_tour.apt", "mikron-ucp710", "haas-ngc", "tcp", "tcp", 7),
+    ("tool_axis_tour.apt", "head-table", "siemens-840d", "tcp", "tcp", 6)])
+def test_points_are_inside_the_bound_where_every_slide_loses_motion(sample: str, machine: str, controller: str, output: str,
+                                                                    law: str, seed: int, tmp_path: Path) -> None:
+    result = converted(sample, machine, controller, two_ways_of_all(tmp_path, machine, seed), output)
+    found = after_formatting(result)
+    assert result.ok and found is not None and result.compensation is not None, [str(d) for d in result.diagnostics]
+    assert result.path is not None and law in {frame.control.law for frame in result.path.frames}
+    assert result.compensation.tip_before > 0.01
+    assert found.tip.max() <= found.tip_bound and found.axis.max() <= found.axis_bound
+    assert result.job is not None and np.median(found.tip) < result.job.rounding.tip
+    assert "geometric_errors.bound" not in {d.code for d in result.diagnostics}
+
+
+# ---- rapids ------------------------------------------------------------------------------------------------------------
+
+def strong(folder: Path) -> Path:
+    """Slides that are 600 um off at 400 mm, lose 60 um and lean by 80 arcsec."""
+    text = ""
+    for a in "XYZ":
+        rows = [f"{p}, {1.5 * p}, {1.5 * p + 60.0}, {0.2 * p}" for p in (-400, 0, 400)]
+        (folder / f"{a}.csv").write_text("\n".join([f"{a} [mm], E{a}{a}+ [um], E{a}{a}- [um], EB{a} [arcsec]", *rows]))
+        text += f'[components.E{a}{a}]\ntable = "{a}.csv"\n[components.EB{a}]\ntable = "{a}.csv"\n'
+    (folder / "e.toml").write_text(text)
+    return folder / "e.toml"
+
+
+def back_and_forth(slanting: bool) -> str:
+    """Cuts with rapids between them that turn back in X, in Y and in Z, along one axis each or slanting."""
+    lines = ["UNITS/MM", "LOADTL/1", "SPINDL/1000, CLW", "FEDRAT/300, MMPM", "RAPID", "GOTO/0, 0, 50"]
+    for k in range(8):
+        x, y = (-1) ** k * (20 + 3 * k), (-1) ** (k // 2) * (10 + 2 * k)
+        lines += ["RAPID", f"GOTO/{x}, {y}, 5", f"GOTO/{x}, {y}, 0", f"GOTO/{x + 4}, {y + 3}, 0", "RAPID",
+                  f"GOTO/{x + 4}, {y + 3}, 5", "RAPID", f"GOTO/{x - 2}, {y if slanting else y + 3}, 5"]
+    return "\n".join([*lines, "FINI\n"])
+
+
+@pytest.mark.parametrize("controller", ["fanuc-30i", "linuxcnc"])
+@pytest.mark.parametrize("slanting", [True, False])
+def test_rapids_that_begin_by_turning_back_get_one_point(controller: str, slanting: bool, tmp_path: Path) -> None:
+    """Whether every axis runs at its own speed (Fanuc) or not; slanting ones are then feeds, which get points as needed."""
+    (tmp_path / "s.apt").write_text(back_and_forth(slanting))
+    result = converted(tmp_path.resolve() / "s.apt", "mill-3axis", controller, strong(tmp_path), setup=load_setup(None)[0])
+    found = after_formatting(result)
+    assert result.ok and found is not None and result.path is not None and result.job is not None
+    assert found.tip.max() <= found.tip_bound
+    path, moves = result.path, result.job.moves
+    straight = (path.code == TRAVERSE) & np.isfinite(path.u) & ~path.home
+    rapids = np.flatnonzero((moves.kind == Kind.RAPID) & ~moves.link)
+    count = np.array([int(straight[path.move == m].sum()) for m in rapids])
+    assert count.max() == 2 and (count == 2).sum() >= 8
+    for m in rapids[count == 2].tolist():
+        first = np.flatnonzero(straight & (path.move == m))[0]
+        assert 0.05 < np.abs(path.q[first] - path.q[first - 1]).max() < 0.3  # taken up on the spot, 60 um per axis
+
+
+# ---- holes -------------------------------------------------------------------------------------------------------------
+
+def cycle_blocks(text: str) -> int:
+    """Holes that a Fanuc program drills in canned cycles."""
+    count, on = 0, False
+    for line in text.splitlines():
+        words = set(re.findall(r"G\d+", "" if line.startswith("(") else line))
+        on = bool(words & {"G73", "G76", "G81", "G82", "G83", "G84", "G85"}) or (on and "G80" not in words)
+        count += on and bool(re.search(r"[XYZR]-?[\d.]", line))
+    return count
+
+
+@pytest.mark.parametrize(("lean", "cycles"), [(0.0, True), (200.0, False)])
+def test_holes_corrected_block_by_block_are_no_cycles(lean: float, cycles: bool, tmp_path: Path) -> None:
+    """A Z axis that leans by 200 arcsec takes the hole from its place by 1 um per mm: no cycle could follow it."""
+    errors = SerialErrors(constants={"EX0S": 0.03, **({"EA0Z": lean * DEG / 3600.0} if lean else {})})
+    model = save(replace(ErrorModel(errors), name="m"), tmp_path)[0]
+    result = converted("five_faces.cls", "mikron-ucp710", "fanuc-30i", model, "axes")
+    found, plain = result.compensation, converted("five_faces.cls", "mikron-ucp710", "fanuc-30i", "", "axes")
+    assert result.ok and found is not None and result.program is not None and plain.program is not None
+    assert result.path is not None and result.job is not None and len(plain.program.holes) == 15
+    drilled = result.job.moves.hole[result.path.move] >= 0
+    bare = np.isfinite(result.path.u) & drilled
+    assert found.apart[~drilled].all() and cycle_blocks(plain.text) >= 15
+    if cycles:
+        assert not found.apart[bare].any() and len(result.program.holes) == 15
+        assert cycle_blocks(result.text) == cycle_blocks(plain.text)
+    else:
+        assert found.apart[bare].any() and len(result.program.holes) < 15
+        assert cycle_blocks(result.text) < cycle_blocks(plain.text)
+    left = after_formatting(result)
+    assert left is not None and left.tip.max() <= left.tip_bound
+
+
+def test_tiny_steps_back_are_no_pecks() -> None:
+    """What the tool rises by from one block to the next is a peck from a micrometre's thousandth on."""
+    tiny = 5e-7
+    one = np.array([-2.0, 1.0, 1.0 - tiny, 2.0, 3.0, 3.0 - tiny, -2.0])
+    assert np.flatnonzero(_turning_points(one)).tolist() == [5]
+    two = np.array([-2.0, 3.0, 2.9, 2.9 + tiny, 6.0, 6.0 + tiny, 6.0 - tiny, -2.0, 6.0])
+    found = two[_turning_points(two)]
+    assert len(found) == 3 and np.allclose(found, [3.0, 6.0, 6.0], atol=2.0 * tiny)
+    assert not _turning_points(np.array([3.0, 2.0, 1.0]))[1:].any()
+    assert _turning_points(np.array([1.0, 2.0])).tolist() == [False, True]
