@@ -78,7 +78,7 @@ def machine_schema() -> None:
 def setup_check(file: Annotated[str, typer.Argument(help="TOML file")], json: Json = "") -> None:
     """Check a set-up file and say what is wrong with it."""
     from postproc.setup import load_setup, part_placement
-    from toolpaths.diagnostics import has_errors
+    from toolpaths.diagnostics import has_errors, info
 
     refuse_overwriting({"--json": json}, {"the set-up": file})
     spec, found = load_setup(file)
@@ -89,6 +89,9 @@ def setup_check(file: Annotated[str, typer.Argument(help="TOML file")], json: Js
 
         bodies, more = described(spec, placement, file)
         found += more
+        if spec.part.system and spec.bodies is not None:
+            found.append(info("setup.system", "the part stands by a system of the CL file: bodies are told as if that were "
+                              "the file's absolute frame", file=file))
     count = len(spec.tools) if spec else 0
     good = "" if has_errors(found) else f"{file}: good: {count} tool{'s' * (count != 1)}{bodies}"
     report(tuple(found), json, {"diagnostics": [d.as_dict() for d in found]}, good)

@@ -23,11 +23,12 @@ from postproc.pivots import control_kinematics
 from postproc.records import plain_records
 from postproc.rounding import Rounding, decimals, helix_bound, rounding_bound
 from postproc.setup import Placement, SetupFile, part_placement, work_frame
+from postproc.setup_system import standing
 from postproc.stated_feeds import without_feed
 from postproc.tool_numbers import numbered
 from toolpaths.arrays import Floats, Ints, shared, taken
 from toolpaths.diagnostics import Diagnostic, error, has_errors, info, warning
-from toolpaths.toolpath import Role, Toolpath
+from toolpaths.toolpath import Frame, Role, Toolpath
 from toolpaths.units import DEG
 
 if TYPE_CHECKING:
@@ -50,6 +51,11 @@ class Job:
     modes: OutputModes
     errors: ErrorModel | None = None
     """geometric errors of the machine"""
+
+    @property
+    def work_system(self) -> Frame:
+        """The system of the CL file that is the work offset."""
+        return work_frame(self.setup, self.toolpath)[0] or self.toolpath.frames[0]
 
     @property
     def axis_tolerance(self) -> float:
@@ -151,6 +157,8 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
     toolpath, found = cut_operations(toolpath, setup.output.longest)
     diagnostics += found
     diagnostics += [*_refused(toolpath), *_no_inverse_time(controller, options)]
+    setup, found = standing(setup, toolpath, options.setup)
+    diagnostics += found
     placement, found = part_placement(setup, options.setup)
     diagnostics += found
     frame, found = work_frame(setup, toolpath, options.setup)

@@ -34,6 +34,7 @@ from postproc.readback.verify import other_axes, read_back
 from postproc.rewinds import drawing_of
 from postproc.rounding import rounding_problem
 from postproc.setup import SetupFile, load_setup
+from postproc.setup_system import standing, with_system
 from postproc.singular import check_singular
 from postproc.smoothed_moves import smoothed_moves
 from postproc.travel import check_travel
@@ -114,7 +115,8 @@ def convert(path: Toolpath, machine: Machine | str | FilePath, controller: str |
         DiagnosticError: where machine, controller or set-up cannot be loaded.
     """
     spec, machine, setup, options = _loaded(controller, machine, setup, options or Options())
-    start = PostResult("", options, machine, spec, FilePath(controller).stem, setup, _reading(path, diagnostics), path)
+    start = _begun(path, PostResult("", options, machine, spec, FilePath(controller).stem, setup,
+                                    _reading(path, diagnostics)))
     start, done = _oriented(start, progress)
     return start if not start.ok else done or _stages(start, progress)
 
@@ -132,6 +134,12 @@ def _loaded(controller: str | FilePath, machine: Machine | str | FilePath, setup
         toolpaths.diagnostics.require(more)
     assert spec is not None and setup is not None
     return spec.divided(setup.output.files), machine, setup, options
+
+
+def _begun(path: Toolpath, start: PostResult) -> PostResult:
+    """The beginning of a conversion with its path, the part standing by the file's absolute frame."""
+    setup, found = standing(start.setup, path, start.options.setup)
+    return _with(start, found, toolpath=path, setup=setup)
 
 
 def _oriented(start: PostResult, progress: Progress | None) -> tuple[PostResult, PostResult | None]:
@@ -154,8 +162,8 @@ def choose_axes(path: Toolpath, machine: Machine, controller: str | FilePath, op
     from postproc.orientation.programs import oriented
 
     spec, machine, setup, options = _loaded(controller, machine, None, options)
-    known = _reading(path, diagnostics)
-    start = PostResult("", options, machine, spec, FilePath(controller).stem, setup, known, path)
+    start = _begun(path, PostResult("", options, machine, spec, FilePath(controller).stem, setup,
+                                    _reading(path, diagnostics)))
     return oriented(start, _stages, progress) if start.ok else start
 
 
@@ -186,7 +194,7 @@ def _stages(result: PostResult, progress: Progress | None) -> PostResult:
         return result
     path, found = build_path(job.modes, job.kinematics, moves, job.space, job.home_rows(), job.operation,
                              shares["linearising"], shares["axis_linearising"] * DEG, file, progress, drawing)
-    result = _with(result, found, path=path)
+    result = _with(result, with_system(found, job.work_system, job.placement), path=path)
     if path is None:
         return result
     if job.errors is not None and job.errors.corrected_by == "post":
@@ -196,7 +204,7 @@ def _stages(result: PostResult, progress: Progress | None) -> PostResult:
     found, extents = check_travel(path, job.moves, job.control, job.kinematics, file)
     found += check_reach(path, job.moves, job.control, file)
     found += check_singular(path, job.moves, job.control, job.setup.joints.singular_distance, file)
-    result = _with(result, found, extents=extents)
+    result = _with(result, with_system(found, job.work_system, job.placement), extents=extents)
     if not result.ok:
         return result
     motion, found = plan_motion(job, moves, result.nominal or path)
@@ -367,12 +375,12 @@ def verify(gcode: str | FilePath, path: Toolpath, machine: Machine | str | FileP
     known = _reading(path, diagnostics)
     if other := other_axes(data, options, str(gcode)):
         return VerifyResult(str(gcode), None, (*other, *known))
-    start = PostResult("", options, machine, spec, FilePath(controller).stem, setup, known, path)
+    start = _begun(path, PostResult("", options, machine, spec, FilePath(controller).stem, setup, known))
     start, _ = _oriented(start, progress)
     path, found = start.toolpath or path, list(start.diagnostics)
     if has_errors(found):
         return VerifyResult(str(gcode), None, tuple(found))
-    job, more = prepare(path, machine, spec, setup, options)
+    job, more = prepare(path, machine, spec, start.setup, options)
     found += more
     if job is None or has_errors(found):
         return VerifyResult(str(gcode), None, tuple(found))

@@ -22,8 +22,12 @@ Vector = Annotated[tuple[float, float, float], Field(description="x, y, z")]
 
 
 class PartPlacement(UserModel):
-    """Where the part frame (the absolute frame of the CL file) stands on the table, all axes at zero."""
+    """Where the part frame (the absolute frame of the CL file), or a system of the file, stands on the table, all axes at
+    zero."""
 
+    system: bool | Annotated[str, Field(min_length=1)] = False
+    """true: origin, x_axis and y_axis are those of the system that is the work offset; a name: of that system of the CL file
+    (see inspect); false: of the file's absolute frame"""
     origin: Vector = (0.0, 0.0, 0.0)
     """its origin in the table frame, mm"""
     x_axis: Vector = (1.0, 0.0, 0.0)
@@ -189,7 +193,11 @@ def load_setup(path: str | Path | None) -> tuple[SetupFile | None, list[Diagnost
 
 
 def part_placement(setup: SetupFile, file: str = "") -> tuple[Placement | None, list[Diagnostic]]:
-    """T_table_part of a set-up; its two directions must be square to each other within 1e-6."""
+    """T_table_part of a set-up; its two directions must be square to each other within 1e-6.
+
+    Where `part.system` names a system it takes that one's coordinates to the table, until `setup_system.standing` has put
+    the absolute frame in its place.
+    """
     x, y = np.array(setup.part.x_axis), np.array(setup.part.y_axis)
     if not np.linalg.norm(x) > 0.0 or not np.linalg.norm(y) > 0.0:
         return None, [error("setup.axes", "part.x_axis and part.y_axis must not be zero", file=file)]
@@ -213,15 +221,21 @@ def work_frame(setup: SetupFile, toolpath: Toolpath, file: str = "") -> tuple[Fr
     """The system of the CL file that is the work offset; `file` is that of the set-up."""
     if not setup.work_offset:
         return toolpath.frames[0], []
+    return system_of(setup.work_offset, toolpath, file, "work_offset", ("work_offset",))
+
+
+def system_of(name: str, toolpath: Toolpath, file: str, key: str,
+              path: tuple[str, ...]) -> tuple[Frame | None, list[Diagnostic]]:
+    """The system of the CL file of that name, capitals or not; `key` and its `path` in the set-up's file ask for it."""
     for frame in toolpath.frames:
-        if frame.name.lower() == setup.work_offset.lower():
+        if frame.name.lower() == name.lower():
             return frame, []
     names = ", ".join(f.name for f in toolpath.frames)
-    return None, [error("setup.work_offset", f"work_offset = {setup.work_offset!r} is no system of the CL file",
-                        file=file or toolpath.file, lines=_line(file, "work_offset"), hint=f"it has: {names}")]
+    return None, [error(f"setup.{path[-1]}", f"{key} = {name!r} is no system of the CL file", file=file or toolpath.file,
+                        lines=_line(file, path), hint=f"it has: {names}")]
 
 
-def _line(file: str, key: str) -> list[int]:
+def _line(file: str, path: tuple[str, ...]) -> list[int]:
     """Where a set-up file states a key."""
     values = read_toml(file)[0] if file else None
-    return [values.origin((key,)).line] if values else []
+    return [values.origin(path).line] if values else []

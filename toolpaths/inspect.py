@@ -11,13 +11,15 @@ from toolpaths.arrays import Bools, Floats
 from toolpaths.cl.dialects import DIALECTS
 from toolpaths.cl.read import ReadResult
 from toolpaths.rotations import angle_between
-from toolpaths.toolpath import Kind, Role, Tool, Toolpath
+from toolpaths.toolpath import Frame, Kind, Role, Tool, Toolpath
 from toolpaths.units import DEG
 
 SAME_DIRECTION = 1e-6
 """rad"""
 HALF_TURN = 1e-3
 """rad beyond 180 degrees that still count as half a turn; a whole turn may miss its end by rounding"""
+TURNED = 1e-4
+"""degrees below which a system stands as the part frame does"""
 _TOOL_ANGLES = ("taper", "tip_angle")
 
 
@@ -126,12 +128,23 @@ def summary(result: ReadResult) -> str:
     if len(p.arcs):
         lines.append(f"  sense of the arcs: {found['arcs_over_180_deg']} of {len(p.arcs)} sweep more than 180 degrees")
     lines += [f"  {name} {low:.3f} to {high:.3f} mm" for name, (low, high) in extents(p).items()]
+    lines += [f"  system {f.name}: {stands(f)}" for f in p.frames]
     lines += [f"  operation {op.name or i + 1}{' (turning)' if op.turning else ''}: "
               f"{int((p.operation == i).sum())} rows" for i, op in enumerate(p.operations)]
     lines += [f"  tool {t.number}{' ' + t.name if t.name else ''}{_size(t)}" for t in p.tools]
     if result.unknown_words:
         lines.append("  unknown words: " + ", ".join(f"{w} ({n})" for w, n in result.unknown_words.items()))
     return "\n".join(lines)
+
+
+def stands(frame: Frame) -> str:
+    """Where a system stands in the part frame and how far it is turned there: the angle about the one axis that turns it
+    (the trace of a rotation is 1 + 2 cos), and how far its z leans."""
+    turned = math.degrees(math.acos(min(max((np.trace(frame.rotation) - 1.0) / 2.0, -1.0), 1.0)))
+    lean = math.degrees(math.acos(min(max(frame.rotation[2][2], -1.0), 1.0)))
+    place = ", ".join(f"{round(v, 4) + 0.0:g}" for v in frame.origin)
+    how = f", turned by {turned:.4g} degrees, its z by {round(lean, 4):g}" if turned > TURNED else ""
+    return f"origin ({place}) mm{how}"
 
 
 def lengths_of(p: Toolpath) -> list[float]:

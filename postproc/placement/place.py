@@ -20,6 +20,7 @@ from postproc.placement.search import Found, Progress, Search
 from postproc.placement.space import ANGLES, Space, space_of
 from postproc.placement.timed import Timer, Tried
 from postproc.setup import PartPlacement, SetupFile, part_placement
+from postproc.setup_system import standing
 from toolpaths.diagnostics import Diagnostic, error, has_errors, info, require, warning
 from toolpaths.toolpath import Toolpath
 from toolpaths.units import DEG
@@ -73,7 +74,11 @@ def place(toolpath: Toolpath, machine: Machine, setup: SetupFile, options: Optio
     than the one at [part] does, links included.
     """
     options = options or Options()
+    setup, stands = standing(setup, toolpath, options.setup)
+    if has_errors(stands):
+        return None, stands
     work, space, found = _begun(toolpath, machine, setup, options, controller)
+    found = [*stands, *found]
     if work is None or space is None:
         return None, found
     bodies, more = beside(work, options.setup)

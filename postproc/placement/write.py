@@ -27,6 +27,8 @@ def placed_text(source: Path, target: Path, part: PartPlacement) -> str:
     if "part" not in document:
         document["part"] = tomlkit.table()
     table = document["part"]
+    if "system" in table or "base" in document:
+        table["system"] = False
     for key, values in (("origin", part.origin), ("x_axis", part.x_axis), ("y_axis", part.y_axis)):
         table[key] = list(values)
     return tomlkit.dumps(document)
