@@ -84,6 +84,8 @@ def merge(blocks: Blocks) -> tuple[Blocks, Ints]:
     joins = line & ~turns & same & np.concatenate([[False], (line & ~turns & ~blocks.forced)[:-1]])
     loop = compiled(chain_ends) if len(blocks) >= KERNEL_FROM else chain_ends
     keep = np.flatnonzero(loop(np.ascontiguousarray(blocks.xyz), joins, np.array(blocks.chain)))
+    if len(keep) == len(blocks) and (blocks.start[1:] == blocks.end[:-1]).all():
+        return blocks, rows
     start = np.concatenate([blocks.start[:1], blocks.end[keep[:-1]]])
     return replace(blocks.take(keep), start=start), rows[keep]
 

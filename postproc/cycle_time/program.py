@@ -61,8 +61,8 @@ def blocks_of(code: Canonical, motion: Motion, machine: Machine, control: Contro
     origin = origin or Origin.by_tool(motion)
     block = _block_of(code, motion)
     words, unit = code.words, np.where(machine.rotary, DEG, 1.0)
-    end = motion.end * unit
-    start = np.concatenate([motion.start[None] * unit, end[:-1]])
+    points = np.concatenate([motion.start[None], motion.end]) * unit
+    start, end = points[:-1], points[1:]
     arc = motion.code == 2
     normal, sweep, center = _arcs(motion, control, arc, start)
     path, tolerance, chain = _path_modes(words, own_path)
