@@ -12,6 +12,8 @@ from tests.linuxcnc.interpreter import Canonical, Move, ToolEntry
 HEAD = "G21 G90 G94 G17\nT1 M6\nG43 H1\nF1000\n"
 TOOLS = {1: ToolEntry(75.5, 6.0), 7: ToolEntry(80.0, 10.0)}
 
+AT, LEFT = "G0 X20 Y0 Z2\n", "G1 Y20\nY40\n"
+
 ACCEPTED = {
     "percent-signs-without-m2": "%\nG21\nG0 X1\n%\n",
     "words-after-percent": "%\nG0 X1\n%\nANYTHING\n",
@@ -35,6 +37,8 @@ ACCEPTED = {
     "twelve-decimals": "G1 X1.123456789012 F100\nM2\n",
     "m9-m5-together": "M5 M9\nM2\n",
     "crlf": "G21\r\nG0 X1\r\nM2\r\n",
+    "compensation-begins-on-an-arc": HEAD + AT + "G41\nG3 X0 Y20 I-20 J0\nG1 X-20\nG40\nG0 Z20\nM2\n",
+    "compensation-ends-before-a-rise": HEAD + AT + "G41\n" + LEFT + "G40\nG0 Z20\nG3 X0 Y60 I-20 J0\nM2\n",
 }
 
 REFUSED = {
@@ -63,6 +67,10 @@ REFUSED = {
     "unknown-tool": ("T500 M6\nM2\n", "tool 500 not found"),
     "unknown-length": ("G43 H150\nM2\n", "tool 150 not found"),
     "dwell-x": ("G4 X0.5\nM2\n", "axis values without a g code"),
+    "compensation-ends-on-an-arc": (HEAD + AT + "G41\n" + LEFT + "G40\nG3 X0 Y60 I-20 J0\nM2\n",
+                                    "must be straight, not an arc"),
+    "compensation-begins-on-a-small-arc": (HEAD + AT + "G41\nG3 X18 Y2 I-2 J0\nM2\n", "entry arc is not greater"),
+    "plane-under-compensation": (HEAD + AT + "G41\n" + LEFT + "G18 G3 X0 Z22 I-20 K0\nM2\n", "Cannot change planes"),
     "nested-comment": ("G0 X1 (a (b) c)\nM2\n", "Nested comment"),
 }
 
@@ -97,6 +105,12 @@ def test_positions_are_exact_and_carry_their_lines(run) -> None:
     np.testing.assert_allclose(canonical.machine[:, [0, 2]], [[0, 125.5], [10.123456789, 125.5], [101, 125.5]],
                                rtol=0, atol=1e-12)
     assert canonical.tool.tolist() == [1, 1, 1]
+
+
+@pytest.mark.parametrize(("code", "x"), [("G41", 17.0), ("G41 D0", 17.0), ("G41 D7", 15.0), ("G41 D7\nG40\nG41", 17.0)])
+def test_compensation_without_d_takes_the_tool_in_the_spindle(run, code: str, x: float) -> None:
+    canonical = run(HEAD + AT + f"{code}\n" + LEFT + "G40\nG0 Z20\nM2\n")
+    assert canonical.error == "" and canonical.pos[-2][0] == pytest.approx(x)
 
 
 def test_inverse_time_and_rotary_feed_give_the_time_of_a_block(run) -> None:
