@@ -10,7 +10,9 @@ import trimesh
 
 import postproc
 from postproc.collision import search
+from postproc.collision.program import touching_parts
 from postproc.pipeline import PostResult
+from postproc.readback.poses import Executed
 from tests.postproc.kit import machine, toolpath
 from toolpaths.diagnostics import Diagnostic
 from toolpaths.toolpath import Toolpath
@@ -265,3 +267,18 @@ def test_two_cutters_under_one_number_are_told_apart(tmp_path: Path) -> None:
     under = fixture((-5, 5, -5), (5, 9, 10))
     found = collisions(converted(toolpath(*lines, head=HEAD), setup_file(tmp_path, under, tool)).diagnostics)
     assert found and found[0].message.startswith("cutter of T1 touches fixture clamp")
+
+
+def test_the_worst_of_each_part_of_a_program(tmp_path: Path) -> None:
+    """A wall beside the cut that the holder is deeper in than the shank; away from it nothing is found."""
+    result = converted(line(), setup_file(tmp_path, fixture((20, 7, -40), (60, 40, 90))))
+    assert result.job is not None and result.comparison is not None and result.comparison.executed is not None
+    motion, owner = result.comparison.executed[1], result.comparison.owner
+    executed = Executed(result.job.control, result.job.kinematics_of, result.job.register_lengths(), None)
+    told = {d.message.split(" touches ")[0]: float(d.message.split(" by ")[1].split(" mm")[0])
+            for d in collisions(result.diagnostics)}
+    assert len(told) == 3 and max(told, key=lambda name: told[name]) == "holder of T1"
+    home = owner >= len(result.job.moves)
+    parts = touching_parts(motion, executed, result.job, owner, np.where(home, 1, 0))
+    assert list(parts) == [0] and str(parts[0]).startswith("holder of T1 touches fixture clamp by ")
+    assert -parts[0].distance == pytest.approx(told["holder of T1"], abs=0.005)
