@@ -14,9 +14,6 @@ import pytest
 
 import postproc
 import toolpaths
-from machines.geometric_error.exchange import save
-from machines.geometric_error.model import ErrorModel
-from machines.geometric_error.serial_errors import SerialErrors
 from postproc.corrected import walk as walking
 from postproc.corrected.proof import after_formatting
 from postproc.corrected.walk import Ends
@@ -28,7 +25,6 @@ from postproc.setup import SetupFile, load_setup
 from tests.postproc.test_compensation_points import two_ways_of_all
 from toolpaths.arrays import Floats
 from toolpaths.toolpath import Kind
-from toolpaths.units import DEG
 
 SAMPLES = Path("samples")
 GRAIN = 1e-4
@@ -55,7 +51,7 @@ def random_ends(rng: np.random.Generator, blocks: int, lossy: int, near: float, 
     if not single:
         bend[0], later[0] = rng.normal(size=size) * (rng.random(size) < 0.3), 0.5 * rng.normal(size=size)
         later[1], later[2] = -1.0, 1.0
-    likes = np.where(rng.random(blocks) < 0.1, np.arange(blocks) - 1, -1)
+    likes = np.where(rng.random(blocks) < 0.25, np.arange(blocks) - 1, -1)
     free = np.where(likes >= 0, 0.0, 1.0)[:, None] * (rng.random((blocks, 3)) < (1.0 if single else 0.95))
     nears = np.where(rng.random(blocks) < (0.0 if single else 0.2), 1.0, near)
     return Ends(off=rng.normal(size=(blocks, 3)) * 1e-3, by_way=by_way,
@@ -85,6 +81,7 @@ def test_the_compiled_walk_is_the_plain_one(lossy: int) -> None:
     assert np.abs(plain).max() > 3.0 and (plain == 0.0).all(axis=1).any()
     likes = np.flatnonzero(ends.like >= 0)
     np.testing.assert_array_equal(plain[likes], plain[ends.like[likes]])
+    assert plain[likes].any()
     assert not plain[(ends.free == 0.0) & (ends.like < 0)[:, None]].any()
 
 
@@ -149,7 +146,7 @@ def test_points_are_inside_the_bound_where_every_slide_loses_motion(sample: str,
     assert result.path is not None and law in {frame.control.law for frame in result.path.frames}
     assert result.compensation.tip_before > 0.01
     assert found.tip.max() <= found.tip_bound and found.axis.max() <= found.axis_bound
-    assert result.job is not None and np.median(found.tip) < result.job.rounding.tip
+    assert result.job is not None and found.tip.max() < 1.1 * result.job.rounding.tip
     assert "geometric_errors.bound" not in {d.code for d in result.diagnostics}
 
 
@@ -207,26 +204,28 @@ def cycle_blocks(text: str) -> int:
     return count
 
 
-@pytest.mark.parametrize(("lean", "cycles"), [(0.0, True), (200.0, False)])
-def test_holes_corrected_block_by_block_are_no_cycles(lean: float, cycles: bool, tmp_path: Path) -> None:
-    """A Z axis that leans by 200 arcsec takes the hole from its place by 1 um per mm: no cycle could follow it."""
-    errors = SerialErrors(constants={"EX0S": 0.03, **({"EA0Z": lean * DEG / 3600.0} if lean else {})})
-    model = save(replace(ErrorModel(errors), name="m"), tmp_path)[0]
-    result = converted("five_faces.cls", "mikron-ucp710", "fanuc-30i", model, "axes")
-    found, plain = result.compensation, converted("five_faces.cls", "mikron-ucp710", "fanuc-30i", "", "axes")
-    assert result.ok and found is not None and result.program is not None and plain.program is not None
-    assert result.path is not None and result.job is not None and len(plain.program.holes) == 15
-    drilled = result.job.moves.hole[result.path.move] >= 0
-    bare = np.isfinite(result.path.u) & drilled
-    assert found.apart[~drilled].all() and cycle_blocks(plain.text) >= 15
-    if cycles:
-        assert not found.apart[bare].any() and len(result.program.holes) == 15
-        assert cycle_blocks(result.text) == cycle_blocks(plain.text)
+NEAR, LEANING, STEEP = "[location]\nEX0S = 30\n", "[location]\nEA0Z = 200\n", \
+    "[components.EZZ]\npolynomial = [0, 2]\nscale = 1\nrange = [-10, 400]\n"
+
+
+@pytest.mark.parametrize(("errors", "whole"), [(NEAR, True), (LEANING, False), (STEEP, False)])
+def test_holes_corrected_block_by_block_are_no_cycles(errors: str, whole: bool, tmp_path: Path) -> None:
+    """Where Z leans by 1 um per mm no cycle can follow the hole; where Z is 2 um per mm too long one could be written, but
+    its pecks would be of another length."""
+    (tmp_path / "e.toml").write_text(errors)
+    result, plain = (converted("five_faces.cls", "mikron-ucp710", "fanuc-30i", model, "axes")
+                     for model in (tmp_path / "e.toml", ""))
+    found, left = result.compensation, after_formatting(result)
+    assert result.ok and found is not None and left is not None and left.tip.max() <= left.tip_bound
+    assert result.program is not None and plain.program is not None and result.path is not None and result.job is not None
+    drilled = (result.job.moves.hole[result.path.move] >= 0) & np.isfinite(result.path.u)
+    assert len(plain.program.holes) == cycle_blocks(plain.text) == 15
+    if whole:
+        assert not found.apart[drilled].any() and len(result.program.holes) == 15
     else:
-        assert found.apart[bare].any() and len(result.program.holes) < 15
-        assert cycle_blocks(result.text) < cycle_blocks(plain.text)
-    left = after_formatting(result)
-    assert left is not None and left.tip.max() <= left.tip_bound
+        single = np.unique(result.job.moves.hole[result.path.move[drilled & found.apart]])
+        assert len(single) > 4 and len(result.program.holes) == 15 - len(single)
+    assert cycle_blocks(result.text) == len(result.program.holes)
 
 
 def test_tiny_steps_back_are_no_pecks() -> None:
