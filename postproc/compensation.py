@@ -118,7 +118,7 @@ def compensate(path: Path, moves: Moves, tools: Ints, kinematics: Callable[[int]
     if (diagnostics and not beyond) or lost.any():
         return None, None, diagnostics or [_lost(path, moves, lost, file)]
     starts = starts_of(corrected, path, work, allowed)
-    corrected, resolved = fitted_arcs(corrected, path, work, starts.q, allowed)
+    corrected, resolved = fitted_arcs(corrected, path, work, starts.q, allowed, float(writing.grain.min()))
     whole = divided(corrected, work, starts, allowed)
     corrected, apart = settled(whole, work, writing, allowed), work.whole[whole.owner] == ALONE
     whole = replace(whole, path=corrected).of(cut)

@@ -10,15 +10,16 @@ from postproc.corrected.reversals import LOOSE
 from postproc.corrected.work import Work, on_arc
 from postproc.groups import groups
 from postproc.path import ARC, FEED, Path
-from postproc.word_arcs import PLANE_COLUMNS
+from postproc.word_arcs import PLANE_AXIS, PLANE_COLUMNS
 from toolpaths.arrays import Bools, Floats, Ints
 
 LOOKS = (0.25, 0.5, 0.75)
 """where the motion between two corrected points is looked at"""
 
 
-def fitted_arcs(path: Path, nominal: Path, work: Work, start: Floats, allowed: float) -> tuple[Path, Bools]:
-    """The path with arcs through their corrected ends, and which of them leave the nominal arc by more than `allowed`."""
+def fitted_arcs(path: Path, nominal: Path, work: Work, start: Floats, allowed: float, grain: float) -> tuple[Path, Bools]:
+    """The path with arcs through their corrected ends, and which of them become lines: those that leave the nominal arc by
+    more than `allowed` mm, or rise by more than half a `grain` across a plane in which the control has no helix."""
     resolved, center = np.zeros(len(path), dtype=bool), path.center.copy()
     arcs = np.flatnonzero(path.code == ARC)
     for rows in groups(path.frame[arcs], work.tools[arcs]):
@@ -29,6 +30,8 @@ def fitted_arcs(path: Path, nominal: Path, work: Work, start: Floats, allowed: f
                                                                         (new, start[k]), (new, path.q[k])))
         xyz = new.xyz
         center[k] = new_centers(path, k, n0[:, xyz], n1[:, xyz], c0[:, xyz], c1[:, xyz])
+        rise = np.abs((c1 - c0)[:, xyz][np.arange(len(k)), [PLANE_AXIS[int(p)] for p in path.plane[k]]])
+        resolved[k] |= ~np.isin(path.plane[k], new.helix_planes) & (rise > 0.5 * grain)
         for t in LOOKS:
             share = np.full(len(k), t)
             got = new.joints(on_arc(path.plane[k], path.ccw[k], center[k], c0, c1, share, xyz), kin, 0.0)

@@ -67,11 +67,11 @@ def after_formatting(result: PostResult) -> AfterFormatting | None:
     if found is None or comparison is None or job is None or job.errors is None:
         return None
     moves = job.moves.without_pecks()
-    tip, axis = _nearest(comparison, moves)
-    points = np.flatnonzero(_cl_points(moves) & np.isfinite(tip))
     tip_play, axis_play = _play(result)
-    return AfterFormatting(tip[points], axis[points], points, found.tip_after + job.rounding.tip + tip_play,
-                           found.axis_after + job.rounding.axis + axis_play)
+    bounds = found.tip_after + job.rounding.tip + tip_play, found.axis_after + job.rounding.axis + axis_play
+    tip, axis = _nearest(comparison, moves, (bounds[0] + SLACK[0], bounds[1] + SLACK[1]))
+    points = np.flatnonzero(_cl_points(moves) & np.isfinite(tip))
+    return AfterFormatting(tip[points], axis[points], points, *bounds)
 
 
 def beyond_bound(result: PostResult) -> list[Diagnostic]:
@@ -116,8 +116,9 @@ def _cl_points(moves: Moves) -> Bools:
     return np.asarray((moves.kind != Kind.RAPID) & ((moves.hole < 0) | (moves.phase == Phase.DRILL)))
 
 
-def _nearest(comparison: Comparison, moves: Moves) -> tuple[Floats, Floats]:
-    """(tip, axis), each (M,), of the block that ends nearest to each move's end; NaN where the move has none.
+def _nearest(comparison: Comparison, moves: Moves, bounds: tuple[float, float]) -> tuple[Floats, Floats]:
+    """(tip, axis), each (M,), of the block that ends nearest to each move's end, by `bounds` mm and rad; NaN where the move
+    has none.
 
     Those that come into question: its own, and all from the end of the move before to that of the move after: a point where
     lost motion is taken up, or one within the tolerance of the end, may have passed for the end.
@@ -129,12 +130,12 @@ def _nearest(comparison: Comparison, moves: Moves) -> tuple[Floats, Floats]:
     count = np.maximum(other[np.searchsorted(at, at, side="right") + 1] - first, 0)
     near = np.repeat(first - np.cumsum(count) + count, count) + np.arange(count.sum())
     block, owner = np.concatenate([own, near, at]), np.concatenate([comparison.owner[own], np.repeat(done, count), done])
-    off = np.linalg.norm(comparison.tip[block] - moves.tip[owner], axis=1)
-    order = np.lexsort((off, owner))
+    tip_off = np.linalg.norm(comparison.tip[block] - moves.tip[owner], axis=1)
+    axis_off = angle_between(comparison.axis[block], moves.axis[owner])
+    order = np.lexsort((np.maximum(tip_off / bounds[0], axis_off / bounds[1]), owner))
     best = order[np.diff(owner[order], prepend=-1) > 0]
     tip, axis = np.full(len(moves), np.nan), np.full(len(moves), np.nan)
-    tip[owner[best]] = off[best]
-    axis[owner[best]] = angle_between(comparison.axis[block[best]], moves.axis[owner[best]])
+    tip[owner[best]], axis[owner[best]] = tip_off[best], axis_off[best]
     return tip, axis
 
 

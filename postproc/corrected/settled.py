@@ -20,7 +20,7 @@ from toolpaths.arrays import Floats, Ints
 PARTS = 16
 """parts of a block whose joints do not run straight, for the ways of its axes"""
 BEGINS = 0.01
-"""weight of what the beginning of a block is off by beside what the end before it is, at points of the CL file"""
+"""weight of what the beginning of a block is off by beside what the end before it is, but where lost motion is taken up"""
 CLOSED = 0.05
 """mm between the ends of arcs that count as closed circles"""
 ROUNDED = 2.5
@@ -97,7 +97,8 @@ class _Written:
         later = _none(3, *self.gap.shape)
         for one, other in zip(first.tolist(), bottom.tolist(), strict=True):
             later[:, one] = _composed(bend, last, one + 1, other + 1)
-        weight, enough = np.where(between, 1.0, BEGINS), np.maximum(ROUNDED * near, np.where(between, allowed, 0.0))
+        weight = np.where(between & (self.made.part == 0.0), 1.0, BEGINS)
+        enough = np.maximum(ROUNDED * near, np.where(between, allowed, 0.0))
         near = np.where(between, enough, near)
         plain = axis_positions(path, self.work.tools[self.made.owner])
         return Ends(off, by_way, tip_rates, back, self.gap, bend, last, later, goes_on, weight, plain, near, enough, free,

@@ -68,7 +68,7 @@ class Ends:
 
 def walk(ends: Ends) -> Floats:
     """Steps (K, 3) of whole last decimals to add to the words X, Y, Z of blocks."""
-    run = _compiled() if len(ends.off) >= ENOUGH else _walk
+    run = _compiled() if len(ends.off) >= ENOUGH or _compiled.cache_info().currsize else _walk
     return np.asarray(run(*vars(ends).values()))
 
 
@@ -98,7 +98,7 @@ def _walk(off: Any, by_way: Any, tip_rates: Any, back: Any, gap: Any, bend: Any,
     for k in range(blocks):
         start = _clip(way - 2.0 * shifted / gap[k] + bend[0, k], bend[1, k], bend[2, k]) + last[k]
         case = (start, back[k], tip_rates[k], off[k], by_way[k], gap[k], goes_on[k], weight[k], later[:, k], free[k], way,
-                max(PLAIN, BETWEEN * weight[k]) if plain[k] else 0.0)
+                (BETWEEN if enough[k] <= near[k] else PLAIN) if plain[k] else 0.0)
         n = np.zeros(3)
         if free[k].any():
             if _cost(n, case) > near[k]:
