@@ -38,6 +38,8 @@ def standing(setup: SetupFile, toolpath: Toolpath, file: str = "") -> tuple[Setu
     origin = there.points(back.origin[None, :])[0] + 0.0
     x, y = (_vector(rotation[:, k] + 0.0) for k in (0, 1))
     part = PartPlacement(origin=_vector(origin), x_axis=x, y_axis=y)
+    if placed(frame).is_identity:
+        return setup.model_copy(update={"part": part}), found
     said = info("setup.system", f"{frame.name} of the CL file stands on the table at {_text(setup.part.origin, 4)} mm: the "
                 f"file's absolute frame at {_text(part.origin, 4)} mm, x along {_text(x, 6)}, y along {_text(y, 6)}",
                 file=file)

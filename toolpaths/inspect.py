@@ -143,7 +143,7 @@ def stands(frame: Frame) -> str:
     turned = math.degrees(math.acos(min(max((np.trace(frame.rotation) - 1.0) / 2.0, -1.0), 1.0)))
     lean = math.degrees(math.acos(min(max(frame.rotation[2][2], -1.0), 1.0)))
     place = ", ".join(f"{round(v, 4) + 0.0:g}" for v in frame.origin)
-    how = f", turned by {turned:.4g} degrees, its z by {round(lean, 4):g}" if turned > TURNED else ""
+    how = f", turned by {turned:.2f} degrees, its z by {lean:.2f}" if turned > TURNED else ""
     return f"origin ({place}) mm{how}"
 
 

@@ -76,8 +76,8 @@ def test_files_without_a_system_of_their_own_are_left_alone() -> None:
     result = convert(upright, "mikron-ucp710", "linuxcnc", setup())
     assert not any("system" in d.hint for d in result.diagnostics) and not result.ok
     low = ["UNITS/MM", "LOADTL/1", "SPINDL/RPM,1000,CLW", "FEDRAT/MMPM,400", "GOTO/5,0,0", "GOTO/5,9,0"]
-    texts = [good(convert(path(low), "mikron-ucp710", "linuxcnc", setup(system=s))).text for s in (True, False)]
-    assert texts[0] == texts[1]
+    by_system, plain = (good(convert(path(low), "mikron-ucp710", "linuxcnc", setup(system=s))) for s in (True, False))
+    assert by_system.text == plain.text and "setup.system" not in codes(by_system.diagnostics)
 
 
 def test_placements_compose() -> None:
@@ -139,7 +139,7 @@ def test_the_sample_is_converted_verified_and_timed(tmp_path: Path) -> None:
 
 def test_inspect_tells_the_systems() -> None:
     text = CliRunner().invoke(app, ["inspect", str(FOLDER / "upside_down.cls")]).stdout
-    assert "system MSYS 1: origin (393, -297, 3) mm, turned by 180 degrees, its z by 180" in text
+    assert "system MSYS 1: origin (393, -297, 3) mm, turned by 180.00 degrees, its z by 180.00" in text
     text = CliRunner().invoke(app, ["inspect", str(SAMPLES / "pocket.cls")]).stdout
     assert "system MSYS 1: origin (0, 0, 0) mm\n" in text
 
