@@ -208,7 +208,8 @@ NEAR, LEANING, STEEP = "[location]\nEX0S = 30\n", "[location]\nEA0Z = 200\n", \
     "[components.EZZ]\npolynomial = [0, 2]\nscale = 1\nrange = [-10, 400]\n"
 
 
-@pytest.mark.parametrize(("errors", "whole"), [(NEAR, True), (LEANING, False), (STEEP, False)])
+@pytest.mark.parametrize(("errors", "whole"), [(NEAR, True), (LEANING, False), (STEEP, False)],
+                         ids=["near", "leaning", "steep"])
 def test_holes_corrected_block_by_block_are_no_cycles(errors: str, whole: bool, tmp_path: Path) -> None:
     """Where Z leans by 1 um per mm no cycle can follow the hole; where Z is 2 um per mm too long one could be written, but
     its pecks would be of another length."""
