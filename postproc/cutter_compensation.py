@@ -88,7 +88,7 @@ class Compensation:
         if named or not self.modal:
             return named
         register = int(self.registers[self.moves.row[move]])
-        if register < 0:
+        if register < 1:
             self.without_tool.append(event.line)
             return ()
         self.chosen.setdefault(register, []).append(event.line)
@@ -120,8 +120,8 @@ class Compensation:
                                       "; where lengths and radii share one table, name another register in CUTCOM"
                                       if self.chosen else "")))
         if self.without_tool:
-            result.append(error("tool.missing", "CUTCOM names no register, and the file has loaded no tool whose register "
-                                "could be taken: D holds until another is stated", file=file,
+            result.append(error("tool.missing", "CUTCOM names no register, and the file has loaded no tool of a number "
+                                "above 0 whose register could be taken: D holds until another is stated", file=file,
                                 lines=self.without_tool[:6], count=len(self.without_tool),
                                 hint="write LOADTL before it, or the register: CUTCOM/LEFT,1"))
         if self.left_on:

@@ -5,11 +5,12 @@ from __future__ import annotations
 from functools import cache
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from postproc.pipeline import PostResult
 from postproc.readback.verify import read_back
-from tests.postproc.kit import codes, convert, good, toolpath
+from tests.postproc.kit import codes, convert, good, goto, tilted, toolpath
 from toolpaths.diagnostics import Diagnostic, Severity
 
 NAMES = ["linuxcnc", "fanuc-30i", "haas-ngc", "siemens-840d", "heidenhain-tnc640", "generic-iso"]
@@ -57,6 +58,30 @@ def test_a_plunge_between_is_no_way_in(controller: str) -> None:
     """A move along Z leads nowhere in the plane, so the arc behind it is the first move there."""
     lines = ["CUTTER/10", "RAPID", "GOTO/20,0,20", "CUTCOM/LEFT", "GOTO/20,0,2", *INTO[1:], "GOTO/-20,20,2", *OUT]
     assert [d.code for d in errors(made(controller, *lines))] == ([] if controller == "linuxcnc" else ["cutcom.arc"])
+
+
+@pytest.mark.parametrize("controller", ["fanuc-30i", "siemens-840d", "heidenhain-tnc640", "haas-ngc"])
+@pytest.mark.parametrize("way", ["into", "arc", "plunge"])
+def test_it_is_the_same_in_a_tilted_plane(controller: str, way: str) -> None:
+    z = tilted(30.0, 0.0)
+    y = np.array([0.0, 1.0, 0.0])
+    x = np.cross(y, z)
+
+    def at(*places: tuple[float, float, float]) -> list[str]:
+        return goto(np.array([a * x + b * y + h * z for a, b, h in places]), np.tile(z, (len(places), 1)))
+    arc = ["CIRCLE/0,0,0," + ",".join(f"{v:.9f}" for v in z) + ",20", *at((0, 20, 0), (-20, 20, 0)), "CUTCOM/OFF",
+           *at((-50, 20, 0)), "RAPID", *at((-50, 20, 40))]
+    ways = {"into": [*at((20, -20, 40), (20, -20, 0)), "CUTCOM/LEFT", *at((20, 0, 0))],
+            "arc": [*at((20, 0, 40), (20, 0, 0)), "CUTCOM/LEFT"],
+            "plunge": [*at((20, 0, 40)), "CUTCOM/LEFT", *at((20, 0, 0))]}
+    result = convert(toolpath("RAPID", *ways[way], *arc), "trunnion-bc", controller)
+    assert [d.code for d in errors(result)] == ([] if way == "into" else ["cutcom.arc"])
+    if controller == "fanuc-30i" and way == "into":
+        rows = result.text.split("\n")
+        on = rows.index("G41 D1")
+        assert result.job is not None and "G68.2" in result.text
+        edited = "\n".join([*rows[:on], rows[on + 1], rows[on], *rows[on + 2:]])
+        assert "verify.cutcom_arc" in codes(read_back(edited.encode(), result.job, "test.apt")[1])
 
 
 def test_a_change_of_side_on_an_arc_is_told_once() -> None:
@@ -179,6 +204,8 @@ def test_compensation_without_a_tool_needs_its_register() -> None:
     head = ["UNITS/MM", "FEDRAT/MMPM,600"]
     told = errors(convert(toolpath(*ROUND, head=head), "mill-3axis", "fanuc-30i"))
     assert [(d.code, d.lines) for d in told] == [("tool.missing", (7,))] and "CUTCOM/LEFT,1" in told[0].hint
+    zero = errors(convert(toolpath(*ROUND, head=["LOADTL/0", *head]), "mill-3axis", "fanuc-30i"))
+    assert [d.code for d in zero] == ["tool.missing"], "D0 is no register"
     named = [line.replace("LEFT", "LEFT,4") for line in ROUND]
     assert "tool.missing" not in codes(convert(toolpath(*named, head=head), "mill-3axis", "fanuc-30i").diagnostics)
     assert "tool.missing" not in codes(convert(toolpath(*ROUND, head=head), "mill-3axis", "linuxcnc").diagnostics)
