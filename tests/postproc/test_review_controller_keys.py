@@ -25,7 +25,8 @@ OTHERS = {"kinematics.rapids", "feed.length", "feed.arc_inverse", "modes.tcp", "
           "subprograms.call", "subprograms.begin", "subprograms.end",
           "subprograms.place", "subprograms.file", "subprogram_files.call", "subprogram_files.begin", "subprogram_files.end",
           "subprogram_files.place", "subprogram_files.file"}
-"""keys of what LinuxCNC has not: test_controllers_*.py, test_compensated_arcs.py, test_parts.py and test_output_modes*.py show what they do"""
+"""keys of what LinuxCNC has not: test_controllers_*.py, test_compensated_arcs.py, test_parts.py and
+test_output_modes*.py show what they do"""
 READ_BACK = {"cycles.peck_relief"}
 """how the control moves inside a canned cycle, which the read-back follows and no block states"""
 OTHER: dict[str, Any] = {
