@@ -120,13 +120,13 @@ def compensate(path: Path, moves: Moves, tools: Ints, kinematics: Callable[[int]
     starts = starts_of(corrected, path, work, allowed)
     corrected, resolved = fitted_arcs(corrected, path, work, starts.q, allowed, float(writing.grain.min()))
     whole = divided(corrected, work, starts, allowed)
-    corrected, apart = settled(whole, work, writing, allowed), work.whole[whole.owner] == ALONE
+    (corrected, axis_left), apart = settled(whole, work, writing, allowed), work.whole[whole.owner] == ALONE
     whole = replace(whole, path=corrected).of(cut)
     (tip_before, axis_before), (tip_after, axis_after) = (x[live].max(axis=0, initial=0.0).tolist()
                                                           for x in (found.before, found.after))
     doubt_tip, doubt_axis = _doubt(path, live, work, model)
     report = Compensation(
-        tip_before, axis_before, tip_after, axis_after, residual_tip=found.residual[:, :3],
+        tip_before, axis_before, tip_after, max(axis_after, axis_left), residual_tip=found.residual[:, :3],
         residual_axis=found.residual[:, 3:], added=len(corrected) - before_cut, resolved=int(resolved.sum()),
         partial=int(found.partial[live].sum()), moved=np.abs(found.q - path.q).max(axis=0, initial=0.0),
         owner=whole.owner, part=whole.part, apart=apart, doubt_tip=doubt_tip, doubt_axis=doubt_axis)

@@ -123,7 +123,8 @@ class Divided:
         gone = np.cumsum(self.part)
         first = np.flatnonzero(np.diff(self.owner, prepend=-1))
         before = np.repeat((gone - self.part)[first], np.diff(first, append=len(gone)))
-        return np.asarray(np.clip(gone - before, 0.0, 1.0))
+        last = np.append(self.owner[1:] != self.owner[:-1], True)
+        return np.asarray(np.where(last, 1.0, np.clip(gone - before, 0.0, 1.0)))
 
     def of(self, before: Divided) -> Divided:
         """The same, told of the path that `before` was made from."""

@@ -43,8 +43,9 @@ class Writing:
     grain: Floats
 
 
-def settled(made: Divided, work: Work, writing: Writing, allowed: float) -> Path:
-    """The path made of the blocks of `work`, with words by which axes that lose motion stand where they should.
+def settled(made: Divided, work: Work, writing: Writing, allowed: float) -> tuple[Path, float]:
+    """The path made of the blocks of `work`, with words by which axes that lose motion stand where they should; and rad, the
+    worst that is left of the axis at ends of CL moves where they do.
 
     Blocks keep their words where these bring the tip as near as rounding lets them. Closed circles, linking moves and blocks
     that name their axes keep them anyway, points between ends and rapids where they are off by no more than `allowed` mm.
@@ -53,12 +54,12 @@ def settled(made: Divided, work: Work, writing: Writing, allowed: float) -> Path
     """
     path = made.path
     if not work.two_way:
-        return path
+        return path, 0.0
     written = _Written(made, work, writing)
-    n = walk(written.ends(allowed))
-    changed = np.flatnonzero(n.any(axis=1))
+    n, ways = walk(written.ends(allowed))
+    left, changed = written.axis_left(ways), np.flatnonzero(n.any(axis=1))
     if not len(changed):
-        return path
+        return path, left
     chosen, xyz = written.words.copy(), path.frames[0].control.xyz
     chosen[:, xyz] += n * writing.grain[xyz]
     q = path.q.copy()
@@ -67,7 +68,7 @@ def settled(made: Divided, work: Work, writing: Writing, allowed: float) -> Path
     center = path.center.copy()
     center[arcs] = new_centers(path, arcs, *(words[rows][:, xyz] for words in (written.words, chosen)
                                              for rows in (arcs - 1, arcs)))
-    return replace(path, q=q, center=center)
+    return replace(path, q=q, center=center), left
 
 
 class _Written:
@@ -104,6 +105,16 @@ class _Written:
         return Ends(off, by_way, tip_rates, back, self.gap, bend, last, later, goes_on, weight, plain, near, enough, free,
                     self._like(first))
 
+    def axis_left(self, ways: Floats) -> float:
+        """rad, the worst deviation of the axis at ends of CL moves, by ways (K, T)."""
+        k = np.flatnonzero((self.path.u == 1.0) & (self.made.until == 1.0) & np.isfinite(self.q).all(axis=1))
+        if not len(k):
+            return 0.0
+        way, owner = np.zeros((len(k), self.q.shape[1])), self.made.owner[k]
+        way[:, self.work.two_way] = ways[k]
+        residual = self.work.residual(self.work.nominal(owner, np.ones(len(k))), self.path.q[k], owner, way)
+        return float(np.linalg.norm(residual[:, 3:], axis=1).max())
+
     def _like(self, first: Ints) -> Ints:
         """(K,) first block of the hole that a block is of, -1 for those and for blocks of none."""
         hole = self.work.whole[self.made.owner]
@@ -122,17 +133,20 @@ class _Written:
         return runs, np.array(bottom, dtype=np.int64)
 
     def _free(self) -> Floats:
-        """(K, 3) words that may be others, those of arcs and before them in their planes; not those of closed circles."""
+        """(K, 3) words that may be others; not those of closed circles, of arcs and before them those of their planes alone
+        where the control has no helix there."""
         path, words = self.path, self.words
         fixed = path.home | np.isnan(path.u) | path.state.any(axis=1) | (self.work.whole[self.made.owner] != ALONE)
         result = np.where(fixed | ~np.isfinite(self.q).all(axis=1), 0.0, 1.0)[:, None] * np.ones(3)
-        xyz = path.frames[0].control.xyz
+        xyz, helix = path.frames[0].control.xyz, np.zeros(len(path), dtype=np.bool_)
+        for law, k in path.by_control():
+            helix[k] = np.isin(path.plane[k], law.helix_planes)
         for plane, flat in PLANE_COLUMNS.items():
             arcs = np.flatnonzero((path.code == ARC) & (path.plane == plane))
             chord = np.linalg.norm((words[arcs] - words[arcs - 1])[:, xyz[list(flat)]], axis=1)
             open_ = (chord > CLOSED) & (path.frame[arcs] == path.frame[arcs - 1])
             for rows in (arcs, arcs - 1):
-                result[rows] *= open_[:, None] * np.isin(np.arange(3), flat)
+                result[rows] *= open_[:, None] * (np.isin(np.arange(3), flat) | helix[arcs][:, None])
         return result
 
     def _motion(self) -> tuple[Floats, Floats, Floats]:

@@ -66,10 +66,11 @@ class Ends:
     like: Ints
 
 
-def walk(ends: Ends) -> Floats:
-    """Steps (K, 3) of whole last decimals to add to the words X, Y, Z of blocks."""
+def walk(ends: Ends) -> tuple[Floats, Floats]:
+    """Steps (K, 3) of whole last decimals to add to the words X, Y, Z of blocks, and the ways (K, T) at their ends then."""
     run = _compiled() if len(ends.off) >= ENOUGH or _compiled.cache_info().currsize else _walk
-    return np.asarray(run(*vars(ends).values()))
+    steps, ways = run(*vars(ends).values())
+    return steps, ways
 
 
 @cache
@@ -93,7 +94,7 @@ def _kept(njit: Any, function: Callable[..., Any]) -> Callable[..., Any]:
 def _walk(off: Any, by_way: Any, tip_rates: Any, back: Any, gap: Any, bend: Any, last: Any, later: Any, goes_on: Any,
           weight: Any, plain: Any, near: Any, enough: Any, free: Any, like: Any) -> Any:
     blocks, lossy = gap.shape
-    result = np.zeros((blocks, 3))
+    result, ways = np.zeros((blocks, 3)), np.zeros((blocks, lossy))
     way, shifted = np.zeros(lossy), np.zeros(lossy)
     for k in range(blocks):
         start = _clip(way - 2.0 * shifted / gap[k] + bend[0, k], bend[1, k], bend[2, k]) + last[k]
@@ -112,7 +113,8 @@ def _walk(off: Any, by_way: Any, tip_rates: Any, back: Any, gap: Any, bend: Any,
         result[k] = n
         shifted = back[k] @ n
         way = _ended(n, case)
-    return result
+        ways[k] = way
+    return result, ways
 
 
 def _clip(way: Any, low: Any, high: Any) -> Any:

@@ -73,11 +73,19 @@ def plain_walk() -> ModuleType:
     return module
 
 
+def steps_of(ends: Ends) -> Floats:
+    """(K, 3) of the plain walk."""
+    return np.asarray(plain_walk().walk(ends)[0])
+
+
 @pytest.mark.parametrize("lossy", [1, 3])
 def test_the_compiled_walk_is_the_plain_one(lossy: int) -> None:
     ends = random_ends(np.random.default_rng(lossy), 40, lossy, 8.7e-5)
-    plain = np.asarray(plain_walk()._walk(*vars(ends).values()))
-    np.testing.assert_array_equal(walking._compiled()(*vars(ends).values()), plain)
+    plain, ways = (np.asarray(x) for x in plain_walk()._walk(*vars(ends).values()))
+    fast = walking._compiled()(*vars(ends).values())
+    np.testing.assert_array_equal(fast[0], plain)
+    np.testing.assert_allclose(fast[1], ways, rtol=0.0, atol=1e-12)  # sums of other order
+    assert np.abs(ways).max() == 1.0 and (np.abs(ways) < 1.0).any()
     assert np.abs(plain).max() > 3.0 and (plain == 0.0).all(axis=1).any()
     likes = np.flatnonzero(ends.like >= 0)
     np.testing.assert_array_equal(plain[likes], plain[ends.like[likes]])
@@ -99,7 +107,7 @@ def costs(ends: Ends, steps: Floats) -> tuple[Floats, Floats]:
 def test_no_steps_around_bring_a_block_nearer() -> None:
     reach = np.arange(-18.0, 19.0)
     grid = np.stack(np.meshgrid(reach, reach, reach, indexing="ij"), axis=-1).reshape(-1, 3)
-    rng, nearest, walk = np.random.default_rng(12), [], plain_walk().walk
+    rng, nearest, walk = np.random.default_rng(12), [], steps_of
     for k in range(18):
         ends = random_ends(rng, 1, 1 + k % 3, 1e-5, single=True)
         off, cost = costs(ends, walk(ends))
@@ -110,7 +118,7 @@ def test_no_steps_around_bring_a_block_nearer() -> None:
 
 
 def test_words_stay_where_rounding_leaves_as_much() -> None:
-    walk = plain_walk().walk
+    walk = steps_of
     ends = random_ends(np.random.default_rng(3), 1, 2, 8.7e-5, single=True)
     still = replace(ends, off=-(ends.by_way @ np.clip(ends.last, -1.0, 1.0)[..., None])[..., 0] + [[6e-5, 0.0, 6e-5]],
                     goes_on=np.zeros((1, 2)))
