@@ -139,7 +139,7 @@ class KlartextWriter(Writer):
         text = self.cycle_of(hole).code.format(**dict(zip(values, numbers, strict=True)))
         if text != self.cycle_text:
             yield text
-        self.cycle_text, self.side, self.asked = text, "R0", "R0"
+        self.cycle_text, self.side, self.asked, self.helix = text, "R0", "R0", None
         p = self.program
         place = "".join(f" {letter}{self.number_text(p.words[hole.last, j:j + 1], int(p.decimals[j]))[0]}"
                         for j, letter in enumerate(p.letters) if letter in "XY")

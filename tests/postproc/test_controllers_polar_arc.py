@@ -16,8 +16,10 @@ from postproc.controllers.polar_arc import REACH, polar_arc
 from postproc.corrected.proof import after_formatting
 from postproc.options import Options
 from postproc.pipeline import PostResult
+from postproc.program import Hole
 from tests.postproc.program_kit import blocks, program, step
 from toolpaths.arrays import Floats
+from toolpaths.toolpath import Cycle
 from toolpaths.units import DEG
 
 GRAIN = 1e-4
@@ -108,6 +110,31 @@ def test_helices_one_after_the_other_do_not_add_up() -> None:
     places = [at for line, at in zip(text, executed(text, (20.0, 0.0)), strict=True) if not line.startswith("CC")]
     off = np.linalg.norm(np.array(places) - wanted, axis=1)
     assert off.max() < 1.1 * GRAIN and off[-20:].mean() < 0.5 * GRAIN
+
+
+def test_a_hole_between_helices_states_where_it_is() -> None:
+    """Its line names X and Y even where its words are those before: the next helix begins there to the last digit."""
+    rng = np.random.default_rng(8)
+    differ = 0
+    for _ in range(6):
+        start, centre = np.array([20.0, 0.0]), rng.uniform(-20.0, 20.0, 2)
+        at = np.round(turned(start, centre, 77.0), 4)
+        away = rng.uniform(-20.0, 20.0, 2)
+        end = np.round(turned(at, at + away, 111.0), 4)
+        steps = [step("rapid", X=20.0, Y=0.0, Z=5.0),
+                 step("ccw", X=at[0], Y=at[1], Z=4.0, centre=(*(centre - start), 0.0), F=300.0), step("rapid", Z=5.0),
+                 step("feed", Z=-8.0, F=200.0), step("rapid", Z=5.0),
+                 step("ccw", X=end[0], Y=end[1], Z=4.0, centre=(*away, 0.0), F=300.0)]
+        hole = Hole(2, 4, 0, 5.0, -8.0, 5.0, 5.0, "DRILL", 3)
+        text = blocks("heidenhain-tnc640", program(steps, holes=(hole,)), (Cycle("DRILL", 11.0, 2.0, None, 200.0),))
+        assert any(line.endswith("M99") and f"X{at[0]:+.4f}".rstrip("0") in line for line in text)
+        wanted, unlike = (polar_arc(begin, end, at + away, 111.0, GRAIN, GRAIN) for begin in (
+            at, executed(text[:3], (20.0, 0.0))[2]))
+        last = [line for line in text if line.startswith(("CC", "CP"))][-2:]
+        assert [float(v) for v in re.findall(r"[XY]([-+][\d.]+)", last[0])] == pytest.approx(wanted.pole.tolist(), abs=1e-9)
+        assert float(re.findall(r"IPA([-+][\d.]+)", last[1])[0]) == pytest.approx(wanted.angle, abs=1e-9)
+        differ += wanted.pole.tolist() != unlike.pole.tolist() or wanted.angle != unlike.angle
+    assert differ
 
 
 def converted(controller: str, model: str, sample: str = "pocket.cls") -> PostResult:
