@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
+from itertools import product
 from typing import Any, cast
 
 import numpy as np
@@ -26,8 +27,17 @@ PLAIN, BETWEEN = 0.05, 0.25
 """weight of what the tip is off by on a machine whose ways are the signs of the last steps; between points of the CL file"""
 RESTS = 1e-9
 """part of its lost motion that is no step of a joint"""
+NEARER = 1e-9
+"""mm that words beside must come nearer"""
 REACH = 32.0, 8.0, 2.0, 1.0
 """last decimals that are tried beside"""
+AROUND = np.array(list(product((-1.0, 0.0, 1.0), repeat=3)))
+"""(27, 3) where"""
+MOST = 6
+"""joints that any machine has at most"""
+WAYS = np.array(list(product((0.0, 1.0, -1.0), repeat=MOST)))[:, ::-1].copy()
+"""(3^6, 6) ways that are tried, the first 3^T of the first T joints being all theirs; 0 where that before stays"""
+STAYS = 1.0 - np.abs(WAYS)
 
 
 @dataclass(frozen=True)
@@ -78,7 +88,7 @@ def _compiled() -> Callable[..., Any]:
     """The same functions compiled; the module's helpers are replaced, so that compiled code calls compiled code."""
     from numba import njit
 
-    for name in ("_clip", "_ended", "_way", "_tip", "_cost", "_nearest", "_toward", "_by_ways", "_beside"):
+    for name in ("_ended", "_costs", "_nearest", "_toward", "_by_ways", "_beside"):
         globals()[name] = _kept(njit, globals()[name])
     return _kept(njit, _walk)
 
@@ -97,96 +107,87 @@ def _walk(off: Any, by_way: Any, tip_rates: Any, back: Any, gap: Any, bend: Any,
     result, ways = np.zeros((blocks, 3)), np.zeros((blocks, lossy))
     way, shifted = np.zeros(lossy), np.zeros(lossy)
     for k in range(blocks):
-        start = _clip(way - 2.0 * shifted / gap[k] + bend[0, k], bend[1, k], bend[2, k]) + last[k]
-        case = (start, back[k], tip_rates[k], off[k], by_way[k], gap[k], goes_on[k], weight[k], later[:, k], free[k], way,
-                (BETWEEN if enough[k] <= near[k] else PLAIN) if plain[k] else 0.0)
-        n = np.zeros(3)
+        start = np.minimum(np.maximum(way - 2.0 * shifted / gap[k] + bend[0, k], bend[1, k]), bend[2, k]) + last[k]
+        turned = np.ascontiguousarray(back[k].T)
+        n = np.zeros((1, 3))
         if free[k].any():
-            if _cost(n, case) > near[k]:
-                n = _toward(n, case)
-            if _cost(n, case) > enough[k]:
-                n = _beside(n, case)
-            if _cost(n, case) > enough[k]:
-                n = _beside(_by_ways(n, way, case), case)
+            weighed = 0.0 if not plain[k] else BETWEEN if enough[k] <= near[k] else PLAIN
+            rates, swayed = np.ascontiguousarray(tip_rates[k].T), np.ascontiguousarray(by_way[k].T)
+            case = (start, turned, rates, off[k], swayed, gap[k], goes_on[k], weight[k], later[:, k], free[k], way, weighed,
+                    np.linalg.inv(rates))
+            cost = _costs(n, case)[0]
+            if cost > near[k]:
+                n, cost = _toward(n, cost, case)
+            if cost > enough[k]:
+                n, cost = _beside(n, cost, case)
+            if cost > enough[k]:
+                n, cost = _by_ways(n, cost, case)
+                n, cost = _beside(n, cost, case)
         elif like[k] >= 0:
-            n = result[like[k]]
-        result[k] = n
-        shifted = back[k] @ n
-        way = _ended(n, case)
+            n[0] = result[like[k]]
+        result[k] = n[0]
+        shifted = n[0] @ turned
+        way = np.minimum(np.maximum(start + 2.0 * shifted / gap[k], -1.0), 1.0)
         ways[k] = way
     return result, ways
 
 
-def _clip(way: Any, low: Any, high: Any) -> Any:
-    return np.minimum(np.maximum(way, low), high)
-
-
 def _ended(n: Any, case: Any) -> Any:
-    """Ways (T,) at the end of the block after steps n (3,) of last decimals."""
-    return np.minimum(np.maximum(case[0] + 2.0 * (case[1] @ n) / case[5], -1.0), 1.0)
+    """Ways (N, T) at the end of the block after steps n (N, 3) of last decimals."""
+    return np.minimum(np.maximum(case[0] + 2.0 * (n @ case[1]) / case[5], -1.0), 1.0)
 
 
-def _way(n: Any, case: Any) -> Any:
-    """Ways (T,) where the tip counts."""
-    later = case[8]
-    return _clip(_ended(n, case) + later[0], later[1], later[2])
-
-
-def _tip(n: Any, case: Any) -> Any:
-    """Tip less wanted (3,)."""
-    return case[3] + case[4] @ _way(n, case) + case[2] @ n
-
-
-def _cost(n: Any, case: Any) -> Any:
-    """mm that the tip is off by, and the weighted parts of what the next block begins off by and of a plain reading."""
-    goes_on, tip, way = case[6], _tip(n, case), _way(n, case)
-    late = case[4] @ np.where(goes_on != 0.0, goes_on - way, 0.0)
-    cost = np.sqrt((tip * tip).sum()) + case[7] * np.sqrt((late * late).sum())
+def _costs(n: Any, case: Any) -> Any:
+    """(N,) mm that the tip is off by after steps n (N, 3), and the weighted parts of what the next block begins off by and
+    of a plain reading."""
+    ended, goes_on, later, by_way = _ended(n, case), case[6], case[8], case[4]
+    way = np.minimum(np.maximum(ended + later[0], later[1]), later[2])
+    tip = case[3] + way @ by_way + n @ case[2]
+    late = (np.abs(goes_on) * (goes_on - way)) @ by_way
+    cost = np.sqrt((tip * tip).sum(axis=1)) + case[7] * np.sqrt((late * late).sum(axis=1))
     if case[11] > 0.0:
-        step = case[0] - case[10] + 2.0 * (case[1] @ n) / case[5]
-        other = case[4] @ np.where(np.abs(step) > RESTS, np.sign(step) - _ended(n, case), 0.0)
-        cost += case[11] * np.sqrt((other * other).sum())
+        step = case[0] - case[10] + 2.0 * (n @ case[1]) / case[5]
+        other = ((np.abs(step) > RESTS) * (np.sign(step) - ended)) @ by_way
+        cost = cost + case[11] * np.sqrt((other * other).sum(axis=1))
     return cost
 
 
 def _nearest(tip: Any, case: Any) -> Any:
-    """Steps (3,) that take back what the tip is off by."""
-    return -np.round(np.linalg.solve(case[2], tip)) * case[9]
+    """Steps (N, 3) that take back what the tip is off by, (N, 3)."""
+    return -np.round(tip @ case[12]) * case[9]
 
 
-def _toward(n: Any, case: Any) -> Any:
-    """The nearest steps for the ways that the steps n make, those of the next, and so on as long as it comes nearer."""
+def _toward(n: Any, cost: Any, case: Any) -> Any:
+    """The nearest steps for the ways that the steps n (1, 3) make, those of the next, as long as it comes nearer."""
     while True:
-        better = n + _nearest(_tip(n, case), case)
-        if _cost(better, case) >= _cost(n, case):
-            return n
-        n = better
+        later = case[8]
+        way = np.minimum(np.maximum(_ended(n, case) + later[0], later[1]), later[2])
+        better = n + _nearest(case[3] + way @ case[4] + n @ case[2], case)
+        there = _costs(better, case)[0]
+        if there >= cost:
+            return n, cost
+        n, cost = better, there
 
 
-def _by_ways(n: Any, before: Any, case: Any) -> Any:
-    """The nearest steps for every way that is one of both or that before, where that comes nearer than n."""
-    lossy = len(before)
-    for number in range(3 ** lossy):
-        way, rest = before.copy(), number
-        for j in range(lossy):
-            if rest % 3:
-                way[j] = 3.0 - 2.0 * (rest % 3)
-            rest //= 3
-        other = _nearest(case[3] + case[4] @ way, case)
-        if _cost(other, case) < _cost(n, case):
-            n = other
-    return n
+def _by_ways(n: Any, cost: Any, case: Any) -> Any:
+    """The nearest steps for every way that is one of both or that before, where that comes nearer than n (1, 3)."""
+    lossy = len(case[5])
+    ways = np.ascontiguousarray(WAYS[:3 ** lossy, :lossy] + case[10] * STAYS[:3 ** lossy, :lossy])
+    others = _nearest(case[3] + ways @ case[4], case)
+    costs = _costs(others, case)
+    k = np.argmin(costs)
+    return (others[k:k + 1], costs[k]) if costs[k] < cost else (n, cost)
 
 
-def _beside(n: Any, case: Any) -> Any:
-    """The best steps around n, near ones and far ones in turn, as long as one comes nearer."""
+def _beside(n: Any, cost: Any, case: Any) -> Any:
+    """The best steps around n (1, 3), near ones and far ones in turn, as long as one comes nearer."""
     for reach in REACH:
         found = True
         while found:
-            found, best = False, n
-            for number in range(27):
-                other = n + reach * case[9] * np.array([number % 3 - 1.0, number // 3 % 3 - 1.0, number // 9 - 1.0])
-                if _cost(other, case) < _cost(best, case) - 1e-9:
-                    found, best = True, other
-            n = best
-    return n
+            others = n + reach * case[9] * AROUND
+            costs = _costs(others, case)
+            k = np.argmin(costs)
+            found = costs[k] < cost - NEARER
+            if found:
+                n, cost = others[k:k + 1], costs[k]
+    return n, cost
