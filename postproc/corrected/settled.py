@@ -19,6 +19,8 @@ from toolpaths.arrays import Floats, Ints
 
 PARTS = 16
 """parts of a block whose joints do not run straight, for the ways of its axes"""
+NOISE = 1e-3
+"""of the ways: turning back by less is none"""
 BEGINS = 0.01
 """weight of what the beginning of a block is off by beside what the end before it is, but where lost motion is taken up"""
 CLOSED = 0.05
@@ -204,7 +206,7 @@ def _runs(pieces: Iterable[Floats]) -> tuple[Floats, Floats, Floats]:
     first, *rest = pieces
     whole, run, gone, most = Steps(*_none(3, *first.shape)), first, first, np.abs(first)
     for piece in rest:
-        turns = run * piece < 0.0
+        turns = (run * piece < 0.0) & (np.minimum(np.abs(run), np.abs(piece)) > NOISE)
         then = whole.then(Steps(run, np.full(run.shape, -1.0), np.full(run.shape, 1.0)))
         whole = Steps(*(np.where(turns, getattr(then, name), getattr(whole, name)) for name in ("shift", "low", "high")))
         run, gone = np.where(turns, piece, run + piece), gone + piece
