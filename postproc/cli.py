@@ -107,7 +107,8 @@ def verify(gcode: Annotated[Path, typer.Argument(metavar="GCODE", help="G-code f
     _choice("--orient", orient, ORIENTATIONS)
     options = replace(_options(tolerance, axis_tolerance, "auto", setup, units, dialect, allow_unknown),
                       error_model=error_model, orient=orient, max_tilt=max_tilt)  # type: ignore[arg-type]
-    refuse_overwriting({"--json": json}, {"the CL file": str(file), "the G-code file": str(gcode), "the set-up": setup})
+    refuse_overwriting({"--json": json}, {"the CL file": str(file), "the G-code file": str(gcode), "the set-up": setup,
+                                         "the error model": error_model})
     from postproc import summary
     from postproc.pipeline import verify as run
 
@@ -129,7 +130,7 @@ def trace(file: ClFile, line: Annotated[int, typer.Option("--line", metavar="L",
     options = replace(_options(tolerance, axis_tolerance, "auto", setup, units, dialect, allow_unknown),
                       error_model=error_model, error_beyond=beyond, orient=orient,  # type: ignore[arg-type]
                       max_tilt=max_tilt)
-    refuse_overwriting({"--json": json}, {"the CL file": str(file), "the set-up": setup})
+    refuse_overwriting({"--json": json}, {"the CL file": str(file), "the set-up": setup, "the error model": error_model})
     from postproc.pipeline import convert as run
     from postproc.trace import as_text, trace_line
 

@@ -15,6 +15,9 @@ if TYPE_CHECKING:
 
 Json = Annotated[str, typer.Option("--json", metavar="FILE", help="write the figures as JSON; - for standard output")]
 
+LONGEST_NAME = 255
+"""characters that the name of a file may have"""
+
 
 def machine_of(name: str) -> Machine:
     import machines
@@ -112,8 +115,9 @@ def rounded(value: Any) -> Any:
 
 
 def refuse_overwriting(outputs: dict[str, str], inputs: dict[str, str]) -> None:
-    """Wrong use where an output would replace an input or another output, or is no regular file."""
-    known = [(_place(name), what) for what, name in inputs.items() if name]
+    """Wrong use where an output would replace an input, a file that a TOML input names, or another output, or is no regular
+    file."""
+    known = [(place, what) for what, name in inputs.items() if name for place in (_place(name), *_named_in(name))]
     for option, name in outputs.items():
         if not name or (name == "-" and option == "--json"):
             continue
@@ -131,6 +135,26 @@ def refuse_overwriting(outputs: dict[str, str], inputs: dict[str, str]) -> None:
         if same or kind:
             raise typer.BadParameter(f"the output would replace {same}" if same else f"{name} is {kind}", param_hint=option)
         known.append((place, f"the file of {option}"))
+
+
+def _named_in(name: str) -> list[Path]:
+    """Files that there are under the texts of a TOML file (tables, meshes); none of a file that cannot be read."""
+    if not name.lower().endswith(".toml"):
+        return []
+    import tomllib
+
+    try:
+        todo: list[Any] = [tomllib.loads(Path(name).read_text(encoding="utf-8"))]
+    except (OSError, ValueError):
+        return []
+    found = []
+    while todo:
+        value = todo.pop()
+        if isinstance(value, (dict, list)):
+            todo += value.values() if isinstance(value, dict) else value
+        elif isinstance(value, str) and "." in value and len(value) < LONGEST_NAME:
+            found.append(_place(str(Path(name).parent / value)))
+    return [place for place in found if place.is_file()]
 
 
 def _place(name: str) -> Path:

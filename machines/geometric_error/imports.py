@@ -35,6 +35,9 @@ _SCREW = re.compile(r"([A-Z])=(.+)$")
 MAP_COLUMNS = {"dx", "dy", "dz"}
 
 
+_TOLD = re.compile(r"#\s*error map: (gauge point|tip of a tool of ([\d.e+-]+) mm),.* directions of the (table|machine)")
+
+
 @dataclass(frozen=True)
 class How:
     """How sources are to be read.
@@ -182,7 +185,8 @@ def _variances(model: ErrorModel, read: Averaged) -> Floats:
 def _map(table: CsvTable, machine: Machine, how: How) -> tuple[ErrorModel | None, list[Diagnostic]]:
     periods = {letter: period for letter, period in how.periods.items() if letter in table.columns}
     result, found = map_from_csv(table, periods)
-    if result is None:
+    found += _told_otherwise(table, how)
+    if result is None or found:
         return None, found
     bed = part_side(machine.kinematics, machine.structure) if how.directions == "machine" else ()
     made = replace(result, length=how.tool_length, bed=bed, table=how.sign * result.table)
@@ -190,6 +194,24 @@ def _map(table: CsvTable, machine: Machine, how: How) -> tuple[ErrorModel | None
     if isinstance(moved, tuple):
         return None, [error("error-map.zero", moved[0], file=table.file, hint=moved[1])]
     return ErrorModel(map=moved), []
+
+
+def _told_otherwise(table: CsvTable, how: How) -> list[Diagnostic]:
+    """What the first line of a written map says of its directions and point, where the options say otherwise."""
+    with Path(table.file).open(encoding="utf-8", errors="replace") as lines:
+        told = _TOLD.match(next(lines, ""))
+    if told is None:
+        return []
+    length, found = float(told[2] or 0.0), []
+    if told[3] != how.directions:
+        found.append(error("error-import.directions", f"the map says that its directions are those of the {told[3]}, the "
+                           f"import those of the {how.directions}", file=table.file, lines=[1],
+                           hint=f"import with --directions {told[3]}"))
+    if abs(length - how.tool_length) > 1e-6:
+        found.append(error("error-import.tool_length", f"the map says that it is of the {told[1]}, the import of a tool of "
+                           f"{how.tool_length:g} mm", file=table.file, lines=[1],
+                           hint=f"import with --tool-length {length:g}"))
+    return found
 
 
 def _axis(table: CsvTable, positions: list[str], machine: Machine, how: How) -> tuple[ErrorModel | None, list[Diagnostic]]:

@@ -91,7 +91,8 @@ def beyond_bound(result: PostResult) -> list[Diagnostic]:
                     f"the bound: tip {1e3 * found.tip[k]:.2f} um of {1e3 * found.tip_bound:.2f} um, axis "
                     f"{found.axis[k] / arcsec:.2f} arcsec of {found.axis_bound / arcsec:.2f} arcsec at the worst of them",
                     file=job.toolpath.file, lines=[int(lines[k]), *rest[:5]], count=len(off),
-                    hint="an axis turns back by less than it loses; more decimals in the controller's [format] help")]
+                    hint=("an axis turns back by less than it loses; " if job.two_way else "")
+                    + "more decimals in the controller's [format] help")]
 
 
 def _play(result: PostResult) -> tuple[float, float]:

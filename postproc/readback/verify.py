@@ -24,7 +24,7 @@ from toolpaths.diagnostics import Diagnostic, Severity, error, has_errors, warni
 from toolpaths.rotations import angle_between
 from toolpaths.units import DEG
 
-_CORRECTED = re.compile(rb"(?im)^[^\n]*geometric errors [^\n]*corrected in this program")
+_CORRECTED = re.compile(rb"(?im)^[^\n]*geometric errors ([^\n]*?):? corrected in this program")
 _BY_CONTROL = re.compile(rb"(?im)^[^\n]*geometric errors [^\n]*corrected by the control")
 _ORIENTED = re.compile(rb"(?im)^[^\n]*tool axes chosen: orient ([a-z-]+), max tilt ([^ \n]+) degrees")
 _OURS = re.compile(rb"(?im)^[^\n]*postproc \d+\.\d[^\n]*\n(?:[^\n]*part [^\n]*\n)?[^\n]*source ")
@@ -112,8 +112,9 @@ def _uncorrected(head: bytes, job: Job, motion: Motion, executed: Executed, comp
 
     A program of another post may correct them all the same, so that no amounts are known.
     """
-    if _CORRECTED.search(head):
-        return []
+    named = _CORRECTED.search(head)
+    if named:
+        return _of_another(named[1].decode("utf-8", "replace"), job, gcode)
     by_control = _BY_CONTROL.search(head)
     if not (by_control or _OURS.search(head)):
         return [warning("verify.error_model", "the header of the program names no error model, it is verified on the "
@@ -122,6 +123,16 @@ def _uncorrected(head: bytes, job: Job, motion: Motion, executed: Executed, comp
     return [error("verify.error_model", f"the program corrects no geometric errors ({why}): verified on the machine with "
                   "errors" + _amounts(job, motion, executed, comparison), file=gcode,
                   hint="verify without --error-model, or convert with it")]
+
+
+def _of_another(name: str, job: Job, gcode: str) -> list[Diagnostic]:
+    """That a program corrects the errors of another model, by the `name` in its header, than it is verified with."""
+    assert job.errors is not None
+    if not name or name.casefold() == job.errors.name.casefold():
+        return []
+    return [error("verify.error_model", f"the header of the program names the error model {name}, it is verified with "
+                  f"{job.errors.name}: what is off may follow from that alone", file=gcode,
+                  hint="verify with the model that the program was written with")]
 
 
 def _amounts(job: Job, motion: Motion, executed: Executed, comparison: Comparison) -> str:
