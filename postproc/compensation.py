@@ -28,7 +28,7 @@ from postproc.modes import OutputModes
 from postproc.moves import Moves
 from postproc.path import Path
 from toolpaths.arrays import Bools, Floats, Ints
-from toolpaths.diagnostics import Diagnostic, error, info
+from toolpaths.diagnostics import Diagnostic, error, info, warning
 from toolpaths.units import DEG
 
 DOUBTS = 500
@@ -44,8 +44,8 @@ class Compensation:
     """What the correction did to the blocks that it corrects, mm and rad.
 
     Attributes:
-        tip_before, axis_before: worst deviation of the machine with errors at nominal block ends
-        tip_after, axis_after: worst deviation at corrected block ends: the residual
+        tip_before, axis_before: worst deviation of the machine with errors at nominal ends of blocks of CL moves
+        tip_after, axis_after: worst deviation at their corrected ends: the residual
         residual_tip, residual_axis: (K, 3) at the ends of the blocks given, actual less wanted; 0 at home blocks
         added: points added; resolved: arcs that became lines
         partial: blocks near a pole, whose axis is corrected in part
@@ -113,7 +113,9 @@ def compensate(path: Path, moves: Moves, tools: Ints, kinematics: Callable[[int]
             break
         corrected, found = _at_ends(path, moves, modes, work, allowed, always)
     live = ~path.home
-    diagnostics = _unmeasured(path, moves, modes.control, found.unmeasured & live[:, None], beyond, file)
+    low, high = work.reached()
+    unmeasured = found.unmeasured | work.unmeasured(low, high)
+    diagnostics = _unmeasured(path, moves, modes.control, unmeasured & live[:, None], (low, high), beyond, file)
     lost = live & ~np.isfinite(found.q).all(axis=1)
     if (diagnostics and not beyond) or lost.any():
         return None, None, diagnostics or [_lost(path, moves, lost, file)]
@@ -122,7 +124,8 @@ def compensate(path: Path, moves: Moves, tools: Ints, kinematics: Callable[[int]
     whole = divided(corrected, work, starts, allowed)
     (corrected, axis_left), apart = settled(whole, work, writing, allowed), work.whole[whole.owner] == ALONE
     whole = replace(whole, path=corrected).of(cut)
-    (tip_before, axis_before), (tip_after, axis_after) = (x[live].max(axis=0, initial=0.0).tolist()
+    done = live & np.isfinite(path.u)
+    (tip_before, axis_before), (tip_after, axis_after) = (x[done].max(axis=0, initial=0.0).tolist()
                                                           for x in (found.before, found.after))
     doubt_tip, doubt_axis = _doubt(path, live, work, model)
     report = Compensation(
@@ -230,19 +233,23 @@ def _doubt(path: Path, live: Bools, work: Work, model: ErrorModel) -> tuple[floa
 
 # ---- what cannot be done ----------------------------------------------------------------------------------------------
 
-def _unmeasured(path: Path, moves: Moves, control: Control, where: Bools, beyond: bool, file: str) -> list[Diagnostic]:
-    rows = np.flatnonzero(where.any(axis=1))
-    if not len(rows):
-        return []
-    j = int(np.flatnonzero(where[rows].any(axis=0))[0])
-    name, value = control.machine.axis_names[j], path.q[where[:, j], j] * control.unit[j]
-    lines = np.unique(moves.line[path.move[rows]])
-    text = f"{name} goes from {value.min():.3f} to {value.max():.3f} where its errors were not measured"
-    if beyond:
-        return [info("compensation.range", text + "; the error at the end of the range is taken", file=file,
-                     lines=lines[:6].tolist(), count=len(rows))]
-    return [error("compensation.range", text, file=file, lines=lines[:6].tolist(), count=len(rows),
-                  hint="measure farther, move the part, or take --error-model-beyond")]
+def _unmeasured(path: Path, moves: Moves, control: Control, where: Bools, reached: tuple[Floats, Floats], beyond: bool,
+                file: str) -> list[Diagnostic]:
+    """One of each axis that goes where its errors were not measured, `where` (K, J), from and to `reached` (K, J)."""
+    told = []
+    for j in np.flatnonzero(where.any(axis=0)).tolist():
+        rows = np.flatnonzero(where[:, j])
+        low, high = reached[0][rows, j].min() * control.unit[j], reached[1][rows, j].max() * control.unit[j]
+        lines = np.unique(moves.line[path.move[rows]])[:6].tolist()
+        text = f"{control.machine.axis_names[j]} goes from {low:.3f} to {high:.3f} where its errors were not measured"
+        if beyond:
+            told.append(warning("compensation.range", text + "; the error at the end of the range is taken", file=file,
+                                lines=lines, count=len(rows)))
+            continue
+        turn = "write repeats = 360 where a whole turn was measured, " if control.machine.rotary[j] else ""
+        told.append(error("compensation.range", text, file=file, lines=lines, count=len(rows),
+                          hint=f"{turn}measure farther, move the part, or take --error-model-beyond"))
+    return told
 
 
 def _lost(path: Path, moves: Moves, lost: Bools, file: str) -> Diagnostic:

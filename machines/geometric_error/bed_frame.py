@@ -49,6 +49,11 @@ class Turned(Curve):
         """Of its components."""
         return [component.curve for _, component in self.parts]
 
+    @property
+    def detail(self) -> float:
+        """See the base class: that of its curves, and a quarter of a turn."""
+        return min(0.5 * np.pi, *(curve.detail for curve in self.curves))
+
     @cached_property
     def values(self) -> Floats:  # type: ignore[override]
         """(P,) of all its curves."""

@@ -25,6 +25,11 @@ class Curve(ABC):
     range: tuple[float, float]
     """least and greatest position that the curve was made for"""
 
+    @property
+    @abstractmethod
+    def detail(self) -> float:
+        """mm or rad over which the curve runs one way at the most: what lies between looks as far apart is seen."""
+
     @abstractmethod
     def labels(self) -> list[str]:
         """What each value is called after the name of the component, P of them."""
@@ -71,6 +76,11 @@ class Table(Curve):
         object.__setattr__(self, "x", frozen(self.x, np.float64, (n,), "Table.x"))
         object.__setattr__(self, "values", frozen(self.values, np.float64, (2 * n if self.both else n,), "Table.values"))
         object.__setattr__(self, "range", EVERYWHERE if self.period else (float(self.x[0]), float(self.x[-1])))
+
+    @property
+    def detail(self) -> float:
+        """See the base class: the least distance between positions."""
+        return float(np.diff(self.x).min(initial=np.inf))
 
     def labels(self) -> list[str]:
         """[0], [1] ... by position; [0]+ forwards, [0]- backwards."""
@@ -149,6 +159,12 @@ class Fourier(Curve):
         if len(self.values) % 2 == 0:
             raise ValueError(f"Fourier.values has {len(self.values)} entries, expected 1 + 2 K")
 
+    @property
+    def detail(self) -> float:
+        """See the base class: half a period of the highest harmonic."""
+        order = len(self.values) // 2
+        return 0.5 * self.period / order if order else np.inf
+
     def labels(self) -> list[str]:
         """mean, cos1, ..., sin1, ..."""
         harmonics = range(1, 1 + len(self.values) // 2)
@@ -182,6 +198,11 @@ class Polynomial(Curve):
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "values", frozen(self.values, np.float64, (-1,), "Polynomial.values"))
+
+    @property
+    def detail(self) -> float:
+        """See the base class: the range by the degree."""
+        return (self.range[1] - self.range[0]) / max(len(self.values) - 1, 1)
 
     def labels(self) -> list[str]:
         """.c0, .c1, ..."""

@@ -78,6 +78,17 @@ class ErrorModel:
         """The same parameters, all 0."""
         return self.with_values(np.zeros(len(self.names)))
 
+    def detail(self, names: tuple[str, ...]) -> Floats:
+        """(J,) mm or rad that the axes `names` may go between two looks, so that no error is overlooked."""
+        result = np.full(len(names), np.inf)
+        for component in self.axes.components:
+            j = names.index(component.name.axis)
+            result[j] = min(result[j], component.curve.detail)
+        for letter, nodes in () if self.map is None else zip(self.map.letters, self.map.nodes, strict=True):
+            mine = [j for j, name in enumerate(names) if name == letter or (letter in "xyz" and name not in "ABC")]
+            result[mine] = np.minimum(result[mine], np.diff(nodes).min(initial=np.inf))
+        return result
+
     def on(self, kinematics: Kinematics) -> Actual:
         """The machine with these errors, at the tip of the kinematics' tool.
 

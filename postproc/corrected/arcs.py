@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
 from postproc.corrected.reversals import LOOSE
 from postproc.corrected.work import Work, on_arc
 from postproc.groups import groups
+from postproc.looks import changes, looks_between
 from postproc.path import ARC, FEED, Path
 from postproc.word_arcs import PLANE_AXIS, PLANE_COLUMNS
 from toolpaths.arrays import Bools, Floats, Ints
@@ -36,7 +38,17 @@ def fitted_arcs(path: Path, nominal: Path, work: Work, start: Floats, allowed: f
             share = np.full(len(k), t)
             got = new.joints(on_arc(path.plane[k], path.ccw[k], center[k], c0, c1, share, xyz), kin, 0.0)
             resolved[k] |= ~(work.off(work.nominal(k, share), got, k, work.way_at(k, share)) <= LOOSE * allowed)
+        for r, share in looks_between(_changes(work, k)):
+            got = new.joints(on_arc(path.plane[k[r]], path.ccw[k[r]], center[k[r]], c0[r], c1[r], share, xyz), kin, 0.0)
+            off = work.off(work.nominal(k[r], share), got, k[r], work.way_at(k[r], share))
+            resolved[k[r][~(off <= LOOSE * allowed)]] = True
     return replace(path, center=center, code=np.where(resolved, FEED, path.code).astype(path.code.dtype)), resolved
+
+
+def _changes(work: Work, k: Ints) -> Ints:
+    """(N,) stretches of arcs k (N,) in which errors run one way."""
+    places = [work.nominal(k, np.full(len(k), t)) for t in (0.0, *LOOKS, 1.0)]
+    return changes(sum((np.abs(two - one) for one, two in pairwise(places)), np.zeros_like(places[0])), work.detail)
 
 
 def new_centers(path: Path, k: Ints, n0: Floats, n1: Floats, c0: Floats, c1: Floats) -> Floats:

@@ -9,6 +9,7 @@ import numpy as np
 from postproc.corrected.arcs import LOOKS as ARC_LOOKS
 from postproc.corrected.reversals import LOOSE, SHORTEST, Divided, Starts, inserted, reversals, stretches
 from postproc.corrected.work import ALONE, MOMENT, Work
+from postproc.looks import looks_between
 from postproc.path import ARC, FEED, Path
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.units import DEG
@@ -56,7 +57,7 @@ class Pieces:
     q1: Floats
     way: Floats
 
-    def rows(self, keep: Bools) -> Pieces:
+    def rows(self, keep: Bools | Ints) -> Pieces:
         """Some of them."""
         return Pieces(self.block[keep], self.t0[keep], self.t1[keep], self.q0[keep], self.q1[keep],
                       self.way[keep])
@@ -90,15 +91,21 @@ def _taken_up(path: Path, work: Work, starts: Starts, block: Ints,
 
 
 def _off(pieces: Pieces, path: Path, work: Work) -> Floats:
-    """(N,) mm, largest distance from the nominal motion at LOOKS."""
-    worst = np.zeros(len(pieces.block))
+    """(N,) mm, largest distance from the nominal motion at LOOKS, and at more where errors change their course between."""
+    worst, count = np.zeros(len(pieces.block)), work.changes(pieces.q0, pieces.q1)
     for look in LOOKS:
-        t = np.full(len(worst), look)
-        at = pieces.t0 + t * (pieces.t1 - pieces.t0)
-        got = work.straight(path, pieces.q0, pieces.q1, pieces.block, t)
-        way = work.played(pieces.way, pieces.q0, got)
-        worst = np.maximum(worst, work.off(work.nominal(pieces.block, at), got, pieces.block, way))
+        worst = np.maximum(worst, _off_at(pieces, np.full(len(worst), look), path, work))
+    for rows, share in looks_between(count):
+        np.maximum.at(worst, rows, _off_at(pieces.rows(rows), share, path, work))
     return worst
+
+
+def _off_at(pieces: Pieces, t: Floats, path: Path, work: Work) -> Floats:
+    """(N,) mm from the nominal motion at t (N,) of pieces."""
+    at = pieces.t0 + t * (pieces.t1 - pieces.t0)
+    got = work.straight(path, pieces.q0, pieces.q1, pieces.block, t)
+    way = work.played(pieces.way, pieces.q0, got)
+    return work.off(work.nominal(pieces.block, at), got, pieces.block, way)
 
 
 def _bound(pieces: Pieces, path: Path, work: Work, allowed: float) -> Floats:

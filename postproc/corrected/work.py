@@ -14,6 +14,7 @@ from machines.geometric_error.lost_motion import GRAIN, Steps, turning_sign
 from machines.geometric_error.model import ErrorModel
 from machines.kinematics.base import Kinematics
 from postproc.groups import groups
+from postproc.looks import changes
 from postproc.path import ARC, TRAVERSE, Path
 from postproc.word_arcs import PLANE_COLUMNS
 from toolpaths.arrays import Bools, Floats, Ints
@@ -181,6 +182,34 @@ class Work:
             control = path.frames[int(path.frame[block[k[0]]])].control
             kin = self.kinematics(int(tools[k[0]]))
             result[k] = control.between(q0[k], q1[k], t[k], kin, rapid[k])[2]
+        return result
+
+    @cached_property
+    def detail(self) -> Floats:
+        """(J,) mm or rad that joints may go between two looks."""
+        return self.model.detail(self.names)
+
+    def changes(self, q0: Floats, q1: Floats) -> Ints:
+        """(N,) stretches of motion from q0 to q1 (N, J) in which errors run one way."""
+        return changes(q1 - q0, self.detail)
+
+    def reached(self) -> tuple[Floats, Floats]:
+        """(K, J) least and greatest joints of blocks: at the end and, where joints do not run straight, on the way."""
+        low, high = self.path.q.copy(), self.path.q.copy()
+        block = np.flatnonzero(self.bent & ~self.path.home)
+        for t in EDGES if len(block) else ():
+            q = self.nominal(block, np.full(len(block), t))
+            low[block], high[block] = np.fmin(low[block], q), np.fmax(high[block], q)
+        return low, high
+
+    def unmeasured(self, low: Floats, high: Floats) -> Bools:
+        """(K, J) joints that go where errors were not measured, in blocks with joints from `low` to `high` (K, J)."""
+        result = np.zeros(low.shape, dtype=np.bool_)
+        for k in groups(self.tools):
+            tool = int(self.tools[k[0]])
+            poses = np.concatenate(self.kinematics(tool).forward(self.path.q[k]), axis=1)
+            for q in (low[k], high[k]):
+                result[k] |= self.actual(tool).outside(self.actual(tool).coordinates(q, poses))
         return result
 
     def ends(self) -> CorrectedEnds:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -10,6 +11,7 @@ import numpy as np
 from machines.geometric_error.actual import Actual
 from machines.geometric_error.lost_motion import Steps
 from machines.geometric_error.model import ErrorModel
+from postproc.looks import changes, looks_between
 from postproc.readback.execute import Motion
 from postproc.readback.poses import Executed, begins
 from toolpaths.arrays import Bools, Floats, Ints
@@ -17,6 +19,8 @@ from toolpaths.arrays import Bools, Floats, Ints
 ARC = 2
 LOOKS = 16
 """parts of a block whose joints do not run straight, for the ways of its axes"""
+ARC_LOOKS = 0.25, 0.5, 0.75, 1.0
+"""where the way of joints in a block is added up"""
 AT_ONCE = 50_000
 """such blocks that are looked at together"""
 
@@ -43,6 +47,14 @@ class ActualExecuted(Executed):
         """(K,) mm: what errors come to at both ends together; axes with rapids of their own take it up one by one."""
         return np.asarray(sum(np.linalg.norm(self.poses(motion, rows, t)[0] - super(ActualExecuted, self).poses(
             motion, rows, t)[0], axis=1) for t in (0.0, 1.0)))
+
+    def looks(self, motion: Motion, rows: Ints) -> Iterator[tuple[Ints, Floats]]:
+        """See `Executed`: errors may change their course on the way."""
+        step, before = np.zeros((len(rows), len(self.control.machine.axis_names))), self.joints(motion, rows, 0.0)
+        for t in ARC_LOOKS:
+            here = self.joints(motion, rows, t)
+            step, before = step + np.abs(here - before), here
+        return looks_between(changes(step, self.model.detail(self.control.machine.axis_names)))
 
     def _actual(self, number: int) -> Actual:
         return self.model.on(self.kinematics(number))

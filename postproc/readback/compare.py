@@ -178,6 +178,13 @@ def _deviations(motion: Motion, executed: Executed, moves: Moves, rows: Ints, ow
             d = np.where(level[part], _off_level(curve, tip), d)
             tip_off[part] = np.fmax(tip_off[part], np.nan_to_num(d, nan=np.inf))
             axis_off[part] = np.fmax(axis_off[part], np.nan_to_num(e, nan=np.inf))
+        for k, places in executed.looks(motion, here):
+            tip, axis = executed.poses(motion, here[k], places)
+            some = moves.curves(owner[here[k]])
+            d, e, _ = some.deviation(tip, axis, np.minimum(begin[part][k] + places * share[part][k], 1.0), within)
+            d = np.where(level[part][k], _off_level(some, tip), d)
+            np.fmax.at(tip_off, at + k, np.nan_to_num(d, nan=np.inf))
+            np.fmax.at(axis_off, at + k, np.nan_to_num(e, nan=np.inf))
     return tip_off, axis_off
 
 

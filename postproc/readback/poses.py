@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -66,6 +66,10 @@ class Executed:
     def corrected_on_the_way(self, motion: Motion, rows: Ints) -> Floats:
         """(K,) mm that the corrections of the tip may change by in blocks: none on the machine without errors."""
         return np.zeros(len(rows))
+
+    def looks(self, motion: Motion, rows: Ints) -> Iterator[tuple[Ints, Floats]]:
+        """(numbers (M,) of `rows`, fractions (M,)) where long blocks are looked at besides SAMPLES; none without errors."""
+        return iter(())
 
     def bent(self, motion: Motion, rows: Ints) -> Bools:
         """(K,) True for rapids that are dog-legs."""

@@ -1,0 +1,91 @@
+"""Between the ends of blocks: errors that change their course many times in one, and places that were not measured."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import postproc
+import toolpaths
+from machines.geometric_error import load
+from postproc.looks import changes, looks_between
+from postproc.options import Options
+from postproc.pipeline import PostResult
+
+HEAD = "UNITS/MM\nLOADTL/1\nSPINDL/3000,RPM,CLW\nFEDRAT/400,MMPM\nRAPID\nGOTO/-160,0,20\nGOTO/-160,0,0\n"
+LINE = HEAD + "GOTO/160,0,0\nFINI\n"
+CIRCLE = HEAD.replace("-160,0", "0,-60") + "CIRCLE/0,0,0,0,0,1,60\nGOTO/0,60,0\nFINI\n"
+
+
+def converted(folder: Path, cl: str, model: str, table: str = "", beyond: bool = False) -> PostResult:
+    (folder / "m.toml").write_text('machine = "mill-3axis"\n' + model)
+    (folder / "t.csv").write_text(table)
+    path, found = toolpaths.read_bytes(cl)
+    return postproc.convert(path, "mill-3axis", "linuxcnc", options=Options(error_model=str(folder / "m.toml"),
+                            error_beyond=beyond), diagnostics=found)
+
+
+def periodic(period: float) -> tuple[str, str]:
+    """Model and table of a screw whose lead errs by 15 um, along and across."""
+    x = period * np.arange(8) / 8.0
+    rows = (f"{v:.6f}, {off:.6f}, {off:.6f}" for v, off in zip(x, 15.0 * np.sin(2.0 * np.pi * x / period), strict=True))
+    one = f'table = "t.csv"\nrepeats = {period}\n'
+    return f"[components.EXX]\n{one}[components.EYX]\n{one}", "\n".join(["X [mm], EXX [um], EYX [um]", *rows, ""])
+
+
+def worst(result: PostResult, folder: Path) -> float:
+    """mm that the tip is off by on the written blocks, looked at every tenth of a millimetre."""
+    actual = load(folder / "m.toml", result.machine).on(result.machine.kinematics)
+    assert result.path is not None
+    q = result.path.q[np.flatnonzero(np.isfinite(result.path.u))]
+    off = 0.0
+    for one, two in pairwise(q):
+        t = np.linspace(0.0, 1.0, 2 + int(10.0 * np.abs(two - one).max()))[:, None]
+        tip = actual.aim(one + t * (two - one))[0]
+        nominal = result.machine.kinematics.forward(np.round(q[:1]))[0]
+        off = max(off, float(np.abs(tip[:, 1] - nominal[0, 1]).max()))
+    return off
+
+
+@pytest.mark.parametrize("period", [2.0, 4.0, 5.0, 7.3])
+def test_errors_with_a_period_are_corrected_along_a_long_line(period: float, tmp_path: Path) -> None:
+    result = converted(tmp_path, LINE, *periodic(period))
+    assert result.ok and result.compensation is not None, [str(d) for d in result.diagnostics]
+    assert result.compensation.added > 2.0 * 320.0 / period
+    assert worst(result, tmp_path) < 2e-3
+
+
+def test_the_proof_looks_between_points_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("postproc.corrected.points.looks_between", lambda count: iter(()))
+    monkeypatch.setattr("postproc.corrected.points.LOOKS", (0.25, 0.5, 0.75))  # whole periods, as those of any program
+    result = converted(tmp_path, LINE, *periodic(4.0))
+    assert not result.ok and "verify.tip" in {d.code for d in result.diagnostics}
+
+
+def test_arcs_with_a_period_become_lines(tmp_path: Path) -> None:
+    result = converted(tmp_path, CIRCLE, *periodic(3.0))
+    assert result.ok and result.compensation is not None and result.compensation.resolved >= 1
+    assert result.compensation.added > 50
+
+
+TABLE = "X [mm], EXX [um]\n-200, 0\n0, 5\n30, 8\n"
+
+
+def test_an_arc_that_leaves_what_was_measured_is_refused(tmp_path: Path) -> None:
+    model = "[components.EXX]\ntable = \"t.csv\"\n[components.EYY]\npolynomial = [0.0, 0.1]\nrange = [-70, 20]\n"
+    result = converted(tmp_path, CIRCLE, model, TABLE)
+    told = [d for d in result.diagnostics if d.code == "compensation.range"]
+    assert not result.ok and result.text == ""
+    assert [d.message.split()[0] for d in told] == ["X", "Y"] and "60.000" in told[0].message
+    allowed = converted(tmp_path, CIRCLE, model, TABLE, beyond=True)
+    assert allowed.ok and len([d for d in allowed.diagnostics if d.code == "compensation.range"]) == 2
+
+
+def test_looks_cover_every_stretch() -> None:
+    count = changes(np.array([[0.5, 100.0], [0.0, 3.0], [np.nan, 1.0]]), np.array([np.inf, 4.0]))
+    np.testing.assert_array_equal(count, [25, 1, 1])
+    rows, shares = (np.concatenate(x) for x in zip(*looks_between(count), strict=True))
+    assert set(rows.tolist()) == {0} and set(np.floor(shares * 25.0).astype(int).tolist()) == set(range(25))
