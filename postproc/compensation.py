@@ -35,6 +35,8 @@ DOUBTS = 500
 """blocks at which the doubt of the correction is computed"""
 SHARE = 0.1
 """of the tolerances: what the correction may be off between corrected points"""
+MOVED = 2
+"""how often points are put between ends: words may take ends farther by other ways, and blocks begin by those then"""
 SETTLED = 5
 """how often the ways of the axes are looked for: a correction by new ways may turn other axes back"""
 
@@ -119,10 +121,18 @@ def compensate(path: Path, moves: Moves, tools: Ints, kinematics: Callable[[int]
     lost = live & ~np.isfinite(found.q).all(axis=1)
     if (diagnostics and not beyond) or lost.any():
         return None, None, diagnostics or [_lost(path, moves, lost, file)]
-    starts = starts_of(corrected, path, work, allowed)
-    corrected, resolved = fitted_arcs(corrected, path, work, starts.q, allowed, float(writing.grain.min()))
-    whole = divided(corrected, work, starts, allowed)
-    (corrected, axis_left), apart = settled(whole, work, writing, allowed), work.whole[whole.owner] == ALONE
+    for _ in range(MOVED):
+        starts = starts_of(corrected, path, work, allowed)
+        fitted, resolved = fitted_arcs(corrected, path, work, starts.q, allowed, float(writing.grain.min()))
+        whole = divided(fitted, work, starts, allowed)
+        written, axis_left, ways = settled(whole, work, writing, allowed)
+        ends = np.flatnonzero(np.append(whole.owner[1:] != whole.owner[:-1], True))
+        far = np.flatnonzero(np.abs(written.q[ends] - fitted.q).max(axis=1, initial=0.0) > allowed)
+        if not len(far):
+            break
+        corrected.q[far] = written.q[ends[far]]
+        work.way[far[:, None], work.two_way] = ways[ends[far]]
+    corrected, apart = written, work.whole[whole.owner] == ALONE
     whole = replace(whole, path=corrected).of(cut)
     done = live & np.isfinite(path.u)
     (tip_before, axis_before), (tip_after, axis_after) = (x[done].max(axis=0, initial=0.0).tolist()

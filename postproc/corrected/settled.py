@@ -45,9 +45,9 @@ class Writing:
     grain: Floats
 
 
-def settled(made: Divided, work: Work, writing: Writing, allowed: float) -> tuple[Path, float]:
-    """The path made of the blocks of `work`, with words by which axes that lose motion stand where they should; and rad, the
-    worst that is left of the axis at ends of CL moves where they do.
+def settled(made: Divided, work: Work, writing: Writing, allowed: float) -> tuple[Path, float, Floats]:
+    """The path made of the blocks of `work`, with words by which axes that lose motion stand where they should; rad, the
+    worst that is left of the axis at ends of CL moves where they do; and the ways (K, T) by which they do.
 
     Blocks keep their words where these bring the tip as near as rounding lets them. Closed circles, linking moves and blocks
     that name their axes keep them anyway, points between ends and rapids where they are off by no more than `allowed` mm.
@@ -56,12 +56,12 @@ def settled(made: Divided, work: Work, writing: Writing, allowed: float) -> tupl
     """
     path = made.path
     if not work.two_way:
-        return path, 0.0
+        return path, 0.0, np.zeros((len(path), 0))
     written = _Written(made, work, writing)
     n, ways = walk(written.ends(allowed))
     left, changed = written.axis_left(ways), np.flatnonzero(n.any(axis=1))
     if not len(changed):
-        return path, left
+        return path, left, ways
     chosen, xyz = written.words.copy(), path.frames[0].control.xyz
     chosen[:, xyz] += n * writing.grain[xyz]
     q = path.q.copy()
@@ -70,7 +70,7 @@ def settled(made: Divided, work: Work, writing: Writing, allowed: float) -> tupl
     center = path.center.copy()
     center[arcs] = new_centers(path, arcs, *(words[rows][:, xyz] for words in (written.words, chosen)
                                              for rows in (arcs - 1, arcs)))
-    return replace(path, q=q, center=center), left
+    return replace(path, q=q, center=center), left, ways
 
 
 class _Written:
