@@ -121,17 +121,7 @@ def compensate(path: Path, moves: Moves, tools: Ints, kinematics: Callable[[int]
     lost = live & ~np.isfinite(found.q).all(axis=1)
     if (diagnostics and not beyond) or lost.any():
         return None, None, diagnostics or [_lost(path, moves, lost, file)]
-    for _ in range(MOVED):
-        starts = starts_of(corrected, path, work, allowed)
-        fitted, resolved = fitted_arcs(corrected, path, work, starts.q, allowed, float(writing.grain.min()))
-        whole = divided(fitted, work, starts, allowed)
-        written, axis_left, ways = settled(whole, work, writing, allowed)
-        ends = np.flatnonzero(np.append(whole.owner[1:] != whole.owner[:-1], True))
-        far = np.flatnonzero(np.abs(written.q[ends] - fitted.q).max(axis=1, initial=0.0) > allowed)
-        if not len(far):
-            break
-        corrected.q[far] = written.q[ends[far]]
-        work.way[far[:, None], work.two_way] = ways[ends[far]]
+    whole, written, resolved, axis_left = _written_out(corrected, path, work, writing, allowed)
     corrected, apart = written, work.whole[whole.owner] == ALONE
     whole = replace(whole, path=corrected).of(cut)
     done = live & np.isfinite(path.u)
@@ -144,6 +134,24 @@ def compensate(path: Path, moves: Moves, tools: Ints, kinematics: Callable[[int]
         partial=int(found.partial[live].sum()), moved=np.abs(found.q - path.q).max(axis=0, initial=0.0),
         owner=whole.owner, part=whole.part, apart=apart, doubt_tip=doubt_tip, doubt_axis=doubt_axis)
     return corrected, report, [*diagnostics, *(info("compensation", line, file=file) for line in report.lines())]
+
+
+def _written_out(corrected: Path, path: Path, work: Work, writing: Writing,
+                 allowed: float) -> tuple[Divided, Path, Bools, float]:
+    """The blocks with points between them, their path in words that stand where they should, arcs that became lines, and rad
+    left of the axis; anew where words take ends farther."""
+    for _ in range(MOVED):
+        starts = starts_of(corrected, path, work, allowed)
+        fitted, resolved = fitted_arcs(corrected, path, work, starts.q, allowed, float(writing.grain.min()))
+        whole = divided(fitted, work, starts, allowed)
+        written, axis_left, ways = settled(whole, work, writing, allowed)
+        ends = np.flatnonzero(np.append(whole.owner[1:] != whole.owner[:-1], True))
+        far = np.flatnonzero(np.abs(written.q[ends] - fitted.q).max(axis=1, initial=0.0) > allowed)
+        if not len(far):
+            break
+        corrected.q[far] = written.q[ends[far]]
+        work.way[far[:, None], work.two_way] = ways[ends[far]]
+    return whole, written, resolved, axis_left
 
 
 def _points_by_mean(cut: Divided, moves: Moves, modes: OutputModes, work: Work, allowed: float, always: Bools) -> Divided:

@@ -81,15 +81,18 @@ def _correct_sequence(path: Path, nominal: Path, holes: list[Ints], work: Work, 
         joints = np.where(work.rotary, path.q[hole.rows], new.joints(words, kin, 0.0))
         way = np.tile(work.way[hole.rows[hole.bottom]], (len(hole.rows), 1))
         share = allowed[hole.rows]
-        if _approach_off(path, work, q, joints, int(hole.rows[0])) <= IN_AIR * share[0] and (
+        if _approach_off(path, work, q, joints, int(hole.rows[0]), float(share[0])) <= IN_AIR * share[0] and (
                 work.off(nominal.q[hole.rows], joints, hole.rows, way) <= LOOSE * share).all() and (
                 work.off(nominal.q[hole.rows], joints, hole.rows, work.way[hole.rows]) <= IN_AIR * share).all():
             q[hole.rows], whole[hole.rows] = joints, hole.rows[0]
 
 
-def _approach_off(path: Path, work: Work, q: Floats, joints: Floats, row: int) -> float:
-    """mm, largest distance from the nominal motion on the way to a hole (block `row`), which gets no points."""
-    if path.code[row] != TRAVERSE:
+def _approach_off(path: Path, work: Work, q: Floats, joints: Floats, row: int, share: float) -> float:
+    """mm, largest distance from the nominal motion on the way to a hole (block `row`), which gets no points; 0 where the
+    correction changes by no more than `share` mm over one stretch of the errors."""
+    change = joints[0] - q[row - 1] - (work.path.q[row] - work.path.q[row - 1])
+    near = work.changes(q[row - 1:row], joints[:1])[0] == 1 and np.abs(change).max() <= share
+    if path.code[row] != TRAVERSE or near:
         return 0.0
     block, t = np.full(len(LOOKS), row), np.array(LOOKS)
     got = work.straight(path, np.tile(q[row - 1], (len(t), 1)), np.tile(joints[0], (len(t), 1)), block, t)
