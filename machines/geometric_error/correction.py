@@ -31,10 +31,10 @@ AXIS_TOLERANCE = 0.05 * DEG
 """rad, unless another is given"""
 BLIND = 1e-9
 """axis rate below which a turn does not move the axis"""
-CLOSED = 2e-6, 5e-8
-"""mm and rad: steps that small are the last; they leave less than a hundredth of themselves, near a pole a tenth"""
+CLOSED = 4e-8, 5e-10
+"""mm and rad: steps that small are not taken any more"""
 STEPS = 20
-"""at most; realistic errors take 3 or 4, only the points that are open go on"""
+"""at most; realistic errors take 2 or 3, only the points that are open go on"""
 
 
 @dataclass(frozen=True)
@@ -91,13 +91,15 @@ def correct(actual: Actual, q: Floats, tip: Floats, axis: Floats, *, group: Ints
             turned += turns.near_pole(axis - at_axis, axis_tolerance)
         gap = tip[rows] - at_tip[rows] - np.einsum("nij,nj->ni", rates[rows, :3, 3:], turned)
         step = np.concatenate([np.einsum("nij,nj->ni", slides[rows], gap), turned], axis=1)
+        closed = np.abs(step) <= np.where(np.arange(step.shape[1]) < 3, *CLOSED)
+        open_ = ~np.all(closed | np.isnan(w[rows]), axis=1)
+        if steps == STEPS or not open_.any():
+            break
+        if group is None:
+            rows, step = np.arange(len(w))[rows][open_], step[open_]
         w[rows] += step
         at_tip[rows], at_axis[rows] = actual.aim(w[rows], None if direction is None else direction[rows])
         steps += 1
-        open_ = np.any(np.abs(step) > np.where(np.arange(step.shape[1]) < 3, *CLOSED), axis=1)
-        if steps == STEPS or not open_.any():
-            break
-        rows = np.arange(len(w))[rows][open_] if group is None else rows
     partial = np.zeros(len(q), dtype=np.bool_) if turns is None else np.asarray(np.any(turns.weak, axis=1))
     after = _deviation(at_tip, at_axis, tip, axis)
     return Corrected(_wound(actual, w, q), *before, *after, at_tip - tip, at_axis - axis, partial, unmeasured, steps)
