@@ -24,6 +24,7 @@ from postproc.corrected.reversals import Divided, arcs_cut, inserted, starts_of
 from postproc.corrected.settled import Writing, settled
 from postproc.corrected.work import ALONE, CorrectedEnds, Work
 from postproc.groups import groups
+from postproc.looks import looks_between
 from postproc.modes import OutputModes
 from postproc.moves import Moves
 from postproc.path import Path
@@ -46,7 +47,8 @@ class Compensation:
     """What the correction did to the blocks that it corrects, mm and rad.
 
     Attributes:
-        tip_before, axis_before: worst deviation of the machine with errors at nominal ends of blocks of CL moves
+        tip_before, axis_before: worst deviation of the machine with errors at nominal ends of blocks of CL moves, and in long
+            ones wherever errors may turn
         tip_after, axis_after: worst deviation at their corrected ends: the residual
         residual_tip, residual_axis: (K, 3) at the ends of the blocks given, actual less wanted; 0 at home blocks
         added: points added; resolved: arcs that became lines
@@ -125,8 +127,8 @@ def compensate(path: Path, moves: Moves, tools: Ints, kinematics: Callable[[int]
     corrected, apart = written, work.whole[whole.owner] == ALONE
     whole = replace(whole, path=corrected).of(cut)
     done = live & np.isfinite(path.u)
-    (tip_before, axis_before), (tip_after, axis_after) = (x[done].max(axis=0, initial=0.0).tolist()
-                                                          for x in (found.before, found.after))
+    tip_before, axis_before = np.maximum(found.before[done].max(axis=0, initial=0.0), _before_inside(path, work, done)).tolist()
+    tip_after, axis_after = found.after[done].max(axis=0, initial=0.0).tolist()
     doubt_tip, doubt_axis = _doubt(path, live, work, model)
     report = Compensation(
         tip_before, axis_before, tip_after, max(axis_after, axis_left), residual_tip=found.residual[:, :3],
@@ -152,6 +154,17 @@ def _written_out(corrected: Path, path: Path, work: Work, writing: Writing,
         corrected.q[far] = written.q[ends[far]]
         work.way[far[:, None], work.two_way] = ways[ends[far]]
     return whole, written, resolved, axis_left
+
+
+def _before_inside(path: Path, work: Work, where: Bools) -> Floats:
+    """(2,) worst deviations, mm and rad, of nominal joints inside the long blocks that are `where` (K,)."""
+    block, worst = np.flatnonzero(where & (np.arange(len(path)) > 0)), np.zeros(2)
+    for k, t in looks_between(work.changes(path.q[block - 1], path.q[block])):
+        rows = block[k]
+        q = work.nominal(rows, t)
+        off = work.residual(q, q, rows, work.way_at(rows, t)).reshape(-1, 2, 3)
+        worst = np.fmax(worst, np.fmax.reduce(np.linalg.norm(off, axis=2)))
+    return worst
 
 
 def _points_by_mean(cut: Divided, moves: Moves, modes: OutputModes, work: Work, allowed: float, always: Bools) -> Divided:

@@ -11,6 +11,9 @@ from postproc.program import Program
 if TYPE_CHECKING:
     from postproc.pipeline import PostResult
 
+FINGERPRINT = "fingerprint of the geometric errors"
+"""before the eight hex digits of the error model that a program was written with"""
+
 
 def header_lines(result: PostResult) -> list[str]:
     """The head of the program of a conversion that is compiled."""
@@ -50,8 +53,10 @@ def _corrections(result: PostResult) -> list[str]:
     name = result.job.errors.name
     if result.compensation is None:
         return [f"geometric errors {name}: corrected by the control, not in this program"]
+    from machines.geometric_error.fingerprint import fingerprint
+
     return [f"geometric errors {name}: corrected in this program; the control must not correct them again",
-            *result.compensation.lines()]
+            f"{FINGERPRINT} {fingerprint(result.job.errors)}", *result.compensation.lines()]
 
 
 def _meanings(program: Program) -> str:

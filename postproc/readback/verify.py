@@ -11,6 +11,7 @@ import numpy as np
 from postproc.job import Job
 from postproc.memory import give_back
 from postproc.options import Options
+from postproc.program_header import FINGERPRINT
 from postproc.readback.changes import check_changes
 from postproc.readback.compare import Comparison, compare
 from postproc.readback.dialects import reader_for
@@ -25,6 +26,7 @@ from toolpaths.rotations import angle_between
 from toolpaths.units import DEG
 
 _CORRECTED = re.compile(rb"(?im)^[^\n]*geometric errors ([^\n]*?):? corrected in this program")
+_FINGERPRINT = re.compile(rb"(?im)^[^\n]*" + FINGERPRINT.encode("ascii") + rb" ([0-9a-f]{8})\b")
 _BY_CONTROL = re.compile(rb"(?im)^[^\n]*geometric errors [^\n]*corrected by the control")
 _ORIENTED = re.compile(rb"(?im)^[^\n]*tool axes chosen: orient ([a-z-]+), max tilt ([^ \n]+) degrees")
 _OURS = re.compile(rb"(?im)^[^\n]*postproc \d+\.\d[^\n]*\n(?:[^\n]*part [^\n]*\n)?[^\n]*source ")
@@ -86,8 +88,10 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Callable[[str, i
     unseen = [*check_changes(code, motion, job, home, faults), *check_stops(code, motion, job, faults),
               *_bodies(motion, executed, job, comparison, faults)]
     told = sorted([*unseen, *comparison.diagnostics], key=lambda d: d.code not in CAUSES)
-    if gcode and has_errors(told) and _by_post(job):
-        told = [*_uncorrected(head, job, motion, executed, comparison, gcode), *told]
+    if gcode and _by_post(job):
+        named = _CORRECTED.search(head)
+        told = [*(_of_model(named[1], head, job, gcode, has_errors(told)) if named else
+                  _uncorrected(head, job, motion, executed, comparison, gcode) if has_errors(told) else []), *told]
     return replace(comparison, executed=(code, motion)), [*diagnostics, *told]
 
 
@@ -112,9 +116,6 @@ def _uncorrected(head: bytes, job: Job, motion: Motion, executed: Executed, comp
 
     A program of another post may correct them all the same, so that no amounts are known.
     """
-    named = _CORRECTED.search(head)
-    if named:
-        return _of_another(named[1].decode("utf-8", "replace"), job, gcode)
     by_control = _BY_CONTROL.search(head)
     if not (by_control or _OURS.search(head)):
         return [warning("verify.error_model", "the header of the program names no error model, it is verified on the "
@@ -125,14 +126,25 @@ def _uncorrected(head: bytes, job: Job, motion: Motion, executed: Executed, comp
                   hint="verify without --error-model, or convert with it")]
 
 
-def _of_another(name: str, job: Job, gcode: str) -> list[Diagnostic]:
-    """That a program corrects the errors of another model, by the `name` in its header, than it is verified with."""
+def _of_model(named: bytes, head: bytes, job: Job, gcode: str, off: bool) -> list[Diagnostic]:
+    """What its header tells of the model that a program corrects, `named` and by its fingerprint, where that is not the one
+    that it is verified with; `off`: the program fails. Programs without a fingerprint have only the name."""
+    from machines.geometric_error.fingerprint import fingerprint
+
     assert job.errors is not None
-    if not name or name.casefold() == job.errors.name.casefold():
+    name, stated, now = named.decode("utf-8", "replace"), _FINGERPRINT.search(head), fingerprint(job.errors)
+    then = stated[1].decode("ascii").lower() if stated else ""
+    same = not name or name.casefold() == job.errors.name.casefold()
+    if then == now or (not then and (same or not off)):
         return []
-    return [error("verify.error_model", f"the header of the program names the error model {name}, it is verified with "
-                  f"{job.errors.name}: what is off may follow from that alone", file=gcode,
-                  hint="verify with the model that the program was written with")]
+    marks = f" (fingerprint {then} then, {now} now)" if then else ""
+    if same:
+        return [warning("verify.error_model_changed", f"the error model {job.errors.name} has changed since the program was "
+                        f"written{marks}: the program corrects the errors as they were", file=gcode,
+                        hint="convert again, or verify with the model as it was")]
+    tell, so = (error, "what is off may follow from that alone") if off else (warning, "the program corrects other errors")
+    return [tell("verify.error_model", f"the header of the program names the error model {name}{marks}, it is verified with "
+                 f"{job.errors.name}: {so}", file=gcode, hint="verify with the model that the program was written with")]
 
 
 def _amounts(job: Job, motion: Motion, executed: Executed, comparison: Comparison) -> str:
