@@ -47,8 +47,8 @@ class Compensation:
     """What the correction did to the blocks that it corrects, mm and rad.
 
     Attributes:
-        tip_before, axis_before: worst deviation of the machine with errors at nominal ends of blocks of CL moves, and in long
-            ones wherever errors may turn
+        tip_before, axis_before: worst deviation of the machine with errors at nominal ends of blocks of CL moves, and in
+            long ones wherever errors may turn
         tip_after, axis_after: worst deviation at their corrected ends: the residual
         residual_tip, residual_axis: (K, 3) at the ends of the blocks given, actual less wanted; 0 at home blocks
         added: points added; resolved: arcs that became lines
@@ -127,8 +127,9 @@ def compensate(path: Path, moves: Moves, tools: Ints, kinematics: Callable[[int]
     corrected, apart = written, work.whole[whole.owner] == ALONE
     whole = replace(whole, path=corrected).of(cut)
     done = live & np.isfinite(path.u)
-    tip_before, axis_before = np.maximum(found.before[done].max(axis=0, initial=0.0), _before_inside(path, work, done)).tolist()
-    tip_after, axis_after = found.after[done].max(axis=0, initial=0.0).tolist()
+    before, after = (x[done].max(axis=0, initial=0.0) for x in (found.before, found.after))
+    tip_before, axis_before = np.maximum(before, _before_inside(path, work, done)).tolist()
+    tip_after, axis_after = after.tolist()
     doubt_tip, doubt_axis = _doubt(path, live, work, model)
     report = Compensation(
         tip_before, axis_before, tip_after, max(axis_after, axis_left), residual_tip=found.residual[:, :3],

@@ -56,7 +56,7 @@ def test_errors_with_a_period_are_corrected_along_a_long_line(period: float, tmp
     assert result.ok and result.compensation is not None, [str(d) for d in result.diagnostics]
     assert result.compensation.added > 2.0 * 320.0 / period
     assert worst(result, tmp_path) < 2e-3
-    assert 0.018 < result.compensation.tip_before < 0.0213  # 15 um both ways, nought at the ends where 320 mm are whole periods
+    assert 0.018 < result.compensation.tip_before < 0.0213  # nought at ends where 320 mm are whole periods
 
 
 def test_the_proof_looks_between_points_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
