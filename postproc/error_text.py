@@ -8,7 +8,8 @@ from typing import Any
 def check_text(file: str, found: dict[str, Any]) -> str:
     """What `machines.geometric_error.survey` gives."""
     who = {"post": "corrected by the post-processor", "control": "corrected by the control"}[found["corrected_by"]]
-    lines = [f"{file}: good: errors of {found['machine']}, {found['parameters']} parameters, {who}", *_components(found)]
+    lines = [f"{file}: good: errors of {found['machine']}, {found['parameters']} parameters, {who}; fingerprint "
+             f"{found['fingerprint']}", *_components(found)]
     for kind in ("line", "zero position", "spindle"):
         mine = [f"{n} {v['value']:.3g} {v['unit']}" for n, v in found["location"].items() if v["kind"] == kind]
         lines += [f"{kind}: {', '.join(mine)}"] if mine else []

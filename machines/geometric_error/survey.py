@@ -10,6 +10,7 @@ from machines.geometric_error.actual import Actual
 from machines.geometric_error.covariance import angular
 from machines.geometric_error.csv_table import UNITS
 from machines.geometric_error.curves import Curve, Fourier, Polynomial, Table
+from machines.geometric_error.fingerprint import fingerprint
 from machines.geometric_error.lattice import COLUMNS, ErrorMap
 from machines.geometric_error.model import ErrorModel, doubt
 from machines.geometric_error.names import DIRECTIONS, SPINDLE, parse
@@ -35,6 +36,7 @@ SHORT = 1e-6
 def survey(model: ErrorModel, machine: Machine, tool_length: float) -> dict[str, Any]:
     """Figures of a model, um and arcsec, positions mm and degrees; tool length mm."""
     return {"machine": machine.name, "corrected_by": model.corrected_by, "parameters": len(model.names),
+            "fingerprint": fingerprint(model),
             "components": {str(c.name): _curve(c.curve, c.name.angular, c.name.axis, model, machine)
                            for c in model.axes.components},
             "absent": absent(model, machine),

@@ -134,7 +134,7 @@ def _of_model(named: bytes, head: bytes, job: Job, gcode: str, off: bool) -> lis
     assert job.errors is not None
     name, stated, now = named.decode("utf-8", "replace"), _FINGERPRINT.search(head), fingerprint(job.errors)
     then = stated[1].decode("ascii").lower() if stated else ""
-    same = not name or name.casefold() == job.errors.name.casefold()
+    same = not name or _as_in_comments(name) == _as_in_comments(job.errors.name)
     if then == now or (not then and (same or not off)):
         return []
     marks = f" (fingerprint {then} then, {now} now)" if then else ""
@@ -143,8 +143,14 @@ def _of_model(named: bytes, head: bytes, job: Job, gcode: str, off: bool) -> lis
                         f"written{marks}: the program corrects the errors as they were", file=gcode,
                         hint="convert again, or verify with the model as it was")]
     tell, so = (error, "what is off may follow from that alone") if off else (warning, "the program corrects other errors")
-    return [tell("verify.error_model", f"the header of the program names the error model {name}{marks}, it is verified with "
-                 f"{job.errors.name}: {so}", file=gcode, hint="verify with the model that the program was written with")]
+    return [tell("verify.error_model", f"the header of the program names the error model {name}, it is verified with "
+                 f"{job.errors.name}{marks}: {so}", file=gcode,
+                 hint="verify with the model that the program was written with")]
+
+
+def _as_in_comments(name: str) -> str:
+    """A name without what the comments of some controls change of it: capitals, accents, brackets."""
+    return re.sub(r"[^a-z0-9]+", " ", name.lower())
 
 
 def _amounts(job: Job, motion: Motion, executed: Executed, comparison: Comparison) -> str:
