@@ -22,6 +22,7 @@ from postproc.console import rounded as rounded
 
 if TYPE_CHECKING:
     from postproc.options import Options
+    from postproc.pipeline import PostResult
     from toolpaths.diagnostics import Diagnostic
     from toolpaths.toolpath import Toolpath
 
@@ -74,6 +75,9 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
                                                  "tolerance")] = False,
             setup: Setup = "", tolerance: Tolerance = 0.01, axis_tolerance: AxisTolerance = 0.05, units: Units = "",
             dialect: Dialect = "", allow_unknown: Allow = None, error_model: Errors = "", beyond: Beyond = False,
+            residuals: Annotated[list[Path] | None, typer.Option("--residuals", metavar="FILE", help="what errors do at "
+                                 "each CL point, before and after correction: .csv, or drawn: .png, .svg; again for "
+                                 "more")] = None,
             json: Json = "") -> None:
     """Convert a CL file to G-code, read it back and prove it; nothing is written where a proof fails."""
     _choice("--orient", orient, ORIENTATIONS)
@@ -83,17 +87,22 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
                       output=output_mode, feed=feed, merge_feeds=merge_feeds / 100.0, smooth=smooth,  # type: ignore[arg-type]
                       error_model=error_model, error_beyond=beyond, orient=orient,  # type: ignore[arg-type]
                       max_tilt=max_tilt, name=output.stem)
-    refuse_overwriting({"-o": str(output), "--json": json}, {"the CL file": str(file), "the set-up": setup,
-                                                             "the error model": error_model})
+    fields = _residual_files(residuals or [], error_model)
+    refuse_overwriting({"-o": str(output), "--json": json, **{f"--residuals {name}": str(name) for name in fields}},
+                       {"the CL file": str(file), "the set-up": setup, "the error model": error_model})
     from postproc import summary
-    from postproc.files import write_all
+    from postproc.files import write_all, write_atomically
     from postproc.pipeline import convert as run
 
     with shown_errors(json), progress_bar() as progress:
         m, spec = machine_of(machine), controller_of(controller)
         path, found = _read(file, options, progress)
         result = run(path, m, spec, options=options, diagnostics=found, progress=progress)
+        told, why = _fields(result, fields) if fields else ([], [])
+        result = replace(result, diagnostics=(*result.diagnostics, *why))
         if result.ok:
+            for name, content in zip(fields, told, strict=True):
+                write_atomically(name, content)
             result = replace(result, diagnostics=(*result.diagnostics, *write_all(output, result.text, result.files or {})))
     report(result.diagnostics, json, summary.as_dict(result, str(output)), summary.as_text(result, str(output)))
 
@@ -172,6 +181,26 @@ def main() -> None:
 def _choice(option: str, value: str, allowed: tuple[str, ...]) -> None:
     if value not in allowed:
         raise typer.BadParameter(f"{value!r} is not available; choose from {', '.join(allowed)}", param_hint=option)
+
+
+def _residual_files(files: list[Path], error_model: str) -> list[Path]:
+    """The files of --residuals; wrong use without an error model, or where one is neither table nor drawing."""
+    if not files:
+        return []
+    from postproc.residuals import ENDINGS
+
+    if not error_model:
+        raise typer.BadParameter("there are none without --error-model", param_hint="--residuals")
+    for name in files:
+        if name.suffix.lower() not in ENDINGS:
+            raise typer.BadParameter(f"{name.name} ends neither in .csv nor in .png or .svg", param_hint="--residuals")
+    return files
+
+
+def _fields(result: PostResult, files: list[Path]) -> tuple[list[str | bytes], list[Diagnostic]]:
+    from postproc.residuals import contents
+
+    return contents(result, [name.suffix.lower() for name in files])
 
 
 def _options(tolerance: float, axis_tolerance: float, feed_mode: str, setup: str, units: str, dialect: str,

@@ -72,6 +72,8 @@ class PostResult:
     diagnostics: tuple[Diagnostic, ...]
     toolpath: Toolpath | None = None
     job: Job | None = None
+    moves: Moves | None = None
+    """that are written: those of `job`, with --smooth moved"""
     path: Path | None = None
     nominal: Path | None = None
     compensation: Compensation | None = None
@@ -188,6 +190,7 @@ def _stages(result: PostResult, progress: Progress | None) -> PostResult:
     if not result.ok:
         return result
     moves = written_moves(job, shares)
+    result = _with(result, [], moves=moves)
     drawing, found = drawing_of(job.setup, job.placement, job.space, job.machine, options.setup or file)
     result = _with(result, found)
     if not result.ok:

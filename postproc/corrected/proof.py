@@ -32,13 +32,15 @@ class AfterFormatting:
 
     Attributes:
         tip, axis: (M,) at each of the `points`
-        points: (M,) numbers of the moves that come there
+        points: (M,) numbers of the moves without pecks that come there
+        blocks: (M,) of the program, ending there
         tip_bound, axis_bound: what correction, rounding of the words and lost motion may leave together
     """
 
     tip: Floats
     axis: Floats
     points: Ints
+    blocks: Ints
     tip_bound: float
     axis_bound: float
 
@@ -58,20 +60,22 @@ class AfterFormatting:
 def after_formatting(result: PostResult) -> AfterFormatting | None:
     """The deviations of a conversion that corrects geometric errors; None of one that does not or that is not proved.
 
-    CL points are where the tool cuts to: ends of feed moves and arcs, bottoms of holes. The bound adds what the correction
-    itself leaves (near poles, and where a machine cannot turn the tool), half a last decimal in every word
-    (`rounding_bound`), and for joints that lose motion a whole one: rounded words may turn one back by that much, within
-    its play.
+    CL points are where the tool cuts to: ends of feed moves and arcs, bottoms of holes; with --smooth where that puts them.
+    The bound adds what the correction itself leaves (near poles, and where a machine cannot turn the tool), half a last
+    decimal in every word (`rounding_bound`), and for joints that lose motion a whole one: rounded words may turn one back
+    by that much, within its play.
     """
     found, comparison, job = result.compensation, result.comparison, result.job
-    if found is None or comparison is None or job is None or job.errors is None:
+    if found is None or comparison is None or job is None or job.errors is None or result.moves is None:
         return None
-    moves = job.moves.without_pecks()
+    moves = result.moves.without_pecks()
     tip_play, axis_play = _play(result)
     bounds = found.tip_after + job.rounding.tip + tip_play, found.axis_after + job.rounding.axis + axis_play
-    tip, axis = _nearest(comparison, moves, (bounds[0] + SLACK[0], bounds[1] + SLACK[1]))
-    points = np.flatnonzero(_cl_points(moves) & np.isfinite(tip))
-    return AfterFormatting(tip[points], axis[points], points, *bounds)
+    block = _nearest(comparison, moves, (bounds[0] + SLACK[0], bounds[1] + SLACK[1]))
+    points = np.flatnonzero(_cl_points(moves) & (block >= 0))
+    tip = np.linalg.norm(comparison.tip[block[points]] - moves.tip[points], axis=1)
+    axis = angle_between(comparison.axis[block[points]], moves.axis[points])
+    return AfterFormatting(tip, axis, points, block[points], *bounds)
 
 
 def beyond_bound(result: PostResult) -> list[Diagnostic]:
@@ -117,9 +121,8 @@ def _cl_points(moves: Moves) -> Bools:
     return np.asarray((moves.kind != Kind.RAPID) & ((moves.hole < 0) | (moves.phase == Phase.DRILL)))
 
 
-def _nearest(comparison: Comparison, moves: Moves, bounds: tuple[float, float]) -> tuple[Floats, Floats]:
-    """(tip, axis), each (M,), of the block that ends nearest to each move's end, by `bounds` mm and rad; NaN where the move
-    has none.
+def _nearest(comparison: Comparison, moves: Moves, bounds: tuple[float, float]) -> Ints:
+    """(M,) the block that ends nearest to each move's end, by `bounds` mm and rad; -1 where the move has none.
 
     Those that come into question: its own, and all from the end of the move before to that of the move after: a point where
     lost motion is taken up, or one within the tolerance of the end, may have passed for the end.
@@ -135,9 +138,9 @@ def _nearest(comparison: Comparison, moves: Moves, bounds: tuple[float, float]) 
     axis_off = angle_between(comparison.axis[block], moves.axis[owner])
     order = np.lexsort((np.maximum(tip_off / bounds[0], axis_off / bounds[1]), owner))
     best = order[np.diff(owner[order], prepend=-1) > 0]
-    tip, axis = np.full(len(moves), np.nan), np.full(len(moves), np.nan)
-    tip[owner[best]], axis[owner[best]] = tip_off[best], axis_off[best]
-    return tip, axis
+    result = np.full(len(moves), -1)
+    result[owner[best]] = block[best]
+    return result
 
 
 def _worst(values: Floats) -> float:

@@ -1,0 +1,122 @@
+"""The residual field of a conversion: what geometric errors do at each CL point, before and after their correction."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from machines.geometric_error.actual import approach
+from postproc.corrected.proof import after_formatting
+from postproc.groups import groups
+from postproc.holes import Phase
+from toolpaths.arrays import Floats, Ints
+from toolpaths.diagnostics import Diagnostic, error
+from toolpaths.drawing import FORMATS
+from toolpaths.units import DEG
+
+if TYPE_CHECKING:
+    from postproc.pipeline import PostResult
+
+ENDINGS = (".csv", *FORMATS)
+"""of files that a field is written to: a table, drawings"""
+UM, ARCSEC = 1e-3, DEG / 3600.0
+WAY = 1e-9
+"""mm or rad of a joint that count as motion"""
+
+
+@dataclass(frozen=True)
+class Residuals:
+    """What geometric errors do at M CL points (ends of cuts, bottoms of holes) of a written program, in the part frame.
+
+    Attributes:
+        line: (M,) of the CL file; tip, axis: (M, 3) wanted, mm
+        q: (M, J) nominal joints, mm and rad
+        before, after: (M, 6) tip and axis of the machine with errors less wanted ones, mm and 1: commanded nominal joints,
+            and commanded the program as it was read back
+        tip_bound, axis_bound: what may be left, mm and rad (see `after_formatting`)
+    """
+
+    line: Ints
+    tip: Floats
+    axis: Floats
+    q: Floats
+    before: Floats
+    after: Floats
+    tip_bound: float
+    axis_bound: float
+
+
+def residuals(result: PostResult) -> Residuals | None:
+    """The field of a conversion; None of one whose errors were not corrected here, or that is not proved."""
+    found, job, nominal = after_formatting(result), result.job, result.nominal
+    if found is None or job is None or nominal is None or result.moves is None or result.comparison is None:
+        return None
+    moves, move = result.moves, np.flatnonzero(result.moves.phase != Phase.PECK)[found.points]
+    block = np.full(len(moves), -1)
+    np.maximum.at(block, nominal.move, np.arange(len(nominal)))
+    block = block[move]
+    q, way = nominal.q[block], approach(_steady(nominal.q))[block]
+    before = np.empty((len(q), 6))
+    for k in groups(moves.tool[move]):
+        kinematics = job.kinematics(int(moves.tool[move[k[0]]]))
+        assert job.errors is not None
+        actual, wanted = job.errors.on(kinematics), np.concatenate(kinematics.forward(q[k]), axis=1)
+        before[k] = np.concatenate(actual.aim(actual.coordinates(q[k], wanted), way[k]), axis=1) - wanted
+    there = result.comparison
+    after = np.concatenate([there.tip[found.blocks] - moves.tip[move], there.axis[found.blocks] - moves.axis[move]], axis=1)
+    part = job.placement.inverse()
+    before, after = (np.concatenate([part.directions(x[:, :3]), part.directions(x[:, 3:])], axis=1) for x in (before, after))
+    return Residuals(moves.line[move], part.points(moves.tip[move]), part.directions(moves.axis[move]), q, before, after,
+                     found.tip_bound, found.axis_bound)
+
+
+def _steady(q: Floats) -> Floats:
+    """Joints (N, J), steps that are numbers' own left out."""
+    result: Floats = np.round(np.nan_to_num(q) / WAY) * WAY
+    return result
+
+
+def contents(result: PostResult, endings: list[str]) -> tuple[list[str | bytes], list[Diagnostic]]:
+    """What files of these endings (of ENDINGS) hold: the field as a table, or drawn; nothing, and why, where there is none.
+
+    Raises:
+        ValueError: for another ending.
+    """
+    found = residuals(result) if result.ok else None
+    if found is None:
+        return [], [no_field(result.options.error_model)] if result.ok else []
+    from postproc.residual_figure import residual_figure
+
+    return [as_csv(found, result) if ending == ".csv" else residual_figure(found, _title(result), ending)
+            for ending in endings], []
+
+
+def _title(result: PostResult) -> str:
+    assert result.job is not None and result.job.errors is not None and result.toolpath is not None
+    name = result.toolpath.name or Path(result.toolpath.file).stem
+    return f"{name} on {result.machine.name}, errors of {result.job.errors.name}"
+
+
+def as_csv(found: Residuals, result: PostResult) -> str:
+    """A table of the field, a row for each CL point; units in its head."""
+    turns = np.array(result.machine.rotary)
+    joints = [f"{letter} [{'deg' if turning else 'mm'}]" for letter, turning in
+              zip(result.machine.axis_names, turns, strict=True)]
+    parts = [f"d{x} [um]" for x in "xyz"] + [f"d{x} [arcsec]" for x in "ijk"]
+    head = ["line", "x [mm]", "y [mm]", "z [mm]", "i", "j", "k", *joints, *(f"before {name}" for name in parts), *parts]
+    units = np.repeat((UM, ARCSEC), 3)
+    values = np.column_stack([found.line, found.tip, found.axis, found.q / np.where(turns, DEG, 1.0), found.before / units,
+                              found.after / units]) + 0.0
+    form = ",".join(["%d", *["%.6f"] * (6 + len(joints)), *["%.4f"] * 12])
+    notes = [f"# {_title(result)}", "# x y z, i j k and differences (actual less wanted) along the axes of the part frame; "
+             "joints nominal", "# before: nominal joints commanded; after: the program as it is read back"]
+    return "\n".join([*notes, ",".join(head), *(form % tuple(row) for row in values.tolist()), ""])
+
+
+def no_field(file: str) -> Diagnostic:
+    """Why a conversion without correction has none."""
+    return error("residuals.none", "the error model says that the control corrects: the program is nominal and leaves no "
+                 "residuals to write", file=file, hint='leave --residuals out, or corrected_by = "post" in the model')
