@@ -63,6 +63,7 @@ def plain_records(toolpath: Toolpath, controller: ControllerFile) -> tuple[Toolp
     found = _Found(toolpath.file)
     events: list[Event] = []
     spindle = Spindle()
+    away = {e.index: e.line for e in toolpath.events if e.word in ("LOADTL", "GOHOME")}
     for event in _without_limits(toolpath.events, found.add):
         for plain in _plain(event, spindle, controller, found.add):
             if plain.word == "SPINDL":
@@ -74,6 +75,8 @@ def plain_records(toolpath: Toolpath, controller: ControllerFile) -> tuple[Toolp
                 _check_coolant(plain, controller, found.add)
             elif plain.word == "CUTCOM":
                 _check_compensation(plain, found.add)
+            elif plain.word == "RETRCT":
+                _check_retract(plain, away.get(plain.index, -1), len(toolpath), found.add)
             events.append(plain)
     check_numbers(toolpath, found.add)
     plain_path = _dwells_in_seconds(replace(toolpath, events=tuple(events)), found.add)
@@ -196,6 +199,14 @@ def _check_delay(event: Event, spindle: Spindle, report: Report) -> None:
     elif "REV" in words(event) and not (spindle.direction and spindle.rpm > 0.0):
         report(Severity.ERROR, "delay.revolutions", "DELAY in revolutions while the spindle stands or its speed is unknown",
                event.line, "state seconds, or the speed before it (SPINDL/RPM,n,CLW)")
+
+
+def _check_retract(event: Event, away: int, rows: int, report: Report) -> None:
+    """RETRCT moves the tool to the clearance plane before the next motion, which would else go straight through the part,
+    unless the program ends or the tool goes home at the same place (line `away`). ON and OFF move nothing."""
+    if not {"ON", "OFF"} & set(words(event)) and event.index < rows and away < event.line:
+        report(Severity.ERROR, "retract.motion", "RETRCT moves the tool to a clearance plane before the next point: this "
+               "is not carried out", event.line, "have the CAM system write the retract as a point (GOTO or GODLTA)")
 
 
 def _check_coolant(event: Event, controller: ControllerFile, report: Report) -> None:

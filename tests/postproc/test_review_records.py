@@ -94,6 +94,18 @@ def test_delays_that_have_no_time(lines: list[str], code: str, line: int) -> Non
     assert (errors[0].code if code == "spindle.speed" else errors[-1].code, errors[0].lines[0]) == (code, line)
 
 
+@pytest.mark.parametrize("record", ["RETRCT", "RETRCT/TOOL", "RETRCT/20"])
+def test_a_retract_that_is_not_carried_out_is_no_reason_to_cut_across(record: str) -> None:
+    assert refused(made("SPINDL/RPM,500,CLW", *CUT, record, "GOTO/9,9,0"), "retract.motion") == 4 + len(CUT) + 1
+
+
+@pytest.mark.parametrize("after", [["RETRCT/OFF", "GOTO/9,9,0"], ["RETRCT"], ["RETRCT", "GOHOME"],
+                                   ["RETRCT", "LOADTL/2", "RAPID", "GOTO/9,9,50"]])
+def test_a_retract_that_nothing_is_cut_after_is_told(after: list[str]) -> None:
+    result = good(made("SPINDL/RPM,500,CLW", *CUT, *after))
+    assert "event.not_carried_out" in codes(result.diagnostics)
+
+
 # ---- tools -----------------------------------------------------------------------------------------------------------
 
 NX = ["UNITS/MM", "FEDRAT/MMPM,600", "SPINDL/RPM,1000,CLW"]
