@@ -64,7 +64,24 @@ def test_cycles_of_each_system(head: str, record: str, values: tuple[object, ...
         assert got == (None if want is None else pytest.approx(want))
 
 
+def cycle_diagnostics(words: str) -> list[str]:
+    text = f"UNITS/MM\nRAPID\nGOTO/0,0,50\nCYCLE/{words}\nGOTO/1,2,3\nCYCLE/OFF\n"
+    return [d.message for d in read_bytes(text).diagnostics if d.code == "cl.cycle-option"]
+
+
+def test_what_a_cycle_says_and_nothing_does_is_told() -> None:
+    words = "DRILL,DEPTH,9,MMPM,60,CLEAR,3,RETURN,5"
+    assert cycle_diagnostics(words) == []
+    for word in ("REPEAT,3", "OFFSET,1,2", "ORIENT,90", "PLUNGE,4", "PARAMS,1,2,3"):
+        told, = cycle_diagnostics(f"{words},{word}")
+        assert told.startswith(f"CYCLE/DRILL: {word.split(',')[0]} ")
+    assert cycle_diagnostics("DRILL,9,60,MMPM,3,20,0") == []
+    assert cycle_diagnostics("DEEP,9,60,MMPM,3,20,4") == ["CYCLE/DEEP: 4 is not used"]
+
+
 def test_taps_pecks_and_dwells() -> None:
+    assert one("CYCLE/DEEP,DEPTH,10,MMPM,60,CLEAR,3,STEP,4,0,0,RETURN,5").steps == (4.0,)
+    assert one("CYCLE/DEEP,DEPTH,10,MMPM,60,CLEAR,3,STEP,0,RETURN,5").steps == ()
     tap = one("CYCLE/TAP,DEPTH,10,TPI,20,CLEAR,3,RETURN,5")
     assert (tap.pitch, tap.feed, tap.feed_mode) == (pytest.approx(1.27), pytest.approx(1.27), FeedMode.PER_REVOLUTION)
     assert one("CYCLE/TAP,DEPTH,10,MMPR,1.5,CLEAR,3,RETURN,5").pitch == 1.5

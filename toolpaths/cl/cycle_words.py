@@ -14,7 +14,9 @@ KINDS = {"DRILL": "DRILL", "DEEP": "DEEP", "DEEP2": "DEEP", "PECK": "DEEP", "BRK
          "CIRCUL": "CIRCUL", "THREAD": "THREAD", "SPOT": "DRILL"}
 _RETRACT = frozenset({"RTRCTO", "RETURN"})
 _PECKS = frozenset({"STEP", "INCR", "PECKING", "1STPECK", "SUBPECK"})
-_OTHER = frozenset({"DIAMET", "TLANGL", "TIMES", "BACK", "OFFSET", "REPEAT", "PARAMS", "ORIENT", "CSKDIA", "PLUNGE"})
+_OTHER = frozenset({"DIAMET", "TLANGL", "TIMES", "BACK", "CSKDIA"})
+_UNUSED = frozenset({"OFFSET", "REPEAT", "PARAMS", "ORIENT", "PLUNGE"})
+"""What the hole would be drilled otherwise for: told, with their numbers."""
 _PLAIN = frozenset({"G98", "G99", "AUTO", "MANUAL", "ON", "REV", "", "SEC", "NEXT"})
 _SIMPLE = {"FEDTO": "depth", "DEPTH": "depth", "RAPTO": "rapto", "CLEAR": "clear", "TPI": "threads",
            "PITCH": "pitch", "DIAMET": "diameter", "TLANGL": "angle"}
@@ -99,7 +101,8 @@ def _label(word: str, n: list[float], following: Word, found: dict[str, object],
         found["revolutions" if word == "REV" else "dwell"] = n[0]
     elif word in _SIMPLE and n:
         found[_SIMPLE[word]] = n[0]
-    elif word in _OTHER:
+    elif word in _OTHER or word in _UNUSED:
+        strange += [] if word in _OTHER else [word]
         return len(n)
     elif word not in _PLAIN and word not in KINDS and word not in _SIMPLE:
         strange.append(word)

@@ -18,6 +18,8 @@ _OFF = frozenset({"OFF", "NOMORE"})
 _DEPTH = frozenset({"FEDTO", "DEPTH"})
 _IN_STEPS = frozenset({"DEEP", "DEEP2", "PECK", "BRKCHP", "BREAKCHP"})
 _BORES = frozenset({"DRAG", "NODRAG", "MANUAL"})
+_LEAST_STEP = 1e-3
+"""file units: no control pecks by less"""
 _APPROACH = 1e-4
 """file units between the second number of a cycle of CATIA and the way from the point before the cycle to its hole"""
 _WORDS = "words"
@@ -115,7 +117,8 @@ def _placed(v: Values, planes: Planes) -> Values:
         found["clear"] = free.pop(0)
     if planes not in _COUNTED_DOWN and v.retract is not None and math.isnan(v.retract) and free:
         found["retract"] = free.pop(0)
-    return replace(v, **found, free=())  # type: ignore[arg-type]
+    strange = tuple(f"{x:g}" for x in free if x not in (0.0, found.get("retract", v.retract)))
+    return replace(v, **found, free=(), strange=(*v.strange, *strange))  # type: ignore[arg-type]
 
 
 _COUNTED_DOWN = (Planes.BOTTOM, Planes.DOWN, Planes.OVER_BOTTOM)
@@ -171,6 +174,22 @@ def _cycle_feed(b: Builder, v: Values) -> tuple[float, FeedMode, float | None]:
     return feed, mode, pitch
 
 
+def _steps(b: Builder, v: Values) -> tuple[float, ...]:
+    """Pecks in mm; a step of 0 is none."""
+    for step in v.steps:
+        if step < _LEAST_STEP and step != 0.0:
+            b.log.error("cl.cycle-value", f"CYCLE/{v.kind}: a peck of {step:g}", b.line,
+                        f"0 for none, or at least {_LEAST_STEP:g}")
+    return tuple(step * b.scale for step in v.steps if step != 0.0)
+
+
+def _rest(b: Builder, v: Values, value: float) -> float:
+    """A dwell in seconds or revolutions, 0 where none is stated."""
+    if value < 0.0:
+        b.log.error("cl.cycle-value", f"CYCLE/{v.kind}: the dwell is {value:g}", b.line, "write 0 or more")
+    return 0.0 if math.isnan(value) else value
+
+
 def _made(b: Builder, v: Values) -> Cycle:
     if math.isnan(v.clearance) and v.placed:
         b.log.warning("cl.cycle-start", f"CYCLE/{v.kind} states no start plane, the point of the GOTO is taken", b.line,
@@ -186,8 +205,7 @@ def _made(b: Builder, v: Values) -> Cycle:
     feed, mode, pitch = _cycle_feed(b, v)
     words = b.memory.pop(_WORDS, v.words)
     return Cycle(v.kind, _depth(b, v) * b.scale, v.clearance * b.scale, None if retract is None else retract * b.scale,
-                 feed, mode, tuple(x * b.scale for x in v.steps), 0.0 if math.isnan(v.dwell) else v.dwell,
-                 0.0 if math.isnan(v.revolutions) else v.revolutions, pitch,
+                 feed, mode, _steps(b, v), _rest(b, v, v.dwell), _rest(b, v, v.revolutions), pitch,
                  words if isinstance(words, tuple) else v.words, b.line)
 
 
