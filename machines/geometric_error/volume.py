@@ -75,6 +75,23 @@ def corners(machine: Machine, lower: Floats, upper: Floats, fixed: Floats) -> Fl
     return np.unique(ends, axis=0)
 
 
+def section(machine: Machine, lower: Floats, upper: Floats, across: int, up: int,
+            count: int) -> tuple[Floats, Floats, Floats]:
+    """Joints (count^2, J) over two slides, or two directions of the platform (0, 1, 2 for x, y, z), the rest in the middle;
+    and the positions (count,) of both, mm."""
+    kinematics, rest = machine.kinematics, middle(machine)
+    box = kinematics.workspace if isinstance(kinematics, LinearDelta | H4Linear) else None
+    j = [across, up] if box else [machine.axis_names.index("XYZ"[k]) for k in (across, up)]
+    ends = (box.lower, box.upper) if box else (lower, upper)
+    one, two = (np.linspace(ends[0][k], ends[1][k], count) for k in j)
+    grid = np.stack(np.meshgrid(one, two), axis=-1).reshape(-1, 2)
+    at = np.tile(np.append(box.middle, np.clip(0.0, *box.tilt)) if box else rest, (len(grid), 1))
+    at[:, j] = grid
+    if isinstance(kinematics, LinearDelta | H4Linear):
+        at = _of_platform(kinematics, at, np.tile(rest[4:], (len(grid), 1)))
+    return at, one, two
+
+
 def _joints(machine: Machine, lower: Floats, upper: Floats, rng: np.random.Generator, count: int) -> Floats:
     kinematics = machine.kinematics
     if not isinstance(kinematics, LinearDelta | H4Linear):

@@ -1,0 +1,69 @@
+"""Error models drawn: curves, doubt and sections, on serial machines, on rods, of maps."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import machines
+from machines.geometric_error import load
+from machines.geometric_error.figures import model_figure
+from machines.geometric_error.volume import ranges, section
+
+
+def words(svg: bytes) -> str:
+    return " ".join(re.findall(r"<!-- (.*?) -->", svg.decode()))
+
+
+def test_every_component_and_its_ways_are_drawn() -> None:
+    machine = machines.load("mikron-ucp710")
+    model = load("samples/errors/mikron-ucp710.toml", machine)
+    told = words(model_figure(model, machine, 100.0, ".svg"))
+    for component in model.axes.components:
+        assert str(component.name) in told
+    assert "EXX, backwards" in told and "EYX, backwards" not in told and "tip off by, um" in told
+
+
+def test_what_a_model_says_of_its_doubt_is_seen() -> None:
+    machine = machines.load("mikron-ucp710")
+    model = load("samples/errors/mikron-ucp710.toml", machine)
+    bare = replace(model, covariance=None)
+    assert model_figure(model, machine, 100.0, ".svg").count(b"FillBetween") > \
+        model_figure(bare, machine, 100.0, ".svg").count(b"FillBetween") == 0
+
+
+@pytest.mark.parametrize("name", ["uranesx", "h4a-c-table"])
+def test_machines_on_rods_have_sections_alone(name: str) -> None:
+    machine = machines.load(name)
+    drawn = model_figure(load(f"samples/errors/{name}.toml", machine), machine, 0.0, ".png")
+    assert drawn.startswith(b"\x89PNG")
+
+
+def test_sections_go_over_the_ends_of_what_is_looked_at() -> None:
+    for name in ("mikron-ucp710", "uranesx", "h4a-c-table"):
+        machine = machines.load(name)
+        model = load(f"samples/errors/{name}.toml", machine)
+        q, one, two = section(machine, *ranges(model, machine), 0, 2, 5)
+        tip, _ = machine.kinematics.forward(q)
+        at = (tip - tip[0]).reshape(5, 5, 3)
+        assert q.shape == (25, len(machine.axis_names)) and np.allclose(np.abs(at[0, :, 0]), np.abs(one - one[0]), atol=1e-9)
+        assert np.allclose(at[:, 0, 2], two - two[0], atol=1e-9)
+
+
+def test_a_map_is_drawn(tmp_path: Path) -> None:
+    machine = machines.load("mill-3axis")
+    rows = "\n".join(f"{x},{y},{z},{0.1 * x},0,{5 + y}" for x in (-100, 100) for y in (-80, 80) for z in (-50, 0))
+    (tmp_path / "map.csv").write_text("X [mm], Y [mm], Z [mm], dx [um], dy [um], dz [um]\n" + rows + "\n")
+    (tmp_path / "m.toml").write_text('machine = "mill-3axis"\n[map]\ntable = "map.csv"\n')
+    told = words(model_figure(load(tmp_path / "m.toml", machine), machine, 50.0, ".svg"))
+    assert "tool of 50 mm" in told
+
+
+def test_another_ending_is_refused() -> None:
+    machine = machines.load("uranesx")
+    with pytest.raises(ValueError, match="figure format"):
+        model_figure(load("samples/errors/uranesx.toml", machine), machine, 0.0, ".pdf")
