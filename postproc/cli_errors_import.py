@@ -12,8 +12,9 @@ from postproc.console import Json, machine_of, refuse_overwriting, shown_errors
 from postproc.error_files import doubted, finish, merged_into, model_files, pairs, required
 
 EXAMPLE = "Example: postproc errors import X=x.comp y.csv -m mill-3axis -o errors.toml"
-Sources = Annotated[list[str], typer.Argument(metavar="SOURCE...", help="tables per axis or of location errors (x.csv), a "
-                                              "lattice (map.csv), LinuxCNC's files (X=x.comp)")]
+Sources = Annotated[list[str], typer.Argument(metavar="SOURCE...", help="tables per axis or of location errors (x.csv), of "
+                                              "targets and runs of one error (EXX=laser.csv), a lattice (map.csv), "
+                                              "LinuxCNC's files (X=x.comp)")]
 Output = Annotated[Path, typer.Option("-o", "--output", metavar="MODEL.toml", help="model to write; its tables are put "
                                       "beside it")]
 Into = Annotated[Path | None, typer.Option("--into", metavar="MODEL.toml", help="model whose other errors stay, with their "
@@ -29,15 +30,17 @@ MapTool = Annotated[float, typer.Option("--tool-length", metavar="MM", min=0.0, 
                                         "map displaces; 0: the gauge point")]
 Zero = Annotated[list[str] | None, typer.Option("--zero", metavar="AXIS=POSITION", help="place at which a map is to be 0, "
                                                 "all its coordinates, mm or degrees")]
-Average = Annotated[bool, typer.Option("--average", help="rows at the same place are readings of it: their mean "
-                                       "counts, their scatter is the doubt")]
+Average = Annotated[bool, typer.Option("--average", help="rows at the same place, columns of runs (EXX+1, EXX-1, EXX+2 ...) "
+                                       "and files of runs are readings: their mean counts, their scatter is the doubt")]
+Near = Annotated[list[str] | None, typer.Option("--near", metavar="AXIS=AMOUNT", help="with --average: readings no farther "
+                                                "apart are of one place, given to that amount, mm or degrees")]
 Directions = Annotated[str, typer.Option("--directions", help="of a map's values: machine or table")]
 
 
 def import_(sources: Sources, machine: MachineName, output: Output, into: Into = None, covariance: Covariance = None,
             interpolation: Interpolation = "linear", repeats: Repeats = None, sign: Sign = 1, kind: Kind = 0,
             tool_length: MapTool = 0.0, directions: Directions = "table", zero: Zero = None, average: Average = False,
-            json: Json = "") -> None:
+            near: Near = None, json: Json = "") -> None:
     """Make an error model of tables that others wrote."""
     for option, value, allowed in (("--interpolation", interpolation, ("linear", "spline")),
                                    ("--sign", str(sign), ("1", "-1")), ("--directions", directions, ("machine", "table"))):
@@ -52,7 +55,9 @@ def import_(sources: Sources, machine: MachineName, output: Output, into: Into =
         m = machine_of(machine)
         known = (*m.axis_names, *"xyz")
         periods, at = in_units(pairs("--repeats", repeats, known)), in_units(pairs("--zero", zero, known))
-        how = How(interpolation, periods, float(sign), kind, tool_length, directions, at, average)  # type: ignore[arg-type]
+        apart = in_units(pairs("--near", near, known))
+        how = How(interpolation, periods, float(sign), kind, tool_length, directions, at, average,  # type: ignore[arg-type]
+                  apart)
         read, found = read_sources(sources, m, how)
         model, told = required(read, found), [f"read: {', '.join(files_of)}"]
         if covariance is not None:

@@ -1,7 +1,8 @@
-"""CSV tables with units in their headers: `X [mm], EXX+ [um], EXX- [um]`.
+"""CSV tables with units in their headers: `X [mm], EXX+ [um], EXX- [um]`, or in a row of units below them.
 
 Numbers with a decimal point, separated by commas, semicolons or tabs; between semicolons or tabs a decimal comma will do
-where the table has no point. `#` begins a comment line. Inside mm and rad.
+where the table has no point. `#` begins a comment line. UTF-8, UTF-16 with its mark, or Windows-1252, as spreadsheets save
+them. Inside mm and rad.
 """
 
 from __future__ import annotations
@@ -20,11 +21,13 @@ from toolpaths.units import DEG, MM_PER_INCH
 LENGTHS = {"mm": 1.0, "um": 1e-3, "m": 1e3, "in": MM_PER_INCH}
 ANGLES = {"deg": DEG, "arcsec": DEG / 3600.0, "arcmin": DEG / 60.0, "urad": 1e-6, "mrad": 1e-3, "rad": 1.0}
 UNITS = {**LENGTHS, **ANGLES}
-_ALIASES = {"\u00b5m": "um", "\u03bcm": "um", "\u00b0": "deg", "\u00b5rad": "urad", "\u03bcrad": "urad"}
+_ALIASES = {"\u00b0": "deg", "inch": "in", "um/m": "urad"}
+_MICRO = str.maketrans("\u00b5\u03bc", "uu")
 _THOUSANDS = re.compile(r"-?\d{1,3}(,\d{3})+$")
 MOST = 8
 """faults of a header that are told"""
-_HEAD = re.compile(r"(?P<name>[^\[\]]+?)\s*(?:\[(?P<unit>[^\]]*)\])?$")
+_HEAD = re.compile(r"(?P<name>[^\[\]()]+?)\s*(?:[\[(](?P<unit>[^\])]*)[\])])?$")
+_CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f]")
 
 
 @dataclass(frozen=True)
@@ -42,21 +45,23 @@ class CsvTable:
         return len(self.lines)
 
 
-def read_csv(path: Path, cited: tuple[str, int] = ("", 0)) -> tuple[CsvTable | None, list[Diagnostic]]:
+def read_csv(path: Path, cited: tuple[str, int] = ("", 0), gaps: bool = False) -> tuple[CsvTable | None, list[Diagnostic]]:
     """The table of a file; None and what is wrong with it.
 
     Args:
         cited: file and line that named it, for a message where it is missing
+        gaps: True takes blank cells, as NaN
     """
     text, found = read_text(path, cited)
     if text is None:
         return None, found
-    rows = [(n, line) for n, line in enumerate(text.splitlines(), 1) if line.strip() and not line.lstrip().startswith("#")]
+    lines = [(n, line) for n, line in enumerate(text.splitlines(), 1) if line.strip(' \t;,"')]  # blank rows of a sheet too
+    rows = [(n, line) for n, line in lines if not line.lstrip().startswith("#") and not line.startswith("sep=")]
     if len(rows) < 2:
         return None, [error("error-table.empty", "a header line and at least one row of numbers are needed, there "
                             + ("is the header alone" if rows else "is nothing"), file=str(path),
                             lines=[n for n, _ in rows], hint="write e.g. X [mm], EXX [um], then a row per position")]
-    return _table(str(path), rows)
+    return _table(str(path), rows, gaps)
 
 
 def read_text(path: Path, cited: tuple[str, int] = ("", 0)) -> tuple[str | None, list[Diagnostic]]:
@@ -67,27 +72,43 @@ def read_text(path: Path, cited: tuple[str, int] = ("", 0)) -> tuple[str | None,
     try:
         if path.exists() and not path.is_file():
             return fault("error-table.unreadable", f"{path} is no regular file", "name a CSV file")
-        return path.read_bytes().decode("utf-8-sig"), []
+        text = _decoded(path.read_bytes())
     except FileNotFoundError:
         return fault("error-table.not-found", f"there is no table {path.name!r}", f"looked in {path.parent or '.'}")
-    except UnicodeDecodeError as bad:
-        return fault("error-table.unreadable", f"byte {bad.start} of {path.name} is not UTF-8", "save it as UTF-8 text")
     except (OSError, ValueError) as bad:
         return fault("error-table.unreadable", f"cannot read {path.name[:60]!r}: {getattr(bad, 'strerror', None) or bad}",
                      "name a CSV file")
+    if text is None:
+        return fault("error-table.unreadable", f"{path.name} is no text", "save it as CSV, UTF-8")
+    return text, []
 
 
-def _table(file: str, rows: list[tuple[int, str]]) -> tuple[CsvTable | None, list[Diagnostic]]:
+def _decoded(data: bytes) -> str | None:
+    """Text as spreadsheets save it; None for what is none."""
+    codes = ["utf-16"] if data.startswith((b"\xff\xfe", b"\xfe\xff")) else ["utf-8-sig", "cp1252"]
+    for code in codes:
+        try:
+            text = data.decode(code)
+        except UnicodeDecodeError:
+            continue
+        return None if _CONTROL.search(text) else text
+    return None
+
+
+def _table(file: str, rows: list[tuple[int, str]], gaps: bool) -> tuple[CsvTable | None, list[Diagnostic]]:
     (first, head), *body = rows
     mark = next((m for m in ";\t" if m in head), ",")
-    cells = [cell.strip().strip('"').strip() for cell in head.split(mark)]
+    cells = _cells(head, mark)
     found = [_HEAD.match(cell) for cell in cells]
     diagnostics = _head_faults(file, first, cells, found)
     if diagnostics:
         return None, diagnostics
     names = [m["name"] for m in found if m]
-    unit = {m["name"]: _ALIASES.get(m["unit"] or "", m["unit"] or "") for m in found if m}
-    values, faults = _numbers(body, mark, names)
+    unit = {m["name"]: unit_of(m["unit"] or "") for m in found if m}
+    below = [unit_of(cell.strip("[]()")) for cell in _cells(body[0][1], mark)]
+    if len(body) > 1 and not any(unit.values()) and len(below) == len(names) and set(below) <= {*UNITS}:
+        unit, body = dict(zip(names, below, strict=True)), body[1:]
+    values, faults = _numbers(body, mark, names, gaps)
     if faults:
         fault, hint = faults[0][1:]
         return None, [error("error-table.row", fault, file=file, lines=[n for n, _, _ in faults[:6]], count=len(faults),
@@ -96,13 +117,27 @@ def _table(file: str, rows: list[tuple[int, str]]) -> tuple[CsvTable | None, lis
     return CsvTable(file, scaled, unit, tuple(line for line, _ in body), first), []
 
 
+def unit_of(text: str) -> str:
+    """A unit as this module calls it; what it does not know as it is."""
+    plain = text.strip().translate(_MICRO)
+    return _ALIASES.get(plain, plain)
+
+
+def _cells(line: str, mark: str) -> list[str]:
+    """Cells of a header without quotes, and without blank ones behind the last."""
+    cells = [cell.strip().strip('"').strip() for cell in line.split(mark)]
+    while len(cells) > 1 and not cells[-1]:
+        cells.pop()
+    return cells
+
+
 def _head_faults(file: str, line: int, cells: Sequence[str], found: Sequence[re.Match[str] | None]) -> list[Diagnostic]:
     result = []
     for cell, match in zip(cells, found, strict=True):
         if match is None or not match["name"]:
-            hint = "write NAME [unit]" if cell else "take the separator without a column out, or name the column"
+            hint = "write NAME [unit]" if cell else "name the column, or take it out"
             result.append(error("error-table.header", f"{cell[:40]!r} is no column", file=file, lines=[line], hint=hint))
-        elif match["unit"] is not None and _ALIASES.get(match["unit"], match["unit"]) not in UNITS:
+        elif match["unit"] is not None and unit_of(match["unit"]) not in UNITS:
             result.append(error("error-table.unit", f"unit {match['unit'][:20]!r} of column {match['name'][:40]} is not "
                                 "known", file=file, lines=[line], hint="known: " + ", ".join(UNITS)))
     if not result and all(_number(cell, False) is not None for cell in cells):
@@ -115,13 +150,13 @@ def _head_faults(file: str, line: int, cells: Sequence[str], found: Sequence[re.
     return result[:MOST]
 
 
-def _numbers(body: Sequence[tuple[int, str]], mark: str,
-             names: Sequence[str]) -> tuple[Floats, list[tuple[int, str, str]]]:
+def _numbers(body: Sequence[tuple[int, str]], mark: str, names: Sequence[str],
+             gaps: bool) -> tuple[Floats, list[tuple[int, str, str]]]:
     """(values (N, C), faults as (line, what, hint)) of rows (line, text)."""
     values, faults = np.empty((len(body), len(names))), []
     comma = mark != "," and not any("." in text for _, text in body)
     for k, (line, text) in enumerate(body):
-        fault = _fill(values[k], text.split(mark), names, comma)
+        fault = _fill(values[k], text.split(mark), names, comma, gaps)
         if fault:
             faults.append((line, *fault))
     if comma and not faults and any("," in text for _, text in body) and _thousands(body, mark):
@@ -135,19 +170,22 @@ def _thousands(body: Sequence[tuple[int, str]], mark: str) -> bool:
     return all(_THOUSANDS.match(cell.strip()) for _, text in body for cell in text.split(mark) if "," in cell)
 
 
-def _fill(row: Floats, cells: Sequence[str], names: Sequence[str], comma: bool) -> tuple[str, str] | None:
+def _fill(row: Floats, cells: list[str], names: Sequence[str], comma: bool, gaps: bool) -> tuple[str, str] | None:
     """Put the numbers of a line in `row`; what is wrong and what to do, None for nothing."""
+    while len(cells) > len(names) and not cells[-1].strip():
+        cells.pop()
     if len(cells) != len(names):
         hint = "write decimal points where commas separate the columns" if len(cells) == 2 * len(names) else ""
         return f"{len(cells)} values, {len(names)} columns", hint
     for k, cell in enumerate(cells):
-        number = _number(cell, comma)
-        if not cell.strip():
-            return f"no number in column {names[k][:40]}", "take the row out where nothing was measured"
+        number = np.nan if not cell.strip() and gaps else _number(cell, comma)
+        if not cell.strip() and not gaps:
+            return f"no number in column {names[k][:40]}", "take the row out where nothing was measured; errors import " \
+                "--average takes blank cells"
         if number is None:
             shown = f"{cell.strip()[:40]!r} in column {names[k][:40]}"
             return f"{shown} is not a number", "write decimal points throughout" if "," in cell else ""
-        if not np.isfinite(number):
+        if not np.isfinite(number) and cell.strip():
             return f"{cell.strip()} in column {names[k][:40]} is not finite", "take the row out where nothing was measured"
         row[k] = number
     return None

@@ -21,6 +21,7 @@ from machines.geometric_error.lattice import COLUMNS
 from machines.geometric_error.lattice_file import COORDINATES, map_from_csv, zeroed, zeroed_covariance
 from machines.geometric_error.model import ErrorModel
 from machines.geometric_error.names import DIRECTIONS, OWN, ErrorName, parse
+from machines.geometric_error.readings import of_component, run_of, runs_as_rows, together
 from machines.geometric_error.screw_tables import from_linuxcnc
 from machines.geometric_error.serial_errors import Component, Frame, SerialErrors
 from machines.geometric_error.table_curves import Fault, table_curve
@@ -32,6 +33,7 @@ from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic, error, has_errors, info
 
 _SCREW = re.compile(r"([A-Z])=(.+)$")
+_NAMED = re.compile(r"(E[A-Z][A-Z])=(.+)$")
 MAP_COLUMNS = {"dx", "dy", "dz"}
 
 
@@ -50,7 +52,9 @@ class How:
         tool_length: mm, of the tool whose tip a map displaces
         directions: of a map
         zero: mm or rad by coordinate: the place at which a map is to be 0; {} takes it as it is
-        average: rows at the same place are readings of it: their mean counts, and their scatter is the doubt
+        average: rows at the same place, columns of runs and files of runs are readings of it: their mean counts, and
+            their scatter is the doubt
+        near: mm or rad by axis or coordinate: readings no farther apart are of one place
     """
 
     rule: Literal["linear", "spline"] = "linear"
@@ -61,37 +65,53 @@ class How:
     directions: Literal["table", "machine"] = "table"
     zero: Mapping[str, float] = field(default_factory=dict)
     average: bool = False
+    near: Mapping[str, float] = field(default_factory=dict)
 
 
 def read_sources(sources: Sequence[str], machine: Machine, how: How) -> tuple[ErrorModel | None, list[Diagnostic]]:
     """The model that all sources make together; None where any has a fault.
 
     Args:
-        sources: `x.csv`: tables per axis, location errors or a lattice, told by their columns; `X=x.comp`: LinuxCNC's
-            screw compensation of the joint X
+        sources: `x.csv`: tables per axis, location errors or a lattice, told by their columns; `EXX=x.csv`: positions and
+            runs of one component, whatever its columns are called; `X=x.comp`: LinuxCNC's screw compensation of the joint X
     """
-    model, found = ErrorModel(machine=machine.name), []
-    places: dict[str, str] = {}
-    for source in sources:
-        screw = _SCREW.match(source)
-        part, faults = _screw(screw[1], Path(screw[2]), machine, how) if screw else _csv(Path(source), machine, how)
-        found += faults
-        if part is None:
-            continue
+    model, places = ErrorModel(machine=machine.name), dict[str, str]()
+    parts, found = _parts(sources, machine, how)
+    for part, source in parts:
         found += _twice(part, places, source)
         model = replace(part, machine=machine.name) if part.map is not None else merged(model, part)
-        if part.map is not None and len(sources) > 1:
+        if part.map is not None and len(parts) > 1:
             found.append(error("error-import.map", "a map stands alone", file=source,
-                               hint=f"import it without the other {len(sources) - 1} sources"))
+                               hint=f"import it without the other {len(parts) - 1} sources"))
     if not has_errors(found):
         found += [*fits(model, machine), *_unused(how, model)]
     return (None if has_errors(found) else model), found
+
+
+def _parts(sources: Sequence[str], machine: Machine, how: How) -> tuple[list[tuple[ErrorModel, str]], list[Diagnostic]]:
+    """Models of the sources, with what each is of, LinuxCNC's files first."""
+    parts, tables, found = list[tuple[ErrorModel, str]](), list[CsvTable](), list[Diagnostic]()
+    for source in sources:
+        screw = _SCREW.match(source)
+        if screw:
+            part, faults = _screw(screw[1], Path(screw[2]), machine, how)
+            parts += [] if part is None else [(part, source)]
+        else:
+            table, faults = _read(source, how)
+            tables += [] if table is None else [table]
+        found += faults
+    for table in together(tables, how.average):
+        part, faults = _csv(table, machine, how)
+        parts += [] if part is None else [(part, table.file)]
+        found += faults
+    return parts, found
 
 
 def _unused(how: How, model: ErrorModel) -> list[Diagnostic]:
     """What was asked for and concerns none of the sources."""
     letters = {c.name.axis for c in model.axes.components} if model.map is None else set(model.map.letters)
     asked = [f"{letter} repeats" for letter in how.periods if letter not in letters]
+    asked += [f"near positions of {letter}" for letter in how.near if letter not in letters or not how.average]
     if model.map is None:
         given = {"tool length": how.tool_length, "zero": how.zero, "directions of the machine": how.directions == "machine"}
         asked += [f"a map's {what}" for what, value in given.items() if value]
@@ -106,7 +126,7 @@ def _twice(part: ErrorModel, places: dict[str, str], source: str) -> list[Diagno
     for name in [*(str(c.name) for c in part.axes.components), *part.axes.constants]:
         if name in places:
             found.append(error("error-import.twice", f"{name} is in {places[name]} too", file=source,
-                               hint="give every error once"))
+                               hint="give every error once; files of several runs: import with --average"))
         places[name] = source
     return found
 
@@ -134,12 +154,41 @@ def with_covariance(model: ErrorModel, path: Path) -> tuple[ErrorModel | None, l
 
 # ---- CSV ------------------------------------------------------------------------------------------------------------
 
-def _csv(path: Path, machine: Machine, how: How) -> tuple[ErrorModel | None, list[Diagnostic]]:
-    table, found = read_csv(path)
-    if table is None:
-        return None, found
+def _read(source: str, how: How) -> tuple[CsvTable | None, list[Diagnostic]]:
+    """The table of a CSV file, its columns by ISO 230-1 names."""
+    named = _NAMED.match(source)
+    name = parse(named[1]) if named else None
+    if named and name is None:
+        return None, [error("error-import.name", f"{named[1]!r} is no component error", hint="write e.g. EXX=x.csv")]
+    table, found = read_csv(Path(named[2] if named else source), gaps=how.average)
+    made = table if table is None or name is None else of_component(table, name)
+    fault = made if isinstance(made, Fault) else None if made is None else _gap(made)
+    if table is not None and fault is not None:
+        return None, [fault.at(table)]
+    assert not isinstance(made, Fault)
+    return made, [*found, *(_told_otherwise(made, how) if made is not None and MAP_COLUMNS & set(made.columns) else [])]
+
+
+def _gap(table: CsvTable) -> Fault | None:
+    """A blank cell where no reading can be missing: positions, and constants."""
     places = [name for name in table.columns if name in COORDINATES]
-    read = averaged(table, places) if how.average and places else None
+    for name in places or table.columns:
+        blank = np.isnan(table.columns[name])
+        if blank.any():
+            hint = "give the position of every reading" if places else "take the column out where nothing was measured"
+            return Fault("error-table.row", f"no number in column {name[:40]}", hint, table.lines[int(np.argmax(blank))])
+    return None
+
+
+def _csv(table: CsvTable, machine: Machine, how: How) -> tuple[ErrorModel | None, list[Diagnostic]]:
+    places = [name for name in table.columns if name in COORDINATES]
+    runs = [name for name in table.columns if run_of(name)[1]]
+    if runs and not how.average:
+        return None, [error("error-import.runs", f"columns {', '.join(runs)[:80]} are runs", file=table.file,
+                            lines=[table.head], hint="import with --average: their mean counts, their scatter is the doubt")]
+    read = _averaged(table, places, how) if places and (how.average or _holes(table)) else None
+    if isinstance(read, Fault):
+        return None, [read.at(table)]
     table = table if read is None else read.table
     if MAP_COLUMNS & set(table.columns):
         model, found = _map(table, machine, how)
@@ -153,11 +202,25 @@ def _csv(path: Path, machine: Machine, how: How) -> tuple[ErrorModel | None, lis
     return model, [*found, told]
 
 
+def _averaged(table: CsvTable, places: list[str], how: How) -> Averaged | Fault:
+    rows = runs_as_rows(table)
+    read = rows if isinstance(rows, Fault) else averaged(rows, places, how.near)
+    if isinstance(read, Averaged) and read.scatter and not how.average:
+        return Fault("error-import.runs", f"{read.rows} rows are readings at {len(read.table)} places",
+                     "import with --average: their mean counts, their scatter is the doubt")
+    return read
+
+
+def _holes(table: CsvTable) -> bool:
+    """True for two ways of files of their own, each without the other's values."""
+    return any(np.isnan(values).any() for values in table.columns.values())
+
+
 def _scattered(model: ErrorModel, read: Averaged, zero: Mapping[str, float]) -> tuple[ErrorModel, Diagnostic]:
     """The model with the doubt of its means."""
     units = {name: UNITS["arcsec" if name[0] == "r" or name[1] in "ABC" else "um"] for name in read.scatter}
     spread = ", ".join(f"{name} {value / units[name]:.3g}" for name, value in read.scatter.items())
-    told = info("error-import.averaged", f"{int(read.runs.sum())} readings at {len(read.runs)} places; standard deviation "
+    told = info("error-import.averaged", f"{read.rows} readings at {len(read.table)} places; standard deviation "
                 f"of one: {spread} (um, arcsec)", file=read.table.file)
     if len(model.names) > MOST_DOUBT:
         return model, replace(told, message=f"{told.message}; the doubt of {len(model.names)} values is not written")
@@ -172,20 +235,19 @@ def _variances(model: ErrorModel, read: Averaged) -> Floats:
     if model.map is not None:
         whole = [len(levels_of(read.table.columns[letter])[0]) for letter in model.map.letters]
         inner = tuple(slice(len(nodes)) for nodes in model.map.nodes)  # less the end of a period
-        parts = [read.variance(c) if c in read.scatter else np.zeros(len(read.runs)) for c in COLUMNS]
+        parts = [read.variance(c) for c in COLUMNS]
         return np.stack([part.reshape(whole)[inner].ravel() for part in parts], axis=1).ravel()
     found = []
     for component in model.axes.components:
-        rows = len(component.curve.values) // (2 if f"{component.name}+" in read.scatter else 1)
-        ways = [f"{component.name}{way}" for way in "+-"]
-        found += [read.variance(c)[:rows] for c in (ways if ways[0] in read.scatter else [str(component.name)])]
+        ways = [c for c in (f"{component.name}+", f"{component.name}-", str(component.name)) if c in read.runs]
+        rows = len(component.curve.values) // len(ways)
+        found += [read.variance(c)[:rows] for c in ways]
     return np.concatenate(found)
 
 
 def _map(table: CsvTable, machine: Machine, how: How) -> tuple[ErrorModel | None, list[Diagnostic]]:
     periods = {letter: period for letter, period in how.periods.items() if letter in table.columns}
     result, found = map_from_csv(table, periods)
-    found += _told_otherwise(table, how)
     if result is None or found:
         return None, found
     bed = part_side(machine.kinematics, machine.structure) if how.directions == "machine" else ()

@@ -55,7 +55,8 @@ def _row_faults(table: CsvTable, lattice: ErrorMap, flat: Ints) -> list[Diagnost
         lines = [table.lines[k] for k in np.flatnonzero(flat == node)]
         return [error("error-map.twice", f"lines {lines[0]} and {lines[1]} are the same node, {lattice.described(node)}; "
                       f"{int((count > 1).sum())} nodes are there more than once", file=table.file, lines=lines[:6],
-                      hint="give every node once; the mean where it was measured several times")]
+                      hint="give every node once; where rows are readings of it, postproc errors import --average takes "
+                      "their mean")]
     if (count == 0).any():
         where, levels = lattice.described(int(np.argmin(count))), _levels_of(lattice.letters, lattice.table.shape[:-1])
         return [error("error-map.missing", f"node {where} is missing: {levels} levels need {count.size} rows, there are "

@@ -44,9 +44,11 @@ def table_curve(name: ErrorName, table: CsvTable, rule: Literal["linear", "splin
     if isinstance(columns, Fault):
         return columns
     x, values = table.columns[name.axis], [table.columns[c] * sign for c in columns]
+    if len(x) > 1 and (np.diff(x) < 0.0).all():  # measured on the way back
+        x, values = x[::-1], [v[::-1] for v in values]
     down = np.flatnonzero(np.diff(x) <= 0.0)
     if len(down):
-        return _order(table, name.axis, int(down[0]))
+        return _order(table, name, int(down[0]))
     if period:
         unit = DEG if name.axis in ROTARY else 1.0
         fault = _period_fault(x / unit, values, period / unit, UNITS["arcsec" if name.angular else "um"])
@@ -62,12 +64,13 @@ def table_curve(name: ErrorName, table: CsvTable, rule: Literal["linear", "splin
     return Table(x, np.concatenate(values), rule, len(values) == 2, period)
 
 
-def _order(table: CsvTable, axis: str, row: int) -> Fault:
-    unit = DEG if axis in ROTARY else 1.0
-    before, after = (float(v) / unit for v in table.columns[axis][row:row + 2])
+def _order(table: CsvTable, name: ErrorName, row: int) -> Fault:
+    axis = name.axis
+    unit, x = DEG if axis in ROTARY else 1.0, table.columns[axis]
+    before, after = (float(v) / unit for v in x[row:row + 2])
     line = table.lines[row + 1]
-    hint = "give each position once; the mean where it was measured several times, or EXX+ and EXX- for two ways" \
-        if before == after else "sort the rows by position"
+    hint = "several readings of one place: postproc errors import --average takes their mean; two ways: columns " \
+        f"{name}+ and {name}-" if len(np.unique(x)) < len(x) else "sort the rows by position"
     return Fault("error-model.order", f"positions of {axis} do not ascend: {after:g} after {before:g}", hint, line)
 
 

@@ -301,7 +301,7 @@ SOURCES = [
     ("error of another axis", {"a.csv": AXIS.replace("EYX", "EYY")}, "error-model.column", "'EYY' is no component error"),
     ("misspelt", {"a.csv": AXIS.replace("EYX", "EQX")}, "error-model.column", "'EQX'"),
     ("no errors", {"a.csv": "X [mm]\n0\n1\n"}, "error-model.column", "no errors of X"),
-    ("order", {"a.csv": AXIS.replace("100,3", "-5,3")}, "error-model.order", "-5 after 0"),
+    ("order", {"a.csv": AXIS + "50,3,4\n"}, "error-model.order", "50 after 100"),
     ("repeated", {"a.csv": AXIS + "100,3,4\n"}, "error-model.order", "100 after 100"),
     ("one row", {"a.csv": "X [mm],EXX [um]\n0,1\n"}, "error-model.rows", "one row"),
     ("unit", {"a.csv": AXIS.replace("EYX [um]", "EYX [arcsec]")}, "error-model.unit", "'arcsec'"),

@@ -23,6 +23,13 @@ GOOD = {"byte order mark and CRLF": b"\xef\xbb\xbf" + CSV.replace("\n", "\r\n").
         "decimal commas": b"X [mm];EXX [um]\n-300,0;0,00\n0;1,0\n300;2\n", "tabs": CSV.replace(",", "\t").encode(),
         "quotes": b'"X [mm]","EXX [um]"\n"-300","0"\n0,"1"\n300,2\n',
         "comments and blank lines": b"# laser\n\nX [mm],EXX [um]\n-300,0\n# again\n0,1\n\n300,2\n",
+        "UTF-16": CSV.encode("utf-16"), "Windows-1252": CSV.replace("[um]", "[\u00b5m]").encode("cp1252"),
+        "separators behind the last column": b"X [mm];EXX [um];;\n-300;0;;\n0;1;\n300;2;;\n;;;\n",
+        "a row of units": b"X;EXX\nmm;\xb5m\n-300;0\n0;1\n300;2\n",
+        "units in brackets below": b"X,EXX\n[mm],(um)\n-300,0\n0,1\n300,2\n",
+        "round brackets": CSV.replace("[", "(").replace("]", ")").encode(),
+        "a line for the spreadsheet": b"sep=;\n" + CSV.replace(",", ";").encode(),
+        "targets on the way back": b"X [mm],EXX [um]\n300,2\n0,1\n-300,0\n",
         "metres and inches": b"X [m],EXX [in]\n-0.3,0\n0,3.937007874015748e-05\n0.3,7.874015748031496e-05\n"}
 
 
@@ -36,14 +43,17 @@ def test_tables_as_programs_save_them(tmp_path: Path, text: bytes) -> None:
 
 
 BAD = [
-    ("UTF-16", TABLE, CSV.encode("utf-16"), "error-table.unreadable", "e.toml", 2, "byte 0 of x.csv is not UTF-8"),
-    ("Latin-1", TABLE, b"X [mm],EXX [\xb5m]\n0,1\n", "error-table.unreadable", "e.toml", 2, "byte 12"),
-    ("binary", TABLE, bytes(range(256)), "error-table.unreadable", "e.toml", 2, "not UTF-8"),
-    ("zeros", TABLE, bytes(9), "error-table.empty", "x.csv", 1, "header alone"),
+    ("UTF-16 without a mark", TABLE, CSV.encode("utf-16-le"), "error-table.unreadable", "e.toml", 2, "x.csv is no text"),
+    ("binary", TABLE, bytes(range(256)), "error-table.unreadable", "e.toml", 2, "no text"),
+    ("zeros", TABLE, bytes(9), "error-table.unreadable", "e.toml", 2, "no text"),
+    ("half a letter", TABLE, b"\xff\xfeX", "error-table.unreadable", "e.toml", 2, "no text"),
+    ("no letter", TABLE, b"X [mm],EXX [\x81m]\n0,1\n", "error-table.unreadable", "e.toml", 2, "no text"),
     ("empty", TABLE, b"", "error-table.empty", "x.csv", 0, "nothing"),
     ("header alone", TABLE, b"X [mm],EXX [um]\n\n", "error-table.empty", "x.csv", 1, "header alone"),
     ("no header", TABLE, b"-300,0\n300,2\n", "error-table.header", "x.csv", 1, "holds numbers"),
-    ("trailing separator", TABLE, b"X [mm];EXX [um];\n0;1;\n", "error-table.header", "x.csv", 1, "'' is no column"),
+    ("column without a name", TABLE, b"X [mm];;EXX [um]\n0;1;2\n", "error-table.header", "x.csv", 1, "'' is no column"),
+    ("value without a name", TABLE, b"X [mm];EXX [um];\n0;1;2\n", "error-table.row", "x.csv", 2, "3 values, 2 columns"),
+    ("units alone", TABLE, b"X;EXX\nmm;um\n", "error-table.row", "x.csv", 2, "'mm'"),
     ("commas between and within", TABLE, b"X [mm],EXX [um]\n-300,5,0,2\n300,0,1,0\n", "error-table.row", "x.csv", 2,
      "4 values, 2 columns"),
     ("point and comma", TABLE, b"X [mm];EXX [um]\n-300,5;0.2\n300;1\n", "error-table.row", "x.csv", 2, "'-300,5'"),
@@ -53,7 +63,7 @@ BAD = [
     ("overflow", TABLE, b"X [mm],EXX [um]\n-300,1e999\n0,1\n", "error-table.row", "x.csv", 2, "not finite"),
     ("underscore", TABLE, b"X [mm],EXX [um]\n-3_00,1\n0,1\n", "error-table.row", "x.csv", 2, "'-3_00'"),
     ("repeated", TABLE, b"X [mm],EXX [um]\n0,1\n0,1\n9,2\n", "error-model.order", "x.csv", 3, "0 after 0"),
-    ("falling", TABLE, b"X [mm],EXX [um]\n9,1\n0,1\n", "error-model.order", "x.csv", 3, "0 after 9"),
+    ("to and fro", TABLE, b"X [mm],EXX [um]\n0,1\n9,1\n5,1\n", "error-model.order", "x.csv", 4, "5 after 9"),
     ("one row", TABLE, b"X [mm],EXX [um]\n9,1\n", "error-model.rows", "x.csv", 2, "one row"),
     ("angle for a length", TABLE, CSV.replace("[um]", "[arcsec]").encode(), "error-model.unit", "x.csv", 1, "'arcsec'"),
     ("degrees of a slide", TABLE, CSV.replace("[mm]", "[deg]").encode(), "error-model.unit", "x.csv", 1, "'deg'"),
