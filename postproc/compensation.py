@@ -239,6 +239,8 @@ def framed(path: Path, nominal: Path, modes: OutputModes, work: Work) -> Path:
     for run in np.unique(work.group[tilted & (work.group >= 0)]).tolist():
         k = np.flatnonzero((work.group == run) & tilted)
         whole = np.flatnonzero(work.group == run)
+        if not np.isfinite(path.q[k[0]]).all():  # out of reach, told by the caller
+            continue
         new, at = modes.plane(work.kinematics(int(work.tools[k[0]])), path.q[k[0]])
         if new not in frames:
             frames.append(new)

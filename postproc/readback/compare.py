@@ -72,7 +72,8 @@ def compare(motion: Motion, job: Job, executed: Executed, gcode: str = "", plann
     diagnostics += _beyond("tip", "mm", worst_tip, tolerance, tip_line, faults)
     diagnostics += _beyond("axis", "degrees", worst_axis / DEG, axis_tolerance / DEG, axis_line, faults)
     diagnostics += check_spins(motion, executed, moves, owner, tip, axis, axis_tolerance, faults)
-    diagnostics += check_kinds(motion, moves, owner, tip, executed.control.rapids == "dog-leg", _taken_up(job, tip), faults)
+    diagnostics += check_kinds(motion, moves, owner, tip, executed.control.rapids == "dog-leg",
+                               _taken_up(job, motion, tip), faults)
     diagnostics += check_states(motion, job, moves, owner, faults)
     diagnostics += check_compensated(motion, job, faults)
     diagnostics += check_holes(motion, job, moves, tip, owner, faults)
@@ -106,14 +107,22 @@ def _kept(job: Job) -> float:
     return SHARE * job.axis_tolerance
 
 
-def _taken_up(job: Job, tip: Floats) -> Bools:
-    """True (K,) for blocks that leave the tip, (K, 3), where it is although axes move: they take up lost motion."""
+def _taken_up(job: Job, motion: Motion, tip: Floats) -> Bools:
+    """True (K,) for blocks that leave the tip, (K, 3), where it is although axes move: they take up lost motion.
+
+    A rapid that a longer one follows may move it by as much as a level in the air, to which the tool came as part of a hole,
+    may be off by.
+    """
     if job.errors is None:
         return np.zeros(len(tip), dtype=np.bool_)
     from postproc.compensation import SHARE
+    from postproc.corrected.cycles import IN_AIR
 
     way = np.linalg.norm(np.diff(tip, axis=0, prepend=np.inf), axis=1)
-    return np.asarray(way <= SHARE * job.options.tolerance + 2.0 * job.rounding.tip)
+    still, air = (share * SHARE * job.options.tolerance + 2.0 * job.rounding.tip for share in (1.0, IN_AIR))
+    rapid = motion.code == 0
+    begins = rapid & np.append(rapid[1:] & (way[1:] > air), False)
+    return np.asarray((way <= still) | (begins & (way <= air)))
 
 
 def _aligned(kept: Ints | slice, tip: Floats, axis: Floats, sweep: Floats, moves: Moves, tolerance: float,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from itertools import pairwise
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from machines.geometric_error import load
 from postproc.looks import changes, looks_between
 from postproc.options import Options
 from postproc.pipeline import PostResult
+from postproc.readback.compare import _taken_up
 
 HEAD = "UNITS/MM\nLOADTL/1\nSPINDL/3000,RPM,CLW\nFEDRAT/400,MMPM\nRAPID\nGOTO/-160,0,20\nGOTO/-160,0,0\n"
 LINE = HEAD + "GOTO/160,0,0\nFINI\n"
@@ -90,3 +92,20 @@ def test_looks_cover_every_stretch() -> None:
     np.testing.assert_array_equal(count, [25, 1, 1])
     rows, shares = (np.concatenate(x) for x in zip(*looks_between(count), strict=True))
     assert set(rows.tolist()) == {0} and set(np.floor(shares * 25.0).astype(int).tolist()) == set(range(25))
+
+
+def test_a_tilted_plane_that_was_not_measured_is_refused(tmp_path: Path) -> None:
+    model = 'machine = "mikron-ucp710"\n[components.EAA]\npolynomial = [0.0, 5.0]\nrange = [-1, 1]\n'
+    (tmp_path / "m.toml").write_text(model)
+    path, found = toolpaths.read("samples/five_faces.cls")
+    result = postproc.convert(path, "mikron-ucp710", "siemens-840d", diagnostics=found,
+                              options=Options(setup="samples/tools.setup.toml", error_model=str(tmp_path / "m.toml")))
+    assert not result.ok and "compensation.range" in {d.code for d in result.diagnostics}
+
+
+def test_a_short_rapid_before_a_rapid_takes_up_lost_motion() -> None:
+    """5 um each: before a long rapid, in a row of rapids, a cut; and 1 um of a cut."""
+    tip = np.cumsum([[0.0], [10.0], [0.005], [20.0], [0.005], [0.005], [0.005], [10.0], [0.005], [20.0], [0.001]], axis=0)
+    motion = SimpleNamespace(code=np.array([0, 1, 0, 0, 0, 0, 0, 1, 1, 0, 1]))
+    job = SimpleNamespace(errors=True, options=Options(), rounding=SimpleNamespace(tip=1e-4))
+    assert np.flatnonzero(_taken_up(job, motion, tip * np.ones(3) / np.sqrt(3.0))).tolist() == [2, 10]  # type: ignore[arg-type]
