@@ -71,7 +71,7 @@ def _map(sheet: Figure, place: Any, field: Residuals, what: Floats, part: slice,
     across, up = sorted(np.argsort(-np.ptp(field.tip, axis=0), kind="stable")[:2].tolist()) if len(field.tip) else (0, 1)
     rows = _spread(len(field.tip), _DOTS)
     size = np.linalg.norm(what[rows][:, part], axis=1) / unit
-    dots = place.scatter(field.tip[rows, across], field.tip[rows, up], c=size, s=6, cmap="viridis")
+    dots = place.scatter(field.tip[rows, across], field.tip[rows, up], c=size, s=6, cmap="viridis", rasterized=True)
     sheet.colorbar(dots, ax=place, label=name)
     rows = _spread(len(field.tip), _ARROWS)
     arrows = what[rows][:, part] / unit

@@ -92,7 +92,8 @@ def _curve(place: Any, component: Component, x: Floats, position: float,
     if covariance is not None:
         middle, basis = curve.at(x) / unit, curve.basis(x, np.zeros(len(x)))
         band = _DOUBT * np.sqrt(np.maximum(np.einsum("ni,ij,nj->n", basis, covariance, basis), 0.0)) / unit
-        place.fill_between(x / position, middle - band, middle + band, color=line.get_color(), alpha=0.15, linewidth=0.0)
+        place.fill_between(x / position, middle - band, middle + band, color=line.get_color(), alpha=0.15, linewidth=0.0,
+                           rasterized=True)
 
 
 def _sections(sheet: Any, model: ErrorModel, machine: Machine, tool_length: float) -> None:
@@ -109,7 +110,8 @@ def _sections(sheet: Any, model: ErrorModel, machine: Machine, tool_length: floa
         off = (actual.aim(w)[0] - nominal.aim(w)[0]) / UM
         off[actual.outside(w, INSIDE).any(axis=1)] = np.nan
         off = off.reshape(NODES, NODES, 3)
-        shown = place.pcolormesh(one, two, np.linalg.norm(off, axis=2), shading="gouraud", cmap="viridis")
+        shown = place.pcolormesh(one, two, np.linalg.norm(off, axis=2), shading="gouraud", cmap="viridis",
+                                 rasterized=True)
         sheet.colorbar(shown, ax=place, label="tip off by, um")
         some = slice(None, None, ARROWS)
         place.quiver(one[some], two[some], off[some, some, across], off[some, some, up], color="white", width=0.003)
