@@ -233,3 +233,8 @@ def test_long_events_are_wrapped_where_no_record_could_begin() -> None:
     text = text_of(p)
     assert text.count("$\n") > 1
     assert read(text).toolpath.equals(p)
+
+
+def test_messages_of_endless_records_are_short() -> None:
+    found = read_bytes("UNITS/MM\nGOTO/" + "1" * 100_000 + ",0,0\n").diagnostics
+    assert found and all(len(str(d)) < 500 for d in found)

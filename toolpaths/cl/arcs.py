@@ -27,6 +27,8 @@ _STEEP = 10.0
 _SENSE_LEAST, _SENSE_ALL = 8, 3
 """so many arcs of which most, or so many that all, sweep more than half a turn are told"""
 _TURN = 2.0 * math.pi
+_MOST_TURNS = 10000
+"""an arc of more turns is no arc that anybody cuts"""
 
 
 @dataclass
@@ -131,7 +133,10 @@ def _sweep(u: Floats, v: Floats, normal: Floats, r: Records, full_circles: bool,
     angle = angle + _TURN * r.times
     for k in np.flatnonzero(~np.isnan(r.sweep)):
         _check_written(float(angle[k]), float(r.sweep[k]), float(np.linalg.norm(u[k])), int(r.line[k]), log)
-    return np.where(np.isnan(r.sweep), angle, r.sweep), back
+    angle = np.where(np.isnan(r.sweep), angle, r.sweep)
+    for k in np.flatnonzero(angle > _TURN * (_MOST_TURNS + 1)):
+        log.error("cl.circle-times", f"an arc of {angle[k] / _TURN:.6g} turns; at most {_MOST_TURNS} are read", int(r.line[k]))
+    return angle, back
 
 
 def _check_written(angle: float, sweep: float, radius: float, line: int, log: Log) -> None:

@@ -6,6 +6,8 @@ from toolpaths.arrays import Ints
 from toolpaths.diagnostics import Diagnostic, Severity
 
 _LINES_KEPT = 10
+_LONGEST = 300
+"""characters of a message; records may have a million"""
 
 
 class _Entry:
@@ -28,7 +30,7 @@ class Log:
         """Note one problem; `key` tells apart problems of one code that are to be listed apart."""
         entry = self._entries.get((severity, code, key))
         if entry is None:
-            entry = self._entries[severity, code, key] = _Entry(severity, code, message, hint)
+            entry = self._entries[severity, code, key] = _Entry(severity, code, _short(message), hint)
         entry.count += 1
         if line > 0 and len(entry.lines) < _LINES_KEPT and line not in entry.lines:
             entry.lines.append(line)
@@ -58,3 +60,9 @@ class Log:
         found = [Diagnostic(e.severity, e.code, e.message, self.file, tuple(e.lines), e.count, e.hint)
                  for e in self._entries.values()]
         return sorted(found, key=lambda d: (-int(d.severity), d.lines[:1] or (0,)))
+
+
+def _short(message: str) -> str:
+    """Beginning and end of a long message."""
+    half = _LONGEST // 2
+    return message if len(message) <= _LONGEST else f"{message[:half]} ... {message[-half:]}"
