@@ -18,6 +18,8 @@ errors_app.command("import", epilog=EXAMPLE)(import_)
 
 ModelFile = Annotated[Path, typer.Argument(metavar="MODEL.toml", help="error model")]
 Folder = Annotated[Path, typer.Option("-o", "--output", metavar="FOLDER", help="folder to write into")]
+Figure = Annotated[Path | None, typer.Option("--figure", metavar="FILE", help="drawing of the errors, and of the tip over "
+                                             "the work volume, .png or .svg")]
 ToolLength = Annotated[float, typer.Option("--tool-length", metavar="MM", min=0.0, max=10_000.0,
                                            help="gauge length of the tool that is looked at")]
 Step = Annotated[list[str] | None, typer.Option("--step", metavar="AXIS=STEP", help="mm or degrees between rows or nodes, "
@@ -43,17 +45,26 @@ Directions = Annotated[str, typer.Option("--directions", help="of the map's valu
 
 
 @errors_app.command("check", epilog="Example: postproc errors check errors.toml -m mikron-ucp710 --tool-length 120")
-def check(file: ModelFile, machine: MachineName, tool_length: ToolLength = 100.0, json: Json = "") -> None:
+def check(file: ModelFile, machine: MachineName, tool_length: ToolLength = 100.0, figure: Figure = None,
+          json: Json = "") -> None:
     """Check an error model: what it holds, how far it reaches, worst tip and axis over the work volume, doubt."""
-    refuse_overwriting({"--json": json}, {"the error model": str(file)})
+    refuse_overwriting({"--figure": str(figure or ""), "--json": json}, {"the error model": str(file)})
+    ending = "" if figure is None else figure.suffix.lower()
+    if figure is not None and ending not in (".png", ".svg"):
+        raise typer.BadParameter(f"{figure.name} is no .png or .svg file", param_hint="--figure")
     from machines.geometric_error.survey import survey, unmeasured
     from postproc.error_text import check_text
+    from postproc.files import write_atomically
 
     with shown_errors(json):
         m = machine_of(machine)
         model, found = loaded(file, m)
         figures = survey(model, m, tool_length)
         found += unmeasured(model, m, str(file))
+        if figure is not None:
+            from machines.geometric_error.figures import model_figure
+
+            write_atomically(figure, model_figure(model, m, tool_length, ending))
     report(tuple(found), json, figures | {"diagnostics": [d.as_dict() for d in found]}, check_text(str(file), figures))
 
 
@@ -98,7 +109,7 @@ def to_linuxcnc(file: ModelFile, machine: MachineName, output: Folder, rest: Res
         worst = [exports.worst(x, m, tool_length, model) for x in (model, screws.rest)]
         beside = {} if rest is None else {rest.parent / name: text for name, text in model_files(
             screws.rest, rest.stem, f"{file.name} less what LinuxCNC corrects", rest.name).items()}
-    figures, told = screw_figures(screws, names, exports.named(screws.losses), worst)
+    figures, told = screw_figures(model, screws, names, exports.named(screws.losses), worst, tool_length)
     found.append(screw_warning(list(figures["losses"]), str(file), rest))
     finish({names[letter]: text for letter, text in screws.texts.items()}, output, [file], json, found,
            [*told, *exports.notices(screws.held, m), "for the INI file:", *exports.ini_lines(m, names)], figures, beside)

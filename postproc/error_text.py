@@ -52,15 +52,27 @@ def _covariance(found: dict[str, Any] | None) -> list[str]:
 def _volume(found: dict[str, Any] | None) -> list[str]:
     if found is None:
         return ["the model holds nowhere within travel"]
-    lines = [f"over the work volume, tool of {found['tool_length_mm']:g} mm, {found['places']} places:",
+    ways = "; two ways at their mean" if found["ways_at_mean"] else ""
+    lines = [f"over the work volume, tool of {found['tool_length_mm']:g} mm, {found['places']} places{ways}:",
              f"  tip  worst {found['tip_worst_um']:.2f} um at {_at(found['tip_worst_at'])}, rms "
              f"{found['tip_rms_um']:.2f} um",
              f"  axis worst {found['axis_worst_arcsec']:.2f} arcsec at {_at(found['axis_worst_at'])}, rms "
-             f"{found['axis_rms_arcsec']:.2f} arcsec"]
+             f"{found['axis_rms_arcsec']:.2f} arcsec", *_residual(found)]
     if "doubt_tip_um" in found:
         lines.append(f"  doubt (one standard deviation): tip {found['doubt_tip_um']:.3g} um, axis "
                      f"{found['doubt_axis_arcsec']:.3g} arcsec")
     return lines
+
+
+def _residual(found: dict[str, Any]) -> list[str]:
+    """What correction leaves, and why."""
+    why = " (near a pole, within the axis tolerance)" if found["residual_near_pole"] else \
+        {0: " (no rotary axis turns the tool)", 1: " (one rotary axis turns the tool one way alone)"}.get(found["turns"], "")
+    lines = [f"  left after correction: tip {found['residual_tip_worst_um']:.3f} um; axis worst "
+             f"{found['residual_axis_worst_arcsec']:.2f} arcsec at {_at(found['residual_axis_worst_at'])}, rms "
+             f"{found['residual_axis_rms_arcsec']:.2f} arcsec{why}"]
+    return lines + ([f"  {found['residual_lost']} places cannot be reached with the correction"] if found["residual_lost"]
+                    else [])
 
 
 def _at(joints: dict[str, float]) -> str:
@@ -82,15 +94,19 @@ def table_figures(model: Any, lost: dict[str, float]) -> tuple[dict[str, Any], l
     return {"losses": lost}, told
 
 
-def screw_figures(screws: Any, names: dict[str, str], lost: dict[str, float],
-                  worst: list[tuple[float, float]]) -> tuple[dict[str, Any], list[str]]:
-    """(figures, text) of `Screws` in files of these names; `worst` tip (um) and axis (arcsec) before and after."""
+def screw_figures(model: Any, screws: Any, names: dict[str, str], lost: dict[str, float], worst: list[tuple[float, float]],
+                  tool_length: float) -> tuple[dict[str, Any], list[str]]:
+    """(figures, text) of `Screws` of a model in files of these names; `worst` tip (um) and axis (arcsec) before and after,
+    with a tool of that length (mm)."""
     before, left = worst
+    both = any(table.both for table in screws.tables.values())
     told = [f"{name}: {len(screws.tables[letter].x)} rows" + (", both ways" if screws.tables[letter].both else "")
             for letter, name in names.items()]
     told += [f"lost between the rows: {', '.join(f'{name} {value:.3g}' for name, value in lost.items())} (um, arcsec)",
-             f"worst over the work volume: tip {before[0]:.2f} um, {left[0]:.2f} um after; axis {before[1]:.2f} arcsec, "
-             f"{left[1]:.2f} arcsec after"]
+             f"worst over the work volume, tool of {tool_length:g} mm{', two ways at their mean' if both else ''}: tip "
+             f"{before[0]:.2f} um, {left[0]:.2f} um after; axis {before[1]:.2f} arcsec, {left[1]:.2f} arcsec after"]
+    if model.covariance is not None:
+        told.append("lost: the covariance of what these files hold; that of the rest stays with it")
     told += [f"{name} is left: its axis leans, and the error is not about the axis" for name in screws.left]
     return {"losses": lost, "worst_tip_um": [before[0], left[0]], "worst_axis_arcsec": [before[1], left[1]]}, told
 

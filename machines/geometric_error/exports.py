@@ -21,6 +21,7 @@ from machines.geometric_error.model import ErrorModel
 from machines.geometric_error.names import DIRECTIONS, OWN
 from machines.geometric_error.screw_tables import LINUXCNC_ROWS, to_linuxcnc
 from machines.geometric_error.serial_errors import Component, SerialErrors
+from machines.geometric_error.survey import PLACES as WORST_PLACES
 from machines.geometric_error.survey import apart
 from machines.geometric_error.tabulate import loss, rows_for, sampled, tabulated, without
 from machines.geometric_error.volume import corners, middle, ranges, samples
@@ -269,9 +270,10 @@ def _rows(by_map: ActualByMap, actual: Actual, fixed: Floats) -> Floats:
 # ---- what stays ----------------------------------------------------------------------------------------------------
 
 def worst(model: ErrorModel, machine: Machine, tool_length: float, places_of: ErrorModel) -> tuple[float, float]:
-    """Worst tip (um) and axis (arcsec) of a model where `places_of` holds; 0 where that is nowhere."""
+    """Worst tip (um) and axis (arcsec) of a model at the places of `survey` where `places_of` holds; 0 where that is
+    nowhere. Two ways count by their mean."""
     kinematics = machine.kinematics.with_tool(tool_length)
-    w = samples(places_of, machine, places_of.on(kinematics), PLACES)
+    w = samples(places_of, machine, places_of.on(kinematics), WORST_PLACES)
     tip, axis = apart(model.on(kinematics), model.zero().on(kinematics), w)
     return float(tip.max(initial=0.0)) / UNITS["um"], float(axis.max(initial=0.0)) / UNITS["arcsec"]
 

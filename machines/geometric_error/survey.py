@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from machines.geometric_error.actual import Actual
+from machines.geometric_error.correction import correct
 from machines.geometric_error.covariance import angular
 from machines.geometric_error.csv_table import UNITS
 from machines.geometric_error.curves import Curve, Fourier, Polynomial, Table
@@ -141,11 +142,29 @@ def _volume(model: ErrorModel, machine: Machine, tool_length: float) -> dict[str
         return None
     tip, axis = apart(actual, nominal, w)
     one, other = int(np.argmax(tip)), int(np.argmax(axis))
-    found = {"tool_length_mm": tool_length, "places": len(w), "tip_worst_um": float(tip[one]) / UM,
-             "tip_rms_um": float(np.sqrt(np.mean(tip**2))) / UM, "tip_worst_at": _joints(machine, actual, w[one]),
+    found = {"tool_length_mm": tool_length, "places": len(w), "ways_at_mean": both_ways(model),
+             "tip_worst_um": float(tip[one]) / UM, "tip_rms_um": float(np.sqrt(np.mean(tip**2))) / UM, "tip_worst_at": _joints(machine, actual, w[one]),
              "axis_worst_arcsec": float(axis[other]) / ARCSEC, "axis_rms_arcsec": float(np.sqrt(np.mean(axis**2))) / ARCSEC,
              "axis_worst_at": _joints(machine, actual, w[other])}
-    return found | _doubt(model, actual, w)
+    return found | _residual(actual, nominal, w, machine) | _doubt(model, actual, w)
+
+
+def both_ways(model: ErrorModel) -> list[str]:
+    """Components with two ways of approach: where no motion is given their mean counts."""
+    return [str(c.name) for c in model.axes.components if isinstance(c.curve, Table) and c.curve.both]
+
+
+def _residual(actual: Actual, nominal: Actual, w: Floats, machine: Machine) -> dict[str, Any]:
+    """What correction leaves at places w, and how many of them it cannot reach."""
+    found = correct(actual, actual.joints(w), *nominal.aim(w))
+    lost = np.isnan(found.q).any(axis=1)
+    tip, axis = (np.where(lost, 0.0, left) for left in (found.tip_after, found.axis_after))
+    figures = {"turns": actual.turns, "residual_lost": int(lost.sum()), "residual_tip_worst_um": float(tip.max()) / UM,
+               "residual_axis_worst_arcsec": float(axis.max()) / ARCSEC,
+               "residual_axis_rms_arcsec": float(np.sqrt(np.mean(axis[~lost] ** 2))) / ARCSEC if not lost.all() else 0.0}
+    at = int(np.argmax(axis))
+    return figures | {"residual_axis_worst_at": _joints(machine, actual, w[at]),
+                      "residual_near_pole": bool(found.partial[at])}
 
 
 def apart(one: Actual, other: Actual, w: Floats) -> tuple[Floats, Floats]:

@@ -41,6 +41,28 @@ def test_check_tells_what_a_model_holds_and_does() -> None:
     assert 50.0 < found["volume"]["tip_worst_um"] < 150.0 and found["volume"]["doubt_tip_um"] < 10.0
 
 
+@pytest.mark.parametrize(("name", "words"), [
+    ("mikron-ucp710", ["places; two ways at their mean:", "left after correction: tip 0.000 um", "(near a pole"]),
+    ("uranesx", ["places:", "left after correction: tip 0.000 um", "(no rotary axis turns the tool)"])])
+def test_check_tells_what_correction_leaves(name: str, words: list[str]) -> None:
+    text = run("check", SAMPLES / f"{name}.toml", "-m", name).stdout
+    assert all(word in text for word in words) and "cannot be reached" not in text
+
+
+@pytest.mark.parametrize(("ending", "start"), [("png", b"\x89PNG"), ("svg", b"<?xml")])
+def test_check_draws_the_model(ending: str, start: bytes, tmp_path: Path) -> None:
+    run("check", SAMPLES / "uranesx.toml", "-m", "uranesx", "--figure", tmp_path / f"new/f.{ending}")
+    assert (tmp_path / f"new/f.{ending}").read_bytes().startswith(start)
+
+
+@pytest.mark.parametrize("figure", ["f.pdf", "f", "e.svg"])
+def test_a_figure_replaces_no_model_and_is_an_image(figure: str, tmp_path: Path) -> None:
+    model = tmp_path / "e.svg"  # a model may be called anything
+    model.write_text("[location]\nEC0Y = 5\n")
+    run("check", model, "-m", "mill-3axis", "--figure", tmp_path / figure, code=2)
+    assert model.read_text().startswith("[location]") and list(tmp_path.iterdir()) == [model]
+
+
 def test_check_tells_where_a_model_ends(tmp_path: Path) -> None:
     (tmp_path / "e.toml").write_text("[location]\nEC0C = 20\nEX0X = 5\n[components.EXX]\npolynomial = [3]\n"
                                      "range = [-100, 100]\n")
@@ -80,6 +102,10 @@ def test_tables_per_axis_go_out_and_come_back(tmp_path: Path) -> None:
 def test_linuxcnc_goes_out_with_the_rest_and_comes_back(tmp_path: Path) -> None:
     done = run("to-linuxcnc", MIKRON, "-m", "mikron-ucp710", "-o", tmp_path / "comp", "--rest", tmp_path / "rest.toml")
     assert "the post-processor must not do it again" in done.stderr and "rest.toml" in done.stderr
+    assert "lost: the covariance of what these files hold; that of the rest stays with it" in done.stdout
+    volume = figures("check", MIKRON, "-m", "mikron-ucp710")["volume"]
+    assert (f"worst over the work volume, tool of 100 mm, two ways at their mean: tip {volume['tip_worst_um']:.2f} um, "
+            in done.stdout)
     assert "[JOINT_4]\nCOMP_FILE = mikron-ucp710-C.comp\nCOMP_FILE_TYPE = 0" in done.stdout
     machine = machines.load("mikron-ucp710")
     full, rest = load(MIKRON, machine), load(tmp_path / "rest.toml", machine)
