@@ -135,7 +135,8 @@ def _sweep(u: Floats, v: Floats, normal: Floats, r: Records, full_circles: bool,
         _check_written(float(angle[k]), float(r.sweep[k]), float(np.linalg.norm(u[k])), int(r.line[k]), log)
     angle = np.where(np.isnan(r.sweep), angle, r.sweep)
     for k in np.flatnonzero(angle > _TURN * (_MOST_TURNS + 1)):
-        log.error("cl.circle-times", f"an arc of {angle[k] / _TURN:.6g} turns; at most {_MOST_TURNS} are read", int(r.line[k]))
+        log.error("cl.circle-times", f"an arc of {angle[k] / _TURN:.6g} turns; at most {_MOST_TURNS} are read",
+                  int(r.line[k]))
     return angle, back
 
 
