@@ -18,6 +18,7 @@ from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 from pydantic_core import ErrorDetails
 
 from machines.toml_lines import Path, key_lines
+from machines.value_words import POINT, advice, allowed, decimal_comma
 from toolpaths.diagnostics import Diagnostic, error
 
 Values = dict[str, Any]
@@ -171,6 +172,10 @@ def _syntax(fault: tomllib.TOMLDecodeError, file: str, text: str) -> Diagnostic:
     message = str(fault)
     what, _, place = message.partition(" (at ")
     line = int(place.split()[1].rstrip(",")) if place.startswith("line ") else text.count("\n") + 1
+    number = decimal_comma(next(iter(text.splitlines()[line - 1:line]), ""))
+    if number:
+        return error("file.syntax", f"{number} is no number", file=file, lines=[line],
+                     hint=f"{POINT}: {number.replace(',', '.')}")
     return error("file.syntax", f"not valid TOML: {what}", file=file, lines=[line],
                  hint="write key = value, text in quotes, [table] in brackets")
 
@@ -222,7 +227,9 @@ class _Fault:
     kind: str
     """pydantic's name"""
     message: str
+    """"allowed: " and what is, where that can be said in words; else what is wrong"""
     value: object
+    hint: str = ""
 
 
 def _faults(values: Values, model: type[BaseModel], found: ValidationError) -> list[_Fault]:
@@ -230,13 +237,15 @@ def _faults(values: Values, model: type[BaseModel], found: ValidationError) -> l
     by_key: dict[Path, _Fault] = {}
     for detail in found.errors(include_url=False):
         path, kind = _in_file(values, detail), detail["type"]
-        message = str(detail.get("ctx", {}).get("error", detail["msg"]))
+        context = detail.get("ctx", {})
+        message = str(context.get("error", detail["msg"]))
         if kind == "missing" and isinstance(path[-1], int):
-            message = f"at least {path[-1] + 1} elements are needed"
-            path, kind = path[:-1], "too_short"
-        fault = _Fault(path, kind, message[:1].lower() + message[1:], detail["input"])
-        said = by_key.get(path)
-        by_key[path] = replace(said, message=f"{said.message}, or {fault.message}") if said else fault
+            kind, context, path = "too_short", {"min_length": path[-1] + 1}, path[:-1]
+        words = allowed(kind, context)
+        message = f"allowed: {words}" if words else message[:1].lower() + message[1:]
+        fault, said = _Fault(path, kind, message, detail["input"], advice(kind, detail["input"])), by_key.get(path)
+        by_key[path] = replace(said, message=f"{said.message}, or {message.removeprefix('allowed: ')}", hint="") if said \
+            else fault
     misspelt = {(*f.path[:-1], _nearest_key(f.path, model)) for f in by_key.values() if f.kind == "extra_forbidden"}
     around = {path[:n] for path in by_key for n in range(1, len(path))}  # the fault inside says more
     return [f for f in by_key.values() if f.path not in around and not (f.kind == "missing" and f.path in misspelt)]
@@ -270,7 +279,19 @@ def _diagnostic(file: UserFile, model: type[BaseModel], fault: _Fault) -> Diagno
     if code:
         return file.problem(code, path, f"{key}: {fault.message}" if key else fault.message)
     code = "file.range" if any(word in fault.kind for word in _RANGE) else "file.type"
-    return file.problem(code, path, f"{key} = {_shown(fault.value)}: {fault.message}")
+    hint = _described(model, path) if fault.kind == "string_pattern_mismatch" else fault.hint
+    return file.problem(code, path, f"{key} = {_shown(fault.value)}: {fault.message}", hint)
+
+
+def _described(model: type[BaseModel], path: Sequence[str | int]) -> str:
+    """What the docstring of the last field on the way along `path` says."""
+    found: list[Any] = [model]
+    text = ""
+    for part in path:
+        fields = [m.model_fields[str(part)] for kind in found for m in _models(kind) if str(part) in m.model_fields]
+        text = next((" ".join(f.description.split()) for f in fields if f.description), text)
+        found = [inner for kind in found for inner in _inside(kind, part)]
+    return text
 
 
 def dotted(path: Sequence[str | int]) -> str:

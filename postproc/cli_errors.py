@@ -52,7 +52,7 @@ def check(file: ModelFile, machine: MachineName, tool_length: ToolLength = 100.0
     ending = "" if figure is None else figure.suffix.lower()
     if figure is not None and ending not in (".png", ".svg"):
         raise typer.BadParameter(f"{figure.name} is no .png or .svg file", param_hint="--figure")
-    from machines.geometric_error.survey import survey, unmeasured
+    from machines.geometric_error.survey import beyond_travel, survey, unmeasured
     from postproc.error_text import check_text
     from postproc.files import write_atomically
 
@@ -60,7 +60,7 @@ def check(file: ModelFile, machine: MachineName, tool_length: ToolLength = 100.0
         m = machine_of(machine)
         model, found = loaded(file, m)
         figures = survey(model, m, tool_length)
-        found += unmeasured(model, m, str(file))
+        found += [*beyond_travel(model, m, str(file)), *unmeasured(model, m, str(file))]
         if figure is not None:
             from machines.geometric_error.figures import model_figure
 

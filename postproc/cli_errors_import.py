@@ -50,6 +50,7 @@ def import_(sources: Sources, machine: MachineName, output: Output, into: Into =
     refuse_overwriting({"-o": str(output), "--json": json}, {name: name for name in files_of})
     from machines.geometric_error.exports import in_units
     from machines.geometric_error.imports import How, read_sources, with_covariance
+    from machines.geometric_error.survey import beyond_travel, unmeasured
 
     with shown_errors(json):
         m = machine_of(machine)
@@ -60,6 +61,7 @@ def import_(sources: Sources, machine: MachineName, output: Output, into: Into =
                   apart)
         read, found = read_sources(sources, m, how)
         model, told = required(read, found), [f"read: {', '.join(files_of)}"]
+        found += [*beyond_travel(model, m, str(output)), *unmeasured(model, m, str(output))]
         if covariance is not None:
             model = required(*with_covariance(model, covariance))
         if into is not None:

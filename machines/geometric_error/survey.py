@@ -30,6 +30,8 @@ DOUBT_WORK = 4e8
 """multiplications that looking for the largest doubt may take at one place after the other"""
 FINE = 4001
 """positions along a curve at which its largest value is looked for"""
+FAR = 0.1
+"""part of its travel by which an axis may have been measured outside it"""
 SHORT = 1e-6
 """mm or rad of travel that counts as none"""
 
@@ -69,6 +71,27 @@ def unmeasured(model: ErrorModel, machine: Machine, file: str) -> list[Diagnosti
         found.append(warning("error-model.range", f"{letter} {travel}, the model holds from {lower[j] / unit:g} to "
                              f"{upper[j] / unit:g}", file=file, hint=f"{hint} conversions stop there unless "
                              "--error-model-beyond is given"))
+    return found
+
+
+def beyond_travel(model: ErrorModel, machine: Machine, file: str) -> list[Diagnostic]:
+    """Warnings where an error was measured far outside travel, where its machine cannot have been: a wrong unit, most
+    likely."""
+    spans = {(c.name.axis, c.curve.range) for c in model.axes.components}
+    if model.map is not None:
+        spans |= {(x, (float(n[0]), float(n[-1]))) for x, n in zip(model.map.letters, model.map.nodes, strict=True)}
+    found = []
+    for letter, (least, most) in sorted(spans):
+        if letter not in machine.axis_names or not np.isfinite([least, most]).all():
+            continue
+        j = machine.axis_names.index(letter)
+        lower, upper, turns = machine.limits.lower[j], machine.limits.upper[j], machine.rotary[j]
+        if max(lower - least, most - upper) <= FAR * (upper - lower):
+            continue
+        unit = DEG if turns else 1.0
+        found.append(warning("error-model.travel", f"{letter} was measured from {least / unit:g} to {most / unit:g}, it "
+                             f"travels from {lower / unit:g} to {upper / unit:g} {'degrees' if turns else 'mm'}", file=file,
+                             hint="are the positions in the unit that their column says, and of this machine?"))
     return found
 
 
@@ -143,7 +166,8 @@ def _volume(model: ErrorModel, machine: Machine, tool_length: float) -> dict[str
     tip, axis = apart(actual, nominal, w)
     one, other = int(np.argmax(tip)), int(np.argmax(axis))
     found = {"tool_length_mm": tool_length, "places": len(w), "ways_at_mean": both_ways(model),
-             "tip_worst_um": float(tip[one]) / UM, "tip_rms_um": float(np.sqrt(np.mean(tip**2))) / UM, "tip_worst_at": _joints(machine, actual, w[one]),
+             "tip_worst_um": float(tip[one]) / UM, "tip_rms_um": float(np.sqrt(np.mean(tip**2))) / UM,
+             "tip_worst_at": _joints(machine, actual, w[one]),
              "axis_worst_arcsec": float(axis[other]) / ARCSEC, "axis_rms_arcsec": float(np.sqrt(np.mean(axis**2))) / ARCSEC,
              "axis_worst_at": _joints(machine, actual, w[other])}
     return found | _residual(actual, nominal, w, machine) | _doubt(model, actual, w)

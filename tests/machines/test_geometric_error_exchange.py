@@ -29,13 +29,14 @@ from machines.geometric_error.loader import load
 from machines.geometric_error.model import ErrorModel, doubt
 from machines.geometric_error.names import parse
 from machines.geometric_error.serial_errors import Component, SerialErrors
-from machines.geometric_error.survey import absent, survey, unmeasured
+from machines.geometric_error.survey import absent, beyond_travel, survey, unmeasured
 from machines.geometric_error.tabulate import without
 from machines.geometric_error.volume import ranges
 from machines.kinematics.serial import Serial
 from machines.machine import Machine
 from tests.machines.error_models import ARCSEC, joints, model
 from toolpaths.arrays import Floats
+from toolpaths.diagnostics import Severity
 from toolpaths.units import DEG
 
 SAMPLES = Path(__file__).parents[2] / "samples" / "errors"
@@ -437,3 +438,19 @@ def test_what_correction_leaves_is_what_the_commands_leave_where_it_is_told(name
     assert volume["residual_axis_worst_arcsec"] == pytest.approx(left, rel=1e-3)
     assert volume["residual_near_pole"] == (turns == 2)
     assert (volume["residual_axis_rms_arcsec"] < 0.1 * volume["axis_rms_arcsec"]) == (turns == 2)
+
+
+@pytest.mark.parametrize(("text", "told"), [
+    ("X [mm],EXX [um]\n-300000,0\n300000,5\n", "X was measured from -300000 to 300000, it travels from -355 to 355 mm"),
+    ("X [in],EXX [um]\n-355,0\n355,5\n", "X was measured from -9017 to 9017"),
+    ("A [rad],EAA [arcsec]\n-30,0\n120,5\n", "A was measured from -1718.87 to 6875.49, it travels from -30 to 120 degrees"),
+    ("X [mm],Y [mm],dx [um],dy [um],dz [um]\n0,0,1,1,1\n0,1000,1,1,1\n9,0,1,1,1\n9,1000,1,1,1\n", "Y was measured"),
+    ("X [mm],EXX [um]\n-360,0\n360,5\n", ""), ("C [deg],ECC [arcsec]\n-400,0\n400,5\n", "")])
+def test_a_range_far_beyond_travel_is_told(text: str, told: str, tmp_path: Path) -> None:
+    machine = machines.load("mikron-ucp710")
+    (tmp_path / "x.csv").write_text(text)
+    found, _ = read_sources([str(tmp_path / "x.csv")], machine, How())
+    assert found is not None
+    warned = beyond_travel(found, machine, "e.toml")
+    assert [d.code for d in warned] == ["error-model.travel"] * bool(told)
+    assert all(told in d.message and d.severity is Severity.WARNING and "unit" in d.hint for d in warned)

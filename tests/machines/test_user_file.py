@@ -1,7 +1,7 @@
 """Files that a user writes: each fault is a diagnostic with file, line, what was found and what to do."""
 
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 import pytest
 from pydantic import Field
@@ -190,3 +190,54 @@ def test_key_lines_of_every_construct():
     assert lines["n", 0, "m", "k"] == 18
     assert lines["n", 1, "k"] == 20
     assert ("no",) not in lines and ("z",) not in lines
+
+
+# ---- what is allowed, in words ----------------------------------------------------------------------------------------
+
+class Every(UserModel):
+    number: float = 0.0
+    whole: int = 0
+    place: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    table: dict[str, float] = Field(default_factory=dict)
+    axis: Axis | None = None
+    way: Literal["up", "down"] = "up"
+    sign: Literal[1, -1] = 1
+    code: str = Field(default="G54", pattern=r"^G5[4-9]$")
+    """register of the control: G54 to G59"""
+    system: bool | Annotated[str, Field(min_length=1)] = False
+    some: tuple[float, ...] = Field(default=(), min_length=0, max_length=2)
+    part: float = Field(default=1.0, gt=0.0, le=5.0)
+
+
+@pytest.mark.parametrize(("text", "said", "hint"), [
+    ('number = "5"', 'number = "5": allowed: a number', "without quotes"),
+    ('number = "5,25"', "allowed: a number", "with a decimal point"),
+    ('number = "five"', "allowed: a number", ""), ("number = true", "number = true: allowed: a number", ""),
+    ("number = nan", "allowed: a finite number", ""),
+    ("whole = 1.5", "whole = 1.5: allowed: a whole number", ""),
+    ("place = 5", "place = 5: allowed: a list in square brackets", ""),
+    ("place = [1, 2]", "place = [1, 2]: allowed: 3 elements or more", ""),
+    ("place = [1, 2, 3,5]", "allowed: 3 elements or fewer", "decimal points"),
+    ("some = [1.0, 2.5, 3.5]", "allowed: 2 elements or fewer", ""),
+    ("table = 5", "table = 5: allowed: a table of keys and values", ""),
+    ("axis = 5", "allowed: a table of keys and values", ""),
+    ('way = "left"', "way = \"left\": allowed: 'up' or 'down'", ""), ("sign = 2", "sign = 2: allowed: 1 or -1", ""),
+    ('code = "G60"', "allowed: text of the form", "register of the control: G54 to G59"),
+    ("code = 54", "allowed: text in quotes", "in quotes"),
+    ("system = 2", "system = 2: allowed: true or false, or text in quotes", ""),
+    ('system = ""', "true or false, or text of length 1 or more", ""),
+    ("part = 0", "part = 0: allowed: more than 0", ""), ("part = 5.5", "part = 5.5: allowed: 5 or less", "")])
+def test_values_are_told_with_what_is_allowed(text, said, hint, tmp_path):
+    model, found = load_toml(write(tmp_path, text + "\n"), Every)
+    assert model is None and len(found) == 1 and said in found[0].message and found[0].lines == (1,)
+    assert hint in found[0].hint and bool(hint) == bool(found[0].hint)
+    assert "should" not in found[0].message and "valid" not in found[0].message
+
+
+@pytest.mark.parametrize(("text", "number"), [
+    ("velocity = 6,5", "6,5"), ("velocity = -6,5   # fast", "-6,5"), ("velocity = 0,05\nreach = 3", "0,05")])
+def test_a_decimal_comma_is_told_with_its_line(text, number, tmp_path):
+    d = only(tmp_path, GOOD.replace("velocity = 500", text))
+    assert (d.code, d.lines, d.message) == ("file.syntax", (5,), f"{number} is no number")
+    assert d.hint == f"write a decimal point: {number.replace(',', '.')}"
+    assert "no number" not in only(tmp_path, GOOD + "velocity 3\n").message

@@ -190,6 +190,14 @@ def test_measured_readings_become_means_with_their_doubt(tmp_path: Path) -> None
     assert np.sqrt(np.diag(found.covariance)) == pytest.approx([0.001 / np.sqrt(2)] * 2)
 
 
+def test_import_tells_ranges_that_are_none_of_the_machine(tmp_path: Path) -> None:
+    for text, told in (("X [mm],EXX [um]\n-300000,0\n300000,5\n", "error-model.travel"),
+                       ("X [mm],EXX [um]\n-0.3,0\n0.3,5\n", "the model holds from -0.3 to 0.3")):
+        (tmp_path / "x.csv").write_text(text)
+        for command in (["import", tmp_path / "x.csv", "-o", tmp_path / "e.toml"], ["check", tmp_path / "e.toml"]):
+            assert told in run(*command, "-m", "mill-3axis").stderr
+
+
 def test_sample_readings_become_models(tmp_path: Path) -> None:
     run("import", SAMPLES / "runs-mill-3axis-X.csv", "-m", "mill-3axis", "-o", tmp_path / "x.toml", "--average")
     found = load(tmp_path / "x.toml", machines.load("mill-3axis"))

@@ -1,0 +1,43 @@
+"""What a key of a user's file may hold, in words, from what pydantic says of a value that is none of that."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import Any
+
+_ALLOWED = {
+    "bool_type": "true or false", "float_type": "a number", "int_type": "a whole number", "string_type": "text in quotes",
+    "tuple_type": "a list in square brackets", "list_type": "a list in square brackets",
+    "dict_type": "a table of keys and values", "model_type": "a table of keys and values",
+    "finite_number": "a finite number", "literal_error": "{expected}",
+    "greater_than": "more than {gt:g}", "greater_than_equal": "{ge:g} or more",
+    "less_than": "less than {lt:g}", "less_than_equal": "{le:g} or less",
+    "too_short": "{min_length} elements or more", "too_long": "{max_length} elements or fewer",
+    "string_too_short": "text of length {min_length} or more", "string_too_long": "text of length {max_length} or less",
+    "string_pattern_mismatch": "text of the form {pattern}"}
+_NUMBER = re.compile(r"\s*[-+]?(\d+[.,]?\d*|[.,]\d+)([eE][-+]?\d+)?\s*$")
+_COMMA = re.compile(r"(?:^|[=\[,])\s*([-+]?\d+),(\d+)\s*(?:#.*)?$")
+POINT = "write a decimal point"
+
+
+def allowed(kind: str, context: Mapping[str, Any]) -> str:
+    """Of a fault of pydantic's `kind`; "" for one that speaks for itself."""
+    return _ALLOWED.get(kind, "").format(**context)
+
+
+def advice(kind: str, value: object) -> str:
+    """What to do where a value was meant to be what is allowed; "" where the allowed says it."""
+    if kind in ("float_type", "int_type") and isinstance(value, str) and _NUMBER.match(value):
+        return "write the number without quotes" + (", with a decimal point" if "," in value else "")
+    if kind == "string_type" and isinstance(value, int | float):
+        return "write it in quotes"
+    if kind == "too_long" and isinstance(value, list) and all(isinstance(v, int) for v in value):
+        return "numbers have decimal points: a comma begins the next"
+    return ""
+
+
+def decimal_comma(line: str) -> str:
+    """The number with a decimal comma at the end of a line that is no TOML; "" for none."""
+    found = _COMMA.search(line)
+    return f"{found[1]},{found[2]}" if found else ""
