@@ -11,7 +11,7 @@ import typer
 from postproc.cli_calibrate import calibrate
 from postproc.cli_catalogue import controller_app, machine_app, setup_app
 from postproc.cli_errors import errors_app
-from postproc.cli_options import Allow, AxisTolerance, ClFile, Dialect, MachineName, Tolerance, Units
+from postproc.cli_options import Allow, AxisTolerance, Beyond, ClFile, Dialect, MachineName, Tolerance, Units
 from postproc.cli_orient import EXAMPLES, ORIENTATIONS, MaxTilt, Orient
 from postproc.cli_orient import orient as orient_command
 from postproc.cli_place import EXAMPLES as PLACES
@@ -42,8 +42,6 @@ ControllerName = Annotated[str, typer.Option("-c", "--controller", help="control
 Setup = Annotated[str, typer.Option("--setup", metavar="S.toml", help="set-up file: placement, tools, safe distances")]
 Errors = Annotated[str, typer.Option("--error-model", metavar="E.toml", help="file of the machine's geometric errors: "
                                      "corrected, and proved on the machine with them")]
-Beyond = Annotated[bool, typer.Option("--error-model-beyond", help="outside the range that was measured, take the error at "
-                                      "its end")]
 
 
 def _version(wanted: bool) -> None:

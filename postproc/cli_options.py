@@ -14,5 +14,7 @@ AxisTolerance = Annotated[float, typer.Option("--axis-tolerance", metavar="DEG",
                                                help="tolerance of the axis")]
 Units = Annotated[str, typer.Option("--units", help="units of a CL file that states none: mm or inch")]
 Dialect = Annotated[str, typer.Option("--dialect", help="read the CL file as this dialect instead of the recognised one")]
+Beyond = Annotated[bool, typer.Option("--error-model-beyond", help="outside the range that was measured, take the error at "
+                                      "its end")]
 Allow = Annotated[list[str] | None, typer.Option("--allow-unknown", metavar="WORD",
                                                  help="leave this word out although it looks like motion")]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from postproc.cli_options import Allow, AxisTolerance, ClFile, Dialect, MachineName, Tolerance, Units
+from postproc.cli_options import Allow, AxisTolerance, Beyond, ClFile, Dialect, MachineName, Tolerance, Units
 from postproc.cli_orient import ORIENTATIONS, MaxTilt, Orient
 from postproc.console import Json, machine_of, progress_bar, refuse_overwriting, report, shown_errors
 
@@ -41,6 +41,7 @@ def place(file: ClFile,
           axis_tolerance: AxisTolerance = 0.05,
           error_model: Annotated[str, typer.Option("--error-model", metavar="E.toml", help="file of the machine's geometric "
                                                    "errors, corrected where the place is proved")] = "",
+          beyond: Beyond = False,
           units: Units = "",
           dialect: Dialect = "",
           allow_unknown: Allow = None,
@@ -56,7 +57,7 @@ def place(file: ClFile,
     from postproc.placement import report as figures
     from postproc.placement.write import placed_text
 
-    options = Options(tolerance, axis_tolerance, setup=str(setup), units=units, dialect=dialect, error_model=error_model,
+    options = Options(tolerance, axis_tolerance, setup=str(setup), units=units, dialect=dialect, error_model=error_model, error_beyond=beyond,
                       allow_unknown=tuple(w.upper() for w in allow_unknown or ()), max_tilt=max_tilt,
                       orient=orient)  # type: ignore[arg-type]
     values: dict[str, Any] = {}

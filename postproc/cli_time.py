@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from postproc.cli_options import AxisTolerance, MachineName, Tolerance, Units
+from postproc.cli_options import AxisTolerance, Beyond, MachineName, Tolerance, Units
 from postproc.console import Json, machine_of, progress_bar, refuse_overwriting, report, shown_errors
 
 if TYPE_CHECKING:
@@ -34,6 +34,7 @@ def time(file: Annotated[Path, typer.Argument(metavar="FILE", help="CL file, or 
          dialect: Annotated[str, typer.Option("--dialect", help="read the CL file as this dialect")] = "",
          error_model: Annotated[str, typer.Option("--error-model", metavar="E.toml", help="a CL file is timed as it is "
                                                   "written with these geometric errors corrected")] = "",
+         beyond: Beyond = False,
          json: Json = "") -> None:
     """Estimate how long a program takes, with a band, and where the time goes."""
     _check(output, calibrate, units, dialect)
@@ -44,7 +45,8 @@ def time(file: Annotated[Path, typer.Argument(metavar="FILE", help="CL file, or 
     from postproc.cycle_time.estimate import estimate
     from postproc.options import Options
 
-    options = Options(tolerance, axis_tolerance, "auto", setup, units, dialect, error_model=error_model)
+    options = Options(tolerance, axis_tolerance, "auto", setup, units, dialect, error_model=error_model,
+                      error_beyond=beyond)
     values: dict[str, Any] = {}
     text = ""
     with shown_errors(json), progress_bar() as progress:

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from machines.geometric_error.model import ErrorModel, doubt
+from machines.geometric_error.volume import measured
 from machines.kinematics.base import Kinematics
 from postproc.control import Control
 from postproc.corrected.arcs import fitted_arcs
@@ -119,7 +120,8 @@ def compensate(path: Path, moves: Moves, tools: Ints, kinematics: Callable[[int]
     live = ~path.home
     low, high = work.reached()
     unmeasured = found.unmeasured | work.unmeasured(low, high)
-    diagnostics = _unmeasured(path, moves, modes.control, unmeasured & live[:, None], (low, high), beyond, file)
+    diagnostics = _unmeasured(path, moves, modes.control, unmeasured & live[:, None], (low, high), measured(model), beyond,
+                              file)
     lost = live & ~np.isfinite(found.q).all(axis=1)
     if (diagnostics and not beyond) or lost.any():
         return None, None, diagnostics or [_lost(path, moves, lost, file)]
@@ -267,15 +269,18 @@ def _doubt(path: Path, live: Bools, work: Work, model: ErrorModel) -> tuple[floa
 
 # ---- what cannot be done ----------------------------------------------------------------------------------------------
 
-def _unmeasured(path: Path, moves: Moves, control: Control, where: Bools, reached: tuple[Floats, Floats], beyond: bool,
-                file: str) -> list[Diagnostic]:
-    """One of each axis that goes where its errors were not measured, `where` (K, J), from and to `reached` (K, J)."""
+def _unmeasured(path: Path, moves: Moves, control: Control, where: Bools, reached: tuple[Floats, Floats],
+                known: dict[str, tuple[float, float]], beyond: bool, file: str) -> list[Diagnostic]:
+    """One of each axis that goes where its errors were not measured, `where` (K, J), from and to `reached` (K, J); `known`:
+    what was measured of it."""
     told = []
     for j in np.flatnonzero(where.any(axis=0)).tolist():
         rows = np.flatnonzero(where[:, j])
         low, high = reached[0][rows, j].min() * control.unit[j], reached[1][rows, j].max() * control.unit[j]
-        lines = np.unique(moves.line[path.move[rows]])[:6].tolist()
-        text = f"{control.machine.axis_names[j]} goes from {low:.3f} to {high:.3f} where its errors were not measured"
+        lines, name = np.unique(moves.line[path.move[rows]])[:6].tolist(), control.machine.axis_names[j]
+        span = " to ".join(f"{x * control.unit[j]:.7g}" for x in known.get(name, ()))
+        text = f"{name} goes from {low:.7g} to {high:.7g} where its errors were not measured" + (
+            f": they were from {span}" if span else "")
         if beyond:
             told.append(warning("compensation.range", text + "; the error at the end of the range is taken", file=file,
                                 lines=lines, count=len(rows)))

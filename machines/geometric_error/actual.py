@@ -21,6 +21,8 @@ RESTS = 1e-6
 """part of the largest motion that counts as none"""
 LEVER = 100.0
 """mm per rad"""
+EDGE = 1e-6
+"""mm or rad beyond what was measured that are numbers' own: a part that ends where the measurement does"""
 
 
 class Actual(ABC):
@@ -60,7 +62,7 @@ class Actual(ABC):
         """First-order motion (N, 6, P) of the tip (mm) and turn (rad) per parameter, in the table frame."""
 
     @abstractmethod
-    def outside(self, w: Floats, margin: float = 0.0) -> Bools:
+    def outside(self, w: Floats, margin: float = EDGE) -> Bools:
         """True (N, J) where a joint stands outside what was measured of it by more than `margin` mm or rad."""
 
     def deviation(self, w: Floats, values: Floats, direction: Floats | None = None) -> Floats:

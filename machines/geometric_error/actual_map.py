@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from machines.geometric_error.actual import Actual, Placed
+from machines.geometric_error.actual import EDGE, Actual, Placed
 from machines.geometric_error.lattice import POINT, ErrorMap
 from machines.kinematics.base import Kinematics
 from machines.kinematics.h4_axes import H4TableAxis
@@ -88,7 +88,7 @@ class ActualByMap(Actual):
             result[rows, :, node[:, k], :] += weight[:, k, None, None] * columns
         return result.reshape(len(w), 6, -1)
 
-    def outside(self, w: Floats, margin: float = 0.0) -> Bools:
+    def outside(self, w: Floats, margin: float = EDGE) -> Bools:
         """See the base class; a coordinate of the point counts for every slide."""
         found = self.map.outside(self.lattice_places(w), margin)
         names, rotary = self.kinematics.axis_names, np.array(self.kinematics.rotary)

@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from machines.geometric_error.actual import Actual, Placed
+from machines.geometric_error.actual import EDGE, Actual, Placed
 from machines.geometric_error.axis_motion import Line, actual_line, actual_tool, along, driven
 from machines.geometric_error.names import SPINDLE, parse
 from machines.geometric_error.rods import RodErrors, RodFrame, platform_turn, rod_frame
@@ -94,7 +94,7 @@ class ActualDelta(ActualRods):
         """See the base class."""
         return np.broadcast_to(np.eye(6, 3), (len(w), 6, 3)).copy()
 
-    def outside(self, w: Floats, margin: float = 0.0) -> Bools:
+    def outside(self, w: Floats, margin: float = EDGE) -> Bools:
         """False: dimensions hold everywhere."""
         return np.zeros((len(w), 3), dtype=np.bool_)
 
@@ -170,7 +170,7 @@ class ActualH4(ActualRods):
             return np.tile(np.eye(3), (len(w), 1, 1))
         return rotation(self.line.joint.direction, w[:, 4])
 
-    def outside(self, w: Floats, margin: float = 0.0) -> Bools:
+    def outside(self, w: Floats, margin: float = EDGE) -> Bools:
         """See the base class; only the rotary axis has a range."""
         return self.chain.outside(self.kinematics.axis_names, np.column_stack([np.zeros((len(w), 4)), w[:, 4]]), margin)
 

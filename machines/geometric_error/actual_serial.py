@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from machines.geometric_error.actual import Actual, Placed
+from machines.geometric_error.actual import EDGE, Actual, Placed
 from machines.geometric_error.axis_motion import Line, actual_line, actual_tool, along, driven
 from machines.geometric_error.names import SPINDLE, parse
 from machines.geometric_error.serial_errors import SerialErrors
@@ -54,7 +54,7 @@ class ActualSerial(Actual):
         """See the base class."""
         return self.kinematics.jacobian(w)
 
-    def outside(self, w: Floats, margin: float = 0.0) -> Bools:
+    def outside(self, w: Floats, margin: float = EDGE) -> Bools:
         """See the base class."""
         return self.errors.outside(self.kinematics.axis_names, w, margin)
 

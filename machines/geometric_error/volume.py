@@ -27,19 +27,24 @@ def ranges(model: ErrorModel, machine: Machine) -> tuple[Floats, Floats]:
     Axes that go round are taken over what was measured of them, else half a turn either way.
     """
     lower, upper = (np.array(x) for x in (machine.limits.lower, machine.limits.upper))
-    for letter, (least, most) in _measured(model):
+    for letter, (least, most) in measured(model).items():
         if letter in machine.axis_names:
             j = machine.axis_names.index(letter)
             lower[j], upper[j] = max(lower[j], least), min(upper[j], most)
     return np.where(np.isfinite(lower), lower, -TURN), np.where(np.isfinite(upper), upper, TURN)
 
 
-def _measured(model: ErrorModel) -> list[tuple[str, tuple[float, float]]]:
+def measured(model: ErrorModel) -> dict[str, tuple[float, float]]:
+    """(least, greatest) position of each axis or coordinate of a map, mm or rad, that all that is known of it holds for."""
     found = [(c.name.axis, c.curve.range) for c in model.axes.components]
     if model.map is not None:
         found += [(letter, (float(nodes[0]), float(nodes[-1]))) for letter, nodes, period in
                   zip(model.map.letters, model.map.nodes, model.map.periods, strict=True) if not period]
-    return found
+    result: dict[str, tuple[float, float]] = {}
+    for letter, (least, most) in found:
+        low, high = result.get(letter, (least, most))
+        result[letter] = max(low, least), min(high, most)
+    return result
 
 
 def samples(model: ErrorModel, machine: Machine, actual: Actual, count: int, seed: int = 0) -> Floats:

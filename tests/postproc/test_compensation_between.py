@@ -82,9 +82,20 @@ def test_an_arc_that_leaves_what_was_measured_is_refused(tmp_path: Path) -> None
     result = converted(tmp_path, CIRCLE, model, TABLE)
     told = [d for d in result.diagnostics if d.code == "compensation.range"]
     assert not result.ok and result.text == ""
-    assert [d.message.split()[0] for d in told] == ["X", "Y"] and "60.000" in told[0].message
+    assert [d.message.split()[0] for d in told] == ["X", "Y"] and told[0].message == (
+        "X goes from 0 to 60 where its errors were not measured: they were from -200 to 30")
     allowed = converted(tmp_path, CIRCLE, model, TABLE, beyond=True)
     assert allowed.ok and len([d for d in allowed.diagnostics if d.code == "compensation.range"]) == 2
+
+
+def test_a_part_may_end_where_the_measurement_does(tmp_path: Path) -> None:
+    path, found = toolpaths.read("samples/five_faces.cls")  # X to 10 on this machine, the last digit off
+    for end, right in ((10.0, True), (9.9999, False)):
+        (tmp_path / "m.toml").write_text('machine = "mikron-ucp710"\n[components.EXX]\npolynomial = [0.0, 5.0]\n'
+                                         f"range = [-{end}, {end}]\n")
+        result = postproc.convert(path, "mikron-ucp710", "linuxcnc", diagnostics=found,
+                                  options=Options(setup="samples/tools.setup.toml", error_model=str(tmp_path / "m.toml")))
+        assert result.ok == right, [str(d) for d in result.diagnostics]
 
 
 def test_looks_cover_every_stretch() -> None:
