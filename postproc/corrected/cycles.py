@@ -9,7 +9,9 @@ import numpy as np
 
 from postproc.corrected.arcs import LOOKS
 from postproc.corrected.reversals import LOOSE
+from postproc.corrected.runs import Runs
 from postproc.corrected.work import ALONE, Work
+from postproc.groups import groups
 from postproc.moves import Moves
 from postproc.path import FEED, TRAVERSE, Path
 from toolpaths.arrays import Bools, Floats, Ints
@@ -31,113 +33,189 @@ def whole_holes(path: Path, nominal: Path, moves: Moves, work: Work, allowed: fl
     cycles that `always` (C,) stay cycles.
     """
     hole = np.where(np.isnan(path.u) | path.home, -1, moves.hole[path.move])
-    runs = np.flatnonzero(np.concatenate([[True], np.diff(hole) != 0]))
+    holes = _along_tool(path, nominal, work, *_sequences(path, hole, work))
     whole, q = np.full(len(path), ALONE), path.q.copy()
-    kept = np.append(always, False)[moves.cycle[path.move]]
-    for rows in _sequences(path, hole, runs, work):
-        _correct_sequence(path, nominal, rows, work, np.where(kept, np.inf, allowed), q, whole)
+    if not len(holes.runs):
+        return path, whole
+    share = np.where(np.append(always, False)[moves.cycle[path.move[holes.rows]]], np.inf, allowed)
+    lead, moved, above = _leads(path, nominal, work, holes)
+    joints = _joints(path, work, holes.owner[holes.hole], path.q[holes.rows], holes.corrected(above))
+    near = _near(nominal, work, holes, joints, share)
+    q[lead] = moved
+    near = _approached(replace(path, q=q), work, holes, joints, share, near, lead)
+    rows = near[holes.hole]
+    q[holes.rows[rows]], whole[holes.rows[rows]] = joints[rows], holes.runs.begin[holes.hole[rows]]
+    q[lead] = moved
     return replace(path, q=q), whole
 
 
-def _sequences(path: Path, hole: Ints, runs: Ints, work: Work) -> list[list[Ints]]:
-    """Holes (their block numbers) that follow each other with one tool in one frame at one orientation."""
-    found: list[list[Ints]] = []
-    for first, last in zip(runs, np.append(runs[1:], len(hole)), strict=True):
-        rows = np.arange(first, last)
-        if hole[first] < 0 or first == 0 or not (path.code[rows] == FEED).any() or not _one_place(path, rows, work):
-            continue
-        joined = found and found[-1][-1][-1] == first - 1 and _one_place(path, np.array([first - 1, first]), work)
-        found[-1].append(rows) if joined else found.append([rows])
-    return found
-
-
-def _one_place(path: Path, rows: Ints, work: Work) -> bool:
-    """True where blocks share frame, tool and rotary axes."""
-    turns = path.q[rows][:, work.rotary]
-    return bool((path.frame[rows] == path.frame[rows[0]]).all() and (work.tools[rows] == work.tools[rows[0]]).all()
-                and (turns == turns[0]).all())
-
-
-def _correct_sequence(path: Path, nominal: Path, holes: list[Ints], work: Work, allowed: Floats, q: Floats,
-                      whole: Ints) -> None:
-    """Put the joints of the holes that stay whole into `q`, and mark them in `whole`; allowed (K,) mm."""
-    lead = int(holes[0][0]) - 1
-    kin = work.kinematics(int(work.tools[lead + 1]))
-    new, old = (p.frames[int(p.frame[lead + 1])].control for p in (path, nominal))
-    at = [_Hole(rows, old.words(nominal.q[rows], kin, 0.0)[:, new.xyz], new.words(path.q[rows], kin, 0.0)[:, new.xyz],
-                path.code[rows] == FEED) for rows in holes]
-    at = [hole for hole in at if hole.along_z]
-    if not at:
-        return
-    least = min(hole.off[2] for hole in at)
-    before, came = old.words(nominal.q[[lead]], kin, 0.0), new.words(path.q[[lead]], kin, 0.0)
-    z = new.xyz[2]
-    if abs(before[0, z] - at[0].plane) <= SAME and path.code[lead] != FEED and not path.home[lead]:
-        came[0, z] = before[0, z] + least
-        q[lead] = np.where(work.rotary, path.q[lead], new.joints(came, kin, 0.0)[0])
-    for hole in at:
-        words = new.words(path.q[hole.rows], kin, 0.0)
-        words[:, new.xyz] = hole.corrected(least, float((came - before)[0, z]))
-        joints = np.where(work.rotary, path.q[hole.rows], new.joints(words, kin, 0.0))
-        way = np.tile(work.way[hole.rows[hole.bottom]], (len(hole.rows), 1))
-        share = allowed[hole.rows]
-        if _approach_off(path, work, q, joints, int(hole.rows[0]), float(share[0])) <= IN_AIR * share[0] and (
-                work.off(nominal.q[hole.rows], joints, hole.rows, way) <= LOOSE * share).all() and (
-                work.off(nominal.q[hole.rows], joints, hole.rows, work.way[hole.rows]) <= IN_AIR * share).all():
-            q[hole.rows], whole[hole.rows] = joints, hole.rows[0]
-
-
-def _approach_off(path: Path, work: Work, q: Floats, joints: Floats, row: int, share: float) -> float:
-    """mm, largest distance from the nominal motion on the way to a hole (block `row`), which gets no points; 0 where the
-    correction changes by no more than `share` mm over one stretch of the errors."""
-    change = joints[0] - q[row - 1] - (work.path.q[row] - work.path.q[row - 1])
-    near = work.changes(q[row - 1:row], joints[:1])[0] == 1 and np.abs(change).max() <= share
-    if path.code[row] != TRAVERSE or near:
-        return 0.0
-    block, t = np.full(len(LOOKS), row), np.array(LOOKS)
-    got = work.straight(path, np.tile(q[row - 1], (len(t), 1)), np.tile(joints[0], (len(t), 1)), block, t)
-    way = np.tile(work.way[row], (len(t), 1))
-    return float(work.off(work.nominal(block, t), got, block, way).max())
+def _sequences(path: Path, hole: Ints, work: Work) -> tuple[Runs, Ints]:
+    """Holes at one orientation with one tool in one frame, as runs of blocks, and for each (H,) the first block of all that
+    follow each other so."""
+    runs, turns = Runs.of(hole), path.q[:, work.rotary]
+    same = np.append(False, (np.diff(path.frame) == 0) & (np.diff(work.tools) == 0) & (turns[1:] == turns[:-1]).all(axis=1))
+    drills = np.logical_or.reduceat(path.code == FEED, runs.begin)
+    fine = (hole[runs.begin] >= 0) & (runs.begin > 0) & drills & runs.throughout(same | (np.diff(hole, prepend=-2) != 0))
+    joined = same[runs.begin] & np.append(False, fine[:-1])
+    first = np.maximum.accumulate(np.where(joined, 0, runs.begin))
+    return runs.some(fine), first[fine]
 
 
 @dataclass(frozen=True)
-class _Hole:
-    """A hole in words X, Y, Z: `wanted` (N, 3) nominal, `found` (N, 3) corrected block by block; `feeds` (N,) drill."""
+class _Holes:
+    """H holes of M blocks in words X, Y, Z.
 
-    rows: Ints
+    runs: their blocks; owner: (H,) first block of the holes that follow each other; feeds: (M,) blocks that drill
+    wanted: (M, 3) nominal; found: (M, 3) corrected block by block
+    """
+
+    runs: Runs
+    owner: Ints
     wanted: Floats
     found: Floats
     feeds: Bools
 
     @cached_property
-    def bottom(self) -> int:
-        """Number of the deepest block."""
-        return int(np.argmin(np.where(self.feeds, self.wanted[:, 2], np.inf)))
+    def rows(self) -> Ints:
+        """(M,) blocks."""
+        return self.runs.rows
 
     @cached_property
-    def start(self) -> int:
-        """Number of the block that ends where drilling begins."""
-        return max(int(np.argmax(self.feeds)) - 1, 0)
+    def hole(self) -> Ints:
+        """(M,) number of the hole."""
+        return self.runs.of_rows
+
+    @cached_property
+    def first(self) -> Ints:
+        """(H,) row of each hole's first block."""
+        return self.runs.packed().begin
+
+    @cached_property
+    def bottom(self) -> Ints:
+        """(H,) row of the deepest block."""
+        return self.runs.least(np.where(self.feeds, self.wanted[:, 2], np.inf))
+
+    @cached_property
+    def start(self) -> Ints:
+        """(H,) row of the block that ends where drilling begins."""
+        return np.asarray(np.maximum(self.runs.first(self.feeds) - 1, self.first))
 
     @property
-    def along_z(self) -> bool:
-        """False where the tool does not come down along Z of the words: no control drills that by itself."""
+    def along_z(self) -> Bools:
+        """(H,) False where the tool does not come down along Z of the words: no control drills that by itself."""
         down = self.wanted[self.bottom, 2] < self.wanted[self.start, 2]
-        return bool(down and np.ptp(self.wanted[self.start:, :2], axis=0).max() <= SAME)
+        inside = (np.arange(len(self.hole)) >= self.start[self.hole])[:, None]
+        flat = self.wanted[:, :2]
+        wide = np.maximum.reduceat(np.where(inside, flat, -np.inf), self.first) - np.minimum.reduceat(
+            np.where(inside, flat, np.inf), self.first)
+        return np.asarray(down & (wide.max(axis=1) <= SAME))
 
     @property
-    def plane(self) -> float:
-        """Level where drilling begins, nominal."""
-        return float(self.wanted[self.start, 2])
+    def plane(self) -> Floats:
+        """(H,) level where drilling begins, nominal."""
+        return np.asarray(self.wanted[self.start, 2])
 
-    @property
+    @cached_property
     def off(self) -> Floats:
-        """(3,) correction of the bottom."""
+        """(H, 3) correction of the bottom."""
         return np.asarray(self.found[self.bottom] - self.wanted[self.bottom])
 
-    def corrected(self, plane: float, above: float) -> Floats:
-        """(N, 3) all as the bottom, along the tool `plane` for the plane and `above` for what is above it."""
-        result = self.wanted + self.off
-        z = self.wanted[:, 2]
-        result[:, 2] = z + np.where(z < self.plane - SAME, self.off[2], np.where(z <= self.plane + SAME, plane, above))
+    @cached_property
+    def sequences(self) -> Runs:
+        """Those that follow each other, as runs of holes."""
+        return Runs.of(self.owner)
+
+    @cached_property
+    def least(self) -> Floats:
+        """(S,) least correction along the tool of each sequence."""
+        return np.minimum.reduceat(self.off[:, 2], self.sequences.begin)
+
+    def corrected(self, above: Floats) -> Floats:
+        """(M, 3) all as the bottom, along the tool as `least` for the plane and `above` (S,) for what is above it."""
+        z, plane, sequence = self.wanted[:, 2], self.plane[self.hole], self.sequences.of_rows[self.hole]
+        result = self.wanted + self.off[self.hole]
+        result[:, 2] = z + np.where(z < plane - SAME, self.off[self.hole, 2],
+                                    np.where(z <= plane + SAME, self.least[sequence], above[sequence]))
         return result
+
+    def some(self, keep: Bools) -> _Holes:
+        """Some of them."""
+        mine = keep[self.hole]
+        return _Holes(self.runs.some(keep), self.owner[keep], self.wanted[mine], self.found[mine], self.feeds[mine])
+
+
+def _along_tool(path: Path, nominal: Path, work: Work, runs: Runs, owner: Ints) -> _Holes:
+    """The holes of some runs that are drilled along Z of the words."""
+    rows, frames = runs.rows, np.repeat(owner, runs.size)
+    wanted, found = (_words(p, work, frames, p.q[rows]) for p in (nominal, path))
+    holes = _Holes(runs, owner, wanted, found, path.code[rows] == FEED)
+    return holes.some(holes.along_z) if len(runs) else holes
+
+
+def _words(path: Path, work: Work, owner: Ints, q: Floats) -> Floats:
+    """(N, 3) words X, Y, Z of joints (N, J) by the law of blocks (N,)."""
+    result = np.empty((len(q), 3))
+    for k in groups(path.frame[owner], work.tools[owner]):
+        control, kin = path.frames[int(path.frame[owner[k[0]]])].control, work.kinematics(int(work.tools[owner[k[0]]]))
+        result[k] = control.words(q[k], kin, 0.0)[:, control.xyz]
+    return result
+
+
+def _joints(path: Path, work: Work, owner: Ints, q: Floats, xyz: Floats) -> Floats:
+    """Joints (N, J) that are q (N, J) but at other words X, Y, Z (N, 3), by the law of blocks (N,)."""
+    result = np.empty_like(q)
+    for k in groups(path.frame[owner], work.tools[owner]):
+        control, kin = path.frames[int(path.frame[owner[k[0]]])].control, work.kinematics(int(work.tools[owner[k[0]]]))
+        words = control.words(q[k], kin, 0.0)
+        words[:, control.xyz] = xyz[k]
+        result[k] = np.where(work.rotary, q[k], control.joints(words, kin, 0.0))
+    return result
+
+
+def _leads(path: Path, nominal: Path, work: Work, holes: _Holes) -> tuple[Ints, Floats, Floats]:
+    """Blocks (N,) before holes that come to the plane of these, their joints (N, J) at its correction, and what blocks that
+    the tool comes from to holes are corrected by along the tool (S,)."""
+    first = holes.sequences.begin
+    owner, plane = holes.owner[first], holes.plane[first]
+    lead = owner - 1
+    before, came = (_words(p, work, owner, p.q[lead]) for p in (nominal, path))
+    level = (np.abs(before[:, 2] - plane) <= SAME) & (path.code[lead] != FEED) & ~path.home[lead]
+    came[level, 2] = before[level, 2] + holes.least[level]
+    return lead[level], _joints(path, work, owner[level], path.q[lead[level]], came[level]), (came - before)[:, 2]
+
+
+def _near(nominal: Path, work: Work, holes: _Holes, joints: Floats, share: Floats) -> Bools:
+    """(H,) holes that joints (M, J) leave within LOOSE times `share` (M,) mm of where they belong by the ways at their
+    bottoms, and within IN_AIR times that by the ways of their blocks."""
+    rows = holes.rows
+    bottom = work.way[rows[holes.bottom]][holes.hole]
+    fine = work.off(nominal.q[rows], joints, rows, bottom) <= LOOSE * share
+    return holes.runs.throughout(fine & (work.off(nominal.q[rows], joints, rows, work.way[rows]) <= IN_AIR * share))
+
+
+def _approached(path: Path, work: Work, holes: _Holes, joints: Floats, share: Floats, near: Bools, lead: Ints) -> Bools:
+    """(H,) those of the holes that are `near` (H,) whose approach is near enough: from the hole before at its joints
+    (M, J) where that stays whole, else from where `path` is; blocks `lead` (N,) stand."""
+    row, limit = holes.runs.begin, IN_AIR * share[holes.first]
+    follows = np.append(False, holes.runs.last[:-1] + 1 == row[1:]) & ~np.isin(row - 1, lead)
+    both = np.flatnonzero(near & follows & np.append(False, near[:-1]))
+    result, behind = near.copy(), np.zeros(len(near), dtype=np.bool_)
+    for k, q, told in ((np.flatnonzero(near), path.q[row - 1], result), (both, joints[holes.first - 1], behind)):
+        told[k] = _approach_off(path, work, q[k], joints[holes.first[k]], row[k], share[holes.first[k]]) <= limit[k]
+    for h in both.tolist():
+        if result[h - 1]:
+            result[h] = behind[h]
+    return result
+
+
+def _approach_off(path: Path, work: Work, q0: Floats, q1: Floats, row: Ints, share: Floats) -> Floats:
+    """(N,) mm, largest distance from the nominal motion on the way from q0 to q1 (N, J), to holes (blocks `row`), which get
+    no points; 0 where the correction changes by no more than `share` (N,) mm over one stretch of the errors."""
+    change = q1 - q0 - (work.path.q[row] - work.path.q[row - 1])
+    near = (work.changes(q0, q1) == 1) & (np.abs(change).max(axis=1, initial=0.0) <= share)
+    far, looks = np.flatnonzero((path.code[row] == TRAVERSE) & ~near), len(LOOKS)
+    k, t = np.repeat(far, looks), np.tile(LOOKS, len(far))
+    got = work.straight(path, q0[k], q1[k], row[k], t)
+    result = np.zeros(len(row))
+    result[far] = work.off(work.nominal(row[k], t), got, row[k], work.way[row[k]]).reshape(-1, looks).max(axis=1)
+    return result

@@ -11,6 +11,7 @@ import numpy as np
 from machines.geometric_error.lost_motion import Steps
 from postproc.corrected.arcs import new_centers
 from postproc.corrected.reversals import Divided
+from postproc.corrected.runs import Runs
 from postproc.corrected.walk import Ends, walk
 from postproc.corrected.work import ALONE, Work, axis_positions, bent_blocks, on_arc
 from postproc.path import ARC, FEED, TRAVERSE, Path
@@ -98,8 +99,7 @@ class _Written:
         goes_on[first] = 0.0
         goes_on[np.append(self.made.part[1:] == 0.0, False)] = 0.0  # what is lost is taken up next
         later = _none(3, *self.gap.shape)
-        for one, other in zip(first.tolist(), bottom.tolist(), strict=True):
-            later[:, one] = _composed(bend, last, one + 1, other + 1)
+        later[:, first] = _composed(bend, last, first + 1, bottom - first)
         weight = np.where(between & (self.made.part == 0.0), 1.0, BEGINS)
         enough = np.maximum(ROUNDED * near, np.where(between, allowed, 0.0))
         near = np.where(between, enough, near)
@@ -128,11 +128,10 @@ class _Written:
     def _holes(self) -> tuple[Ints, Ints]:
         """First blocks and bottoms of the holes that are corrected as a whole."""
         hole = self.work.whole[self.made.owner]
-        runs = np.flatnonzero((hole != ALONE) & (np.diff(hole, prepend=ALONE) != 0))
+        runs = Runs.of(hole)
+        runs = runs.some(hole[runs.begin] != ALONE)
         depth = np.where(self.path.code == FEED, self.words[:, self.path.frames[0].control.xyz[2]], np.inf)
-        ends = [int(np.flatnonzero(hole == hole[row])[-1]) + 1 for row in runs.tolist()]
-        bottom = [row + int(np.argmin(depth[row:end])) for row, end in zip(runs.tolist(), ends, strict=True)]
-        return runs, np.array(bottom, dtype=np.int64)
+        return runs.begin, runs.rows[runs.least(depth[runs.rows])]
 
     def _free(self) -> Floats:
         """(K, 3) words that may be others; not those of closed circles, of arcs and before them those of their planes alone
@@ -221,10 +220,13 @@ def _none(*shape: int) -> Floats:
     return result
 
 
-def _composed(bend: Floats, last: Floats, first: int, end: int) -> Floats:
-    """Shift, low, high (3, T) of blocks one after the other."""
-    whole = Steps(*_none(3, bend.shape[2]))
-    for k in range(first, end):
-        ones = np.ones(bend.shape[2])
-        whole = whole.then(Steps(*bend[:, k])).then(Steps(last[k], -ones, ones))
-    return np.stack([whole.shift, whole.low, whole.high])
+def _composed(bend: Floats, last: Floats, first: Ints, count: Ints) -> Floats:
+    """Shift, low, high (3, H, T) of `count` (H,) blocks one after the other, from blocks `first` (H,) on."""
+    result = _none(3, len(first), bend.shape[2])
+    for k in range(int(count.max(initial=0))):
+        rows = np.flatnonzero(count > k)
+        block = first[rows] + k
+        ones = np.ones((len(rows), bend.shape[2]))
+        whole = Steps(*result[:, rows]).then(Steps(*bend[:, block])).then(Steps(last[block], -ones, ones))
+        result[:, rows] = np.stack([whole.shift, whole.low, whole.high])
+    return result

@@ -99,9 +99,18 @@ class Work:
         lateral = step[inside[:, None], self.two_way]
         step[inside[:, None], self.two_way] = np.where(np.abs(lateral) >= self.gaps(q[inside]), lateral, 0.0)
         self.way = turning_sign(step, self.rotary)
-        for rows in np.split(inside, np.flatnonzero(np.diff(inside, prepend=-2) > 1)[1:]) if len(inside) else []:
-            steps = Steps.of(np.diff(q[rows[0] - 1:rows[-1] + 1], axis=0)[:, self.two_way], self.gaps(q[rows]))
-            self.way[rows[:, None], self.two_way] = steps.walked().at(self.way[rows[:1] - 1][:, self.two_way])
+        self._ways_inside(inside, q)
+
+    def _ways_inside(self, inside: Ints, q: Floats) -> None:
+        """Take up by shares in blocks `inside` (N,) of holes, which go to joints q (K, J), from the ways before them."""
+        if not len(inside):
+            return
+        before = np.setdiff1d(inside - 1, inside)
+        rows, two = np.union1d(before, inside), self.two_way
+        way, steps = self.way[rows][:, two], Steps.of(np.nan_to_num(q[rows] - q[rows - 1])[:, two], self.gaps(q[rows]))
+        begins = np.isin(rows, before)[:, None]
+        steps = Steps(*(np.where(begins, x, y) for x, y in ((0.0, steps.shift), (way, steps.low), (way, steps.high))))
+        self.way[rows[:, None], two] = steps.walked().at(way)
 
     @cached_property
     def bent(self) -> Bools:
