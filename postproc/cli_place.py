@@ -57,8 +57,8 @@ def place(file: ClFile,
     from postproc.placement import report as figures
     from postproc.placement.write import placed_text
 
-    options = Options(tolerance, axis_tolerance, setup=str(setup), units=units, dialect=dialect, error_model=error_model, error_beyond=beyond,
-                      allow_unknown=tuple(w.upper() for w in allow_unknown or ()), max_tilt=max_tilt,
+    options = Options(tolerance, axis_tolerance, setup=str(setup), units=units, dialect=dialect, error_model=error_model,
+                      error_beyond=beyond, allow_unknown=tuple(w.upper() for w in allow_unknown or ()), max_tilt=max_tilt,
                       orient=orient)  # type: ignore[arg-type]
     values: dict[str, Any] = {}
     text = ""
