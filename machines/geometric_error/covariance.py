@@ -63,7 +63,7 @@ def read_covariance(path: Path, names: list[str], cited: tuple[str, int]) -> tup
     if text is None:
         return None, found
     lines = [(n, x) for n, x in enumerate(text.splitlines(), 1) if x.strip() and not x.startswith("#")]
-    head = [cell.strip() for cell in _cells(lines[0][1])[1:]] if lines else []
+    head = [cell.strip(' "') for cell in _cells(lines[0][1])[1:]] if lines else []
     fault = _head_fault(head, [n for n, _ in lines], names)
     if fault:
         return None, [error("error-table.row", fault[0], file=str(path), lines=[n for n, _ in lines[:1]], hint=fault[1])]
@@ -94,10 +94,11 @@ def _head_fault(head: list[str], lines: list[int], names: list[str]) -> tuple[st
 def _row(text: str, name: str, count: int) -> list[float] | tuple[str, str]:
     """The numbers of a row, or what is wrong and what to do."""
     row, *cells = _cells(text)
-    if row.strip() != name:
+    if row.strip(' "') != name:
         return f"row {row.strip()[:40]!r}, expected parameter {name!r}", "the rows have the order of the columns"
     if len(cells) != count:
-        return f"row {name!r} has {len(cells)} numbers for {count} parameters", "the table is square"
+        return (f"row {name!r} has {len(cells)} numbers for {count} parameters", "the table is square, its numbers have "
+                "decimal points")
     try:
         values = [float(cell) for cell in cells]
     except ValueError as fault:

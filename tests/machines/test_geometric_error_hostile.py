@@ -10,6 +10,7 @@ import pytest
 import machines
 from machines.geometric_error.csv_table import read_csv
 from machines.geometric_error.lattice_file import map_from_csv
+from machines.geometric_error.csv_table import UNITS
 from machines.geometric_error.loader import load_checked
 from toolpaths.diagnostics import Severity
 
@@ -109,6 +110,16 @@ def test_what_is_wrong_is_told(tmp_path: Path, toml: str, csv: bytes, code: str,
     assert (first.code, Path(first.file).name, first.lines[:1]) == (code, file, (line,) if line else ())
     assert word in first.message and len(str(first)) < 400 + len(str(tmp_path))
     assert first.hint or first.code.startswith("file.")
+
+
+@pytest.mark.parametrize("text", ['parameter,EC0Y,EB0Z\nEC0Y,4,1\nEB0Z,1,9\n', '# probe\n"parameter";"EB0Z";"EC0Y"\n"EB0Z";9;1\n'
+                                  '"EC0Y";1;4\n'])
+def test_a_covariance_as_programs_save_it(text: str, tmp_path: Path) -> None:
+    (tmp_path / "e.toml").write_text(COVARIANCE)
+    (tmp_path / "x.csv").write_text(text)
+    found, faults = load_checked(tmp_path / "e.toml", machines.load("mikron-ucp710"))
+    assert found is not None and found.covariance is not None and not faults
+    assert found.covariance / UNITS["arcsec"] ** 2 == pytest.approx(np.array([[4.0, 1.0], [1.0, 9.0]]))
 
 
 def test_a_thousand_faults_are_one_message(tmp_path: Path) -> None:
