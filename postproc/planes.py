@@ -3,8 +3,9 @@
 A convention names the letters of three turns about the axes of the moving frame, one after another (intrinsic), so that
 R = R_1(angle 1) R_2(angle 2) R_3(angle 3). "ZXZ" are Euler angles (Fanuc B-64484EN, G68.2 with I, J, K: turns about Z,
 the new X, the new Z); "ZYX" is the same as turns about the fixed X, then Y, then Z (Heidenhain, PLANE SPATIAL: SPA,
-SPB, SPC are fixed); "XYZ" turns about X, the new Y, the new Z (Siemens, CYCLE800 with _MODE 57). "rotary" has no angles
-of its own: the frame is what the rotary axes make of it.
+SPB, SPC are fixed; Siemens, CYCLE800 with _MODE 27); "XYZ" turns about X, the new Y, the new Z (CYCLE800 with _MODE 57):
+there the direction of a small tilt hangs on the last decimals of two angles. "rotary" has no angles of its own: the frame
+is what the rotary axes make of it.
 """
 
 from __future__ import annotations

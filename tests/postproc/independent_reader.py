@@ -167,9 +167,9 @@ class Reading:
                 given = call[3].split(",")
                 self.enter("axes")
                 if given != [""]:
-                    assert given[3] == "57" and set(given[4:7]) == {"0"} == set(given[10:13])
+                    assert given[3] == "27" and set(given[4:7]) == {"0"} == set(given[10:13])  # 01 10 11: Z, Y, X
                     turns = [float(v) for v in given[7:10]]
-                    self.enter("tilted", Rotation.from_euler("XYZ", turns, degrees=True).as_matrix())
+                    self.enter("tilted", Rotation.from_euler("ZYX", turns, degrees=True).as_matrix())
             elif call is not None and call[1]:
                 deep = float(call[3].split(",")[3]), float(call[3].split(",")[0])
             elif block == "MCALL":

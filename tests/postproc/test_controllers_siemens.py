@@ -39,7 +39,7 @@ def test_tilted_plane_names_its_turns_and_the_side_of_the_first_axis(angle: floa
                    {0: LOAD, 1: [command("ENTER_SECTION", 1.0)], 2: [command("LEAVE_SECTION", 1.0)]},
                    sections=(Section(0, "axes"), section))
     assert blocks("siemens-840d", made)[5:] == [
-        "D1", f'CYCLE800(0,"",0,57,0,0,0,12.5,30,-45,0,0,0,{direction},0,1)', "G0 X1 Y2 Z50", "CYCLE800()"]
+        "D1", f'CYCLE800(0,"",0,27,0,0,0,12.5,30,-45,0,0,0,{direction},0,1)', "G0 X1 Y2 Z50", "CYCLE800()"]
 
 
 def test_tcp_states_the_work_offset_and_linear_rotary_axes() -> None:

@@ -136,11 +136,11 @@ class Run:
         mode = int(s.number(3, 0.0))
         if s.number(0, 0.0) != 0.0 or s.number(2, 0.0) != 0.0 or mode >> 6:
             self.fault("gcode.mode", b, "CYCLE800 that retracts, adds to a plane, or turns otherwise than axis by axis",
-                       "_FR 0, _ST 0, _MODE 57")
+                       "_FR 0, _ST 0, _MODE 27 or 57")
             return
         axes = [_SEQUENCE.get(mode >> shift & 3, "") for shift in (0, 2, 4)]
         if "" in axes:
-            self.fault("gcode.mode", b, f"CYCLE800 with _MODE {mode}: no order of turns", "_MODE 57: X, then Y, then Z")
+            self.fault("gcode.mode", b, f"CYCLE800 with _MODE {mode}: no order of turns", "_MODE 27: Z, then Y, then X; 57: X, then Y, then Z")
             return
         rotation = turned("".join(axes), [s.number(k, 0.0) for k in (7, 8, 9)])
         shift = np.array([s.number(k, 0.0) for k in (4, 5, 6)])
