@@ -285,10 +285,19 @@ def _unmeasured(path: Path, moves: Moves, control: Control, where: Bools, reache
             told.append(warning("compensation.range", text + "; the error at the end of the range is taken", file=file,
                                 lines=lines, count=len(rows)))
             continue
-        turn = "write repeats = 360 where a whole turn was measured, " if control.machine.rotary[j] else ""
         told.append(error("compensation.range", text, file=file, lines=lines, count=len(rows),
-                          hint=f"{turn}measure farther, move the part, or take --error-model-beyond"))
+                          hint=_instead(control, j, low, high)))
     return told
+
+
+def _instead(control: Control, j: int, low: float, high: float) -> str:
+    """What to do about joint j going from `low` to `high`, in units of its words, where its errors were not measured."""
+    limits = control.machine.limits
+    least, most = (float(x[j]) * control.unit[j] for x in (limits.lower, limits.upper))
+    if low < least or high > most:
+        return f"its travel ends at {least:.7g} and {most:.7g}: move the part in the set-up (part.origin)"
+    turn = "write repeats = 360 where a whole turn was measured, " if control.machine.rotary[j] else ""
+    return f"{turn}measure farther, move the part, or take --error-model-beyond"
 
 
 def _lost(path: Path, moves: Moves, lost: Bools, file: str) -> Diagnostic:

@@ -14,6 +14,9 @@ from machines.kinematics.serial import Serial
 from toolpaths.arrays import Bools, Floats
 from toolpaths.rotations import rotation
 
+STILL = 1e-6
+"""of a slide's motion: by so little it does not move a coordinate"""
+
 
 @dataclass(frozen=True, eq=False)
 class ActualByMap(Actual):
@@ -89,16 +92,24 @@ class ActualByMap(Actual):
         return result.reshape(len(w), 6, -1)
 
     def outside(self, w: Floats, margin: float = EDGE) -> Bools:
-        """See the base class; a coordinate of the point counts for every slide."""
+        """See the base class; a coordinate of the point counts for the slides that move it."""
         found = self.map.outside(self.lattice_places(w), margin)
         names, rotary = self.kinematics.axis_names, np.array(self.kinematics.rotary)
         result = np.zeros((len(w), len(names)), dtype=np.bool_)
         for letter, column in zip(self.map.letters, found.T, strict=True):
             if letter in POINT:
-                result |= column[:, None] & ~rotary
+                rows = np.flatnonzero(column)
+                result[np.ix_(rows, ~rotary)] |= self._moving(w[rows], POINT.index(letter))
             else:
                 result[:, names.index(letter)] |= column
         return result
+
+    def _moving(self, w: Floats, coordinate: int) -> Bools:
+        """(N, slides) True for slides that move a coordinate of the point; all of a machine whose w are not its joints."""
+        slides = int(np.sum(~np.array(self.kinematics.rotary)))
+        if not isinstance(self.kinematics, Serial):
+            return np.ones((len(w), slides), dtype=np.bool_)
+        return np.asarray(np.abs(self.rates(w)[:, coordinate, :slides]) > STILL)
 
 
 def part_side(kinematics: Kinematics, structure: str) -> tuple[str, ...]:

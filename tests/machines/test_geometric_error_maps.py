@@ -36,6 +36,17 @@ def loaded(folder: Path, table: str, keys: str = "") -> tuple[ErrorModel | None,
     return load_checked(folder / "e.toml", machines.load("mikron-ucp710"))
 
 
+def test_a_coordinate_of_the_point_that_is_outside_counts_for_the_slides_that_move_it() -> None:
+    ends = (np.array([-100.0, 100.0]),) * 3
+    trunnion = "mikron-ucp710"
+    for name, turn, wanted in (("mill-3axis", [], "Z"), (trunnion, [0.0, 0.3], "Z"), (trunnion, [0.5, 0.3], "YZ")):
+        machine = machines.load(name)
+        actual = ErrorModel(map=random_map(("x", "y", "z"), ends)).on(machine.kinematics)
+        assert isinstance(actual, ActualByMap)
+        out = actual.outside(np.array([[0.0, 0.0, 150.0, *turn], [0.0, 0.0, 50.0, *turn]]))
+        assert "".join(np.array(machine.axis_names)[out[0]]) == wanted and not out[1].any()
+
+
 # ---- round about -----------------------------------------------------------------------------------------------------
 
 ROUND = "C [deg],dx [um],dy [um],dz [um]\n0,1,2,3\n90,5,2,3\n200,9,2,3\n360,1,2,3\n"

@@ -178,12 +178,13 @@ FINI
 """
 
 
-def mill(tmp_path: Path, toml: str, table: str = "") -> PostResult:
+def mill(tmp_path: Path, toml: str, table: str = "", part: str = "") -> PostResult:
     (tmp_path / "x.csv").write_text(table)
     (tmp_path / "e.toml").write_text(toml)
     (tmp_path / "s.apt").write_text(SQUARE)
     path, found = toolpaths.read(tmp_path / "s.apt")
-    setup, _ = load_setup(None)
+    (tmp_path / "part.toml").write_text(part)
+    setup, _ = load_setup(str(tmp_path / "part.toml"))
     return postproc.convert(path, "mill-3axis", "linuxcnc", setup, Options(error_model=str(tmp_path / "e.toml")), found)
 
 
@@ -267,6 +268,15 @@ def test_beyond_the_measured_range_is_refused_unless_asked_for(tmp_path: Path) -
     asked = postproc.convert(path, "mill-3axis", "linuxcnc", None,
                              Options(error_model=str(tmp_path / "e.toml"), error_beyond=True), found)
     assert asked.ok and any(d.code == "compensation.range" for d in asked.diagnostics)
+
+
+def test_what_lies_beyond_travel_too_is_told_so(tmp_path: Path) -> None:
+    """Where the machine cannot go, measuring farther is no help."""
+    toml = "[components.EYX]\npolynomial = [3.0]\nrange = [-30, 30]\n"
+    refused = [mill(tmp_path, toml, part=part) for part in ("", "[part]\norigin = [480, 0, 0]\n")]
+    hints = [next(d.hint for d in result.diagnostics if d.code == "compensation.range") for result in refused]
+    assert "--error-model-beyond" in hints[0]
+    assert "travel ends at -500 and 500" in hints[1] and "beyond" not in hints[1]
 
 
 def test_a_faulty_model_stops_the_conversion(tmp_path: Path) -> None:
