@@ -100,7 +100,7 @@ def _table(file: str, rows: list[tuple[int, str]], gaps: bool) -> tuple[CsvTable
     mark = next((m for m in ";\t" if m in head), ",")
     cells = _cells(head, mark)
     found = [_HEAD.match(cell) for cell in cells]
-    diagnostics = _head_faults(file, first, cells, found)
+    diagnostics = _no_head(file, first, head, body, mark) or _head_faults(file, first, cells, found)
     if diagnostics:
         return None, diagnostics
     names = [m["name"] for m in found if m]
@@ -129,6 +129,23 @@ def _cells(line: str, mark: str) -> list[str]:
     while len(cells) > 1 and not cells[-1]:
         cells.pop()
     return cells
+
+
+def _no_head(file: str, line: int, head: str, body: Sequence[tuple[int, str]], mark: str) -> list[Diagnostic]:
+    """A first line without columns: words of the program that wrote the file, or a file of another kind."""
+    def fault(message: str, hint: str) -> list[Diagnostic]:
+        return [error("error-table.header", message, file=file, lines=[line], hint=hint)]
+
+    words = head.split()
+    if mark in head or mark != ",":
+        return []
+    if len(words) > 1 and all(_number(word, False) is not None for word in words):
+        return fault("the first line holds numbers, without commas, semicolons or tabs between them",
+                     "a file of LinuxCNC is imported as X=x.comp; a table has a header, e.g. X [mm], EXX [um]")
+    if any(m in text for _, text in body for m in ",;\t"):
+        return fault(f"{head.strip()[:40]!r} is one column, the rows below have more",
+                     "begin lines above the header with #; separate all lines by the same commas, semicolons or tabs")
+    return []
 
 
 def _head_faults(file: str, line: int, cells: Sequence[str], found: Sequence[re.Match[str] | None]) -> list[Diagnostic]:
@@ -184,7 +201,8 @@ def _fill(row: Floats, cells: list[str], names: Sequence[str], comma: bool, gaps
                 "--average takes blank cells"
         if number is None:
             shown = f"{cell.strip()[:40]!r} in column {names[k][:40]}"
-            return f"{shown} is not a number", "write decimal points throughout" if "," in cell else ""
+            hint = "" if any(map(str.isdigit, cell)) else "take columns without numbers out"
+            return f"{shown} is not a number", "write decimal points throughout" if "," in cell else hint
         if not np.isfinite(number) and cell.strip():
             return f"{cell.strip()} in column {names[k][:40]} is not finite", "take the row out where nothing was measured"
         row[k] = number

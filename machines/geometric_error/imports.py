@@ -21,7 +21,7 @@ from machines.geometric_error.lattice import COLUMNS
 from machines.geometric_error.lattice_file import COORDINATES, map_from_csv, zeroed, zeroed_covariance
 from machines.geometric_error.model import ErrorModel
 from machines.geometric_error.names import DIRECTIONS, OWN, ErrorName, parse
-from machines.geometric_error.readings import of_component, run_of, runs_as_rows, together
+from machines.geometric_error.readings import by_iso_names, run_of, runs_as_rows, together
 from machines.geometric_error.screw_tables import from_linuxcnc
 from machines.geometric_error.serial_errors import Component, Frame, SerialErrors
 from machines.geometric_error.table_curves import Fault, table_curve
@@ -161,7 +161,7 @@ def _read(source: str, how: How) -> tuple[CsvTable | None, list[Diagnostic]]:
     if named and name is None:
         return None, [error("error-import.name", f"{named[1]!r} is no component error", hint="write e.g. EXX=x.csv")]
     table, found = read_csv(Path(named[2] if named else source), gaps=how.average)
-    made = table if table is None or name is None else of_component(table, name)
+    made = None if table is None else by_iso_names(table, name)
     fault = made if isinstance(made, Fault) else None if made is None else _gap(made)
     if table is not None and fault is not None:
         return None, [fault.at(table)]
@@ -203,8 +203,7 @@ def _csv(table: CsvTable, machine: Machine, how: How) -> tuple[ErrorModel | None
 
 
 def _averaged(table: CsvTable, places: list[str], how: How) -> Averaged | Fault:
-    rows = runs_as_rows(table)
-    read = rows if isinstance(rows, Fault) else averaged(rows, places, how.near)
+    read = averaged(runs_as_rows(table), places, how.near)
     if isinstance(read, Averaged) and read.scatter and not how.average:
         return Fault("error-import.runs", f"{read.rows} rows are readings at {len(read.table)} places",
                      "import with --average: their mean counts, their scatter is the doubt")
@@ -283,8 +282,9 @@ def _axis(table: CsvTable, positions: list[str], machine: Machine, how: How) -> 
         return None, [error("error-import.axis", f"columns {' and '.join(positions)} are positions of several axes",
                             file=table.file, lines=[table.head], hint="write a table for each axis; a map has dx, dy, dz")]
     if letter not in machine.axis_names:
+        small = " in capitals" if letter.upper() in machine.axis_names else ""
         return None, [error("error-model.axis", f"{machine.name} has no axis {letter!r}", file=table.file,
-                            lines=[table.head], hint="its axes are " + ", ".join(machine.axis_names))]
+                            lines=[table.head], hint=f"its axes are {', '.join(machine.axis_names)}{small}")]
     names, found = _names(table, letter)
     components = []
     for name in names:

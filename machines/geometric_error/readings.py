@@ -15,54 +15,79 @@ from machines.geometric_error.names import ErrorName
 from machines.geometric_error.table_curves import Fault
 from toolpaths.arrays import Floats
 
-POSITIONS = ("target", "position", "nominal")
+POSITIONS = ("target", "position", "nominal", "sollposition")
 """columns of positions, besides the letter of the axis, in a table whose component is named outside"""
-_RUN = re.compile(r"(?P<name>E[XYZABC][XYZUVWABC]|run|error|deviation)?[ _#]*(?P<before>\d*)[ _#]*(?P<way>[+-]?)[ _#]*"
-                  r"(?P<after>\d*)$", re.IGNORECASE)
-_ARROWS = str.maketrans("\u2191\u2193\u2212", "+--")
-"""ways as ISO 230-2 shows them, and the sign of minus"""
+_RUN = re.compile(r"(?P<name>E[XYZABC][XYZUVWABC]|run|lauf|error|deviation|abweichung)?[ _#]*(?P<before>\d*)[ _#]*"
+                  r"(?P<way>[+-]?)[ _#]*(?P<after>\d*)$", re.IGNORECASE)
+_WAYS = (re.compile("\u2191|\\b(?:up|forward)\\b", re.IGNORECASE),
+         re.compile("\u2193|\u2212|\\b(?:down|backward|reverse)\\b", re.IGNORECASE))
+"""of ISO 230-2 and in words; a long minus"""
+_OF_RUN = re.compile(r"(E[XYZABC][XYZUVWABC][+-]?)(\d+)$")
+_NUMBERED = ("RUN", "LAUF")
+_SINGLE = ("", "ERROR", "DEVIATION", "ABWEICHUNG")
 
 
-def of_component(table: CsvTable, name: ErrorName) -> CsvTable | Fault:
-    """The table with its columns called after component `name`: a column of positions, and one for each run and way."""
+def by_iso_names(table: CsvTable, name: ErrorName | None) -> CsvTable | Fault:
+    """The table with its columns called EXX, EXX+, EXX-, EXX+1 ..., as other spellings of them say.
+
+    Args:
+        name: component that all values are of; then a column may also be called after positions, errors and runs
+    """
     columns, unit = dict[str, Floats](), dict[str, str]()
     for column, values in table.columns.items():
-        found = _RUN.match(column.translate(_ARROWS))
-        if column.casefold() in (name.axis.casefold(), *POSITIONS):
-            new = name.axis
-        elif found and found[0] and (found["name"] or "").upper() in ("", str(name), "RUN", "ERROR", "DEVIATION"):
-            new = f"{name}{found['way']}{found['before'] or found['after']}"
-        else:
+        new = _iso_name(column) if name is None else _of_component(column, name)
+        if new is None:
             return Fault("error-import.column", f"column {column[:40]!r} is neither a position nor a run",
-                         f"write {name.axis} or target for positions, {name}+ and {name}- for values, or run 1+, run 1-, "
-                         "run 2+ ...", table.head)
+                         f"write target for positions, {name}+ and {name}- for values, or run 1+, run 1-, run 2+ ...; take "
+                         "others out", table.head)
         if new in columns:
-            return Fault("error-import.column", f"column {column[:40]!r} is {new} again", "name every run once", table.head)
+            return Fault("error-import.column", f"column {column[:40]!r} is {new} again", "name runs and positions once",
+                         table.head)
         columns[new], unit[new] = values, table.unit[column]
-    if name.axis not in columns:
+    if name is not None and name.axis not in columns:
         return Fault("error-import.column", "no column holds positions", f"call it {name.axis} or target", table.head)
     return CsvTable(table.file, columns, unit, table.lines, table.head)
 
 
+def _match(column: str) -> re.Match[str] | None:
+    for way, sign in zip(_WAYS, "+-", strict=True):
+        column = way.sub(sign, column)
+    return _RUN.match(column)
+
+
+def _iso_name(column: str) -> str:
+    """EXX+3 of EXX 3 up, EXX3+ ...; a column that is no component's as it is."""
+    found = _match(column)
+    if found is None or len(found["name"] or "") != len("EXX"):
+        return column
+    return f"{found['name']}{found['way']}{found['before'] or found['after']}"
+
+
+def _of_component(column: str, name: ErrorName) -> str | None:
+    """What a column of a table of one component is; None for what is unknown."""
+    if column.casefold() in (name.axis.casefold(), *POSITIONS):
+        return name.axis
+    found = _match(column)
+    if found is None or not found[0]:
+        return None
+    called, run = (found["name"] or "").upper(), found["before"] or found["after"]
+    known = called in (str(name), *_SINGLE) or (called in _NUMBERED and run)
+    return f"{name}{found['way']}{run}" if known else None
+
+
 def run_of(column: str) -> tuple[str, str]:
-    """(component with its way, number of the run) of a column as EXX+3, EXX 3+, EXX3; (the column, "") for one of no run."""
-    found = _RUN.match(column.translate(_ARROWS))
-    run = (found["before"] or found["after"]) if found else ""
-    return (f"{found['name']}{found['way']}", run) if found and run and len(found["name"] or "") == 3 else (column, "")
+    """(component with its way, number of the run) of a column as EXX+3; (the column, "") for one of no run."""
+    found = _OF_RUN.match(column)
+    return (found[1], found[2]) if found else (column, "")
 
 
-def runs_as_rows(table: CsvTable) -> CsvTable | Fault:
+def runs_as_rows(table: CsvTable) -> CsvTable:
     """Columns of runs below each other, those of no run first; positions in all."""
     places, parts = [c for c in table.columns if len(c) == 1], dict[str, dict[str, str]]()
     for column in table.columns:
         base, run = run_of(column)
-        if column in places:
-            continue
-        mine = parts.setdefault(run, {})
-        if base in mine.values():
-            return Fault("error-import.column", f"column {column[:40]!r} is run {run} of {base} again",
-                         "name every run once", table.head)
-        mine[column] = base
+        if column not in places:
+            parts.setdefault(run, {})[column] = base
     return stacked([_part(table, {**dict(zip(places, places, strict=True)), **mine}) for mine in parts.values()]) \
         if len(parts) > 1 or "" not in parts else table
 

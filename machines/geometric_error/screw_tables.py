@@ -60,7 +60,8 @@ def from_linuxcnc(text: str, name: ErrorName, sense: float = 1.0, kind: int = 0,
             row = []
         if len(row) != 3 or not np.isfinite(row).all() or (rows and row[0] <= rows[-1][0]):
             return None, [error("error-table.row", f"{line.strip()[:60]!r} is no row of a screw compensation file",
-                                file=file, lines=[n], hint="write nominal, forward and reverse, nominal ascending")]
+                                file=file, lines=[n], hint="write nominal, forward and reverse, nominal ascending; a "
+                                "CSV table is imported by its name alone, or as EXX=x.csv")]
         rows.append(row)
     if len(rows) < 2:
         return None, [error("error-table.empty", f"{len(rows)} rows; at least two are needed", file=file,

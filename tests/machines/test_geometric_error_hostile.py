@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 import machines
-from machines.geometric_error.csv_table import read_csv
+from machines.geometric_error.csv_table import UNITS, read_csv
 from machines.geometric_error.lattice_file import map_from_csv
-from machines.geometric_error.csv_table import UNITS
 from machines.geometric_error.loader import load_checked
 from toolpaths.diagnostics import Severity
 
@@ -52,6 +51,10 @@ BAD = [
     ("empty", TABLE, b"", "error-table.empty", "x.csv", 0, "nothing"),
     ("header alone", TABLE, b"X [mm],EXX [um]\n\n", "error-table.empty", "x.csv", 1, "header alone"),
     ("no header", TABLE, b"-300,0\n300,2\n", "error-table.header", "x.csv", 1, "holds numbers"),
+    ("words above the header", TABLE, b"Machine: DMU\nX [mm],EXX [um]\n0,1\n9,1\n", "error-table.header", "x.csv", 1,
+     "'Machine: DMU' is one column"),
+    ("a file of LinuxCNC", TABLE, b"0 0.001 0\n9 9.001 9\n", "error-table.header", "x.csv", 1, "without commas"),
+    ("words in a column", TABLE, b"X [mm],EXX [um],note\n0,1,ok\n9,1,warm\n", "error-table.row", "x.csv", 2, "'ok'"),
     ("column without a name", TABLE, b"X [mm];;EXX [um]\n0;1;2\n", "error-table.header", "x.csv", 1, "'' is no column"),
     ("value without a name", TABLE, b"X [mm];EXX [um];\n0;1;2\n", "error-table.row", "x.csv", 2, "3 values, 2 columns"),
     ("units alone", TABLE, b"X;EXX\nmm;um\n", "error-table.row", "x.csv", 2, "'mm'"),
@@ -112,8 +115,8 @@ def test_what_is_wrong_is_told(tmp_path: Path, toml: str, csv: bytes, code: str,
     assert first.hint or first.code.startswith("file.")
 
 
-@pytest.mark.parametrize("text", ['parameter,EC0Y,EB0Z\nEC0Y,4,1\nEB0Z,1,9\n', '# probe\n"parameter";"EB0Z";"EC0Y"\n"EB0Z";9;1\n'
-                                  '"EC0Y";1;4\n'])
+@pytest.mark.parametrize("text", ['parameter,EC0Y,EB0Z\nEC0Y,4,1\nEB0Z,1,9\n',
+                                  '# probe\n"parameter";"EB0Z";"EC0Y"\n"EB0Z";9;1\n"EC0Y";1;4\n'])
 def test_a_covariance_as_programs_save_it(text: str, tmp_path: Path) -> None:
     (tmp_path / "e.toml").write_text(COVARIANCE)
     (tmp_path / "x.csv").write_text(text)

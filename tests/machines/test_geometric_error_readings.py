@@ -69,6 +69,12 @@ def test_readings_in_any_layout_are_the_same_means_and_doubt(files: dict[str, st
     assert [d.code for d in told] == ["error-import.averaged"]
 
 
+def test_ways_in_words_are_those_of_the_component(tmp_path: Path) -> None:
+    text = WAYS.replace("+", " up").replace("-", "\u2193") + "0,1,5\n100,11,14\n"
+    model, told = read(tmp_path, {"a.csv": text}, How())
+    assert means(model) == [1.0, 11.0, 5.0, 14.0] and not told
+
+
 def test_a_reading_that_is_missing_counts_less_and_its_place_has_more_doubt(tmp_path: Path) -> None:
     model, _ = read(tmp_path, {"a.csv": ROWS.replace("0,2,6\n1", "0,,6\n1").replace("100,12,16", "100,12,")},
                     How(average=True))
@@ -81,7 +87,8 @@ TARGETS = "target [mm];run 1+ [um];run 1- [um];run 2+ [um];run 2- [um]\n0;1;5;3;
 
 
 @pytest.mark.parametrize(("old", "new"), [
-    ("", ""), ("target", "Position"), ("target", "Y"), ("run ", ""), ("run ", "Error "), ("run ", "EYY"),
+    ("", ""), ("run", "Lauf"), ("+", " Forward"), ("-", " down"), ("target", "Sollposition"),
+    ("target", "Position"), ("target", "Y"), ("run ", ""), ("run ", "Error "), ("run ", "EYY"),
     ("+", "\u2191"), ("0;1;5;3;7\n100;11;14;13;18\n", "100;11;14;13;18\n0;1;5;3;7\n")])
 def test_targets_and_runs_are_of_the_component_that_is_named(old: str, new: str, tmp_path: Path) -> None:
     model, told = read(tmp_path, {"laser.csv": TARGETS.replace(old, new)}, How(average=True), "EYY=laser.csv")
@@ -142,7 +149,7 @@ FAULTS = [
      "near positions of Y"),
     ("near of no readings", {"a.csv": WAYS + "0,1,2\n9,1,3\n"}, How(near={"X": 0.1}), "error-import.unused", "", "near"),
     ("one run twice", {"a.csv": "X [mm],EXX+1 [um],EXX 1+ [um]\n0,1,2\n9,1,3\n"}, How(average=True), "error-import.column",
-     "a.csv:1", "run 1 of EXX+ again"),
+     "a.csv:1", "'EXX 1+' is EXX+1 again"),
     ("blank constant", {"a.csv": "EC0Y [arcsec],EA0Y [arcsec]\n1,\n"}, How(average=True), "error-table.row", "a.csv:2",
      "EA0Y")]
 
@@ -161,6 +168,8 @@ def test_what_is_wrong_with_readings(files: dict[str, str], how: How, code: str,
                                                                  "'mean'"),
     ("EYY=laser.csv", "run 2-", "EXX2-", "error-import.column", "'EXX2-'"),
     ("EYY=laser.csv", "run 2", "run 1", "error-table.header", "twice"),
+    ("EYY=laser.csv", "run 2+ [um]", "run", "error-import.column", "'run' is neither"),
+    ("EYY=laser.csv", "run 2+", "position", "error-import.column", "'position' is Y again"),
     ("EYY=laser.csv", "run 2+", "EYY+1", "error-import.column", "EYY+1 again"),
     ("EYY=laser.csv", "target", "run 7+", "error-import.column", "no column holds positions")])
 def test_what_is_wrong_with_the_columns_of_a_component(source: str, old: str, new: str, code: str, word: str,
