@@ -140,7 +140,8 @@ class Run:
             return
         axes = [_SEQUENCE.get(mode >> shift & 3, "") for shift in (0, 2, 4)]
         if "" in axes:
-            self.fault("gcode.mode", b, f"CYCLE800 with _MODE {mode}: no order of turns", "_MODE 27: Z, then Y, then X; 57: X, then Y, then Z")
+            self.fault("gcode.mode", b, f"CYCLE800 with _MODE {mode}: no order of turns",
+                       "_MODE 27: Z, then Y, then X; 57: X, then Y, then Z")
             return
         rotation = turned("".join(axes), [s.number(k, 0.0) for k in (7, 8, 9)])
         shift = np.array([s.number(k, 0.0) for k in (4, 5, 6)])
