@@ -118,7 +118,7 @@ class SerialErrors:
         result = np.zeros((len(q), len(joints)))
         for k, j in enumerate(joints):
             for component in self.components:
-                if component.name.axis == names[j] and str(component.name)[1] == names[j]:
+                if component.name.axis == names[j] and component.name.positioning:
                     result[:, k] += component.curve.at(q[:, j], 1.0) - component.curve.at(q[:, j], -1.0)
         least = np.array([GRAIN[1 if names[j] in ROTARY else 0] for j in joints])
         return np.asarray(np.maximum(np.abs(result), least))

@@ -46,3 +46,12 @@ def test_lost_motion_of_axes() -> None:
     assert errors.two_way(names) == [0, 1]
     q = np.array([[100.0, -100.0, 0.0], [0.0, 100.0, 0.0]])
     np.testing.assert_allclose(errors.gaps(names, q, [0, 1, 2]), [[0.002, 0.004, GRAIN[0]], [0.003, 0.002, GRAIN[0]]])
+
+
+def test_lost_motion_of_an_axis_named_after_another() -> None:
+    """EXU is the positioning error of U, which moves along X (ISO 841)."""
+    both = Table(np.array([-100.0, 100.0]), np.array([0.0, 0.0, 0.004, 0.002]), both=True)
+    name = parse("EXU")
+    assert name is not None
+    found = SerialErrors((Component(name, both),)).gaps(("U",), np.array([[100.0]]), [0])
+    np.testing.assert_allclose(found, [[0.002]])
