@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from machines.geometric_error.actual import approach
-from postproc.corrected.proof import after_formatting
+from postproc.corrected.proof import after_formatting, planned_moves
 from postproc.groups import groups
 from postproc.holes import Phase
 from toolpaths.arrays import Floats, Ints
@@ -54,22 +54,22 @@ def residuals(result: PostResult) -> Residuals | None:
     found, job, nominal = after_formatting(result), result.job, result.nominal
     if found is None or job is None or nominal is None or result.moves is None or result.comparison is None:
         return None
-    moves, move = result.moves, np.flatnonzero(result.moves.phase != Phase.PECK)[found.points]
-    block = np.full(len(moves), -1)
+    moves, move = planned_moves(result), np.flatnonzero(result.moves.phase != Phase.PECK)[found.points]
+    block, here = np.full(len(result.moves), -1), found.points
     np.maximum.at(block, nominal.move, np.arange(len(nominal)))
     block = block[move]
     q, way = nominal.q[block], approach(_steady(nominal.q))[block]
     before = np.empty((len(q), 6))
-    for k in groups(moves.tool[move]):
-        kinematics = job.kinematics(int(moves.tool[move[k[0]]]))
+    for k in groups(moves.tool[here]):
+        kinematics = job.kinematics(int(moves.tool[here[k[0]]]))
         assert job.errors is not None
         actual, wanted = job.errors.on(kinematics), np.concatenate(kinematics.forward(q[k]), axis=1)
         before[k] = np.concatenate(actual.aim(actual.coordinates(q[k], wanted), way[k]), axis=1) - wanted
     there = result.comparison
-    after = np.concatenate([there.tip[found.blocks] - moves.tip[move], there.axis[found.blocks] - moves.axis[move]], axis=1)
+    after = np.concatenate([there.tip[found.blocks] - moves.tip[here], there.axis[found.blocks] - moves.axis[here]], axis=1)
     part = job.placement.inverse()
     before, after = (np.concatenate([part.directions(x[:, :3]), part.directions(x[:, 3:])], axis=1) for x in (before, after))
-    return Residuals(moves.line[move], part.points(moves.tip[move]), part.directions(moves.axis[move]), q, before, after,
+    return Residuals(moves.line[here], part.points(moves.tip[here]), part.directions(moves.axis[here]), q, before, after,
                      found.tip_bound, found.axis_bound)
 
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from postproc.groups import groups
 from postproc.holes import Phase
 from postproc.moves import Moves
 from postproc.readback.compare import Comparison
@@ -60,15 +61,15 @@ class AfterFormatting:
 def after_formatting(result: PostResult) -> AfterFormatting | None:
     """The deviations of a conversion that corrects geometric errors; None of one that does not or that is not proved.
 
-    CL points are where the tool cuts to: ends of feed moves and arcs, bottoms of holes; with --smooth where that puts them.
-    The bound adds what the correction itself leaves (near poles, and where a machine cannot turn the tool), half a last
+    CL points are where the tool cuts to: ends of feed moves and arcs, bottoms of holes; as the path before correction has
+    them, which --smooth may have moved and whose axis may have been led past a singular direction. The bound adds what the correction itself leaves (near poles, and where a machine cannot turn the tool), half a last
     decimal in every word (`rounding_bound`), and for joints that lose motion a whole one: rounded words may turn one back
     by that much, within its play.
     """
     found, comparison, job = result.compensation, result.comparison, result.job
     if found is None or comparison is None or job is None or job.errors is None or result.moves is None:
         return None
-    moves = result.moves.without_pecks()
+    moves = planned_moves(result)
     tip_play, axis_play = _play(result)
     bounds = found.tip_after + job.rounding.tip + tip_play, found.axis_after + job.rounding.axis + axis_play
     block = _nearest(comparison, moves, (bounds[0] + SLACK[0], bounds[1] + SLACK[1]))
@@ -76,6 +77,19 @@ def after_formatting(result: PostResult) -> AfterFormatting | None:
     tip = np.linalg.norm(comparison.tip[block[points]] - moves.tip[points], axis=1)
     axis = angle_between(comparison.axis[block[points]], moves.axis[points])
     return AfterFormatting(tip, axis, points, block[points], *bounds)
+
+
+def planned_moves(result: PostResult) -> Moves:
+    """The moves without pecks, ending at tip and axis (M, 3) of the path before correction."""
+    job, moves, path = result.job, result.moves, result.nominal
+    assert job is not None and moves is not None and path is not None
+    there = np.flatnonzero((path.u == 1.0) & ~path.home)
+    there, move = there[::-1], path.move[there[::-1]]
+    move, last = np.unique(move, return_index=True)
+    tip, axis = np.array(moves.tip), np.array(moves.axis)
+    for k in groups(moves.tool[move]):
+        tip[move[k]], axis[move[k]] = job.kinematics(int(moves.tool[move[k[0]]])).forward(path.q[there[last[k]]])
+    return replace(moves, tip=tip, axis=axis).without_pecks()
 
 
 def beyond_bound(result: PostResult) -> list[Diagnostic]:

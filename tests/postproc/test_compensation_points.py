@@ -21,6 +21,7 @@ from postproc.pipeline import PostResult, verify
 from postproc.setup import load_setup
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Severity
+from toolpaths.units import DEG
 
 SAMPLES = Path("samples")
 CASES = [("five_faces.cls", "mikron-ucp710", "fanuc-30i", "tools"),
@@ -47,6 +48,16 @@ def test_points_are_inside_the_rounding_of_their_words(sample: str, machine: str
     assert found.tip.max() <= min(1.1 * result.job.rounding.tip, found.tip_bound)
     assert found.axis.max() <= found.axis_bound
     assert np.median(found.tip) > 0.1 * result.job.rounding.tip
+
+
+def test_an_axis_led_past_a_singular_direction_is_no_error_left() -> None:
+    path, found = toolpaths.read(SAMPLES / "joints" / "singular_pass.cls")
+    result = postproc.convert(path, "mikron-ucp710", "fanuc-30i", diagnostics=found,
+                              options=Options(error_model=str(SAMPLES / "errors/mikron-ucp710.toml")))
+    codes = {d.code for d in result.diagnostics}
+    assert result.ok and "singular.led" in codes and "geometric_errors.bound" not in codes
+    left = after_formatting(result)
+    assert left is not None and left.axis.max() <= left.axis_bound < 36.0 * DEG / 3600.0
 
 
 def test_the_figures_stand_in_the_json_and_in_the_text(tmp_path: Path) -> None:
