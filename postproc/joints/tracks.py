@@ -92,7 +92,8 @@ def _walk(kin: Kinematics, tip: Floats, axis: Floats, q: Floats, branch: int) ->
     """Joints at the second of two poses, reached from joints q of the first without a jump.
 
     Steps are halved until the joints move little; the branch may only change where it comes as near as where the tool
-    passes through a singular direction.
+    passes through a singular direction. Where the way leaves the reach, as around the pole of axes that are not square to
+    each other, it ends there.
     """
     rotary = np.array(kin.rotary)
     u, size = 0.0, 0.25
@@ -105,6 +106,8 @@ def _walk(kin: Kinematics, tip: Floats, axis: Floats, q: Floats, branch: int) ->
         if way[near] > (_SMALL_STEP if near == branch else _CROSSING) and size > _LEAST_STEP:
             size *= 0.5
             continue
+        if not np.isfinite(way[near]):
+            break
         q, branch, u = found[near], near, u + size
         size *= 2.0
     return q

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import product
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+import machines
 from machines.machine import Limits
 from postproc.joint_path import nearest_solution, reachable_axes, solve, wrap
 from tests.postproc.kit import angle, great_circle, machine, tilted, unit
@@ -218,6 +220,28 @@ def test_poses_out_of_reach_are_nan_and_the_others_go_on() -> None:
     assert np.isnan(q[[3, 6]]).all()
     good = np.isfinite(q).all(axis=1)
     assert np.abs(np.diff(q[good][:, 3:], axis=0)).max() < 0.8
+
+
+def test_a_way_through_the_hole_at_the_pole_of_axes_that_are_not_square_ends(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With C out of square by 0.001, directions within 0.001 of its own cannot be taken: who follows a branch across them
+    in ever smaller steps never arrives."""
+    file = tmp_path / "measured.toml"
+    file.write_text('base = "mikron-ucp710"\n[kinematics.axes.C]\ndirection = [0.001, 0, 0.9999995]\n')
+    m = machines.load(file)
+    axis = unit(np.array([[-0.02, 0.001, 1.0], [0.001, 0.0, 1.0], [0.03, -0.001, 1.0]]))[[0, 2]]
+    assert np.isfinite(m.kinematics.inverse(np.zeros((2, 3)), axis)).all()
+    calls: list[int] = []
+    inverse = type(m.kinematics).inverse
+
+    def counted(*args: object, **more: object) -> np.ndarray:
+        calls.append(1)
+        assert len(calls) < 2000
+        return inverse(*args, **more)
+
+    monkeypatch.setattr(type(m.kinematics), "inverse", counted)
+    q = solve(m.kinematics, np.zeros((2, 3)), axis, m.limits, m.home).q
+    assert np.isfinite(q).all()
 
 
 @pytest.mark.parametrize("name", ["mill-3axis", "mill-4axis", "mikron-ucp710"])
