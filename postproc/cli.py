@@ -11,7 +11,17 @@ import typer
 from postproc.cli_calibrate import calibrate
 from postproc.cli_catalogue import controller_app, machine_app, setup_app
 from postproc.cli_errors import errors_app
-from postproc.cli_options import Allow, AxisTolerance, Beyond, ClFile, Dialect, MachineName, Tolerance, Units
+from postproc.cli_options import (
+    Allow,
+    AxisTolerance,
+    Beyond,
+    ClFile,
+    Dialect,
+    MachineName,
+    Tolerance,
+    Units,
+    only_with_errors,
+)
 from postproc.cli_orient import EXAMPLES, ORIENTATIONS, MaxTilt, Orient
 from postproc.cli_orient import orient as orient_command
 from postproc.cli_place import EXAMPLES as PLACES
@@ -85,6 +95,7 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
                       output=output_mode, feed=feed, merge_feeds=merge_feeds / 100.0, smooth=smooth,  # type: ignore[arg-type]
                       error_model=error_model, error_beyond=beyond, orient=orient,  # type: ignore[arg-type]
                       max_tilt=max_tilt, name=output.stem)
+    only_with_errors(beyond, error_model)
     fields = _residual_files(residuals or [], error_model)
     refuse_overwriting({"-o": str(output), "--json": json, **{f"--residuals {name}": str(name) for name in fields}},
                        {"the CL file": str(file), "the set-up": setup, "the error model": error_model})
@@ -133,6 +144,7 @@ def trace(file: ClFile, line: Annotated[int, typer.Option("--line", metavar="L",
           error_model: Errors = "", beyond: Beyond = False, orient: Orient = "keep", max_tilt: MaxTilt = 60.0,
           json: Json = "") -> None:
     """Show one point of a CL file through every stage, from its record to its blocks and back."""
+    only_with_errors(beyond, error_model)
     _choice("--orient", orient, ORIENTATIONS)
     options = replace(_options(tolerance, axis_tolerance, "auto", setup, units, dialect, allow_unknown),
                       error_model=error_model, error_beyond=beyond, orient=orient,  # type: ignore[arg-type]
@@ -174,6 +186,9 @@ def main() -> None:
             raise
         typer.echo("interrupted; nothing was written", err=True)
         raise SystemExit(130) from None
+    except OSError as fault:
+        typer.echo(f"standard output cannot be written: {fault.strerror}", err=True)
+        raise SystemExit(1) from None
 
 
 def _choice(option: str, value: str, allowed: tuple[str, ...]) -> None:

@@ -18,3 +18,9 @@ Beyond = Annotated[bool, typer.Option("--error-model-beyond", help="outside the 
                                       "its end")]
 Allow = Annotated[list[str] | None, typer.Option("--allow-unknown", metavar="WORD",
                                                  help="leave this word out although it looks like motion")]
+
+
+def only_with_errors(beyond: bool, error_model: str) -> None:
+    """Wrong use of --error-model-beyond without an error model."""
+    if beyond and not error_model:
+        raise typer.BadParameter("there is no range without --error-model", param_hint="--error-model-beyond")

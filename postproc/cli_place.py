@@ -7,7 +7,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from postproc.cli_options import Allow, AxisTolerance, Beyond, ClFile, Dialect, MachineName, Tolerance, Units
+from postproc.cli_options import (
+    Allow,
+    AxisTolerance,
+    Beyond,
+    ClFile,
+    Dialect,
+    MachineName,
+    Tolerance,
+    Units,
+    only_with_errors,
+)
 from postproc.cli_orient import ORIENTATIONS, MaxTilt, Orient
 from postproc.console import Json, machine_of, progress_bar, refuse_overwriting, report, shown_errors
 
@@ -50,6 +60,7 @@ def place(file: ClFile,
           json: Json = "") -> None:
     """Place and turn the part on the table for the least planned time, inside the limits of the set-up."""
     _check(orient, units, dialect, setup, figure)
+    only_with_errors(beyond, error_model)
     refuse_overwriting({"-o": str(output), "--json": json, "--figure": str(figure or "")},
                        {"the CL file": str(file), "the set-up": str(setup), "the error model": error_model})
     from postproc.files import write_atomically

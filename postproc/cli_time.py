@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from postproc.cli_options import AxisTolerance, Beyond, MachineName, Tolerance, Units
+from postproc.cli_options import AxisTolerance, Beyond, MachineName, Tolerance, Units, only_with_errors
 from postproc.console import Json, machine_of, progress_bar, refuse_overwriting, report, shown_errors
 
 if TYPE_CHECKING:
@@ -38,6 +38,7 @@ def time(file: Annotated[Path, typer.Argument(metavar="FILE", help="CL file, or 
          json: Json = "") -> None:
     """Estimate how long a program takes, with a band, and where the time goes."""
     _check(output, calibrate, units, dialect)
+    only_with_errors(beyond, error_model)
     refuse_overwriting({"-o": output, "--json": json}, {"the file": str(file), "the set-up": setup, "the log": calibrate,
                                                         "the error model": error_model,
                                                         "the model": model if Path(model).suffix else ""})

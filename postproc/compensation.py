@@ -23,14 +23,14 @@ from postproc.corrected.cycles import whole_holes
 from postproc.corrected.points import between, divided
 from postproc.corrected.reversals import Divided, arcs_cut, inserted, starts_of
 from postproc.corrected.settled import Writing, settled
-from postproc.corrected.work import ALONE, CorrectedEnds, Work
+from postproc.corrected.work import CorrectedEnds, Work
 from postproc.groups import groups
 from postproc.looks import looks_between
 from postproc.modes import OutputModes
 from postproc.moves import Moves
 from postproc.path import Path
 from toolpaths.arrays import Bools, Floats, Ints
-from toolpaths.diagnostics import Diagnostic, error, info, warning
+from toolpaths.diagnostics import Diagnostic, error, warning
 from toolpaths.units import DEG
 
 DOUBTS = 500
@@ -126,7 +126,7 @@ def compensate(path: Path, moves: Moves, tools: Ints, kinematics: Callable[[int]
     if (diagnostics and not beyond) or lost.any():
         return None, None, diagnostics or [_lost(path, moves, lost, file)]
     whole, written, resolved, axis_left = _written_out(corrected, path, work, writing, allowed)
-    corrected, apart = written, work.whole[whole.owner] == ALONE
+    corrected, apart = written, work.whole[whole.owner] < 0
     whole = replace(whole, path=corrected).of(cut)
     done = live & np.isfinite(path.u)
     before, after = (x[done].max(axis=0, initial=0.0) for x in (found.before, found.after))
@@ -138,7 +138,7 @@ def compensate(path: Path, moves: Moves, tools: Ints, kinematics: Callable[[int]
         residual_axis=found.residual[:, 3:], added=len(corrected) - before_cut, resolved=int(resolved.sum()),
         partial=int(found.partial[live].sum()), moved=np.abs(found.q - path.q).max(axis=0, initial=0.0),
         owner=whole.owner, part=whole.part, apart=apart, doubt_tip=doubt_tip, doubt_axis=doubt_axis)
-    return corrected, report, [*diagnostics, *(info("compensation", line, file=file) for line in report.lines())]
+    return corrected, report, diagnostics
 
 
 def _written_out(corrected: Path, path: Path, work: Work, writing: Writing,

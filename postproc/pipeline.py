@@ -250,14 +250,18 @@ def _with(result: PostResult, diagnostics: list[Diagnostic], **values: object) -
 
 
 def _compensated(result: PostResult, job: Job, moves: Moves, path: Path) -> tuple[PostResult, Path | None]:
-    """The path on the machine with its geometric errors; `nominal` keeps it as it was."""
+    """The path on the machine with its geometric errors, where it is inside travel without; `nominal` keeps it as it was."""
     from postproc.compensation import compensate
 
     assert job.errors is not None
-    options = job.options
+    options, file = job.options, job.toolpath.file
+    far = check_travel(path, job.moves, job.control, job.kinematics, file)[0]
+    far += check_reach(path, job.moves, job.control, file)
+    if has_errors(far):
+        return _with(result, with_system(far, job.work_system, job.placement), path=path), None
     corrected, report, found = compensate(path, moves, block_tools(path, moves), job.kinematics, job.errors, job.modes,
                                           options.tolerance, job.axis_tolerance, writing_of(job, moves),
-                                          only_canned(job.toolpath, job.controller), options.error_beyond, job.toolpath.file)
+                                          only_canned(job.toolpath, job.controller), options.error_beyond, file)
     return _with(result, found, path=corrected, nominal=path, compensation=report), corrected
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import re
 import subprocess
@@ -12,7 +13,7 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner, Result
 
-from postproc.cli import app
+from postproc.cli import app, main
 from tests.postproc.kit import HEAD, SAMPLES, TOOLS
 
 MILL = ["-m", "mill-3axis", "-c", "linuxcnc"]
@@ -214,3 +215,21 @@ def test_same_input_same_output(tmp_path: Path) -> None:
         assert run("convert", POCKET, *MILL, "-o", tmp_path / name).exit_code == 0
         texts.append((tmp_path / name).read_bytes())
     assert texts[0] == texts[1] and b"\r" not in texts[0]
+
+
+@pytest.mark.parametrize("command", [["convert", "-o", "a.ngc", "-c", "linuxcnc"], ["time"],
+                                     ["trace", "--line", "9", "-c", "linuxcnc"]])
+def test_a_range_without_an_error_model_is_wrong_use(command: list[str]) -> None:
+    name, *rest = command
+    run = CliRunner().invoke(app, [name, "samples/pocket.cls", "-m", "mill-3axis", *rest, "--error-model-beyond"])
+    assert run.exit_code == 2 and "--error-model-beyond" in run.output
+
+
+def test_an_output_that_is_full_is_told(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    def full() -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("postproc.cli.app", full)
+    with pytest.raises(SystemExit) as end:
+        main()
+    assert end.value.code == 1 and "standard output cannot be written: No space left" in capsys.readouterr().err

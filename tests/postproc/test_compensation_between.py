@@ -114,6 +114,15 @@ def test_a_tilted_plane_that_was_not_measured_is_refused(tmp_path: Path) -> None
     assert not result.ok and "compensation.range" in {d.code for d in result.diagnostics}
 
 
+def test_a_part_out_of_travel_is_told_before_it_is_corrected(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("postproc.compensation.compensate", lambda *args: pytest.fail("corrected"))
+    path, found = toolpaths.read("samples/systems/upside_down.cls")
+    result = postproc.convert(path, "mikron-ucp710", "fanuc-30i", diagnostics=found, options=Options(
+        setup="samples/tools.setup.toml", error_model="samples/errors/mikron-ucp710.toml"))
+    told = [d for d in result.diagnostics if d.code == "travel.exceeded"]
+    assert told and len(told) == len({d.message for d in told}) and "system = " in told[0].hint
+
+
 def test_a_short_rapid_before_a_rapid_takes_up_lost_motion() -> None:
     """5 um each: before a long rapid, in a row of rapids, a cut; and 1 um of a cut."""
     tip = np.cumsum([[0.0], [10.0], [0.005], [20.0], [0.005], [0.005], [0.005], [10.0], [0.005], [20.0], [0.001]], axis=0)
