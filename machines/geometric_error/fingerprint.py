@@ -77,4 +77,6 @@ def _map(error_map: ErrorMap) -> list[str]:
 
 def _text(values: Floats | list[float] | tuple[float, ...], unit: float = 1.0) -> str:
     """Numbers in units, to the places that count; no -0."""
-    return " ".join(map(f"%.{PLACES}f".__mod__, (np.round(np.divide(values, unit), PLACES) + 0.0).tolist()))
+    with np.errstate(over="ignore"):  # positions may be any number
+        rounded = np.round(np.divide(values, unit), PLACES) + 0.0
+    return " ".join(map(f"%.{PLACES}f".__mod__, rounded.tolist()))

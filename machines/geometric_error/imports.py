@@ -24,13 +24,14 @@ from machines.geometric_error.names import DIRECTIONS, OWN, ErrorName, parse
 from machines.geometric_error.readings import by_iso_names, run_of, runs_as_rows, together
 from machines.geometric_error.screw_tables import from_linuxcnc
 from machines.geometric_error.serial_errors import Component, Frame, SerialErrors
+from machines.geometric_error.sizes import too_large
 from machines.geometric_error.table_curves import Fault, table_curve
 from machines.geometric_error.tabulate import merged
 from machines.kinematics.serial import Serial
 from machines.machine import Machine
 from machines.user_file import nearest
 from toolpaths.arrays import Floats
-from toolpaths.diagnostics import Diagnostic, error, has_errors, info
+from toolpaths.diagnostics import Diagnostic, error, has_errors, info, warning
 
 _SCREW = re.compile(r"([A-Z])=(.+)$")
 _NAMED = re.compile(r"(E[A-Z][A-Z])=(.+)$")
@@ -84,7 +85,7 @@ def read_sources(sources: Sequence[str], machine: Machine, how: How) -> tuple[Er
             found.append(error("error-import.map", "a map stands alone", file=source,
                                hint=f"import it without the other {len(parts) - 1} sources"))
     if not has_errors(found):
-        found += [*fits(model, machine), *_unused(how, model)]
+        found += [*fits(model, machine), *_unused(how, model), *_large(model, sources)]
     return (None if has_errors(found) else model), found
 
 
@@ -105,6 +106,13 @@ def _parts(sources: Sequence[str], machine: Machine, how: How) -> tuple[list[tup
         parts += [] if part is None else [(part, table.file)]
         found += faults
     return parts, found
+
+
+def _large(model: ErrorModel, sources: Sequence[str]) -> list[Diagnostic]:
+    """Errors that no machine has, and doubtful ones."""
+    names, hint = ", ".join(sources)[:200], "it is what the header of its column says"
+    return [(error if large.never else warning)("error-model.large", large.message, file=names, hint=hint)
+            for large in too_large(model)]
 
 
 def _unused(how: How, model: ErrorModel) -> list[Diagnostic]:

@@ -9,16 +9,17 @@ import numpy as np
 
 from machines.geometric_error.actual_map import part_side
 from machines.geometric_error.axis_motion import effect
-from machines.geometric_error.covariance import angular, covariance_of
+from machines.geometric_error.covariance import covariance_of
 from machines.geometric_error.csv_table import UNITS, CsvTable, read_csv
-from machines.geometric_error.curves import EVERYWHERE, Curve, Fourier, Polynomial, largest
+from machines.geometric_error.curves import EVERYWHERE, Curve, Fourier, Polynomial
 from machines.geometric_error.file_models import CurveModel, ErrorFileModel
-from machines.geometric_error.lattice import COLUMNS, ErrorMap
+from machines.geometric_error.lattice import ErrorMap
 from machines.geometric_error.lattice_file import map_from_csv, zeroed, zeroed_covariance
 from machines.geometric_error.model import ErrorModel
 from machines.geometric_error.names import SPINDLE, ErrorName, parse
 from machines.geometric_error.rods import RodErrors, gives_rods, rod_frame, rod_names
 from machines.geometric_error.serial_errors import Component, Frame, SerialErrors
+from machines.geometric_error.sizes import too_large
 from machines.geometric_error.table_curves import ROTARY, Fault, table_curve
 from machines.kinematics.h4_axes import H4TableAxis
 from machines.kinematics.h4_linear import H4Linear
@@ -31,8 +32,6 @@ from toolpaths.diagnostics import Diagnostic, Severity, has_errors, require, war
 from toolpaths.units import DEG
 
 KIND = "error model"
-LARGE = {False: (1.0, 100.0), True: (0.5 * DEG, 10.0 * DEG)}
-"""mm, and rad of angles: errors that are told, and that no machine has"""
 
 
 def load(source: str | Path, machine: Machine) -> ErrorModel:
@@ -75,6 +74,8 @@ class _Loader:
     def model(self) -> tuple[ErrorModel | None, list[Diagnostic]]:
         """The model, or None and the faults."""
         self._check_machine()
+        if self.found:
+            return None, self.found
         self._check_letters()
         axes, rods, error_map = self._axes(), self._rods(), self._map()
         if has_errors(self.found):
@@ -119,22 +120,10 @@ class _Loader:
         if not (given.components or given.location or given.legs or given.map):
             self.found.append(warning("error-model.empty", "the file holds no errors: the machine is taken as nominal",
                                       file=self.file.file, hint="write [components], [location], [legs] or [map]"))
-        sizes: dict[tuple[str, ...], tuple[float, bool]] = {
-            ("components", str(c.name)): (largest(c.curve), c.name.angular) for c in model.axes.components}
-        sizes |= {("location", name): (abs(value), angular(name)) for name, value in model.axes.constants.items()}
-        if model.rods is not None:
-            for name, value in zip(model.rods.names, model.rods.values.tolist(), strict=True):
-                sizes["legs", name.split(".")[0].rstrip("12"), name] = abs(value), angular(name)
-        if model.map is not None:
-            for k, name in enumerate(COLUMNS):
-                sizes["map", "table", name] = float(np.abs(model.map.table[..., k]).max()), k >= 3
-        for path, (size, turn) in sizes.items():
-            doubtful, never = LARGE[turn]
-            if size > doubtful:
-                shown = f"{size / DEG:.4g} degrees" if turn else f"{size:.4g} mm"
-                found = self.file.problem("error-model.large", path, f"{path[-1]} is up to {shown}: is the unit right?",
-                                          "it is length_unit or angle_unit, in tables what their headers say")
-                self.found.append(found if size > never else replace(found, severity=Severity.WARNING))
+        for large in too_large(model):
+            found = self.file.problem("error-model.large", large.path, large.message,
+                                      "it is length_unit or angle_unit, in tables what their headers say")
+            self.found.append(found if large.never else replace(found, severity=Severity.WARNING))
 
     # ---- axes ------------------------------------------------------------------------------------------------------
 

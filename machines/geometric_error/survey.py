@@ -68,9 +68,9 @@ def unmeasured(model: ErrorModel, machine: Machine, file: str) -> list[Diagnosti
         unit = DEG if machine.rotary[j] else 1.0
         travel = "goes round" if round_about else f"travels from {first[j] / unit:g} to {last[j] / unit:g}"
         hint = "write repeats = 360 where it closes after a turn; else" if round_about else "beyond,"
-        found.append(warning("error-model.range", f"{letter} {travel}, the model holds from {lower[j] / unit:g} to "
-                             f"{upper[j] / unit:g}", file=file, hint=f"{hint} conversions stop there unless "
-                             "--error-model-beyond is given"))
+        holds = f"from {lower[j] / unit:g} to {upper[j] / unit:g}" if lower[j] <= upper[j] else "nowhere there"
+        found.append(warning("error-model.range", f"{letter} {travel}, the model holds {holds}", file=file,
+                             hint=f"{hint} conversions stop there unless --error-model-beyond is given"))
     return found
 
 

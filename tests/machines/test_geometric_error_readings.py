@@ -177,3 +177,12 @@ def test_what_is_wrong_with_the_columns_of_a_component(source: str, old: str, ne
     model, faults = read(tmp_path, {"laser.csv": TARGETS.replace(old, new)}, How(average=True), source)
     assert model is None
     assert faults[0].code == code and word in str(faults[0])
+
+
+@pytest.mark.parametrize(("unit", "code", "severity"), [
+    ("mm", "error-model.large", "WARNING"), ("m", "error-model.large", "ERROR"), ("um", "", "")])
+def test_a_wrong_unit_is_noticed_when_it_comes_in(unit: str, code: str, severity: str, tmp_path: Path) -> None:
+    model, told = read(tmp_path, {"a.csv": f"X [mm],EXX [{unit}]\n-500,0\n500,2.5\n"}, How())
+    assert (model is None) == (severity == "ERROR")
+    assert [(d.code, d.severity.name) for d in told] == ([(code, severity)] if code else [])
+    assert all("EXX is up to" in d.message and "a.csv" in d.file for d in told)

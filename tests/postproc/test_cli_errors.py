@@ -102,7 +102,7 @@ def test_tables_per_axis_go_out_and_come_back(tmp_path: Path) -> None:
 def test_linuxcnc_goes_out_with_the_rest_and_comes_back(tmp_path: Path) -> None:
     done = run("to-linuxcnc", MIKRON, "-m", "mikron-ucp710", "-o", tmp_path / "comp", "--rest", tmp_path / "rest.toml")
     assert "the post-processor must not do it again" in done.stderr and "rest.toml" in done.stderr
-    assert "lost: the covariance of what these files hold; that of the rest stays with it" in done.stdout
+    assert "lost: the covariance of what these files hold, as they have no place for it" in done.stdout
     volume = figures("check", MIKRON, "-m", "mikron-ucp710")["volume"]
     assert (f"worst over the work volume, tool of 100 mm, two ways at their mean: tip {volume['tip_worst_um']:.2f} um, "
             in done.stdout)
@@ -188,6 +188,18 @@ def test_measured_readings_become_means_with_their_doubt(tmp_path: Path) -> None
     found = load(tmp_path / "e.toml", machines.load("mill-3axis"))
     assert found.values == pytest.approx([0.001, 0.006]) and found.covariance is not None
     assert np.sqrt(np.diag(found.covariance)) == pytest.approx([0.001 / np.sqrt(2)] * 2)
+
+
+def test_a_range_outside_travel_holds_nowhere(tmp_path: Path) -> None:
+    (tmp_path / "e.toml").write_text("[components.EXX]\npolynomial = [1]\nrange = [2000, 3000]\n")
+    done = run("check", tmp_path / "e.toml", "-m", "mikron-ucp710")
+    assert "X travels from -355 to 355, the model holds nowhere there" in done.stderr
+    assert "X was measured from 2000 to 3000" in done.stderr and "the model holds nowhere within travel" in done.stdout
+
+
+def test_a_model_of_another_machine_is_one_fault() -> None:
+    done = run("check", SAMPLES / "uranesx.toml", "-m", "h4a-c-table", code=1)
+    assert [d.split("]")[0] for d in done.stderr.split("error [")[1:]] == ["error-model.machine"]
 
 
 def test_import_tells_ranges_that_are_none_of_the_machine(tmp_path: Path) -> None:
