@@ -22,6 +22,8 @@ _SMALLEST = 1e-9
 """of a curve: a block that short and still outside is a jump"""
 _AIM, _ENOUGH = 0.95, 0.85
 """of the tolerance: what a step aims at, and what is near enough to the longest"""
+_HALVINGS, _FOLLOWED = 24, 1e-6
+"""of a curve, on the way to its end in a singular direction; rad to which the joints are then known"""
 _UNKNOWN = -2
 _NARROW = 1.05
 """a longest step that is known within this factor is known"""
@@ -191,7 +193,37 @@ def family_turns(kin: Kinematics, curves: Curves, q0: Floats, q1: Floats) -> tup
     if not len(rows):
         return rows, np.zeros((0, kin.joints))
     begun = nearest_solution(kin, curves.start[rows], curves.axis0[rows], q1[rows])
+    limit = _limit(kin, curves.take(rows), q1[rows], 0.0)
+    begun = np.where(_apart(kin, limit, begun)[:, None], limit, begun)
     needed = np.abs(wrap(begun[:, rotary] - q0[rows][:, rotary])).max(axis=1) > 1e-9
     turned = begun[needed]
     turned[:, rotary] = q1[rows[needed]][:, rotary] + wrap(turned[:, rotary] - q1[rows[needed]][:, rotary])
     return rows[needed], turned
+
+
+def approached(kin: Kinematics, curves: Curves, q: Floats) -> Floats:
+    """Joints (N + 1, J) of a run of curves (N); at poses where the tool lies along a rotary axis, that axis as the curve
+    that leads there needs it. With axes at right angles that is the value it has before, with nutating ones it is not."""
+    singular = kin.singular(np.nan_to_num(q))
+    rows = np.flatnonzero(singular[1:] & ~singular[:-1])
+    if not len(rows):
+        return q
+    limit = _limit(kin, curves.take(rows), q[rows], 1.0)
+    off = _apart(kin, limit, q[rows + 1])
+    result = q.copy()
+    result[rows[off] + 1] = limit[off]
+    return result
+
+
+def _limit(kin: Kinematics, curves: Curves, q: Floats, end: float) -> Floats:
+    """Joints (K, J) at u = `end` (0 or 1) of curves (K), followed there from joints q (K, J) at their other ends."""
+    for share in 0.5 ** np.arange(1, _HALVINGS):
+        q = nearest_solution(kin, *curves.at(np.full(len(curves), abs(end - share))), q)
+    return nearest_solution(kin, *curves.at(np.full(len(curves), end)), q)
+
+
+def _apart(kin: Kinematics, a: Floats, b: Floats) -> Bools:
+    """(K,) rotary joints that differ by more than following them rounds; NaN is no difference."""
+    rotary = np.array(kin.rotary)
+    apart: Bools = np.abs(wrap(a[:, rotary] - b[:, rotary])).max(axis=1, initial=0.0) > _FOLLOWED
+    return apart

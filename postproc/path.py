@@ -17,6 +17,7 @@ from postproc.blocks import Builder, add_run, rapid_codes
 from postproc.control import Control
 from postproc.groups import groups
 from postproc.joints.lead import Event
+from postproc.linearise import approached
 from postproc.links import Link, Pose, SafeSpace, plan_link
 from postproc.memory import give_back
 from postproc.modes import OutputModes, WordFrame, stands_still, turning_run
@@ -133,14 +134,15 @@ def build_path(modes: OutputModes, kinematics: Callable[[int], Kinematics], move
         _add_link(out, moves, int(first), link, _Legs(frame, way, run.frame, before, kin, state))
         if not link.clear:
             diagnostics.append(faults.no_way(moves, int(first), file))
+        q = run.q
         if len(rows) > 1:
-            curves = moves.run(int(first), int(last))
-            left, turned, broken = add_run(out, run.frame, kin, moves, rows[1:], _with_axes(curves, run.axis), run.q,
-                                           tolerance, run.left)
+            curves = _with_axes(moves.run(int(first), int(last)), run.axis)
+            q = approached(kin, curves, q)
+            left, turned, broken = add_run(out, run.frame, kin, moves, rows[1:], curves, q, tolerance, run.left)
             worst = np.maximum(worst, left)
             turns.append(turned)
-            diagnostics += faults.broken(machine, moves, broken, run.q[[broken - first - 1, broken - first]], file)
-        state, frame = Pose(moves.tip[last - 1], run.axis[-1], run.q[-1], run.frame.control), run.frame
+            diagnostics += faults.broken(machine, moves, broken, q[[broken - first - 1, broken - first]], file)
+        state, frame = Pose(moves.tip[last - 1], run.axis[-1], q[-1], run.frame.control), run.frame
         if progress:
             progress("blocks", int(last), len(moves))
     if has_errors(diagnostics):

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+import machines
 import postproc
 from machines.machine import Machine
 from postproc.pipeline import PostResult
@@ -99,3 +101,29 @@ def test_choices_are_told() -> None:
     result = run(cone(0.5, 5.0, 45.0), machine("mikron-ucp710"))
     (d,) = [d for d in result.diagnostics if d.code == "joints.chosen"]
     assert "leave travel" in d.message
+
+
+NUTATED = """base = "{base}"
+[kinematics.axes.B]
+direction = [0.0, 0.7071067811865476, {z}0.7071067811865476]
+[axes.B]
+travel = [-180, 180]
+[axes.C]
+travel = [-720, 720]
+"""
+
+
+@pytest.mark.parametrize(("base", "sign"), [("trunnion-bc", "-"), ("trunnion-bc", ""), ("head-table", "")])
+@pytest.mark.parametrize("seed", range(3))
+def test_nutating_axes_pass_the_direction_of_the_table(base: str, sign: str, seed: int, tmp_path: Path) -> None:
+    """With a nutating axis the table turns while the tool is tilted along a great circle: at the pole it stands where both
+    sides of the path need it, not where it stood at the points before."""
+    file = tmp_path / "nutated.toml"
+    file.write_text(NUTATED.format(base=base, z=sign))
+    rng = np.random.default_rng(seed)
+    tilts, sides = rng.uniform(4, 40, 6), rng.uniform(0, 360, 6)
+    axis = tilted(np.where(np.arange(12) % 2, 0.0, np.repeat(tilts, 2)), np.repeat(sides, 2))
+    points = goto(rng.uniform(-40, 40, (12, 3)) * [1, 1, 0.1], axis)
+    result = run(["RAPID", points[0], "FEDRAT/MMPM,1000", *points[1:]], machines.load(file))
+    assert result.comparison is not None
+    assert result.comparison.worst_tip < 0.01 and result.comparison.worst_axis < 0.05 * DEG
