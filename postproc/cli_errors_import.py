@@ -34,13 +34,14 @@ Average = Annotated[bool, typer.Option("--average", help="rows at the same place
                                        "and files of runs are readings: their mean counts, their scatter is the doubt")]
 Near = Annotated[list[str] | None, typer.Option("--near", metavar="AXIS=AMOUNT", help="with --average: readings no farther "
                                                 "apart are of one place, given to that amount, mm or degrees")]
+Large = Annotated[bool, typer.Option("--large", help="errors above 1 mm or 0.5 degrees are so, and no unit slipped")]
 Directions = Annotated[str, typer.Option("--directions", help="of a map's values: machine or table")]
 
 
 def import_(sources: Sources, machine: MachineName, output: Output, into: Into = None, covariance: Covariance = None,
             interpolation: Interpolation = "linear", repeats: Repeats = None, sign: Sign = 1, kind: Kind = 0,
             tool_length: MapTool = 0.0, directions: Directions = "table", zero: Zero = None, average: Average = False,
-            near: Near = None, json: Json = "") -> None:
+            near: Near = None, large: Large = False, json: Json = "") -> None:
     """Make an error model of tables that others wrote."""
     for option, value, allowed in (("--interpolation", interpolation, ("linear", "spline")),
                                    ("--sign", str(sign), ("1", "-1")), ("--directions", directions, ("machine", "table"))):
@@ -58,7 +59,7 @@ def import_(sources: Sources, machine: MachineName, output: Output, into: Into =
         periods, at = in_units(pairs("--repeats", repeats, known)), in_units(pairs("--zero", zero, known))
         apart = in_units(pairs("--near", near, known))
         how = How(interpolation, periods, float(sign), kind, tool_length, directions, at, average,  # type: ignore[arg-type]
-                  apart)
+                  apart, large)
         read, found = read_sources(sources, m, how)
         model, told = required(read, found), [f"read: {', '.join(files_of)}"]
         found += [*beyond_travel(model, m, str(output)), *unmeasured(model, m, str(output))]

@@ -30,6 +30,7 @@ def write_model(model: ErrorModel, description: str = "") -> dict[str, str]:
     head = [f"description = {_quoted(description)}"] if description else []
     head += [f"machine = {_quoted(model.machine)}"] if model.machine else []
     head += [f'corrected_by = "{model.corrected_by}"', f'length_unit = "{LENGTH}"', f'angle_unit = "{ANGLE}"']
+    head += ["large = true"] if model.large else []
     body = [*_component_lines(model.axes, stem, files), *_constant_lines(model.axes), *_reference_lines(model.axes)]
     body += [] if model.rods is None else _leg_lines(model.rods)
     if model.map is not None:

@@ -236,7 +236,8 @@ def to_map(model: ErrorModel, machine: Machine, lattice: ErrorMap, fixed: Floats
     else:
         made, inside = refined(actual, nominal, lattice, fixed, tolerance, MOST_NODES)
     _measured(actual, nodes_of(ActualByMap(nominal, made), made.places(), fixed))
-    result = ErrorModel(map=made, corrected_by=model.corrected_by, name=model.name, machine=model.machine)
+    result = ErrorModel(map=made, corrected_by=model.corrected_by, name=model.name, machine=model.machine,
+                        large=model.large)
     volume = samples(model, machine, actual, PLACES)
     volume = volume[~result.on(kinematics).outside(volume).any(axis=1)]
     lost = map_loss(result.on(kinematics), actual, volume) if len(volume) else None

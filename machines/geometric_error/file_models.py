@@ -130,6 +130,9 @@ class ErrorFileModel(UserModel):
     """of the numbers in this file; CSV tables have units in their headers"""
     angle_unit: Literal["arcsec", "urad", "deg"] = "arcsec"
     """of the numbers in this file"""
+    large: bool = False
+    """true: errors above 1 mm or 0.5 degrees are so; else they are refused, as a unit that slipped, most likely. Those above
+    100 mm or 10 degrees always are"""
     components: dict[str, CurveModel] = Field(default_factory=dict)
     """component errors by ISO 230-1 name, EXX, EYX, ... ECC"""
     location: dict[str, float] = Field(default_factory=dict)

@@ -55,6 +55,7 @@ class How:
         zero: mm or rad by coordinate: the place at which a map is to be 0; {} takes it as it is
         average: rows at the same place, columns of runs and files of runs are readings of it: their mean counts, and
             their scatter is the doubt
+        large: errors above 1 mm or 0.5 degrees are so
         near: mm or rad by axis or coordinate: readings no farther apart are of one place
     """
 
@@ -67,6 +68,7 @@ class How:
     zero: Mapping[str, float] = field(default_factory=dict)
     average: bool = False
     near: Mapping[str, float] = field(default_factory=dict)
+    large: bool = False
 
 
 def read_sources(sources: Sequence[str], machine: Machine, how: How) -> tuple[ErrorModel | None, list[Diagnostic]]:
@@ -85,7 +87,8 @@ def read_sources(sources: Sequence[str], machine: Machine, how: How) -> tuple[Er
             found.append(error("error-import.map", "a map stands alone", file=source,
                                hint=f"import it without the other {len(parts) - 1} sources"))
     if not has_errors(found):
-        found += [*fits(model, machine), *_unused(how, model), *_large(model, sources)]
+        found += [*fits(model, machine), *_unused(how, model), *_large(model, sources, how)]
+        model = replace(model, large=how.large)
     return (None if has_errors(found) else model), found
 
 
@@ -108,11 +111,11 @@ def _parts(sources: Sequence[str], machine: Machine, how: How) -> tuple[list[tup
     return parts, found
 
 
-def _large(model: ErrorModel, sources: Sequence[str]) -> list[Diagnostic]:
-    """Errors that no machine has, and doubtful ones."""
-    names, hint = ", ".join(sources)[:200], "it is what the header of its column says"
-    return [(error if large.never else warning)("error-model.large", large.message, file=names, hint=hint)
-            for large in too_large(model)]
+def _large(model: ErrorModel, sources: Sequence[str], how: How) -> list[Diagnostic]:
+    """Errors above what machines have."""
+    return [(error if one.refused(how.large) else warning)(
+        "error-model.large", one.message(how.large), file=", ".join(sources)[:200],
+        hint=one.hint(how.large, "headers of columns", "--large")) for one in too_large(model)]
 
 
 def _unused(how: How, model: ErrorModel) -> list[Diagnostic]:

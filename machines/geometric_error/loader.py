@@ -80,7 +80,8 @@ class _Loader:
         axes, rods, error_map = self._axes(), self._rods(), self._map()
         if has_errors(self.found):
             return None, self.found
-        model = ErrorModel(axes, rods, error_map, None, self.checked.corrected_by, self.file.name, self.checked.machine)
+        model = ErrorModel(axes, rods, error_map, None, self.checked.corrected_by, self.file.name, self.checked.machine,
+                           self.checked.large)
         try:
             model.on(self.machine.kinematics)
         except ValueError as fault:
@@ -120,10 +121,10 @@ class _Loader:
         if not (given.components or given.location or given.legs or given.map):
             self.found.append(warning("error-model.empty", "the file holds no errors: the machine is taken as nominal",
                                       file=self.file.file, hint="write [components], [location], [legs] or [map]"))
-        for large in too_large(model):
-            found = self.file.problem("error-model.large", large.path, large.message,
-                                      "it is length_unit or angle_unit, in tables what their headers say")
-            self.found.append(found if large.never else replace(found, severity=Severity.WARNING))
+        for one in too_large(model):
+            found = self.file.problem("error-model.large", one.path, one.message(given.large), one.hint(
+                given.large, "length_unit, angle_unit, headers of tables", "large = true in this file"))
+            self.found.append(found if one.refused(given.large) else replace(found, severity=Severity.WARNING))
 
     # ---- axes ------------------------------------------------------------------------------------------------------
 

@@ -36,6 +36,7 @@ class ErrorModel:
         covariance: (P, P) of `values`, mm and rad; None where nothing is known
         corrected_by: who corrects, the post-processor or the control; never both
         name, machine: of the file, and the machine it was made for ("" any)
+        large: True where errors above 1 mm or 0.5 degrees are meant, which else are refused when files are read
     """
 
     axes: SerialErrors = field(default_factory=SerialErrors)
@@ -45,6 +46,7 @@ class ErrorModel:
     corrected_by: Place = "post"
     name: str = ""
     machine: str = ""
+    large: bool = False
 
     def __post_init__(self) -> None:
         if self.covariance is not None:

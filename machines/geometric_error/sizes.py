@@ -13,31 +13,42 @@ from machines.geometric_error.model import ErrorModel
 from toolpaths.units import DEG
 
 LARGE = {False: (1.0, 100.0), True: (0.5 * DEG, 10.0 * DEG)}
-"""mm, and rad of angles: errors that are told, and that no machine has"""
+"""mm, and rad of angles: errors that are refused unless the file says that they are so, and that no machine has"""
 
 
 @dataclass(frozen=True)
 class TooLarge:
-    """An error that is doubtful, or one that `never` is any; `path` where a model file gives it, the last its name."""
+    """An error above what machines have; `path` where a model file gives it, the last its name.
+
+    `large` of its methods: True where such errors are said to be so.
+    """
 
     path: tuple[str, ...]
     size: float
     turn: bool
 
-    @property
-    def never(self) -> bool:
-        """True for one that no machine has."""
-        return not self.size <= LARGE[self.turn][1]
+    def refused(self, large: bool) -> bool:
+        """True for one that is no warning."""
+        return not (large and self.size <= LARGE[self.turn][1])
 
-    @property
-    def message(self) -> str:
-        """The error and its size."""
-        shown = f"{self.size / DEG:.4g} degrees" if self.turn else f"{self.size:.4g} mm"
-        return f"{self.path[-1]} is up to {shown}: is the unit right?"
+    def message(self, large: bool) -> str:
+        """The error, its size, and what is allowed."""
+        most = f"; errors above {self._shown(LARGE[self.turn][large])} are refused" if self.refused(large) else ""
+        return f"{self.path[-1]} is up to {self._shown(self.size)}{most}"
+
+    def hint(self, large: bool, units: str, key: str) -> str:
+        """What to do: where the units stand, and what says that the error is so."""
+        if not self.refused(large):
+            return f"{key} says that it is so"
+        may = self.size <= LARGE[self.turn][1]
+        return f"a unit that slipped, most likely: {units}" + (f"; {key} if it is so" if may else "")
+
+    def _shown(self, size: float) -> str:
+        return f"{size / DEG:.4g} degrees" if self.turn else f"{size:.4g} mm"
 
 
 def too_large(model: ErrorModel) -> list[TooLarge]:
-    """The errors of a model that are doubtful."""
+    """The errors of a model above 1 mm or 0.5 degrees."""
     found = [TooLarge(("components", str(c.name)), largest(c.curve), c.name.angular) for c in model.axes.components]
     found += [TooLarge(("location", name), abs(value), angular(name)) for name, value in model.axes.constants.items()]
     if model.rods is not None:

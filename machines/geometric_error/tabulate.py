@@ -189,7 +189,8 @@ def merged(model: ErrorModel, more: ErrorModel) -> ErrorModel:
     axes = replace(model.axes, components=components, constants={**model.axes.constants, **more.axes.constants},
                    reference={**model.axes.reference, **more.axes.reference},
                    frame={**model.axes.frame, **more.axes.frame})
-    result = _with_axes(model, replace(model, axes=axes, covariance=None), replaced(model, more))
+    both = replace(model, axes=axes, covariance=None, large=model.large or more.large)
+    result = _with_axes(model, both, replaced(model, more))
     return _with_axes(more, result)
 
 

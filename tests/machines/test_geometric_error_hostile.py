@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,8 @@ import pytest
 
 import machines
 from machines.geometric_error.csv_table import UNITS, read_csv
+from machines.geometric_error.exchange import save
+from machines.geometric_error.fingerprint import fingerprint
 from machines.geometric_error.lattice_file import map_from_csv
 from machines.geometric_error.loader import load_checked
 from toolpaths.diagnostics import Severity
@@ -131,30 +134,46 @@ def test_a_thousand_faults_are_one_message(tmp_path: Path) -> None:
     assert table is None and len(faults) == 1 and faults[0].count == 1000 and faults[0].lines == (2, 3, 4, 5, 6, 7)
 
 
-@pytest.mark.parametrize(("toml", "word"), [('length_unit = "mm"\n[location]\nEX0C = 25\n', "EX0C is up to 25 mm"),
-                                            ("[components.ECC]\ncosine = [2500]\n", "ECC is up to 0.6944 degrees"),
-                                            ("", "no errors")])
-def test_what_may_be_wrong_is_a_warning(tmp_path: Path, toml: str, word: str) -> None:
-    (tmp_path / "e.toml").write_text(toml)
+def test_no_errors_at_all_are_a_warning(tmp_path: Path) -> None:
+    (tmp_path / "e.toml").write_text("")
     found, faults = load_checked(tmp_path / "e.toml", machines.load("mikron-ucp710"))
     assert found is not None and [d.severity for d in faults] == [Severity.WARNING]
-    assert word in faults[0].message and faults[0].hint
+    assert "no errors" in faults[0].message and faults[0].hint
 
 
-def test_a_table_in_millimetres_that_is_in_microns_is_noticed(tmp_path: Path) -> None:
-    (tmp_path / "e.toml").write_text(TABLE)
-    (tmp_path / "x.csv").write_text(CSV.replace("[um]", "[mm]"))
+@pytest.mark.parametrize(("toml", "machine", "line", "said"), [
+    ('length_unit = "mm"\n[location]\nEX0C = 25\n', "mikron-ucp710", 3,
+     "EX0C is up to 25 mm; errors above 1 mm are refused"),
+    ("[components.ECC]\ncosine = [2500]\n", "mikron-ucp710", 1,
+     "ECC is up to 0.6944 degrees; errors above 0.5 degrees are refused"),
+    (TABLE, "mikron-ucp710", 1, "EXX is up to 2 mm"), (MAP, "mikron-ucp710", 2, "dy is up to 3 mm"),
+    ('length_unit = "mm"\n[legs.X]\nrail = [16.0, 0.0, 0.0]\n', "uranesx", 2, "X.rail.x is up to 16 mm")])
+def test_a_unit_that_slipped_is_refused_unless_the_file_says_that_it_did_not(toml: str, machine: str, line: int, said: str,
+                                                                            tmp_path: Path) -> None:
+    (tmp_path / "e.toml").write_text(toml)
+    (tmp_path / "x.csv").write_text(CSV.replace("[um]", "[mm]") if toml == TABLE else
+                                    "X [mm],dx [um],dy [mm],dz [um]\n0,1,2,3\n9,1,3,3\n")
+    found, faults = load_checked(tmp_path / "e.toml", machines.load(machine))
+    assert found is None and len(faults) == 1 and faults[0].code == "error-model.large" and faults[0].lines == (line,)
+    assert said in faults[0].message and "large = true" in faults[0].hint and "unit that slipped" in faults[0].hint
+    (tmp_path / "e.toml").write_text("large = true\n" + toml)
+    found, faults = load_checked(tmp_path / "e.toml", machines.load(machine))
+    assert found is not None and [(d.code, d.severity) for d in faults] == [("error-model.large", Severity.WARNING)]
+    save(replace(found, name="again"), tmp_path)
+    again, faults = load_checked(tmp_path / "again.toml", machines.load(machine))
+    assert again is not None and again.large and fingerprint(again) == fingerprint(found)
+
+
+def test_no_machine_has_errors_of_decimetres(tmp_path: Path) -> None:
+    (tmp_path / "e.toml").write_text('large = true\nlength_unit = "mm"\n[location]\nEX0C = 101\n')
     found, faults = load_checked(tmp_path / "e.toml", machines.load("mikron-ucp710"))
-    assert found is not None and [d.code for d in faults] == ["error-model.large"]
+    assert found is None and "errors above 100 mm are refused" in faults[0].message and "large" not in faults[0].hint
 
 
 def test_legs_of_a_machine_on_rods_are_no_axes(tmp_path: Path) -> None:
     (tmp_path / "e.toml").write_text("[components.EXX]\npolynomial = [1]\nrange = [0, 1]\n")
     found, faults = load_checked(tmp_path / "e.toml", machines.load("uranesx"))
     assert found is None and faults[0].code == "error-model.axis" and "[legs]" in faults[0].hint
-    (tmp_path / "e.toml").write_text('length_unit = "mm"\n[legs.X]\nrail = [16.0, 0.0, 0.0]\n')
-    found, faults = load_checked(tmp_path / "e.toml", machines.load("uranesx"))
-    assert found is not None and faults[0].code == "error-model.large" and faults[0].lines == (2,)
 
 
 def test_a_large_lattice_in_any_order_is_read(tmp_path: Path) -> None:

@@ -179,10 +179,11 @@ def test_what_is_wrong_with_the_columns_of_a_component(source: str, old: str, ne
     assert faults[0].code == code and word in str(faults[0])
 
 
-@pytest.mark.parametrize(("unit", "code", "severity"), [
-    ("mm", "error-model.large", "WARNING"), ("m", "error-model.large", "ERROR"), ("um", "", "")])
-def test_a_wrong_unit_is_noticed_when_it_comes_in(unit: str, code: str, severity: str, tmp_path: Path) -> None:
-    model, told = read(tmp_path, {"a.csv": f"X [mm],EXX [{unit}]\n-500,0\n500,2.5\n"}, How())
+@pytest.mark.parametrize(("unit", "large", "severity"), [
+    ("mm", False, "ERROR"), ("mm", True, "WARNING"), ("m", True, "ERROR"), ("um", False, ""), ("um", True, "")])
+def test_a_wrong_unit_is_noticed_when_it_comes_in(unit: str, large: bool, severity: str, tmp_path: Path) -> None:
+    model, told = read(tmp_path, {"a.csv": f"X [mm],EXX [{unit}]\n-500,0\n500,2.5\n"}, How(large=large))
     assert (model is None) == (severity == "ERROR")
-    assert [(d.code, d.severity.name) for d in told] == ([(code, severity)] if code else [])
+    assert [(d.code, d.severity.name) for d in told] == ([("error-model.large", severity)] if severity else [])
+    assert model is None or model.large == large
     assert all("EXX is up to" in d.message and "a.csv" in d.file for d in told)

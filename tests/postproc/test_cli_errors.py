@@ -190,6 +190,25 @@ def test_measured_readings_become_means_with_their_doubt(tmp_path: Path) -> None
     assert np.sqrt(np.diag(found.covariance)) == pytest.approx([0.001 / np.sqrt(2)] * 2)
 
 
+def test_large_errors_are_refused_everywhere_and_stay_meant(tmp_path: Path) -> None:
+    (tmp_path / "x.csv").write_text("X [mm],EXX [mm]\n-500,0\n500,2.5\n")
+    (tmp_path / "y.csv").write_text("Y [mm],EYY [um]\n-400,0\n400,2.5\n")
+    source = ["import", tmp_path / "x.csv", "-m", "mill-3axis", "-o", tmp_path / "e.toml"]
+    refused = run(*source, code=1)
+    assert "errors above 1 mm are refused" in refused.stderr and "--large if it is so" in refused.stderr
+    assert "--large says that it is so" in run(*source, "--large").stderr
+    assert "EXX is up to 2.5 mm" in run("check", tmp_path / "e.toml", "-m", "mill-3axis").stderr
+    run("import", tmp_path / "y.csv", "-m", "mill-3axis", "-o", tmp_path / "all.toml", "--into", tmp_path / "e.toml")
+    run("to-map", tmp_path / "all.toml", "-m", "mill-3axis", "-o", tmp_path / "map.toml")
+    run("to-tables", tmp_path / "all.toml", "-m", "mill-3axis", "-o", tmp_path / "t")
+    for model in (tmp_path / "all.toml", tmp_path / "map.toml", tmp_path / "t/all.toml"):
+        text = model.read_text()
+        assert "large = true\n" in text
+        run("check", model, "-m", "mill-3axis")
+        model.write_text(text.replace("large = true\n", ""))
+        run("check", model, "-m", "mill-3axis", code=1)
+
+
 def test_a_range_outside_travel_holds_nowhere(tmp_path: Path) -> None:
     (tmp_path / "e.toml").write_text("[components.EXX]\npolynomial = [1]\nrange = [2000, 3000]\n")
     done = run("check", tmp_path / "e.toml", "-m", "mikron-ucp710")
