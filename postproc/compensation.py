@@ -30,7 +30,7 @@ from postproc.modes import OutputModes
 from postproc.moves import Moves
 from postproc.path import Path
 from toolpaths.arrays import Bools, Floats, Ints
-from toolpaths.diagnostics import Diagnostic, error, warning
+from toolpaths.diagnostics import Diagnostic, Severity, error, has_errors
 from toolpaths.units import DEG
 
 DOUBTS = 500
@@ -98,7 +98,7 @@ def compensate(path: Path, moves: Moves, tools: Ints, kinematics: Callable[[int]
         tolerance, axis_tolerance: mm and rad of the whole conversion
         writing: how a path is written
         always: (C,) cycles that stay canned cycles: single moves do not replace them
-        beyond: True corrects outside the measured range with the error at its end
+        beyond: True corrects outside the measured range with the error at its end, as linking moves are anyway
     """
     allowed, before_cut = SHARE * tolerance, len(path)
 
@@ -118,12 +118,14 @@ def compensate(path: Path, moves: Moves, tools: Ints, kinematics: Callable[[int]
             break
         corrected, found = _at_ends(path, moves, modes, work, allowed, always)
     live = ~path.home
-    low, high = work.reached()
-    unmeasured = found.unmeasured | work.unmeasured(low, high)
-    diagnostics = _unmeasured(path, moves, modes.control, unmeasured & live[:, None], (low, high), measured(model), beyond,
-                              file)
+    reached = work.reached()
+    unmeasured, diagnostics = found.unmeasured | work.unmeasured(*reached), []
+    for where, severity in ((live & np.isfinite(path.u), Severity.WARNING if beyond else Severity.ERROR),
+                            (live & np.isnan(path.u), Severity.INFO)):
+        diagnostics += _unmeasured(path, moves, modes.control, unmeasured & where[:, None], reached, measured(model),
+                                   severity, file)
     lost = live & ~np.isfinite(found.q).all(axis=1)
-    if (diagnostics and not beyond) or lost.any():
+    if has_errors(diagnostics) or lost.any():
         return None, None, diagnostics or [_lost(path, moves, lost, file)]
     whole, written, resolved, axis_left = _written_out(corrected, path, work, writing, allowed)
     corrected, apart = written, work.whole[whole.owner] < 0
@@ -270,34 +272,25 @@ def _doubt(path: Path, live: Bools, work: Work, model: ErrorModel) -> tuple[floa
 # ---- what cannot be done ----------------------------------------------------------------------------------------------
 
 def _unmeasured(path: Path, moves: Moves, control: Control, where: Bools, reached: tuple[Floats, Floats],
-                known: dict[str, tuple[float, float]], beyond: bool, file: str) -> list[Diagnostic]:
+                known: dict[str, tuple[float, float]], severity: Severity, file: str) -> list[Diagnostic]:
     """One of each axis that goes where its errors were not measured, `where` (K, J), from and to `reached` (K, J); `known`:
-    what was measured of it."""
-    told = []
+    what was measured of it. Those that are no errors get the error at the end of the range: linking moves are INFO."""
+    told, linking = [], " in linking moves" if severity == Severity.INFO else ""
     for j in np.flatnonzero(where.any(axis=0)).tolist():
         rows = np.flatnonzero(where[:, j])
         low, high = reached[0][rows, j].min() * control.unit[j], reached[1][rows, j].max() * control.unit[j]
         lines, name = np.unique(moves.line[path.move[rows]])[:6].tolist(), control.machine.axis_names[j]
         span = " to ".join(f"{x * control.unit[j]:.7g}" for x in known.get(name, ()))
-        text = f"{name} goes from {low:.7g} to {high:.7g} where its errors were not measured" + (
+        text = f"{name} goes from {low:.7g} to {high:.7g}{linking} where its errors were not measured" + (
             f": they were from {span}" if span else "")
-        if beyond:
-            told.append(warning("compensation.range", text + "; the error at the end of the range is taken", file=file,
-                                lines=lines, count=len(rows)))
+        if severity != Severity.ERROR:
+            told.append(Diagnostic(severity, "compensation.range", text + "; the error at the end of the range is taken",
+                                   file=file, lines=tuple(lines), count=len(rows)))
             continue
+        turn = "write repeats = 360 where a whole turn was measured, " if control.machine.rotary[j] else ""
         told.append(error("compensation.range", text, file=file, lines=lines, count=len(rows),
-                          hint=_instead(control, j, low, high)))
+                          hint=f"{turn}measure farther, move the part, or take --error-model-beyond"))
     return told
-
-
-def _instead(control: Control, j: int, low: float, high: float) -> str:
-    """What to do about joint j going from `low` to `high`, in units of its words, where its errors were not measured."""
-    limits = control.machine.limits
-    least, most = (float(x[j]) * control.unit[j] for x in (limits.lower, limits.upper))
-    if low < least or high > most:
-        return f"its travel ends at {least:.7g} and {most:.7g}: move the part in the set-up (part.origin)"
-    turn = "write repeats = 360 where a whole turn was measured, " if control.machine.rotary[j] else ""
-    return f"{turn}measure farther, move the part, or take --error-model-beyond"
 
 
 def _lost(path: Path, moves: Moves, lost: Bools, file: str) -> Diagnostic:

@@ -65,7 +65,7 @@ class Corrected:
 
 def correct(actual: Actual, q: Floats, tip: Floats, axis: Floats, *, group: Ints | None = None,
             direction: Floats | None = None, axis_tolerance: float = AXIS_TOLERANCE, turn: bool = True,
-            beyond: bool = False) -> Corrected:
+            beyond: bool | Bools = False) -> Corrected:
     """Joints near the nominal q (N, J) at which the machine with errors has its tool at tip and axis (N, 3).
 
     Args:
@@ -74,11 +74,11 @@ def correct(actual: Actual, q: Floats, tip: Floats, axis: Floats, *, group: Ints
         direction: (N, J) sign of each joint's last motion, see `approach`
         axis_tolerance: rad, what the axis may keep near a pole
         turn: False leaves the rotary axes as they are
-        beyond: True corrects outside the measured range too, with the error at its end
+        beyond: True, for all or (N,), corrects outside the measured range too, with the error at its end
     """
     nominal = actual.coordinates(q, np.concatenate([tip, axis], axis=1))
     unmeasured = actual.outside(nominal)
-    w = nominal if beyond else np.where(np.any(unmeasured, axis=1, keepdims=True), np.nan, nominal)
+    w = np.where((np.any(unmeasured, axis=1) & ~np.asarray(beyond))[:, None], np.nan, nominal)
     at_tip, at_axis = actual.aim(w, direction)
     before = _deviation(at_tip, at_axis, tip, axis)
     rates = actual.rates(nominal)

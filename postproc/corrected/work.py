@@ -25,7 +25,8 @@ LAST = 1.0 / 16.0
 """of a block: the same at its ends; turning back later than that counts as none"""
 EDGES = tuple(k / 16.0 for k in range(17))
 """where the directions of the axes in a block are looked at"""
-ALONE = -1
+ALONE, LIFTS = -1, -2
+"""instead of the hole of a block: of none, or of none and along Z of the words from where the block before ends"""
 STANDS = 1e-9
 """rad that rotary joints of one orientation may differ by: inverse kinematics of points on one line of retract"""
 
@@ -45,14 +46,17 @@ class CorrectedEnds:
 class Work:
     """What is needed throughout: the machine with errors by tool, groups of one orientation.
 
-    `whole`: (K,) the hole that a block is of where it is corrected as a whole; `way`: (K, J) sign of each joint's last
-    motion at the ends of the blocks, 0 for the mean of both; `drift`: (K, J) of the correction over each block.
+    `whole`: (K,) the hole that a block is of where it is corrected as a whole, else ALONE or LIFTS; `way`: (K, J) sign of
+    each joint's last motion at the ends of the blocks, 0 for the mean of both; `drift`: (K, J) of the correction over each
+    block; `beyond`, `beyond_inside`: (K,) blocks that may end, or run, where errors were not measured.
     """
 
     def __init__(self, path: Path, tools: Ints, kinematics: Callable[[int], Kinematics], model: ErrorModel,
                  axis_tolerance: float, beyond: bool, share: float, mean: bool = False) -> None:
         self.path, self.tools, self.kinematics = path, tools, kinematics
-        self.axis_tolerance, self.beyond, self.model = axis_tolerance, beyond, model
+        self.axis_tolerance, self.model = axis_tolerance, model
+        self.beyond: Bools = np.isnan(path.u) | beyond
+        self.beyond_inside: Bools = self.beyond | (path.code == TRAVERSE)
         self.axis_share, self.mean = share * axis_tolerance, mean
         self.whole: Ints = np.full(len(path), ALONE)
         self.way: Floats = np.zeros(path.q.shape)
@@ -203,8 +207,11 @@ class Work:
         return changes(q1 - q0, self.detail)
 
     def reached(self) -> tuple[Floats, Floats]:
-        """(K, J) least and greatest joints of blocks: at the end and, where joints do not run straight, on the way."""
+        """(K, J) least and greatest joints of blocks: at the end; where joints do not run straight on the way; and where cuts
+        begin that a linking move leads to."""
         low, high = self.path.q.copy(), self.path.q.copy()
+        cuts = np.flatnonzero((self.path.code[1:] != TRAVERSE) & np.isnan(self.path.u[:-1]) & ~self.path.home[:-1]) + 1
+        low[cuts], high[cuts] = (f(low[cuts], self.path.q[cuts - 1]) for f in (np.fmin, np.fmax))
         block = np.flatnonzero(self.bent & ~self.path.home)
         for t in EDGES if len(block) else ():
             q = self.nominal(block, np.full(len(block), t))
@@ -234,7 +241,7 @@ class Work:
             q = self.path.q[rows]
             tip, axis = self.kinematics(tool).forward(q)
             found = correct(self.actual(tool), q, tip, axis, group=self.group[rows], direction=self.way[rows],
-                            axis_tolerance=self.axis_tolerance, beyond=self.beyond)
+                            axis_tolerance=self.axis_tolerance, beyond=self.beyond[rows])
             out.q[rows] = self._exact_turns(found.q, rows)
             out.before[rows] = np.stack([found.tip_before, found.axis_before], axis=1)
             out.after[rows] = np.stack([found.tip_after, found.axis_after], axis=1)
@@ -261,7 +268,7 @@ class Work:
             if turns is not None:
                 start[:, self.rotary] = turns[k]
             result[k] = correct(self.actual(tool), start, tip, axis, direction=way[k], turn=turns is None,
-                                axis_tolerance=self.axis_tolerance, beyond=self.beyond).q
+                                axis_tolerance=self.axis_tolerance, beyond=self.beyond_inside[blocks[k]]).q
         return result
 
     def corrected(self, there: Floats, block: Ints, way: Floats, path: Path) -> Floats:

@@ -270,15 +270,6 @@ def test_beyond_the_measured_range_is_refused_unless_asked_for(tmp_path: Path) -
     assert asked.ok and any(d.code == "compensation.range" for d in asked.diagnostics)
 
 
-def test_what_lies_beyond_travel_too_is_told_so(tmp_path: Path) -> None:
-    """Where the machine cannot go, measuring farther is no help."""
-    toml = "[components.EYX]\npolynomial = [3.0]\nrange = [-30, 30]\n"
-    refused = [mill(tmp_path, toml, part=part) for part in ("", "[part]\norigin = [480, 0, 0]\n")]
-    hints = [next(d.hint for d in result.diagnostics if d.code == "compensation.range") for result in refused]
-    assert "--error-model-beyond" in hints[0]
-    assert "travel ends at -500 and 500" in hints[1] and "beyond" not in hints[1]
-
-
 def test_a_faulty_model_stops_the_conversion(tmp_path: Path) -> None:
     result = mill(tmp_path, "[location]\nEX0Y = 20\n")
     assert not result.ok and any(d.code == "error-model.no-effect" and d.lines == (2,) for d in result.diagnostics)

@@ -16,6 +16,7 @@ from postproc.looks import changes, looks_between
 from postproc.options import Options
 from postproc.pipeline import PostResult
 from postproc.readback.compare import _taken_up
+from toolpaths.diagnostics import Severity
 
 HEAD = "UNITS/MM\nLOADTL/1\nSPINDL/3000,RPM,CLW\nFEDRAT/400,MMPM\nRAPID\nGOTO/-160,0,20\nGOTO/-160,0,0\n"
 LINE = HEAD + "GOTO/160,0,0\nFINI\n"
@@ -80,12 +81,26 @@ TABLE = "X [mm], EXX [um]\n-200, 0\n0, 5\n30, 8\n"
 def test_an_arc_that_leaves_what_was_measured_is_refused(tmp_path: Path) -> None:
     model = "[components.EXX]\ntable = \"t.csv\"\n[components.EYY]\npolynomial = [0.0, 0.1]\nrange = [-70, 20]\n"
     result = converted(tmp_path, CIRCLE, model, TABLE)
-    told = [d for d in result.diagnostics if d.code == "compensation.range"]
+    told = [d for d in result.diagnostics if d.code == "compensation.range" and d.severity == Severity.ERROR]
     assert not result.ok and result.text == ""
     assert [d.message.split()[0] for d in told] == ["X", "Y"] and told[0].message == (
         "X goes from 0 to 60 where its errors were not measured: they were from -200 to 30")
     allowed = converted(tmp_path, CIRCLE, model, TABLE, beyond=True)
-    assert allowed.ok and len([d for d in allowed.diagnostics if d.code == "compensation.range"]) == 2
+    assert allowed.ok and sum(d.code == "compensation.range" and d.severity == Severity.WARNING
+                              for d in allowed.diagnostics) == 2
+
+
+def test_home_need_not_be_measured(tmp_path: Path) -> None:
+    """Linking moves get the error at the end of the range; home is in the machine's own coordinates."""
+    model = "[components.EZZ]\npolynomial = [2.0, 0.1]\nrange = [-20, {}]\n"
+    result = converted(tmp_path, LINE, model.format(25))
+    told = [d for d in result.diagnostics if d.code == "compensation.range"]
+    assert result.ok and [d.severity for d in told] == [Severity.INFO] and "Z goes" in told[0].message
+    assert result.path is not None and result.nominal is not None
+    links = np.flatnonzero(np.isnan(result.nominal.u) & ~result.nominal.home & (result.nominal.q[:, 2] > 25.0))
+    assert len(links) and "linking moves" in told[0].message
+    assert not converted(tmp_path, LINE, model.format(15)).ok  # a cut of the CL file from 20 on
+    assert converted(tmp_path, LINE.replace("GOTO/-160,0,0", "RAPID\nGOTO/-160,0,0"), model.format(15)).ok
 
 
 def test_a_part_may_end_where_the_measurement_does(tmp_path: Path) -> None:
