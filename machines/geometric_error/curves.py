@@ -15,6 +15,8 @@ import numpy as np
 from toolpaths.arrays import Bools, Floats, frozen
 
 EVERYWHERE = (-np.inf, np.inf)
+FINEST = 1.0 / 2000.0
+"""of the length of a table: rows nearer to each other are readings of one place, and looked at as such"""
 
 
 class Curve(ABC):
@@ -79,8 +81,9 @@ class Table(Curve):
 
     @property
     def detail(self) -> float:
-        """See the base class: the least distance between positions."""
-        return float(np.diff(self.x).min(initial=np.inf))
+        """See the base class: the least distance between positions, but no less than FINEST of them all."""
+        x = self.closed(self.values[: len(self.x)])[0]
+        return max(float(np.diff(x).min(initial=np.inf)), FINEST * float(x[-1] - x[0]))
 
     def labels(self) -> list[str]:
         """[0], [1] ... by position; [0]+ forwards, [0]- backwards."""

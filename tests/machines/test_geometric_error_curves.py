@@ -8,7 +8,7 @@ from scipy.interpolate import CubicSpline
 
 from machines.geometric_error.actual import approach
 from machines.geometric_error.curve_banks import banks
-from machines.geometric_error.curves import Curve, Fourier, Polynomial, Table
+from machines.geometric_error.curves import FINEST, Curve, Fourier, Polynomial, Table
 
 X = np.array([-100.0, 0.0, 50.0, 120.0])
 V = np.array([0.01, -0.02, 0.03, 0.0])
@@ -91,3 +91,12 @@ def test_curves_of_one_basis_are_evaluated_together_as_one_by_one() -> None:
         for numbers, bank in found:
             expected = [curves[k].at(at, direction) for k in numbers]
             np.testing.assert_allclose(bank.at(at, direction), expected, rtol=0.0, atol=1e-13)
+
+
+def test_rows_of_one_place_ask_for_no_closer_look() -> None:
+    """Two readings half a micrometre apart among rows of 50 mm; a table that repeats ends where it begins again."""
+    rows = np.linspace(-350.0, 350.0, 15)
+    assert Table(rows, np.zeros(15)).detail == pytest.approx(50.0)
+    assert Table(np.sort(np.append(rows, 0.0005)), np.zeros(16)).detail == pytest.approx(700.0 * FINEST)
+    assert Table(np.array([0.0, 1.0, 2.0]), np.zeros(3), period=2.5).detail == pytest.approx(0.5)
+    assert Table(np.array([3.0]), np.zeros(1)).detail == np.inf
