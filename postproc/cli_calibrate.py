@@ -3,11 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
-from postproc.console import Json, refuse_overwriting, report, shown_errors
+from postproc.console import Json, print_json, refuse_overwriting, report, shown_errors
+
+
+def _schema(wanted: bool) -> None:
+    if wanted:
+        from machines.calibration.measurement_file import measurement_schema
+
+        print_json(measurement_schema())
+        raise typer.Exit
 
 
 def calibrate(file: Annotated[Path, typer.Argument(metavar="MEASUREMENTS.toml", help="what was measured, and how")],
@@ -15,6 +23,8 @@ def calibrate(file: Annotated[Path, typer.Argument(metavar="MEASUREMENTS.toml", 
                                                    help="error model to write; its tables are put beside it")],
               figure: Annotated[Path | None, typer.Option("--figure", metavar="FILE", help="drawing of signatures, "
                                                           "residuals and condition number, .png or .svg")] = None,
+              schema: Annotated[bool, typer.Option("--schema", is_eager=True, callback=_schema, help="print the JSON schema "
+                                                   "of a measurement file, with the columns of its table")] = False,
               json: Json = "") -> None:
     """Identify a machine's errors from measurements, each with its doubt; what the data do not tell is refused."""
     refuse_overwriting({"-o": str(output), "--figure": str(figure or ""), "--json": json}, {"the measurements": str(file)})
@@ -24,31 +34,21 @@ def calibrate(file: Annotated[Path, typer.Argument(metavar="MEASUREMENTS.toml", 
     from dataclasses import replace
 
     from machines.calibration.calibrate import calibrate as run
+    from machines.calibration.text import text
     from machines.geometric_error.exchange import write_model
     from postproc.files import write_atomically
 
     with shown_errors(json):
         found, diagnostics = run(file)
-        figures = {} if found is None else found.figures
+        figures: dict[str, Any] = {} if found is None else found.figures
         if found is not None and found.model is not None:
-            for name, text in write_model(replace(found.model, name=output.stem), f"from {file.name}").items():
-                write_atomically(output.parent / (output.name if name == f"{output.stem}.toml" else name), text)
+            for name, content in write_model(replace(found.model, name=output.stem), f"from {file.name}").items():
+                write_atomically(output.parent / (output.name if name == f"{output.stem}.toml" else name), content)
             if figure is not None:
                 from machines.calibration.figures import draw
 
                 write_atomically(figure, draw(figures, f"calibration: {file.name}", ending))
     done = found is not None and found.model is not None
     report(tuple(diagnostics), json, {"output": str(output) if done else None, **figures,
-                                      "diagnostics": [d.as_dict() for d in diagnostics]}, _text(figures, output, done))
-
-
-def _text(figures: dict[str, object], output: Path, done: bool) -> str:
-    if not figures:
-        return "nothing written"
-    head = f"{output}: written" if done else "nothing written"
-    lines = [head, f"rank {figures['rank']}, condition number {figures['condition_number']}, weighted residual "
-             f"{figures['rms_before']:.3f} before, {figures['rms_after']:.3f} after"]
-    parameters = figures["parameters"]
-    assert isinstance(parameters, dict)
-    lines += [f"  {name:16} {p['value']:10.3f} +- {p['sigma']:.3f} {p['unit']}" for name, p in parameters.items()]
-    return "\n".join(lines)
+                                      "diagnostics": [d.as_dict() for d in diagnostics]},
+           text(figures, f"{output}: written" if done else "nothing written"))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -18,20 +19,27 @@ CURVE = 5
 """degrees between the points of a drawn series"""
 
 
-def account(result: CalibrationResult, rank: int, number: float) -> dict[str, Any]:
-    """Of every fit: rank, condition number (None where it is infinite), weighted residual before and after."""
-    count = max(len(result.residuals), 1)
-    return {"parameters": {}, "rank": rank, "condition_number": finite(number),
-            "rms_before": float(np.sqrt(result.cost_before / count)), "rms_after": float(np.sqrt(result.cost_after / count)),
+def account(result: CalibrationResult, rank: int, number: float, unknowns: int, cost_instrument: float) -> dict[str, Any]:
+    """Of every fit: rank of so many unknowns, condition number (None where it is infinite), weighted residual (root mean
+    square) before, with nothing found but what belongs to the instrument, and after; `reduced` is that after, by readings
+    less unknowns (None where there are no more readings than that)."""
+    count, spare = max(len(result.residuals), 1), len(result.residuals) - result.rank
+    return {"parameters": {}, "kept": 0, "rank": rank, "unknowns": unknowns, "condition_number": finite(number),
+            "readings": len(result.residuals), "spare": spare, "rms_before": float(np.sqrt(result.cost_before / count)),
+            "rms_instrument": float(np.sqrt(cost_instrument / count)),
+            "rms_after": float(np.sqrt(result.cost_after / count)),
+            "reduced": float(np.sqrt(result.cost_after / spare)) if spare > 0 else None,
             "converged": result.converged, "not_identifiable": [list(group) for group in result.not_identifiable]}
 
 
-def parameters(model: ErrorModel) -> dict[str, Any]:
-    """By name: value, sigma, unit (um or arcsec)."""
+def parameters(model: ErrorModel, wanted: Sequence[str] = ()) -> dict[str, Any]:
+    """By name, of those that begin as one of `wanted` (all without): value, sigma (None where it is not known), unit (um or
+    arcsec)."""
     sigma = np.zeros(len(model.names)) if model.covariance is None else np.sqrt(np.diag(model.covariance))
     units = ["arcsec" if angular(name) else "um" for name in model.names]
-    return {name: {"value": float(v / UNITS[u]), "sigma": float(s / UNITS[u]), "unit": u}
-            for name, v, s, u in zip(model.names, model.values, sigma, units, strict=True)}
+    return {name: {"value": float(v / UNITS[u]), "sigma": float(s / UNITS[u]) if s > 0.0 else None, "unit": u}
+            for name, v, s, u in zip(model.names, model.values, sigma, units, strict=True)
+            if not wanted or name.startswith(tuple(wanted))}
 
 
 def signature(degrees: Floats, values: Floats, sigma: Floats, unit: str) -> dict[str, Any]:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 SIZE = 8.0, 3.2
 """inches, of one panel"""
 MANY = 40
-"""parameters beyond which their names are left out"""
+"""points of a curve beyond which they are not marked; names of parameters below the axis"""
 BOUND = 1.96
 """standard deviations of the 95 % bounds drawn"""
 
@@ -64,11 +64,11 @@ def _signatures(place: Axes, curves: dict[str, Any]) -> None:
 
 
 def _parameters(place: Axes, chosen: dict[str, Any]) -> None:
-    values, sigma = (np.array([p[key] for p in chosen.values()]) for key in ("value", "sigma"))
+    values, sigma = (_floats([p[key] for p in chosen.values()]) for key in ("value", "sigma"))
     at = np.arange(len(values))
     place.errorbar(at, values, yerr=BOUND * sigma, fmt="o", markersize=3.0, capsize=3.0)
-    if len(at) <= MANY:
-        place.set_xticks(at, [plain(name) for name in chosen], rotation=90, fontsize="small")
+    named = at[:: -(-len(at) // MANY)]
+    place.set_xticks(named, [plain(list(chosen)[k]) for k in named], rotation=90, fontsize="small")
     _labelled(place, "parameter", f"value [{next(iter(chosen.values()))['unit']}], 95 % bounds")
 
 

@@ -13,6 +13,7 @@ from typing import Literal
 
 import numpy as np
 
+from machines.calibration.folded import near
 from machines.calibration.problem import CalibrationProblem, CalibrationResult, solve
 from machines.geometric_error.actual import Actual
 from machines.geometric_error.model import ErrorModel
@@ -36,6 +37,7 @@ class Measurements:
         sigma: mm, one or per reading
         centre: (3,) mm in the table frame, nominal centre of the ball-bar
         toward: (3,) unit direction in the table frame
+        ways: (N, J) by which way each joint came: +1, -1, 0 for the mean of both; None: the mean for all
         zeroed: True where the place of the ball (zero of the laser) is not known and is identified along
     """
 
@@ -45,6 +47,7 @@ class Measurements:
     sigma: float | Floats
     centre: Floats | None = None
     toward: Floats | None = None
+    ways: Floats | None = None
     zeroed: bool = True
 
 
@@ -58,7 +61,7 @@ def problem_of(model: ErrorModel, kinematics: Kinematics, measured: Measurements
     chosen = [name for name in model.names if not parameters or name.startswith(tuple(parameters))]
     for prefix in parameters:
         if not any(name.startswith(prefix) for name in model.names):
-            raise ValueError(f"{prefix!r} is no parameter of the error model; it has {', '.join(model.names[:12])} ...")
+            raise ValueError(f"{prefix!r} is no parameter of the error model; {near(prefix, model.names)}")
     setup = SETUP[measured.kind]
     names = (*model.names, *setup)
     free = np.array([*(name in set(chosen) for name in model.names), *(measured.zeroed for _ in setup)])
@@ -71,11 +74,12 @@ def problem_of(model: ErrorModel, kinematics: Kinematics, measured: Measurements
         return model.with_values(values[:count]).on(kinematics)
 
     def predict(values: Floats) -> Floats:
-        return reader.read(actual(values).place(w)[0], values[count:])
+        return reader.read(actual(values).place(w, measured.ways)[0], values[count:])
 
     def jacobian(values: Floats) -> Floats:
         machine = actual(values)
-        return reader.rates(machine.place(w)[0], machine.sensitivity(w)[:, :3], values[count:])
+        moved = machine.sensitivity(w, measured.ways)[:, :3]
+        return reader.rates(machine.place(w, measured.ways)[0], moved, values[count:])
 
     read = np.asarray(measured.read, dtype=np.float64).ravel()
     sigma = np.broadcast_to(measured.sigma, np.shape(measured.read)).ravel()
@@ -121,11 +125,18 @@ class _Reader:
 
 @dataclass(frozen=True, eq=False)
 class MachineFit:
-    """The identified model, with its covariance, and the fit that gave it; `setup` values are those of the instrument."""
+    """The identified model, with its covariance, and the fit that gave it.
+
+    Attributes:
+        setup: values of the instrument, mm: how far the ball is from its place (of the readings), what the bar's readings
+            are too short by, what the laser reads at 0 with the sign turned round
+        cost_instrument: sum of squared weighted residuals where nothing but those is found
+    """
 
     model: ErrorModel
     result: CalibrationResult
     setup: dict[str, float]
+    cost_instrument: float
 
 
 def fit(model: ErrorModel, kinematics: Kinematics, measured: Measurements, parameters: Sequence[str] = (),
@@ -140,4 +151,6 @@ def fit(model: ErrorModel, kinematics: Kinematics, measured: Measurements, param
         covariance[np.ix_(stay, stay)] = model.covariance[np.ix_(stay, stay)]
     found = replace(model.with_values(result.values[:count]), covariance=covariance)
     names = result.names[count:]
-    return MachineFit(found, result, dict(zip(names, result.values[count:].tolist(), strict=True)))
+    alone = replace(problem, free=problem.free & (np.arange(len(problem.names)) >= count))
+    cost = solve(alone, robust).cost_after if alone.free.any() else result.cost_before
+    return MachineFit(found, result, dict(zip(names, result.values[count:].tolist(), strict=True)), cost)

@@ -5,21 +5,45 @@ Lengths mm and angles degrees where a key has no unit in its name; CSV tables ha
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal, NamedTuple
 
 from pydantic import Field, field_validator
 
 from machines.models import NotNegative, Positive, Vector
-from machines.user_file import UserModel
+from machines.user_file import UserModel, schema
 
 Sigma = Annotated[float, Field(ge=1e-6, le=1e6)]
 Steps = Annotated[int, Field(ge=3, le=360)]
 Place = Annotated[float, Field(ge=-1e6, le=1e6)]
 
 
+class Column(NamedTuple):
+    """A column of a table: its name, the kind of its unit ("length", "angle", "" none), what it says."""
+
+    name: str
+    unit: Literal["length", "angle", ""]
+    meaning: str = ""
+
+
+_PLACES = (Column("setup", "", "number of the set-up: 0, 1, ..."),
+           Column("step", "", "0 .. steps - 1: where the axis stands, counted in steps of 360 / steps degrees from its 0"))
+_SIX = (*(Column(f"d{x}", "length", f"displacement along {x} of what the axis moves, + along {x}") for x in "xyz"),
+        *(Column(f"e{x}", "angle", f"turn about {x} of what the axis moves, + as a right-hand screw") for x in "xyz"))
+COLUMNS: dict[str, tuple[Column, ...]] = {
+    "reversal": (*_PLACES, Column("reading", "angle", "actual less commanded angle, + the way the axis counts")),
+    "rotary": (*_PLACES, *_SIX),
+    "poses": tuple(Column(f"d{x}", "length", f"actual less nominal place of the tip along {x} of the table frame")
+                   for x in "xyz"),
+    "ball_bar": (Column("distance", "length", "whole length from the ball on the table to the ball in the spindle"),),
+    "laser": (Column("reading", "length", "actual less nominal displacement of the tip, + along `toward`"),),
+}
+"""what was read, by kind of measurement; poses, ball_bar and laser have a column for each axis of the machine beside"""
+JOINT = "commanded position of each axis of the machine, slides in a length, rotary axes in an angle"
+WAY = "may be left out: way by which X came there (so for any axis), 1 from lesser values, -1 from greater ones, 0 not known"
+
+
 class ReversalModel(UserModel):
-    """`[reversal]`: axis against indexer. Table: setup (0, 1, ...), step (0 .. n - 1), reading [arcsec]: actual less
-    commanded, counted as the axis counts."""
+    """`[reversal]`: axis against indexer."""
 
     table: str
     """CSV file beside this one"""
@@ -30,13 +54,14 @@ class ReversalModel(UserModel):
     sigma_arcsec: Sigma
     """standard deviation of a reading"""
     shifts: tuple[Annotated[int, Field(ge=0)], ...] = ()
-    """increments by which the indexer was turned in each set-up; default 0, 1, 2, ..."""
+    """increments by which the indexer was turned in each set-up: step i then meets its increment i + shift; default 0, 1,
+    2, ..."""
     zeroed: bool = True
     """the instrument was zeroed anew at each set-up"""
 
 
 class RotaryModel(UserModel):
-    """`[rotary]`: all six errors by reversal. Table: setup, step, dx dy dz [um], ex ey ez [arcsec]."""
+    """`[rotary]`: all six errors by reversal."""
 
     table: str
     """CSV file beside this one; empty cells are not allowed, leave whole rows out"""
@@ -60,33 +85,34 @@ class RotaryModel(UserModel):
 
 
 class PosesModel(UserModel):
-    """`[poses]`: tips measured at commanded joints. Table: X [mm] ... C [deg], dx dy dz [um], actual less nominal."""
+    """`[poses]`: tips measured at commanded positions."""
 
     table: str
     """CSV file beside this one"""
     sigma_um: Sigma
     """standard deviation of a displacement"""
     tool_length: NotNegative = 0.0
-    """mm"""
+    """mm from the gauge point to the point that was measured"""
     zeroed: bool = True
     """the place of the ball is not known and found along"""
 
 
 class BarModel(UserModel):
-    """`[ball_bar]`: distances at commanded joints. Table: X [mm] ... C [deg], distance [mm]."""
+    """`[ball_bar]`: distances at commanded positions."""
 
     table: str
     """CSV file beside this one"""
     sigma_um: Sigma
     """standard deviation of a distance"""
     centre: tuple[Place, Place, Place]
-    """mm, nominal centre in the table frame; where it really is, and the bar's length error, are found along"""
+    """mm, where the ball on the table is thought to be, in the table frame; where it really is, and how much the readings
+    are too short, are found along"""
     tool_length: NotNegative = 0.0
-    """mm"""
+    """mm from the gauge point to the point that was measured"""
 
 
 class LaserModel(UserModel):
-    """`[laser]`: displacements along a direction. Table: X [mm] ... C [deg], reading [um], actual less nominal."""
+    """`[laser]`: displacements along a direction at commanded positions."""
 
     table: str
     """CSV file beside this one"""
@@ -95,7 +121,7 @@ class LaserModel(UserModel):
     toward: Vector
     """direction in the table frame, of any length but 0"""
     tool_length: NotNegative = 0.0
-    """mm"""
+    """mm from the gauge point to the point that was measured"""
     zeroed: bool = False
     """the laser's zero is not known and found along"""
 
@@ -118,6 +144,9 @@ class MeasurementModel(UserModel):
     """error model file to start from; its parameters are those that can be found (poses, ball_bar, laser)"""
     parameters: tuple[str, ...] = ()
     """names, or beginnings of names, of the parameters to find; all of the model without"""
+    large: bool = False
+    """true: errors above 1 mm or 0.5 degrees, and a ball or a bar as far from what the file says, are meant; they are
+    warnings then"""
     robust: bool = False
     """let readings count less that do not fit (Huber)"""
     minutes_per_reading: Positive = 0.5
@@ -134,3 +163,16 @@ class MeasurementModel(UserModel):
     """telescoping ball-bar"""
     laser: LaserModel | None = None
     """interferometer"""
+
+
+def measurement_schema() -> dict[str, Any]:
+    """The JSON schema of a measurement file; `table` of each kind says which columns it has."""
+    result = schema(MeasurementModel)
+    for kind, columns in COLUMNS.items():
+        reference = result["properties"][kind]["anyOf"][0]["$ref"].split("/")[-1]
+        found = [{"name": c.name, "unit": c.unit, "meaning": c.meaning} for c in columns]
+        if kind not in ("reversal", "rotary"):
+            found += [{"name": "X, Y, ...", "unit": "length or angle", "meaning": JOINT},
+                      {"name": "X way, ...", "unit": "", "meaning": WAY}]
+        result["$defs"][reference]["properties"]["table"]["columns"] = found
+    return result

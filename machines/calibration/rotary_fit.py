@@ -36,6 +36,7 @@ class RotaryFit:
         lost: names of the amplitudes that mounting or indexer can pretend as well
         result: of the fit; the smallest one where the readings leave it open
         residuals: (m, n, 6)
+        cost_instrument: sum of squared weighted residuals where nothing but indexer and mounting is found
     """
 
     amplitudes: Floats
@@ -44,6 +45,7 @@ class RotaryFit:
     lost: tuple[str, ...]
     result: CalibrationResult
     residuals: Floats
+    cost_instrument: float
 
 
 def fit_rotary(bench: Bench, readings: Floats, sigma: Floats, harmonics: int, robust: bool = False) -> RotaryFit:
@@ -62,6 +64,7 @@ def fit_rotary(bench: Bench, readings: Floats, sigma: Floats, harmonics: int, ro
     count = 12 * harmonics
     lost = _lost(rows / weights[:, None], count)
     result = solve(linear(names, rows, observed, weights), robust)
+    alone = solve(linear(names, rows, observed, weights, np.arange(len(names)) >= count), robust)
     values = np.where(lost, 0.0, result.values[:count])
     shape = (len(PARTS), 2, harmonics)
     spread = np.where(lost, np.inf, np.sqrt(np.diag(result.covariance)[:count]))
@@ -69,7 +72,8 @@ def fit_rotary(bench: Bench, readings: Floats, sigma: Floats, harmonics: int, ro
     residuals[known] = result.residuals
     covariance = result.covariance[:count, :count] * np.outer(~lost, ~lost)
     return RotaryFit(values.reshape(shape), spread.reshape(shape), covariance,
-                     tuple(np.array(names[:count])[lost].tolist()), result, residuals.reshape(readings.shape))
+                     tuple(np.array(names[:count])[lost].tolist()), result, residuals.reshape(readings.shape),
+                     alone.cost_after)
 
 
 def _design(bench: Bench, m: int, harmonics: int) -> tuple[Floats, tuple[str, ...]]:

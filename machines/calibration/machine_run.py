@@ -1,0 +1,168 @@
+"""Poses, ball-bar and laser: errors of a whole machine, and where ball, bar and laser really were."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from machines.calibration.account import account, weighted
+from machines.calibration.folded import folded, near
+from machines.calibration.machine_fit import SETUP, Kind, MachineFit, Measurements, fit
+from machines.calibration.measurement_file import COLUMNS, BarModel, Column, LaserModel, PosesModel
+from machines.calibration.outcome import MEANT, Calibration, done, doubtful
+from machines.calibration.run import Run, way_column
+from machines.calibration.slips import machine_slip
+from machines.geometric_error.csv_table import LENGTHS, CsvTable
+from machines.geometric_error.curves import Table
+from machines.geometric_error.loader import load_checked as load_errors
+from machines.geometric_error.model import ErrorModel
+from machines.kinematics.base import Kinematics
+from toolpaths.arrays import Floats
+from toolpaths.diagnostics import has_errors
+
+FAR = 1.0
+"""mm that a ball, a bar or a laser's zero may be from what the file says"""
+APART = 2.0
+"""times the commanded distance, or one part of it, that the median of a bar's readings may be"""
+SEEN = 1e-6
+"""mm or rad that an error differs by its way, to be told"""
+
+
+def machine_errors(run: Run, given: PosesModel | BarModel | LaserModel, table: CsvTable) -> Calibration | None:
+    """The parameters that are asked for; None where the file is at fault."""
+    names = run.machine.axis_names
+    joints = [Column(n, "angle" if r else "length") for n, r in zip(names, run.machine.rotary, strict=True)]
+    if not run.columns(table, [*joints, *COLUMNS[run.kind]], [way_column(n) for n in names]):
+        return None
+    q, ways, start = run.joints(table), run.ways(table), _start(run)
+    if start is None or has_errors(run.found):
+        return None
+    kinematics = run.machine.kinematics.with_tool(given.tool_length)
+    read = np.stack([table.columns[c.name] for c in COLUMNS[run.kind]], axis=1)
+    measured = _measured(given, q, read, ways)
+    if not _reached(run, table, kinematics, q) or not _distances(run, table, kinematics, measured):
+        return None
+    if not _known(run, start):
+        return None
+    _lost_motion(run, start, ways)
+    fitted = fit(start, kinematics, measured, run.checked.parameters, run.checked.robust)
+    return _judged(run, given, start, kinematics, measured, fitted)
+
+
+def _measured(given: PosesModel | BarModel | LaserModel, q: Floats, read: Floats, ways: Floats) -> Measurements:
+    sigma = given.sigma_um * 1e-3
+    if isinstance(given, PosesModel):
+        return Measurements("position", q, read, sigma, zeroed=given.zeroed, ways=ways)
+    if isinstance(given, BarModel):
+        return Measurements("distance", q, read[:, 0], sigma, centre=np.array(given.centre), ways=ways)
+    toward = np.array(given.toward) / np.linalg.norm(given.toward)
+    return Measurements("along", q, read[:, 0], sigma, toward=toward, zeroed=given.zeroed, ways=ways)
+
+
+def _start(run: Run) -> ErrorModel | None:
+    if not run.checked.model:
+        run.found.append(run.file.problem("calibrate.model", ("model",), "no error model to start from",
+                                          "write model = \"start.toml\", with the parameters that are wanted, all 0"))
+        return None
+    origin = run.file.origin(("model",))
+    model, found = load_errors(Path(origin.file).parent / run.checked.model, run.machine)
+    run.found += found
+    return model
+
+
+# ---- before the fit ------------------------------------------------------------------------------------------------------
+
+def _known(run: Run, start: ErrorModel) -> bool:
+    """False where a parameter is asked for that the start model has not."""
+    unknown = [word for word in run.checked.parameters if not any(name.startswith(word) for name in start.names)]
+    for word in unknown:
+        run.found.append(run.file.problem("calibrate.parameter", ("parameters",),
+                                          f"{run.checked.model} has no parameter {word!r}", near(word, start.names)))
+    return not unknown
+
+
+def _reached(run: Run, table: CsvTable, kinematics: Kinematics, q: Floats) -> bool:
+    """False where the machine cannot stand at a row."""
+    lost = ~np.isfinite(kinematics.forward(q)[0]).all(axis=1)
+    if lost.any():
+        run.row(table, int(np.argmax(lost)), f"{run.machine.name} cannot stand there ({int(lost.sum())} of {len(q)} rows)",
+                "look at the units of the axes' columns")
+    return not lost.any()
+
+
+def _distances(run: Run, table: CsvTable, kinematics: Kinematics, measured: Measurements) -> bool:
+    """False where a bar's readings are of another size than the commanded distances."""
+    if measured.centre is None:
+        return True
+    middle = float(np.median(np.linalg.norm(kinematics.forward(measured.q)[0] - measured.centre, axis=1)))
+    read, unit = float(np.median(measured.read)), table.unit["distance"]
+    if middle <= APART * read and read <= APART * middle:
+        return True
+    fits = [u for u, size in LENGTHS.items() if 0.5 < read / LENGTHS[unit] * size / max(middle, 1e-9) < 2.0]
+    run.problem("calibrate.distance", f"distances are {read:.4g} mm in the middle; at the commanded positions they "
+                f"would be {middle:.4g} mm", f"write distance [{fits[0]}] in the table" if fits else
+                "distance is the whole length of the bar; look at centre and tool_length")
+    return False
+
+
+def _lost_motion(run: Run, start: ErrorModel, ways: Floats) -> None:
+    """Axes that come to another place by either way, where the table does not say by which they came."""
+    names = run.machine.axis_names
+    silent = [names[j] for j in start.axes.two_way(names) if not ways[:, j].any()]
+    if silent:
+        gaps = [f"{axis} (up to {1e3 * gap:.4g} um)" if (gap := _gap(start, axis)) > SEEN else axis for axis in silent]
+        run.tell("calibrate.ways", f"{run.checked.model} has errors of both ways for {', '.join(gaps)}, the table does not "
+                 "say by which way it came: the mean is taken", f"add a column {way_column(silent[0])}, 1 or -1: readings "
+                 "from one side alone are off by half of what the ways differ")
+
+
+def _gap(start: ErrorModel, axis: str) -> float:
+    """mm, the most that a displacement of an axis differs by its way."""
+    both = [c.curve for c in start.axes.components
+            if c.name.axis == axis and not c.name.angular and isinstance(c.curve, Table) and c.curve.both]
+    return max((float(np.abs(np.diff(curve.values.reshape(2, -1), axis=0)).max()) for curve in both), default=0.0)
+
+
+# ---- after the fit -------------------------------------------------------------------------------------------------------
+
+def _judged(run: Run, given: PosesModel | BarModel | LaserModel, start: ErrorModel, kinematics: Kinematics,
+            measured: Measurements, fitted: MachineFit) -> Calibration:
+    result = fitted.result
+    rows = result.residuals.reshape(len(measured.q), -1).T
+    wanted = run.checked.parameters
+    unknowns = sum(not wanted or name.startswith(wanted) for name in start.names)
+    unknowns += len(SETUP[measured.kind]) if measured.zeroed else 0
+    figures = account(result, result.rank, result.condition_number, unknowns, fitted.cost_instrument) | {
+        "setup_mm": fitted.setup, "residuals": weighted(rows, measured.sigma, [c.name for c in COLUMNS[run.kind]])}
+    if isinstance(given, BarModel):
+        figures["centre_mm"] = [c + fitted.setup[name] for c, name in zip(given.centre, SETUP["distance"], strict=False)]
+    if not result.converged:
+        run.problem("calibrate.converged", "the fit does not come to an end", "check units and signs of the table")
+    for group in result.not_identifiable:
+        run.problem("calibrate.rank", f"the readings do not tell {group[0]}" if len(group) == 1 else
+                    f"the readings tell only combinations of {folded(group)}",
+                    "measure where they differ, or name fewer under parameters")
+    if has_errors(run.found):
+        return Calibration(None, figures)
+    _far(run, given, measured.kind, fitted.setup)
+    return done(run, fitted.model, figures, f"sigma_um = {given.sigma_um:g}",
+                lambda: machine_slip(start, kinematics, measured, wanted), start, wanted)
+
+
+def _far(run: Run, given: PosesModel | BarModel | LaserModel, kind: Kind, setup: dict[str, float]) -> None:
+    """Ball, bar or zero where they cannot be."""
+    off = np.array([setup[name] for name in SETUP[kind]])
+    away = float(np.linalg.norm(off[:3]))
+    if isinstance(given, BarModel):
+        at = "[" + ", ".join(f"{c + d:.4f}" for c, d in zip(given.centre, off, strict=False)) + "]"
+        if away > FAR:
+            doubtful(run, "calibrate.place", f"the ball is found at {at}, {away:.4g} mm from centre = {list(given.centre)}",
+                     f"look at tool_length = {given.tool_length:g} and centre; centre = {at} where that is right", "centre")
+        if abs(off[3]) > FAR:
+            doubtful(run, "calibrate.place", f"distances are {abs(off[3]):.4g} mm too {'short' if off[3] > 0.0 else 'long'}",
+                     f"distance is the whole length from ball to ball; look at its unit; {MEANT}")
+    elif away > FAR:
+        what = "the tip" if isinstance(given, PosesModel) else "the zero"
+        doubtful(run, "calibrate.place", f"{what} is found {away:.4g} mm from where it should be",
+                 f"readings are actual less nominal; look at their unit and at tool_length; {MEANT}")

@@ -1,0 +1,137 @@
+"""Reversal and rotary measurements: the errors of one rotary axis, told apart from those of the indexer on it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from machines.calibration.account import account, finite, listed, series_signatures, signature, weighted
+from machines.calibration.folded import folded
+from machines.calibration.measurement_file import COLUMNS, ReversalModel, RotaryModel
+from machines.calibration.outcome import Calibration, done
+from machines.calibration.reversal import Reversal, identify, plan, statistics
+from machines.calibration.rotary_fit import RotaryFit, error_model, fit_rotary, hidden, told_apart
+from machines.calibration.run import Run
+from machines.calibration.simulator import PARTS, Bench
+from machines.calibration.slips import reversal_slip, rotary_slip
+from machines.geometric_error.axis_motion import ALONG
+from machines.geometric_error.csv_table import UNITS, CsvTable
+from machines.geometric_error.curves import Table
+from machines.geometric_error.model import ErrorModel
+from machines.geometric_error.names import DIRECTIONS, ErrorName
+from machines.geometric_error.serial_errors import Component, SerialErrors
+from machines.kinematics.h4_axes import H4TableAxis
+from machines.kinematics.serial import Serial
+from toolpaths.arrays import Floats
+
+ARCSEC = UNITS["arcsec"]
+SETUPS = 6
+"""up to which the condition number of a rotary axis's readings is told"""
+
+
+def reversal(run: Run, given: ReversalModel, table: CsvTable) -> Calibration | None:
+    """The signature of an axis; None where the file is at fault."""
+    sense = _sense(run, given.axis)
+    if not sense or not run.columns(table, COLUMNS["reversal"]) or (places := run.places(table, given.steps)) is None:
+        return None
+    setup, step, m = places
+    if given.shifts and len(given.shifts) != m:
+        run.problem("calibrate.shifts", f"{len(given.shifts)} shifts for {m} set-ups", "write one per set-up", "shifts")
+        return None
+    readings = np.full((m, given.steps), np.nan)
+    readings[setup, step] = table.columns["reading"]
+    sigma = given.sigma_arcsec * ARCSEC
+    fitted = identify(readings, sigma, given.zeroed, run.checked.robust, given.shifts or None)
+    figures = _reversal_figures(run, given, fitted, readings, sigma)
+    if fitted.lacking:
+        run.problem("calibrate.rank", f"the readings do not tell axis and indexer apart: {fitted.lacking}")
+        return Calibration(None, figures)
+    name = ErrorName(DIRECTIONS.index(given.axis), False, given.axis)
+    x = 2.0 * np.pi * np.arange(given.steps) / given.steps
+    model = ErrorModel(SerialErrors((Component(name, Table(x, sense * fitted.axis, "spline", period=2.0 * np.pi)),)),
+                       covariance=fitted.covariance[: given.steps, : given.steps])
+    return done(run, model, figures, f"sigma_arcsec = {given.sigma_arcsec:g}", lambda: reversal_slip(readings, sigma, given))
+
+
+def _reversal_figures(run: Run, given: ReversalModel, fitted: Reversal, readings: Floats, sigma: float) -> dict[str, Any]:
+    degrees = np.asarray(np.arange(given.steps) * (360.0 / given.steps), dtype=np.float64)
+    curves = {"axis": (fitted.axis, fitted.axis_sigma), "indexer": (fitted.indexer, fitted.indexer_sigma)}
+    known, planned = fitted.conditioning, _planned(given.steps, 12, 864)
+    own = readings - np.nanmean(readings, axis=1, keepdims=True) if given.zeroed else readings
+    alone = float(np.nansum((own / sigma) ** 2))
+    return account(fitted.result, known.rank, known.condition_number, known.unknowns, alone) | {
+        "signatures": {k: signature(degrees, *curve, "arcsec") for k, curve in curves.items()},
+        "residuals": weighted(fitted.residuals, sigma, [f"set-up {k}" for k in range(len(readings))]),
+        "axis_arcsec": listed(fitted.axis / ARCSEC), "axis_sigma_arcsec": listed(fitted.axis_sigma / ARCSEC),
+        "indexer_arcsec": listed(fitted.indexer / ARCSEC),
+        "set_by_closure": ["sum of the axis's errors over a turn", "sum of the indexer's errors over a turn",
+                           *(["constant of each set-up"] if given.zeroed else [])],
+        "residual_rms_arcsec": statistics(fitted.residuals).rms / ARCSEC,
+        "plan": [{"setups": c.setups, "sigma_arcsec": finite(c.sigma / ARCSEC), "minutes": c.minutes,
+                  "condition_number": finite(c.condition_number)}
+                 for c in plan(given.steps, sigma, run.checked.minutes_per_reading, run.checked.minutes_per_setup, planned,
+                               given.zeroed)]}
+
+
+def rotary(run: Run, given: RotaryModel, table: CsvTable) -> Calibration | None:
+    """The six series of an axis; None where the file is at fault."""
+    sense = _sense(run, given.axis)
+    if not sense or not run.columns(table, COLUMNS["rotary"]) or (places := run.places(table, given.steps)) is None:
+        return None
+    setup, step, m = places
+    readings = np.full((m, given.steps, 6), np.nan)
+    readings[setup, step] = np.stack([table.columns[p] for p in PARTS], axis=1)
+    sigma = np.repeat([given.sigma_um * 1e-3, given.sigma_arcsec * ARCSEC], 3)
+    bench = Bench(given.steps, given.axis_to_indexer, given.indexer_to_reflector, np.array(given.shift))
+    if given.harmonics > (given.steps - 1) // 2:
+        run.problem("calibrate.harmonics", f"{given.steps} steps carry {(given.steps - 1) // 2} harmonics at the "
+                    f"most, {given.harmonics} are asked for", "ask for fewer, or measure more steps", "harmonics")
+        return None
+    fitted = fit_rotary(bench, readings, sigma, given.harmonics, run.checked.robust)
+    figures = _rotary_figures(given, bench, fitted, sigma)
+    untold = [name for name in fitted.lost if name not in hidden(bench, sigma, given.harmonics)]
+    if untold:
+        run.problem("calibrate.rank", f"the readings do not tell {folded(untold)}",
+                    "measure one more set-up, the indexer turned by one increment more")
+        return Calibration(None, figures)
+    if fitted.lost:
+        run.tell("calibrate.hidden", f"the mounting can pretend {', '.join(fitted.lost)} as well; they are 0 in the model")
+    model = error_model(fitted, given.axis, sense=sense, carries_part=_carries_part(run, given.axis))
+    return done(run, model, figures, f"sigma_um = {given.sigma_um:g} and sigma_arcsec = {given.sigma_arcsec:g}",
+                lambda: rotary_slip(bench, readings, sigma, given.harmonics))
+
+
+def _rotary_figures(given: RotaryModel, bench: Bench, fitted: RotaryFit, sigma: Floats) -> dict[str, Any]:
+    result, told = fitted.result, _planned(given.steps, SETUPS, 216)
+    return account(result, result.rank, result.condition_number, len(result.names), fitted.cost_instrument) | {
+        "not_identifiable": [[name] for name in fitted.lost], "signatures": series_signatures(fitted),
+        "residuals": weighted(fitted.residuals.reshape(-1, 6).T, sigma[:, None], list(PARTS)),
+        "plan": [{"setups": k, "condition_number": finite(told_apart(bench, k, sigma, given.harmonics))}
+                 for k in range(1, told + 1)]}
+
+
+def _sense(run: Run, letter: str) -> int:
+    """1 or -1: how the axis turns about x, y or z of the machine at positive commands; 0: not, a problem."""
+    machine, kinematics = run.machine, run.machine.kinematics
+    if letter not in machine.axis_names:
+        run.problem("calibrate.axis", f"{machine.name} has no axis {letter}", "it has " + ", ".join(machine.axis_names),
+                    "axis")
+        return 0
+    if not isinstance(kinematics, Serial):
+        return -1 if isinstance(kinematics, H4TableAxis) and kinematics.sense < 0 else 1
+    along = next(j.direction for j in kinematics.chain if j.name == letter)["ABC".index(letter)]
+    if abs(along) < 1.0 - ALONG:
+        run.problem("calibrate.axis", f"{letter} of {machine.name} is inclined: E{letter}{letter} is not its "
+                    "positioning error", "measure poses, and name its parameters", "axis")
+        return 0
+    return 1 if along > 0.0 else -1
+
+
+def _carries_part(run: Run, letter: str) -> bool:
+    return f"{letter}'" in run.machine.structure or isinstance(run.machine.kinematics, H4TableAxis)
+
+
+def _planned(steps: int, most: int, readings: int) -> int:
+    """Set-ups up to which a campaign is planned: `most`, fewer where they have more readings than that; 2 at the least."""
+    return max(2, min(steps, most, readings // steps))

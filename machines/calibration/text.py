@@ -1,0 +1,63 @@
+"""What a calibration found, in words: the figures of `account` for a reader."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+FIGURES = 4
+"""of a number without a doubt of its own"""
+DOUBTS = 3
+"""figures that a doubt is written with, and its value to the same decimal"""
+
+
+def text(figures: dict[str, Any], head: str) -> str:
+    """Lines: what was written, how well the readings tell it, where ball and bar are, then each error found."""
+    if not figures:
+        return head
+    return "\n".join([head, *_quality(figures), *_instrument(figures), *_errors(figures)])
+
+
+def _quality(figures: dict[str, Any]) -> list[str]:
+    number = figures["condition_number"]
+    shown = "infinite" if number is None else f"{number:.{FIGURES}g}"
+    return [f"rank {figures['rank']} of {figures['unknowns']}, condition number {shown}, {figures['readings']} readings",
+            f"weighted residual {figures['rms_before']:.{FIGURES}g} before, {figures['rms_instrument']:.{FIGURES}g} with "
+            f"nothing found of the machine, {figures['rms_after']:.{FIGURES}g} after"]
+
+
+def _instrument(figures: dict[str, Any]) -> list[str]:
+    """Ball, bar and zero."""
+    setup, lines = figures.get("setup_mm", {}), []
+    if "centre_mm" in figures:
+        ball = ", ".join(f"{v:.4f}" for v in figures["centre_mm"])
+        length = setup["bar.length"]
+        lines = [f"ball found at {ball} mm, {math.hypot(*_ball(setup)):.4f} mm from the stated centre; distances are "
+                 f"{1e3 * abs(length):.{FIGURES}g} um too {'short' if length > 0.0 else 'long'}"]
+    elif "ball.x" in setup:
+        x, y, z = (1e3 * v for v in _ball(setup))
+        lines = [f"ball found {x:.{FIGURES}g}, {y:.{FIGURES}g}, {z:.{FIGURES}g} um from where it was thought"]
+    elif "zero" in setup:
+        lines = [f"zero of the laser found {1e3 * setup['zero']:.{FIGURES}g} um off"]
+    return lines
+
+
+def _ball(setup: dict[str, float]) -> tuple[float, ...]:
+    return tuple(setup[f"ball.{x}"] for x in "xyz")
+
+
+def _errors(figures: dict[str, Any]) -> list[str]:
+    """Each parameter that was found; how many others stay."""
+    found = figures["parameters"]
+    lines = ["found, with one standard deviation:"] if found else []
+    wide = max((len(name) for name in found), default=0)
+    lines += [f"  {name:{wide}} {_value(p['value'], p['sigma'])} {p['unit']}" for name, p in found.items()]
+    kept = figures["kept"]
+    return lines + ([f"{kept} other parameters stay as they were"] if kept else [])
+
+
+def _value(value: float, sigma: float | None) -> str:
+    if sigma is None:
+        return f"{value:10.{FIGURES}g} +- not known"
+    decimals = min(max(DOUBTS - 1 - math.floor(math.log10(sigma)), 0), 9) if sigma > 0.0 else FIGURES
+    return f"{value:10.{decimals}f} +- {sigma:.{decimals}f}"
