@@ -34,7 +34,7 @@ class ActualExecuted(Executed):
 
     def poses(self, motion: Motion, rows: Ints, t: float | Floats) -> tuple[Floats, Floats]:
         """(tip, axis) (K, 3) of the blocks `rows` at fraction t, errors in, by the way that each axis last moved."""
-        near = np.concatenate(super().poses(motion, rows, t), axis=1)
+        near = np.concatenate(self.nominal(motion, rows, t), axis=1)
         q, way = self.joints(motion, rows, t), self._way(motion, rows, t)
         tip, axis = np.empty((len(rows), 3)), np.empty((len(rows), 3))
         for number in np.unique(motion.tool[rows]).tolist():
@@ -43,10 +43,14 @@ class ActualExecuted(Executed):
             tip[k], axis[k], _ = actual.place(actual.coordinates(q[k], near[k]), way[k])
         return tip, axis
 
+    def nominal(self, motion: Motion, rows: Ints, t: float | Floats) -> tuple[Floats, Floats]:
+        """The same of the machine without errors."""
+        return super().poses(motion, rows, t)
+
     def corrected_on_the_way(self, motion: Motion, rows: Ints) -> Floats:
         """(K,) mm: what errors come to at both ends together; axes with rapids of their own take it up one by one."""
-        return np.asarray(sum(np.linalg.norm(self.poses(motion, rows, t)[0] - super(ActualExecuted, self).poses(
-            motion, rows, t)[0], axis=1) for t in (0.0, 1.0)))
+        return np.asarray(sum(np.linalg.norm(self.poses(motion, rows, t)[0] - self.nominal(motion, rows, t)[0], axis=1)
+                              for t in (0.0, 1.0)))
 
     def looks(self, motion: Motion, rows: Ints) -> Iterator[tuple[Ints, Floats]]:
         """See `Executed`: errors may change their course on the way."""

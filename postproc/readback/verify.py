@@ -91,8 +91,16 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Callable[[str, i
     if gcode and _by_post(job):
         named = _CORRECTED.search(head)
         told = [*(_of_model(named[1], head, job, gcode, has_errors(told)) if named else
-                  _uncorrected(head, job, motion, executed, comparison, gcode) if has_errors(told) else []), *told]
+                  _uncorrected(head, job, motion, executed, comparison, gcode) if has_errors(told) else []), *told,
+                *_unmeasured(motion, executed, job, faults)]
     return replace(comparison, executed=(code, motion)), [*diagnostics, *told]
+
+
+def _unmeasured(motion: Motion, executed: Executed, job: Job, faults: Faults) -> list[Diagnostic]:
+    from postproc.readback.actual import ActualExecuted
+    from postproc.readback.measured import check_measured
+
+    return check_measured(motion, executed, job, faults) if isinstance(executed, ActualExecuted) else []
 
 
 def _by_post(job: Job) -> bool:

@@ -133,3 +133,19 @@ def test_a_corrected_programs_other_fault_is_not_laid_to_the_model(tmp_path: Pat
     block = next(line for line in text.splitlines() if line.startswith("G1 ") and "F" in line)
     told = verified(tmp_path, text.replace(block + "\n", "", 1), error_model=ERRORS)
     assert errors(told) and "verify.error_model" not in errors(told)
+
+
+def test_cuts_beyond_what_was_measured_are_told(tmp_path: Path) -> None:
+    """Programs are proved there with the error at the end of the range, as they were converted when that was asked for."""
+    cl, nc = tmp_path / "a.apt", tmp_path / "a.ngc"
+    cl.write_text("UNITS/MM\nLOADTL/1\nSPINDL/3000,RPM,CLW\nRAPID\nGOTO/0,0,20\nFEDRAT/400,MMPM\nGOTO/0,0,0\nGOTO/60,0,0\nFINI\n")
+    for end, told in ((60.0, False), (30.0, True)):
+        model = 'machine = "mill-3axis"\n[components.EXX]\npolynomial = [3.0, 0.5]\n'
+        (tmp_path / "m.toml").write_text(f"{model}range = [0, {end}]\n")
+        options = Options(error_model=str(tmp_path / "m.toml"), error_beyond=True)
+        path, found = toolpaths.read(cl)
+        nc.write_text(postproc.convert(path, "mill-3axis", options=options, diagnostics=found).text)
+        result = verify(nc, path, "mill-3axis", options=options, diagnostics=found)
+        spoken = [d for d in result.diagnostics if d.code == "compensation.range"]
+        assert result.ok and bool(spoken) == told
+        assert not told or ("to 59.98" in spoken[0].message and "they were from 0 to 30" in spoken[0].message)
