@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,7 +15,7 @@ from machines.geometric_error.axis_motion import ALONG, sense
 from machines.geometric_error.bed_frame import bed_side, in_bed_frame
 from machines.geometric_error.covariance import angular
 from machines.geometric_error.csv_table import UNITS, write_csv
-from machines.geometric_error.curves import Table
+from machines.geometric_error.curves import Polynomial, Table
 from machines.geometric_error.lattice import POINT, ROTARY, ErrorMap
 from machines.geometric_error.lattice_making import MapLoss, map_loss, map_of, nodes_of, probes, refined
 from machines.geometric_error.model import ErrorModel
@@ -23,7 +24,7 @@ from machines.geometric_error.screw_tables import LINUXCNC_ROWS, to_linuxcnc
 from machines.geometric_error.serial_errors import Component, SerialErrors
 from machines.geometric_error.survey import PLACES as WORST_PLACES
 from machines.geometric_error.survey import apart
-from machines.geometric_error.tabulate import loss, rows_for, sampled, tabulated, without
+from machines.geometric_error.tabulate import Rows, loss, merged, rows_for, sampled, tabulated, without
 from machines.geometric_error.volume import corners, middle, ranges, samples
 from machines.kinematics.serial import Serial
 from machines.machine import Machine
@@ -38,6 +39,8 @@ MOST_DOUBT = 1200
 """parameters whose covariance is written: a square table"""
 TURN = 13
 """levels of one turn, where nothing says how many"""
+TURNS = 2.0, 1.0, 0.5
+"""either way, of an axis that goes round: rows of screw compensation are tried over these"""
 PLACES = 5000
 """of the work volume at which an export is compared with its model"""
 Steps = Mapping[str, float]
@@ -70,10 +73,12 @@ def location_csv(model: ErrorModel) -> str:
     return write_csv(columns, ["location errors: actual less commanded, tool relative to part"])
 
 
-def travel(machine: Machine) -> dict[str, tuple[float, float]]:
-    """mm or rad by axis letter: travel, a turn either way where it is unlimited."""
-    lower, upper = ranges(ErrorModel(), machine)
-    return {letter: (float(a), float(b)) for letter, a, b in zip(machine.axis_names, lower, upper, strict=True)}
+def travel(machine: Machine, turns: float = 0.5) -> dict[str, tuple[float, float]]:
+    """mm or rad by axis letter: travel, so many turns either way where it is unlimited."""
+    lower, upper = machine.limits.lower, machine.limits.upper
+    most = 2.0 * np.pi * turns
+    return {letter: (float(a) if np.isfinite(a) else -most, float(b) if np.isfinite(b) else most)
+            for letter, a, b in zip(machine.axis_names, lower, upper, strict=True)}
 
 
 # ---- screw compensation -----------------------------------------------------------------------------------------------
@@ -93,7 +98,10 @@ class Screws:
 
 
 def to_screws(model: ErrorModel, machine: Machine, step: Steps, length: float, angle: float) -> Screws:
-    """Positioning errors as LinuxCNC's files; arguments as `to_tables`, axes that go round over a turn either way.
+    """Positioning errors as LinuxCNC's files; arguments as `to_tables`.
+
+    Axes that go round have rows over two turns either way, or as many as rows allow. Beyond its rows LinuxCNC goes on with
+    the last: where a joint can go there the rest has a component of zeros that ends with them, so that programs stop too.
 
     Raises:
         ValueError: no positioning error there, or more rows than LinuxCNC holds would be needed.
@@ -102,13 +110,31 @@ def to_screws(model: ErrorModel, machine: Machine, step: Steps, length: float, a
     if not mine:
         raise ValueError("the model has no positioning error of an axis (EXX, EYY, ... ECC) that moves along or about its "
                          "machine axis; LinuxCNC's screw compensation holds nothing else")
-    rows = rows_for(mine, travel(machine), step, length, angle, LINUXCNC_ROWS, repeat=False)
+    rows = _screw_rows(mine, machine, step, length, angle)
     tables = {c.name.axis: sampled(c.curve, rows[str(c.name)].x) for c in mine}
     texts = {c.name.axis: to_linuxcnc(c.name, tables[c.name.axis], joint_sense(machine, c.name.axis)) for c in mine}
     losses = {str(c.name): loss(c.curve, rows[str(c.name)]) for c in mine}
     held = ErrorModel(SerialErrors(tuple(Component(c.name, tables[c.name.axis]) for c in mine)))
     left = tuple(str(c.name) for c in model.axes.components if c.name.positioning and c not in mine)
-    return Screws(texts, tables, losses, held, without(model, [c.name for c in mine]), left)
+    ends = tuple(Component(c.name, Polynomial(np.zeros(1), c.curve.range)) for c in held.axes.components
+                 if _goes_beyond(machine, c.name.axis, c.curve.range))
+    rest = merged(without(model, [c.name for c in mine]), ErrorModel(SerialErrors(ends)))
+    return Screws(texts, tables, losses, held, rest, left)
+
+
+def _screw_rows(components: Sequence[Component], machine: Machine, step: Steps, length: float,
+                angle: float) -> dict[str, Rows]:
+    """Rows by component over as many turns of axes that go round as LinuxCNC has rows for."""
+    for turns in TURNS[:-1]:
+        with suppress(ValueError):
+            return rows_for(components, travel(machine, turns), step, length, angle, LINUXCNC_ROWS, repeat=False)
+    return rows_for(components, travel(machine, TURNS[-1]), step, length, angle, LINUXCNC_ROWS, repeat=False)
+
+
+def _goes_beyond(machine: Machine, letter: str, span: tuple[float, float]) -> bool:
+    """True for a joint whose travel leaves `span` (mm or rad)."""
+    j = machine.axis_names.index(letter)
+    return bool(machine.limits.lower[j] < span[0] - SAME or machine.limits.upper[j] > span[1] + SAME)
 
 
 def leans(machine: Machine, letter: str) -> bool:

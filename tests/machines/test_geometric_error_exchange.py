@@ -163,7 +163,7 @@ def test_linuxcnc_with_the_files_leaves_the_rest(name: str, way: float) -> None:
     leaning = {"EBB"} if name == "nutating-head" else set()
     assert set(screws.left) == leaning and set(screws.texts) == set(kin.axis_names) - {x[2] for x in leaning}
     assert all(text.count("\n") <= 256 for text in screws.texts.values())
-    assert {str(c.name) for c in screws.rest.axes.components if c.name.positioning} == leaning
+    assert {str(c.name) for c in screws.rest.axes.components if c.name.positioning and c.curve.values.any()} == leaning
     q = np.clip(joints(kin, 50), machine.limits.lower, machine.limits.upper)
     ways = np.full(q.shape, way)
     tip, axis, _ = full.on(kin).place(as_linuxcnc(machine, screws.texts, q, way), ways)
@@ -171,6 +171,36 @@ def test_linuxcnc_with_the_files_leaves_the_rest(name: str, way: float) -> None:
     uncorrected = full.on(kin).place(q, ways)
     assert np.abs(tip - wanted[0]).max() < 3e-4 < 0.1 * np.abs(uncorrected[0] - wanted[0]).max()
     assert np.abs(axis - wanted[1]).max() < 2e-7
+
+
+@pytest.mark.parametrize(("angle", "step", "turns"), [(0.1, 0.0, 2.0), (0.1, 4.0, 1.0), (0.1, 2.0, 0.5), (0.003, 0.0, 1.0)])
+def test_an_axis_that_goes_round_has_rows_over_as_many_turns_as_there_are_rows(angle: float, step: float,
+                                                                               turns: float) -> None:
+    machine = machines.load("mikron-ucp710")
+    full = load(SAMPLES / "mikron-ucp710.toml", machine)
+    screws = to_screws(full, machine, {"C": step * DEG} if step else {}, 1e-3, angle * ARCSEC)
+    table = screws.tables["C"]
+    assert table.x[[0, -1]] == pytest.approx([-2 * np.pi * turns, 2 * np.pi * turns]) and len(table.x) <= 256
+    if not step:
+        assert screws.losses["ECC"] <= angle * ARCSEC
+    kin, q = machine.kinematics, np.zeros((2, 5))
+    q[:, 4] = 2 * np.pi * turns + np.array([-0.01, 0.01])
+    assert full.on(kin).outside(q).sum() == 0
+    assert screws.rest.on(kin).outside(q)[:, 4].tolist() == [False, True]
+
+
+def test_where_rows_end_inside_travel_the_rest_ends_too(tmp_path: Path) -> None:
+    machine = machines.load("mill-3axis")
+    ends = {"EXX": (-500.0, 500.0), "EYY": (-300.0, 400.0), "EZZ": (-300.0, 400.0)}
+    full = ErrorModel(SerialErrors(tuple(component(name, Table(np.array(x), np.array([0.0, 0.01])))
+                                         for name, x in ends.items())), machine=machine.name)
+    full = replace(full, covariance=np.diag(np.full(6, 1e-8)))
+    screws = to_screws(full, machine, {}, 1e-4, ARCSEC)
+    assert [(str(c.name), c.curve.range) for c in screws.rest.axes.components] == [("EYY", (-300.0, 400.0))]
+    assert not screws.rest.values.any() and screws.rest.covariance is not None and not screws.rest.covariance.any()
+    save(replace(screws.rest, name="rest"), tmp_path)
+    rest = load(tmp_path / "rest.toml", machine).on(machine.kinematics)
+    assert rest.outside(np.array([[0.0, -301.0, 0.0], [0.0, -299.0, 0.0]])).tolist() == [[False, True, False], [False] * 3]
 
 
 @pytest.mark.parametrize("name", ["mikron-ucp710", "linuxcnc-xyzac-trt"])
@@ -290,7 +320,7 @@ def test_what_tables_do_not_say_is_told() -> None:
     full = load(SAMPLES / "mikron-ucp710.toml", machine)
     assert notices(to_tables(full, machine, {}, 1.0, 1.0)[0], machine) == []
     assert notices(to_screws(full, machine, {}, 1.0, 1.0).held, machine) == [
-        "C goes round, its table holds from -180 to 180 degrees"]
+        "C goes round, its table holds from -720 to 720 degrees"]
     fixed = replace(full, axes=replace(full.axes, frame={"A": "moving", "C": "fixed"}))
     assert notices(fixed, machine) == [
         "errors of C are along x, y, z of the part's side of the axis, not of the bed as in ISO 230-1"]

@@ -110,7 +110,9 @@ def test_linuxcnc_goes_out_with_the_rest_and_comes_back(tmp_path: Path) -> None:
     machine = machines.load("mikron-ucp710")
     full, rest = load(MIKRON, machine), load(tmp_path / "rest.toml", machine)
     assert {str(c.name) for c in full.axes.components} - {str(c.name) for c in rest.axes.components} == {
-        "EXX", "EYY", "EZZ", "EAA", "ECC"}
+        "EXX", "EYY", "EZZ", "EAA"}  # that of C stays as zeros that end with the rows
+    assert "C goes round, its table holds from -720 to 720 degrees" in done.stdout
+    assert "[components.ECC]\npolynomial = [0.0]" in (tmp_path / "rest.toml").read_text()
     assert rest.covariance is not None and len(rest.covariance) == len(rest.names)
     screws = [f"{x}={tmp_path}/comp/mikron-ucp710-{x}.comp" for x in "XYZ"]
     run("import", *screws, "-m", "mikron-ucp710", "-o", tmp_path / "all.toml", "--into", tmp_path / "rest.toml")
