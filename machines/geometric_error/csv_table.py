@@ -1,8 +1,8 @@
 """CSV tables with units in their headers: `X [mm], EXX+ [um], EXX- [um]`, or in a row of units below them.
 
 Numbers with a decimal point, separated by commas, semicolons or tabs; between semicolons or tabs a decimal comma will do
-where the table has no point. `#` begins a comment line. UTF-8, UTF-16 with its mark, or Windows-1252, as spreadsheets save
-them. Inside mm and rad.
+where the table has no point. `#` begins a comment line, lines of words above the header are titles. UTF-8, UTF-16 with its
+mark, or Windows-1252, as spreadsheets save them. Inside mm and rad.
 """
 
 from __future__ import annotations
@@ -24,6 +24,8 @@ UNITS = {**LENGTHS, **ANGLES}
 _ALIASES = {"\u00b0": "deg", "inch": "in", "um/m": "urad"}
 _MICRO = str.maketrans("\u00b5\u03bc", "uu")
 _THOUSANDS = re.compile(r"-?\d{1,3}(,\d{3})+$")
+TITLES = 60
+"""lines at the most that stand above a header"""
 MOST = 8
 """faults of a header that are told"""
 _HEAD = re.compile(r"(?P<name>[^\[\]()]+?)\s*(?:[\[(](?P<unit>[^\])]*)[\])])?$")
@@ -61,7 +63,30 @@ def read_csv(path: Path, cited: tuple[str, int] = ("", 0), gaps: bool = False) -
         return None, [error("error-table.empty", "a header line and at least one row of numbers are needed, there "
                             + ("is the header alone" if rows else "is nothing"), file=str(path),
                             lines=[n for n, _ in rows], hint="write e.g. X [mm], EXX [um], then a row per position")]
-    return _table(str(path), rows, gaps)
+    return _table(str(path), _below_titles(rows), gaps)
+
+
+def _below_titles(rows: list[tuple[int, str]]) -> list[tuple[int, str]]:
+    """Rows from the header on: the first line without numbers above one that begins with a number, or above units.
+
+    All of them where there is no such line, or one above it has units, as it then is a header.
+    """
+    for k in range(min(len(rows) - 1, TITLES)):
+        (_, line), (_, below) = rows[k:k + 2]
+        mark = _mark(line)
+        cells, under = _cells(line, mark), _cells(below, mark)
+        number = next((_number(cell, mark != ",") for cell in under if cell), None)
+        numbers = [cell for cell in cells if _number(cell, mark != ",") is not None]
+        if not numbers and len(under) <= len(cells) and (number is not None or _units(under)):
+            return rows[k:]
+        if any(m and m["unit"] and unit_of(m["unit"]) in UNITS for m in map(_HEAD.match, cells)):
+            break
+    return rows
+
+
+def _units(cells: Sequence[str]) -> bool:
+    """True for a row of units."""
+    return {unit_of(cell.strip("[]()")) for cell in cells} <= {*UNITS}
 
 
 def read_text(path: Path, cited: tuple[str, int] = ("", 0)) -> tuple[str | None, list[Diagnostic]]:
@@ -97,7 +122,7 @@ def _decoded(data: bytes) -> str | None:
 
 def _table(file: str, rows: list[tuple[int, str]], gaps: bool) -> tuple[CsvTable | None, list[Diagnostic]]:
     (first, head), *body = rows
-    mark = next((m for m in ";\t" if m in head), ",")
+    mark = _mark(head)
     cells = _cells(head, mark)
     found = [_HEAD.match(cell) for cell in cells]
     diagnostics = _no_head(file, first, head, body, mark) or _head_faults(file, first, cells, found)
@@ -105,9 +130,9 @@ def _table(file: str, rows: list[tuple[int, str]], gaps: bool) -> tuple[CsvTable
         return None, diagnostics
     names = [m["name"] for m in found if m]
     unit = {m["name"]: unit_of(m["unit"] or "") for m in found if m}
-    below = [unit_of(cell.strip("[]()")) for cell in _cells(body[0][1], mark)]
-    if len(body) > 1 and not any(unit.values()) and len(below) == len(names) and set(below) <= {*UNITS}:
-        unit, body = dict(zip(names, below, strict=True)), body[1:]
+    below = _cells(body[0][1], mark)
+    if len(body) > 1 and not any(unit.values()) and len(below) == len(names) and _units(below):
+        unit, body = {name: unit_of(cell.strip("[]()")) for name, cell in zip(names, below, strict=True)}, body[1:]
     values, faults = _numbers(body, mark, names, gaps)
     if faults:
         fault, hint = faults[0][1:]
@@ -121,6 +146,11 @@ def unit_of(text: str) -> str:
     """A unit as this module calls it; what it does not know as it is."""
     plain = text.strip().translate(_MICRO)
     return _ALIASES.get(plain, plain)
+
+
+def _mark(line: str) -> str:
+    """What separates the cells of a line."""
+    return next((mark for mark in ";\t" if mark in line), ",")
 
 
 def _cells(line: str, mark: str) -> list[str]:

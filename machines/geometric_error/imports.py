@@ -21,7 +21,7 @@ from machines.geometric_error.lattice import COLUMNS
 from machines.geometric_error.lattice_file import COORDINATES, map_from_csv, zeroed, zeroed_covariance
 from machines.geometric_error.model import ErrorModel
 from machines.geometric_error.names import DIRECTIONS, OWN, ErrorName, parse
-from machines.geometric_error.readings import by_iso_names, run_of, runs_as_rows, together
+from machines.geometric_error.readings import by_iso_names, run_of, runs_as_rows, together, turned_back
 from machines.geometric_error.screw_tables import from_linuxcnc
 from machines.geometric_error.serial_errors import Component, Frame, SerialErrors
 from machines.geometric_error.sizes import too_large
@@ -214,7 +214,10 @@ def _csv(table: CsvTable, machine: Machine, how: How) -> tuple[ErrorModel | None
 
 
 def _averaged(table: CsvTable, places: list[str], how: How) -> Averaged | Fault:
-    read = averaged(runs_as_rows(table), places, how.near)
+    rows = runs_as_rows(table)
+    for letter in (letter for letter in places if letter in how.periods):
+        rows = turned_back(rows, letter, how.periods[letter], how.near.get(letter, 0.0))
+    read = averaged(rows, places, how.near)
     if isinstance(read, Averaged) and read.scatter and not how.average:
         return Fault("error-import.runs", f"{read.rows} rows are readings at {len(read.table)} places",
                      "import with --average: their mean counts, their scatter is the doubt")

@@ -87,7 +87,8 @@ def round_about(lattice: ErrorMap, periods: Mapping[str, float], file: str) -> t
                 found.append(error("error-map.period", f"the first and last level of {letter} are one place, but their "
                                    f"values differ by up to {1e3 * apart[:3].max():.3g} um and "
                                    f"{apart[3:].max() / ANGLES['arcsec']:.3g} arcsec", file=file,
-                                   hint="write the same values in both, or leave the last level out"))
+                                   hint="write the same values in both, or leave the last level out; errors import "
+                                   "--average takes their mean"))
             nodes[k], table = nodes[k][:-1], np.delete(table, -1, axis=k)
     if found:
         return None, found

@@ -12,7 +12,7 @@ import numpy as np
 
 from machines.geometric_error.csv_table import LENGTHS, CsvTable
 from machines.geometric_error.names import ErrorName
-from machines.geometric_error.table_curves import Fault
+from machines.geometric_error.table_curves import CLOSES, Fault
 from toolpaths.arrays import Floats
 
 POSITIONS = ("target", "position", "nominal", "sollposition")
@@ -40,6 +40,9 @@ def by_iso_names(table: CsvTable, name: ErrorName | None) -> CsvTable | Fault:
             return Fault("error-import.column", f"column {column[:40]!r} is neither a position nor a run",
                          f"write target for positions, {name}+ and {name}- for values, or run 1+, run 1-, run 2+ ...; take "
                          "others out", table.head)
+        if new != column and not table.unit[column]:
+            return Fault("error-model.unit", f"column {column[:40]!r} has no unit", f"write {column[:40]} [mm] or the like, "
+                         "or a row of units below the header", table.head)
         if new in columns:
             return Fault("error-import.column", f"column {column[:40]!r} is {new} again", "name runs and positions once",
                          table.head)
@@ -90,6 +93,15 @@ def runs_as_rows(table: CsvTable) -> CsvTable:
             parts.setdefault(run, {})[column] = base
     return stacked([_part(table, {**dict(zip(places, places, strict=True)), **mine}) for mine in parts.values()]) \
         if len(parts) > 1 or "" not in parts else table
+
+
+def turned_back(table: CsvTable, letter: str, period: float, near: float) -> CsvTable:
+    """The table with readings at the end of a period, mm or rad, as those of its begin; `near` as in `averaged`."""
+    x = table.columns[letter]
+    span, least = float(x.max() - x.min()), float(x.min())
+    slack = max(near, CLOSES * period)
+    at = np.where((x >= least + period - slack) & (span <= period + slack), x - period, x)
+    return CsvTable(table.file, {**table.columns, letter: at}, table.unit, table.lines, table.head)
 
 
 def _part(table: CsvTable, names: dict[str, str]) -> CsvTable:

@@ -102,5 +102,6 @@ def _period_fault(x: Floats, values: list[Floats], period: float, unit: float) -
     if span > period * (1.0 - CLOSES) and apart > CLOSES:
         what = "um" if unit == UNITS["um"] else "arcsec"
         return Fault("error-model.period", "first and last row are one place, but their values differ by "
-                     f"{apart:.6g} {what}", "close the table: write the same values in both")
+                     f"{apart:.6g} {what}", "close the table: write the same values in both; errors import "
+                     "--average takes their mean")
     return None

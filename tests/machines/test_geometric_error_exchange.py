@@ -301,15 +301,16 @@ def test_a_lattice_of_several_readings_that_goes_round_has_a_doubt_by_node(tmp_p
     assert found.map.table[1, :, 0] * 1e3 == pytest.approx([1.0, 0.0, -1.0, 0.0], abs=1e-6)
     assert found.map.table[0, :, 0] * 1e3 == pytest.approx([0.0, -1.0, -2.0, -1.0], abs=1e-6)
     variance = np.diag(found.covariance).reshape(2, 4, 6) * 1e6
-    scatter = 5 * (2.0 + 2.0) / (30 - 10)  # sum of squares about the means over readings less places
-    zero = scatter / 2  # of the node that is taken off
-    assert variance[:, :, 1] == pytest.approx(np.array([[scatter / 4 + zero] * 4,
-                                                        [scatter / 2 + zero, 0.0, scatter / 2 + zero, scatter / 2 + zero]]))
+    scatter = 5 * (2.0 + 2.0) / (30 - 8)  # sum of squares about the means over readings less places
+    mean = scatter / np.array([[8.0, 4.0, 4.0, 4.0], [4.0, 2.0, 2.0, 2.0]])  # the end of a turn is its begin
+    wanted = mean + mean[1, 1]  # the node that is taken off
+    wanted[1, 1] = 0.0
+    assert variance[:, :, 1] == pytest.approx(wanted)
     plain, _ = read_sources([str(tmp_path / "m.csv")], machines.load("mikron-ucp710"), replace(how, zero={}))
     assert plain is not None and plain.covariance is not None
     variance = np.diag(plain.covariance).reshape(2, 4, 6) * 1e6
-    assert variance[:, :, 1] == pytest.approx(np.array([[scatter / 4] * 4, [scatter / 2] * 4]))
-    assert variance[:, :, [0, 2, 3]] == pytest.approx(0.0, abs=1e-12) and "30 readings at 10 places" in told[0].message
+    assert variance[:, :, 1] == pytest.approx(mean)
+    assert variance[:, :, [0, 2, 3]] == pytest.approx(0.0, abs=1e-12) and "30 readings at 8 places" in told[0].message
     outside, faults = read_sources([str(tmp_path / "m.csv")], machines.load("mikron-ucp710"),
                                    replace(how, zero={"Z": 101.0, "C": 0.0}))
     assert outside is None and faults[0].code == "error-map.zero"

@@ -33,6 +33,8 @@ GOOD = {"byte order mark and CRLF": b"\xef\xbb\xbf" + CSV.replace("\n", "\r\n").
         "round brackets": CSV.replace("[", "(").replace("]", ")").encode(),
         "a line for the spreadsheet": b"sep=;\n" + CSV.replace(",", ";").encode(),
         "targets on the way back": b"X [mm],EXX [um]\n300,2\n0,1\n-300,0\n",
+        "titles above the header": b"Laser, XL-80, 2026\nMachine: DMU\nRuns,1\nAxis,X\n\n" + CSV.encode(),
+        "titles of a sheet": b"Machine;DMU\r\nTemperature;20,1\r\nX;EXX\r\nmm;\xb5m\r\n-300;0\r\n0;1\r\n300;2\r\n",
         "metres and inches": b"X [m],EXX [in]\n-0.3,0\n0,3.937007874015748e-05\n0.3,7.874015748031496e-05\n"}
 
 
@@ -54,8 +56,11 @@ BAD = [
     ("empty", TABLE, b"", "error-table.empty", "x.csv", 0, "nothing"),
     ("header alone", TABLE, b"X [mm],EXX [um]\n\n", "error-table.empty", "x.csv", 1, "header alone"),
     ("no header", TABLE, b"-300,0\n300,2\n", "error-table.header", "x.csv", 1, "holds numbers"),
-    ("words above the header", TABLE, b"Machine: DMU\nX [mm],EXX [um]\n0,1\n9,1\n", "error-table.header", "x.csv", 1,
+    ("no header below words", TABLE, b"Machine: DMU\n0,1\n9,1\n", "error-table.header", "x.csv", 1,
      "'Machine: DMU' is one column"),
+    ("a word in the first row", TABLE, b"X [mm],EXX [um]\na,b\n0,1\n9,1\n", "error-table.row", "x.csv", 2, "'a'"),
+    ("titles that are too many", TABLE, b"Machine\n" * 60 + b"X [mm],EXX [um]\n0,1\n9,1\n", "error-table.header", "x.csv", 1,
+     "one column"),
     ("a file of LinuxCNC", TABLE, b"0 0.001 0\n9 9.001 9\n", "error-table.header", "x.csv", 1, "without commas"),
     ("words in a column", TABLE, b"X [mm],EXX [um],note\n0,1,ok\n9,1,warm\n", "error-table.row", "x.csv", 2, "'ok'"),
     ("column without a name", TABLE, b"X [mm];;EXX [um]\n0;1;2\n", "error-table.header", "x.csv", 1, "'' is no column"),

@@ -130,6 +130,20 @@ def test_nodes_of_a_map_are_met_as_nearly(tmp_path: Path) -> None:
     assert plain is None and faults[0].code.startswith("error-map.")
 
 
+@pytest.mark.parametrize("text", ["C [deg],ECC [arcsec]\n0,1\n120,4\n240,5\n360,2\n",
+                                  "C [deg],ECC [arcsec]\n360.004,2\n240,5\n120,4\n0,1\n"])
+def test_a_turn_that_does_not_close_takes_the_mean_of_its_ends(text: str, tmp_path: Path) -> None:
+    (tmp_path / "c.csv").write_text(text)
+    how = How(average=True, periods={"C": 2 * np.pi}, near={"C": np.radians(0.01)})
+    machine, arcsec = machines.load("mikron-ucp710"), np.radians(1.0 / 3600.0)
+    model, _ = read_sources([str(tmp_path / "c.csv")], machine, how)
+    assert model is not None and model.values / arcsec == pytest.approx([1.5, 4.0, 5.0])
+    assert model.covariance is not None
+    assert np.diag(model.covariance) / arcsec**2 == pytest.approx([0.25, 0.5, 0.5])  # s^2 = (0.5^2 + 0.5^2) / (4 - 3)
+    plain, faults = read_sources([str(tmp_path / "c.csv")], machine, How(periods={"C": 2 * np.pi}))
+    assert plain is None and ("--average" in faults[0].hint or "spans 360.004" in faults[0].message)
+
+
 RUNS = SAME["columns of runs"]
 FAULTS = [
     ("rows without --average", {"a.csv": ROWS}, How(), "error-model.order", "a.csv:3", "import --average"),
@@ -168,7 +182,8 @@ def test_what_is_wrong_with_readings(files: dict[str, str], how: How, code: str,
                                                                  "'mean'"),
     ("EYY=laser.csv", "run 2-", "EXX2-", "error-import.column", "'EXX2-'"),
     ("EYY=laser.csv", "run 2", "run 1", "error-table.header", "twice"),
-    ("EYY=laser.csv", "run 2+ [um]", "run", "error-import.column", "'run' is neither"),
+    ("EYY=laser.csv", "run 2+ [um]", "run 2+", "error-model.unit", "'run 2+' has no unit"),
+    ("EYY=laser.csv", "run 2+ [um]", "run [um]", "error-import.column", "'run' is neither"),
     ("EYY=laser.csv", "run 2+", "position", "error-import.column", "'position' is Y again"),
     ("EYY=laser.csv", "run 2+", "EYY+1", "error-import.column", "EYY+1 again"),
     ("EYY=laser.csv", "target", "run 7+", "error-import.column", "no column holds positions")])
