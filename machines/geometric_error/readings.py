@@ -96,11 +96,9 @@ def runs_as_rows(table: CsvTable) -> CsvTable:
 
 
 def turned_back(table: CsvTable, letter: str, period: float, near: float) -> CsvTable:
-    """The table with readings at the end of a period, mm or rad, as those of its begin; `near` as in `averaged`."""
+    """The table with readings whole periods, mm or rad, after others as of the same places; `near` as in `averaged`."""
     x = table.columns[letter]
-    span, least = float(x.max() - x.min()), float(x.min())
-    slack = max(near, CLOSES * period)
-    at = np.where((x >= least + period - slack) & (span <= period + slack), x - period, x)
+    at = x - period * np.floor((x - x.min() + max(near, CLOSES * period)) / period)
     return CsvTable(table.file, {**table.columns, letter: at}, table.unit, table.lines, table.head)
 
 
