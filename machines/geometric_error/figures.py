@@ -59,19 +59,19 @@ def model_figure(model: ErrorModel, machine: Machine, tool_length: float, ending
 
 
 def _axis(sheet: Any, model: ErrorModel, machine: Machine, letter: str) -> None:
-    """The displacements of an axis on the left, its turns on the right."""
+    """The displacements of an axis on the left, its turns on the right; what it has none of has no panel."""
     turning = machine.rotary[machine.axis_names.index(letter)]
     number = {name: k for k, name in enumerate(model.names)}
-    for place, angular in zip(sheet.subplots(1, 2), (False, True), strict=True):
-        drawn = [c for c in model.axes.components if c.name.axis == letter and c.name.angular == angular]
-        for component in drawn:
-            mine = [number[f"{component.name}{label}"] for label in component.curve.labels()]
-            known = None if model.covariance is None else model.covariance[np.ix_(mine, mine)]
+    mine = [c for c in model.axes.components if c.name.axis == letter]
+    kinds = sorted({c.name.angular for c in mine})
+    for place, angular in zip(sheet.subplots(1, len(kinds), squeeze=False)[0], kinds, strict=True):
+        for component in (c for c in mine if c.name.angular == angular):
+            own = [number[f"{component.name}{label}"] for label in component.curve.labels()]
+            known = None if model.covariance is None else model.covariance[np.ix_(own, own)]
             _curve(place, component, _positions(model, machine, component), DEG if turning else 1.0, known)
         place.set_xlabel(f"{letter}, {'degrees' if turning else 'mm'}")
         place.set_ylabel("arcsec" if angular else "um")
-        if drawn:
-            place.legend(**BESIDE)
+        place.legend(**BESIDE)
 
 
 def _positions(model: ErrorModel, machine: Machine, component: Component) -> Floats:
@@ -96,6 +96,14 @@ def _curve(place: Any, component: Component, x: Floats, position: float,
                            rasterized=True)
 
 
+def _round_part(value: float) -> float:
+    """The greatest of 1, 2, 5, 10 ... that is no more than `value`; 0 for none."""
+    if not value > 0.0:
+        return 0.0
+    ten = 10.0 ** np.floor(np.log10(value))
+    return float(max(digit * ten for digit in (1.0, 2.0, 5.0) if digit * ten <= value))
+
+
 def _sections(sheet: Any, model: ErrorModel, machine: Machine, tool_length: float) -> None:
     """What the tip is off by when commanded as the nominal machine, over x y and over x z."""
     kinematics = machine.kinematics.with_tool(tool_length)
@@ -114,7 +122,10 @@ def _sections(sheet: Any, model: ErrorModel, machine: Machine, tool_length: floa
                                  rasterized=True)
         sheet.colorbar(shown, ax=place, label="tip off by, um")
         some = slice(None, None, ARROWS)
-        place.quiver(one[some], two[some], off[some, some, across], off[some, some, up], color="white", width=0.003)
+        arrows = place.quiver(one[some], two[some], off[some, some, across], off[some, some, up], color="white", width=0.003)
+        long = _round_part(float(np.nanmax(np.linalg.norm(off[..., [across, up]], axis=2), initial=0.0)))
+        if long:
+            place.quiverkey(arrows, 0.9, 1.04, long, f"{long:g} um", labelpos="E", color="black")
         place.set_xlabel(f"{'xyz'[across]}, mm")
         place.set_ylabel(f"{'xyz'[up]}, mm")
         place.set_title(f"tool of {tool_length:g} mm, other axes in the middle", fontsize="small")

@@ -11,7 +11,7 @@ import pytest
 
 import machines
 from machines.geometric_error import load
-from machines.geometric_error.figures import model_figure
+from machines.geometric_error.figures import _round_part, model_figure
 from machines.geometric_error.volume import ranges, section
 
 
@@ -34,6 +34,26 @@ def test_what_a_model_says_of_its_doubt_is_seen() -> None:
     bare = replace(model, covariance=None)
     assert model_figure(model, machine, 100.0, ".svg").count(b"<image") > \
         model_figure(bare, machine, 100.0, ".svg").count(b"<image") == 4  # sections and their scales
+
+
+def test_an_arrow_is_drawn_with_its_length_and_no_panel_is_empty(tmp_path: Path) -> None:
+    machine = machines.load("mikron-ucp710")
+
+    def drawn(model: Path) -> tuple[list[str], int]:
+        """Lengths of arrows that are told, and panels of turns."""
+        svg = model_figure(load(model, machine), machine, 100.0, ".svg")
+        return re.findall(r"<!-- (\d+ um) -->", svg.decode()), svg.count(b"<!-- arcsec -->")
+
+    assert drawn(Path("samples/errors/mikron-ucp710.toml")) == (["20 um", "50 um"], 5)
+    (tmp_path / "e.toml").write_text("[components.EXX]\npolynomial = [0, 3]\nscale = 100\nrange = [-300, 300]\n")
+    assert drawn(tmp_path / "e.toml") == (["5 um", "5 um"], 0)  # of 9
+    (tmp_path / "e.toml").write_text("[components.EAX]\npolynomial = [0]\nrange = [-300, 300]\n")
+    assert drawn(tmp_path / "e.toml") == ([], 1)
+
+
+@pytest.mark.parametrize(("value", "part"), [(9.99, 5.0), (10.0, 10.0), (0.3, 0.2), (0.0, 0.0), (float("nan"), 0.0)])
+def test_arrows_that_are_told_are_round(value: float, part: float) -> None:
+    assert _round_part(value) == pytest.approx(part)
 
 
 @pytest.mark.parametrize("name", ["uranesx", "h4a-c-table"])
