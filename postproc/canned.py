@@ -50,9 +50,9 @@ def holes_of(toolpath: Toolpath, moves: Moves, path: Path, words: WordRows, cont
         key = cycle_key(toolpath.cycles[int(moves.cycle[path.move[first]])].kind, int(turning[moves.row[path.move[first]]]))
         if not _states_retract(controller, key):
             last -= _rises_beyond(moves, path, words, z, first, last, initial + _slack(path, controller, first))
-        before_initial, previous_last = initial, last
         found = _hole(toolpath, moves, path, words, control, controller, int(first), int(last), initial, key)
-        if found is not None and allowed[first]:
+        if found is not None and allowed[first:last + 1].all():
+            before_initial, previous_last = initial, last
             holes.append(found)
             native[first:last + 1] = True
     return native, holes

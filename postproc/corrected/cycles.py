@@ -7,16 +7,18 @@ from functools import cached_property
 
 import numpy as np
 
+from machines.geometric_error.lost_motion import GRAIN
 from postproc.corrected.arcs import LOOKS
 from postproc.corrected.reversals import LOOSE
 from postproc.corrected.runs import Runs
-from postproc.corrected.work import ALONE, Work
+from postproc.corrected.work import ALONE, LIFTS, Work
 from postproc.groups import groups
 from postproc.moves import Moves
-from postproc.path import FEED, TRAVERSE, Path
+from postproc.path import FEED, Path
 from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.toolpath import Kind
 
-SAME = 1e-6
+SAME = 0.5 * GRAIN[0]
 """mm: places nearer than this are one"""
 
 IN_AIR = 8.0
@@ -24,16 +26,19 @@ IN_AIR = 8.0
 
 
 def whole_holes(path: Path, nominal: Path, moves: Moves, work: Work, allowed: float, always: Bools) -> tuple[Path, Ints]:
-    """The path with holes corrected as a whole, and the hole (K,) that each block is of, ALONE for those of none.
+    """The path with holes corrected as a whole, and for each block (K,) its hole or ALONE or LIFTS.
 
-    Every block of a hole is corrected as its bottom is, but along the tool: the plane that drilling begins at gets the
+    Every block of a hole is corrected as its bottom is, but along the tool: the planes that drilling begins at get the
     least correction of the bottoms of the holes that follow each other, so that one plane serves all of them and no peck is
-    added, levels above it that of the block that the tool comes from to the first. Holes that this takes farther than LOOSE
-    times `allowed` mm from where they belong keep the corrections of their blocks and are written out, but for those of
-    cycles that `always` (C,) stay cycles.
+    added, levels above them that of the block that the tool comes from to the first. A block that lifts the tool to the
+    plane of the next hole goes with the hole that it lifts it from. Holes that this takes farther than LOOSE times `allowed`
+    mm from where they belong keep the corrections of their blocks and are written out, but for those of cycles that
+    `always` (C,) stay cycles.
     """
     hole = np.where(np.isnan(path.u) | path.home, -1, moves.hole[path.move])
-    holes = _along_tool(path, nominal, work, *_sequences(path, hole, work))
+    feeds = moves.kind[path.move] != Kind.RAPID
+    runs, owner, lifts = _sequences(path, nominal, hole, feeds, work)
+    holes = _along_tool(path, nominal, work, runs, owner, feeds)
     whole, q = np.full(len(path), ALONE), path.q.copy()
     if not len(holes.runs):
         return path, whole
@@ -46,19 +51,39 @@ def whole_holes(path: Path, nominal: Path, moves: Moves, work: Work, allowed: fl
     rows = near[holes.hole]
     q[holes.rows[rows]], whole[holes.rows[rows]] = joints[rows], holes.runs.begin[holes.hole[rows]]
     q[lead] = moved
+    lifts = lifts[whole[lifts] == ALONE]
+    q[lifts], whole[lifts] = _lifted(path, q, work, lifts), LIFTS
     return replace(path, q=q), whole
 
 
-def _sequences(path: Path, hole: Ints, work: Work) -> tuple[Runs, Ints]:
-    """Holes at one orientation with one tool in one frame, as runs of blocks, and for each (H,) the first block of all that
-    follow each other so."""
+def _sequences(path: Path, nominal: Path, hole: Ints, feeds: Bools, work: Work) -> tuple[Runs, Ints, Ints]:
+    """Holes at one orientation with one tool in one frame, as runs of blocks; for each (H,) the first block of all that
+    follow each other so; and blocks that lift the tool to the plane of the next, none of this but of the one before."""
     runs, turns = Runs.of(hole), path.q[:, work.rotary]
     same = np.append(False, (np.diff(path.frame) == 0) & (np.diff(work.tools) == 0) & (turns[1:] == turns[:-1]).all(axis=1))
-    drills = np.logical_or.reduceat(path.code == FEED, runs.begin)
+    drills = np.logical_or.reduceat(feeds, runs.begin)
     fine = (hole[runs.begin] >= 0) & (runs.begin > 0) & drills & runs.throughout(same | (np.diff(hole, prepend=-2) != 0))
     joined = same[runs.begin] & np.append(False, fine[:-1])
-    first = np.maximum.accumulate(np.where(joined, 0, runs.begin))
-    return runs.some(fine), first[fine]
+    lifts = np.flatnonzero(fine & same[runs.begin] & ~feeds[runs.begin] & (runs.size > 1))
+    lifts = lifts[_lifting(nominal, work, runs.begin[lifts])]
+    begin, end = runs.begin.copy(), runs.last + 1
+    begin[lifts] += 1
+    end[lifts - 1] += joined[lifts]
+    first = np.maximum.accumulate(np.where(joined, 0, begin))
+    return Runs(begin, end - begin).some(fine), first[fine], runs.begin[lifts]
+
+
+def _lifting(path: Path, work: Work, block: Ints) -> Bools:
+    """(N,) blocks (N,) that go up along Z of the words and nowhere else."""
+    step = np.subtract(*(_words(path, work, block, path.q[k]) for k in (block, block - 1)))
+    across = np.abs(step[:, :2]).max(axis=1, initial=0.0)
+    return np.asarray((step[:, 2] > SAME) & (across <= SAME) & ~path.home[block - 1])
+
+
+def _lifted(path: Path, q: Floats, work: Work, block: Ints) -> Floats:
+    """Joints (N, J) of blocks (N,) that go up from where the block before ends at joints (K, J), along Z of the words."""
+    xyz = np.append(_words(path, work, block, q[block - 1])[:, :2], _words(path, work, block, q[block])[:, 2:], axis=1)
+    return _joints(path, work, block, q[block], xyz)
 
 
 @dataclass(frozen=True)
@@ -116,6 +141,11 @@ class _Holes:
         return np.asarray(self.wanted[self.start, 2])
 
     @cached_property
+    def top(self) -> Floats:
+        """(S,) highest plane of each sequence."""
+        return np.asarray(np.maximum.reduceat(self.plane, self.sequences.begin))
+
+    @cached_property
     def off(self) -> Floats:
         """(H, 3) correction of the bottom."""
         return np.asarray(self.found[self.bottom] - self.wanted[self.bottom])
@@ -131,11 +161,11 @@ class _Holes:
         return np.minimum.reduceat(self.off[:, 2], self.sequences.begin)
 
     def corrected(self, above: Floats) -> Floats:
-        """(M, 3) all as the bottom, along the tool as `least` for the plane and `above` (S,) for what is above it."""
-        z, plane, sequence = self.wanted[:, 2], self.plane[self.hole], self.sequences.of_rows[self.hole]
+        """(M, 3) all as the bottom, along the tool as `least` for the planes and `above` (S,) for what is above them."""
+        z, sequence = self.wanted[:, 2], self.sequences.of_rows[self.hole]
         result = self.wanted + self.off[self.hole]
-        result[:, 2] = z + np.where(z < plane - SAME, self.off[self.hole, 2],
-                                    np.where(z <= plane + SAME, self.least[sequence], above[sequence]))
+        result[:, 2] = z + np.where(z < self.plane[self.hole] - SAME, self.off[self.hole, 2],
+                                    np.where(z <= self.top[sequence] + SAME, self.least[sequence], above[sequence]))
         return result
 
     def some(self, keep: Bools) -> _Holes:
@@ -144,11 +174,11 @@ class _Holes:
         return _Holes(self.runs.some(keep), self.owner[keep], self.wanted[mine], self.found[mine], self.feeds[mine])
 
 
-def _along_tool(path: Path, nominal: Path, work: Work, runs: Runs, owner: Ints) -> _Holes:
+def _along_tool(path: Path, nominal: Path, work: Work, runs: Runs, owner: Ints, feeds: Bools) -> _Holes:
     """The holes of some runs that are drilled along Z of the words."""
     rows, frames = runs.rows, np.repeat(owner, runs.size)
     wanted, found = (_words(p, work, frames, p.q[rows]) for p in (nominal, path))
-    holes = _Holes(runs, owner, wanted, found, path.code[rows] == FEED)
+    holes = _Holes(runs, owner, wanted, found, feeds[rows])
     return holes.some(holes.along_z) if len(runs) else holes
 
 
@@ -173,13 +203,14 @@ def _joints(path: Path, work: Work, owner: Ints, q: Floats, xyz: Floats) -> Floa
 
 
 def _leads(path: Path, nominal: Path, work: Work, holes: _Holes) -> tuple[Ints, Floats, Floats]:
-    """Blocks (N,) before holes that come to the plane of these, their joints (N, J) at its correction, and what blocks that
-    the tool comes from to holes are corrected by along the tool (S,)."""
+    """Blocks (N,) before holes that come to planes of these, their joints (N, J) at the correction of planes, and what the
+    blocks before holes are corrected by along the tool (S,)."""
     first = holes.sequences.begin
     owner, plane = holes.owner[first], holes.plane[first]
     lead = owner - 1
     before, came = (_words(p, work, owner, p.q[lead]) for p in (nominal, path))
-    level = (np.abs(before[:, 2] - plane) <= SAME) & (path.code[lead] != FEED) & ~path.home[lead]
+    level = (before[:, 2] >= plane - SAME) & (before[:, 2] <= holes.top + SAME)
+    level &= (path.code[lead] != FEED) & ~path.home[lead]
     came[level, 2] = before[level, 2] + holes.least[level]
     return lead[level], _joints(path, work, owner[level], path.q[lead[level]], came[level]), (came - before)[:, 2]
 
@@ -213,7 +244,7 @@ def _approach_off(path: Path, work: Work, q0: Floats, q1: Floats, row: Ints, sha
     no points; 0 where the correction changes by no more than `share` (N,) mm over one stretch of the errors."""
     change = q1 - q0 - (work.path.q[row] - work.path.q[row - 1])
     near = (work.changes(q0, q1) == 1) & (np.abs(change).max(axis=1, initial=0.0) <= share)
-    far, looks = np.flatnonzero((path.code[row] == TRAVERSE) & ~near), len(LOOKS)
+    far, looks = np.flatnonzero(~near), len(LOOKS)
     k, t = np.repeat(far, looks), np.tile(LOOKS, len(far))
     got = work.straight(path, q0[k], q1[k], row[k], t)
     result = np.zeros(len(row))

@@ -13,7 +13,7 @@ from postproc.corrected.arcs import new_centers
 from postproc.corrected.reversals import Divided
 from postproc.corrected.runs import Runs
 from postproc.corrected.walk import Ends, walk
-from postproc.corrected.work import ALONE, Work, axis_positions, bent_blocks, on_arc
+from postproc.corrected.work import ALONE, LIFTS, Work, axis_positions, bent_blocks, on_arc
 from postproc.path import ARC, FEED, TRAVERSE, Path
 from postproc.word_arcs import PLANE_COLUMNS
 from toolpaths.arrays import Floats, Ints
@@ -118,18 +118,17 @@ class _Written:
         return float(np.linalg.norm(residual[:, 3:], axis=1).max())
 
     def _like(self, first: Ints) -> Ints:
-        """(K,) first block of the hole that a block is of, -1 for those and for blocks of none."""
-        hole = self.work.whole[self.made.owner]
-        result = np.where(hole == ALONE, -1, np.maximum.accumulate(np.where(np.isin(np.arange(len(hole)), first),
-                                                                            np.arange(len(hole)), 0)))
+        """(K,) first block of the hole that a block is of, the one before for those that lift the tool; -1 for others."""
+        hole, block = self.work.whole[self.made.owner], np.arange(len(self.path))
+        result = np.where(hole < 0, -1, np.maximum.accumulate(np.where(np.isin(block, first), block, 0)))
         result[first] = -1
-        return result
+        return np.asarray(np.where(hole == LIFTS, block - 1, result))
 
     def _holes(self) -> tuple[Ints, Ints]:
         """First blocks and bottoms of the holes that are corrected as a whole."""
         hole = self.work.whole[self.made.owner]
         runs = Runs.of(hole)
-        runs = runs.some(hole[runs.begin] != ALONE)
+        runs = runs.some(hole[runs.begin] >= 0)
         depth = np.where(self.path.code == FEED, self.words[:, self.path.frames[0].control.xyz[2]], np.inf)
         return runs.begin, runs.rows[runs.least(depth[runs.rows])]
 

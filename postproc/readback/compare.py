@@ -8,6 +8,7 @@ import numpy as np
 
 from postproc.job import Job
 from postproc.moves import Moves, Phase
+from postproc.path import FEED, TRAVERSE
 from postproc.readback.align import align, unreached
 from postproc.readback.canonical import Canonical
 from postproc.readback.checks import (
@@ -110,8 +111,9 @@ def _kept(job: Job) -> float:
 def _taken_up(job: Job, motion: Motion, tip: Floats) -> Bools:
     """True (K,) for blocks that leave the tip, (K, 3), where it is although axes move: they take up lost motion.
 
-    A rapid that a longer one follows may move it by as much as a level in the air, to which the tool came as part of a hole,
-    may be off by.
+    A rapid that a longer one follows, a feed that a longer feed follows, and a rapid between a longer one and a feed (the
+    last part of the way to the plane of a hole) may move it by as much as a level in the air, to which the tool came as part
+    of a hole, may be off by.
     """
     if job.errors is None:
         return np.zeros(len(tip), dtype=np.bool_)
@@ -120,9 +122,11 @@ def _taken_up(job: Job, motion: Motion, tip: Floats) -> Bools:
 
     way = np.linalg.norm(np.diff(tip, axis=0, prepend=np.inf), axis=1)
     still, air = (share * SHARE * job.options.tolerance + 2.0 * job.rounding.tip for share in (1.0, IN_AIR))
-    rapid = motion.code == 0
-    begins = rapid & np.append(rapid[1:] & (way[1:] > air), False)
-    return np.asarray((way <= still) | (begins & (way <= air)))
+    rapid, feed, far = motion.code == TRAVERSE, motion.code == FEED, way > air
+    rapid_next, feed_next = (np.append((code & far)[1:], False) for code in (rapid, feed))
+    ends = rapid & np.append(False, (rapid & far)[:-1]) & feed_next
+    begins = (rapid & rapid_next) | (feed & feed_next)
+    return np.asarray((way <= still) | ((begins | ends) & ~far))
 
 
 def _aligned(kept: Ints | slice, tip: Floats, axis: Floats, sweep: Floats, moves: Moves, tolerance: float,

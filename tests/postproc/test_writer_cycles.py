@@ -48,12 +48,12 @@ def test_generic_iso_cycle() -> None:
 
 
 def test_retract_that_no_code_makes_is_written_as_single_moves() -> None:
-    """20 mm above each top is neither the plane nor the level the tool came from."""
+    """20 mm above the top is neither the plane nor the level the tool came from; it is that to the next hole."""
     path = toolpath("RAPID", "GOTO/0,0,50", "CYCLE/DRILL,DEPTH,12,RAPTO,3,RTRCTO,20,MANUAL,MMPM,100", "GOTO/10,0,0",
                     "GOTO/20,0,0")
     blocks = body(good(convert(path, "mill-3axis")).text)
     at = blocks.index("X10")
-    assert blocks[at:at + 8] == ["X10", "Z3", "G1 Z-12 F100", "G0 Z20", "X20", "Z3", "G1 Z-12", "G0 Z20"]
+    assert blocks[at:at + 5] == ["X10", "Z3", "G1 Z-12 F100", "G0 Z20", "G98 G81 X20 Y0 Z-12 R3 F100"]
 
 
 def test_pecks_that_grow_smaller_are_written_as_single_moves() -> None:
