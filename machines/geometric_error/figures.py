@@ -122,9 +122,10 @@ def _sections(sheet: Any, model: ErrorModel, machine: Machine, tool_length: floa
                                  rasterized=True)
         sheet.colorbar(shown, ax=place, label="tip off by, um")
         some = slice(None, None, ARROWS)
-        arrows = place.quiver(one[some], two[some], off[some, some, across], off[some, some, up], color="white", width=0.003)
         long = _round_part(float(np.nanmax(np.linalg.norm(off[..., [across, up]], axis=2), initial=0.0)))
         if long:
+            arrows = place.quiver(one[some], two[some], off[some, some, across], off[some, some, up], color="white",
+                                  width=0.003)
             place.quiverkey(arrows, 0.9, 1.04, long, f"{long:g} um", labelpos="E", color="black")
         place.set_xlabel(f"{'xyz'[across]}, mm")
         place.set_ylabel(f"{'xyz'[up]}, mm")
