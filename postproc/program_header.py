@@ -5,7 +5,10 @@ from __future__ import annotations
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from postproc import VERSION
+from postproc.job import Job
 from postproc.program import Program
 
 if TYPE_CHECKING:
@@ -31,10 +34,26 @@ def header_lines(result: PostResult) -> list[str]:
         header.append("tool numbers of the set-up: " + ", ".join(numbers))
     if any(d.code == "feed.of_setup" for d in result.diagnostics):
         header.append(f"feed {result.setup.output.feed:g} mm/min of the set-up where the CL file states none")
-    header += _corrections(result) + _orientations(result)
+    header += [*_corrections(result), *_orientations(result), *_tools(job)]
     if result.toolpath.name:
         header.insert(1, f"part {result.toolpath.name}")
     return header
+
+
+def _tools(job: Job) -> list[str]:
+    """A line for each tool that moves, in order of use: what must be in the magazine, and how long the set-up has it."""
+    index, first = np.unique(job.moves.tool, return_index=True)
+    found: dict[int, str] = {}
+    for k in index[np.argsort(first, kind="stable")].tolist():
+        number, length = job.number_of(k), job.gauge_length(k)
+        tool = job.toolpath.tools[k] if k >= 0 else None
+        if number < 0 or number in found:
+            continue
+        parts = [f"tool T{number}{f' {tool.name}' if tool and tool.name else ''}",
+                 *([f"diameter {tool.diameter:.4g} mm"] if tool and tool.diameter else []),
+                 f"gauge length {length:.4f} mm" if length else "gauge length not stated"]
+        found[number] = ", ".join(parts)
+    return list(found.values())
 
 
 def _orientations(result: PostResult) -> list[str]:
@@ -56,6 +75,7 @@ def _corrections(result: PostResult) -> list[str]:
     from machines.geometric_error.fingerprint import fingerprint
 
     return [f"geometric errors {name}: corrected in this program; the control must not correct them again",
+            "they are corrected for this work offset and these gauge lengths: convert again for others",
             f"{FINGERPRINT} {fingerprint(result.job.errors)}", *result.compensation.lines()]
 
 
