@@ -107,7 +107,7 @@ def screw_figures(model: Any, screws: Any, names: dict[str, str], lost: dict[str
              f"{before[0]:.2f} um, {left[0]:.2f} um after; axis {before[1]:.2f} arcsec, {left[1]:.2f} arcsec after"]
     if model.covariance is not None:
         told.append("lost: the covariance of what these files hold, as they have no place for it; a --rest keeps its own")
-    told += [f"{name} is left: its axis leans, and the error is not about the axis" for name in screws.left]
+    told += [f"{name} is left: {why}" for name, why in screws.left.items()]
     return {"losses": lost, "worst_tip_um": [before[0], left[0]], "worst_axis_arcsec": [before[1], left[1]]}, told
 
 

@@ -102,7 +102,7 @@ def in_bed_frame(model: ErrorModel, machine: Machine) -> tuple[list[Component], 
     for letter in dict.fromkeys(c.name.axis for c in model.axes.components):
         mine = {c.name.part: c for c in model.axes.components if c.name.axis == letter}
         side = bed_side(machine, letter)
-        if letter not in "ABC" or frame.get(letter, "fixed") == side or not _on_line(model, machine, letter):
+        if letter not in "ABC" or frame.get(letter, "fixed") == side or not on_line(model, machine, letter):
             components += mine.values()
             continue
         components += _turned(letter, mine, _line(machine, letter)[0], back=side == "moving")
@@ -123,7 +123,8 @@ def _turned(letter: str, mine: dict[int, Component], direction: Floats, back: bo
     return found
 
 
-def _on_line(model: ErrorModel, machine: Machine, letter: str) -> bool:
+def on_line(model: ErrorModel, machine: Machine, letter: str) -> bool:
+    """True where the errors of a rotary axis act about a point of its own line."""
     reference = model.axes.reference.get(letter)
     if reference is None:
         return True

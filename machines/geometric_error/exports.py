@@ -12,7 +12,7 @@ from machines.geometric_error.actual import Actual
 from machines.geometric_error.actual_map import ActualByMap, part_side
 from machines.geometric_error.averages import SAME
 from machines.geometric_error.axis_motion import ALONG, sense
-from machines.geometric_error.bed_frame import bed_side, in_bed_frame
+from machines.geometric_error.bed_frame import bed_side, in_bed_frame, on_line
 from machines.geometric_error.covariance import angular
 from machines.geometric_error.csv_table import UNITS, write_csv
 from machines.geometric_error.curves import Polynomial, Table
@@ -93,8 +93,8 @@ class Screws:
     losses: dict[str, float]
     held: ErrorModel
     rest: ErrorModel
-    left: tuple[str, ...]
-    """positioning errors of axes that lean: they are not along or about the joint"""
+    left: Mapping[str, str]
+    """positioning errors that are not along or about the joint, and why"""
 
 
 def to_screws(model: ErrorModel, machine: Machine, step: Steps, length: float, angle: float) -> Screws:
@@ -106,7 +106,9 @@ def to_screws(model: ErrorModel, machine: Machine, step: Steps, length: float, a
     Raises:
         ValueError: no positioning error there, or more rows than LinuxCNC holds would be needed.
     """
-    mine = tuple(c for c in model.axes.components if c.name.positioning and not leans(machine, c.name.axis))
+    positioning = [c for c in model.axes.components if c.name.positioning]
+    left = {str(c.name): why for c in positioning if (why := _not_of_joint(model, machine, c))}
+    mine = tuple(c for c in positioning if str(c.name) not in left)
     if not mine:
         raise ValueError("the model has no positioning error of an axis (EXX, EYY, ... ECC) that moves along or about its "
                          "machine axis; LinuxCNC's screw compensation holds nothing else")
@@ -115,7 +117,6 @@ def to_screws(model: ErrorModel, machine: Machine, step: Steps, length: float, a
     texts = {c.name.axis: to_linuxcnc(c.name, tables[c.name.axis], joint_sense(machine, c.name.axis)) for c in mine}
     losses = {str(c.name): loss(c.curve, rows[str(c.name)]) for c in mine}
     held = ErrorModel(SerialErrors(tuple(Component(c.name, tables[c.name.axis]) for c in mine)))
-    left = tuple(str(c.name) for c in model.axes.components if c.name.positioning and c not in mine)
     ends = tuple(Component(c.name, Polynomial(np.zeros(1), c.curve.range)) for c in held.axes.components
                  if _goes_beyond(machine, c.name.axis, c.curve.range))
     rest = merged(without(model, [c.name for c in mine]), ErrorModel(SerialErrors(ends)))
@@ -135,6 +136,16 @@ def _goes_beyond(machine: Machine, letter: str, span: tuple[float, float]) -> bo
     """True for a joint whose travel leaves `span` (mm or rad)."""
     j = machine.axis_names.index(letter)
     return bool(machine.limits.lower[j] < span[0] - SAME or machine.limits.upper[j] > span[1] + SAME)
+
+
+def _not_of_joint(model: ErrorModel, machine: Machine, component: Component) -> str:
+    """Why the joint cannot take a positioning error back; "" where it can."""
+    letter = component.name.axis
+    if leans(machine, letter):
+        return "its axis leans, and the error is not about the axis"
+    if letter in ROTARY and not on_line(model, machine, letter):
+        return "the reference point of its axis lies beside the axis, so that it moves the tool sideways too"
+    return ""
 
 
 def leans(machine: Machine, letter: str) -> bool:

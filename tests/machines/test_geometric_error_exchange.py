@@ -189,6 +189,20 @@ def test_an_axis_that_goes_round_has_rows_over_as_many_turns_as_there_are_rows(a
     assert screws.rest.on(kin).outside(q)[:, 4].tolist() == [False, True]
 
 
+def test_an_axis_whose_errors_act_about_a_point_beside_it_is_left(tmp_path: Path) -> None:
+    machine = machines.load("mikron-ucp710")
+    full = load(SAMPLES / "mikron-ucp710.toml", machine)
+    for point, left in (([0.0, 0.0, 50.0], set()), ([30.0, 0.0, 50.0], {"ECC"})):  # along the line of C, and beside it
+        moved = replace(full, axes=replace(full.axes, reference={"C": np.array(point)}))
+        screws = to_screws(moved, machine, {}, 1e-4, 0.1 * ARCSEC)
+        assert set(screws.left) == left and ("C" in screws.texts) == (not left)
+        assert all("beside the axis" in why for why in screws.left.values())
+        kin = machine.kinematics.with_tool(50.0)
+        q = np.clip(joints(kin, 50), machine.limits.lower, machine.limits.upper)
+        tip, _, _ = moved.on(kin).place(as_linuxcnc(machine, screws.texts, q, 1.0), np.ones(q.shape))
+        assert np.abs(tip - screws.rest.on(kin).place(q, np.ones(q.shape))[0]).max() < 3e-4
+
+
 def test_where_rows_end_inside_travel_the_rest_ends_too(tmp_path: Path) -> None:
     machine = machines.load("mill-3axis")
     ends = {"EXX": (-500.0, 500.0), "EYY": (-300.0, 400.0), "EZZ": (-300.0, 400.0)}
