@@ -12,7 +12,9 @@ from machines.calibration.rotary_fit import RotaryFit
 from machines.calibration.simulator import PARTS
 from machines.geometric_error.covariance import angular
 from machines.geometric_error.csv_table import UNITS
+from machines.geometric_error.curves import Table
 from machines.geometric_error.model import ErrorModel
+from machines.geometric_error.table_curves import ROTARY
 from toolpaths.arrays import Floats
 
 CURVE = 5
@@ -34,12 +36,26 @@ def account(result: CalibrationResult, rank: int, number: float, unknowns: int, 
 
 def parameters(model: ErrorModel, wanted: Sequence[str] = ()) -> dict[str, Any]:
     """By name, of those that begin as one of `wanted` (all without): value, sigma (None where it is not known), unit (um or
-    arcsec)."""
+    arcsec), at: the position that a value of a table is of, "X -300", "X -300 +" with its way ("" for all others)."""
     sigma = np.zeros(len(model.names)) if model.covariance is None else np.sqrt(np.diag(model.covariance))
     units = ["arcsec" if angular(name) else "um" for name in model.names]
-    return {name: {"value": float(v / UNITS[u]), "sigma": float(s / UNITS[u]) if s > 0.0 else None, "unit": u}
+    places = _places(model)
+    return {name: {"value": float(v / UNITS[u]), "sigma": float(s / UNITS[u]) if s > 0.0 else None, "unit": u,
+                   "at": places.get(name, "")}
             for name, v, s, u in zip(model.names, model.values, sigma, units, strict=True)
             if not wanted or name.startswith(tuple(wanted))}
+
+
+def _places(model: ErrorModel) -> dict[str, str]:
+    """Where the values of tables belong, by name."""
+    found = {}
+    for component in model.axes.components:
+        curve, axis = component.curve, component.name.axis
+        if isinstance(curve, Table):
+            at = np.degrees(curve.x) if axis in ROTARY else curve.x
+            for k, label in enumerate(curve.labels()):
+                found[f"{component.name}{label}"] = f"{axis} {at[k % len(at)]:.7g}{' ' + label[-1] if curve.both else ''}"
+    return found
 
 
 def signature(degrees: Floats, values: Floats, sigma: Floats, unit: str) -> dict[str, Any]:

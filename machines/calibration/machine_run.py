@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +26,8 @@ FAR = 1.0
 """mm that a ball, a bar or a laser's zero may be from what the file says"""
 APART = 2.0
 """times the commanded distance, or one part of it, that the median of a bar's readings may be"""
+MOST = 3
+"""groups that are told"""
 SEEN = 1e-6
 """mm or rad that an error differs by its way, to be told"""
 
@@ -102,7 +105,7 @@ def _distances(run: Run, table: CsvTable, kinematics: Kinematics, measured: Meas
     fits = [u for u, size in LENGTHS.items() if 0.5 < read / LENGTHS[unit] * size / max(middle, 1e-9) < 2.0]
     run.problem("calibrate.distance", f"distances are {read:.4g} mm in the middle; at the commanded positions they "
                 f"would be {middle:.4g} mm", f"write distance [{fits[0]}] in the table" if fits else
-                "distance is the whole length of the bar; look at centre and tool_length")
+                "distance is the whole length of the bar, not what it differs by; look at centre and tool_length")
     return False
 
 
@@ -139,15 +142,25 @@ def _judged(run: Run, given: PosesModel | BarModel | LaserModel, start: ErrorMod
         figures["centre_mm"] = [c + fitted.setup[name] for c, name in zip(given.centre, SETUP["distance"], strict=False)]
     if not result.converged:
         run.problem("calibrate.converged", "the fit does not come to an end", "check units and signs of the table")
-    for group in result.not_identifiable:
-        run.problem("calibrate.rank", f"the readings do not tell {group[0]}" if len(group) == 1 else
-                    f"the readings tell only combinations of {folded(group)}",
-                    "measure where they differ, or name fewer under parameters")
+    _untold(run, result.not_identifiable)
     if has_errors(run.found):
         return Calibration(None, figures)
     _far(run, given, measured.kind, fitted.setup)
     return done(run, fitted.model, figures, f"sigma_um = {given.sigma_um:g}",
                 lambda: machine_slip(start, kinematics, measured, wanted), start, wanted)
+
+
+def _untold(run: Run, groups: Sequence[tuple[str, ...]]) -> None:
+    """Parameters that the readings do not tell, alone or from each other."""
+    alone, together = [g[0] for g in groups if len(g) == 1], [folded(g) for g in groups if len(g) > 1]
+    ways = any({name[-1] for name in g} == {"+", "-"} for g in groups)
+    hint = "measure where they differ, or name fewer under parameters"
+    if alone:
+        run.problem("calibrate.rank", f"the readings do not tell {folded(alone)}", hint)
+    if together:
+        more = f", and of {len(together) - MOST} more" if len(together) > MOST else ""
+        run.problem("calibrate.rank", f"the readings tell only combinations of {'; of '.join(together[:MOST])}{more}",
+                    f"say in columns such as X way by which way each axis came; or {hint}" if ways else hint)
 
 
 def _far(run: Run, given: PosesModel | BarModel | LaserModel, kind: Kind, setup: dict[str, float]) -> None:

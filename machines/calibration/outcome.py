@@ -10,6 +10,7 @@ from machines.calibration.account import parameters
 from machines.calibration.run import Run
 from machines.geometric_error.model import ErrorModel
 from machines.geometric_error.sizes import too_large
+from toolpaths.diagnostics import has_errors
 
 SUSPECT = 2.0
 """times the stated standard deviation: what is left of the readings is more than noise"""
@@ -17,11 +18,13 @@ UNFIT = 5.0
 """the same, where the errors found do not help: no model"""
 LITTLE = 0.5
 """of what is left with nothing found but ball, zero, mounting and indexer: where more stays, little is explained"""
-SILENT = 0.2
-"""times the stated standard deviation: less is left than any noise leaves"""
+SILENT, MUTE = 0.2, 0.02
+"""times the stated standard deviation: less is left than any noise leaves; so little that no model is written"""
+DIFFERENCES = "reversal", "poses", "laser"
+"""kinds whose readings are actual less nominal"""
 MEANT = "write large = true at the top of the file where it is so"
 MOST = 6
-"""errors above what machines have that are told"""
+"""errors above what machines have, that are told"""
 ENOUGH = 10
 """readings more than unknowns, from which on SILENT is looked at (chance below 1e-6)"""
 
@@ -54,10 +57,10 @@ def done(run: Run, model: ErrorModel, figures: dict[str, Any], sigma: str, slip:
 def _large(run: Run, model: ErrorModel, start: ErrorModel | None) -> None:
     """Found errors beyond what machines have; those of the start model are its own matter."""
     before = {one.path: one.size for one in too_large(start)} if start is not None else {}
+    large = run.checked.large or (start is not None and start.large)
+    units = "look at those of the table" + (", whose readings are actual less nominal" if run.kind in DIFFERENCES else "")
     for one in [one for one in too_large(model) if before.get(one.path) != one.size][:MOST]:
-        large = run.checked.large
-        message = one.message(large)
-        hint = one.hint(large, "look at those of the table", "large = true at the top of the file")
+        message, hint = one.message(large), one.hint(large, units, "large = true at the top of the file")
         if one.refused(large):
             run.problem("error-model.large", message, hint)
         else:
@@ -79,19 +82,20 @@ def _residual(run: Run, figures: dict[str, Any], sigma: str, slip: Callable[[], 
         run.tell("calibrate.unchecked", f"{figures['readings']} readings for as many unknowns: nothing is left over that "
                  "could show a mistake", "measure more than is asked for")
         return
+    message = f"what is left is {left:.3g} times the stated standard deviation of the readings"
     if left < SILENT and figures["spare"] >= ENOUGH:
-        run.warn("calibrate.silent", f"what is left is {left:.3g} times the stated standard deviation of the readings, less "
-                 "than any noise leaves", f"look at the unit of the readings, and at {sigma}")
+        tell = run.problem if left < MUTE else run.warn
+        tell("calibrate.silent", f"{message}, less than any noise leaves", "look at the unit of the readings; where they "
+             f"are so fine, say so in {sigma}")
     if left <= SUSPECT:
         return
-    suspected = slip()
-    hint = suspected or "look for wrong signs, units and outliers (robust = true)"
-    message = f"what is left is {left:.4g} times the stated standard deviation of the readings"
-    if left > UNFIT and figures["rms_after"] > LITTLE * figures["rms_instrument"]:
-        run.problem("calibrate.unexplained", f"{message}, and {figures['rms_instrument']:.4g} times without the errors "
-                    "found: they explain little", f"{hint}; where the readings are so rough, state it instead of {sigma}")
-    elif suspected:
-        run.problem("calibrate.slip", message, hint)
-    else:
-        run.warn("calibrate.residual", f"{message}: the model's own doubt is too small by as much",
-                 f"{hint}, or state what the instrument really does instead of {sigma}")
+    if suspected := slip():
+        run.problem("calibrate.slip", message, suspected)
+        return
+    hint = f"look for wrong signs, units, outliers (robust = true); where the readings are so rough, say so in {sigma}"
+    without = figures["rms_instrument"]
+    if left > UNFIT and figures["rms_after"] > LITTLE * without:
+        run.problem("calibrate.unexplained", f"{message}, and {without:.3g} times without the errors found: they explain "
+                    "little", hint)
+    elif not has_errors(run.found):
+        run.warn("calibrate.residual", f"{message}: the model's own doubt is too small by as much", hint)

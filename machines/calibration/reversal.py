@@ -11,7 +11,7 @@ set-up k are those of the identity, shifted by k.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -97,6 +97,28 @@ def identify(readings: Floats, sigma: float | Floats, offsets: bool = True, robu
         shifts: as in `reversal_matrix`
     """
     m, n = readings.shape
+    measured, basis = np.isfinite(readings), np.kron(np.eye(2), closed_basis(n))
+    result = solve(_problem(readings, sigma, offsets, shifts), robust)
+    both = basis @ result.values[: 2 * n - 2]
+    covariance = basis @ result.covariance[: 2 * n - 2, : 2 * n - 2] @ basis.T
+    spread = np.sqrt(np.diag(covariance)) if result.supported else np.full(2 * n, np.inf)
+    residuals = np.full((m, n), np.nan)
+    residuals[measured] = result.residuals
+    return Reversal(both[:n], both[n:], spread[:n], spread[n:], result.values[2 * n - 2:], residuals, result,
+                    conditioning(n, m, measured, shifts), covariance)
+
+
+def cost_without(readings: Floats, sigma: float | Floats, offsets: bool = True, robust: bool = False,
+                 shifts: Sequence[int] | None = None) -> float:
+    """Sum of squared weighted residuals where the axis is taken as perfect; arguments as `identify`."""
+    problem = _problem(readings, sigma, offsets, shifts)
+    indexer = np.arange(len(problem.names)) >= readings.shape[1] - 1
+    return solve(replace(problem, free=problem.free & indexer), robust).cost_after
+
+
+def _problem(readings: Floats, sigma: float | Floats, offsets: bool, shifts: Sequence[int] | None) -> CalibrationProblem:
+    """In parameters that keep the closures: axis (n - 1), indexer (n - 1), constants of the set-ups (m)."""
+    m, n = readings.shape
     measured = np.isfinite(readings)
     matrix = reversal_matrix(n, m, measured, False, shifts)
     basis = np.kron(np.eye(2), closed_basis(n))
@@ -107,16 +129,8 @@ def identify(readings: Floats, sigma: float | Floats, offsets: bool = True, robu
     free = np.ones(len(names), dtype=np.bool_)
     free[2 * n - 2:] = offsets
     weights = np.broadcast_to(sigma, readings.shape)[measured]
-    problem = CalibrationProblem(names, np.zeros(len(names)), free, readings[measured], weights, lambda v: design @ v,
-                                 lambda v: design)
-    result = solve(problem, robust)
-    both = basis @ result.values[: 2 * n - 2]
-    covariance = basis @ result.covariance[: 2 * n - 2, : 2 * n - 2] @ basis.T
-    spread = np.sqrt(np.diag(covariance)) if result.supported else np.full(2 * n, np.inf)
-    residuals = np.full((m, n), np.nan)
-    residuals[measured] = result.residuals
-    return Reversal(both[:n], both[n:], spread[:n], spread[n:], result.values[2 * n - 2:], residuals, result,
-                    conditioning(n, m, measured, shifts), covariance)
+    return CalibrationProblem(names, np.zeros(len(names)), free, readings[measured], weights, lambda v: design @ v,
+                              lambda v: design)
 
 
 def closed_basis(n: int) -> Floats:

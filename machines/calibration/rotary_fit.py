@@ -22,6 +22,8 @@ from toolpaths.arrays import Bools, Floats
 
 ENOUGH = 3
 """set-ups, turned by one increment each: more tell no other amplitudes"""
+SPAN = 1e-9
+"""of the largest singular value"""
 TOLD = 1e-6
 """of a column's length: where mounting and indexer leave less of it, it is not told"""
 
@@ -36,6 +38,8 @@ class RotaryFit:
         lost: names of the amplitudes that mounting or indexer can pretend as well
         result: of the fit; the smallest one where the readings leave it open
         residuals: (m, n, 6)
+        told, condition_number: how many amplitudes the readings tell, and how far apart (2-norm, columns of length 1), with
+            mounting and indexer taken out
         cost_instrument: sum of squared weighted residuals where nothing but indexer and mounting is found
     """
 
@@ -45,6 +49,8 @@ class RotaryFit:
     lost: tuple[str, ...]
     result: CalibrationResult
     residuals: Floats
+    told: int
+    condition_number: float
     cost_instrument: float
 
 
@@ -62,7 +68,7 @@ def fit_rotary(bench: Bench, readings: Floats, sigma: Floats, harmonics: int, ro
     weights = np.tile(sigma, m * n)[known]
     rows, observed = design[known], readings.ravel()[known]
     count = 12 * harmonics
-    lost = _lost(rows / weights[:, None], count)
+    lost, values_told = _lost(rows / weights[:, None], count), _told(rows / weights[:, None], count)
     result = solve(linear(names, rows, observed, weights), robust)
     alone = solve(linear(names, rows, observed, weights, np.arange(len(names)) >= count), robust)
     values = np.where(lost, 0.0, result.values[:count])
@@ -73,7 +79,16 @@ def fit_rotary(bench: Bench, readings: Floats, sigma: Floats, harmonics: int, ro
     covariance = result.covariance[:count, :count] * np.outer(~lost, ~lost)
     return RotaryFit(values.reshape(shape), spread.reshape(shape), covariance,
                      tuple(np.array(names[:count])[lost].tolist()), result, residuals.reshape(readings.shape),
-                     alone.cost_after)
+                     len(values_told), _condition(values_told), alone.cost_after)
+
+
+def rotary_span(bench: Bench, readings: Floats, sigma: Floats, harmonics: int) -> tuple[Floats, Floats]:
+    """What `fit_rotary` can explain of the known readings (K,) in order, divided by their standard deviations: orthonormal
+    columns (K, rank); and those standard deviations (K,)."""
+    known, weights = np.isfinite(readings).ravel(), np.tile(sigma, readings.size // 6)
+    columns = _design(bench, len(readings), harmonics)[0][known]
+    u, s, _ = np.linalg.svd(columns / weights[known][:, None], full_matrices=False)
+    return u[:, s > SPAN * s[0]], weights[known]
 
 
 def _design(bench: Bench, m: int, harmonics: int) -> tuple[Floats, tuple[str, ...]]:
@@ -107,9 +122,16 @@ def hidden(bench: Bench, sigma: Floats, harmonics: int) -> tuple[str, ...]:
 def told_apart(bench: Bench, m: int, sigma: Floats, harmonics: int) -> float:
     """Condition number (2-norm, columns of length 1) of the amplitudes that m set-ups tell, mounting and indexer taken out;
     inf where they tell none."""
-    values = np.linalg.svd(_left(_design(bench, m, harmonics)[0] / np.tile(sigma, m * bench.steps)[:, None], 12 * harmonics),
-                           compute_uv=False)
-    told = values[values > TOLD]
+    return _condition(_told(_design(bench, m, harmonics)[0] / np.tile(sigma, m * bench.steps)[:, None], 12 * harmonics))
+
+
+def _told(rows: Floats, count: int) -> Floats:
+    """Singular values of the first columns, scaled to length 1, that the others leave of them."""
+    values = np.linalg.svd(_left(rows, count), compute_uv=False)
+    return np.asarray(values[values > TOLD])
+
+
+def _condition(told: Floats) -> float:
     return float(told[0] / told[-1]) if len(told) else float("inf")
 
 
@@ -117,7 +139,7 @@ def _left(rows: Floats, count: int) -> Floats:
     """The first columns, scaled to length 1, less what lies in the span of the others."""
     wanted, nuisance = rows[:, :count], rows[:, count:]
     u, s, _ = np.linalg.svd(nuisance, full_matrices=False)
-    span = u[:, s > 1e-9 * s[0]]
+    span = u[:, s > SPAN * s[0]]
     result: Floats = (wanted - span @ (span.T @ wanted)) / np.maximum(np.linalg.norm(wanted, axis=0), 1e-300)
     return result
 

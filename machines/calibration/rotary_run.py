@@ -10,7 +10,7 @@ from machines.calibration.account import account, finite, listed, series_signatu
 from machines.calibration.folded import folded
 from machines.calibration.measurement_file import COLUMNS, ReversalModel, RotaryModel
 from machines.calibration.outcome import Calibration, done
-from machines.calibration.reversal import Reversal, identify, plan, statistics
+from machines.calibration.reversal import Reversal, cost_without, identify, plan, statistics
 from machines.calibration.rotary_fit import RotaryFit, error_model, fit_rotary, hidden, told_apart
 from machines.calibration.run import Run
 from machines.calibration.simulator import PARTS, Bench
@@ -58,8 +58,7 @@ def _reversal_figures(run: Run, given: ReversalModel, fitted: Reversal, readings
     degrees = np.asarray(np.arange(given.steps) * (360.0 / given.steps), dtype=np.float64)
     curves = {"axis": (fitted.axis, fitted.axis_sigma), "indexer": (fitted.indexer, fitted.indexer_sigma)}
     known, planned = fitted.conditioning, _planned(given.steps, 12, 864)
-    own = readings - np.nanmean(readings, axis=1, keepdims=True) if given.zeroed else readings
-    alone = float(np.nansum((own / sigma) ** 2))
+    alone = cost_without(readings, sigma, given.zeroed, run.checked.robust, given.shifts or None)
     return account(fitted.result, known.rank, known.condition_number, known.unknowns, alone) | {
         "signatures": {k: signature(degrees, *curve, "arcsec") for k, curve in curves.items()},
         "residuals": weighted(fitted.residuals, sigma, [f"set-up {k}" for k in range(len(readings))]),
@@ -98,17 +97,17 @@ def rotary(run: Run, given: RotaryModel, table: CsvTable) -> Calibration | None:
     if fitted.lost:
         run.tell("calibrate.hidden", f"the mounting can pretend {', '.join(fitted.lost)} as well; they are 0 in the model")
     model = error_model(fitted, given.axis, sense=sense, carries_part=_carries_part(run, given.axis))
-    return done(run, model, figures, f"sigma_um = {given.sigma_um:g} and sigma_arcsec = {given.sigma_arcsec:g}",
+    return done(run, model, figures, f"sigma_um = {given.sigma_um:g} or sigma_arcsec = {given.sigma_arcsec:g}",
                 lambda: rotary_slip(bench, readings, sigma, given.harmonics))
 
 
 def _rotary_figures(given: RotaryModel, bench: Bench, fitted: RotaryFit, sigma: Floats) -> dict[str, Any]:
-    result, told = fitted.result, _planned(given.steps, SETUPS, 216)
-    return account(result, result.rank, result.condition_number, len(result.names), fitted.cost_instrument) | {
+    planned = _planned(given.steps, SETUPS, 216)
+    return account(fitted.result, fitted.told, fitted.condition_number, fitted.amplitudes.size, fitted.cost_instrument) | {
         "not_identifiable": [[name] for name in fitted.lost], "signatures": series_signatures(fitted),
         "residuals": weighted(fitted.residuals.reshape(-1, 6).T, sigma[:, None], list(PARTS)),
         "plan": [{"setups": k, "condition_number": finite(told_apart(bench, k, sigma, given.harmonics))}
-                 for k in range(1, told + 1)]}
+                 for k in range(1, planned + 1)]}
 
 
 def _sense(run: Run, letter: str) -> int:

@@ -50,7 +50,11 @@ class Run:
             if table.unit.get(name):
                 self._unit(table, name, "")
         known = [column.name for column in wanted]
-        if other := [name for name in table.columns if name not in (*known, *optional)]:
+        other = [name for name in table.columns if name not in (*known, *optional)]
+        for name in [name for name in other if optional and name.lower().endswith("way")]:
+            self.problem("calibrate.column", f"{Path(table.file).name}: {name!r} is the way of no axis",
+                         "write " + ", ".join(optional))
+        if other:
             self.tell("calibrate.unused", f"{Path(table.file).name}: {', '.join(other)[:200]} not used",
                       "columns are " + ", ".join([*known, *optional]))
         return not has_errors(self.found)

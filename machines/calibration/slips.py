@@ -15,7 +15,7 @@ from machines.calibration.machine_fit import Measurements, fit
 from machines.calibration.measurement_file import ReversalModel
 from machines.calibration.problem import CalibrationResult
 from machines.calibration.reversal import identify
-from machines.calibration.rotary_fit import fit_rotary
+from machines.calibration.rotary_fit import rotary_span
 from machines.calibration.simulator import PARTS, Bench
 from machines.geometric_error.model import ErrorModel
 from machines.kinematics.base import Kinematics
@@ -23,6 +23,8 @@ from toolpaths.arrays import Floats
 
 BETTER = 3.0
 """times less is left, for a slip to be named"""
+ALIKE = 1.1
+"""times what the best of them leaves: slips that cannot be told from it"""
 ROWS = 400
 """of a table that slips are looked for in"""
 PAIRS = ((0, 1), (1, 2), (0, 2))
@@ -33,8 +35,8 @@ def machine_slip(start: ErrorModel, kinematics: Kinematics, measured: Measuremen
     some = np.unique(np.linspace(0, len(measured.q) - 1, ROWS).astype(np.int64))
     part = replace(measured, q=measured.q[some], read=measured.read[some],
                    ways=None if measured.ways is None else measured.ways[some])
-    tried = ((words, fit(start, kinematics, other, wanted).result) for words, other in _others(part, kinematics))
-    return _best(fit(start, kinematics, part, wanted).result, tried)
+    tried = ((words, _left(fit(start, kinematics, other, wanted).result)) for words, other in _others(part, kinematics))
+    return _best(_left(fit(start, kinematics, part, wanted).result), tried)
 
 
 def _others(m: Measurements, kinematics: Kinematics) -> Iterable[tuple[str, Measurements]]:
@@ -57,12 +59,19 @@ def _others(m: Measurements, kinematics: Kinematics) -> Iterable[tuple[str, Meas
 
 def rotary_slip(bench: Bench, readings: Floats, sigma: Floats, harmonics: int) -> str:
     """The slip of a table of all six readings (m, n, 6), "" where there is none."""
+    span, weights = rotary_span(bench, readings, sigma, harmonics)
     others = [(f"with {part} turned round", readings * (1.0 - 2.0 * np.eye(6)[k])) for k, part in enumerate(PARTS)]
     others += [(f"with {PARTS[a + k]} and {PARTS[b + k]} changed over", readings[:, :, _swapped(6, a + k, b + k)])
                for k in (0, 3) for a, b in PAIRS]
-    others.append(("with the set-ups in the other order", readings[::-1]))
-    tried = ((words, fit_rotary(bench, other, sigma, harmonics).result) for words, other in others)
-    return _best(fit_rotary(bench, readings, sigma, harmonics).result, tried)
+    if (np.isfinite(readings) == np.isfinite(readings[::-1])).all():
+        others.append(("with the set-ups in the other order", readings[::-1]))
+
+    def left(values: Floats) -> float:
+        """See `_left`; what is fitted is the same for all of them."""
+        y = values[np.isfinite(readings)] / weights
+        return float(np.linalg.norm(y - span @ (span.T @ y)) / np.sqrt(max(len(y) - span.shape[1], 1)))
+
+    return _best(left(readings), ((words, left(other)) for words, other in others))
 
 
 def reversal_slip(readings: Floats, sigma: float, given: ReversalModel) -> str:
@@ -70,8 +79,8 @@ def reversal_slip(readings: Floats, sigma: float, given: ReversalModel) -> str:
     m, n = readings.shape
     shifts = given.shifts or tuple(range(m))
     other = identify(readings, sigma, given.zeroed, shifts=[(-k) % n for k in shifts])
-    return _best(identify(readings, sigma, given.zeroed, shifts=shifts).result,
-                 [("with the indexer turned the other way, shifts = " + str([(-k) % n for k in shifts]), other.result)])
+    words = f"with the indexer turned the other way, shifts = {[(-k) % n for k in shifts]}"
+    return _best(_left(identify(readings, sigma, given.zeroed, shifts=shifts).result), [(words, _left(other.result))])
 
 
 def _swapped(count: int, a: int, b: int) -> list[int]:
@@ -80,10 +89,13 @@ def _swapped(count: int, a: int, b: int) -> list[int]:
     return order
 
 
-def _best(given: CalibrationResult, tried: Iterable[tuple[str, CalibrationResult]]) -> str:
-    """The words that leave least, where that is far less than is left now."""
-    words, least = min(((words, _left(result)) for words, result in tried), key=lambda pair: pair[1], default=("", np.inf))
-    return f"{words} only {least:.3g} times would be left" if BETTER * least < _left(given) else ""
+def _best(now: float, tried: Iterable[tuple[str, float]]) -> str:
+    """The words that leave least, and those that leave as little, where that is far less than is left now."""
+    left = sorted((size, words) for words, size in tried)
+    if not left or BETTER * left[0][0] >= now:
+        return ""
+    words = " or ".join(words for size, words in left if size <= ALIKE * left[0][0])
+    return f"{words} only {left[0][0]:.3g} times would be left"
 
 
 def _left(result: CalibrationResult) -> float:

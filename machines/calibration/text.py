@@ -7,6 +7,8 @@ from typing import Any
 
 FIGURES = 4
 """of a number without a doubt of its own"""
+MOST = 9
+"""decimals"""
 DOUBTS = 3
 """figures that a doubt is written with, and its value to the same decimal"""
 
@@ -20,10 +22,10 @@ def text(figures: dict[str, Any], head: str) -> str:
 
 def _quality(figures: dict[str, Any]) -> list[str]:
     number = figures["condition_number"]
-    shown = "infinite" if number is None else f"{number:.{FIGURES}g}"
+    shown = "infinite" if number is None else f"{number:#.{FIGURES}g}"
     return [f"rank {figures['rank']} of {figures['unknowns']}, condition number {shown}, {figures['readings']} readings",
-            f"weighted residual {figures['rms_before']:.{FIGURES}g} before, {figures['rms_instrument']:.{FIGURES}g} with "
-            f"nothing found of the machine, {figures['rms_after']:.{FIGURES}g} after"]
+            f"weighted residual {figures['rms_before']:#.{FIGURES}g} before, {figures['rms_instrument']:#.{FIGURES}g} with "
+            f"nothing found of the machine, {figures['rms_after']:#.{FIGURES}g} after"]
 
 
 def _instrument(figures: dict[str, Any]) -> list[str]:
@@ -34,10 +36,10 @@ def _instrument(figures: dict[str, Any]) -> list[str]:
         length = setup["bar.length"]
         lines = [f"ball found at {ball} mm, {math.hypot(*_ball(setup)):.4f} mm from the stated centre; distances are "
                  f"{1e3 * abs(length):.{FIGURES}g} um too {'short' if length > 0.0 else 'long'}"]
-    elif "ball.x" in setup:
+    elif "ball.x" in setup and any(_ball(setup)):
         x, y, z = (1e3 * v for v in _ball(setup))
         lines = [f"ball found {x:.{FIGURES}g}, {y:.{FIGURES}g}, {z:.{FIGURES}g} um from where it was thought"]
-    elif "zero" in setup:
+    elif setup.get("zero"):
         lines = [f"zero of the laser found {1e3 * setup['zero']:.{FIGURES}g} um off"]
     return lines
 
@@ -48,16 +50,17 @@ def _ball(setup: dict[str, float]) -> tuple[float, ...]:
 
 def _errors(figures: dict[str, Any]) -> list[str]:
     """Each parameter that was found; how many others stay."""
-    found = figures["parameters"]
-    lines = ["found, with one standard deviation:"] if found else []
-    wide = max((len(name) for name in found), default=0)
-    lines += [f"  {name:{wide}} {_value(p['value'], p['sigma'])} {p['unit']}" for name, p in found.items()]
-    kept = figures["kept"]
+    told = {name: p for name, p in figures["parameters"].items() if p["sigma"] is not None}
+    untold, kept = [name for name in figures["parameters"] if name not in told], figures["kept"]
+    wide = max((len(name) for name in told), default=0)
+    lines = ["found, with one standard deviation:"] if told else []
+    lines += [f"  {name:{wide}} {_value(p['value'], p['sigma'])} {p['unit']:6} {p['at'] and 'at '}{p['at']}".rstrip()
+              for name, p in told.items()]
+    lines += [f"not known, 0 in the model: {', '.join(untold)}"] if untold else []
     return lines + ([f"{kept} other parameters stay as they were"] if kept else [])
 
 
-def _value(value: float, sigma: float | None) -> str:
-    if sigma is None:
-        return f"{value:10.{FIGURES}g} +- not known"
-    decimals = min(max(DOUBTS - 1 - math.floor(math.log10(sigma)), 0), 9) if sigma > 0.0 else FIGURES
+def _value(value: float, sigma: float) -> str:
+    """Both to the decimal that the doubt has its DOUBTS figures at."""
+    decimals = min(max(DOUBTS - 1 - math.floor(math.log10(sigma)), 0), MOST)
     return f"{value:10.{decimals}f} +- {sigma:.{decimals}f}"

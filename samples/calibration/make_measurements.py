@@ -2,6 +2,8 @@
 
 A Mikron UCP 710 with known errors (truth.toml): the C axis by reversal (12 steps, 4 set-ups, indexer and mounting with
 errors of their own), then the places of its axes by a probe on a ball. start.toml is what the second fit starts from.
+Beside it, each with a start of its own: the squareness of the slides by a ball-bar, the screw of X by a laser (both ways,
+screw-truth.toml), all six errors of C by reversal.
 """
 
 from __future__ import annotations
@@ -12,9 +14,9 @@ from pathlib import Path
 import numpy as np
 
 import machines
-from machines.calibration.simulator import Bench, simulate
+from machines.calibration.simulator import PARTS, Bench, simulate
 from machines.geometric_error.csv_table import write_csv
-from machines.geometric_error.curves import Fourier
+from machines.geometric_error.curves import Fourier, Table
 from machines.geometric_error.exchange import save
 from machines.geometric_error.model import ErrorModel
 from machines.geometric_error.names import parse
@@ -63,9 +65,71 @@ def probe(rng: np.random.Generator, n: int = 80) -> str:
     q = branches[np.argmin(np.abs(branches[:, :, 3] - start[:, 3]), axis=0), np.arange(n)]
     q = np.round(q / [1, 1, 1, DEG, DEG], 4) * [1, 1, 1, DEG, DEG]
     off = truth().on(kin).place(q)[0] - kin.forward(q)[0] - [0.05, -0.02, 0.03] + rng.normal(size=(n, 3)) * NOISE[1]
-    columns = {name: ("deg" if k > 2 else "mm", q[:, k]) for k, name in enumerate("XYZAC")}
-    return write_csv(columns | {f"d{x}": ("um", _fine(off[:, k], 1e-3)) for k, x in enumerate("xyz")},
+    return write_csv(_joints(q) | {f"d{x}": ("um", _fine(off[:, k], 1e-3)) for k, x in enumerate("xyz")},
                      ["probe on two balls of the table: actual less nominal place"])
+
+
+SQUARE = "EC0Y", "EB0Z", "EA0Z"
+RADIUS, LONG, BALL = 150.0, 0.0032, (0.012, -0.02, 0.008)
+"""of the ball-bar, what its readings are too long by, and where its ball stands from the centre, mm"""
+SERIES, SETUPS_OF_SIX = {"dz": (2, 1.5, -0.5), "ex": (2, -1.0, 0.7), "ez": (1, 2.0, 4.0)}, 3
+"""harmonic, cosine and sine of errors of C, um and arcsec"""
+SCREW = np.linspace(-300.0, 300.0, 13)
+
+
+def ball_bar(rng: np.random.Generator, n: int = 24) -> str:
+    """Table of three circles, one in each plane of the slides."""
+    kin = machines.load("mikron-ucp710").kinematics.with_tool(TOOL)
+    turn = np.linspace(0.0, 2.0 * np.pi, n, endpoint=False)
+    circle = RADIUS * np.stack([np.cos(turn), np.sin(turn), 0.0 * turn], axis=1)
+    q = np.concatenate([circle, circle[:, [0, 2, 1]], circle[:, [2, 0, 1]]])
+    q = np.round(np.column_stack([q, np.zeros((3 * n, 2))]), 4)
+    bar = truth().on(kin).place(q)[0] - kin.forward(np.zeros((1, 5)))[0] - BALL
+    read = np.linalg.norm(bar, axis=1) + LONG + rng.normal(size=3 * n) * NOISE[1]
+    return write_csv(_joints(q) | {"distance": ("mm", np.round(read, 5))}, ["ball-bar, three circles of 150 mm"])
+
+
+def screw() -> ErrorModel:
+    """Positioning error of X, 3 um of lost motion."""
+    forward = np.round(8e-3 * SCREW / 300.0 + 2e-3 * np.sin(SCREW / 50.0), 4)
+    name = parse("EXX")
+    assert name is not None
+    table = Table(SCREW, np.concatenate([forward, forward - 3e-3]), both=True)
+    return ErrorModel(SerialErrors((Component(name, table),)), name="screw-truth", machine="mikron-ucp710")
+
+
+def laser(rng: np.random.Generator, runs: int = 2) -> str:
+    """Table of X forwards and backwards."""
+    kin = machines.load("mikron-ucp710").kinematics.with_tool(TOOL)
+    x = np.tile(np.concatenate([SCREW, SCREW[::-1]]), runs)
+    way = np.tile(np.repeat([1.0, -1.0], len(SCREW)), runs)
+    q, ways = np.zeros((len(x), 5)), np.zeros((len(x), 5))
+    q[:, 0], ways[:, 0] = x, way
+    off = (screw().on(kin).place(q, ways)[0] - kin.forward(q)[0])[:, 0] + rng.normal(size=len(x)) * NOISE[1]
+    return write_csv(_joints(q) | {"X way": ("", way), "reading": ("um", _fine(off, 1e-3))},
+                     ["interferometer along X: actual less nominal"])
+
+
+def rotary(rng: np.random.Generator) -> str:
+    """Table of all six readings of C."""
+    bench, unit = Bench(STEPS), {part: 1e-3 if part[0] == "d" else ARCSEC for part in PARTS}
+    axis = np.zeros((STEPS, 6))
+    for part, (harmonic, cosine, sine) in SERIES.items():
+        phase = harmonic * bench.angles
+        axis[:, PARTS.index(part)] = unit[part] * (cosine * np.cos(phase) + sine * np.sin(phase))
+    sizes = np.array([unit[part] for part in PARTS])
+    indexer = rng.normal(size=(STEPS, 6)) * 0.5 * sizes
+    mounts = rng.normal(size=(SETUPS_OF_SIX, 3, 6)) * 5.0 * sizes
+    noise = np.repeat([0.1e-3, NOISE[0]], 3)
+    read = simulate(bench, axis, indexer, mounts, noise, rng).reshape(-1, 6)
+    setup, step = np.repeat(np.arange(SETUPS_OF_SIX), STEPS), np.tile(np.arange(STEPS), SETUPS_OF_SIX)
+    where = {"setup": ("", setup * 1.0), "step": ("", step * 1.0)}
+    six = {part: ("um" if part[0] == "d" else "arcsec", _fine(read[:, k], unit[part])) for k, part in enumerate(PARTS)}
+    return write_csv(where | six, ["reflector and levels on an indexer that turns back"])
+
+
+def _joints(q: np.ndarray) -> dict[str, tuple[str, np.ndarray]]:
+    return {name: ("deg" if k > 2 else "mm", q[:, k]) for k, name in enumerate("XYZAC")}
 
 
 def _fine(values: np.ndarray, unit: float) -> np.ndarray:
@@ -92,14 +156,54 @@ table = "probe.csv"
 sigma_um = 0.3
 tool_length = {TOOL}
 """
+BAR_START = "[location]\n" + "".join(f"{k} = 0.0\n" for k in SQUARE)
+BALL_BAR = f"""description = "squareness of the slides by a ball-bar, simulated"
+machine = "mikron-ucp710"
+model = "bar-start.toml"
+
+[ball_bar]
+table = "ball_bar.csv"
+sigma_um = 0.3
+centre = [0.0, 0.0, {-TOOL}]     # table frame: where the ball stands, under the spindle at X0 Y0 Z0
+tool_length = {TOOL}
+"""
+SCREW_START = """[components.EXX]             # both ways: + reached forwards, - backwards
+table = "screw-start-X.csv"
+"""
+LASER = f"""description = "screw of X by a laser, both ways, simulated"
+machine = "mikron-ucp710"
+model = "screw-start.toml"
+
+[laser]
+table = "laser.csv"
+sigma_um = 0.3
+toward = [1.0, 0.0, 0.0]
+tool_length = {TOOL}
+"""
+ROTARY = f"""description = "all six errors of C of the Mikron, simulated"
+machine = "mikron-ucp710"
+
+[rotary]
+table = "rotary.csv"
+axis = "C"
+steps = {STEPS}
+harmonics = 2
+sigma_um = 0.1
+sigma_arcsec = 0.05
+"""
 
 
 def main() -> None:
     """Write all."""
     folder, rng = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent, np.random.default_rng(11)
     save(truth(), folder, "the simulated machine")
-    for name, text in (("reversal.csv", reversal(rng)), ("probe.csv", probe(rng)), ("reversal.toml", REVERSAL),
-                       ("start.toml", START), ("probe.toml", PROBE)):
+    save(screw(), folder, "the simulated screw")
+    zeros = {"X": ("mm", SCREW), "EXX+": ("um", np.zeros(len(SCREW))), "EXX-": ("um", np.zeros(len(SCREW)))}
+    for name, text in (("reversal.csv", reversal(rng)), ("probe.csv", probe(rng)), ("ball_bar.csv", ball_bar(rng)),
+                       ("laser.csv", laser(rng)), ("rotary.csv", rotary(rng)), ("screw-start-X.csv", write_csv(zeros)),
+                       ("reversal.toml", REVERSAL), ("start.toml", START), ("probe.toml", PROBE),
+                       ("ball_bar.toml", BALL_BAR), ("bar-start.toml", BAR_START), ("laser.toml", LASER),
+                       ("screw-start.toml", SCREW_START), ("rotary.toml", ROTARY)):
         (folder / name).write_text(text)
 
 

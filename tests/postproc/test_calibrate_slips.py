@@ -1,0 +1,148 @@
+"""Slips of unit, sign and order in measurement files: each is told, and no model is written where it would be wrong."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import machines
+from machines.calibration.calibrate import calibrate
+from machines.geometric_error.exchange import save
+from machines.geometric_error.loader import load
+from postproc.cli import app
+from toolpaths.diagnostics import Severity
+
+SAMPLES = Path(__file__).parents[2] / "samples" / "calibration"
+Rows = Callable[[dict[str, float]], None]
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The samples with axis.toml, which start.toml takes in."""
+    folder = Path(shutil.copytree(SAMPLES, tmp_path_factory.mktemp("made") / "c"))
+    found, _ = calibrate(folder / "reversal.toml")
+    assert found is not None and found.model is not None
+    save(replace(found.model, name="axis"), folder)
+    return folder
+
+
+@pytest.fixture
+def folder(made: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(made, tmp_path / "c"))
+
+
+def text(old: str, new: str) -> Callable[[str], str]:
+    def change(content: str) -> str:
+        assert old in content
+        return content.replace(old, new)
+    return change
+
+
+def rows(change: Rows) -> Callable[[str], str]:
+    def changed(content: str) -> str:
+        note, head, *body = content.splitlines()
+        names = [cell.split(" [")[0] for cell in head.split(",")]
+        lines = []
+        for line in body:
+            row = dict(zip(names, map(float, line.split(",")), strict=True))
+            change(row)
+            lines.append(",".join(f"{v:.9g}" for v in row.values()))
+        return "\n".join([note, head, *lines, ""])
+    return changed
+
+
+def scaled(size: float, *names: str) -> Callable[[str], str]:
+    return rows(lambda row: row.update({name: size * row[name] for name in names}))
+
+
+def swapped(a: str, b: str) -> Callable[[str], str]:
+    return rows(lambda row: row.update({a: row[b], b: row[a]}))
+
+
+SLIPS = {
+    "bar in um": ("ball_bar.csv", text("distance [mm]", "distance [um]"), "calibrate.distance", "write distance [mm]"),
+    "bar's change": ("ball_bar.csv", rows(lambda r: r.update(distance=r["distance"] - 150.0)), "calibrate.distance",
+                     "not what it differs by"),
+    "X in inches": ("ball_bar.csv", text("X [mm]", "X [in]"), "calibrate.travel", "unit of X [in]"),
+    "centre": ("ball_bar.toml", text("-90.0]", "-80.0]"), "calibrate.place", "centre = [0.0119, -0.0200, -89.9920]"),
+    "tool": ("ball_bar.toml", text("tool_length = 90.0", "tool_length = 80.0"), "calibrate.place", "tool_length = 80"),
+    "bar 2 mm": ("ball_bar.csv", rows(lambda r: r.update(distance=r["distance"] + 2.0)), "calibrate.place",
+                 "2.003 mm too long"),
+    "probe in mm": ("probe.csv", text("[um]", "[mm]"), "error-model.large", "EC0Y is up to 1.735 degrees"),
+    "probe far": ("probe.csv", rows(lambda r: r.update(dz=r["dz"] + 5000.0)), "calibrate.place", "4.97 mm from where"),
+    "probe too small": ("probe.csv", scaled(1e-3, "dx", "dy", "dz"), "calibrate.unexplained", "explain little"),
+    "C turned round": ("probe.csv", scaled(-1.0, "C"), "calibrate.slip", "with C turned round only"),
+    "dx turned round": ("probe.csv", scaled(-1.0, "dx"), "calibrate.slip", "with dx turned round only"),
+    "all turned round": ("probe.csv", scaled(-1.0, "dx", "dy", "dz"), "calibrate.slip", "with all readings turned round"),
+    "dx for dy": ("probe.csv", swapped("dx", "dy"), "calibrate.slip", "with dx and dy changed over"),
+    "A in rad": ("probe.csv", text("A [deg]", "A [rad]"), "calibrate.travel", "unit of A [rad]"),
+    "laser in mm": ("laser.csv", text("reading [um]", "reading [mm]"), "error-model.large", "EXX is up to 10.56 mm"),
+    "laser too small": ("laser.csv", scaled(1e-3, "reading"), "calibrate.silent", "less than any noise"),
+    "laser absolute": ("laser.csv", rows(lambda r: r.update(reading=r["reading"] + 1e3 * r["X"])), "error-model.large",
+                       "actual less nominal"),
+    "way of nothing": ("laser.csv", text("X way", "x way"), "calibrate.column", "write X way"),
+    "way of 2": ("laser.csv", scaled(2.0, "X way"), "calibrate.row", "X way is 2"),
+    "way in mm": ("laser.csv", text("X way", "X way [mm]"), "calibrate.unit", "write X way alone"),
+    "reversal in degrees": ("reversal.csv", text("[arcsec]", "[deg]"), "error-model.large", "ECC is up to 9.982 degrees"),
+    "reversal too small": ("reversal.csv", scaled(1e-3, "reading"), "calibrate.silent", "less than any noise"),
+    "indexer the other way": ("reversal.toml", text("steps = 12", "steps = 12\nshifts = [0, 11, 10, 9]"), "calibrate.slip",
+                              "shifts = [0, 1, 2, 3]"),
+    "six in mm": ("rotary.csv", text("[um]", "[mm]"), "error-model.large", "EZC is up to 2.039 mm"),
+    "ex turned round": ("rotary.csv", scaled(-1.0, "ex"), "calibrate.slip", "with ex turned round"),
+    "ex for ey": ("rotary.csv", swapped("ex", "ey"), "calibrate.slip", "with ex and ey changed over"),
+    "set-ups backwards": ("rotary.csv", rows(lambda r: r.update(setup=2.0 - r["setup"])), "calibrate.slip",
+                          "set-ups in the other order"),
+}
+
+
+@pytest.mark.parametrize("name", SLIPS)
+def test_a_slip_is_told_and_gives_no_model(name: str, folder: Path) -> None:
+    file, change, code, words = SLIPS[name]
+    (folder / file).write_text(change((folder / file).read_text()))
+    source = folder / f"{file.split('.')[0]}.toml"
+    done = CliRunner().invoke(app, ["calibrate", str(source), "-o", str(folder / "out.toml")])
+    assert any(f"[{code}]" in line and words in line for line in done.stderr.splitlines()), done.stderr
+    assert done.exit_code == 1 and "nothing written" in done.stdout and not (folder / "out.toml").exists()
+
+
+@pytest.mark.parametrize("kind", ["reversal", "probe", "ball_bar", "laser", "rotary"])
+def test_good_files_are_not_suspected(kind: str, folder: Path) -> None:
+    found, diagnostics = calibrate(folder / f"{kind}.toml")
+    assert found is not None and found.model is not None
+    assert all(d.severity is Severity.INFO for d in diagnostics) and [d.code for d in diagnostics] == (
+        ["calibrate.hidden"] if kind == "rotary" else [])
+
+
+def test_what_is_large_is_taken_where_the_file_says_so(folder: Path) -> None:
+    """And the model that is written says so in its turn, so that it is read again."""
+    (folder / "probe.csv").write_text(rows(lambda r: r.update(dz=r["dz"] + 5000.0))((folder / "probe.csv").read_text()))
+    (folder / "laser.csv").write_text(text("[um]", "[mm]")((folder / "laser.csv").read_text()))
+    for name in ("probe", "laser"):
+        content = (folder / f"{name}.toml").read_text()
+        (folder / f"{name}.toml").write_text("large = true\n" + content.replace("sigma_um = 0.3", "sigma_um = 300"
+                                                                                if name == "laser" else "sigma_um = 0.3"))
+        done = CliRunner().invoke(app, ["calibrate", str(folder / f"{name}.toml"), "-o", str(folder / f"{name}-m.toml")])
+        assert done.exit_code == 0 and "warning" in done.stderr, done.stderr
+    model = load(folder / "laser-m.toml", machines.load("mikron-ucp710"))
+    assert model.large and np.abs(model.values).max() > 10.0
+    assert "large = true" in (folder / "laser-m.toml").read_text()
+    assert "large = true" not in (folder / "probe-m.toml").read_text()
+
+
+def test_doubt_that_is_stated_as_it_is_makes_a_rough_fit_good(folder: Path) -> None:
+    """Too little explained is refused at the stated doubt, and taken at the true one; the doubt found grows by as much."""
+    rng = np.random.default_rng(3)
+    noisy = rows(lambda r: r.update({k: r[k] + 200.0 * rng.normal() for k in ("dx", "dy", "dz")}))
+    (folder / "probe.csv").write_text(noisy((folder / "probe.csv").read_text()))
+    found, diagnostics = calibrate(folder / "probe.toml")
+    assert found is not None and found.model is None and [d.code for d in diagnostics] == ["calibrate.unexplained"]
+    (folder / "probe.toml").write_text((folder / "probe.toml").read_text().replace("sigma_um = 0.3", "sigma_um = 200.0"))
+    found, diagnostics = calibrate(folder / "probe.toml")
+    assert found is not None and found.model is not None and not diagnostics
+    assert found.figures["parameters"]["EX0C"]["sigma"] > 20.0
