@@ -11,17 +11,17 @@ from typing import Literal
 import numpy as np
 
 from machines.geometric_error.actual_map import part_side
-from machines.geometric_error.averages import Averaged, averaged, levels_of
+from machines.geometric_error.averages import Averaged, averaged
 from machines.geometric_error.axis_motion import effect
 from machines.geometric_error.bed_frame import bed_side
 from machines.geometric_error.covariance import angular, read_covariance
 from machines.geometric_error.csv_table import ANGLES, LENGTHS, UNITS, CsvTable, read_csv, read_text
-from machines.geometric_error.exports import MOST_DOUBT, joint_sense, leans
-from machines.geometric_error.lattice import COLUMNS
-from machines.geometric_error.lattice_file import COORDINATES, map_from_csv, zeroed, zeroed_covariance
+from machines.geometric_error.exports import joint_sense, leans
+from machines.geometric_error.lattice_file import COORDINATES, map_from_csv, zeroed
 from machines.geometric_error.model import ErrorModel
 from machines.geometric_error.names import DIRECTIONS, OWN, ErrorName, parse
-from machines.geometric_error.readings import by_iso_names, run_of, runs_as_rows, together, turned_back
+from machines.geometric_error.readings import by_iso_names, run_of, runs_as_rows, together, turned_back, unknown_columns
+from machines.geometric_error.scatter import with_scatter
 from machines.geometric_error.screw_tables import from_linuxcnc
 from machines.geometric_error.serial_errors import Component, Frame, SerialErrors
 from machines.geometric_error.sizes import too_large
@@ -30,8 +30,7 @@ from machines.geometric_error.tabulate import merged
 from machines.kinematics.serial import Serial
 from machines.machine import Machine
 from machines.user_file import nearest
-from toolpaths.arrays import Floats
-from toolpaths.diagnostics import Diagnostic, error, has_errors, info, warning
+from toolpaths.diagnostics import Diagnostic, error, has_errors, warning
 
 _SCREW = re.compile(r"([A-Z])=(.+)$")
 _NAMED = re.compile(r"(E[A-Z][A-Z])=(.+)$")
@@ -209,7 +208,7 @@ def _csv(table: CsvTable, machine: Machine, how: How) -> tuple[ErrorModel | None
         return _location(table, how)
     if model is None or read is None or not read.scatter:
         return model, found
-    model, told = _scattered(model, read, how.zero)
+    model, told = with_scatter(model, read, how.zero)
     return model, [*found, told]
 
 
@@ -227,35 +226,6 @@ def _averaged(table: CsvTable, places: list[str], how: How) -> Averaged | Fault:
 def _holes(table: CsvTable) -> bool:
     """True for two ways of files of their own, each without the other's values."""
     return any(np.isnan(values).any() for values in table.columns.values())
-
-
-def _scattered(model: ErrorModel, read: Averaged, zero: Mapping[str, float]) -> tuple[ErrorModel, Diagnostic]:
-    """The model with the doubt of its means."""
-    units = {name: UNITS["arcsec" if name[0] == "r" or name[1] in "ABC" else "um"] for name in read.scatter}
-    spread = ", ".join(f"{name} {value / units[name]:.3g}" for name, value in read.scatter.items())
-    told = info("error-import.averaged", f"{read.rows} readings at {len(read.table)} places; standard deviation "
-                f"of one: {spread} (um, arcsec)", file=read.table.file)
-    if len(model.names) > MOST_DOUBT:
-        return model, replace(told, message=f"{told.message}; the doubt of {len(model.names)} values is not written")
-    covariance = np.diag(_variances(model, read))
-    if model.map is not None and zero:
-        covariance = zeroed_covariance(covariance, model.map, zero)
-    return replace(model, covariance=covariance), told
-
-
-def _variances(model: ErrorModel, read: Averaged) -> Floats:
-    """(P,) of the means: those of a lattice by node, those of an axis by row and way."""
-    if model.map is not None:
-        whole = [len(levels_of(read.table.columns[letter])[0]) for letter in model.map.letters]
-        inner = tuple(slice(len(nodes)) for nodes in model.map.nodes)  # less the end of a period
-        parts = [read.variance(c) for c in COLUMNS]
-        return np.stack([part.reshape(whole)[inner].ravel() for part in parts], axis=1).ravel()
-    found = []
-    for component in model.axes.components:
-        ways = [c for c in (f"{component.name}+", f"{component.name}-", str(component.name)) if c in read.runs]
-        rows = len(component.curve.values) // len(ways)
-        found += [read.variance(c)[:rows] for c in ways]
-    return np.concatenate(found)
 
 
 def _map(table: CsvTable, machine: Machine, how: How) -> tuple[ErrorModel | None, list[Diagnostic]]:
@@ -338,13 +308,10 @@ def _names(table: CsvTable, letter: str) -> tuple[list[ErrorName], list[Diagnost
 
 def _location(table: CsvTable, how: How) -> tuple[ErrorModel | None, list[Diagnostic]]:
     """Location errors: one row, a column each."""
-    found, constants = [], {}
+    found, constants = unknown_columns(table), {}
     for column, values in table.columns.items():
         name = parse(column)
         if name is None or not name.location:
-            found.append(error("error-import.columns", f"column {column[:40]!r} is neither the position of an axis, nor a "
-                               "coordinate or value of a map, nor a location error", file=table.file, lines=[table.head],
-                               hint="write e.g. X [mm], EXX [um]; or X [mm], dx [um], dy [um], dz [um]; or EC0Y [arcsec]"))
             continue
         known = ANGLES if name.angular else LENGTHS
         if table.unit[column] not in known:

@@ -7,13 +7,15 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 
 from machines.geometric_error.csv_table import LENGTHS, CsvTable
-from machines.geometric_error.names import ErrorName
+from machines.geometric_error.names import ErrorName, parse
 from machines.geometric_error.table_curves import CLOSES, Fault
 from toolpaths.arrays import Floats
+from toolpaths.diagnostics import Diagnostic, error
 
 POSITIONS = ("target", "position", "nominal", "sollposition")
 """columns of positions, besides the letter of the axis, in a table whose component is named outside"""
@@ -139,3 +141,17 @@ def _belongs(table: CsvTable, group: Sequence[CsvTable], average: bool) -> bool:
         return False
     shared = {run_of(n)[0].rstrip("+-") for n in values} & {run_of(n)[0].rstrip("+-") for n in there}
     return bool(shared) and (average or not values & {*there})
+
+
+def unknown_columns(table: CsvTable) -> list[Diagnostic]:
+    """Columns that are nothing, of a table without positions of an axis."""
+    columns = [column for column in table.columns if not ((name := parse(column)) and name.location)]
+    if not columns:
+        return []
+    laser = any(column.casefold() in POSITIONS for column in columns)
+    what = "columns " * (len(columns) > 1) + ", ".join(repr(column[:40]) for column in columns[:4])
+    more = " ..." * (len(columns) > 4)
+    return [error("error-import.columns", f"{what}{more}: neither positions of an axis, nor coordinates or values of a map, "
+                  "nor location errors", file=table.file, lines=[table.head],
+                  hint=f"positions and runs of one error are imported as e.g. EXX={Path(table.file).name}" if laser else
+                  "write e.g. X [mm], EXX [um]; or X [mm], dx [um], dy [um], dz [um]; or EC0Y [arcsec]")]

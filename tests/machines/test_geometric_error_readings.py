@@ -165,6 +165,8 @@ FAULTS = [
     ("near of another axis", {"a.csv": ROWS}, How(average=True, near={"Y": 0.1}), "error-import.unused", "",
      "near positions of Y"),
     ("near of no readings", {"a.csv": WAYS + "0,1,2\n9,1,3\n"}, How(near={"X": 0.1}), "error-import.unused", "", "near"),
+    ("a laser without a name", {"a.csv": "Position [mm],run 1 [um],run 2 [um]\n0,1,2\n9,1,2\n"}, How(average=True),
+     "error-import.columns", "a.csv:1", "imported as e.g. EXX=a.csv"),
     ("one run twice", {"a.csv": "X [mm],EXX+1 [um],EXX 1+ [um]\n0,1,2\n9,1,3\n"}, How(average=True), "error-import.column",
      "a.csv:1", "'EXX 1+' is EXX+1 again"),
     ("blank constant", {"a.csv": "EC0Y [arcsec],EA0Y [arcsec]\n1,\n"}, How(average=True), "error-table.row", "a.csv:2",
