@@ -6,23 +6,20 @@ follows from the ways of its axes, and these from the words before and the words
 those are taken that bring it nearest: by the ways that the words themselves make, by other ways, by last decimals beside.
 Ways by which the next block does not begin count a little: it would first take up what they are off by. So do, where words
 are axis positions, steps back by less than an axis loses: who takes the way of an axis for the sign of its last step sees
-another machine there.
+another machine there. For long programs `walk_loop` does the same compiled.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
 from itertools import product
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
+from postproc.corrected import walk_loop
 from toolpaths.arrays import Bools, Floats, Ints
 
-ENOUGH = 20_000
-"""blocks from which on the compiled walk pays"""
 PLAIN, BETWEEN = 0.05, 0.25
 """weight of what the tip is off by on a machine whose ways are the signs of the last steps; between points of the CL file"""
 RESTS = 1e-9
@@ -78,27 +75,13 @@ class Ends:
 
 def walk(ends: Ends) -> tuple[Floats, Floats]:
     """Steps (K, 3) of whole last decimals to add to the words X, Y, Z of blocks, and the ways (K, T) at their ends then."""
-    run = _compiled() if len(ends.off) >= ENOUGH or _compiled.cache_info().currsize else _walk
-    steps, ways = run(*vars(ends).values())
+    columns = vars(ends).values()
+    if walk_loop.wanted(len(ends.off)):
+        settings = np.array([PLAIN, BETWEEN]), RESTS, NEARER, np.array(REACH)
+        steps, ways = walk_loop.compiled()(*map(np.ascontiguousarray, columns), *settings)
+    else:
+        steps, ways = _walk(*columns)
     return steps, ways
-
-
-@cache
-def _compiled() -> Callable[..., Any]:
-    """The same functions compiled; the module's helpers are replaced, so that compiled code calls compiled code."""
-    from numba import njit
-
-    for name in ("_ended", "_costs", "_nearest", "_toward", "_by_ways", "_beside"):
-        globals()[name] = _kept(njit, globals()[name])
-    return _kept(njit, _walk)
-
-
-def _kept(njit: Any, function: Callable[..., Any]) -> Callable[..., Any]:
-    """Compiled when first called; kept on disk where the package's folder can be written."""
-    try:
-        return cast(Callable[..., Any], njit(function, cache=True))
-    except RuntimeError:
-        return cast(Callable[..., Any], njit(function))
 
 
 def _walk(off: Any, by_way: Any, tip_rates: Any, back: Any, gap: Any, bend: Any, last: Any, later: Any, goes_on: Any,
@@ -108,11 +91,11 @@ def _walk(off: Any, by_way: Any, tip_rates: Any, back: Any, gap: Any, bend: Any,
     way, shifted = np.zeros(lossy), np.zeros(lossy)
     for k in range(blocks):
         start = np.minimum(np.maximum(way - 2.0 * shifted / gap[k] + bend[0, k], bend[1, k]), bend[2, k]) + last[k]
-        turned = np.ascontiguousarray(back[k].T)
+        turned = back[k].T
         n = np.zeros((1, 3))
         if free[k].any():
             weighed = 0.0 if not plain[k] else BETWEEN if enough[k] <= near[k] else PLAIN
-            rates, swayed = np.ascontiguousarray(tip_rates[k].T), np.ascontiguousarray(by_way[k].T)
+            rates, swayed = tip_rates[k].T, by_way[k].T
             case = (start, turned, rates, off[k], swayed, gap[k], goes_on[k], weight[k], later[:, k], free[k], way, weighed,
                     np.linalg.inv(rates))
             cost = _costs(n, case)[0]
@@ -172,7 +155,7 @@ def _toward(n: Any, cost: Any, case: Any) -> Any:
 def _by_ways(n: Any, cost: Any, case: Any) -> Any:
     """The nearest steps for every way that is one of both or that before, where that comes nearer than n (1, 3)."""
     lossy = len(case[5])
-    ways = np.ascontiguousarray(WAYS[:3 ** lossy, :lossy] + case[10] * STAYS[:3 ** lossy, :lossy])
+    ways = WAYS[:3 ** lossy, :lossy] + case[10] * STAYS[:3 ** lossy, :lossy]
     others = _nearest(case[3] + ways @ case[4], case)
     costs = _costs(others, case)
     k = np.argmin(costs)

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import importlib.util
 import re
-import sys
 from dataclasses import replace
 from pathlib import Path
-from types import ModuleType
 
 import numpy as np
 import pytest
@@ -15,6 +12,7 @@ import pytest
 import postproc
 import toolpaths
 from postproc.corrected import walk as walking
+from postproc.corrected import walk_loop
 from postproc.corrected.proof import after_formatting
 from postproc.corrected.walk import Ends
 from postproc.options import Options
@@ -63,26 +61,18 @@ def random_ends(rng: np.random.Generator, blocks: int, lossy: int, near: float, 
                 like=np.full(blocks, -1) if single else likes)
 
 
-def plain_walk() -> ModuleType:
-    """The module once more, of which nothing is compiled."""
-    spec = importlib.util.spec_from_file_location("plain_walk", str(walking.__file__))
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules["plain_walk"] = module
-    spec.loader.exec_module(module)
-    return module
-
-
 def steps_of(ends: Ends) -> Floats:
     """(K, 3) of the plain walk."""
-    return np.asarray(plain_walk().walk(ends)[0])
+    return np.asarray(walking._walk(*vars(ends).values())[0])
 
 
-@pytest.mark.parametrize("lossy", [1, 3])
-def test_the_compiled_walk_is_the_plain_one(lossy: int) -> None:
-    ends = random_ends(np.random.default_rng(lossy), 40, lossy, 8.7e-5)
-    plain, ways = (np.asarray(x) for x in plain_walk()._walk(*vars(ends).values()))
-    fast = walking._compiled()(*vars(ends).values())
+@pytest.mark.parametrize("lossy", [1, 2, 3])
+def test_the_compiled_walk_is_the_plain_one(lossy: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    ends = random_ends(np.random.default_rng(lossy), 400, lossy, 8.7e-5)
+    plain, ways = (np.asarray(x) for x in walking._walk(*vars(ends).values()))
+    monkeypatch.setattr(walk_loop, "COMPILE_FROM", 400)
+    fast = walking.walk(ends)
+    assert walk_loop.wanted(1)
     np.testing.assert_array_equal(fast[0], plain)
     np.testing.assert_allclose(fast[1], ways, rtol=0.0, atol=1e-12)  # sums of other order
     assert np.abs(ways).max() == 1.0 and (np.abs(ways) < 1.0).any()
