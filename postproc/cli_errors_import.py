@@ -64,6 +64,7 @@ def import_(sources: Sources, machine: MachineName, output: Output, into: Into =
         model, told = required(read, found), [f"read: {', '.join(files_of)}"]
         found += [*beyond_travel(model, m, str(output)), *unmeasured(model, m, str(output))]
         if covariance is not None:
+            told += [f"the doubt is that of {covariance.name}, not of the scatter"] if model.covariance is not None else []
             model = required(*with_covariance(model, covariance))
         if into is not None:
             model, lost = merged_into(model, into, m)

@@ -121,13 +121,14 @@ def _unused(how: How, model: ErrorModel) -> list[Diagnostic]:
     """What was asked for and concerns none of the sources."""
     letters = {c.name.axis for c in model.axes.components} if model.map is None else set(model.map.letters)
     asked = [f"{letter} repeats" for letter in how.periods if letter not in letters]
-    asked += [f"near positions of {letter}" for letter in how.near if letter not in letters or not how.average]
+    asked += [f"near positions of {letter}" for letter in how.near if letter not in letters]
     if model.map is None:
         given = {"tool length": how.tool_length, "zero": how.zero, "directions of the machine": how.directions == "machine"}
         asked += [f"a map's {what}" for what, value in given.items() if value]
     elif how.rule == "spline":
         asked.append("splines")
-    return [error("error-import.unused", f"no source takes that {what}" if "repeats" in what else f"no source takes {what}",
+    alone = [error("error-import.unused", "near positions are those of readings", hint="give --average too")]
+    return alone * bool(how.near and not how.average) + [error("error-import.unused", f"no source takes that {what}" if "repeats" in what else f"no source takes {what}",
                   hint="leave it out, or add what it is for") for what in asked]
 
 

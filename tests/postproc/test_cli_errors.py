@@ -231,6 +231,16 @@ def test_import_tells_ranges_that_are_none_of_the_machine(tmp_path: Path) -> Non
             assert told in run(*command, "-m", "mill-3axis").stderr
 
 
+def test_a_covariance_that_is_given_counts_before_the_scatter(tmp_path: Path) -> None:
+    (tmp_path / "x.csv").write_text("X [mm],EXX [um]\n-500,0\n-500,2\n500,4\n500,6\n")
+    (tmp_path / "c.csv").write_text("p,EXX[0],EXX[1]\nEXX[0],9,1\nEXX[1],1,4\n")
+    done = run("import", tmp_path / "x.csv", "-m", "mill-3axis", "-o", tmp_path / "e.toml", "--average", "--covariance",
+               tmp_path / "c.csv")
+    assert "the doubt is that of c.csv, not of the scatter" in done.stdout
+    model = load(tmp_path / "e.toml", machines.load("mill-3axis"))
+    assert model.covariance is not None and model.covariance * 1e6 == pytest.approx(np.array([[9.0, 1.0], [1.0, 4.0]]))
+
+
 def test_sample_readings_become_models(tmp_path: Path) -> None:
     run("import", SAMPLES / "runs-mill-3axis-X.csv", "-m", "mill-3axis", "-o", tmp_path / "x.toml", "--average")
     found = load(tmp_path / "x.toml", machines.load("mill-3axis"))
