@@ -127,9 +127,11 @@ def _unused(how: How, model: ErrorModel) -> list[Diagnostic]:
         asked += [f"a map's {what}" for what, value in given.items() if value]
     elif how.rule == "spline":
         asked.append("splines")
-    alone = [error("error-import.unused", "near positions are those of readings", hint="give --average too")]
-    return alone * bool(how.near and not how.average) + [error("error-import.unused", f"no source takes that {what}" if "repeats" in what else f"no source takes {what}",
-                  hint="leave it out, or add what it is for") for what in asked]
+    found = [error("error-import.unused", f"no source takes {'that ' * ('repeats' in what)}{what}",
+                   hint="leave it out, or add what it is for") for what in asked]
+    if how.near and not how.average:
+        found.append(error("error-import.unused", "near positions are those of readings", hint="give --average too"))
+    return found
 
 
 def _twice(part: ErrorModel, places: dict[str, str], source: str) -> list[Diagnostic]:
