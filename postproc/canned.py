@@ -20,13 +20,19 @@ STATES_RETRACT = ("{retract}", "{second}")
 """one of them stands in cycles that state the level they retract to"""
 
 
+_BACK_TO_THE_FIRST = ("linuxcnc", "iso")
+"""writers for controls that, before a hole which ends at the first level of its sequence, bring a tool that stands at the
+plane of the hole to that level on the way there (see `readback.cycles.legs`)"""
+
+
 def holes_of(toolpath: Toolpath, moves: Moves, path: Path, words: WordRows, control: Control,
              controller: ControllerFile, skip: Bools) -> tuple[Bools, list[Hole]]:
     """Blocks of holes that the controller can drill by itself, and the holes; not among blocks that a switch may `skip`.
 
     Native where the tool stands along Z of the words, the kind is in the controller's table and the way out ends at
     the clearance plane, at the level that the tool came from, or at one that the cycle states. Cycles that feed out and then
-    rise higher end at the clearance plane, the rest is a rapid behind them.
+    rise higher end at the clearance plane, the rest is a rapid behind them. Controls of `_BACK_TO_THE_FIRST` go back to the
+    first level of a sequence only from there.
     """
     native = np.zeros(len(path), dtype=bool)
     holes: list[Hole] = []
@@ -47,10 +53,14 @@ def holes_of(toolpath: Toolpath, moves: Moves, path: Path, words: WordRows, cont
         first += _before_own_level(moves, path, words, z, first, last)
         level = float(words.start[first, z]) if first > 0 else np.inf
         initial = before_initial if previous_last == first - 1 else level
+        low = controller.writer in _BACK_TO_THE_FIRST and level < initial - 1e-9
         key = cycle_key(toolpath.cycles[int(moves.cycle[path.move[first]])].kind, int(turning[moves.row[path.move[first]]]))
         if not _states_retract(controller, key):
-            last -= _rises_beyond(moves, path, words, z, first, last, initial + _slack(path, controller, first))
+            slack = _slack(path, controller, first)
+            last -= _rises_beyond(moves, path, words, z, first, last, -np.inf if low else initial + slack)
         found = _hole(toolpath, moves, path, words, control, controller, int(first), int(last), initial, key)
+        if low and found is not None and found.retract > found.plane_level:
+            continue
         if found is not None and allowed[first:last + 1].all():
             before_initial, previous_last = initial, last
             holes.append(found)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
@@ -16,20 +15,20 @@ Leg = tuple[int, Floats, float, float]
 EPSILON = 1e-9
 
 
-Rise = Literal["before", "aslant", "after"]
-"""when a tool below the plane rises to it: before it travels to the hole, on the way, or above the hole"""
-
-
-def legs(drill: Drill, start: Floats, target: Floats, z: int, rise: Rise = "after") -> list[Leg]:
+def legs(drill: Drill, start: Floats, target: Floats, z: int, first: float | None = None) -> list[Leg]:
     """The legs from `start` (J,) over the hole, whose place is that of `target` (J,), to the level where the cycle ends.
 
-    `z` is the column of the tool's axis.
+    `z` is the column of the tool's axis. `first`: the level where the sequence of cycles began, on controls that leave the
+    level of the last hole on the way: where it is below the plane they first go to the plane; from there or lower they
+    travel aslant to where the cycle ends (LinuxCNC 2.9, as its interpreter shows). Others travel at the level where the
+    tool stands.
     """
     level, result, nothing = float(start[z]), [], float("nan")
-    if level < drill.plane - EPSILON and rise == "before":
-        result.append((0, _at(start, z, drill.plane), nothing, 0.0))
-    if level < drill.plane and rise != "after":
-        level = drill.plane
+    if first is not None:
+        if first < drill.plane - EPSILON and abs(level - drill.plane) > EPSILON:
+            level = drill.plane
+            result.append((0, _at(start, z, level), nothing, 0.0))
+        level = level if level > drill.plane + EPSILON else drill.out
     over = _at(target, z, level)
     if (over != (result[-1][1] if result else start)).any():
         result.append((0, over, nothing, 0.0))

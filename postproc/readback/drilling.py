@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from postproc.readback.canonical import Canonical, Drill
-from postproc.readback.cycles import Leg, Rise, Sticky, legs
+from postproc.readback.cycles import Leg, Sticky, legs
 from postproc.readback.rows import Section, State
 from postproc.word_arcs import PLANE_AXIS
 from toolpaths.arrays import Bools, Floats, Ints
@@ -40,8 +40,7 @@ def spell_holes(state: State, moving: Bools, drilling: Ints, code: Canonical, fi
         else:
             k = int(np.searchsorted(motion_lines, n)) - 1
             fresh = previous < 0 or k < 0 or motion_lines[k] != previous
-            fresh = fresh or _broken(section, previous, n, offsets.rises_first)
-            if fresh:
+            if fresh or _broken(section, previous, n):
                 sticky.enter(level)
             drill = _sticky(state, sticky, n, z, code, file, found)
             times = section.repeats[n]
@@ -49,17 +48,17 @@ def spell_holes(state: State, moving: Bools, drilling: Ints, code: Canonical, fi
                 found.append(error("gcode.cycle", f"a cycle that is repeated {times:g} times", file=file,
                                    lines=[int(code.line[n + section.first])], hint="1 or more, a whole number"))
             elif drill is not None:
-                spelt[n] = _repeated(state, n, drill, begun, target, z, fresh)
+                spelt[n] = _repeated(state, n, drill, begun, target, z, sticky.initial)
         out = float(spelt[n][-1][1][z]) if n in spelt else level
         state.columns[n, z] = out
         previous = n
     return spelt
 
 
-def _broken(section: Section, previous: int, n: int, nist: bool) -> bool:
-    """True where a code of motion, or a G80 where the control counts it, stands between two blocks of cycles."""
+def _broken(section: Section, previous: int, n: int) -> bool:
+    """True where a code of motion or a G80 stands between two blocks of cycles."""
     between = section.motion[previous + 1:n]
-    return bool((between < 73).any() or (not nist and (between == 80).any()))
+    return bool(((between < 73) | (between == 80)).any())
 
 
 def _sticky(state: State, sticky: Sticky, n: int, z: int, code: Canonical, file: str,
@@ -73,15 +72,15 @@ def _sticky(state: State, sticky: Sticky, n: int, z: int, code: Canonical, file:
                         section.level[n] == 99, relative, file, int(code.line[n + section.first]), found)
 
 
-def _repeated(state: State, n: int, drill: Drill, begun: Floats, target: Floats, z: int, fresh: bool) -> list[Leg]:
-    """The cycle of one block, as often as it is repeated, each a step further."""
+def _repeated(state: State, n: int, drill: Drill, begun: Floats, target: Floats, z: int, first: float) -> list[Leg]:
+    """The cycle of one block, as often as it is repeated, each a step further; `first`: see `legs`."""
     times = int(state.section.repeats[n]) if np.isfinite(state.section.repeats[n]) else 1
     step = np.nan_to_num(state.steps[n]) / max(times, 1)
     step[z] = 0.0
     result: list[Leg] = []
     for k in range(times):
-        rise: Rise = "after" if not state.offsets.rises_first else "before" if fresh and k == 0 else "aslant"
-        result += legs(drill, result[-1][1] if result else begun, target - (times - 1 - k) * step, z, rise)
+        result += legs(drill, result[-1][1] if result else begun, target - (times - 1 - k) * step, z,
+                       first if state.offsets.rises_first else None)
     return result
 
 

@@ -89,8 +89,8 @@ class Offsets:
     """What the control holds: work offset (J,) in machine coordinates, column of Z, tool lengths by register.
 
     `control` is needed where a program uses laws of its own; `rises_first`: a canned cycle brings a tool that is below its
-    plane up before it travels, and G80 does not end a sequence (RS274/NGC), else above the hole; `arc_slack`: mm by which
-    the radius may differ between the ends of an arc.
+    plane, or below the level where the cycle ends, up before it is over the hole (RS274/NGC, see `cycles.legs`);
+    `arc_slack`: mm by which the radius may differ between the ends of an arc.
     """
 
     work: Floats

@@ -88,3 +88,13 @@ def test_cycles_on_a_head_at_an_angle_are_single_moves() -> None:
     steps = execute(result)
     tips = [p[0] for s, p in zip(steps, tool_poses(result, steps), strict=True) if s.kind == "feed"]
     assert np.allclose(tips[-1][-1], np.array([10, 0, 0]) - 12 * axis, atol=1e-3)
+
+
+@pytest.mark.parametrize("between", [[], ["COOLNT/FLOOD"], ["DELAY/1"]])
+@pytest.mark.parametrize("controller", ["linuxcnc", "generic-iso"])
+def test_no_cycle_goes_back_to_a_first_level_that_the_tool_has_left(between: list[str], controller: str) -> None:
+    """From the plane of the hole before, LinuxCNC would go aslant to that level, and after a G80 it is none any more."""
+    got = cycle("CYCLE/DRILL,DEPTH,5,MMPM,100,CLEAR,3", "GOTO/10,0,0", *between,
+                "CYCLE/DRILL,DEPTH,5,MMPM,100,RAPTO,3,RTRCTO,50", "GOTO/20,0,0", "GOTO/30,0,0", controller=controller)
+    assert [b.replace(".", "").split(" F")[0] for b in got if b.startswith("G")] == [
+        "G99 G81 X10 Y0 Z-5 R3", "G80", "G98 G81 X30 Y0 Z-5 R3", "G80"]
