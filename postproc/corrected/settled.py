@@ -18,6 +18,8 @@ from postproc.path import ARC, FEED, TRAVERSE, Path
 from postproc.word_arcs import PLANE_COLUMNS
 from toolpaths.arrays import Floats, Ints
 
+AT_ONCE = 50_000
+"""blocks whose rates are found together"""
 PARTS = 16
 """parts of a block whose joints do not run straight, for the ways of its axes"""
 NOISE = 1e-3
@@ -177,25 +179,40 @@ class _Written:
 
     def _rates(self, k: Ints, counts: Ints) -> tuple[Floats, Floats, Floats, Floats]:
         """back, tip_rates, off, by_way of `Ends`, 0 but for the blocks k (N,); the tip counts at those of `counts` (K,)."""
-        path, work, at = self.path, self.work, counts[k]
-        lossy, size = len(work.two_way), len(path)
+        lossy, size, until = len(self.work.two_way), len(self.path), self.made.until
         back, tip_rates = np.zeros((size, lossy, 3)), np.zeros((size, 3, 3))
         off, by_way = np.zeros((size, 3)), np.zeros((size, 3, lossy))
-        owner = self.made.owner[at]
+        for first in range(0, len(k), AT_ONCE):
+            rows = k[first:first + AT_ONCE]
+            at = counts[rows]
+            back[rows], tip_rates[rows] = self._moved(at)
+            off[rows], by_way[rows] = self._left(at, until[at])
+        return back, tip_rates, off, by_way
+
+    def _moved(self, at: Ints) -> tuple[Floats, Floats]:
+        """back (N, T, 3) and tip_rates (N, 3, 3) of `Ends` at blocks (N,)."""
+        path, work, owner = self.path, self.work, self.made.owner[at]
+        back, rates = np.zeros((len(at), len(work.two_way), 3)), np.zeros((len(at), 3, 3))
         here = work.poses(self.q[at], owner)[0]
         for i, column in enumerate(path.frames[0].control.xyz.tolist()):
             beside = self.words[at]
             beside[:, column] += self.writing.grain[column]
             moved = self.writing.joints(path, beside, at)
-            back[k, :, i] = (moved - self.q[at])[:, work.two_way]
-            tip_rates[k, :, i] = work.poses(moved, owner)[0] - here
-        wanted, way = work.nominal(owner, self.made.until[at]), np.zeros((len(k), path.q.shape[1]))
-        off[k] = work.residual(wanted, self.q[at], owner, way)[:, :3]
+            back[:, :, i] = (moved - self.q[at])[:, work.two_way]
+            rates[:, :, i] = work.poses(moved, owner)[0] - here
+        return back, rates
+
+    def _left(self, at: Ints, until: Floats) -> tuple[Floats, Floats]:
+        """off (N, 3) and by_way (N, 3, T) of `Ends` at blocks (N,), `until` (N,) of the time of theirs in `work`."""
+        work, owner = self.work, self.made.owner[at]
+        wanted, way = work.nominal(owner, until), np.zeros((len(at), self.q.shape[1]))
+        off = work.residual(wanted, self.q[at], owner, way)[:, :3]
+        by_way = np.zeros((len(at), 3, len(work.two_way)))
         for i, j in enumerate(work.two_way):
             forward = way.copy()
             forward[:, j] = 1.0
-            by_way[k, :, i] = work.residual(wanted, self.q[at], owner, forward)[:, :3] - off[k]
-        return back, tip_rates, off, by_way
+            by_way[:, :, i] = work.residual(wanted, self.q[at], owner, forward)[:, :3] - off
+        return off, by_way
 
 
 def _runs(pieces: Iterable[Floats]) -> tuple[Floats, Floats, Floats]:
