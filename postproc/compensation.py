@@ -147,19 +147,20 @@ def _written_out(corrected: Path, path: Path, work: Work, writing: Writing,
                  allowed: float) -> tuple[Divided, Path, Bools, float]:
     """The blocks with points between them, their path in words that stand where they should, arcs that became lines, and rad
     left of the axis; anew where words take ends farther."""
-    for again in reversed(range(MOVED)):
+    again = MOVED
+    while True:
         starts = starts_of(corrected, path, work, allowed)
         fitted, resolved = fitted_arcs(corrected, path, work, starts.q, allowed, float(writing.grain.min()))
         whole = divided(fitted, work, starts, allowed)
         written, axis_left, ways = settled(whole, work, writing, allowed)
         ends = np.flatnonzero(np.append(whole.owner[1:] != whole.owner[:-1], True))
         far = np.flatnonzero(np.abs(written.q[ends] - fitted.q).max(axis=1, initial=0.0) > allowed)
+        again -= 1
         if not (again and len(far)):
-            break
+            return whole, written, resolved, axis_left
         corrected.q[far] = written.q[ends[far]]
         work.way[far[:, None], work.two_way] = ways[ends[far]]
         del starts, fitted, whole, written, ways  # not to be held beside the next
-    return whole, written, resolved, axis_left
 
 
 def _before_inside(path: Path, work: Work, where: Bools) -> Floats:

@@ -207,7 +207,7 @@ class Work:
         return changes(q1 - q0, self.detail)
 
     def reached(self) -> tuple[Floats, Floats]:
-        """(K, J) least and greatest joints of blocks: at the end; where joints do not run straight on the way; and where cuts
+        """(K, J) least and greatest joints of blocks: at the end; where joints do not run straight on the way; where cuts
         begin that a linking move leads to."""
         low, high = self.path.q.copy(), self.path.q.copy()
         cuts = np.flatnonzero((self.path.code[1:] != TRAVERSE) & np.isnan(self.path.u[:-1]) & ~self.path.home[:-1]) + 1
