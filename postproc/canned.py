@@ -43,8 +43,8 @@ def holes_of(toolpath: Toolpath, moves: Moves, path: Path, words: WordRows, cont
     hole = np.where(np.isnan(path.u), -1, moves.hole[path.move])
     turning = spindle_states(toolpath)[0]
     change = np.flatnonzero(np.diff(hole)) + 1
-    before_initial = 0.0
-    previous_last = -2
+    switched = {e.index for e in toolpath.events}
+    before_initial, previous_last, cut = 0.0, -2, False
     for first, last in zip([0, *change], [*(change - 1), len(path) - 1], strict=True):
         if hole[first] < 0:
             continue
@@ -53,13 +53,16 @@ def holes_of(toolpath: Toolpath, moves: Moves, path: Path, words: WordRows, cont
         first += _before_own_level(moves, path, words, z, first, last)
         level = float(words.start[first, z]) if first > 0 else np.inf
         initial = before_initial if previous_last == first - 1 else level
-        low = controller.writer in _BACK_TO_THE_FIRST and level < initial - 1e-9
+        # A command before the hole ends the sequence: what the control takes for its first level then is where the tool is.
+        low = level < initial - 1e-9
+        cut = previous_last == first - 1 and (cut or (low and int(moves.row[path.move[first]]) in switched))
+        low = cut or (low and controller.writer in _BACK_TO_THE_FIRST)
         key = cycle_key(toolpath.cycles[int(moves.cycle[path.move[first]])].kind, int(turning[moves.row[path.move[first]]]))
         if not _states_retract(controller, key):
             slack = _slack(path, controller, first)
             last -= _rises_beyond(moves, path, words, z, first, last, -np.inf if low else initial + slack)
         found = _hole(toolpath, moves, path, words, control, controller, int(first), int(last), initial, key)
-        if low and found is not None and found.retract > found.plane_level:
+        if low and found is not None and found.retract > found.plane_level and not _states_retract(controller, key):
             continue
         if found is not None and allowed[first:last + 1].all():
             before_initial, previous_last = initial, last

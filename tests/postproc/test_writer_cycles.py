@@ -98,3 +98,14 @@ def test_no_cycle_goes_back_to_a_first_level_that_the_tool_has_left(between: lis
                 "CYCLE/DRILL,DEPTH,5,MMPM,100,RAPTO,3,RTRCTO,50", "GOTO/20,0,0", "GOTO/30,0,0", controller=controller)
     assert [b.replace(".", "").split(" F")[0] for b in got if b.startswith("G")] == [
         "G99 G81 X10 Y0 Z-5 R3", "G80", "G98 G81 X30 Y0 Z-5 R3", "G80"]
+
+
+@pytest.mark.parametrize("controller", ["fanuc-30i", "haas-ngc"])
+def test_a_command_between_holes_ends_the_first_level_too(controller: str) -> None:
+    """G80 stands before the command: what the control takes for its first level then is the plane where the tool is."""
+    got = cycle("CYCLE/DRILL,DEPTH,5,MMPM,100,CLEAR,3", "GOTO/10,0,0", "COOLNT/FLOOD",
+                "CYCLE/DRILL,DEPTH,5,MMPM,100,RAPTO,3,RTRCTO,50", "GOTO/20,0,0", "GOTO/30,0,0", controller=controller)
+    assert [b.split(" Z")[0] for b in got if b.startswith("G9")] == ["G99 G81 X10. Y0.", "G98 G81 X30. Y0."]
+    got = cycle("CYCLE/DRILL,DEPTH,5,MMPM,100,CLEAR,3", "GOTO/10,0,0",
+                "CYCLE/DRILL,DEPTH,5,MMPM,100,RAPTO,3,RTRCTO,50", "GOTO/20,0,0", controller=controller)
+    assert [b.split(" Z")[0] for b in got if b.startswith("G9")] == ["G99 G81 X10. Y0.", "G98 G81 X20. Y0."]
