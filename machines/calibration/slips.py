@@ -25,6 +25,8 @@ BETTER = 3.0
 """times less is left, for a slip to be named"""
 ALIKE = 1.1
 """times what the best of them leaves: slips that cannot be told from it"""
+TURNED = 1e-6
+"""of a direction: a table frame that never turns"""
 ROWS = 400
 """of a table that slips are looked for in"""
 PAIRS = ((0, 1), (1, 2), (0, 2))
@@ -35,7 +37,8 @@ def machine_slip(start: ErrorModel, kinematics: Kinematics, measured: Measuremen
     some = np.unique(np.linspace(0, len(measured.q) - 1, ROWS).astype(np.int64))
     part = replace(measured, q=measured.q[some], read=measured.read[some],
                    ways=None if measured.ways is None else measured.ways[some])
-    tried = ((words, _left(fit(start, kinematics, other, wanted).result)) for words, other in _others(part, kinematics))
+    others = [*_others(part, kinematics), *_other_directions(part, start, kinematics)]
+    tried = ((words, _left(fit(start, kinematics, other, wanted).result)) for words, other in others)
     return _best(_left(fit(start, kinematics, part, wanted).result), tried)
 
 
@@ -55,6 +58,21 @@ def _others(m: Measurements, kinematics: Kinematics) -> Iterable[tuple[str, Meas
             yield f"with d{x} turned round", replace(m, read=m.read * (1.0 - 2.0 * np.eye(3)[k]))
         for a, b in PAIRS:
             yield f"with d{'xyz'[a]} and d{'xyz'[b]} changed over", replace(m, read=m.read[:, _swapped(3, a, b)])
+
+
+def _other_directions(m: Measurements, start: ErrorModel, kinematics: Kinematics) -> Iterable[tuple[str, Measurements]]:
+    """Readings along x, y, z of the machine, turned to those of the table frame by the motion that the slides give the tip."""
+    if m.kind != "position":
+        return
+    actual = start.zero().on(kinematics)
+    w = actual.coordinates(m.q)
+    level = w.copy()
+    level[:, 3:] = 0.0
+    slides, straight = actual.rates(w)[:, :3, :3], actual.rates(level)[:, :3, :3]
+    turn = slides @ np.linalg.inv(straight)
+    if np.abs(turn - np.eye(3)).max() > TURNED:
+        read = np.einsum("nij,nj->ni", turn, m.read)
+        yield "with dx, dy, dz taken along the machine instead of the table", replace(m, read=read)
 
 
 def rotary_slip(bench: Bench, readings: Floats, sigma: Floats, harmonics: int) -> str:

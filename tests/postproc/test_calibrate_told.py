@@ -102,6 +102,7 @@ def test_only_what_was_asked_for_is_listed_with_as_many_digits_as_are_known(fold
     found, _ = calibrate(source)
     assert found is not None and set(found.figures["parameters"]) == {"EC0Y", "EB0Z", "EA0Z"}
     assert found.figures["kept"] == 1 and found.figures["unknowns"] == 7 and found.figures["spare"] == 65
+    assert found.figures["reduced"] == pytest.approx(found.figures["rms_after"] * np.sqrt(72.0 / 65.0))
     assert load(folder / "out.toml", machines.load("mikron-ucp710")).values[-1] == pytest.approx(4e-6)
 
 
