@@ -81,9 +81,8 @@ class Table(Curve):
 
     @property
     def detail(self) -> float:
-        """See the base class: the least distance between positions, but no less than FINEST of them all."""
-        x = self.closed(self.values[: len(self.x)])[0]
-        return max(float(np.diff(x).min(initial=np.inf)), FINEST * float(x[-1] - x[0]))
+        """See the base class: the least distance between positions."""
+        return least_apart(self.closed(self.values[: len(self.x)])[0])
 
     def labels(self) -> list[str]:
         """[0], [1] ... by position; [0]+ forwards, [0]- backwards."""
@@ -224,6 +223,11 @@ class Polynomial(Curve):
         t = (np.clip(x, *self.range) - self.origin) / self.scale
         result: Floats = np.vander(t, len(self.values), increasing=True)
         return result
+
+
+def least_apart(x: Floats) -> float:
+    """Least distance of M ascending positions, but no less than FINEST of them all; infinite for one."""
+    return max(float(np.diff(x).min(initial=np.inf)), FINEST * float(x[-1] - x[0]))
 
 
 def largest(curve: Curve) -> float:

@@ -11,6 +11,7 @@ from machines.geometric_error.actual import Actual
 from machines.geometric_error.actual_map import ActualByMap
 from machines.geometric_error.actual_rods import ActualDelta, ActualH4
 from machines.geometric_error.actual_serial import ActualSerial
+from machines.geometric_error.curves import least_apart
 from machines.geometric_error.lattice import ErrorMap
 from machines.geometric_error.rods import RodErrors, gives_rods, rod_frame, rod_names
 from machines.geometric_error.serial_errors import SerialErrors
@@ -86,9 +87,9 @@ class ErrorModel:
         for component in self.axes.components:
             j = names.index(component.name.axis)
             result[j] = min(result[j], component.curve.detail)
-        for letter, nodes in () if self.map is None else zip(self.map.letters, self.map.nodes, strict=True):
+        for letter, (nodes, _) in () if self.map is None else zip(self.map.letters, self.map.closed(), strict=True):
             mine = [j for j, name in enumerate(names) if name == letter or (letter in "xyz" and name not in "ABC")]
-            result[mine] = np.minimum(result[mine], np.diff(nodes).min(initial=np.inf))
+            result[mine] = np.minimum(result[mine], least_apart(nodes))
         return result
 
     def on(self, kinematics: Kinematics) -> Actual:

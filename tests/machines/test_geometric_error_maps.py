@@ -47,6 +47,13 @@ def test_a_coordinate_of_the_point_that_is_outside_counts_for_the_slides_that_mo
         assert "".join(np.array(machine.axis_names)[out[0]]) == wanted and not out[1].any()
 
 
+def test_nodes_of_one_place_ask_for_no_closer_look() -> None:
+    """As of tables; from the last node of a coordinate that goes round to the first one counts too."""
+    nodes = (np.array([-100.0, 0.0, 0.001, 100.0]), np.array([0.0, 1.0, 2.0]))
+    given = ErrorModel(map=random_map(("x", "C"), nodes, periods=(0.0, 2.5)))
+    assert given.detail(("X", "Y", "Z", "C")) == pytest.approx([0.1, 0.1, 0.1, 0.5])
+
+
 # ---- round about -----------------------------------------------------------------------------------------------------
 
 ROUND = "C [deg],dx [um],dy [um],dz [um]\n0,1,2,3\n90,5,2,3\n200,9,2,3\n360,1,2,3\n"
