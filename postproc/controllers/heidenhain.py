@@ -97,7 +97,10 @@ class KlartextWriter(Writer):
         return result
 
     def arc(self, k: int, text: str, feed: str) -> Iterator[str]:
-        """CC with the centre, then C, or CP with the angle where the arc climbs (in the XY plane only)."""
+        """CC with the centre, then C, or CP with the angle where the arc climbs (in the XY plane only).
+
+        A whole circle must begin where it ends: an L takes back what a CP before it has left.
+        """
         p = self.program
         third = PLANE_AXIS[int(p.plane[k])]
         columns = [p.letters.index(letter) for letter in "XYZ"]
@@ -106,6 +109,10 @@ class KlartextWriter(Writer):
         if end[third] != start[third]:
             yield from self.climbing(k, start, end, f"{sense}{feed}")
             return
+        if (start == end).all() and (self.begins(k, start[:2]) != start[:2]).any():
+            x, y = self.number_text(start[:2], self.controller.format.linear_decimals)
+            yield f"L X{x} Y{y}"
+            self.helix = None
         centre = self.number_text(start + p.center[k], self.controller.format.linear_decimals)
         yield "CC" + "".join(f" {'XYZ'[i]}{centre[i]}" for i in range(3) if i != third)
         yield f"C{text} {sense}{feed}"

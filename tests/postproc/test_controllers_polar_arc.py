@@ -170,3 +170,23 @@ def test_the_bound_counts_helices_where_there_are_some() -> None:
         radius = moves.arcs.radius[moves.arc[rows]].max(initial=0.0)
         more = math.hypot(GRAIN, 0.5 * GRAIN * DEG * radius) if len(rows) else 0.0
         assert job.rounding.tip == pytest.approx(words + more, rel=1e-12)
+
+
+@pytest.mark.parametrize("sense", [1, -1])
+@pytest.mark.parametrize("seed", range(6))
+def test_a_whole_circle_behind_a_helix_begins_where_it_ends(tmp_path: Path, sense: int, seed: int) -> None:
+    """A helical bore cleaned at its bottom: CP ends where its angle lets it; C from there to the circle's own end would be the
+    small rest of a turn."""
+    rng = np.random.default_rng(seed)
+    centre = rng.uniform(-30.0, 30.0, 2)
+    start = np.round(turned(centre + np.array([8.7, 0.0]), centre, float(rng.uniform(0.0, 360.0))), 4)
+    end = np.round(turned(start, centre, sense * float(rng.uniform(30.0, 330.0))), 4)
+    circle = f"CIRCLE/{centre[0]:.5f},{centre[1]:.5f},{{z}},0,0,{sense},8.7"
+    lines = ["UNITS/MM", "LOADTL/1", "SPINDL/RPM,1000,CLW", "FEDRAT/MMPM,600", "RAPID", f"GOTO/{start[0]},{start[1]},30",
+             f"GOTO/{start[0]},{start[1]},0", circle.format(z="0"), f"GOTO/{end[0]},{end[1]},-2.5", circle.format(z="-2.5"),
+             f"GOTO/{end[0]},{end[1]},-2.5", "GOTO/0,0,-2.5", "FINI", ""]
+    (tmp_path / "bore.apt").write_text("\n".join(lines))
+    path, found = toolpaths.read(tmp_path / "bore.apt")
+    result = postproc.convert(path, "mill-3axis", controller="heidenhain-tnc640", diagnostics=found)
+    assert result.ok, [str(d) for d in result.diagnostics]
+    assert re.search(r"CP IPA.*\n(\d+ L X\S+ Y\S+\n)?\d+ CC .*\n\d+ C X", result.text)
