@@ -175,8 +175,8 @@ def test_the_bound_counts_helices_where_there_are_some() -> None:
 @pytest.mark.parametrize("sense", [1, -1])
 @pytest.mark.parametrize("seed", range(6))
 def test_a_whole_circle_behind_a_helix_begins_where_it_ends(tmp_path: Path, sense: int, seed: int) -> None:
-    """A helical bore cleaned at its bottom: CP ends where its angle lets it; C from there to the circle's own end would be the
-    small rest of a turn."""
+    """A helical bore cleaned at its bottom: CP ends where its angle lets it; C from there to the circle's own end would
+    be the small rest of a turn."""
     rng = np.random.default_rng(seed)
     centre = rng.uniform(-30.0, 30.0, 2)
     start = np.round(turned(centre + np.array([8.7, 0.0]), centre, float(rng.uniform(0.0, 360.0))), 4)
