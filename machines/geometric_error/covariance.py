@@ -14,10 +14,14 @@ from machines.geometric_error.model import ErrorModel
 from machines.geometric_error.names import parse
 from machines.user_file import UserFile, nearest
 from toolpaths.arrays import Floats
-from toolpaths.diagnostics import Diagnostic, error
+from toolpaths.diagnostics import Diagnostic, Severity, error
 
 SYMMETRIC = 1e-6
 """largest difference of two mirrored entries, and negative eigenvalue, relative to the largest entry"""
+
+
+MOST = 12_000
+"""parameters whose covariance is held: 1.2 GB"""
 
 
 def angular(name: str) -> bool:
@@ -46,7 +50,11 @@ def covariance_of(model: ErrorModel, file: UserFile, checked: ErrorFileModel) ->
         return (model if matrix is None else replace(model, covariance=matrix * np.outer(scale, scale))), found
     if not checked.sigma:
         return model, []
-    names, found = model.names, []
+    names, found = model.names, list[Diagnostic]()
+    if len(names) > MOST:
+        told = file.problem("error-model.sigma", ("sigma",), f"the doubt of {len(names)} parameters is not told, at most that of "
+                            f"{MOST} is", "a map of fewer nodes, or take [sigma] out; the correction is the same")
+        return model, [replace(told, severity=Severity.WARNING)]
     sigma = np.zeros(len(names))
     for prefix in sorted(checked.sigma, key=len):
         mine = [k for k, name in enumerate(names) if name.startswith(prefix)]

@@ -21,7 +21,7 @@ from machines.geometric_error.serial_errors import SerialErrors
 from machines.geometric_error.volume import middle, samples
 from tests.machines.error_models import ARCSEC, joints, model
 from toolpaths.arrays import Floats
-from toolpaths.diagnostics import Diagnostic
+from toolpaths.diagnostics import Diagnostic, Severity
 from toolpaths.units import DEG
 
 
@@ -250,3 +250,15 @@ def test_the_volume_is_where_machine_and_model_hold(name: str) -> None:
     assert len(w) > 250 and np.isfinite(q).all() and not actual.outside(w).any()
     assert (q >= machine.limits.lower - 1e-6).all() and (q <= machine.limits.upper + 1e-6).all()
     assert np.isfinite(machine.kinematics.forward(middle(machine)[None])[0]).all()
+
+
+def test_the_doubt_of_more_parameters_than_are_held_is_left_out_and_told(tmp_path: Path,
+                                                                         monkeypatch: pytest.MonkeyPatch) -> None:
+    table = "X [mm],dx [um],dy [um],dz [um]\n-300,1,0,0\n300,3,0,0\n"
+    found, faults = loaded(tmp_path, table, "[sigma]\nnode = 0.5\n")
+    assert found is not None and found.covariance is not None and found.covariance.shape == (12, 12) and not faults
+    monkeypatch.setattr("machines.geometric_error.covariance.MOST", 11)
+    found, faults = loaded(tmp_path, table, "[sigma]\nnode = 0.5\n")
+    assert found is not None and found.map is not None and found.covariance is None
+    assert [(d.code, d.severity, d.lines) for d in faults] == [("error-model.sigma", Severity.WARNING, (3,))]
+    assert "12 parameters" in faults[0].message
