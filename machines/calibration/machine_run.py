@@ -28,6 +28,8 @@ APART = 2.0
 """times the commanded distance, or one part of it, that the median of a bar's readings may be"""
 MOST = 3
 """groups that are told"""
+SHORT = 1e-3
+"""mm, a bar that is none"""
 SEEN = 1e-6
 """mm or rad that an error differs by its way, to be told"""
 
@@ -98,7 +100,12 @@ def _distances(run: Run, table: CsvTable, kinematics: Kinematics, measured: Meas
     """False where a bar's readings are of another size than the commanded distances."""
     if measured.centre is None:
         return True
-    middle = float(np.median(np.linalg.norm(kinematics.forward(measured.q)[0] - measured.centre, axis=1)))
+    bars = np.linalg.norm(kinematics.forward(measured.q)[0] - measured.centre, axis=1)
+    if bars[least := int(np.argmin(bars))] < SHORT:
+        run.row(table, least, f"the tip stands {bars[least]:.3g} mm from the centre, where a bar has no direction",
+                "look at centre and tool_length")
+        return False
+    middle = float(np.median(bars))
     read, unit = float(np.median(measured.read)), table.unit["distance"]
     if middle <= APART * read and read <= APART * middle:
         return True

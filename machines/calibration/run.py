@@ -9,11 +9,14 @@ import numpy as np
 
 from machines.calibration.measurement_file import Column, MeasurementModel
 from machines.geometric_error.csv_table import ANGLES, LENGTHS, CsvTable
+from machines.geometric_error.names import parse
 from machines.machine import Machine
 from machines.user_file import UserFile, nearest
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error, has_errors, info, warning
 
+LARGEST = 1e6
+"""mm or rad"""
 EDGE = 1e-6
 """mm or rad beyond a travel that are numbers' own"""
 UNIT = {"length": LENGTHS, "angle": ANGLES, "": {"": 1.0}}
@@ -40,11 +43,9 @@ class Run:
 
     def columns(self, table: CsvTable, wanted: Sequence[Column], optional: Sequence[str] = ()) -> bool:
         """True where all columns are there with the right kind of unit; those that are not used are told."""
+        self._missing(table, [column.name for column in wanted if column.name not in table.columns])
         for name, kind, _ in wanted:
-            if name not in table.columns:
-                self.problem("calibrate.column", f"{Path(table.file).name} has no column {name!r}",
-                             nearest(name, list(table.columns)))
-            elif table.unit[name] not in UNIT[kind]:
+            if name in table.columns and table.unit[name] not in UNIT[kind]:
                 self._unit(table, name, kind)
         for name in optional:
             if table.unit.get(name):
@@ -54,10 +55,28 @@ class Run:
         for name in [name for name in other if optional and name.lower().endswith("way")]:
             self.problem("calibrate.column", f"{Path(table.file).name}: {name!r} is the way of no axis",
                          "write " + ", ".join(optional))
+        self._sizes(table, [column.name for column in wanted if column.unit])
         if other:
             self.tell("calibrate.unused", f"{Path(table.file).name}: {', '.join(other)[:200]} not used",
                       "columns are " + ", ".join([*known, *optional]))
         return not has_errors(self.found)
+
+    def _sizes(self, table: CsvTable, names: Sequence[str]) -> None:
+        """Numbers that are none."""
+        for name in names:
+            large = np.abs(table.columns.get(name, np.zeros(1))) > LARGEST
+            if large.any():
+                row = int(np.argmax(large))
+                self.row(table, row, f"{name} is {table.columns[name][row]:.3g} mm or rad", f"allowed are up to {LARGEST:g}")
+
+    def _missing(self, table: CsvTable, names: Sequence[str]) -> None:
+        """Columns that are not there; errors by their names (EXX) are another kind of table."""
+        if not names:
+            return
+        hint = nearest(names[0], list(table.columns)) if len(names) == 1 else "it has " + ", ".join(table.columns)[:200]
+        if any(parse(name.rstrip("+-")) for name in table.columns):
+            hint = "tables of errors by their names are read by `postproc errors import`"
+        self.problem("calibrate.column", f"{Path(table.file).name} has no column {', '.join(names)}", hint)
 
     def _unit(self, table: CsvTable, name: str, kind: str) -> None:
         self.problem("calibrate.unit", f"column {name!r} has unit {table.unit[name]!r}",

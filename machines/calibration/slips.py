@@ -60,8 +60,9 @@ def _others(m: Measurements, kinematics: Kinematics) -> Iterable[tuple[str, Meas
             yield f"with d{'xyz'[a]} and d{'xyz'[b]} changed over", replace(m, read=m.read[:, _swapped(3, a, b)])
 
 
-def _other_directions(m: Measurements, start: ErrorModel, kinematics: Kinematics) -> Iterable[tuple[str, Measurements]]:
-    """Readings along x, y, z of the machine, turned to those of the table frame by the motion that the slides give the tip."""
+def _other_directions(m: Measurements, start: ErrorModel,
+                      kinematics: Kinematics) -> Iterable[tuple[str, Measurements]]:
+    """Readings along x, y, z of the machine, turned to those of the table frame by how the slides move the tip."""
     if m.kind != "position":
         return
     actual = start.zero().on(kinematics)
@@ -72,7 +73,7 @@ def _other_directions(m: Measurements, start: ErrorModel, kinematics: Kinematics
     turn = slides @ np.linalg.inv(straight)
     if np.abs(turn - np.eye(3)).max() > TURNED:
         read = np.einsum("nij,nj->ni", turn, m.read)
-        yield "with dx, dy, dz taken along the machine instead of the table", replace(m, read=read)
+        yield "with dx, dy, dz along the machine instead of the table", replace(m, read=read)
 
 
 def rotary_slip(bench: Bench, readings: Floats, sigma: Floats, harmonics: int) -> str:
