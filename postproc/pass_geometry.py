@@ -16,6 +16,7 @@ from machines.kinematics.base import Kinematics
 from postproc.feedrate.geometry import MachinePath, Stretch, machine_paths
 from postproc.moves import Moves
 from postproc.path import TRAVERSE, Path
+from postproc.planned_errors import PlannedCorrection
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.rotations import angle_between
@@ -68,13 +69,15 @@ def chains(moves: Moves, stops: Ints) -> list[tuple[int, int]]:
 
 
 def pass_geometry(path: Path, moves: Moves, kinematics: Callable[[int], Kinematics], tolerance: Tolerance, stops: Ints,
-                  sharpest: float = SHARPEST, file: str = "") -> tuple[list[PassGeometry], list[Diagnostic]]:
+                  sharpest: float = SHARPEST, file: str = "",
+                  correction: PlannedCorrection | None = None) -> tuple[list[PassGeometry], list[Diagnostic]]:
     """All passes of a path, smoothed within `tolerance` of the moves.
 
     Args:
         kinematics: the kinematics with the tool of that index of the Toolpath
         stops: rows of Moves before which the motion stops, besides those where it turns on the spot or is drawn back
         sharpest: rad; it stops at corners that turn by more
+        correction: the joints are those that correct the machine's geometric errors
     """
     reference = moves.curves()
     written = [_written(path, block, reference, kinematics(int(moves.tool[first])))
@@ -84,7 +87,7 @@ def pass_geometry(path: Path, moves: Moves, kinematics: Callable[[int], Kinemati
     begin = np.concatenate(([0], np.cumsum([len(one.move) for one in written])))
     smoothed = smooth_all(_joined(written), begin, tolerance, sharpest)
     passes = [_placed(path, one, found) for one, found in zip(written, smoothed, strict=True) if found is not None]
-    paths = iter(_machine_paths(passes, moves, kinematics))
+    paths = iter(_machine_paths(passes, moves, kinematics, correction))
     result, diagnostics = [], []
     for one in passes:
         own = list(islice(paths, len(one.stretches)))
@@ -159,6 +162,8 @@ class _Placed:
     begin: Floats
     ends: Floats
     stretches: tuple[Stretch, ...]
+    first: tuple[int, ...]
+    """block of the Path that each stretch begins in"""
 
 
 def _placed(path: Path, written: _Written, found: Smooth) -> _Placed:
@@ -168,20 +173,30 @@ def _placed(path: Path, written: _Written, found: Smooth) -> _Placed:
     begin = np.concatenate((found.s[:1], ends[:-1]))
     jump = np.flatnonzero(np.diff(block) > 1) + 1
     cuts = np.unique(np.concatenate(([0.0], found.stops, ends[jump - 1], found.s[-1:])))
-    stretches = []
+    stretches, first = [], []
     for low, high in pairwise(cuts.tolist()):
         own = np.flatnonzero((ends > low) & (begin < high))
         near = _Near(np.append(begin[own[:1]], ends[own]), path.q[np.append(block[own[:1]] - 1, block[own])])
         stretches.append(Stretch(found, low, high, near))
-    return _Placed(written, found, begin, ends, tuple(stretches))
+        first.append(int(block[own[0]]))
+    return _Placed(written, found, begin, ends, tuple(stretches), tuple(first))
 
 
-def _machine_paths(passes: list[_Placed], moves: Moves, kinematics: Callable[[int], Kinematics]) -> list[MachinePath | str]:
+def _machine_paths(passes: list[_Placed], moves: Moves, kinematics: Callable[[int], Kinematics],
+                   correction: PlannedCorrection | None) -> list[MachinePath | str]:
     """The joints along all stretches in order, those of one tool together."""
     tool = [int(moves.tool[one.written.move[0]]) for one in passes]
     result: list[MachinePath | str] = []
     for index, group in groupby(zip(tool, passes, strict=True), key=lambda pair: pair[0]):
-        result += machine_paths([stretch for _, one in group for stretch in one.stretches], kinematics(index))
+        placed, kin = [one for _, one in group], kinematics(index)
+        made = machine_paths([stretch for one in placed for stretch in one.stretches], kin)
+        if correction is not None:
+            block = [k for one in placed for k in one.first]
+            good = [i for i, one in enumerate(made) if isinstance(one, MachinePath)]
+            solved = [one for one in made if isinstance(one, MachinePath)]
+            for i, one in zip(good, correction.of(solved, kin, [block[i] for i in good]), strict=True):
+                made[i] = one
+        result += made
     return result
 
 

@@ -25,6 +25,7 @@ from postproc.options import Options
 from postproc.pass_geometry import stops_of
 from postproc.path import Path, build_path
 from postproc.planned import PlannedMotion, Source, planned_motion
+from postproc.planned_errors import PlannedCorrection, on_written, planned_correction
 from postproc.program import Program
 from postproc.program_header import header_lines
 from postproc.reach import check_reach
@@ -39,7 +40,6 @@ from postproc.singular import check_singular
 from postproc.smoothed_moves import smoothed_moves
 from postproc.travel import check_travel
 from postproc.word_rows import block_tools
-from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic, DiagnosticError, error, has_errors
 from toolpaths.smoothing.smooth import Tolerance
 from toolpaths.toolpath import Toolpath
@@ -210,11 +210,11 @@ def _stages(result: PostResult, progress: Progress | None) -> PostResult:
     result = _with(result, with_system(found, job.work_system, job.placement), extents=extents)
     if not result.ok:
         return result
-    motion, found = plan_motion(job, moves, result.nominal or path)
+    motion, found = plan_motion(job, moves, result.nominal or path, planned_correction(result))
     result = _with(result, found, motion=motion)
     if not result.ok:
         return result
-    planned = None if motion is None else Planned(_on_path(result, motion.needed), options.merge_feeds)
+    planned = None if motion is None else Planned(on_written(result, motion.needed), options.merge_feeds)
     program, feeds, found = compile_program(job, moves, path, planned,
                                             None if result.compensation is None else result.compensation.apart)
     found += unwritable(result.controller, program, toolpath.cycles, file, job.control.length_on_z)
@@ -265,12 +265,6 @@ def _compensated(result: PostResult, job: Job, moves: Moves, path: Path) -> tupl
     return _with(result, found, path=corrected, nominal=path, compensation=report), corrected
 
 
-def _on_path(result: PostResult, seconds: Floats) -> Floats:
-    """Seconds of the planned blocks on the blocks that are written; those of corrected ones are parts of nominal ones."""
-    found = result.compensation
-    return seconds if found is None else np.asarray(seconds[found.owner] * found.part)
-
-
 def tolerance_shares(job: Job) -> tuple[dict[str, float], list[Diagnostic]]:
     """Where the tolerance goes (mm; axis_ in degrees): what the control's smoothing and rounding leave is linearising."""
     tolerance, axis = job.options.tolerance, job.options.axis_tolerance
@@ -308,13 +302,14 @@ def written_moves(job: Job, shares: dict[str, float]) -> Moves:
                           stops_of(job.toolpath, job.moves))
 
 
-def plan_motion(job: Job, moves: Moves, path: Path) -> tuple[PlannedMotion | None, list[Diagnostic]]:
+def plan_motion(job: Job, moves: Moves, path: Path,
+                correction: PlannedCorrection | None = None) -> tuple[PlannedMotion | None, list[Diagnostic]]:
     """What the passes allow under the limits of the axes, with --feed planned."""
     if job.options.feed != "planned":
         return None, []
     return planned_motion(Source(path, moves, job.machine, job.kinematics,
                                  Tolerance(job.options.tolerance, job.axis_tolerance), stops_of(job.toolpath, moves),
-                                 job.toolpath.file))
+                                 job.toolpath.file, correction))
 
 
 def write_text(result: PostResult) -> tuple[str, dict[str, str]]:

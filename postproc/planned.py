@@ -19,6 +19,7 @@ from postproc.feedrate.trajectory import JointTrajectory
 from postproc.moves import Moves
 from postproc.pass_geometry import PassGeometry, pass_geometry
 from postproc.path import Path
+from postproc.planned_errors import PlannedCorrection
 from postproc.steady_feed import CORNER, steady_seconds
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, DiagnosticError, error, require
@@ -140,7 +141,8 @@ class PlannedMotion:
 
 @dataclass(frozen=True)
 class Source:
-    """What passes are made from: blocks, moves, machine, kinematics by tool, tolerance, rows before which it stops."""
+    """What passes are made from: blocks, moves, machine, kinematics by tool, tolerance, rows before which it stops, and how
+    geometric errors are corrected, where they are."""
 
     path: Path
     moves: Moves
@@ -149,6 +151,7 @@ class Source:
     tolerance: Tolerance
     stops: Ints
     file: str = ""
+    correction: PlannedCorrection | None = None
 
     @property
     def bounds(self) -> JointLimits:
@@ -157,7 +160,8 @@ class Source:
 
     def geometry(self, sharpest: float = SHARPEST) -> tuple[list[PassGeometry], list[Diagnostic]]:
         """See `pass_geometry`."""
-        return pass_geometry(self.path, self.moves, self.kinematics, self.tolerance, self.stops, sharpest, self.file)
+        return pass_geometry(self.path, self.moves, self.kinematics, self.tolerance, self.stops, sharpest, self.file,
+                             self.correction)
 
 
 def planned_motion(source: Source) -> tuple[PlannedMotion | None, list[Diagnostic]]:

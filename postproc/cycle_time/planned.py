@@ -13,6 +13,7 @@ from postproc.cycle_time.phases import Timed
 from postproc.pass_geometry import stops_of
 from postproc.pipeline import PostResult
 from postproc.planned import PlannedMotion, Source
+from postproc.planned_errors import planned_correction
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic, DiagnosticError, warning
 from toolpaths.smoothing.smooth import Tolerance
@@ -24,9 +25,10 @@ def planned_times(result: PostResult, blocks: Blocks, model: CycleTimeModel) -> 
     job, path = result.job, result.path
     if job is None or path is None or blocks.move is None:
         return times, []
-    moves = job.moves
-    source = Source(path, moves, job.machine, job.kinematics, Tolerance(job.options.tolerance, job.axis_tolerance),
-                    stops_of(job.toolpath, moves), job.toolpath.file)
+    moves = result.moves or job.moves
+    source = Source(result.nominal or path, moves, job.machine, job.kinematics,
+                    Tolerance(job.options.tolerance, job.axis_tolerance), stops_of(job.toolpath, moves), job.toolpath.file,
+                    planned_correction(result))
     motion = result.motion or PlannedMotion(source, np.zeros(0))
     try:
         spans = [(int(one.move.min()), int(one.move.max()), made.seconds)
