@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from machines.geometric_error.axis_motion import effect
@@ -78,3 +80,16 @@ def joints(kinematics: Kinematics, n: int, seed: int = 0) -> Floats:
         return q
     slides = kinematics.random_slides(rng, n)
     return slides if not any(kinematics.rotary) else np.column_stack([slides, rng.uniform(-1.0, 1.0, n)])
+
+
+def correlated(full: ErrorModel, seed: int = 0) -> ErrorModel:
+    """The model with a covariance of all its parameters."""
+    root = np.random.default_rng(seed).normal(size=(len(full.names), 6)) * 1e-6
+    return replace(full, covariance=root @ root.T + np.diag(np.full(len(full.names), 1e-14)))
+
+
+def component(text: str, curve: Table | Fourier | Polynomial) -> Component:
+    """A component error by its name."""
+    name = parse(text)
+    assert name is not None
+    return Component(name, curve)
