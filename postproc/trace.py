@@ -9,6 +9,8 @@ import numpy as np
 
 from postproc.options import Orientation
 from postproc.pipeline import PostResult
+from postproc.readback.canonical import in_files
+from postproc.readback.compare import Comparison
 from postproc.word_arcs import PLANE_AXIS
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
@@ -103,8 +105,19 @@ def _move(result: PostResult, m: int) -> dict[str, Any]:
             tip, axis = c.tip[match], c.axis[match]
             entry["read_back"] = {"tip_mm": tip.tolist(), "axis": axis.tolist(),
                                   "tip_deviation_mm": float(np.linalg.norm(tip - moves.tip[m])),
-                                  "axis_deviation_deg": float(np.linalg.norm(axis - moves.axis[m])) / DEG}
+                                  "axis_deviation_deg": float(np.linalg.norm(axis - moves.axis[m])) / DEG,
+                                  **_program_line(c, match)}
     return entry
+
+
+def _program_line(c: Comparison, match: int) -> dict[str, Any]:
+    """Where the program comes there: line, and file where it is of a subprogram's."""
+    if c.executed is None:
+        return {}
+    code, motion = c.executed
+    line = motion.line[match:match + 1]
+    k = int(np.searchsorted([n for _, n in code.files], line[0])) - 1 if code.files else 0
+    return {"program_line": int(in_files(line, code.files)[0]), **({"file": code.files[k][0]} if k > 0 else {})}
 
 
 def _named(result: PostResult, values: Floats) -> dict[str, float | None]:
@@ -171,7 +184,8 @@ def _move_text(move: dict[str, Any]) -> list[str]:
     if "read_back" in move:
         r = move["read_back"]
         lines.append(f"  read back    tip {_vector(r['tip_mm'])}  axis {_vector(r['axis'])}  off by "
-                     f"{r['tip_deviation_mm']:.6f} mm, {r['axis_deviation_deg']:.6f} degrees")
+                     f"{r['tip_deviation_mm']:.6f} mm, {r['axis_deviation_deg']:.6f} degrees"
+                     + (f", line {r['program_line']} of {r.get('file', 'the program')}" if "program_line" in r else ""))
     return lines
 
 

@@ -86,6 +86,8 @@ def test_trace_shows_one_point(tmp_path: Path) -> None:
     (move,) = d["points"][0]["moves"]
     assert move["joints"] == [{"X": 12.5, "Y": 0, "Z": 5}] and not move["linked"]
     assert "X12.5" in move["blocks"][0] and move["read_back"]["tip_deviation_mm"] < 1e-9
+    run("convert", path, *MILL, "-o", tmp_path / "p.ngc")
+    assert "X12.5" in (tmp_path / "p.ngc").read_text().splitlines()[move["read_back"]["program_line"] - 1]
     got = run("trace", path, "--line", "3", *MILL)
     assert got.exit_code == 1 and "trace.no_point" in got.stderr and "lines 6, 7" in got.stderr
 
