@@ -41,20 +41,21 @@ def units(names: list[str], model: ErrorFileModel) -> Floats:
 
 
 def covariance_of(model: ErrorModel, file: UserFile, checked: ErrorFileModel) -> tuple[ErrorModel, list[Diagnostic]]:
-    """The model with the covariance that its file gives."""
+    """The model with the covariance that its file gives; without it, told, where it has more parameters than MOST."""
+    given = "covariance" if checked.covariance is not None else "sigma"
+    names, found = model.names, list[Diagnostic]()
+    if len(names) > MOST and (checked.sigma or checked.covariance is not None):
+        told = file.problem(f"error-model.{given}", (given,), f"the doubt of {len(names)} parameters is not told, at most "
+                            f"that of {MOST} is", f"a map of fewer nodes, or take [{given}] out; the correction is the same")
+        return model, [replace(told, severity=Severity.WARNING)]
     if checked.covariance is not None:
         origin = file.origin(("covariance", "table"))
         path = Path(origin.file).parent / checked.covariance.table
-        scale = units(model.names, checked)
-        matrix, found = read_covariance(path, model.names, (origin.file, origin.line))
+        scale = units(names, checked)
+        matrix, found = read_covariance(path, names, (origin.file, origin.line))
         return (model if matrix is None else replace(model, covariance=matrix * np.outer(scale, scale))), found
     if not checked.sigma:
         return model, []
-    names, found = model.names, list[Diagnostic]()
-    if len(names) > MOST:
-        told = file.problem("error-model.sigma", ("sigma",), f"the doubt of {len(names)} parameters is not told, at most that of "
-                            f"{MOST} is", "a map of fewer nodes, or take [sigma] out; the correction is the same")
-        return model, [replace(told, severity=Severity.WARNING)]
     sigma = np.zeros(len(names))
     for prefix in sorted(checked.sigma, key=len):
         mine = [k for k, name in enumerate(names) if name.startswith(prefix)]
@@ -75,14 +76,22 @@ def read_covariance(path: Path, names: list[str], cited: tuple[str, int]) -> tup
     fault = _head_fault(head, [n for n, _ in lines], names)
     if fault:
         return None, [error("error-table.row", fault[0], file=str(path), lines=[n for n, _ in lines[:1]], hint=fault[1])]
-    index, matrix = {name: k for k, name in enumerate(names)}, np.zeros((len(names), len(names)))
-    columns = [index[name] for name in head]
-    for (line, row), name in zip(lines[1:], head, strict=True):
+    matrix = np.zeros((len(head), len(head)))
+    for k, ((line, row), name) in enumerate(zip(lines[1:], head, strict=True)):
         values = _row(row, name, len(head))
         if isinstance(values, tuple):
             return None, [error("error-table.row", values[0], file=str(path), lines=[line], hint=values[1])]
-        matrix[index[name], columns] = values
-    return _checked(matrix, path, names)
+        matrix[k] = values
+    own, found = _checked(matrix, path, head)
+    return (None if own is None else _among(own, head, names)), found
+
+
+def _among(own: Floats, head: list[str], names: list[str]) -> Floats:
+    """(P, P) for all `names` of a covariance of those in `head`; the others have none."""
+    index, result = {name: k for k, name in enumerate(names)}, np.zeros((len(names), len(names)))
+    place = np.array([index[name] for name in head])
+    result[np.ix_(place, place)] = own
+    return result
 
 
 def _head_fault(head: list[str], lines: list[int], names: list[str]) -> tuple[str, str] | None:

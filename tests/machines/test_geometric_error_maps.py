@@ -257,8 +257,14 @@ def test_the_doubt_of_more_parameters_than_are_held_is_left_out_and_told(tmp_pat
     table = "X [mm],dx [um],dy [um],dz [um]\n-300,1,0,0\n300,3,0,0\n"
     found, faults = loaded(tmp_path, table, "[sigma]\nnode = 0.5\n")
     assert found is not None and found.covariance is not None and found.covariance.shape == (12, 12) and not faults
+    (tmp_path / "c.csv").write_text("parameter,node[1].dy,node[0].dx\nnode[1].dy,4,1\nnode[0].dx,1,9\n")
+    covariance = '[covariance]\ntable = "c.csv"\n'
+    some, faults = loaded(tmp_path, table, covariance)
+    assert some is not None and some.covariance is not None and not faults
+    assert some.covariance[0, [0, 7]] == pytest.approx([9e-6, 1e-6]) and np.count_nonzero(some.covariance) == 4
     monkeypatch.setattr("machines.geometric_error.covariance.MOST", 11)
-    found, faults = loaded(tmp_path, table, "[sigma]\nnode = 0.5\n")
-    assert found is not None and found.map is not None and found.covariance is None
-    assert [(d.code, d.severity, d.lines) for d in faults] == [("error-model.sigma", Severity.WARNING, (3,))]
-    assert "12 parameters" in faults[0].message
+    for keys, code in (("[sigma]\nnode = 0.5\n", "error-model.sigma"), (covariance, "error-model.covariance")):
+        found, faults = loaded(tmp_path, table, keys)
+        assert found is not None and found.map is not None and found.covariance is None
+        assert [(d.code, d.severity, d.lines) for d in faults] == [(code, Severity.WARNING, (3,))]
+        assert "12 parameters" in faults[0].message
