@@ -22,6 +22,7 @@ _SMALLEST = 1e-9
 """of a curve: a block that short and still outside is a jump"""
 _AIM, _ENOUGH = 0.95, 0.85
 """of the tolerance: what a step aims at, and what is near enough to the longest"""
+_TURN = 2.0 * np.pi
 _HALVINGS, _FOLLOWED = 24, 1e-6
 """of a curve, on the way to its end in a singular direction; rad to which the joints are then known"""
 _UNKNOWN = -2
@@ -75,15 +76,19 @@ def _straight_already(control: Control, kin: Kinematics, curves: Curves, q0: Flo
 class _Front:
     """Where each unfinished curve stands, and the blocks done so far: one step of all curves at a time.
 
-    `at`, `joints`, `pose`: where the next block begins; `step`: its length to be tried; `held`, `failed`: the longest step
-    that is inside the tolerance and the shortest that is not, of the block being looked for; `even`: half of what is left.
+    Helices of many turns are followed from every turn on, so that their steps are not one after the other.
+    `at`, `joints`, `pose`: where the next block begins; `until`, `goal`: where the curve, or this turn of it, ends;
+    `step`: its length to be tried; `held`, `failed`: the longest step that is inside the tolerance and the shortest that is
+    not, of the block being looked for; `even`: half of what is left.
     """
 
     def __init__(self, control: Control, kin: Kinematics, curves: Curves, q0: Floats, q1: Floats, index: Ints,
                  tolerance: float, axis_tolerance: float) -> None:
-        self.control, self.kin, self.curves, self.last = control, kin, curves, q1
+        self.control, self.kin, self.curves = control, kin, curves
         self.tolerance, self.axis_tolerance = tolerance, axis_tolerance
-        self.index, self.at, self.joints = index, np.zeros(len(index)), q0[index]
+        self.index, self.at, self.until = _turns(kin, curves, q0, q1, index)
+        index = self.index
+        self.joints, self.goal = self._on_the_way(self.at, q0, q0), self._on_the_way(self.until, q1, q0)
         self.pose = kin.forward(self.joints)
         turn = np.where(curves.is_arc, curves.sweep, 0.0)[index]
         self.longest = np.minimum(0.5 * np.pi / np.maximum(turn, 1e-9), 1.0)
@@ -104,27 +109,35 @@ class _Front:
         tip, axis = bounds(self.control, self.kin, stretch, self.tolerance, self.axis_tolerance)
         ratio = np.maximum(tip / self.tolerance, axis / self.axis_tolerance)
         good = ratio <= 1.0
-        full = (u1 == 1.0) | (self.step >= self.longest)
+        full = (u1 == self.until) | (self.step >= self.longest)
         taken = good & (full | self.even | (ratio >= _ENOUGH) | (self.failed <= _NARROW * self.step))
         # What is left after this block would be shorter than it: both are made alike, so that no block is very short.
-        halves = taken & ~self.even & (u1 < 1.0) & (1.0 - u1 < self.step)
+        halves = taken & ~self.even & (u1 < self.until) & (self.until - u1 < self.step)
         taken &= ~halves
         self._record(taken, u1, q1, tip, axis)
         gone = ~good & (self.step <= _SMALLEST)
-        self._give_up(self.index[gone])
+        self._give_up(gone)
         self._next(taken, good, ratio, u1, q1, pose)
-        self.step = np.where(halves, 0.5 * (1.0 - self.at), self.step)
+        self.step = np.where(halves, 0.5 * (self.until - self.at), self.step)
         self.even = halves
-        self._keep(~(gone | (taken & (u1 == 1.0))))
+        self._keep(~(gone | (taken & (u1 == self.until))))
+
+    def _on_the_way(self, u: Floats, ends: Floats, near: Floats) -> Floats:
+        """Joints (K, J) at `u` (K,) of the curves: `ends` at their own ends, nearest to `near` between."""
+        q = ends[self.index]
+        inner = np.flatnonzero((u > 0.0) & (u < 1.0))
+        if len(inner):
+            q[inner] = nearest_solution(self.kin, *self.curves.take(self.index[inner]).at(u[inner]), near[self.index[inner]])
+        return q
 
     def _tried(self) -> tuple[Floats, Floats, tuple[Floats, Floats]]:
         """(u, joints, pose) at the end of the steps."""
-        u1 = np.where(self.at + self.step >= 1.0 - _SMALLEST, 1.0, self.at + self.step)
-        q1 = self.last[self.index]
-        inner = np.flatnonzero(u1 < 1.0)
+        u1 = np.where(self.at + self.step >= self.until - _SMALLEST, self.until, self.at + self.step)
+        q1 = self.goal.copy()
+        inner = np.flatnonzero(u1 < self.until)
         if len(inner):
             tip, axis = self.curves.take(self.index[inner]).at(u1[inner])
-            share = (u1 - self.at)[inner] / (1.0 - self.at[inner])
+            share = (u1 - self.at)[inner] / (self.until - self.at)[inner]
             near = self.joints[inner] + share[:, None] * (q1[inner] - self.joints[inner])
             q1[inner] = nearest_solution(self.kin, tip, axis, near, self._branches(inner))
         return u1, q1, self.kin.forward(q1)
@@ -138,7 +151,7 @@ class _Front:
         if len(new) and self.kin.branches > 1:
             curves = self.curves.take(self.index[new])
             first = branch_of(self.kin, *curves.at(self.at[new]), self.joints[new])
-            last = branch_of(self.kin, curves.end, curves.axis1, self.last[self.index[new]])
+            last = branch_of(self.kin, *curves.at(self.until[new]), self.goal[new])
             both = np.where(first >= 0, first, last)
             self.branch[new] = np.where((last >= 0) & (both != last), -1, both)
         elif len(new):
@@ -152,12 +165,12 @@ class _Front:
             self.q.append(q1[taken])
             self.worst = np.maximum(self.worst, [tip[taken].max(), axis[taken].max()])
 
-    def _give_up(self, index: Ints) -> None:
+    def _give_up(self, gone: Bools) -> None:
         """Curves that jump end where they should, so that every curve has its blocks."""
-        self.broken.append(index)
-        self.curve.append(index)
-        self.u.append(np.ones(len(index)))
-        self.q.append(self.last[index])
+        self.broken.append(self.index[gone])
+        self.curve.append(self.index[gone])
+        self.u.append(self.until[gone])
+        self.q.append(self.goal[gone])
 
     def _next(self, taken: Bools, good: Bools, ratio: Floats, u1: Floats, q1: Floats,
               pose: tuple[Floats, Floats]) -> None:
@@ -176,9 +189,22 @@ class _Front:
         self.pose = (np.where(taken[:, None], pose[0], self.pose[0]), np.where(taken[:, None], pose[1], self.pose[1]))
 
     def _keep(self, rows: Bools) -> None:
-        for name in ("index", "at", "joints", "longest", "step", "held", "failed", "branch", "even"):
+        for name in ("index", "at", "until", "joints", "goal", "longest", "step", "held", "failed", "branch", "even"):
             setattr(self, name, getattr(self, name)[rows])
         self.pose = (self.pose[0][rows], self.pose[1][rows])
+
+
+def _turns(kin: Kinematics, curves: Curves, q0: Floats, q1: Floats, index: Ints) -> tuple[Ints, Floats, Floats]:
+    """(curve (K,), from u (K,), to u (K,)): the curves of `index`, those that wind more than once at standing rotary joints
+    and tool axis in as many parts as turns."""
+    rotary = np.array(kin.rotary)
+    stands = (q0[index][:, rotary] == q1[index][:, rotary]).all(axis=1)
+    stands &= (curves.axis0[index] == curves.axis1[index]).all(axis=1)
+    turns = np.where(curves.is_arc, curves.sweep, 0.0)[index] / _TURN
+    parts = np.where(stands & (turns > 1.5), np.ceil(turns), 1.0).astype(np.int64)
+    which = np.repeat(np.arange(len(index)), parts)
+    part = np.arange(len(which)) - np.repeat(np.cumsum(parts) - parts, parts)
+    return index[which], part / parts[which], (part + 1) / parts[which]
 
 
 def family_turns(kin: Kinematics, curves: Curves, q0: Floats, q1: Floats) -> tuple[Ints, Floats]:

@@ -7,7 +7,7 @@ import pytest
 
 from postproc.control import Control
 from postproc.joint_path import nearest_solution, solve
-from postproc.linearise import Pieces, family_turns, linearise
+from postproc.linearise import Pieces, _Front, family_turns, linearise
 from tests.postproc.kit import angle, great_circle, machine, pose_of, tilted, unit
 from toolpaths.shape import Curves
 
@@ -231,3 +231,32 @@ def test_turns_at_a_pole_take_the_value_that_the_curve_needs() -> None:
     tip, axis = pose_of(name, begun * [1, 1, 1, 180 / np.pi, 180 / np.pi], 0.0)
     assert np.allclose(tip, curves.start) and np.allclose(axis, up)
     assert len(family_turns(m.kinematics, curves, begun, q1)[0]) == 0
+
+
+def helix(turns: int) -> Curves:
+    """Turns of radius 10 and pitch 0.5 at a tilted tool axis."""
+    end = np.array([[10.0, 0, -0.5 * turns]])
+    axis, up = tilted(25, 40)[None], np.array([[0, 0, 1.0]])
+    return Curves(np.array([[10.0, 0, 0]]), end, axis, axis, np.ones(1, dtype=bool), np.zeros((1, 3)), up,
+                  np.array([2 * np.pi * turns]))
+
+
+def test_the_steps_of_many_turns_are_not_one_after_the_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As many blocks a turn as one turn has, in hardly more rounds, inside the tolerance all along."""
+    rounds: list[int] = []
+    advance = _Front.advance
+    monkeypatch.setattr(_Front, "advance", lambda front: (rounds.append(len(front.index)), advance(front)))
+    one = split("mikron-ucp710", helix(1))[0]
+    of_one = len(rounds)
+    curves = helix(60)
+    many, q0 = split("mikron-ucp710", curves)
+    assert len(rounds) - of_one <= 1.5 * of_one
+    assert abs(len(many.u) / len(one.u) / 60 - 1) < 0.03 and (np.diff(many.u) > 0).all() and many.u[-1] == 1.0
+    assert not len(many.broken) and many.worst_tip <= TIP
+    q = np.concatenate([q0, many.q])
+    for k in np.random.default_rng(1).integers(0, len(many.u), 60):
+        tip, axis = dense_poses("mikron-ucp710", q[k], q[k + 1])
+        along = np.interp(tip[:, 2], [-30.0, 0.0], [1.0, 0.0])
+        assert np.abs(np.hypot(tip[:, 0], tip[:, 1]) - 10.0).max() < TIP
+        assert np.linalg.norm(curves.take(np.zeros(DENSE, dtype=int)).at(along)[0] - tip, axis=1).max() < 3 * TIP
+        assert angle(axis, curves.axis0).max() < 1e-9
