@@ -68,9 +68,10 @@ def fit_rotary(bench: Bench, readings: Floats, sigma: Floats, harmonics: int, ro
     weights = np.tile(sigma, m * n)[known]
     rows, observed = design[known], readings.ravel()[known]
     count = 12 * harmonics
-    lost, values_told = _lost(rows / weights[:, None], count), _told(rows / weights[:, None], count)
+    lost, told = _told(_left(rows / weights[:, None], count))
     result = solve(linear(names, rows, observed, weights), robust)
-    alone = solve(linear(names, rows, observed, weights, np.arange(len(names)) >= count), robust)
+    scale = np.sqrt(result.weights) / weights
+    alone = np.linalg.lstsq(rows[:, count:] * scale[:, None], observed * scale, rcond=SPAN)[0]
     values = np.where(lost, 0.0, result.values[:count])
     shape = (len(PARTS), 2, harmonics)
     spread = np.where(lost, np.inf, np.sqrt(np.diag(result.covariance)[:count]))
@@ -79,7 +80,7 @@ def fit_rotary(bench: Bench, readings: Floats, sigma: Floats, harmonics: int, ro
     covariance = result.covariance[:count, :count] * np.outer(~lost, ~lost)
     return RotaryFit(values.reshape(shape), spread.reshape(shape), covariance,
                      tuple(np.array(names[:count])[lost].tolist()), result, residuals.reshape(readings.shape),
-                     len(values_told), _condition(values_told), alone.cost_after)
+                     len(told), _condition(told), float(np.sum((scale * (observed - rows[:, count:] @ alone)) ** 2)))
 
 
 def rotary_span(bench: Bench, readings: Floats, sigma: Floats, harmonics: int) -> tuple[Floats, Floats]:
@@ -115,20 +116,15 @@ def _design(bench: Bench, m: int, harmonics: int) -> tuple[Floats, tuple[str, ..
 def hidden(bench: Bench, sigma: Floats, harmonics: int) -> tuple[str, ...]:
     """Names of the amplitudes that the mounting can pretend however many set-ups are measured."""
     design, names = _design(bench, min(bench.steps, ENOUGH), harmonics)
-    lost = _lost(design / np.tile(sigma, len(design) // 6)[:, None], 12 * harmonics)
+    lost, _ = _told(_left(design / np.tile(sigma, len(design) // 6)[:, None], 12 * harmonics))
     return tuple(np.array(names[:12 * harmonics])[lost].tolist())
 
 
 def told_apart(bench: Bench, m: int, sigma: Floats, harmonics: int) -> float:
     """Condition number (2-norm, columns of length 1) of the amplitudes that m set-ups tell, mounting and indexer taken out;
     inf where they tell none."""
-    return _condition(_told(_design(bench, m, harmonics)[0] / np.tile(sigma, m * bench.steps)[:, None], 12 * harmonics))
-
-
-def _told(rows: Floats, count: int) -> Floats:
-    """Singular values of the first columns, scaled to length 1, that the others leave of them."""
-    values = np.linalg.svd(_left(rows, count), compute_uv=False)
-    return np.asarray(values[values > TOLD])
+    rows = _design(bench, m, harmonics)[0] / np.tile(sigma, m * bench.steps)[:, None]
+    return _condition(_told(_left(rows, 12 * harmonics))[1])
 
 
 def _condition(told: Floats) -> float:
@@ -144,12 +140,12 @@ def _left(rows: Floats, count: int) -> Floats:
     return result
 
 
-def _lost(rows: Floats, count: int) -> Bools:
-    """(count,) True for the first columns that lie in the span of the others beyond them, or of lost and others."""
-    square = np.linalg.qr(_left(rows, count), mode="r")
+def _told(left: Floats) -> tuple[Bools, Floats]:
+    """Of what mounting and indexer leave of the wanted columns (K, P): True (P,) for those that they or lost ones can make
+    up, and the singular values of what is told."""
+    square, count = np.linalg.qr(left, mode="r"), left.shape[1]
     _, values, vt = np.linalg.svd(np.concatenate([square, np.zeros((count - len(square), count))]))
-    result: Bools = np.asarray(np.sum(vt[values <= TOLD] ** 2, axis=0) > 1e-6)
-    return result
+    return np.asarray(np.sum(vt[values <= TOLD] ** 2, axis=0) > 1e-6), values[values > TOLD]
 
 
 def error_model(fitted: RotaryFit, axis: str, machine: str = "", name: str = "", sense: int = 1,

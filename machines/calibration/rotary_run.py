@@ -89,7 +89,8 @@ def rotary(run: Run, given: RotaryModel, table: CsvTable) -> Calibration | None:
         return None
     fitted = fit_rotary(bench, readings, sigma, given.harmonics, run.checked.robust)
     figures = _rotary_figures(given, bench, fitted, sigma)
-    untold = [name for name in fitted.lost if name not in hidden(bench, sigma, given.harmonics)]
+    never = hidden(bench, sigma, given.harmonics)
+    untold = [name for name in fitted.lost if name not in never]
     if untold:
         run.problem("calibrate.rank", f"the readings do not tell {folded(untold)}",
                     "measure one more set-up, the indexer turned by one increment more")

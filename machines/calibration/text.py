@@ -57,7 +57,7 @@ def _errors(figures: dict[str, Any]) -> list[str]:
     lines += [f"  {name:{wide}} {_value(p['value'], p['sigma'])} {p['unit']:6} {p['at'] and 'at '}{p['at']}".rstrip()
               for name, p in told.items()]
     lines += [f"not known, 0 in the model: {', '.join(untold)}"] if untold else []
-    return lines + ([f"{kept} other parameters stay as they were"] if kept else [])
+    return lines + ([f"other parameters, which stay as they were: {kept}"] if kept else [])
 
 
 def _value(value: float, sigma: float) -> str:
