@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from machines.calibration.problem import linear, solve
-from machines.calibration.reversal import conditioning, identify, plan, reversal_matrix, statistics
+from machines.calibration.reversal import conditioning, cost_without, identify, plan, reversal_matrix, statistics
 from machines.calibration.rotary_fit import error_model, fit_rotary
 from machines.calibration.setup_filter import setup_filter
 from machines.calibration.simulator import Bench, mount_jacobian, simulate
@@ -251,3 +251,19 @@ def test_six_errors_move_the_tool_as_the_measured_body_moves(name: str, letter: 
         else:
             wanted = turned.apply(small.apply(start - point) + frame @ e[:3]) + point
         assert actual.place(q[k:k + 1])[0][0] == pytest.approx(wanted, abs=2e-5)
+
+
+def test_what_the_instrument_alone_leaves_is_what_the_axis_did() -> None:
+    """A perfect axis: nothing is left without it; else at least what the axis's own steps spread by."""
+    rng = np.random.default_rng(21)
+    axis, indexer = closed(rng, 12), closed(rng, 12)
+    offsets = rng.normal(size=(4, 1))
+    assert cost_without(readings(0.0 * axis, indexer, 4) + offsets, 1.0) < 1e-24
+    assert cost_without(readings(axis, indexer, 4) + offsets, 1.0) > 1.0
+    assert cost_without(readings(0.0 * axis, indexer, 4) + offsets, 1.0, offsets=False) > 1.0
+    bench, sigma, unit = Bench(12), np.full(6, 1e-6), np.array([1e-3, 1e-3, 1e-3, ARCSEC, ARCSEC, ARCSEC])
+    turned, still = rng.normal(size=(12, 6)) * unit, np.zeros((12, 6))
+    mounts = rng.normal(size=(3, 3, 6)) * unit
+    read = [simulate(bench, moved, turned, mounts) for moved in (still, turned)]
+    alone = [fit_rotary(bench, one, sigma, 2).cost_instrument for one in read]
+    assert alone[0] < 1e-3 * alone[1]
