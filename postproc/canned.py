@@ -51,6 +51,8 @@ def holes_of(toolpath: Toolpath, moves: Moves, path: Path, words: WordRows, cont
         first += _rises_first(words, z, int(first), int(last))
         first, last = _without_feeding_rapids(moves, path, int(first), int(last))
         first += _before_own_level(moves, path, words, z, first, last)
+        placed = _placed_before(moves, path, allowed, first, last)
+        first += placed
         level = float(words.start[first, z]) if first > 0 else np.inf
         initial = before_initial if previous_last == first - 1 else level
         # A command before the hole ends the sequence: what the control takes for its first level then is where the tool is.
@@ -61,7 +63,7 @@ def holes_of(toolpath: Toolpath, moves: Moves, path: Path, words: WordRows, cont
         if not _states_retract(controller, key):
             slack = _slack(path, controller, first)
             last -= _rises_beyond(moves, path, words, z, first, last, -np.inf if low else initial + slack)
-        found = _hole(toolpath, moves, path, words, control, controller, int(first), int(last), initial, key)
+        found = _hole(toolpath, moves, path, words, control, controller, int(first), int(last), initial, key, placed > 0)
         if low and found is not None and found.retract > found.plane_level and not _states_retract(controller, key):
             continue
         if found is not None and allowed[first:last + 1].all():
@@ -99,6 +101,12 @@ def _before_own_level(moves: Moves, path: Path, words: WordRows, z: int, first: 
     return int(found[-1]) + 1 if len(found) else 0
 
 
+def _placed_before(moves: Moves, path: Path, allowed: Bools, first: int, last: int) -> int:
+    """How many blocks bring the tool over a hole that are not `allowed` (K,) in its cycle: they stay blocks of their own."""
+    inside = np.flatnonzero(allowed[first:last + 1] | (moves.phase[path.move[first:last + 1]] > Phase.APPROACH))
+    return int(inside[0]) if len(inside) else 0
+
+
 def _rises_beyond(moves: Moves, path: Path, words: WordRows, z: int, first: int, last: int, initial: float) -> bool:
     """True where block `last` goes on in rapid, from the plane that the cycle feeds out to, to above its initial level.
 
@@ -126,8 +134,8 @@ def _without_feeding_rapids(moves: Moves, path: Path, first: int, last: int) -> 
     They stay blocks of their own: the cycle begins over the hole, or at its clearance plane, and ends there.
     """
     own = feeding_rapid(moves, path, np.arange(first, last + 1))
-    inner = np.flatnonzero(~own)
-    return first + int(inner[0]), first + int(inner[-1])
+    inner, over = np.flatnonzero(~own), np.flatnonzero(own & (moves.phase[path.move[first:last + 1]] == Phase.POSITION))
+    return first + max(int(inner[0]), int(over[-1]) + 1 if len(over) else 0), first + int(inner[-1])
 
 
 def feeding_rapid(moves: Moves, path: Path, blocks: Ints) -> Bools:
@@ -136,7 +144,9 @@ def feeding_rapid(moves: Moves, path: Path, blocks: Ints) -> Bools:
 
 
 def _hole(toolpath: Toolpath, moves: Moves, path: Path, rows: WordRows, control: Control, controller: ControllerFile,
-          first: int, last: int, initial: float, key: str) -> Hole | None:
+          first: int, last: int, initial: float, key: str, placed: bool) -> Hole | None:
+    """The hole of blocks `first` to `last`; the tool goes to the very place at the plane where blocks of their own have
+    `placed` it there."""
     cycle = toolpath.cycles[int(moves.cycle[path.move[first]])]
     spec = controller.cycles.with_dwell if cycle.dwell > 0.0 else controller.cycles.table
     phases = moves.phase[path.move[first:last + 1]]
@@ -145,7 +155,8 @@ def _hole(toolpath: Toolpath, moves: Moves, path: Path, rows: WordRows, control:
     words = np.concatenate([rows.start[first:first + 1], rows.end[first:last + 1]])
     start = int(np.flatnonzero(phases <= Phase.APPROACH)[-1]) + 1 if (phases <= Phase.APPROACH).any() else 0
     slack = _slack(path, controller, first)
-    along = bool((np.abs(np.delete(words[start:], z, axis=1) - np.delete(words[start], z)) <= slack).all())
+    down = words[start + (placed and start == 0):]
+    along = bool((np.abs(np.delete(down, z, axis=1) - np.delete(down[0], z)) <= slack).all())
     plane, out, deepest = float(words[start, z]), float(words[-1, z]), float(words[bottom - first + 1, z])
     if feeding_rapid(moves, path, np.arange(first, last + 1)).any() or phases[-1] == Phase.DRILL:
         return None

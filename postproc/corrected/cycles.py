@@ -26,23 +26,26 @@ IN_AIR = 8.0
 
 
 def whole_holes(path: Path, nominal: Path, moves: Moves, work: Work, allowed: float, always: Bools) -> tuple[Path, Ints]:
-    """The path with holes corrected as a whole, and for each block (K,) its hole or ALONE or LIFTS.
+    """The path with holes corrected as a whole, and for each block (K,) its hole or ALONE or LIFTS; sets `work.level`.
 
     Every block of a hole is corrected as its bottom is, but along the tool: the planes that drilling begins at get the
     least correction of the bottoms of the holes that follow each other, so that one plane serves all of them and no peck is
     added, levels above them that of the block that the tool comes from to the first. A block that lifts the tool to the
-    plane of the next hole goes with the hole that it lifts it from. Holes that this takes farther than LOOSE times `allowed`
-    mm from where they belong keep the corrections of their blocks and are written out, but for those of cycles that
-    `always` (C,) stay cycles.
+    plane of the next hole goes with the hole that it lifts it from; those that bring it to the first from afar are
+    corrected alone. Holes that this takes farther than LOOSE times `allowed` mm from where they belong keep the corrections
+    of their blocks and are written out, but for those of cycles that `always` (C,) stay cycles: these have planes of their
+    own where one does not serve them.
     """
     hole = np.where(np.isnan(path.u) | path.home, -1, moves.hole[path.move])
     feeds = moves.kind[path.move] != Kind.RAPID
     runs, owner, lifts = _sequences(path, nominal, hole, feeds, work)
-    holes = _along_tool(path, nominal, work, runs, owner, feeds)
-    whole, q = np.full(len(path), ALONE), path.q.copy()
+    holes, whole, q = _along_tool(path, nominal, work, runs, owner, feeds), np.full(len(path), ALONE), path.q.copy()
     if not len(holes.runs):
         return path, whole
-    share = np.where(np.append(always, False)[moves.cycle[path.move[holes.rows]]], np.inf, allowed)
+    holes = holes.without_first(holes.from_afar(LOOSE * allowed))
+    stay = np.append(always, False)[moves.cycle[path.move[holes.rows]]]
+    holes = replace(holes, apart=stay[holes.first] & (holes.spread > LOOSE * allowed))
+    share = np.where(stay, np.inf, allowed)
     lead, moved, above = _leads(path, nominal, work, holes)
     joints = _joints(path, work, holes.owner[holes.hole], path.q[holes.rows], holes.corrected(above))
     near = _near(nominal, work, holes, joints, share)
@@ -50,7 +53,7 @@ def whole_holes(path: Path, nominal: Path, moves: Moves, work: Work, allowed: fl
     near = _approached(replace(path, q=q), work, holes, joints, share, near, lead)
     rows = near[holes.hole]
     q[holes.rows[rows]], whole[holes.rows[rows]] = joints[rows], holes.runs.begin[holes.hole[rows]]
-    q[lead] = moved
+    q[lead], work.level = moved, np.isin(np.arange(len(path)), lead[whole[lead + 1] >= 0])
     lifts = lifts[whole[lifts] == ALONE]
     q[lifts], whole[lifts] = _lifted(path, q, work, lifts), LIFTS
     return replace(path, q=q), whole
@@ -92,6 +95,7 @@ class _Holes:
 
     runs: their blocks; owner: (H,) first block of the holes that follow each other; feeds: (M,) blocks that drill
     wanted: (M, 3) nominal; found: (M, 3) corrected block by block
+    plane: (H,) levels where drilling begins, nominal; apart: (H,) those with planes of their own
     """
 
     runs: Runs
@@ -99,6 +103,8 @@ class _Holes:
     wanted: Floats
     found: Floats
     feeds: Bools
+    plane: Floats
+    apart: Bools
 
     @cached_property
     def rows(self) -> Ints:
@@ -135,11 +141,6 @@ class _Holes:
             np.where(inside, flat, np.inf), self.first)
         return np.asarray(down & (wide.max(axis=1) <= SAME))
 
-    @property
-    def plane(self) -> Floats:
-        """(H,) level where drilling begins, nominal."""
-        return np.asarray(self.wanted[self.start, 2])
-
     @cached_property
     def top(self) -> Floats:
         """(S,) highest plane of each sequence."""
@@ -160,26 +161,53 @@ class _Holes:
         """(S,) least correction along the tool of each sequence."""
         return np.minimum.reduceat(self.off[:, 2], self.sequences.begin)
 
+    @property
+    def spread(self) -> Floats:
+        """(H,) mm between the corrections along the tool of the holes of each one's sequence."""
+        most = np.maximum.reduceat(self.off[:, 2], self.sequences.begin)
+        return np.asarray((most - self.least)[self.sequences.of_rows])
+
+    @cached_property
+    def level(self) -> Floats:
+        """(H,) correction along the tool of each hole's plane."""
+        return np.asarray(np.where(self.apart, self.off[:, 2], self.least[self.sequences.of_rows]))
+
+    def from_afar(self, most: float) -> Ints:
+        """(H,) blocks that bring the tool over the first hole of a sequence from above all planes, and down to it where it
+        goes back no farther: where the correction across the tool differs by more than `most` mm from that at the bottom."""
+        first, last, top = self.first, self.first + self.runs.size - 1, self.top[self.sequences.of_rows] + SAME
+        across = np.linalg.norm((self.found[first] - self.wanted[first] - self.off)[:, :2], axis=1)
+        far = (self.wanted[first, 2] > top) & (self.start > first) & (self.owner == self.runs.begin) & (across > most)
+        return np.asarray(np.where(far, np.where(self.wanted[last, 2] > top, 1, self.start - first + 1), 0))
+
+    def without_first(self, count: Ints) -> _Holes:
+        """All without the first `count` (H,) blocks."""
+        keep = np.arange(len(self.rows)) >= (self.first + count)[self.hole]
+        owner = self.owner + count[self.sequences.begin][self.sequences.of_rows]
+        return _Holes(Runs(self.runs.begin + count, self.runs.size - count), owner, self.wanted[keep], self.found[keep],
+                      self.feeds[keep], self.plane, self.apart)
+
     def corrected(self, above: Floats) -> Floats:
-        """(M, 3) all as the bottom, along the tool as `least` for the planes and `above` (S,) for what is above them."""
+        """(M, 3) all as the bottom, along the tool as `level` for the planes and `above` (S,) for what is above them."""
         z, sequence = self.wanted[:, 2], self.sequences.of_rows[self.hole]
         result = self.wanted + self.off[self.hole]
         result[:, 2] = z + np.where(z < self.plane[self.hole] - SAME, self.off[self.hole, 2],
-                                    np.where(z <= self.top[sequence] + SAME, self.least[sequence], above[sequence]))
+                                    np.where(z <= self.top[sequence] + SAME, self.level[self.hole], above[sequence]))
         return result
 
     def some(self, keep: Bools) -> _Holes:
         """Some of them."""
         mine = keep[self.hole]
-        return _Holes(self.runs.some(keep), self.owner[keep], self.wanted[mine], self.found[mine], self.feeds[mine])
+        return _Holes(self.runs.some(keep), self.owner[keep], self.wanted[mine], self.found[mine], self.feeds[mine],
+                      self.plane[keep], self.apart[keep])
 
 
 def _along_tool(path: Path, nominal: Path, work: Work, runs: Runs, owner: Ints, feeds: Bools) -> _Holes:
     """The holes of some runs that are drilled along Z of the words."""
     rows, frames = runs.rows, np.repeat(owner, runs.size)
     wanted, found = (_words(p, work, frames, p.q[rows]) for p in (nominal, path))
-    holes = _Holes(runs, owner, wanted, found, feeds[rows])
-    return holes.some(holes.along_z) if len(runs) else holes
+    holes = _Holes(runs, owner, wanted, found, feeds[rows], np.zeros(len(runs)), np.zeros(len(runs), dtype=np.bool_))
+    return replace(holes, plane=wanted[holes.start, 2]).some(holes.along_z) if len(runs) else holes
 
 
 def _words(path: Path, work: Work, owner: Ints, q: Floats) -> Floats:
@@ -211,7 +239,7 @@ def _leads(path: Path, nominal: Path, work: Work, holes: _Holes) -> tuple[Ints, 
     before, came = (_words(p, work, owner, p.q[lead]) for p in (nominal, path))
     level = (before[:, 2] >= plane - SAME) & (before[:, 2] <= holes.top + SAME)
     level &= (path.code[lead] != FEED) & ~path.home[lead]
-    came[level, 2] = before[level, 2] + holes.least[level]
+    came[level, 2] = before[level, 2] + holes.level[first][level]
     return lead[level], _joints(path, work, owner[level], path.q[lead[level]], came[level]), (came - before)[:, 2]
 
 

@@ -10,7 +10,7 @@ from postproc.corrected.arcs import LOOKS as ARC_LOOKS
 from postproc.corrected.reversals import LOOSE, SHORTEST, Divided, Starts, inserted, reversals, stretches
 from postproc.corrected.work import ALONE, MOMENT, Work
 from postproc.looks import looks_between
-from postproc.path import ARC, FEED, Path
+from postproc.path import ARC, FEED, TRAVERSE, Path
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.units import DEG
 
@@ -48,7 +48,8 @@ def between(path: Path, work: Work, starts: Starts, allowed: float) -> tuple[Int
 
 @dataclass(frozen=True)
 class Pieces:
-    """Parts t0..t1 (N,) of blocks (N,) with the corrected joints (N, J) at their ends, and the ways (N, J) at t0."""
+    """Parts t0..t1 (N,) of blocks (N,) with the corrected joints (N, J) at their ends, and the ways (N, J) at t0; mm (N,)
+    that the tip is off at t0 of rapids behind holes that are corrected as a whole: no point between mends that."""
 
     block: Ints
     t0: Floats
@@ -56,16 +57,18 @@ class Pieces:
     q0: Floats
     q1: Floats
     way: Floats
+    behind: Floats
 
     def rows(self, keep: Bools | Ints) -> Pieces:
         """Some of them."""
-        return Pieces(self.block[keep], self.t0[keep], self.t1[keep], self.q0[keep], self.q1[keep],
-                      self.way[keep])
+        return Pieces(self.block[keep], self.t0[keep], self.t1[keep], self.q0[keep], self.q1[keep], self.way[keep],
+                      self.behind[keep])
 
     def halved(self, middle: Floats, q: Floats, way: Floats) -> Pieces:
         """Both halves of each, joints and ways in the middle being q and way."""
         return Pieces(np.tile(self.block, 2), np.concatenate([self.t0, middle]), np.concatenate([middle, self.t1]),
-                       np.concatenate([self.q0, q]), np.concatenate([q, self.q1]), np.concatenate([self.way, way]))
+                       np.concatenate([self.q0, q]), np.concatenate([q, self.q1]), np.concatenate([self.way, way]),
+                      np.concatenate([self.behind, np.zeros(len(q))]))
 
 
 def _taken_up(path: Path, work: Work, starts: Starts, block: Ints,
@@ -85,9 +88,18 @@ def _taken_up(path: Path, work: Work, starts: Starts, block: Ints,
     t0, t1 = np.concatenate([zero, at]), np.concatenate([zero + 1.0, at])
     begins, ends = np.lexsort((t0, owner)), np.lexsort((t1, owner))
     pieces = Pieces(owner[begins], t0[begins], t1[ends], np.concatenate([starts.q[block], new])[begins],
-                     np.concatenate([path.q[block], old])[ends], np.concatenate([starts.way[block], after])[begins])
+                    np.concatenate([path.q[block], old])[ends], np.concatenate([starts.way[block], after])[begins],
+                    np.concatenate([_behind(path, work, starts, block), 0.0 * at])[begins])
     back = starts.block
     return pieces, [(back, np.zeros(len(back)), starts.q[back]), (turning, at, old), (turning, at, new)]
+
+
+def _behind(path: Path, work: Work, starts: Starts, block: Ints) -> Floats:
+    """`behind` (N,) of blocks (N,) as a whole."""
+    result, k = np.zeros(len(block)), np.flatnonzero((path.code[block] == TRAVERSE) & (work.whole[block - 1] != ALONE))
+    rows = block[k]
+    result[k] = work.off(work.nominal(rows, np.zeros(len(rows))), starts.q[rows], rows, starts.way[rows])
+    return result
 
 
 def _off(pieces: Pieces, path: Path, work: Work) -> Floats:
@@ -101,11 +113,11 @@ def _off(pieces: Pieces, path: Path, work: Work) -> Floats:
 
 
 def _off_at(pieces: Pieces, t: Floats, path: Path, work: Work) -> Floats:
-    """(N,) mm from the nominal motion at t (N,) of pieces."""
+    """(N,) mm from the nominal motion at t (N,) of pieces, beyond what is left of what their beginning is off by."""
     at = pieces.t0 + t * (pieces.t1 - pieces.t0)
     got = work.straight(path, pieces.q0, pieces.q1, pieces.block, t)
     way = work.played(pieces.way, pieces.q0, got)
-    return work.off(work.nominal(pieces.block, at), got, pieces.block, way)
+    return np.asarray(work.off(work.nominal(pieces.block, at), got, pieces.block, way) - (1.0 - t) * pieces.behind)
 
 
 def _bound(pieces: Pieces, path: Path, work: Work, allowed: float) -> Floats:

@@ -140,6 +140,7 @@ class _Written:
         path, words = self.path, self.words
         fixed = path.home | np.isnan(path.u) | path.state.any(axis=1) | (self.work.whole[self.made.owner] != ALONE)
         result = np.where(fixed | ~np.isfinite(self.q).all(axis=1), 0.0, 1.0)[:, None] * np.ones(3)
+        result[self.work.level[self.made.owner] & (self.made.until == 1.0), 2] = 0.0
         xyz, helix = path.frames[0].control.xyz, np.zeros(len(path), dtype=np.bool_)
         for law, k in path.by_control():
             helix[k] = np.isin(path.plane[k], law.helix_planes)

@@ -59,6 +59,7 @@ class Work:
         self.beyond_inside: Bools = self.beyond | (path.code == TRAVERSE)
         self.axis_share, self.mean = share * axis_tolerance, mean
         self.whole: Ints = np.full(len(path), ALONE)
+        self.level: Bools = np.zeros(len(path), dtype=np.bool_)
         self.way: Floats = np.zeros(path.q.shape)
         self.drift: Floats = np.zeros(path.q.shape)
         self.rotary = np.array(kinematics(int(tools[0])).rotary)

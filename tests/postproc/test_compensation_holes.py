@@ -59,7 +59,8 @@ def test_blocks_compose_as_one_after_the_other() -> None:
 
 # ---- programs ----------------------------------------------------------------------------------------------------------
 
-def drilled(folder: Path, machine: str, controller: str, cycle: str, tilted: bool = False, seed: int = 2) -> PostResult:
+def drilled(folder: Path, machine: str, controller: str, cycle: str, tilted: bool = False, seed: int = 2,
+            model: str = "") -> PostResult:
     """Holes at HEIGHTS in one sequence, along z or along an axis that leans by 30 degrees."""
     y, z = (np.array([0.0, 0.5 * np.sqrt(3.0), 0.5]), np.array([0.0, -0.5, 0.5 * np.sqrt(3.0)])) if tilted else np.eye(3)[1:]
     at = [f"GOTO/{','.join(f'{v:.6f}' for v in (x * np.eye(3)[0] + v * y + h * z, z) for v in v)}"
@@ -67,7 +68,7 @@ def drilled(folder: Path, machine: str, controller: str, cycle: str, tilted: boo
     lines = ["UNITS/MM", "LOADTL/1", "SPINDL/1000,CLW", "MULTAX/ON", "RAPID", at[0], f"CYCLE/{cycle}", *at[1:-1],
              "CYCLE/OFF", "RAPID", at[-1], "FINI", ""]
     path, found = toolpaths.read_bytes("\n".join(lines))
-    options = Options(error_model=str(two_ways_of_all(folder, machine, seed)) if seed else "")
+    options = Options(error_model=model or (str(two_ways_of_all(folder, machine, seed)) if seed else ""))
     return postproc.convert(path, machine, controller, load_setup(None)[0], options, found)
 
 
@@ -133,3 +134,28 @@ def test_what_a_level_is_off_by_is_taken_up_before_a_feed_and_at_its_beginning()
     job = SimpleNamespace(errors=True, options=Options(), rounding=SimpleNamespace(tip=1e-4))
     tip = np.cumsum(way)[:, None] * np.eye(3)[:1]
     assert np.flatnonzero(_taken_up(job, motion, tip)).tolist() == [2, 4]  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("controller", CONTROLLERS)
+@pytest.mark.parametrize("two_ways", [False, True])
+def test_taps_have_planes_of_their_own_and_are_come_to_from_afar(controller: str, two_ways: bool, tmp_path: Path) -> None:
+    """A table that sinks by 0.06 um per mm and a Z that leans by 40 arcsec: 11 um across at the level that the tool comes
+    from, up to 6 um between the planes; neither is the bottom's to settle."""
+    (tmp_path / "z.csv").write_text("Z [mm], EZZ+ [um], EZZ- [um]\n-500, 0, 3\n500, 1, 4\n")
+    text = '[location]\nEA0Z = 40\n[components.EZX]\npolynomial = [0, 0.06]\nrange = [-300, 300]\n'
+    (tmp_path / "e.toml").write_text(text + ('[components.EZZ]\ntable = "z.csv"\n' if two_ways else ""))
+    cycle, model = "TAP,DEPTH,8,CLEAR,4,MMPR,1", str(tmp_path / "e.toml")
+    result = checked(drilled(tmp_path, "mill-3axis", controller, cycle, model=model))
+    assert result.program is not None and len(result.program.holes) == len(HEIGHTS)
+    planes = np.array([hole.plane_level for hole in result.program.holes])
+    off = planes - 4.0 - np.array(HEIGHTS)
+    assert 0.004 < np.ptp(off) < 0.012 and np.ptp(off - [-6e-5 * x for x, _ in PLACES]) < 2e-3
+
+
+def test_no_points_mend_what_a_hole_leaves_a_rapid_off_by(tmp_path: Path) -> None:
+    """Behind a hole with a level of the common plane; the rapid away is halved for its own errors alone."""
+    result = checked(drilled(tmp_path, "mill-3axis", "linuxcnc", "DRILL,DEPTH,3,CLEAR,2,RETURN,2,MMPM,250", seed=1))
+    path, moves = result.path, result.job.moves if result.job is not None else None
+    assert path is not None and moves is not None
+    count = np.bincount(path.move[(path.code == 0) & np.isfinite(path.u)], minlength=len(moves))
+    assert count.max() <= 3
