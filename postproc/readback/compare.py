@@ -109,18 +109,19 @@ def _kept(job: Job) -> float:
 
 
 def _taken_up(job: Job, motion: Motion, tip: Floats) -> Bools:
-    """True (K,) for blocks that leave the tip, (K, 3), where it is although axes move: they take up lost motion.
+    """True (K,) for blocks that leave the tip, (K, 3), where it is although axes move: they take up lost motion, or the last
+    decimal by which the level of a hole differs from that of the hole before.
 
-    A rapid that a longer one follows, a feed that a longer feed follows, and a rapid between a longer one and a feed (the
-    last part of the way to the plane of a hole) may move it by as much as a level in the air, to which the tool came as part
-    of a hole, may be off by.
+    With errors, a rapid that a longer one follows, a feed that a longer feed follows, and a rapid between a longer one and a
+    feed (the last part of the way to the plane of a hole) may move it by as much as a level in the air, to which the tool
+    came as part of a hole, may be off by.
     """
+    way = np.linalg.norm(np.diff(tip, axis=0, prepend=np.inf), axis=1)
     if job.errors is None:
-        return np.zeros(len(tip), dtype=np.bool_)
+        return np.asarray(way <= 2.0 * job.rounding.tip)
     from postproc.compensation import SHARE
     from postproc.corrected.cycles import IN_AIR
 
-    way = np.linalg.norm(np.diff(tip, axis=0, prepend=np.inf), axis=1)
     still, air = (share * SHARE * job.options.tolerance + 2.0 * job.rounding.tip for share in (1.0, IN_AIR))
     rapid, feed, far = motion.code == TRAVERSE, motion.code == FEED, way > air
     rapid_next, feed_next = (np.append((code & far)[1:], False) for code in (rapid, feed))

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from tests.postproc.kit import body, codes, convert, execute, good, goto, shop_file, tilted, tool_poses, toolpath
+from toolpaths.rotations import rotation
 
 
 def cycle(*lines: str, controller: str = "linuxcnc", before: str = "GOTO/0,0,50") -> list[str]:
@@ -109,3 +110,19 @@ def test_a_command_between_holes_ends_the_first_level_too(controller: str) -> No
     got = cycle("CYCLE/DRILL,DEPTH,5,MMPM,100,CLEAR,3", "GOTO/10,0,0",
                 "CYCLE/DRILL,DEPTH,5,MMPM,100,RAPTO,3,RTRCTO,50", "GOTO/20,0,0", controller=controller)
     assert [b.split(" Z")[0] for b in got if b.startswith("G9")] == ["G99 G81 X10. Y0.", "G98 G81 X20. Y0."]
+
+
+@pytest.mark.parametrize("controller", ["siemens-840d", "heidenhain-tnc640", "fanuc-30i"])
+@pytest.mark.parametrize("kind", ["DRILL", "TAP"])
+@pytest.mark.parametrize("seed", [1, 3])
+def test_holes_of_one_plane_may_differ_by_the_last_decimal(controller: str, kind: str, seed: int) -> None:
+    """Points of four decimals in a tilted plane: the levels of the holes differ by the last one here and there, and a rapid
+    of that length is no cut that was left out."""
+    turned = rotation(np.array([0.6, -0.8, 0.0]), np.array([0.5]))[0]
+    places = np.random.default_rng(seed).uniform(-20, 20, (40, 3)) * [1, 1, 0]
+    feed = "MMPR,1" if kind == "TAP" else "MMPM,100"
+    holes = goto(np.round(places @ turned.T, 4), np.tile(np.round(turned[:, 2], 7), (40, 1)))
+    above = goto((turned @ [0, 0, 40.0])[None], turned[:, 2][None])
+    path = toolpath("RAPID", *above, f"CYCLE/{kind},DEPTH,9,{feed},RAPTO,3,RTRCTO,3", *holes, "CYCLE/OFF", "RAPID", *above)
+    result = convert(path, "head-table", controller)
+    assert result.ok, [str(d) for d in result.diagnostics]
