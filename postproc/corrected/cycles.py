@@ -40,7 +40,7 @@ def whole_holes(path: Path, nominal: Path, moves: Moves, work: Work, allowed: fl
     feeds = moves.kind[path.move] != Kind.RAPID
     runs, owner, lifts = _sequences(path, nominal, hole, feeds, work)
     holes, whole, q = _along_tool(path, nominal, work, runs, owner, feeds), np.full(len(path), ALONE), path.q.copy()
-    if not len(holes.runs):
+    if not len(holes.runs) or (path.frames[0].control.xyz < 0).any():  # no words X, Y, Z: no cycles
         return path, whole
     holes = holes.without_first(holes.from_afar(LOOSE * allowed))
     stay = np.append(always, False)[moves.cycle[path.move[holes.rows]]]

@@ -58,14 +58,14 @@ def settled(made: Divided, work: Work, writing: Writing, allowed: float) -> tupl
     with their ends.
     """
     path = made.path
-    if not work.two_way:
+    if not work.two_way or len(_columns(path)) != 3:
         return path, 0.0, np.zeros((len(path), 0))
     written = _Written(made, work, writing)
     n, ways = walk(written.ends(allowed))
     left, changed = written.axis_left(ways), np.flatnonzero(n.any(axis=1))
     if not len(changed):
         return path, left, ways
-    chosen, xyz = written.words.copy(), path.frames[0].control.xyz
+    chosen, xyz = written.words.copy(), _columns(path)
     chosen[:, xyz] += n * writing.grain[xyz]
     q = path.q.copy()
     q[changed] = writing.turned(path, writing.joints(path, chosen[changed], changed), changed)
@@ -74,6 +74,12 @@ def settled(made: Divided, work: Work, writing: Writing, allowed: float) -> tupl
     center[arcs] = new_centers(path, arcs, *(words[rows][:, xyz] for words in (written.words, chosen)
                                              for rows in (arcs - 1, arcs)))
     return replace(path, q=q, center=center), left, ways
+
+
+def _columns(path: Path) -> Ints:
+    """Columns of the words X, Y, Z; those of all slides where the machine has other letters."""
+    control = path.frames[0].control
+    return control.slides if (control.xyz < 0).any() else control.xyz
 
 
 class _Written:
@@ -131,7 +137,7 @@ class _Written:
         hole = self.work.whole[self.made.owner]
         runs = Runs.of(hole)
         runs = runs.some(hole[runs.begin] >= 0)
-        depth = np.where(self.path.code == FEED, self.words[:, self.path.frames[0].control.xyz[2]], np.inf)
+        depth = np.where(self.path.code == FEED, self.words[:, _columns(self.path)[2]], np.inf)
         return runs.begin, runs.rows[runs.least(depth[runs.rows])]
 
     def _free(self) -> Floats:
@@ -141,7 +147,7 @@ class _Written:
         fixed = path.home | np.isnan(path.u) | path.state.any(axis=1) | (self.work.whole[self.made.owner] != ALONE)
         result = np.where(fixed | ~np.isfinite(self.q).all(axis=1), 0.0, 1.0)[:, None] * np.ones(3)
         result[self.work.level[self.made.owner] & (self.made.until == 1.0), 2] = 0.0
-        xyz, helix = path.frames[0].control.xyz, np.zeros(len(path), dtype=np.bool_)
+        xyz, helix = _columns(path), np.zeros(len(path), dtype=np.bool_)
         for law, k in path.by_control():
             helix[k] = np.isin(path.plane[k], law.helix_planes)
         for plane, flat in PLANE_COLUMNS.items():
@@ -195,7 +201,7 @@ class _Written:
         path, work, owner = self.path, self.work, self.made.owner[at]
         back, rates = np.zeros((len(at), len(work.two_way), 3)), np.zeros((len(at), 3, 3))
         here = work.poses(self.q[at], owner)[0]
-        for i, column in enumerate(path.frames[0].control.xyz.tolist()):
+        for i, column in enumerate(_columns(path).tolist()):
             beside = self.words[at]
             beside[:, column] += self.writing.grain[column]
             moved = self.writing.joints(path, beside, at)

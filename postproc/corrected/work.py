@@ -46,9 +46,10 @@ class CorrectedEnds:
 class Work:
     """What is needed throughout: the machine with errors by tool, groups of one orientation.
 
-    `whole`: (K,) the hole that a block is of where it is corrected as a whole, else ALONE or LIFTS; `way`: (K, J) sign of
-    each joint's last motion at the ends of the blocks, 0 for the mean of both; `drift`: (K, J) of the correction over each
-    block; `beyond`, `beyond_inside`: (K,) blocks that may end, or run, where errors were not measured.
+    `whole`: (K,) the hole that a block is of where it is corrected as a whole, else ALONE or LIFTS; `level`: (K,) blocks
+    that end at the plane of such holes, whose Z stands; `way`: (K, J) sign of each joint's last motion at the ends of the
+    blocks, 0 for the mean of both; `drift`: (K, J) of the correction over each block; `beyond`, `beyond_inside`: (K,)
+    blocks that may end, or run, where errors were not measured.
     """
 
     def __init__(self, path: Path, tools: Ints, kinematics: Callable[[int], Kinematics], model: ErrorModel,

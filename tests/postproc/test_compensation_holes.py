@@ -159,3 +159,17 @@ def test_no_points_mend_what_a_hole_leaves_a_rapid_off_by(tmp_path: Path) -> Non
     assert path is not None and moves is not None
     count = np.bincount(path.move[(path.code == 0) & np.isfinite(path.u)], minlength=len(moves))
     assert count.max() <= 3
+
+
+def test_slides_of_other_letters_lose_motion_too(tmp_path: Path) -> None:
+    text = Path("machines/data/mill-3axis.toml").read_text()
+    for one, other in zip("XYZ", "UVW", strict=True):
+        text = re.sub(rf"(\[axes\.|retract_axis = \"|[wb' ]){one}(?=[\]'\" ])", rf"\g<1>{other}", text)
+    (tmp_path / "uvw.toml").write_text(text)
+    (tmp_path / "u.csv").write_text("U [mm], EXU+ [um], EXU- [um]\n-400, 0, 4\n400, 5, 9\n")
+    (tmp_path / "e.toml").write_text('[components.EXU]\ntable = "u.csv"\n')
+    lines = ["UNITS/MM", "LOADTL/1", "SPINDL/1000,CLW", "FEDRAT/300,MMPM", "RAPID", "GOTO/0,0,20", "GOTO/30,0,0",
+             "GOTO/10,5,0", "GOTO/20,9,-1", "FINI", ""]
+    path, found = toolpaths.read_bytes("\n".join(lines))
+    options = Options(error_model=str(tmp_path / "e.toml"), setup="samples/tools.setup.toml")
+    checked(postproc.convert(path, str(tmp_path / "uvw.toml"), "linuxcnc", options=options, diagnostics=found))
