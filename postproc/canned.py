@@ -48,7 +48,7 @@ def holes_of(toolpath: Toolpath, moves: Moves, path: Path, words: WordRows, cont
     for first, last in zip([0, *change], [*(change - 1), len(path) - 1], strict=True):
         if hole[first] < 0:
             continue
-        first += _rises_first(words, z, int(first), int(last))
+        first += _rises_first(words, z, int(first), int(last), _slack(path, controller, first))
         first, last = _without_feeding_rapids(moves, path, int(first), int(last))
         first += _before_own_level(moves, path, words, z, first, last)
         placed = _placed_before(moves, path, allowed, first, last)
@@ -82,14 +82,14 @@ def may_cycle(control: Control, controller: ControllerFile) -> bool:
     return mode is not None and mode.cycles
 
 
-def _rises_first(words: WordRows, z: int, first: int, last: int) -> bool:
+def _rises_first(words: WordRows, z: int, first: int, last: int, slack: float) -> bool:
     """True where block `first` only lifts the tool to the clearance plane.
 
     It stays a block of its own: inside a sequence of cycles LinuxCNC goes aslant to a higher plane under G99, others
     cross over before they rise.
     """
     step = words.end[first] - words.start[first]
-    return 0 < first < last and bool(step[z] > 0.0) and not np.delete(step, z).any()
+    return 0 < first < last and bool(step[z] > slack) and not (np.abs(np.delete(step, z)) > slack).any()
 
 
 def _before_own_level(moves: Moves, path: Path, words: WordRows, z: int, first: int, last: int) -> int:

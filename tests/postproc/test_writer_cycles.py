@@ -126,3 +126,18 @@ def test_holes_of_one_plane_may_differ_by_the_last_decimal(controller: str, kind
     path = toolpath("RAPID", *above, f"CYCLE/{kind},DEPTH,9,{feed},RAPTO,3,RTRCTO,3", *holes, "CYCLE/OFF", "RAPID", *above)
     result = convert(path, "head-table", controller)
     assert result.ok, [str(d) for d in result.diagnostics]
+
+
+@pytest.mark.parametrize("controller", ["siemens-840d", "heidenhain-tnc640", "fanuc-30i"])
+@pytest.mark.parametrize("seed", [5, 8])
+def test_a_tool_in_a_tilted_plane_rises_before_it_goes_to_a_higher_hole(controller: str, seed: int) -> None:
+    """The lift of rounded words is off the vertical by a last decimal; without it the tool would cross at the hole's top."""
+    rng = np.random.default_rng(seed)
+    turn = rng.uniform(0, 2 * np.pi)
+    turned = rotation(np.array([np.cos(turn), np.sin(turn), 0.0]), np.array([rng.uniform(0.2, 1.2)]))[0]
+    places = rng.uniform(-20, 20, (30, 3)) * [1, 1, 0] + rng.choice([0.0, 3.0, -3.0], 30)[:, None] * [0, 0, 1]
+    holes = goto(np.round(places @ turned.T, 4), np.tile(np.round(turned[:, 2], 7), (30, 1)))
+    above = goto((turned @ [0, 0, 40.0])[None], turned[:, 2][None])
+    record = "CYCLE/DEEP,DEPTH,9,MMPM,100,STEP,4,RAPTO,3,RTRCTO,3"
+    result = convert(toolpath("RAPID", *above, record, *holes, "CYCLE/OFF", "RAPID", *above), "head-table", controller)
+    assert result.ok, [str(d) for d in result.diagnostics]
