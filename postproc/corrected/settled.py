@@ -16,7 +16,7 @@ from postproc.corrected.walk import Ends, walk
 from postproc.corrected.work import ALONE, LIFTS, Work, axis_positions, bent_blocks, on_arc
 from postproc.path import ARC, FEED, TRAVERSE, Path
 from postproc.word_arcs import PLANE_COLUMNS
-from toolpaths.arrays import Floats, Ints
+from toolpaths.arrays import Bools, Floats, Ints
 
 AT_ONCE = 50_000
 """blocks whose rates are found together"""
@@ -24,6 +24,9 @@ PARTS = 16
 """parts of a block whose joints do not run straight, for the ways of its axes"""
 NOISE = 1e-3
 """of the ways: turning back by less is none"""
+QUARTERS, NEAR = (0.25, 0.5, 0.75), 16.0
+"""where joints are looked at, and the part of their way off the straight one within which none turns back: bows of second
+and third order do where they leave it there by a fourth and by an eleventh"""
 BEGINS = 0.01
 """weight of what the beginning of a block is off by beside what the end before it is, but where lost motion is taken up"""
 CLOSED = 0.05
@@ -165,11 +168,19 @@ class _Written:
         last = 2.0 * np.nan_to_num(np.diff(self.q, axis=0, prepend=self.q[:1]))[:, t] / self.gap
         bend, begin = _none(3, *self.gap.shape), np.where(np.abs(last) >= 2.0, np.sign(last), 0.0)
         bent = np.flatnonzero(bent_blocks(self.path, self.work.rotary))
+        bent = bent[self._turning(bent)]
         if len(bent):
             places = (self._along(bent, k / PARTS) for k in range(PARTS + 1))
             bend[:, bent], last[bent], begin[bent] = _runs(
                 2.0 * np.nan_to_num(two - one)[:, t] / self.gap[bent] for one, two in pairwise(places))
         return bend, last, begin
+
+    def _turning(self, rows: Ints) -> Bools:
+        """(N,) blocks (N,) in which a joint may turn back: not where all stay near the straight way."""
+        t, gap = self.work.two_way, self.gap[rows]
+        q0, step = self.q[rows - 1][:, t], (self.q[rows] - self.q[rows - 1])[:, t]
+        apart = np.max([np.abs(self._along(rows, share)[:, t] - q0 - share * step) for share in QUARTERS], axis=0)
+        return np.asarray(~(apart <= np.maximum(np.abs(step), 0.5 * NOISE * gap) / NEAR).all(axis=1))
 
     def _along(self, rows: Ints, share: float) -> Floats:
         """Joints (N, J) at a share of blocks (N,) as they are written."""

@@ -1,4 +1,5 @@
-"""Holes corrected as a whole: all at once as one by one, at several heights, in planes, tapped, and what stays a cycle."""
+"""Holes corrected as a whole: all at once as one by one, at several heights, in planes, tapped, and what stays a cycle; ways
+of joints in blocks that are nearly straight."""
 
 from __future__ import annotations
 
@@ -12,6 +13,7 @@ import pytest
 import postproc
 import toolpaths
 from machines.geometric_error.lost_motion import Steps
+from postproc.corrected import settled
 from postproc.corrected.proof import after_formatting
 from postproc.corrected.runs import Runs
 from postproc.corrected.settled import _composed
@@ -173,3 +175,16 @@ def test_slides_of_other_letters_lose_motion_too(tmp_path: Path) -> None:
     path, found = toolpaths.read_bytes("\n".join(lines))
     options = Options(error_model=str(tmp_path / "e.toml"), setup="samples/tools.setup.toml")
     checked(postproc.convert(path, str(tmp_path / "uvw.toml"), "linuxcnc", options=options, diagnostics=found))
+
+
+def test_blocks_that_are_nearly_straight_need_no_pieces(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The words are those that pieces of all blocks lead to; some blocks are not straight enough to go without."""
+    model, texts, counts = two_ways_of_all(tmp_path, "mikron-ucp710", 3), [], []
+    runs = settled._runs
+    monkeypatch.setattr(settled, "_runs", lambda pieces: (lambda found: counts.append(len(found[1])) or found)(runs(pieces)))
+    for near in (settled.NEAR, np.inf):
+        monkeypatch.setattr(settled, "NEAR", near)
+        path, found = toolpaths.read("samples/tool_axis_tour.apt")
+        options = Options(error_model=str(model), setup="samples/tools.setup.toml", output="tcp")
+        texts.append(checked(postproc.convert(path, "mikron-ucp710", "haas-ngc", options=options, diagnostics=found)).text)
+    assert texts[0] == texts[1] and 0 < min(counts[:len(counts) // 2]) < 0.9 * min(counts[len(counts) // 2:])
