@@ -21,7 +21,7 @@ from toolpaths.arrays import Bools, Floats, Ints
 
 MOMENT = 1e-3
 """of a block: how far back its direction at a place is looked at"""
-LAST = 1.0 / 16.0
+LAST = 1.0 / 256.0
 """of a block: the same at its ends; turning back later than that counts as none"""
 EDGES = tuple(k / 16.0 for k in range(17))
 """where the directions of the axes in a block are looked at"""

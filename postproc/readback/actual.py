@@ -99,7 +99,10 @@ class ActualExecuted(Executed):
             looks = self._looked_at(motion, rows[k])
             last = np.minimum((share[k] * LOOKS).astype(np.int64), LOOKS - 1)
             gone = Steps(*(steps[last, np.arange(len(k))] for steps in looks))
-            whole = gone.then(self._between(motion, rows[k], last / LOOKS, share[k]))
+            before, middle, q = (self.joints(motion, rows[k], t) for t in (
+                last / LOOKS, 0.5 * (last / LOOKS + share[k]), share[k]))
+            turn = _turning(before, middle, q)
+            whole = gone.then(self._of(before, turn)).then(self._of(turn, q))
             for name in ("shift", "low", "high"):
                 getattr(result, name)[k] = getattr(whole, name)
         return result
@@ -111,8 +114,10 @@ class ActualExecuted(Executed):
             whole = self._between(motion, rows, np.zeros(len(rows)), np.zeros(len(rows)))
             stages, q = [whole], self.joints(motion, rows, np.zeros(len(rows)))
             for k in range(1, LOOKS):
-                before, q = q, self.joints(motion, rows, np.full(len(rows), k / LOOKS))
-                whole = whole.then(self._of(before, q))
+                before, middle, q = q, *(self.joints(motion, rows, np.full(len(rows), t)) for t in ((k - 0.5) / LOOKS,
+                                                                                                     k / LOOKS))
+                turn = _turning(before, middle, q)
+                whole = whole.then(self._of(before, turn)).then(self._of(turn, q))
                 stages.append(whole)
             shift, low, high = (np.stack([getattr(stage, name) for stage in stages]) for name in ("shift", "low", "high"))
             known = self._kept["rows"] = rows, shift, low, high
@@ -128,3 +133,12 @@ class ActualExecuted(Executed):
     def _of(self, before: Floats, q: Floats) -> Steps:
         step = np.nan_to_num((q - before)[:, self._two_way])
         return Steps.of(step, self.model.axes.gaps(self.control.machine.axis_names, q, self._two_way))
+
+
+def _turning(before: Floats, middle: Floats, after: Floats) -> Floats:
+    """Joints (N, J) where they turn back between three places as far apart in time, by the parabola through them; those
+    that do not are in the middle."""
+    slope, bend = 0.5 * (after - before), 0.5 * (after + before) - middle
+    with np.errstate(divide="ignore", invalid="ignore"):
+        there = np.where(2.0 * np.abs(bend) > np.abs(slope), -0.5 * slope / bend, 0.0)
+    return np.asarray(middle + there * (slope + there * bend))
