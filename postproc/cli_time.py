@@ -19,6 +19,11 @@ if TYPE_CHECKING:
     from toolpaths.diagnostics import Diagnostic
 
 
+UNKNOWN: dict[str, Any] = {"cycle_time_s": None, "lower_bound_s": None, "band_s": None, "feed_s": None, "operations": [],
+                           "limiting": {}}
+"""what is told of a file that is refused"""
+
+
 def time(file: Annotated[Path, typer.Argument(metavar="FILE", help="CL file, or G-code file of the controller")],
          machine: MachineName,
          controller: Annotated[str, typer.Option("-c", "--controller", help="controller: name or TOML file")] = "linuxcnc",
@@ -59,7 +64,7 @@ def time(file: Annotated[Path, typer.Argument(metavar="FILE", help="CL file, or 
         if blocks is not None and planner is not None:
             e = estimate(blocks, m, planner, times=times)
             values, text = figures.as_dict(e) | values, figures.as_text(e, file.name)
-    report(tuple(found), json, values | {"diagnostics": [d.as_dict() for d in found]}, text)
+    report(tuple(found), json, UNKNOWN | values | {"diagnostics": [d.as_dict() for d in found]}, text)
 
 
 def _check(output: str, calibrate: str, units: str, dialect: str) -> None:

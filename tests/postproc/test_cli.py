@@ -235,3 +235,9 @@ def test_an_output_that_is_full_is_told(monkeypatch: pytest.MonkeyPatch, capsys:
     with pytest.raises(SystemExit) as end:
         main()
     assert end.value.code == 1 and "standard output cannot be written: No space left" in capsys.readouterr().err
+
+
+def test_time_of_a_file_that_is_refused_is_null(tmp_path: Path) -> None:
+    got = run("time", cl(tmp_path, "RAPID", "GOTO/0,0,9000"), "-m", "mill-3axis", "--json", "-")
+    told = json.loads(got.stdout)
+    assert got.exit_code == 1 and told["cycle_time_s"] is None and told["operations"] == [] and told["diagnostics"]
