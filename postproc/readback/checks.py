@@ -176,7 +176,7 @@ def check_speeds(motion: Motion, moves: Moves, owner: Ints, match: Ints, seconds
 
     Chords within the tolerance e of an arc are shorter than its length r s by up to s e / 3: e = c^2 / (8 r) and the arc
     of a chord c is c (1 + c^2 / (24 r^2)). Where one move ends and the next begins is known to the tolerance only: time that
-    short ones lack may be found beside them.
+    short ones lack may be found beside them, also as feed at the ends of a rapid.
     """
     cutting = (owner < len(moves)) & (motion.code > 0)
     total = np.bincount(owner[cutting], weights=seconds[cutting], minlength=len(moves) + 1)[:len(moves)]
@@ -184,7 +184,7 @@ def check_speeds(motion: Motion, moves: Moves, owner: Ints, match: Ints, seconds
     shorter = 0.002 + moves.sweeps() * tolerance / 3.0
     slack = shorter / np.where(moves.feed > 0.0, moves.feed, np.inf)
     check = (moves.kind != Kind.RAPID) & ~moves.link & (match >= 0) & (total > 0.0)
-    spare = np.pad(np.where(check, np.maximum(total - asked, 0.0), 0.0), 1)
+    spare = np.pad(np.where(check, np.maximum(total - asked, 0.0), np.where(moves.kind == Kind.RAPID, total, 0.0)), 1)
     slack += np.minimum(spare[:-2] + spare[2:], 2.0 * tolerance / np.where(moves.feed > 0.0, moves.feed, np.inf))
     fast = np.flatnonzero(check & (total * ALLOWED_SPEED + slack < asked))
     if not len(fast):

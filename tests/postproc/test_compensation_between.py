@@ -15,7 +15,9 @@ from machines.geometric_error import load
 from postproc.looks import changes, looks_between
 from postproc.options import Options
 from postproc.pipeline import PostResult
+from postproc.readback.checks import check_speeds
 from postproc.readback.compare import _taken_up
+from postproc.readback.faults import Faults
 from toolpaths.diagnostics import Severity
 
 HEAD = "UNITS/MM\nLOADTL/1\nSPINDL/3000,RPM,CLW\nFEDRAT/400,MMPM\nRAPID\nGOTO/-160,0,20\nGOTO/-160,0,0\n"
@@ -144,3 +146,16 @@ def test_a_short_rapid_before_a_rapid_takes_up_lost_motion() -> None:
     motion = SimpleNamespace(code=np.array([0, 1, 0, 0, 0, 0, 0, 1, 1, 0, 1]))
     job = SimpleNamespace(errors=True, options=Options(), rounding=SimpleNamespace(tip=1e-4))
     assert np.flatnonzero(_taken_up(job, motion, tip * np.ones(3) / np.sqrt(3.0))).tolist() == [2, 10]  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(("feed_beside", "told"), [(0.008, False), (0.001, True)])
+def test_the_end_of_a_cut_may_pass_for_the_beginning_of_a_rapid(feed_beside: float, told: bool) -> None:
+    """A cut of 0.176 mm whose last 8 um stand within the tolerance of its end: the rapid that follows has them."""
+    feed = 2500.0 / 60.0
+    motion = SimpleNamespace(code=np.array([1, 1, 0]), line=np.arange(3))
+    moves = type("Moves", (SimpleNamespace,), {"__len__": lambda self: 2})(
+        kind=np.array([1, 0]), link=np.zeros(2, dtype=bool), seconds=np.full(2, np.nan), line=np.array([7, 8]),
+        feed=np.array([feed, np.nan]), lengths=lambda: np.array([0.176, 25.0]), sweeps=lambda: np.zeros(2))
+    found = check_speeds(motion, moves, np.array([0, 1, 1]), np.array([0, 2]),  # type: ignore[arg-type]
+                         np.array([0.168 / feed, feed_beside / feed, 0.1]), 0.01, Faults("a.apt"))
+    assert [d.code for d in found] == (["verify.feed"] if told else [])
