@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from machines.geometric_error.lost_motion import carried_on
-from postproc.corrected.work import ALONE, EDGES, LAST, Work
+from postproc.corrected.work import ALONE, EDGES, Work
 from postproc.path import ARC, FEED, TRAVERSE, Path
 from postproc.word_arcs import PLANE_COLUMNS
 from toolpaths.arrays import Bools, Floats, Ints
@@ -93,12 +93,13 @@ def _bisected(work: Work, block: Ints, edges: tuple[float, ...]) -> tuple[Ints, 
     where, at = [np.zeros(0, dtype=np.int64)], [np.zeros(0)]
     if not len(block) or not work.two_way:
         return where[0], at[0]
-    signs = np.stack([work.moving(block, np.full(len(block), t), LAST) for t in edges])
+    last = work.last(block)
+    signs = np.stack([work.moving(block, np.full(len(block), t), last) for t in edges])
     for j in work.two_way:
         sign = carried_on(signs[:, :, j])
         for i, (one, two) in enumerate(pairwise(sign)):
             rows = np.flatnonzero(one * two < 0.0)
-            low, high = np.full(len(rows), max(edges[i] - LAST, 0.0)), np.full(len(rows), edges[i + 1])
+            low, high = np.maximum(edges[i] - last[rows], 0.0), np.full(len(rows), edges[i + 1])
             for _ in range(BISECTIONS if len(rows) else 0):
                 middle = 0.5 * (low + high)
                 still = work.moving(block[rows], middle)[:, j] == one[rows]

@@ -21,8 +21,9 @@ from toolpaths.arrays import Bools, Floats, Ints
 
 MOMENT = 1e-3
 """of a block: how far back its direction at a place is looked at"""
-LAST = 1.0 / 256.0
-"""of a block: the same at its ends; turning back later than that counts as none"""
+LAST, LAST_OF_ARC = 1.0 / 16.0, 1.0 / 256.0
+"""of a block: the same at its ends; turning back later than that counts as none. Joints of blocks by the tip bow a little at
+every end, by less than they lose; those of arcs turn back for good"""
 EDGES = tuple(k / 16.0 for k in range(17))
 """where the directions of the axes in a block are looked at"""
 ALONE, LIFTS = -1, -2
@@ -99,7 +100,7 @@ class Work:
         unit = path.frames[0].control.unit
         step[stated] = np.nan_to_num(np.diff(words, axis=0, prepend=words[:1]) / unit)[stated]
         bent = np.flatnonzero(self.bent)
-        last = self.moving(bent, np.ones(len(bent)), LAST)
+        last = self.moving(bent, np.ones(len(bent)), self.last(bent))
         step[bent] = np.where(last != 0.0, last, step[bent])
         inside = np.flatnonzero((self.whole[1:] != ALONE) & (self.whole[1:] == self.whole[:-1])) + 1
         lateral = step[inside[:, None], self.two_way]
@@ -123,14 +124,19 @@ class Work:
         """(K,) blocks in which joints do not run straight."""
         return bent_blocks(self.path, self.rotary)
 
-    def moving(self, block: Ints, t: Floats, moment: float = MOMENT) -> Floats:
+    def last(self, block: Ints) -> Floats:
+        """(N,) LAST of blocks (N,), LAST_OF_ARC of arcs."""
+        return np.where(self.path.code[block] == ARC, LAST_OF_ARC, LAST)
+
+    def moving(self, block: Ints, t: Floats, moment: float | Floats = MOMENT) -> Floats:
         """(N, J) sign of each joint's motion at fraction t (N,) of blocks (N,), over a moment before; after it at the start.
 
         The correction counts as changing evenly over a block.
         """
-        return moving_sign(self._step(block, t, moment) + moment * self.drift[block], self.rotary)
+        share = np.broadcast_to(moment, len(block))
+        return moving_sign(self._step(block, t, share) + share[:, None] * self.drift[block], self.rotary)
 
-    def _step(self, block: Ints, t: Floats, moment: float) -> Floats:
+    def _step(self, block: Ints, t: Floats, moment: Floats) -> Floats:
         before = np.clip(t - moment, 0.0, 1.0 - moment)
         result: Floats = self.nominal(block, before + moment) - self.nominal(block, before)
         return result
@@ -154,7 +160,8 @@ class Work:
         arc = self.path.code[block] == ARC
         for rows, edges in ((np.flatnonzero(arc), EDGES), (np.flatnonzero(~arc), (0.0, 1.0))):
             for t in edges[::-1] if len(rows) else ():
-                step, drift = self._step(block[rows], np.full(len(rows), t), LAST), LAST * self.drift[block[rows]]
+                last = self.last(block[rows])
+                step, drift = self._step(block[rows], np.full(len(rows), t), last), last[:, None] * self.drift[block[rows]]
                 first[rows] = np.where(np.abs(step) > np.abs(drift), moving_sign(step + drift, self.rotary), first[rows])
         return np.asarray(np.where(first != 0.0, first, self.way[np.maximum(block - 1, 0)]))
 
