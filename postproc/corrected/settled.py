@@ -103,7 +103,8 @@ class _Written:
         free, counts = self._free(), np.arange(size)
         free[first] = np.isfinite(self.q[bottom]).all(axis=1, keepdims=True) * np.array([1.0, 1.0, 0.0])
         counts[first] = bottom
-        back, tip_rates, off, by_way = self._rates(np.flatnonzero(free.any(axis=1)), counts)
+        like = self._like(first)
+        back, tip_rates, off, by_way = self._rates(np.flatnonzero(free.any(axis=1) | (like >= 0)), counts)
         near = 0.5 * np.linalg.norm(tip_rates, axis=(1, 2))
         between = ((self.made.until < 1.0) | (path.code == TRAVERSE)) & (counts == np.arange(size))
         goes_on = np.append(begin[1:], np.zeros((1, begin.shape[1])), axis=0)
@@ -116,7 +117,7 @@ class _Written:
         near = np.where(between, enough, near)
         plain = axis_positions(path, self.work.tools[self.made.owner])
         return Ends(off, by_way, tip_rates, back, self.gap, bend, last, later, goes_on, weight, plain, near, enough, free,
-                    self._like(first))
+                    like)
 
     def axis_left(self, ways: Floats) -> float:
         """rad, the worst deviation of the axis at ends of CL moves, by ways (K, T)."""

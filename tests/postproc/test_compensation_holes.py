@@ -17,11 +17,13 @@ from postproc.corrected import settled
 from postproc.corrected.proof import after_formatting
 from postproc.corrected.runs import Runs
 from postproc.corrected.settled import _composed
+from postproc.corrected.walk import Ends, walk
 from postproc.options import Options
 from postproc.pipeline import PostResult
 from postproc.readback.compare import _taken_up
 from postproc.setup import load_setup
 from tests.postproc.test_compensation_points import two_ways_of_all
+from toolpaths.arrays import Floats
 
 CONTROLLERS = ["linuxcnc", "fanuc-30i", "siemens-840d", "heidenhain-tnc640", "haas-ngc"]
 HEIGHTS = (0, -4, 0, 0, -4, 0, 5, 0)
@@ -188,3 +190,21 @@ def test_blocks_that_are_nearly_straight_need_no_pieces(tmp_path: Path, monkeypa
         options = Options(error_model=str(model), setup="samples/tools.setup.toml", output="tcp")
         texts.append(checked(postproc.convert(path, "mikron-ucp710", "haas-ngc", options=options, diagnostics=found)).text)
     assert texts[0] == texts[1] and 0 < min(counts[:len(counts) // 2]) < 0.9 * min(counts[len(counts) // 2:])
+
+
+def test_blocks_of_a_hole_are_moved_as_far_as_its_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    """So are their joints: else the ways behind the first block would be those of a hole that was moved back."""
+    seen: list[Ends] = []
+
+    def kept(ends: Ends) -> tuple[Floats, Floats]:
+        seen.append(ends)
+        return walk(ends)
+
+    monkeypatch.setattr("postproc.corrected.settled.walk", kept)
+    path, found = toolpaths.read("samples/five_faces.cls")
+    result = postproc.convert(path, "mikron-ucp710", "fanuc-30i", diagnostics=found, options=Options(
+        setup="samples/tools.setup.toml", error_model="samples/errors/mikron-ucp710.toml"))
+    assert result.ok and seen
+    rows = np.flatnonzero(seen[-1].like >= 0)
+    assert len(rows) > 20 and np.abs(seen[-1].back[rows]).max(axis=(1, 2)).min() > 1e-5
+    np.testing.assert_allclose(seen[-1].back[rows], seen[-1].back[seen[-1].like[rows]], atol=1e-9)
