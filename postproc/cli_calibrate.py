@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
+from postproc.cli_options import figure_ending
 from postproc.console import Json, print_json, refuse_overwriting, report, shown_errors
 
 
@@ -28,9 +29,7 @@ def calibrate(file: Annotated[Path, typer.Argument(metavar="MEASUREMENTS.toml", 
               json: Json = "") -> None:
     """Identify a machine's errors from measurements, each with its doubt; what the data do not tell is refused."""
     refuse_overwriting({"-o": str(output), "--figure": str(figure or ""), "--json": json}, {"the measurements": str(file)})
-    ending = "" if figure is None else figure.suffix.lower()
-    if figure is not None and ending not in (".png", ".svg"):
-        raise typer.BadParameter(f"{figure.name} is no .png or .svg file", param_hint="--figure")
+    ending = figure_ending(figure)
     from dataclasses import replace
 
     from machines.calibration.calibrate import calibrate as run

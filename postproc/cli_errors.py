@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from postproc.cli_errors_import import EXAMPLE, import_
-from postproc.cli_options import MachineName
+from postproc.cli_options import MachineName, figure_ending
 from postproc.console import Json, machine_of, print_json, refuse_overwriting, report, shown_errors
 from postproc.error_files import finish, loaded, model_files, or_refused, pairs, writable
 
@@ -49,9 +49,7 @@ def check(file: ModelFile, machine: MachineName, tool_length: ToolLength = 100.0
           json: Json = "") -> None:
     """Check an error model: what it holds, how far it reaches, worst tip and axis over the work volume, doubt."""
     refuse_overwriting({"--figure": str(figure or ""), "--json": json}, {"the error model": str(file)})
-    ending = "" if figure is None else figure.suffix.lower()
-    if figure is not None and ending not in (".png", ".svg"):
-        raise typer.BadParameter(f"{figure.name} is no .png or .svg file", param_hint="--figure")
+    ending = figure_ending(figure)
     from machines.geometric_error.survey import beyond_travel, survey, unmeasured
     from postproc.error_text import check_text
     from postproc.files import write_atomically

@@ -20,6 +20,18 @@ Allow = Annotated[list[str] | None, typer.Option("--allow-unknown", metavar="WOR
                                                  help="leave this word out although it looks like motion")]
 
 
+def figure_ending(figure: Path | None) -> str:
+    """Ending of the file of --figure, "" without one; wrong use where nothing can be drawn with it."""
+    if figure is None:
+        return ""
+    from toolpaths.drawing import FORMATS
+
+    ending = figure.suffix.lower()
+    if ending not in FORMATS:
+        raise typer.BadParameter(f"{figure.name} is no .png or .svg file", param_hint="--figure")
+    return ending
+
+
 def only_with_errors(beyond: bool, error_model: str) -> None:
     """Wrong use of --error-model-beyond without an error model."""
     if beyond and not error_model:

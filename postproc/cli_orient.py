@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from postproc.cli_options import Allow, AxisTolerance, ClFile, Dialect, MachineName, Tolerance, Units
+from postproc.cli_options import Allow, AxisTolerance, ClFile, Dialect, MachineName, Tolerance, Units, figure_ending
 from postproc.console import Json, controller_of, machine_of, progress_bar, refuse_overwriting, report, shown_errors
 
 if TYPE_CHECKING:
@@ -89,8 +89,7 @@ def _check(plan: str, figure: Path | None, units: str, dialect: str, passes: lis
         if dialect not in DIALECTS:
             raise typer.BadParameter(f"{dialect!r} is not available; choose from {', '.join(DIALECTS)}",
                                      param_hint="--dialect")
-    if figure is not None and figure.suffix.lower() not in (".png", ".svg"):
-        raise typer.BadParameter(f"{figure.name} is no .png or .svg file", param_hint="--figure")
+    figure_ending(figure)
     if len(set(passes)) > MOST:
         raise typer.BadParameter(f"{len(set(passes))} passes at once, at most {MOST} are shown in full; all are in --json",
                                  param_hint="--pass")

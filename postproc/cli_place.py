@@ -16,6 +16,7 @@ from postproc.cli_options import (
     MachineName,
     Tolerance,
     Units,
+    figure_ending,
     only_with_errors,
 )
 from postproc.cli_orient import ORIENTATIONS, MaxTilt, Orient
@@ -98,8 +99,7 @@ def _check(orient: str, units: str, dialect: str, setup: Path, figure: Path | No
                                  ("--dialect", dialect or next(iter(DIALECTS)), tuple(DIALECTS))):
         if value not in known:
             raise typer.BadParameter(f"{value!r} is not available; choose from {', '.join(known)}", param_hint=option)
-    if figure is not None and figure.suffix.lower() not in (".png", ".svg"):
-        raise typer.BadParameter(f"{figure.name} is no .png or .svg file", param_hint="--figure")
+    figure_ending(figure)
     if setup.exists() and not setup.is_file():
         raise typer.BadParameter(f"{setup} is no regular file: its text is read twice", param_hint="--setup")
 

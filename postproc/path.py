@@ -106,8 +106,7 @@ def build_path(modes: OutputModes, kinematics: Callable[[int], Kinematics], move
         tolerance, axis_tolerance: mm and rad that linearising may use
         drawing: what the set-up says about rewinds and preferred joints; default: its defaults
     """
-    machine, given = modes.control.machine, moves
-    drawing = drawing or Drawing.default(space)
+    machine, given, drawing = modes.control.machine, moves, drawing or Drawing.default(space)
     plan = plan_moves(machine, kinematics, moves, drawing.manner(machine, axis_tolerance),
                       None if progress is None else lambda run: progress("joints", run, int(given.link.sum())))
     road = _Road(plan, modes, operation[plan.refined.origin], axis_tolerance, file)

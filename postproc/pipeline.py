@@ -47,6 +47,7 @@ from toolpaths.units import DEG
 
 if TYPE_CHECKING:
     from postproc.compensation import Compensation
+    from postproc.corrected.proof import AfterFormatting
     from postproc.cycle_time.estimate import Estimate
     from postproc.orientation.orient import OrientationChoice
 
@@ -99,6 +100,13 @@ class PostResult:
         from postproc.cycle_time.conversion import estimate_of
 
         return estimate_of(self)
+
+    @cached_property
+    def after_formatting(self) -> AfterFormatting | None:
+        """What is left of geometric errors at the CL points, made when first asked for; None where none are corrected."""
+        from postproc.corrected.proof import after_formatting
+
+        return after_formatting(self)
 
 
 def convert(path: Toolpath, machine: Machine | str | FilePath, controller: str | FilePath = "linuxcnc",

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from machines.geometric_error.actual import approach
-from postproc.corrected.proof import after_formatting, planned_moves
+from postproc.corrected.proof import last_blocks, planned_moves
 from postproc.groups import groups
 from postproc.holes import Phase
 from toolpaths.arrays import Floats, Ints
@@ -51,13 +51,11 @@ class Residuals:
 
 def residuals(result: PostResult) -> Residuals | None:
     """The field of a conversion; None of one whose errors were not corrected here, or that is not proved."""
-    found, job, nominal = after_formatting(result), result.job, result.nominal
+    found, job, nominal = result.after_formatting, result.job, result.nominal
     if found is None or job is None or nominal is None or result.moves is None or result.comparison is None:
         return None
     moves, move = planned_moves(result), np.flatnonzero(result.moves.phase != Phase.PECK)[found.points]
-    block, here = np.full(len(result.moves), -1), found.points
-    np.maximum.at(block, nominal.move, np.arange(len(nominal)))
-    block = block[move]
+    block, here = last_blocks(nominal, len(result.moves))[move], found.points
     q, way = nominal.q[block], approach(_steady(nominal.q))[block]
     before = np.empty((len(q), 6))
     for k in groups(moves.tool[here]):

@@ -61,9 +61,7 @@ def _errors(result: PostResult) -> dict[str, Any] | None:
     who = {"model": job.errors.name, "corrected_by": job.errors.corrected_by}
     if found is None:
         return who
-    from postproc.corrected.proof import after_formatting
-
-    proof = after_formatting(result)
+    proof = result.after_formatting
     return {**who, "tip_before_mm": found.tip_before, "axis_before_deg": found.axis_before / DEG,
             "tip_residual_mm": found.tip_after, "axis_residual_deg": found.axis_after / DEG, "points_added": found.added,
             "arcs_resolved": found.resolved, "blocks_near_a_pole": found.partial,
@@ -149,9 +147,7 @@ def as_text(result: PostResult, output: str) -> str:
     if d["geometric_errors"] is not None and d["geometric_errors"]["corrected_by"] == "control":
         lines.append(f"geometric errors {d['geometric_errors']['model']}: left to the control, not corrected here")
     if result.compensation is not None:
-        from postproc.corrected.proof import after_formatting
-
-        proof = after_formatting(result)
+        proof = result.after_formatting
         lines += result.compensation.lines() + ([] if proof is None else [proof.line()])
     if d["feed_reduced_blocks"]:
         lines.append(f"feed reduced for an axis limit in {d['feed_reduced_blocks']} blocks")

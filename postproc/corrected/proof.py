@@ -10,6 +10,7 @@ import numpy as np
 from postproc.groups import groups
 from postproc.holes import Phase
 from postproc.moves import Moves
+from postproc.path import Path
 from postproc.readback.compare import Comparison
 from postproc.rounding import decimals
 from toolpaths.arrays import Bools, Floats, Ints
@@ -84,18 +85,23 @@ def planned_moves(result: PostResult) -> Moves:
     """The moves without pecks, ending at tip and axis (M, 3) of the path before correction."""
     job, moves, path = result.job, result.moves, result.nominal
     assert job is not None and moves is not None and path is not None
-    there = np.flatnonzero((path.u == 1.0) & ~path.home)
-    there, move = there[::-1], path.move[there[::-1]]
-    move, last = np.unique(move, return_index=True)
-    tip, axis = np.array(moves.tip), np.array(moves.axis)
+    block = last_blocks(path, len(moves))
+    move, tip, axis = np.flatnonzero(block >= 0), np.array(moves.tip), np.array(moves.axis)
     for k in groups(moves.tool[move]):
-        tip[move[k]], axis[move[k]] = job.kinematics(int(moves.tool[move[k[0]]])).forward(path.q[there[last[k]]])
+        tip[move[k]], axis[move[k]] = job.kinematics(int(moves.tool[move[k[0]]])).forward(path.q[block[move[k]]])
     return replace(moves, tip=tip, axis=axis).without_pecks()
+
+
+def last_blocks(path: Path, moves: int) -> Ints:
+    """(M,) the block of a path that ends each of its moves; -1 where none does."""
+    rows, result = np.flatnonzero((path.u == 1.0) & ~path.home), np.full(moves, -1)
+    np.maximum.at(result, path.move[rows], rows)
+    return result
 
 
 def beyond_bound(result: PostResult) -> list[Diagnostic]:
     """A warning where points of the CL file are farther off than `after_formatting` counts on."""
-    found, job = after_formatting(result), result.job
+    found, job = result.after_formatting, result.job
     if found is None or job is None:
         return []
     tip, axis = found.tip - found.tip_bound, found.axis - found.axis_bound
