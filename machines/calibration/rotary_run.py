@@ -89,7 +89,7 @@ def rotary(run: Run, given: RotaryModel, table: CsvTable) -> Calibration | None:
         return None
     fitted = fit_rotary(bench, readings, sigma, given.harmonics, run.checked.robust)
     figures = _rotary_figures(given, bench, fitted, sigma)
-    never = hidden(bench, sigma, given.harmonics)
+    never = hidden(bench, sigma, given.harmonics) if fitted.lost else ()
     untold = [name for name in fitted.lost if name not in never]
     if untold:
         run.problem("calibrate.rank", f"the readings do not tell {folded(untold)}",

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from machines.geometric_error.csv_table import UNITS
-from machines.geometric_error.curves import Table
 from machines.geometric_error.model import ErrorModel
 from machines.geometric_error.serial_errors import Component
+from machines.geometric_error.tabulate import both_ways
 from machines.geometric_error.volume import INSIDE, ranges, section
 from machines.machine import Machine
 from toolpaths.arrays import Floats
@@ -84,7 +84,7 @@ def _curve(place: Any, component: Component, x: Floats, position: float,
            covariance: Floats | None) -> None:
     """A component, approached backwards as dots where that differs; a band of its doubt."""
     curve, unit = component.curve, ARCSEC if component.name.angular else UM
-    both = isinstance(curve, Table) and curve.both
+    both = both_ways(curve)
     line, = place.plot(x / position, curve.at(x, 1.0 if both else 0.0) / unit, linewidth=1.1, label=str(component.name))
     if both:
         place.plot(x / position, curve.at(x, -1.0) / unit, linewidth=1.1, linestyle=":", color=line.get_color(),

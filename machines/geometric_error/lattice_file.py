@@ -145,7 +145,10 @@ def zeroed_covariance(covariance: Floats, error_map: ErrorMap, zero: Mapping[str
     taken = np.zeros((6, len(covariance)))
     for k, share in zip(node[0], weight[0], strict=True):
         taken[range(6), range(6 * k, 6 * k + 6)] += share
-    by = np.eye(len(covariance)) - np.tile(taken, (len(covariance) // 6, 1))
-    result: Floats = by @ covariance @ by.T
+    nodes, rows, columns = len(covariance) // 6, taken @ covariance, covariance @ taken.T
+    result: Floats = covariance.copy()
+    result.reshape(nodes, 6, -1)[...] -= rows
+    result.reshape(-1, nodes, 6)[...] -= columns[:, None, :]
+    result.reshape(nodes, 6, nodes, 6)[...] += (rows @ taken.T)[:, None, :]
     np.fill_diagonal(result, np.maximum(result.diagonal(), 0.0))  # round-off
     return result

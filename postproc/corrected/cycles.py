@@ -175,7 +175,7 @@ class _Holes:
     def from_afar(self, most: float) -> Ints:
         """(H,) blocks that bring the tool over the first hole of a sequence from above all planes, and down to it where it
         goes back no farther: where the correction across the tool differs by more than `most` mm from that at the bottom."""
-        first, last, top = self.first, self.first + self.runs.size - 1, self.top[self.sequences.of_rows] + SAME
+        first, last, top = self.first, self.runs.packed().last, self.top[self.sequences.of_rows] + SAME
         across = np.linalg.norm((self.found[first] - self.wanted[first] - self.off)[:, :2], axis=1)
         far = (self.wanted[first, 2] > top) & (self.start > first) & (self.owner == self.runs.begin) & (across > most)
         return np.asarray(np.where(far, np.where(self.wanted[last, 2] > top, 1, self.start - first + 1), 0))

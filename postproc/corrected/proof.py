@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from postproc.corrected.runs import Runs
 from postproc.groups import groups
 from postproc.holes import Phase
 from postproc.moves import Moves
@@ -153,8 +154,8 @@ def _nearest(comparison: Comparison, moves: Moves, bounds: tuple[float, float]) 
     other = np.concatenate([[0], at, [len(comparison.tip)]])
     first = other[np.searchsorted(at, at)]
     count = np.maximum(other[np.searchsorted(at, at, side="right") + 1] - first, 0)
-    near = np.repeat(first - np.cumsum(count) + count, count) + np.arange(count.sum())
-    block, owner = np.concatenate([own, near, at]), np.concatenate([comparison.owner[own], np.repeat(done, count), done])
+    near = Runs(first, count)
+    block, owner = np.concatenate([own, near.rows, at]), np.concatenate([comparison.owner[own], done[near.of_rows], done])
     tip_off = np.linalg.norm(comparison.tip[block] - moves.tip[owner], axis=1)
     axis_off = angle_between(comparison.axis[block], moves.axis[owner])
     order = np.lexsort((np.maximum(tip_off / bounds[0], axis_off / bounds[1]), owner))

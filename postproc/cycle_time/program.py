@@ -113,11 +113,10 @@ def _tip_lengths(motion: Motion, control: Control) -> Floats:
     if not len(rows):
         return repeated(np.nan, len(motion))
     result = np.full(len(motion), np.nan)
-    if len(rows):
-        before, end = coordinates(motion, rows)
-        result[rows] = control.under("tcp").feed_length(end - before)
-        turning = np.linalg.norm((end - before)[:, control.xyz], axis=1) <= NOTHING
-        result[rows[turning]] *= DEG
+    before, end = coordinates(motion, rows)
+    result[rows] = control.under("tcp").feed_length(end - before)
+    turning = np.linalg.norm((end - before)[:, control.xyz], axis=1) <= NOTHING
+    result[rows[turning]] *= DEG
     return result
 
 

@@ -39,7 +39,7 @@ class ActualExecuted(Executed):
         tip, axis = np.empty((len(rows), 3)), np.empty((len(rows), 3))
         for number in np.unique(motion.tool[rows]).tolist():
             k = np.flatnonzero(motion.tool[rows] == number)
-            actual = self._actual(number)
+            actual = self.actual(number)
             tip[k], axis[k], _ = actual.place(actual.coordinates(q[k], near[k]), way[k])
         return tip, axis
 
@@ -60,7 +60,8 @@ class ActualExecuted(Executed):
             step, before = step + np.abs(here - before), here
         return looks_between(changes(step, self.model.detail(self.control.machine.axis_names)))
 
-    def _actual(self, number: int) -> Actual:
+    def actual(self, number: int) -> Actual:
+        """The machine with errors at the tip of a tool by its number."""
         return self.model.on(self.kinematics(number))
 
     @cached_property
@@ -111,8 +112,9 @@ class ActualExecuted(Executed):
         """Shift, low and high, each (LOOKS, K, T), from the beginning of blocks to each look; kept for the next time."""
         known = self._kept.get("rows")
         if known is None or not np.array_equal(known[0], rows):
-            whole = self._between(motion, rows, np.zeros(len(rows)), np.zeros(len(rows)))
-            stages, q = [whole], self.joints(motion, rows, np.zeros(len(rows)))
+            q = self.joints(motion, rows, np.zeros(len(rows)))
+            whole = self._of(q, q)
+            stages = [whole]
             for k in range(1, LOOKS):
                 before, middle, q = q, *(self.joints(motion, rows, np.full(len(rows), t)) for t in ((k - 0.5) / LOOKS,
                                                                                                      k / LOOKS))

@@ -27,7 +27,7 @@ def check_measured(motion: Motion, executed: ActualExecuted, job: Job, faults: F
         q, near = executed.joints(motion, rows, t), np.concatenate(executed.nominal(motion, rows, t), axis=1)
         for number in np.unique(motion.tool[rows]).tolist():
             k = np.flatnonzero(motion.tool[rows] == number)
-            actual = executed.model.on(executed.kinematics(number))
+            actual = executed.actual(number)
             beyond[k] += actual.outside(actual.coordinates(q[k], near[k]), CORRECTED)
         low, high = np.fmin(low, q), np.fmax(high, q)
     told, known = [], measured(executed.model)
