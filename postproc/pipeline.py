@@ -37,7 +37,7 @@ from postproc.rounding import rounding_problem
 from postproc.setup import SetupFile, load_setup
 from postproc.setup_system import standing, with_system
 from postproc.singular import check_singular
-from postproc.smoothed_moves import smoothed_moves
+from postproc.smoothed_stages import Left, with_passes_taken_back, written_moves
 from postproc.travel import check_travel
 from postproc.word_rows import block_tools
 from toolpaths.diagnostics import Diagnostic, DiagnosticError, error, has_errors
@@ -184,6 +184,13 @@ def _reading(path: Toolpath, diagnostics: list[Diagnostic] | None) -> tuple[Diag
 
 
 def _stages(result: PostResult, progress: Progress | None) -> PostResult:
+    """`_staged`; with --smooth passes that cannot be smoothed are taken back."""
+    if result.options.smooth:
+        return with_passes_taken_back(result, lambda begun, left: _staged(begun, progress, left))
+    return _staged(result, progress)
+
+
+def _staged(result: PostResult, progress: Progress | None, left: Left = frozenset()) -> PostResult:
     """prepare -> solve, link, linearise -> travel -> compile -> write -> read back."""
     assert result.toolpath is not None
     options, toolpath, file = result.options, result.toolpath, result.toolpath.file
@@ -197,8 +204,8 @@ def _stages(result: PostResult, progress: Progress | None) -> PostResult:
     result = _with(result, found, shares=shares)
     if not result.ok:
         return result
-    moves = written_moves(job, shares)
-    result = _with(result, [], moves=moves)
+    moves, found = written_moves(job, shares, left)
+    result = _with(result, found, moves=moves)
     drawing, found = drawing_of(job.setup, job.placement, job.space, job.machine, options.setup or file)
     result = _with(result, found)
     if not result.ok:
@@ -300,14 +307,6 @@ def tolerance_shares(job: Job) -> tuple[dict[str, float], list[Diagnostic]]:
                               f"{tolerance:g} mm", hint="a wider --tolerance, or a smaller kinematics.smoothing_fixed in "
                               "the controller file")]
     return shares, rounding_problem(bound, tolerance - smoothing, job.axis_tolerance - axis_smoothing * DEG)
-
-
-def written_moves(job: Job, shares: dict[str, float]) -> Moves:
-    """The moves that are written: those of the CL file, with --smooth moved within their share of the tolerance."""
-    if not job.options.smooth:
-        return job.moves
-    return smoothed_moves(job.moves, Tolerance(shares["points"], shares["axis_points"] * DEG),
-                          stops_of(job.toolpath, job.moves))
 
 
 def plan_motion(job: Job, moves: Moves, path: Path,
