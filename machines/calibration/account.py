@@ -24,13 +24,15 @@ CURVE = 5
 def account(result: CalibrationResult, rank: int, number: float, unknowns: int, cost_instrument: float) -> dict[str, Any]:
     """Of every fit: rank of so many unknowns, condition number (None where it is infinite), weighted residual (root mean
     square) before, with nothing found but what belongs to the instrument, and after; `reduced` is that after, by readings
-    less unknowns (None where there are no more readings than that)."""
-    count, spare = max(len(result.residuals), 1), len(result.residuals) - result.rank
+    less unknowns (None where there are no more readings than that), `chance` that readings at their stated noise leave as much,
+    `covariance_scale` what the covariance of the stated noise was multiplied by."""
+    count, spare, noise = max(len(result.residuals), 1), len(result.residuals) - result.rank, result.noise
     return {"parameters": {}, "kept": 0, "rank": rank, "unknowns": unknowns, "condition_number": finite(number),
             "readings": len(result.residuals), "spare": spare, "rms_before": float(np.sqrt(result.cost_before / count)),
             "rms_instrument": float(np.sqrt(cost_instrument / count)),
             "rms_after": float(np.sqrt(result.cost_after / count)),
-            "reduced": float(np.sqrt(result.cost_after / spare)) if spare > 0 else None,
+            "reduced": None if noise is None else noise.left, "chance": None if noise is None else noise.more,
+            "covariance_scale": result.scale,
             "converged": result.converged, "not_identifiable": [list(group) for group in result.not_identifiable]}
 
 

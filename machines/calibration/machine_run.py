@@ -52,7 +52,7 @@ def machine_errors(run: Run, given: PosesModel | BarModel | LaserModel, table: C
         return None
     _lost_motion(run, start, ways)
     fitted = fit(start, kinematics, measured, run.checked.parameters, run.checked.robust)
-    return _judged(run, given, start, kinematics, measured, fitted)
+    return _judged(run, given, start, kinematics, measured, fitted, table)
 
 
 def _measured(given: PosesModel | BarModel | LaserModel, q: Floats, read: Floats, ways: Floats) -> Measurements:
@@ -137,7 +137,7 @@ def _gap(start: ErrorModel, axis: str) -> float:
 # ---- after the fit -------------------------------------------------------------------------------------------------------
 
 def _judged(run: Run, given: PosesModel | BarModel | LaserModel, start: ErrorModel, kinematics: Kinematics,
-            measured: Measurements, fitted: MachineFit) -> Calibration:
+            measured: Measurements, fitted: MachineFit, table: CsvTable) -> Calibration:
     result = fitted.result
     rows = result.residuals.reshape(len(measured.q), -1).T
     wanted = run.checked.parameters
@@ -153,8 +153,10 @@ def _judged(run: Run, given: PosesModel | BarModel | LaserModel, start: ErrorMod
     if has_errors(run.found):
         return Calibration(None, figures)
     _far(run, given, measured.kind, fitted.setup)
-    return done(run, fitted.model, figures, f"sigma_um = {given.sigma_um:g}",
-                lambda: machine_slip(start, kinematics, measured, wanted), start, wanted)
+    columns = [c.name for c in COLUMNS[run.kind]]
+    units, joints = ([table.unit[name] for name in names] for names in (columns, run.machine.axis_names))
+    return done(run, fitted.model, figures, result.noise, f"sigma_um = {given.sigma_um:g}",
+                lambda: machine_slip(start, kinematics, measured, wanted, units, joints, columns), start, wanted)
 
 
 def _untold(run: Run, groups: Sequence[tuple[str, ...]]) -> None:

@@ -7,26 +7,26 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from machines.calibration.account import parameters
+from machines.calibration.noise import CHANCE, Noise
 from machines.calibration.run import Run
+from machines.calibration.slips import Slip
 from machines.geometric_error.model import ErrorModel
 from machines.geometric_error.sizes import too_large
-from toolpaths.diagnostics import has_errors
 
-SUSPECT = 2.0
-"""times the stated standard deviation: what is left of the readings is more than noise"""
 UNFIT = 5.0
 """the same, where the errors found do not help: no model"""
 LITTLE = 0.5
 """of what is left with nothing found but ball, zero, mounting and indexer: where more stays, little is explained"""
-SILENT, MUTE = 0.2, 0.02
-"""times the stated standard deviation: less is left than any noise leaves; so little that no model is written"""
+SILENT, MUTE = 0.5, 0.02
+"""times the stated standard deviation: less is left than that leaves; so little that no model is written"""
+ACCEPT = "accept_residual = true at the top of the file (or --accept-residual) takes the fit, its covariance scaled by what is left"
 DIFFERENCES = "reversal", "poses", "laser"
 """kinds whose readings are actual less nominal"""
 MEANT = "write large = true at the top of the file where it is so"
 MOST = 6
 """errors above what machines have, that are told"""
-ENOUGH = 10
-"""readings more than unknowns, from which on SILENT is looked at (chance below 1e-6)"""
+FEW = 8
+"""readings more than unknowns, below which what is left shows no unit slipped by 5 or more"""
 
 
 @dataclass(frozen=True)
@@ -37,18 +37,19 @@ class Calibration:
     figures: dict[str, Any]
 
 
-def done(run: Run, model: ErrorModel, figures: dict[str, Any], sigma: str, slip: Callable[[], str],
-         start: ErrorModel | None = None, wanted: Sequence[str] = ()) -> Calibration:
+def done(run: Run, model: ErrorModel, figures: dict[str, Any], noise: Noise | None, sigma: str,
+         slip: Callable[[], Slip | None], start: ErrorModel | None = None, wanted: Sequence[str] = ()) -> Calibration:
     """The calibration, its parameters in the figures.
 
     Args:
-        sigma: how the file states the doubt of its readings
-        slip: looks for a wrong sign or order in the table that would explain the readings, "" where there is none
+        noise: what is left of the readings
+        sigma: how the file states their noise
+        slip: looks for a wrong unit, sign or order in the table that would explain the readings, None where there is none
         start, wanted: model that was begun from, and beginnings of names that were asked for
     """
     model = replace(model, machine=run.machine.name, large=bool(too_large(model)))
     _large(run, model, start)
-    _residual(run, figures, sigma, slip)
+    _residual(run, figures, noise, sigma, slip)
     found = parameters(model, wanted)
     figures |= {"parameters": found, "kept": len(model.names) - len(found)}
     return Calibration(model, figures)
@@ -75,27 +76,53 @@ def doubtful(run: Run, code: str, message: str, hint: str, key: str = "table") -
         run.problem(code, message, hint, key)
 
 
-def _residual(run: Run, figures: dict[str, Any], sigma: str, slip: Callable[[], str]) -> None:
-    """What is left of the readings against what the file says of their doubt."""
-    left = figures["reduced"]
-    if left is None:
+def _residual(run: Run, figures: dict[str, Any], noise: Noise | None, sigma: str, slip: Callable[[], Slip | None]) -> None:
+    """What is left of the readings against what the file says of their noise."""
+    if noise is None:
         run.tell("calibrate.unchecked", f"{figures['readings']} readings for as many unknowns: nothing is left over that "
                  "could show a mistake", "measure more than is asked for")
         return
-    message = f"what is left is {left:.3g} times the stated standard deviation of the readings"
-    if left < SILENT and figures["spare"] >= ENOUGH:
-        tell = run.problem if left < MUTE else run.warn
-        tell("calibrate.silent", f"{message}, less than any noise leaves", "look at the unit of the readings; where they "
-             f"are so fine, say so in {sigma}")
-    if left <= SUSPECT:
+    message = (f"what is left is {noise.left:.3g} times the stated standard deviation of the readings "
+               f"({figures['spare']} more readings than unknowns)")
+    found = None if noise.meets else slip()
+    stated = f"where the noise of the readings is so, write {_stated(sigma, noise.left)}"
+    if noise.less <= CHANCE:
+        _silent(run, noise, message, found, stated)
+    elif noise.more <= CHANCE:
+        _loud(run, figures, noise, message, found, stated)
+    elif figures["spare"] < FEW:
+        run.tell("calibrate.few", f"{figures['spare']} more readings than unknowns: a wrong unit could not be seen in what is "
+                 "left of them", "measure more than is asked for")
+
+
+def _silent(run: Run, noise: Noise, message: str, found: Slip | None, stated: str) -> None:
+    """Less is left than the stated noise leaves."""
+    if found is not None:
+        run.problem("calibrate.slip", f"{message}, less than such noise leaves", f"{found.words}; {stated}")
+    elif noise.left < MUTE:
+        run.problem("calibrate.silent", f"{message}, less than any noise leaves", f"look at the unit of the readings; {stated}")
+    elif noise.left < SILENT:
+        run.warn("calibrate.silent", f"{message}: it is stated too large", stated)
+
+
+def _loud(run: Run, figures: dict[str, Any], noise: Noise, message: str, found: Slip | None, stated: str) -> None:
+    """More is left than the stated noise leaves: refused, unless it is asked for."""
+    accepted = run.checked.accept_residual
+    if found is not None and not (found.size and accepted):
+        run.problem("calibrate.slip", message, f"{found.words}; {stated}" if found.size else found.words)
         return
-    if suspected := slip():
-        run.problem("calibrate.slip", message, suspected)
-        return
-    hint = f"look for wrong signs, units, outliers (robust = true); where the readings are so rough, say so in {sigma}"
     without = figures["rms_instrument"]
-    if left > UNFIT and figures["rms_after"] > LITTLE * without:
-        run.problem("calibrate.unexplained", f"{message}, and {without:.3g} times without the errors found: they explain "
-                    "little", hint)
-    elif not has_errors(run.found):
-        run.warn("calibrate.residual", f"{message}: the model's own doubt is too small by as much", hint)
+    explains = "" if figures["rms_after"] <= LITTLE * without else (
+        f", and {without:.3g} times without the errors found: they explain little")
+    if accepted:
+        run.warn("calibrate.residual", f"{message}{explains}: the covariance is scaled by {figures['covariance_scale']:.4g}",
+                 "accept_residual is set")
+        return
+    run.problem("calibrate.unexplained" if explains and noise.left > UNFIT else "calibrate.residual", message + explains,
+                f"look for wrong signs, units, outliers (robust = true); {stated}; {ACCEPT}")
+
+
+def _stated(sigma: str, left: float) -> str:
+    """The keys that state the noise, as they would be for what is left: `sigma` "sigma_um = 0.3 or sigma_arcsec = 0.05"."""
+    keys = [key.split(" = ") for key in sigma.split(" or ")]
+    return " or ".join(f"{name} = {left * float(value):.3g}" for name, value in keys)

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from machines.calibration.noise import Noise, noise_of, robust_scale
 from toolpaths.arrays import Bools, Floats, frozen
 
 RANK = 1e-9
@@ -59,7 +60,9 @@ class CalibrationResult:
 
     Attributes:
         values, sigma: (P,) parameters and their standard deviations; sigma is 0 for fixed ones, inf where it is not known
-        covariance: (P, P) of those that are identified, rows of the others 0
+        covariance: (P, P) of those that are identified, rows of the others 0; `scale` times what the stated noise makes it,
+            where more than that noise is left of the readings
+        noise: what is left against the stated noise; None where no reading is to spare
         converged: False where the steps did not end
         cost_before, cost_after: sum of squared weighted residuals
         rank, condition_number: of the scaled, weighted Jacobian of the free parameters
@@ -80,6 +83,8 @@ class CalibrationResult:
     not_identifiable: tuple[tuple[str, ...], ...]
     residuals: Floats
     weights: Floats
+    noise: Noise | None = None
+    scale: float = 1.0
 
     @property
     def supported(self) -> bool:
@@ -103,14 +108,18 @@ def solve(problem: CalibrationProblem, robust: bool = False) -> CalibrationResul
             converged = True
             break
     decomposed = _Decomposed(problem, values, weights)
-    covariance = decomposed.covariance(len(problem.names))
+    weighted = residual / problem.sigma
+    noise = noise_of(weighted, decomposed.rank, robust)
+    scale = robust_scale(weighted, decomposed.rank, HUBER) if robust else 1.0 if noise is None else noise.scale
+    even = _Decomposed(problem, values, np.ones(len(residual))) if robust else decomposed
+    covariance = scale * even.covariance(len(problem.names))
     groups = decomposed.groups()
     sigma = np.sqrt(np.diag(covariance))
     lost = {name for group in groups for name in group}
     sigma[[k for k, name in enumerate(problem.names) if name in lost]] = np.inf
     costs = _cost(start, problem, weights), _cost(residual, problem, weights)
     return CalibrationResult(problem.names, values, sigma, covariance, converged, *costs, decomposed.rank,
-                             decomposed.condition_number, groups, residual, weights)
+                             decomposed.condition_number, groups, residual, weights, noise, scale)
 
 
 def _cost(residual: Floats, problem: CalibrationProblem, weights: Floats) -> float:

@@ -116,6 +116,13 @@ def cost_without(readings: Floats, sigma: float | Floats, offsets: bool = True, 
     return solve(replace(problem, free=problem.free & indexer), robust).cost_after
 
 
+def reversal_span(readings: Floats, offsets: bool = True, shifts: Sequence[int] | None = None) -> Floats:
+    """Orthonormal columns (K, rank) of what `identify` can explain of the known readings (K,) of one standard deviation."""
+    problem = _problem(readings, 1.0, offsets, shifts)
+    u, s, _ = np.linalg.svd(problem.jacobian(problem.guess)[:, problem.free], full_matrices=False)
+    return np.asarray(u[:, s > 1e-9 * s.max(initial=0.0)])
+
+
 def _problem(readings: Floats, sigma: float | Floats, offsets: bool, shifts: Sequence[int] | None) -> CalibrationProblem:
     """In parameters that keep the closures: axis (n - 1), indexer (n - 1), constants of the set-ups (m)."""
     m, n = readings.shape

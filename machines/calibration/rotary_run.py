@@ -51,7 +51,8 @@ def reversal(run: Run, given: ReversalModel, table: CsvTable) -> Calibration | N
     x = 2.0 * np.pi * np.arange(given.steps) / given.steps
     model = ErrorModel(SerialErrors((Component(name, Table(x, sense * fitted.axis, "spline", period=2.0 * np.pi)),)),
                        covariance=fitted.covariance[: given.steps, : given.steps])
-    return done(run, model, figures, f"sigma_arcsec = {given.sigma_arcsec:g}", lambda: reversal_slip(readings, sigma, given))
+    return done(run, model, figures, fitted.result.noise, f"sigma_arcsec = {given.sigma_arcsec:g}",
+                lambda: reversal_slip(readings, sigma, given, table.unit["reading"]))
 
 
 def _reversal_figures(run: Run, given: ReversalModel, fitted: Reversal, readings: Floats, sigma: float) -> dict[str, Any]:
@@ -98,8 +99,9 @@ def rotary(run: Run, given: RotaryModel, table: CsvTable) -> Calibration | None:
     if fitted.lost:
         run.tell("calibrate.hidden", f"the mounting can pretend {', '.join(fitted.lost)} as well; they are 0 in the model")
     model = error_model(fitted, given.axis, sense=sense, carries_part=_carries_part(run, given.axis))
-    return done(run, model, figures, f"sigma_um = {given.sigma_um:g} or sigma_arcsec = {given.sigma_arcsec:g}",
-                lambda: rotary_slip(bench, readings, sigma, given.harmonics))
+    return done(run, model, figures, fitted.result.noise,
+                f"sigma_um = {given.sigma_um:g} or sigma_arcsec = {given.sigma_arcsec:g}",
+                lambda: rotary_slip(bench, readings, sigma, given.harmonics, [table.unit[p] for p in PARTS]))
 
 
 def _rotary_figures(given: RotaryModel, bench: Bench, fitted: RotaryFit, sigma: Floats) -> dict[str, Any]:

@@ -10,6 +10,7 @@ from postproc.cycle_time.blocks import Blocks
 from postproc.cycle_time.lookahead import lookahead
 from postproc.cycle_time.model import CycleTimeModel
 from postproc.cycle_time.phases import Timed
+from postproc.moves import Moves
 from postproc.pass_geometry import stops_of
 from postproc.pipeline import PostResult
 from postproc.planned import PlannedMotion, Source
@@ -36,7 +37,16 @@ def planned_times(result: PostResult, blocks: Blocks, model: CycleTimeModel) -> 
     except DiagnosticError as fault:
         return times, [warning("time.plan", f"the motion cannot be planned, times of passes are the model's: {fault}",
                                file=job.toolpath.file, hint="--model lookahead")]
-    return with_seconds(times, _of_passes(blocks, times, spans)), []
+    return with_seconds(times, _of_passes(blocks, times, spans)), _unsolved(motion, moves, job.toolpath.file)
+
+
+def _unsolved(motion: PlannedMotion, moves: Moves, file: str) -> list[Diagnostic]:
+    """A warning where the time of a pass is that of a plan that was not solved."""
+    lines = [int(moves.line[one.move[0]]) for one, made in zip(motion.passes, motion.plans, strict=True) if not made.solved]
+    if not lines:
+        return []
+    return [warning("time.unsolved", "the least time of these passes was not found; they are given longer than need be, within "
+                    "all limits", file=file, lines=lines[:6], count=len(lines), hint="--model lookahead")]
 
 
 def _of_passes(blocks: Blocks, times: Timed, spans: list[tuple[int, int, float]]) -> Floats:

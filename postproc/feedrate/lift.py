@@ -33,15 +33,27 @@ def gains(path: Path, limits: JointLimits, feed: Feed, stops: Sequence[float], m
 
     They do not add up: where one limit goes, the next one binds. A limit without a share gains nothing, the problem
     being convex next to its optimum. `made` is the plan of the same arguments in fast mode.
+
+    Raises:
+        ArithmeticError: where one of the plans is not solved: its time says nothing of a gain.
     """
-    enough, found = least * made.seconds, []
+    def time(limits: JointLimits, feed: Feed) -> float:
+        return _solved(plan(path, limits, feed, stops, options))
+
+    before, enough, found = _solved(made), least * made.seconds, []
     shares = made.shares
     for order, axis in np.argwhere(shares.limits >= enough).tolist():
-        seconds = plan(path, without(limits, axis, order + 1), feed, stops, options).seconds
-        found.append(Gain(axis, order + 1, made.seconds - seconds))
+        found.append(Gain(axis, order + 1, before - time(without(limits, axis, order + 1), feed)))
     if shares.feed >= enough:
-        found.append(Gain(-1, 1, made.seconds - plan(path, limits, np.inf, stops, options).seconds))
+        found.append(Gain(-1, 1, before - time(limits, np.inf)))
     return sorted(found, key=lambda gain: -gain.seconds)
+
+
+def _solved(made: Plan) -> float:
+    """Seconds of a plan that is solved."""
+    if not made.solved:
+        raise ArithmeticError(f"a plan of {made.seconds:.4g} s is not solved: no gain can be taken from it")
+    return made.seconds
 
 
 def without(limits: JointLimits, axis: int, order: int) -> JointLimits:

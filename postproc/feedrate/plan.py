@@ -16,12 +16,13 @@ from postproc.feedrate.motion import CHUNK, SAMPLE, Piece, Plan
 from postproc.feedrate.paths import Eased, Path
 from postproc.feedrate.problem import Knots
 from postproc.feedrate.profile import Profile, linear_profile, spline_profile
+from postproc.feedrate.retried import solved_again
 from postproc.feedrate.rows import steady_tool_speed
 from postproc.feedrate.second_order import second_order
 from postproc.feedrate.shares import shares
 from postproc.feedrate.spline import rest_basis
 from postproc.feedrate.tightening import SPLIT, tightened
-from postproc.feedrate.windows import Method, Solved, solved
+from postproc.feedrate.windows import Method, Solved
 from toolpaths.arrays import Floats
 
 ROUNDS = 12
@@ -62,6 +63,9 @@ def plan(path: Path, limits: JointLimits, feed: Feed = np.inf, stops: Sequence[f
         options: see `Options`
         knots: sigma of the knots, instead of the mesh; only without stops
 
+    What is not solved at once is solved again on finer knots (`retried`). A motion that is not `solved` even then is slowed down
+    until its samples keep all limits, as in strict mode: it takes longer than it need, and exceeds nothing.
+
     Raises:
         ValueError: stops outside the path or not rising; knots with stops; an infinite jerk limit everywhere.
     """
@@ -83,7 +87,7 @@ def plan(path: Path, limits: JointLimits, feed: Feed = np.inf, stops: Sequence[f
         guess.append(slower)
     made = Plan(tuple(pieces), limits, allowed, options.step, max(r.iterations for r in reports),
                 max(r.mismatch for r in reports), all(r.solved for r in reports))
-    return _within(made, np.array(guess)) if options.strict else made
+    return _within(made, np.array(guess)) if options.strict or not made.solved else made
 
 
 def plan_second_order(path: Path, limits: JointLimits, feed: Feed = np.inf, stops: Sequence[float] = (),
@@ -131,7 +135,7 @@ def _solve(grid: Knots, options: Options) -> tuple[Profile, Solved, float]:
 
     The fastest of them with the factor on time that it still needs there; 1 in fast mode.
     """
-    report = solved(grid, options.method)
+    grid, report = solved_again(grid, options.method)
     profile = _profile(grid, report.c)
     if not options.strict:
         return profile, report, 1.0
@@ -140,8 +144,8 @@ def _solve(grid: Knots, options: Options) -> tuple[Profile, Solved, float]:
     for before in range(1, options.passes + 1):
         if better is None:
             break
-        report = solved(better, options.method, report.c if len(better.sigma) == len(grid.sigma) else None)
-        grid, profile = better, _profile(better, report.c)
+        grid, report = solved_again(better, options.method, report.c if len(better.sigma) == len(grid.sigma) else None)
+        profile = _profile(grid, report.c)
         slower, better = tightened(grid, profile, SPLIT[min(before, len(SPLIT) - 1)], bool(options.method.kernel))
         best = min(best, (slower * float(profile.times[-1]), slower, grid, report), key=lambda one: one[0])
     _, slower, grid, last = best

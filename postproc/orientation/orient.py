@@ -89,11 +89,20 @@ def orient(toolpath: Toolpath, machine: Machine, setup: SetupFile, options: Opti
     found += _unlinked(work, plans.named["auto"], any(np.isfinite(one.seconds) for one in plans.named.values()))
     if has_errors(found):
         return None, found
-    choice = OrientationChoice(work, tuple(results), table, plans.named, plans.paper)
-    if convert is None:
-        return _bettered(choice), found
-    choice, more = proved(choice, options.orient, convert)
-    return _bettered(choice), found + more
+    choice, more = OrientationChoice(work, tuple(results), table, plans.named, plans.paper), []
+    if convert is not None:
+        choice, more = proved(choice, options.orient, convert)
+    return _bettered(choice), [*found, *more, *_unsolved(choice, options.orient)]
+
+
+def _unsolved(choice: OrientationChoice, plan: Orientation) -> list[Diagnostic]:
+    """A warning where times that are compared are those of plans that were not solved."""
+    compared = [made for name in dict.fromkeys((plan, "keep", "auto")) for made in choice.plans[name].picked]
+    lines = sorted({made.one.line for made in compared if not made.solved})
+    if not lines:
+        return []
+    return [warning("orient.unsolved", "the least time of these passes was not found; the times compared are longer than need "
+                    "be, within all limits", file=choice.work.toolpath.file, lines=lines[:6], count=len(lines))]
 
 
 def _bettered(choice: OrientationChoice) -> OrientationChoice:

@@ -116,6 +116,11 @@ class Turned:
         return self._planned[0]
 
     @property
+    def solved(self) -> bool:
+        """False where a plan was not solved: its time is longer than need be."""
+        return self._planned[3]
+
+    @property
     def knots(self) -> tuple[Floats, ...]:
         """Of the plan of each stretch, along its eased parameter."""
         return self._planned[2]
@@ -132,16 +137,17 @@ class Turned:
         return self._planned[1]
 
     @cached_property
-    def _planned(self) -> tuple[float, tuple[str, str], tuple[Floats, ...]]:
-        """Seconds, what limits, and the knots of the plans."""
+    def _planned(self) -> tuple[float, tuple[str, str], tuple[Floats, ...], bool]:
+        """Seconds, what limits, the knots of the plans, and whether all were solved."""
         if self.told is not None:
-            return self.told, ("", ""), ()
+            return self.told, ("", ""), (), True
         if self.refused:
-            return np.inf, ("", ""), ()
+            return np.inf, ("", ""), (), True
         plans = self.plans()
         seconds = self.drilling + float(sum(made.seconds for made in plans))
         knots = tuple(made.pieces[0].profile.sigma for made in plans)
-        return seconds, self._binding([made.shares for made in plans] if self.jerky else []), knots
+        binding = self._binding([made.shares for made in plans] if self.jerky else [])
+        return seconds, binding, knots, all(made.solved for made in plans)
 
     @property
     def jerky(self) -> bool:

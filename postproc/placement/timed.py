@@ -89,11 +89,13 @@ class Timer:
         most: places that may be looked at, fewer of long files
         looked, refused, pruned: places that were, where the part cannot stand, and that lost by their bound alone
         planned: cuts
+        unsolved: lines of passes with a plan that was not solved, whose time is longer than need be
     """
 
     def __init__(self, work: Work, space: Space, least: float, bodies: Beside | None = None) -> None:
         self.work, self.space, self.least, self.bodies = work, space, least, bodies
         self.planned, self.looked, self.pruned, self.refused = 0, 0, 0, 0
+        self.unsolved: set[int] = set()
         self._cuts: dict[tuple[int, bytes], _Cut] = {}
         self._known: dict[bytes, Tried] = {}
         prepare(work.passes)
@@ -182,6 +184,7 @@ class Timer:
                     return [], total, True
                 self.planned += 1
                 cut = self._cuts[keys[k]] = _Cut(cut.bound, (made[k].seconds, " ".join(made[k].limiting).strip()))
+                self.unsolved |= set() if made[k].solved else {made[k].one.line}
             assert cut.planned is not None
             total += cut.planned[0] - bounds[k]
         done = [self._cuts[key].planned for key in keys]

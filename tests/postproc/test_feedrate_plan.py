@@ -8,15 +8,17 @@ from itertools import cycle
 import numpy as np
 import pytest
 
-from postproc.feedrate import interior, windows
+from postproc.feedrate import interior, retried, windows
 from postproc.feedrate.feed import Allowed, StepFeed
+from postproc.feedrate.lift import gains
 from postproc.feedrate.limits import JointLimits
 from postproc.feedrate.mesh import Spacing
 from postproc.feedrate.plan import Options, Plan, plan, plan_second_order
 from postproc.feedrate.problem import Knots
 from postproc.feedrate.trajectory import JointTrajectory
-from postproc.feedrate.windows import Method, solved
+from postproc.feedrate.windows import Method, Solved, solved
 from tests.postproc.feedrate_kit import MIKRON, PolynomialPath, only_jerk, random_path, uniform, zigzag
+from toolpaths.arrays import Floats
 
 STRICT = Options(strict=True)
 PASS_0 = PolynomialPath([[0.0], [0.0, 1.0], [0.0, 0.0, 30.0 / 60.0**2, -20.0 / 60.0**3]], 60.0)
@@ -167,7 +169,32 @@ def test_windows_that_stop_early_are_slow_not_wrong(monkeypatch: pytest.MonkeyPa
     report = solved(grid, Method(window=800, overlap=100))
     assert not report.solved and report.mismatch > 0.1
     assert grid.problem().ratios(report.c).max() < 1.0
-    assert not plan(path, MIKRON, knots=grid.sigma, options=Options(method=Method(window=800, overlap=100))).solved
+    again = plan(path, MIKRON, knots=grid.sigma, options=Options(method=Method(window=800, overlap=100)))
+    assert again.solved and again.seconds == pytest.approx(plan(path, MIKRON, knots=grid.sigma).seconds, rel=1e-3)
+
+
+def test_what_is_not_solved_is_solved_on_finer_knots(monkeypatch: pytest.MonkeyPatch) -> None:
+    path = random_path(2)
+    good, sizes = plan(path, MIKRON), list[int]()
+
+    def failing(knots: Knots, method: Method, near: Floats | None = None) -> Solved:
+        sizes.append(len(knots.sigma))
+        return replace(solved(knots, method, near), solved=len(sizes) > 2)
+
+    monkeypatch.setattr(retried, "solved", failing)
+    made = plan(path, MIKRON)
+    assert made.solved and sizes == [sizes[0], sizes[0], 2 * sizes[0] - 1]
+    assert made.seconds == pytest.approx(good.seconds, rel=2e-3)
+
+
+def test_what_is_not_solved_at_all_keeps_the_limits_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    path = random_path(2)
+    good = plan(path, MIKRON)
+    monkeypatch.setattr(windows, "solve", lambda steps, rows, gap: interior.solve(steps, rows, gap, most=6))
+    made = plan(path, MIKRON)
+    assert not made.solved and made.usage().worst <= 1.0 + 1e-9 and made.seconds > good.seconds
+    with pytest.raises(ArithmeticError, match="not solved"):
+        gains(path, MIKRON, np.inf, (), made)
 
 
 def test_nothing_depends_on_units() -> None:
