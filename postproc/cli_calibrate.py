@@ -24,10 +24,13 @@ def calibrate(file: Annotated[Path, typer.Argument(metavar="MEASUREMENTS.toml", 
                                                    help="error model to write; its tables are put beside it")],
               figure: Annotated[Path | None, typer.Option("--figure", metavar="FILE", help="drawing of signatures, "
                                                           "residuals and condition number, .png or .svg")] = None,
+              accept_residual: Annotated[bool, typer.Option("--accept-residual", help="take a fit that leaves more of the "
+                                                            "readings than their stated noise; its covariance is scaled by "
+                                                            "what is left")] = False,
               schema: Annotated[bool, typer.Option("--schema", is_eager=True, callback=_schema, help="print the JSON schema "
                                                    "of a measurement file, with the columns of its table")] = False,
               json: Json = "") -> None:
-    """Identify a machine's errors from measurements, each with its doubt; what the data do not tell is refused."""
+    """Identify a machine's errors from measurements, each with its uncertainty; what the data cannot identify is refused."""
     refuse_overwriting({"-o": str(output), "--figure": str(figure or ""), "--json": json}, {"the measurements": str(file)})
     ending = figure_ending(figure)
     from dataclasses import replace
@@ -38,10 +41,10 @@ def calibrate(file: Annotated[Path, typer.Argument(metavar="MEASUREMENTS.toml", 
     from postproc.files import write_atomically
 
     with shown_errors(json):
-        found, diagnostics = run(file)
+        found, diagnostics = run(file, accept_residual)
         figures: dict[str, Any] = {} if found is None else found.figures
         if found is not None and found.model is not None:
-            for name, content in write_model(replace(found.model, name=output.stem), f"from {file.name}").items():
+            for name, content in write_model(replace(found.model, name=output.stem), found.description(file.name)).items():
                 write_atomically(output.parent / (output.name if name == f"{output.stem}.toml" else name), content)
             if figure is not None:
                 from machines.calibration.figures import draw

@@ -15,15 +15,21 @@ from machines.user_file import read_toml, validate
 from toolpaths.diagnostics import Diagnostic, has_errors
 
 
-def calibrate(source: str | Path) -> tuple[Calibration | None, list[Diagnostic]]:
+def calibrate(source: str | Path, accept_residual: bool = False) -> tuple[Calibration | None, list[Diagnostic]]:
     """Identify what a measurement file asks for; None and what is wrong where it cannot be read. Where the data do not
-    support a model, or only one that cannot be, the figures come without it."""
+    support a model, or only one that cannot be, the figures come without it.
+
+    Args:
+        accept_residual: as in the file; one of them is enough
+    """
     file, diagnostics = read_toml(source, None, "measurement")
     if file is None:
         return None, diagnostics
     checked, diagnostics = validate(file, MeasurementModel)
     if checked is None:
         return None, diagnostics
+    if accept_residual:
+        checked = checked.model_copy(update={"accept_residual": True})
     given = [kind for kind in COLUMNS if getattr(checked, kind) is not None]
     if len(given) != 1:
         return None, [file.problem("calibrate.kind", (), f"{len(given)} kinds of measurement, one is needed",

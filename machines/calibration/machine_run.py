@@ -153,10 +153,11 @@ def _judged(run: Run, given: PosesModel | BarModel | LaserModel, start: ErrorMod
     if has_errors(run.found):
         return Calibration(None, figures)
     _far(run, given, measured.kind, fitted.setup)
+    travel = run.machine.limits.lower, run.machine.limits.upper
     columns = [c.name for c in COLUMNS[run.kind]]
     units, joints = ([table.unit[name] for name in names] for names in (columns, run.machine.axis_names))
     return done(run, fitted.model, figures, result.noise, f"sigma_um = {given.sigma_um:g}",
-                lambda: machine_slip(start, kinematics, measured, wanted, units, joints, columns), start, wanted)
+                lambda: machine_slip(start, kinematics, measured, wanted, travel, units, joints, columns), start, wanted)
 
 
 def _untold(run: Run, groups: Sequence[tuple[str, ...]]) -> None:

@@ -150,8 +150,8 @@ class MeasurementModel(UserModel):
     robust: bool = False
     """let readings count less that do not fit (Huber)"""
     accept_residual: bool = False
-    """true: take a fit that leaves more of the readings than their stated standard deviation explains; its covariance is scaled
-    by what is left"""
+    """true: take a fit that leaves more of the readings than their stated standard deviation explains; its covariance is
+    scaled by what is left"""
     minutes_per_reading: Positive = 0.5
     """machine time, for what another set-up would cost"""
     minutes_per_setup: NotNegative = 20.0

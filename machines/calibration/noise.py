@@ -1,13 +1,13 @@
 """What a fit leaves of its readings against what is stated of their noise: chi-square, and the scale of the covariance.
 
-Sums of squared weighted residuals of readings at their stated noise follow a chi-square of as many degrees of freedom as there
-are readings to spare; both tails are looked at (JCGM 100, annexes G and H; Birge 1932 for the scale). Robust fits are judged by
-the median of the residuals, which outliers do not move, with the degrees of freedom that it is worth.
+Sums of squared weighted residuals of readings at their stated noise follow a chi-square of as many degrees of freedom as
+there are readings to spare; both tails are looked at (JCGM 100, annexes G and H; Birge 1932 for the scale). Robust fits are
+judged by the median of the residuals, which outliers do not move, with the degrees of freedom that it is worth.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import gammainc, gammaincc, stdtrit
@@ -20,6 +20,8 @@ MEDIAN = 0.6744897501960817
 """of the size of a normal deviate, over its standard deviation"""
 WORTH = 0.368
 """degrees of freedom of that median against those of the sum of squares"""
+HUBER_LOSS, MEDIAN_LOSS = 1.0526, 0.5 * np.pi
+"""variance of robust fits of normal residuals over that of least squares"""
 NORMAL = 1.959963984540054
 """standard deviations of the 95 % bounds of a normal deviate"""
 
@@ -31,10 +33,12 @@ class Noise:
     Attributes:
         left: root of what is left over the stated noise, by degrees of freedom: 1 is right
         freedom: degrees of freedom, above 0
+        robust: True where the fit counts residuals beyond the stated noise linearly
     """
 
     left: float
     freedom: float
+    robust: bool = False
 
     @property
     def more(self) -> float:
@@ -53,15 +57,18 @@ class Noise:
 
     def scaled(self, factor: float) -> Noise:
         """Where so many times as much is left."""
-        return Noise(factor * self.left, self.freedom)
+        return replace(self, left=factor * self.left)
 
     @property
     def scale(self) -> float:
         """Factor on a covariance made from the stated noise: 1 where no more than that is left, else what is left, squared,
-        so that NORMAL standard deviations hold 95 % as Student's t has it for few degrees of freedom."""
+        so that NORMAL standard deviations hold 95 % as Student's t has it for few degrees of freedom. A robust fit has the
+        variance of Huber's at the stated noise, and comes to that of least absolute values where the noise is larger."""
+        more = max(self.left, 1.0)
+        lost = HUBER_LOSS + (MEDIAN_LOSS - HUBER_LOSS) * (1.0 - 1.0 / more) if self.robust else 1.0
         if self.left <= 1.0:
-            return 1.0
-        return float((self.left * stdtrit(self.freedom, 0.975) / NORMAL) ** 2)
+            return lost
+        return float(lost * (more * stdtrit(self.freedom, 0.975) / NORMAL) ** 2)
 
 
 def noise_of(weighted: Floats, unknowns: int, robust: bool = False) -> Noise | None:
@@ -72,15 +79,4 @@ def noise_of(weighted: Floats, unknowns: int, robust: bool = False) -> Noise | N
     if not robust:
         return Noise(float(np.sqrt(np.sum(weighted**2) / spare)), float(spare))
     middle = float(np.median(np.abs(weighted))) / MEDIAN
-    return Noise(middle * float(np.sqrt(len(weighted) / spare)), max(WORTH * spare, 1.0))
-
-
-def robust_scale(weighted: Floats, unknowns: int, bend: float) -> float:
-    """Factor on the covariance of an unweighted fit of the same readings for one that counts residuals beyond `bend`
-    linearly (Huber 1981, 7.6): outliers enlarge it no more than they move the result; at least 1."""
-    spare = len(weighted) - unknowns
-    inside = float(np.mean(np.abs(weighted) <= bend)) if len(weighted) else 1.0
-    if spare <= 0 or inside <= 0.0:
-        return 1.0
-    factor = float(np.sum(np.minimum(np.abs(weighted), bend) ** 2)) / spare / inside**2
-    return max(1.0, factor) * (float(stdtrit(spare, 0.975)) / NORMAL) ** 2 if factor > 1.0 else 1.0
+    return Noise(middle * float(np.sqrt(len(weighted) / spare)), max(WORTH * spare, 1.0), True)

@@ -19,7 +19,7 @@ LITTLE = 0.5
 """of what is left with nothing found but ball, zero, mounting and indexer: where more stays, little is explained"""
 SILENT, MUTE = 0.5, 0.02
 """times the stated standard deviation: less is left than that leaves; so little that no model is written"""
-ACCEPT = "accept_residual = true at the top of the file (or --accept-residual) takes the fit, its covariance scaled by what is left"
+ACCEPT = "accept_residual = true at the top of the file, or --accept-residual, takes the fit and scales its covariance"
 DIFFERENCES = "reversal", "poses", "laser"
 """kinds whose readings are actual less nominal"""
 MEANT = "write large = true at the top of the file where it is so"
@@ -35,6 +35,14 @@ class Calibration:
 
     model: ErrorModel | None
     figures: dict[str, Any]
+
+    def description(self, source: str) -> str:
+        """One line for the model's file: what it is from, and what its covariance was scaled by."""
+        scale, left = self.figures.get("covariance_scale", 1.0), self.figures.get("reduced")
+        if left is None or scale == 1.0:
+            return f"from {source}"
+        return (f"from {source}; covariance scaled by {scale:.4g}: {left:.4g} times the stated noise is left of the "
+                f"readings, {self.figures['spare']} degrees of freedom")
 
 
 def done(run: Run, model: ErrorModel, figures: dict[str, Any], noise: Noise | None, sigma: str,
@@ -91,8 +99,8 @@ def _residual(run: Run, figures: dict[str, Any], noise: Noise | None, sigma: str
     elif noise.more <= CHANCE:
         _loud(run, figures, noise, message, found, stated)
     elif figures["spare"] < FEW:
-        run.tell("calibrate.few", f"{figures['spare']} more readings than unknowns: a wrong unit could not be seen in what is "
-                 "left of them", "measure more than is asked for")
+        run.tell("calibrate.few", f"{figures['spare']} more readings than unknowns: a wrong unit could not be seen in what "
+                 "is left of them", "measure more than is asked for")
 
 
 def _silent(run: Run, noise: Noise, message: str, found: Slip | None, stated: str) -> None:
@@ -100,7 +108,8 @@ def _silent(run: Run, noise: Noise, message: str, found: Slip | None, stated: st
     if found is not None:
         run.problem("calibrate.slip", f"{message}, less than such noise leaves", f"{found.words}; {stated}")
     elif noise.left < MUTE:
-        run.problem("calibrate.silent", f"{message}, less than any noise leaves", f"look at the unit of the readings; {stated}")
+        run.problem("calibrate.silent", f"{message}, less than any noise leaves",
+                    f"look at the unit of the readings; {stated}")
     elif noise.left < SILENT:
         run.warn("calibrate.silent", f"{message}: it is stated too large", stated)
 

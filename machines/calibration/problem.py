@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from machines.calibration.noise import Noise, noise_of, robust_scale
+from machines.calibration.noise import Noise, noise_of
 from toolpaths.arrays import Bools, Floats, frozen
 
 RANK = 1e-9
@@ -108,9 +108,8 @@ def solve(problem: CalibrationProblem, robust: bool = False) -> CalibrationResul
             converged = True
             break
     decomposed = _Decomposed(problem, values, weights)
-    weighted = residual / problem.sigma
-    noise = noise_of(weighted, decomposed.rank, robust)
-    scale = robust_scale(weighted, decomposed.rank, HUBER) if robust else 1.0 if noise is None else noise.scale
+    noise = noise_of(residual / problem.sigma, decomposed.rank, robust)
+    scale = 1.0 if noise is None else noise.scale
     even = _Decomposed(problem, values, np.ones(len(residual))) if robust else decomposed
     covariance = scale * even.covariance(len(problem.names))
     groups = decomposed.groups()

@@ -1,8 +1,8 @@
-"""Slips of a measurement table that the readings themselves show: a wrong unit, a wrong sign, two columns in each other's place.
+"""Slips of a measurement table that the readings themselves show: a wrong unit or sign, two columns changed over.
 
-Where a fit does not leave the noise that is stated, the same fit is made with each slip put right; one that brings what is left
-to the stated noise, or far nearer to it, is named. What all readings share (one sign, a turn of the zero) cannot be seen: the
-errors found only have it too.
+Where a fit does not leave the noise that is stated, the same fit is made with each slip put right; one that brings what is
+left to the stated noise, or far nearer to it, is named. What all readings share (one sign, a turn of the zero) cannot be
+seen: the errors found only have it too.
 """
 
 from __future__ import annotations
@@ -34,6 +34,10 @@ SHOWN = 3
 """slips that are named"""
 TURNED = 1e-6
 """of a direction: a table frame that never turns"""
+REFITTED = 5
+"""slips of the axes' columns, those that leave least at the first order, that are fitted in full"""
+EDGE = 1e-6
+"""mm or rad beyond a travel that are numbers' own"""
 ROWS = 400
 """of a table that slips are looked for in"""
 PAIRS = ((0, 1), (1, 2), (0, 2))
@@ -59,10 +63,12 @@ class Tried:
 
 
 def machine_slip(start: ErrorModel, kinematics: Kinematics, measured: Measurements, wanted: Sequence[str],
-                 units: Sequence[str], joints: Sequence[str], columns: Sequence[str]) -> Slip | None:
+                 travel: tuple[Floats, Floats], units: Sequence[str], joints: Sequence[str],
+                 columns: Sequence[str]) -> Slip | None:
     """The slip of a table of poses, bar or laser, None where there is none.
 
     Args:
+        travel: lower and upper ends (J,) of the axes, mm and rad
         units, joints: units of the columns of readings, of the axes' columns
         columns: names of the columns of readings
     """
@@ -75,16 +81,28 @@ def machine_slip(start: ErrorModel, kinematics: Kinematics, measured: Measuremen
         return result.noise if result.converged else None
 
     def tried() -> Iterable[Tried]:
-        for words, other in [*_positions(part, kinematics, joints), *_other_directions(part, start, kinematics)]:
-            yield Tried(words, left(other))
+        others = [*_positions(part, kinematics, travel, joints), *_other_directions(part, start, kinematics)]
+        roughly = [(size, k) for k, (_, other) in enumerate(others)
+                   if (size := _roughly(problem_of(start, kinematics, other, wanted))) is not None]
+        for _, k in sorted(roughly)[:REFITTED]:
+            yield Tried(others[k][0], left(others[k][1]))
         if part.kind != "distance":
             yield from _readings(problem_of(start, kinematics, part, wanted), part.read, columns, units)
 
     return _best(left(part), tried)
 
 
-def _positions(m: Measurements, kinematics: Kinematics, units: Sequence[str]) -> Iterable[tuple[str, Measurements]]:
-    """Slips of the columns of the axes in words, and the measurements without them."""
+def _roughly(problem: CalibrationProblem) -> float | None:
+    """Logarithm of what a fit leaves, either way, taken at the first order; None where it leaves nothing."""
+    span = _span(problem.jacobian(problem.guess)[:, problem.free] / problem.sigma[:, None])
+    y = (problem.observed - problem.predict(problem.guess)) / problem.sigma
+    noise = noise_of(y - span @ (span.T @ y), span.shape[1])
+    return None if noise is None or not noise.left > 0.0 else abs(float(np.log(noise.left)))
+
+
+def _positions(m: Measurements, kinematics: Kinematics, travel: tuple[Floats, Floats],
+               units: Sequence[str]) -> Iterable[tuple[str, Measurements]]:
+    """Slips of the columns of the axes in words, and the measurements without them; all inside travel."""
     names, one = kinematics.axis_names, np.eye(len(kinematics.axis_names))
     rotary = np.array(kinematics.rotary)
     moved = np.ptp(m.q, axis=0) + np.abs(m.q).max(axis=0) > 0.0
@@ -100,7 +118,8 @@ def _positions(m: Measurements, kinematics: Kinematics, units: Sequence[str]) ->
         found += [(f"with {who} {words}", m.q * (1.0 + (size - 1.0) * one[group].sum(axis=0)))
                   for words, size in _sizes(units[group[0]])]
     for words, q in found:
-        if np.isfinite(kinematics.forward(q)[0]).all():
+        inside = (q >= travel[0] - EDGE).all() and (q <= travel[1] + EDGE).all()
+        if inside and np.isfinite(kinematics.forward(q)[0]).all():
             yield words, replace(m, q=q)
     if m.ways is not None and m.ways.any():
         yield "with the ways turned round", replace(m, ways=-m.ways)
@@ -127,7 +146,7 @@ def _other_directions(m: Measurements, start: ErrorModel,
 
 
 def _readings(problem: CalibrationProblem, read: Floats, columns: Sequence[str], units: Sequence[str]) -> Iterable[Tried]:
-    """Slips of the readings (N,) or (N, C): what a fit leaves of them is taken at the first order, which errors are small for."""
+    """Slips of the readings (N,) or (N, C); what a fit leaves of them is taken at the first order, errors being small."""
     table = read.reshape(len(read), -1)
     rates = problem.jacobian(problem.guess)[:, problem.free] / problem.sigma[:, None]
     span = _span(rates)
@@ -247,6 +266,8 @@ def _best(now: Noise | None, tried: Callable[[], Iterable[Tried]]) -> Slip | Non
     if now is None or now.meets:
         return None
     known = [(one, one.noise) for one in tried() if one.noise is not None and one.noise.left > 0.0]
+    if now.left < 1.0:  # what is put in disorder leaves more, not less
+        known = [(one, noise) for one, noise in known if one.size]
     good = [(abs(np.log(noise.left)), one) for one, noise in known if noise.meets and _nearer(noise, now)]
     if not good and now.left > LOUD:
         good = [(float(np.log(noise.left)), one) for one, noise in known

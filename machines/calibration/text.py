@@ -25,7 +25,14 @@ def _quality(figures: dict[str, Any]) -> list[str]:
     shown = "infinite" if number is None else f"{number:#.{FIGURES}g}"
     return [f"rank {figures['rank']} of {figures['unknowns']}, condition number {shown}, {figures['readings']} readings",
             f"weighted residual {figures['rms_before']:#.{FIGURES}g} before, {figures['rms_instrument']:#.{FIGURES}g} with "
-            f"nothing found of the machine, {figures['rms_after']:#.{FIGURES}g} after"]
+            f"nothing found of the machine, {figures['rms_after']:#.{FIGURES}g} after", *_scaled(figures)]
+
+
+def _scaled(figures: dict[str, Any]) -> list[str]:
+    """What the covariance was scaled by, where more than the stated noise is left."""
+    scale = figures.get("covariance_scale", 1.0)
+    times = f"{math.sqrt(scale):.{FIGURES}g}"
+    return [] if scale == 1.0 else [f"standard deviations are {times} times those of the stated noise"]
 
 
 def _instrument(figures: dict[str, Any]) -> list[str]:

@@ -45,8 +45,8 @@ def _unsolved(motion: PlannedMotion, moves: Moves, file: str) -> list[Diagnostic
     lines = [int(moves.line[one.move[0]]) for one, made in zip(motion.passes, motion.plans, strict=True) if not made.solved]
     if not lines:
         return []
-    return [warning("time.unsolved", "the least time of these passes was not found; they are given longer than need be, within "
-                    "all limits", file=file, lines=lines[:6], count=len(lines), hint="--model lookahead")]
+    return [warning("time.unsolved", "the least time of these passes was not found; they are given longer than need be, "
+                    "within all limits", file=file, lines=lines[:6], count=len(lines), hint="--model lookahead")]
 
 
 def _of_passes(blocks: Blocks, times: Timed, spans: list[tuple[int, int, float]]) -> Floats:

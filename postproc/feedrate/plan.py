@@ -63,8 +63,8 @@ def plan(path: Path, limits: JointLimits, feed: Feed = np.inf, stops: Sequence[f
         options: see `Options`
         knots: sigma of the knots, instead of the mesh; only without stops
 
-    What is not solved at once is solved again on finer knots (`retried`). A motion that is not `solved` even then is slowed down
-    until its samples keep all limits, as in strict mode: it takes longer than it need, and exceeds nothing.
+    What is not solved at once is solved again on finer knots (`retried`). A motion that is not `solved` even then is slowed
+    down until its samples keep all limits, as in strict mode: it takes longer than it need, and exceeds nothing.
 
     Raises:
         ValueError: stops outside the path or not rising; knots with stops; an infinite jerk limit everywhere.

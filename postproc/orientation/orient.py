@@ -101,8 +101,8 @@ def _unsolved(choice: OrientationChoice, plan: Orientation) -> list[Diagnostic]:
     lines = sorted({made.one.line for made in compared if not made.solved})
     if not lines:
         return []
-    return [warning("orient.unsolved", "the least time of these passes was not found; the times compared are longer than need "
-                    "be, within all limits", file=choice.work.toolpath.file, lines=lines[:6], count=len(lines))]
+    return [warning("orient.unsolved", "the least time of these passes was not found; the times compared are longer than "
+                    "need be, within all limits", file=choice.work.toolpath.file, lines=lines[:6], count=len(lines))]
 
 
 def _bettered(choice: OrientationChoice) -> OrientationChoice:

@@ -96,8 +96,8 @@ def place(toolpath: Toolpath, machine: Machine, setup: SetupFile, options: Optio
     except (ValueError, ArithmeticError) as fault:
         return None, [*found, error("place.plan", f"no motion could be planned: {fault}", file=toolpath.file)]
     if timer.unsolved:
-        found.append(warning("place.unsolved", "the least time of these passes was not found at every place; the times compared "
-                             "are longer than need be, within all limits", file=toolpath.file,
+        found.append(warning("place.unsolved", "the least time of these passes was not found at every place; the times "
+                             "compared are longer than need be, within all limits", file=toolpath.file,
                              lines=sorted(timer.unsolved)[:6], count=len(timer.unsolved)))
     if result.now.refused:
         found.append(warning("place.now", f"where [part] has it the part cannot stand: {result.now.refused}",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from collections.abc import Callable
 from dataclasses import replace
@@ -87,7 +88,11 @@ SLIPS = {
                  "2.003 mm too long"),
     "probe in mm": ("probe.csv", text("[um]", "[mm]"), "error-model.large", "EC0Y is up to 1.735 degrees"),
     "probe far": ("probe.csv", rows(lambda r: r.update(dz=r["dz"] + 5000.0)), "calibrate.place", "4.97 mm from where"),
-    "probe too small": ("probe.csv", scaled(1e-3, "dx", "dy", "dz"), "calibrate.unexplained", "explain little"),
+    "probe too small": ("probe.csv", scaled(1e-3, "dx", "dy", "dz"), "calibrate.slip", "write [mm] in the header"),
+    "probe tenfold": ("probe.csv", scaled(10.0, "dx", "dy", "dz"), "calibrate.slip", "dx, dy, dz a tenth as large"),
+    "probe, a tenth": ("probe.csv", scaled(0.1, "dx", "dy", "dz"), "calibrate.slip", "dx, dy, dz ten times as large"),
+    "dz tenfold": ("probe.csv", scaled(10.0, "dz"), "calibrate.slip", "dz a tenth as large"),
+    "Y for X": ("probe.csv", swapped("X", "Y"), "calibrate.slip", "X and Y changed over"),
     "C turned round": ("probe.csv", scaled(-1.0, "C"), "calibrate.slip", "with C turned round only"),
     "dx turned round": ("probe.csv", scaled(-1.0, "dx"), "calibrate.slip", "with dx turned round only"),
     "all turned round": ("probe.csv", scaled(-1.0, "dx", "dy", "dz"), "calibrate.slip", "with all readings turned round"),
@@ -95,7 +100,11 @@ SLIPS = {
     "along the machine": ("probe.csv", None, "calibrate.slip", "along the machine instead of the table"),
     "A in rad": ("probe.csv", text("A [deg]", "A [rad]"), "calibrate.travel", "unit of A [rad]"),
     "laser in mm": ("laser.csv", text("reading [um]", "reading [mm]"), "error-model.large", "EXX is up to 10.56 mm"),
-    "laser too small": ("laser.csv", scaled(1e-3, "reading"), "calibrate.silent", "less than any noise"),
+    "laser too small": ("laser.csv", scaled(1e-3, "reading"), "calibrate.slip", "reading in mm (write [mm] in the header)"),
+    "laser tenfold": ("laser.csv", scaled(10.0, "reading"), "calibrate.slip", "reading a tenth as large"),
+    "laser, a tenth": ("laser.csv", scaled(0.1, "reading"), "calibrate.slip", "reading ten times as large"),
+    "laser in inches": ("laser.csv", scaled(1.0 / 25400.0, "reading"), "calibrate.slip", "reading in in (write [in]"),
+    "X of the laser in um": ("laser.csv", text("X [mm]", "X [um]"), "calibrate.rank", "do not tell EXX[0]+ .."),
     "laser absolute": ("laser.csv", rows(lambda r: r.update(reading=r["reading"] + 1e3 * r["X"])), "error-model.large",
                        "actual less nominal"),
     "errors by name": ("laser.csv", text("reading", "EXX"), "calibrate.column", "no column reading; tables of errors by"),
@@ -107,11 +116,23 @@ SLIPS = {
     "way in mm": ("laser.csv", text("X way", "X way [mm]"), "calibrate.unit", "write X way alone"),
     "reversal in degrees": ("reversal.csv", text("[arcsec]", "[deg]"), "error-model.large", "ECC is up to 9.982 degrees"),
     "reversal too small": ("reversal.csv", scaled(1e-3, "reading"), "calibrate.silent", "less than any noise"),
+    "arcsec under urad": ("reversal.csv", text("[arcsec]", "[urad]"), "calibrate.slip", "reading in arcsec (write [arcsec]"),
+    "urad under arcsec": ("reversal.csv", scaled(4.84813681, "reading"), "calibrate.slip", "reading in urad (write [urad]"),
+    "reversal tenfold": ("reversal.csv", scaled(10.0, "reading"), "calibrate.slip", "reading a tenth as large"),
+    "reversal, a tenth": ("reversal.csv", scaled(0.1, "reading"), "calibrate.slip", "reading ten times as large"),
+    "one set-up turned round": ("reversal.csv", rows(lambda r: r.update(reading=r["reading"] * (-1) ** (r["setup"] == 2))),
+                                "calibrate.slip", "set-up 2 turned round"),
     "indexer the other way": ("reversal.toml", text("steps = 12", "steps = 12\nshifts = [0, 11, 10, 9]"), "calibrate.slip",
                               "shifts = [0, 1, 2, 3]"),
     "six in mm": ("rotary.csv", text("[um]", "[mm]"), "error-model.large", "EZC is up to 2.039 mm"),
     "ex turned round": ("rotary.csv", scaled(-1.0, "ex"), "calibrate.slip", "with ex turned round"),
     "ex for ey": ("rotary.csv", swapped("ex", "ey"), "calibrate.slip", "with ex and ey changed over"),
+    "six, turns in arcsec under urad": ("rotary.csv", lambda c: c.replace("[arcsec]", "[urad]"), "calibrate.slip",
+                                        "ex, ey, ez in arcsec (write [arcsec]"),
+    "six, places tenfold": ("rotary.csv", scaled(10.0, "dx", "dy", "dz"), "calibrate.slip", "dx, dy, dz a tenth as large"),
+    "six, ez tenfold": ("rotary.csv", scaled(10.0, "ez"), "calibrate.slip", "ez a tenth as large"),
+    "steps backwards": ("rotary.csv", rows(lambda r: r.update(step=(12.0 - r["step"]) % 12.0)), "calibrate.slip",
+                        "steps counted the other way"),
     "set-ups backwards": ("rotary.csv", rows(lambda r: r.update(setup=2.0 - r["setup"])), "calibrate.slip",
                           "set-ups in the other order"),
 }
@@ -151,6 +172,27 @@ def test_what_is_large_is_taken_where_the_file_says_so(folder: Path) -> None:
     assert "large = true" not in (folder / "probe-m.toml").read_text()
 
 
+@pytest.mark.parametrize(("kind", "columns"), [("reversal", ["reading"]), ("laser", ["reading"]), ("ball_bar", ["distance"])])
+def test_more_noise_than_stated_is_refused_and_taken_where_it_is_asked_for(kind: str, columns: list[str], folder: Path) -> None:
+    """The hint is followed; the model's covariance grows by what is left, and its file says so."""
+    rng, table = np.random.default_rng(5), folder / f"{kind}.csv"
+    noise = {"reversal": 0.5, "laser": 3.0, "ball_bar": 3e-3}[kind]
+    before, _ = calibrate(folder / f"{kind}.toml")
+    table.write_text(rows(lambda r: r.update({k: r[k] + noise * rng.normal() for k in columns}))(table.read_text()))
+    found, diagnostics = calibrate(folder / f"{kind}.toml")
+    assert found is not None and found.model is None
+    assert any("accept_residual" in d.hint or "write sigma" in d.hint for d in diagnostics)
+    arguments = ["calibrate", str(folder / f"{kind}.toml"), "-o", str(folder / "out.toml")]
+    done = CliRunner().invoke(app, [*arguments, "--accept-residual"])
+    assert done.exit_code == 0 and "calibrate.residual" in done.stderr, done.stderr
+    assert "covariance scaled by" in (folder / "out.toml").read_text() and "times those of the stated noise" in done.stdout
+    (folder / f"{kind}.toml").write_text("accept_residual = true\n" + (folder / f"{kind}.toml").read_text())
+    accepted, _ = calibrate(folder / f"{kind}.toml")
+    assert before is not None and accepted is not None and accepted.model is not None
+    for name, p in accepted.figures["parameters"].items():
+        assert 6.0 < p["sigma"] / before.figures["parameters"][name]["sigma"] < 16.0
+
+
 def test_doubt_that_is_stated_as_it_is_makes_a_rough_fit_good(folder: Path) -> None:
     """Too little explained is refused at the stated doubt, and taken at the true one; the doubt found grows by as much."""
     rng = np.random.default_rng(3)
@@ -158,7 +200,9 @@ def test_doubt_that_is_stated_as_it_is_makes_a_rough_fit_good(folder: Path) -> N
     (folder / "probe.csv").write_text(noisy((folder / "probe.csv").read_text()))
     found, diagnostics = calibrate(folder / "probe.toml")
     assert found is not None and found.model is None and [d.code for d in diagnostics] == ["calibrate.unexplained"]
-    (folder / "probe.toml").write_text((folder / "probe.toml").read_text().replace("sigma_um = 0.3", "sigma_um = 200.0"))
+    stated = re.search(r"write (sigma_um = [0-9.]+)", diagnostics[0].hint)
+    assert stated is not None and 150.0 < float(stated[1].split()[-1]) < 250.0
+    (folder / "probe.toml").write_text((folder / "probe.toml").read_text().replace("sigma_um = 0.3", stated[1]))
     found, diagnostics = calibrate(folder / "probe.toml")
     assert found is not None and found.model is not None and not diagnostics
     assert found.figures["parameters"]["EX0C"]["sigma"] > 20.0
