@@ -172,13 +172,13 @@ def test_what_is_large_is_taken_where_the_file_says_so(folder: Path) -> None:
     assert "large = true" not in (folder / "probe-m.toml").read_text()
 
 
-@pytest.mark.parametrize(("kind", "columns"), [("reversal", ["reading"]), ("laser", ["reading"]), ("ball_bar", ["distance"])])
-def test_more_noise_than_stated_is_refused_and_taken_where_it_is_asked_for(kind: str, columns: list[str], folder: Path) -> None:
+@pytest.mark.parametrize(("kind", "column"), [("reversal", "reading"), ("laser", "reading"), ("ball_bar", "distance")])
+def test_more_noise_than_stated_is_refused_and_taken_where_it_is_asked_for(kind: str, column: str, folder: Path) -> None:
     """The hint is followed; the model's covariance grows by what is left, and its file says so."""
     rng, table = np.random.default_rng(5), folder / f"{kind}.csv"
     noise = {"reversal": 0.5, "laser": 3.0, "ball_bar": 3e-3}[kind]
     before, _ = calibrate(folder / f"{kind}.toml")
-    table.write_text(rows(lambda r: r.update({k: r[k] + noise * rng.normal() for k in columns}))(table.read_text()))
+    table.write_text(rows(lambda r: r.update({column: r[column] + noise * rng.normal()}))(table.read_text()))
     found, diagnostics = calibrate(folder / f"{kind}.toml")
     assert found is not None and found.model is None
     assert any("accept_residual" in d.hint or "write sigma" in d.hint for d in diagnostics)
