@@ -20,7 +20,7 @@ PART = 1e-6
 """least share of a parameter in what cannot be told, to be named"""
 HUBER = 1.345
 """standard deviations beyond which a residual counts linearly in a robust fit (Huber 1964: 95 % efficient)"""
-STEPS = 30
+STEPS, ROBUST_STEPS = 30, 300
 STOPS = 1e-8
 """standard deviations: a step that changes no reading by more is the last"""
 
@@ -97,7 +97,7 @@ def solve(problem: CalibrationProblem, robust: bool = False) -> CalibrationResul
     values, weights = np.array(problem.guess), np.ones(len(problem.observed))
     start = problem.observed - problem.predict(values)
     residual, converged = start, False
-    for _ in range(STEPS):
+    for _ in range(ROBUST_STEPS if robust else STEPS):
         decomposed = _Decomposed(problem, values, weights)
         step = decomposed.step(residual * np.sqrt(weights) / problem.sigma)
         values[problem.free] += step

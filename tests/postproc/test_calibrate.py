@@ -129,8 +129,12 @@ def test_one_reading_is_not_enough_and_more_than_noise_is_told(folder: Path) -> 
     (folder / "reversal.csv").write_text("\n".join(text.splitlines()[:3]) + "\n")
     assert run(folder, "reversal.toml", "o.toml", 1)["rank"] == 3
     (folder / "reversal.csv").write_text(text.replace("\n0,5,-11", "\n0,5,-1"))  # one reading 10 arcsec off
-    figures = run(folder, "reversal.toml", "o.toml")
+    figures = run(folder, "reversal.toml", "o.toml", 1)
     assert [d["code"] for d in figures["diagnostics"]] == ["calibrate.residual"] and figures["rms_after"] > 2.0
+    assert "robust = true" in figures["diagnostics"][0]["hint"] and figures["chance"] < 1e-3
+    (folder / "reversal.toml").write_text("robust = true\n" + (folder / "reversal.toml").read_text())
+    figures = run(folder, "reversal.toml", "o.toml")
+    assert not figures["diagnostics"] and figures["reduced"] < 1.5 and figures["covariance_scale"] < 4.0
 
 
 def test_a_fit_without_support_is_refused(folder: Path) -> None:

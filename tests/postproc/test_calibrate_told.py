@@ -92,15 +92,18 @@ def test_only_what_was_asked_for_is_listed_with_as_many_digits_as_are_known(fold
     assert lines[1] == "rank 7 of 7, condition number 1.000, 72 readings"
     assert re.fullmatch(r"weighted residual 48\.\d\d before, 5\.4\d\d with nothing found of the machine, 1\.0\d\d after",
                         lines[2])
+    scaled = re.fullmatch(r"standard deviations are (1\.\d+) times those of the stated noise", lines.pop(3))
+    assert scaled is not None
     ball = re.fullmatch(r"ball found at (\S+), (\S+), (\S+) mm, 0\.02\d\d mm from the stated centre; distances are 3\.\d+ "
                         "um too long", lines[3])
     assert ball is not None and [float(v) for v in ball.groups()] == pytest.approx([0.012, -0.02, -89.992], abs=5e-4)
     assert [line.split()[0] for line in lines[5:8]] == ["EC0Y", "EB0Z", "EA0Z"]
     value, sigma = lines[5].split()[1], lines[5].split()[3]
-    assert sigma == "0.238" and len(value.split(".")[1]) == 3 and abs(float(value) - 8.0) < 4 * 0.238
+    assert float(sigma) == pytest.approx(0.2377 * float(scaled[1]), abs=6e-4) and len(value.split(".")[1]) == 3 and abs(float(value) - 8.0) < 4 * 0.238
     assert lines[8:] == ["other parameters, which stay as they were: 1"]
     found, _ = calibrate(source)
     assert found is not None and set(found.figures["parameters"]) == {"EC0Y", "EB0Z", "EA0Z"}
+    assert found.figures["covariance_scale"] == pytest.approx(float(scaled[1]) ** 2, rel=1e-3)
     assert found.figures["kept"] == 1 and found.figures["unknowns"] == 7 and found.figures["spare"] == 65
     assert found.figures["reduced"] == pytest.approx(found.figures["rms_after"] * np.sqrt(72.0 / 65.0))
     assert load(folder / "out.toml", machines.load("mikron-ucp710")).values[-1] == pytest.approx(4e-6)
