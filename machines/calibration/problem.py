@@ -21,6 +21,7 @@ PART = 1e-6
 HUBER = 1.345
 """standard deviations beyond which a residual counts linearly in a robust fit (Huber 1964: 95 % efficient)"""
 STEPS, ROBUST_STEPS = 30, 300
+"""of a fit; the weights of a robust one come to rest slowly"""
 STOPS = 1e-8
 """standard deviations: a step that changes no reading by more is the last"""
 
