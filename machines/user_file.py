@@ -20,6 +20,8 @@ from pydantic_core import ErrorDetails
 from machines.toml_lines import Path, key_lines
 from machines.value_words import POINT, advice, allowed, decimal_comma
 from toolpaths.diagnostics import Diagnostic, error
+from toolpaths.input_files import advice as remedy
+from toolpaths.input_files import place, read_input, reason, shown
 
 Values = dict[str, Any]
 
@@ -129,7 +131,7 @@ def _nearest(word: str, known: Sequence[str]) -> str | None:
 def _read(source: str, builtin: Mapping[str, FilePath], kind: str, wanted_by: UserFile | None,
           above: tuple[str, ...]) -> tuple[UserFile | None, list[Diagnostic]]:
     path = _resolve(source, builtin, wanted_by)
-    key = str(path.resolve())
+    key = str(place(path))
     if key in above:
         assert wanted_by is not None
         message = f"base = {source!r} leads back to a file that it is the base of"
@@ -142,6 +144,10 @@ def _read(source: str, builtin: Mapping[str, FilePath], kind: str, wanted_by: Us
         values = tomllib.loads(text)
     except tomllib.TOMLDecodeError as fault:
         return None, [_syntax(fault, str(path), text)]
+    except (ValueError, RecursionError) as fault:  # of Python's own: digits of a number, depth of lists
+        why = "its lists or tables are nested too deeply" if isinstance(fault, RecursionError) else str(fault).split(";")[0]
+        return None, [error("file.syntax", f"not valid TOML: {why}", file=str(path),
+                            hint="write key = value, text in quotes, [table] in brackets")]
     origins = {p: Origin(str(path), line) for p, line in key_lines(text).items()}
     return _with_base(UserFile(name, str(path), values, origins), builtin, kind, (*above, key))
 
@@ -157,12 +163,13 @@ def _text(path: FilePath, source: str, builtin: Mapping[str, FilePath], kind: st
     origin = wanted_by.origin(("base",)) if wanted_by else None
     file, lines = (origin.file, [origin.line]) if origin else ("", [])
     try:
-        return path.read_bytes().decode("utf-8-sig").replace("\r\n", "\n"), None
+        return read_input(path).decode("utf-8-sig").replace("\r\n", "\n"), None
     except FileNotFoundError:
         what = f"no {kind} is called {source!r}" + ("" if source in builtin else " and there is no such file")
         return None, error("file.not-found", what, file=file, lines=lines, hint=nearest(source, sorted(builtin)))
     except OSError as fault:
-        return None, error("file.unreadable", f"cannot read {path}: {fault.strerror}", file=file, lines=lines)
+        return None, error("file.unreadable", f"cannot read {shown(path)}: {reason(fault)}", file=file, lines=lines,
+                           hint=remedy(fault, f"name a TOML file of a {kind}"))
     except UnicodeDecodeError as fault:
         return None, error("file.encoding", f"byte {fault.start} is not UTF-8", file=str(path),
                            hint="save the file as UTF-8 text")

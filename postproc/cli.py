@@ -11,6 +11,7 @@ import typer
 from postproc.cli_calibrate import calibrate
 from postproc.cli_catalogue import controller_app, machine_app, setup_app
 from postproc.cli_errors import errors_app
+from postproc.cli_group import Group
 from postproc.cli_options import (
     Allow,
     AxisTolerance,
@@ -29,6 +30,7 @@ from postproc.cli_place import place
 from postproc.cli_time import time
 from postproc.console import Json, controller_of, machine_of, progress_bar, refuse_overwriting, report, shown_errors
 from postproc.console import rounded as rounded
+from postproc.guard import guarded
 
 if TYPE_CHECKING:
     from postproc.options import Options
@@ -36,7 +38,7 @@ if TYPE_CHECKING:
     from toolpaths.diagnostics import Diagnostic
     from toolpaths.toolpath import Toolpath
 
-app = typer.Typer(name="postproc", no_args_is_help=True, add_completion=False, rich_markup_mode=None,
+app = typer.Typer(name="postproc", cls=Group, no_args_is_help=True, add_completion=False, rich_markup_mode=None,
                   context_settings={"help_option_names": ["-h", "--help"]},
                   help="CL file in, proved G-code out: a toolpath post-processor that plans the machine's motion.")
 app.add_typer(machine_app, name="machine")
@@ -178,17 +180,8 @@ def inspect(file: ClFile, units: Units = "", dialect: Dialect = "", allow_unknow
 
 
 def main() -> None:
-    """Entry point of the console script."""
-    try:
-        app()
-    except (KeyboardInterrupt, SystemExit) as end:
-        if isinstance(end, SystemExit) and end.code != 130:
-            raise
-        typer.echo("interrupted; nothing was written", err=True)
-        raise SystemExit(130) from None
-    except OSError as fault:
-        typer.echo(f"standard output cannot be written: {fault.strerror}", err=True)
-        raise SystemExit(1) from None
+    """The command line under its guard, for callers that have imported it already."""
+    raise SystemExit(guarded(app))
 
 
 def _choice(option: str, value: str, allowed: tuple[str, ...]) -> None:

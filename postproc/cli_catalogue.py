@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from postproc.cli_group import Group
 from postproc.console import (
     Json,
     controller_file,
@@ -17,9 +18,10 @@ from postproc.console import (
     shown_errors,
 )
 
-machine_app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Machines: list, show, check, analyse, schema.")
-controller_app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Controllers: list, show, schema.")
-setup_app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Set-up files: check, schema.")
+machine_app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None,
+                          help="Machines: list, show, check, analyse, schema.")
+controller_app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None, help="Controllers: list, show, schema.")
+setup_app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None, help="Set-up files: check, schema.")
 
 
 @machine_app.command("list")

@@ -8,11 +8,13 @@ from typing import Annotated
 import typer
 
 from postproc.cli_errors_import import EXAMPLE, import_
+from postproc.cli_group import Group
 from postproc.cli_options import MachineName, figure_ending
 from postproc.console import Json, machine_of, print_json, refuse_overwriting, report, shown_errors
 from postproc.error_files import finish, loaded, model_files, or_refused, pairs, writable
 
-errors_app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Error models: check, export to tables, maps and "
+errors_app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None,
+                         help="Error models: check, export to tables, maps and "
                          "LinuxCNC's screw compensation, import, schema.")
 errors_app.command("import", epilog=EXAMPLE)(import_)
 

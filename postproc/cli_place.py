@@ -94,13 +94,14 @@ def _check(orient: str, units: str, dialect: str, setup: Path, figure: Path | No
         typer.BadParameter: says what there is to choose from.
     """
     from toolpaths.cl.dialects import DIALECTS
+    from toolpaths.input_files import is_regular, there_is
 
     for option, value, known in (("--orient", orient, ORIENTATIONS), ("--units", units or "mm", ("mm", "inch")),
                                  ("--dialect", dialect or next(iter(DIALECTS)), tuple(DIALECTS))):
         if value not in known:
             raise typer.BadParameter(f"{value!r} is not available; choose from {', '.join(known)}", param_hint=option)
     figure_ending(figure)
-    if setup.exists() and not setup.is_file():
+    if there_is(setup) and not is_regular(setup):
         raise typer.BadParameter(f"{setup} is no regular file: its text is read twice", param_hint="--setup")
 
 

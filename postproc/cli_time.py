@@ -105,7 +105,8 @@ def _blocks(file: Path, machine: Machine, controller: str, model: str, options: 
     import toolpaths
     from postproc.pipeline import convert
 
-    path, found = toolpaths.read(file, units=options.units or None, dialect=options.dialect or None)
+    path, found = toolpaths.read_bytes(data, file=str(file), units=options.units or None, dialect=options.dialect or None)
+    del data
     result = convert(path, machine, controller, options=options, diagnostics=found, progress=progress)
     if not result.ok or planner is None:
         return None, planner, None, list(result.diagnostics)

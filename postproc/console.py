@@ -117,24 +117,26 @@ def rounded(value: Any) -> Any:
 def refuse_overwriting(outputs: dict[str, str], inputs: dict[str, str]) -> None:
     """Wrong use where an output would replace an input, a file that a TOML input names, or another output, or is no regular
     file."""
-    known = [(place, what) for what, name in inputs.items() if name for place in (_place(name), *_named_in(name))]
+    from toolpaths.input_files import place
+
+    known = [(at, what) for what, name in inputs.items() if name for at in (place(name), *_named_in(name))]
     for option, name in outputs.items():
         if not name or (name == "-" and option == "--json"):
             continue
         if name == "-":
             raise typer.BadParameter("a program is written whole or not at all, so not to standard output; name a file",
                                      param_hint=option)
-        place = _place(name)
+        target = place(name)
         try:
-            same = next((what for other, what in known if other == place or (
-                other.exists() and place.exists() and other.samefile(place))), "")
-            kind = "" if not place.exists() or place.is_file() else "a folder; name a file" if place.is_dir() else \
+            same = next((what for other, what in known if other == target or (
+                other.exists() and target.exists() and other.samefile(target))), "")
+            kind = "" if not target.exists() or target.is_file() else "a folder; name a file" if target.is_dir() else \
                 "no regular file"
         except OSError:  # no name a file can have: writing says so
             continue
         if same or kind:
             raise typer.BadParameter(f"the output would replace {same}" if same else f"{name} is {kind}", param_hint=option)
-        known.append((place, f"the file of {option}"))
+        known.append((target, f"the file of {option}"))
 
 
 def _named_in(name: str) -> list[Path]:
@@ -143,9 +145,11 @@ def _named_in(name: str) -> list[Path]:
         return []
     import tomllib
 
+    from toolpaths.input_files import is_regular, place, read_input
+
     try:
-        todo: list[Any] = [tomllib.loads(Path(name).read_text(encoding="utf-8"))]
-    except (OSError, ValueError):
+        todo: list[Any] = [tomllib.loads(read_input(name).decode("utf-8-sig"))]
+    except (OSError, ValueError, RecursionError):
         return []
     found = []
     while todo:
@@ -153,13 +157,5 @@ def _named_in(name: str) -> list[Path]:
         if isinstance(value, (dict, list)):
             todo += value.values() if isinstance(value, dict) else value
         elif isinstance(value, str) and "." in value and len(value) < LONGEST_NAME:
-            found.append(_place(str(Path(name).parent / value)))
-    return [place for place in found if place.is_file()]
-
-
-def _place(name: str) -> Path:
-    """Where a name leads, through links; loops stay as they are."""
-    try:
-        return Path(name).resolve()
-    except (OSError, RuntimeError):
-        return Path(name)
+            found.append(place(Path(name).parent / value))
+    return [at for at in found if is_regular(at)]

@@ -142,13 +142,14 @@ def finish(files: dict[str, str], folder: Path, inputs: Sequence[Path], json: st
     from postproc.error_text import export_text
     from postproc.files import write_atomically
     from toolpaths.diagnostics import DiagnosticError, error
+    from toolpaths.input_files import place
 
     last = sorted(files, key=lambda name: name.endswith(".toml"))  # a model is there when its tables are
     outputs = {**{folder / name: files[name] for name in last}, **(beside or {})}
-    known = {path.resolve() for given in inputs for path in (given, *(tables_of(given) if given.suffix == ".toml" else []))}
+    known = {place(path) for given in inputs for path in (given, *(tables_of(given) if given.suffix == ".toml" else []))}
     with shown_errors(json):
         for path in outputs:
-            if path.resolve() in known:
+            if place(path) in known:
                 raise DiagnosticError([error("error-export.input", "the output would replace an input", file=str(path),
                                              hint="write into another folder, or under another name")])
         for path, text in outputs.items():

@@ -8,6 +8,7 @@ import tempfile
 from pathlib import Path
 
 from toolpaths.diagnostics import Diagnostic, DiagnosticError, error, warning
+from toolpaths.input_files import is_regular, read_input
 
 
 def write_atomically(path: Path, text: str | bytes) -> None:
@@ -23,6 +24,8 @@ def write_atomically(path: Path, text: str | bytes) -> None:
             raise OSError(errno.EINVAL, "it is no regular file")
         path.parent.mkdir(parents=True, exist_ok=True)
         handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    except ValueError as fault:
+        raise DiagnosticError([_cannot(path, OSError(errno.EINVAL, "no file can have this name"))]) from fault
     except RuntimeError as fault:
         raise DiagnosticError([_cannot(path, OSError(errno.ELOOP, "its links lead in a circle"))]) from fault
     except OSError as fault:
@@ -64,7 +67,7 @@ def replaced(files: dict[Path, str], mark: str) -> list[Diagnostic]:
 
     A file names its program in the line that holds `mark`.
     """
-    found = [path for path, text in files.items() if path.is_file() and not _same_program(path, text, mark.lower())]
+    found = [path for path, text in files.items() if is_regular(path) and not _same_program(path, text, mark.lower())]
     if not found:
         return []
     names = ", ".join(path.name for path in found[:6]) + (", ..." if len(found) > 6 else "")
@@ -76,7 +79,7 @@ def replaced(files: dict[Path, str], mark: str) -> list[Diagnostic]:
 def _same_program(path: Path, text: str, mark: str) -> bool:
     own = [line for line in text.splitlines()[:8] if mark in line.lower()]
     try:
-        return own[0] in path.read_text(encoding="utf-8", errors="replace")[:4096].splitlines() if own else False
+        return own[0] in read_input(path)[:4096].decode("utf-8", "replace").splitlines() if own else False
     except OSError:
         return False
 

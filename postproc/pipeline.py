@@ -41,6 +41,7 @@ from postproc.smoothed_stages import Left, with_passes_taken_back, written_moves
 from postproc.travel import check_travel
 from postproc.word_rows import block_tools
 from toolpaths.diagnostics import Diagnostic, DiagnosticError, error, has_errors
+from toolpaths.input_files import read_input, unreadable
 from toolpaths.smoothing.smooth import Tolerance
 from toolpaths.toolpath import Toolpath
 from toolpaths.units import DEG
@@ -378,9 +379,9 @@ def verify(gcode: str | FilePath, path: Toolpath, machine: Machine | str | FileP
     """
     spec, machine, setup, options = _loaded(controller, machine, setup, options or Options())
     try:
-        data = FilePath(gcode).read_bytes()
+        data = read_input(gcode, standard_input=True)
     except OSError as fault:
-        raise DiagnosticError([error("gcode.open", f"cannot be read: {fault.strerror}", file=str(gcode))]) from fault
+        raise DiagnosticError([unreadable(fault, "gcode.open", gcode, "name the program that is checked")]) from fault
     known = _reading(path, diagnostics)
     if other := other_axes(data, options, str(gcode)):
         return VerifyResult(str(gcode), None, (*other, *known))

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from machines.user_file import UserFile
+from toolpaths.input_files import place
 
 Key = tuple[str | int, ...]
 
@@ -35,7 +36,7 @@ def seen_from_here(file: UserFile) -> UserFile:
 
 def renamed(name: str, there: Path, here: Path) -> str:
     """A file as folder `here` names it, that is `name` in folder `there`; untouched where both are one."""
-    there, here = there.resolve(), here.resolve()
+    there, here = place(there), place(here)
     return name if here == there or Path(name).is_absolute() else Path(os.path.relpath(there / name, here)).as_posix()
 
 

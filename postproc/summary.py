@@ -10,6 +10,7 @@ import numpy as np
 
 from postproc.pipeline import PostResult, VerifyResult, points_in
 from toolpaths.diagnostics import Severity
+from toolpaths.input_files import there_is
 from toolpaths.units import DEG
 
 
@@ -117,7 +118,7 @@ def points_added(result: PostResult) -> int:
 def as_text(result: PostResult, output: str) -> str:
     """The summary on standard output."""
     if not result.ok:
-        return f"nothing written; {output} is left as it was" if Path(output).exists() else "nothing written"
+        return f"nothing written; {output} is left as it was" if there_is(output) else "nothing written"
     d = as_dict(result, output)
     shares = d["tolerance_shares"]
     lines = [f"{output}: {d['blocks_out']} blocks from {d['points_in']} points ({d['points_added']} added) for "

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +15,7 @@ from postproc.readback.compare import Comparison
 from postproc.word_arcs import PLANE_AXIS
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
+from toolpaths.input_files import check_input
 from toolpaths.toolpath import Kind, Role
 from toolpaths.units import DEG
 
@@ -41,13 +43,11 @@ def trace_line(result: PostResult, line: int) -> tuple[dict[str, Any], list[Diag
 
 def _record(file: str, line: int) -> str:
     try:
+        check_input(file)
         with Path(file).open("rb") as stream:
-            for number, text in enumerate(stream, 1):
-                if number == line:
-                    return text.decode("utf-8", "replace").strip()
+            return next(islice(stream, line - 1, None), b"").decode("utf-8", "replace").strip()
     except OSError:
         return ""
-    return ""
 
 
 def _point(result: PostResult, row: int) -> dict[str, Any]:

@@ -13,6 +13,7 @@ from machines.geometric_error.csv_table import CsvTable, read_csv
 from machines.loader import load_checked as load_machine
 from machines.user_file import read_toml, validate
 from toolpaths.diagnostics import Diagnostic, has_errors
+from toolpaths.input_files import there_is
 
 
 def calibrate(source: str | Path, accept_residual: bool = False) -> tuple[Calibration | None, list[Diagnostic]]:
@@ -36,7 +37,7 @@ def calibrate(source: str | Path, accept_residual: bool = False) -> tuple[Calibr
                                    "write one of " + ", ".join(f"[{k}]" for k in COLUMNS))]
     origin = file.origin(("machine",))
     beside = Path(origin.file).parent / checked.machine
-    machine, found = load_machine(beside if beside.suffix == ".toml" and beside.exists() else checked.machine)
+    machine, found = load_machine(beside if beside.suffix == ".toml" and there_is(beside) else checked.machine)
     if machine is None:
         return None, found
     return _worked(Run(file, checked, machine, given[0]))

@@ -16,6 +16,7 @@ import numpy as np
 
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic, error
+from toolpaths.input_files import advice, read_input, reason
 from toolpaths.units import DEG, MM_PER_INCH
 
 LENGTHS = {"mm": 1.0, "um": 1e-3, "m": 1e3, "in": MM_PER_INCH}
@@ -95,14 +96,12 @@ def read_text(path: Path, cited: tuple[str, int] = ("", 0)) -> tuple[str | None,
         return None, [error(code, message, file=cited[0] or str(path), lines=[cited[1]], hint=hint)]
 
     try:
-        if path.exists() and not path.is_file():
-            return fault("error-table.unreadable", f"{path} is no regular file", "name a CSV file")
-        text = _decoded(path.read_bytes())
+        text = _decoded(read_input(path))
     except FileNotFoundError:
         return fault("error-table.not-found", f"there is no table {path.name!r}", f"looked in {path.parent or '.'}")
-    except (OSError, ValueError) as bad:
-        return fault("error-table.unreadable", f"cannot read {path.name[:60]!r}: {getattr(bad, 'strerror', None) or bad}",
-                     "name a CSV file")
+    except OSError as bad:
+        return fault("error-table.unreadable", f"cannot read {path.name[:60]!r}: {reason(bad)}",
+                     advice(bad, "name a CSV file"))
     if text is None:
         return fault("error-table.unreadable", f"{path.name} is no text", "save it as CSV, UTF-8")
     return text, []

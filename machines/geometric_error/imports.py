@@ -31,6 +31,7 @@ from machines.kinematics.serial import Serial
 from machines.machine import Machine
 from machines.user_file import nearest
 from toolpaths.diagnostics import Diagnostic, error, has_errors, warning
+from toolpaths.input_files import read_input
 
 _SCREW = re.compile(r"([A-Z])=(.+)$")
 _NAMED = re.compile(r"(E[A-Z][A-Z])=(.+)$")
@@ -38,6 +39,8 @@ MAP_COLUMNS = {"dx", "dy", "dz"}
 
 
 _TOLD = re.compile(r"#\s*error map: (gauge point|tip of a tool of ([\d.e+-]+) mm),.* directions of the (table|machine)")
+_FIRST = 1000
+"""bytes that hold the first line of a map"""
 
 
 @dataclass(frozen=True)
@@ -246,8 +249,7 @@ def _map(table: CsvTable, machine: Machine, how: How) -> tuple[ErrorModel | None
 
 def _told_otherwise(table: CsvTable, how: How) -> list[Diagnostic]:
     """What the first line of a written map says of its directions and point, where the options say otherwise."""
-    with Path(table.file).open(encoding="utf-8", errors="replace") as lines:
-        told = _TOLD.match(next(lines, ""))
+    told = _TOLD.match(read_input(table.file)[:_FIRST].decode("utf-8", "replace"))
     if told is None:
         return []
     length, found = float(told[2] or 0.0), []

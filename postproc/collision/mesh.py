@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import warnings
 from functools import lru_cache
+from io import BytesIO
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from toolpaths.diagnostics import Diagnostic, error, has_errors, warning
+from toolpaths.input_files import advice, check_input, read_input, reason, shown, unreadable
 from toolpaths.units import MM_PER_INCH
 
 if TYPE_CHECKING:
@@ -35,10 +37,10 @@ def load_mesh(path: str | FilePath, units: str = "mm", key: str = "") -> tuple[T
         return None, [error("mesh.format", f"{what}{path.name}: a mesh is read from {', '.join(FORMATS)}", file=str(path),
                             hint="export the solid as STL, PLY, OBJ or OFF")]
     try:
-        stat = path.stat()
+        stat = check_input(path)
     except OSError as fault:
-        return None, [error("mesh.open", f"{what}cannot be read: {fault.strerror}", file=str(path),
-                            hint="paths are relative to the set-up file")]
+        return None, [error("mesh.open", f"{what}cannot be read: {reason(fault)}", file=shown(path),
+                            hint=advice(fault, "paths are relative to the set-up file"))]
     mesh, found = _loaded(str(path), stat.st_mtime_ns, stat.st_size, units)
     return mesh, [Diagnostic(d.severity, d.code, what + d.message, d.file, hint=d.hint) for d in found]
 
@@ -51,7 +53,10 @@ def _loaded(path: str, _changed: int, _size: int, units: str) -> tuple[Trimesh |
     try:
         with warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("ignore")
-            read = trimesh.load_mesh(path, process=False, **_reader(path))
+            read = trimesh.load_mesh(BytesIO(read_input(path)), file_type=path.rpartition(".")[2].lower(), process=False,
+                                     **_reader(path))
+    except OSError as fault:
+        return None, (unreadable(fault, "mesh.open", path),)
     except Exception as fault:  # the readers of the formats raise what comes up
         why = "" if isinstance(fault, ImportError) else f" ({type(fault).__name__}: {fault})"
         return None, (error("mesh.format", f"is no {path.rpartition('.')[2].upper()} file that can be read{why}", file=path,

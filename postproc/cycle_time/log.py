@@ -42,7 +42,11 @@ def read_log(file: str | Path, letters: tuple[str, ...]) -> tuple[Log | None, li
         DiagnosticError: where the file cannot be read.
     """
     text = read_file(file, "a log of a measured run: columns nc_line and time_s").decode("utf-8-sig", "replace")
-    rows = list(csv.reader(io.StringIO(text)))
+    try:
+        rows = list(csv.reader(io.StringIO(text)))
+    except csv.Error as fault:
+        return None, [error("log.columns", f"is no CSV file: {fault}", file=str(file),
+                            hint="a log has the columns nc_line and time_s, a comma between them")]
     names = [name.strip() for name in rows[0]] if rows else []
     allowed = ("nc_line", "time_s", *letters)
     if not {"nc_line", "time_s"} <= set(names) <= set(allowed) or len(set(names)) < len(names):

@@ -40,7 +40,8 @@ def ramps(length: Floats, first: Floats, last: Floats, target: Floats, rate: Flo
     way = (peak**2 - first**2 + peak**2 - last**2) / (2.0 * rate)
     steady = np.maximum(length - way, 0.0) / np.where(peak > 0.0, peak, 1.0)
     if gentle is not None and gentle.any():
-        whole = 2.0 * length / np.maximum(first + last, 1e-300)
+        with np.errstate(over="ignore"):
+            whole = 2.0 * length / np.maximum(first + last, 1e-300)
         up = np.where(gentle, np.where(last > first, whole, 0.0), up)
         down = np.where(gentle, np.where(last < first, whole, 0.0), down)
         steady = np.where(gentle, np.where(last == first, whole, 0.0), steady)

@@ -20,6 +20,7 @@ from postproc.readback.dialects import reader_for
 from postproc.readback.execute import Motion, Offsets, run
 from postproc.setup import SetupFile, part_placement
 from toolpaths.diagnostics import Diagnostic, DiagnosticError, error, has_errors
+from toolpaths.input_files import read_input, unreadable
 
 
 def from_conversion(result: PostResult) -> Blocks:
@@ -115,7 +116,6 @@ def read_file(file: str | Path, hint: str = "a CL file, or a program of the cont
         DiagnosticError: where it cannot be read.
     """
     try:
-        return Path(file).read_bytes()
+        return read_input(file, standard_input=True)
     except OSError as fault:
-        raise DiagnosticError([error("time.open", f"cannot be read: {fault.strerror}", file=str(file),
-                                     hint=hint)]) from fault
+        raise DiagnosticError([unreadable(fault, "time.open", file, f"name {hint}")]) from fault

@@ -9,6 +9,7 @@ from typing import Any
 
 from postproc.setup import PartPlacement
 from postproc.setup_files import file_keys, renamed
+from toolpaths.input_files import read_input
 
 
 def placed_text(source: Path, target: Path, part: PartPlacement) -> str:
@@ -18,7 +19,7 @@ def placed_text(source: Path, target: Path, part: PartPlacement) -> str:
     """
     import tomlkit
 
-    document: Any = tomlkit.parse(source.read_bytes().decode("utf-8-sig"))
+    document: Any = tomlkit.parse(read_input(source).decode("utf-8-sig"))
     here, there = source.parent, target.parent
     for *tables, key in [("base",), *file_keys(document)]:
         table = reduce(getitem, tables, document)

@@ -38,10 +38,12 @@ def centres(start: Floats, end: Floats, plane: Array, ccw: Bools, relative: Floa
         k = np.flatnonzero((plane == code) & ~np.isfinite(radius))
         if len(k):
             middle = center[k][:, (i, j)]
-            off = np.abs(np.linalg.norm(start[k][:, (i, j)] - middle, axis=1)
-                         - np.linalg.norm(end[k][:, (i, j)] - middle, axis=1))
+            first, last = (np.linalg.norm(point[k][:, (i, j)] - middle, axis=1) for point in (start, end))
+            off = np.abs(first - last)
             for n in np.flatnonzero(off > slack):
                 bad[int(k[n])] = f"the radius differs by {off[n]:.4f} mm between the ends of the arc, allowed {slack:g} mm"
+            for n in np.flatnonzero(np.minimum(first, last) < _SMALL):
+                bad[int(k[n])] = "an arc that begins or ends at its own centre: centre or radius are missing, or 0"
     return center, bad
 
 

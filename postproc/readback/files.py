@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
+from toolpaths.diagnostics import DiagnosticError
+from toolpaths.input_files import is_regular, read_input, unreadable
+
 
 class Beside(Mapping[str, bytes]):
     """Files of a program's folder by their names, without itself; read where they are asked for."""
@@ -15,10 +18,17 @@ class Beside(Mapping[str, bytes]):
     def __getitem__(self, name: str) -> bytes:
         if name not in set(self):
             raise KeyError(name)
-        return (self.folder / name).read_bytes()
+        try:
+            return read_input(self.folder / name)
+        except OSError as fault:
+            raise DiagnosticError([unreadable(fault, "gcode.open", self.folder / name)]) from fault
 
     def __iter__(self) -> Iterator[str]:
-        return iter(sorted(p.name for p in self.folder.iterdir() if p.is_file() and p.name != self.own))
+        try:
+            files = [p.name for p in self.folder.iterdir() if p.name != self.own and is_regular(p)]
+        except OSError:  # a folder that cannot be listed: calls of subprograms say that there are none
+            files = []
+        return iter(sorted(files))
 
     def __len__(self) -> int:
         return sum(1 for _ in self)

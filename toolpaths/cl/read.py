@@ -16,7 +16,8 @@ from toolpaths.cl.scan import LARGEST, LARGEST_OWN, Progress, scan
 from toolpaths.cl.source import normalise
 from toolpaths.cl.statements import Lexer, Program
 from toolpaths.cl.structure import open_paths
-from toolpaths.diagnostics import Diagnostic, Severity, error
+from toolpaths.diagnostics import Diagnostic, Severity
+from toolpaths.input_files import read_input, unreadable
 from toolpaths.toolpath import Toolpath
 
 _OWN_HEAD = b"$$-> TOOLPATH /"
@@ -46,12 +47,11 @@ class ReadResult:
 
 def read_file(path: str | Path, *, units: str | None = None, dialect: str | None = None,
               allow_unknown: Iterable[str] = (), progress: Progress | None = None) -> ReadResult:
-    """Read the file at `path`; see `read_bytes`. A file that cannot be opened is a diagnostic too."""
+    """Read the file at `path` (- for standard input); see `read_bytes`. A file that cannot be opened is a diagnostic too."""
     try:
-        data = Path(path).read_bytes()
-    except (OSError, ValueError) as fault:
-        reason = getattr(fault, "strerror", None) or str(fault)
-        diagnostics = [error("cl.open", f"cannot be read: {reason}", file=str(path))]
+        data = read_input(path, standard_input=True)
+    except OSError as fault:
+        diagnostics = [unreadable(fault, "cl.open", path, "name a CL file (APT text)")]
         return ReadResult(_with_faults(_empty(str(path)), diagnostics), diagnostics)
     return read_bytes(data, file=str(path), units=units, dialect=dialect, allow_unknown=allow_unknown,
                       progress=progress)

@@ -1,0 +1,44 @@
+"""What every command has: the option that raises the size of the files it reads."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Annotated, Any
+
+import typer
+from typer.core import TyperGroup
+
+MaxFileSize = Annotated[float | None, typer.Option("--max-file-size", metavar="MB", min=0.001, max=1e9, is_eager=True,
+                                                   callback=lambda context, value: _hold(context, value),
+                                                   help="largest input file that is read (default 1000 MB)")]
+
+
+class Group(TyperGroup):
+    """Commands with the option, each of them."""
+
+    def __init__(self, **attributes: Any) -> None:
+        super().__init__(**attributes)
+        for command in self.commands.values():
+            if not isinstance(command, TyperGroup):
+                command.params.append(_option())
+
+
+def _hold(context: typer.Context, value: float | None) -> None:
+    """The size that was asked for, while the command runs."""
+    from toolpaths.input_files import MEGABYTE, largest_file
+
+    if value is not None:
+        context.with_resource(largest_file(value * MEGABYTE))
+
+
+@cache
+def _option() -> Any:
+    """The option as typer makes it, without a value that commands would have to take."""
+    def command(max_file_size: MaxFileSize = None) -> None:
+        """Nothing but the option."""
+
+    lone = typer.Typer(add_completion=False)
+    lone.command()(command)
+    option = next(p for p in typer.main.get_command(lone).params if p.name == "max_file_size")
+    option.expose_value = False
+    return option

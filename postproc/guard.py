@@ -1,0 +1,199 @@
+"""The outermost guard of the command line: what nobody foresaw ends as one line, a report file and exit code 70.
+
+Nothing is imported here before it is needed, so that the guard holds from the first import of the commands on.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import TracebackType
+
+INTERNAL = 70
+"""exit code of a fault of the program itself (EX_SOFTWARE of BSD's sysexits.h)"""
+INTERRUPTED = 130
+_ROOMS = ("postproc", "machines", "toolpaths")
+_PRINTS = ("echo", "print_json", "report", "flush")
+"""functions in which an OSError is one of the console"""
+_LARGEST_HASHED = 10**9
+_PARTS = ("numpy", "scipy", "numba", "pydantic", "tomlkit", "typer", "ruckig", "trimesh", "matplotlib")
+
+
+def guarded(command: Callable[[], object]) -> int:
+    """Run a command; its exit code.
+
+    An unexpected exception writes a report file and is shown as `internal error [code]`; Ctrl-C and a closed pipe end
+    quietly.
+    """
+    try:
+        try:
+            command()
+            code = 0
+        except SystemExit as end:
+            code = _exit_code(end)
+        sys.stdout.flush()
+        return code if code != INTERRUPTED else _interrupted()
+    except KeyboardInterrupt:
+        return _interrupted()
+    except OSError as fault:
+        return _console_gone(fault) if _of_console(fault) else _internal(fault)
+    except Exception as fault:
+        return _internal(fault)
+
+
+def fingerprint(fault: BaseException) -> str:
+    """Eight hexadecimal digits that stand for the kind of an exception and the place of our own code that raised it: file
+    and function, not the line, so that one fault keeps its code from version to version."""
+    import hashlib
+
+    places = [f"{file}:{name}" for file, name in _own_places(fault)] or ["outside"]
+    return hashlib.sha256(f"{type(fault).__name__} {places[-1]}".encode()).hexdigest()[:8]
+
+
+def report_text(fault: BaseException, arguments: list[str]) -> str:
+    """What the bug tracker needs: versions, the command line, the traceback, the inputs by size and hash, not their text."""
+    import platform
+    import traceback
+
+    from postproc import VERSION
+
+    return "\n".join([
+        f"internal error [{fingerprint(fault)}]", "", f"postproc {VERSION}",
+        f"Python {platform.python_version()}, {platform.platform()}", *_versions(), "",
+        f"command line: {' '.join(map(_quoted, arguments))}", "",
+        "files named in it:", *(_hashes(arguments) or ["none"]), "",
+        "traceback:", "".join(traceback.format_exception(fault)).rstrip(), ""])
+
+
+def _internal(fault: BaseException) -> int:
+    """One line on standard error, and the report file."""
+    code = fingerprint(fault)
+    where = _written(f"postproc-error-{code}.txt", fault)
+    send = f"please send {where} (versions, command line, traceback, sizes and hashes of the files, not their text)" \
+        if where else "no report file could be written; please send the command line and the version"
+    _say(f"internal error [{code}] {_named(fault)}: a fault of postproc, not of its use; the command ended, nothing was "
+         f"written; {send} to the bug tracker")
+    return INTERNAL
+
+
+def _named(fault: BaseException) -> str:
+    """The kind of exception, in words where it has some."""
+    return {MemoryError: "memory is used up", RecursionError: "nested too deeply"}.get(type(fault), type(fault).__name__)
+
+
+def _written(name: str, fault: BaseException) -> str:
+    """Where the report was written: the current folder, else the one for temporary files; "" where neither takes it."""
+    import tempfile
+
+    try:
+        text = report_text(fault, sys.argv).encode("utf-8", "backslashreplace")
+    except Exception:  # the report must not fail for what it is about: used-up memory, a broken package
+        text = f"internal error [{fingerprint(fault)}] {type(fault).__name__}\n".encode()
+    for folder in (Path(), Path(tempfile.gettempdir())):
+        try:
+            with os.fdopen(os.open(folder / name, _NEW, 0o600), "wb") as file:
+                file.write(text)
+        except OSError:
+            continue
+        return str(folder / name)
+    return ""
+
+
+_NEW = os.O_WRONLY | os.O_CREAT | os.O_TRUNC | getattr(os, "O_NOFOLLOW", 0)
+
+
+def _own_places(fault: BaseException) -> Iterator[tuple[str, str]]:
+    """(file below the package's folder, function) of each frame in our own code, outermost first."""
+    root = Path(__file__).parents[1]
+    for frame in _frames(fault.__traceback__):
+        file = Path(frame.tb_frame.f_code.co_filename)
+        if file.is_relative_to(root) and file.relative_to(root).parts[0] in _ROOMS:
+            yield file.relative_to(root).as_posix(), frame.tb_frame.f_code.co_name
+
+
+def _frames(trace: TracebackType | None) -> Iterator[TracebackType]:
+    while trace is not None:
+        yield trace
+        trace = trace.tb_next
+
+
+def _of_console(fault: OSError) -> bool:
+    """True for an OSError of standard output or error: no file is named, and it was raised while printing."""
+    names = [frame.tb_frame.f_code.co_name for frame in _frames(fault.__traceback__)]
+    return fault.filename is None and (names[-1:] == ["guarded"] or not set(_PRINTS).isdisjoint(names[-4:]))
+
+
+def _console_gone(fault: OSError) -> int:
+    """Nobody reads any more (quiet), or what is printed cannot be stored."""
+    _silence(sys.stdout)
+    if not isinstance(fault, BrokenPipeError):
+        _say(f"standard output cannot be written: {fault.strerror}")
+    return 1
+
+
+def _silence(stream: object) -> None:
+    """What is left in a stream goes nowhere, so that Python does not complain of it at its end."""
+    try:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())  # type: ignore[attr-defined]
+    except (OSError, ValueError, AttributeError):
+        return
+
+
+def _interrupted() -> int:
+    _say("interrupted; nothing was written")
+    return INTERRUPTED
+
+
+def _exit_code(end: SystemExit) -> int:
+    if end.code is None or isinstance(end.code, int):
+        return end.code or 0
+    _say(str(end.code))
+    return 1
+
+
+def _say(text: str) -> None:
+    """A line on standard error, or nothing where that is closed."""
+    try:
+        sys.stderr.write(f"{text}\n")
+        sys.stderr.flush()
+    except (OSError, ValueError, AttributeError):
+        _silence(sys.stderr)
+
+
+def _versions() -> list[str]:
+    from importlib.metadata import PackageNotFoundError, version
+
+    found = []
+    for name in _PARTS:
+        try:
+            found.append(f"{name} {version(name)}")
+        except PackageNotFoundError:
+            found.append(f"{name} is missing")
+    return found
+
+
+def _hashes(arguments: list[str]) -> list[str]:
+    """Name, size and SHA-256 of the regular files that the arguments name."""
+    import hashlib
+    import stat
+
+    found = []
+    for name in dict.fromkeys(part for a in arguments[1:] for part in (a, a.partition("=")[2]) if part):
+        try:
+            state = Path(name).stat()
+            if not stat.S_ISREG(state.st_mode) or state.st_size > _LARGEST_HASHED:
+                continue
+            with Path(name).open("rb") as file:
+                digest = hashlib.file_digest(file, "sha256").hexdigest()
+        except (OSError, ValueError):
+            continue
+        found.append(f"{_quoted(name)}: {state.st_size} bytes, sha256 {digest}")
+    return found
+
+
+def _quoted(text: str) -> str:
+    import shlex
+
+    return shlex.quote(text)
