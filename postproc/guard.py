@@ -5,6 +5,7 @@ Nothing is imported here before it is needed, so that the guard holds from the f
 
 from __future__ import annotations
 
+import errno
 import os
 import sys
 from collections.abc import Callable, Iterator
@@ -15,8 +16,8 @@ INTERNAL = 70
 """exit code of a fault of the program itself (EX_SOFTWARE of BSD's sysexits.h)"""
 INTERRUPTED = 130
 _ROOMS = ("postproc", "machines", "toolpaths")
-_PRINTS = ("echo", "print_json", "report", "flush")
-"""functions in which an OSError is one of the console"""
+_CONSOLE = (errno.EPIPE, errno.ENOSPC, errno.EIO, errno.EBADF, errno.EFBIG, errno.EAGAIN)
+"""what printing fails with; files that are read and written have their own diagnostics"""
 _LARGEST_HASHED = 10**9
 _PARTS = ("numpy", "scipy", "numba", "pydantic", "tomlkit", "typer", "ruckig", "trimesh", "matplotlib")
 
@@ -120,9 +121,8 @@ def _frames(trace: TracebackType | None) -> Iterator[TracebackType]:
 
 
 def _of_console(fault: OSError) -> bool:
-    """True for an OSError of standard output or error: no file is named, and it was raised while printing."""
-    names = [frame.tb_frame.f_code.co_name for frame in _frames(fault.__traceback__)]
-    return fault.filename is None and (names[-1:] == ["guarded"] or not set(_PRINTS).isdisjoint(names[-4:]))
+    """True for an OSError of standard output or error: no file is named."""
+    return fault.filename is None and fault.errno in _CONSOLE
 
 
 def _console_gone(fault: OSError) -> int:
