@@ -13,6 +13,7 @@ from machines.machine import Machine
 from postproc.control import Control, Law
 from postproc.controllers.model import ControllerFile
 from postproc.events import register_changes, tool_changes
+from postproc.hole_depths import unfit_holes
 from postproc.length_registers import own_registers
 from postproc.links import SafeSpace, safe_space
 from postproc.modes import OutputModes, output_modes
@@ -156,7 +157,7 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
     diagnostics += found
     toolpath, found = cut_operations(toolpath, setup.output.longest)
     diagnostics += found
-    diagnostics += [*_refused(toolpath), *_no_inverse_time(controller, options)]
+    diagnostics += [*unfit_holes(toolpath, controller), *_refused(toolpath), *_no_inverse_time(controller, options)]
     setup, found = standing(setup, toolpath, options.setup)
     diagnostics += found
     placement, found = part_placement(setup, options.setup)

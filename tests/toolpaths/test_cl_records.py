@@ -81,7 +81,7 @@ def test_what_a_cycle_says_and_nothing_does_is_told() -> None:
 
 def test_taps_pecks_and_dwells() -> None:
     assert one("CYCLE/DEEP,DEPTH,10,MMPM,60,CLEAR,3,STEP,4,0,0,RETURN,5").steps == (4.0,)
-    assert one("CYCLE/DEEP,DEPTH,10,MMPM,60,CLEAR,3,STEP,0,RETURN,5").steps == ()
+    assert one("CYCLE/DRILL,DEPTH,10,MMPM,60,CLEAR,3,STEP,0,RETURN,5").steps == ()
     tap = one("CYCLE/TAP,DEPTH,10,TPI,20,CLEAR,3,RETURN,5")
     assert (tap.pitch, tap.feed, tap.feed_mode) == (pytest.approx(1.27), pytest.approx(1.27), FeedMode.PER_REVOLUTION)
     assert one("CYCLE/TAP,DEPTH,10,MMPR,1.5,CLEAR,3,RETURN,5").pitch == 1.5

@@ -17,6 +17,8 @@ from toolpaths.units import MM_PER_INCH
 _OFF = frozenset({"OFF", "NOMORE"})
 _DEPTH = frozenset({"FEDTO", "DEPTH"})
 _IN_STEPS = frozenset({"DEEP", "DEEP2", "PECK", "BRKCHP", "BREAKCHP"})
+_PECKED = frozenset({"DEEP", "BRKCHP"})
+_STEP_WORDS = ("STEP", "INCR", "PECKING", "1STPECK", "SUBPECK")
 _BORES = frozenset({"DRAG", "NODRAG", "MANUAL"})
 _LEAST_STEP = 1e-3
 """file units: no control pecks by less"""
@@ -149,6 +151,9 @@ def _depth(b: Builder, v: Values) -> float:
     elif depth < 0.0:
         b.log.error("cl.cycle-depth", f"CYCLE/{v.kind}: the depth {v.depth:g} points away from the part", b.line,
                     f"{b.dialect.title} writes depths {'negative' if b.dialect.depth_sign < 0 else 'positive'}")
+    elif depth == 0.0:
+        b.log.error("cl.cycle-depth", f"CYCLE/{v.kind}: a hole of depth 0", b.line, "state the depth of the hole in the CAM "
+                    "system (FEDTO or DEPTH of the CYCLE record), or take the hole out of the operation")
     return depth
 
 
@@ -175,7 +180,14 @@ def _cycle_feed(b: Builder, v: Values) -> tuple[float, FeedMode, float | None]:
 
 
 def _steps(b: Builder, v: Values) -> tuple[float, ...]:
-    """Pecks in mm; a step of 0 is none."""
+    """Pecks in mm. A step of 0 behind another changes nothing; alone it is none, which pecking cannot have."""
+    if v.kind in _PECKED and not any(v.steps):
+        if v.steps:
+            b.log.error("cl.cycle-peck", f"CYCLE/{v.kind}: a peck of 0", b.line, "state the depth of a peck with STEP, or "
+                        "write CYCLE/DRILL where the hole is drilled in one go")
+        elif not {*_STEP_WORDS}.intersection(v.empty):
+            b.log.warning("cl.cycle-peck", f"CYCLE/{v.kind} states no peck: drilled in one go", b.line,
+                          "state the depth of a peck with STEP")
     for step in v.steps:
         if step < _LEAST_STEP and step != 0.0:
             b.log.error("cl.cycle-value", f"CYCLE/{v.kind}: a peck of {step:g}", b.line,
