@@ -14,6 +14,7 @@ from postproc.controllers.model import ControllerFile
 from postproc.coolant import switched_by
 from postproc.readback.canonical import COOLANT, EXTENDED_OFFSETS, Canonical, Text, added, offset_number, placed
 from postproc.readback.flow import Structure, expand
+from postproc.readback.magnitude import too_large
 from postproc.readback.modal import GROUPS, Groups, check_codes, check_end, codes, drop_passive
 from postproc.readback.words import Words
 from toolpaths.arrays import Floats, Ints
@@ -141,6 +142,7 @@ class Reader(ABC):
         """Words and programs of one file; None where its text cannot be read."""
         text, found = self.tokens(data, name)
         del data
+        found += too_large(text, name)
         if has_errors(found):
             return None, found
         if self.controller is not None:
