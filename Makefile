@@ -7,7 +7,7 @@ STAMP := .venv/installed
 PYTEST_ARGS ?= -n auto --maxprocesses 4 -rfEs
 SOURCES := toolpaths machines postproc
 
-.PHONY: demo test lint lock clean
+.PHONY: demo test hard lint lock clean
 
 demo: $(STAMP)
 	@mkdir -p out
@@ -16,6 +16,11 @@ demo: $(STAMP)
 
 test: $(STAMP)
 	$(BIN)/pytest $(PYTEST_ARGS)
+
+# Every sample, and every file of the folder HARD, unmodified, on every machine and control; EDITS=all changes each block too.
+EDITS ?= 1
+hard: $(STAMP)
+	$(BIN)/python tests/hard/run.py $(if $(HARD),"$(HARD)") --edits $(EDITS) $(HARD_ARGS)
 
 lint: $(STAMP)
 	$(BIN)/ruff check .

@@ -129,7 +129,8 @@ class _Offset:
         """(mm, rad), e having been seen at places `apart` of the block from each other."""
         share = apart * apart / 8.0
         tip = self.seen.tip + share * self.bend.tip
-        axis = self.seen.axis + share * self.bend.axis + self.turn * self._slip(curves, tip, share)
+        with np.errstate(invalid="ignore"):  # unbounded, and so NaN: infinite below
+            axis = self.seen.axis + share * self.bend.axis + self.turn * self._slip(curves, tip, share)
         angle = 2.0 * np.arcsin(np.minimum(0.5 * axis, 1.0))
         return np.nan_to_num(tip, nan=np.inf), np.nan_to_num(angle, nan=np.inf)
 

@@ -13,6 +13,8 @@ from toolpaths.diagnostics import Diagnostic, error
 Leg = tuple[int, Floats, float, float]
 """code, end, feed (NaN: the F word in force), rest at the end (s) of one leg"""
 EPSILON = 1e-9
+MOST = 10_000
+"""pecks of one hole, and holes of one block: more are a slip of the pen"""
 
 
 def legs(drill: Drill, start: Floats, target: Floats, z: int, first: float | None = None) -> list[Leg]:
@@ -69,10 +71,20 @@ def _out(drill: Drill, target: Floats, z: int) -> list[Leg]:
     return [(0, _at(target, z, drill.out), nothing, 0.0)]
 
 
+def unfit(drill: Drill) -> tuple[str, str] | None:
+    """(what is wrong with a cycle, what to do); None where it makes a hole."""
+    if not drill.bottom < drill.plane - EPSILON:
+        return "whose bottom does not lie below its plane: a hole without depth", "state Z below R"
+    return (f"of more than {MOST} pecks", "state a larger peck") if len(drill.bottoms) > MOST else None
+
+
 def pecks(plane: float, bottom: float, first: float, less: float = 0.0, least: float = 0.0) -> tuple[float, ...]:
-    """Depths of pecks below `plane`: `first` mm, then each by `less` mm less, `least` mm at least; the last is `bottom`."""
+    """Depths of pecks below `plane`: `first` mm, then each by `less` mm less, `least` mm at least; the last is `bottom`.
+
+    More than MOST end there: `unfit` refuses them.
+    """
     depths, depth, step = [], plane - first, first
-    while depth > bottom + EPSILON:
+    while depth > bottom + EPSILON and len(depths) <= MOST:
         depths.append(depth)
         step = max(step - less, least, EPSILON * 10.0) if less > 0.0 else step
         depth -= step

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from postproc.readback.canonical import Canonical, Drill
-from postproc.readback.cycles import Leg, Sticky, legs
+from postproc.readback.cycles import MOST, Leg, Sticky, legs, unfit
 from postproc.readback.rows import Section, State
 from postproc.word_arcs import PLANE_AXIS
 from toolpaths.arrays import Bools, Floats, Ints
@@ -36,7 +36,9 @@ def spell_holes(state: State, moving: Bools, drilling: Ints, code: Canonical, fi
         begun, target = before[n].copy(), before[n + 1].copy()
         begun[z] = level
         if np.isfinite(section.call[n]):
-            spelt[n] = _called(state, n, begun, target, z, code.drills[int(section.call[n])])
+            drill = code.drills[int(section.call[n])]
+            if not _refused(drill, int(code.line[n + section.first]), file, found):
+                spelt[n] = _called(state, n, begun, target, z, drill)
         else:
             k = int(np.searchsorted(motion_lines, n)) - 1
             fresh = previous < 0 or k < 0 or motion_lines[k] != previous
@@ -44,15 +46,23 @@ def spell_holes(state: State, moving: Bools, drilling: Ints, code: Canonical, fi
                 sticky.enter(level)
             drill = _sticky(state, sticky, n, z, code, file, found)
             times = section.repeats[n]
-            if drill is not None and not (np.isnan(times) or (times >= 1.0 and times == round(times))):
+            if drill is not None and not (np.isnan(times) or (1.0 <= times <= MOST and times == round(times))):
                 found.append(error("gcode.cycle", f"a cycle that is repeated {times:g} times", file=file,
-                                   lines=[int(code.line[n + section.first])], hint="1 or more, a whole number"))
-            elif drill is not None:
+                                   lines=[int(code.line[n + section.first])], hint=f"a whole number, 1 to {MOST}"))
+            elif drill is not None and not _refused(drill, int(code.line[n + section.first]), file, found):
                 spelt[n] = _repeated(state, n, drill, begun, target, z, sticky.initial)
         out = float(spelt[n][-1][1][z]) if n in spelt else level
         state.columns[n, z] = out
         previous = n
     return spelt
+
+
+def _refused(drill: Drill, line: int, file: str, found: list[Diagnostic]) -> bool:
+    """True, and an error, where the cycle makes no hole."""
+    wrong = unfit(drill)
+    if wrong is not None:
+        found.append(error("gcode.cycle", f"a cycle {wrong[0]}", file=file, lines=[line], hint=wrong[1]))
+    return wrong is not None
 
 
 def _broken(section: Section, previous: int, n: int) -> bool:

@@ -1,10 +1,10 @@
-"""Numbers that no control holds: refused where a program is read, before anything is computed with them."""
+"""Numbers that no control takes: refused where a program is read, before anything is computed with them."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from postproc.readback.canonical import STATEMENT, Text
+from postproc.readback.canonical import SMOOTH, STATEMENT, Canonical, Text
 from toolpaths.diagnostics import Diagnostic, error
 
 LARGEST = 1e10
@@ -25,3 +25,13 @@ def too_large(text: Text, file: str) -> list[Diagnostic]:
     lines = np.unique(words.line[rows])
     return [error("gcode.number", f"a number of more than {LARGEST:g}", file=file, lines=lines[:6].tolist(),
                   count=len(lines), hint="controls hold eight or nine digits: correct the number")]
+
+
+def negative_smoothing(code: Canonical, file: str) -> list[Diagnostic]:
+    """An error where a program asks for corners rounded by less than nothing."""
+    blocks, value = code.words.pick(SMOOTH)
+    lines = np.unique(code.line[blocks[value < 0.0]])
+    if not len(lines):
+        return []
+    return [error("gcode.smoothing", "a negative tolerance of the control's smoothing", file=file, lines=lines[:6].tolist(),
+                  count=len(lines), hint="state 0 or more")]

@@ -14,7 +14,7 @@ from postproc.controllers.model import ControllerFile
 from postproc.coolant import switched_by
 from postproc.readback.canonical import COOLANT, EXTENDED_OFFSETS, Canonical, Text, added, offset_number, placed
 from postproc.readback.flow import Structure, expand
-from postproc.readback.magnitude import too_large
+from postproc.readback.magnitude import negative_smoothing, too_large
 from postproc.readback.modal import GROUPS, Groups, check_codes, check_end, codes, drop_passive
 from postproc.readback.words import Words
 from toolpaths.arrays import Floats, Ints
@@ -107,7 +107,8 @@ class Reader(ABC):
         if has_errors(more):
             return None, [*found, *more]
         code, last = self.translated(text, line, file)
-        return replace(code, files=files), [*found, *more, *placed([*self.units(code, file), *last], files)]
+        last = [*self.units(code, file), *negative_smoothing(code, file), *last]
+        return replace(code, files=files), [*found, *more, *placed(last, files)]
 
     def translated(self, text: Text, line: Ints, file: str) -> tuple[Canonical, list[Diagnostic]]:
         """Canonical words of blocks in running order, with what coolant flows."""

@@ -1,0 +1,224 @@
+"""Every sample, and every file of a folder, on every machine and control: what comes out, by kind (`make hard`).
+
+    python tests/hard/run.py [FOLDER] [--machine NAME ...] [--controller NAME ...] [--edits N | --edits all] [--workers 2]
+
+Each conversion is written and proved, or refused with a code; the estimate of its time and all texts are made too. With
+--edits each program is changed in N blocks (`edits.py`) and goes through `time` and `verify` again. Internal errors, and
+conversions without an end, are failures: exit code 1.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import signal
+import sys
+import warnings
+from collections import Counter
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
+from functools import cache, lru_cache
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).parents[2]
+sys.path.insert(0, str(ROOT))
+for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"):
+    os.environ.setdefault(_name, "1")
+
+SAMPLES = ROOT / "samples"
+ENDINGS = frozenset({".cls", ".cl", ".apt", ".aptsource", ".clt", ".ncl", ".as", ".ncd", ".tap", ".txt", ".cldata"})
+SETUPS = (("h4a", "h4a.setup.toml"), ("delta", "delta.setup.toml"), ("uranesx", "delta.setup.toml"),
+          ("linuxcnc-lineardelta", "delta.setup.toml"), ("", "tools.setup.toml"))
+"""set-up by how the machine's name begins, unless FILE.setup.toml stands with the file"""
+LONGEST = 900
+"""s that one conversion may take, edits included"""
+PROVED, REFUSED, INTERNAL, ENDLESS, NUMBERS = "written and proved", "refused", "INTERNAL ERROR", "NO END", "number warning"
+
+
+@dataclass(frozen=True)
+class Task:
+    """One file on one machine, for all controllers."""
+
+    file: Path
+    machine: str
+    controllers: tuple[str, ...]
+    edits: int | None
+
+
+def files_of(folder: Path | None) -> list[Path]:
+    """The samples, and all files of the folder, however they are called."""
+    found = sorted(p for p in SAMPLES.rglob("*") if p.suffix.lower() in ENDINGS and "errors" not in p.parts)
+    more = folder.rglob("*") if folder else ()
+    return found + sorted(p for p in more if p.is_file() and not p.name.endswith(".setup.toml"))
+
+
+def worked(task: Task) -> Counter[tuple[str, str, str]]:
+    """(kind, detail, example) of each conversion of a task."""
+    found: Counter[tuple[str, str, str]] = Counter()
+    for controller in task.controllers:
+        where = f"{task.file.name} on {task.machine}, {controller}"
+        with warnings.catch_warnings(record=True) as noise:
+            warnings.simplefilter("always")
+            signal.signal(signal.SIGALRM, _endless)
+            signal.alarm(LONGEST)
+            for kind, detail, more in _outcomes(task, controller):
+                found[kind, detail, where + more] += 1
+            signal.alarm(0)
+        for w in noise:
+            found[NUMBERS, f"{Path(w.filename).name}:{w.lineno} {w.message}", where] += 1
+    return found
+
+
+class Endless(BaseException):
+    """Raised where a conversion takes too long; no `except Exception` holds it."""
+
+
+def _endless(*_: object) -> None:
+    raise Endless
+
+
+def _outcomes(task: Task, controller: str) -> Iterator[tuple[str, str, str]]:
+    """(kind, detail, what was done to the program) of one conversion and of its edits."""
+    from postproc.guard import fingerprint
+
+    step = ""
+    try:
+        result = _converted(task, controller)
+        yield (PROVED, "", "") if result.ok else (REFUSED, _reason(result.diagnostics), "")
+        if not result.ok or task.edits == 0:
+            return
+        from tests.hard.edits import edits, timed, verified
+
+        for what, program in edits(result.text, task.edits):
+            step = f", {what}"
+            timed(program, result, result.machine, result.controller, controller)
+            yield (f"edited: {'proved' if verified(program, result) else 'refused'}", "", step)
+    except Endless:
+        yield ENDLESS, f"within {LONGEST} s", step
+    except Exception as fault:
+        trace = fault.__traceback__
+        while trace is not None and trace.tb_next is not None:
+            trace = trace.tb_next
+        place = f"{Path(trace.tb_frame.f_code.co_filename).name}:{trace.tb_lineno}" if trace else ""
+        yield INTERNAL, f"[{fingerprint(fault)}] {type(fault).__name__}: {str(fault)[:80]} ({place})", step
+
+
+def _converted(task: Task, controller: str) -> Any:
+    """The conversion, with all that is said of it."""
+    import postproc
+    from postproc import summary
+    from postproc.console import rounded
+    from postproc.cycle_time import report
+    from postproc.cycle_time.estimate import estimate
+    from postproc.cycle_time.model import load_model, model_name
+    from postproc.cycle_time.source import from_conversion
+
+    path, found = _read(task.file)
+    machine, setup = _machine(task.machine, str(_setup_of(task)))
+    result = postproc.convert(path, machine, controller=controller, setup=setup, diagnostics=list(found))
+    summary.as_text(result, "out.nc")
+    json.dumps(rounded(summary.as_dict(result, "out.nc")), allow_nan=False, default=str)
+    if result.ok:
+        planner, _ = load_model(model_name(controller, result.controller.writer))
+        assert planner is not None
+        figures = estimate(from_conversion(result), machine, planner)
+        json.dumps(rounded(report.as_dict(figures)), allow_nan=False, default=str)
+        report.as_text(figures, "out.nc")
+    return result
+
+
+@lru_cache(maxsize=1)
+def _read(file: Path) -> Any:
+    import toolpaths
+
+    return toolpaths.read(file)
+
+
+@cache
+def _machine(name: str, setup: str) -> Any:
+    import machines
+    from postproc.setup import load_setup
+
+    return machines.load(name), load_setup(setup)[0]
+
+
+def _setup_of(task: Task) -> Path:
+    own = task.file.with_name(f"{task.file.stem}.setup.toml")
+    return own if own.is_file() else SAMPLES / next(name for begin, name in SETUPS if task.machine.startswith(begin))
+
+
+def _reason(diagnostics: Any) -> str:
+    """The code of the first error."""
+    return next((str(d.code) for d in diagnostics if d.severity == 2), "NO REASON")
+
+
+def table(found: Counter[tuple[str, str, str]]) -> str:
+    """Counts by kind and detail, the most frequent first, each with an example."""
+    by: Counter[tuple[str, str]] = Counter()
+    example: dict[tuple[str, str], str] = {}
+    for (kind, detail, where), count in found.items():
+        by[kind, detail] += count
+        example.setdefault((kind, detail), where)
+    totals = Counter({kind: sum(c for (k, _), c in by.items() if k == kind) for kind, _ in by})
+    lines = []
+    for kind, total in totals.most_common():
+        lines.append(f"{total:7} {kind}")
+        lines += [f"{count:14} {detail}  ({example[k, detail]})" for (k, detail), count in by.most_common()
+                  if k == kind and detail]
+    return "\n".join(lines)
+
+
+def failures(found: Counter[tuple[str, str, str]]) -> int:
+    """Internal errors, conversions without an end, and refusals that name no reason."""
+    return sum(count for (kind, detail, _), count in found.items() if kind in (INTERNAL, ENDLESS) or detail == "NO REASON")
+
+
+def run(tasks: list[Task], workers: int) -> Counter[tuple[str, str, str]]:
+    """All tasks, in processes of their own: one that ends without a word is an internal error too."""
+    found: Counter[tuple[str, str, str]] = Counter()
+    with ProcessPoolExecutor(workers) as pool:
+        todo = iter(tasks)
+        running = {pool.submit(worked, task): task for task in islice(todo, 2 * workers)}
+        while running:
+            done = next(as_completed(running))
+            task = running.pop(done)
+            try:
+                found += done.result()
+            except BrokenProcessPool:
+                found[INTERNAL, "a process ended without a word (memory?)", f"near {task.file.name} on {task.machine}"] += 1
+                return found
+            running |= {pool.submit(worked, one): one for one in islice(todo, 1)}
+            print(f"{task.file.name} on {task.machine}", file=sys.stderr, flush=True)
+    return found
+
+
+def main() -> int:
+    import machines
+    from postproc.controllers.model import builtin_files
+
+    wanted = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    wanted.add_argument("folder", nargs="?", type=Path)
+    wanted.add_argument("--machine", nargs="*", default=list(machines.names()))
+    wanted.add_argument("--controller", nargs="*", default=sorted(builtin_files()))
+    wanted.add_argument("--edits", default="1")
+    wanted.add_argument("--workers", type=int, default=2)
+    wanted.add_argument("--match", default="", help="part of the files' names")
+    a = wanted.parse_args()
+    if a.folder and not a.folder.is_dir():
+        wanted.error(f"{a.folder} is no folder")
+    edits = None if a.edits == "all" else int(a.edits)
+    tasks = [Task(file, machine, tuple(a.controller), edits) for file in files_of(a.folder) if a.match in file.name
+             for machine in a.machine]
+    found = run(tasks, a.workers)
+    print(table(found))
+    print(f"{failures(found)} failures")
+    return 1 if failures(found) else 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
