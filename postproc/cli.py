@@ -111,11 +111,14 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
         result = run(path, m, spec, options=options, diagnostics=found, progress=progress)
         told, why = _fields(result, fields) if fields else ([], [])
         result = replace(result, diagnostics=(*result.diagnostics, *why))
+        values, text = summary.as_dict(result, str(output)), summary.as_text(result, str(output))  # before a file is written
+        more: list[Diagnostic] = []
         if result.ok:
             for name, content in zip(fields, told, strict=True):
                 write_atomically(name, content)
-            result = replace(result, diagnostics=(*result.diagnostics, *write_all(output, result.text, result.files or {})))
-    report(result.diagnostics, json, summary.as_dict(result, str(output)), summary.as_text(result, str(output)))
+            more = write_all(output, result.text, result.files or {})
+    found = [*result.diagnostics, *more]
+    report(tuple(found), json, values | {"diagnostics": [d.as_dict() for d in found]}, text)
 
 
 @app.command(epilog="Example: postproc verify part.ngc part.cls -m mikron-ucp710 -c linuxcnc")

@@ -59,7 +59,7 @@ def read_input(path: str | Path, *, standard_input: bool = False) -> bytes:
     try:
         size = check_input(path).st_size
     except InputFault as fault:
-        fault.hint += ", or pipe it in and name - as the file" if standard_input and "pipe" in fault.strerror else ""
+        fault.hint += ", or pipe it in and name - as the file" if standard_input and "pipe" in reason(fault) else ""
         raise
     with _opened(path) as stream:
         _check_kind(os.fstat(stream.fileno()))

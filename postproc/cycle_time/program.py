@@ -65,7 +65,6 @@ def blocks_of(code: Canonical, motion: Motion, machine: Machine, control: Contro
     start, end = points[:-1], points[1:]
     arc = motion.code == 2
     normal, sweep, center = _arcs(motion, control, arc, start)
-    arc &= sweep > NOTHING  # ends on one spoke: the control goes straight along it
     path, tolerance, chain = _path_modes(words, own_path)
     path = np.where(motion.hole, Path.EXACT, path[block])
     pauses = _pauses(words, block, code.line, motion, machine)

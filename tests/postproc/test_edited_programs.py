@@ -74,12 +74,3 @@ def test_what_no_control_runs_is_refused_before_it_costs_time_or_memory(name: st
 
 def test_corners_cannot_be_rounded_by_less_than_nothing() -> None:
     assert "gcode.smoothing" in refused("haas-ngc", program("G187 E-1.\nG1 X5 F100"))
-
-
-def test_an_arc_along_one_spoke_is_timed_as_the_straight_line_that_it_is() -> None:
-    """Fanuc takes arcs whose radius differs between the ends, as its parameter says."""
-    controller, _ = load_controller("fanuc-30i")
-    assert controller is not None
-    blocks, found = from_gcode(program("G2 X-3 Y0 I5 J0 F100").encode(), machine("mill-3axis"), controller, tool_setup(),
-                               "part.nc")
-    assert blocks is not None and not blocks.arc.any(), [str(d) for d in found]

@@ -1,0 +1,43 @@
+"""`make hard` on one small file: outcomes by kind, and a planted fault is a failure of its own kind."""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+from tests.hard.run import INTERNAL, PROVED, REFUSED, Task, failures, files_of, table, worked
+from tests.postproc.kit import SAMPLES
+
+NX = SAMPLES / "dialects" / "inch_nx.cls"
+
+
+def kinds(found: Counter[tuple[str, str, str]]) -> Counter[str]:
+    return Counter({kind: sum(n for (k, _, _), n in found.items() if k == kind) for kind, _, _ in found})
+
+
+def test_outcomes(tmp_path: Path) -> None:
+    found = worked(Task(NX, "mill-3axis", ("generic-iso", "heidenhain-tnc640"), 0))
+    assert kinds(found) == {PROVED: 2} and failures(found) == 0
+    spoilt = tmp_path / "zero.cls"
+    spoilt.write_text(NX.read_text().replace("FEDTO,-0.47244", "FEDTO,0.0000"))
+    found = worked(Task(spoilt, "mill-3axis", ("siemens-840d", "heidenhain-tnc640"), 0))
+    assert kinds(found) == {REFUSED: 2} and failures(found) == 0
+    assert "cl.cycle-depth" in table(found)
+
+
+def test_faults_are_failures(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: object) -> None:
+        raise ZeroDivisionError
+
+    monkeypatch.setattr("postproc.pipeline.prepare", fail)
+    found = worked(Task(NX, "mill-3axis", ("generic-iso",), 0))
+    assert kinds(found) == {INTERNAL: 1} and failures(found) == 1 and "ZeroDivisionError" in table(found)
+
+
+def test_all_samples_and_the_files_of_a_folder_are_taken(tmp_path: Path) -> None:
+    (tmp_path / "deep").mkdir()
+    (tmp_path / "deep" / "part").write_text("x")
+    files = files_of(tmp_path)
+    assert {p.name for p in files} >= {"pocket.cls", "inch_plate.apt", "catia.aptsource", "solidworks.clt", "ncl.as", "part"}
