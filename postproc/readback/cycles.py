@@ -83,7 +83,8 @@ def pecks(plane: float, bottom: float, first: float, less: float = 0.0, least: f
 
     More than MOST end there: `unfit` refuses them.
     """
-    depths, depth, step = [], plane - first, first
+    depths: list[float] = []
+    depth, step = plane - first, first
     while depth > bottom + EPSILON and len(depths) <= MOST:
         depths.append(depth)
         step = max(step - less, least, EPSILON * 10.0) if less > 0.0 else step

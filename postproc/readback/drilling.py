@@ -36,9 +36,9 @@ def spell_holes(state: State, moving: Bools, drilling: Ints, code: Canonical, fi
         begun, target = before[n].copy(), before[n + 1].copy()
         begun[z] = level
         if np.isfinite(section.call[n]):
-            drill = code.drills[int(section.call[n])]
-            if not _refused(drill, int(code.line[n + section.first]), file, found):
-                spelt[n] = _called(state, n, begun, target, z, drill)
+            called = code.drills[int(section.call[n])]
+            if not _refused(called, int(code.line[n + section.first]), file, found):
+                spelt[n] = _called(state, n, begun, target, z, called)
         else:
             k = int(np.searchsorted(motion_lines, n)) - 1
             fresh = previous < 0 or k < 0 or motion_lines[k] != previous
