@@ -81,7 +81,9 @@ def _internal(fault: BaseException) -> int:
 
 def _named(fault: BaseException) -> str:
     """The kind of exception, in words where it has some."""
-    return {MemoryError: "memory is used up", RecursionError: "nested too deeply"}.get(type(fault), type(fault).__name__)
+    if isinstance(fault, MemoryError):
+        return "memory is used up"
+    return "nested too deeply" if isinstance(fault, RecursionError) else type(fault).__name__
 
 
 def _written(name: str, fault: BaseException) -> str:
