@@ -7,7 +7,7 @@ STAMP := .venv/installed
 PYTEST_ARGS ?= -n auto --maxprocesses 4 -rfEs
 SOURCES := toolpaths machines postproc
 
-.PHONY: demo test hard lint lock clean
+.PHONY: demo test hard changes lint lock clean
 
 demo: $(STAMP)
 	@mkdir -p out
@@ -21,6 +21,10 @@ test: $(STAMP)
 EDITS ?= 1
 hard: $(STAMP)
 	$(BIN)/python tests/hard/run.py $(if $(HARD),"$(HARD)") --edits $(EDITS) $(HARD_ARGS)
+
+# Every word, block and number of written programs changed, on every control: minutes each.
+changes: $(STAMP)
+	$(BIN)/pytest $(PYTEST_ARGS) -m slow tests/postproc/test_mutation.py
 
 lint: $(STAMP)
 	$(BIN)/ruff check .

@@ -43,6 +43,7 @@ class Control:
         plane: of the law "tilted"
         rapids: "straight", or "dog-leg": each axis at its own rapid speed (not under "tcp")
         feed_rule: what a feed per minute refers to under the law "axes", see `feed_length`
+        entry_frame: what the frame of the tip is where its mode is entered with turned tables, see `TcpMode.frame`
         own_kinematics: at the gauge point, as the control holds it; None: the machine's
     """
 
@@ -57,6 +58,7 @@ class Control:
     own_kinematics: Kinematics | None = None
     helix_planes: tuple[int, ...] = (17, 18, 19)
     arc_planes: tuple[int, ...] = (17, 18, 19)
+    entry_frame: Literal["table", "entry", "either"] = "table"
 
     @cached_property
     def _others(self) -> dict[tuple[object, ...], Control]:

@@ -176,12 +176,14 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
     law: Law = "tcp" if tip_law else "axes"
     own, found = control_kinematics(machine, setup, options)
     diagnostics += found
-    control = Control(machine, law, origin, largest, law, rapids=controller.kinematics.rapids,
+    errors, found = _error_model(machine, options)
+    diagnostics += found
+    corrects = errors is not None and errors.corrected_by == "post"  # tables that are corrected do not stand at zero
+    entry = "table" if corrects or controller.modes.tcp is None else controller.modes.tcp.frame
+    control = Control(machine, law, origin, largest, law, rapids=controller.kinematics.rapids, entry_frame=entry,
                       feed_rule=controller.feed.length, own_kinematics=own,
                       helix_planes=controller.arcs.helix_planes)
     modes, found = output_modes(control, controller, setup, options, toolpath, decimals(control, controller))
-    diagnostics += found
-    errors, found = _error_model(machine, options)
     diagnostics += found
     job = Job(toolpath, machine, controller, setup, options, placement, control, moves, safe_space(moves, setup, placement),
               modes, errors)

@@ -178,7 +178,7 @@ def _link(control: Control, kin0: Kinematics, kin1: Kinematics, space: SafeSpace
         return Link(retract, home, none, none, home_state, none > 0.0, way)
     if by_home and _has_retract_axis(control):
         index, state = _from_home(control, home[-1], up1)
-        clear = _stays_clear(control, kin1, space, np.concatenate([home[-1:], index]), slack)
+        clear = stays_clear(control, kin1, space, np.concatenate([home[-1:], index]), slack)
         return Link(retract, home, index, approach, home_state, state, clear)
     begin = home[-1] if by_home else up0.q if up0 is not None else control.machine.home
     index, clear = _index(control, kin1, space, begin, up1, space.plane(up1.axis, turning, share), slack)
@@ -257,7 +257,7 @@ def _index(control: Control, kin: Kinematics, space: SafeSpace, begin: Floats, u
             near = nearest_solution(kin, space.centre + (floor + _RISE) * axes, axes, near)
         q = np.concatenate([near, up.q[None, :]])
         start = begin[None, :] if lifted is None else lifted[None, :]
-        if np.isfinite(q).all() and _stays_clear(control, kin, space, np.concatenate([start, q]), slack):
+        if np.isfinite(q).all() and stays_clear(control, kin, space, np.concatenate([start, q]), slack):
             return (q if lifted is None else np.concatenate([start, q])), True
     return up.q[None, :], False
 
@@ -271,7 +271,7 @@ def _lifted(kin: Kinematics, space: SafeSpace, q: Floats, floor: float, slack: f
     return np.asarray(nearest_solution(kin, tip + lift * axis, axis, q[None, :])[0])
 
 
-def _stays_clear(control: Control, kin: Kinematics, space: SafeSpace, q: Floats, slack: float) -> bool:
+def stays_clear(control: Control, kin: Kinematics, space: SafeSpace, q: Floats, slack: float) -> bool:
     """True where the tool is clear at even places of all ways between the joints q (K, J), looked at together."""
     count = len(q) - 1
     t = np.repeat(np.linspace(0.0, 1.0, _SAMPLES), count)

@@ -13,6 +13,7 @@ from postproc.controllers.model import ControllerFile, Mode
 from postproc.options import Options
 from postproc.planes import Plane, stated
 from postproc.setup import SetupFile
+from postproc.zero_entry import table_axes
 from toolpaths.arrays import Array, Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.rotations import angle_between
@@ -58,7 +59,9 @@ class OutputModes:
             "rotary axis"
         tables = modes.tilted is not None and modes.tilted.tables_only and not control.has_rotary_tables_only
         return {"axes": "",
-                "tcp": machine or ("" if modes.tcp else "the controller has no tool-centre-point mode ([modes.tcp])"),
+                "tcp": machine or ("" if modes.tcp else "the controller has no tool-centre-point mode ([modes.tcp])")
+                or (f"the mode is entered at home with the tables at zero, and {name} names no retract_axis"
+                    if self.at_zero and control.machine.retract_axis < 0 else ""),
                 "tilted": machine or ("" if modes.tilted else "the controller has no tilted plane ([modes.tilted])")
                 or (f"the controller's plane is for rotary tables only, {name} has a rotary head" if tables else "")}
 
@@ -70,6 +73,19 @@ class OutputModes:
         control = self.control.under("tcp")
         mode = self.controller.modes.tcp
         return WordFrame(_with_arcs(control, mode))
+
+    @property
+    def tcp_code(self) -> str:
+        """What switches the mode by the tip on."""
+        mode = self.controller.modes.tcp
+        return mode.enter[0].split(" ")[0] if mode else ""
+
+    @cached_property
+    def at_zero(self) -> bool:
+        """True where the mode by the tip has to be entered with the rotary tables at zero."""
+        mode = self.controller.modes.tcp
+        return mode is not None and self.control.base != "tcp" and self.control.entry_frame != "table" and bool(
+            len(table_axes(self.control)))
 
     @cached_property
     def base(self) -> WordFrame:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -24,6 +24,7 @@ from postproc.modes import OutputModes, WordFrame, stands_still, turning_run
 from postproc.moves import Moves
 from postproc.rewinds import Drawing
 from postproc.run_plan import RunPlan, plan_moves
+from postproc.zero_entry import ZeroEntry, cost, needed, zero_entry
 from toolpaths.arrays import Array, Bools, Floats, Ints
 from toolpaths.diagnostics import Diagnostic, has_errors
 from toolpaths.shape import Curves
@@ -116,7 +117,7 @@ def build_path(modes: OutputModes, kinematics: Callable[[int], Kinematics], move
     state: Pose | None = None
     frame, kin = modes.base, kinematics(int(moves.tool[0]))
     diagnostics: list[Diagnostic] = []
-    worst, turns = np.zeros(2), [np.zeros(0, dtype=np.int64)]
+    worst, turns, longer = np.zeros(2), [np.zeros(0, dtype=np.int64)], list[float]()
     starts = np.flatnonzero(moves.link)
     for first, last in zip(starts, [*starts[1:], len(moves)], strict=True):
         before, kin = kin, kinematics(int(moves.tool[first]))
@@ -128,9 +129,16 @@ def build_path(modes: OutputModes, kinematics: Callable[[int], Kinematics], move
         target = Pose(moves.tip[first], run.axis[0], run.q[0], run.frame.control)
         by_home = first in home_rows
         way = _way(modes, frame, run.frame, by_home)
+        enters = modes.at_zero and run.frame is modes.tcp and way is not modes.tcp
         link = drawing.link(way.control, kin, state, target) if plan.refined.rewind[first] else plan_link(
             way.control, before, kin, space, state, target, by_home)
-        _add_link(out, moves, int(first), link, _Legs(frame, way, run.frame, before, kin, state))
+        entry = None
+        if enters and needed(modes.control, link):
+            link = link if by_home else plan_link(way.control, before, kin, space, state, target, True)
+            entry = zero_entry(modes.control, modes.tcp.control, kin, space, link)
+            longer.append(entry.seconds)
+            link = replace(link, clear=link.clear and entry.clear)
+        _add_link(out, moves, int(first), link, _Legs(frame, way, run.frame, before, kin, state, entry))
         if not link.clear:
             diagnostics.append(faults.no_way(moves, int(first), file))
         q = run.q
@@ -153,6 +161,7 @@ def build_path(modes: OutputModes, kinematics: Callable[[int], Kinematics], move
     give_back()
     path = _of_given(columns, out, plan, len(given), np.concatenate(turns), worst)
     diagnostics += joint_faults.planned(plan, machine, given, file)
+    diagnostics += cost(modes.tcp_code, longer, file)
     return path, faults.merged(diagnostics) + faults.rapid_as_feed(path.code, path.move, path.seconds, given, file)
 
 
@@ -222,6 +231,8 @@ class _Legs:
     kin_before: Kinematics
     kin_after: Kinematics
     start: Pose | None
+    entry: ZeroEntry | None = None
+    """where the mode that it goes to is entered with the tables at zero"""
 
 
 def _add_link(out: Builder, moves: Moves, row: int, link: Link, legs: _Legs) -> None:
@@ -234,10 +245,14 @@ def _add_link(out: Builder, moves: Moves, row: int, link: Link, legs: _Legs) -> 
         _leg(out, legs.before, legs.kin_before, legs.start.q, link.retract, row)
     out.link(legs.way, link.home, row, not legs.way.control.tip_law, link.home_state)
     out.begin[row] = out.count
+    if legs.entry is not None:
+        out.link(legs.way, legs.entry.before, row, False, legs.entry.state)
+        out.link(legs.after, legs.entry.inside, row)
     state = link.index_state.copy()
     if len(state) and legs.after is not legs.way and not state[:, legs.way.control.rotary].any(axis=0).all():
         state[-1] = True
-    out.link(legs.way, link.index, row, False, state)
+    if legs.entry is None:
+        out.link(legs.way, link.index, row, False, state)
     if not len(link.approach):
         return
     begin = link.index[-1]

@@ -31,6 +31,7 @@ from postproc.program_header import header_lines
 from postproc.reach import check_reach
 from postproc.readback.compare import Comparison
 from postproc.readback.files import Beside
+from postproc.readback.slow import with_fingerprint
 from postproc.readback.verify import other_axes, read_back
 from postproc.rewinds import drawing_of
 from postproc.rounding import rounding_problem
@@ -331,7 +332,8 @@ def write_text(result: PostResult) -> tuple[str, dict[str, str]]:
                         name=result.options.name or FilePath(result.toolpath.file).stem,
                         subprograms=result.setup.output.divided)
     text = writer.text(header)
-    return text, {name: "\n".join(blocks) + "\n" for name, blocks in writer.files.items()}
+    files = {name: "\n".join(blocks) + "\n" for name, blocks in writer.files.items()}
+    return with_fingerprint(text, files), files
 
 
 def long_blocks(text: str, most: int, file: str) -> list[Diagnostic]:

@@ -10,12 +10,17 @@ import numpy as np
 from postproc import VERSION
 from postproc.job import Job
 from postproc.program import Program
+from postproc.zero_entry import table_axes
 
 if TYPE_CHECKING:
     from postproc.pipeline import PostResult
 
 FINGERPRINT = "fingerprint of the geometric errors"
 """before the eight hex digits of the error model that a program was written with"""
+FEEDS = "fingerprint of the planned feeds"
+"""before the eight hex digits of the F words"""
+UNKNOWN = "--------"
+"""in their place while the program is written"""
 
 
 def header_lines(result: PostResult) -> list[str]:
@@ -34,10 +39,25 @@ def header_lines(result: PostResult) -> list[str]:
         header.append("tool numbers of the set-up: " + ", ".join(numbers))
     if any(d.code == "feed.of_setup" for d in result.diagnostics):
         header.append(f"feed {result.setup.output.feed:g} mm/min of the set-up where the CL file states none")
-    header += [*_corrections(result), *_orientations(result), *_tools(job)]
+    if result.motion is not None:
+        header.append(f"{FEEDS} {UNKNOWN}")
+    header += [*_tip_frame(result), *_corrections(result), *_orientations(result), *_tools(job)]
     if result.toolpath.name:
         header.insert(1, f"part {result.toolpath.name}")
     return header
+
+
+def _tip_frame(result: PostResult) -> list[str]:
+    """What is relied on where the frame of the tip's mode is not known for turned tables."""
+    assert result.program is not None and result.job is not None
+    mode, control = result.controller.modes.tcp, result.job.control
+    if mode is None or mode.frame == "table" or all(s.law != "tcp" for s in result.program.sections):
+        return []
+    code = result.job.modes.tcp_code
+    if result.job.modes.at_zero:
+        return [f"{code} is switched on with the tables at zero, right by both readings of its frame"]
+    return [f"relies on the frame of {code} being the part's, turned with the table by its scale"] if len(
+        table_axes(control)) else []
 
 
 def _tools(job: Job) -> list[str]:

@@ -114,6 +114,14 @@ class Kinematics(UserModel):
     """share of the axis tolerance left to it"""
 
 
+class Start(UserModel):
+    """What is in force where a program begins."""
+
+    codes: tuple[Annotated[str, Field(pattern=r"^G[0-9]+(\.[0-9]+)?$")], ...] = ()
+    """codes that the control itself puts in force before every program, whatever ran before it (power-on or reset states
+    that no parameter changes): `verify` takes them as stated; all other states the program must state itself"""
+
+
 class Mode(UserModel):
     """How a mode is switched on and off, and what may stand in it."""
 
@@ -144,6 +152,11 @@ class TcpMode(Mode):
     """blocks that switch it on; {register} is the length register in force"""
     leave: tuple[Annotated[str, placeholders("register", "work_offset")], ...]
     """blocks that switch it off"""
+    frame: Literal["table", "entry", "either"] = "table"
+    """what X, Y, Z are the tip in, where a rotary table stands turned when the mode is switched on: "table", the part's
+    frame, turned with the table by its scale; "entry", the frame of the work offset as it lies unturned in the machine,
+    which then goes with the table; "either": not known, so that the mode is entered with the tables at zero, where both
+    are one, and `verify` proves the program under both"""
     cycles: bool = False
     """canned cycles may stand in it"""
     compensation: bool = False
@@ -187,6 +200,7 @@ class ControllerFile(UserModel):
     format: Format = Format()
     comment: Comment = Comment()
     program: Frame = Frame()
+    start: Start = Start()
     codes: Codes = Codes()
     tools: Tools = Tools()
     subprograms: Subprograms = Subprograms()

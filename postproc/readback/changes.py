@@ -27,7 +27,7 @@ def check_changes(code: Canonical, motion: Motion, job: Job, home: Floats, fault
         return []
     before = np.searchsorted(motion.block, changes) - 1
     place = np.where((before >= 0)[:, None], motion.end[np.maximum(before, 0)], motion.start)
-    axes = _lifting(job)
+    axes = lifting(job)
     away = np.abs(place[:, axes] - home[axes])
     away = np.where(np.isfinite(away), away, np.inf)
     spindle, coolant = _on(code, (3, 4, 5), 5.0, changes), _on(code, (7, 8, 9), 9.0, changes)
@@ -87,7 +87,7 @@ def _others(code: Canonical, job: Job, faults: Faults) -> list[Diagnostic]:
     return result
 
 
-def _lifting(job: Job) -> Ints:
+def lifting(job: Job) -> Ints:
     """Columns that have to be at home: the retract axis, or all of them."""
     lift = job.machine.retract_axis
     return np.array([lift] if lift >= 0 and not job.control.tip_law else range(len(job.machine.axis_names)))

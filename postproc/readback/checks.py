@@ -19,7 +19,7 @@ from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.diagnostics import Diagnostic
 from toolpaths.toolpath import Kind
 
-ALLOWED_SPEED = 1.02
+ALLOWED_SPEED = 1.006
 """share of the programmed feed above which a move counts as too fast (short blocks carry rounding)"""
 CHUNK = 50_000
 """blocks that are sampled at a time, so that memory does not grow with the samples"""
@@ -80,7 +80,7 @@ def check_holes(motion: Motion, job: Job, moves: Moves, tip: Floats, owner: Ints
         return []
     m = owner[rows]
     starts = np.flatnonzero(np.diff(m, prepend=-1))
-    bad_peck, bad_out, bad_dwell, bad_rest = [], [], [], []
+    bad_peck, bad_out, bad_break, bad_dwell, bad_rest = [], [], [], [], []
     for at, stop in zip(starts, [*starts[1:], len(rows)], strict=True):
         cycle = job.toolpath.cycles[int(moves.cycle[m[at]])]
         part = rows[at:stop]
@@ -98,8 +98,11 @@ def check_holes(motion: Motion, job: Job, moves: Moves, tip: Floats, owner: Ints
                 bad_peck.append(part[0])
             elif cycle.kind == "DEEP" and out < int(pecks.sum()) - 1:
                 bad_out.append(part[0])
+            elif cycle.kind == "BRKCHP" and out:
+                bad_break.append(part[0])
     result = []
     for bad, what in ((bad_out, "the tool does not leave the hole between pecks as the CL file says"),
+                      (bad_break, "the tool leaves the hole between pecks, the CL file only breaks chips"),
                       (bad_peck, "the hole is drilled in deeper pecks than the CL file says"),
                       (bad_dwell, "the tool rests at the bottom for less time than the CL file says"),
                       (bad_rest, "the tool rests in the hole for more time than the CL file says")):

@@ -26,7 +26,7 @@ from postproc.readback.execute import Motion
 from postproc.readback.faults import Faults
 from postproc.readback.poses import SAMPLES, Executed, arc_sweeps
 from postproc.readback.rewinds import check_rewinds, rewinds
-from postproc.readback.slow import check_slow
+from postproc.readback.slow import check_fed_rapids, check_slow
 from postproc.readback.spins import check_spins
 from postproc.readback.states import check_states
 from postproc.readback.taps import check_taps
@@ -83,6 +83,7 @@ def compare(motion: Motion, job: Job, executed: Executed, gcode: str = "", plann
     diagnostics += check_speeds(motion, moves, owner, match, seconds, tolerance, faults)
     if not planned:
         diagnostics += check_slow(motion, executed, job, moves, owner, match, tip, seconds, faults)
+    diagnostics += check_fed_rapids(motion, executed, job, moves, owner, tip, seconds, faults)
     diagnostics += check_links(motion, executed, moves, owner, job.space, tolerance, faults)
     diagnostics += check_rewinds(motion, executed, number, tip, axis, job.space, tolerance, grain[1] + _kept(job), faults)
     diagnostics += check_travel(motion, executed, moves, owner, faults)

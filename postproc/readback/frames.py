@@ -13,6 +13,7 @@ import numpy as np
 from machines.kinematics.base import Kinematics
 from postproc.control import Control
 from postproc.readback.canonical import Law, LawName
+from postproc.zero_entry import table_axes
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.rotations import angle_between
@@ -20,6 +21,8 @@ from toolpaths.units import DEG
 
 ANGLE_SLACK = 0.01
 """degrees by which the rotary axes may stand off the plane, or off the control's own choice: rounding of the angles"""
+ENTRY_SLACK = 1e-3
+"""degrees or mm by which the frames of both readings may differ: the last decimal of words"""
 _CHUNK = 50_000
 _TURN = 360.0
 
@@ -102,7 +105,13 @@ def frame_of(law: Law, control: Control | None, length: float, position: Floats,
         return AXES
     kin = kin.with_tool(length)
     if law.name == "tcp":
-        return Frame("tcp", control, kin, np.eye(3), control.origin)
+        rotation, origin = entered(control, kin, position / control.unit)
+        off = max(float(np.abs(rotation - np.eye(3)).max()) / DEG, float(np.abs(origin - control.origin).max()))
+        if control.entry_frame == "either" and off > ENTRY_SLACK:
+            found.append(_two_frames(law, control, position, file, line))
+        if control.entry_frame != "entry":
+            rotation, origin = np.eye(3), control.origin
+        return Frame("tcp", control, kin, rotation, origin)
     q = position / control.unit
     rotation = tool_frame(kin, q) if law.rotation is None else law.rotation
     if law.rotation is not None:
@@ -127,6 +136,29 @@ def _wrong_pose(law: Law, control: Control, kin: Kinematics, q: Floats, file: st
                       "rotary position in force, where the tool lies along a rotary axis", file=file, lines=[line],
                       hint="state the plane by the position of that axis")]
     return []
+
+
+def entered(control: Control, kin: Kinematics, q: Floats) -> tuple[Floats, Floats]:
+    """(rotation (3, 3), origin (3,) mm) seen from the table of the work offset's frame as it lies in the machine with the
+    tables at zero, where the tables stand as in joints q (J,): of the mode by the tip under the reading "entry".
+
+    The slides run along the axes of the machine; the tip is t0(rotaries) + R s as the table sees it, t1 + s as the machine
+    does, t1 being t0 with the tables at zero.
+    """
+    at = np.stack([q, q])
+    at[:, control.slides] = 0.0
+    at[1, table_axes(control)] = 0.0
+    seen, machine = kin.forward(at)[0]
+    rotation = kin.jacobian(at[:1])[0, :3][:, control.xyz]
+    return np.asarray(rotation), np.asarray(seen + rotation @ (control.origin - machine))
+
+
+def _two_frames(law: Law, control: Control, position: Floats, file: str, line: int) -> Diagnostic:
+    where = " ".join(f"{control.machine.axis_names[j]}{position[j]:.4f}" for j in table_axes(control))
+    return error("gcode.tcp_frame", f"{law.code} is switched on with the tables at {where}: by the maker's pages its frame "
+                 "is that of the part, or that of the work offset turned on from there, and the program is right under one "
+                 "of them only", file=file, lines=[line], hint="switch it on with the tables at zero; or state which of "
+                 'both the control has: [modes.tcp] frame = "table" or "entry" in the controller file')
 
 
 def _picked(law: Law, control: Control, kin: Kinematics, q: Floats) -> Floats | None:

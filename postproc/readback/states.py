@@ -73,8 +73,26 @@ def check_states(motion: Motion, job: Job, moves: Moves, owner: Ints, faults: Fa
                 k = int(bad[0])
                 first.setdefault(what, (int(here[k]), f"{what} is {name(found[k])}, it should be {name(wanted[k])}"))
                 count[what] += len(bad)
-    return [faults.error("verify.state", said, int(moves.line[owner[k]]), int(motion.line[k]), count[what])
+    return _left_on(motion, job, moves, owner, asked, reader, faults) + [
+        faults.error("verify.state", said, int(moves.line[owner[k]]), int(motion.line[k]), count[what])
             for what, (k, said) in sorted(first.items(), key=lambda one: (one[1][0], _ORDER.index(one[0])))]
+
+
+def _left_on(motion: Motion, job: Job, moves: Moves, owner: Ints, asked: _Asked, reader: Reader,
+             faults: Faults) -> list[Diagnostic]:
+    """Cutter compensation on rapids and linking moves for which the CL file has none: the control shifts those too."""
+    on = np.flatnonzero(motion.compensation != 40) if np.any(motion.compensation != 40) else np.zeros(0, dtype=np.int64)
+    serving = np.minimum(owner[on], len(moves) - 1)
+    linking = (owner[on] >= len(moves)) | moves.link[serving]
+    cut = (motion.code[on] > 0) & (moves.kind[serving] != Kind.RAPID) & (owner[on] < len(moves))
+    bad = on[(linking | (asked.side[moves.row[serving]] == 40)) & ~cut]
+    if not len(bad):
+        return []
+    k = int(bad[0])
+    line = int(moves.line[owner[k]]) if owner[k] < len(moves) else 0
+    return [faults.error("verify.state", f"cutter compensation is {reader.sides[int(motion.compensation[k])]} on a rapid or "
+                         "a positioning move without it", line, int(motion.line[k]), len(bad),
+                         "cancel it before the tool leaves the cut")]
 
 
 _ORDER = ("tool", "spindle", "spindle speed", "coolant", "length register", "cutter compensation",

@@ -12,6 +12,7 @@ from postproc.job import Job
 from postproc.memory import give_back
 from postproc.options import Options
 from postproc.program_header import FINGERPRINT
+from postproc.readback.canonical import placed
 from postproc.readback.changes import check_changes
 from postproc.readback.compare import Comparison, compare
 from postproc.readback.dialects import reader_for
@@ -20,6 +21,8 @@ from postproc.readback.execute import Motion, Offsets, run
 from postproc.readback.faults import Faults
 from postproc.readback.poses import Executed, poses_before
 from postproc.readback.slow import HEADER, planned_feeds
+from postproc.readback.starts import check_end, check_start
+from postproc.readback.stated import check_stated
 from postproc.readback.stops import check_stops
 from toolpaths.diagnostics import Diagnostic, Severity, error, has_errors, warning
 from toolpaths.rotations import angle_between
@@ -30,7 +33,7 @@ _FINGERPRINT = re.compile(rb"(?im)^[^\n]*" + FINGERPRINT.encode("ascii") + rb" (
 _BY_CONTROL = re.compile(rb"(?im)^[^\n]*geometric errors [^\n]*corrected by the control")
 _ORIENTED = re.compile(rb"(?im)^[^\n]*tool axes chosen: orient ([a-z-]+), max tilt ([^ \n]+) degrees")
 _OURS = re.compile(rb"(?im)^[^\n]*postproc \d+\.\d[^\n]*\n(?:[^\n]*part [^\n]*\n)?[^\n]*source ")
-CAUSES = frozenset({"verify.tool", "verify.tool_change", "verify.state", "verify.tap", "verify.hole"})
+CAUSES = frozenset({"verify.start", "verify.tool", "verify.tool_change", "verify.state", "verify.tap", "verify.hole"})
 """told first: a path that is off follows from them"""
 
 
@@ -66,12 +69,16 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Callable[[str, i
     diagnostics = [_located(_judged(d, reader.units_stay), job.toolpath.file) for d in diagnostics]
     if gcode and not _by_post(job) and _CORRECTED.search(head):
         return None, [_twice(job, gcode), *diagnostics]
+    if code is not None:
+        diagnostics += placed([_located(d, job.toolpath.file) for d in check_stated(code, reader, gcode)], code.files)
     if code is None or has_errors(diagnostics):
         return None, diagnostics
     offsets = Offsets(control.work_offset, control.xyz, job.register_lengths(), home, control.length_on_z,
                       job.controller.cycles.peck_relief, control, reader.rises_first, reader.arc_slack)
     motion, found = run(code, machine.axis_names, offsets, gcode)
     give_back()
+    faults = Faults(job.toolpath.file, gcode)
+    unseen = check_start(code, job, faults)
     code = code.without((*machine.axis_names, *(a.lower() for a in machine.axis_names), *"IJKijk"))
     diagnostics += [_located(d, job.toolpath.file) for d in found]
     if has_errors(diagnostics):
@@ -82,10 +89,10 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Callable[[str, i
         progress("read back", 0, len(motion))
     executed = _executed(job, motion, offsets.lengths)
     with np.errstate(invalid="ignore"):
-        planned = job.options.feed == "planned" or planned_feeds(head)
+        planned, changed = planned_feeds(as_bytes(data), others or {}, gcode or job.toolpath.file)
         comparison = compare(motion, job, executed, gcode, planned)
-    faults = Faults(job.toolpath.file, gcode)
-    unseen = [*check_changes(code, motion, job, home, faults), *check_stops(code, motion, job, faults),
+    unseen += [*changed, *check_end(motion, job, home, faults), *check_changes(code, motion, job, home, faults),
+               *check_stops(code, motion, job, faults),
               *_bodies(motion, executed, job, comparison, faults)]
     told = sorted([*unseen, *comparison.diagnostics], key=lambda d: d.code not in CAUSES)
     if gcode and _by_post(job):

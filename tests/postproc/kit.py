@@ -10,6 +10,7 @@ import math
 import re
 from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 
@@ -57,6 +58,17 @@ def machine(name: str) -> machines.machine.Machine:
 def tool_setup() -> SetupFile:
     setup, found = load_setup(TOOLS)
     assert setup is not None and not found
+    return setup
+
+
+@cache
+def setup_of(text: str) -> SetupFile:
+    """The set-up of a text."""
+    with TemporaryDirectory() as folder:
+        file = Path(folder) / "setup.toml"
+        file.write_text(text)
+        setup, found = load_setup(file)
+    assert setup is not None and not found, found
     return setup
 
 

@@ -99,7 +99,7 @@ class Peer:
         elif g in (43, 49):
             self.register = int(words["H"]) if g == 43 else -1
         else:
-            assert g in (40, 54, 64, 90), f"line {number}: G{g:g}"
+            assert g in (40, 54, 64, 90, 91.1), f"line {number}: G{g:g}"
 
     def switch(self, codes: list[int], words: dict[str, float]) -> None:
         """Tool, spindle and coolant."""

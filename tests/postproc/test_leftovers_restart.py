@@ -117,7 +117,8 @@ def test_from_an_arbitrary_pose_in_modes_of_another_program(controller: str, mac
     for label in labels(result, controller):
         start = rng.uniform(np.maximum(limits.lower, -700.0), np.minimum(limits.upper, 700.0))
         body = [n for n in lines[label:] if "END PGM" not in n]
-        text = "\n".join([*head, FOREIGN[controller], *body, *tail])
+        foreign = FOREIGN[controller].replace(" RR", "")  # on a TNC radius compensation ends with its program
+        text = "\n".join([*head, foreign, *body, *tail])
         taken_up(result, text, len(head) + 1, start * result.job.control.unit, whole, label)
 
 

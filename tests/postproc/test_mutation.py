@@ -9,13 +9,16 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+import toolpaths
 from postproc.pipeline import PostResult
 from postproc.readback.verify import read_back
-from tests.postproc.kit import codes, convert, execute, good, goto, sample, tilted, toolpath
+from tests.postproc.kit import codes, convert, execute, good, goto, sample, setup_of, tilted, toolpath
+from tests.postproc.mutation_kit import Effect, mutants, verdict
 from toolpaths.diagnostics import Severity
 
 FLAT = [("pocket.cls", "mill-3axis", "linuxcnc"), ("inch_plate.apt", "mill-3axis", "generic-iso"),
@@ -221,3 +224,66 @@ def test_linking_moves_through_the_part() -> None:
     at = lines.index("T2 M6")
     row = next(i for i in range(at, len(lines)) if re.fullmatch(r"Z1\d\d\.\d+", lines[i]))
     assert found(result, replaced(lines, row, "Z-20"))
+
+
+# ---- every kind of change, on every control and in every mode --------------------------------------------------------
+
+OFF_AXES = """\
+[part]
+origin = [37.0, -23.0, 11.0]
+x_axis = [0.9563047559630355, 0.29237170472273677, 0.0]
+y_axis = [-0.29237170472273677, 0.9563047559630355, 0.0]
+[tools.1]
+gauge_length = 120.0
+[tools.2]
+gauge_length = 95.5
+[tools.3]
+gauge_length = 133.25
+"""
+"""the part off the rotary axes and turned about z, tools of different lengths: what stands on the crossing hides faults"""
+GOLDEN = Path(__file__).parents[1] / "golden"
+SIX = ("fanuc-30i", "siemens-840d", "heidenhain-tnc640", "haas-ngc", "linuxcnc", "generic-iso")
+CHANGED = [(source, controller, mode) for controller in SIX for source, mode in (
+    (GOLDEN / "three_laws.cls", "auto"), (GOLDEN / "three_laws.cls", "axes"), (GOLDEN / "every_cycle.cls", "auto"))
+    if controller not in ("linuxcnc", "generic-iso") or source.stem != "every_cycle"]
+EACH = 14
+"""changes of each program that every run of the tests looks at; the whole of them with -m slow"""
+HARMLESS = {
+    "same": "the same motion, states and times: words that state what holds already, a block twice that goes nowhere",
+    "placed": "only rapids between operations end elsewhere: the read-back has found them clear of the part, inside travel",
+    "near": "everything ends within the tolerance, by which it has been compared",
+    "warned": "a warning says so: axes that end the program away from home, more stops or rests than the CL file has",
+}
+
+
+@cache
+def off_axes(source: Path, controller: str, mode: str) -> tuple[PostResult, Effect]:
+    """A program for a machine whose pivots are beside its origin, and what it does."""
+    path, _ = toolpaths.read(source)
+    result = good(convert(path, "trunnion-bc", controller, setup_of(OFF_AXES), output=mode))
+    assert result.job is not None
+    comparison, _ = read_back(result.text.encode(), result.job, "f.cls")
+    assert comparison is not None
+    return result, Effect.of(result.job, comparison)
+
+
+def judged(source: Path, controller: str, mode: str, count: int | None, start: int = 0) -> list[str]:
+    """Changes that pass although they do harm, of `count` evenly picked ones (None: all)."""
+    result, effect = off_axes(source, controller, mode)
+    assert result.job is not None
+    every = list(mutants(result.text, result.controller.comment.open.strip()))
+    picked = every if count is None else some(every[start % len(every):], count)
+    assert picked
+    verdicts = [(one, verdict(result.job, one.text, effect)) for one in picked]
+    return [f"{one}: {said}" for one, said in verdicts if said.split()[0] not in ("caught", *HARMLESS)]
+
+
+@pytest.mark.parametrize(("source", "controller", "mode"), CHANGED, ids=lambda v: getattr(v, "stem", v))
+def test_no_change_is_silent_and_harmful(source: Path, controller: str, mode: str) -> None:
+    assert judged(source, controller, mode, EACH, SIX.index(controller)) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("source", "controller", "mode"), CHANGED, ids=lambda v: getattr(v, "stem", v))
+def test_none_of_all_changes_is_silent_and_harmful(source: Path, controller: str, mode: str) -> None:
+    assert judged(source, controller, mode, None) == []

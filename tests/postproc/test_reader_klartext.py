@@ -79,9 +79,19 @@ def test_a_helix_of_more_than_a_turn() -> None:
 CYCLE = "CYCL DEF {} ~\n Q200=+2 ;SET-UP ~\n Q201=-5 ;DEPTH ~\n Q203=+1 ;SURFACE ~\n Q204={} ;2ND{}\n"
 
 
+STATES = {"200": (206, 202, 210, 211), "201": (206, 211, 208), "203": (206, 202, 210, 212, 213, 205, 211, 208, 256),
+          "205": (206, 202, 212, 205, 258, 259, 257, 256, 211, 379, 253), "207": (239,), "240": (343, 344, 206, 211)}
+"""parameters that the control asks for besides those of CYCLE (Cycle Programming 34059x)"""
+
+
+def stated(number: str, rest: str) -> str:
+    """The rest of a cycle with all that it must state; what a test does not name is 0."""
+    return rest + "".join(f" ~\n Q{n}=+0" for n in STATES[number] if f"Q{n}=" not in rest)
+
+
 def heights(number: str, rest: str = "", second: str = "+10") -> list[tuple[float, int, float]]:
     holes = "L X+4 R0 FMAX M99\nL X+5 R0 FMAX M99\n"
-    motion = good(TNC, program(START + "L F77\n" + CYCLE.format(number, second, rest) + holes))
+    motion = good(TNC, program(START + "L F77\n" + CYCLE.format(number, second, stated(number, rest)) + holes))
     assert motion.hole.sum() * 1 == len(motion) - 1
     z = [(round(float(e[2]) - 30, 4), int(c), float(f)) for e, c, f in zip(motion.end, motion.code, motion.feed,
                                                                                  strict=True)]
@@ -122,7 +132,8 @@ def test_pecks_get_smaller_by_q212_down_to_q205() -> None:
 
 
 def test_cycl_call_and_cycl_call_pos() -> None:
-    body = START + CYCLE.format("240", "+10", " ~\n Q206=+100") + "CYCL CALL M8\nCYCL CALL POS X+5 Y+6 Z+0 FMAX\n"
+    cycle = CYCLE.format("240", "+10", stated("240", " ~\n Q206=+100"))
+    body = START + cycle + "CYCL CALL M8\nCYCL CALL POS X+5 Y+6 Z+0 FMAX\n"
     motion = good(TNC, program(body))
     assert words(motion)[1:] == [[0, 0, 3], [0, 0, -4], [0, 0, 11], [5, 6, 11], [5, 6, 3], [5, 6, -4], [5, 6, 11]]
     assert motion.flood[1:].all()

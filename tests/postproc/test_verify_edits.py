@@ -88,7 +88,7 @@ def test_a_program_of_our_own_has_nothing_to_be_told(controller: str) -> None:
     ("siemens-840d", ",,1.5,0,400,400", ",,3,0,200,200"),
     ("heidenhain-tnc640", "Q239=+1.5", "Q239=+1.25"), ("heidenhain-tnc640", "Q239=+1.5", "Q239=-1.5"),
     ("heidenhain-tnc640", "Q239=+1.5", "Q239=+1.75"),
-    ("heidenhain-tnc640", "207 RIGID TAPPING ~", "206 TAPPING ~\nQ206=+600 ;FEED ~")])
+    ("heidenhain-tnc640", "207 RIGID TAPPING ~", "206 TAPPING ~\nQ206=+600 ;FEED ~\nQ211=+0 ;DWELL ~")])
 def test_taps_keep_their_pitch_hand_and_kind(controller: str, old: str, new: str) -> None:
     assert "verify.tap" in codes(found(part(controller), old, new))
 
@@ -153,15 +153,7 @@ def test_stops_that_are_added_are_told(controller: str, old: str, new: str) -> N
 @pytest.mark.parametrize("controller", NAMES)
 def test_feeds_cut_to_a_quarter_are_told_once(controller: str) -> None:
     told = [d for d in found(part(controller), "F800", "F200") if d.code == "verify.slow"]
-    assert len(told) == 1 and told[0].severity is Severity.WARNING and told[0].count == 3 and "0.25" in told[0].message
-
-
-def test_planned_feeds_are_not_called_slow() -> None:
-    result = part("linuxcnc")
-    assert "verify.slow" not in [d.code for d in found(result, "(feed mode auto)", "(feed planned, merged within 0 %)\n", 0)]
-    text = result.text.replace("(feed mode auto)", "(feed planned, merged within 0 %)").replace("F800", "F200")
-    assert result.job is not None
-    assert "verify.slow" not in [d.code for d in read_back(text.encode(), result.job, "part.apt")[1]]
+    assert len(told) == 1 and told[0].severity is Severity.ERROR and told[0].count == 3 and "0.25" in told[0].message
 
 
 def test_the_first_line_names_the_cause() -> None:

@@ -18,7 +18,7 @@ def in_inches(text: str, share: float) -> str:
     def word(match: re.Match[str]) -> str:
         value = float(match[2]) / 25.4 * (share if match[1] == "F" else 1.0)
         return f"{match[1]}{value:.7f}"
-    blocks = [b if b.startswith("(") else re.sub(r"([XYZIJKRQFE])([-+]?[0-9.]+)", word, b.replace("G21", "G20"))
+    blocks = [b if b.startswith(("(", "G05.1")) else re.sub(r"([XYZIJKRQFE])([-+]?[0-9.]+)", word, b.replace("G21", "G20"))
               for b in text.split("\n")]
     return "\n".join(re.sub(r"P(0\.\d+)", lambda m: f"P{float(m[1]) / 25.4:.7f}", b) if "G64" in b else b for b in blocks)
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from postproc.controllers.model import ControllerFile
 from postproc.coolant import switched_by
-from postproc.readback.canonical import COOLANT, EXTENDED_OFFSETS, Canonical, Text, added, offset_number, placed
+from postproc.readback.canonical import COOLANT, EXTENDED_OFFSETS, Canonical, LawName, Text, added, offset_number, placed
 from postproc.readback.flow import Structure, expand
 from postproc.readback.magnitude import negative_smoothing, too_large
 from postproc.readback.modal import GROUPS, Groups, check_codes, check_end, codes, drop_passive
@@ -35,6 +35,8 @@ class Reader(ABC):
         sides, smoothing_hint: what the control calls cutter compensation and its own smoothing
         units_codes, units_from: what states mm or inches, and what tells them where nothing does
         units_stay: that is a setting of the control, which no program changes
+        stating: by group, the words that state it; a block that relies on one that nothing states is an error in `verify`
+        leaving: by law, the codes that switch it off; modes_named: what the control calls it
     """
 
     groups: Groups = GROUPS
@@ -47,6 +49,12 @@ class Reader(ABC):
     units_codes = "G20 or G21"
     units_from = "the program before left them"
     units_stay = False
+    stating: ClassVar[dict[str, str]] = {
+        "motion": "G0 or G1", "plane": "G17, G18 or G19", "distance": "G90 or G91", "feed_mode": "G93, G94 or G95",
+        "compensation": "G40", "length": "G49, or G43 with H", "level": "G98 or G99",
+        "offset": "the work offset (G54 ...)"}
+    leaving: ClassVar[dict[LawName, tuple[str, ...]]] = {}
+    modes_named: ClassVar[dict[LawName, str]] = {"tcp": "the tool-centre-point mode", "tilted": "the tilted plane"}
 
     def __init__(self, axes: tuple[str, ...], controller: ControllerFile | None = None, home: Floats | None = None) -> None:
         self.axes, self.controller, self.home = axes, controller, home

@@ -15,8 +15,18 @@ from typing import ClassVar
 
 import numpy as np
 
-from postproc.readback.canonical import LAW, OFFSET, REGISTER, SMOOTH, Canonical, Law, Text, offset_number
-from postproc.readback.dialects.base import M_CODES
+from postproc.readback.canonical import (
+    LAW,
+    OFFSET,
+    REGISTER,
+    SMOOTH,
+    Canonical,
+    Law,
+    LawName,
+    Text,
+    offset_number,
+)
+from postproc.readback.dialects.base import M_CODES, Reader
 from postproc.readback.dialects.iso import IsoReader, New, motion_of
 from postproc.readback.flow import Call, Structure
 from postproc.readback.modal import CYCLES, GROUPS, Groups, codes, number_of
@@ -38,6 +48,8 @@ class FanucReader(IsoReader):
     m_codes = (*M_CODES, 29.0, 98.0, 99.0)
     letters = "GMFSTHDNIJKRPQLO"
     rises_first = False
+    stating = Reader.stating
+    leaving: ClassVar[dict[LawName, tuple[str, ...]]] = {"tilted": ("G69",)}
     laws: ClassVar[tuple[float, ...]] = _LAWS
     tcp_code = 43.4
     extended_offset = 54.1
@@ -158,11 +170,17 @@ class FanucReader(IsoReader):
         for b in codes(words, "G", (self.extended_offset,))[0].tolist():
             new.append((b, OFFSET, offset_number(f"G54.1 P{block(words, b).get('P', 0.0):g}")))
         for b in codes(words, "G", (5.1,))[0].tolist():
-            take(words, drop, b, "Q")
+            self.contour_control(take(words, drop, b, "QR"), int(line[b]), file, found)
         self.modes(words, new, drop, line, file, found)
         self.reference(words, new, drop, line, file, found)
         self.machine_moves(words, line, file, found)
         self.taps(words, line, file, found)
+
+    def contour_control(self, stated: dict[str, float], line: int, file: str, found: list[Diagnostic]) -> None:
+        """G5.1 Q1, with R1 to R10 where the control has that, or Q0."""
+        if stated.get("Q") not in (0.0, 1.0) or stated.get("R", 1.0) not in range(1, 11):
+            said = " ".join(f"{a}{v:g}" for a, v in stated.items()) or "nothing"
+            found.append(error("gcode.smoothing", f"G05.1 with {said}", file=file, lines=[line], hint="G05.1 Q1, or Q0"))
 
     def taps(self, words: Words, line: Ints, file: str, found: list[Diagnostic]) -> None:
         """G74 and G84 tap rigidly only behind M29 (B-63944EN-2, rigid tapping), which ends with the next code of motion."""

@@ -9,7 +9,9 @@ and metric: setting 9; G20 and G21 only ask for it.
 
 from __future__ import annotations
 
-from postproc.readback.canonical import SMOOTH, Text
+from typing import ClassVar
+
+from postproc.readback.canonical import SMOOTH, LawName, Text
 from postproc.readback.dialects.base import M_CODES
 from postproc.readback.dialects.fanuc import MILLISECONDS, FanucReader, block, take
 from postproc.readback.dialects.iso import New
@@ -29,6 +31,7 @@ class HaasReader(FanucReader):
     m_codes = (*M_CODES, 97.0, 98.0, 99.0)
     letters = "GMFSTHDNIJKRPQLOE"
     laws = (43.0, 49.0, 234.0, 254.0, 255.0)
+    leaving: ClassVar[dict[LawName, tuple[str, ...]]] = {"tilted": ("G255",)}
     tcp_code = 234.0
     extended_offset = 154.0
     arc_slack = 0.01
@@ -75,7 +78,7 @@ class HaasReader(FanucReader):
         """G187 P E: corners rounded by E mm; without words, or without E, as a setting of the control has it."""
         for b in codes(words, "G", (187,))[0].tolist():
             stated = block(words, b)
-            new.append((b, SMOOTH, stated.get("E", float("inf"))))
+            new.append((b, SMOOTH, stated.get("E", 0.0) or float("inf")))
         for b in codes(words, "G", (61,))[0].tolist():
             new.append((b, SMOOTH, 0.0))
 

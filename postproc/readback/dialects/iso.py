@@ -31,6 +31,7 @@ class IsoReader(Reader):
     """Letters and numbers; rests in seconds (P), registers by H."""
 
     rises_first = True
+    stating = Reader.stating | {"arc_distance": "G91.1 or G90.1"}
     units_from = "the program before left them, or as its start-up code and the INI file have them"
     millimetres = 25.4
     """mm of smoothing per unit under G20"""
@@ -94,14 +95,14 @@ class IsoReader(Reader):
         return float(words.value[low + here[0]]) if len(here) else None
 
     def paths(self, words: Words, new: New) -> None:
-        """G61 none; G64 P blends within P and merges short lines within Q (P where it is not stated)."""
+        """G61 none; G64 P blends within P and merges short lines within Q (P where it is not stated); P0 is no limit."""
         blocks, code = codes(words, "G", (61, 61.1, 64))
         units = fill(*codes(words, "G", (20, 21)), words.lines, 21.0)
         for b, c in zip(blocks.tolist(), code.tolist(), strict=True):
             low, high = np.searchsorted(words.line, [b, b + 1])
             stated = {chr(a): float(v) for a, v in zip(words.letter[low:high], words.value[low:high], strict=True)}
             value = 0.0 if c != 64 else float("inf")
-            if c == 64 and "P" in stated:
+            if c == 64 and stated.get("P", 0.0) > 0.0 and stated.get("Q", 0.0) >= 0.0:
                 value = stated["P"] + stated.get("Q", stated["P"])
             new.append((b, SMOOTH, value * (self.millimetres if units[b] == 20 else 1.0)))
 

@@ -14,7 +14,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from postproc.readback.canonical import STATEMENT, Canonical, Statement, Text, added
+from postproc.readback.canonical import STATEMENT, Canonical, LawName, Statement, Text, added
 from postproc.readback.dialects.base import M_CODES, Reader
 from postproc.readback.dialects.iso import New
 from postproc.readback.dialects.klartext_run import Run
@@ -53,6 +53,9 @@ class KlartextReader(Reader):
     arc_slack = 0.016
     """mm, the TNC's own (circle end points)"""
 
+    stating: ClassVar[dict[str, str]] = {
+        "compensation": "R0", "offset": "the preset (CYCL DEF 247)", "length": "a tool (TOOL CALL)"}
+    leaving: ClassVar[dict[LawName, tuple[str, ...]]] = {"tcp": ("FUNCTION RESET TCPM", "M129"), "tilted": ("PLANE RESET",)}
     units_codes = "BEGIN PGM ... MM"
     units_from = "nobody knows: the control takes no program without"
 
@@ -185,6 +188,8 @@ def _named(body: str) -> Statement | None:
     if match := re.fullmatch(rf"TOOL CALL(?: (\d+))?(?: ([XYZ]))?((?: (?:S|F|DL|DR|DR2) ?=? ?{_NUMBER})*)", body):
         return Statement("TOOL CALL", (float(match[1]) if match[1] else None, match[2]), _keyed(match[3]))
     if match := re.fullmatch(r"CYCL DEF (\d+)(?:\.(\d+))?\b(.*)", body):
+        if match[2] is None and not re.fullmatch(rf"[^=]*?(?:\s*Q\d+\s*=\s*{_NUMBER}\s*)*", match[3]):
+            return None
         values = keys if match[2] is None else _keyed(match[3])
         return Statement("CYCL DEF", (float(match[1]), float(match[2]) if match[2] else None, match[3].strip()), values)
     if match := re.fullmatch(r"CYCL CALL(?: POS)?(.*)", body):

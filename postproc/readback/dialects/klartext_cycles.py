@@ -16,6 +16,14 @@ RAPID = 99999.0
 """mm/min and more: FMAX"""
 APPROACH = 0.2
 """mm before the last depth to which cycles 200 and 203 come back rapidly"""
+NEEDED = {number: tuple(f"Q{n}" for n in names) for number, names in {
+    200: (200, 201, 206, 202, 210, 203, 204, 211), 201: (200, 201, 206, 211, 208, 203, 204),
+    203: (200, 201, 206, 202, 210, 203, 204, 212, 213, 205, 211, 208, 256),
+    205: (200, 201, 206, 202, 203, 204, 212, 205, 258, 259, 257, 256, 211, 379, 253),
+    206: (200, 201, 206, 211, 203, 204), 207: (200, 201, 239, 203, 204),
+    240: (200, 343, 201, 344, 206, 211, 203, 204)}.items()}
+"""parameters that a cycle must state (Cycle Programming 34059x); those that later software added (Q395, Q208 of cycle 205)
+have their old meaning where they are not stated"""
 Q = dict[str, float]
 Made = tuple[Drill | None, str]
 
@@ -25,9 +33,9 @@ def drill_of(number: int, q: Q, speed: float) -> Made:
     kinds = {200: _drill, 201: _ream, 203: _universal, 205: _deep, 240: _centre}
     if number not in (*kinds, 206, 207):
         return None, "is not executed by this reader"
-    missing = [k for k in ("Q200", "Q201", "Q203") if k not in q]
+    missing = [k for k in NEEDED[number] if k not in q]
     if missing:
-        return None, f"lacks {missing[0]}"
+        return None, f"lacks {missing[0]}: the control asks for it"
     if q.get("Q395", 0.0) != 0.0 or q["Q201"] >= 0.0:
         return None, "with Q395, or with a depth that is not negative, is not executed by this reader"
     return _tap(q, speed, number == 207) if number in (206, 207) else kinds[number](q, speed)

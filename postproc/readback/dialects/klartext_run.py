@@ -27,7 +27,7 @@ from postproc.readback.canonical import (
 from postproc.readback.dialects.iso import New
 from postproc.readback.dialects.klartext_cycles import drill_of
 from postproc.readback.dialects.track import Track
-from postproc.readback.modal import codes, number_of
+from postproc.readback.modal import GROUPS, codes, fill, number_of
 from postproc.readback.turns import turned
 from toolpaths.arrays import Ints
 from toolpaths.diagnostics import Diagnostic, error
@@ -35,6 +35,8 @@ from toolpaths.diagnostics import Diagnostic, error
 PLANES = {frozenset("XY"): 17.0, frozenset("XZ"): 18.0, frozenset("YZ"): 19.0}
 """codes of the planes of circles by their axes; DR+ turns as G3 does there"""
 _TCPM = {"F", "TCP", "AXIS", "POS", "PATHCTRL", "REFPNT", "TIP-TIP"}
+_UNCOMPENSATED = {"PLANE SPATIAL", "PLANE RESET", "FUNCTION TCPM", "FUNCTION RESET TCPM", "M128", "M129"}
+"""before these radius compensation is cancelled (iTNC 530 manual; TOOL CALL, cycles 19 and 32 too)"""
 _PLANE = {"TURN", "MOVE", "STAY", "FMAX", "F", "MAX", "TABLE", "COORD", "ROT", "SYM+", "SYM-", "SEQ+", "SEQ-"}
 
 
@@ -51,6 +53,9 @@ class Run:
         self.track = Track(text.words)
         self.state, self.cycle = "axes", -1
         self.speed = np.array(number_of(text.words, "S"))
+        self.side = fill(*codes(text.words, "G", GROUPS["compensation"]), text.words.lines, 40.0)
+        self.part = math.nan, math.nan
+        self.waiting: tuple[int, float] | None = None
 
     def fault(self, code: str, b: int, message: str, hint: str) -> None:
         """An ERROR at a block."""
@@ -63,7 +68,9 @@ class Run:
         events = [(int(b), 0, self.text.statements[int(k)]) for b, k in zip(where, index, strict=True)]
         events += [(int(b), 1, Statement(f"M{int(m)}")) for b, m in zip(*codes(words, "M", (91, 99, 128, 129)), strict=True)]
         for b, _, s in sorted(events, key=lambda e: e[:2]):
+            self.in_order(b, s)
             self.one(b, s)
+        self.in_order(words.lines, Statement(""))
         both = {13.0: (3.0, 8.0), 14.0: (4.0, 8.0)}
         for b, m in zip(*codes(words, "M", (13, 14)), strict=True):
             self.new += [(int(b), "M", v) for v in both[float(m)]]
@@ -89,6 +96,28 @@ class Run:
             self.reset(b, s)
         elif s.name == "STOP":
             self.new.append((b, "M", 0.0))
+
+    def in_order(self, b: int, s: Statement) -> None:
+        """Parts of cycles 9 and 32 stand one behind the other, and none of these while radius compensation is on."""
+        number, part = (s.number(0), s.number(1)) if s.name == "CYCL DEF" else (math.nan, math.nan)
+        if self.waiting is not None and ((number, part) != (self.waiting[1], 1.0) or self.between(self.waiting[0], b)):
+            self.fault("gcode.cycle", self.waiting[0], f"CYCL DEF {self.waiting[1]:g}.0 without its part "
+                       f"{self.waiting[1]:g}.1", f"CYCL DEF {self.waiting[1]:g}.1 in the next block")
+        before, self.waiting = self.waiting, (b, number) if part == 0.0 else None
+        last = self.part
+        self.part = (number, part) if part == part else (math.nan, math.nan)
+        if part > 0.0 and (before is None if part == 1.0 else last != (number, part - 1.0)):
+            self.fault("gcode.cycle", b, f"CYCL DEF {number:g}.{part:g} without CYCL DEF {number:g}.{part - 1.0:g} before "
+                       "it", f"CYCL DEF {number:g}.0 and its parts in order")
+        shifts = s.name in _UNCOMPENSATED or (s.name == "TOOL CALL") or number == 32.0
+        if shifts and self.side[b] != 40.0:
+            name = f"CYCL DEF {number:g}" if number == 32.0 else s.name
+            self.fault("gcode.compensation", b, f"{name} while radius compensation is on", "R0 before it")
+
+    def between(self, first: int, last: int) -> bool:
+        """True where words stand between two blocks."""
+        low, high = np.searchsorted(self.words.line, [first + 1, last])
+        return bool(high > low)
 
     # ---- contours -----------------------------------------------------------------------------------------------
 
@@ -215,6 +244,8 @@ class Run:
         """CYCL DEF: what holds from here on, or a cycle to be called."""
         number, part = s.number(0), s.number(1)
         if number == 247.0:
+            if "Q339" not in s.keys:
+                self.fault("gcode.cycle", b, "CYCL DEF 247 lacks Q339", "Q339=+1 ;DATUM NUMBER")
             self.new.append((b, OFFSET, s.keys.get("Q339", math.nan)))
             self.track.lost(b, "XYZ")
         elif number == 9.0:
@@ -223,7 +254,7 @@ class Run:
             if part == 1.0 and not seconds:
                 self.fault("gcode.dwell", b, "CYCL DEF 9.1 lacks its time", "CYCL DEF 9.1 DWELL 0.5 (seconds)")
         elif number == 32.0:
-            self.new += [(b, SMOOTH, s.keys.get("T", math.inf))] if part == 1.0 else []
+            self.new += [(b, SMOOTH, s.keys.get("T", 0.0) or math.inf)] if part == 1.0 else []
         else:
             drill, why = drill_of(int(number), s.keys, float(self.speed[b]))
             if drill is None:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from pathlib import PurePath
+from typing import ClassVar
 
 import numpy as np
 
@@ -23,6 +24,7 @@ from postproc.readback.canonical import (
     STATEMENT,
     TURNS,
     Canonical,
+    LawName,
     Statement,
     Text,
     added,
@@ -64,6 +66,8 @@ class SiemensReader(Reader):
         "path": (9, 60, 64), "once": (4,), "exact_stop": (601, 602, 603), "length": (), "level": (), "arc_distance": ()}
     m_codes = (*M_CODES, 17.0)
     letters = "GMFSTDNIJKRLP?~"
+    stating = {k: v for k, v in Reader.stating.items() if k != "level"} | {"length": "D, or a tool"}
+    leaving: ClassVar[dict[LawName, tuple[str, ...]]] = {"tcp": ("TRAFOOF",), "tilted": ("CYCLE800",)}
     units_codes = "G70, G71, G700 or G710"
     units_from = "machine data 20150 and 20152 have the reset position of group 13"
     smoothing_hint = "CYCLE832 as the post writes it, or G60"
@@ -167,8 +171,9 @@ class SiemensReader(Reader):
                 new.append((b, LOADED, loaded))
                 if loaded < 0.0:
                     run.fault("gcode.tool", b, "M6 without a tool number", "")
-            if d > 1.0:
-                run.fault("gcode.tool", b, f"D{d:g}: the length of a second cutting edge is not known", "D1 or D0")
+            if d not in (0.0, 1.0):
+                run.fault("gcode.tool", b, f"D{d:g}: the length of another cutting edge than the first is not known",
+                          "D1 or D0")
             run.length.append((b, -1.0 if kind and d == 0.0 else loaded))
             new.append((b, REGISTER, run.length[-1][1]))
 

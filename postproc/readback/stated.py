@@ -1,0 +1,90 @@
+"""What a block relies on must be stated before it: power-on states are parameters, the program before may have left others.
+
+Whatever `[start] codes` of the controller file names counts as stated.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from postproc.readback.canonical import INCREMENTAL, LAW, OFFSET, REGISTER, Canonical
+from postproc.readback.modal import CYCLES, GROUPS, codes, fill
+from postproc.readback.words import Words
+from toolpaths.arrays import Ints
+from toolpaths.diagnostics import Diagnostic, error
+
+if TYPE_CHECKING:
+    from postproc.readback.dialects.base import Reader
+
+_ARCS = (2, 3)
+Need = tuple[str, Ints, Ints]
+"""what must be stated: its name, the blocks that rely on it, the blocks that state it"""
+
+
+def check_stated(code: Canonical, reader: Reader, file: str) -> list[Diagnostic]:
+    """Blocks that rely on a state that nothing before them, and not they themselves, has stated."""
+    result = []
+    for what, relying, stating in _needs(code, reader):
+        first = int(stating.min(initial=code.words.lines + 1))
+        bad = np.unique(relying[relying < first])
+        if len(bad):
+            words = reader.stating[what]
+            result.append(error("gcode.unstated", f"nothing states {words} before this block, which depends on it: the "
+                                "state is what the program before, or a parameter of the control, has left", file=file,
+                                lines=code.line[bad][:6].tolist(), count=len(bad),
+                                hint=f"state {words} at the start of the program; where the control itself puts it in force "
+                                "before every program, name the code in [start] codes of the controller file"))
+    return result + _undone(code, reader, file)
+
+
+def _needs(code: Canonical, reader: Reader) -> Iterator[Need]:
+    """What the dialect has no fixed state for, without what the controller file says of its start."""
+    words, known = code.words, _known(reader)
+    moves, machine = _moves(words, reader.axes), codes(words, "G", (53,))[0]
+    work, motion = moves[~np.isin(moves, machine)], fill(*codes(words, "G", GROUPS["motion"]), words.lines, -1.0)
+    feeds, cycles = moves[motion[moves] != 0], moves[np.isin(motion[moves], CYCLES)]
+    arcs = moves[np.isin(motion[moves], _ARCS)]
+    heights = np.intersect1d(work, _moves(words, ("Z",)))
+    relying = {"motion": moves, "distance": moves, "compensation": moves, "plane": work, "feed_mode": feeds, "level": cycles,
+               "arc_distance": arcs, "offset": work, "length": heights}
+    for what in reader.stating:
+        if what in known or what not in relying:
+            continue
+        stating = words.pick(OFFSET)[0] if what == "offset" else words.pick(REGISTER)[0] if what == "length" else \
+            codes(words, "G", GROUPS[what])[0]
+        yield what, relying[what], stating
+
+
+def _known(reader: Reader) -> set[str]:
+    """The groups whose state the controller file tells."""
+    said = reader.controller.start.codes if reader.controller is not None else ()
+    numbers = [float(m[1]) for text in said if (m := re.fullmatch(r"G(\d+\.?\d*)", text))]
+    return {name for name, group in reader.groups.items() if np.isin(numbers, group).any()}
+
+
+def _moves(words: Words, axes: tuple[str, ...]) -> Ints:
+    """Blocks with words of axes, absolute or relative."""
+    letters = [ord(a) + d for a in axes for d in (0, INCREMENTAL)]
+    return np.unique(words.line[np.isin(words.letter, letters)])
+
+
+def _undone(code: Canonical, reader: Reader, file: str) -> list[Diagnostic]:
+    """Modes that the program uses, and that may still be on from the program before where it begins to move."""
+    blocks, index = code.words.pick(LAW)
+    moves = _moves(code.words, reader.axes)
+    if not len(moves) or not len(blocks):
+        return []
+    laws, result = [code.laws[int(k)] for k in index], []
+    for name, leaving in reader.leaving.items():
+        entered = any(law.name == name for law in laws)
+        off = [int(b) for b, law in zip(blocks, laws, strict=True) if law.name == "axes" and law.code in leaving]
+        if entered and min(off, default=code.words.lines + 1) > int(moves[0]):
+            mode = reader.modes_named[name]
+            result.append(error("gcode.unstated", f"nothing switches {mode} off before the first motion: it may be on from "
+                                "the program before", file=file, lines=[int(code.line[moves[0]])],
+                                hint=f"state {leaving[0]} at the start of the program"))
+    return result

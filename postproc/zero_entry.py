@@ -1,0 +1,120 @@
+"""Tool-centre-point mode switched on with the rotary tables at zero, where makers' manuals leave open what its frame is.
+
+FANUC A-79348E p. 19 (and B-63783EN-1 p. 1116; Mitsubishi M700V p. 477): the programming frame is fixed to the table at
+switch-on, and "the angle of the table's rotary axis represents the initial state of the programming coordinate system". Read
+one way the frame is that of the part, turned with the table by its scale; read the other way it is the work offset's frame,
+unturned, at the angle at which the table stands. With the tables at zero both are one: so the mode is entered there, at the
+height of home, and the tables turn in it, the slides standing as nearly as straight paths of the tip let them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from machines.kinematics.base import Kinematics
+from machines.machine import Machine
+from postproc.control import Control
+from postproc.links import Link, SafeSpace, stays_clear
+from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.diagnostics import Diagnostic, info
+from toolpaths.units import DEG
+
+_CHORD = 10.0 * DEG
+"""turn of one block: the slides then leave their place by less than half a percent of the distance to the rotary axis"""
+_BELOW = 1.0
+"""mm below the end of travel, for what rounded words of the tip make of the slides"""
+_ZERO = 1e-9
+"""rad"""
+_PLACES = np.linspace(0.0, 1.0, 9)
+
+
+@dataclass(frozen=True)
+class ZeroEntry:
+    """Joints (K, J) of the blocks up to the mode, with the axes that they state, and (L, J) of those in the mode; `seconds`
+    that the whole takes longer than indexing the tables before it."""
+
+    before: Floats
+    state: Bools
+    inside: Floats
+    clear: bool
+    seconds: float
+
+
+def table_axes(control: Control) -> Ints:
+    """Joint numbers of the rotary axes that carry the part: those that turn the slides as the table sees them."""
+    kin = control.machine.kinematics
+    if not control.has_tip_modes:
+        return np.zeros(0, dtype=np.int64)
+    q = np.zeros((2, kin.joints))
+    found = []
+    for j in control.rotary.tolist():
+        q[1] = 0.0
+        q[1, j] = 0.7
+        slides = kin.jacobian(q)[:, :3][:, :, control.xyz]
+        if not np.allclose(slides[0], slides[1], atol=1e-9):
+            found.append(j)
+    return np.array(found, dtype=np.int64)
+
+
+def needed(control: Control, link: Link) -> bool:
+    """True where the tables would not stand at zero where a link leads into the mode."""
+    tables = table_axes(control)
+    return bool(len(link.index) and (np.abs(link.index[-1][tables]) > _ZERO).any())
+
+
+def zero_entry(base: Control, tcp: Control, kin: Kinematics, space: SafeSpace, link: Link) -> ZeroEntry:
+    """The index blocks of a link by home (rotary axes, slides, retract axis) through the tables' zero.
+
+    The retract axis stays as high as its travel lets the straight paths of the tip be.
+    """
+    machine, tables = base.machine, table_axes(base)
+    turned, moved, up = link.index
+    zero = np.stack([turned, moved, moved])
+    zero[:, tables] = 0.0
+    turn = moved - zero[1]
+    count = max(int(np.ceil(np.abs(turn[tables]).max() / _CHORD - 1e-9)), 1)
+    steps = zero[1] + np.arange(1, count + 1)[:, None] / count * turn
+    sign = 1.0 if machine.limits.upper[machine.retract_axis] - moved[machine.retract_axis] < \
+        moved[machine.retract_axis] - machine.limits.lower[machine.retract_axis] else -1.0
+    for _ in range(3):
+        over = _beyond(tcp, kin, np.concatenate([zero[-1:], steps]), machine, machine.retract_axis, sign)
+        if over <= 0.0:
+            break
+        zero[-1, machine.retract_axis] -= sign * over
+        steps[:, machine.retract_axis] -= sign * over
+    inside = np.concatenate([steps, up[None]])
+    way = np.concatenate([zero[-1:], inside])
+    clear = stays_clear(base, kin, space, np.concatenate([link.home[-1:], zero]), 0.0) and stays_clear(
+        tcp, kin, space, way, 0.0)
+    longer = _seconds(machine, np.concatenate([link.home[-1:], zero, moved[None], up[None]])) - _seconds(
+        machine, np.concatenate([link.home[-1:], link.index]))
+    return ZeroEntry(zero, link.index_state, inside, clear, max(longer, 0.0))
+
+
+def _beyond(tcp: Control, kin: Kinematics, q: Floats, machine: Machine, axis: int, sign: float) -> float:
+    """mm by which an axis would come nearer to the end of its travel than `_BELOW` between joints q (K, J)."""
+    limit = machine.limits.upper[axis] if sign > 0.0 else machine.limits.lower[axis]
+    worst = max(float((sign * (at[:, axis] - limit)).max()) for at in tcp.bent(q[:-1], q[1:], _PLACES, kin))
+    return worst + _BELOW
+
+
+def _seconds(machine: Machine, q: Floats) -> float:
+    """s of rapids from rest to rest through joints (K, J), by the velocities and accelerations of the axes."""
+    way = np.abs(np.diff(q, axis=0))
+    v, a = machine.limits.velocity, machine.limits.acceleration
+    with np.errstate(divide="ignore", invalid="ignore"):
+        each = np.where(way >= v**2 / a, way / v + v / a, 2.0 * np.sqrt(way / a))
+    return float(np.nan_to_num(each).max(axis=1, initial=0.0).sum())
+
+
+def cost(code: str, seconds: list[float], file: str) -> list[Diagnostic]:
+    """What entering at zero costs, once for a program."""
+    if not seconds:
+        return []
+    many = f"{len(seconds)} times" if len(seconds) > 1 else "once"
+    return [info("output.tables_at_zero", f"{code} is switched on {many} with the rotary tables at zero, so that both "
+                 f"readings of its frame mean the same: {sum(seconds):.1f} s longer than with the tables turned", file=file,
+                 hint='frame = "table" in [modes.tcp] of the controller file, where the control is known to turn the frame '
+                 "with the table's scale")]
