@@ -13,7 +13,7 @@ from tests.linuxcnc import interpreter, simulator
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Whatever asks for LinuxCNC can be chosen with `-m linuxcnc`."""
     for item in items:
-        if {"interpret", "simulate", "standstill"} & set(getattr(item, "fixturenames", ())):
+        if {"interpret", "simulate", "recorded", "standstill"} & set(getattr(item, "fixturenames", ())):
             item.add_marker(pytest.mark.linuxcnc)
 
 
@@ -38,6 +38,12 @@ def interpret() -> Callable[..., interpreter.Canonical]:
 def simulate() -> Callable[..., simulator.Run]:
     """`simulator.simulate`, or a skipped test."""
     return _or_skip(simulator.simulate, "simulator")
+
+
+@pytest.fixture(scope="session")
+def recorded() -> Callable[..., simulator.Run]:
+    """`simulator.recorded`, or a skipped test."""
+    return _or_skip(simulator.recorded, "simulator")
 
 
 @pytest.fixture(scope="session")
