@@ -38,7 +38,7 @@ class Session:
                     "NMLFILE": str(folder / "sim.nml"), "RTAPI_FIFO_PATH": str(folder / "fifo"),
                     "HAL_RTMOD_DIR": self.job["modules"], "LINUXCNC_FORCE_REALTIME": "0"}
         self.env.pop("DISPLAY", None)
-        self.warped = {**self.env, "LD_PRELOAD": str(folder / "clock.so"), "WARP": str(self.job["warp"])}
+        self.warped = {**self.env, "LD_PRELOAD": str(folder / "clock.so"), "WARP": self.job["warp"]}
         self.log = (folder / "log").open("w")
 
     def __enter__(self) -> Session:

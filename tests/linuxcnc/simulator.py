@@ -11,6 +11,7 @@ import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from functools import cache
 from pathlib import Path
 
@@ -94,7 +95,7 @@ def missing() -> str:
 
 
 def simulate(machine: Machine, program: str | Path, tools: Mapping[int, ToolEntry | tuple[float, float]] | None = None,
-             warp: int = 10, time_limit: float = 300.0) -> Run:
+             warp: int | Fraction = 10, time_limit: float = 300.0) -> Run:
     """Run a G-code file on LinuxCNC configured as `machine`, from its home; M0 and M1 go on by themselves.
 
     The machine's own kinematics module runs where `control_kinematics` names one, else joints are the program's axes.
@@ -103,7 +104,7 @@ def simulate(machine: Machine, program: str | Path, tools: Mapping[int, ToolEntr
         machine: travel, velocity, acceleration and home come from it. LinuxCNC knows no jerk.
         program: the file.
         tools: tool table, number to (length offset z, diameter) in mm.
-        warp: how much faster than real time; 1000 blocks per s of machine time need 4 or less.
+        warp: how much faster than real time, slower below 1; 1000 blocks per s of machine time need 4 or less.
         time_limit: s of the host.
 
     Raises:
@@ -129,7 +130,7 @@ def recorded(machine: Machine, program: str | Path, tools: Mapping[int, ToolEntr
     """
     runs: list[Run] = []
     for attempt in range(RECORDINGS):
-        runs.append(simulate(machine, program, tools, max(warp >> attempt, 1)))
+        runs.append(simulate(machine, program, tools, Fraction(warp, 2**attempt)))
         if runs[-1].errors or not runs[-1].doubtful:
             return runs[-1]
         runs.sort(key=lambda run: run.seconds)
@@ -253,7 +254,7 @@ def _shared_objects() -> set[tuple[str, int, int]]:
             for key, number, *_ in map(str.split, Path(f"/proc/sysvipc/{kind}").read_text().splitlines()[1:])}
 
 
-def _result(folder: Path, machine: Machine, warp: int) -> Run:
+def _result(folder: Path, machine: Machine, warp: int | Fraction) -> Run:
     result, axes = json.loads((folder / "result.json").read_text()), config.letters(machine)
     joints = len(machine.axis_names)
     rows = np.fromfile(folder / "samples.f64").reshape(-1, 1 + joints + len(axes) + 2)
@@ -264,4 +265,4 @@ def _result(folder: Path, machine: Machine, warp: int) -> Run:
     late, early = rows[DELAY:], rows[:len(rows) - DELAY] if len(rows) > DELAY else rows[:0]
     return Run(t=(late[:, 0] - late[:1, 0]) * config.PERIOD, joints=late[:, 1:1 + joints],
                pose=early[:, 1 + joints:1 + joints + len(axes)], line=early[:, -2].astype(np.int64), axes=axes,
-               errors=tuple(result["errors"]), starved=result["starved"], waited=result["waited"] * warp)
+               errors=tuple(result["errors"]), starved=result["starved"], waited=result["waited"] * float(warp))

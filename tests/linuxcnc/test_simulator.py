@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -72,7 +73,7 @@ def test_straight_move_takes_length_over_feed_and_one_ramp(recorded, tmp_path: P
 
 def test_warp_does_not_change_the_machine_time(recorded, tmp_path: Path) -> None:
     program = write(tmp_path, "G21 G90 G94 G61\nF6000\nG1 X50\nG1 Y30\nM2\n")
-    times = [recorded(machines.load("mill-3axis"), program, warp=warp).seconds for warp in (1, 20)]
+    times = [recorded(machines.load("mill-3axis"), program, warp=warp).seconds for warp in (Fraction(3, 4), 20)]
     assert times[0] == pytest.approx(times[1], abs=0.005)
 
 
@@ -112,13 +113,13 @@ def recording(seconds: float, waited: float, still: float = 0.0) -> Run:
 def test_starved_recordings_are_made_again(monkeypatch: pytest.MonkeyPatch, taken: list[tuple[float, float, float]],
                                            seconds: float, made: int) -> None:
     """Until one is beyond doubt or the two shortest agree, each at half the warp of the one before; the shortest counts."""
-    warps: list[int] = []
+    warps: list[Fraction] = []
 
-    def simulated(machine: Machine, program: Path, tools: None, warp: int) -> Run:
+    def simulated(machine: Machine, program: Path, tools: None, warp: Fraction) -> Run:
         warps.append(warp)
         return recording(*taken[len(warps) - 1])
 
     monkeypatch.setattr(simulator, "simulate", simulated)
     found = simulator.recorded(machines.load("mill-3axis"), Path("program.ngc"), warp=20)
     assert found.seconds == pytest.approx(seconds, abs=0.002)
-    assert warps == [20, 10, 5, 2, 1, 1][:made]
+    assert warps == [Fraction(20, 2**k) for k in range(made)]
