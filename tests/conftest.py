@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-import os
-import sys
 from collections.abc import Callable
 from functools import cache
 
 import pytest
 
+from tests import environment
 from tests.linuxcnc import interpreter, simulator
 
-
-def pytest_configure() -> None:
-    """Where bytecode is not kept, every worker and every command that a test starts compiles the whole project again."""
-    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
-    sys.dont_write_bytecode = False
+__all__ = ["environment"]
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
