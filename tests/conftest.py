@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Callable
 from functools import cache
 
@@ -18,6 +19,12 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if {"interpret", "simulate", "recorded", "standstill"} & set(getattr(item, "fixturenames", ())):
             item.add_marker(pytest.mark.linuxcnc)
+
+
+def pytest_collection_finish() -> None:
+    """What stays until the end is not looked through by each collection of garbage."""
+    gc.collect()
+    gc.freeze()
 
 
 @cache

@@ -51,6 +51,7 @@ def toppra_time(path: SplinePath, sigma: Floats, unit: float = 10.0) -> float:
     return least_time(sigma / unit, speed**2)
 
 
+@pytest.mark.numeric
 @pytest.mark.parametrize("path", [bezier(1), bezier(2), bezier(3), zigzag(100.0), random_path(1)])
 def test_compiled_equals_numpy_and_toppra(path: SplinePath) -> None:
     sigma = np.linspace(path.start, path.end, 301)
