@@ -10,13 +10,16 @@ import pytest
 
 from tests import environment
 from tests.linuxcnc import interpreter, simulator
+from tests.tiers import QUICK
 
 __all__ = ["environment"]
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Whatever asks for LinuxCNC can be chosen with `-m linuxcnc`."""
+    """Whatever asks for LinuxCNC can be chosen with `-m linuxcnc`, the files of the quick tier with `-m quick`."""
     for item in items:
+        if item.nodeid.split("::")[0] in QUICK:
+            item.add_marker(pytest.mark.quick)
         if {"interpret", "simulate", "recorded", "standstill"} & set(getattr(item, "fixturenames", ())):
             item.add_marker(pytest.mark.linuxcnc)
 
