@@ -70,8 +70,8 @@ def test_an_axis_led_past_a_singular_direction_is_no_error_left() -> None:
 
 
 def test_the_figures_stand_in_the_json_and_in_the_text(tmp_path: Path) -> None:
-    common = ["convert", "samples/h4a_indexed.cls", "-m", "h4a-c-table", "-c", "linuxcnc", "--setup",
-              "samples/h4a.setup.toml", "--error-model", "samples/errors/h4a-c-table.toml", "-o", str(tmp_path / "a.ngc")]
+    common = ["convert", "samples/pocket.cls", "-m", "uranesx", "-c", "linuxcnc", "--setup",
+              "samples/delta.setup.toml", "--error-model", "samples/errors/uranesx.toml", "-o", str(tmp_path / "a.ngc")]
     run = CliRunner().invoke(app, [*common, "--json", str(tmp_path / "a.json")])
     figures = json.loads((tmp_path / "a.json").read_text())["geometric_errors"]
     assert figures["tip_before_mm"] > 0.02 > 100.0 * figures["tip_after_mm"] > 0.0
