@@ -45,8 +45,11 @@ def second_order(sigma: Floats, dq: Floats, d2q: Floats, acceleration: Floats, c
     bound[np.isinf(bound)] = 1e300
     if kernel is None:
         kernel = wanted(len(sigma), KERNEL_FROM)
-    rows = (np.ascontiguousarray(order / acceleration) for order in (dq, d2q))
-    (compiled(sweep) if kernel else _sweep)(np.diff(sigma), *rows, bound, FLAT)
+    first, second = (np.ascontiguousarray(order / acceleration) for order in (dq, d2q))
+    if kernel:
+        compiled(sweep)(np.diff(sigma), first, second, bound, FLAT)
+    else:
+        _sweep(np.diff(sigma), first, second, bound, FLAT)
     return bound
 
 

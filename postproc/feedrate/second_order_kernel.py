@@ -53,8 +53,9 @@ def sweep(h: Any, dq: Any, d2q: Any, x: Any, flat: Any) -> None:
                         high, highest = (1.0 - used) * over[j], j
             if high >= low or not backward:
                 break
-            falls = (-a[highest] * over[highest] if highest >= 0 else 0.0) - (-a[lowest] * over[lowest] if lowest >= 0 else 0.0)
-            nearer = max(x0 - (high - low) / falls, 0.0)
+            fall = -a[highest] * over[highest] if highest >= 0 else 0.0
+            rise = -a[lowest] * over[lowest] if lowest >= 0 else 0.0
+            nearer = max(x0 - (high - low) / (fall - rise), 0.0)
             if not nearer < x0:
                 break
             x0 = nearer
