@@ -4,10 +4,12 @@ PYTHON ?= $(shell for p in python3 python3.13 python3.12 python3.11; do \
 	"$$p" -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo "$$p" && break; done)
 BIN := .venv/bin
 STAMP := .venv/installed
-PYTEST_ARGS ?= -n auto --maxprocesses 4 -rfEs
+# A file stays with one worker, so that what its tests share is made once.
+PYTEST_ARGS ?= -n auto --maxprocesses 4 --dist loadfile -rfEs
 SOURCES := toolpaths machines postproc
+NUMERIC = $(shell grep -rl --include='test_*.py' 'mark\.numeric' tests)
 
-.PHONY: demo test hard changes lint lock clean
+.PHONY: demo test quick numeric hard changes lint lock clean
 
 demo: $(STAMP)
 	@mkdir -p out
@@ -25,6 +27,16 @@ hard: $(STAMP)
 # Every word, block and number of written programs changed, on every control: minutes each.
 changes: $(STAMP)
 	$(BIN)/pytest $(PYTEST_ARGS) -m slow tests/postproc/test_mutation.py
+
+# Under a minute on two processors once compiled code is kept (tests/tiers.py says what belongs to it).
+quick: $(STAMP)
+	$(BIN)/pytest $(PYTEST_ARGS) -m quick $(shell sed -n 's|^ *"\(tests/.*\.py\)",$$|\1|p' tests/tiers.py)
+
+# The compiled loops against their numpy twins, for each kind of processor that runs here (tests/processors.py).
+numeric: $(STAMP)
+	@for kind in $$($(BIN)/python -m tests.processors); do echo "processor: $$kind"; \
+		NUMBA_CPU_NAME=$$kind NUMBA_CPU_FEATURES= NUMBA_CACHE_DIR="$(CURDIR)/.pytest_cache/numba-$$kind" \
+		$(BIN)/pytest -m numeric $(NUMERIC) || exit 1; done
 
 lint: $(STAMP)
 	$(BIN)/ruff check .

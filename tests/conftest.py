@@ -2,19 +2,32 @@
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Callable
 from functools import cache
 
 import pytest
 
+from tests import environment
 from tests.linuxcnc import interpreter, simulator
+from tests.tiers import QUICK
+
+__all__ = ["environment"]
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Whatever asks for LinuxCNC can be chosen with `-m linuxcnc`."""
+    """Whatever asks for LinuxCNC can be chosen with `-m linuxcnc`, the files of the quick tier with `-m quick`."""
     for item in items:
-        if {"interpret", "simulate", "standstill"} & set(getattr(item, "fixturenames", ())):
+        if item.nodeid.split("::")[0] in QUICK:
+            item.add_marker(pytest.mark.quick)
+        if {"interpret", "simulate", "recorded", "standstill"} & set(getattr(item, "fixturenames", ())):
             item.add_marker(pytest.mark.linuxcnc)
+
+
+def pytest_collection_finish() -> None:
+    """What stays until the end is not looked through by each collection of garbage."""
+    gc.collect()
+    gc.freeze()
 
 
 @cache
@@ -38,6 +51,12 @@ def interpret() -> Callable[..., interpreter.Canonical]:
 def simulate() -> Callable[..., simulator.Run]:
     """`simulator.simulate`, or a skipped test."""
     return _or_skip(simulator.simulate, "simulator")
+
+
+@pytest.fixture(scope="session")
+def recorded() -> Callable[..., simulator.Run]:
+    """`simulator.recorded`, or a skipped test."""
+    return _or_skip(simulator.recorded, "simulator")
 
 
 @pytest.fixture(scope="session")

@@ -24,7 +24,7 @@ def compiled() -> Callable[..., Any]:
     """`close_all` compiled, kept on disk where the package's folder can be written."""
     from numba import njit
 
-    options: dict[str, Any] = {"nogil": True, "fastmath": {"contract", "reassoc", "nsz", "arcp"}, "error_model": "numpy"}
+    options: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
 
     def jit(function: Callable[..., Any]) -> Callable[..., Any]:
         try:

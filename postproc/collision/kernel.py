@@ -1,4 +1,5 @@
-"""Plain loops of `search.py`, compiled for long ways and fine meshes; the numpy search there is the reference.
+"""Plain loops of `search.py`, compiled for long ways and fine meshes; the numpy search there is the reference. How they are
+rounded: `feedrate/compiled.py`.
 
 A cell is a row of 21 numbers: the corners of a triangle, two tips, two axes. `out` holds the least distance so far, the
 place on the way, the point, the cells looked at since something was too near, and whether a leaf was cut short.

@@ -1,4 +1,7 @@
-"""Plain loops of `interior_packed.py` over the coefficients themselves: their rows c >= 0, and tied ends."""
+"""Plain loops of `interior_packed.py` over the coefficients themselves: their rows c >= 0, and tied ends.
+
+How they are rounded: `compiled.py`.
+"""
 
 from __future__ import annotations
 

@@ -9,15 +9,17 @@ from typing import Any, cast
 
 
 @cache
-def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
+def compiled(function: Callable[..., Any], fused: bool = False) -> Callable[..., Any]:
     """`function` compiled without the interpreter lock, kept on disk where the package's folder can be written.
 
-    Contraction and reassociation are allowed, NaN and infinity keep their meaning (the test of positive pivots needs
-    it).
+    Each operation is rounded by itself and in the order of the text, so that a loop gives the same bits on every processor,
+    and those of a numpy twin that does the same operations. `fused` lets the compiler join a product and a sum: faster,
+    and the last bits depend on the processor; only where twins need to agree within a tolerance.
+    A function is compiled one way only: what is kept on disk is found by its file, whose text must change with the way.
     """
     from numba import njit
 
-    options: dict[str, Any] = {"nogil": True, "fastmath": {"contract", "reassoc", "nsz", "arcp"}, "error_model": "numpy"}
+    options: dict[str, Any] = {"nogil": True, "fastmath": {"contract"} if fused else False, "error_model": "numpy"}
     try:
         return cast(Callable[..., Any], njit(function, cache=True, **options))
     except RuntimeError:

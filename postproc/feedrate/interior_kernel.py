@@ -96,7 +96,7 @@ def _joint(w: Any, v: Any, b: Any, q: Any, ia: Any, ij: Any, mu: Any, dual: Any)
         w[p + H22] += ratio * j2 * j2
 
 
-knots_of_block, joint_of_block = compiled(_knots), compiled(_joint)
+knots_of_block, joint_of_block = compiled(_knots, fused=True), compiled(_joint, fused=True)
 
 
 def assemble(w: Any, v: Any, c: Any, inverse: Any, blocks: Any, mu: Any, dual: Any) -> Any:

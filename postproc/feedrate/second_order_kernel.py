@@ -1,47 +1,67 @@
-"""Plain loops of `second_order.py`, compiled for long grids. The numpy functions there are the reference."""
+"""Plain loops of `second_order.py`, compiled for long grids. The numpy functions there are the reference.
+
+Both do the same operations in the same order, so that they agree to the last bit on any processor (`compiled.py`).
+"""
 
 from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 
-def sweep(h: Any, dq: Any, d2q: Any, x: Any) -> None:
-    """Both passes. h (N-1,), dq and d2q (N, J) over the acceleration limits; x (N,) holds the bound, then the result."""
+STEPS = 100
+"""Most steps of Newton's method."""
+
+
+def sweep(h: Any, dq: Any, d2q: Any, x: Any, flat: Any) -> None:
+    """Both passes. h (N-1,), dq and d2q (N, J) over the acceleration limits; x (N,) holds the bound, then the result.
+
+    `flat`: part of a limit below which x1 does not count in its row.
+    """
     intervals, joints = len(h), dq.shape[1]
+    a, b, over, reaches = np.empty(2 * joints), np.empty(2 * joints), np.empty(2 * joints), np.empty(intervals)
     for step in range(2 * intervals):
         backward = step < intervals
         i = intervals - 1 - step if backward else step - intervals
-        half_h = 0.5 / h[i]
-        x0, cap = x[i], x[i + 1]
-        low, high = 0.0, cap
-        for turn in range(100):
-            low, high, low_slope, high_slope, alone = 0.0, cap, 0.0, 0.0, x0
+        half, x0, cap = 0.5 / h[i], x[i], x[i + 1]
+        for j in range(joints):
+            k, here, there = j + joints, dq[i, j] * half, dq[i + 1, j] * half
+            a[j], b[j], a[k], b[k] = d2q[i, j] - here, here, -there, d2q[i + 1, j] + there
+        for j in range(2 * joints):
+            if b[j] < 0.0:
+                a[j] = -a[j]
+            b[j] = abs(b[j])
+            over[j] = 1.0 / b[j]
+        if backward:
             for j in range(2 * joints):
-                if j < joints:
-                    b = dq[i, j] * half_h
-                    a = d2q[i, j] - b
-                else:
-                    a = -dq[i + 1, j - joints] * half_h
-                    b = d2q[i + 1, j - joints] - a
-                if abs(b) > 1e-12 * abs(a):
-                    inverse = 1.0 / b
-                    slope = -a * inverse
-                    width = abs(inverse)
-                    if slope * x0 - width > low:
-                        low, low_slope = slope * x0 - width, slope
-                    if slope * x0 + width < high:
-                        high, high_slope = slope * x0 + width, slope
-                elif abs(a) * alone > 1.0:
-                    alone = 1.0 / abs(a)
-            if not backward:
+                x0 = min(x0, (1.0 + b[j] * cap) / abs(a[j]))
+            reach = cap
+            for j in range(2 * joints):
+                reach = min(reach, (1.0 + abs(a[j]) * x0) / b[j])
+            reaches[i] = reach
+            for j in range(2 * joints):
+                if not b[j] * reach > flat:
+                    x0 = min(x0, (1.0 - b[j] * reach) / abs(a[j]))
+        for _ in range(STEPS):
+            low, high, lowest, highest = 0.0, cap, -1, -1
+            for j in range(2 * joints):
+                if b[j] * reaches[i] > flat:
+                    used = a[j] * x0
+                    if (-1.0 - used) * over[j] > low:
+                        low, lowest = (-1.0 - used) * over[j], j
+                    if (1.0 - used) * over[j] < high:
+                        high, highest = (1.0 - used) * over[j], j
+            if high >= low or not backward:
                 break
-            if turn == 0 and alone < x0:
-                x0 = alone
-                continue
-            if high - low >= -1e-13 * max(low, 1e-300):
+            fall = -a[highest] * over[highest] if highest >= 0 else 0.0
+            rise = -a[lowest] * over[lowest] if lowest >= 0 else 0.0
+            nearer = max(x0 - (high - low) / (fall - rise), 0.0)
+            if not nearer < x0:
                 break
-            x0 = max(x0 - (high - low) / (high_slope - low_slope), 0.0)
+            x0 = nearer
         if backward:
             x[i] = x0
-        else:
-            x[i + 1] = max(low, high)
+            continue
+        if high < low and highest >= 0:
+            high = low + (high - low) * (b[highest] / (b[lowest] + b[highest])) if lowest >= 0 else low
+        x[i + 1] = min(max(high, 0.0), cap)

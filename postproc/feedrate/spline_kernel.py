@@ -1,4 +1,7 @@
-"""Plain loop of `paths.SplinePath.derivatives`, compiled for long paths; scipy's splines there are the reference."""
+"""Plain loop of `paths.SplinePath.derivatives`, compiled for long paths; scipy's splines there are the reference.
+
+How it is rounded: `compiled.py`.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Plain loop of `tightening.worst_ratios`, compiled for long motions; the numpy function there is the reference."""
+"""Plain loop of `tightening.worst_ratios`, compiled for long motions; the numpy function there is the reference.
+
+How it is rounded: `compiled.py`.
+"""
 
 from __future__ import annotations
 

@@ -40,7 +40,7 @@ LONG = 50_000
 def prepare(passes: Sequence[Pass]) -> None:
     """Load the compiler where so many passes are worth it; then all of them are planned by compiled loops, else none."""
     if wanted(_KNOTS * sum(len(stretch.s) for one in passes for stretch in one.stretches), KERNEL_FROM):
-        compiled(pentadiagonal)
+        compiled(pentadiagonal, fused=True)
 
 
 class Ranking:

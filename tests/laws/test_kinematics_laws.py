@@ -8,7 +8,7 @@ import machines
 from machines.kinematics.serial import Serial
 
 pytestmark = pytest.mark.parametrize("name", machines.names())
-MANY = 100_000
+MANY = 20_000
 
 
 def test_forward_of_inverse_is_identity(name):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -30,7 +31,7 @@ def letters(machine: Machine) -> str:
     return "XYZ" + "".join(name for name, turns in zip(machine.axis_names, machine.rotary, strict=True) if turns)
 
 
-def write(folder: Path, machine: Machine, tools: Mapping[int, ToolEntry | tuple[float, float]], warp: int,
+def write(folder: Path, machine: Machine, tools: Mapping[int, ToolEntry | tuple[float, float]], warp: int | Fraction,
           time_limit: float) -> None:
     """Everything that session.py reads, apart from the program and the clock."""
     axes = letters(machine)
@@ -44,7 +45,7 @@ def write(folder: Path, machine: Machine, tools: Mapping[int, ToolEntry | tuple[
     (folder / "sim.var").touch()
     (folder / "tool.tbl").write_text(table_text(tools))
     (folder / "job.json").write_text(json.dumps({
-        "warp": warp, "joints": len(machine.axis_names), "pins": kinds, "modules": MODULES, "time_limit": time_limit,
+        "warp": str(warp), "joints": len(machine.axis_names), "pins": kinds, "modules": MODULES, "time_limit": time_limit,
         "realtime": _realtime(machine, axes, kinds)}))
 
 

@@ -23,7 +23,9 @@ POLL = 0.005
 IDLE_POLLS = 6
 PAUSE = 20
 """Servo cycles that M0 and M1 last."""
-START_LIMIT = 20.0
+START_LIMIT = 60.0
+WAITED_FOR = ("milltask", "io", "linuxcncsvr")
+"""Processes for which a motion that has stopped waits; the servo cycles themselves stand still with their own."""
 
 
 class Session:
@@ -36,7 +38,7 @@ class Session:
                     "NMLFILE": str(folder / "sim.nml"), "RTAPI_FIFO_PATH": str(folder / "fifo"),
                     "HAL_RTMOD_DIR": self.job["modules"], "LINUXCNC_FORCE_REALTIME": "0"}
         self.env.pop("DISPLAY", None)
-        self.warped = {**self.env, "LD_PRELOAD": str(folder / "clock.so"), "WARP": str(self.job["warp"])}
+        self.warped = {**self.env, "LD_PRELOAD": str(folder / "clock.so"), "WARP": self.job["warp"]}
         self.log = (folder / "log").open("w")
 
     def __enter__(self) -> Session:
@@ -120,6 +122,18 @@ def any_child() -> bool:
     return True
 
 
+def waited(names: tuple[str, ...]) -> float:
+    """s that the session's processes of these names have been ready to run and waited for a processor."""
+    total = 0
+    for pid in descendants(os.getpid()):
+        try:
+            if Path(f"/proc/{pid}/comm").read_text().strip() in names:
+                total += sum(int(task.read_text().split()[1]) for task in Path(f"/proc/{pid}/task").glob("*/schedstat"))
+        except (OSError, IndexError):
+            continue
+    return total / 1e9
+
+
 def wait(condition, what: str, limit: float = START_LIMIT) -> None:
     deadline = time.monotonic() + limit
     while not condition():
@@ -145,7 +159,7 @@ class Controller:
         try:
             self.stat = self.api.stat()
             self.stat.poll()
-        except self.api.error:
+        except (self.api.error, SystemError):  # of a status that is not there yet
             return False
         return self.stat.joints == self.joints
 
@@ -231,7 +245,8 @@ class Recorder:
 
 
 def run_program(controller: Controller, recorder: Recorder, limit: float) -> dict[str, float]:
-    """Run to the end, recording. Returns how often the motion queue was found nearly empty."""
+    """Run to the end, recording. Returns how often the motion queue was found nearly empty, and s waited for a processor."""
+    before = waited(WAITED_FOR)
     api, deadline = controller.api, time.monotonic() + limit
     controller.command.auto(api.AUTO_RUN, 0)
     idle, polls, low, paused_at = 0, 0, 0, 0
@@ -250,7 +265,7 @@ def run_program(controller: Controller, recorder: Recorder, limit: float) -> dic
             controller.command.abort()
             raise RuntimeError(f"the program did not end in {limit:g} s")
         time.sleep(POLL)
-    return {"starved": low / max(polls, 1)}
+    return {"starved": low / max(polls, 1), "waited": waited(WAITED_FOR) - before}
 
 
 def main() -> None:

@@ -44,20 +44,20 @@ def in_motion(e: Estimate) -> float:
     return float(e.timed.end.max() - e.timed.begin.min())
 
 
-def run(simulate: Callable[..., Run], text: str, on: Machine, folder: Path, fast: int = 20) -> Run:
+def run(recorded: Callable[..., Run], text: str, on: Machine, folder: Path, fast: int = 20) -> Run:
     """Commands between motions wait for processes of the host, whose delays the fast clock multiplies."""
     (folder / "program.ngc").write_text(text)
     warp = 3 if any(word in text for word in ("M6", "M8", "F30000", "F24000")) else fast
-    result: Run = simulate(on, folder / "program.ngc", {1: (0.0, 6.0), 2: (0.0, 6.0)}, warp=warp)
+    result: Run = recorded(on, folder / "program.ngc", {1: (0.0, 6.0), 2: (0.0, 6.0)}, warp=warp)
     assert result.errors == ()
     return result
 
 
 @pytest.mark.parametrize("name", PROGRAMS)
-def test_estimate_is_the_simulators_time(simulate, tmp_path: Path, name: str) -> None:
+def test_estimate_is_the_simulators_time(recorded, tmp_path: Path, name: str) -> None:
     letters, program = PROGRAMS[name]
     on, text = machine(letters), program + END
-    measured = run(simulate, text, on, tmp_path).seconds
+    measured = run(recorded, text, on, tmp_path).seconds
     e = estimated(text, on)
     seen[name] = in_motion(e) / measured - 1.0
     assert abs(seen[name]) < EACH
@@ -71,10 +71,10 @@ def test_mean_of_all_programs() -> None:
     assert np.mean(np.abs(list(seen.values()))) < MEAN
 
 
-def test_lines_are_taken_up_when_the_simulator_takes_them_up(simulate, tmp_path: Path) -> None:
+def test_lines_are_taken_up_when_the_simulator_takes_them_up(recorded, tmp_path: Path) -> None:
     """Not only the sum is right: every line begins within a few per mille of the run."""
     on, text = machine("mill-3axis"), f"{HEAD} G64 P0.05 Q0\nG0 Z300\nF3000\n{random_lines(60)}{END}"
-    result = run(simulate, text, on, tmp_path, fast=6)
+    result = run(recorded, text, on, tmp_path, fast=6)
     b = blocks(text, on)
     begin = estimated(text, on).timed.begin
     moving = np.flatnonzero(np.any(np.diff(result.joints, axis=0) != 0.0, axis=1))[0]
@@ -83,12 +83,12 @@ def test_lines_are_taken_up_when_the_simulator_takes_them_up(simulate, tmp_path:
         assert begin[row] == pytest.approx(measured, abs=0.025)
 
 
-def test_a_generic_model_learns_linuxcnc_from_its_log(simulate, tmp_path: Path) -> None:
+def test_a_generic_model_learns_linuxcnc_from_its_log(recorded, tmp_path: Path) -> None:
     """A look-ahead model fitted to one run foretells another within its band."""
     on = machine("mill-3axis")
     texts = [f"{HEAD} G64 P0.01\nG0 Z300\nF{feed}\n{random_lines(count)}G0 X0 Y0 Z300\nG0 X200\n{END}"
              for feed, count in ((4000, 120), (2500, 80))]
-    runs = [run(simulate, text, on, tmp_path) for text in texts]
+    runs = [run(recorded, text, on, tmp_path) for text in texts]
     taught = runs[0]
     rows = np.concatenate([[0], np.flatnonzero(np.diff(taught.line) != 0) + 1])
     rows = rows[taught.line[rows] > 0]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,8 @@ import pytest
 
 import machines
 from machines.machine import Machine
-from tests.linuxcnc import config
+from tests.linuxcnc import config, simulator
+from tests.linuxcnc.simulator import Run
 from toolpaths.arrays import Floats
 
 TIGHT = 1e-6
@@ -60,18 +62,18 @@ def test_delta_joints_at_standstill_are_our_inverse(standstill) -> None:
     assert np.nanmin(np.abs(branches - joints).max(axis=2), axis=0).max() < TIGHT
 
 
-def test_straight_move_takes_length_over_feed_and_one_ramp(simulate, tmp_path: Path) -> None:
+def test_straight_move_takes_length_over_feed_and_one_ramp(recorded, tmp_path: Path) -> None:
     machine = machines.load("mill-3axis")
-    run = simulate(machine, write(tmp_path, "G21 G90 G94 G61\nF1000\nG1 X100\nM2\n"))
+    run = recorded(machine, write(tmp_path, "G21 G90 G94 G61\nF1000\nG1 X100\nM2\n"))
     speed, acceleration = 1000 / 60, float(machine.limits.acceleration[0])
     assert run.errors == ()
     assert run.seconds == pytest.approx(100 / speed + speed / acceleration, abs=0.006)
     np.testing.assert_allclose(run.joints[-1], np.add(machine.home, [100, 0, 0]), atol=1e-9)
 
 
-def test_warp_does_not_change_the_machine_time(simulate, tmp_path: Path) -> None:
+def test_warp_does_not_change_the_machine_time(recorded, tmp_path: Path) -> None:
     program = write(tmp_path, "G21 G90 G94 G61\nF6000\nG1 X50\nG1 Y30\nM2\n")
-    times = [simulate(machines.load("mill-3axis"), program, warp=warp).seconds for warp in (1, 20)]
+    times = [recorded(machines.load("mill-3axis"), program, warp=warp).seconds for warp in (Fraction(3, 4), 20)]
     assert times[0] == pytest.approx(times[1], abs=0.005)
 
 
@@ -90,3 +92,34 @@ def test_pose_and_joints_belong_together_in_motion(simulate, tmp_path: Path) -> 
 def test_what_the_control_refuses_is_told(simulate, tmp_path: Path) -> None:
     run = simulate(machines.load("mill-3axis"), write(tmp_path, "G21 G90 G94\nG1 X600 F3000\nM2\n"))
     assert any("exceed" in error for error in run.errors)
+
+
+def recording(seconds: float, waited: float, still: float = 0.0) -> Run:
+    """A run of one joint that moves for so long and stands in between; the host was busy for `waited` s of it."""
+    way = np.ones(round(1000 * seconds))
+    way[100:100 + round(1000 * still)] = 0.0
+    joints = np.cumsum(way)[:, None]
+    return Run(t=1e-3 * np.arange(len(way)), joints=joints, pose=joints, line=np.ones(len(way), dtype=int), axes="X",
+               errors=(), starved=0.0, waited=waited)
+
+
+@pytest.mark.parametrize(("taken", "seconds", "made"), [
+    ([(10.0, 0.0, 0.0)], 10.0, 1),  # nobody waited
+    ([(10.0, 5.0, 0.0)], 10.0, 1),  # nothing stood while they did
+    ([(10.0, 0.01, 0.5)], 10.0, 1),  # a programmed dwell on a quiet host
+    ([(10.2, 5.0, 0.7), (10.0, 0.01, 0.5)], 10.0, 2),
+    ([(10.2, 5.0, 0.7), (10.1, 4.0, 0.6), (10.005, 3.0, 0.5), (10.0, 2.0, 0.5)], 10.0, 4),
+    ([(10.5 - 0.1 * k, 5.0, 1.0) for k in range(6)], 10.0, 6)])
+def test_starved_recordings_are_made_again(monkeypatch: pytest.MonkeyPatch, taken: list[tuple[float, float, float]],
+                                           seconds: float, made: int) -> None:
+    """Until one is beyond doubt or the two shortest agree, each at half the warp of the one before; the shortest counts."""
+    warps: list[Fraction] = []
+
+    def simulated(machine: Machine, program: Path, tools: None, warp: Fraction) -> Run:
+        warps.append(warp)
+        return recording(*taken[len(warps) - 1])
+
+    monkeypatch.setattr(simulator, "simulate", simulated)
+    found = simulator.recorded(machines.load("mill-3axis"), Path("program.ngc"), warp=20)
+    assert found.seconds == pytest.approx(seconds, abs=0.002)
+    assert warps == [Fraction(20, 2**k) for k in range(made)]

@@ -12,6 +12,7 @@ import pytest
 import machines
 from machines.geometric_error import load
 from machines.geometric_error.figures import _round_part, model_figure
+from machines.geometric_error.model import ErrorModel
 from machines.geometric_error.volume import ranges, section
 
 
@@ -19,36 +20,43 @@ def words(svg: bytes) -> str:
     return " ".join(re.findall(r"<!-- (.*?) -->", svg.decode()))
 
 
-def test_every_component_and_its_ways_are_drawn() -> None:
+@pytest.fixture(scope="module")
+def drawn() -> tuple[ErrorModel, bytes]:
+    """The sample of mikron-ucp710 and its figure."""
     machine = machines.load("mikron-ucp710")
     model = load("samples/errors/mikron-ucp710.toml", machine)
-    told = words(model_figure(model, machine, 100.0, ".svg"))
+    return model, model_figure(model, machine, 100.0, ".svg")
+
+
+def test_every_component_and_its_ways_are_drawn(drawn: tuple[ErrorModel, bytes]) -> None:
+    model, svg = drawn
+    told = words(svg)
     for component in model.axes.components:
         assert str(component.name) in told
     assert "EXX, backwards" in told and "EYX, backwards" not in told and "tip off by, um" in told
 
 
-def test_what_a_model_says_of_its_doubt_is_seen() -> None:
-    machine = machines.load("mikron-ucp710")
-    model = load("samples/errors/mikron-ucp710.toml", machine)
-    bare = replace(model, covariance=None)
-    assert model_figure(model, machine, 100.0, ".svg").count(b"<image") > \
-        model_figure(bare, machine, 100.0, ".svg").count(b"<image") == 4  # sections and their scales
+def test_what_a_model_says_of_its_doubt_is_seen(drawn: tuple[ErrorModel, bytes]) -> None:
+    model, svg = drawn
+    bare = model_figure(replace(model, covariance=None), machines.load("mikron-ucp710"), 100.0, ".svg")
+    assert svg.count(b"<image") > bare.count(b"<image") == 4  # sections and their scales
 
 
-def test_an_arrow_is_drawn_with_its_length_and_no_panel_is_empty(tmp_path: Path) -> None:
+def test_an_arrow_is_drawn_with_its_length_and_no_panel_is_empty(drawn: tuple[ErrorModel, bytes], tmp_path: Path) -> None:
     machine = machines.load("mikron-ucp710")
 
-    def drawn(model: Path) -> tuple[list[str], int]:
-        """Lengths of arrows that are told, and panels of turns."""
-        svg = model_figure(load(model, machine), machine, 100.0, ".svg")
+    def seen(svg: bytes) -> tuple[list[str], int]:
+        """Lengths of arrows that are named, and panels of turns."""
         return re.findall(r"<!-- (\d+ um) -->", svg.decode()), svg.count(b"<!-- arcsec -->")
 
-    assert drawn(Path("samples/errors/mikron-ucp710.toml")) == (["20 um", "50 um"], 5)
+    def of_file() -> tuple[list[str], int]:
+        return seen(model_figure(load(tmp_path / "e.toml", machine), machine, 100.0, ".svg"))
+
+    assert seen(drawn[1]) == (["20 um", "50 um"], 5)
     (tmp_path / "e.toml").write_text("[components.EXX]\npolynomial = [0, 3]\nscale = 100\nrange = [-300, 300]\n")
-    assert drawn(tmp_path / "e.toml") == (["5 um", "5 um"], 0)  # of 9
+    assert of_file() == (["5 um", "5 um"], 0)  # of 9
     (tmp_path / "e.toml").write_text("[components.EAX]\npolynomial = [0]\nrange = [-300, 300]\n")
-    assert drawn(tmp_path / "e.toml") == ([], 1)
+    assert of_file() == ([], 1)
 
 
 @pytest.mark.parametrize(("value", "part"), [(9.99, 5.0), (10.0, 10.0), (0.3, 0.2), (0.0, 0.0), (float("nan"), 0.0)])

@@ -135,13 +135,13 @@ class Spread(Errors):
         return values + SIGMA * self.unit(name) * self.rng.normal(size=len(values))
 
 
-DRAWS = 200
+DRAWS = 120
 
 
 @pytest.mark.parametrize("name", ["nutating-head", "uranesx", "h4a-c-table"])
 def test_the_predicted_doubt_is_the_spread_of_machines_drawn_at_random(name: str, tmp_path: Path) -> None:
     """Every number of the files is drawn anew, by SIGMA um or arcsec; the tips are those of the second implementation."""
-    case = drawn(tmp_path, name, 0, n=3, sigma=sigmas(name))
+    case = drawn(tmp_path, name, 0, n=2, sigma=sigmas(name))
     predicted = doubt(case.model, case.actual, case.actual.coordinates(case.q, case.nominal))
     rng = np.random.default_rng(3)
     tips = np.stack([case.poses(case.q, errors=Spread(case.file, rng))[0] for _ in range(DRAWS)])

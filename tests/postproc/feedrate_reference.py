@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
+
 import clarabel
 import numpy as np
 from scipy import sparse
@@ -101,3 +103,52 @@ def largest_second_order(sigma: Floats, dq: Floats, d2q: Floats, acceleration: F
     found = linprog(-np.ones(n), A_ub=sparse.vstack((matrix, -matrix)) * scale, b_ub=np.ones(2 * row.size),
                     bounds=np.stack((np.zeros(n), top / scale), axis=1), method="highs")
     return np.asarray(found.x) * scale
+
+
+Row = tuple[Fraction, Fraction]
+"""(a, b) of |a x0 + b x1| <= 1, b >= 0."""
+
+
+def exact_second_order(sigma: Floats, dq: Floats, d2q: Floats, cap: Floats, flat: float = 0.0) -> list[Fraction]:
+    """The squared speeds of `second_order` in fractions, nothing rounded; dq, d2q (N, J) over the limits.
+
+    `flat` 0 is the greedy solution itself: it gives all of x1 away for the last bit of x0 where x1 hardly counts in a row.
+    """
+    x = [Fraction(0), *map(Fraction, cap[1:-1].tolist()), Fraction(0)]
+    rows = exact_rows(sigma, dq, d2q)
+    for i in range(len(rows) - 1, -1, -1):
+        rows[i], most = _exact_alone(rows[i], x[i], x[i + 1], Fraction(flat))
+        x[i] = _exact_start(rows[i], most, x[i + 1])
+    for i, row in enumerate(rows):
+        x[i + 1] = min([x[i + 1]] + [(1 - a * x[i]) / b for a, b in row])
+    return x
+
+
+def exact_rows(sigma: Floats, dq: Floats, d2q: Floats) -> list[list[Row]]:
+    """Of each interval, one limit at each end for each joint."""
+    s, first, second = (np.vectorize(Fraction, otypes=[object])(values.astype(float)) for values in (sigma, dq, d2q))
+    made = []
+    for i in range(len(s) - 1):
+        half = 1 / (2 * (s[i + 1] - s[i]))
+        both = [(second[i, j] - first[i, j] * half, first[i, j] * half) for j in range(dq.shape[1])]
+        both += [(-first[i + 1, j] * half, second[i + 1, j] + first[i + 1, j] * half) for j in range(dq.shape[1])]
+        made.append([(-a, -b) if b < 0 else (a, b) for a, b in both])
+    return made
+
+
+def _exact_alone(rows: list[Row], x0: Fraction, cap: Fraction, flat: Fraction) -> tuple[list[Row], Fraction]:
+    """Rows in which x1 counts, and the largest x0 of the others."""
+    x0 = min([x0] + [(1 + b * cap) / abs(a) for a, b in rows if a])
+    reach = min([cap] + [(1 + abs(a) * x0) / b for a, b in rows if b])
+    x0 = min([x0] + [(1 - b * reach) / abs(a) for a, b in rows if a and b * reach <= flat])
+    return [(a, b) for a, b in rows if b * reach > flat], x0
+
+
+def _exact_start(rows: list[Row], x0: Fraction, cap: Fraction) -> Fraction:
+    """Largest x0 from which some x1 in [0, cap] respects all rows: Newton's method, which ends."""
+    while True:
+        low, rise = max([(Fraction(0), Fraction(0))] + [((-1 - a * x0) / b, -a / b) for a, b in rows])
+        high, fall = min([(cap, Fraction(0))] + [((1 - a * x0) / b, -a / b) for a, b in rows])
+        if high >= low:
+            return x0
+        x0 -= (high - low) / (fall - rise)

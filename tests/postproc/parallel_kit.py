@@ -31,6 +31,7 @@ def setup(name: str) -> SetupFile:
     return found
 
 
+@cache
 def converted(file: str, name: str, setup_name: str, **options: object) -> PostResult:
     path, _ = toolpaths.read(Path(SAMPLES / file))
     return postproc.convert(path, machine(name), "linuxcnc", setup(setup_name), postproc.Options(**options))

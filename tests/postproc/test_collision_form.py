@@ -203,7 +203,7 @@ def test_a_spun_mesh_holds_the_mesh_at_any_angle() -> None:
 
 
 def test_a_spun_mesh_with_many_levels_is_held_by_few_pieces() -> None:
-    mesh = trimesh.creation.icosphere(4, radius=20.0).apply_translation((3.0, 1.0, 50.0))
+    mesh = trimesh.creation.icosphere(3, radius=20.0).apply_translation((3.0, 1.0, 50.0))
     pieces = spun(np.asarray(mesh.vertices), np.asarray(mesh.edges_unique))
     assert len(pieces) <= 60 < len(np.unique(mesh.vertices[:, 2])) and sunk(mesh, pieces) < 1e-6
 

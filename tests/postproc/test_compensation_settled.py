@@ -66,6 +66,7 @@ def steps_of(ends: Ends) -> Floats:
     return np.asarray(walking._walk(*vars(ends).values())[0])
 
 
+@pytest.mark.numeric
 @pytest.mark.parametrize("lossy", [1, 2, 3])
 def test_the_compiled_walk_is_the_plain_one(lossy: int, monkeypatch: pytest.MonkeyPatch) -> None:
     ends = random_ends(np.random.default_rng(lossy), 400, lossy, 8.7e-5)

@@ -48,6 +48,7 @@ def path(what: str) -> Toolpath:
     return made
 
 
+@cache
 def made(controller: str | Path, what: str) -> PostResult:
     machine = {"helix": "mill-3axis", "head": "fork-head-ab", "nutating": "nutating-head"}.get(what, "mikron-ucp710")
     options = {"axes": {"output": "axes"}, "tcp": {"output": "tcp"}, "top holes": {"output": "tcp"},

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -137,6 +138,7 @@ def test_a_hole_between_helices_states_where_it_is() -> None:
     assert differ
 
 
+@cache
 def converted(controller: str, model: str, sample: str = "pocket.cls") -> PostResult:
     path, found = toolpaths.read(SAMPLES / sample)
     options = Options(setup=str(SAMPLES / "tools.setup.toml"), error_model=model, output="tcp")

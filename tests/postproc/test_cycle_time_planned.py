@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -16,6 +18,7 @@ from tests.postproc.kit import SAMPLES, TOOLS, toolpath
 from tests.postproc.time_kit import model
 
 
+@cache
 def converted(name: str, machine: str, **options: object) -> PostResult:
     path, found = toolpaths.read(SAMPLES / name)
     result = postproc.convert(path, machine, "linuxcnc", TOOLS, postproc.Options(**options), found)

@@ -54,6 +54,7 @@ def test_tied_ends_follow_the_law_and_join_smoothly() -> None:
     assert part.tied == (1, 1)
 
 
+@pytest.mark.numeric
 @pytest.mark.parametrize(("first", "last"), [(0, 257), (0, 180), (70, 257), (70, 181)])
 def test_compiled_equals_numpy(first: int, last: int) -> None:
     """Same iterates, also with free ends and numbers of knots that fill no lanes."""
@@ -96,6 +97,7 @@ def test_twice_the_knots_change_the_time_little() -> None:
     assert times[0] == pytest.approx(times[1], rel=5e-4)
 
 
+@pytest.mark.numeric
 @pytest.mark.parametrize("joints", [1, 2, 3, 6, 9])
 def test_one_to_nine_joints(joints: int) -> None:
     """Compiled as numpy, within the limits, and a joint that stands still changes nothing."""
@@ -113,6 +115,7 @@ def test_one_to_nine_joints(joints: int) -> None:
     assert np.sum(more.weight * x[1] ** -0.5) == pytest.approx(np.sum(problem.weight * x[0] ** -0.5), rel=1e-4)
 
 
+@pytest.mark.numeric
 @pytest.mark.parametrize("tied", [(1, 1), (1, 11), (11, 1), (11, 11)])
 def test_tied_equations_are_those_of_one_unknown(tied: tuple[int, int]) -> None:
     """Solved with both ends replaced by one unknown each, dense; untied ends change nothing. Compiled alike."""

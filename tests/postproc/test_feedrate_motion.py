@@ -115,6 +115,7 @@ def test_shares_of_known_motions() -> None:
         _ = plan_second_order(line, only_jerk([5000.0])).shares
 
 
+@pytest.mark.numeric
 @pytest.mark.parametrize("kernel", [True, False])
 def test_shares_do_not_depend_on_windows(kernel: bool) -> None:
     path = zigzag(300.0)

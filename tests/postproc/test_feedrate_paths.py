@@ -72,6 +72,7 @@ def test_bad_values_are_refused() -> None:
         JointLimits(np.ones(2), np.ones(3), np.ones(2))
 
 
+@pytest.mark.numeric
 @pytest.mark.parametrize("degree", [4, 5, 6])
 def test_compiled_spline_equals_scipys(degree: int) -> None:
     """Rising places, any order, both ends, repeated knots, joints in columns."""

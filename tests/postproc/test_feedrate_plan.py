@@ -145,6 +145,7 @@ def stitched(method: Method) -> tuple[Plan, Plan]:
     return plan(path, MIKRON, knots=knots), plan(path, MIKRON, options=Options(method=method), knots=knots)
 
 
+@pytest.mark.numeric
 @pytest.mark.parametrize("kernel", [True, False])
 def test_windows_equal_the_whole(kernel: bool) -> None:
     whole, parts = stitched(Method(window=800, overlap=600, threads=2, kernel=kernel))

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import warnings
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -11,9 +13,9 @@ import pytest
 from postproc.feedrate.limits import JointLimits, squared_speed
 from postproc.feedrate.paths import Derivatives, SplinePath
 from postproc.feedrate.plan import Options, plan_second_order
-from postproc.feedrate.second_order import least_time, second_order
+from postproc.feedrate.second_order import FLAT, least_time, second_order
 from tests.postproc.feedrate_kit import MIKRON, PolynomialPath, bezier, random_path, zigzag
-from tests.postproc.feedrate_reference import largest_second_order
+from tests.postproc.feedrate_reference import exact_rows, exact_second_order, largest_second_order
 from toolpaths.arrays import Floats
 
 
@@ -49,12 +51,48 @@ def toppra_time(path: SplinePath, sigma: Floats, unit: float = 10.0) -> float:
     return least_time(sigma / unit, speed**2)
 
 
+@pytest.mark.numeric
 @pytest.mark.parametrize("path", [bezier(1), bezier(2), bezier(3), zigzag(100.0), random_path(1)])
 def test_compiled_equals_numpy_and_toppra(path: SplinePath) -> None:
     sigma = np.linspace(path.start, path.end, 301)
     fast, plain = planned(path, sigma, True), planned(path, sigma, False)
-    np.testing.assert_allclose(fast, plain, rtol=1e-9, atol=1e-9 * plain.max())
+    np.testing.assert_array_equal(fast, plain)
     assert least_time(sigma, plain) == pytest.approx(toppra_time(path, sigma), rel=1e-6)
+
+
+def reversing(way: str, small: float, seed: int) -> tuple[Floats, Floats, Floats, Floats]:
+    """sigma (N,), dq and d2q (N, J) over the limits, cap (N,): one joint whose row hardly depends on x1 in one interval.
+
+    Its slope is `small` at the interval's begin, or the sum of curvature and slope/(2h) cancels to `small` at its end.
+    """
+    rng = np.random.default_rng(seed)
+    sigma = np.cumsum(rng.uniform(0.1, 0.4, 9))
+    dq, d2q = 1e-3 * rng.normal(size=(2, 9, 5))
+    joint, k = int(rng.integers(5)), int(rng.integers(2, 7))
+    if way == "slope":
+        dq[k, joint] = 1e-3 * small
+    else:
+        dq[k + 1, joint] = -2.0 * (sigma[k + 1] - sigma[k]) * d2q[k + 1, joint] * (1.0 + small)
+    return sigma, dq, d2q, 0.05 / np.abs(dq).max(axis=1) ** 2
+
+
+@pytest.mark.numeric
+@pytest.mark.parametrize("way", ["slope", "sum"])
+@pytest.mark.parametrize("power", range(-14, -5))
+def test_rows_that_hardly_depend_on_the_next_speed_are_exact(way: str, power: int) -> None:
+    """Against fractions: x, every limit, and the time of the greedy solution. Compiled to the last bit as numpy."""
+    unit = np.ones(5)
+    for seed, sign in itertools.product(range(3), (-1.0, 1.0)):
+        sigma, dq, d2q, cap = reversing(way, sign * 10.0**power, seed)
+        fast, plain = (second_order(sigma, dq, d2q, unit, cap, kernel) for kernel in (True, False))
+        np.testing.assert_array_equal(fast, plain)
+        exact = np.array(exact_second_order(sigma, dq, d2q, cap, FLAT), dtype=np.float64)
+        np.testing.assert_allclose(plain, exact, rtol=0.0, atol=2e-15 / FLAT * exact.max())
+        x = [Fraction(value) for value in plain.tolist()]
+        used = max(abs(a * x[i] + b * x[i + 1]) for i, rows in enumerate(exact_rows(sigma, dq, d2q)) for a, b in rows)
+        assert used <= 1 + Fraction(1e-14)
+        greedy = np.array(exact_second_order(sigma, dq, d2q, cap), dtype=np.float64)
+        assert least_time(sigma, plain) <= (1.0 + FLAT) * least_time(sigma, greedy)
 
 
 @pytest.mark.parametrize("seed", range(3))

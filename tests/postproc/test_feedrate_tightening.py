@@ -20,6 +20,7 @@ from tests.postproc.feedrate_kit import MIKRON, random_path, uniform, unlimited
 from tests.postproc.test_feedrate_motion import Circle, Screw
 
 
+@pytest.mark.numeric
 def test_compiled_ratios_equal_numpy() -> None:
     rng = np.random.default_rng(7)
     at = random_path(1).derivatives(rng.uniform(0.0, 100.0, 50))

@@ -182,6 +182,7 @@ def test_turning_the_part_turns_the_path() -> None:
     assert np.abs(one.at(s)[0] @ turn.T - two.at(s)[0]).max() < 1e-6
 
 
+@pytest.mark.numeric
 def test_compiled_pass_equals_numpy() -> None:
     rng = np.random.default_rng(3)
     knots = Knots.clamped(np.array([0.0, 1, 2.5, 3, 4, 6, 7, 8.5]), np.array([0, 5, 8]))

@@ -109,7 +109,7 @@ def _compiled() -> Callable[..., None]:
     """The loop compiled, kept on disk where the package's folder can be written."""
     from numba import njit
 
-    options: dict[str, Any] = {"nogil": True, "fastmath": {"contract", "reassoc", "nsz", "arcp"}, "error_model": "numpy"}
+    options: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
     try:
         return cast(Callable[..., None], njit(_loop, cache=True, **options))
     except RuntimeError:

@@ -1,0 +1,53 @@
+"""Files of the quick tier, `make quick`: each part of the road in a minute; whatever converts many samples is left out.
+
+`tests/conftest.py` gives their tests the marker `quick`.
+"""
+
+from __future__ import annotations
+
+QUICK = (
+    "tests/test_imports.py",
+    "tests/bad/test_bad_files.py",
+    "tests/laws/test_acceptance.py",
+    "tests/laws/test_serial_structures.py",
+    "tests/machines/test_delta_linear.py",
+    "tests/machines/test_geometric_error_curves.py",
+    "tests/machines/test_geometric_error_frames.py",
+    "tests/machines/test_geometric_error_hostile.py",
+    "tests/machines/test_geometric_error_lost_motion.py",
+    "tests/machines/test_geometric_error_maps_independent.py",
+    "tests/machines/test_geometric_error_readings.py",
+    "tests/machines/test_loader.py",
+    "tests/machines/test_polytope.py",
+    "tests/machines/test_reach_margins.py",
+    "tests/machines/test_serial_known.py",
+    "tests/machines/test_sliders.py",
+    "tests/machines/test_user_file.py",
+    "tests/postproc/test_arcs_turning_back.py",
+    "tests/postproc/test_catalogue.py",
+    "tests/postproc/test_cli.py",
+    "tests/postproc/test_controllers_fanuc.py",
+    "tests/postproc/test_controllers_files.py",
+    "tests/postproc/test_controllers_haas.py",
+    "tests/postproc/test_controllers_heidenhain.py",
+    "tests/postproc/test_controllers_operations.py",
+    "tests/postproc/test_controllers_siemens.py",
+    "tests/postproc/test_feedrate_second_order.py",
+    "tests/postproc/test_golden.py",
+    "tests/postproc/test_links.py",
+    "tests/postproc/test_moves.py",
+    "tests/postproc/test_reader_fanuc.py",
+    "tests/postproc/test_reader_klartext.py",
+    "tests/postproc/test_reader_siemens.py",
+    "tests/postproc/test_travel.py",
+    "tests/postproc/test_verify_inch.py",
+    "tests/postproc/test_writer.py",
+    "tests/postproc/test_writer_arcs.py",
+    "tests/postproc/test_writer_cycles.py",
+    "tests/toolpaths/test_arrays.py",
+    "tests/toolpaths/test_cl_catia.py",
+    "tests/toolpaths/test_cl_clt.py",
+    "tests/toolpaths/test_cl_lexical.py",
+    "tests/toolpaths/test_cl_motion.py",
+    "tests/toolpaths/test_cl_records.py",
+)
