@@ -220,8 +220,8 @@ def test_creo_points_of_six_numbers_are_in_the_common_frame() -> None:
 
 
 def test_creo_rotate_turns_the_points_unless_a_system_follows() -> None:
-    head = "$$-> MFGNO / A\nUNITS/MM\nFEDRAT/1\nGOTO/0,0,1\nROTATE / AAXIS, INCR, -90, CCLW\n"
-    p = read(head + "GOTO/0,0,1\nROTATE / AAXIS, INCR, 90, CCLW\nGOTO/0,0,1\n")
+    head = "$$-> MFGNO / A\nUNITS/MM\nFEDRAT/1\nGOTO/0,0,1\nROTATE / AAXIS, INCR, -90, CCLW\nRAPID\n"
+    p = read(head + "GOTO/0,0,1\nROTATE / AAXIS, INCR, 90, CCLW\nRAPID\nGOTO/0,0,1\n")
     assert p.tip == pytest.approx(np.array([[0, 0, 1], [0, -1, 0], [0, 0, 1]]), abs=1e-15)
     assert [e.word for e in p.events] == ["ROTATE", "ROTATE"]
     p = read(head + "$$-> CSYS / 1,0,0,0, $\n0,0,-1,0, $\n0,1,0,0\nGOTO/0,0,1\n")

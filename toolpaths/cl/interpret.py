@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable
 from itertools import compress
 
-from toolpaths.cl import curves, cycles, feeds, frames, motion, structure, tools
+from toolpaths.cl import curves, cycles, feeds, frames, indexing, motion, structure, tools
 from toolpaths.cl.build import Builder
 from toolpaths.cl.statements import DATA_COMMENT, TEXT, Statement
 from toolpaths.cl.words import SILENT, UNSUPPORTED_MOTION
@@ -92,16 +92,26 @@ def calsub(b: Builder, s: Statement) -> None:
         b.log.error("cl.subprogram", f"CALSUB/{s.body}: the subprogram {why}", b.line)
         return
     start, end = found
-    index, fast = b.index, b.fast
+    index, fast, about_axis = b.index, b.fast, b.about_axis
     b.calls.append(found)
     b.in_subprogram.set(b.row, True)
+    _stand_about_axis(b, about_axis or s.numbers[0] in indexing.indexed_subprograms(b))
+    indexing.note_call(b, b.caller_row)
+    b.caller_row = b.row
     b.jump(b.program.before[start])
     run(b, start + 1, end)
     b.advance(b.program.before[end])
     b.jump(fast)
     b.calls.pop()
     b.in_subprogram.set(b.row, bool(b.calls))
-    b.index = index
+    b.index, b.caller_row = index, b.row
+    _stand_about_axis(b, about_axis)
+
+
+def _stand_about_axis(b: Builder, value: bool) -> None:
+    if b.about_axis != value:
+        b.about_axis = value
+        frames.refresh(b)
 
 
 HANDLERS.update({"DEFSUB": defsub, "CALSUB": calsub, "ENDSUB": structure.nothing})
