@@ -165,7 +165,13 @@ class Builder:
         self.axis_system: list[list[float]] | None = None
         self.name = ""
         self.unknown: dict[str, list[tuple[int, int, int]]] = {}
-        self.texts: list[tuple[int, int, int, str]] = []
+        self.texts: list[tuple[int, str]] = []
+        """line and text of what has not the form of a record"""
+        self.neutral_texts = 0
+        self.called: set[tuple[int, int]] = set()
+        """subroutines that ran"""
+        self.uncalled = 0
+        """records of subroutines that nothing calls, left out as asked"""
         self.memory: dict[str, object] = {}
         """what one file of handlers keeps between records (tool in hand, last cycle)"""
         self.cycle_records = 0

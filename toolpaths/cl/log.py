@@ -43,6 +43,10 @@ class Log:
             self.add(severity, code, message, line, hint)
         self._entries[severity, code, ""].count += max(0, len(lines) - _LINES_KEPT)
 
+    def lines_with_errors(self) -> frozenset[int]:
+        """Lines that an ERROR names."""
+        return frozenset(line for entry in self._entries.values() if entry.severity is Severity.ERROR for line in entry.lines)
+
     def error(self, code: str, message: str, line: int = 0, hint: str = "", key: str = "") -> None:
         """An ERROR."""
         self.add(Severity.ERROR, code, message, line, hint, key)

@@ -1,0 +1,182 @@
+"""The form of records: which words and how many numbers each takes. A damaged byte shows where a record departs from it.
+
+A word that a form does not list passes (posts have words of their own), unless it is one edit from a listed one, begins like a
+number, or holds another record. A number that does not fit, an empty field and a second slash are refused.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from toolpaths.cl.cycle_words import CYCLE_WORDS
+from toolpaths.cl.dialects import UNIT_WORDS
+from toolpaths.cl.feeds import UNITS
+from toolpaths.cl.log import Log
+from toolpaths.cl.near import nearest
+from toolpaths.cl.statements import COMMENT, DATA_COMMENT, Program, Statement
+from toolpaths.cl.words import BARE_WORDS, NEUTRAL, TEXT_WORDS
+
+
+@dataclass(frozen=True)
+class Form:
+    """Words of a record, the counts of its numbers (empty: any), whether other words pass, and whether fields may be empty."""
+
+    words: frozenset[str] = frozenset()
+    counts: frozenset[int] = frozenset()
+    open: bool = True
+    gaps: bool = False
+    lengths: bool = False
+    """numbers are lengths: whole ones that begin with 0 are what is left of another"""
+
+
+def _form(words: str = "", *counts: int, closed: bool = False, gaps: bool = False, lengths: bool = False) -> Form:
+    return Form(frozenset(words.split()), frozenset(counts), not closed, gaps, lengths)
+
+
+_TABLE = _form("AAXIS BAXIS CAXIS INCR ABS CLW CCLW TABLE HEAD ATANGL NEXT ROTREF AXIS XAXIS YAXIS ZAXIS A B C", 1, 2)
+_ALONE = _form("", 0, closed=True)
+_FEED_MODIFIERS = frozenset({"SCALE", "LENGTH", "LOCK", "MAXIPM", "MAXRPM", "OVPLOT"})
+FORMS: dict[str, Form] = {
+    "FEDRAT": Form(UNITS | _FEED_MODIFIERS | {"INVERS", "AUTO", "ON", "OFF", "PERSEC"}, frozenset({0, 1})),
+    "SPINDL": _form("RPM SFM SMM CLW CCLW ON OFF LOCK UNLOCK MAXRPM ORIENT LOW MEDIUM HIGH RANGE NEUTRL AUTO MILL TURN RADIUS",
+                    0, 1),
+    "COOLNT": _form("ON OFF FLOOD MIST AIR TAP TAPKUL THRU LOW MEDIUM HIGH ALL NOW NEXT TOOL", 0, 1),
+    "CUTCOM": _form("LEFT RIGHT ON OFF XYPLAN YZPLAN ZXPLAN NORMAL NORMDS PERPTO MODIFY ADJUST LENGTH OSETNO", 0, 1, 2),
+    "LOADTL": _form("OSETNO ADJUST OFFSET LENGTH IN TURN MILL SPINDL MANUAL AUTO LARGE SMALL", lengths=False),
+    "LOAD": _form("TOOL TURRET WIRE ADJUST OSETNO MANUAL ZOFF NEXTTL", 0, 1, 2, 3),
+    "SELECT": _form("TOOL", 1),
+    "TURRET": _form("OSETNO SETOOL ADJUST LENGTH CLW CCLW"),
+    "CUTTER": _form("DISPLY ON OFF", 0, 1, 2, 3, 4, 5, 6, 7, lengths=True),
+    "$$->CUTTER": _form("", 1, closed=True),
+    "TLDATA": _form("MILL DRILL TURN GROOVE THREAD BARREL TCUTTER", lengths=True),
+    "CSI_SET_FLUTE_LENGTH": _form("", 1),
+    "CIRCLE": _form("TIMES SWEEP CLOCKWISE COUNTERCLOCKWISE CLW CCLW", 4, 5, 6, 7, 8, 11, 12, closed=True),
+    "MOVARC": _form("CENTER AXIS RADIUS ANGLE TIMES", closed=True),
+    "CYCLE": Form(CYCLE_WORDS),
+    "FROM": _form("", 3, 6, closed=True), "GOHOME": _form("", 0, 3, 6),
+    "TLAXIS": _form("", 3, closed=True), "INDIRV": _form("", 3, closed=True), "INDIRP": _form("", 3, closed=True),
+    "RAPID": _form("FEDTO SCALE", closed=True),
+    "MSYS": _form("", 9, closed=True), "CSYS": _form("", 12, closed=True), "$$->CSYS": _form("", 12, closed=True),
+    "CAMERA": _form("", 12, closed=True), "MCS": _form("", 12, closed=True), "MCS2": _form("", 9, closed=True),
+    "TRANS": _form("", 3), "ZERO": _form("", 1), "ORIGIN": _form("", 3, 9), "TRNTYP": _form("WORLD"),
+    "ROTATE": _TABLE, "ROTABL": _TABLE, "ROTHED": _TABLE,
+    "UNITS": Form(frozenset(UNIT_WORDS), frozenset({0}), False), "UNIT": Form(frozenset(UNIT_WORDS), frozenset({0}), False),
+    "MULTAX": _form("ON OFF", 0, closed=True),
+    "STOP": _ALONE, "OPSTOP": _ALONE, "FINI": _ALONE, "END": _form("", 0), "END-OF-PATH": _ALONE, "ENDSUB": _form("", 0, 1),
+    "NURBS": _ALONE, "AUTOPS": _ALONE,
+    "DELAY": _form("REV SEC TIME NOW NEXT", 1), "DWELL": _form("REV SEC TIME NOW NEXT", 1),
+    "CALSUB": _form("", 0, 1), "DEFSUB": _form("", 0, 1),
+    "OPSKIP": _form("ON OFF", 0, 1), "SEQNO": _form("INCR ON OFF NEXT", 0, 1, 2), "PREFUN": _form("NOW NEXT"),
+    "AUXFUN": _form("NOW NEXT"), "SET": _form("MODE ABSOL INCR INCRE INCREM LINTOL LINEAR ON OFF"),
+    "MODE": _form("MILL TURN INCR INCRE INCREM ON OFF TOOL XYPLAN YZPLAN ZXPLAN ABSOL"),
+    "RETRCT": _form("ON OFF TOOL"), "CLEARP": _form("XYPLAN YZPLAN ZXPLAN ON OFF"), "APPLY": _form("MILL TURN"),
+    "UNLOAD": _form("TOOL"), "REWIND": _form("", 0, 1), "LEADER": _form("", 1), "CHECK": _form(), "HEAD": _form(),
+    "CLAMP": _form("ON OFF AUTO XAXIS YAXIS ZAXIS AAXIS BAXIS CAXIS"), "AIR": _form("ON OFF"), "OFSTNO": _form("ON OFF"),
+}
+_MILL_COUNTS = frozenset({5, 7, 10})
+_ANY_NUMBERS = {"FEDRAT": _FEED_MODIFIERS, "SPINDL": frozenset({"MAXRPM", "RANGE", "RADIUS", "LOCK", "ORIENT"})}
+"""Words with which a record takes numbers of their own."""
+_NAMED = frozenset({"TOOL PATH", "OPNAME", "CSI_TOOL_PATH", "OPFEATSTART", "TOOLNO", "$$->FEATNO", *TEXT_WORDS})
+_ACTING = ("GOTO GODLTA FROM GOHOME CIRCLE MOVARC RAPID TLAXIS MULTAX FEDRAT SPINDL COOLNT LOADTL LOAD SELECT CUTCOM CYCLE MSYS CSYS "
+           "MCSYS MCS CAMERA UNITS UNIT CUTTER TLDATA DELAY DWELL ROTATE ROTABL ROTHED TRANS CALSUB DEFSUB TURRET TOOLNO PREFUN "
+           "AUXFUN OPSKIP MODE INDIRV INDIRP NURBS KNOT CNTRL ORIGIN ZERO RETRCT CLEARP").split()
+_RECORD = r"(?:" + "|".join([*_ACTING, "TOOL PATH", "TLON *, *GOFWD"]) + r")\s*/"
+_BEFORE = r"(?:[A-Za-z0-9.)\]%\"';:!?]|[-=*#_]{3})"
+_GLUED = re.compile(_BEFORE + r"(?<![A-Z_]LOAD)" + _RECORD + r"|" + _BEFORE +
+                    r"(?:RAPID|FINI|END-OF-PATH|GOHOME|OPSTOP|MULTAX|ENDSUB|(?<![A-Za-z])STOP)\s*$")
+_MOTION_BEHIND = re.compile(r"\S\s+(?:GOTO|GODLTA)\s*/\s*[-+.\d]+(?:\s*,\s*[-+.\d]+)+\s*$", re.IGNORECASE)
+_NUMBER_LIKE = re.compile(r"[-+.]*\d[-+.\d]*|[-+.\d]*[eEdD][-+.\d]*\d[-+.\d]*|[-+.]+")
+_QUOTED = re.compile(r"'[^'/$]*'")
+_STARTS_NUMBER = frozenset("+-.0123456789")
+_LEADING_ZEROS = re.compile(r"[+-]?0\d+(?![\d.])")
+
+
+def check_forms(program: Program, log: Log, allowed: Iterable[str]) -> None:
+    """An error for each different statement that departs from the form of its word, where its line has none yet."""
+    allow, refused = frozenset(allowed), log.lines_with_errors()
+    for statement, line in program.first.items():
+        if statement.major in allow or line in refused:
+            continue
+        fault = fault_of(statement, allow)
+        if fault:
+            name = statement.major.removeprefix(DATA_COMMENT)
+            log.error("cl.form", f"{name}{'/' if statement.body and statement.slash else ' ' if statement.body else ''}"
+                      f"{statement.body[:60]}: {fault}", line, "compare the record with the CAM system; --allow-unknown WORD takes a "
+                      "word as it stands", key=f"{name} {fault}")
+
+
+def fault_of(s: Statement, allow: frozenset[str] = frozenset()) -> str:
+    """What is wrong with the form of a statement, "" where nothing is."""
+    if s.major == COMMENT or s.major in _NAMED or s.major in NEUTRAL:
+        return _joined_fault(s)
+    form = FORMS.get(s.major)
+    if form is None:
+        return ""
+    return _words_fault(s, form, allow) or _numbers_fault(s, form)
+
+
+def _joined_fault(s: Statement) -> str:
+    """Another record within text: what is left where the end of a line is lost."""
+    if s.major == "TOOL PATH":
+        parts = [p.strip().upper() for p in s.body.split(",")]
+        if "TOOL" not in parts[1:] and (len(parts) > 1 or parts[0].endswith("TOOL") or "TOOL" in parts[0]):
+            return "the name of the tool is not behind TOOL"
+    found = _GLUED.search(s.body) or _MOTION_BEHIND.search(s.body)
+    if found is None:
+        return _words_fault(s, FORMS[s.major], frozenset()) or _numbers_fault(s, FORMS[s.major]) if s.major in FORMS else ""
+    return f"a record stands within it, {found[0].strip()[:30]!r}: the end of a line is missing"
+
+
+def _words_fault(s: Statement, form: Form, allow: frozenset[str]) -> str:
+    if "/" in s.body:
+        return "a second slash"
+    for word in s.words:
+        if isinstance(word, float) or word in form.words or word in allow or _QUOTED.fullmatch(word):
+            continue
+        if word == "":
+            if not form.gaps and not _bare_gap(s):
+                return "an empty field"
+            continue
+        fault = _word_fault(word, form)
+        if fault:
+            return fault
+    return ""
+
+
+def _bare_gap(s: Statement) -> bool:
+    """GOHOME reports its own."""
+    return s.major == "GOHOME"
+
+
+def _word_fault(word: str, form: Form) -> str:
+    if word[0] in _STARTS_NUMBER or _NUMBER_LIKE.fullmatch(word):
+        return f"{word[:30]} is not a number"
+    meant = nearest(word, sorted(form.words))
+    if meant:
+        return f"{word[:30]} is no word of it: {meant}?"
+    for known in form.words:
+        rest = word.removeprefix(known)
+        if rest != word and (rest[0] in _STARTS_NUMBER or not rest[0].isalnum() or rest in form.words):
+            return f"{word[:30]}: a comma is missing behind {known}"
+    ends = next((bare for bare in BARE_WORDS if word.endswith(bare) and word != bare), "")
+    if ends:
+        return f"{ends} stands within it: the end of a line is missing"
+    if not form.open:
+        return f"{word[:30]} is no word of it"
+    return "" if re.fullmatch(r"[A-Z0-9_.-]+", word) else f"{word[:30]} is no word"
+
+
+def _numbers_fault(s: Statement, form: Form) -> str:
+    count = sum(isinstance(w, float) for w in s.words)
+    counts = form.counts
+    if s.major == "TLDATA" and s.words[:1] == ("MILL",):
+        counts = _MILL_COUNTS
+    if s.has(*_ANY_NUMBERS.get(s.major, ())):
+        counts = frozenset()
+    if counts and count not in counts:
+        return f"{count} numbers, it takes {' or '.join(map(str, sorted(counts)))}"
+    if form.lengths and any(_LEADING_ZEROS.fullmatch(part.strip()) for part in re.split(r"[,\s]+", s.body)):
+        return "a number begins with 0 and has no point"
+    return ""
