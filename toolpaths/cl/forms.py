@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import pairwise
 
 from toolpaths.cl.cycle_words import CYCLE_WORDS
 from toolpaths.cl.dialects import UNIT_WORDS
@@ -16,7 +17,7 @@ from toolpaths.cl.feeds import UNITS
 from toolpaths.cl.log import Log
 from toolpaths.cl.near import nearest
 from toolpaths.cl.statements import COMMENT, DATA_COMMENT, Program, Statement
-from toolpaths.cl.words import BARE_WORDS, NEUTRAL, TEXT_WORDS
+from toolpaths.cl.words import BARE_WORDS, NEUTRAL, SILENT, TEXT_WORDS
 
 
 @dataclass(frozen=True)
@@ -64,12 +65,12 @@ FORMS: dict[str, Form] = {
     "ROTATE": _TABLE, "ROTABL": _TABLE, "ROTHED": _TABLE,
     "UNITS": Form(frozenset(UNIT_WORDS), frozenset({0}), False), "UNIT": Form(frozenset(UNIT_WORDS), frozenset({0}), False),
     "MULTAX": _form("ON OFF", 0, closed=True),
-    "STOP": _ALONE, "OPSTOP": _ALONE, "FINI": _ALONE, "END": _form("", 0), "END-OF-PATH": _ALONE, "ENDSUB": _form("", 0, 1),
+    "STOP": _ALONE, "OPSTOP": _ALONE, "FINI": _ALONE, "END": _ALONE, "END-OF-PATH": _ALONE, "ENDSUB": _form("", 0, 1),
     "NURBS": _ALONE, "AUTOPS": _ALONE,
     "DELAY": _form("REV SEC TIME NOW NEXT", 1), "DWELL": _form("REV SEC TIME NOW NEXT", 1),
     "CALSUB": _form("", 0, 1), "DEFSUB": _form("", 0, 1),
-    "OPSKIP": _form("ON OFF", 0, 1), "SEQNO": _form("INCR ON OFF NEXT", 0, 1, 2), "PREFUN": _form("NOW NEXT"),
-    "AUXFUN": _form("NOW NEXT"), "SET": _form("MODE ABSOL INCR INCRE INCREM LINTOL LINEAR ON OFF"),
+    "OPSKIP": _form("ON OFF", 0, 1), "SEQNO": _form("INCR ON OFF NEXT", 0, 1, 2), "PREFUN": _form("NOW NEXT", 1, 2, 3, 4),
+    "AUXFUN": _form("NOW NEXT", 1, 2, 3, 4), "SET": _form("MODE ABSOL INCR INCRE INCREM LINTOL LINEAR ON OFF"),
     "MODE": _form("MILL TURN INCR INCRE INCREM ON OFF TOOL XYPLAN YZPLAN ZXPLAN ABSOL"),
     "RETRCT": _form("ON OFF TOOL"), "CLEARP": _form("XYPLAN YZPLAN ZXPLAN ON OFF"), "APPLY": _form("MILL TURN"),
     "UNLOAD": _form("TOOL"), "REWIND": _form("", 0, 1), "LEADER": _form("", 1), "CHECK": _form(), "HEAD": _form(),
@@ -79,18 +80,23 @@ _MILL_COUNTS = frozenset({5, 7, 10})
 _ANY_NUMBERS = {"FEDRAT": _FEED_MODIFIERS, "SPINDL": frozenset({"MAXRPM", "RANGE", "RADIUS", "LOCK", "ORIENT"})}
 """Words with which a record takes numbers of their own."""
 _NAMED = frozenset({"TOOL PATH", "OPNAME", "CSI_TOOL_PATH", "OPFEATSTART", "TOOLNO", "$$->FEATNO", *TEXT_WORDS})
-_ACTING = ("GOTO GODLTA FROM GOHOME CIRCLE MOVARC RAPID TLAXIS MULTAX FEDRAT SPINDL COOLNT LOADTL LOAD SELECT CUTCOM CYCLE MSYS CSYS "
+_ACTING = ("GOTO GODLTA FROM GOHOME CIRCLE MOVARC RAPID TLAXIS MULTAX FEDRAT SPINDL COOLNT LOADTL SELECT CUTCOM CYCLE MSYS CSYS "
            "MCSYS MCS CAMERA UNITS UNIT CUTTER TLDATA DELAY DWELL ROTATE ROTABL ROTHED TRANS CALSUB DEFSUB TURRET TOOLNO PREFUN "
            "AUXFUN OPSKIP MODE INDIRV INDIRP NURBS KNOT CNTRL ORIGIN ZERO RETRCT CLEARP").split()
-_RECORD = r"(?:" + "|".join([*_ACTING, "TOOL PATH", "TLON *, *GOFWD"]) + r")\s*/"
-_BEFORE = r"(?:[A-Za-z0-9.)\]%\"';:!?]|[-=*#_]{3})"
-_GLUED = re.compile(_BEFORE + r"(?<![A-Z_]LOAD)" + _RECORD + r"|" + _BEFORE +
-                    r"(?:RAPID|FINI|END-OF-PATH|GOHOME|OPSTOP|MULTAX|ENDSUB|(?<![A-Za-z])STOP)\s*$")
-_MOTION_BEHIND = re.compile(r"\S\s+(?:GOTO|GODLTA)\s*/\s*[-+.\d]+(?:\s*,\s*[-+.\d]+)+\s*$", re.IGNORECASE)
+_RECORD = r"(?:(?<!UN)LOAD|" + "|".join([*_ACTING, "TOOL PATH", "TLON *, *GOFWD"]) + r")\s*/"
+_GLUED = re.compile(r"(?:[A-Za-z0-9.)\]%\"';:!?][^A-Za-z0-9\s]?|[-=*#_]{3})(?:" + _RECORD +
+                    r"|(?:RAPID|FINI|END-OF-PATH|GOHOME|OPSTOP|MULTAX|ENDSUB|(?<![A-Za-z])STOP)\s*$)")
+_BEHIND = re.compile(r"\S\s+" + _RECORD + r"\s*[^\s/]+(?:\s*,\s*[^\s/]+)*\s*$")
+_GEOMETRY = frozenset({"PSIS", "SYN"})
+"""Words whose parameters hold slashes."""
+_WITHIN = re.compile(_RECORD)
+_NAMES = frozenset({"$$->FEATNO", "TOOL PATH", "PARTNO", "TPRINT", "OPNAME", "CSI_TOOL_PATH", "OPFEATSTART"})
 _NUMBER_LIKE = re.compile(r"[-+.]*\d[-+.\d]*|[-+.\d]*[eEdD][-+.\d]*\d[-+.\d]*|[-+.]+")
 _QUOTED = re.compile(r"'[^'/$]*'")
+_ONE_LETTER = re.compile(r"[-+.\d]*[^-+.\d][-+.\d]*")
+_TWO_NUMBERS = re.compile(r"[\d.]\s+[-+.\d]")
 _STARTS_NUMBER = frozenset("+-.0123456789")
-_LEADING_ZEROS = re.compile(r"[+-]?0\d+(?![\d.])")
+_LEADING_ZEROS = re.compile(r"[+-]?(?:0\d+|\.0*)")
 
 
 def check_forms(program: Program, log: Log, allowed: Iterable[str]) -> None:
@@ -123,7 +129,9 @@ def _joined_fault(s: Statement) -> str:
         parts = [p.strip().upper() for p in s.body.split(",")]
         if "TOOL" not in parts[1:] and (len(parts) > 1 or parts[0].endswith("TOOL") or "TOOL" in parts[0]):
             return "the name of the tool is not behind TOOL"
-    found = _GLUED.search(s.body) or _MOTION_BEHIND.search(s.body)
+    if s.major in SILENT and s.major not in _GEOMETRY and "/" in s.body:
+        return "a second slash"
+    found = _GLUED.search(s.body) or (_WITHIN if s.major in _NAMES else _BEHIND).search(s.body)
     if found is None:
         return _words_fault(s, FORMS[s.major], frozenset()) or _numbers_fault(s, FORMS[s.major]) if s.major in FORMS else ""
     return f"a record stands within it, {found[0].strip()[:30]!r}: the end of a line is missing"
@@ -132,6 +140,9 @@ def _joined_fault(s: Statement) -> str:
 def _words_fault(s: Statement, form: Form, allow: frozenset[str]) -> str:
     if "/" in s.body:
         return "a second slash"
+    split = _split_word(s, form)
+    if split:
+        return split
     for word in s.words:
         if isinstance(word, float) or word in form.words or word in allow or _QUOTED.fullmatch(word):
             continue
@@ -145,25 +156,39 @@ def _words_fault(s: Statement, form: Form, allow: frozenset[str]) -> str:
     return ""
 
 
+def _split_word(s: Statement, form: Form) -> str:
+    """A word with a comma or a blank in it, a number with a blank: only GOTO and CYCLE have numbers without commas between."""
+    words = [w for w in s.words if isinstance(w, str) and w and w[0].isalpha()]
+    for a, b in pairwise(words):
+        if a not in form.words or b not in form.words:
+            whole = a + b if a + b in form.words else nearest(a + b, sorted(form.words))
+            if whole:
+                return f"{a} {b}: {whole} is cut in two"
+    if s.major != "CYCLE" and any(_TWO_NUMBERS.search(part) for part in s.body.split(",")):
+        return "a blank between two numbers"
+    return ""
+
+
 def _bare_gap(s: Statement) -> bool:
     """GOHOME reports its own."""
     return s.major == "GOHOME"
 
 
 def _word_fault(word: str, form: Form) -> str:
-    if word[0] in _STARTS_NUMBER or _NUMBER_LIKE.fullmatch(word):
+    if word[0] in _STARTS_NUMBER or _NUMBER_LIKE.fullmatch(word) or (len(word) > 1 and _ONE_LETTER.fullmatch(word)):
         return f"{word[:30]} is not a number"
     meant = nearest(word, sorted(form.words))
     if meant:
         return f"{word[:30]} is no word of it: {meant}?"
     for known in form.words:
         rest = word.removeprefix(known)
-        if rest != word and (rest[0] in _STARTS_NUMBER or not rest[0].isalnum() or rest in form.words):
+        if rest != word and (rest[0] in _STARTS_NUMBER or not rest[0].isalnum() or rest in form.words
+                             or rest[1:] in form.words):
             return f"{word[:30]}: a comma is missing behind {known}"
-    ends = next((bare for bare in BARE_WORDS if word.endswith(bare) and word != bare), "")
+    ends = next((bare for bare in BARE_WORDS if word.endswith(bare)), "")
     if ends:
         return f"{ends} stands within it: the end of a line is missing"
-    if not form.open:
+    if not form.open or len(word) == 1:
         return f"{word[:30]} is no word of it"
     return "" if re.fullmatch(r"[A-Z0-9_.-]+", word) else f"{word[:30]} is no word"
 
@@ -178,5 +203,5 @@ def _numbers_fault(s: Statement, form: Form) -> str:
     if counts and count not in counts:
         return f"{count} numbers, it takes {' or '.join(map(str, sorted(counts)))}"
     if form.lengths and any(_LEADING_ZEROS.fullmatch(part.strip()) for part in re.split(r"[,\s]+", s.body)):
-        return "a number begins with 0 and has no point"
+        return "a number is cut off at its point"
     return ""

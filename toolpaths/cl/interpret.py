@@ -138,8 +138,9 @@ def _remark(b: Builder, s: Statement) -> None:
     word = s.major.removeprefix(DATA_COMMENT)
     known = [w.removeprefix(DATA_COMMENT) for w in HANDLERS if w.startswith(DATA_COMMENT)]
     first = re.split(r"[^A-Z]", word + " ")[0]
-    meant = nearest(word, known) or nearest(first, known) or (first if first in known else "") or nearest(
-        word.replace(" ", ""), known)
+    inner = re.split(r"[^A-Z]", s.body.upper() + " ")[0] if "/" in s.body or not word else ""
+    heads = {word, first, inner, word + inner, word.replace(" ", ""), re.sub(r"[^A-Z]", "", word)} - {""}
+    meant = next((h if h in known else nearest(h, known) for h in sorted(heads) if h in known or nearest(h, known)), "")
     if meant and first not in REMARKS:
         b.log.error("cl.data-comment", f"$$-> {word[:40]}: no remark that is known, {meant}?", b.line,
                     "correct the word, or write $$ without -> before a comment", key=meant)

@@ -18,7 +18,7 @@ def low_rapids(p: Toolpath) -> Ints:
     in all the file: those of the pass with its axis, and its last one with any. Only passes of one axis are judged."""
     cut = (p.kind != Kind.RAPID) | (p.role == Role.HOLE)
     rapid = ~cut & (p.role == Role.POINT)
-    if not cut.any() or not rapid.any():
+    if not cut.any() or not rapid.any() or not np.isfinite(p.axis).all() or not np.isfinite(p.tip).all():
         return np.zeros(0, np.int64)
     if p.axis.strides[0] == 0 or bool((p.axis == p.axis[0]).all()):
         return _low_of_one_axis(p, cut, rapid)
