@@ -1,4 +1,4 @@
-"""Write indexing/: a round part on a fourth axis as Creo writes it, indexed by ROTATE. python samples/make_indexing.py [FOLDER].
+"""Write indexing/: a round part on a fourth axis, indexed by Creo. python samples/make_indexing.py [FOLDER].
 
 Fourteen slots in seats 56.66 mm off the rotation axis, by a subroutine between TRANS +h and -h, and fourteen holes between
 them, by a subroutine about the rotation axis; steps of 360/14 degrees, written as 25.714, from 45 degrees on.

@@ -45,7 +45,8 @@ def inspect(result: ReadResult) -> dict[str, object]:
         "operations": _operations(p, point, lengths), "tools": [tool_dict(t) for t in p.tools],
         "frames": [asdict(f) for f in p.frames], "units": p.units, "five_axis": motion != "fixed",
         "axis_motion": motion, "length_mm": float(lengths.sum()), "extents": extents(p),
-        "unknown_words": dict(result.unknown_words), "records": asdict(p.records), "diagnostics": [d.as_dict() for d in result.diagnostics],
+        "unknown_words": dict(result.unknown_words), "records": asdict(p.records),
+        "diagnostics": [d.as_dict() for d in result.diagnostics],
     }
 
 

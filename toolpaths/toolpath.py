@@ -47,7 +47,7 @@ class FeedMode(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Records:
-    """Records of a CL file: all, executed, neutral (they say nothing to the machine), dropped (the file has an error then)."""
+    """Records of a CL file: all, executed, neutral (nothing for the machine), dropped (then the file has an error)."""
 
     total: int = 0
     executed: int = 0
@@ -252,7 +252,7 @@ class Toolpath:
         return len(self.tip)
 
     def equals(self, other: Toolpath) -> bool:
-        """True where every value is the same bit for bit, apart from source lines, faults, counts of records and the file's name."""
+        """True where every value is the same bit for bit, apart from source lines, faults, counts and the file's name."""
         for f in fields(self):
             if f.name in ("line", "file", "faults", "records"):
                 continue

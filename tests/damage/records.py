@@ -11,28 +11,132 @@ from toolpaths.cl.read import ReadResult, read_bytes
 from toolpaths.diagnostics import has_errors
 from toolpaths.toolpath import Arcs, Toolpath
 
-NX = ("TOOL PATH/A,TOOL,M10\nTLDATA/MILL,10.0000,0.0000,75.0000,0.0000,0.0000\nMSYS/0.0000,0.0000,5.0000,1.0,0.0,0.0,0.0,1.0,0.0\n"
-      "$$ centerline data\nPAINT/PATH\nLOAD/TOOL,1,ADJUST,1\nSPINDL/RPM,3000,CLW\nCOOLNT/FLOOD\nFEDRAT/MMPM,250.0000\nRAPID\n"
-      "GOTO/0.0000,0.0000,5.0000,0.0,0.0,1.0\nCUTCOM/LEFT,XYPLAN\nGOTO/10.0000,0.0000,-1.0000\nPAINT/COLOR,31\n"
-      "CIRCLE/0.0,0.0,-1.0,0.0,0.0,-1.0,10.0,0.03,0.5,10.0,0.0\nGOTO/0.0000,10.0000,-1.0000\nCUTCOM/OFF\nDELAY/2.5\nSTOP\n"
-      "GOTO/0.0000,12.0000,-1.0000\nPAINT/TOOL,NOMORE\nEND-OF-PATH\n")
-APT = ("PARTNO PLATE\nUNITS/MM\nLOADTL/12\nCUTTER/10.0,1.0\nSPINDL/3000,RPM,CLW\nCOOLNT/ON\nFEDRAT/250.0,MMPM\nFROM/0.0,0.0,50.0\n"
-       "RAPID\nGOTO/0.0,0.0,5.0\nGOTO/10.0,0.0,-1.0\nGODLTA/0.0,0.0,-5.0\nGODLTA/7.5\nCYCLE/DRILL,FEDTO,12.0,MMPM,120.0,RAPTO,3.0,"
-       "RTRCTO,20.0\nGOTO/30.0,5.0,0.0\nCYCLE/OFF\nOPSTOP\nAUXFUN/8\nGOTO/31.0,6.0,9.0\nFINI\n")
-CREO = ("$$-> MFGNO / P\nPARTNO / P\nMACHIN / UNCX01, 1\nUNITS / MM\n$$-> FEATNO / 10\nLOADTL / 1, OSETNO, 1\n$$-> CUTTER / 10.500000\n"
-        "$$-> CSYS / 1.0, 0.0, 0.0, 0.0,  $\n 0.0, 1.0, 0.0, 0.0,  $\n 0.0, 0.0, 1.0, 7.0\nSPINDL / RPM, 3000.0,  CLW\nMULTAX / ON\n"
-        "FEDRAT / 250.0,  MMPM\nRAPID\nGOTO / 10.0, 0.0, 50.0, $\n 0.0, 0.0, 1.0\nGOTO / 10.0, 0.0, 5.0, $\n 0.0, 0.0, 1.0\n"
-        "CIRCLE / 0.0, 0.0, 5.0, $\n0.0, 0.0, 1.0, 10.0\nGOTO / 0.0, 10.0, 5.0, $\n 0.0, 0.0, 1.0\n$$-> END /\nFINI\n")
-INDEXED = ("$$-> MFGNO / P\nUNITS / MM\nDEFSUB / 1\nFEDRAT / 250.0,  MMPM\nGOTO / 0.0, 0.0, 2.0\nENDSUB\nLOADTL / 1\n"
-           "ROTATE / AAXIS, INCR, -90.000, CCLW\nRAPID\nGOTO / 0.0, 0.0, 9.0\nTRANS / 0.0, 0.0, 20.0\nCALSUB / 1\nTRANS / 0.0, 0.0, 0.0\n"
-           "FINI\n")
-SOLIDWORKS = ("PARTNO/1\nMACHIN/PWORKS,0\nUNIT/MM\nSETUP/START,1\nCUTTER/10.,0,5.,0,0,0,75.\nLOAD/TOOL,1\nTRNTYP/WORLD,0,0,0\n"
-              "CSYS/1.,0,0,0,0,1.,0,0,0,0,1.,0\nSPINDL/3000,RPM,CLW\nRAPID/\nGOTO/10.,0,50.\nFEDRAT/250.,MMPM\nGOTO/10.,0,-3.\n"
-              "CIRCLE/0,0,-3.,0,0,1.\nGOTO/0,10.,-3.\nCUTCOM/OFF\nFINI\n")
-CATIA = ("$$*CATIA0\n$$ Program.1\n$$     1.00000    0.00000    0.00000   10.00000\n$$     0.00000    1.00000    0.00000    0.00000\n"
-         "$$     0.00000    0.00000    1.00000    0.00000\nPARTNO SAMPLE\n$$ OPERATION NAME : POCKET\nTPRINT/MILL,MILL,MILL\nLOADTL/1\n"
-         "MULTAX\nSPINDL/ 3000.0,RPM,CLW\nFEDRAT/ 250.0,MMPM\nRAPID\nGOTO  /    10.00000,    0.00000,   50.00000, 0.0, 0.0, 1.0\n"
-         "TLAXIS/ 0.0,0.0,1.0\nGOTO  /    20.00000,    0.00000,   -3.00000\nFINI\n")
+NX = """\
+TOOL PATH/A,TOOL,M10
+TLDATA/MILL,10.0000,0.0000,75.0000,0.0000,0.0000
+MSYS/0.0000,0.0000,5.0000,1.0,0.0,0.0,0.0,1.0,0.0
+$$ centerline data
+PAINT/PATH
+LOAD/TOOL,1,ADJUST,1
+SPINDL/RPM,3000,CLW
+COOLNT/FLOOD
+FEDRAT/MMPM,250.0000
+RAPID
+GOTO/0.0000,0.0000,5.0000,0.0,0.0,1.0
+CUTCOM/LEFT,XYPLAN
+GOTO/10.0000,0.0000,-1.0000
+PAINT/COLOR,31
+CIRCLE/0.0,0.0,-1.0,0.0,0.0,-1.0,10.0,0.03,0.5,10.0,0.0
+GOTO/0.0000,10.0000,-1.0000
+CUTCOM/OFF
+DELAY/2.5
+STOP
+GOTO/0.0000,12.0000,-1.0000
+PAINT/TOOL,NOMORE
+END-OF-PATH
+"""
+APT = """\
+PARTNO PLATE
+UNITS/MM
+LOADTL/12
+CUTTER/10.0,1.0
+SPINDL/3000,RPM,CLW
+COOLNT/ON
+FEDRAT/250.0,MMPM
+FROM/0.0,0.0,50.0
+RAPID
+GOTO/0.0,0.0,5.0
+GOTO/10.0,0.0,-1.0
+GODLTA/0.0,0.0,-5.0
+GODLTA/7.5
+CYCLE/DRILL,FEDTO,12.0,MMPM,120.0,RAPTO,3.0,RTRCTO,20.0
+GOTO/30.0,5.0,0.0
+CYCLE/OFF
+OPSTOP
+AUXFUN/8
+GOTO/31.0,6.0,9.0
+FINI
+"""
+CREO = """\
+$$-> MFGNO / P
+PARTNO / P
+MACHIN / UNCX01, 1
+UNITS / MM
+$$-> FEATNO / 10
+LOADTL / 1, OSETNO, 1
+$$-> CUTTER / 10.500000
+$$-> CSYS / 1.0, 0.0, 0.0, 0.0,  $
+ 0.0, 1.0, 0.0, 0.0,  $
+ 0.0, 0.0, 1.0, 7.0
+SPINDL / RPM, 3000.0,  CLW
+MULTAX / ON
+FEDRAT / 250.0,  MMPM
+RAPID
+GOTO / 10.0, 0.0, 50.0, $
+ 0.0, 0.0, 1.0
+GOTO / 10.0, 0.0, 5.0, $
+ 0.0, 0.0, 1.0
+CIRCLE / 0.0, 0.0, 5.0, $
+0.0, 0.0, 1.0, 10.0
+GOTO / 0.0, 10.0, 5.0, $
+ 0.0, 0.0, 1.0
+$$-> END /
+FINI
+"""
+INDEXED = """\
+$$-> MFGNO / P
+UNITS / MM
+DEFSUB / 1
+FEDRAT / 250.0,  MMPM
+GOTO / 0.0, 0.0, 2.0
+ENDSUB
+LOADTL / 1
+ROTATE / AAXIS, INCR, -90.000, CCLW
+RAPID
+GOTO / 0.0, 0.0, 9.0
+TRANS / 0.0, 0.0, 20.0
+CALSUB / 1
+TRANS / 0.0, 0.0, 0.0
+FINI
+"""
+SOLIDWORKS = """\
+PARTNO/1
+MACHIN/PWORKS,0
+UNIT/MM
+SETUP/START,1
+CUTTER/10.,0,5.,0,0,0,75.
+LOAD/TOOL,1
+TRNTYP/WORLD,0,0,0
+CSYS/1.,0,0,0,0,1.,0,0,0,0,1.,0
+SPINDL/3000,RPM,CLW
+RAPID/
+GOTO/10.,0,50.
+FEDRAT/250.,MMPM
+GOTO/10.,0,-3.
+CIRCLE/0,0,-3.,0,0,1.
+GOTO/0,10.,-3.
+CUTCOM/OFF
+FINI
+"""
+CATIA = """\
+$$*CATIA0
+$$ Program.1
+$$     1.00000    0.00000    0.00000   10.00000
+$$     0.00000    1.00000    0.00000    0.00000
+$$     0.00000    0.00000    1.00000    0.00000
+PARTNO SAMPLE
+$$ OPERATION NAME : POCKET
+TPRINT/MILL,MILL,MILL
+LOADTL/1
+MULTAX
+SPINDL/ 3000.0,RPM,CLW
+FEDRAT/ 250.0,MMPM
+RAPID
+GOTO  /    10.00000,    0.00000,   50.00000, 0.0, 0.0, 1.0
+TLAXIS/ 0.0,0.0,1.0
+GOTO  /    20.00000,    0.00000,   -3.00000
+FINI
+"""
 FILES = {"nx": NX, "apt": APT, "creo": CREO, "indexed": INDEXED, "solidworks": SOLIDWORKS, "catia": CATIA}
 LEFT_OUT = ("PAINT", "$$ ", "PARTNO", "MACHIN", "SETUP", "$$-> END", "$$-> MFGNO", "TPRINT")
 """Lines that say nothing to the machine: names, display, comments."""
@@ -97,12 +201,13 @@ def outcome(result: ReadResult, whole: ReadResult) -> str:
 
 def shape(p: Toolpath) -> object:
     """All of a toolpath but its numbers and names."""
-    return (len(p), p.kind.tolist(), p.role.tolist(), p.arc.tolist(), p.pass_.tolist(), np.isfinite(p.feed).tolist(),
-            p.feed_mode.tolist(), _arcs(p.arcs), [(e.index, e.word, tuple(v if isinstance(v, str) else 0.0 for v in e.values))
-                                                  for e in p.events if e.word not in ("PPRINT", "INSERT")],
-            [(c.kind, c.retract is None, len(c.steps)) for c in p.cycles], len(p.operations), len(p.tools),
-            [(t.shape, t.diameter is None, t.corner_radius is None, len(t.cutter), t.length_register is None) for t in p.tools],
-            len(p.frames), p.units)
+    rows = [column.tolist() for column in (p.kind, p.role, p.arc, p.pass_, np.isfinite(p.feed), p.feed_mode)]
+    events = [(e.index, e.word, tuple(v if isinstance(v, str) else 0.0 for v in e.values)) for e in p.events
+              if e.word not in ("PPRINT", "INSERT")]
+    tools = [(t.shape, t.diameter is None, t.corner_radius is None, len(t.cutter), t.length_register is None)
+             for t in p.tools]
+    cycles = [(c.kind, c.retract is None, len(c.steps)) for c in p.cycles]
+    return len(p), rows, events, tools, cycles, _arcs(p.arcs), len(p.operations), len(p.frames), p.units
 
 
 def _arcs(a: Arcs) -> list[object]:

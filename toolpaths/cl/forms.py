@@ -1,7 +1,7 @@
 """The form of records: which words and how many numbers each takes. A damaged byte shows where a record departs from it.
 
-A word that a form does not list passes (posts have words of their own), unless it is one edit from a listed one, begins like a
-number, or holds another record. A number that does not fit, an empty field and a second slash are refused.
+A word that a form does not list passes (posts have words of their own), unless it is one edit from a listed one, begins
+like a number, or holds another record. A number that does not fit, an empty field and a second slash are refused.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from toolpaths.cl.words import BARE_WORDS, NEUTRAL, SILENT, TEXT_WORDS
 
 @dataclass(frozen=True)
 class Form:
-    """Words of a record, the counts of its numbers (empty: any), whether other words pass, and whether fields may be empty."""
+    """Words of a record, counts of its numbers (empty: any), whether other words pass, whether fields may be empty."""
 
     words: frozenset[str] = frozenset()
     counts: frozenset[int] = frozenset()
@@ -36,20 +36,20 @@ def _form(words: str = "", *counts: int, closed: bool = False, gaps: bool = Fals
     return Form(frozenset(words.split()), frozenset(counts), not closed, gaps, lengths)
 
 
-_TABLE = _form("AAXIS BAXIS CAXIS INCR ABS CLW CCLW TABLE HEAD ATANGL NEXT ROTREF AXIS XAXIS YAXIS ZAXIS A B C", 1, 2)
+_TABLE = _form("AAXIS BAXIS CAXIS INCR ABS CLW CCLW TABLE HEAD ATANGL NEXT ROTREF AXIS", 1)
 _ALONE = _form("", 0, closed=True)
 _FEED_MODIFIERS = frozenset({"SCALE", "LENGTH", "LOCK", "MAXIPM", "MAXRPM", "OVPLOT"})
 FORMS: dict[str, Form] = {
     "FEDRAT": Form(UNITS | _FEED_MODIFIERS | {"INVERS", "AUTO", "ON", "OFF", "PERSEC"}, frozenset({0, 1})),
-    "SPINDL": _form("RPM SFM SMM CLW CCLW ON OFF LOCK UNLOCK MAXRPM ORIENT LOW MEDIUM HIGH RANGE NEUTRL AUTO MILL TURN RADIUS",
-                    0, 1),
+    "SPINDL": _form("RPM SFM SMM CLW CCLW ON OFF LOCK UNLOCK MAXRPM ORIENT LOW MEDIUM HIGH RANGE NEUTRL AUTO MILL TURN "
+                    "RADIUS", 0, 1),
     "COOLNT": _form("ON OFF FLOOD MIST AIR TAP TAPKUL THRU LOW MEDIUM HIGH ALL NOW NEXT TOOL", 0, 1),
     "CUTCOM": _form("LEFT RIGHT ON OFF XYPLAN YZPLAN ZXPLAN NORMAL NORMDS PERPTO MODIFY ADJUST LENGTH OSETNO", 0, 1, 2),
     "LOADTL": _form("OSETNO ADJUST OFFSET LENGTH IN TURN MILL SPINDL MANUAL AUTO LARGE SMALL", lengths=False),
     "LOAD": _form("TOOL TURRET WIRE ADJUST OSETNO MANUAL ZOFF NEXTTL", 0, 1, 2, 3),
     "SELECT": _form("TOOL", 1),
     "TURRET": _form("OSETNO SETOOL ADJUST LENGTH CLW CCLW"),
-    "CUTTER": _form("DISPLY ON OFF", 0, 1, 2, 3, 4, 5, 6, 7, lengths=True),
+    "CUTTER": _form("DISPLY ON OFF", 0, 1, 2, 3, 4, 5, 7, lengths=True),
     "$$->CUTTER": _form("", 1, closed=True),
     "TLDATA": _form("MILL DRILL TURN GROOVE THREAD BARREL TCUTTER", lengths=True),
     "CSI_SET_FLUTE_LENGTH": _form("", 1),
@@ -77,13 +77,16 @@ FORMS: dict[str, Form] = {
     "CLAMP": _form("ON OFF AUTO XAXIS YAXIS ZAXIS AAXIS BAXIS CAXIS"), "AIR": _form("ON OFF"), "OFSTNO": _form("ON OFF"),
 }
 _MILL_COUNTS = frozenset({5, 7, 10})
-_ANY_NUMBERS = {"FEDRAT": _FEED_MODIFIERS, "SPINDL": frozenset({"MAXRPM", "RANGE", "RADIUS", "LOCK", "ORIENT"})}
+_ANY_NUMBERS = {"FEDRAT": _FEED_MODIFIERS, "SPINDL": frozenset({"MAXRPM", "RANGE", "RADIUS", "LOCK", "ORIENT"}),
+                "ROTABL": frozenset({"AXIS"}), "ROTHED": frozenset({"AXIS"})}
 """Words with which a record takes numbers of their own."""
+_VALUED, _VALUED_IN = frozenset({"OSETNO", "ADJUST", "OFFSET", "LENGTH"}), frozenset({"LOADTL", "LOAD", "TURRET"})
+"""Words that a number must follow, and in which records."""
 _NAMED = frozenset({"TOOL PATH", "OPNAME", "CSI_TOOL_PATH", "OPFEATSTART", "TOOLNO", "$$->FEATNO", *TEXT_WORDS})
-_ACTING = ("GOTO GODLTA FROM GOHOME CIRCLE MOVARC RAPID TLAXIS MULTAX FEDRAT SPINDL COOLNT LOADTL SELECT CUTCOM CYCLE MSYS CSYS "
-           "MCSYS MCS CAMERA UNITS UNIT CUTTER TLDATA DELAY DWELL ROTATE ROTABL ROTHED TRANS CALSUB DEFSUB TURRET TOOLNO PREFUN "
-           "AUXFUN OPSKIP MODE INDIRV INDIRP NURBS KNOT CNTRL ORIGIN ZERO RETRCT CLEARP").split()
-_RECORD = r"(?:(?<!UN)LOAD|" + "|".join([*_ACTING, "TOOL PATH", "TLON *, *GOFWD"]) + r")\s*/"
+_ACTING = tuple(word for word in (*FORMS, "GOTO", "GODLTA", "MCSYS", "TOOLNO", "KNOT", "CNTRL", "TOOL PATH",
+                             "TLON *, *GOFWD")
+                if word not in ("LOAD", "END", "STOP", "HEAD", "CHECK", "AIR", "SET") and not word.startswith(DATA_COMMENT))
+_RECORD = r"(?:(?<!UN)LOAD|" + "|".join(_ACTING) + r")\s*/"
 _GLUED = re.compile(r"(?:[A-Za-z0-9.)\]%\"';:!?][^A-Za-z0-9\s]?|[-=*#_]{3})(?:" + _RECORD +
                     r"|(?:RAPID|FINI|END-OF-PATH|GOHOME|OPSTOP|MULTAX|ENDSUB|(?<![A-Za-z])STOP)\s*$)")
 _BEHIND = re.compile(r"\S\s+" + _RECORD + r"\s*[^\s/]+(?:\s*,\s*[^\s/]+)*\s*$")
@@ -108,9 +111,9 @@ def check_forms(program: Program, log: Log, allowed: Iterable[str]) -> None:
         fault = fault_of(statement, allow)
         if fault:
             name = statement.major.removeprefix(DATA_COMMENT)
-            log.error("cl.form", f"{name}{'/' if statement.body and statement.slash else ' ' if statement.body else ''}"
-                      f"{statement.body[:60]}: {fault}", line, "compare the record with the CAM system; --allow-unknown WORD takes a "
-                      "word as it stands", key=f"{name} {fault}")
+            between = "/" if statement.body and statement.slash else " " if statement.body else ""
+            log.error("cl.form", f"{name}{between}{statement.body[:60]}: {fault}", line, "compare the record with the CAM "
+                      "system; --allow-unknown WORD takes a word as it stands", key=f"{name} {fault}")
 
 
 def fault_of(s: Statement, allow: frozenset[str] = frozenset()) -> str:
@@ -157,7 +160,7 @@ def _words_fault(s: Statement, form: Form, allow: frozenset[str]) -> str:
 
 
 def _split_word(s: Statement, form: Form) -> str:
-    """A word with a comma or a blank in it, a number with a blank: only GOTO and CYCLE have numbers without commas between."""
+    """A word with a comma or a blank in it, a number with a blank: GOTO and CYCLE alone have numbers without commas."""
     words = [w for w in s.words if isinstance(w, str) and w and w[0].isalpha()]
     for a, b in pairwise(words):
         if a not in form.words or b not in form.words:
@@ -183,7 +186,7 @@ def _word_fault(word: str, form: Form) -> str:
     for known in form.words:
         rest = word.removeprefix(known)
         if rest != word and (rest[0] in _STARTS_NUMBER or not rest[0].isalnum() or rest in form.words
-                             or rest[1:] in form.words):
+                             or rest[1:] in form.words or rest[1:2] in _STARTS_NUMBER):
             return f"{word[:30]}: a comma is missing behind {known}"
     ends = next((bare for bare in BARE_WORDS if word.endswith(bare)), "")
     if ends:
@@ -198,6 +201,10 @@ def _numbers_fault(s: Statement, form: Form) -> str:
     counts = form.counts
     if s.major == "TLDATA" and s.words[:1] == ("MILL",):
         counts = _MILL_COUNTS
+    if s.major in _VALUED_IN:
+        bare = [w for w, after in zip(s.words, (*s.words[1:], ""), strict=True) if w in _VALUED and isinstance(after, str)]
+        if bare:
+            return f"no number behind {bare[0]}"
     if s.has(*_ANY_NUMBERS.get(s.major, ())):
         counts = frozenset()
     if counts and count not in counts:

@@ -19,9 +19,10 @@ SAME_AXIS = 2e-3
 """rad: angles of three decimals that add up over a turn, and rows of CSYS remarks"""
 SAME_PLACE = 0.02
 """mm between a TRANS and the translation of a CSYS remark that say the same"""
+_NO_PLACE = 1e-6
 _STEP = 1e-12
-TRANS_HINT = ("have Creo write the sequence with MULTAX/ON (six numbers) and without subroutines, or correct ROTATE, TRANS or "
-              "the CSYS remark")
+TRANS_HINT = ("have Creo write the sequence with MULTAX/ON (six numbers) and without subroutines, or correct ROTATE, "
+              "TRANS or the CSYS remark")
 
 
 def in_force(b: Builder) -> bool:
@@ -68,7 +69,7 @@ def map_of(b: Builder) -> tuple[Map, str]:
             b.dropped_at.set(b.row, True)
             place = np.zeros(3)
         return (matrix, place), fault
-    if _apart(place, shift) <= SAME_PLACE or not place.any():
+    if _apart(place, shift) <= SAME_PLACE or float(np.abs(place).max()) <= _NO_PLACE:
         return (matrix, shift), fault
     if _apart(place, b.shift) <= SAME_PLACE:
         return (matrix, b.shift.copy()), fault

@@ -165,7 +165,8 @@ def report_others(b: Builder) -> dict[str, int]:
     listing, allowed = [], []
     for line, body in dict.fromkeys(b.texts):
         word = listing_text.word_of(body)
-        if not (_MOTION.match(body) and any(c.isdigit() for c in body)) and listing_text.is_listing(body, line < first, line > last, VOCABULARY):
+        moves = _MOTION.match(body) is not None and any(c.isdigit() for c in body)
+        if not moves and listing_text.is_listing(body, line < first, line > last, VOCABULARY):
             listing.append(line)
         elif listing_text.SINGLE.fullmatch(body) and not known(body):
             b.unknown.setdefault(body, []).append((line, 0, 0))
@@ -174,8 +175,8 @@ def report_others(b: Builder) -> dict[str, int]:
         elif known(word) and word not in SILENT:
             b.log.error("cl.slash", f"{word} is not followed by a slash", line, f"write {word}/...", key=word)
         else:
-            b.log.error("cl.text", f"no record: {body[:60]!r}", line, "correct it to WORD/..., or write $$ before a comment; "
-                        "--allow-unknown '(TEXT)' leaves such lines out", key="" if not _MOTION.match(body) else "motion")
+            b.log.error("cl.text", f"no record: {body[:60]!r}", line, "correct it to WORD/..., or write $$ before a "
+                        "comment; --allow-unknown '(TEXT)' leaves such lines out", key="motion" if moves else "")
     b.neutral_texts = len(set(listing)) + len(allowed)
     _report_uncalled(b)
     counts = {word: len(found) for word, found in b.unknown.items()}
@@ -207,8 +208,8 @@ def _report_word(b: Builder, word: str, found: list[tuple[int, int, int]]) -> No
             b.log.warning("cl.unknown-word", f"unknown word {word}, left out", line, key=word)
         elif (numbers >= _MANY and 0 < row < b.row) or word.split(" ")[-1] in motion.HANDLERS or (
                 numbers > 0 and word.startswith(_MOVING)):
-            b.log.error("cl.unknown-motion", f"unknown word {word} with {numbers} numbers, which may move the tool", line, hint,
-                        key=word)
+            b.log.error("cl.unknown-motion", f"unknown word {word} with {numbers} numbers, which may move the tool", line,
+                        hint, key=word)
         else:
             b.log.error("cl.unknown-word", f"unknown word {word}", line, hint, key=word)
 

@@ -49,4 +49,6 @@ def _resembles(text: str, vocabulary: frozenset[str]) -> bool:
     words = upper.split()
     heads = {re.split(r"[^A-Z_-]", upper + " ")[0], re.split(r"[^A-Z ]", upper + "/")[0].strip(), upper, *words[:1],
              "".join(words[:2]), " ".join(words[:2])} - {""}
-    return upper.startswith(TEXT_WORDS) or any(h in vocabulary or (len(h) >= _SHORTEST and nearest(h, vocabulary)) for h in heads)
+    if upper.startswith(TEXT_WORDS) or heads & vocabulary:
+        return True
+    return any(len(h) >= _SHORTEST and nearest(h, vocabulary) for h in heads)

@@ -45,7 +45,8 @@ class Log:
 
     def lines_with_errors(self) -> frozenset[int]:
         """Lines that an ERROR names."""
-        return frozenset(line for entry in self._entries.values() if entry.severity is Severity.ERROR for line in entry.lines)
+        errors = (entry.lines for entry in self._entries.values() if entry.severity is Severity.ERROR)
+        return frozenset(line for lines in errors for line in lines)
 
     def error(self, code: str, message: str, line: int = 0, hint: str = "", key: str = "") -> None:
         """An ERROR."""

@@ -35,8 +35,8 @@ def goto(b: Builder, s: Statement) -> None:
     if len(numbers) == 2 and b.zsurf is not None:
         numbers = [*numbers, b.zsurf]
     if len(numbers) in (4, 7):
-        b.log.error("cl.goto-feed", f"GOTO has {len(numbers)} numbers, it takes 3, 6 or 9: the last may be a feed, or a comma or a "
-                    "blank splits a number", b.line, "state the feed by FEDRAT before the GOTO")
+        b.log.error("cl.goto-feed", f"GOTO has {len(numbers)} numbers, it takes 3, 6 or 9: the last may be a feed, or a "
+                    "comma or a blank splits a number", b.line, "state the feed by FEDRAT before the GOTO")
         return
     if len(numbers) not in (3, 6, 9):
         b.log.error("cl.goto", f"GOTO has {len(numbers)} numbers, it takes 3, 6 or 9", b.line)

@@ -106,8 +106,9 @@ def _check_rapids(b: Builder, toolpath: Toolpath) -> None:
     """Rapids below all that their tool cuts: an error where an indexed part may stand in the wrong frame, else a warning."""
     rows = low_rapids(toolpath)
     indexed = bool(b.turns_at or b.entries)
-    b.log.many(Severity.ERROR if indexed else Severity.WARNING, "cl.rapid-below", "a rapid goes below everything that its tool "
-               "cuts along that axis", toolpath.line[rows], TRANS_HINT if indexed else "look at the point in the CAM system")
+    b.log.many(Severity.ERROR if indexed else Severity.WARNING, "cl.rapid-below", "a rapid goes below everything that its "
+               "tool cuts along that axis", toolpath.line[rows],
+               TRANS_HINT if indexed else "look at the point in the CAM system")
 
 
 def _cut_off(data: bytes | str, lines: int, log: Log) -> None:

@@ -12,10 +12,11 @@ from toolpaths.toolpath import Records
 
 
 def counted(b: Builder, known: frozenset[str]) -> Records:
-    """Records (continued lines are one, comments none): executed, neutral by the list in `words`, by the rules for text around
-    the program or as --allow-unknown asks, dropped. A file with dropped records has errors that name them."""
+    """Records (continued lines are one, comments none): executed, neutral by the list in `words`, by the rules for text
+    around the program or as --allow-unknown asks, dropped. A file with dropped records has errors that name them."""
     majors = Counter(map(attrgetter("major"), b.program.statements))
-    comments = sum(n for word, n in majors.items() if word == COMMENT or (word.startswith(DATA_COMMENT) and word not in known))
+    comments = sum(n for word, n in majors.items()
+                   if word == COMMENT or (word.startswith(DATA_COMMENT) and word not in known))
     total = len(b.points) + sum(majors.values()) - comments
     lines = {word: {line for line, _, _ in found} for word, found in b.unknown.items()}
     left_out = sum(len(found) for word, found in lines.items() if word in b.allow_unknown)

@@ -236,7 +236,8 @@ class Lexer:
             part, continued, lost = _cut(text, not parts and text.startswith(DATA_COMMENT), text_word)
             parts.append(part)
             if lost:
-                self.log.error("cl.dollar", f"{lost[:40]!r} stands behind a continuation mark $", self.scan.line[self.next - 1],
+                line = self.scan.line[self.next - 1]
+                self.log.error("cl.dollar", f"{lost[:40]!r} stands behind a continuation mark $", line,
                                "end the line behind $, or write $$ before a comment")
             depth += part.count("(") - part.count(")")
             if not continued:

@@ -48,11 +48,14 @@ LENGTH_EVENTS = frozenset({"RETRCT", "CLEARP", "CLRSRF", "LEADER"})
 
 _REASONS = {
     "display": "PAINT DISPLY PLOT CLPRNT BOX",
-    "listing and punching of APT systems": "PRINT PUNCH TITLES EJECT RESERV NOPOST PLABEL LPRINT PPLABEL LETTER REMARK PARTNO",
-    "vocabulary and settings of another post-processor": "PPWORD PPFUN SYN MACHIN ISN ARCSLP OPERATION BEGIN START TOOLPATH_TYPE",
+    "listing and punching of APT systems": "PRINT PUNCH TITLES EJECT RESERV NOPOST PLABEL LPRINT PPLABEL LETTER REMARK "
+                                           "PARTNO",
+    "vocabulary and settings of another post-processor": "PPWORD PPFUN SYN MACHIN ISN ARCSLP OPERATION BEGIN START "
+                                                         "TOOLPATH_TYPE",
     "bookkeeping of the CAM system": "OPFEATEND MOVE_ATTRIB SETUP START_OP END_OP MATERL CSI_SET_PATH_PARAM "
                                      "CSI_SET_EXTENSION_LENGTH",
-    "tolerances of a path that is computed already": "INTOL OUTTOL TOLER LINTOL MCHTOL CSI_PATH_TOLERANCE NUMPTS MAXDP MAXANG",
+    "tolerances of a path that is computed already": "INTOL OUTTOL TOLER LINTOL MCHTOL CSI_PATH_TOLERANCE NUMPTS MAXDP "
+                                                     "MAXANG",
     "part surface of arcs that state their plane": "AUTOPS PSIS",
     "which point of the tool the lathe drives; said by the operation": "SWITCH",
     "how the control runs the axes; chosen by the set-up": "ALIGN TCP CUT",
