@@ -7,7 +7,7 @@ STAMP := .venv/installed
 PYTEST_ARGS ?= -n auto --maxprocesses 4 -rfEs
 SOURCES := toolpaths machines postproc
 
-.PHONY: demo test hard lint lock clean
+.PHONY: demo test damage hard lint lock clean
 
 demo: $(STAMP)
 	@mkdir -p out
@@ -21,6 +21,9 @@ test: $(STAMP)
 EDITS ?= 1
 hard: $(STAMP)
 	$(BIN)/python tests/hard/run.py $(if $(HARD),"$(HARD)") --edits $(EDITS) $(HARD_ARGS)
+# Every byte of every kind of record by all 256; an hour of processor.
+damage: $(STAMP)
+	DAMAGE=all $(BIN)/pytest $(PYTEST_ARGS) tests/damage
 
 lint: $(STAMP)
 	$(BIN)/ruff check .
