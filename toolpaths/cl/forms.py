@@ -49,7 +49,7 @@ FORMS: dict[str, Form] = {
     "LOAD": _form("TOOL TURRET WIRE ADJUST OSETNO MANUAL ZOFF NEXTTL", 0, 1, 2, 3),
     "SELECT": _form("TOOL", 1),
     "TURRET": _form("OSETNO SETOOL ADJUST LENGTH CLW CCLW"),
-    "CUTTER": _form("DISPLY ON OFF", 0, 1, 2, 3, 4, 5, 7, lengths=True),
+    "CUTTER": _form("DISPLY ON OFF", 0, 1, 2, 3, 4, 5, 6, 7, lengths=True),
     "$$->CUTTER": _form("", 1, closed=True),
     "TLDATA": _form("MILL DRILL TURN GROOVE THREAD BARREL TCUTTER", lengths=True),
     "CSI_SET_FLUTE_LENGTH": _form("", 1),
@@ -76,6 +76,8 @@ FORMS: dict[str, Form] = {
     "UNLOAD": _form("TOOL"), "REWIND": _form("", 0, 1), "LEADER": _form("", 1), "CHECK": _form(), "HEAD": _form(),
     "CLAMP": _form("ON OFF AUTO XAXIS YAXIS ZAXIS AAXIS BAXIS CAXIS"), "AIR": _form("ON OFF"), "OFSTNO": _form("ON OFF"),
 }
+_CLT_CUTTER = 6
+"""numbers of CUTTER in `.clt`, which has a comma behind the last"""
 _MILL_COUNTS = frozenset({5, 7, 10})
 _ANY_NUMBERS = {"FEDRAT": _FEED_MODIFIERS, "SPINDL": frozenset({"MAXRPM", "RANGE", "RADIUS", "LOCK", "ORIENT"}),
                 "ROTABL": frozenset({"AXIS"}), "ROTHED": frozenset({"AXIS"})}
@@ -201,6 +203,8 @@ def _numbers_fault(s: Statement, form: Form) -> str:
     counts = form.counts
     if s.major == "TLDATA" and s.words[:1] == ("MILL",):
         counts = _MILL_COUNTS
+    if s.major == "CUTTER" and count == _CLT_CUTTER and not s.body.endswith(","):
+        return "6 numbers: one of seven is missing, or the comma behind the last"
     if s.major in _VALUED_IN:
         bare = [w for w, after in zip(s.words, (*s.words[1:], ""), strict=True) if w in _VALUED and isinstance(after, str)]
         if bare:

@@ -9,6 +9,7 @@ from toolpaths.toolpath import Kind, Role, Toolpath
 
 BELOW = 0.02
 """mm"""
+_WIDE = 1_000_100
 _SAME = 1e-6
 """of an axis, from row to row"""
 
@@ -56,8 +57,9 @@ def _low_of_passes(p: Toolpath, cut: Bools, rapid: Bools) -> Ints:
     fixed = ~np.logical_or.reduceat(off & cut, start) & (number[first] == np.arange(len(start)))
     height = np.einsum("ni,ni->n", p.tip, axis[number])
     lowest = np.minimum.reduceat(np.where(cut, _lowest(p, height), np.inf), start)
-    key = np.column_stack((p.tool[first], np.round(axis / _SAME)))[fixed]
-    _, group = np.unique(key, axis=0, return_inverse=True)
+    i, j, k = (np.round(axis[fixed] / _SAME) + _WIDE).astype(np.int64).T
+    _, direction = np.unique((i * 2 * _WIDE + j) * 2 * _WIDE + k, return_inverse=True)
+    _, group = np.unique(direction.ravel() * (len(p.tools) + 1) + p.tool[first][fixed], return_inverse=True)
     floor = np.full(len(start), -np.inf)
     least = np.full(int(group.max(initial=-1)) + 1, np.inf)
     np.minimum.at(least, group.ravel(), lowest[fixed])

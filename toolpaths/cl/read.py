@@ -12,7 +12,7 @@ from toolpaths.cl.build import Builder
 from toolpaths.cl.dialects import DIALECTS, Dialect, detect, units_said
 from toolpaths.cl.forms import check_forms
 from toolpaths.cl.indexing import TRANS_HINT
-from toolpaths.cl.interpret import VOCABULARY, known, report_others, run
+from toolpaths.cl.interpret import HANDLERS, known, report_others, run
 from toolpaths.cl.log import Log
 from toolpaths.cl.rapid_heights import low_rapids
 from toolpaths.cl.records import counted
@@ -97,7 +97,7 @@ def read_bytes(data: bytes | str, *, file: str = "", units: str | None = None, d
     _check_rapids(b, toolpath)
     check_forms(program, log, b.allow_unknown)
     diagnostics = log.diagnostics()
-    toolpath = replace(_with_faults(toolpath, diagnostics), records=counted(b, VOCABULARY))
+    toolpath = replace(_with_faults(toolpath, diagnostics), records=counted(b, frozenset(HANDLERS)))
     return ReadResult(toolpath, diagnostics, counts, found.name, evidence,
                       b.arc_records, b.cycle_records, parts.lines)
 

@@ -239,6 +239,7 @@ class Lexer:
                 line = self.scan.line[self.next - 1]
                 self.log.error("cl.dollar", f"{lost[:40]!r} stands behind a continuation mark $", line,
                                "end the line behind $, or write $$ before a comment")
+                return "".join(parts)
             depth += part.count("(") - part.count(")")
             if not continued:
                 return "".join(parts)
