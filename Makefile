@@ -9,7 +9,7 @@ PYTEST_ARGS ?= -n auto --maxprocesses 4 --dist loadfile -rfEs
 SOURCES := toolpaths machines postproc
 NUMERIC = $(shell grep -rl --include='test_*.py' 'mark\.numeric' tests)
 
-.PHONY: demo test quick numeric hard changes lint lock clean
+.PHONY: demo test quick numeric hard damage changes lint lock clean
 
 demo: $(STAMP)
 	@mkdir -p out
@@ -23,6 +23,10 @@ test: $(STAMP)
 EDITS ?= 1
 hard: $(STAMP)
 	$(BIN)/python tests/hard/run.py $(if $(HARD),"$(HARD)") --edits $(EDITS) $(HARD_ARGS)
+
+# Every byte of every kind of record by all 256; an hour of processor.
+damage: $(STAMP)
+	DAMAGE=all $(BIN)/pytest $(PYTEST_ARGS) tests/damage
 
 # Every word, block and number of written programs changed, on every control: minutes each.
 changes: $(STAMP)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import numpy as np
 from postproc.pipeline import PostResult, VerifyResult, points_in
 from toolpaths.diagnostics import Severity
 from toolpaths.input_files import there_is
+from toolpaths.toolpath import Records
 from toolpaths.units import DEG
 
 
@@ -25,6 +27,7 @@ def as_dict(result: PostResult, output: str) -> dict[str, Any]:
         "machine": result.machine.name,
         "controller": result.controller_name,
         "points_in": points_in(result.toolpath) if result.toolpath is not None else 0,
+        "records": asdict(result.toolpath.records) if result.toolpath is not None else asdict(Records()),
         "blocks_out": len(result.program) if result.program is not None else 0,
         "points_added": points_added(result),
         **conversion.figures(result.estimate),
@@ -128,6 +131,8 @@ def as_text(result: PostResult, output: str) -> str:
              f"{result.options.axis_tolerance:g} degrees)",
              f"tolerance: linearising {shares['linearising']:.4f}, control's smoothing {shares['smoothing']:.4f}, "
              f"rounding at most {shares['rounding']:.5f} mm"]
+    if result.toolpath is not None and result.toolpath.records.total:
+        lines.append(f"read: {result.toolpath.records}")
     if any(laws != ["axes"] for laws in d["output_modes"].values()):
         lines.append("output: " + ", ".join(f"{name} {' and '.join(laws)}" for name, laws in d["output_modes"].items()))
     if d["orientation"] is not None:

@@ -242,7 +242,7 @@ GODLTA / 0, .4, 0
 Goto / -3.5 , -1.1 , $
    -.05
 godlta/0,.4,0
-GOTO / +3.5, -.7, $ what stands behind the mark is ignored
+GOTO / +3.5, -.7, $ $$ a comment behind the mark
    -0.05
 GODLTA / 1.
 RAPID

@@ -53,6 +53,16 @@ def test_script_reproduces_the_dialects(tmp_path: Path) -> None:
         assert (tmp_path / "dialects" / name).read_bytes() == (FOLDER / "dialects" / name).read_bytes()
 
 
+def test_script_reproduces_the_indexed_parts(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.syspath_prepend(FOLDER)
+    import make_indexing
+
+    make_indexing.main(tmp_path)
+    assert {p.name for p in (FOLDER / "indexing").iterdir()} == set(make_indexing.FILES)
+    for name in make_indexing.FILES:
+        assert (tmp_path / "indexing" / name).read_bytes() == (FOLDER / "indexing" / name).read_bytes()
+
+
 @pytest.mark.parametrize("name", DIALECTS)
 def test_dialects_are_small_explained_and_listed(name: str) -> None:
     data = (FOLDER / "dialects" / name).read_bytes()

@@ -45,7 +45,8 @@ def inspect(result: ReadResult) -> dict[str, object]:
         "operations": _operations(p, point, lengths), "tools": [tool_dict(t) for t in p.tools],
         "frames": [asdict(f) for f in p.frames], "units": p.units, "five_axis": motion != "fixed",
         "axis_motion": motion, "length_mm": float(lengths.sum()), "extents": extents(p),
-        "unknown_words": dict(result.unknown_words), "diagnostics": [d.as_dict() for d in result.diagnostics],
+        "unknown_words": dict(result.unknown_words), "records": asdict(p.records),
+        "diagnostics": [d.as_dict() for d in result.diagnostics],
     }
 
 
@@ -123,6 +124,7 @@ def summary(result: ReadResult) -> str:
     lines = [f"{p.file or 'CL text'}: {title} ({result.evidence}), {p.units}, {result.lines} lines",
              f"  {found['points']} points ({found['rapids']} rapid, {found['arcs']} arcs, {found['holes']} holes of "
              f"{found['cycles']} cycles), {sum(lengths_of(p)):.1f} mm of cutting, tool axis {found['axis_motion']}"]
+    lines.append(f"  {p.records}")
     if found["normals"]:
         lines.append(f"  surface normals at {found['normals']} points")
     if len(p.arcs):

@@ -46,6 +46,19 @@ class FeedMode(IntEnum):
 
 
 @dataclass(frozen=True, slots=True)
+class Records:
+    """Records of a CL file: all, executed, neutral (nothing for the machine), dropped (then the file has an error)."""
+
+    total: int = 0
+    executed: int = 0
+    neutral: int = 0
+    dropped: int = 0
+
+    def __str__(self) -> str:
+        return f"{self.total:,} records: {self.executed:,} executed, {self.neutral:,} neutral, {self.dropped:,} dropped"
+
+
+@dataclass(frozen=True, slots=True)
 class Event:
     """A record without motion that acts before point `index` (APT word and its parameters, as in the file)."""
 
@@ -218,6 +231,8 @@ class Toolpath:
     faults: tuple[Diagnostic, ...] = ()
     """errors that reading met: what they stand for is missing, so that nothing may be written from the path"""
     spin: Floats | None = None
+    records: Records = field(default_factory=Records)
+    """what became of the records of the file"""
 
     def __post_init__(self) -> None:
         n = len(self.tip)
@@ -237,9 +252,9 @@ class Toolpath:
         return len(self.tip)
 
     def equals(self, other: Toolpath) -> bool:
-        """True where every value is the same bit for bit, apart from source lines, faults and the file's name."""
+        """True where every value is the same bit for bit, apart from source lines, faults, counts and the file's name."""
         for f in fields(self):
-            if f.name in ("line", "file", "faults"):
+            if f.name in ("line", "file", "faults", "records"):
                 continue
             if not _same(getattr(self, f.name), getattr(other, f.name)):
                 return False

@@ -162,7 +162,7 @@ def test_contact_points_that_look_like_normals() -> None:
 
 
 def test_numbers_that_grow_by_conversion() -> None:
-    text = "UNITS/INCHES\nFEDRAT/9e11,IPM\nGOTO/9e11,2,3\nCYCLE/DRILL,DEPTH,1,1e11,.003,CLEAR,9e11\nGOTO/1,2,3\n"
+    text = "UNITS/INCHES\nFEDRAT/9e+11,IPM\nGOTO/9e+11,2,3\nCYCLE/DRILL,DEPTH,1,1e+11,.003,CLEAR,9e+11\nGOTO/1,2,3\n"
     result = read_bytes(text)
     assert not has_errors(result.diagnostics)
     assert_writes_back(result.toolpath)

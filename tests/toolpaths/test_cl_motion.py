@@ -72,10 +72,17 @@ def test_rapid_holds_for_one_move_and_the_feed_returns() -> None:
     assert p.pass_.tolist() == [0, 1, 1, 2, 2]
 
 
-def test_goto_spellings_with_a_feed_and_zsurf() -> None:
-    p = read("UNITS/MM\nFEDRAT/60\nZSURF/7\nGOTO/1,2\nGOTO/1,2,3,600\nGOTO/1,2,4\n")
-    assert p.tip.tolist() == [[1, 2, 7], [1, 2, 3], [1, 2, 4]]
-    assert p.feed.tolist() == [1.0, 10.0, 10.0]
+def test_goto_of_two_numbers_with_zsurf() -> None:
+    p = read("UNITS/MM\nFEDRAT/60\nZSURF/7\nGOTO/1,2\nGOTO/1,2,4\n")
+    assert p.tip.tolist() == [[1, 2, 7], [1, 2, 4]]
+
+
+@pytest.mark.parametrize("numbers", ["1,2,3,600", "1,2,3,0,0,1,600"])
+def test_a_number_too_many_is_no_feed(numbers: str) -> None:
+    """A comma or a blank within a number leaves the same; the remedy is a FEDRAT before the GOTO."""
+    found = read_bytes(f"UNITS/MM\nGOTO/{numbers}\n")
+    assert "cl.goto-feed" in [d.code for d in found.diagnostics if d.severity is Severity.ERROR and "FEDRAT" in d.hint]
+    assert read(f"UNITS/MM\nFEDRAT/600\nGOTO/{numbers.removesuffix(',600')}\n").feed.tolist() == [10.0]
 
 
 def test_godlta() -> None:
@@ -220,8 +227,8 @@ def test_creo_points_of_six_numbers_are_in_the_common_frame() -> None:
 
 
 def test_creo_rotate_turns_the_points_unless_a_system_follows() -> None:
-    head = "$$-> MFGNO / A\nUNITS/MM\nFEDRAT/1\nGOTO/0,0,1\nROTATE / AAXIS, INCR, -90, CCLW\n"
-    p = read(head + "GOTO/0,0,1\nROTATE / AAXIS, INCR, 90, CCLW\nGOTO/0,0,1\n")
+    head = "$$-> MFGNO / A\nUNITS/MM\nFEDRAT/1\nGOTO/0,0,1\nROTATE / AAXIS, INCR, -90, CCLW\nRAPID\n"
+    p = read(head + "GOTO/0,0,1\nROTATE / AAXIS, INCR, 90, CCLW\nRAPID\nGOTO/0,0,1\n")
     assert p.tip == pytest.approx(np.array([[0, 0, 1], [0, -1, 0], [0, 0, 1]]), abs=1e-15)
     assert [e.word for e in p.events] == ["ROTATE", "ROTATE"]
     p = read(head + "$$-> CSYS / 1,0,0,0, $\n0,0,-1,0, $\n0,1,0,0\nGOTO/0,0,1\n")

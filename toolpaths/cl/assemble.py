@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
 import numpy as np
 
 from toolpaths.arrays import Array, Bools, Floats, Ints
+from toolpaths.cl import indexing
 from toolpaths.cl.arcs import UNIT_ROUNDING, Records, arcs_of, unit
 from toolpaths.cl.build import Builder, Track
 from toolpaths.cl.heights import height_of, place
@@ -22,7 +23,8 @@ T = TypeVar("T")
 
 @dataclass
 class Rows:
-    """The N rows while they are worked on, mm; `given` (N,): the record carries an axis of its own."""
+    """The N rows while they are worked on, mm; `given` (N,): the record carries an axis of its own, `index` (N,): which map
+    of the builder it takes."""
 
     tip: Floats
     axis: Floats
@@ -30,6 +32,7 @@ class Rows:
     line: Ints
     given: Bools
     common: Bools | None = None
+    index: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
 
     def __len__(self) -> int:
         return len(self.line)
@@ -39,7 +42,8 @@ def assemble(b: Builder) -> Toolpath:
     """The toolpath; consumes the builder's arrays."""
     rows = _rows(b)
     n = len(rows)
-    rows.common = rows.given & ~spread(b.in_subprogram, n, np.bool_) if b.dialect.six_common else None
+    rows.index = spread(b.map, n, np.int64)
+    _place_frames(b, rows)
     _fill_axis(b, rows)
     if b.scale != 1.0:
         rows.tip *= b.scale
@@ -174,15 +178,29 @@ def _normals(b: Builder, rows: Rows) -> tuple[Floats | None, Floats | None]:
     return normal, np.where(is_contact[:, None], rows.third * b.scale, np.nan)
 
 
+def _place_frames(b: Builder, rows: Rows) -> None:
+    """Which map each row takes, and which rows of six numbers are in the common frame."""
+    if not b.dialect.six_common:
+        return
+    n, inside = len(rows), spread(b.in_subprogram, len(rows), np.bool_)
+    rapid = np.zeros(n, dtype=np.bool_)
+    at = np.array(b.rapids, np.int64)
+    rapid[at[at < n]] = True
+    rows.index, approach = indexing.approaches(b, rows.tip, rapid, rows.index)
+    local = indexing.local_rows(b, rows.given, inside, approach, rows.axis, rows.index)
+    rows.common = rows.given & ~local
+    indexing.check_frames(b, rows.index, ~rows.common, rows.line)
+    indexing.check_axes(b, inside, rows.given, rows.axis, rows.index, rows.line)
+    indexing.check_cuts(b, ~rapid, rows.index, rows.line)
+
+
 def _to_part_frame(b: Builder, rows: Rows, normal: Floats | None, contact: Floats | None) -> None:
-    n = len(rows)
-    ends = [*b.map.starts[1:], n]
-    for start, end, index in zip(b.map.starts, ends, b.map.values, strict=True):
-        found = b.maps[index]
-        if found is None or start >= min(end, n):
+    for start, end in _runs(rows.index):
+        found = b.maps[rows.index[start]]
+        if found is None:
             continue
         rotation, origin = found
-        where = slice(start, min(end, n))
+        where = slice(start, end)
         local = where if rows.common is None else np.flatnonzero(~rows.common[where]) + start
         rows.tip[local] = rows.tip[local] @ rotation.T + origin
         rows.axis[local] = unit(rows.axis[local] @ rotation.T)
@@ -192,11 +210,19 @@ def _to_part_frame(b: Builder, rows: Rows, normal: Floats | None, contact: Float
             contact[local] = contact[local] @ rotation.T + origin
 
 
+def _runs(index: Ints) -> list[tuple[int, int]]:
+    """(start, end) of the runs of equal values."""
+    if not len(index):
+        return []
+    cut = (np.flatnonzero(np.diff(index)) + 1).tolist()
+    return list(zip([0, *cut], [*cut, len(index)], strict=True))
+
+
 def _add_deltas(b: Builder, rows: Rows) -> None:
     """GODLTA: each from the row before it, in order."""
     if not b.deltas:
         return
-    index = spread(b.map, len(rows), np.int64)
+    index = rows.index
     for row, step in b.deltas:
         if step[1] != step[1]:
             move = step[0] * b.scale * rows.axis[row]
@@ -257,7 +283,7 @@ def _has_start(b: Builder, rows: Rows, kind: Array, k: int, row: int) -> bool:
 
 
 def _map_arcs(b: Builder, rows: Rows, row: Ints, center: Floats, normal: Floats, toward: Floats) -> None:
-    index = spread(b.map, len(rows), np.int64)[row]
+    index = rows.index[row]
     if rows.common is not None:
         index = np.where(rows.common[row], 0, index)
     for i in np.unique(index):

@@ -108,6 +108,10 @@ class Builder:
         self.system = Track(-1)
         self.map = Track(0)
         self.in_subprogram = Track(False)
+        self.frame_faults: Track[object] = Track("")
+        """what the file contradicts about the frame of its points (`indexing`)"""
+        self.dropped_at: Track[object] = Track(False)
+        """where the translation of a CSYS remark is not added"""
 
     def _start_lists(self) -> None:
         self.maps: list[Map | None] = [None]
@@ -142,6 +146,18 @@ class Builder:
         self.calls: list[tuple[int, int]] = []
         self.table = [0.0, 0.0, 0.0]
         self.turned: Floats = np.eye(3)
+        self.table_turn: Floats = np.eye(3)
+        """turned machine to part, by ROTATE alone (Creo)"""
+        self.table_here: Floats = np.eye(3)
+        """the same where the last system was stated"""
+        self.turns_at: list[int] = []
+        """rows before which ROTATE stands"""
+        self.about_axis = False
+        self.indexed_subs: frozenset[float] | None = None
+        self.caller_row = 0
+        """first row since the last subroutine ended"""
+        self.entries: list[tuple[int, int]] = []
+        """first row of the caller's own points and first row of the subroutine, by CALSUB"""
         self.here: Map = (np.eye(3), np.zeros(3))
         self.shift: Floats = np.zeros(3)
         self.toward: Triple | None = None
@@ -149,7 +165,13 @@ class Builder:
         self.axis_system: list[list[float]] | None = None
         self.name = ""
         self.unknown: dict[str, list[tuple[int, int, int]]] = {}
-        self.texts: list[tuple[int, int, int, str]] = []
+        self.texts: list[tuple[int, str]] = []
+        """line and text of what has not the form of a record"""
+        self.neutral_texts = 0
+        self.called: set[tuple[int, int]] = set()
+        """subroutines that ran"""
+        self.uncalled = 0
+        """records of subroutines that nothing calls, left out as asked"""
         self.memory: dict[str, object] = {}
         """what one file of handlers keeps between records (tool in hand, last cycle)"""
         self.cycle_records = 0

@@ -22,6 +22,11 @@ _SIMPLE = {"FEDTO": "depth", "DEPTH": "depth", "RAPTO": "rapto", "CLEAR": "clear
            "PITCH": "pitch", "DIAMET": "diameter", "TLANGL": "angle"}
 
 
+CYCLE_WORDS = frozenset({*KINDS, *_RETRACT, *_PECKS, *_OTHER, *_UNUSED, *_PLAIN, *_SIMPLE, *UNITS, "INIT", "OFF", "DWELL",
+                         "DRAG", "NODRAG", "CAM"}) - {""}
+"""All that a CYCLE record may hold."""
+
+
 @dataclass(frozen=True)
 class Values:
     """What a CYCLE record states, file units; NaN or None where it does not."""

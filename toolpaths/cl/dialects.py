@@ -35,6 +35,7 @@ class Dialect:
         insert_is_comment: INSERT is for people
         rotabl_radians: angles of ROTABL are rad
         frame_turns: ROTABL turns the frame of the points by its angle, not the table
+        table_frames: under ROTATE and TRANS points stand about the rotation axis (`indexing`)
         axis_reset: the axis is the local z again at each operation
         planes: how cycles state their planes
     """
@@ -48,6 +49,7 @@ class Dialect:
     insert_is_comment: bool = False
     rotabl_radians: bool = False
     frame_turns: bool = False
+    table_frames: bool = False
     axis_reset: bool = False
     planes: Planes = Planes.RELATIVE
 
@@ -56,7 +58,7 @@ DIALECTS = {d.name: d for d in (
     Dialect("generic", "APT text"),
     Dialect("nx", "Siemens NX", arc_sense=-1, full_circles=False, depth_sign=-1, axis_reset=True),
     Dialect("makino", "Makino FF/CAM", arc_sense=-1, full_circles=False),
-    Dialect("creo", "PTC Creo", six_common=True),
+    Dialect("creo", "PTC Creo", six_common=True, table_frames=True),
     Dialect("solidworks", "SolidWorks CAM .apt", six_common=True, insert_is_comment=True),
     Dialect("solidworks-clt", "SolidWorks CAM .clt", arc_sense=0, six_common=True, insert_is_comment=True,
             rotabl_radians=True, frame_turns=True),

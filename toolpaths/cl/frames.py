@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from toolpaths.arrays import Floats
+from toolpaths.cl import indexing
 from toolpaths.cl.build import Builder, Map
 from toolpaths.cl.statements import Statement, words_of
 from toolpaths.rotations import rotation
@@ -17,19 +18,32 @@ _WORK_OFFSET = "work offset"
 
 def set_system(b: Builder, name: str, matrix: Floats, origin: Floats) -> None:
     """Points from here on are in that system; the tool axis is its z until a point says otherwise."""
+    b.here = (matrix, origin)
+    b.turned = np.eye(3)
+    b.table_here = b.table_turn
+    if not indexing.in_force(b):
+        _name_system(b, name, matrix, origin)
+    refresh(b)
+    b.axis_marks.append((b.row, (0.0, 0.0, 1.0)))
+
+
+def _name_system(b: Builder, name: str, matrix: Floats, origin: Floats) -> None:
+    """Operations from here on are in that system; a position of an indexed table is none."""
     frame = Frame("", tuple(origin.tolist()), tuple(tuple(row) for row in matrix.tolist()))
     index = b.frame_index.setdefault((frame.origin, frame.rotation), len(b.frames))
     if index == len(b.frames):
         b.frames.append(Frame(f"{name} {index + 1}", frame.origin, frame.rotation))
     b.system.set(b.row, index)
-    b.here = (matrix, origin)
-    b.turned = np.eye(3)
-    _refresh(b)
-    b.axis_marks.append((b.row, (0.0, 0.0, 1.0)))
 
 
-def _refresh(b: Builder) -> None:
-    """The map of points from the system and the shift (TRANS) that hold now."""
+def refresh(b: Builder) -> None:
+    """The map of points from the system, the table and the shift (TRANS) that hold now."""
+    if b.dialect.table_frames:
+        b.dropped_at.set(b.row, False)
+        found, fault = indexing.map_of(b)
+        b.frame_faults.set(b.row, fault)
+        b.use_map(found)
+        return
     matrix, origin = b.here
     if b.shift.any():
         origin = matrix @ b.shift + origin
@@ -131,8 +145,9 @@ def trans(b: Builder, s: Statement) -> None:
     if len(s.numbers) != 3 or len(s.words) != 3:
         b.log.error("cl.frame", f"TRANS/{s.body}: only three numbers are understood", b.line)
         return
-    b.shift = np.array(s.numbers) * b.scale
-    _refresh(b)
+    shift = np.array(s.numbers) * b.scale
+    b.shift = np.zeros(3) if indexing.cancels(b, shift) else shift
+    refresh(b)
 
 
 def origin(b: Builder, s: Statement) -> None:
@@ -170,6 +185,8 @@ def comment(b: Builder, s: Statement) -> None:
 
 _RADIAN_ROUNDING = 5.1e-7
 _SAME_FRAME = 1e-9
+_NO_ANGLE = 1e-9
+"""rad"""
 _AXES = {"AAXIS": 0, "BAXIS": 1, "CAXIS": 2, "A": 0, "B": 1, "C": 2, "XAXIS": 0, "YAXIS": 1, "ZAXIS": 2}
 _TURNED = frozenset({"creo", "solidworks-clt"})
 _NO_AXIS_WORDS = frozenset({"CLW", "CCLW", "INCR", "ATANGL", "TABLE", "HEAD", "NEXT", "ROTREF", "AXIS"})
@@ -206,10 +223,14 @@ def _turn(b: Builder, axis: int, angle: float, incremental: bool) -> None:
     angles = b.table
     step = angle if incremental else angle - angles[axis]
     angles[axis] += step
-    if step != 0.0:
-        sense = 1.0 if b.dialect.frame_turns else -1.0
-        b.turned = b.turned @ rotation(np.eye(3)[axis], np.array([sense * step]))[0]
-        _refresh(b)
+    if abs(angles[axis]) < _NO_ANGLE:
+        angles[axis] = 0.0
+    if b.dialect.table_frames:
+        indexing.turn_table(b, axis, step)
+        refresh(b)
+    elif step != 0.0:
+        b.turned = b.turned @ rotation(np.eye(3)[axis], np.array([step]))[0]
+        refresh(b)
     if b.dialect.frame_turns:
         use_world_axis(b)
 

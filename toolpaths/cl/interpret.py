@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from itertools import compress
 
-from toolpaths.cl import curves, cycles, feeds, frames, motion, structure, tools
+from toolpaths.cl import curves, cycles, feeds, frames, indexing, listing_text, motion, structure, tools
 from toolpaths.cl.build import Builder
+from toolpaths.cl.near import nearest
 from toolpaths.cl.statements import DATA_COMMENT, TEXT, Statement
 from toolpaths.cl.words import SILENT, UNSUPPORTED_MOTION
 
@@ -16,9 +16,8 @@ HANDLERS: dict[str, Handler] = {**dict.fromkeys(SILENT, structure.nothing), **st
                                 **motion.HANDLERS, **curves.HANDLERS, **frames.HANDLERS, **tools.HANDLERS,
                                 **cycles.HANDLERS}
 _MANY = 3
-_NO_SLASH = -1
-"""in place of a count of numbers: text that begins with a known word and has no slash"""
-_WORD = re.compile(r"[A-Z0-9_-]+")
+REMARKS = frozenset({"MFGNO", "END", "SETSTART", "SETEND", "FEATURE", "NAME", "STEP"})
+"""`$$->` remarks that say nothing to the machine."""
 _MOTION = re.compile(r"\W*(?:GOTO|GODLTA|RAPID|CIRCLE|MOVARC|GOHOME)\b|IF\s*\(|.*\b(?:GOTO|GODLTA|CIRCLE|MOVARC)\s*/",
                      re.IGNORECASE)
 """Text that is no record and yet names a motion, or chooses one: dropped, it would leave the tool elsewhere."""
@@ -92,19 +91,32 @@ def calsub(b: Builder, s: Statement) -> None:
         b.log.error("cl.subprogram", f"CALSUB/{s.body}: the subprogram {why}", b.line)
         return
     start, end = found
-    index, fast = b.index, b.fast
+    index, fast, about_axis = b.index, b.fast, b.about_axis
     b.calls.append(found)
+    b.called.add(found)
     b.in_subprogram.set(b.row, True)
+    _stand_about_axis(b, about_axis or s.numbers[0] in indexing.indexed_subprograms(b))
+    indexing.note_call(b, b.caller_row)
+    b.caller_row = b.row
     b.jump(b.program.before[start])
     run(b, start + 1, end)
     b.advance(b.program.before[end])
     b.jump(fast)
     b.calls.pop()
     b.in_subprogram.set(b.row, bool(b.calls))
-    b.index = index
+    b.index, b.caller_row = index, b.row
+    _stand_about_axis(b, about_axis)
+
+
+def _stand_about_axis(b: Builder, value: bool) -> None:
+    if b.about_axis != value:
+        b.about_axis = value
+        frames.refresh(b)
 
 
 HANDLERS.update({"DEFSUB": defsub, "CALSUB": calsub, "ENDSUB": structure.nothing})
+VOCABULARY = frozenset(HANDLERS) | UNSUPPORTED_MOTION
+"""Every word the reader has an answer to"""
 
 
 def _other(b: Builder, s: Statement) -> None:
@@ -112,15 +124,26 @@ def _other(b: Builder, s: Statement) -> None:
     if word in UNSUPPORTED_MOTION:
         _unsupported(b, s, word)
     elif s.major == TEXT:
-        b.texts.append((b.line, b.row, sum(isinstance(w, float) for w in s.words), s.body))
-    elif not s.major.startswith(DATA_COMMENT):
-        first = _first_word(s.major)
-        if s.slash or s.major in b.allow_unknown:
-            b.note_unknown(s, s.major)
-        elif not known(first) or first in SILENT:
-            b.texts.append((b.line, b.row, 0, s.major))
-        else:
-            b.texts.append((b.line, b.row, _NO_SLASH, s.major))
+        b.texts.append((b.line, s.body))
+    elif s.major.startswith(DATA_COMMENT):
+        _remark(b, s)
+    elif s.slash or s.major in b.allow_unknown:
+        b.note_unknown(s, s.major)
+    else:
+        b.texts.append((b.line, s.major))
+
+
+def _remark(b: Builder, s: Statement) -> None:
+    """A `$$->` remark that nobody reads is a comment, unless its word is one edit from one that says something."""
+    word = s.major.removeprefix(DATA_COMMENT)
+    known = [w.removeprefix(DATA_COMMENT) for w in HANDLERS if w.startswith(DATA_COMMENT)]
+    first = re.split(r"[^A-Z]", word + " ")[0]
+    inner = re.split(r"[^A-Z]", s.body.upper() + " ")[0] if "/" in s.body or not word else ""
+    heads = {word, first, inner, word + inner, word.replace(" ", ""), re.sub(r"[^A-Z]", "", word)} - {""}
+    meant = next((h if h in known else nearest(h, known) for h in sorted(heads) if h in known or nearest(h, known)), "")
+    if meant and first not in REMARKS:
+        b.log.error("cl.data-comment", f"$$-> {word[:40]}: no remark that is known, {meant}?", b.line,
+                    "correct the word, or write $$ without -> before a comment", key=meant)
 
 
 def _unsupported(b: Builder, s: Statement, word: str) -> None:
@@ -134,37 +157,28 @@ def _unsupported(b: Builder, s: Statement, word: str) -> None:
                 key=word)
 
 
-def _first_word(body: str) -> str:
-    return body.replace(",", " ").split(" ")[0]
-
-
-def _is_motion(numbers: int, body: str) -> bool:
-    """True for text like `GOTO 1 2 3` or `GOTO(1,2,3)`, which is no listing text wherever it stands."""
-    if numbers == _NO_SLASH:
-        return _first_word(body) in motion.HANDLERS and body[-1:].isdigit()
-    return _MOTION.match(body) is not None and any(c.isdigit() for c in body)
-
-
 def report_others(b: Builder) -> dict[str, int]:
     """Diagnostics of unknown words and of text that is no record; how often each unknown word stands."""
     if 0 <= b.finished < b.row:
         b.log.warning("cl.after-fini", f"{b.row - b.finished} points stand after FINI, they are read too")
     first, last = _extent(b)
-    inside = [first <= line <= last or _is_motion(numbers, body) for line, _, numbers, body in b.texts]
-    listing = [text[0] for text, here in zip(b.texts, inside, strict=True) if not here]
-    for line, row, numbers, body in compress(b.texts, inside):
-        if numbers == _NO_SLASH:
-            word = _first_word(body)
+    listing, allowed = [], []
+    for line, body in dict.fromkeys(b.texts):
+        word = listing_text.word_of(body)
+        moves = _MOTION.match(body) is not None and any(c.isdigit() for c in body)
+        if not moves and listing_text.is_listing(body, line < first, line > last, VOCABULARY):
+            listing.append(line)
+        elif listing_text.SINGLE.fullmatch(body) and not known(body):
+            b.unknown.setdefault(body, []).append((line, 0, 0))
+        elif "(TEXT)" in b.allow_unknown:
+            allowed.append(line)
+        elif known(word) and word not in SILENT:
             b.log.error("cl.slash", f"{word} is not followed by a slash", line, f"write {word}/...", key=word)
-        elif _WORD.fullmatch(body):
-            b.unknown.setdefault(body, []).append((line, row, numbers))
-        elif numbers >= _MANY and 0 < row < b.row and "(TEXT)" not in b.allow_unknown:
-            b.log.error("cl.text", f"no record: {body[:60]!r}, with numbers between motions", line)
-        elif _MOTION.match(body) and "(TEXT)" not in b.allow_unknown:
-            b.log.error("cl.text", f"no record: {body[:60]!r}, which names a motion", line, "write it as WORD/numbers, on a "
-                        "line of its own; --allow-unknown '(TEXT)' leaves such lines out", key="motion")
         else:
-            b.log.warning("cl.text", f"no record: {body[:60]!r}", line)
+            b.log.error("cl.text", f"no record: {body[:60]!r}", line, "correct it to WORD/..., or write $$ before a "
+                        "comment; --allow-unknown '(TEXT)' leaves such lines out", key="motion" if moves else "")
+    b.neutral_texts = len(set(listing)) + len(allowed)
+    _report_uncalled(b)
     counts = {word: len(found) for word, found in b.unknown.items()}
     for word, found in b.unknown.items():
         _report_word(b, word, found)
@@ -173,15 +187,31 @@ def report_others(b: Builder) -> dict[str, int]:
     return counts
 
 
-def _report_word(b: Builder, word: str, found: list[tuple[int, int, int]]) -> None:
-    for line, row, numbers in found:
-        moves = (numbers >= _MANY and 0 < row < b.row) or word.split(" ")[-1] in motion.HANDLERS or (
-            numbers > 0 and word.startswith(_MOVING))
-        if moves and word not in b.allow_unknown:
-            b.log.error("cl.unknown-motion", f"unknown word {word} with {numbers} numbers, which may move the tool", line,
-                        f"--allow-unknown {word} leaves it out", key=word)
+def _report_uncalled(b: Builder) -> None:
+    """What stands in a subroutine that no CALSUB runs is not executed."""
+    for number, (start, end) in subprograms(b).items():
+        if (start, end) in b.called:
+            continue
+        if "DEFSUB" in b.allow_unknown:
+            before = b.program.before
+            b.uncalled += end - start + before[end] - before[start]
         else:
+            b.log.error("cl.subprogram", f"no CALSUB runs subroutine {number:g}: its records are not executed",
+                        b.program.lines[start], "--allow-unknown DEFSUB leaves it out", key=f"uncalled {number}")
+
+
+def _report_word(b: Builder, word: str, found: list[tuple[int, int, int]]) -> None:
+    meant = nearest(word, HANDLERS)
+    hint = f"{f'write {meant}, or ' if meant else ''}--allow-unknown {word} leaves it out"
+    for line, row, numbers in found:
+        if word in b.allow_unknown:
             b.log.warning("cl.unknown-word", f"unknown word {word}, left out", line, key=word)
+        elif (numbers >= _MANY and 0 < row < b.row) or word.split(" ")[-1] in motion.HANDLERS or (
+                numbers > 0 and word.startswith(_MOVING)):
+            b.log.error("cl.unknown-motion", f"unknown word {word} with {numbers} numbers, which may move the tool", line,
+                        hint, key=word)
+        else:
+            b.log.error("cl.unknown-word", f"unknown word {word}", line, hint, key=word)
 
 
 def _extent(b: Builder) -> tuple[int, int]:

@@ -43,6 +43,11 @@ class Log:
             self.add(severity, code, message, line, hint)
         self._entries[severity, code, ""].count += max(0, len(lines) - _LINES_KEPT)
 
+    def lines_with_errors(self) -> frozenset[int]:
+        """Lines that an ERROR names."""
+        errors = (entry.lines for entry in self._entries.values() if entry.severity is Severity.ERROR)
+        return frozenset(line for lines in errors for line in lines)
+
     def error(self, code: str, message: str, line: int = 0, hint: str = "", key: str = "") -> None:
         """An ERROR."""
         self.add(Severity.ERROR, code, message, line, hint, key)

@@ -6,7 +6,6 @@ import math
 
 from toolpaths.cl.build import NO_NUMBERS, Builder, Triple
 from toolpaths.cl.dialects import Planes
-from toolpaths.cl.feeds import feed_in
 from toolpaths.cl.frames import use_world_axis
 from toolpaths.cl.statements import Statement
 from toolpaths.toolpath import Role
@@ -27,7 +26,7 @@ def _triple(numbers: list[float], at: int) -> Triple:
 
 
 def goto(b: Builder, s: Statement) -> None:
-    """A point of 3, 6 or 9 numbers; 4 or 7: the last is a feed; 2: z from ZSURF."""
+    """A point of 3, 6 or 9 numbers; 2: z from ZSURF."""
     numbers = s.numbers
     if s.tail and s.tail != ("CONTACT",):
         b.log.error("cl.number", f"GOTO/{s.body[:60]}: {s.tail[0] or 'an empty field'} is not a number", b.line,
@@ -36,8 +35,9 @@ def goto(b: Builder, s: Statement) -> None:
     if len(numbers) == 2 and b.zsurf is not None:
         numbers = [*numbers, b.zsurf]
     if len(numbers) in (4, 7):
-        b.feed.set(b.row, feed_in(numbers.pop(), "", b.scale))
-        b.log.warning("cl.goto-feed", "the last number of GOTO is read as a feed", b.line)
+        b.log.error("cl.goto-feed", f"GOTO has {len(numbers)} numbers, it takes 3, 6 or 9: the last may be a feed, or a "
+                    "comma or a blank splits a number", b.line, "state the feed by FEDRAT before the GOTO")
+        return
     if len(numbers) not in (3, 6, 9):
         b.log.error("cl.goto", f"GOTO has {len(numbers)} numbers, it takes 3, 6 or 9", b.line)
         return
@@ -63,7 +63,7 @@ def godlta(b: Builder, s: Statement) -> None:
 def from_(b: Builder, s: Statement) -> None:
     """Where the tool stands; a RAPID before it counts for the move after it."""
     numbers = s.numbers
-    if len(numbers) < 3:
+    if len(numbers) not in (3, 6):
         b.log.error("cl.from", f"FROM/{s.body[:60]}: it takes 3 or 6 numbers", b.line)
         return
     waiting = bool(b.rapids) and b.rapids[-1] == b.row

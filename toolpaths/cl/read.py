@@ -10,8 +10,12 @@ from pathlib import Path
 from toolpaths.cl.assemble import assemble
 from toolpaths.cl.build import Builder
 from toolpaths.cl.dialects import DIALECTS, Dialect, detect, units_said
-from toolpaths.cl.interpret import known, report_others, run
+from toolpaths.cl.forms import check_forms
+from toolpaths.cl.indexing import TRANS_HINT
+from toolpaths.cl.interpret import HANDLERS, known, report_others, run
 from toolpaths.cl.log import Log
+from toolpaths.cl.rapid_heights import low_rapids
+from toolpaths.cl.records import counted
 from toolpaths.cl.scan import LARGEST, LARGEST_OWN, Progress, scan
 from toolpaths.cl.source import normalise
 from toolpaths.cl.statements import Lexer, Program
@@ -72,6 +76,7 @@ def read_bytes(data: bytes | str, *, file: str = "", units: str | None = None, d
         ValueError: for a dialect or unit that does not exist (wrong use; faults of the file are diagnostics).
     """
     _check_options(units, dialect)
+    allow_unknown = frozenset(allow_unknown)
     log = Log(file)
     plain = normalise(data.encode("utf-8", "replace") if isinstance(data, str) else bytes(data), log)
     largest = LARGEST_OWN if plain.startswith(_OWN_HEAD) else LARGEST
@@ -89,9 +94,21 @@ def read_bytes(data: bytes | str, *, file: str = "", units: str | None = None, d
     if b.row == 0:
         log.error("cl.empty", "the file holds no point", hint="a CL file has GOTO records")
     toolpath = assemble(b)
+    _check_rapids(b, toolpath)
+    check_forms(program, log, b.allow_unknown)
     diagnostics = log.diagnostics()
-    return ReadResult(_with_faults(toolpath, diagnostics), diagnostics, counts, found.name, evidence,
+    toolpath = replace(_with_faults(toolpath, diagnostics), records=counted(b, frozenset(HANDLERS)))
+    return ReadResult(toolpath, diagnostics, counts, found.name, evidence,
                       b.arc_records, b.cycle_records, parts.lines)
+
+
+def _check_rapids(b: Builder, toolpath: Toolpath) -> None:
+    """Rapids below all that their tool cuts: an error where an indexed part may stand in the wrong frame, else a warning."""
+    rows = low_rapids(toolpath)
+    indexed = bool(b.turns_at or b.entries)
+    b.log.many(Severity.ERROR if indexed else Severity.WARNING, "cl.rapid-below", "a rapid goes below everything that its "
+               "tool cuts along that axis", toolpath.line[rows],
+               TRANS_HINT if indexed else "look at the point in the CAM system")
 
 
 def _cut_off(data: bytes | str, lines: int, log: Log) -> None:

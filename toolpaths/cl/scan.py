@@ -114,10 +114,19 @@ def _split(c: Bytes, largest: float) -> _Lines:
     starts = np.concatenate([[0], ends[:-1] + 1])
     count = np.add.reduceat(c == 44, starts, dtype=np.int32) + 1
     plain = _looks_plain(c, starts, ends) & ((count == 3) | (count == 6) | (count == 9))
+    _refuse_bare_exponents(c, ends, plain)
     rows = np.flatnonzero(plain)
     numbers, bad = _numbers(c, starts, ends, count, rows, largest)
     plain[bad] = False
     return _Lines(starts, ends, plain, count, numbers)
+
+
+def _refuse_bare_exponents(c: Bytes, ends: Ints, plain: Bools) -> None:
+    """Lines with an exponent without its sign are not plain: it may be a damaged digit."""
+    marks = np.flatnonzero((c[:-1] & 0xDF) == 69)
+    if len(marks):
+        marks = marks[(c[marks + 1] >= 48) & (c[marks + 1] <= 57)]
+        plain[np.searchsorted(ends, marks)] = False
 
 
 def _chunk(found: _Lines, line_ends: Ints, position: int, lines_before: int) -> _Chunk:

@@ -12,12 +12,16 @@ from toolpaths.cl.feed_lines import FeedLines, feed_lines
 from toolpaths.cl.log import Log
 from toolpaths.cl.scan import LARGEST, LARGEST_OWN, Scan
 from toolpaths.cl.source import text_of
-from toolpaths.cl.words import BARE_STARTS, TEXT_WORDS
+from toolpaths.cl.words import BARE_WORDS, TEXT_WORDS
 
 Word = str | float
 _NUMBER_ENDS, _NUMBER_STARTS = "0123456789.", "+-.0123456789"
 """of what float() reads as a NUMBER does: it takes inf, nan and underscores besides, and no D for the exponent"""
-_NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?", re.ASCII)
+_NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]\d+)?", re.ASCII)
+_BARE_EXPONENT = re.compile(r"[eE]\d")
+"""An exponent without its sign may be a damaged digit: no system writes it."""
+_CARD_LABEL = re.compile(r"\s*[A-Z]{2,3} {2,}\d{1,5}\s*")
+"""CATIA numbers points and circles in columns 73 to 80."""
 _MAJOR = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_ ,=*.+-]*", re.ASCII)
 _SIMPLE = re.compile(r"([A-Z]+)[ ]*/([^$()/]*)", re.ASCII)
 """Most records: one major word, a slash, no comment, continuation or label."""
@@ -93,7 +97,7 @@ def words_of(body: str) -> tuple[Word, ...]:
 
 
 def _word(text: str) -> Word:
-    if text[-1] in _NUMBER_ENDS and text[0] in _NUMBER_STARTS and "_" not in text:
+    if text[-1] in _NUMBER_ENDS and text[0] in _NUMBER_STARTS and "_" not in text and not _BARE_EXPONENT.search(text):
         try:
             value = float(text)
         except ValueError:
@@ -229,8 +233,13 @@ class Lexer:
         parts: list[str] = []
         depth = 0
         while True:
-            part, continued = _cut(text, not parts and text.startswith(DATA_COMMENT), text_word)
+            part, continued, lost = _cut(text, not parts and text.startswith(DATA_COMMENT), text_word)
             parts.append(part)
+            if lost:
+                line = self.scan.line[self.next - 1]
+                self.log.error("cl.dollar", f"{lost[:40]!r} stands behind a continuation mark $", line,
+                               "end the line behind $, or write $$ before a comment")
+                return "".join(parts)
             depth += part.count("(") - part.count(")")
             if not continued:
                 return "".join(parts)
@@ -264,22 +273,20 @@ class Lexer:
         major = major_of(head)
         if slash:
             return self.known(major)
-        return major in BARE_STARTS or _text_statement(text) is not None
+        return major in BARE_WORDS or _text_statement(text) is not None
 
 
-def _cut(text: str, comment: bool, text_word: bool) -> tuple[str, str]:
-    """(text before a comment or continuation mark, "" | "certain" | "maybe" continued)."""
-    if comment:
-        return (text.rstrip()[:-1], "certain") if text.rstrip().endswith("$") else (text, "")
-    if text_word:
-        return (text.rstrip().rstrip("$ "), "maybe") if text.rstrip().endswith("$") else (text, "")
+def _cut(text: str, comment: bool, text_word: bool) -> tuple[str, str, str]:
+    """(text before a comment or continuation mark, "" | "certain" | "maybe" continued, text that would be lost)."""
+    if comment or text_word:
+        if not text.rstrip().endswith("$"):
+            return text, "", ""
+        return (text.rstrip()[:-1], "certain", "") if comment else (text.rstrip().rstrip("$ "), "maybe", "")
     at = text.find("$")
     if at < 0:
-        return text, ""
+        return text, "", ""
     head, rest = text[:at], text[at:]
     if rest.startswith(COMMENT):
-        return head, ""
+        return head, "", ""
     after = rest[1:].strip()
-    if not after or after.startswith("$"):
-        return head, "certain"
-    return head, "certain" if head.rstrip().endswith((",", "/")) else "maybe"
+    return head, "certain", "" if after.startswith("$") or _CARD_LABEL.fullmatch(rest[1:]) else after

@@ -46,13 +46,25 @@ PPRINT and INSERT (one text), GOHOME without a point (none), FEDRAT/INVERS,AUTO 
 LENGTH_EVENTS = frozenset({"RETRCT", "CLEARP", "CLRSRF", "LEADER"})
 """Events whose numbers are lengths: converted to mm."""
 
-SILENT = frozenset({
-    "PAINT", "PPWORD", "PPFUN", "SYN", "OPFEATEND", "MOVE_ATTRIB", "BOX", "SETUP", "SWITCH", "DISPLY",
-    "AUTOPS", "PSIS", "INTOL", "OUTTOL", "TOLER", "LINTOL", "MACHIN", "ALIGN", "PLABEL", "CLPRNT", "NOPOST", "PLOT",
-    "CSI_SET_EXTENSION_LENGTH", "MCHTOL", "CUT", "START_OP", "END_OP", "TOOLPATH_TYPE",
-    "ISN", "ARCSLP", "MCS2", "START", "OPERATION", "BEGIN", "MATERL", "TCP", "CSI_PATH_TOLERANCE", "CSI_SET_PATH_PARAM",
-})
-"""Display, listing, tolerance and bookkeeping: no motion, nothing for the machine."""
+_REASONS = {
+    "display": "PAINT DISPLY PLOT CLPRNT BOX",
+    "listing and punching of APT systems": "PRINT PUNCH TITLES EJECT RESERV NOPOST PLABEL LPRINT PPLABEL LETTER REMARK "
+                                           "PARTNO",
+    "vocabulary and settings of another post-processor": "PPWORD PPFUN SYN MACHIN ISN ARCSLP OPERATION BEGIN START "
+                                                         "TOOLPATH_TYPE",
+    "bookkeeping of the CAM system": "OPFEATEND MOVE_ATTRIB SETUP START_OP END_OP MATERL CSI_SET_PATH_PARAM "
+                                     "CSI_SET_EXTENSION_LENGTH",
+    "tolerances of a path that is computed already": "INTOL OUTTOL TOLER LINTOL MCHTOL CSI_PATH_TOLERANCE NUMPTS MAXDP "
+                                                     "MAXANG",
+    "part surface of arcs that state their plane": "AUTOPS PSIS",
+    "which point of the tool the lathe drives; said by the operation": "SWITCH",
+    "how the control runs the axes; chosen by the set-up": "ALIGN TCP CUT",
+    "the same work plane again, for another post-processor": "MCS2",
+}
+NEUTRAL: dict[str, str] = {word: reason for reason, words in _REASONS.items() for word in words.split()}
+"""Words that neither move the tool nor say anything to the machine, and why."""
+SILENT = frozenset(NEUTRAL) - {"PARTNO", "LPRINT", "PPLABEL", "LETTER", "REMARK"}
+"""Those of them that need no handler."""
 
 UNSUPPORTED_MOTION = frozenset({
     "DNTCUT", "COPY", "TRACUT", "GOFWD", "GOLFT", "GORGT", "GOBACK", "GOUP", "GODOWN", "GO",
@@ -64,3 +76,6 @@ UNSUPPORTED_MOTION = frozenset({
 
 BARE_STARTS = frozenset({"RAPID", "FINI", "END-OF-PATH", "GOHOME", "STOP", "OPSTOP", "END"})
 """Words that begin a new statement even without a slash."""
+
+BARE_WORDS = BARE_STARTS | {"MULTAX", "ENDSUB", "AUTOPS", "NURBS"}
+"""Words that stand alone in a line; a line that continues another is none of them."""

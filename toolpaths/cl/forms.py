@@ -1,0 +1,218 @@
+"""The form of records: which words and how many numbers each takes. A damaged byte shows where a record departs from it.
+
+A word that a form does not list passes (posts have words of their own), unless it is one edit from a listed one, begins
+like a number, or holds another record. A number that does not fit, an empty field and a second slash are refused.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from itertools import pairwise
+
+from toolpaths.cl.cycle_words import CYCLE_WORDS
+from toolpaths.cl.dialects import UNIT_WORDS
+from toolpaths.cl.feeds import UNITS
+from toolpaths.cl.log import Log
+from toolpaths.cl.near import nearest
+from toolpaths.cl.statements import COMMENT, DATA_COMMENT, Program, Statement
+from toolpaths.cl.words import BARE_WORDS, NEUTRAL, SILENT, TEXT_WORDS
+
+
+@dataclass(frozen=True)
+class Form:
+    """Words of a record, counts of its numbers (empty: any), whether other words pass, whether fields may be empty."""
+
+    words: frozenset[str] = frozenset()
+    counts: frozenset[int] = frozenset()
+    open: bool = True
+    gaps: bool = False
+    lengths: bool = False
+    """numbers are lengths: whole ones that begin with 0 are what is left of another"""
+
+
+def _form(words: str = "", *counts: int, closed: bool = False, gaps: bool = False, lengths: bool = False) -> Form:
+    return Form(frozenset(words.split()), frozenset(counts), not closed, gaps, lengths)
+
+
+_TABLE = _form("AAXIS BAXIS CAXIS INCR ABS CLW CCLW TABLE HEAD ATANGL NEXT ROTREF AXIS", 1)
+_ALONE = _form("", 0, closed=True)
+_FEED_MODIFIERS = frozenset({"SCALE", "LENGTH", "LOCK", "MAXIPM", "MAXRPM", "OVPLOT"})
+FORMS: dict[str, Form] = {
+    "FEDRAT": Form(UNITS | _FEED_MODIFIERS | {"INVERS", "AUTO", "ON", "OFF", "PERSEC"}, frozenset({0, 1})),
+    "SPINDL": _form("RPM SFM SMM CLW CCLW ON OFF LOCK UNLOCK MAXRPM ORIENT LOW MEDIUM HIGH RANGE NEUTRL AUTO MILL TURN "
+                    "RADIUS", 0, 1),
+    "COOLNT": _form("ON OFF FLOOD MIST AIR TAP TAPKUL THRU LOW MEDIUM HIGH ALL NOW NEXT TOOL", 0, 1),
+    "CUTCOM": _form("LEFT RIGHT ON OFF XYPLAN YZPLAN ZXPLAN NORMAL NORMDS PERPTO MODIFY ADJUST LENGTH OSETNO", 0, 1, 2),
+    "LOADTL": _form("OSETNO ADJUST OFFSET LENGTH IN TURN MILL SPINDL MANUAL AUTO LARGE SMALL", lengths=False),
+    "LOAD": _form("TOOL TURRET WIRE ADJUST OSETNO MANUAL ZOFF NEXTTL", 0, 1, 2, 3),
+    "SELECT": _form("TOOL", 1),
+    "TURRET": _form("OSETNO SETOOL ADJUST LENGTH CLW CCLW"),
+    "CUTTER": _form("DISPLY ON OFF", 0, 1, 2, 3, 4, 5, 6, 7, lengths=True),
+    "$$->CUTTER": _form("", 1, closed=True),
+    "TLDATA": _form("MILL DRILL TURN GROOVE THREAD BARREL TCUTTER", lengths=True),
+    "CSI_SET_FLUTE_LENGTH": _form("", 1),
+    "CIRCLE": _form("TIMES SWEEP CLOCKWISE COUNTERCLOCKWISE CLW CCLW", 4, 5, 6, 7, 8, 11, 12, closed=True),
+    "MOVARC": _form("CENTER AXIS RADIUS ANGLE TIMES", closed=True),
+    "CYCLE": Form(CYCLE_WORDS),
+    "FROM": _form("", 3, 6, closed=True), "GOHOME": _form("", 0, 3, 6),
+    "TLAXIS": _form("", 3, closed=True), "INDIRV": _form("", 3, closed=True), "INDIRP": _form("", 3, closed=True),
+    "RAPID": _form("FEDTO SCALE", closed=True),
+    "MSYS": _form("", 9, closed=True), "CSYS": _form("", 12, closed=True), "$$->CSYS": _form("", 12, closed=True),
+    "CAMERA": _form("", 12, closed=True), "MCS": _form("", 12, closed=True), "MCS2": _form("", 9, closed=True),
+    "TRANS": _form("", 3), "ZERO": _form("", 1), "ORIGIN": _form("", 3, 9), "TRNTYP": _form("WORLD"),
+    "ROTATE": _TABLE, "ROTABL": _TABLE, "ROTHED": _TABLE,
+    "UNITS": Form(frozenset(UNIT_WORDS), frozenset({0}), False), "UNIT": Form(frozenset(UNIT_WORDS), frozenset({0}), False),
+    "MULTAX": _form("ON OFF", 0, closed=True),
+    "STOP": _ALONE, "OPSTOP": _ALONE, "FINI": _ALONE, "END": _ALONE, "END-OF-PATH": _ALONE, "ENDSUB": _form("", 0, 1),
+    "NURBS": _ALONE, "AUTOPS": _ALONE,
+    "DELAY": _form("REV SEC TIME NOW NEXT", 1), "DWELL": _form("REV SEC TIME NOW NEXT", 1),
+    "CALSUB": _form("", 0, 1), "DEFSUB": _form("", 0, 1),
+    "OPSKIP": _form("ON OFF", 0, 1), "SEQNO": _form("INCR ON OFF NEXT", 0, 1, 2), "PREFUN": _form("NOW NEXT", 1, 2, 3, 4),
+    "AUXFUN": _form("NOW NEXT", 1, 2, 3, 4), "SET": _form("MODE ABSOL INCR INCRE INCREM LINTOL LINEAR ON OFF"),
+    "MODE": _form("MILL TURN INCR INCRE INCREM ON OFF TOOL XYPLAN YZPLAN ZXPLAN ABSOL"),
+    "RETRCT": _form("ON OFF TOOL"), "CLEARP": _form("XYPLAN YZPLAN ZXPLAN ON OFF"), "APPLY": _form("MILL TURN"),
+    "UNLOAD": _form("TOOL"), "REWIND": _form("", 0, 1), "LEADER": _form("", 1), "CHECK": _form(), "HEAD": _form(),
+    "CLAMP": _form("ON OFF AUTO XAXIS YAXIS ZAXIS AAXIS BAXIS CAXIS"), "AIR": _form("ON OFF"), "OFSTNO": _form("ON OFF"),
+}
+_CLT_CUTTER = 6
+"""numbers of CUTTER in `.clt`, which has a comma behind the last"""
+_MILL_COUNTS = frozenset({5, 7, 10})
+_ANY_NUMBERS = {"FEDRAT": _FEED_MODIFIERS, "SPINDL": frozenset({"MAXRPM", "RANGE", "RADIUS", "LOCK", "ORIENT"}),
+                "ROTABL": frozenset({"AXIS"}), "ROTHED": frozenset({"AXIS"})}
+"""Words with which a record takes numbers of their own."""
+_VALUED, _VALUED_IN = frozenset({"OSETNO", "ADJUST", "OFFSET", "LENGTH"}), frozenset({"LOADTL", "LOAD", "TURRET"})
+"""Words that a number must follow, and in which records."""
+_NAMED = frozenset({"TOOL PATH", "OPNAME", "CSI_TOOL_PATH", "OPFEATSTART", "TOOLNO", "$$->FEATNO", *TEXT_WORDS})
+_ACTING = tuple(word for word in (*FORMS, "GOTO", "GODLTA", "MCSYS", "TOOLNO", "KNOT", "CNTRL", "TOOL PATH",
+                             "TLON *, *GOFWD")
+                if word not in ("LOAD", "END", "STOP", "HEAD", "CHECK", "AIR", "SET") and not word.startswith(DATA_COMMENT))
+_RECORD = r"(?:(?<!UN)LOAD|" + "|".join(_ACTING) + r")\s*/"
+_GLUED = re.compile(r"(?:[A-Za-z0-9.)\]%\"';:!?][^A-Za-z0-9\s]?|[-=*#_]{3})(?:" + _RECORD +
+                    r"|(?:RAPID|FINI|END-OF-PATH|GOHOME|OPSTOP|MULTAX|ENDSUB|(?<![A-Za-z])STOP)\s*$)")
+_BEHIND = re.compile(r"\S\s+" + _RECORD + r"\s*[^\s/]+(?:\s*,\s*[^\s/]+)*\s*$")
+_GEOMETRY = frozenset({"PSIS", "SYN"})
+"""Words whose parameters hold slashes."""
+_WITHIN = re.compile(_RECORD)
+_NAMES = frozenset({"$$->FEATNO", "TOOL PATH", "PARTNO", "TPRINT", "OPNAME", "CSI_TOOL_PATH", "OPFEATSTART"})
+_NUMBER_LIKE = re.compile(r"[-+.]*\d[-+.\d]*|[-+.\d]*[eEdD][-+.\d]*\d[-+.\d]*|[-+.]+")
+_QUOTED = re.compile(r"'[^'/$]*'")
+_ONE_LETTER = re.compile(r"[-+.\d]*[^-+.\d][-+.\d]*")
+_TWO_NUMBERS = re.compile(r"[\d.]\s+[-+.\d]")
+_STARTS_NUMBER = frozenset("+-.0123456789")
+_LEADING_ZEROS = re.compile(r"[+-]?(?:0\d+|\.0*)")
+
+
+def check_forms(program: Program, log: Log, allowed: Iterable[str]) -> None:
+    """An error for each different statement that departs from the form of its word, where its line has none yet."""
+    allow, refused = frozenset(allowed), log.lines_with_errors()
+    for statement, line in program.first.items():
+        if statement.major in allow or line in refused:
+            continue
+        fault = fault_of(statement, allow)
+        if fault:
+            name = statement.major.removeprefix(DATA_COMMENT)
+            between = "/" if statement.body and statement.slash else " " if statement.body else ""
+            log.error("cl.form", f"{name}{between}{statement.body[:60]}: {fault}", line, "compare the record with the CAM "
+                      "system; --allow-unknown WORD takes a word as it stands", key=f"{name} {fault}")
+
+
+def fault_of(s: Statement, allow: frozenset[str] = frozenset()) -> str:
+    """What is wrong with the form of a statement, "" where nothing is."""
+    if s.major == COMMENT or s.major in _NAMED or s.major in NEUTRAL:
+        return _joined_fault(s)
+    form = FORMS.get(s.major)
+    if form is None:
+        return ""
+    return _words_fault(s, form, allow) or _numbers_fault(s, form)
+
+
+def _joined_fault(s: Statement) -> str:
+    """Another record within text: what is left where the end of a line is lost."""
+    if s.major == "TOOL PATH":
+        parts = [p.strip().upper() for p in s.body.split(",")]
+        if "TOOL" not in parts[1:] and (len(parts) > 1 or parts[0].endswith("TOOL") or "TOOL" in parts[0]):
+            return "the name of the tool is not behind TOOL"
+    if s.major in SILENT and s.major not in _GEOMETRY and "/" in s.body:
+        return "a second slash"
+    found = _GLUED.search(s.body) or (_WITHIN if s.major in _NAMES else _BEHIND).search(s.body)
+    if found is None:
+        return _words_fault(s, FORMS[s.major], frozenset()) or _numbers_fault(s, FORMS[s.major]) if s.major in FORMS else ""
+    return f"a record stands within it, {found[0].strip()[:30]!r}: the end of a line is missing"
+
+
+def _words_fault(s: Statement, form: Form, allow: frozenset[str]) -> str:
+    if "/" in s.body:
+        return "a second slash"
+    split = _split_word(s, form)
+    if split:
+        return split
+    for word in s.words:
+        if isinstance(word, float) or word in form.words or word in allow or _QUOTED.fullmatch(word):
+            continue
+        if word == "":
+            if not form.gaps and not _bare_gap(s):
+                return "an empty field"
+            continue
+        fault = _word_fault(word, form)
+        if fault:
+            return fault
+    return ""
+
+
+def _split_word(s: Statement, form: Form) -> str:
+    """A word with a comma or a blank in it, a number with a blank: GOTO and CYCLE alone have numbers without commas."""
+    words = [w for w in s.words if isinstance(w, str) and w and w[0].isalpha()]
+    for a, b in pairwise(words):
+        if a not in form.words or b not in form.words:
+            whole = a + b if a + b in form.words else nearest(a + b, sorted(form.words))
+            if whole:
+                return f"{a} {b}: {whole} is cut in two"
+    if s.major != "CYCLE" and any(_TWO_NUMBERS.search(part) for part in s.body.split(",")):
+        return "a blank between two numbers"
+    return ""
+
+
+def _bare_gap(s: Statement) -> bool:
+    """GOHOME reports its own."""
+    return s.major == "GOHOME"
+
+
+def _word_fault(word: str, form: Form) -> str:
+    if word[0] in _STARTS_NUMBER or _NUMBER_LIKE.fullmatch(word) or (len(word) > 1 and _ONE_LETTER.fullmatch(word)):
+        return f"{word[:30]} is not a number"
+    meant = nearest(word, sorted(form.words))
+    if meant:
+        return f"{word[:30]} is no word of it: {meant}?"
+    for known in form.words:
+        rest = word.removeprefix(known)
+        if rest != word and (rest[0] in _STARTS_NUMBER or not rest[0].isalnum() or rest in form.words
+                             or rest[1:] in form.words or rest[1:2] in _STARTS_NUMBER):
+            return f"{word[:30]}: a comma is missing behind {known}"
+    ends = next((bare for bare in BARE_WORDS if word.endswith(bare)), "")
+    if ends:
+        return f"{ends} stands within it: the end of a line is missing"
+    if not form.open or len(word) == 1:
+        return f"{word[:30]} is no word of it"
+    return "" if re.fullmatch(r"[A-Z0-9_.-]+", word) else f"{word[:30]} is no word"
+
+
+def _numbers_fault(s: Statement, form: Form) -> str:
+    count = sum(isinstance(w, float) for w in s.words)
+    counts = form.counts
+    if s.major == "TLDATA" and s.words[:1] == ("MILL",):
+        counts = _MILL_COUNTS
+    if s.major == "CUTTER" and count == _CLT_CUTTER and not s.body.endswith(","):
+        return "6 numbers: one of seven is missing, or the comma behind the last"
+    if s.major in _VALUED_IN:
+        bare = [w for w, after in zip(s.words, (*s.words[1:], ""), strict=True) if w in _VALUED and isinstance(after, str)]
+        if bare:
+            return f"no number behind {bare[0]}"
+    if s.has(*_ANY_NUMBERS.get(s.major, ())):
+        counts = frozenset()
+    if counts and count not in counts:
+        return f"{count} numbers, it takes {' or '.join(map(str, sorted(counts)))}"
+    if form.lengths and any(_LEADING_ZEROS.fullmatch(part.strip()) for part in re.split(r"[,\s]+", s.body)):
+        return "a number is cut off at its point"
+    return ""
