@@ -44,6 +44,7 @@ class Control:
         rapids: "straight", or "dog-leg": each axis at its own rapid speed (not under "tcp")
         feed_rule: what a feed per minute refers to under the law "axes", see `feed_length`
         own_kinematics: at the gauge point, as the control holds it; None: the machine's
+        measured: mm of tool length that the work offset holds, where the program calls none
     """
 
     machine: Machine
@@ -57,6 +58,7 @@ class Control:
     own_kinematics: Kinematics | None = None
     helix_planes: tuple[int, ...] = (17, 18, 19)
     arc_planes: tuple[int, ...] = (17, 18, 19)
+    measured: float = 0.0
 
     @cached_property
     def _others(self) -> dict[tuple[object, ...], Control]:
@@ -179,6 +181,8 @@ class Control:
         if not kin.slides_affine:
             return np.zeros(kin.joints)
         result: Floats = self.slides_for(kin, self.origin[None, :], np.zeros((1, kin.joints)))[0] * self.unit
+        if self.measured:
+            result[self.xyz[2]] += self.measured
         return result
 
     def slides_for(self, kin: Kinematics, tip: Floats, q: Floats) -> Floats:
