@@ -25,12 +25,12 @@ from postproc.records import checked_records, plain_records
 from postproc.rounding import Rounding, decimals, helix_bound, rounding_bound
 from postproc.setup import Placement, SetupFile, part_placement, work_frame
 from postproc.setup_system import standing
-from postproc.spindle_defaults import standing_cuts, with_defaults
+from postproc.spindle_defaults import standing_cuts, stated_by_setup, with_defaults
 from postproc.stated_feeds import without_feed
 from postproc.tool_numbers import numbered
 from postproc.unnumbered_tools import measured_length
 from toolpaths.arrays import Floats, Ints, shared, taken
-from toolpaths.diagnostics import Diagnostic, error, has_errors, info, warning
+from toolpaths.diagnostics import Diagnostic, Severity, error, has_errors, info, warning
 from toolpaths.toolpath import Frame, Role, Toolpath
 from toolpaths.units import DEG
 
@@ -54,6 +54,8 @@ class Job:
     modes: OutputModes
     errors: ErrorModel | None = None
     """geometric errors of the machine"""
+    stated: tuple[tuple[int, str], ...] = ()
+    """(tool number, what the set-up states of its spindle and coolant), where the CL file states none"""
 
     @property
     def work_system(self) -> Frame:
@@ -155,10 +157,12 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
     toolpath, diagnostics = numbered(toolpath, setup, options.setup)
     toolpath, found = plain_records(toolpath, controller)
     diagnostics += found
-    toolpath, found = with_defaults(toolpath, setup)
-    diagnostics += [*found, *standing_cuts(toolpath)]
+    toolpath, stated = with_defaults(toolpath, setup)
+    diagnostics += stated_by_setup(toolpath, stated)
     toolpath, found = checked_records(toolpath, controller)
     diagnostics += found
+    if not any(d.severity is Severity.ERROR and d.code.split(".")[0] in ("spindle", "insert") for d in diagnostics):
+        diagnostics += standing_cuts(toolpath)
     toolpath, found = own_registers(toolpath, controller)
     diagnostics += found
     toolpath, found = cut_operations(toolpath, setup.output.longest)
@@ -192,7 +196,7 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
     errors, found = _error_model(machine, options)
     diagnostics += found
     job = Job(toolpath, machine, controller, setup, options, placement, control, moves, safe_space(moves, setup, placement),
-              modes, errors)
+              modes, errors, tuple(stated))
     return job, diagnostics + _tool_lengths(job) + _unused_tools(job)
 
 

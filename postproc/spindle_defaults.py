@@ -33,15 +33,20 @@ class Use:
     line: int
 
 
-def with_defaults(toolpath: Toolpath, setup: SetupFile) -> tuple[Toolpath, list[Diagnostic]]:
-    """The path with SPINDL and COOLNT of the set-up where a tool has none of its own, behind the record that loads it.
+Stated = dict[tuple[int, str], list[int]]
+"""lines by tool number and what the set-up states for it, in words"""
+
+
+def with_defaults(toolpath: Toolpath, setup: SetupFile) -> tuple[Toolpath, Stated]:
+    """The path with SPINDL and COOLNT of the set-up where a tool has none of its own, behind the record that loads it; and
+    what the set-up states so.
 
     A record states it for a tool where it stands between the tool's load and the next one; a start that stands right before
     the load, without a motion between, is the tool's too. `[tools.N]` comes before what the tool before has left in force,
     `[output]` behind it.
     """
     new: list[tuple[int, Event]] = []
-    told: dict[str, list[int]] = {}
+    stated: Stated = {}
     spindle, flowing = Spindle(), False
     cuts = np.flatnonzero(cutting(toolpath))
     for use in uses(toolpath):
@@ -55,18 +60,22 @@ def with_defaults(toolpath: Toolpath, setup: SetupFile) -> tuple[Toolpath, list[
                 record = Event(use.first, "SPINDL", ("RPM", wanted.rpm, side), use.line)
                 new.append((use.at, record))
                 spindle = spindle_after(record, spindle)
-                told.setdefault(f"T{max(use.number, 0)}: {wanted}", []).append(use.line)
+                stated.setdefault((use.number, str(wanted)), []).append(use.line)
             cooled = _coolant_of(here, first, flowing, own, setup)
             if cooled is not None:
                 new.append((use.at, Event(use.first, "COOLNT", (_COOLANT[cooled],), use.line)))
                 flowing = cooled != "off"
-                told.setdefault(f"T{max(use.number, 0)}: coolant {cooled}", []).append(use.line)
+                stated.setdefault((use.number, f"coolant {cooled}"), []).append(use.line)
         for event in here:
             spindle = spindle_after(event, spindle) if event.word == "SPINDL" else spindle
             flowing = "OFF" not in words(event) if event.word == "COOLNT" else flowing
-    found = [info("spindle.of_setup", f"of the set-up, as the CL file states none: {what}", file=toolpath.file,
-                  lines=lines[:6], count=len(lines)) for what, lines in told.items()]
-    return replace(toolpath, events=_placed(toolpath.events, new)) if new else toolpath, found
+    return (replace(toolpath, events=_placed(toolpath.events, new)) if new else toolpath), stated
+
+
+def stated_by_setup(toolpath: Toolpath, stated: Stated) -> list[Diagnostic]:
+    """Notes of what the set-up states where the CL file states none."""
+    return [info("spindle.of_setup", f"T{number}: no record states it, {what} of the set-up is taken", file=toolpath.file,
+                 lines=lines[:6], count=len(lines)) for (number, what), lines in stated.items()]
 
 
 def _spindle_of(here: tuple[Event, ...], first: int, before: Spindle, own: ToolSetup,
@@ -168,7 +177,8 @@ def _remedy(toolpath: Toolpath, rows: Ints) -> str:
     starts = [use.first for use in found]
     tools = sorted({found[max(bisect_right(starts, int(row)) - 1, 0)].number for row in rows[:1000]})
     what = "spindle = { rpm = ..., direction = \"clockwise\" }"
-    return f"add to the set-up {', '.join(f'[tools.{n}]' for n in tools[:6])} {what}, or for all tools [output] {what}"
+    own = "".join(f"[tools.{n}] {what}, " for n in tools[:6] if n > 0)
+    return f"add to the set-up {own}{'or for all tools ' if own else ''}[output] {what}"
 
 
 def _stopped_by(toolpath: Toolpath, row: int) -> int:

@@ -73,10 +73,16 @@ def check_states(motion: Motion, job: Job, moves: Moves, owner: Ints, faults: Fa
                 k = int(bad[0])
                 first.setdefault(what, (int(here[k]), f"{what} is {name(found[k])}, it should be {name(wanted[k])}"))
                 count[what] += len(bad)
-    return [faults.error("verify.state", said, int(moves.line[owner[k]]), int(motion.line[k]), count[what])
+    return [faults.error("verify.state", said, int(moves.line[owner[k]]), int(motion.line[k]), count[what],
+                         _HINTS.get(what, ""))
             for what, (k, said) in sorted(first.items(), key=lambda one: (one[1][0], _ORDER.index(one[0])))]
 
 
+_HINTS = {
+    "spindle": "state S with M3 or M4 before the cut; a tool change and, on most machines, M0 and M1 stop it",
+    "coolant": "state it before the cut; a tool change and, on most machines, M0 and M1 switch it off",
+    "length register": "put the length of the tool in the spindle in force before the cut",
+}
 _ORDER = ("tool", "spindle", "spindle speed", "coolant", "length register", "cutter compensation",
           "register of the cutter compensation", "work offset")
 
@@ -96,13 +102,22 @@ def _states(motion: Motion, job: Job, asked: _Asked, rows: Ints, row: Ints,
     yield "spindle speed", same_speed, motion.rpm[rows], rpm, number
     yield ("coolant", np.where(cooled == ANY, coolant > 0, coolant == cooled), coolant, cooled,
            lambda bits: label(int(bits)))
-    yield ("length register", (motion.register[rows] == register) | ~job.control.length_on_z, motion.register[rows],
-           register, number)
+    register = _registers_of(motion, job, rows, register)
+    yield "length register", motion.register[rows] == register, motion.register[rows], register, number
     yield "cutter compensation", given == side, given, side, lambda g: reader.sides[int(g)]
     yield ("register of the cutter compensation", (radius == wanted_radius) | np.isnan(wanted_radius) | (given == 40),
            radius, wanted_radius, number)
     yield ("work offset", motion.offset[rows] == code, motion.offset[rows], code,
            lambda g: reader.offset_name(g) if np.isfinite(g) else "not stated")
+
+
+def _registers_of(motion: Motion, job: Job, rows: Ints, named: Ints) -> Ints:
+    """(K,) length register that should be in force in the blocks `rows`: that which the CL file names (K,); none where axis
+    positions hold the length of the tool already, and where the program calls none."""
+    if job.control.length_on_z:
+        return named
+    joints = np.array([frame.law == "axes" for frame in motion.frames])[motion.frame[rows]]
+    return np.where(joints, -1, named)
 
 
 def _radius_registers(job: Job) -> Floats:
