@@ -11,11 +11,13 @@ import numpy as np
 from postproc.events import TOOL_WORDS, Spindle, cutting, numbers, speed_said, spindle_after, spindle_states, words
 from postproc.setup import SetupFile, ToolSetup
 from postproc.setup_spindle import CoolantKind, SpindleSetup
-from toolpaths.arrays import Ints
+from toolpaths.arrays import Bools, Ints
 from toolpaths.diagnostics import Diagnostic, error, info
 from toolpaths.toolpath import Event, Toolpath
 
 _COOLANT = {"off": "OFF", "flood": "FLOOD", "mist": "MIST", "through": "THRU", "air": "AIR"}
+_ALONG = 1e-9
+"""by which the cosine between a straight retract and the tool axis may be less than 1"""
 _OFF = frozenset({"OFF", "NEUTRL", "NEUTRAL"})
 
 
@@ -144,6 +146,8 @@ def standing_cuts(toolpath: Toolpath) -> list[Diagnostic]:
     """Errors where the path cuts while the spindle stands, or turns at a speed that nobody states."""
     direction, rpm = spindle_states(toolpath)
     cuts = cutting(toolpath)
+    if (cuts & ((direction == 0) | ~(rpm > 0.0))).any():
+        cuts &= ~_drawn_out(toolpath)
     started = [e.index for e in toolpath.events if e.word == "SPINDL" and not _OFF & set(words(e))]
     rows = np.flatnonzero(cuts & (direction == 0))
     before = rows[rows < (min(started) if started else len(toolpath))]
@@ -164,6 +168,15 @@ def standing_cuts(toolpath: Toolpath) -> list[Diagnostic]:
         result.append(_refused(toolpath, unknown, "spindle.no_speed", "cutting while no record has stated the spindle speed",
                                f"state SPINDL/RPM,n,CLW in the CAM system, or {_remedy(toolpath, unknown)}"))
     return result
+
+
+def _drawn_out(toolpath: Toolpath) -> Bools:
+    """(N,) rows to which the tool is drawn back straight along its axis, as out of a bore: that cuts nothing."""
+    step = np.diff(toolpath.tip, axis=0, prepend=toolpath.tip[:1])
+    length = np.linalg.norm(step, axis=1)
+    along = np.einsum("ni,ni->n", step, toolpath.axis) >= length * (1.0 - _ALONG)
+    stays = np.append(True, (toolpath.axis[1:] == toolpath.axis[:-1]).all(axis=1))
+    return np.asarray(along & stays & (length > 0.0) & (toolpath.arc < 0) & (toolpath.cycle < 0))
 
 
 def _refused(toolpath: Toolpath, rows: Ints, code: str, message: str, hint: str) -> Diagnostic:

@@ -71,13 +71,13 @@ def _not_loaded(toolpath: Toolpath) -> list[Diagnostic]:
 
 
 def check_numbers(toolpath: Toolpath, report: Report) -> None:
-    """Different tools under one number that both cut."""
+    """Different tools under one number that both cut; those without a number are refused as such."""
     cutting = toolpath.tool[(toolpath.kind != Kind.RAPID) | (toolpath.cycle >= 0)]
     lines = toolpath.line[(toolpath.kind != Kind.RAPID) | (toolpath.cycle >= 0)]
     used, first = np.unique(cutting, return_index=True)
     known: dict[int, list[tuple[Tool, int]]] = {}
     for index, at in sorted(zip(used.tolist(), first.tolist(), strict=True), key=lambda pair: pair[1]):
-        if index < 0:
+        if index < 0 or toolpath.tools[index].number <= 0:
             continue
         tool, line = toolpath.tools[index], int(lines[at])
         others = known.setdefault(tool.number, [])

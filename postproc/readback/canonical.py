@@ -18,6 +18,8 @@ from toolpaths.diagnostics import Diagnostic
 
 REGISTER = "@"
 """length register in force from this block on, -1 for none"""
+UNSTATED = -2.0
+"""register behind a tool change after which the length in force is a setting of the control"""
 LOADED = "$"
 """tool that this block puts into the spindle"""
 COOLANT = "^"

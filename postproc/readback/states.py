@@ -18,6 +18,7 @@ from postproc.events import (
     numbers,
     spindle_states,
     state_at,
+    tool_loads,
 )
 from postproc.job import Job
 from postproc.moves import Moves
@@ -109,6 +110,24 @@ def _states(motion: Motion, job: Job, asked: _Asked, rows: Ints, row: Ints,
            radius, wanted_radius, number)
     yield ("work offset", motion.offset[rows] == code, motion.offset[rows], code,
            lambda g: reader.offset_name(g) if np.isfinite(g) else "not stated")
+
+
+def check_lengths(motion: Motion, job: Job, faults: Faults) -> list[Diagnostic]:
+    """Cutting blocks under a length register that the CL file names for no use of the tool in the spindle: why a program
+    comes nowhere, where its blocks cannot be told apart by their places any more."""
+    named: dict[int, set[int]] = {-1: {-1}}
+    for load, register, _ in tool_loads(job.toolpath):
+        named.setdefault(load.number, set()).add(register)
+    rows = np.flatnonzero(motion.code > 0)
+    pairs, first = np.unique(np.stack([motion.tool[rows], motion.register[rows]], axis=1), axis=0, return_index=True)
+    for (tool, held), k in sorted(zip(pairs.tolist(), first.tolist(), strict=True), key=lambda one: one[1]):
+        at = rows[k:k + 1]
+        wanted = {int(_registers_of(motion, job, at, np.array([one]))[0]) for one in named.get(tool, {held})}
+        if held not in wanted:
+            found, asked = (" or ".join(str(r) if r >= 0 else "none" for r in sorted(one)) for one in ({held}, wanted))
+            return [faults.error("verify.state", f"length register is {found} with T{max(tool, 0)} in the spindle, it "
+                                 f"should be {asked}", 0, int(motion.line[at[0]]), hint=_HINTS["length register"])]
+    return []
 
 
 def _registers_of(motion: Motion, job: Job, rows: Ints, named: Ints) -> Ints:

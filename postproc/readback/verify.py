@@ -20,6 +20,7 @@ from postproc.readback.execute import Motion, Offsets, run
 from postproc.readback.faults import Faults
 from postproc.readback.poses import Executed, poses_before
 from postproc.readback.slow import HEADER, planned_feeds
+from postproc.readback.states import check_lengths
 from postproc.readback.stops import check_stops
 from toolpaths.diagnostics import Diagnostic, Severity, error, has_errors, warning
 from toolpaths.rotations import angle_between
@@ -85,7 +86,8 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Callable[[str, i
         planned = job.options.feed == "planned" or planned_feeds(head)
         comparison = compare(motion, job, executed, gcode, planned)
     faults = Faults(job.toolpath.file, gcode)
-    unseen = [*check_changes(code, motion, job, home, faults), *check_stops(code, motion, job, faults),
+    lengths = [] if any(d.code == "verify.state" for d in comparison.diagnostics) else check_lengths(motion, job, faults)
+    unseen = [*lengths, *check_changes(code, motion, job, home, faults), *check_stops(code, motion, job, faults),
               *_bodies(motion, executed, job, comparison, faults)]
     told = sorted([*unseen, *comparison.diagnostics], key=lambda d: d.code not in CAUSES)
     if gcode and _by_post(job):

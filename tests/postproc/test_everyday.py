@@ -104,8 +104,9 @@ NAMES = {"em12": 1, "EM6": 2}
 
 
 def test_two_tools_of_one_number_are_refused_and_the_set_up_is_named() -> None:
-    hint = said(converted(TWO), "tool.same_number").hint
+    hint = said(converted(TWO.replace("TOOL,0", "TOOL,3")), "tool.same_number").hint
     assert '[tool_numbers] "EM12" = 1, "EM6" = 2' in hint
+    assert '[tool_numbers]\n"EM12" = 1\n"EM6" = 2' in said(converted(TWO), "tool.number").hint
 
 
 @pytest.mark.parametrize("controller", ["linuxcnc", "fanuc-30i", "siemens-840d", "heidenhain-tnc640"])

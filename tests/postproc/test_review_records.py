@@ -117,7 +117,7 @@ def tool(name: str, size: float, number: int = 0) -> list[str]:
 
 
 def test_different_tools_under_one_number_are_refused() -> None:
-    result = made(*tool("EM10", 10.0), *CUT, "RAPID", "GOTO/9,0,50", *tool("EM6", 6.0), *CUT, head=NX)
+    result = made(*tool("EM10", 10.0, 4), *CUT, "RAPID", "GOTO/9,0,50", *tool("EM6", 6.0, 4), *CUT, head=NX)
     errors = [d for d in result.diagnostics if d.code == "tool.same_number"]
     assert len(errors) == 1 and "lines 9 and 17" in errors[0].hint and not result.text, [str(d) for d in result.diagnostics]
 

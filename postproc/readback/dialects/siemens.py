@@ -22,6 +22,7 @@ from postproc.readback.canonical import (
     SMOOTH,
     STATEMENT,
     TURNS,
+    UNSTATED,
     Canonical,
     Statement,
     Text,
@@ -170,7 +171,7 @@ class SiemensReader(Reader):
             if d > 1.0:
                 run.fault("gcode.tool", b, f"D{d:g}: the length of a second cutting edge is not known", "D1 or D0")
             run.length.append((b, -1.0 if kind and d == 0.0 else loaded))
-            new.append((b, REGISTER, run.length[-1][1]))
+            new.append((b, REGISTER, run.length[-1][1] if kind else UNSTATED))
 
 
 def _apart(text: bytes) -> tuple[bytes, list[tuple[int, str]]]:
