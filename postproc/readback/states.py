@@ -114,7 +114,7 @@ def _states(motion: Motion, job: Job, asked: _Asked, rows: Ints, row: Ints,
 
 def check_lengths(motion: Motion, job: Job, faults: Faults) -> list[Diagnostic]:
     """Cutting blocks under a length register that the CL file names for no use of the tool in the spindle: why a program
-    comes nowhere, where its blocks cannot be told apart by their places any more."""
+    comes nowhere, where its blocks cannot be matched by their places any more."""
     named: dict[int, set[int]] = {-1: {-1}}
     for load, register, _ in tool_loads(job.toolpath):
         named.setdefault(load.number, set()).add(register)

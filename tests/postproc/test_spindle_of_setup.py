@@ -158,6 +158,13 @@ def test_set_ups_that_say_nothing_sensible(text: str, says: str, tmp_path: Path)
     assert got.exit_code == 1 and says in got.output + got.stderr and "s.toml:2" in got.output + got.stderr
 
 
+def test_the_set_up_of_the_readme_is_a_good_file(tmp_path: Path) -> None:
+    readme = (Path(__file__).parents[2] / "README.md").read_text()
+    (tmp_path / "s.toml").write_text(readme.split("## The set-up file")[1].split("```")[1].removeprefix("toml\n"))
+    of, found = load_setup(tmp_path / "s.toml")
+    assert not found and of is not None and of.output.spindle is not None and of.tools["1"].coolant == "flood"
+
+
 def test_every_command_knows_it(tmp_path: Path) -> None:
     (tmp_path / "part.apt").write_text("\n".join([*HEAD, "FINI"]))
     (tmp_path / "s.toml").write_text("[output]\nspindle = { rpm = 4000 }\n[tools.1]\ngauge_length = 100\n"
@@ -170,8 +177,8 @@ def test_every_command_knows_it(tmp_path: Path) -> None:
         return got.stdout
 
     out = str(tmp_path / "part.ngc")
-    told = json.loads(run("convert", "-o", out, "--json", "-"))["tools"]
-    assert told == [{"number": 1, "name": "", "gauge_length_mm": 100.0, "spindle_rpm": [4000.0],
+    shown = json.loads(run("convert", "-o", out, "--json", "-"))["tools"]
+    assert shown == [{"number": 1, "name": "", "gauge_length_mm": 100.0, "spindle_rpm": [4000.0],
                      "of_setup": ["4000 rev/min clockwise", "coolant flood"]}]
     assert "T1: 4000 rev/min clockwise, of the set-up" in run("convert", "-o", out)
     assert "(T1: 4000 rev/min clockwise, of the set-up)" in Path(out).read_text()

@@ -192,11 +192,11 @@ def test_a_program_without_the_length_or_with_another_one_fails(controller: str,
 def test_inspect_shows_which_tools_lack_a_number_or_a_spindle(tmp_path: Path) -> None:
     file = tmp_path / "part.apt"
     file.write_text("\n".join([*NAMED, "FINI"]))
-    told = json.loads(CliRunner().invoke(app, ["inspect", str(file), "--json", "-"]).stdout)
-    assert told["tools_without_number"] == ["EM10"] and told["tools_without_spindle"] == []
+    shown = json.loads(CliRunner().invoke(app, ["inspect", str(file), "--json", "-"]).stdout)
+    assert shown["tools_without_number"] == ["EM10"] and shown["tools_without_spindle"] == []
     file.write_text("\n".join([*[n for n in NOTHING if "SPINDL" not in n], "FINI"]))
-    told = json.loads(CliRunner().invoke(app, ["inspect", str(file), "--json", "-"]).stdout)
-    assert told["tools_without_number"] == told["tools_without_spindle"] == ["unnamed"]
+    shown = json.loads(CliRunner().invoke(app, ["inspect", str(file), "--json", "-"]).stdout)
+    assert shown["tools_without_number"] == shown["tools_without_spindle"] == ["unnamed"]
     text = CliRunner().invoke(app, ["inspect", str(file)]).stdout
     assert "without a number" in text and "without a spindle record" in text
 
