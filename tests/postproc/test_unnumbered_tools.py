@@ -121,6 +121,26 @@ def test_a_measured_tool_is_not_called(name: str, controller: str, tmp_path: Pat
     assert "verify.state" in {d.code for d in other.diagnostics}, "a program without tool call and length is no other"
 
 
+@pytest.mark.parametrize(("number", "low", "touches"), [("0", 30.0, False), ("0", 8.0, True), ("3", 8.0, True)])
+def test_its_form_is_compared_with_part_and_fixtures(number: str, low: float, touches: bool, tmp_path: Path) -> None:
+    """A holder of diameter 60 from 20 mm over the tip on, 10 mm from a clamp 3 mm beyond the end of the cut."""
+    text = MEASURED.split("[part]")[0] + f"""[tools.{number}]
+gauge_length = 100
+diameter = 10
+corner_radius = 0
+flute_length = {low}
+holder = [{{diameter = 60, length = {100 - low}}}]
+[[bodies.fixtures]]
+name = "clamp"
+box = {{ low = [33, -40, -20], high = [60, 40, 25] }}
+[bodies]
+"""
+    head = NOTHING if number == "0" else ["UNITS/MM", f"LOADTL/{number}", *NOTHING[1:]]
+    result = convert(toolpath(head=head), "mill-3axis", setup=setup_of(text, tmp_path))
+    found = [d for d in errors(result) if d.code.startswith("collision.")]
+    assert bool(found) is touches, [str(d) for d in result.diagnostics]
+
+
 def test_its_travel_is_checked_with_its_length(tmp_path: Path) -> None:
     """Z of mill-3axis ends at 400: a tool of 380 mm cannot go to z = 60, one of 100 can."""
     path = toolpath(head=["UNITS/MM", *SPINDLE, "RAPID", "GOTO/0,0,60", "GOTO/0,0,55", "GOTO/10,0,55"])
