@@ -37,7 +37,7 @@ CASES = {
     "among blocks that a switch leaves out": ["OPSKIP/ON", "GOTO/5,0,0", "STOP", "GOTO/10,0,0", "OPSKIP/OFF", "GOTO/20,0,0"],
     "at the end of blocks that a switch leaves out": ["OPSKIP/ON", "GOTO/5,0,0", "STOP", "OPSKIP/OFF", "GOTO/20,0,0"],
 }
-PLACES = {"h4a-c-table": (0.0, 0.0, -900.0), "uranesx": (0.0, 0.0, -270.0)}
+PLACES = {"uranesx": (0.0, 0.0, -270.0)}
 CUT = re.compile(r"(?:^|\s)(G0?[123]|G8[1-9]|G7[34]|MCALL CYCLE8\d|CP? |M99)(?![\d.])")
 RAPID = re.compile(r"(?:^|\s)G0?0(?![\d.])")
 
@@ -96,7 +96,7 @@ def test_nor_in_programs_that_can_be_taken_up(controller: str) -> None:
 
 @pytest.mark.parametrize(("name", "controller"), [
     ("fork-head-ab", "heidenhain-tnc640"), ("head-table", "siemens-840d"), ("mill-4axis", "haas-ngc"),
-    ("uranesx", "generic-iso"), ("h4a-c-table", "linuxcnc"), ("linuxcnc-xyzac-trt", "linuxcnc")])
+    ("uranesx", "generic-iso"), ("linuxcnc-xyzac-trt", "linuxcnc")])
 def test_nor_on_other_machines(name: str, controller: str) -> None:
     path = toolpath("GOTO/10,0,0", *CASES["several"], head=HEAD)
     place = PLACES.get(name, (0.0, 0.0, 0.0))

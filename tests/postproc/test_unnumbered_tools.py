@@ -49,8 +49,8 @@ def hinted(result: PostResult) -> str:
     return "\n".join(line for line in lines if not line.startswith("or,")) + "\n"
 
 
-@pytest.mark.parametrize("controller", CONTROLLERS)
-@pytest.mark.parametrize("file", FILES)
+@pytest.mark.parametrize(("file", "controller"), [
+    *((file, CONTROLLERS[k]) for k, file in enumerate(FILES)), *(("several forms", one) for one in CONTROLLERS)])
 def test_the_hint_numbers_the_tools(file: str, controller: str, tmp_path: Path) -> None:
     path = toolpath(head=FILES[file])
     text = hinted(convert(path, "mill-3axis", controller, SetupFile()))
@@ -101,8 +101,8 @@ LENGTH = "[tools.0]\ngauge_length = 100\n"
 CALLS = re.compile(r"(?:^|\s)(T\d|G43|H\d|TOOL CALL|D[1-9]|M0?6\b)", re.MULTILINE)
 
 
-@pytest.mark.parametrize("controller", [c for c in CONTROLLERS if c != "heidenhain-tnc640"])
-@pytest.mark.parametrize("name", ["mill-3axis", "mikron-ucp710"])
+@pytest.mark.parametrize(("controller", "name"), [
+    (c, ("mill-3axis", "mikron-ucp710")[k % 2]) for k, c in enumerate(CONTROLLERS) if c != "heidenhain-tnc640"])
 def test_a_measured_tool_is_not_called(name: str, controller: str, tmp_path: Path) -> None:
     path, setup = toolpath(head=NOTHING), setup_of(MEASURED + LENGTH, tmp_path)
     result = good(convert(path, name, controller, setup))
