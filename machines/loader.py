@@ -103,7 +103,8 @@ def assemble(file: UserFile, model: MachineModel) -> Machine:
         axis_names=names, rotary=kinematics.rotary, limits=_limits(model, kinematics),
         home=np.array([model.axes[name].home for name in names]) * _scale(kinematics), retract_axis=retract,
         timing=Timing(timing.tool_change, timing.clamp, timing.unclamp, frozenset(timing.assumed)),
-        control_kinematics=model.control_kinematics(), file=file.file)
+        control_kinematics=model.control_kinematics(), file=file.file,
+        stop=model.control.stop or "" if model.control is not None else "")
 
 
 def _limits(model: MachineModel, kinematics: Kinematics) -> Limits:

@@ -70,6 +70,8 @@ class Machine:
         home: (J,) joints where programs start and tool changes happen
         retract_axis: index of the linear joint that lifts the tool at home (approach goes there last), or -1
         control_kinematics: set where the control owns the kinematics (programs in tip coordinates)
+        stop: what a stop of the program switches off: "spindle and coolant", "spindle", "nothing", or "" where the machine
+            file does not say
     """
 
     name: str
@@ -84,6 +86,7 @@ class Machine:
     timing: Timing = field(default_factory=Timing)
     control_kinematics: ControlKinematics | None = None
     file: str = ""
+    stop: str = ""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "home", frozen(self.home, np.float64, (len(self.axis_names),), "Machine.home"))

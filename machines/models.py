@@ -11,6 +11,7 @@ from pydantic import AfterValidator, Field
 
 from machines.kinematics.base import Kinematics
 from machines.machine import ControlKinematics
+from machines.stop import Stop
 from machines.user_file import UserModel
 
 Positive = Annotated[float, Field(gt=0)]
@@ -107,10 +108,14 @@ class TimingModel(UserModel):
 
 
 class ControlModel(UserModel):
-    """The `[control]` table of a machine whose control computes the joints itself."""
+    """The `[control]` table: what the control of this machine does of its own."""
 
-    module: str
-    """LinuxCNC kinematics module; its pins follow from `[kinematics]`. trivkins: none, words are joints after all"""
+    module: str = JOINTS_ARE_AXES
+    """LinuxCNC kinematics module, where the control computes the joints itself; its pins follow from `[kinematics]`.
+    trivkins: none, words are joints after all"""
+    stop: Stop | None = None
+    """what a stop (M0; M1 where its switch is on) switches off: "spindle and coolant", "spindle" or "nothing"; the builder's
+    PLC decides on most controls. Default: what the controller file has ([stops])"""
 
 
 class MachineModel(UserModel):

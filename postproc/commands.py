@@ -13,6 +13,7 @@ from postproc.cutter_compensation import Compensation
 from postproc.events import (
     Spindle,
     ToolChange,
+    cutting,
     loaded_registers,
     numbers,
     register_changes,
@@ -26,25 +27,29 @@ from postproc.program import Command, Commands
 from postproc.switched import Switched
 from toolpaths.arrays import Bools
 from toolpaths.diagnostics import Diagnostic, warning
-from toolpaths.toolpath import Event, Kind, Toolpath
+from toolpaths.toolpath import Event, Toolpath
 from toolpaths.units import PER_MINUTE
 
 QUIET = frozenset({"GOHOME", "END", "OPSKIP", "SEQNO", "MODE", "ROTATE", "ROTABL", "ROTHED", "REWIND", "AIR"})
 """Events that need no command: the motion already holds what they say."""
+_STOPS = frozenset({"STOP", "OPSTOP"})
 
 
 def commands_of(toolpath: Toolpath, moves: Moves, path: Path, controller: ControllerFile, native: Bools,
-                restart: bool = False) -> tuple[Commands, list[Diagnostic]]:
-    """Commands by block, and what could not be carried out; with `restart` every operation restates its tool."""
+                restart: bool = False, tool_call: bool = True) -> tuple[Commands, list[Diagnostic]]:
+    """Commands by block, and what could not be carried out; with `restart` every operation restates its tool; without
+    `tool_call` no length register may be left in force by what ran before."""
     writing = _Writing(toolpath, moves, path, controller, restart)
     for at, event in enumerate(toolpath.events):
         writing.operations(event)
         writing.event(at, event)
     writing.operations(None)
     result, diagnostics = writing.done()
+    if not tool_call:
+        _without_length(result, controller)
     for k in _dwells(toolpath, moves, path, native):
         result.setdefault(k[0], []).insert(0, k[1])
-    return {k: tuple(v) for k, v in result.items() if v}, diagnostics + _no_spindle(toolpath, moves)
+    return {k: tuple(v) for k, v in result.items() if v}, diagnostics
 
 
 def operation_starts(toolpath: Toolpath, moves: Moves) -> list[tuple[int, int]]:
@@ -71,6 +76,10 @@ class _Writing:
         self.starts = operation_starts(toolpath, moves)
         self.lost: dict[str, list[int]] = {}
         self.skipping = False
+        self.cuts = np.flatnonzero(cutting(toolpath))
+        renewing = [e.index for e in toolpath.events if e.word in _STOPS or (e.index, e.line) in self.changes]
+        self.renewed = np.array([*sorted(renewing), len(toolpath) + 1])
+        """rows before which spindle and coolant are stated again in any case"""
 
     def at(self, block: int) -> list[Command]:
         """The commands before a block."""
@@ -134,10 +143,28 @@ class _Writing:
             self._tool(at, event, out, move < len(self.moves))
         elif command := _simple(event, self.spindle):
             out.append(command)
+            if event.word in _STOPS:
+                out += self._behind_stop(at, event)
         elif event.word not in QUIET:
             self.lost.setdefault(event.word, []).append(event.line)
         if self.skipping:
             out[known:] = [replace(c, skip=True) for c in out[known:]]
+
+    def _behind_stop(self, at: int, event: Event) -> list[Command]:
+        """Spindle and coolant again behind a stop, where a cut follows before the next one and before a tool change."""
+        self.state.stop()
+        events, but = self.toolpath.events, set[str]()
+        k = at + 1
+        while k < len(events) and events[k].index == event.index:
+            but.add(events[k].word)
+            change = events[k].word == "LOADTL" and (events[k].index, events[k].line) in self.changes
+            if change or events[k].word in _STOPS:
+                return []
+            k += 1
+        cut = int(np.searchsorted(self.cuts, event.index))
+        if cut == len(self.cuts) or self.renewed[np.searchsorted(self.renewed, event.index, side="right")] <= self.cuts[cut]:
+            return []
+        return self.state.again(event.line, but)
 
     def _loads(self, at: int, event: Event) -> bool:
         """True where a tool change follows at the same place."""
@@ -165,6 +192,18 @@ class _Writing:
         return self.result, lost + self.compensation.diagnostics(self.toolpath.file)
 
 
+def _without_length(commands: dict[int, list[Command]], controller: ControllerFile) -> None:
+    """The length register off at the program's beginning and wherever it may be taken up, where the safe start leaves it."""
+    cancel = controller.codes.length_cancel
+    if not cancel or any(cancel in block.split() for block in controller.program.preamble):
+        return
+    for group in commands.values():
+        for k in range(len(group) - 1, -1, -1):
+            if group[k].name == "OPERATION_START" and len(group[k].args) > 1:
+                group.insert(k + 1, Command("CANCEL_TOOL_LENGTH_OFFSET"))
+    commands.setdefault(0, []).insert(0, Command("CANCEL_TOOL_LENGTH_OFFSET"))
+
+
 def _gone(events: tuple[Event, ...], at: int) -> bool:
     """True where a record of the same place, before this one, sends the tool away already."""
     return any(e.index == events[at].index and e.word in ("LOADTL", "GOHOME") for e in events[max(at - 20, 0):at])
@@ -189,7 +228,7 @@ def _simple(event: Event, spindle: Spindle) -> Command | None:
     if event.word == "DELAY" and values:
         seconds = values[0] / (spindle.rpm * PER_MINUTE) if "REV" in said else values[0]
         return Command("DWELL", (seconds,), event.line)
-    if event.word in ("STOP", "OPSTOP"):
+    if event.word in _STOPS:
         return Command("PROGRAM_STOP" if event.word == "STOP" else "OPTIONAL_PROGRAM_STOP", (), event.line)
     if event.word == "PPRINT":
         return Command("COMMENT", (" ".join(str(v) for v in event.values),), event.line)
@@ -209,13 +248,3 @@ def _dwells(toolpath: Toolpath, moves: Moves, path: Path, native: Bools) -> list
         if cycle.dwell > 0.0 and not native[min(block, len(native) - 1)]:
             result.append((int(path.begin[m + 1]), Command("DWELL", (cycle.dwell,), int(moves.line[m]))))
     return result
-
-
-def _no_spindle(toolpath: Toolpath, moves: Moves) -> list[Diagnostic]:
-    """Cutting while no record has started the spindle."""
-    started = [e.index for e in toolpath.events if e.word == "SPINDL" and "OFF" not in words(e)]
-    cutting = np.flatnonzero((moves.kind != Kind.RAPID) & (moves.row < (min(started) if started else len(toolpath))))
-    if not len(cutting):
-        return []
-    return [warning("spindle.not_started", "cutting before any record starts the spindle", file=toolpath.file,
-                    lines=[int(moves.line[cutting[0]])], count=1, hint="state SPINDL/RPM,n,CLW in the CAM system")]

@@ -39,7 +39,8 @@ def compile_program(job: Job, moves: Moves, path: Path,
     feeds = plan_feeds(path, control, words.end - words.start, moves.feed[path.move],
                        toolpath.pass_[moves.row[path.move]], native, job.options.feed_mode, controller.feed,
                        planned)
-    commands, diagnostics = commands_of(toolpath, moves, path, controller, native, job.setup.output.apart)
+    commands, diagnostics = commands_of(toolpath, moves, path, controller, native, job.setup.output.apart,
+                                        job.setup.output.tool_call)
     keep = words.write.any(axis=1) | (path.code == ARC)
     new = np.concatenate([[0], np.cumsum(keep)])
     sections = sections_of(path, new)
@@ -59,7 +60,7 @@ def compile_program(job: Job, moves: Moves, path: Path,
 
 def words_of(job: Job, moves: Moves, path: Path, anew: Ints | None = None) -> WordRows:
     """The words of a path's blocks; the blocks `anew` state every axis."""
-    return word_rows(path, moves, job.control, job.kinematics, job.gauge_length, decimals(job.control, job.controller),
+    return word_rows(path, moves, job.control, job.kinematics, job.offset_length, decimals(job.control, job.controller),
                      np.zeros(0, dtype=np.int64) if anew is None else anew, job.rounding.made_up, job.two_way, job.corrects)
 
 
@@ -68,7 +69,7 @@ def writing_of(job: Job, moves: Moves) -> Writing:
     from postproc.corrected.settled import Writing
 
     def joints(path: Path, words: Floats, rows: Ints) -> Floats:
-        return joints_of(path, words, rows, block_tools(path, moves), job.kinematics, job.gauge_length)
+        return joints_of(path, words, rows, block_tools(path, moves), job.kinematics, job.offset_length)
 
     def turned(path: Path, q: Floats, rows: Ints) -> Floats:
         return with_turns(q, path.q[rows], path, rows, block_tools(path, moves), job.kinematics, job.rounding.made_up)

@@ -45,6 +45,7 @@ class Control:
         feed_rule: what a feed per minute refers to under the law "axes", see `feed_length`
         entry_frame: what the frame of the tip is where its mode is entered with turned tables, see `TcpMode.frame`
         own_kinematics: at the gauge point, as the control holds it; None: the machine's
+        measured: mm of tool length that the work offset holds, where the program calls none
     """
 
     machine: Machine
@@ -59,6 +60,7 @@ class Control:
     helix_planes: tuple[int, ...] = (17, 18, 19)
     arc_planes: tuple[int, ...] = (17, 18, 19)
     entry_frame: Literal["table", "entry", "either"] = "table"
+    measured: float = 0.0
 
     @cached_property
     def _others(self) -> dict[tuple[object, ...], Control]:
@@ -181,6 +183,8 @@ class Control:
         if not kin.slides_affine:
             return np.zeros(kin.joints)
         result: Floats = self.slides_for(kin, self.origin[None, :], np.zeros((1, kin.joints)))[0] * self.unit
+        if self.measured:
+            result[self.xyz[2]] += self.measured
         return result
 
     def slides_for(self, kin: Kinematics, tip: Floats, q: Floats) -> Floats:

@@ -11,6 +11,7 @@ from toolpaths.toolpath import Toolpath
 
 OFF, FLOOD, MIST, THROUGH, AIR, ANY = 0, 1, 2, 4, 8, -1
 """bits of what flows; ANY: COOLNT/ON, whatever the kind"""
+ALL = FLOOD | MIST | THROUGH | AIR
 LABELS = {FLOOD: "flood", MIST: "mist", THROUGH: "through the tool", AIR: "air"}
 COMMANDS = {"FLOOD_ON": FLOOD, "MIST_ON": MIST, "THROUGH_ON": THROUGH, "AIR_ON": AIR}
 _LESS = {"THROUGH_ON": "FLOOD_ON", "AIR_ON": "MIST_ON", "MIST_ON": "FLOOD_ON"}
@@ -48,7 +49,7 @@ def switched_by(codes: Codes | None) -> dict[float, tuple[int, int]]:
         if _number(off) >= 0.0:
             result[_number(off)] = 0, COMMANDS[name]
             own |= COMMANDS[name]
-    result[9.0 if codes is None else _number(codes.coolant_off)] = 0, (FLOOD | MIST | THROUGH | AIR) & ~own
+    result[9.0 if codes is None else _number(codes.coolant_off)] = 0, ALL & ~own
     return result
 
 

@@ -8,8 +8,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from toolpaths.arrays import Floats, Ints
-from toolpaths.toolpath import Event, Toolpath
+from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.toolpath import Event, Kind, Role, Toolpath
 from toolpaths.units import PER_MINUTE
 
 TOOL_WORDS = frozenset({"LOADTL", "LOAD/TOOL", "LOAD", "TURRET"})
@@ -33,6 +33,12 @@ def numbers(event: Event) -> list[float]:
 def words(event: Event) -> list[str]:
     """The words among an event's values, upper case."""
     return [v.upper() for v in event.values if isinstance(v, str)]
+
+
+def cutting(toolpath: Toolpath) -> Bools:
+    """(N,) rows that cut: motion at feed, and holes."""
+    moved = (toolpath.kind != Kind.RAPID) & (toolpath.role != Role.START)
+    return np.asarray(moved | (toolpath.cycle >= 0))
 
 
 def tool_loads(toolpath: Toolpath) -> list[tuple[ToolChange, int, bool]]:

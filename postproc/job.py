@@ -21,14 +21,16 @@ from postproc.moves import Moves, build_moves
 from postproc.options import Options
 from postproc.parts import cut_operations
 from postproc.pivots import control_kinematics
-from postproc.records import plain_records
+from postproc.records import checked_records, plain_records
 from postproc.rounding import Rounding, decimals, helix_bound, rounding_bound
 from postproc.setup import Placement, SetupFile, part_placement, work_frame
 from postproc.setup_system import standing
+from postproc.spindle_defaults import standing_cuts, stated_by_setup, with_defaults
 from postproc.stated_feeds import without_feed
 from postproc.tool_numbers import numbered
+from postproc.unnumbered_tools import measured_length
 from toolpaths.arrays import Floats, Ints, shared, taken
-from toolpaths.diagnostics import Diagnostic, error, has_errors, info, warning
+from toolpaths.diagnostics import Diagnostic, Severity, error, has_errors, info, warning
 from toolpaths.toolpath import Frame, Role, Toolpath
 from toolpaths.units import DEG
 
@@ -52,6 +54,8 @@ class Job:
     modes: OutputModes
     errors: ErrorModel | None = None
     """geometric errors of the machine"""
+    stated: tuple[tuple[int, str], ...] = ()
+    """(tool number, what the set-up states of its spindle and coolant), where the CL file states none"""
 
     @property
     def work_system(self) -> Frame:
@@ -64,24 +68,24 @@ class Job:
         return self.options.axis_tolerance * DEG
 
     def gauge_length(self, index: int) -> float:
-        """Gauge length of the tool of that index, mm; 0 where the set-up does not tell."""
+        """Gauge length of the tool of that index, mm; 0 where the set-up does not say."""
         return self.length_of(self.number_of(index))
 
-    def number_of(self, index: int) -> int:
-        """Number of the tool of that index. Without one (-1) it is -1, no tool, before the first tool change; 0 in a
-        file that changes none, where the set-up's [tools.0] is what stands in the spindle."""
-        if index >= 0:
-            return self.toolpath.tools[index].number
-        return -1 if self._loads else 0
+    def offset_length(self, index: int) -> float:
+        """mm that the length register of the tool of that index holds: its gauge length, 0 where the program calls none."""
+        return self.gauge_length(index) if self.setup.output.tool_call else 0.0
 
-    @cached_property
-    def _loads(self) -> bool:
-        return bool(tool_changes(self.toolpath))
+    def number_of(self, index: int) -> int:
+        """Number of the tool of that index; -1 without one. Where the program calls none it is that of the one tool, 0
+        where that has no number."""
+        return self.toolpath.tools[index].number if index >= 0 else -1
 
     def length_of(self, number: int) -> float:
-        """Gauge length of a tool by its number."""
+        """Gauge length of a tool by its number; where the program calls none, that of the tool in the spindle."""
+        if not self.setup.output.tool_call:
+            return measured_length(self.toolpath, self.setup)
         tool = self.setup.tools.get(str(number))
-        return tool.gauge_length if tool else 0.0
+        return tool.length if tool else 0.0
 
     def kinematics(self, index: int) -> Kinematics:
         """The kinematics at the tip of the tool of that index."""
@@ -153,6 +157,12 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
     toolpath, diagnostics = numbered(toolpath, setup, options.setup)
     toolpath, found = plain_records(toolpath, controller)
     diagnostics += found
+    toolpath, stated = with_defaults(toolpath, setup)
+    diagnostics += stated_by_setup(toolpath, stated)
+    toolpath, found = checked_records(toolpath, controller)
+    diagnostics += found
+    if not any(d.severity is Severity.ERROR and d.code.split(".")[0] in ("spindle", "insert") for d in diagnostics):
+        diagnostics += standing_cuts(toolpath)
     toolpath, found = own_registers(toolpath, controller)
     diagnostics += found
     toolpath, found = cut_operations(toolpath, setup.output.longest)
@@ -182,12 +192,34 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
     entry = "table" if corrects or controller.modes.tcp is None else controller.modes.tcp.frame
     control = Control(machine, law, origin, largest, law, rapids=controller.kinematics.rapids, entry_frame=entry,
                       feed_rule=controller.feed.length, own_kinematics=own,
-                      helix_planes=controller.arcs.helix_planes)
+                      helix_planes=controller.arcs.helix_planes,
+                      measured=0.0 if setup.output.tool_call else measured_length(toolpath, setup))
+    diagnostics += _measured(control, controller, moves.axis, setup, options)
     modes, found = output_modes(control, controller, setup, options, toolpath, decimals(control, controller))
     diagnostics += found
     job = Job(toolpath, machine, controller, setup, options, placement, control, moves, safe_space(moves, setup, placement),
-              modes, errors)
+              modes, errors, tuple(stated))
     return job, diagnostics + _tool_lengths(job) + _unused_tools(job)
+
+
+def _measured(control: Control, controller: ControllerFile, axis: Floats, setup: SetupFile,
+              options: Options) -> list[Diagnostic]:
+    """Where a tool cannot be measured into the work offset: its length stands along Z of the words only where every rotary
+    axis carries the part and the words are axis positions, and where the control adds none of its own."""
+    if setup.output.tool_call:
+        return []
+    name = control.machine.name
+    if control.base == "tcp":
+        why = f"the control runs the kinematics of {name} and needs the length of the tool"
+    elif words_depend_on_length(control, control.machine.kinematics, axis) or not control.length_on_z:
+        why = f"on {name} the axis positions depend on the tool's length in other directions than Z"
+    elif controller.tools.length_automatic and not controller.codes.length_cancel:
+        why = "this control adds the length of the tool in the spindle by itself"
+    else:
+        return []
+    return [error("tool.measured", f"[output] tool_call = false: the tool cannot be measured into the work offset, {why}",
+                  file=options.setup, hint="take tool_call out of the set-up, number the tool under [tool_numbers] and "
+                  "state its gauge_length under [tools.N]")]
 
 
 def _error_model(machine: Machine, options: Options) -> tuple[ErrorModel | None, list[Diagnostic]]:
@@ -235,12 +267,15 @@ def _no_inverse_time(controller: ControllerFile, options: Options) -> list[Diagn
 def _tool_lengths(job: Job) -> list[Diagnostic]:
     """A missing gauge length is an error where program words depend on it, else a warning: travel leaves it out."""
     used = sorted({int(t) for t in np.unique(job.moves.tool)})
-    missing = sorted({job.number_of(t) for t in used if job.gauge_length(t) == 0.0})
+    missing = sorted({max(job.number_of(t), 0) for t in used if job.gauge_length(t) == 0.0})
     if not missing:
         return []
-    names = ", ".join(f"T{n}" if n >= 0 else "what cuts before the first tool change" for n in missing)
-    hint = f"add [tools.{missing[-1]}] gauge_length = ... to the set-up" if missing[-1] >= 0 else ""
-    hint += ("; " if hint else "") + "load a tool before the first motion" if missing[0] < 0 else ""
+    if not job.setup.output.tool_call:
+        return [warning("tool.length", "no gauge length for the tool that is measured into the work offset: its travel is "
+                        "not checked, and the header names the work offset without it", file=job.toolpath.file,
+                        hint=f"add to the set-up: [tools.{missing[0]}] gauge_length = ...")]
+    names = ", ".join(f"T{n}" for n in missing)
+    hint = "add to the set-up: " + ", ".join(f"[tools.{n}] gauge_length = ..." for n in missing[:6])
     if words_depend_on_length(job.control, job.machine.kinematics, job.moves.axis):
         return [error("tool.length", f"no gauge length for {names}: on {job.machine.name} the axis positions depend on it",
                       file=job.toolpath.file, hint=hint)]
@@ -251,7 +286,6 @@ def _tool_lengths(job: Job) -> list[Diagnostic]:
 def _unused_tools(job: Job) -> list[Diagnostic]:
     """Tools of the set-up that the CL file never loads."""
     used = {str(t.number) for t in job.toolpath.tools} | {str(c.number) for c in tool_changes(job.toolpath)}
-    used |= {str(job.number_of(-1))}
     unused = [f"T{number}" for number in job.setup.tools if number not in used]
     return [info("setup.tool_unused", f"the CL file does not use {', '.join(unused)} of the set-up",
                  file=job.options.setup)] if unused else []

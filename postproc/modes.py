@@ -41,12 +41,14 @@ class OutputModes:
         control: under its base law
         asked (operations,): index into ASKED
         decimals (J,): of the axis words
+        tool_call: False where no length register is ever in force
     """
 
     control: Control
     controller: ControllerFile
     asked: Array
     decimals: Ints
+    tool_call: bool = True
 
     @cached_property
     def lacking(self) -> dict[Law, str]:
@@ -57,6 +59,8 @@ class OutputModes:
             return {"axes": own, "tcp": "", "tilted": own}
         machine = "" if control.has_tip_modes else f"{name} is no serial machine with slides X, Y, Z along its axes and a " \
             "rotary axis"
+        machine = machine or ("" if self.tool_call else "it needs the tool's length in a register, and the set-up has "
+                              "[output] tool_call = false")
         tables = modes.tilted is not None and modes.tilted.tables_only and not control.has_rotary_tables_only
         return {"axes": "",
                 "tcp": machine or ("" if modes.tcp else "the controller has no tool-centre-point mode ([modes.tcp])")
@@ -139,7 +143,8 @@ def output_modes(control: Control, controller: ControllerFile, setup: SetupFile,
     """The modes of a job, and what is asked for but cannot be had."""
     default = setup.output.default if options.output == "auto" else options.output
     names = [setup.output.operations.get(op.name, default) for op in toolpath.operations]
-    modes = OutputModes(control, controller, np.array([ASKED.index(name) for name in names], dtype=np.int8), decimals)
+    modes = OutputModes(control, controller, np.array([ASKED.index(name) for name in names], dtype=np.int8), decimals,
+                        setup.output.tool_call)
     return modes, [*_not_available(modes, toolpath), *_unknown_operations(setup, options, toolpath),
                    *_no_subprograms(controller, setup, options)]
 

@@ -34,6 +34,7 @@ def header_lines(result: PostResult) -> list[str]:
               f"words: {_meanings(result.program)}",
               f"work offset {result.controller.program.offset_name(result.setup.work_offset_code)} in machine coordinates: "
               f"{offset}"]
+    header += _measured(job)
     if result.setup.tool_numbers:
         numbers = dict.fromkeys(f"{t.name} = T{t.number}" for t in result.toolpath.tools if t.name)
         header.append("tool numbers of the set-up: " + ", ".join(numbers))
@@ -41,6 +42,7 @@ def header_lines(result: PostResult) -> list[str]:
         header.append(f"feed {result.setup.output.feed:g} mm/min of the set-up where the CL file states none")
     if result.motion is not None:
         header.append(f"{FEEDS} {UNKNOWN}")
+    header += [f"T{number}: {what}, of the set-up" for number, what in job.stated]
     header += [*_tip_frame(result), *_corrections(result), *_orientations(result), *_tools(job)]
     if result.toolpath.name:
         header.insert(1, f"part {result.toolpath.name}")
@@ -60,6 +62,16 @@ def _tip_frame(result: PostResult) -> list[str]:
         table_axes(control)) else []
 
 
+def _measured(job: Job) -> list[str]:
+    """That the program calls no tool, and what the work offset holds of its length."""
+    if job.setup.output.tool_call:
+        return []
+    axis, length = "Z", job.control.measured
+    held = f"{axis} of the work offset holds its gauge length {length:.4f} mm" if length else \
+        f"its length must be added to {axis} of the work offset"
+    return ["no tool call, no length register: for the tool in the spindle, measured into the work offset", held]
+
+
 def _tools(job: Job) -> list[str]:
     """A line for each tool that moves, in order of use: what must be in the magazine, and how long the set-up has it."""
     index, first = np.unique(job.moves.tool, return_index=True)
@@ -69,7 +81,8 @@ def _tools(job: Job) -> list[str]:
         tool = job.toolpath.tools[k] if k >= 0 else None
         if number < 0 or number in found:
             continue
-        parts = [f"tool T{number}{f' {tool.name}' if tool and tool.name else ''}",
+        called = f"T{number}" if number or job.setup.output.tool_call else "without a number"
+        parts = [f"tool {called}{f' {tool.name}' if tool and tool.name else ''}",
                  *([f"diameter {tool.diameter:.4g} mm"] if tool and tool.diameter else []),
                  f"gauge length {length:.4f} mm" if length else "gauge length not stated"]
         found[number] = ", ".join(parts)

@@ -59,27 +59,36 @@ class _Found:
 
 
 def plain_records(toolpath: Toolpath, controller: ControllerFile) -> tuple[Toolpath, list[Diagnostic]]:
-    """The path with its records in plain words and its dwells in seconds, and what cannot be carried out."""
+    """The path with its records in plain words, and what cannot be carried out."""
     found = _Found(toolpath.file)
     events: list[Event] = []
     spindle = Spindle()
-    away = {e.index: e.line for e in toolpath.events if e.word in ("LOADTL", "GOHOME")}
     for event in _without_limits(toolpath.events, found.add):
         for plain in _plain(event, spindle, controller, found.add):
-            if plain.word == "SPINDL":
-                _check_spindle(plain, found.add)
-                spindle = spindle_after(plain, spindle)
-            elif plain.word == "DELAY":
-                _check_delay(plain, spindle, found.add)
-            elif plain.word == "COOLNT":
-                _check_coolant(plain, controller, found.add)
-            elif plain.word == "CUTCOM":
-                _check_compensation(plain, found.add)
-            elif plain.word == "RETRCT":
-                _check_retract(plain, away.get(plain.index, -1), len(toolpath), found.add)
+            spindle = spindle_after(plain, spindle) if plain.word == "SPINDL" else spindle
             events.append(plain)
+    return replace(toolpath, events=tuple(events)), found.diagnostics()
+
+
+def checked_records(toolpath: Toolpath, controller: ControllerFile) -> tuple[Toolpath, list[Diagnostic]]:
+    """The path of plain records with its dwells in seconds, and what cannot be carried out."""
+    found = _Found(toolpath.file)
+    spindle = Spindle()
+    away = {e.index: e.line for e in toolpath.events if e.word in ("LOADTL", "GOHOME")}
+    for plain in toolpath.events:
+        if plain.word == "SPINDL":
+            _check_spindle(plain, found.add)
+            spindle = spindle_after(plain, spindle)
+        elif plain.word == "DELAY":
+            _check_delay(plain, spindle, found.add)
+        elif plain.word == "COOLNT":
+            _check_coolant(plain, controller, found.add)
+        elif plain.word == "CUTCOM":
+            _check_compensation(plain, found.add)
+        elif plain.word == "RETRCT":
+            _check_retract(plain, away.get(plain.index, -1), len(toolpath), found.add)
     check_numbers(toolpath, found.add)
-    plain_path = _dwells_in_seconds(replace(toolpath, events=tuple(events)), found.add)
+    plain_path = _dwells_in_seconds(toolpath, found.add)
     return plain_path, found.diagnostics()
 
 

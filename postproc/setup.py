@@ -14,6 +14,7 @@ from postproc.setup_bodies import Bodies, ToolBody
 from postproc.setup_files import seen_from_here
 from postproc.setup_orientation import OrientationLimits
 from postproc.setup_place import PlacementLimits
+from postproc.setup_spindle import CoolantKind, SpindleSetup
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.toolpath import Frame, Toolpath
@@ -52,8 +53,17 @@ class Clearance(UserModel):
 class ToolSetup(ToolBody):
     """One tool in the machine."""
 
-    gauge_length: float = Field(gt=0.0)
-    """from the gauge point of the spindle to the tip, mm"""
+    gauge_length: float | None = Field(default=None, gt=0.0)
+    """from the gauge point of the spindle to the tip, mm; default: not known, travel is checked as if it were 0"""
+    spindle: SpindleSetup | None = None
+    """where the CL file states no SPINDL for this tool, e.g. spindle = { rpm = 8000, direction = "clockwise" }"""
+    coolant: CoolantKind | None = None
+    """where the CL file states no COOLNT for this tool"""
+
+    @property
+    def length(self) -> float:
+        """Gauge length, mm, 0 where it is not known."""
+        return self.gauge_length or 0.0
 
 
 Asked = Literal["auto", "axes", "tcp", "tilted"]
@@ -77,6 +87,14 @@ class Output(UserModel):
     """most CL points of one part: longer operations are cut at rapids, each part begins as with restart; 0: any"""
     feed: float | None = Field(default=None, gt=0.0)
     """of cuts for which the CL file has stated none (no FEDRAT before them) but taps, mm/min; default: they are refused"""
+    spindle: SpindleSetup | None = None
+    """of tools for which neither the CL file (SPINDL) nor [tools.N] states one; default: cuts without it are refused"""
+    coolant: CoolantKind | None = None
+    """of tools for which neither the CL file (COOLNT) nor [tools.N] states one; default: off"""
+    tool_call: bool = True
+    """false: the program calls no tool and no length: the one tool of the file stands in the spindle already and its length
+    is measured into the work offset. [tools.N] gauge_length (N = 0 for a tool without a number) is then part of the work
+    offset that the header names"""
 
     @property
     def apart(self) -> bool:
@@ -143,7 +161,7 @@ class SetupFile(UserModel):
     tool_numbers: dict[Annotated[str, Field(min_length=1)], Annotated[int, Field(ge=1, lt=10**9)]] = Field(
         default_factory=dict)
     """by name of the tool in the CL file (see inspect), e.g. [tool_numbers] "EM12" = 2: its number, whatever the file loads
-    it by; lengths in [tools.2] are then its"""
+    it by, and where it loads none; lengths in [tools.2] are then its. "unnamed" is a tool without name and number"""
     output: Output = Output()
     control_pivots: dict[Annotated[str, Field(pattern="^[ABC]$")], Pivot] = Field(default_factory=dict)
     """by rotary axis, e.g. [control_pivots.A]: what the control's parameters say; default: as the machine file"""

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from postproc.events import cutting, spindle_states
 from postproc.pipeline import PostResult, VerifyResult, points_in
 from toolpaths.diagnostics import Severity
 from toolpaths.input_files import there_is
@@ -42,6 +43,8 @@ def as_dict(result: PostResult, output: str) -> dict[str, Any]:
         "output_modes": output_modes(result),
         "geometric_errors": _errors(result),
         "orientation": _orientation(result),
+        "tool_call": result.setup.output.tool_call,
+        "tools": tools_of(result),
         "diagnostics": [d.as_dict() for d in result.diagnostics],
     }
 
@@ -111,6 +114,36 @@ def output_modes(result: PostResult) -> dict[str, list[str]]:
     return found
 
 
+def tools_of(result: PostResult) -> list[dict[str, Any]]:
+    """The tools in order of use: number, name, gauge length (null: not stated), the speeds that they cut at (rev/min,
+    negative: anti-clockwise), and what the set-up states of spindle and coolant where the CL file does not."""
+    job = result.job
+    if job is None:
+        return []
+    path, cuts = job.toolpath, cutting(job.toolpath)
+    direction, rpm = spindle_states(path)
+    index, first = np.unique(job.moves.tool, return_index=True)
+    found: dict[int, dict[str, Any]] = {}
+    for k in index[np.argsort(first, kind="stable")].tolist():
+        number = job.number_of(k)
+        speeds = np.unique((direction * rpm)[cuts & (path.tool == k)])
+        tool = found.setdefault(number, {
+            "number": number, "name": path.tools[k].name if k >= 0 else "", "gauge_length_mm": job.gauge_length(k) or None,
+            "spindle_rpm": [], "of_setup": [what for n, what in job.stated if n == number]})
+        tool["spindle_rpm"] = sorted({*tool["spindle_rpm"], *speeds[np.isfinite(speeds)].tolist()})
+    return list(found.values())
+
+
+def tool_lines(result: PostResult) -> list[str]:
+    """Of the summary: what the set-up states of spindle and coolant, and that no tool is called."""
+    lines = []
+    if result.job is not None and not result.setup.output.tool_call:
+        length = result.job.control.measured
+        lines.append("no tool call: for the tool in the spindle, measured into the work offset, which "
+                     + (f"holds its gauge length {length:.4f} mm" if length else "must hold its length besides"))
+    return lines + [f"T{number}: {what}, of the set-up" for number, what in (result.job.stated if result.job else ())]
+
+
 def points_added(result: PostResult) -> int:
     """Blocks that linearising put between CL points."""
     if result.path is None:
@@ -145,6 +178,7 @@ def as_text(result: PostResult, output: str) -> str:
         offset = " ".join(f"{k}{round(v, 4) + 0.0:.4f}" for k, v in zip(
             result.machine.axis_names, result.job.control.work_offset, strict=True))
         lines.append(f"work offset {result.controller.program.offset_name(result.setup.work_offset_code)}: {offset}")
+    lines += tool_lines(result)
     if result.estimate is not None:
         from postproc.cycle_time.conversion import text
 

@@ -18,15 +18,18 @@ class Switched:
         self.cooling: Command | None = None
         self.waiting: dict[str, Command] = {}
         """what a tool change that comes first will switch on"""
+        self.unsure = {"spindle": False, "coolant": False}
+        """True from a stop on until it is stated again: controls differ in what they switch off there"""
 
     def spindle(self, wanted: Command, loads: bool = False) -> list[Command]:
         """The command where it changes something; a start waits for the tool change that `loads`."""
         if loads and wanted.name != _STOPPED:
             self.waiting["spindle"] = wanted
             return []
-        if self.turning is not None and (self.turning.name, self.turning.args) == (wanted.name, wanted.args):
+        same = self.turning is not None and (self.turning.name, self.turning.args) == (wanted.name, wanted.args)
+        if same and not self.unsure["spindle"]:
             return []
-        self.turning = wanted
+        self.turning, self.unsure["spindle"] = wanted, False
         return [wanted]
 
     def coolant(self, wanted: Command, loads: bool = False) -> list[Command]:
@@ -34,10 +37,23 @@ class Switched:
         if loads and wanted.name != _DRY:
             self.waiting["coolant"] = wanted
             return []
-        if self.cooling is not None and self.cooling.name == wanted.name:
+        if self.cooling is not None and self.cooling.name == wanted.name and not self.unsure["coolant"]:
             return []
-        self.cooling = wanted
+        self.cooling, self.unsure["coolant"] = wanted, False
         return [wanted]
+
+    def stop(self) -> None:
+        """A stop of the program: nobody knows what still turns and flows."""
+        self.unsure = {"spindle": True, "coolant": True}
+
+    def again(self, line: int, but: set[str]) -> list[Command]:
+        """Spindle and coolant as they were before a stop, but for what the records `but` state by themselves."""
+        out: list[Command] = []
+        if self.turning is not None and self.turning.name != _STOPPED and "SPINDL" not in but:
+            out += self.spindle(replace(self.turning, line=line))
+        if self.cooling is not None and self.cooling.name != _DRY and "COOLNT" not in but:
+            out += self.coolant(replace(self.cooling, line=line))
+        return out
 
     def change(self, change: ToolChange, follows: set[str], moves_on: bool) -> list[Command]:
         """A tool change with spindle and coolant off, and on again where no record that `follows` says otherwise.
@@ -53,6 +69,7 @@ class Switched:
         cooled = self.waiting.pop("coolant", self.cooling)
         register = change.register if change.register is not None else change.number
         out.append(Command("CHANGE_TOOL", (float(change.number),), change.line))
+        self.unsure = {"spindle": False, "coolant": False}
         if not moves_on:
             self.turning, self.cooling = Command(_STOPPED), Command(_DRY)
             return out

@@ -8,8 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from postproc.events import TOOL_WORDS, loaded_tools
+from postproc.events import TOOL_WORDS, cutting, loaded_tools
 from postproc.setup import SetupFile
+from postproc.unnumbered_tools import measured, named_by, with_loads, with_tools, without_number
 from toolpaths.arrays import Ints
 from toolpaths.diagnostics import Diagnostic, Severity, error, info
 from toolpaths.toolpath import Event, Kind, Tool, Toolpath
@@ -23,17 +24,22 @@ def numbered(toolpath: Toolpath, setup: SetupFile, file: str = "") -> tuple[Tool
 
     A record loads the tool that the rows behind it are cut with; SELECT prepares the one that is loaded next.
     """
-    if not setup.tool_numbers:
-        return toolpath, []
+    toolpath = with_tools(toolpath)
     asked = {name.upper(): number for name, number in setup.tool_numbers.items()}
-    tools = tuple(replace(t, number=asked.get(t.name.upper(), t.number)) for t in toolpath.tools)
-    result = replace(toolpath, tools=tools, events=_events(toolpath, tools, asked))
-    known = {t.name.upper() for t in tools}
+    tools = tuple(replace(t, number=asked.get(named_by(t), t.number)) for t in toolpath.tools)
+    known = {named_by(t) for t in toolpath.tools}
     unknown = [name for name in setup.tool_numbers if name.upper() not in known]
     found = [info("setup.tool_name_unused", f"[tool_numbers]: the CL file has no tool {', '.join(unknown)}", file=file,
                   hint="its tools: " + (", ".join(sorted(t.name for t in tools if t.name)) or "none has a name"))
              ] if unknown else []
-    return result, found + _not_loaded(result, asked)
+    if asked:
+        toolpath = replace(toolpath, tools=tools, events=_events(toolpath, tools, asked))
+    if not setup.output.tool_call:
+        toolpath, more = measured(toolpath, setup)
+        return toolpath, found + more
+    found += without_number(toolpath, setup)
+    toolpath, more = with_loads(toolpath)
+    return toolpath, found + more + _not_loaded(toolpath)
 
 
 def _events(toolpath: Toolpath, tools: tuple[Tool, ...], asked: dict[str, int]) -> tuple[Event, ...]:
@@ -43,7 +49,7 @@ def _events(toolpath: Toolpath, tools: tuple[Tool, ...], asked: dict[str, int]) 
     for event in reversed(toolpath.events):
         if event.word in TOOL_WORDS and event.values:
             index = int(toolpath.tool[event.index]) if event.index < len(toolpath) else -1
-            own = index >= 0 and tools[index].name.upper() in asked
+            own = index >= 0 and named_by(toolpath.tools[index]) in asked
             next_one = event.values[0], float(tools[index].number) if own else event.values[0]
             event = replace(event, values=(next_one[1], *event.values[1:]))
         elif event.word == "SELECT" and event.values[:1] == next_one[:1]:
@@ -52,11 +58,10 @@ def _events(toolpath: Toolpath, tools: tuple[Tool, ...], asked: dict[str, int]) 
     return tuple(reversed(result))
 
 
-def _not_loaded(toolpath: Toolpath, asked: dict[str, int]) -> list[Diagnostic]:
-    """Cuts with a tool that the set-up numbers while the file has loaded another."""
-    own = np.array([t.number if t.name.upper() in asked else -1 for t in toolpath.tools] + [-1])[toolpath.tool]
-    cutting = (toolpath.kind != Kind.RAPID) | (toolpath.cycle >= 0)
-    rows: Ints = np.flatnonzero(cutting & (own >= 0) & (own != loaded_tools(toolpath)))
+def _not_loaded(toolpath: Toolpath) -> list[Diagnostic]:
+    """Cuts with a tool that has a number while the file has loaded another."""
+    own = np.array([t.number for t in toolpath.tools] + [-1])[toolpath.tool]
+    rows: Ints = np.flatnonzero(cutting(toolpath) & (own > 0) & (own != loaded_tools(toolpath)))
     if not len(rows):
         return []
     tool = toolpath.tools[int(toolpath.tool[rows[0]])]
@@ -66,13 +71,13 @@ def _not_loaded(toolpath: Toolpath, asked: dict[str, int]) -> list[Diagnostic]:
 
 
 def check_numbers(toolpath: Toolpath, report: Report) -> None:
-    """Different tools under one number that both cut."""
+    """Different tools under one number that both cut; those without a number are refused as such."""
     cutting = toolpath.tool[(toolpath.kind != Kind.RAPID) | (toolpath.cycle >= 0)]
     lines = toolpath.line[(toolpath.kind != Kind.RAPID) | (toolpath.cycle >= 0)]
     used, first = np.unique(cutting, return_index=True)
     known: dict[int, list[tuple[Tool, int]]] = {}
     for index, at in sorted(zip(used.tolist(), first.tolist(), strict=True), key=lambda pair: pair[1]):
-        if index < 0:
+        if index < 0 or toolpath.tools[index].number <= 0:
             continue
         tool, line = toolpath.tools[index], int(lines[at])
         others = known.setdefault(tool.number, [])

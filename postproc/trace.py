@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from postproc.coolant import coolant_states, label
+from postproc.events import spindle_states
 from postproc.options import Orientation
 from postproc.pipeline import PostResult
 from postproc.readback.canonical import in_files
@@ -63,8 +65,20 @@ def _point(result: PostResult, row: int) -> dict[str, Any]:
     if result.job is None:
         return point
     moves = result.job.moves
+    point |= _running(result, row)
     point["moves"] = [_move(result, int(m)) for m in np.flatnonzero(moves.row == row)]
     return point
+
+
+def _running(result: PostResult, row: int) -> dict[str, Any]:
+    """Tool, spindle and coolant at a point, those of the set-up where the CL file states none."""
+    assert result.job is not None
+    path = result.job.toolpath
+    direction, rpm = spindle_states(path)
+    return {"tool": result.job.number_of(int(path.tool[row])),
+            "gauge_length_mm": result.job.gauge_length(int(path.tool[row])) or None,
+            "spindle_rpm": _finite(float(direction[row] * rpm[row])) if direction[row] else 0.0,
+            "coolant": label(int(coolant_states(path, result.controller.codes)[row]))}
 
 
 def _turned(choice: OrientationChoice, plan: Orientation, row: int) -> dict[str, Any]:
@@ -161,11 +175,22 @@ def as_text(stages: dict[str, Any]) -> str:
         t = point["toolpath"]
         lines.append(f"  toolpath     tip {_vector(t['tip_mm'])}  axis {_vector(t['axis'])}  {t['kind']} {t['role']}  "
                      f"operation {t['operation'] or '-'}  pass {t['pass']}")
+        if "tool" in point:
+            lines.append(_running_text(point))
         if "orientation" in point:
             lines.append(_turned_text(point["orientation"]))
         for move in point.get("moves", []):
             lines += _move_text(move)
     return "\n".join(lines)
+
+
+def _running_text(point: dict[str, Any]) -> str:
+    rpm = point["spindle_rpm"]
+    turns = "off" if rpm == 0.0 else "at an unknown speed" if rpm is None else \
+        f"{abs(rpm):g} rev/min {'clockwise' if rpm > 0.0 else 'anti-clockwise'}"
+    length = point["gauge_length_mm"]
+    return f"  tool         T{point['tool']}  gauge length {'not stated' if length is None else f'{length:.4f} mm'}  " \
+        f"spindle {turns}  coolant {point['coolant']}"
 
 
 def _turned_text(o: dict[str, Any]) -> str:

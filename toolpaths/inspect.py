@@ -20,6 +20,8 @@ HALF_TURN = 1e-3
 """rad beyond 180 degrees that still count as half a turn; a whole turn may miss its end by rounding"""
 TURNED = 1e-4
 """degrees below which a system stands as the part frame does"""
+_LACKING = ("tools without a number (the set-up gives it: [tool_numbers])",
+            "tools that cut without a spindle record (the set-up gives it: [tools.N] or [output] spindle)")
 _TOOL_ANGLES = ("taper", "tip_angle")
 
 
@@ -42,7 +44,7 @@ def inspect(result: ReadResult) -> dict[str, object]:
         "arcs": result.arc_records, "arcs_over_180_deg": over_half(p), "holes": int((p.role == Role.HOLE).sum()),
         "normals": 0 if p.normal is None else int(np.isfinite(p.normal).all(axis=1).sum()),
         "cycles": result.cycle_records,
-        "operations": _operations(p, point, lengths), "tools": [tool_dict(t) for t in p.tools],
+        "operations": _operations(p, point, lengths), "tools": [tool_dict(t) for t in p.tools], **tools_lacking(p),
         "frames": [asdict(f) for f in p.frames], "units": p.units, "five_axis": motion != "fixed",
         "axis_motion": motion, "length_mm": float(lengths.sum()), "extents": extents(p),
         "unknown_words": dict(result.unknown_words), "records": asdict(p.records),
@@ -99,6 +101,32 @@ def tool_dict(tool: Tool) -> dict[str, object]:
     return {key: value / DEG if key in _TOOL_ANGLES else value for key, value in found.items()}
 
 
+def tools_lacking(p: Toolpath) -> dict[str, list[str]]:
+    """Tools that move without a number, and tools that cut before any record starts the spindle or after one has stopped it;
+    "unnamed" where the file does not name them, T and the number where it numbers them."""
+    moving = p.role != Role.START
+    cuts = moving & ((p.kind != Kind.RAPID) | (p.cycle >= 0))
+    number = np.array([t.number for t in p.tools] + [0])[p.tool]
+    return {"tools_without_number": _called(p, moving & (number <= 0)),
+            "tools_without_spindle": _called(p, cuts & ~_turning(p))}
+
+
+def _called(p: Toolpath, rows: Bools) -> list[str]:
+    """Names of the tools of some rows (N,), in order of use."""
+    used, first = np.unique(p.tool[rows], return_index=True)
+    tools = [p.tools[k] if k >= 0 else Tool(0) for k in used[np.argsort(first)].tolist()]
+    return list(dict.fromkeys(t.name or (f"T{t.number}" if t.number > 0 else "unnamed") for t in tools))
+
+
+def _turning(p: Toolpath) -> Bools:
+    """(N,) True while a SPINDL record has the spindle turn."""
+    said = [e for e in p.events if e.word == "SPINDL"]
+    turns = np.array([False, *(not {"OFF", "NEUTRL", "NEUTRAL"} & set(map(str, e.values)) for e in said)])
+    at = np.searchsorted(np.array([0, *(e.index for e in said)]), np.arange(len(p)), side="right") - 1
+    result: Bools = turns[at]
+    return result
+
+
 def _operations(p: Toolpath, point: Bools, lengths: Floats) -> list[dict[str, object]]:
     count = len(p.operations)
     rows = np.bincount(p.operation, minlength=count)
@@ -134,6 +162,8 @@ def summary(result: ReadResult) -> str:
     lines += [f"  operation {op.name or i + 1}{' (turning)' if op.turning else ''}: "
               f"{int((p.operation == i).sum())} rows" for i, op in enumerate(p.operations)]
     lines += [f"  tool {t.number}{' ' + t.name if t.name else ''}{_size(t)}" for t in p.tools]
+    lines += [f"  {title}: {', '.join(names)}" for title, names in zip(_LACKING, tools_lacking(p).values(), strict=True)
+              if names]
     if result.unknown_words:
         lines.append("  unknown words: " + ", ".join(f"{w} ({n})" for w, n in result.unknown_words.items()))
     return "\n".join(lines)

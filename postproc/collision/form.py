@@ -126,7 +126,7 @@ def _unknown(number: int, cutter: Cutter, setup: ToolSetup | None, pieces: dict[
     elif holder > at + _DIFFERS:
         missing.append((f"what is between {at:g} mm over the tip and the holder, which begins at {holder:g} mm,",
                         "more sections of shank"))
-    if holder is not None and setup is not None and top < setup.gauge_length - _DIFFERS:
+    if holder is not None and setup is not None and top < setup.length - _DIFFERS:
         missing.append((f"what is between the holder, which ends {top:g} mm over the tip, and the gauge point at "
                         f"{setup.gauge_length:g} mm,", "more sections of holder"))
     return [warning("collision.unchecked", f"T{number}: {what} is not known and not checked", hint=f"state {key} in "
@@ -138,7 +138,7 @@ def stacked(number: int | str, given: ToolSetup, flutes: float | None) -> list[D
     found, holder = [], [one.length for one in given.holder]
     at = (flutes or 0.0) + sum(one.length for one in given.shank)
     last = at + sum(holder[:-1])
-    if last > given.gauge_length + _DIFFERS:
+    if given.gauge_length is not None and last > given.gauge_length + _DIFFERS:
         found.append(warning("collision.stack", f"T{number}: the last section of {'its holder' if holder else 'its tool'} "
                              f"{'begins' if holder else 'ends'} {last:g} mm over the tip, above the gauge point at "
                              f"{given.gauge_length:g} mm: flutes, shank and holder are {at + sum(holder):g} mm long",

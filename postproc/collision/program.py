@@ -103,10 +103,12 @@ def _ways(motion: Motion, executed: Executed, job: Job, owner: Ints) -> tuple[li
 def _tools(motion: Motion, job: Job, moves: Moves, owner: Ints) -> Ints:
     """(E,) index of the tool in the spindle among those of the CL file: that of the move, else the last one of its number.
 
-    A file may describe several tools under one number.
+    A file may describe several tools under one number; a program that calls none has the same one from its beginning.
     """
     numbers = np.array([tool.number for tool in job.toolpath.tools] + [0])
     result = moves.tool[np.minimum(owner, len(moves) - 1)].astype(np.int64)
+    if not job.setup.output.tool_call:
+        return result
     for number in np.unique(motion.tool).tolist():
         rows = np.flatnonzero(motion.tool == number)
         known = np.flatnonzero(numbers[:-1] == max(number, 0))

@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from machines.stop import Stop
 from machines.user_file import UserModel, load_toml
 from postproc.controllers.spelling import Codes, Comment, Format, Frame, Subprograms, Tools
 from postproc.controllers.texts import CYCLE_VALUES, placeholders
@@ -188,6 +189,16 @@ class Modes(UserModel):
     """tilted working plane"""
 
 
+class Stops(UserModel):
+    """What the control does at M0, and at M1 where its switch is on."""
+
+    switch_off: Stop = "spindle and coolant"
+    """what they switch off by themselves, where the machine file does not say ([control] stop): the read-back counts it as
+    standing from there on. Programs restate spindle and coolant behind every stop, whatever stands here"""
+    tool_change: Stop = "spindle and coolant"
+    """what a tool change switches off by itself"""
+
+
 class ControllerFile(UserModel):
     """A controller."""
 
@@ -203,6 +214,7 @@ class ControllerFile(UserModel):
     start: Start = Start()
     codes: Codes = Codes()
     tools: Tools = Tools()
+    stops: Stops = Stops()
     subprograms: Subprograms = Subprograms()
     subprogram_files: Subprograms = Subprograms(place="files")
     """the same in files of their own, which the set-up may ask for"""

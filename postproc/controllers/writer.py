@@ -202,10 +202,13 @@ class Writer(WriterState, ABC):
         """The blocks of one canonical command."""
         codes = self.controller.codes
         fixed = {"STOP_SPINDLE_TURNING": codes.spindle_stop, "PROGRAM_STOP": codes.stop,
-                 "OPTIONAL_PROGRAM_STOP": codes.optional_stop, "CUTTER_COMPENSATION_OFF": codes.compensation_off}
+                 "OPTIONAL_PROGRAM_STOP": codes.optional_stop,
+                 "CANCEL_TOOL_LENGTH_OFFSET": codes.length_cancel, "CUTTER_COMPENSATION_OFF": codes.compensation_off}
         if command.name in fixed:
             if command.name == "STOP_SPINDLE_TURNING":
                 self.turning = None if command.skip else False
+            elif command.name in ("PROGRAM_STOP", "OPTIONAL_PROGRAM_STOP"):
+                self.turning, self.cooling = self.turning and None, self.cooling and None
             yield fixed[command.name]
         elif command.name == "COOLANT_OFF" or command.name in COMMANDS:
             yield from self.coolant(command)

@@ -52,7 +52,7 @@ def from_gcode(data: bytes, machine: Machine, controller: ControllerFile, setup:
     law: Law = "tcp" if tip_law else "axes"
     control = Control(machine, law, placement.points(np.zeros((1, 3)))[0], base=law, rapids=controller.kinematics.rapids,
                       feed_rule=controller.feed.length)
-    lengths = {int(number): tool.gauge_length for number, tool in setup.tools.items()}
+    lengths = {int(number): tool.length for number, tool in setup.tools.items()}
     code, motion, more = _executed(data, controller, control, lengths, file, others)
     found += more
     if code is None or motion is None or has_errors(found):
@@ -74,7 +74,7 @@ def _executed(data: bytes, controller: ControllerFile, control: Control, lengths
     """Text to canonical words to motion."""
     machine = control.machine
     home = control.words(machine.home[None, :], machine.kinematics, 0.0)[0] + control.work_offset
-    reader = reader_for(controller, machine.axis_names, home)
+    reader = reader_for(controller, machine.axis_names, home, machine.stop)
     code, found = reader.read(data, file, others)
     if code is None or has_errors(found):
         return None, None, found

@@ -237,7 +237,7 @@ def _pass(number: int, rows: tuple[int, int], of: _Cutting) -> Pass:
     known = of.toolpath.tools[tool] if tool >= 0 else None
     radius = ball_radius(known)
     length = of.setup.tools.get(str(known.number if known else 0))
-    kin = of.machine.kinematics.with_tool(length.gauge_length if length else 0.0)
+    kin = of.machine.kinematics.with_tool(length.length if length else 0.0)
     inside = [one for first in range(*rows) for one in of.stretches.get(first, ())]
     stays = _kept(of, cuts) or _fixed(moves, rows, cuts - rows[0], axis)
     fixed = stays or _by_cutter(radius)

@@ -18,10 +18,14 @@ from toolpaths.diagnostics import Diagnostic
 
 REGISTER = "@"
 """length register in force from this block on, -1 for none"""
+UNSTATED = -2.0
+"""register behind a tool change after which the length in force is a setting of the control"""
 LOADED = "$"
 """tool that this block puts into the spindle"""
 COOLANT = "^"
 """bits of what flows from this block on (`postproc.coolant`)"""
+STANDS = "_"
+"""a block before which the control itself has stopped the spindle: M0 or M1 in the one before it"""
 REST = "="
 """s that the block rests"""
 SMOOTH = "!"

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from postproc.readback.canonical import COOLANT, LOADED, OFFSET, REGISTER, SMOOTH
+from postproc.readback.canonical import COOLANT, LOADED, OFFSET, REGISTER, SMOOTH, STANDS
 from postproc.readback.words import Words
 from toolpaths.arrays import Array, Floats, Ints, repeated, shared
 from toolpaths.diagnostics import Diagnostic, error
@@ -111,7 +111,9 @@ def modal_state(words: Words) -> Modal:
     feed_mode = group("feed_mode", 94).astype(np.int8)
     change, tool = words.pick(LOADED)
     turn_line, turn = codes(words, "M", (3, 4, 5))
-    turn_line, turn = np.concatenate([change, turn_line]), np.concatenate([np.full(len(change), 5.0), turn])
+    stops, _ = words.pick(STANDS)
+    turn_line = np.concatenate([stops, change, turn_line])
+    turn = np.concatenate([np.full(len(stops) + len(change), 5.0), turn])
     order = np.argsort(turn_line, kind="stable")
     spindle = fill(turn_line[order], np.where(turn == 3, 1, np.where(turn == 4, -1, 0))[order], n, 0.0)
     state = (group("motion", 1).astype(np.int16), group("plane", 17).astype(np.int8), feed_mode == 93, feed_mode == 95,

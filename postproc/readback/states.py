@@ -18,6 +18,7 @@ from postproc.events import (
     numbers,
     spindle_states,
     state_at,
+    tool_loads,
 )
 from postproc.job import Job
 from postproc.moves import Moves
@@ -74,7 +75,7 @@ def check_states(motion: Motion, job: Job, moves: Moves, owner: Ints, faults: Fa
                 first.setdefault(what, (int(here[k]), f"{what} is {name(found[k])}, it should be {name(wanted[k])}"))
                 count[what] += len(bad)
     return _left_on(motion, job, moves, owner, asked, reader, faults) + [
-        faults.error("verify.state", said, int(moves.line[owner[k]]), int(motion.line[k]), count[what])
+        faults.error("verify.state", said, int(moves.line[owner[k]]), int(motion.line[k]), count[what], _HINTS.get(what, ""))
             for what, (k, said) in sorted(first.items(), key=lambda one: (one[1][0], _ORDER.index(one[0])))]
 
 
@@ -95,6 +96,11 @@ def _left_on(motion: Motion, job: Job, moves: Moves, owner: Ints, asked: _Asked,
                          "cancel it before the tool leaves the cut")]
 
 
+_HINTS = {
+    "spindle": "state S with M3 or M4 before the cut; a tool change and, on most machines, M0 and M1 stop it",
+    "coolant": "state it before the cut; a tool change and, on most machines, M0 and M1 switch it off",
+    "length register": "put the length of the tool in the spindle in force before the cut",
+}
 _ORDER = ("tool", "spindle", "spindle speed", "coolant", "length register", "cutter compensation",
           "register of the cutter compensation", "work offset")
 
@@ -114,13 +120,40 @@ def _states(motion: Motion, job: Job, asked: _Asked, rows: Ints, row: Ints,
     yield "spindle speed", same_speed, motion.rpm[rows], rpm, number
     yield ("coolant", np.where(cooled == ANY, coolant > 0, coolant == cooled), coolant, cooled,
            lambda bits: label(int(bits)))
-    yield ("length register", (motion.register[rows] == register) | ~job.control.length_on_z, motion.register[rows],
-           register, number)
+    register = _registers_of(motion, job, rows, register)
+    yield "length register", motion.register[rows] == register, motion.register[rows], register, number
     yield "cutter compensation", given == side, given, side, lambda g: reader.sides[int(g)]
     yield ("register of the cutter compensation", (radius == wanted_radius) | np.isnan(wanted_radius) | (given == 40),
            radius, wanted_radius, number)
     yield ("work offset", motion.offset[rows] == code, motion.offset[rows], code,
            lambda g: reader.offset_name(g) if np.isfinite(g) else "not stated")
+
+
+def check_lengths(motion: Motion, job: Job, faults: Faults) -> list[Diagnostic]:
+    """Cutting blocks under a length register that the CL file names for no use of the tool in the spindle: why a program
+    comes nowhere, where its blocks cannot be matched by their places any more."""
+    named: dict[int, set[int]] = {-1: {-1}}
+    for load, register, _ in tool_loads(job.toolpath):
+        named.setdefault(load.number, set()).add(register)
+    rows = np.flatnonzero(motion.code > 0)
+    pairs, first = np.unique(np.stack([motion.tool[rows], motion.register[rows]], axis=1), axis=0, return_index=True)
+    for (tool, held), k in sorted(zip(pairs.tolist(), first.tolist(), strict=True), key=lambda one: one[1]):
+        at = rows[k:k + 1]
+        wanted = {int(_registers_of(motion, job, at, np.array([one]))[0]) for one in named.get(tool, {held})}
+        if held not in wanted:
+            found, asked = (" or ".join(str(r) if r >= 0 else "none" for r in sorted(one)) for one in ({held}, wanted))
+            return [faults.error("verify.state", f"length register is {found} with T{max(tool, 0)} in the spindle, it "
+                                 f"should be {asked}", 0, int(motion.line[at[0]]), hint=_HINTS["length register"])]
+    return []
+
+
+def _registers_of(motion: Motion, job: Job, rows: Ints, named: Ints) -> Ints:
+    """(K,) length register that should be in force in the blocks `rows`: that which the CL file names (K,); none where axis
+    positions hold the length of the tool already, and where the program calls none."""
+    if job.control.length_on_z:
+        return named
+    joints = np.array([frame.law == "axes" for frame in motion.frames])[motion.frame[rows]]
+    return np.where(joints, -1, named)
 
 
 def _radius_registers(job: Job) -> Floats:

@@ -23,6 +23,7 @@ from postproc.readback.poses import Executed, poses_before
 from postproc.readback.slow import HEADER, planned_feeds
 from postproc.readback.starts import check_end, check_start
 from postproc.readback.stated import check_stated
+from postproc.readback.states import check_lengths
 from postproc.readback.stops import check_stops
 from toolpaths.diagnostics import Diagnostic, Severity, error, has_errors, warning
 from toolpaths.rotations import angle_between
@@ -63,7 +64,7 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Callable[[str, i
     give_back()
     machine, control = job.machine, job.control
     home = control.words(machine.home[None, :], machine.kinematics, 0.0)[0] + control.work_offset
-    reader = reader_for(job.controller, machine.axis_names, home)
+    reader = reader_for(job.controller, machine.axis_names, home, machine.stop)
     code, diagnostics = reader.read(data, gcode, others)
     head = as_bytes(data[:HEADER])
     diagnostics = [_located(_judged(d, reader.units_stay), job.toolpath.file) for d in diagnostics]
@@ -91,7 +92,8 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Callable[[str, i
     with np.errstate(invalid="ignore"):
         planned, changed = planned_feeds(as_bytes(data), others or {}, gcode or job.toolpath.file)
         comparison = compare(motion, job, executed, gcode, planned)
-    unseen += [*changed, *check_end(motion, job, home, faults), *check_changes(code, motion, job, home, faults),
+    lengths = [] if any(d.code == "verify.state" for d in comparison.diagnostics) else check_lengths(motion, job, faults)
+    unseen += [*lengths, *changed, *check_end(motion, job, home, faults), *check_changes(code, motion, job, home, faults),
                *check_stops(code, motion, job, faults),
               *_bodies(motion, executed, job, comparison, faults)]
     told = sorted([*unseen, *comparison.diagnostics], key=lambda d: d.code not in CAUSES)

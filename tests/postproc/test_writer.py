@@ -212,10 +212,10 @@ def test_order_around_a_tool_change() -> None:
 
 def test_speed_and_coolant_records() -> None:
     blocks = flat("GOTO/1,0,5", "SPINDL/RPM,2000,CCLW", "GOTO/2,0,5", "SPINDL/RPM,1500,CLW", "GOTO/2.5,0,5", "SPINDL/OFF",
-                  "COOLNT/MIST", "GOTO/3,0,5", "SPINDL/ON", "DELAY/2.5", "GOTO/4,0,5", "COOLNT/OFF", "OPSTOP", "STOP",
-                  "GOTO/5,0,5")
-    assert blocks[:15] == ["G1 X1 F600", "S2000 M4", "X2", "S1500 M3", "X2.5", "M5", "M7", "X3", "S1500 M3", "G4 P2.5", "X4",
-                           "M9", "M1", "M0", "X5"]
+                  "COOLNT/MIST", "RAPID", "GOTO/3,0,5", "SPINDL/ON", "DELAY/2.5", "GOTO/4,0,5", "COOLNT/OFF", "OPSTOP",
+                  "STOP", "GOTO/5,0,5")
+    assert blocks[:16] == ["G1 X1 F600", "S2000 M4", "X2", "S1500 M3", "X2.5", "M5", "M7", "G0 X3", "S1500 M3", "G4 P2.5",
+                           "G1 X4", "M9", "M1", "M0", "S1500 M3", "X5"]
 
 
 def test_length_offset_register_follows_the_tool_record() -> None:

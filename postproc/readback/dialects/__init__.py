@@ -10,8 +10,10 @@ if TYPE_CHECKING:
     from toolpaths.arrays import Floats
 
 
-def reader_for(controller: ControllerFile, letters: tuple[str, ...], home: Floats | None = None) -> Reader:
-    """The reader of the dialect that the controller file's writer writes; `home` (J,): machine coordinates, mm, degrees."""
+def reader_for(controller: ControllerFile, letters: tuple[str, ...], home: Floats | None = None,
+               stop: str = "") -> Reader:
+    """The reader of the dialect that the controller file's writer writes; `home` (J,): machine coordinates, mm, degrees;
+    `stop`: what stops switch off where the machine file says it."""
     from postproc.readback.dialects.fanuc import FanucReader
     from postproc.readback.dialects.haas import HaasReader
     from postproc.readback.dialects.iso import IsoReader
@@ -20,4 +22,4 @@ def reader_for(controller: ControllerFile, letters: tuple[str, ...], home: Float
 
     readers: dict[str, type[Reader]] = {"iso": IsoReader, "linuxcnc": IsoReader, "fanuc": FanucReader, "haas": HaasReader,
                                         "siemens": SiemensReader, "heidenhain": KlartextReader}
-    return readers[controller.writer](letters, controller, home)
+    return readers[controller.writer](letters, controller, home, stop)

@@ -10,9 +10,20 @@ from typing import ClassVar
 
 import numpy as np
 
-from postproc.controllers.model import ControllerFile
-from postproc.coolant import switched_by
-from postproc.readback.canonical import COOLANT, EXTENDED_OFFSETS, Canonical, LawName, Text, added, offset_number, placed
+from postproc.controllers.model import ControllerFile, Stops
+from postproc.coolant import ALL, switched_by
+from postproc.readback.canonical import (
+    COOLANT,
+    EXTENDED_OFFSETS,
+    LOADED,
+    STANDS,
+    Canonical,
+    LawName,
+    Text,
+    added,
+    offset_number,
+    placed,
+)
 from postproc.readback.flow import Structure, expand
 from postproc.readback.magnitude import negative_smoothing, too_large
 from postproc.readback.modal import GROUPS, Groups, check_codes, check_end, codes, drop_passive
@@ -22,6 +33,8 @@ from toolpaths.diagnostics import Diagnostic, has_errors, warning
 
 Program = tuple[Text, Structure]
 UNITS_UNSTATED = "gcode.units_unstated"
+STOPS = (0.0, 1.0)
+"""M codes of stops"""
 M_CODES = (0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 30.0)
 
 
@@ -37,6 +50,8 @@ class Reader(ABC):
         units_stay: that is a setting of the control, which no program changes
         stating: by group, the words that state it; a block that relies on one that nothing states is an error in `verify`
         leaving: by law, the codes that switch it off; modes_named: what the control calls it
+        stop: what M0 and M1 switch off, by the controller file or by that of the machine (`[control] stop`)
+        changes: what a tool change switches off
     """
 
     groups: Groups = GROUPS
@@ -56,8 +71,11 @@ class Reader(ABC):
     leaving: ClassVar[dict[LawName, tuple[str, ...]]] = {}
     modes_named: ClassVar[dict[LawName, str]] = {"tcp": "the tool-centre-point mode", "tilted": "the tilted plane"}
 
-    def __init__(self, axes: tuple[str, ...], controller: ControllerFile | None = None, home: Floats | None = None) -> None:
+    def __init__(self, axes: tuple[str, ...], controller: ControllerFile | None = None, home: Floats | None = None,
+                 stop: str = "") -> None:
         self.axes, self.controller, self.home = axes, controller, home
+        stops = controller.stops if controller is not None else Stops()
+        self.stop, self.changes = stop or stops.switch_off, stops.tool_change
         self.main_file = ""
         self.switches = switched_by(controller.codes if controller is not None else None)
         """(bits on, bits off) by M number, see `postproc.coolant`"""
@@ -119,16 +137,25 @@ class Reader(ABC):
         return replace(code, files=files), [*found, *more, *placed(last, files)]
 
     def translated(self, text: Text, line: Ints, file: str) -> tuple[Canonical, list[Diagnostic]]:
-        """Canonical words of blocks in running order, with what coolant flows."""
+        """Canonical words of blocks in running order, with what turns and flows behind stops."""
         code, found = self.canonical(text, line, file)
-        return replace(code, words=self.cooled(code.words)), found
+        return replace(code, words=self.cooled(self.stopped(code.words))), found
+
+    def stopped(self, words: Words) -> Words:
+        """The words with the blocks before which the control itself has stopped the spindle."""
+        return words if self.stop == "nothing" else added(words, [(b, STANDS, 1.0) for b in _behind_stops(words)])
 
     def cooled(self, words: Words) -> Words:
-        """The words with what flows from each block on that switches coolant, in the order of the codes."""
+        """The words with what flows from each block on that switches coolant, in the order of the codes: a tool change acts
+        before the codes of its block, a stop behind them."""
         blocks, numbers = codes(words, "M", tuple(self.switches))
+        events = [(int(b), 1, *self.switches[float(m)]) for b, m in zip(blocks, numbers, strict=True)]
+        if self.changes == "spindle and coolant":
+            events += [(int(b), 0, 0, ALL) for b in np.unique(words.pick(LOADED)[0])]
+        if self.stop == "spindle and coolant":
+            events += [(b, 0, 0, ALL) for b in _behind_stops(words)]
         new, flowing = [], 0
-        for block, number in zip(blocks.tolist(), numbers.tolist(), strict=True):
-            on, off = self.switches[number]
+        for block, _, on, off in sorted(events, key=lambda e: e[:2]):
             flowing = flowing & ~off | on
             new.append((block, COOLANT, float(flowing)))
         return added(words, new)
@@ -178,6 +205,11 @@ def _to_end(words: Words, main: tuple[int, int]) -> tuple[int, int]:
     ends, _ = codes(words, "M", (2, 30))
     ends = ends[ends >= main[0]]
     return main if not len(ends) or int(words.line[-1]) == int(ends[0]) else (main[0], min(main[1], int(ends[0])))
+
+
+def _behind_stops(words: Words) -> list[int]:
+    """The blocks that follow a stop."""
+    return [int(b) + 1 for b in np.unique(codes(words, "M", STOPS)[0]) if b < words.lines]
 
 
 def whole(text: Text) -> Structure:

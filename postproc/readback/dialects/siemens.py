@@ -23,6 +23,7 @@ from postproc.readback.canonical import (
     SMOOTH,
     STATEMENT,
     TURNS,
+    UNSTATED,
     Canonical,
     LawName,
     Statement,
@@ -175,7 +176,7 @@ class SiemensReader(Reader):
                 run.fault("gcode.tool", b, f"D{d:g}: the length of another cutting edge than the first is not known",
                           "D1 or D0")
             run.length.append((b, -1.0 if kind and d == 0.0 else loaded))
-            new.append((b, REGISTER, run.length[-1][1]))
+            new.append((b, REGISTER, run.length[-1][1] if kind else UNSTATED))
 
 
 def _apart(text: bytes) -> tuple[bytes, list[tuple[int, str]]]:
