@@ -89,7 +89,7 @@ def compare(motion: Motion, job: Job, executed: Executed, gcode: str = "", plann
     if bound.unbounded and job.options.require_proof:
         diagnostics.append(faults.error("verify.no_bound", f"{bound.unbounded} of {len(motion)} blocks have no bound of "
                                         "their deviation, they are only checked at places", int(moves.line[0]),
-                                        hint="convert without --require-proof, where checked is enough"))
+                                        int(motion.line[0]), hint="leave --require-proof out, where checked is enough"))
     diagnostics += check_spins(motion, executed, moves, owner, tip, axis, axis_tolerance, faults)
     diagnostics += check_kinds(motion, moves, owner, tip, executed.control.rapids == "dog-leg",
                                _taken_up(job, motion, tip), faults)

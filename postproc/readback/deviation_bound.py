@@ -147,7 +147,7 @@ class _Worst:
     def _limit(self) -> Floats:
         """Bounds up to here are near enough: to the worst seen, and inside the tolerance where that is."""
         near = np.maximum(TIGHT * self.seen, np.array(GRAIN))
-        return np.where(self.seen <= self.allowed, np.minimum(near, self.allowed), near)
+        return np.asarray(np.where(self.seen <= self.allowed, np.minimum(near, self.allowed), near))
 
     def _sort_out(self) -> None:
         """Close the pieces whose bounds are near enough to the worst seen."""
@@ -215,9 +215,13 @@ def _values(motion: Motion, executed: Executed, moves: Moves, ends: _Ends, piece
     bend = [np.where(law.known, _bend(jet) + np.zeros(n), np.inf) for jet in (tip, axis)]
     # A straight tip beside a straight line: with both parameters even the difference is straight, so largest at an end.
     bend[0] = np.where(even & law.known, 0.0, bend[0])
-    return _Values(np.nan_to_num(tip_off, nan=np.inf, posinf=np.inf), _angle(np.nan_to_num(axis_off, nan=np.inf, posinf=np.inf)),
-                   np.nan_to_num(tip_off + bend[0] / 32.0, nan=np.inf, posinf=np.inf),
-                   _angle(np.nan_to_num(axis_off + bend[1] / 32.0, nan=np.inf, posinf=np.inf)))
+    return _Values(_known(tip_off), _angle(_known(axis_off)), _known(tip_off + bend[0] / 32.0),
+                   _angle(_known(axis_off + bend[1] / 32.0)))
+
+
+def _known(values: Floats) -> Floats:
+    """Infinity instead of NaN."""
+    return np.where(np.isnan(values), np.inf, values)
 
 
 def _bend(jet: Jet) -> Floats | float:
@@ -313,10 +317,10 @@ def _circle_jets(motion: Motion, executed: Executed, rows: Ints, pieces: _Pieces
         k = np.flatnonzero(motion.plane[rows] == plane)
         if not len(k):
             continue
-        pair = [i, j]
-        centre[np.ix_(k, pair)] = motion.center[rows[k]][:, pair]
-        turn = signed_sweep(start[np.ix_(k, pair)] - centre[np.ix_(k, pair)],
-                            stop[np.ix_(k, pair)] - centre[np.ix_(k, pair)], motion.ccw[rows[k]])
+        centre[k, i], centre[k, j] = motion.center[rows[k], i], motion.center[rows[k], j]
+        first, last = (np.stack([point[k, i] - centre[k, i], point[k, j] - centre[k, j]], axis=1)
+                       for point in (start, stop))
+        turn = signed_sweep(first, last, motion.ccw[rows[k]])
         normal[k, PLANE_AXIS[plane]], sweep[k] = np.sign(turn), np.abs(turn)
     n = len(rows)
     words = Curves(start, stop, axis0, axis0, np.ones(n, dtype=bool), centre, normal, sweep)

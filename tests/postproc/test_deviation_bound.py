@@ -16,6 +16,7 @@ from postproc.readback import deviation_bound as bound_module
 from postproc.readback.verify import _executed
 from tests.postproc.kit import SAMPLES, codes, convert, good, goto, toolpath
 from toolpaths import read
+from toolpaths.diagnostics import Severity
 
 GOLDEN = Path(__file__).parents[1] / "golden"
 PROGRAMS = [("short_five_axis.apt", "mikron-ucp710", "linuxcnc"), ("short_five_axis.apt", "mikron-ucp710", "fanuc-30i"),
@@ -86,7 +87,7 @@ def test_blocks_that_may_be_off_between_the_places_looked_at_are_an_error(monkey
     monkeypatch.setattr(bound_module, "HALVINGS", 0)
     monkeypatch.setattr(bound_module, "_bend", lambda jet: 1.0)
     result = convert(path_of("short_five_axis.apt"), "mikron-ucp710")
-    assert {d.code for d in result.diagnostics if d.severity.value == "error"} == {"verify.tip", "verify.axis"}
+    assert {d.code for d in result.diagnostics if d.severity is Severity.ERROR} == {"verify.tip", "verify.axis"}
     assert "may be off" in " ".join(d.message for d in result.diagnostics) and not result.ok
 
 
