@@ -111,7 +111,7 @@ class _Offset:
         n, chord = len(s), _chord(s.curves)
         tip, axis = _law_jets(control, kin, s)
         way, turn = _way(s, columns.to_rows(tip.value, n)), angle_between(s.curves.axis0, s.curves.axis1)
-        tip, axis = tip - _tip_reference(s.curves, way), axis - _axis_reference(s.curves, way, turn)
+        tip, axis = tip - tip_reference(s.curves, way), axis - axis_reference(s.curves, way, turn)
         seen = _Seen.at(columns.to_rows(tip.value, n), columns.to_rows(axis.value, n), chord)
         for pose, u in ((s.start, s.u0), (s.end, s.u1)):
             on_tip, on_axis = s.curves.at(u)
@@ -165,16 +165,21 @@ def _law_jets(control: Control, kin: Kinematics, s: Stretch) -> tuple[Jet, Jet]:
 
 
 def _way(s: Stretch, middle: Floats) -> Angle:
-    """The parabola of the curve's parameter through both ends and the point nearest to the block's middle."""
+    """The curve's parameter through both ends and the point nearest to the block's middle."""
     even = 0.5 * (s.u0 + s.u1)
     length = s.curves.length()
     found = np.where(length > SHORT, s.curves.project(np.nan_to_num(middle), even), even)
-    reach = _MOST_SKEW * (s.u1 - s.u0)
-    value = np.clip(found, even - reach, even + reach)
-    return Angle(value, s.u1 - s.u0, 4.0 * (s.u0 - 2.0 * value + s.u1))
+    return curve_parameter(s.u0, found, s.u1)
 
 
-def _tip_reference(curves: Curves, way: Angle) -> Jet:
+def curve_parameter(u0: Floats, middle: Floats, u1: Floats) -> Angle:
+    """The parabola (N,) of the curve's parameter through `u0`, `middle` and `u1`, monotone."""
+    even, reach = 0.5 * (u0 + u1), _MOST_SKEW * np.abs(u1 - u0)
+    value = np.clip(middle, even - reach, even + reach)
+    return Angle(value, u1 - u0, 4.0 * (u0 - 2.0 * value + u1))
+
+
+def tip_reference(curves: Curves, way: Angle) -> Jet:
     """The curve's tip: straight, or on arcs the radius vector, blended between the ends, turned about the centre."""
     span, start = curves.end - curves.start, curves.start
     arc = curves.is_arc
@@ -206,7 +211,7 @@ def _run(start: Floats, span: Floats, way: Angle) -> Jet:
                columns.times(way.second, d))
 
 
-def _axis_reference(curves: Curves, way: Angle, turn: Floats) -> Jet:
+def axis_reference(curves: Curves, way: Angle, turn: Floats) -> Jet:
     """The tool axis on the great circle."""
     normal = cross(curves.axis0, curves.axis1)
     size = np.linalg.norm(normal, axis=1, keepdims=True)

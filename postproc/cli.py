@@ -19,6 +19,7 @@ from postproc.cli_options import (
     ClFile,
     Dialect,
     MachineName,
+    RequireProof,
     Tolerance,
     Units,
     only_with_errors,
@@ -88,7 +89,7 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
             residuals: Annotated[list[Path] | None, typer.Option("--residuals", metavar="FILE", help="what errors do at "
                                  "each CL point, before and after correction: .csv, or drawn: .png, .svg; again for "
                                  "more")] = None,
-            json: Json = "") -> None:
+            require_proof: RequireProof = False, json: Json = "") -> None:
     """Convert a CL file to G-code, read it back and prove it; nothing is written where a proof fails."""
     _choice("--orient", orient, ORIENTATIONS)
     _choice("--feed", feed, ("programmed", "planned"))
@@ -96,7 +97,7 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
     options = replace(_options(tolerance, axis_tolerance, feed_mode, setup, units, dialect, allow_unknown),
                       output=output_mode, feed=feed, merge_feeds=merge_feeds / 100.0, smooth=smooth,  # type: ignore[arg-type]
                       error_model=error_model, error_beyond=beyond, orient=orient,  # type: ignore[arg-type]
-                      max_tilt=max_tilt, name=output.stem)
+                      max_tilt=max_tilt, name=output.stem, require_proof=require_proof)
     only_with_errors(beyond, error_model)
     fields = _residual_files(residuals or [], error_model)
     refuse_overwriting({"-o": str(output), "--json": json, **{f"--residuals {name}": str(name) for name in fields}},
@@ -125,11 +126,13 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
 def verify(gcode: Annotated[Path, typer.Argument(metavar="GCODE", help="G-code file")], file: ClFile,
            machine: MachineName, controller: ControllerName, setup: Setup = "", tolerance: Tolerance = 0.01,
            axis_tolerance: AxisTolerance = 0.05, units: Units = "", dialect: Dialect = "", allow_unknown: Allow = None,
-           error_model: Errors = "", orient: Orient = "keep", max_tilt: MaxTilt = 60.0, json: Json = "") -> None:
+           error_model: Errors = "", orient: Orient = "keep", max_tilt: MaxTilt = 60.0,
+           require_proof: RequireProof = False, json: Json = "") -> None:
     """Read a G-code file back and compare its motion with a CL file."""
     _choice("--orient", orient, ORIENTATIONS)
     options = replace(_options(tolerance, axis_tolerance, "auto", setup, units, dialect, allow_unknown),
-                      error_model=error_model, orient=orient, max_tilt=max_tilt)  # type: ignore[arg-type]
+                      error_model=error_model, orient=orient, max_tilt=max_tilt,  # type: ignore[arg-type]
+                      require_proof=require_proof)
     refuse_overwriting({"--json": json}, {"the CL file": str(file), "the G-code file": str(gcode), "the set-up": setup,
                                          "the error model": error_model})
     from postproc import summary

@@ -16,6 +16,8 @@ Units = Annotated[str, typer.Option("--units", help="units of a CL file that sta
 Dialect = Annotated[str, typer.Option("--dialect", help="read the CL file as this dialect instead of the recognised one")]
 Beyond = Annotated[bool, typer.Option("--error-model-beyond", help="outside the range that was measured, take the error at "
                                       "its end")]
+RequireProof = Annotated[bool, typer.Option("--require-proof", help="refuse a program where some block has no bound of its "
+                                            "deviation and is only checked at places")]
 Allow = Annotated[list[str] | None, typer.Option("--allow-unknown", metavar="WORD",
                                                  help="leave this word out although it looks like motion")]
 

@@ -36,6 +36,8 @@ class Options:
     error_beyond: bool = False
     """True: errors at the ends of their measured ranges count beyond them too"""
 
+    require_proof: bool = False
+    """True: programs whose deviation is not bounded in every block are refused"""
     name: str = ""
     """of the program and its subprograms' files; default: that of the CL file"""
 

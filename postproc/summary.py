@@ -11,6 +11,7 @@ import numpy as np
 
 from postproc.events import cutting, spindle_states
 from postproc.pipeline import PostResult, VerifyResult, points_in
+from postproc.readback.compare import Comparison
 from toolpaths.diagnostics import Severity
 from toolpaths.input_files import there_is
 from toolpaths.toolpath import Records
@@ -32,8 +33,7 @@ def as_dict(result: PostResult, output: str) -> dict[str, Any]:
         "blocks_out": len(result.program) if result.program is not None else 0,
         "points_added": points_added(result),
         **conversion.figures(result.estimate),
-        "worst_tip_deviation_mm": _number(c.worst_tip) if c else None,
-        "worst_axis_deviation_deg": _number(c.worst_axis / DEG) if c else None,
+        **deviations(c),
         "rewinds": len(result.path.rewinds) if result.path is not None else 0,
         "singular_events": len(result.path.turns) + len(result.path.events) if result.path is not None else 0,
         "linearising_bound": _bound(result),
@@ -47,6 +47,32 @@ def as_dict(result: PostResult, output: str) -> dict[str, Any]:
         "tools": tools_of(result),
         "diagnostics": [d.as_dict() for d in result.diagnostics],
     }
+
+
+def deviations(c: Comparison | None) -> dict[str, Any]:
+    """Bounds of the deviation of all blocks, what was seen at places of them, and how many have no bound."""
+    return {"worst_tip_deviation_mm": _number(c.tip_bound) if c else None,
+            "worst_axis_deviation_deg": _number(c.axis_bound / DEG) if c else None,
+            "sampled_tip_deviation_mm": _number(c.worst_tip) if c else None,
+            "sampled_axis_deviation_deg": _number(c.worst_axis / DEG) if c else None,
+            "blocks_without_bound": c.unbounded if c else None}
+
+
+def _proof(result: PostResult) -> list[str]:
+    """What the read-back shows: bounds, or where some blocks have none what was seen of them."""
+    c = result.comparison
+    return [] if c is None else [f"{deviation_text(c)} (allowed {result.options.tolerance:g} mm, "
+                                 f"{result.options.axis_tolerance:g} degrees)"]
+
+
+def deviation_text(c: Comparison) -> str:
+    """The deviation of a program from its CL file in a sentence."""
+    seen = f"{c.worst_tip:.6f} mm and {c.worst_axis / DEG:.6f} degrees"
+    if c.unbounded:
+        return (f"checked, not proved: {c.unbounded} of {len(c.owner)} blocks have no bound; tip and axis are within {seen} "
+                "of the CL file at the places looked at")
+    return (f"proved: tip within {c.tip_bound:.6f} mm, axis within {c.axis_bound / DEG:.6f} degrees of the CL file all "
+            f"along every block, {seen} at the places looked at")
 
 
 def files_beside(result: PostResult, output: str) -> list[str]:
@@ -159,9 +185,7 @@ def as_text(result: PostResult, output: str) -> str:
     shares = d["tolerance_shares"]
     lines = [f"{output}: {d['blocks_out']} blocks from {d['points_in']} points ({d['points_added']} added) for "
              f"{d['machine']}, {d['controller']}",
-             f"proved: tip within {d['worst_tip_deviation_mm']:.6f} mm, axis within "
-             f"{d['worst_axis_deviation_deg']:.6f} degrees of the CL file (allowed {result.options.tolerance:g} mm, "
-             f"{result.options.axis_tolerance:g} degrees)",
+             *_proof(result),
              f"tolerance: linearising {shares['linearising']:.4f}, control's smoothing {shares['smoothing']:.4f}, "
              f"rounding at most {shares['rounding']:.5f} mm"]
     if result.toolpath is not None and result.toolpath.records.total:
@@ -205,8 +229,7 @@ def verify_dict(result: VerifyResult) -> dict[str, Any]:
         "gcode": result.gcode,
         "proved": result.ok,
         "blocks": len(c.owner) if c else 0,
-        "worst_tip_deviation_mm": _number(c.worst_tip) if c else None,
-        "worst_axis_deviation_deg": _number(c.worst_axis / DEG) if c else None,
+        **deviations(c),
         "worst_tip_lines": list(c.worst_tip_line) if c else None,
         "worst_axis_lines": list(c.worst_axis_line) if c else None,
         "diagnostics": [d.as_dict() for d in result.diagnostics],
@@ -221,6 +244,5 @@ def verify_text(result: VerifyResult) -> str:
     if not result.ok:
         errors = sum(d.severity is Severity.ERROR for d in result.diagnostics)
         return f"NOT proved: {len(c.owner)} blocks, {errors} error{'s' * (errors > 1)}; the first may cause the rest"
-    return (f"proved: {len(c.owner)} blocks; tip within {c.worst_tip:.6f} mm (CL line {c.worst_tip_line[0]}, block line "
-            f"{c.worst_tip_line[1]}), axis within {c.worst_axis / DEG:.6f} degrees (CL line {c.worst_axis_line[0]}, block "
-            f"line {c.worst_axis_line[1]})")
+    return (f"{deviation_text(c)} ({len(c.owner)} blocks; worst at CL line {c.worst_tip_line[0]}, block line "
+            f"{c.worst_tip_line[1]}, the axis at CL line {c.worst_axis_line[0]}, block line {c.worst_axis_line[1]})")

@@ -47,6 +47,11 @@ class ActualExecuted(Executed):
         """The same of the machine without errors."""
         return super().poses(motion, rows, t)
 
+    @property
+    def nominal_machine(self) -> bool:
+        """False: errors are looked at, not bounded."""
+        return False
+
     def corrected_on_the_way(self, motion: Motion, rows: Ints) -> Floats:
         """(K,) mm: what errors come to at both ends together; axes with rapids of their own take it up one by one."""
         return np.asarray(sum(np.linalg.norm(self.poses(motion, rows, t)[0] - self.nominal(motion, rows, t)[0], axis=1)

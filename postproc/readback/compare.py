@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from postproc.readback.checks import (
     check_travel,
 )
 from postproc.readback.compensated import check_compensated
+from postproc.readback.deviation_bound import DeviationBound, deviation_bound
 from postproc.readback.execute import Motion
 from postproc.readback.faults import Faults
 from postproc.readback.poses import SAMPLES, Executed, arc_sweeps
@@ -31,7 +32,7 @@ from postproc.readback.spins import check_spins
 from postproc.readback.states import check_states
 from postproc.readback.taps import check_taps
 from toolpaths.arrays import Bools, Floats, Ints, as_slice, shared
-from toolpaths.diagnostics import Diagnostic
+from toolpaths.diagnostics import Diagnostic, has_errors
 from toolpaths.rotations import angle_between, lengths
 from toolpaths.shape import Curves
 from toolpaths.units import DEG
@@ -39,8 +40,15 @@ from toolpaths.units import DEG
 
 @dataclass(frozen=True)
 class Comparison:
-    """Worst deviations (mm, rad) with the CL line and program line of each, and the poses and matching they rest on;
-    `executed` is what was compared, the words of the program and their motion, so that nothing reads it again."""
+    """Worst deviations (mm, rad) with the CL line and program line of each, and the poses and matching they rest on.
+
+    Attributes:
+        worst_tip, worst_axis: the worst of the places that were looked at
+        tip_bound, axis_bound: what no block exceeds anywhere, see `deviation_bound`; blocks without a bound count by the
+            places that were looked at
+        unbounded: how many blocks have no bound, which makes the program checked, not proved
+        executed: what was compared, the words of the program and their motion, so that nothing reads it again
+    """
 
     worst_tip: float
     worst_axis: float
@@ -51,6 +59,9 @@ class Comparison:
     match: Ints
     owner: Ints
     diagnostics: tuple[Diagnostic, ...]
+    tip_bound: float
+    axis_bound: float
+    unbounded: int
     executed: tuple[Canonical, Motion] | None = None
 
 
@@ -72,6 +83,13 @@ def compare(motion: Motion, job: Job, executed: Executed, gcode: str = "", plann
     (worst_tip, tip_line), (worst_axis, axis_line) = _farthest(motion, executed, moves, tip, axis, match, owner, tolerance)
     diagnostics += _beyond("tip", "mm", worst_tip, tolerance, tip_line, faults)
     diagnostics += _beyond("axis", "degrees", worst_axis / DEG, axis_tolerance / DEG, axis_line, faults)
+    bound = _bound(motion, executed, moves, owner, (tolerance, axis_tolerance))
+    if not has_errors(diagnostics):
+        diagnostics += _unproved(bound, (tolerance, axis_tolerance), moves, motion, owner, faults)
+    if bound.unbounded and job.options.require_proof:
+        diagnostics.append(faults.error("verify.no_bound", f"{bound.unbounded} of {len(motion)} blocks have no bound of "
+                                        "their deviation, they are only checked at places", int(moves.line[0]),
+                                        int(motion.line[0]), hint="leave --require-proof out, where checked is enough"))
     diagnostics += check_spins(motion, executed, moves, owner, tip, axis, axis_tolerance, faults)
     diagnostics += check_kinds(motion, moves, owner, tip, executed.control.rapids == "dog-leg",
                                _taken_up(job, motion, tip), faults)
@@ -88,7 +106,8 @@ def compare(motion: Motion, job: Job, executed: Executed, gcode: str = "", plann
     diagnostics += check_rewinds(motion, executed, number, tip, axis, job.space, tolerance, grain[1] + _kept(job), faults)
     diagnostics += check_travel(motion, executed, moves, owner, faults)
     diagnostics += check_smoothing(motion, job, moves, owner, faults)
-    return Comparison(worst_tip, worst_axis, tip_line, axis_line, tip, axis, match, owner, tuple(diagnostics))
+    return Comparison(worst_tip, worst_axis, tip_line, axis_line, tip, axis, match, owner, tuple(diagnostics),
+                      max(bound.tip, worst_tip), max(bound.axis, worst_axis), bound.unbounded)
 
 
 def _ends(motion: Motion, executed: Executed) -> tuple[Floats, Floats]:
@@ -163,6 +182,33 @@ def _not_reached(motion: Motion, moves: Moves, match: Ints, lost: int, faults: F
     return faults.error("verify.not_reached", f"the program never comes to the point ({x:.4f}, {y:.4f}, {z:.4f}) mm of the "
                         "table frame", int(moves.line[lost]), last, hint="a block behind this line is missing or wrong, or "
                         "the program is not made from this CL file with this machine, set-up and tools")
+
+
+def _bound(motion: Motion, executed: Executed, moves: Moves, owner: Ints, allowed: tuple[float, float]) -> DeviationBound:
+    """Bounds of every block of the moves that are no links; dog-legs from hole to hole are bounded in height."""
+    rows = np.flatnonzero((owner < len(moves)) & ~moves.link[np.minimum(owner, len(moves) - 1)])
+    begin, share = _place(motion, executed, rows, owner, moves)
+    level = (moves.phase[owner[rows]] == Phase.POSITION) & executed.bent(motion, rows)
+    some = as_slice(np.flatnonzero(~level))
+    found = deviation_bound(motion, executed, moves, rows[some], owner[rows[some]], begin[some], share[some], allowed)
+    for corner in executed.corners(motion, rows[level]).T if level.any() else ():
+        tip, _ = executed.poses(motion, rows[level], corner)
+        height = float(_off_level(moves.curves(owner[rows[level]]), tip).max())
+        found = replace(found, tip=max(found.tip, height))
+    return found
+
+
+def _unproved(bound: DeviationBound, allowed: tuple[float, float], moves: Moves, motion: Motion, owner: Ints,
+              faults: Faults) -> list[Diagnostic]:
+    """Errors where a bound is outside the tolerance although no place that was looked at is."""
+    found = []
+    for what, unit, scale, value, limit, row in (("tip", "mm", 1.0, bound.tip, allowed[0], bound.tip_row),
+                                                 ("axis", "degrees", DEG, bound.axis, allowed[1], bound.axis_row)):
+        if value > limit * (1.0 + 1e-9):
+            found.append(faults.error(f"verify.{what}", f"the {what} may be off by {value / scale:.6f} {unit} between the "
+                                      f"places that were looked at, allowed {limit / scale:g} {unit}",
+                                      int(moves.line[owner[row]]), int(motion.line[row]), hint="do not run this program"))
+    return found
 
 
 def _off_level(curve: Curves, tip: Floats) -> Floats:

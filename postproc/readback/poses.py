@@ -40,7 +40,20 @@ class Executed:
 
     def poses(self, motion: Motion, rows: Ints, t: float | Floats) -> tuple[Floats, Floats]:
         """(tip, axis) (K, 3) of the blocks `rows` at fraction t."""
-        position = motion.end[rows] if _whole(t) else self._ways(motion, rows).at(t)
+        return self._placed(motion, rows, motion.end[rows] if _whole(t) else self._ways(motion, rows).at(t))
+
+    def at_coordinates(self, motion: Motion, rows: Ints, beginning: Floats, xyz: Floats) -> Floats:
+        """Tips (K, 3) where X, Y, Z of the frames of blocks stand at `xyz` (K, 3), all else as in `beginning` (K, J)."""
+        position = np.array(beginning)
+        position[:, self.control.xyz] = xyz
+        numbers = motion.frame[rows]
+        for number in np.unique(numbers).tolist():
+            k = np.flatnonzero(numbers == number)
+            position[k] = motion.frames[number].position(position[k])
+        return self._placed(motion, rows, position)[0]
+
+    def _placed(self, motion: Motion, rows: Ints, position: Floats) -> tuple[Floats, Floats]:
+        """(tip, axis) (K, 3) of machine coordinates (K, J) with the tools and registers of the blocks `rows`."""
         tip, axis = np.empty((len(rows), 3)), np.empty((len(rows), 3))
         tool, register = motion.tool[rows], motion.register[rows]
         for number, h in {*zip(tool.tolist(), register.tolist(), strict=True)}:
@@ -63,6 +76,11 @@ class Executed:
             q[k] = self._held(position[k], self.lengths.get(h, 0.0) if h >= 0 else 0.0)
         return q
 
+    @property
+    def nominal_machine(self) -> bool:
+        """True where the poses are those of the kinematics, whose motion in a block has proved bounds."""
+        return True
+
     def corrected_on_the_way(self, motion: Motion, rows: Ints) -> Floats:
         """(K,) mm that the corrections of the tip may change by in blocks: none on the machine without errors."""
         return np.zeros(len(rows))
@@ -79,12 +97,15 @@ class Executed:
         """Fractions at which blocks are looked at: SAMPLES, and the corners of dog-legs, (K,) each."""
         if self.control.rapids != "dog-leg":
             return list(SAMPLES)
+        return [*SAMPLES, *self.corners(motion, rows).T]
+
+    def corners(self, motion: Motion, rows: Ints) -> Floats:
+        """(K, J) fractions at which the axes of dog-legs come to their ends, 1 in blocks that are none."""
         step = motion.end[rows] - begins(motion, rows)
         own = np.abs(step) / (self.control.machine.limits.velocity * self.control.unit)
         longest = own.max(axis=1, initial=0.0)
         bent = _bent(motion, self.control, rows) & (longest > 0.0)
-        corners = np.where(bent[:, None], own / np.where(longest > 0.0, longest, 1.0)[:, None], 1.0)
-        return [*SAMPLES, *corners.T]
+        return np.asarray(np.where(bent[:, None], own / np.where(longest > 0.0, longest, 1.0)[:, None], 1.0))
 
     def _held(self, position: Floats, offset: float) -> Floats:
         """Joints that a control with its own kinematics takes under a tool length offset."""

@@ -1,0 +1,342 @@
+"""The largest deviation of a program's blocks from the CL file as a bound that holds everywhere, by branch and bound.
+
+Between two places of a block the difference e of the executed pose and a pose of its curve bends by at most M, so that it
+stays within M / 32 of the largest value at the begin, middle and end (interpolation error, see `postproc.bound`). M comes
+from the law of the block by Taylor's theorem (`machines.straight_blocks`); the values themselves are poses of the reader.
+Blocks whose bound is above the worst that was seen anywhere are halved until bound and worst meet.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from machines.kinematics import columns
+from machines.kinematics.base import Kinematics
+from machines.kinematics.jets import Angle, Jet, straight
+from machines.straight_blocks import pose_jets
+from postproc.bound import SHORT, axis_reference, curve_parameter, tip_reference
+from postproc.groups import groups
+from postproc.moves import Moves
+from postproc.path import ARC
+from postproc.readback.execute import Motion
+from postproc.readback.poses import Executed, coordinates, signed_sweep
+from postproc.word_arcs import PLANE_AXIS, PLANE_COLUMNS
+from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.rotations import angle_between, cross, lengths
+from toolpaths.shape import Curves
+
+TIGHT = 1.01
+"""bound over worst pose that is near enough"""
+HALVINGS = 14
+"""at most, of one block"""
+GRAIN = 1e-7, 1e-9
+"""mm, rad: bounds below are not looked at more closely"""
+SAME = 1e-5
+"""mm: what the law of a block and the reader may differ by in its middle"""
+CHUNK = 20_000
+_STANDS = 1e-12
+
+
+@dataclass(frozen=True)
+class DeviationBound:
+    """Upper bounds over all blocks: tip (mm), axis (rad), each with the block (row) that has it, -1 where there are none;
+    how many blocks have no bound, because kinematics or law give none (they are only checked at places)."""
+
+    tip: float
+    axis: float
+    tip_row: int
+    axis_row: int
+    unbounded: int
+
+
+@dataclass(frozen=True)
+class _Ends:
+    """What bounds need of blocks `rows`: where each begins and ends on its curve, by count (a guess for helices)."""
+
+    rows: Ints
+    owner: Ints
+    begin: Floats
+    share: Floats
+
+
+@dataclass(frozen=True)
+class _Pieces:
+    """Parts [a, b] of blocks: `k` (N,) numbers of `_Ends.rows`."""
+
+    k: Ints
+    a: Floats
+    b: Floats
+
+    def __len__(self) -> int:
+        return len(self.k)
+
+    def halves(self) -> _Pieces:
+        """Twice as many, half as long."""
+        middle = 0.5 * (self.a + self.b)
+        return _Pieces(np.repeat(self.k, 2), np.stack([self.a, middle], axis=1).ravel(),
+                       np.stack([middle, self.b], axis=1).ravel())
+
+    def take(self, index: Ints | Bools | slice) -> _Pieces:
+        """Some of them."""
+        return _Pieces(self.k[index], self.a[index], self.b[index])
+
+
+@dataclass(frozen=True)
+class _Values:
+    """Of N pieces: worst deviation at places, and bound, of tip (mm) and axis (rad); inf where there is no bound."""
+
+    seen_tip: Floats
+    seen_axis: Floats
+    tip: Floats
+    axis: Floats
+
+    def take(self, index: Bools) -> _Values:
+        """Some of them."""
+        return _Values(self.seen_tip[index], self.seen_axis[index], self.tip[index], self.axis[index])
+
+
+def deviation_bound(motion: Motion, executed: Executed, moves: Moves, rows: Ints, owner: Ints, begin: Floats,
+                    share: Floats, allowed: tuple[float, float]) -> DeviationBound:
+    """Bounds of the blocks `rows` (K,) from the curves of their moves `owner` (K,).
+
+    `begin`, `share` (K,): where on its curve each begins and what part of it it is, by count; `allowed`: tolerances of tip
+    (mm) and axis (rad). Rapids that are dog-legs are bounded piece by piece between their corners.
+    """
+    if not executed.nominal_machine:
+        return DeviationBound(0.0, 0.0, -1, -1, len(rows))
+    ends = _Ends(rows, owner, begin, share)
+    worst = _Worst(allowed)
+    for at in range(0, len(rows), CHUNK):
+        for pieces in _whole(motion, executed, ends, np.arange(at, min(at + CHUNK, len(rows)))):
+            worst.add(pieces, _values(motion, executed, moves, ends, pieces))
+    for _ in range(HALVINGS):
+        halves = worst.taken().halves()
+        if not len(halves):
+            break
+        for at in range(0, len(halves), CHUNK):
+            part = halves.take(slice(at, at + CHUNK))
+            worst.add(part, _values(motion, executed, moves, ends, part))
+    return worst.result(rows)
+
+
+class _Worst:
+    """The state of the search: worst poses seen, largest bounds of closed pieces, pieces that are still open.
+
+    Everything in pairs, of tip and axis.
+    """
+
+    def __init__(self, allowed: tuple[float, float]) -> None:
+        self.allowed = np.array(allowed)
+        self.seen, self.closed = np.zeros(2), np.zeros(2)
+        self.k = [-1, -1]
+        self.open: list[tuple[_Pieces, _Values]] = []
+        self.unbounded: set[int] = set()
+
+    def add(self, pieces: _Pieces, values: _Values) -> None:
+        """Take pieces in; those without a bound count by what was seen of them."""
+        self.seen = np.maximum(self.seen, [values.seen_tip.max(), values.seen_axis.max()])
+        bounded = np.isfinite(values.tip) & np.isfinite(values.axis)
+        if not bounded.all():
+            self.unbounded.update(np.unique(pieces.k[~bounded]).tolist())
+            pieces, values = pieces.take(bounded), values.take(bounded)
+        self.open.append((pieces, values))
+        self._sort_out()
+
+    def _limit(self) -> Floats:
+        """Bounds up to here are near enough: to the worst seen, and inside the tolerance where that is."""
+        near = np.maximum(TIGHT * self.seen, np.array(GRAIN))
+        return np.asarray(np.where(self.seen <= self.allowed, np.minimum(near, self.allowed), near))
+
+    def _sort_out(self) -> None:
+        """Close the pieces whose bounds are near enough to the worst seen."""
+        limit, still = self._limit(), []
+        for pieces, values in self.open:
+            above = (values.tip > limit[0]) | (values.axis > limit[1])
+            self._close(pieces.take(~above), values.take(~above))
+            if above.any():
+                still.append((pieces.take(above), values.take(above)))
+        self.open = still
+
+    def _close(self, pieces: _Pieces, values: _Values) -> None:
+        for i, bound in enumerate((values.tip, values.axis)):
+            if len(bound) and bound.max() > self.closed[i]:
+                self.closed[i], self.k[i] = bound.max(), int(pieces.k[bound.argmax()])
+
+    def taken(self) -> _Pieces:
+        """The pieces that are open, which are so no more."""
+        self._sort_out()
+        pieces, self.open = [p for p, _ in self.open], []
+        if not pieces:
+            return _Pieces(np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0))
+        return _Pieces(*(np.concatenate([getattr(p, name) for p in pieces]) for name in ("k", "a", "b")))
+
+    def result(self, rows: Ints) -> DeviationBound:
+        """What is known in the end."""
+        for pieces, values in self.open:
+            self._close(pieces, values)
+        tip, axis = np.maximum(self.closed, self.seen).tolist()
+        tip_row, axis_row = (int(rows[k]) if k >= 0 else -1 for k in self.k)
+        return DeviationBound(tip, axis, tip_row, axis_row, len(self.unbounded))
+
+
+def _whole(motion: Motion, executed: Executed, ends: _Ends, k: Ints) -> list[_Pieces]:
+    """Whole blocks; dog-legs cut at their corners."""
+    bent = executed.bent(motion, ends.rows[k])
+    pieces = [_Pieces(k[~bent], np.zeros(int((~bent).sum())), np.ones(int((~bent).sum())))]
+    legs = k[bent]
+    if len(legs):
+        cuts = np.sort(np.concatenate([np.zeros((len(legs), 1)), executed.corners(motion, ends.rows[legs]),
+                                       np.ones((len(legs), 1))], axis=1), axis=1)
+        a, b = cuts[:, :-1].ravel(), cuts[:, 1:].ravel()
+        pieces.append(_Pieces(np.repeat(legs, cuts.shape[1] - 1), a, b).take(b > a))
+    return [p for p in pieces if len(p)]
+
+
+def _values(motion: Motion, executed: Executed, moves: Moves, ends: _Ends, pieces: _Pieces) -> _Values:
+    """Deviations and bounds of pieces."""
+    rows, n = ends.rows[pieces.k], len(pieces)
+    curves = moves.curves(ends.owner[pieces.k])
+    places = pieces.a, 0.5 * (pieces.a + pieces.b), pieces.b
+    poses = [executed.poses(motion, rows, t) for t in places]
+    guess = [np.minimum(ends.begin[pieces.k] + t * ends.share[pieces.k], 1.0) for t in places]
+    u = [curves.project(np.nan_to_num(tip), g) for (tip, _), g in zip(poses, guess, strict=True)]
+    law = _Law.of(motion, executed, rows, pieces, poses)
+    even = law.straight_tip & ~curves.is_arc
+    even_parameter = even | (curves.length() <= SHORT)
+    way = curve_parameter(u[0], np.where(even_parameter, 0.5 * (u[0] + u[2]), u[1]), u[2])
+    on = [curves.at(np.clip(v, 0.0, 1.0)) for v in (u[0], np.asarray(way.value + np.zeros(n)), u[2])]
+    tip_off = np.max([lengths(p[0] - c[0]) for p, c in zip(poses, on, strict=True)], axis=0)
+    axis_off = np.max([lengths(p[1] - c[1]) for p, c in zip(poses, on, strict=True)], axis=0)
+    turn = angle_between(curves.axis0, curves.axis1)
+    tip = law.tip - tip_reference(curves, way)
+    axis = law.axis - axis_reference(curves, way, turn)
+    bend = [np.where(law.known, _bend(jet) + np.zeros(n), np.inf) for jet in (tip, axis)]
+    # A straight tip beside a straight line: with both parameters even the difference is straight, so largest at an end.
+    bend[0] = np.where(even & law.known, 0.0, bend[0])
+    return _Values(_known(tip_off), _angle(_known(axis_off)), _known(tip_off + bend[0] / 32.0),
+                   _angle(_known(axis_off + bend[1] / 32.0)))
+
+
+def _known(values: Floats) -> Floats:
+    """Infinity instead of NaN."""
+    return np.where(np.isnan(values), np.inf, values)
+
+
+def _bend(jet: Jet) -> Floats | float:
+    """M of the difference: what its second derivative nowhere exceeds."""
+    return jet.bend()
+
+
+def _angle(chord: Floats) -> Floats:
+    """The angle between unit vectors `chord` apart; infinity stays."""
+    return np.where(chord < 2.0, 2.0 * np.arcsin(np.minimum(0.5 * chord, 1.0)), np.where(np.isinf(chord), np.inf, np.pi))
+
+
+@dataclass(frozen=True)
+class _Law:
+    """Jets of N pieces by the law of their blocks: tip, axis; `known` where there are any; `straight_tip` where the tip is
+    straight and even by the law itself."""
+
+    tip: Jet
+    axis: Jet
+    known: Bools
+    straight_tip: Bools
+
+    @classmethod
+    def of(cls, motion: Motion, executed: Executed, rows: Ints, pieces: _Pieces,
+           poses: list[tuple[Floats, Floats]]) -> _Law:
+        """By kind: arcs; tip straight and axis standing; straight in joints; tip straight and rotary joints even."""
+        n = len(rows)
+        third, value = np.zeros((2, n)), np.zeros((2, 3, 3, n))
+        known, straight_tip = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
+        law = _kinds(motion, executed, rows)
+        q0, q1 = (executed.joints(motion, rows, t) for t in (pieces.a, pieces.b))
+        for k in groups(motion.tool[rows]):
+            kin = executed.kinematics(int(motion.tool[rows[k[0]]]))
+            for kind in np.unique(law[k]).tolist():
+                some = k[law[k] == kind]
+                made = _jets(kind, motion, executed, rows[some], pieces.take(some), kin, q0[some], q1[some],
+                             [(tip[some], axis[some]) for tip, axis in poses])
+                known[some] = made is not None
+                straight_tip[some] = kind in (_LINE, _TIP)
+                if made is None:
+                    continue
+                for i, jet in enumerate(made):
+                    third[i, some] = jet.third
+                    for d, part in enumerate((jet.value, jet.first, jet.second)):
+                        for c in range(3):
+                            value[i, d, c, some] = part[c]
+        tip, axis = (Jet(list(value[i, 0]), list(value[i, 1]), list(value[i, 2]), third[i]) for i in range(2))
+        apart = lengths(value[0, 0].T - poses[1][0])
+        return cls(tip, axis, known & (apart <= SAME), straight_tip)
+
+
+_LINE, _JOINTS, _TIP, _CIRCLE = range(4)
+
+
+def _kinds(motion: Motion, executed: Executed, rows: Ints) -> Ints:
+    """(N,) which law the blocks run under."""
+    control = executed.control
+    laws = [frame.law for frame in motion.frames]
+    by_tip = np.array([law == "tcp" for law in laws])[motion.frame[rows]] | (control.base == "tcp")
+    in_plane = np.array([law == "tilted" for law in laws])[motion.frame[rows]]
+    before = np.where((rows == 0)[:, None], motion.start, motion.end[np.maximum(rows - 1, 0)])
+    stands = (before[:, control.rotary] == motion.end[rows][:, control.rotary]).all(axis=1)
+    straight_slides = control.machine.kinematics.slides_affine
+    kind = np.where(by_tip, _TIP, _JOINTS)
+    kind = np.where(in_plane | (stands & (straight_slides | (by_tip & (control.base != "tcp")))), _LINE, kind)
+    return np.where(motion.code[rows] == ARC, _CIRCLE, kind)
+
+
+def _jets(kind: int, motion: Motion, executed: Executed, rows: Ints, pieces: _Pieces, kin: Kinematics, q0: Floats,
+          q1: Floats, poses: list[tuple[Floats, Floats]]) -> tuple[Jet, Jet] | None:
+    """(tip, axis) of pieces of one kind; None where the kinematics gives no bound."""
+    (tip0, axis0), _, (tip1, _) = poses
+    if kind == _CIRCLE:
+        return _circle_jets(motion, executed, rows, pieces, tip0, axis0)
+    line = straight(list(tip0.T), list(tip1.T))
+    if kind == _LINE or (kind == _TIP and not any(kin.rotary)):
+        return line, Jet(list(axis0.T))
+    try:
+        tip, axis = pose_jets(kin, q0, q1)
+    except TypeError:
+        return None
+    return (line, axis) if kind == _TIP else (tip, axis)
+
+
+def _circle_jets(motion: Motion, executed: Executed, rows: Ints, pieces: _Pieces, tip0: Floats,
+                 axis0: Floats) -> tuple[Jet, Jet] | None:
+    """Arcs and helices: what the words say, seen from the table, where the slides keep lengths and angles."""
+    begin, end = coordinates(motion, rows)
+    xyz = executed.control.xyz
+    start, stop = begin[:, xyz], end[:, xyz]
+    centre, normal, sweep = np.array(start), np.zeros((len(rows), 3)), np.zeros(len(rows))
+    for plane, (i, j) in PLANE_COLUMNS.items():
+        k = np.flatnonzero(motion.plane[rows] == plane)
+        if not len(k):
+            continue
+        centre[k, i], centre[k, j] = motion.center[rows[k], i], motion.center[rows[k], j]
+        first, last = (np.stack([point[k, i] - centre[k, i], point[k, j] - centre[k, j]], axis=1)
+                       for point in (start, stop))
+        turn = signed_sweep(first, last, motion.ccw[rows[k]])
+        normal[k, PLANE_AXIS[plane]], sweep[k] = np.sign(turn), np.abs(turn)
+    n = len(rows)
+    words = Curves(start, stop, axis0, axis0, np.ones(n, dtype=bool), centre, normal, sweep)
+    points = [words.tip_at(pieces.a), words.tip_at(pieces.b), centre, centre + normal]
+    seen = [executed.at_coordinates(motion, rows, begin, point) for point in points]
+    first, last, middle, up = seen
+    n_table = up - middle
+    reach = np.maximum(lengths(start - centre), 1.0)
+    kept = np.abs(lengths(n_table) - 1.0) < 1e-9
+    for point, image in ((points[0], first), (points[1], last)):
+        kept &= np.abs(lengths(image - middle) - lengths(point - centre)) < 1e-9 * reach
+        kept &= np.abs(((image - middle) * n_table).sum(axis=1) - ((point - centre) * normal).sum(axis=1)) < 1e-9 * reach
+    kept &= lengths(first - tip0) <= SAME
+    inside = np.einsum("ni,ni->n", first - middle, cross(n_table, last - middle))
+    kept &= np.abs(inside - np.einsum("ni,ni->n", points[0] - centre, cross(normal, points[1] - centre))) < 1e-9 * reach**2
+    part = Curves(first, last, axis0, axis0, np.ones(n, dtype=bool), middle, n_table, sweep * (pieces.b - pieces.a))
+    jet = tip_reference(part, Angle(np.full(n, 0.5), np.ones(n), np.zeros(n)))
+    lost = np.where(kept, 0.0, np.inf)
+    return Jet(jet.value, jet.first, jet.second, jet.third + lost), Jet(columns.of_rows(axis0))
