@@ -168,6 +168,15 @@ _COLUMNS: dict[str, tuple[type, tuple[int, ...]]] = {
 
 
 @dataclass(frozen=True)
+class Source:
+    """The bytes of the CL file that a path was read from, and with which units and dialect ("": as the file says)."""
+
+    data: bytes
+    units: str = ""
+    dialect: str = ""
+
+
+@dataclass(frozen=True)
 class Toolpath:
     """The path of the cutter in the part frame (the absolute frame of the CL file), one row per commanded position.
 
@@ -218,6 +227,8 @@ class Toolpath:
     faults: tuple[Diagnostic, ...] = ()
     """errors that reading met: what they stand for is missing, so that nothing may be written from the path"""
     spin: Floats | None = None
+    source: Source | None = field(default=None, init=False, repr=False, compare=False)
+    """where the path is exactly what reading a file gave: a path that is made otherwise, or changed, has none"""
 
     def __post_init__(self) -> None:
         n = len(self.tip)

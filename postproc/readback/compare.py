@@ -52,6 +52,9 @@ class Comparison:
     owner: Ints
     diagnostics: tuple[Diagnostic, ...]
     executed: tuple[Canonical, Motion] | None = None
+    poses: Executed | None = None
+    planned: bool = False
+    """the feeds of the program were planned"""
 
 
 def compare(motion: Motion, job: Job, executed: Executed, gcode: str = "", planned: bool = False) -> Comparison:
