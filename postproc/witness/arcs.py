@@ -71,41 +71,40 @@ def tlon(r: Record, toward: tuple[float, ...] | None) -> tuple[Given, tuple[floa
     return Given(tuple(n[:3]), axis or (0.0, 0.0, 1.0), toward=toward), tuple(ends[-1])
 
 
-def resolved(given: dict[int, Given], tip: Array, axis: Array, place: Array, common: Array,
-             frames: list[tuple[Array, Array]], scale: float,
-             dialect: Dialect) -> tuple[Array, Array, Array, Array, list[int]]:
+def resolved(given: dict[int, Given], tip: Array, place: Array, common: Array, frames: list[tuple[Array, Array]],
+             scale: float, dialect: Dialect) -> tuple[Array, Array, Array, Array, list[int]]:
     """(arc (N,), centre, normal (K, 3), sweep (K,), rows of arcs that this reader is not sure of) in the absolute frame."""
     arc = np.full(len(tip), -1)
-    centres, normals, sweeps, unsure = [], [], [], []
-    for row, g in given.items():
-        if not 0 < row < len(tip):
-            continue
-        matrix, origin = (np.eye(3), np.zeros(3)) if common[row] else frames[place[row]]
-        centre = matrix @ (np.array(g.centre) * scale) + origin
-        normal = unit(matrix @ np.array(g.normal))
-        u, v = tip[row - 1] - centre, tip[row] - centre
-        if g.toward is not None and np.cross(normal, u) @ (matrix @ np.array(g.toward)) < 0.0:
-            normal = -normal
-        centre = centre + (u @ normal) * normal
-        sweep, sure = _sweep(u, v, normal, g, dialect)
-        if not sure:
-            unsure.append(row)
-        arc[row] = len(sweeps)
-        centres.append(centre)
-        normals.append(normal)
-        sweeps.append(sweep)
-    return (arc, np.array(centres).reshape(-1, 3), np.array(normals).reshape(-1, 3), np.array(sweeps, np.float64), unsure)
+    row = np.array([r for r in given if 0 < r < len(tip)], np.int64)
+    own = [given[int(r)] for r in row]
+    none = np.zeros((0, 3))
+    if not own:
+        return arc, none, none, np.zeros(0), []
+    centre = scale * np.array([g.centre for g in own])
+    normal = unit(np.array([g.normal for g in own]))
+    toward = np.array([g.toward or (np.nan,) * 3 for g in own])
+    for k in np.unique(place[row]).tolist():
+        at = np.flatnonzero((place[row] == k) & ~common[row])
+        matrix, origin = frames[k]
+        centre[at], normal[at], toward[at] = centre[at] @ matrix.T + origin, normal[at] @ matrix.T, toward[at] @ matrix.T
+    u, v = tip[row - 1] - centre, tip[row] - centre
+    against = np.einsum("ni,ni->n", np.cross(normal, u), toward) < 0.0
+    normal[against] = -normal[against]
+    height = np.einsum("ni,ni->n", u, normal)
+    sweep, sure = _sweeps(u, v, normal, own, dialect)
+    arc[row] = np.arange(len(row))
+    return arc, centre + height[:, None] * normal, normal, sweep, row[~sure].tolist()
 
 
-def _sweep(u: Array, v: Array, normal: Array, g: Given, dialect: Dialect) -> tuple[float, bool]:
-    """(angle from u to v about the normal with whole turns, True where nothing about it hangs on rounding)."""
-    u, v = u - (u @ normal) * normal, v - (v @ normal) * normal
-    angle = math.atan2(float(np.cross(u, v) @ normal), float(u @ v)) % _TURN
-    chord = float(np.linalg.norm(u - v))
-    if not math.isnan(g.angle):
-        return g.angle, True
-    if g.turns > 0.0:
-        return (angle - _TURN if chord <= _NEAR and angle > math.pi else angle) + _TURN * g.turns, True
-    if chord <= _SAME and dialect.whole:
-        return _TURN, True
-    return angle, chord > _NEAR
+def _sweeps(u: Array, v: Array, normal: Array, own: list[Given], dialect: Dialect) -> tuple[Array, Array]:
+    """(angle (K,) from u to v about the normal with whole turns, True (K,) where nothing about it hangs on rounding)."""
+    u = u - np.einsum("ni,ni->n", u, normal)[:, None] * normal
+    v = v - np.einsum("ni,ni->n", v, normal)[:, None] * normal
+    turns, stated = np.array([g.turns for g in own]), np.array([g.angle for g in own])
+    angle = np.arctan2(np.einsum("ni,ni->n", np.cross(u, v), normal), (u * v).sum(axis=1)) % _TURN
+    chord = np.sqrt(((u - v) ** 2).sum(axis=1))
+    counted = turns > 0.0
+    angle = np.where(counted & (chord <= _NEAR) & (angle > math.pi), angle - _TURN, angle) + _TURN * turns
+    whole = (chord <= _SAME) & dialect.whole & ~counted
+    sure = counted | whole | (chord > _NEAR) | np.isfinite(stated)
+    return np.where(np.isfinite(stated), stated, np.where(whole, _TURN, angle)), sure

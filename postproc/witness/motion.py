@@ -164,28 +164,28 @@ def _explained(w: Walked, rows: Array, margin: float, table: dict[str, object]) 
     return result
 
 
-def check_arcs(w: Walked, turns: Array, match: Array, lines: Array) -> list[Finding]:
+def check_arcs(w: Walked, turns: Array, lines: Array) -> list[Finding]:
     """Arcs of the CL file that the program turns the other way, or by another angle."""
-    t = w.targets
-    found = []
-    rows = np.flatnonzero((t.sweep != 0.0) & (match >= 0) & ~t.gap)
-    for i in rows.tolist():
-        last = int(match[i])
-        blocks = np.flatnonzero(w.owner[max(0, last - 5000):last + 1] == i) + max(0, last - 5000)
-        if not len(blocks):
-            continue
-        begin = w.tip[blocks[0] - 1] if blocks[0] > 0 else t.start[i]
-        ends = np.vstack([begin[None, :], w.tip[blocks]]) - t.centre[i]
-        flat = ends - (ends @ t.normal[i])[:, None] * t.normal[i]
-        cross = np.cross(flat[:-1], flat[1:]) @ t.normal[i]
-        step = np.arctan2(cross, (flat[:-1] * flat[1:]).sum(axis=1))
-        size = turns[blocks] @ t.normal[i]
-        step = np.where(size != 0.0, step + 2.0 * np.pi * np.round((size - step) / (2.0 * np.pi)), step)
-        radius = float(np.linalg.norm(flat[-1]))
-        if abs(step.sum() - t.sweep[i]) > 4.0 * (w.tolerance[0] + 2e-3) / max(radius, 1e-3):
-            found.append((i, int(blocks[0]), float(step.sum())))
-    if not found:
+    t, m = w.targets, len(w.targets)
+    if not t.sweep.any():
         return []
-    i, k, turned = found[0]
-    return [Finding("arc", f"the tool turns by {np.degrees(turned):.3f} degrees about the axis of the arc, the CL file says "
-                    f"{np.degrees(t.sweep[i]):.3f}", int(lines[t.row[i]]), int(w.poses.executed.line[k]), len(found))]
+    rows = np.flatnonzero(w.inside & (t.sweep != 0.0)[np.minimum(w.owner, m - 1)])
+    i = w.owner[rows]
+    normal = t.normal[i]
+    begin = np.where((rows > 0)[:, None], w.tip[np.maximum(rows - 1, 0)], t.start[i])
+    u, v = begin - t.centre[i], w.tip[rows] - t.centre[i]
+    low, high = np.einsum("ni,ni->n", u, normal), np.einsum("ni,ni->n", v, normal)
+    step = np.arctan2(np.einsum("ni,ni->n", np.cross(u, v), normal), np.einsum("ni,ni->n", u, v) - low * high)
+    size = np.einsum("ni,ni->n", turns[rows], normal)
+    step = np.where(size != 0.0, step + 2.0 * np.pi * np.round((size - step) / (2.0 * np.pi)), step)
+    turned = np.bincount(i, weights=step, minlength=m)
+    radius = np.full(m, np.inf)
+    radius[i] = np.sqrt(np.maximum((v * v).sum(axis=1) - high * high, 1e-6))
+    some = np.bincount(i, minlength=m) > 0
+    bad = np.flatnonzero(some & (np.abs(turned - t.sweep) > 4.0 * (w.tolerance[0] + 2e-3) / radius))
+    if not len(bad):
+        return []
+    k = int(bad[0])
+    block = int(rows[np.searchsorted(i, k)])
+    return [Finding("arc", f"the tool turns by {np.degrees(turned[k]):.3f} degrees about the axis of the arc, the CL file says "
+                    f"{np.degrees(t.sweep[k]):.3f}", int(lines[t.row[k]]), int(w.poses.executed.line[block]), len(bad))]

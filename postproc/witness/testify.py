@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from time import perf_counter
+from time import process_time
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from postproc.witness.text import Array
 
 def testify(case: Case, executed: Executed) -> Testimony:
     """What this witness says of an executed program; it never raises for what it does not understand."""
-    began = perf_counter()
+    began = process_time()
     if case.oriented:
         return _nothing("all (the tool axes were chosen, the CL file has others)", began)
     try:
@@ -37,13 +37,14 @@ def testify(case: Case, executed: Executed) -> Testimony:
         missing.append("kinematics (machine with geometric errors: poses of the read-back)" if case.errors
                        else "kinematics (no machine file of a known family: poses of the read-back)")
     poses = Poses(case, executed, machine, machine is not None, [])
-    found, worst, counts = _compare(case, executed, c, place, poses, table)
+    with np.errstate(all="ignore"):
+        found, worst, counts = _compare(case, executed, c, place, poses, table)
     compared = [f"{n} {what}" for what, n in counts.items() if n]
-    return Testimony(tuple(compared), tuple(missing), tuple(found), int(c.known.sum()), *worst, perf_counter() - began)
+    return Testimony(tuple(compared), tuple(missing), tuple(found), int(c.known.sum()), *worst, process_time() - began)
 
 
 def _nothing(why: str, began: float) -> Testimony:
-    return Testimony((), (why,), seconds=perf_counter() - began)
+    return Testimony((), (why,), seconds=process_time() - began)
 
 
 def _compare(case: Case, executed: Executed, c: Commanded, place: tuple[Array, Array], poses: Poses,
@@ -73,7 +74,7 @@ def _compare(case: Case, executed: Executed, c: Commanded, place: tuple[Array, A
     margin = float((case.setup.get("clearance") or {}).get("margin", 50.0))
     if not len(lost):
         found += check_way(w, c.line, cut, margin, case.bent_rapids, table)
-        found += check_arcs(w, turns, match, c.line)
+        found += check_arcs(w, turns, c.line)
     faults, holes = check_holes(w, c, case, match)
     found += faults
     faults, feeds = check_feeds(w, c, case, table, match)

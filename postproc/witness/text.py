@@ -74,7 +74,8 @@ def read(data: bytes) -> Text:
     text = _plain(data)
     text, line_of = _written_out(text)
     spans = [m.span() for m in _OTHER.finditer(text)]
-    ends = np.flatnonzero(np.isin(np.frombuffer(text, np.uint8), (10, JOIN[0])))
+    raw = np.frombuffer(text, np.uint8)
+    ends = np.flatnonzero((raw == 10) | (raw == JOIN[0]))
     kept, at = [], 0
     for first, last in spans:
         kept.append(text[at:first])
@@ -115,7 +116,8 @@ def _plain(data: bytes) -> bytes:
         data = _CATIA.sub(_catia_system, data)
     if b"$" not in data:
         return data
-    return _GOES_ON.sub(b" " + JOIN, _COMMENT.sub(_without_comment, data))
+    data = _COMMENT.sub(_without_comment, data)
+    return _GOES_ON.sub(b" " + JOIN, data) if b"$" in data else data
 
 
 def _without_comment(found: re.Match[bytes]) -> bytes:
@@ -196,9 +198,8 @@ def _some_numbers(text: bytes) -> Array:
     if not text:
         return np.zeros((0, 6))
     raw = np.frombuffer(text, np.uint8)
-    commas = np.cumsum(raw == ord(","))
-    ends = np.append(np.flatnonzero(raw == 10), len(raw) - 1)
-    count = np.diff(commas[ends], prepend=0) + 1
+    ends = np.append(np.flatnonzero(raw == 10), len(raw))
+    count = np.diff(np.searchsorted(np.flatnonzero(raw == ord(",")), ends), prepend=0) + 1
     values = np.fromstring(text.translate(_TO_COMMAS, b"GOTO/ \t\x01"), sep=",")
     assert len(values) == count.sum()
     result = np.full((len(count), 6), np.nan)
