@@ -45,7 +45,7 @@ from postproc.word_rows import block_tools
 from toolpaths.diagnostics import Diagnostic, DiagnosticError, error, has_errors
 from toolpaths.input_files import read_input, unreadable
 from toolpaths.smoothing.smooth import Tolerance
-from toolpaths.toolpath import Source, Toolpath
+from toolpaths.toolpath import ClSource, Toolpath
 from toolpaths.units import DEG
 
 if TYPE_CHECKING:
@@ -92,7 +92,7 @@ class PostResult:
     """texts of subprograms in files of their own, by file name"""
     choice: OrientationChoice | None = None
     """of the tool axes that `toolpath` has instead of the CL file's, where --orient asked for one"""
-    source: Source | None = None
+    source: ClSource | None = None
     """of the path as it was read, for the second witness"""
     asked: SetupFile | None = None
     """the set-up as the shop has it, before [part] is said in the absolute frame"""

@@ -20,7 +20,7 @@ from postproc.setup import SetupFile
 from postproc.witness import Case, Executed, Testimony, testify
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
-from toolpaths.toolpath import Source
+from toolpaths.toolpath import ClSource
 
 
 def machine_tables(machine: Machine) -> list[dict[str, Any]]:
@@ -61,7 +61,7 @@ def executed_of(comparison: Comparison, poses: Poses, job: Job) -> Executed:
                     motion.dwell, motion.pitch, motion.hole, joints_at, poses_at)
 
 
-def second_witness(source: Source | None, setup: SetupFile, options: Options, job: Job,
+def second_witness(source: ClSource | None, setup: SetupFile, options: Options, job: Job,
                    comparison: Comparison) -> tuple[Testimony, list[Diagnostic]]:
     """What the second witness says of a program that was read back, and its findings as errors.
 
@@ -73,7 +73,8 @@ def second_witness(source: Source | None, setup: SetupFile, options: Options, jo
         why = "the tool axes were chosen" if options.orient != "keep" else "the path is not as it was read from a file"
         return Testimony((), (f"all ({why})",)), []
     case = Case(source.data, machine_tables(job.machine), setup.model_dump(), options.tolerance, job.axis_tolerance,
-                source.units or None, source.dialect or None, job.control.rapids == "dog-leg", comparison.planned, job.corrects)
+                source.units or None, source.dialect or None, job.control.rapids == "dog-leg", comparison.planned,
+                job.corrects)
     said = testify(case, executed_of(comparison, comparison.poses, job))
     return said, [error(f"witness.{f.code}", f"second witness: {f.message} (line {f.block} of the program)",
                         file=job.toolpath.file, lines=[f.line] if f.line else [], count=f.count,

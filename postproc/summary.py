@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from postproc.pipeline import PostResult, VerifyResult, points_in
+from postproc.witness import Testimony
 from toolpaths.diagnostics import Severity
 from toolpaths.input_files import there_is
 from toolpaths.units import DEG
@@ -39,6 +40,7 @@ def as_dict(result: PostResult, output: str) -> dict[str, Any]:
         "output_modes": output_modes(result),
         "geometric_errors": _errors(result),
         "orientation": _orientation(result),
+        "witness": witness_dict(result.witness),
         "diagnostics": [d.as_dict() for d in result.diagnostics],
     }
 
@@ -77,6 +79,22 @@ def _orientation(result: PostResult) -> dict[str, Any] | None:
     from postproc.orientation.report import chosen
 
     return chosen(result.choice, result.options.orient)
+
+
+def witness_dict(said: Testimony | None) -> dict[str, Any] | None:
+    """What the second witness compared; None where it was not asked, because the read-back had found errors."""
+    return None if said is None else {"agrees": not said.findings, "compared": list(said.compared),
+                                      "not_compared": list(said.not_compared), "points": said.points,
+                                      "worst_tip_mm": _number(said.worst_tip),
+                                      "worst_axis_deg": _number(said.worst_axis / DEG), "seconds": said.seconds}
+
+
+def witness_lines(said: Testimony | None) -> list[str]:
+    """The same for people: that it agrees, and what it has not compared."""
+    if said is None:
+        return []
+    lines = [f"second witness agrees: {', '.join(said.compared)}"] if said.compared and not said.findings else []
+    return lines + ([f"second witness: not compared: {'; '.join(said.not_compared)}"] if said.not_compared else [])
 
 
 def _number(value: float) -> float | None:
@@ -126,6 +144,7 @@ def as_text(result: PostResult, output: str) -> str:
              f"proved: tip within {d['worst_tip_deviation_mm']:.6f} mm, axis within "
              f"{d['worst_axis_deviation_deg']:.6f} degrees of the CL file (allowed {result.options.tolerance:g} mm, "
              f"{result.options.axis_tolerance:g} degrees)",
+             *witness_lines(result.witness),
              f"tolerance: linearising {shares['linearising']:.4f}, control's smoothing {shares['smoothing']:.4f}, "
              f"rounding at most {shares['rounding']:.5f} mm"]
     if any(laws != ["axes"] for laws in d["output_modes"].values()):
@@ -170,6 +189,7 @@ def verify_dict(result: VerifyResult) -> dict[str, Any]:
         "worst_axis_deviation_deg": _number(c.worst_axis / DEG) if c else None,
         "worst_tip_lines": list(c.worst_tip_line) if c else None,
         "worst_axis_lines": list(c.worst_axis_line) if c else None,
+        "witness": witness_dict(result.witness),
         "diagnostics": [d.as_dict() for d in result.diagnostics],
     }
 
@@ -182,6 +202,7 @@ def verify_text(result: VerifyResult) -> str:
     if not result.ok:
         errors = sum(d.severity is Severity.ERROR for d in result.diagnostics)
         return f"NOT proved: {len(c.owner)} blocks, {errors} error{'s' * (errors > 1)}; the first may cause the rest"
+    said = "".join(f"\n{line}" for line in witness_lines(result.witness))
     return (f"proved: {len(c.owner)} blocks; tip within {c.worst_tip:.6f} mm (CL line {c.worst_tip_line[0]}, block line "
             f"{c.worst_tip_line[1]}), axis within {c.worst_axis / DEG:.6f} degrees (CL line {c.worst_axis_line[0]}, block "
-            f"line {c.worst_axis_line[1]})")
+            f"line {c.worst_axis_line[1]}){said}")

@@ -168,7 +168,7 @@ _COLUMNS: dict[str, tuple[type, tuple[int, ...]]] = {
 
 
 @dataclass(frozen=True)
-class Source:
+class ClSource:
     """The bytes of the CL file that a path was read from, and with which units and dialect ("": as the file says)."""
 
     data: bytes
@@ -227,7 +227,7 @@ class Toolpath:
     faults: tuple[Diagnostic, ...] = ()
     """errors that reading met: what they stand for is missing, so that nothing may be written from the path"""
     spin: Floats | None = None
-    source: Source | None = field(default=None, init=False, repr=False, compare=False)
+    source: ClSource | None = field(default=None, init=False, repr=False, compare=False)
     """where the path is exactly what reading a file gave: a path that is made otherwise, or changed, has none"""
 
     def __post_init__(self) -> None:

@@ -4,105 +4,32 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 
 from postproc.witness import arcs, cycles
-from postproc.witness.commanded import ARC, HOLE, LINE, RAPID, START, UNKNOWN, Commanded, Cycle, unit
-from postproc.witness.dialect import ALL, Dialect, dialect_of, scale_of
-from postproc.witness.text import Array, Record, Text, read
+from postproc.witness.commanded import UNKNOWN, Commanded, unit
+from postproc.witness.dialect import ALL, dialect_of, scale_of
+from postproc.witness.execution import Execution, Z
+from postproc.witness.rows import assembled
+from postproc.witness.text import Record, read
 
 _NAN3 = (math.nan,) * 3
-Z = (0.0, 0.0, 1.0)
 FEEDS = {"MMPM": (1.0, False), "IPM": (25.4, False), "FPM": (304.8, False), "MPM": (1000.0, False), "MMPS": (60.0, False),
          "IPS": (1524.0, False), "PERMIN": (None, False), "MMPR": (1.0, True), "IPR": (25.4, True), "FPR": (304.8, True),
          "PERREV": (None, True)}
-_NO_MOTION = frozenset("""PARTNO PPRINT INSERT REMARK TPRINT LPRINT PPLABEL LETTER UNITS UNIT MULTAX FINI END PAINT PPWORD
-PPFUN SYN OPFEATSTART OPFEATEND MOVE_ATTRIB BOX SETUP SWITCH DISPLY AUTOPS PSIS INTOL OUTTOL TOLER LINTOL MACHIN ALIGN PLABEL
-CLPRNT NOPOST PLOT CSI_SET_EXTENSION_LENGTH CSI_SET_FLUTE_LENGTH MCHTOL CUTTER TLDATA TOOLNO TRNTYP SELECT CUTCOM DELAY
-DWELL STOP OPSTOP OPSKIP SEQNO MODE REWIND CLAMP BREAK CHECK LEADER HEAD POD AIR SLOWDN UNLOAD SELCTL OFSTNO CLEARP CLRSRF
-RETRCT END-OF-PATH START_OP END_OP TOOLPATH_TYPE ISN ARCSLP MCS2 START OPERATION BEGIN MATERL TCP CSI_PATH_TOLERANCE
-CSI_SET_PATH_PARAM SET ORIGIN SAFPOS COMMENT""".split())
-_UNREAD_MOTION = frozenset("""HELICAL TRACUT COPY MOVNRB THREAD CALL INDEX MACRO MCS MCSYS ZERO TLON PSIS INDIRP
-ROTHED""".split())
-
-
-class Track:
-    """Values that hold from a row on; of several for one row the last counts."""
-
-    def __init__(self, first: Any) -> None:
-        self.rows, self.values = [0], [first]
-
-    def set(self, row: int, value: Any) -> None:
-        """From `row` on."""
-        if self.rows[-1] == row:
-            self.values[-1] = value
-        else:
-            self.rows.append(row)
-            self.values.append(value)
-
-    @property
-    def now(self) -> Any:
-        """The last value."""
-        return self.values[-1]
-
-    def column(self, n: int, dtype: Any) -> Array:
-        """(n,) value of every row."""
-        starts = np.minimum(np.append(self.rows, n), n)
-        return np.repeat(np.array(self.values, dtype), np.diff(starts))
-
-
-class Execution:
-    """The state of a reading; `row` counts all positions."""
-
-    def __init__(self, text: Text, dialect: Dialect, scale: float) -> None:
-        self.text, self.dialect, self.scale = text, dialect, scale
-        self.row = 0
-        self.extra: list[tuple[int, Any, Any, int]] = []
-        self.rapid: set[int] = set()
-        self.start: set[int] = set()
-        self.deltas: list[tuple[int, tuple[float, ...]]] = []
-        self.unread: dict[str, int] = {}
-        self.axes: dict[int, tuple[float, ...]] = {}
-        self.systems: dict[str, tuple[Array, Array]] = {}
-        self.frame, self.frames = Track(0), [(np.eye(3), np.zeros(3))]
-        self.known, self.gap = Track(True), set[int]()
-        self.feed: Track = Track((math.nan, False, False))
-        self.tool, self.name, self.names = Track(UNKNOWN), Track(-1), list[str]()
-        self.spindle: Track = Track((UNKNOWN, math.nan))
-        self.last_direction = 1
-        self.coolant, self.cycle, self.cycles = Track(UNKNOWN), Track(-1), list[Cycle]()
-        self.armed = -1
-        self.arcs: dict[int, arcs.Given] = {}
-        self.toward: tuple[float, ...] | None = None
-        self.inside = Track(0)
-        self.shifted = False
-        self.height: float | None = None
-        self.turn, self.upright = np.eye(3), Z
-
-    def lost(self, what: str, line: int) -> None:
-        """Something that was not understood."""
-        self.unread.setdefault(what, line)
-
-    def point(self, xyz: Any, axis: Any, line: int) -> None:
-        """A position that no plain GOTO gives."""
-        self.extra.append((self.row, xyz, axis, line))
-        self.row += 1
-
-    def system(self, matrix: Array, origin: Array, word: str, row: int) -> None:
-        """Positions from here on are in a system, along its z until they say otherwise."""
-        for name, (r, o) in self.systems.items():
-            if (r == matrix).all() and (o == origin).all():
-                break
-        else:
-            name = f"{word} {len(self.systems) + 1}"
-            self.systems[name] = matrix, origin
-        self.frames.append((matrix, origin))
-        self.frame.set(row, len(self.frames) - 1)
-        self.axes[row] = Z
-        if not self.shifted:
-            self.known.set(row, True)
+_NO_MOTION = frozenset((
+    "PARTNO", "PPRINT", "INSERT", "REMARK", "TPRINT", "LPRINT", "PPLABEL", "LETTER", "UNITS", "UNIT", "MULTAX", "FINI",
+    "END", "PAINT", "PPWORD", "PPFUN", "SYN", "OPFEATSTART", "OPFEATEND", "MOVE_ATTRIB", "BOX", "SETUP", "SWITCH",
+    "DISPLY", "AUTOPS", "PSIS", "INTOL", "OUTTOL", "TOLER", "LINTOL", "MACHIN", "ALIGN", "PLABEL", "CLPRNT", "NOPOST",
+    "PLOT", "CSI_SET_EXTENSION_LENGTH", "CSI_SET_FLUTE_LENGTH", "MCHTOL", "CUTTER", "TLDATA", "TOOLNO", "TRNTYP",
+    "SELECT", "CUTCOM", "DELAY", "DWELL", "STOP", "OPSTOP", "OPSKIP", "SEQNO", "MODE", "REWIND", "CLAMP", "BREAK",
+    "CHECK", "LEADER", "HEAD", "POD", "AIR", "SLOWDN", "UNLOAD", "SELCTL", "OFSTNO", "CLEARP", "CLRSRF", "RETRCT",
+    "END-OF-PATH", "START_OP", "END_OP", "TOOLPATH_TYPE", "ISN", "ARCSLP", "MCS2", "START", "OPERATION", "BEGIN",
+    "MATERL", "TCP", "CSI_PATH_TOLERANCE", "CSI_SET_PATH_PARAM", "SET", "ORIGIN", "SAFPOS", "COMMENT"))
+_UNREAD_MOTION = frozenset((
+    "HELICAL", "TRACUT", "COPY", "MOVNRB", "THREAD", "CALL", "INDEX", "MACRO", "MCS", "MCSYS", "ZERO", "TLON", "PSIS",
+    "INDIRP", "ROTHED"))
 
 
 def commanded(data: bytes, units: str | None = None, dialect: str | None = None) -> Commanded:
@@ -125,7 +52,7 @@ def commanded(data: bytes, units: str | None = None, dialect: str | None = None)
         done = before
         _one(e, record, line)
     e.row += len(text.points) - done
-    return _assembled(e)
+    return assembled(e)
 
 
 def _one(e: Execution, r: Record, line: int) -> None:
@@ -310,9 +237,8 @@ def _fedrat(e: Execution, r: Record, line: int) -> None:
         e.lost("FEDRAT/INVERS", line) if value is None else None
         e.feed.set(e.row, (math.nan if value is None else value, False, True))
     elif r.numbers:
-        if len(r.numbers) > 1 or any(isinstance(w, str) and w not in FEEDS for w in r.words):
-            if not isinstance(r.words[0], float) and r.words[0] not in FEEDS:
-                return
+        if isinstance(r.words[0], str) and r.words[0] not in FEEDS:
+            return
         e.feed.set(e.row, (*feed_of(r.words, e.scale), False))
 
 
@@ -402,81 +328,13 @@ def _cycle(e: Execution, r: Record, line: int) -> None:
 
 
 HANDLERS: dict[str, Callable[[Execution, Record, int], None]] = {
-    "GOTO": _goto, "GODLTA": _godlta, "FROM": _from, "GOHOME": _gohome, "TLAXIS": _tlaxis, "ZSURF": _zsurf, "MULTAX": _multax,
+    "GOTO": _goto, "GODLTA": _godlta, "FROM": _from, "GOHOME": _gohome,
+    "TLAXIS": _tlaxis, "ZSURF": _zsurf, "MULTAX": _multax,
     "NURBS": _nurbs, "CNTRL": _cntrl, "KNOT": _multax, "MSYS": _msys, "CSYS": _csys, "$$->CSYS": _csys, "CAMERA": _csys,
     "CATIA0": _csys, "TRANS": _turned, "ROTATE": _turned, "ROTABL": _turned, "SUB-BEGIN": _sub, "SUB-END": _sub,
     "SUB-UNKNOWN": _sub_unknown, "CIRCLE": _circle, "MOVARC": _movarc, "INDIRV": _indirv, "TLON,GOFWD": _tlon,
     "RAPID": _rapid, "FEDRAT": _fedrat, "LOAD": _load, "LOADTL": _load, "TURRET": _load, "TOOL PATH": _tool_path,
-    "TPRINT": _tprint, "SPINDL": _spindl, "COOLNT": _coolnt, "AUXFUN": _by_code, "PREFUN": _by_code, "INSERT": _by_code,
+    "TPRINT": _tprint, "SPINDL": _spindl, "COOLNT": _coolnt, "AUXFUN": _by_code, "PREFUN": _by_code,
+    "INSERT": _by_code,
     "CYCLE": _cycle,
 }
-
-
-# ---- all rows at once --------------------------------------------------------------------------------------------------
-
-def _assembled(e: Execution) -> Commanded:
-    n, points = e.row, e.text.points
-    extra = np.array([row for row, *_ in e.extra], np.int64)
-    plain = np.ones(n, bool)
-    plain[extra] = False
-    numbers, line = np.empty((n, 6)), np.empty(n, np.int64)
-    numbers[plain], line[plain] = points, e.text.line
-    if len(extra):
-        numbers[extra] = [(*xyz, *axis) for _, xyz, axis, _ in e.extra]
-        line[extra] = [number for *_, number in e.extra]
-    tip, given = numbers[:, :3] * e.scale, ~np.isnan(numbers[:, 3])
-    common = given & (e.inside.column(n, np.int64) == 0) if e.dialect.local_three else np.zeros(n, bool)
-    axis = unit(_axes(e, numbers[:, 3:], given))
-    place = e.frame.column(n, np.int64)
-    for k in np.unique(place).tolist():
-        matrix, origin = e.frames[k]
-        if (matrix == np.eye(3)).all() and not origin.any():
-            continue
-        at = np.flatnonzero((place == k) & ~common)
-        tip[at], axis[at] = np.einsum("ij,nj->ni", matrix, tip[at]) + origin, np.einsum("ij,nj->ni", matrix, axis[at])
-    for row, step in e.deltas:
-        matrix = np.eye(3) if common[row] else e.frames[place[row]][0]
-        move = step[0] * axis[row] if len(step) == 1 else matrix @ np.array(step)
-        tip[row] = tip[row - 1] + e.scale * move if row else np.nan
-    kind, cycle = np.full(n, LINE, np.int8), e.cycle.column(n, np.int64)
-    arc, centre, normal, sweep, doubtful = arcs.resolved(e.arcs, tip, place, common, e.frames, e.scale, e.dialect)
-    kind[list(e.arcs.keys() & set(range(n)))] = ARC
-    cycle[arc >= 0] = -1
-    start = np.array(sorted(e.start), np.int64)
-    cycle[start[start < n]] = -1
-    kind[cycle >= 0] = HOLE
-    rapid = np.array(sorted(e.rapid), np.int64)
-    rapid = rapid[rapid < n]
-    kind[rapid[kind[rapid] != HOLE]] = RAPID
-    kind[start[start < n]] = START
-    feed = np.array(e.feed.values, np.float64)[_index(e.feed, n)]
-    spindle = np.array(e.spindle.values, np.float64)[_index(e.spindle, n)]
-    known = e.known.column(n, bool) & np.isfinite(tip).all(axis=1) & np.isfinite(axis).all(axis=1)
-    gap = np.zeros(n, bool)
-    gap[[row for row in e.gap if row < n] + doubtful] = True
-    return Commanded(tip, axis, kind, line, known, gap, feed[:, 0], feed[:, 1] > 0, feed[:, 2] > 0, arc, centre, normal,
-                     sweep, cycle, tuple(e.cycles), e.tool.column(n, np.int64), e.name.column(n, np.int64), tuple(e.names),
-                     spindle[:, 0].astype(np.int64), spindle[:, 1], e.coolant.column(n, np.int64), e.systems, e.unread)
-
-
-def _index(track: Track, n: int) -> Array:
-    starts = np.minimum(np.append(track.rows, n), n)
-    return np.repeat(np.arange(len(track.rows)), np.diff(starts))
-
-
-def _axes(e: Execution, written: Array, given: Array) -> Array:
-    """The tool axis of every row: its own, else the last that was written or set."""
-    n = len(written)
-    if given.all():
-        return written
-    source, values = np.where(given, np.arange(n), -1), written
-    marks = {row: axis for row, axis in e.axes.items() if row < n and not given[row]}
-    if e.dialect.local_three:
-        for row in (np.flatnonzero(~given[1:] & given[:-1]) + 1).tolist():
-            marks.setdefault(row, Z)
-    if marks:
-        rows = np.array(list(marks), np.int64)
-        values = written.copy()
-        values[rows], source[rows] = list(marks.values()), rows
-    source = np.maximum.accumulate(source)
-    return np.where((source < 0)[:, None], Z, values[source])

@@ -15,14 +15,15 @@ _KINDS = ("DRILL", "TAP", "RIGID", "BORE", "BORE7", "BORE8", "BORE9", "REAM", "F
 _PER_MINUTE = {"MMPM": 1.0, "IPM": INCH, "FPM": 12.0 * INCH, "PERMIN": 0.0, "MPM": 1000.0, "MMPS": 60.0}
 _PER_TURN = {"MMPR": 1.0, "IPR": INCH, "FPR": 12.0 * INCH, "PERREV": 0.0}
 _STEPS = ("STEP", "INCR", "PECKING", "1STPECK", "SUBPECK")
-_LABELS = {*_STEPS, "FEDTO", "DEPTH", "RAPTO", "CLEAR", "RTRCTO", "RETURN", "AUTO", "MANUAL", "DWELL", "TPI", "PITCH", "DIAMET",
-           "TLANGL", "TIMES", "BACK", "REV", *_PER_MINUTE, *_PER_TURN}
+_LABELS = {*_STEPS, "FEDTO", "DEPTH", "RAPTO", "CLEAR", "RTRCTO", "RETURN", "AUTO", "MANUAL", "DWELL", "TPI", "PITCH",
+           "DIAMET", "TLANGL", "TIMES", "BACK", "REV", *_PER_MINUTE, *_PER_TURN}
 
 
 def cycle(r: Record, dialect: Dialect, scale: float, feed: tuple[float, bool, bool], line: int) -> Cycle:
     """A CYCLE record; depth NaN where numbers without words would have to be guessed."""
     words = [w for w in r.words if isinstance(w, str) and w not in _LABELS]
-    kind = next((_PECKED[w] for w in words if w in _PECKED), next((w for w in words if w in _KINDS and w != "DRILL"), "DRILL"))
+    plain = next((w for w in words if w in _KINDS and w != "DRILL"), "DRILL")
+    kind = next((_PECKED[w] for w in words if w in _PECKED), plain)
     kind = {"RIGID": "TAP", "SPOT": "DRILL"}.get(kind, kind)
     bare = Cycle(kind, math.nan, math.nan, feed[0], feed[1], line=line)
     return _stated(bare, r, dialect, scale, line)
@@ -45,7 +46,8 @@ def _stated(made: Cycle, r: Record, dialect: Dialect, scale: float, line: int) -
         made = replace(made, clearance=start * scale)
     steps = tuple(v * scale for v in _steps(r) if v > 0.0)
     rest = r.after("DWELL") or 0.0
-    return replace(_fed(made, r, scale), steps=steps or made.steps, dwell=rest if "REV" not in r.words else math.nan, line=line)
+    rest = math.nan if "REV" in r.words else rest
+    return replace(_fed(made, r, scale), steps=steps or made.steps, dwell=rest, line=line)
 
 
 def _steps(r: Record) -> list[float]:

@@ -36,7 +36,7 @@ def _over(below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Chain:
-    """A serial machine: letters from the workpiece to the tool, one screw each; `order` of the joints as programs have it."""
+    """A serial machine: letters from the workpiece to the tool, direction and point (rotary) of each axis at zero."""
 
     letters: tuple[str, ...]
     direction: dict[str, Array]

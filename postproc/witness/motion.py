@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from postproc.witness.commanded import RAPID
 from postproc.witness.evidence import Finding
 from postproc.witness.machine import Chain, limits_of
 from postproc.witness.place import Cut, Poses
-from postproc.witness.stretches import BOTTOM, ENTER, RAPID, Targets, is_cut, is_rapid, off
+from postproc.witness.stretches import BOTTOM, ENTER, Targets, is_cut, is_rapid, off
 from postproc.witness.text import Array
 
 CHUNK = 100_000
@@ -64,7 +65,7 @@ class Walked:
 def check_way(w: Walked, lines: Array, cut: Cut | None, margin: float, bent: bool,
               table: dict[str, object]) -> list[Finding]:
     """Blocks off their way that are no retract, approach or move clear of what is cut; rapids in cuts and the reverse."""
-    e, good = w.poses.executed, w.on_way()
+    good = w.on_way()
     step = np.diff(w.tip, axis=0, prepend=w.tip[:1])
     moved = np.sqrt((step * step).sum(axis=1))
     cutting, rapid = is_cut(w.kind) & ~w.gap, is_rapid(w.kind) & ~w.gap
@@ -83,11 +84,11 @@ def check_way(w: Walked, lines: Array, cut: Cut | None, margin: float, bent: boo
     cuts = bad[(w.code[bad] > 0) & is_cut(w.kind[bad])]
     if len(cuts):
         k = int(cuts[0])
-        found += _finding(w, cuts, lines, "path", f"the tool is {w.away[k]:.6f} mm and {np.degrees(w.tilt[k]):.6f} degrees off "
-                          "the way of the CL file")
+        found += _finding(w, cuts, lines, "path", f"the tool is {w.away[k]:.6f} mm and {np.degrees(w.tilt[k]):.6f} degrees "
+                          "off the way of the CL file")
     rest = bad[~np.isin(bad, cuts)]
-    return found + _finding(w, rest, lines, "clearance", "motion that the CL file does not command comes nearer to what is cut "
-                            "than the margin of the set-up")
+    return found + _finding(w, rest, lines, "clearance", "motion that the CL file does not command comes nearer to what is "
+                            "cut than the margin of the set-up")
 
 
 def _finding(w: Walked, rows: Array, lines: Array, code: str, message: str) -> list[Finding]:
@@ -155,7 +156,7 @@ def _explained(w: Walked, rows: Array, margin: float, table: dict[str, object]) 
     result = np.zeros(len(rows), bool)
     for owner in np.unique(w.owner[rows]).tolist():
         link = np.flatnonzero(w.owner == owner)
-        tip, axis = w.poses.at(link, 1.0)
+        axis = w.axis[link]
         linear, ways = machine.slides(e.joints[link], e.letters)
         lift = np.linalg.solve(ways, 0.95 * margin * axis[:, :, None])[:, :, 0]
         q = e.joints[link][:, linear] + lift
@@ -187,5 +188,5 @@ def check_arcs(w: Walked, turns: Array, lines: Array) -> list[Finding]:
         return []
     k = int(bad[0])
     block = int(rows[np.searchsorted(i, k)])
-    return [Finding("arc", f"the tool turns by {np.degrees(turned[k]):.3f} degrees about the axis of the arc, the CL file says "
-                    f"{np.degrees(t.sweep[k]):.3f}", int(lines[t.row[k]]), int(w.poses.executed.line[block]), len(bad))]
+    return [Finding("arc", f"the tool turns by {np.degrees(turned[k]):.3f} degrees about the axis of the arc, the CL file "
+                    f"says {np.degrees(t.sweep[k]):.3f}", int(lines[t.row[k]]), int(w.poses.executed.line[block]), len(bad))]

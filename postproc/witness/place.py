@@ -43,7 +43,7 @@ def placement(setup: dict[str, Any], c: Commanded) -> tuple[Array, Array]:
 
 @dataclass(frozen=True)
 class Poses:
-    """Poses of a program's blocks by this witness's own kinematics; of machines on rods, the reader's, held against the rods.
+    """Poses of a program's blocks by this witness's own kinematics; on rods those of the reader, held against the rods.
 
     `own` False: the machine has geometric errors that the program corrects; poses are then those of the reader.
     """

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from postproc.witness.commanded import UNKNOWN, Commanded, Cycle
+from postproc.witness.commanded import ARC, LINE, UNKNOWN, Commanded, Cycle
 from postproc.witness.evidence import Case, Finding
 from postproc.witness.machine import limits_of
 from postproc.witness.motion import Walked
-from postproc.witness.stretches import ARC, BOTTOM, LINE
+from postproc.witness.stretches import BOTTOM
 from postproc.witness.text import Array
 
 ALLOWED = 1.02

@@ -128,7 +128,7 @@ def from_line(tip: Array, start: Array, end: Array) -> Array:
     length = (way * way).sum(axis=1)
     share = np.clip((offset * way).sum(axis=1) / np.where(length > 0.0, length, 1.0), 0.0, 1.0)
     rest = offset - share[:, None] * way
-    return np.sqrt((rest * rest).sum(axis=1))
+    return np.asarray(np.sqrt((rest * rest).sum(axis=1)))
 
 
 def _from_arc(tip: Array, start: Array, end: Array, centre: Array, normal: Array, sweep: Array) -> Array:

@@ -8,7 +8,7 @@ from time import process_time
 import numpy as np
 
 from postproc.witness.clfile import commanded
-from postproc.witness.commanded import ARC, HOLE, LINE, Commanded
+from postproc.witness.commanded import ARC, LINE, Commanded
 from postproc.witness.evidence import Case, Executed, Finding, Testimony
 from postproc.witness.machine import ROD, kinematics_of, merged
 from postproc.witness.motion import Walked, check_arcs, check_way
@@ -99,5 +99,7 @@ def _rods(poses: Poses) -> list[Finding]:
     worst = max(poses.misfits, default=(0.0, 0))
     if worst[0] <= ROD:
         return []
-    said = "a carriage stands on the wrong side of its rod" if math.isinf(worst[0]) else f"rods miss their length by {worst[0]:.6f} mm"
+    said = f"rods miss their length by {worst[0]:.6f} mm"
+    if math.isinf(worst[0]):
+        said = "a carriage stands on the wrong side of its rod"
     return [Finding("rods", f"{said} where the tool is said to be", 0, int(poses.executed.line[worst[1]]))]

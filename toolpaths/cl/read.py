@@ -18,7 +18,7 @@ from toolpaths.cl.statements import Lexer, Program
 from toolpaths.cl.structure import open_paths
 from toolpaths.diagnostics import Diagnostic, Severity
 from toolpaths.input_files import read_input, unreadable
-from toolpaths.toolpath import Source, Toolpath
+from toolpaths.toolpath import ClSource, Toolpath
 
 _OWN_HEAD = b"$$-> TOOLPATH /"
 _TAIL = 400
@@ -92,7 +92,7 @@ def read_bytes(data: bytes | str, *, file: str = "", units: str | None = None, d
     diagnostics = log.diagnostics()
     read = _with_faults(toolpath, diagnostics)
     raw = data.encode("utf-8", "replace") if isinstance(data, str) else bytes(data)
-    object.__setattr__(read, "source", Source(raw, units or "", dialect or ""))
+    object.__setattr__(read, "source", ClSource(raw, units or "", dialect or ""))
     return ReadResult(read, diagnostics, counts, found.name, evidence,
                       b.arc_records, b.cycle_records, parts.lines)
 

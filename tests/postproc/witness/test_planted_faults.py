@@ -226,7 +226,7 @@ def turned_back(j: Any) -> Any:
 
 
 def beside(j: Any) -> Any:
-    return replace(j, point=j.point + [0.1, 0.0, 0.0]) if j.rotary else j
+    return replace(j, point=j.point + np.array([0.1, 0.0, 0.0])) if j.rotary else j
 
 
 def transposed(old: Any, *given: Any) -> Any:
@@ -289,10 +289,12 @@ FAULTS: dict[str, tuple[str, str, str, str, Plant]] = {
     "CSYS ignored": (CREO, "mikron-ucp710", "fanuc-30i", "turned", frame(lambda m: EYE)),
     "CSYS transposed": (CREO, "mikron-ucp710", "fanuc-30i", "turned", frame(lambda m: m.T)),
     "subroutine skipped": (CREO, "mikron-ucp710", "fanuc-30i", "turned", subroutine_skipped),
-    "arcs the other way": (NX, "mill-3axis", "linuxcnc", "plain", arcs(normal=lambda n: -n, sweep=lambda s: 2.0 * np.pi - s)),
+    "arcs the other way": (NX, "mill-3axis", "linuxcnc", "plain",
+                           arcs(normal=lambda n: -n, sweep=lambda s: 2.0 * np.pi - s)),
     "arcs the other way, as lines": (NX, "uranesx", "linuxcnc", "delta",
                                      arcs(normal=lambda n: -n, sweep=lambda s: 2.0 * np.pi - s)),
-    "centre of arcs shifted": (NX, "mill-3axis", "linuxcnc", "plain", arcs(center=lambda c: c + [-0.05, 0.05, 0.0])),
+    "centre of arcs shifted": (NX, "mill-3axis", "linuxcnc", "plain",
+                                arcs(center=lambda c: c + np.array([-0.05, 0.05, 0.0]))),
     "depth of cycles + 1 mm": (NX, "mill-3axis", "siemens-840d", "plain", cycle(depth=lambda d: d + 1.0)),
     "depth of cycles - 1 mm": (NX, "mill-3axis", "fanuc-30i", "plain", cycle(depth=lambda d: d - 1.0)),
     "depth of cycles turned": (NX, "mill-3axis", "generic-iso", "plain", cycle(depth=lambda d: d * 0.5)),
@@ -332,7 +334,7 @@ FAULTS: dict[str, tuple[str, str, str, str, Plant]] = {
     "point dropped": (NX, "mill-3axis", "linuxcnc", "plain", path_changed(moved({5: (4, 6)}))),
     "points exchanged": (NX, "mill-3axis", "linuxcnc", "plain", path_changed(moved({4: 5, 5: 4}))),
     "point moved by 0.02 mm": (NX, "mill-3axis", "linuxcnc", "plain",
-                               path_changed(lambda p: replace(p, tip=p.tip + [0.0, 0.02, 0.0]))),
+                               path_changed(lambda p: replace(p, tip=p.tip + np.array([0.0, 0.02, 0.0])))),
     "cut as rapid": (NX, "mill-3axis", "linuxcnc", "plain", path_changed(kinds(6, Kind.RAPID))),
     "rapid as cut": (NX, "mill-3axis", "linuxcnc", "plain", path_changed(kinds(7, Kind.FEED))),
     "GODLTA the other way": (NX, "mill-3axis", "linuxcnc", "plain",
