@@ -55,9 +55,8 @@ class Poses:
     misfits: list[tuple[float, int]]
 
     def lengths(self, rows: Array) -> Array:
-        """(K,) gauge length of the tool in the spindle."""
-        tools = self.case.setup.get("tools", {})
-        number = np.maximum(self.executed.tool[rows], 0)
+        """(K,) gauge length of the tool in the spindle; 0 where the program calls none: its tip is in the work offset."""
+        tools, number = self.case.setup.get("tools", {}), self.executed.tool[rows]
         result = np.zeros(len(rows))
         for n in np.unique(number).tolist():
             result[number == n] = float((tools.get(str(int(n))) or {}).get("gauge_length") or 0.0)

@@ -174,18 +174,21 @@ def _hole_faults(w: Walked, i: int, blocks: Array, cycle: Cycle, rpm: float, tol
     if cycle.kind in _FEED_OUT and out < len(e) and e.code[out] == 0:
         found.append("the tool leaves the hole in rapid, the CL file asks for feed")
     if cycle.kind != "TAP":
-        found += _feed_fault(w, i, blocks[fed], cycle, rpm)
+        found += _feed_fault(w, blocks[fed & (depth > reached + 1e-3)], cycle, rpm)
     return found
 
 
-def _feed_fault(w: Walked, i: int, blocks: Array, cycle: Cycle, rpm: float) -> list[str]:
-    """That a hole is drilled at another feed: faster at all, or slower."""
+def _feed_fault(w: Walked, blocks: Array, cycle: Cycle, rpm: float) -> list[str]:
+    """That a block which goes deeper than those before it is faster than the feed of the cycle."""
     e = w.poses.executed
     feed = cycle.feed * rpm if cycle.per_turn else cycle.feed
-    begin = w.tip[np.maximum(blocks - 1, 0)]
-    length = np.sqrt(((w.tip[blocks] - begin) ** 2).sum(axis=1)).sum()
-    seconds = float(e.seconds[blocks].sum())
-    if not (math.isfinite(feed) and seconds > 0.0 and length > 0.1):
+    step = w.tip[blocks] - w.tip[np.maximum(blocks - 1, 0)]
+    length = np.sqrt((step * step).sum(axis=1))
+    long = (length > 0.1) & (e.seconds[blocks] > 0.0)
+    if not math.isfinite(feed) or not long.any():
         return []
-    ratio = 60.0 * length / seconds / feed
-    return [f"the hole is drilled at {ratio:.3f} times the feed of the CL file"] if ratio > ALLOWED + 0.02 / length else []
+    ratio = 60.0 * length[long] / e.seconds[blocks[long]] / feed
+    worst = int((ratio - 0.02 / length[long]).argmax())
+    if ratio[worst] <= ALLOWED + 0.02 / length[long][worst]:
+        return []
+    return [f"the hole is drilled at {ratio[worst]:.3f} times the feed of the CL file"]
