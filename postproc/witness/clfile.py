@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 from postproc.witness import arcs, cycles
-from postproc.witness.commanded import UNKNOWN, Commanded, unit
+from postproc.witness.commanded import UNFOLLOWED, UNKNOWN, Commanded, unit
 from postproc.witness.dialect import ALL, dialect_of, scale_of
 from postproc.witness.execution import Execution, Z
 from postproc.witness.rows import assembled
@@ -307,7 +307,7 @@ def _by_code(e: Execution, r: Record, line: int) -> None:
         return
     e.lost(f"spindle and coolant after {r.major}", line)
     e.spindle.set(e.row, (UNKNOWN, math.nan))
-    e.coolant.set(e.row, UNKNOWN)
+    e.coolant.set(e.row, UNFOLLOWED)
 
 
 def _cycle(e: Execution, r: Record, line: int) -> None:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from postproc.witness.commanded import ARC, LINE, UNKNOWN, Commanded, Cycle
+from postproc.witness.commanded import ARC, LINE, UNFOLLOWED, UNKNOWN, Commanded, Cycle
 from postproc.witness.evidence import Case, Finding
 from postproc.witness.machine import limits_of
 from postproc.witness.motion import Walked
@@ -97,7 +97,7 @@ def check_states(w: Walked, c: Commanded, case: Case) -> tuple[list[Finding], di
     flow = e.coolant[rows]
     stated = direction != UNKNOWN
     speed = stated & (direction != 0) & np.isfinite(rpm) & ~tap
-    some = "coolant" in str(case.setup.get("tools", "")) or "coolant" in str(case.setup.get("output", ""))
+    some = _states_coolant(case.setup.get("tools")) or _states_coolant(case.setup.get("output"))
     wet = np.where(coolant == UNKNOWN, some | (flow == 0), np.where(coolant == 0, flow == 0, flow > 0))
     wet &= (coolant != 1) | ((flow & 1) > 0)
     checks = (("tool", "the tool is T{0:g}, the CL file cuts with T{1:g}", tool != UNKNOWN, e.tool[rows], tool,
@@ -107,7 +107,7 @@ def check_states(w: Walked, c: Commanded, case: Case) -> tuple[list[Finding], di
               ("spindle", "the spindle speed is {0:g}, the CL file says {1:g}", speed, e.rpm[rows], rpm,
                np.abs(e.rpm[rows] - rpm) <= 0.5 + 1e-3 * np.abs(rpm)),
               ("coolant", "the coolant is {0:g} (0 off), the CL file says {1:g} (0 off, 1 flood, 2 on)",
-               (coolant != UNKNOWN) | (not some), flow, coolant, wet))
+               (coolant != UNFOLLOWED) & ((coolant != UNKNOWN) | (not some)), flow, coolant, wet))
     found, counts = [], dict[str, int]()
     for code, text, compared, is_, wanted, good in checks:
         bad = np.flatnonzero(compared & ~good)
@@ -117,6 +117,13 @@ def check_states(w: Walked, c: Commanded, case: Case) -> tuple[list[Finding], di
             found.append(Finding(code, text.format(float(is_[k]), float(wanted[k])), int(c.line[row[k]]),
                                  int(e.line[rows[k]]), len(bad)))
     return found, counts
+
+
+def _states_coolant(table: Any) -> bool:
+    """True where a table of the set-up, or one in it, says what coolant flows where the CL file does not."""
+    if not isinstance(table, dict):
+        return False
+    return any((key == "coolant" and bool(value)) or _states_coolant(value) for key, value in table.items())
 
 
 def _tools(c: Commanded, setup: dict[str, Any]) -> Array:
