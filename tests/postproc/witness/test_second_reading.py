@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import machines
+import postproc
 import toolpaths
 from machines.loader import builtin
 from postproc.second_witness import machine_tables
+from postproc.summary import as_text
 from postproc.witness.clfile import commanded
 from postproc.witness.commanded import HOLE, LINE
 from postproc.witness.machine import Chain, Rods, kinematics_of, limits_of, merged
@@ -96,3 +99,14 @@ def test_poses_of_every_machine(name: str) -> None:
         assert own.misfit(q, m.axis_names, tip, axis, np.full(50, length)).max() < 1e-8
         assert own.misfit(q, m.axis_names, tip, axis, np.full(50, length + 0.05)).min() > 1e-4
         assert own.misfit(q, m.axis_names, tip + np.array([0.02, 0.0, 0.0]), axis, np.full(50, length)).max() > 1e-4
+
+
+def test_a_path_that_was_changed_after_reading_has_no_second_reading() -> None:
+    text = b"UNITS/MM\nLOADTL/1\nSPINDL/RPM,1000,CLW\nFEDRAT/500,MMPM\nRAPID\nGOTO/0,0,50\nGOTO/0,0,1\nGOTO/5,0,1\nFINI\n"
+    path, found = toolpaths.read_bytes(text, file="part.apt")
+    read = postproc.convert(path, "mill-3axis", diagnostics=found)
+    changed = postproc.convert(replace(path, tip=path.tip + 1.0), "mill-3axis", diagnostics=found)
+    assert read.witness is not None and read.witness.compared and not read.witness.not_compared
+    assert changed.ok and changed.witness is not None and not changed.witness.compared and changed.witness.not_compared
+    assert "second witness agrees: 3 positions" in as_text(read, "out.ngc")
+    assert "second witness: not compared: all" in as_text(changed, "out.ngc")
