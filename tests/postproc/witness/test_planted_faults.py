@@ -66,6 +66,7 @@ RAPID
 GOTO/40,5,50
 """
 NX = HEAD + HOLES + "END-OF-PATH\n"
+MILLED = HEAD + "END-OF-PATH\n"
 DRILL = HEAD + HOLES.replace("DRILL,DEEP", "DRILL").replace("STEP,4,", "DWELL,0.5,") + "END-OF-PATH\n"
 INCH = """UNITS/INCHES
 LOADTL/1
@@ -291,7 +292,7 @@ FAULTS: dict[str, tuple[str, str, str, str, Plant]] = {
     "subroutine skipped": (CREO, "mikron-ucp710", "fanuc-30i", "turned", subroutine_skipped),
     "arcs the other way": (NX, "mill-3axis", "linuxcnc", "plain",
                            arcs(normal=lambda n: -n, sweep=lambda s: 2.0 * np.pi - s)),
-    "arcs the other way, as lines": (NX, "uranesx", "linuxcnc", "delta",
+    "arcs the other way, as lines": (MILLED, "uranesx", "linuxcnc", "delta",
                                      arcs(normal=lambda n: -n, sweep=lambda s: 2.0 * np.pi - s)),
     "centre of arcs shifted": (NX, "mill-3axis", "linuxcnc", "plain",
                                 arcs(center=lambda c: c + np.array([-0.05, 0.05, 0.0]))),
@@ -315,9 +316,9 @@ FAULTS: dict[str, tuple[str, str, str, str, Plant]] = {
                       wrapped(postproc.job, "safe_space", lambda old, *a: replace(old(*a), margin=0.0))),
     "gauge length x 1.001": (FIVE, "head-table", "linuxcnc", "turned",
                              wrapped(Job, "length_of", lambda old, self, n: 1.001 * old(self, n))),
-    "gauge length x 1.001, rods": (NX, "h4a-c-table", "linuxcnc", "h4a",
+    "gauge length x 1.001, rods": (MILLED, "h4a-c-table", "linuxcnc", "h4a",
                                    wrapped(Job, "length_of", lambda old, self, n: 1.001 * old(self, n))),
-    "rods x 1.0002": (NX, "uranesx", "linuxcnc", "delta", wrapped(SliderModel, "build_legs", rods)),
+    "rods x 1.0002": (MILLED, "uranesx", "linuxcnc", "delta", wrapped(SliderModel, "build_legs", rods)),
     "lines of the rotary axes off by 0.1 mm": (FIVE, "mikron-ucp710", "linuxcnc", "turned", joint(beside)),
     "lines of the rotary axes off, tip modes": (FIVE, "mikron-ucp710", "siemens-840d", "turned", joint(beside)),
     "C the other way": (FIVE, "mikron-ucp710", "linuxcnc", "turned", joint(turned_back)),
