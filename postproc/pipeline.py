@@ -35,6 +35,7 @@ from postproc.readback.slow import with_fingerprint
 from postproc.readback.verify import other_axes, read_back
 from postproc.rewinds import drawing_of
 from postproc.rounding import rounding_problem
+from postproc.second_witness import second_witness
 from postproc.setup import SetupFile, load_setup
 from postproc.setup_system import standing, with_system
 from postproc.singular import check_singular
@@ -44,7 +45,7 @@ from postproc.word_rows import block_tools
 from toolpaths.diagnostics import Diagnostic, DiagnosticError, error, has_errors
 from toolpaths.input_files import read_input, unreadable
 from toolpaths.smoothing.smooth import Tolerance
-from toolpaths.toolpath import Toolpath
+from toolpaths.toolpath import ClSource, Toolpath
 from toolpaths.units import DEG
 
 if TYPE_CHECKING:
@@ -52,6 +53,7 @@ if TYPE_CHECKING:
     from postproc.corrected.proof import AfterFormatting
     from postproc.cycle_time.estimate import Estimate
     from postproc.orientation.orient import OrientationChoice
+    from postproc.witness import Testimony
 
 Progress = Callable[[str, int, int], None]
 MARGIN = 0.85
@@ -90,6 +92,12 @@ class PostResult:
     """texts of subprograms in files of their own, by file name"""
     choice: OrientationChoice | None = None
     """of the tool axes that `toolpath` has instead of the CL file's, where --orient asked for one"""
+    source: ClSource | None = None
+    """of the path as it was read, for the second witness"""
+    asked: SetupFile | None = None
+    """the set-up as the shop has it, before [part] is said in the absolute frame"""
+    witness: Testimony | None = None
+    """what the second witness says"""
 
     @property
     def ok(self) -> bool:
@@ -151,7 +159,7 @@ def _loaded(controller: str | FilePath, machine: Machine | str | FilePath, setup
 def _begun(path: Toolpath, start: PostResult) -> PostResult:
     """The beginning of a conversion with its path, the part standing by the file's absolute frame."""
     setup, found = standing(start.setup, path, start.options.setup)
-    return _with(start, found, toolpath=path, setup=setup)
+    return _with(start, found, toolpath=path, setup=setup, source=path.source, asked=start.setup)
 
 
 def _oriented(start: PostResult, progress: Progress | None) -> tuple[PostResult, PostResult | None]:
@@ -246,6 +254,9 @@ def _staged(result: PostResult, progress: Progress | None, left: Left = frozense
     comparison, found = read_back(text, job, file, progress,
                                   others={name: t.encode() for name, t in files.items()})
     result = _with(result, found, comparison=comparison)
+    if result.ok and comparison is not None:
+        said, found = second_witness(result.source, result.asked or result.setup, options, job, comparison)
+        result = _with(result, found, witness=said)
     if result.compensation is not None:
         from postproc.corrected.proof import beyond_bound
 
@@ -363,6 +374,7 @@ class VerifyResult:
     gcode: str
     comparison: Comparison | None
     diagnostics: tuple[Diagnostic, ...]
+    witness: Testimony | None = None
 
     @property
     def ok(self) -> bool:
@@ -397,4 +409,9 @@ def verify(gcode: str | FilePath, path: Toolpath, machine: Machine | str | FileP
     if job is None or has_errors(found):
         return VerifyResult(str(gcode), None, tuple(found))
     comparison, more = read_back(data, job, path.file, progress, str(gcode), Beside(gcode))
-    return VerifyResult(str(gcode), comparison, (*found, *more))
+    found += more
+    said = None
+    if comparison is not None and not has_errors(found):
+        said, more = second_witness(start.source, start.asked or start.setup, options, job, comparison)
+        found += more
+    return VerifyResult(str(gcode), comparison, tuple(found), said)

@@ -12,6 +12,7 @@ import numpy as np
 from postproc.events import cutting, spindle_states
 from postproc.pipeline import PostResult, VerifyResult, points_in
 from postproc.readback.compare import Comparison
+from postproc.witness import Testimony
 from toolpaths.diagnostics import Severity
 from toolpaths.input_files import there_is
 from toolpaths.toolpath import Records
@@ -45,6 +46,7 @@ def as_dict(result: PostResult, output: str) -> dict[str, Any]:
         "orientation": _orientation(result),
         "tool_call": result.setup.output.tool_call,
         "tools": tools_of(result),
+        "witness": witness_dict(result.witness),
         "diagnostics": [d.as_dict() for d in result.diagnostics],
     }
 
@@ -109,6 +111,22 @@ def _orientation(result: PostResult) -> dict[str, Any] | None:
     from postproc.orientation.report import chosen
 
     return chosen(result.choice, result.options.orient)
+
+
+def witness_dict(said: Testimony | None) -> dict[str, Any] | None:
+    """What the second witness compared; None where it was not asked, because the read-back had found errors."""
+    return None if said is None else {"agrees": not said.findings, "compared": list(said.compared),
+                                      "not_compared": list(said.not_compared), "points": said.points,
+                                      "worst_tip_mm": _number(said.worst_tip),
+                                      "worst_axis_deg": _number(said.worst_axis / DEG), "seconds": said.seconds}
+
+
+def witness_lines(said: Testimony | None) -> list[str]:
+    """The same for people: that it agrees, and what it has not compared."""
+    if said is None:
+        return []
+    lines = [f"second witness agrees: {', '.join(said.compared)}"] if said.compared and not said.findings else []
+    return lines + ([f"second witness: not compared: {'; '.join(said.not_compared)}"] if said.not_compared else [])
 
 
 def _number(value: float) -> float | None:
@@ -186,6 +204,7 @@ def as_text(result: PostResult, output: str) -> str:
     lines = [f"{output}: {d['blocks_out']} blocks from {d['points_in']} points ({d['points_added']} added) for "
              f"{d['machine']}, {d['controller']}",
              *_proof(result),
+             *witness_lines(result.witness),
              f"tolerance: linearising {shares['linearising']:.4f}, control's smoothing {shares['smoothing']:.4f}, "
              f"rounding at most {shares['rounding']:.5f} mm"]
     if result.toolpath is not None and result.toolpath.records.total:
@@ -232,6 +251,7 @@ def verify_dict(result: VerifyResult) -> dict[str, Any]:
         **deviations(c),
         "worst_tip_lines": list(c.worst_tip_line) if c else None,
         "worst_axis_lines": list(c.worst_axis_line) if c else None,
+        "witness": witness_dict(result.witness),
         "diagnostics": [d.as_dict() for d in result.diagnostics],
     }
 
@@ -244,5 +264,6 @@ def verify_text(result: VerifyResult) -> str:
     if not result.ok:
         errors = sum(d.severity is Severity.ERROR for d in result.diagnostics)
         return f"NOT proved: {len(c.owner)} blocks, {errors} error{'s' * (errors > 1)}; the first may cause the rest"
+    said = "".join(f"\n{line}" for line in witness_lines(result.witness))
     return (f"{deviation_text(c)} ({len(c.owner)} blocks; worst at CL line {c.worst_tip_line[0]}, block line "
-            f"{c.worst_tip_line[1]}, the axis at CL line {c.worst_axis_line[0]}, block line {c.worst_axis_line[1]})")
+            f"{c.worst_tip_line[1]}, the axis at CL line {c.worst_axis_line[0]}, block line {c.worst_axis_line[1]}){said}")

@@ -181,6 +181,15 @@ _COLUMNS: dict[str, tuple[type, tuple[int, ...]]] = {
 
 
 @dataclass(frozen=True)
+class ClSource:
+    """The bytes of the CL file that a path was read from, and with which units and dialect ("": as the file says)."""
+
+    data: bytes
+    units: str = ""
+    dialect: str = ""
+
+
+@dataclass(frozen=True)
 class Toolpath:
     """The path of the cutter in the part frame (the absolute frame of the CL file), one row per commanded position.
 
@@ -233,6 +242,8 @@ class Toolpath:
     spin: Floats | None = None
     records: Records = field(default_factory=Records)
     """what became of the records of the file"""
+    source: ClSource | None = field(default=None, init=False, repr=False, compare=False)
+    """where the path is exactly what reading a file gave: a path that is made otherwise, or changed, has none"""
 
     def __post_init__(self) -> None:
         n = len(self.tip)

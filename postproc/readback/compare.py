@@ -63,6 +63,9 @@ class Comparison:
     axis_bound: float
     unbounded: int
     executed: tuple[Canonical, Motion] | None = None
+    poses: Executed | None = None
+    planned: bool = False
+    """the feeds of the program were planned"""
 
 
 def compare(motion: Motion, job: Job, executed: Executed, gcode: str = "", planned: bool = False) -> Comparison:

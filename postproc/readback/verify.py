@@ -102,7 +102,7 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Callable[[str, i
         told = [*(_of_model(named[1], head, job, gcode, has_errors(told)) if named else
                   _uncorrected(head, job, motion, executed, comparison, gcode) if has_errors(told) else []), *told,
                 *_unmeasured(motion, executed, job, faults)]
-    return replace(comparison, executed=(code, motion)), [*diagnostics, *told]
+    return replace(comparison, executed=(code, motion), poses=executed, planned=planned), [*diagnostics, *told]
 
 
 def _unmeasured(motion: Motion, executed: Executed, job: Job, faults: Faults) -> list[Diagnostic]:

@@ -22,7 +22,7 @@ from toolpaths.cl.statements import Lexer, Program
 from toolpaths.cl.structure import open_paths
 from toolpaths.diagnostics import Diagnostic, Severity
 from toolpaths.input_files import read_input, unreadable
-from toolpaths.toolpath import Toolpath
+from toolpaths.toolpath import ClSource, Toolpath
 
 _OWN_HEAD = b"$$-> TOOLPATH /"
 _TAIL = 400
@@ -97,8 +97,10 @@ def read_bytes(data: bytes | str, *, file: str = "", units: str | None = None, d
     _check_rapids(b, toolpath)
     check_forms(program, log, b.allow_unknown)
     diagnostics = log.diagnostics()
-    toolpath = replace(_with_faults(toolpath, diagnostics), records=counted(b, frozenset(HANDLERS)))
-    return ReadResult(toolpath, diagnostics, counts, found.name, evidence,
+    read = replace(_with_faults(toolpath, diagnostics), records=counted(b, frozenset(HANDLERS)))
+    raw = data.encode("utf-8", "replace") if isinstance(data, str) else bytes(data)
+    object.__setattr__(read, "source", ClSource(raw, units or "", dialect or ""))
+    return ReadResult(read, diagnostics, counts, found.name, evidence,
                       b.arc_records, b.cycle_records, parts.lines)
 
 

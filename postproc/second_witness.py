@@ -1,0 +1,85 @@
+"""Hands a conversion to the second witness (`witness/`), which knows nothing of the project, and says what it found."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from machines.loader import builtin
+from machines.machine import Machine
+from postproc.job import Job
+from postproc.options import Options
+from postproc.readback.checks import block_seconds
+from postproc.readback.compare import Comparison
+from postproc.readback.poses import Executed as Poses
+from postproc.readback.poses import arc_sweeps, begins
+from postproc.setup import SetupFile
+from postproc.witness import Case, Executed, Testimony, testify
+from toolpaths.arrays import Floats, Ints
+from toolpaths.diagnostics import Diagnostic, error
+from toolpaths.toolpath import ClSource
+
+
+def machine_tables(machine: Machine) -> list[dict[str, Any]]:
+    """The machine's file as parsed, then that of its base and so on; none where there is no file."""
+    found: list[dict[str, Any]] = []
+    path: Path | None = Path(machine.file) if machine.file else builtin().get(machine.name)
+    while path is not None and path.is_file():
+        found.append(tomllib.loads(path.read_text("utf-8")))
+        base = found[-1].get("base")
+        path = None if base is None else builtin().get(base, path.parent / str(base))
+    return found
+
+
+def executed_of(comparison: Comparison, poses: Poses, job: Job) -> Executed:
+    """The motion of a program, read back, as plain arrays."""
+    assert comparison.executed is not None
+    motion, control = comparison.executed[1], job.control
+    every = np.arange(len(motion))
+    joints = motion.end / control.unit if control.base != "tcp" else poses.joints(motion, every, 1.0)
+    straight = (motion.code != 2) & (motion.frame == 0) & (control.base != "tcp")
+    if control.rapids == "dog-leg":
+        straight &= motion.code != 0
+
+    def joints_at(rows: Ints, t: float | Floats) -> Floats:
+        if isinstance(t, np.ndarray) and not t.any() and control.base != "tcp":
+            return begins(motion, rows) / control.unit
+        return poses.joints(motion, rows, t)
+
+    def poses_at(rows: Ints, t: float | Floats) -> tuple[Floats, Floats]:
+        if isinstance(t, float) and t == 1.0:
+            return comparison.tip[rows], comparison.axis[rows]
+        return poses.poses(motion, rows, t)
+
+    seconds = block_seconds(motion, control, job.controller.feed.arc_inverse == "radius")
+    start = motion.start / control.unit if control.base != "tcp" else job.machine.home
+    return Executed(job.machine.axis_names, joints, start, motion.line, motion.code, np.asarray(straight),
+                    arc_sweeps(motion, control), seconds, motion.tool, motion.spindle, motion.rpm, motion.coolant,
+                    motion.dwell, motion.pitch, motion.hole, joints_at, poses_at)
+
+
+def second_witness(source: ClSource | None, setup: SetupFile, options: Options, job: Job,
+                   comparison: Comparison) -> tuple[Testimony, list[Diagnostic]]:
+    """What the second witness says of a program that was read back, and its findings as errors.
+
+    Args:
+        source: what the path was read from
+        setup: as the shop wrote it, [part] by whatever it names
+    """
+    if options.orient != "keep" or source is None or comparison.executed is None or comparison.poses is None:
+        why = "the tool axes were chosen" if options.orient != "keep" else "the path is not as it was read from a file"
+        return Testimony((), (f"all ({why})",)), []
+    case = Case(source.data, machine_tables(job.machine), setup.model_dump(), options.tolerance, job.axis_tolerance,
+                source.units or None, source.dialect or None, job.control.rapids == "dog-leg", comparison.planned,
+                job.corrects)
+    try:
+        said = testify(case, executed_of(comparison, comparison.poses, job))
+    except (ArithmeticError, AssertionError, LookupError, TypeError, ValueError) as fault:
+        # A file that it does not get through weakens the proof, which the text then says; it must not stop the program.
+        return Testimony((), (f"all (the second witness failed: {type(fault).__name__}: {fault})",)), []
+    return said, [error(f"witness.{f.code}", f"second witness: {f.message} (line {f.block} of the program)",
+                        file=job.toolpath.file, lines=[f.line] if f.line else [], count=f.count,
+                        hint="do not run this program") for f in said.findings]

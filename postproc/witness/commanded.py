@@ -1,0 +1,80 @@
+"""What a CL file commands, as the second witness has read it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from postproc.witness.text import Array
+
+RAPID, LINE, ARC, HOLE, START = range(5)
+UNKNOWN = -9
+"""of tool, spindle or coolant: the file does not say"""
+UNFOLLOWED = -8
+"""of coolant: switched by codes of the machine, which this witness does not follow"""
+
+
+@dataclass(frozen=True)
+class Cycle:
+    """A drilling cycle, mm from the hole's top along the tool axis; `feed` mm/min or (per turn) mm; NaN: not stated."""
+
+    kind: str
+    depth: float
+    clearance: float
+    feed: float = math.nan
+    per_turn: bool = False
+    steps: tuple[float, ...] = ()
+    dwell: float = 0.0
+    line: int = 0
+
+
+@dataclass(frozen=True)
+class Commanded:
+    """N positions in the absolute frame of the file, mm.
+
+    Attributes:
+        tip, axis (N, 3); kind (N,): RAPID, LINE, ARC, HOLE, START (not gone to); line (N,)
+        known (N,): False where the position was not understood; gap (N,): the way to it was not
+        feed (N,): mm/min, or mm per turn where `per_turn` (N,), or 1/min where `inverse` (N,); NaN: none
+        arc (N,): index into centre, normal (K, 3), sweep (K,) rad; -1
+        cycle (N,): index into cycles, -1; tool, spindle, coolant (N,): number; -1, 0, 1; "" to words; UNKNOWN
+        rpm (N,): NaN where not stated; name (N,): index into names of tools
+        system: origin and rotation of every system of the file by its name, in order
+        unread: what was not understood, by its text
+    """
+
+    tip: Array
+    axis: Array
+    kind: Array
+    line: Array
+    known: Array
+    gap: Array
+    feed: Array
+    per_turn: Array
+    inverse: Array
+    arc: Array
+    centre: Array
+    normal: Array
+    sweep: Array
+    cycle: Array
+    cycles: tuple[Cycle, ...]
+    tool: Array
+    name: Array
+    names: tuple[str, ...]
+    spindle: Array
+    rpm: Array
+    coolant: Array
+    systems: dict[str, tuple[Array, Array]]
+    unread: dict[str, int] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        return len(self.tip)
+
+
+def unit(v: Array) -> Array:
+    """Rows (N, 3) at length 1; NaN for zero rows."""
+    size = np.sqrt((v * v).sum(axis=-1, keepdims=True))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(np.where(size > 0.0, v / size, np.nan))

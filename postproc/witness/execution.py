@@ -1,0 +1,89 @@
+"""The state of a reading of a CL file: what holds from which position on."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from postproc.witness import arcs
+from postproc.witness.commanded import UNKNOWN, Cycle
+from postproc.witness.dialect import Dialect
+from postproc.witness.text import Array, Text
+
+Z = (0.0, 0.0, 1.0)
+
+
+class Track:
+    """Values that hold from a row on; of several for one row the last counts."""
+
+    def __init__(self, first: Any) -> None:
+        self.rows, self.values = [0], [first]
+
+    def set(self, row: int, value: Any) -> None:
+        """From `row` on."""
+        if self.rows[-1] == row:
+            self.values[-1] = value
+        else:
+            self.rows.append(row)
+            self.values.append(value)
+
+    @property
+    def now(self) -> Any:
+        """The last value."""
+        return self.values[-1]
+
+    def column(self, n: int, dtype: Any) -> Array:
+        """(n,) value of every row."""
+        starts = np.minimum(np.append(self.rows, n), n)
+        return np.repeat(np.array(self.values, dtype), np.diff(starts))
+
+
+class Execution:
+    """The state of a reading; `row` counts all positions."""
+
+    def __init__(self, text: Text, dialect: Dialect, scale: float) -> None:
+        self.text, self.dialect, self.scale = text, dialect, scale
+        self.row = 0
+        self.extra: list[tuple[int, Any, Any, int]] = []
+        self.rapid: set[int] = set()
+        self.start: set[int] = set()
+        self.deltas: list[tuple[int, tuple[float, ...]]] = []
+        self.unread: dict[str, int] = {}
+        self.axes: dict[int, tuple[float, ...]] = {}
+        self.systems: dict[str, tuple[Array, Array]] = {}
+        self.frame, self.frames = Track(0), [(np.eye(3), np.zeros(3))]
+        self.known, self.gap = Track(True), set[int]()
+        self.feed: Track = Track((math.nan, False, False))
+        self.tool, self.name, self.names = Track(UNKNOWN), Track(-1), list[str]()
+        self.spindle: Track = Track((UNKNOWN, math.nan))
+        self.last_direction = 1
+        self.coolant, self.cycle, self.cycles = Track(UNKNOWN), Track(-1), list[Cycle]()
+        self.armed = -1
+        self.arcs: dict[int, arcs.Given] = {}
+        self.toward: tuple[float, ...] | None = None
+        self.inside = Track(0)
+        self.shifted = False
+        self.height: float | None = None
+        self.turn = np.eye(3)
+        self.upright: tuple[float, ...] = Z
+
+    def lost(self, what: str, line: int) -> None:
+        """Something that was not understood."""
+        self.unread.setdefault(what, line)
+
+    def point(self, xyz: Any, axis: Any, line: int) -> None:
+        """A position that no plain GOTO gives."""
+        self.extra.append((self.row, xyz, axis, line))
+        self.row += 1
+
+    def system(self, matrix: Array, origin: Array, word: str, row: int) -> None:
+        """Positions from here on are in a system, along its z until they say otherwise."""
+        if not any((r == matrix).all() and (o == origin).all() for r, o in self.systems.values()):
+            self.systems[f"{word} {len(self.systems) + 1}"] = matrix, origin
+        self.frames.append((matrix, origin))
+        self.frame.set(row, len(self.frames) - 1)
+        self.axes[row] = Z
+        if not self.shifted:
+            self.known.set(row, True)

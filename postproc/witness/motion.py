@@ -1,0 +1,192 @@
+"""Blocks against the way that the CL file commands: deviation, rapid or feed, arcs, clearance of what the post has added."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from postproc.witness.commanded import RAPID
+from postproc.witness.evidence import Finding
+from postproc.witness.machine import Chain, limits_of
+from postproc.witness.place import Cut, Poses
+from postproc.witness.stretches import BOTTOM, ENTER, Targets, is_cut, is_rapid, off
+from postproc.witness.text import Array
+
+CHUNK = 100_000
+STILL = 0.01
+"""mm that a block may move the tip and be neither rapid nor feed"""
+FULL, LEAST = 0.45, 0.04
+"""shares of the margin that linking moves keep: where travel allows, and where it does not"""
+EXACT = 1e-6
+
+
+class Walked:
+    """Blocks with what of them is known: `owner` (E,) target of each, pose at its end, its deviation from its way (E,)."""
+
+    def __init__(self, poses: Poses, targets: Targets, owner: Array, tip: Array, axis: Array,
+                 tolerance: tuple[float, float]) -> None:
+        self.poses, self.targets, self.owner, self.tip, self.axis = poses, targets, owner, tip, axis
+        self.tolerance = tolerance
+        self.code = poses.executed.code
+        self.inside = owner < len(targets)
+        m = np.minimum(owner, max(len(targets) - 1, 0))
+        self.begin = np.concatenate([[0], np.flatnonzero(np.diff(owner)) + 1])
+        self.first = self.begin[np.searchsorted(self.begin, np.arange(len(owner)), side="right") - 1]
+        self.kind = np.where(self.inside, targets.kind[m], -1)
+        self.gap = np.where(self.inside, targets.gap[m], False)
+        self.away, self.tilt = np.zeros(len(owner)), np.zeros(len(owner))
+
+    def start(self, rows: Array) -> tuple[Array, Array]:
+        """(tip, axis) where the way of blocks `rows` begins: as commanded, or where the tool stood."""
+        i = self.owner[rows]
+        free = self.targets.free[i]
+        start, axis = self.targets.start[i].copy(), self.targets.start_axis[i].copy()
+        before = self.first[rows[free]] - 1
+        start[free] = np.where((before >= 0)[:, None], self.tip[before], self.targets.tip[i[free]])
+        axis[free] = np.where((before >= 0)[:, None], self.axis[before], self.targets.axis[i[free]])
+        return start, axis
+
+    def measure(self) -> None:
+        """Deviation at the middle and the end of every block that serves a target."""
+        rows = np.flatnonzero(self.inside & ~self.gap)
+        for first in range(0, len(rows), CHUNK):
+            k = rows[first:first + CHUNK]
+            i, (start, start_axis) = self.owner[k], self.start(k)
+            middle = self.poses.at(k, 0.5)
+            for tip, axis in (middle, (self.tip[k], self.axis[k])):
+                d, a = off(self.targets, i, tip, axis, start, start_axis)
+                self.away[k] = np.fmax(self.away[k], np.nan_to_num(d, nan=np.inf))
+                self.tilt[k] = np.fmax(self.tilt[k], np.nan_to_num(a, nan=np.inf))
+
+    def on_way(self) -> Array:
+        """(E,) blocks that stay on the way to their target."""
+        return self.inside & ~self.gap & (self.away <= self.tolerance[0] + EXACT) & (self.tilt <= self.tolerance[1] + EXACT)
+
+
+def check_way(w: Walked, lines: Array, cut: Cut | None, margin: float, bent: bool,
+              table: dict[str, object]) -> list[Finding]:
+    """Blocks off their way that are no retract, approach or move clear of what is cut; rapids in cuts and the reverse."""
+    good = w.on_way()
+    step = np.diff(w.tip, axis=0, prepend=w.tip[:1])
+    moved = np.sqrt((step * step).sum(axis=1))
+    cutting, rapid = is_cut(w.kind) & ~w.gap, is_rapid(w.kind) & ~w.gap
+    found = []
+    hurried = cutting & good & (w.code == 0) & (moved > STILL) & (w.kind != BOTTOM)
+    found += _finding(w, np.flatnonzero(hurried), lines, "kind", "rapid motion on a cut of the CL file")
+    after_hole = w.targets.kind[np.clip(w.owner - 1, 0, len(w.targets) - 1)] == BOTTOM
+    fed = (w.kind == RAPID) & ~after_hole & ~w.gap & good & (w.code > 0) & (moved > STILL) & (not bent)
+    found += _finding(w, np.flatnonzero(fed), lines, "kind", "feed motion on a rapid of the CL file")
+    rows = np.flatnonzero(~good & ~w.gap & (np.arange(len(w.owner)) > 0) & ((w.code == 0) | cutting | rapid | ~w.inside))
+    if not len(rows):
+        return found
+    low = _low(w, rows, cut, margin, bent, table)
+    bad = rows[low]
+    bad = bad[(w.code[bad] == 0) | (moved[bad] > EXACT)]
+    cuts = bad[(w.code[bad] > 0) & is_cut(w.kind[bad])]
+    if len(cuts):
+        k = int(cuts[0])
+        found += _finding(w, cuts, lines, "path", f"the tool is {w.away[k]:.6f} mm and {np.degrees(w.tilt[k]):.6f} degrees "
+                          "off the way of the CL file")
+    rest = bad[~np.isin(bad, cuts)]
+    return found + _finding(w, rest, lines, "clearance", "motion that the CL file does not command comes nearer to what is "
+                            "cut than the margin of the set-up")
+
+
+def _finding(w: Walked, rows: Array, lines: Array, code: str, message: str) -> list[Finding]:
+    if not len(rows):
+        return []
+    k = int(rows[0])
+    owner = int(w.owner[k])
+    line = int(lines[w.targets.row[owner]]) if owner < len(w.targets) else 0
+    return [Finding(code, message, line, int(w.poses.executed.line[k]), len(rows))]
+
+
+def _low(w: Walked, rows: Array, cut: Cut | None, margin: float, bent: bool, table: dict[str, object]) -> Array:
+    """(K,) True for blocks that are neither clear nor on the line of a retract or an approach."""
+    m, near = len(w.targets), w.tolerance[0] + EXACT
+    to, before = np.minimum(w.owner[rows], m - 1), np.maximum(w.owner[rows] - 1, 0)
+    ends, begins = w.owner[rows] >= m, w.owner[rows] == 0
+    entry = w.targets.free[to] & is_rapid(w.targets.kind[to])
+    start, start_axis = w.targets.start[to], w.targets.start_axis[to]
+    here = np.maximum(w.first[rows] - 1, 0)
+    low = np.zeros(len(rows), bool)
+    tight = np.zeros(len(rows), bool)
+    for t in (0.25, 0.5, 0.75, 1.0):
+        tip, axis = w.poses.at(rows, t)
+        line = np.fmin(_above(tip, w.targets.tip[before], w.targets.axis[before]), _above(tip, w.tip[here], w.axis[here]))
+        line = np.where(begins, np.inf, line)
+        line = np.fmin(line, np.where(ends, np.inf, _above(tip, w.targets.tip[to], w.targets.axis[to])))
+        line = np.fmin(line, np.where(ends | entry, np.inf, _above(tip, start, start_axis)))
+        beside = ~(line <= near)
+        beside &= ~_level(w, rows, to, ends | begins, tip, near, bent)
+        if cut is not None:
+            low |= beside & ~cut.clear(tip, axis, LEAST * margin)
+            tight |= beside & ~cut.clear(tip, axis, FULL * margin)
+    short = np.flatnonzero(tight & ~low)
+    if len(short):
+        low[short] = ~_explained(w, rows[short], margin, table)
+    return low
+
+
+def _above(tip: Array, end: Array, axis: Array) -> Array:
+    """(K,) mm from the half lines that leave `end` along `axis`."""
+    offset = tip - end
+    rise = np.maximum(np.einsum("ni,ni->n", offset, axis), 0.0)
+    rest = offset - rise[:, None] * axis
+    return np.asarray(np.sqrt((rest * rest).sum(axis=1)))
+
+
+def _level(w: Walked, rows: Array, to: Array, away: Array, tip: Array, near: float, bent: bool) -> Array:
+    """(K,) True for rapids to a hole or from one that keep the height of where they come from: the start plane of the hole
+    before, or the position before; and for dog-legs."""
+    before = np.maximum(to - 1, 0)
+    drilled = w.targets.kind[before] == BOTTOM
+    level = w.targets.tip[before - drilled]
+    rise, first = (np.einsum("ni,ni->n", p, w.targets.axis[to]) for p in (tip, level))
+    of_hole = drilled | (w.targets.kind[to] == ENTER)
+    last = np.einsum("ni,ni->n", w.targets.tip[to], w.targets.axis[to]) if bent else first
+    return np.asarray(~away & is_rapid(w.kind[rows]) & (of_hole | bent) & (rise >= np.minimum(first, last) - near))
+
+
+def _explained(w: Walked, rows: Array, margin: float, table: dict[str, object]) -> Array:
+    """(K,) True where a tool that is lifted by the margin would leave the travel of a slide, somewhere on the same link."""
+    e, machine = w.poses.executed, w.poses.machine
+    if not isinstance(machine, Chain):
+        return np.ones(len(rows), bool)
+    travel, _ = limits_of(table, e.letters)
+    result = np.zeros(len(rows), bool)
+    for owner in np.unique(w.owner[rows]).tolist():
+        link = np.flatnonzero(w.owner == owner)
+        axis = w.axis[link]
+        linear, ways = machine.slides(e.joints[link], e.letters)
+        lift = np.linalg.solve(ways, 0.95 * margin * axis[:, :, None])[:, :, 0]
+        q = e.joints[link][:, linear] + lift
+        beyond = (q < travel[linear, 0]) | (q > travel[linear, 1])
+        result[w.owner[rows] == owner] = bool(beyond.any())
+    return result
+
+
+def check_arcs(w: Walked, turns: Array, lines: Array) -> list[Finding]:
+    """Arcs of the CL file that the program turns the other way, or by another angle."""
+    t, m = w.targets, len(w.targets)
+    if not t.sweep.any():
+        return []
+    rows = np.flatnonzero(w.inside & (t.sweep != 0.0)[np.minimum(w.owner, m - 1)])
+    i = w.owner[rows]
+    normal = t.normal[i]
+    begin = np.where((rows > 0)[:, None], w.tip[np.maximum(rows - 1, 0)], t.start[i])
+    u, v = begin - t.centre[i], w.tip[rows] - t.centre[i]
+    low, high = np.einsum("ni,ni->n", u, normal), np.einsum("ni,ni->n", v, normal)
+    step = np.arctan2(np.einsum("ni,ni->n", np.cross(u, v), normal), np.einsum("ni,ni->n", u, v) - low * high)
+    size = np.einsum("ni,ni->n", turns[rows], normal)
+    step = np.where(size != 0.0, step + 2.0 * np.pi * np.round((size - step) / (2.0 * np.pi)), step)
+    turned = np.bincount(i, weights=step, minlength=m)
+    radius = np.full(m, np.inf)
+    radius[i] = np.sqrt(np.maximum((v * v).sum(axis=1) - high * high, 1e-6))
+    some = np.bincount(i, minlength=m) > 0
+    bad = np.flatnonzero(some & (np.abs(turned - t.sweep) > 4.0 * (w.tolerance[0] + 2e-3) / radius))
+    if not len(bad):
+        return []
+    k = int(bad[0])
+    block = int(rows[np.searchsorted(i, k)])
+    return [Finding("arc", f"the tool turns by {np.degrees(turned[k]):.3f} degrees about the axis of the arc, the CL file "
+                    f"says {np.degrees(t.sweep[k]):.3f}", int(lines[t.row[k]]), int(w.poses.executed.line[block]), len(bad))]

@@ -1,0 +1,155 @@
+"""Where the part stands, which poses a program takes, and what is cut: all in the table frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from postproc.witness.commanded import ARC, HOLE, LINE, Commanded, unit
+from postproc.witness.evidence import Case, Executed
+from postproc.witness.machine import Chain, Rods
+from postproc.witness.text import Array
+
+CHUNK = 100_000
+
+
+class Unplaced(Exception):
+    """The set-up names a system that this witness has not found in the CL file."""
+
+
+def placement(setup: dict[str, Any], c: Commanded) -> tuple[Array, Array]:
+    """(rotation (3, 3), origin (3,)) that take the file's absolute frame to the table.
+
+    Raises:
+        Unplaced: where [part] stands by a system that is not known.
+    """
+    part = setup.get("part", {})
+    x = unit(np.array(part.get("x_axis", (1.0, 0.0, 0.0)), np.float64))
+    y = np.array(part.get("y_axis", (0.0, 1.0, 0.0)), np.float64)
+    y = unit(y - (x @ y) * x)
+    rotation, origin = np.stack([x, y, np.cross(x, y)], axis=1), np.array(part.get("origin", (0.0, 0.0, 0.0)), np.float64)
+    system = part.get("system", False)
+    if not system:
+        return rotation, origin
+    name = system if isinstance(system, str) else setup.get("work_offset") or next(iter(c.systems), "")
+    found = next((v for k, v in c.systems.items() if k.lower() == name.lower()), None)
+    if found is None:
+        raise Unplaced(name)
+    matrix, there = found
+    return rotation @ matrix.T, origin - rotation @ matrix.T @ there
+
+
+@dataclass(frozen=True)
+class Poses:
+    """Poses of a program's blocks by this witness's own kinematics; on rods those of the reader, held against the rods.
+
+    `own` False: the machine has geometric errors that the program corrects; poses are then those of the reader.
+    """
+
+    case: Case
+    executed: Executed
+    machine: Chain | Rods | None
+    own: bool
+    misfits: list[tuple[float, int]]
+
+    def lengths(self, rows: Array) -> Array:
+        """(K,) gauge length of the tool in the spindle; 0 where the program calls none: its tip is in the work offset."""
+        tools, number = self.case.setup.get("tools", {}), self.executed.tool[rows]
+        result = np.zeros(len(rows))
+        for n in np.unique(number).tolist():
+            result[number == n] = float((tools.get(str(int(n))) or {}).get("gauge_length") or 0.0)
+        return result
+
+    def before(self, rows: Array) -> Array:
+        """(K, J) joints where blocks begin."""
+        q = self.executed.joints[np.maximum(rows - 1, 0)]
+        return np.where((rows == 0)[:, None], self.executed.start, q)
+
+    def joints(self, rows: Array, t: float) -> Array:
+        """(K, J) joints of blocks at a fraction."""
+        e = self.executed
+        if t == 1.0:
+            return np.asarray(e.joints[rows])
+        q = np.empty((len(rows), e.joints.shape[1]))
+        straight = e.straight[rows]
+        here = rows[straight]
+        q[straight] = (1.0 - t) * self.before(here) + t * e.joints[here]
+        if not straight.all():
+            q[~straight] = e.joints_at(rows[~straight], t)
+        return q
+
+    def at(self, rows: Array, t: float) -> tuple[Array, Array]:
+        """(tip, axis) (K, 3) of blocks at a fraction of each."""
+        tip, axis = np.empty((len(rows), 3)), np.empty((len(rows), 3))
+        for first in range(0, len(rows), CHUNK):
+            part = slice(first, first + CHUNK)
+            tip[part], axis[part] = self._some(rows[part], t)
+        return tip, axis
+
+    def _some(self, rows: Array, t: float) -> tuple[Array, Array]:
+        e, length = self.executed, self.lengths(rows)
+        if isinstance(self.machine, Chain) and self.own:
+            return self.machine.pose(self.joints(rows, t), e.letters, length)
+        tip, axis = e.poses_at(rows, t)
+        if isinstance(self.machine, Rods) and self.own:
+            off = self.machine.misfit(self.joints(rows, t) if t < 1.0 else e.joints[rows], e.letters, tip, axis, length)
+            worst = int(np.nan_to_num(off, nan=np.inf).argmax())
+            self.misfits.append((float(np.nan_to_num(off[worst], nan=np.inf)), int(rows[worst])))
+        return tip, axis
+
+
+@dataclass(frozen=True)
+class Cut:
+    """The box (8, 3) and the sphere of what is cut."""
+
+    corners: Array
+    centre: Array
+    radius: float
+
+    def clear(self, tip: Array, axis: Array, margin: float) -> Array:
+        """(N,) True where the half line from a tip along its axis keeps `margin` mm from the box seen along the axis, or
+        from the sphere."""
+        rise = np.einsum("ni,ni->n", tip, axis)
+        above = rise - (axis @ self.corners.T).max(axis=1) >= margin
+        offset = tip - self.centre
+        along = np.minimum(np.einsum("ni,ni->n", offset, axis), 0.0)
+        apart = np.sqrt(np.maximum((offset * offset).sum(axis=1) - along * along, 0.0))
+        return np.asarray(above | (apart >= self.radius + margin))
+
+
+def cut_of(case: Case, c: Commanded, tip: Array, axis: Array, centre: Array, normal: Array,
+           place: tuple[Array, Array]) -> Cut | None:
+    """What the CL file cuts; tips, axes, centres and normals in the table frame. None where it cuts nothing."""
+    points = [tip[c.known & ((c.kind == LINE) | (c.kind == ARC))]]
+    holes = np.flatnonzero(c.known & (c.kind == HOLE))
+    if len(holes):
+        depth = np.array([x.depth for x in c.cycles])[c.cycle[holes]]
+        points.append(tip[holes] - np.nan_to_num(depth)[:, None] * axis[holes])
+    rows = np.flatnonzero(c.known & (c.arc >= 0))
+    rows = rows[rows > 0]
+    if len(rows):
+        k = c.arc[rows]
+        for share in np.linspace(0.05, 0.95, 19):
+            points.append(on_arc(tip[rows - 1], tip[rows], centre[k], normal[k], c.sweep[k], share))
+    every = np.concatenate(points)
+    every = every[np.isfinite(every).all(axis=1)]
+    if not len(every):
+        return None
+    low, high = every.min(axis=0), every.max(axis=0)
+    given = case.setup.get("clearance", {}).get("centre")
+    middle = 0.5 * (low + high) if given is None else place[0] @ np.array(given, np.float64) + place[1]
+    corners = np.stack(np.meshgrid(*zip(low, high, strict=True), indexing="ij"), axis=-1).reshape(8, 3)
+    return Cut(corners, middle, float(np.sqrt(((every - middle) ** 2).sum(axis=1).max())))
+
+
+def on_arc(start: Array, end: Array, centre: Array, normal: Array, sweep: Array, share: float | Array) -> Array:
+    """(N, 3) places on arcs and helices from `start` about (centre, normal) by `sweep`, at a share of each."""
+    share = np.broadcast_to(share, sweep.shape)
+    offset = start - centre
+    height = np.einsum("ni,ni->n", offset, normal)
+    flat = offset - height[:, None] * normal
+    rise = np.einsum("ni,ni->n", end - start, normal)
+    c, s = np.cos(share * sweep)[:, None], np.sin(share * sweep)[:, None]
+    return np.asarray(centre + (height + share * rise)[:, None] * normal + c * flat + s * np.cross(normal, flat))

@@ -1,0 +1,79 @@
+"""From the state of a reading to all positions at once: axes that hold on, systems, increments, arcs."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from postproc.witness import arcs
+from postproc.witness.commanded import ARC, HOLE, LINE, RAPID, START, Commanded, unit
+from postproc.witness.execution import Execution, Track, Z
+from postproc.witness.text import Array
+
+
+def assembled(e: Execution) -> Commanded:
+    """All positions of a file that is read."""
+    n, points = e.row, e.text.points
+    extra = np.array([row for row, *_ in e.extra], np.int64)
+    plain = np.ones(n, bool)
+    plain[extra] = False
+    numbers, line = np.empty((n, 6)), np.empty(n, np.int64)
+    numbers[plain], line[plain] = points, e.text.line
+    if len(extra):
+        numbers[extra] = [(*xyz, *axis) for _, xyz, axis, _ in e.extra]
+        line[extra] = [number for *_, number in e.extra]
+    tip, given = numbers[:, :3] * e.scale, ~np.isnan(numbers[:, 3])
+    common = given & (e.inside.column(n, np.int64) == 0) if e.dialect.local_three else np.zeros(n, bool)
+    axis = unit(_axes(e, numbers[:, 3:], given))
+    place = e.frame.column(n, np.int64)
+    for k in np.unique(place).tolist():
+        matrix, origin = e.frames[k]
+        if (matrix == np.eye(3)).all() and not origin.any():
+            continue
+        at = np.flatnonzero((place == k) & ~common)
+        tip[at], axis[at] = np.einsum("ij,nj->ni", matrix, tip[at]) + origin, np.einsum("ij,nj->ni", matrix, axis[at])
+    for row, step in e.deltas:
+        matrix = np.eye(3) if common[row] else e.frames[place[row]][0]
+        move = step[0] * axis[row] if len(step) == 1 else matrix @ np.array(step)
+        tip[row] = tip[row - 1] + e.scale * move if row else np.nan
+    kind, cycle = np.full(n, LINE, np.int8), e.cycle.column(n, np.int64)
+    arc, centre, normal, sweep, doubtful = arcs.resolved(e.arcs, tip, place, common, e.frames, e.scale, e.dialect)
+    kind[list(e.arcs.keys() & set(range(n)))] = ARC
+    cycle[arc >= 0] = -1
+    start = np.array(sorted(e.start), np.int64)
+    cycle[start[start < n]] = -1
+    kind[cycle >= 0] = HOLE
+    rapid = np.array(sorted(e.rapid), np.int64)
+    rapid = rapid[rapid < n]
+    kind[rapid[kind[rapid] != HOLE]] = RAPID
+    kind[start[start < n]] = START
+    feed = np.array(e.feed.values, np.float64)[_index(e.feed, n)]
+    spindle = np.array(e.spindle.values, np.float64)[_index(e.spindle, n)]
+    known = e.known.column(n, bool) & np.isfinite(tip).all(axis=1) & np.isfinite(axis).all(axis=1)
+    gap = np.zeros(n, bool)
+    gap[[row for row in e.gap if row < n] + doubtful] = True
+    return Commanded(tip, axis, kind, line, known, gap, feed[:, 0], feed[:, 1] > 0, feed[:, 2] > 0, arc, centre, normal,
+                     sweep, cycle, tuple(e.cycles), e.tool.column(n, np.int64), e.name.column(n, np.int64), tuple(e.names),
+                     spindle[:, 0].astype(np.int64), spindle[:, 1], e.coolant.column(n, np.int64), e.systems, e.unread)
+
+
+def _index(track: Track, n: int) -> Array:
+    starts = np.minimum(np.append(track.rows, n), n)
+    return np.repeat(np.arange(len(track.rows)), np.diff(starts))
+
+
+def _axes(e: Execution, written: Array, given: Array) -> Array:
+    """The tool axis of every row: its own, else the last that was written or set."""
+    n = len(written)
+    if given.all():
+        return written
+    source, values = np.where(given, np.arange(n), -1), written
+    marks = {row: axis for row, axis in e.axes.items() if row < n and not given[row]}
+    if e.dialect.local_three:
+        for row in (np.flatnonzero(~given[1:] & given[:-1]) + 1).tolist():
+            marks.setdefault(row, Z)
+    if marks:
+        rows = np.array(list(marks), np.int64)
+        values = written.copy()
+        values[rows], source[rows] = list(marks.values()), rows
+    source = np.maximum.accumulate(source)
+    return np.where((source < 0)[:, None], Z, values[source])

@@ -1,0 +1,201 @@
+"""Feeds, holes, tool, spindle and coolant of every cut against the CL file and the set-up."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from postproc.witness.commanded import ARC, LINE, UNFOLLOWED, UNKNOWN, Commanded, Cycle
+from postproc.witness.evidence import Case, Finding
+from postproc.witness.machine import limits_of
+from postproc.witness.motion import Walked
+from postproc.witness.stretches import BOTTOM
+from postproc.witness.text import Array
+
+ALLOWED = 1.02
+"""share by which a feed may be off: short blocks carry the rounding of their words"""
+_PECKED = ("DEEP", "BRKCHP")
+_FEED_OUT = ("BORE", "REAM", "TAP")
+
+
+def feeds_of(c: Commanded, setup: dict[str, Any]) -> Array:
+    """(N,) mm/min that the CL file asks for at every position, holes by their cycle; NaN where it does not say."""
+    own = np.array([(x.feed, x.per_turn) for x in c.cycles] + [(math.nan, 0.0)], np.float64)
+    hole = c.cycle >= 0
+    feed = np.where(hole, own[c.cycle, 0], c.feed)
+    per_turn = np.where(hole, own[c.cycle, 1] > 0, c.per_turn)
+    tap = np.array([x.kind == "TAP" for x in c.cycles] + [False])[c.cycle]
+    default = (setup.get("output") or {}).get("feed")
+    if default:
+        feed = np.where(np.isnan(feed) & ~c.inverse & ~tap, float(default), feed)
+        per_turn = per_turn & ~(np.isnan(c.feed) & ~hole)
+    return np.asarray(np.where(per_turn, feed * c.rpm, np.where(c.inverse & ~hole, math.nan, feed)))
+
+
+def check_feeds(w: Walked, c: Commanded, case: Case, table: dict[str, Any], match: Array) -> tuple[list[Finding], int]:
+    """Cuts that are faster than programmed, or slower and no axis explains it; the number of cuts that were compared."""
+    t, e = w.targets, w.poses.executed
+    rows = np.flatnonzero(w.inside & (w.code > 0) & ~w.gap & ((w.kind == LINE) | (w.kind == ARC)) & w.on_way())
+    m = len(t)
+    seconds = np.bincount(w.owner[rows], weights=e.seconds[rows], minlength=m)[:m]
+    length = np.sqrt(((t.tip - t.start) ** 2).sum(axis=1))
+    round_ = t.sweep != 0.0
+    flat = t.start - t.centre
+    rise = np.einsum("ni,ni->n", t.tip - t.start, t.normal)
+    radius = np.sqrt(np.maximum((flat * flat).sum(axis=1) - np.einsum("ni,ni->n", flat, t.normal) ** 2, 0.0))
+    length = np.where(round_, np.hypot(radius * np.abs(t.sweep), rise), length)
+    feed = feeds_of(c, case.setup)[t.row]
+    inverse = c.inverse[t.row] & (t.kind != BOTTOM)
+    asked = np.where(inverse, 60.0 / c.feed[t.row], 60.0 * length / feed)
+    shorter = 0.002 + 4.0 * case.tolerance + np.abs(t.sweep) * case.tolerance
+    slack = shorter * np.where(inverse, asked / np.maximum(length, 1e-3), 60.0 / feed)
+    check = ((t.kind == LINE) | (t.kind == ARC)) & ~t.gap & ~t.free & (match >= 0) & (seconds > 0.0) & np.isfinite(asked)
+    fast = np.flatnonzero(check & (seconds * ALLOWED + slack < asked))
+    found = _feed_finding(w, c, fast, asked / np.where(seconds > 0.0, seconds, 1.0), match)
+    if not case.planned:
+        slow = np.flatnonzero(check & (seconds > ALLOWED * asked + slack))
+        needed = _needed(w, rows, slow, asked / np.maximum(length, 1e-9), table)
+        slow = slow[seconds[slow] > ALLOWED * np.maximum(asked[slow], needed[slow]) + slack[slow]]
+        found += _feed_finding(w, c, slow, asked / np.where(seconds > 0.0, seconds, 1.0), match)
+    return found, int(check.sum())
+
+
+def _needed(w: Walked, rows: Array, slow: Array, pace: Array, table: dict[str, Any]) -> Array:
+    """(M,) s of the targets `slow` where every block takes what the feed, `pace` (M,) s/mm, and the velocities of the axes
+    ask for."""
+    result = np.zeros(len(w.targets))
+    here = rows[np.isin(w.owner[rows], slow)]
+    if len(here):
+        _, speed = limits_of(table, w.poses.executed.letters)
+        step = w.tip[here] - w.tip[np.maximum(here - 1, 0)]
+        q, most = w.poses.before(here), np.sqrt((step * step).sum(axis=1)) * pace[w.owner[here]]
+        for t in (0.25, 0.5, 0.75, 1.0):
+            after = w.poses.joints(here, t)
+            most = np.maximum(most, 4.0 * (np.abs(after - q) / speed).max(axis=1))
+            q = after
+        np.add.at(result, w.owner[here], most)
+    return result
+
+
+def _feed_finding(w: Walked, c: Commanded, at: Array, ratio: Array, match: Array) -> list[Finding]:
+    if not len(at):
+        return []
+    k = at[int(np.abs(np.log(np.maximum(ratio[at], 1e-9))).argmax())]
+    return [Finding("feed", f"the cut runs at {ratio[k]:.3f} times the feed of the CL file", int(c.line[w.targets.row[k]]),
+                    int(w.poses.executed.line[match[k]]), len(at))]
+
+
+def check_states(w: Walked, c: Commanded, case: Case) -> tuple[list[Finding], dict[str, int]]:
+    """Tool, spindle, speed and coolant while cutting; how many blocks each was compared in."""
+    e = w.poses.executed
+    rows = np.flatnonzero(w.inside & (w.code > 0) & ((w.kind == LINE) | (w.kind == ARC) | (w.kind == BOTTOM)))
+    row = w.targets.row[w.owner[rows]]
+    tool, direction, rpm, coolant = _tools(c, case.setup)[row], c.spindle[row], c.rpm[row], c.coolant[row]
+    tap = np.array([x.kind == "TAP" for x in c.cycles] + [False])[c.cycle[row]]
+    flow = e.coolant[rows]
+    stated = direction != UNKNOWN
+    speed = stated & (direction != 0) & np.isfinite(rpm) & ~tap
+    some = _states_coolant(case.setup.get("tools")) or _states_coolant(case.setup.get("output"))
+    wet = np.where(coolant == UNKNOWN, some | (flow == 0), np.where(coolant == 0, flow == 0, flow > 0))
+    wet &= (coolant != 1) | ((flow & 1) > 0)
+    checks = (("tool", "the tool is T{0:g}, the CL file cuts with T{1:g}", tool != UNKNOWN, e.tool[rows], tool,
+               e.tool[rows] == tool),
+              ("spindle", "the spindle turns {0:g} (1 M3, -1 M4, 0 stopped), the CL file says {1:g}", stated & ~tap,
+               e.spindle[rows], direction, e.spindle[rows] == direction),
+              ("spindle", "the spindle speed is {0:g}, the CL file says {1:g}", speed, e.rpm[rows], rpm,
+               np.abs(e.rpm[rows] - rpm) <= 0.5 + 1e-3 * np.abs(rpm)),
+              ("coolant", "the coolant is {0:g} (0 off), the CL file says {1:g} (0 off, 1 flood, 2 on)",
+               (coolant != UNFOLLOWED) & ((coolant != UNKNOWN) | (not some)), flow, coolant, wet))
+    found, counts = [], dict[str, int]()
+    for code, text, compared, is_, wanted, good in checks:
+        bad = np.flatnonzero(compared & ~good)
+        counts[code] = counts.get(code, 0) + int(compared.sum())
+        if len(bad):
+            k = int(bad[0])
+            found.append(Finding(code, text.format(float(is_[k]), float(wanted[k])), int(c.line[row[k]]),
+                                 int(e.line[rows[k]]), len(bad)))
+    return found, counts
+
+
+def _states_coolant(table: Any) -> bool:
+    """True where a table of the set-up, or one in it, says what coolant flows where the CL file does not."""
+    if not isinstance(table, dict):
+        return False
+    return any((key == "coolant" and bool(value)) or _states_coolant(value) for key, value in table.items())
+
+
+def _tools(c: Commanded, setup: dict[str, Any]) -> Array:
+    """(N,) number of the tool, by its name where the set-up numbers that; UNKNOWN where nothing is loaded."""
+    asked = {str(name).upper(): int(n) for name, n in (setup.get("tool_numbers") or {}).items()}
+    if not asked:
+        return c.tool
+    own = np.array([asked.get(name, UNKNOWN) for name in c.names] + [UNKNOWN])[c.name]
+    return np.asarray(np.where(own != UNKNOWN, own, UNKNOWN))
+
+
+def check_holes(w: Walked, c: Commanded, case: Case, match: Array) -> tuple[list[Finding], int]:
+    """Depth, pecks, dwell and thread of every hole."""
+    t, e = w.targets, w.poses.executed
+    bad: dict[str, list[tuple[int, int]]] = {}
+    holes = np.flatnonzero((t.kind == BOTTOM) & (match >= 0))
+    edges = np.searchsorted(w.owner, np.append(holes, 0)[:-1], side="left")
+    for i, first in zip(holes.tolist(), edges.tolist(), strict=True):
+        last = int(match[i])
+        blocks = np.arange(first, last + 1)
+        if len(blocks):
+            for what in _hole_faults(w, i, blocks, c.cycles[c.cycle[t.row[i]]], float(c.rpm[t.row[i]]), case.tolerance):
+                bad.setdefault(what, []).append((i, last))
+    return [Finding("hole", what, int(c.line[t.row[at[0][0]]]), int(e.line[at[0][1]]), len(at))
+            for what, at in bad.items()], len(holes)
+
+
+def _hole_faults(w: Walked, i: int, blocks: Array, cycle: Cycle, rpm: float, tolerance: float) -> list[str]:
+    t, e = w.targets, w.poses.executed
+    depth = (t.tip[i] - w.tip[blocks]) @ t.axis[i]
+    total, found = cycle.depth + cycle.clearance, []
+    if depth.max() > tolerance + 1e-6:
+        found.append("the hole is deeper than the CL file says")
+    fed = e.code[blocks] > 0
+    deepest = np.maximum.accumulate(np.where(fed, depth, -np.inf))
+    reached = np.append(-total, deepest[:-1])
+    if (~fed & (depth > np.maximum(reached, -total) + 1e-3)).any():
+        found.append("rapid motion into uncut material of a hole")
+    steps = np.diff(np.append(-cycle.depth, np.unique(np.round(deepest[np.isfinite(deepest)], 6))))
+    pecked = cycle.kind in _PECKED and len(cycle.steps) > 0
+    if pecked and steps.max(initial=0.0) > max(cycle.steps) + 0.01:
+        found.append("the hole is drilled in deeper pecks than the CL file says")
+    if not cycle.steps and len(blocks) > 1 and (np.diff(depth) < -0.01).any():
+        found.append("the hole is drilled in pecks, the CL file has none")
+    rest = float(e.dwell[blocks].sum())
+    if cycle.dwell == cycle.dwell and not cycle.dwell * 0.99 - 2e-3 <= rest <= cycle.dwell * 1.01 + 2e-3:
+        found.append(f"the tool rests {rest:g} s in the hole, the CL file says {cycle.dwell:g} s")
+    pitch = e.pitch[blocks[-1]]
+    if cycle.kind != "TAP" and math.isfinite(pitch):
+        found.append("the hole is tapped, the CL file does not tap it")
+    wanted = cycle.feed if cycle.per_turn else cycle.feed / rpm if rpm > 0.0 else math.nan
+    if cycle.kind == "TAP" and abs(abs(pitch) - wanted) > 0.001 * wanted + 1e-4:
+        found.append(f"the thread has a pitch of {abs(pitch):g} mm, by the CL file {wanted:g} mm")
+    out = blocks[-1] + 1
+    if cycle.kind in _FEED_OUT and out < len(e) and e.code[out] == 0:
+        found.append("the tool leaves the hole in rapid, the CL file asks for feed")
+    if cycle.kind != "TAP":
+        found += _feed_fault(w, blocks[fed & (depth > reached + 1e-3)], cycle, rpm)
+    return found
+
+
+def _feed_fault(w: Walked, blocks: Array, cycle: Cycle, rpm: float) -> list[str]:
+    """That a block which goes deeper than those before it is faster than the feed of the cycle."""
+    e = w.poses.executed
+    feed = cycle.feed * rpm if cycle.per_turn else cycle.feed
+    step = w.tip[blocks] - w.tip[np.maximum(blocks - 1, 0)]
+    length = np.sqrt((step * step).sum(axis=1))
+    long = (length > 0.1) & (e.seconds[blocks] > 0.0)
+    if not math.isfinite(feed) or not long.any():
+        return []
+    ratio = 60.0 * length[long] / e.seconds[blocks[long]] / feed
+    worst = int((ratio - 0.02 / length[long]).argmax())
+    if ratio[worst] <= ALLOWED + 0.02 / length[long][worst]:
+        return []
+    return [f"the hole is drilled at {ratio[worst]:.3f} times the feed of the CL file"]

@@ -1,0 +1,179 @@
+"""Positions of the CL file as targets of a program, and how far blocks are from the way between two of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from postproc.witness.commanded import ARC, HOLE, LINE, RAPID, START, Commanded
+from postproc.witness.place import Poses
+from postproc.witness.text import Array
+from postproc.witness.walk import walk
+
+ENTER, BOTTOM = 5, 6
+"""kinds of targets: the start plane of a hole, its bottom"""
+
+
+@dataclass(frozen=True)
+class Targets:
+    """M poses that a program has to come to, in order, in the table frame.
+
+    Attributes:
+        tip, axis (M, 3); kind (M,): RAPID, LINE, ARC, ENTER, BOTTOM; row (M,): of the CL file
+        start (M, 3), start_axis: where the way there begins; free (M,): that is wherever the tool stands
+        gap (M,): the way there is not known; centre, normal (M, 3), sweep (M,): of arcs, 0 for others
+    """
+
+    tip: Array
+    axis: Array
+    kind: Array
+    row: Array
+    start: Array
+    start_axis: Array
+    free: Array
+    gap: Array
+    centre: Array
+    normal: Array
+    sweep: Array
+
+    def __len__(self) -> int:
+        return len(self.row)
+
+
+def targets_of(c: Commanded, tip: Array, axis: Array, centre: Array, normal: Array) -> Targets:
+    """The targets of a CL file; `tip`, `axis`, `centre`, `normal` are its own in the table frame."""
+    depth = np.array([x.depth for x in c.cycles] + [0.0])[c.cycle]
+    above = np.array([x.clearance for x in c.cycles] + [0.0])[c.cycle]
+    hole = c.kind == HOLE
+    plain = hole & ~(np.isfinite(depth) & np.isfinite(above))
+    good = c.known & ~plain & (c.kind != START)
+    count = np.where(good, np.where(hole, 2, 1), 0)
+    row = np.repeat(np.arange(len(c)), count)
+    second = np.zeros(len(row), bool)
+    second[1:] = (row[1:] == row[:-1])
+    on_hole = hole[row]
+    kind = np.where(on_hole, np.where(second, BOTTOM, ENTER), c.kind[row])
+    lift = np.where(on_hole, np.where(second, -depth[row], above[row]), 0.0)
+    there = tip[row] if not on_hole.any() else tip[row] + lift[:, None] * axis[row]
+    before = np.maximum(row - 1, 0)
+    start, start_axis = tip[before], axis[before]
+    free = (row == 0) | ~c.known[before] | hole[before] | on_hole
+    if on_hole.any():
+        start[second], start_axis[second], free = there[np.flatnonzero(second) - 1], axis[row[second]], free & ~second
+    lost = np.concatenate([[0], np.cumsum(~good & (c.kind != START))])
+    skipped = np.zeros(len(row), bool)
+    if len(row):
+        skipped[1:] = lost[row[1:]] != lost[row[:-1] + 1]
+        skipped[0] = lost[row[0]] > 0
+    arc = c.arc[row]
+    round_ = (kind == ARC) & (arc >= 0)
+    m = len(row)
+    mid, about, sweep = np.zeros((m, 3)), np.zeros((m, 3)), np.zeros(m)
+    mid[round_], about[round_], sweep[round_] = centre[arc[round_]], normal[arc[round_]], c.sweep[arc[round_]]
+    gap = c.gap[row] | (skipped & ~second)
+    return Targets(there, axis[row], kind, row, start, start_axis, free, gap, mid, about, np.where(gap, 0.0, sweep))
+
+
+def matched(targets: Targets, tip: Array, axis: Array, turns: Array, tolerance: float,
+            axis_tolerance: float) -> tuple[Array, Array]:
+    """(block (M,) that ends at each target, -1; target (E,) that each block serves, M behind the last)."""
+    around = np.concatenate([targets.centre, targets.normal], axis=1)
+    match = walk(tip, axis, turns, targets.tip, targets.axis, targets.sweep, around, (tolerance, axis_tolerance))
+    reached = match[:int(np.argmax(match < 0))] if (match < 0).any() else match
+    return match, np.searchsorted(reached, np.arange(len(tip)), side="left")
+
+
+def turns_of(poses: Poses) -> Array:
+    """(E, 3) rotation vectors of the blocks that are arcs, in the table frame; 0 for others."""
+    e = poses.executed
+    result = np.zeros((len(e), 3))
+    rows = np.flatnonzero((e.code == 2) & np.isfinite(e.sweep))
+    if not len(rows):
+        return result
+    part = np.minimum(0.25, 0.5 * np.pi / np.maximum(np.abs(e.sweep[rows]), 1e-12))
+    points = []
+    for share in (0.0, 1.0, 2.0):
+        q = e.joints_at(rows, share * part)
+        points.append(_pose_of(poses, rows, q, share * part))
+    cross = np.cross(points[1] - points[0], points[2] - points[1])
+    size = np.sqrt((cross * cross).sum(axis=1))
+    result[rows] = cross * (np.abs(e.sweep[rows]) / np.where(size > 0.0, size, 1.0))[:, None]
+    return result
+
+
+def _pose_of(poses: Poses, rows: Array, q: Array, t: Array) -> Array:
+    from postproc.witness.machine import Chain
+
+    if isinstance(poses.machine, Chain) and poses.own:
+        return poses.machine.pose(q, poses.executed.letters, poses.lengths(rows))[0]
+    return poses.executed.poses_at(rows, t)[0]
+
+
+def off(targets: Targets, i: Array, tip: Array, axis: Array, start: Array, start_axis: Array) -> tuple[Array, Array]:
+    """(mm, rad) (K,) by which poses are off the way to the targets `i` (K,) from `start`: a line or an arc, and the great
+    circle of the axes."""
+    away = from_line(tip, start, targets.tip[i])
+    round_ = np.flatnonzero(targets.sweep[i] != 0.0)
+    if len(round_):
+        k = i[round_]
+        away[round_] = _from_arc(tip[round_], start[round_], targets.tip[k], targets.centre[k], targets.normal[k],
+                                 targets.sweep[k])
+    return away, _from_circle(axis, start_axis, targets.axis[i])
+
+
+def from_line(tip: Array, start: Array, end: Array) -> Array:
+    """(K,) mm from lines between two points."""
+    way, offset = end - start, tip - start
+    length = (way * way).sum(axis=1)
+    share = np.clip((offset * way).sum(axis=1) / np.where(length > 0.0, length, 1.0), 0.0, 1.0)
+    rest = offset - share[:, None] * way
+    return np.asarray(np.sqrt((rest * rest).sum(axis=1)))
+
+
+def _from_arc(tip: Array, start: Array, end: Array, centre: Array, normal: Array, sweep: Array) -> Array:
+    """(K,) mm from arcs and helices: off the radius and the rise that belong to the angle."""
+    first, here = start - centre, tip - centre
+    low, height = np.einsum("ni,ni->n", first, normal), np.einsum("ni,ni->n", here, normal)
+    u, v = first - low[:, None] * normal, here - height[:, None] * normal
+    last = end - centre
+    w = last - np.einsum("ni,ni->n", last, normal)[:, None] * normal
+    radius, final, size = (np.sqrt((x * x).sum(axis=1)) for x in (u, w, v))
+    angle = np.arctan2(np.einsum("ni,ni->n", np.cross(u, v), normal), np.einsum("ni,ni->n", u, v)) % (2.0 * np.pi)
+    rise = np.einsum("ni,ni->n", end - start, normal)
+    best = np.full(len(tip), np.inf)
+    for turn in range(-1, int(np.abs(sweep).max() // (2.0 * np.pi)) + 1):
+        at = np.clip((angle + 2.0 * np.pi * turn) / sweep, 0.0, 1.0)
+        miss = (angle + 2.0 * np.pi * turn - at * sweep) * size
+        off_radius = size - (radius + at * (final - radius))
+        best = np.minimum(best, np.sqrt(off_radius**2 + (height - low - at * rise) ** 2 + miss**2))
+    return best
+
+
+def _from_circle(axis: Array, first: Array, last: Array) -> Array:
+    """(K,) rad from the great circle between two directions."""
+    square = np.cross(first, last)
+    size = np.sqrt((square * square).sum(axis=1))
+    ends = np.minimum(_angle(axis, first), _angle(axis, last))
+    if not (size > 1e-9).any():
+        return ends
+    pole = square / np.where(size > 1e-9, size, 1.0)[:, None]
+    inside = (np.einsum("ni,ni->n", np.cross(pole, first), axis) >= 0.0) & (
+        np.einsum("ni,ni->n", np.cross(last, pole), axis) >= 0.0)
+    aside = np.abs(np.arcsin(np.clip(np.einsum("ni,ni->n", pole, axis), -1.0, 1.0)))
+    return np.where((size > 1e-9) & inside, np.minimum(aside, ends), ends)
+
+
+def _angle(a: Array, b: Array) -> Array:
+    d = a - b
+    return np.asarray(2.0 * np.arcsin(np.minimum(0.5 * np.sqrt((d * d).sum(axis=1)), 1.0)))
+
+
+def is_cut(kind: Array) -> Array:
+    """(N,) True for targets that are come to at feed."""
+    return np.asarray((kind == LINE) | (kind == ARC) | (kind == BOTTOM))
+
+
+def is_rapid(kind: Array) -> Array:
+    """(N,) True for targets that are come to in rapid."""
+    return np.asarray((kind == RAPID) | (kind == ENTER))

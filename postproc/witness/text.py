@@ -1,0 +1,236 @@
+"""A CL file as rows of numbers and records between them: comments off, subroutines written out, plain GOTO lines at once."""
+
+from __future__ import annotations
+
+import codecs
+import re
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+Array = np.ndarray[Any, np.dtype[Any]]
+Word = float | str
+JOIN = b"\x01"
+"""stands for the end of a line that the next one continues, so that lines can still be counted"""
+_NUMBER = rb"[ \t\x01]*[-+]?(?:\d+\.?\d*|\.\d+)(?:[Ee][-+]?\d+)?[ \t\x01]*"
+_THREE = _NUMBER + rb"," + _NUMBER + rb"," + _NUMBER
+_PLAIN = rb"[ \t]*GOTO[ \t]*/" + _THREE + rb"(?:," + _THREE + rb")?"
+_OTHER = re.compile(rb"^(?!" + _PLAIN + rb"$)[^\n]*", re.MULTILINE)
+_COMMENT = re.compile(rb"\$\$[^\n]*")
+_GOES_ON = re.compile(rb"(?<!\$)\$(?!\$)[^\n]*\n")
+_SUBROUTINE = re.compile(rb"^[ \t]*DEFSUB[ \t]*/([^\n$]*)\n(.*?)^[ \t]*ENDSUB[^\n]*$", re.MULTILINE | re.DOTALL)
+_CALL = re.compile(rb"^[ \t]*CALSUB[ \t]*/([^\n$]*)$", re.MULTILINE)
+_CATIA = re.compile(rb"^[ \t]*\$\$\*CATIA0[^\n]*\n[ \t]*\$\$[^\n]*\n((?:[ \t]*\$\$[^\n]*\n){3})", re.MULTILINE)
+_MAJOR = re.compile(r"(\$\$->\s*[\w-]+|[^/]*)/?(.*)", re.DOTALL)
+TEXT_WORDS = ("PARTNO", "PPRINT", "INSERT", "REMARK", "TPRINT", "LPRINT", "PPLABEL", "LETTER")
+_BARE = re.compile(r"(?:" + "|".join(TEXT_WORDS) + r")\b", re.IGNORECASE)
+_CHUNK = 1 << 23
+_DEEP = 10
+
+
+@dataclass(frozen=True)
+class Record:
+    """A record that is no plain GOTO: its word, what stands behind its slash, that in words and numbers."""
+
+    major: str
+    body: str
+    words: tuple[Word, ...]
+
+    @property
+    def numbers(self) -> list[float]:
+        """Numbers among the words."""
+        return [w for w in self.words if isinstance(w, float)]
+
+    def has(self, *words: str) -> bool:
+        """True where one of the words stands in it."""
+        return any(w in self.words for w in words)
+
+    def after(self, *names: str) -> float | None:
+        """The number right behind the first of the words that is there."""
+        for name in names:
+            if name in self.words:
+                at = self.words.index(name) + 1
+                value = self.words[at] if at < len(self.words) else None
+                return value if isinstance(value, float) else None
+        return None
+
+
+@dataclass(frozen=True)
+class Text:
+    """Plain points: numbers (N, 6), NaN where a line has three, line (N,); records with `before`, points before each."""
+
+    points: Array
+    line: Array
+    records: list[Record]
+    before: list[int]
+    lines: list[int]
+    subroutines: bool
+
+
+def read(data: bytes) -> Text:
+    """Records and points of a CL file in the order in which they are executed."""
+    text = _plain(data)
+    text, line_of = _written_out(text)
+    spans = [m.span() for m in _OTHER.finditer(text)]
+    raw = np.frombuffer(text, np.uint8)
+    ends = np.flatnonzero((raw == 10) | (raw == JOIN[0]))
+    kept, at = [], 0
+    for first, last in spans:
+        kept.append(text[at:first])
+        at = last + 1
+    kept.append(text[at:])
+    lengths = [part.count(b"\n") + (1 if k == len(kept) - 1 and part.strip() and not part.endswith(b"\n") else 0)
+               for k, part in enumerate(kept)]
+    before = np.cumsum(lengths)
+    rows = _numbers(b"".join(kept))
+    starts = np.searchsorted(ends, [first for first, _ in spans]) if spans else np.zeros(0, np.int64)
+    found = [_record(text[first:last]) for first, last in spans]
+    used = [k for k, r in enumerate(found) if r.major or r.body]
+    lines = line_of[starts] if spans else starts
+    return Text(rows, _lines_of_points(text, spans, ends, line_of), [found[k] for k in used],
+                [int(before[k]) for k in used], [int(lines[k]) for k in used], b"CALSUB" in text or b"SUB-BEGIN" in text)
+
+
+def _lines_of_points(text: bytes, spans: list[tuple[int, int]], ends: Array, line_of: Array) -> Array:
+    """Lines of the plain points: all line ends but those of other records, and those that only continue."""
+    real = ends[np.frombuffer(text, np.uint8)[ends] == 10]
+    if not text.endswith(b"\n"):
+        real = np.append(real, len(text))
+    other = np.array([last for _, last in spans], np.int64)
+    plain = np.setdiff1d(real, other, assume_unique=True)
+    begins = np.append(-1, real)[np.searchsorted(real, plain)] + 1
+    return np.asarray(line_of[np.searchsorted(ends, begins)])
+
+
+def _plain(data: bytes) -> bytes:
+    """ASCII with LF, without comments but data comments at the start of a line, continued lines joined by JOIN."""
+    for bom, encoding in ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16")):
+        if data.startswith(bom):
+            data = data.decode(encoding, "replace").encode("utf-8")
+    for old, new in ((b"\r\n", b"\n"), (b"\r", b"\n"), (b"\x00", b" "), (b"\x1a", b" ")):
+        if old in data:
+            data = data.replace(old, new)
+    if b"*CATIA0" in data:
+        data = _CATIA.sub(_catia_system, data)
+    if b"$" not in data:
+        return data
+    data = _COMMENT.sub(_without_comment, data)
+    return _GOES_ON.sub(b" " + JOIN, data) if b"$" in data else data
+
+
+def _without_comment(found: re.Match[bytes]) -> bytes:
+    """A comment of data stays, where it begins its line."""
+    at, text = found.start(), found.string
+    alone = not text[text.rfind(b"\n", 0, at) + 1:at].strip()
+    return found[0] if alone and found[0].startswith(b"$$->") else b""
+
+
+def _catia_system(found: re.Match[bytes]) -> bytes:
+    """The rows of a CATIA axis system as a record of their own, of as many lines."""
+    rows = [row.replace(b"$$", b" ").split() for row in found[1].splitlines()]
+    good = all(len(row) == 4 for row in rows)
+    body = b",".join(v for row in rows for v in row) if good else b"?"
+    return b"CATIA0/" + body + b"\n" * found[0].count(b"\n")
+
+
+def _written_out(text: bytes) -> tuple[bytes, Array]:
+    """The text with subroutines in the places of their calls; the line of the file of each of its lines."""
+    count = text.count(b"\n") + text.count(JOIN) + 1
+    if b"DEFSUB" not in text:
+        return text, np.arange(1, count + 1)
+    bodies: dict[bytes, tuple[bytes, int]] = {}
+
+    def define(found: re.Match[bytes]) -> bytes:
+        first = _ends(text[:found.start(2)])
+        bodies[found[1].strip()] = found[2], first
+        return b"\n" * _ends(found[0])
+
+    rest = _SUBROUTINE.sub(define, text)
+    parts: list[tuple[bytes, Array]] = []
+    _expand(rest, 1, bodies, parts, 0)
+    return b"\n".join(p for p, _ in parts), np.concatenate([n for _, n in parts])
+
+
+def _ends(text: bytes) -> int:
+    return text.count(b"\n") + text.count(JOIN)
+
+
+def _expand(text: bytes, first: int, bodies: dict[bytes, tuple[bytes, int]], parts: list[tuple[bytes, Array]],
+            deep: int) -> None:
+    at = 0
+    for call in _CALL.finditer(text):
+        name = call[1].strip()
+        _piece(text[at:call.start()].removesuffix(b"\n"), first + _ends(text[:at]), parts, at < call.start())
+        here = first + _ends(text[:call.start()])
+        at = min(call.end() + 1, len(text))
+        if name in bodies and deep < _DEEP:
+            body, line = bodies[name]
+            _piece(b"SUB-BEGIN", here, parts)
+            _expand(body.removesuffix(b"\n"), line + 1, bodies, parts, deep + 1)
+            _piece(b"SUB-END", here, parts)
+        else:
+            _piece(b"SUB-UNKNOWN", here, parts)
+    _piece(text[at:], first + _ends(text[:at]), parts, at < len(text))
+
+
+def _piece(text: bytes, first: int, parts: list[tuple[bytes, Array]], some: bool = True) -> None:
+    if some:
+        parts.append((text, np.arange(first, first + _ends(text) + 1)))
+
+
+def _numbers(text: bytes) -> Array:
+    """(N, 6) of plain GOTO lines."""
+    found, at = [np.zeros((0, 6))], 0
+    while at < len(text):
+        stop = text.find(b"\n", min(at + _CHUNK, len(text) - 1)) + 1 or len(text)
+        found.append(_some_numbers(text[at:stop]))
+        at = stop
+    return np.concatenate(found)
+
+
+_TO_COMMAS = bytes.maketrans(b"\n", b",")
+
+
+def _some_numbers(text: bytes) -> Array:
+    text = text.strip(b"\n")
+    if not text:
+        return np.zeros((0, 6))
+    raw = np.frombuffer(text, np.uint8)
+    ends = np.append(np.flatnonzero(raw == 10), len(raw))
+    count = np.diff(np.searchsorted(np.flatnonzero(raw == ord(",")), ends), prepend=0) + 1
+    values = np.fromstring(text.translate(_TO_COMMAS, b"GOTO/ \t\x01"), sep=",")
+    assert len(values) == count.sum()
+    result = np.full((len(count), 6), np.nan)
+    wide = count == 6
+    first = np.cumsum(count) - count
+    result[:, :3] = values[first[:, None] + np.arange(3)]
+    result[wide, 3:] = values[first[wide][:, None] + np.arange(3, 6)]
+    return result
+
+
+@lru_cache(maxsize=100_000)
+def _record(raw: bytes) -> Record:
+    text = raw.replace(JOIN, b" ").decode("latin-1").strip()
+    if not text:
+        return Record("", "", ())
+    if (free := _BARE.match(text)) is not None:
+        return Record(free[0].upper(), text[free.end():].lstrip(" /"), ())
+    found = _MAJOR.match(text)
+    assert found is not None
+    major = re.sub(r"\s+", " ", found[1].strip()).upper().replace("$$-> ", "$$->")
+    body = found[2].strip()
+    return Record(re.sub(r"^(GOTO|CIRCLE|FEDRAT|CYCLE)\b.*", r"\1", major), body, words_of(body))
+
+
+def words_of(body: str) -> tuple[Word, ...]:
+    """Numbers and words behind a slash, between commas and blanks, capitals."""
+    result: list[Word] = []
+    for part in re.split(r"[,\s()]+", body):
+        if part:
+            try:
+                result.append(float(part))
+            except ValueError:
+                result.append(part.upper())
+    return tuple(result)

@@ -1,0 +1,112 @@
+"""The witness's reading and kinematics beside the project's own: two ways to one result."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import machines
+import postproc
+import toolpaths
+from machines.loader import builtin
+from postproc.second_witness import machine_tables
+from postproc.summary import as_text
+from postproc.witness.clfile import commanded
+from postproc.witness.commanded import HOLE, LINE
+from postproc.witness.machine import Chain, Rods, kinematics_of, limits_of, merged
+from toolpaths.diagnostics import has_errors
+from toolpaths.toolpath import Kind, Role
+
+ROOT = Path(__file__).parents[3]
+FILES = sorted(p for folder in ("samples", "tests/golden") for p in (ROOT / folder).rglob("*")
+               if p.suffix in (".cls", ".apt", ".ncl", ".as", ".clt", ".aptsource"))
+TEXTS = {
+    "arcs of generic files": "GOTO/10,0,0\nCIRCLE/0,0,0,0,0,1,10\nGOTO/0,10,0\nCIRCLE/0,0,0,0,0,-1,10\nGOTO/10,0,0\nFINI\n",
+    "MOVARC": "GOTO/10,0,0\nMOVARC/0,0,0,0,0,1,10,ANGLE,90\nGOTO/0,10,0\nFINI\n",
+    "GODLTA along the axis": "GOTO/1,2,3,0,0.6,0.8\nGODLTA/5\nGODLTA/1,1,1\nRAPID\nGODLTA/-2\n",
+    "GODLTA in a turned system": "TOOL PATH/A,TOOL,B\nMSYS/1,2,3,0,1,0,-1,0,0\nGOTO/1,2,3\nGODLTA/1,0,2\nEND-OF-PATH\n",
+    "continued and commented": ("goto / 1, $ after the mark\n 2, 3 $$ a remark\n$$ alone\nGOTO/1,2,$\n4\n"
+                                "PPRINT $$ text / 1,2,3\nGOTO/4,5,6\n"),
+    "carriage returns": "GOTO/1,2,3\r\nRAPID\r\nGOTO/4,5,6\r\n",
+    "blanks for commas": "GOTO/1 2 3\nGOTO/4 5 6 0 0 1\n",
+    "FROM and GOHOME": "FROM/0,0,100\nGOTO/1,2,3\nGOHOME/0,0,100\nGOHOME\nGOTO/1,2,3\n",
+    "subroutine called twice": ("DEFSUB/1\nGOTO/1,2,3\nGOTO/4,5,6\nENDSUB\nGOTO/0,0,9\nCALSUB/1\nGOTO/0,0,9\nCALSUB/1\n"
+                                "GOTO/7,8,9\n"),
+    "inches by their feeds": "FEDRAT/10,IPM\nGOTO/1,2,3\n",
+    "points in the common system": ("$$-> FEATNO / 1\n$$-> CSYS / 1,0,0,5, $\n0,0.8,-0.6,6, $\n0,0.6,0.8,7\nGOTO/1,2,3\n"
+                                    "GOTO/1,2,3,0,0.6,0.8\nGOTO/4,5,6\nMULTAX/ON\nGOTO/7,8,9,0,0,1\n"),
+}
+
+
+def agrees(text: bytes) -> None:
+    path, found = toolpaths.read_bytes(text)
+    assert not has_errors(found), [str(d) for d in found]
+    c = commanded(text)
+    assert len(c) == len(path) and (c.line == path.line).all() and c.known.all()
+    np.testing.assert_allclose(c.tip, path.tip, atol=1e-9)
+    np.testing.assert_allclose(c.axis, path.axis, atol=1e-12)
+    assert ((c.kind == HOLE) == (path.role == Role.HOLE)).all()
+    assert ((c.arc >= 0) == (path.kind == Kind.ARC)).all()
+    assert ((c.kind == LINE) == ((path.kind == Kind.FEED) & (path.role != Role.START))).all()
+    np.testing.assert_allclose(c.normal, path.arcs.normal, atol=1e-12)
+    np.testing.assert_allclose(c.centre, path.arcs.center, atol=1e-9)
+    np.testing.assert_allclose(c.sweep, path.arcs.sweep, atol=1e-9)
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda p: p.name)
+def test_both_read_the_samples_alike(path: Path) -> None:
+    agrees(path.read_bytes())
+
+
+@pytest.mark.parametrize("name", TEXTS)
+def test_both_read_alike(name: str) -> None:
+    agrees(TEXTS[name].encode())
+
+
+@pytest.mark.parametrize(("text", "what"), [
+    ("GOTO/0,0,0\nNURBS/\nKNOT/.5,1\nCNTRL/1,0,0\nCNTRL/2,0,0\nCNTRL/3,0,0\nCNTRL/4,0,0\nGOTO/5,0,0\n", "NURBS"),
+    ("$$-> FEATNO / 1\nGOTO/1,2,3\nROTATE / AAXIS, INCR, 45, CCLW\nGOTO/1,2,3\n", "ROTATE"),
+    ("GOTO/1,2,3\nTRANS/1,0,0\nGOTO/1,2,3\n", "TRANS"), ("CYCLE/DRILL,5,100,2\nGOTO/1,2,3\n", "CYCLE by place"),
+    ("GOTO/1,2,3\nSPLINEX/1,2,3\nGOTO/4,5,6\n", "SPLINEX"), ("PARTNO 'X'\nLOADTL/1,2,3,4\nGOTO/1,2,3\n", "dialect"),
+])
+def test_what_is_not_read_is_said(text: str, what: str) -> None:
+    c = commanded(text.encode())
+    assert any(what in said for said in c.unread)
+    assert not c.known.all() or c.gap.any() or not np.isfinite([x.depth for x in c.cycles]).all()
+
+
+@pytest.mark.parametrize("name", sorted(builtin()))
+def test_poses_of_every_machine(name: str) -> None:
+    """Serial machines: the same tip and axis. Rods: their lengths where the machine says the tool is, and nowhere else."""
+    m = machines.load(name)
+    table = merged(machine_tables(m))
+    own, length = kinematics_of(table), 83.3
+    rng = np.random.default_rng(5)
+    travel, speed = limits_of(table, m.axis_names)
+    np.testing.assert_allclose(travel, np.stack([m.limits.lower, m.limits.upper], axis=1))
+    np.testing.assert_allclose(speed, m.limits.velocity)
+    q = m.home + rng.normal(size=(50, len(m.home))) * np.where(m.rotary, 0.4, 20.0)
+    tip, axis = m.kinematics.with_tool(length).forward(q)
+    if isinstance(own, Chain):
+        mine = own.pose(q, m.axis_names, np.full(50, length))
+        np.testing.assert_allclose(mine[0], tip, atol=1e-9)
+        np.testing.assert_allclose(mine[1], axis, atol=1e-12)
+    else:
+        assert isinstance(own, Rods)
+        assert own.misfit(q, m.axis_names, tip, axis, np.full(50, length)).max() < 1e-8
+        assert own.misfit(q, m.axis_names, tip, axis, np.full(50, length + 0.05)).min() > 1e-4
+        assert own.misfit(q, m.axis_names, tip + np.array([0.02, 0.0, 0.0]), axis, np.full(50, length)).max() > 1e-4
+
+
+def test_a_path_that_was_changed_after_reading_has_no_second_reading() -> None:
+    text = b"UNITS/MM\nLOADTL/1\nSPINDL/RPM,1000,CLW\nFEDRAT/500,MMPM\nRAPID\nGOTO/0,0,50\nGOTO/0,0,1\nGOTO/5,0,1\nFINI\n"
+    path, found = toolpaths.read_bytes(text, file="part.apt")
+    read = postproc.convert(path, "mill-3axis", diagnostics=found)
+    changed = postproc.convert(replace(path, tip=path.tip + 1.0), "mill-3axis", diagnostics=found)
+    assert read.witness is not None and read.witness.compared and not read.witness.not_compared
+    assert changed.ok and changed.witness is not None and not changed.witness.compared and changed.witness.not_compared
+    assert "second witness agrees: 3 positions" in as_text(read, "out.ngc")
+    assert "second witness: not compared: all" in as_text(changed, "out.ngc")
