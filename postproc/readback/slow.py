@@ -78,7 +78,7 @@ def check_slow(motion: Motion, executed: Executed, job: Job, moves: Moves, owner
     cutting = (owner < len(moves)) & (motion.code > 0)
     length = moves.lengths()
     asked = np.where(moves.seconds > 0.0, moves.seconds, length / moves.feed)
-    total, again = _by_move(owner, cutting, seconds, len(moves)), _pecked(motion, moves, owner, cutting, seconds, length)
+    total, again = _by_move(owner, cutting, seconds, len(moves)), _pecked(moves, owner, cutting, tip, length)
     total = total / again
     rules = _Slack.of(job, bool(motion.inch.any()))
     slack = rules.seconds + rules.length / np.where(moves.feed > 0.0, moves.feed, np.inf)
@@ -154,11 +154,12 @@ def _rounded(motion: Motion, job: Job, owner: Ints, cutting: Bools, moves: int) 
     return np.asarray(10.0**-places.astype(np.float64) / least)[:-1]
 
 
-def _pecked(motion: Motion, moves: Moves, owner: Ints, cutting: Bools, seconds: Floats, length: Floats) -> Floats:
-    """(M,) how often the path of a drilled hole is fed, 1 for other moves."""
+def _pecked(moves: Moves, owner: Ints, cutting: Bools, tip: Floats, length: Floats) -> Floats:
+    """(M,) how often the path of a drilled hole is fed, 1 for other moves; `tip` (E, 3) at the ends of blocks."""
     if not (moves.phase == Phase.DRILL).any():
         return np.ones(len(moves))
-    fed = _by_move(owner, cutting, seconds * motion.feed * np.where(motion.inch, INCH, 1.0) / 60.0, len(moves))
+    path = np.concatenate([[0.0], lengths(np.diff(tip, axis=0))])
+    fed = _by_move(owner, cutting, path, len(moves))
     return np.asarray(np.fmax(np.where(moves.phase == Phase.DRILL, fed / np.fmax(length, 1e-9), 1.0), 1.0))
 
 
