@@ -23,11 +23,12 @@ def losses(record: Record, substitutes: bytes, inserted: bytes, only: int = 0) -
     changes = list(damaged(record, substitutes, inserted))
     if only:
         changes = [changes[i] for i in np.random.default_rng(len(record.data)).permutation(len(changes))[:only]]
-    found = []
+    found, whole_record = [], record.data[record.start:record.stop].upper()
     for what, data in changes:
         result = outcome(read(data), whole)
         text = data[record.start:record.stop + len(data) - len(record.data)]
-        if result.startswith("lost") and text not in UNKNOWABLE:
+        turned = text.upper().replace(b"CCLW", b"CLW") == whole_record and b"CCLW" in text.upper()
+        if result.startswith("lost") and text not in UNKNOWABLE and not turned:
             found.append(f"{what} {result}: {text!r}")
     return found
 
@@ -44,8 +45,10 @@ def test_every_byte_of_a_short_motion_by_every_common_one(name: str) -> None:
     assert losses(record, COMMON, b",$") == []
 
 
-@pytest.mark.skipif("DAMAGE" not in os.environ, reason="make damage: all 256 bytes at each place, an hour of processor")
+@pytest.mark.skipif("DAMAGE" not in os.environ, reason="make damage: any of 256 bytes at any place, hours of processor")
 @pytest.mark.parametrize("record", RECORDS, ids=lambda r: r.name)
 def test_all_bytes(record: Record) -> None:
+    """DAMAGE=all, or a number of seeded changes of each record."""
+    only = os.environ["DAMAGE"]
     if not record.free:
-        assert losses(record, bytes(range(256)), bytes(range(256))) == []
+        assert losses(record, bytes(range(256)), bytes(range(256)), 0 if only == "all" else int(only)) == []

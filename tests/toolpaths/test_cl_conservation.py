@@ -65,3 +65,18 @@ def test_a_word_of_the_shop_is_taken_as_it_stands_where_it_is_allowed(word: str)
 ])
 def test_comments_and_texts_of_real_files_pass(line: str) -> None:
     assert not has_errors(read_bytes(f"{HEAD}GOTO/1,2,3\n{line}\nGOTO/1,2,4\n").diagnostics)
+
+
+@pytest.mark.parametrize(("record", "code"), [
+    ("O)STOP", "cl.text"), ("OP)STOP", "cl.text"), ("SPINDL/RPM,3000,C\xdfLW", "cl.form"),
+    ("LOADTL / 1, OSETNO, 19$$-> CUTTER / 10.500000", "cl.data-comment")])
+def test_what_a_byte_leaves_of_a_record_is_refused(record: str, code: str) -> None:
+    """A bracket within a word, a letter that is none of ASCII, a remark on the line of a record."""
+    found = read_bytes("\n".join(["UNITS/MM", "LOADTL/1", record, "GOTO/0,0,1", "FINI", ""]), file="part.apt").diagnostics
+    assert has_errors(found), [str(d) for d in found]
+    assert code in {d.code for d in found}
+
+
+def test_a_label_and_a_remark_of_a_name_are_read_as_before() -> None:
+    text = "UNITS/MM\nLOADTL/4, OSETNO, 4 $$-> THREAD TOOL\nA10)GOTO/0,0,1\nA20) STOP\nGOTO/0,0,2\nFINI\n"
+    assert not has_errors(read_bytes(text, file="part.apt").diagnostics)

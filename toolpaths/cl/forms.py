@@ -145,6 +145,8 @@ def _joined_fault(s: Statement) -> str:
 def _words_fault(s: Statement, form: Form, allow: frozenset[str]) -> str:
     if "/" in s.body:
         return "a second slash"
+    if not s.body.isascii():
+        return f"{next(c for c in s.body if ord(c) > 127)!r} is no character of a record"
     split = _split_word(s, form)
     if split:
         return split

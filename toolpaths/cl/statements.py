@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 from toolpaths.arrays import Floats
 from toolpaths.cl.feed_lines import FeedLines, feed_lines
 from toolpaths.cl.log import Log
+from toolpaths.cl.near import nearest
 from toolpaths.cl.scan import LARGEST, LARGEST_OWN, Scan
 from toolpaths.cl.source import text_of
 from toolpaths.cl.words import BARE_WORDS, TEXT_WORDS
@@ -22,6 +23,7 @@ _BARE_EXPONENT = re.compile(r"[eE]\d")
 """An exponent without its sign may be a damaged digit: no system writes it."""
 _CARD_LABEL = re.compile(r"\s*[A-Z]{2,3} {2,}\d{1,5}\s*")
 """CATIA numbers points and circles in columns 73 to 80."""
+_REMARK = re.compile(r"\$\$->\s*(?:CSYS|CUTTER|FEATNO)\s*/")
 _MAJOR = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_ ,=*.+-]*", re.ASCII)
 _SIMPLE = re.compile(r"([A-Z]+)[ ]*/([^$()/]*)", re.ASCII)
 """Most records: one major word, a slash, no comment, continuation or label."""
@@ -223,9 +225,14 @@ class Lexer:
         return statement_of(joined) if joined else None
 
     def _unlabelled(self, text: str) -> str:
-        """`text` without the label of APT before a statement, as in `A10)GOTO/...`."""
+        """`text` without the label of APT before a statement, as in `A10)GOTO/...`: not where a bracket stands in a word,
+        as in `O)STOP`."""
         label = _LABEL.match(text)
         rest = text[label.end():] if label else ""
+        if label and label[0].rstrip(" )").isalpha() and not label[0].endswith(" "):
+            whole = major_of(label[0].rstrip(" )") + rest.partition("/")[0])
+            if self.known(whole) or nearest(whole, BARE_WORDS):
+                return text
         return rest if rest and (self._begins(rest) or self.known(major_of(rest))) else text
 
     def _joined(self, text: str, i: int, text_word: bool = False) -> str:
@@ -235,6 +242,10 @@ class Lexer:
         while True:
             part, continued, lost = _cut(text, not parts and text.startswith(DATA_COMMENT), text_word)
             parts.append(part)
+            if lost.startswith(DATA_COMMENT):
+                self.log.error("cl.data-comment", f"{lost[:40]!r} stands behind a record: the end of a line is missing",
+                               self.scan.line[self.next - 1], "put the remark on a line of its own")
+                return "".join(parts)
             if lost:
                 line = self.scan.line[self.next - 1]
                 self.log.error("cl.dollar", f"{lost[:40]!r} stands behind a continuation mark $", line,
@@ -287,6 +298,7 @@ def _cut(text: str, comment: bool, text_word: bool) -> tuple[str, str, str]:
         return text, "", ""
     head, rest = text[:at], text[at:]
     if rest.startswith(COMMENT):
-        return head, "", ""
+        # A remark that says something stands on a line of its own: here the end of the line before it is lost.
+        return head, "", rest if head.strip() and _REMARK.match(rest) else ""
     after = rest[1:].strip()
     return head, "certain", "" if after.startswith("$") or _CARD_LABEL.fullmatch(rest[1:]) else after
