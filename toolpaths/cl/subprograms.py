@@ -1,0 +1,48 @@
+"""Subprograms of a CL file (DEFSUB ... ENDSUB), by the number or name that CALSUB calls them by."""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from toolpaths.cl.statements import Statement
+
+Called = float | str
+
+
+@dataclass(frozen=True)
+class Subprograms:
+    """Statements of DEFSUB and ENDSUB: `ends` by that of DEFSUB; `named` in the order of the file."""
+
+    ends: dict[int, int]
+    named: dict[Called, list[tuple[int, int]]]
+    names: tuple[str, ...]
+    """those that are no numbers"""
+
+    def place(self, name: Called, at: int) -> tuple[int, int] | None:
+        """The subprogram that a call at statement `at` means: defined last before it, else first after it."""
+        places = self.named.get(name, [])
+        before = bisect_left(places, (at, 0))
+        return places[max(before - 1, 0)] if places else None
+
+
+def subprograms_of(statements: Sequence[Statement]) -> Subprograms:
+    """All subprograms that have an end."""
+    begun: list[int] = []
+    ends: dict[int, int] = {}
+    for i, s in enumerate(statements):
+        if s.major == "DEFSUB":
+            begun.append(i)
+        elif s.major == "ENDSUB" and begun:
+            ends[begun.pop()] = i
+    named: dict[Called, list[tuple[int, int]]] = {}
+    for start in sorted(ends):
+        named.setdefault(called(statements[start]), []).append((start, ends[start]))
+    return Subprograms(ends, named, tuple(name for name in named if isinstance(name, str) and name))
+
+
+def called(s: Statement) -> Called:
+    """Number or name of a subprogram, "" without one."""
+    first = s.words[0] if s.words else ""
+    return first.strip().upper() if isinstance(first, str) else first
