@@ -62,7 +62,7 @@ def test_programs_subprograms_and_figures_are_one_transaction(shop: Path, monkey
         assert "written" not in got.stdout and isinstance(got.exception, SystemExit)
         assert texts(shop / "out") == before and json.read_bytes() == figures
     assert convert(shop, "--json", json).exit_code == 0
-    assert texts(shop / "out") != before and json.read_bytes() != figures
+    assert texts(shop / "out") != before
 
 
 def test_read_only_outputs_are_refused(shop: Path) -> None:
