@@ -19,6 +19,8 @@ from toolpaths.shape import Curves
 from toolpaths.toolpath import Kind
 
 TRAVERSE, FEED, ARC = 0, 1, 2
+LEG = 0.01, 1e-3
+"""mm and rad that a rapid of a linking move may leave its line by before it is written as a feed move"""
 PARTS, LINK, RUN = 8, 0, 7
 """places of a move's blocks: those of its link, by their parts, then its own"""
 COLUMNS = ("q", "move", "u", "code", "home", "seconds", "plane", "ccw", "center", "state", "frame")

@@ -13,10 +13,11 @@ from postproc import joint_faults
 from postproc import path_faults as faults
 from postproc.blocks import ARC as ARC
 from postproc.blocks import FEED as FEED
+from postproc.blocks import LEG, Builder, add_run, rapid_codes
 from postproc.blocks import TRAVERSE as TRAVERSE
-from postproc.blocks import Builder, add_run, rapid_codes
 from postproc.control import Control
 from postproc.groups import groups
+from postproc.home_links import add_home_links
 from postproc.joints.lead import Event
 from postproc.linearise import approached
 from postproc.links import Link, Pose, SafeSpace, plan_link
@@ -33,8 +34,6 @@ from toolpaths.shape import Curves
 from toolpaths.toolpath import Kind
 
 Progress = Callable[[str, int, int], None]
-_LEG = 0.01, 1e-3
-"""mm and rad that a rapid of a linking move may leave its line by before it is written as a feed move"""
 
 
 @dataclass(frozen=True)
@@ -124,8 +123,14 @@ def build_path(modes: OutputModes, kinematics: Callable[[int], Kinematics], move
     state: Pose | None = None
     longer = list[float]()
     frame, before = modes.base, kinematics(int(moves.tool[0]))
-    for run in runs.each:
-        first, by_home = run.first, run.first in home_rows
+    linked = np.array([run.first in home_rows and not plan.refined.rewind[run.first] for run in runs.each], dtype=np.bool_)
+    done = add_home_links(out, modes.base, space, runs, moves, linked)
+    for run, there in zip(runs.each, done.tolist(), strict=True):
+        first, by_home, end = run.first, run.first in home_rows, run.last - 1
+        if there:
+            state = Pose(moves.tip[end], runs.axis[end], runs.q[end], run.frame.control)
+            frame, before = run.frame, run.kin
+            continue
         target = Pose(moves.tip[first], runs.axis[first], runs.q[first], run.frame.control)
         way = _way(modes, frame, run.frame, by_home)
         enters = modes.at_zero and run.frame is modes.tcp and way is not modes.tcp
@@ -140,7 +145,6 @@ def build_path(modes: OutputModes, kinematics: Callable[[int], Kinematics], move
         _add_link(out, moves, first, link, _Legs(frame, way, run.frame, before, run.kin, state, entry))
         if not link.clear:
             diagnostics.append(faults.no_way(moves, first, file))
-        end = run.last - 1
         state, frame, before = Pose(moves.tip[end], runs.axis[end], runs.q[end], run.frame.control), run.frame, run.kin
         if progress:
             progress("blocks", run.last, len(moves))
@@ -252,7 +256,7 @@ def _add_link(out: Builder, moves: Moves, row: int, link: Link, legs: _Legs) -> 
 
 def _leg(out: Builder, frame: WordFrame, kin: Kinematics, begin: Floats, q: Floats, row: int) -> None:
     """Blocks (K, J) along the tool axis in rapid, at feed where rapids would leave the line."""
-    code = rapid_codes(frame.control, kin, np.concatenate([begin[None], q[:-1]]) if len(q) else q, q, *_LEG)
+    code = rapid_codes(frame.control, kin, np.concatenate([begin[None], q[:-1]]) if len(q) else q, q, *LEG)
     out.link(frame, q, row, code=code, seconds=np.where(code == TRAVERSE, np.nan, 0.0))
 
 

@@ -97,7 +97,8 @@ def test_machine_and_controller_files_are_not_replaced(shop: Path) -> None:
 def test_header_has_names_and_no_places(tmp_path: Path, controller: str) -> None:
     """Not of machine, controller, set-up, error model or CL file; the set-up is known by its fingerprint."""
     places = {}
-    for key, name, text in (("m", "mikron-ucp710.toml", 'base = "mikron-ucp710"\n'), ("c", "ctrl.toml", f'base = "{controller}"\n'),
+    for key, name, text in (("m", "mikron-ucp710.toml", 'base = "mikron-ucp710"\n'),
+                            ("c", "ctrl.toml", f'base = "{controller}"\n'),
                             ("s", "shop.toml", Path(TOOLS).read_text()), ("e", "errors.toml", "")):
         (tmp_path / f"secret_{key}").mkdir()
         places[key] = tmp_path / f"secret_{key}" / name
