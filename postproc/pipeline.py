@@ -154,8 +154,7 @@ def _loaded(controller: str | FilePath, machine: Machine | str | FilePath, setup
         setup, more = load_setup(options.setup or None)
         toolpaths.diagnostics.require(more)
     assert spec is not None and setup is not None
-    if options.setup:
-        options = replace(options, setup_mark=fingerprint(setup, options.setup))
+    options = replace(options, setup_mark=fingerprint(setup, options.setup) if options.setup else "")
     return spec.divided(setup.output.files), machine, setup, options
 
 
@@ -402,8 +401,8 @@ def verify(gcode: str | FilePath, path: Toolpath, machine: Machine | str | FileP
     known = (*_reading(path, diagnostics), *unfinished(FilePath(gcode)))
     if other := other_axes(data, options, str(gcode)):
         return VerifyResult(str(gcode), None, (*other, *known))
-    start = _begun(path, PostResult("", options, machine, spec, FilePath(controller).stem, setup, known))
-    start, _ = _oriented(start, progress)
+    begun = PostResult("", options, machine, spec, FilePath(controller).stem, setup, known)
+    start, _ = _oriented(_begun(path, begun), progress)
     path, found = start.toolpath or path, list(start.diagnostics)
     if has_errors(found):
         return VerifyResult(str(gcode), None, tuple(found))

@@ -18,7 +18,7 @@ from toolpaths.cl.dialects import SCALE, Dialect
 from toolpaths.cl.log import Log
 from toolpaths.cl.scan import Points
 from toolpaths.cl.statements import Program, Statement
-from toolpaths.cl.subprograms import Subprograms
+from toolpaths.cl.subprograms import Called, Subprograms
 from toolpaths.toolpath import Cycle, Event, FeedMode, Frame, Operation, Role, Tool
 
 Triple = tuple[float, float, float]
@@ -154,7 +154,7 @@ class Builder:
         self.turns_at: list[int] = []
         """rows before which ROTATE stands"""
         self.about_axis = False
-        self.indexed_subs: frozenset[float] | None = None
+        self.indexed_subs: frozenset[Called] | None = None
         self.caller_row = 0
         """first row since the last subroutine ended"""
         self.entries: list[tuple[int, int]] = []

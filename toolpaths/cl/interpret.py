@@ -9,7 +9,7 @@ from toolpaths.cl import curves, cycles, feeds, frames, indexing, listing_text, 
 from toolpaths.cl.build import Builder
 from toolpaths.cl.near import nearest
 from toolpaths.cl.statements import DATA_COMMENT, TEXT, Statement
-from toolpaths.cl.subprograms import Subprograms, called, subprograms_of
+from toolpaths.cl.subprograms import Subprograms, called, shown, subprograms_of
 from toolpaths.cl.words import SILENT, UNSUPPORTED_MOTION
 
 Handler = Callable[[Builder, Statement], None]
@@ -93,7 +93,7 @@ def calsub(b: Builder, s: Statement) -> None:
     b.calls.append(found)
     b.called.add(found)
     b.in_subprogram.set(b.row, True)
-    _stand_about_axis(b, about_axis or s.numbers[0] in indexing.indexed_subprograms(b))
+    _stand_about_axis(b, about_axis or name in indexing.indexed_subprograms(b))
     indexing.note_call(b, b.caller_row)
     b.caller_row = b.row
     b.jump(b.program.before[start])
@@ -187,15 +187,16 @@ def report_others(b: Builder) -> dict[str, int]:
 
 def _report_uncalled(b: Builder) -> None:
     """What stands in a subroutine that no CALSUB runs is not executed."""
-    for number, (start, end) in subprograms(b).items():
+    known = _subprograms(b)
+    for name, start, end in ((name, *place) for name, places in known.named.items() for place in places):
         if (start, end) in b.called:
             continue
         if "DEFSUB" in b.allow_unknown:
             before = b.program.before
             b.uncalled += end - start + before[end] - before[start]
         else:
-            b.log.error("cl.subprogram", f"no CALSUB runs subroutine {number:g}: its records are not executed",
-                        b.program.lines[start], "--allow-unknown DEFSUB leaves it out", key=f"uncalled {number}")
+            b.log.error("cl.subprogram", f"no CALSUB runs subroutine {shown(name)}: its records are not executed",
+                        b.program.lines[start], "--allow-unknown DEFSUB leaves it out", key=f"uncalled {name}")
 
 
 def _report_word(b: Builder, word: str, found: list[tuple[int, int, int]]) -> None:

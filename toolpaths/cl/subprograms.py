@@ -46,3 +46,8 @@ def called(s: Statement) -> Called:
     """Number or name of a subprogram, "" without one."""
     first = s.words[0] if s.words else ""
     return first.strip().upper() if isinstance(first, str) else first
+
+
+def shown(name: Called) -> str:
+    """A number or name as files write it."""
+    return name if isinstance(name, str) else f"{name:g}"
