@@ -40,7 +40,7 @@ def text_of(kind: str, count: int) -> str:
     body = KINDS[kind]
     parts = [body.format(k=k, x=k * 37 % 1000 / 10, x1=k * 37 % 1000 / 10 + 1, y=k * 11 % 800 / 10, tool=1 + k % 20,
                          deep=3 + k % 5) for k in range(count)]
-    return HEAD + PECK + "GOTO/0,0,20\n" + "".join(parts) + "FINI\n"
+    return HEAD + (PECK if "PECK" in body else "") + "GOTO/0,0,20\n" + "".join(parts) + "FINI\n"
 
 
 def seconds_of(kind: str, count: int, machine: str = "mill-3axis", controller: str = "linuxcnc") -> float:

@@ -15,7 +15,7 @@ from postproc.pipeline import PostResult, convert
 from postproc.setup import SetupFile
 from tests.benchmarks.bench_many import KINDS, text_of
 
-MOST = {"tool changes": 1500}
+MOST = {"tool changes": 2000}
 """calls for each; 20,000 of them are to take seconds"""
 SETUP = SetupFile.model_validate({"tools": {str(k): {"gauge_length": 100.0 + k % 3} for k in range(1, 21)}})
 

@@ -79,7 +79,7 @@ def calsub(b: Builder, s: Statement) -> None:
     """Carry out the statements and points of a subprogram here, under the frame that holds here."""
     known, name = _subprograms(b), called(s)
     found = known.place(name, b.index) if name != "" else None
-    if found is None and isinstance(name, str) and name and not known.names:
+    if found is None and known.elsewhere(name):
         b.log.warning("cl.subprogram", f"CALSUB/{s.body}: no subprogram of the file, left out", b.line,
                       "moves of a program that the machine keeps are not checked", key="named")
         return

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,6 +10,9 @@ from dataclasses import dataclass
 from toolpaths.cl.statements import Statement
 
 Called = float | str
+NAME = re.compile(r"[A-Z][A-Z0-9_.-]*")
+"""of a subprogram"""
+_DAMAGED = re.compile(r"[A-Z]\d*")
 
 
 @dataclass(frozen=True)
@@ -19,6 +23,13 @@ class Subprograms:
     named: dict[Called, list[tuple[int, int]]]
     names: tuple[str, ...]
     """those that are no numbers"""
+
+    def elsewhere(self, name: Called) -> bool:
+        """True where a call means a program that the machine keeps: by name in a file without subprograms.
+
+        A letter before digits alone may be what is left of a number.
+        """
+        return not self.named and isinstance(name, str) and bool(name) and not _DAMAGED.fullmatch(name)
 
     def place(self, name: Called, at: int) -> tuple[int, int] | None:
         """The subprogram that a call at statement `at` means: defined last before it, else first after it."""
