@@ -19,6 +19,10 @@ from toolpaths.shape import Curves
 from toolpaths.toolpath import Kind
 
 TRAVERSE, FEED, ARC = 0, 1, 2
+LEG = 0.01, 1e-3
+"""mm and rad that a rapid of a linking move may leave its line by before it is written as a feed move"""
+PARTS, LINK, RUN = 8, 0, 7
+"""places of a move's blocks: those of its link, by their parts, then its own"""
 COLUMNS = ("q", "move", "u", "code", "home", "seconds", "plane", "ccw", "center", "state", "frame")
 
 
@@ -28,6 +32,9 @@ class Builder:
     def __init__(self, moves: Moves, joints: int) -> None:
         self.moves, self.joints = moves, joints
         self.columns: dict[str, list[Array]] = {k: [] for k in COLUMNS}
+        self.places: list[Array] = []
+        self.ended = 0
+        """1 where what is added comes behind all moves"""
         self.begin = np.zeros(len(moves) + 1, dtype=np.int64)
         self.count = 0
         self.frames: dict[WordFrame, int] = {}
@@ -38,12 +45,17 @@ class Builder:
 
     def add(self, frame: WordFrame, q: Floats, move: Ints, u: Floats, code: Array, seconds: Floats, home: bool = False,
             plane: Array | None = None, ccw: Array | None = None, center: Floats | None = None,
-            state: Array | None = None) -> None:
-        """Blocks in `frame`; what is not given is that of straight blocks which name no axes."""
+            state: Array | None = None, place: Array | None = None) -> None:
+        """Blocks in `frame`; what is not given is that of straight blocks which name no axes.
+
+        Blocks come in the order of their `place` (K,) at last, those of one place in the order in which they were added;
+        without one it is that of their moves' links.
+        """
         n = len(q)
         if not n:
             return
         self.count += n
+        self.places.append(LINK + PARTS * (move + self.ended) if place is None else place)
         for name, value in (("q", q), ("move", move), ("u", u), ("code", code), ("seconds", seconds),
                             ("home", repeated(home, n)), ("frame", repeated(self.frame(frame), n)),
                             ("plane", repeated(np.int8(17), n) if plane is None else plane),
@@ -60,10 +72,20 @@ class Builder:
                  np.full(n, TRAVERSE, dtype=np.int8) if code is None else code,
                  np.full(n, np.nan) if seconds is None else seconds, home, state=state)
 
-    def joined(self, name: str) -> Array:
-        """One column of all blocks, whose parts are forgotten."""
-        parts = self.columns.pop(name)
-        return joined(parts) if parts else np.zeros(0)
+    def joined(self) -> dict[str, Array]:
+        """The columns of all blocks, whose parts are forgotten; `begin` then counts them in their final order."""
+        place = joined(self.places) if self.places else np.zeros(0, dtype=np.int64)
+        order = None if (place[1:] >= place[:-1]).all() else np.argsort(place, kind="stable")
+        result = {}
+        for name in COLUMNS:
+            parts = self.columns.pop(name)
+            column = joined(parts) if parts else np.zeros(0)
+            result[name] = column if order is None else taken(column, order)
+        if order is not None:
+            final = np.empty(len(order) + 1, dtype=np.int64)
+            final[order], final[-1] = np.arange(len(order)), len(order)
+            self.begin = final[self.begin]
+        return result
 
 
 def rapid_codes(control: Control, kin: Kinematics, q0: Floats, q1: Floats, tolerance: float,
@@ -98,17 +120,20 @@ def _off(tip: Floats, begin: Floats, end: Floats) -> Floats:
     return np.asarray(np.linalg.norm(tip - begin - along[:, None] * way, axis=1))
 
 
-def add_run(out: Builder, frame: WordFrame, kin: Kinematics, moves: Moves, rows: Ints, curves: Curves, q: Floats,
-            tolerance: float, axis_tolerance: float) -> tuple[Floats, Ints, Ints]:
-    """The blocks of a run after its first pose: (worst deviations (2,), rows with turns on the spot, broken rows)."""
+def add_run(out: Builder, frame: WordFrame, kin: Kinematics, moves: Moves, rows: Ints, curves: Curves, q0: Floats,
+            q1: Floats, tolerance: float, axis_tolerance: float) -> tuple[Floats, Ints, Ints]:
+    """The blocks of moves `rows` (N,), of one or many runs, along curves (N) from joints q0 to q1 (N, J): (worst deviations
+    (2,), rows with turns on the spot, broken rows)."""
     control = frame.control
-    q0, q1 = q[:-1], q[1:].copy()
     where, begun = family_turns(kin, curves, q0, q1)
     start = q0.copy()
     start[where] = begun
     arcs = word_arcs(control, kin, curves, start, q1)
     arcs = replace(arcs, keep=arcs.keep & (np.linalg.norm(curves.start - curves.center, axis=1) <= control.arc_limit))
     main = linearise(control, kin, curves, start, q1, arcs.keep, tolerance, axis_tolerance)
+    if not len(where):
+        _emit(out, frame, moves, rows, kin, curves, arcs, main.curve, main.u, main.q, q0, tolerance, axis_tolerance)
+        return np.array([main.worst_tip, main.worst_axis]), rows[where], rows[main.broken]
     spot = _on_the_spot(curves, where)
     turning = linearise(control, kin, spot, q0[where], begun, np.zeros(len(where), dtype=bool), tolerance,
                         axis_tolerance)
@@ -116,7 +141,7 @@ def add_run(out: Builder, frame: WordFrame, kin: Kinematics, moves: Moves, rows:
     u = np.concatenate([np.zeros(len(turning.curve)), main.u])
     joints = np.concatenate([turning.q, main.q])
     order = np.lexsort((np.concatenate([turning.u, main.u + 1.0]), curve))
-    _emit(out, frame, moves, rows, kin, curves, arcs, curve[order], u[order], joints[order], q[0], tolerance,
+    _emit(out, frame, moves, rows, kin, curves, arcs, curve[order], u[order], joints[order], q0, tolerance,
           axis_tolerance)
     broken = np.union1d(rows[main.broken], rows[where[turning.broken]])
     return np.array([max(main.worst_tip, turning.worst_tip), max(main.worst_axis, turning.worst_axis)]), \
@@ -129,8 +154,8 @@ def _on_the_spot(curves: Curves, where: Ints) -> Curves:
 
 
 def _emit(out: Builder, frame: WordFrame, moves: Moves, rows: Ints, kin: Kinematics, curves: Curves, arcs: WordArcs,
-          curve: Ints, u: Floats, q: Floats, begin: Floats, tolerance: float, axis_tolerance: float) -> None:
-    """Blocks of a run in order, kept arcs cut into whole turns, with code and seconds."""
+          curve: Ints, u: Floats, q: Floats, q0: Floats, tolerance: float, axis_tolerance: float) -> None:
+    """Blocks in order, kept arcs cut into whole turns, with code and seconds; curves begin at joints q0 (N, J)."""
     if ((arcs.parts > 1) & arcs.keep)[curve].any():
         curve, u, q = _cut_turns(kin, curves, arcs, curve, u, q)
     row = rows[curve]
@@ -146,12 +171,14 @@ def _emit(out: Builder, frame: WordFrame, moves: Moves, rows: Ints, kin: Kinemat
     code = np.where(keep, ARC, np.where(cutting, FEED, TRAVERSE)).astype(np.int8)
     rapid = code == TRAVERSE
     level = moves.phase[row] == Phase.POSITION
-    code[rapid] = rapid_codes(frame.control, kin, np.concatenate([begin[None], q[:-1]])[rapid], q[rapid], tolerance,
-                              axis_tolerance, level[rapid])
+    before = np.concatenate([q0[:1], q[:-1]])
+    before[first] = q0[curve[first]]
+    code[rapid] = rapid_codes(frame.control, kin, before[rapid], q[rapid], tolerance, axis_tolerance, level[rapid])
     seconds = np.where(cutting, seconds, np.where(code == TRAVERSE, np.nan, 0.0))
     turned = np.where(keep & ~first, np.concatenate([[0.0], u[:-1]]) * curves.sweep[curve], 0.0)
     center = _turned_centers(arcs, curve, turned) if keep.any() else repeated(np.zeros(3), len(curve))
-    out.add(frame, q, row, u, code, seconds, False, taken(arcs.plane, curve), taken(arcs.ccw, curve), center)
+    out.add(frame, q, row, u, code, seconds, False, taken(arcs.plane, curve), taken(arcs.ccw, curve), center,
+            place=RUN + PARTS * row)
 
 
 def _turned_centers(arcs: WordArcs, curve: Ints, angle: Floats) -> Floats:

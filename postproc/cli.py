@@ -29,7 +29,17 @@ from postproc.cli_orient import orient as orient_command
 from postproc.cli_place import EXAMPLES as PLACES
 from postproc.cli_place import place
 from postproc.cli_time import time
-from postproc.console import Json, controller_of, machine_of, progress_bar, refuse_overwriting, report, shown_errors
+from postproc.console import (
+    Json,
+    controller_of,
+    machine_of,
+    own_files,
+    progress_bar,
+    refuse_inputs,
+    refuse_overwriting,
+    report,
+    shown_errors,
+)
 from postproc.console import rounded as rounded
 from postproc.guard import guarded
 
@@ -101,11 +111,13 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
     only_with_errors(beyond, error_model)
     fields = _residual_files(residuals or [], error_model)
     refuse_overwriting({"-o": str(output), "--json": json, **{f"--residuals {name}": str(name) for name in fields}},
-                       {"the CL file": str(file), "the set-up": setup, "the error model": error_model})
+                       inputs := {"the CL file": str(file), "the set-up": setup, "the error model": error_model,
+                                  **own_files(machine, controller)})
     from postproc import summary
-    from postproc.files import write_all, write_atomically
+    from postproc.files import program_files
     from postproc.pipeline import convert as run
 
+    outputs: dict[Path, str | bytes] = {}
     with shown_errors(json), progress_bar() as progress:
         m, spec = machine_of(machine), controller_of(controller)
         path, found = _read(file, options, progress)
@@ -115,11 +127,11 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
         values, text = summary.as_dict(result, str(output)), summary.as_text(result, str(output))  # before a file is written
         more: list[Diagnostic] = []
         if result.ok:
-            for name, content in zip(fields, told, strict=True):
-                write_atomically(name, content)
-            more = write_all(output, result.text, result.files or {})
+            texts, more = program_files(output, result.text, result.files or {})
+            refuse_inputs(list(texts)[:-1], inputs)
+            outputs = {**dict(zip(fields, told, strict=True)), **texts}
     found = [*result.diagnostics, *more]
-    report(tuple(found), json, values | {"diagnostics": [d.as_dict() for d in found]}, text)
+    report(tuple(found), json, values | {"diagnostics": [d.as_dict() for d in found]}, text, outputs)
 
 
 @app.command(epilog="Example: postproc verify part.ngc part.cls -m mikron-ucp710 -c linuxcnc")
@@ -134,7 +146,7 @@ def verify(gcode: Annotated[Path, typer.Argument(metavar="GCODE", help="G-code f
                       error_model=error_model, orient=orient, max_tilt=max_tilt,  # type: ignore[arg-type]
                       require_proof=require_proof)
     refuse_overwriting({"--json": json}, {"the CL file": str(file), "the G-code file": str(gcode), "the set-up": setup,
-                                         "the error model": error_model})
+                                         "the error model": error_model, **own_files(machine, controller)})
     from postproc import summary
     from postproc.pipeline import verify as run
 
@@ -157,7 +169,8 @@ def trace(file: ClFile, line: Annotated[int, typer.Option("--line", metavar="L",
     options = replace(_options(tolerance, axis_tolerance, "auto", setup, units, dialect, allow_unknown),
                       error_model=error_model, error_beyond=beyond, orient=orient,  # type: ignore[arg-type]
                       max_tilt=max_tilt)
-    refuse_overwriting({"--json": json}, {"the CL file": str(file), "the set-up": setup, "the error model": error_model})
+    refuse_overwriting({"--json": json}, {"the CL file": str(file), "the set-up": setup, "the error model": error_model,
+                                         **own_files(machine, controller)})
     from postproc.pipeline import convert as run
     from postproc.trace import as_text, trace_line
 

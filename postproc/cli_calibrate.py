@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from postproc.cli_options import figure_ending
-from postproc.console import Json, print_json, refuse_overwriting, report, shown_errors
+from postproc.console import Json, print_json, refuse_inputs, refuse_overwriting, report, shown_errors
 
 
 def _schema(wanted: bool) -> None:
@@ -38,19 +38,21 @@ def calibrate(file: Annotated[Path, typer.Argument(metavar="MEASUREMENTS.toml", 
     from machines.calibration.calibrate import calibrate as run
     from machines.calibration.text import text
     from machines.geometric_error.exchange import write_model
-    from postproc.files import write_atomically
 
+    outputs: dict[Path, str | bytes] = {}
     with shown_errors(json):
         found, diagnostics = run(file, accept_residual)
         figures: dict[str, Any] = {} if found is None else found.figures
         if found is not None and found.model is not None:
-            for name, content in write_model(replace(found.model, name=output.stem), found.description(file.name)).items():
-                write_atomically(output.parent / (output.name if name == f"{output.stem}.toml" else name), content)
             if figure is not None:
                 from machines.calibration.figures import draw
 
-                write_atomically(figure, draw(figures, f"calibration: {file.name}", ending))
+                outputs[figure] = draw(figures, f"calibration: {file.name}", ending)
+            files = write_model(replace(found.model, name=output.stem), found.description(file.name))
+            model = files.pop(f"{output.stem}.toml")
+            refuse_inputs([output.parent / name for name in files], {"the measurements": str(file)})
+            outputs |= {**{output.parent / name: content for name, content in files.items()}, output: model}
     done = found is not None and found.model is not None
     report(tuple(diagnostics), json, {"output": str(output) if done else None, **figures,
                                       "diagnostics": [d.as_dict() for d in diagnostics]},
-           text(figures, f"{output}: written" if done else "nothing written"))
+           text(figures, f"{output}: written" if done else "nothing written"), outputs)

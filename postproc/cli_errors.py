@@ -10,7 +10,7 @@ import typer
 from postproc.cli_errors_import import EXAMPLE, import_
 from postproc.cli_group import Group
 from postproc.cli_options import MachineName, figure_ending
-from postproc.console import Json, machine_of, print_json, refuse_overwriting, report, shown_errors
+from postproc.console import Json, machine_of, own_files, print_json, refuse_overwriting, report, shown_errors
 from postproc.error_files import finish, loaded, model_files, or_refused, pairs, writable
 
 errors_app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None,
@@ -50,12 +50,12 @@ Directions = Annotated[str, typer.Option("--directions", help="of the map's valu
 def check(file: ModelFile, machine: MachineName, tool_length: ToolLength = 100.0, figure: Figure = None,
           json: Json = "") -> None:
     """Check an error model: what it holds, how far it reaches, worst tip and axis over the work volume, doubt."""
-    refuse_overwriting({"--figure": str(figure or ""), "--json": json}, {"the error model": str(file)})
+    refuse_overwriting({"--figure": str(figure or ""), "--json": json}, {"the error model": str(file), **own_files(machine)})
     ending = figure_ending(figure)
     from machines.geometric_error.survey import beyond_travel, survey, unmeasured
     from postproc.error_text import check_text
-    from postproc.files import write_atomically
 
+    outputs: dict[Path, str | bytes] = {}
     with shown_errors(json):
         m = machine_of(machine)
         model, found = loaded(file, m)
@@ -64,15 +64,16 @@ def check(file: ModelFile, machine: MachineName, tool_length: ToolLength = 100.0
         if figure is not None:
             from machines.geometric_error.figures import model_figure
 
-            write_atomically(figure, model_figure(model, m, tool_length, ending))
-    report(tuple(found), json, figures | {"diagnostics": [d.as_dict() for d in found]}, check_text(str(file), figures))
+            outputs[figure] = model_figure(model, m, tool_length, ending)
+    report(tuple(found), json, figures | {"diagnostics": [d.as_dict() for d in found]}, check_text(str(file), figures),
+           outputs)
 
 
 @errors_app.command("to-tables", epilog="Example: postproc errors to-tables errors.toml -m mikron-ucp710 -o tables")
 def to_tables(file: ModelFile, machine: MachineName, output: Folder, step: Step = None, loss: Loss = 0.1,
               angle_loss: AngleLoss = 0.1, json: Json = "") -> None:
     """Write every component error as a table per axis with ISO 230-1 names, and a model that reads them."""
-    refuse_overwriting({"--json": json}, {"the error model": str(file)})
+    refuse_overwriting({"--json": json}, {"the error model": str(file), **own_files(machine)})
     from machines.geometric_error import exports
     from machines.geometric_error.csv_table import UNITS
     from postproc.error_text import table_figures
@@ -94,7 +95,7 @@ def to_tables(file: ModelFile, machine: MachineName, output: Folder, step: Step 
 def to_linuxcnc(file: ModelFile, machine: MachineName, output: Folder, rest: Rest = None, step: Step = None,
                 loss: Loss = 0.1, angle_loss: AngleLoss = 0.1, tool_length: ToolLength = 100.0, json: Json = "") -> None:
     """Write positioning errors as LinuxCNC's screw compensation, one file per joint, and say what they leave."""
-    refuse_overwriting({"--rest": str(rest or ""), "--json": json}, {"the error model": str(file)})
+    refuse_overwriting({"--rest": str(rest or ""), "--json": json}, {"the error model": str(file), **own_files(machine)})
     from machines.geometric_error import exports
     from machines.geometric_error.csv_table import UNITS
     from postproc.error_text import screw_figures, screw_warning
@@ -119,7 +120,7 @@ def to_linuxcnc(file: ModelFile, machine: MachineName, output: Folder, rest: Res
 def to_map(file: ModelFile, machine: MachineName, output: MapFile, over: Over = "", step: Step = None, loss: MapLoss = None,
            at: At = None, tool_length: MapTool = 0.0, directions: Directions = "machine", json: Json = "") -> None:
     """Write an error map of a model, as controls hold it, and say what it loses."""
-    refuse_overwriting({"-o": str(output), "--json": json}, {"the error model": str(file)})
+    refuse_overwriting({"-o": str(output), "--json": json}, {"the error model": str(file), **own_files(machine)})
     if directions not in ("machine", "table"):
         raise typer.BadParameter(f"{directions!r} is not available; choose from machine, table", param_hint="--directions")
     from machines.geometric_error import exports

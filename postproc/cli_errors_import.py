@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from postproc.cli_options import MachineName
-from postproc.console import Json, machine_of, refuse_overwriting, shown_errors
+from postproc.console import Json, machine_of, own_files, refuse_overwriting, shown_errors
 from postproc.error_files import doubted, finish, merged_into, model_files, pairs, required
 
 EXAMPLE = "Example: postproc errors import X=x.comp y.csv -m mill-3axis -o errors.toml"
@@ -48,7 +48,10 @@ def import_(sources: Sources, machine: MachineName, output: Output, into: Into =
         if value not in allowed:
             raise typer.BadParameter(f"{value!r} is not available; choose from {', '.join(allowed)}", param_hint=option)
     files_of = [source.split("=", 1)[-1] for source in sources]
-    refuse_overwriting({"-o": str(output), "--json": json}, {name: name for name in files_of})
+    refuse_overwriting({"-o": str(output), "--json": json},
+                       {**{name: name for name in files_of}, **own_files(machine)})
+    refuse_overwriting({"--json": json}, {"the model of --into": str(into or ""),
+                                         "the table of --covariance": str(covariance or "")})
     from machines.geometric_error.exports import in_units
     from machines.geometric_error.imports import How, read_sources, with_covariance
     from machines.geometric_error.survey import beyond_travel, unmeasured

@@ -8,7 +8,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from postproc.cli_options import Allow, AxisTolerance, ClFile, Dialect, MachineName, Tolerance, Units, figure_ending
-from postproc.console import Json, controller_of, machine_of, progress_bar, refuse_overwriting, report, shown_errors
+from postproc.console import (
+    Json,
+    controller_of,
+    machine_of,
+    own_files,
+    progress_bar,
+    refuse_overwriting,
+    report,
+    shown_errors,
+)
 
 if TYPE_CHECKING:
     from machines.machine import Machine
@@ -54,7 +63,8 @@ def orient(file: ClFile,
     """Choose the tool orientation of 3+2 passes for the least planned time, and say why."""
     _check(plan, figure, units, dialect, passes or [])
     refuse_overwriting({"--figure": str(figure or ""), "--json": json},
-                       {"the CL file": str(file), "the set-up": setup, "the error model": error_model})
+                       {"the CL file": str(file), "the set-up": setup, "the error model": error_model,
+                        **own_files(machine, controller)})
     from postproc.options import Options
 
     options = Options(tolerance, axis_tolerance, setup=setup, units=units, dialect=dialect, error_model=error_model,
@@ -62,6 +72,7 @@ def orient(file: ClFile,
                       orient=plan)  # type: ignore[arg-type]
     values: dict[str, Any] = {}
     text = ""
+    outputs: dict[Path, str | bytes] = {}
     with shown_errors(json), progress_bar() as progress:
         choice, found = _chosen(file, machine_of(machine), controller_of(controller), options, progress)
         if choice is not None:
@@ -71,11 +82,10 @@ def orient(file: ClFile,
             shown = _known(passes or [], choice)
             values, text = as_dict(choice, options.orient), as_text(choice, options.orient, shown)
             if figure is not None:
-                from postproc.files import write_atomically
                 from postproc.orientation.figures.sheet import draw
 
-                write_atomically(figure, draw(choice, options.orient, shown, figure.suffix.lower()))
-    report(tuple(found), json, values | {"diagnostics": [d.as_dict() for d in found]}, text)
+                outputs[figure] = draw(choice, options.orient, shown, figure.suffix.lower())
+    report(tuple(found), json, values | {"diagnostics": [d.as_dict() for d in found]}, text, outputs)
 
 
 def _check(plan: str, figure: Path | None, units: str, dialect: str, passes: list[int]) -> None:

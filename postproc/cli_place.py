@@ -20,7 +20,7 @@ from postproc.cli_options import (
     only_with_errors,
 )
 from postproc.cli_orient import ORIENTATIONS, MaxTilt, Orient
-from postproc.console import Json, machine_of, progress_bar, refuse_overwriting, report, shown_errors
+from postproc.console import Json, machine_of, own_files, progress_bar, refuse_overwriting, report, shown_errors
 
 if TYPE_CHECKING:
     from machines.machine import Machine
@@ -63,8 +63,8 @@ def place(file: ClFile,
     _check(orient, units, dialect, setup, figure)
     only_with_errors(beyond, error_model)
     refuse_overwriting({"-o": str(output), "--json": json, "--figure": str(figure or "")},
-                       {"the CL file": str(file), "the set-up": str(setup), "the error model": error_model})
-    from postproc.files import write_atomically
+                       {"the CL file": str(file), "the set-up": str(setup), "the error model": error_model,
+                        **own_files(machine, controller)})
     from postproc.options import Options
     from postproc.placement import report as figures
     from postproc.placement.write import placed_text
@@ -74,17 +74,18 @@ def place(file: ClFile,
                       orient=orient)  # type: ignore[arg-type]
     values: dict[str, Any] = {}
     text = ""
+    outputs: dict[Path, str | bytes] = {}
     with shown_errors(json), progress_bar() as progress:
         choice, found = _chosen(file, machine_of(machine), controller, options, progress)
         if choice is not None:
             if figure is not None:
                 from postproc.placement.figure import placement_figure
 
-                write_atomically(figure, placement_figure(choice, figure.suffix.lower()))
-            write_atomically(output, placed_text(setup, output, choice.part))
+                outputs[figure] = placement_figure(choice, figure.suffix.lower())
+            outputs[output] = placed_text(setup, output, choice.part)
             values = figures.as_dict(choice) | {"output": str(output)}
             text = figures.as_text(choice) + f"\nwritten: {output}"
-    report(tuple(found), json, values | {"diagnostics": [d.as_dict() for d in found]}, text)
+    report(tuple(found), json, values | {"diagnostics": [d.as_dict() for d in found]}, text, outputs)
 
 
 def _check(orient: str, units: str, dialect: str, setup: Path, figure: Path | None) -> None:

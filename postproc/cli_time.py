@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from postproc.cli_options import AxisTolerance, Beyond, MachineName, Tolerance, Units, only_with_errors
-from postproc.console import Json, machine_of, progress_bar, refuse_overwriting, report, shown_errors
+from postproc.console import Json, machine_of, own_files, progress_bar, refuse_overwriting, report, shown_errors
 
 if TYPE_CHECKING:
     from machines.machine import Machine
@@ -45,7 +45,7 @@ def time(file: Annotated[Path, typer.Argument(metavar="FILE", help="CL file, or 
     _check(output, calibrate, units, dialect)
     only_with_errors(beyond, error_model)
     refuse_overwriting({"-o": output, "--json": json}, {"the file": str(file), "the set-up": setup, "the log": calibrate,
-                                                        "the error model": error_model,
+                                                        "the error model": error_model, **own_files(machine, controller),
                                                         "the model": model if Path(model).suffix else ""})
     from postproc.cycle_time import report as figures
     from postproc.cycle_time.estimate import estimate
@@ -55,16 +55,21 @@ def time(file: Annotated[Path, typer.Argument(metavar="FILE", help="CL file, or 
                       error_beyond=beyond)
     values: dict[str, Any] = {}
     text = ""
+    outputs: dict[Path, str | bytes] = {}
     with shown_errors(json), progress_bar() as progress:
         m = machine_of(machine)
         blocks, planner, times, found = _blocks(file, m, controller, model, options, progress)
         if blocks is not None and calibrate:
-            planner, values, more = _calibrated(blocks, m, planner, calibrate, output)
+            planner, values, more = _calibrated(blocks, m, planner, calibrate)
+            if output and planner is not None:
+                from postproc.cycle_time.calibrate import as_toml
+
+                outputs[Path(output)] = as_toml(planner)
             found, times = [*found, *more], None
         if blocks is not None and planner is not None:
             e = estimate(blocks, m, planner, times=times)
             values, text = figures.as_dict(e) | values, figures.as_text(e, file.name)
-    report(tuple(found), json, UNKNOWN | values | {"diagnostics": [d.as_dict() for d in found]}, text)
+    report(tuple(found), json, UNKNOWN | values | {"diagnostics": [d.as_dict() for d in found]}, text, outputs)
 
 
 def _check(output: str, calibrate: str, units: str, dialect: str) -> None:
@@ -118,12 +123,11 @@ def _blocks(file: Path, machine: Machine, controller: str, model: str, options: 
     return blocks, planner, times, [*result.diagnostics, *found]
 
 
-def _calibrated(blocks: Blocks, machine: Machine, planner: CycleTimeModel | None, log: str,
-                output: str) -> tuple[CycleTimeModel | None, dict[str, Any], list[Diagnostic]]:
-    """The model fitted to a log, its figures, and the file where one was asked for."""
-    from postproc.cycle_time.calibrate import as_dict, as_toml, calibrate
+def _calibrated(blocks: Blocks, machine: Machine, planner: CycleTimeModel | None,
+                log: str) -> tuple[CycleTimeModel | None, dict[str, Any], list[Diagnostic]]:
+    """The model fitted to a log (None where it cannot be), and its figures."""
+    from postproc.cycle_time.calibrate import as_dict, calibrate
     from postproc.cycle_time.log import read_log
-    from postproc.files import write_atomically
 
     assert planner is not None
     read, found = read_log(log, machine.axis_names)
@@ -132,6 +136,4 @@ def _calibrated(blocks: Blocks, machine: Machine, planner: CycleTimeModel | None
     fit, found = calibrate(blocks, read, planner, log, machine)
     if fit is None:
         return None, {}, found
-    if output:
-        write_atomically(Path(output), as_toml(fit.model))
     return fit.model, {"calibration": as_dict(fit)}, found

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -73,36 +73,44 @@ def print_json(values: object) -> None:
     typer.echo(json.dumps(values, indent=2, allow_nan=False, default=str))
 
 
-def report(diagnostics: tuple[Diagnostic, ...], target: str, values: dict[str, Any], text: str) -> None:
-    """Messages to standard error, the figures where they were asked for; exit code 1 where there are errors."""
+def report(diagnostics: tuple[Diagnostic, ...], target: str, values: dict[str, Any], text: str,
+           outputs: Mapping[Path, str | bytes] | None = None) -> None:
+    """Messages to standard error, the figures where they were asked for; exit code 1 where there are errors.
+
+    `outputs` (path -> content, the one that needs the others last) and the file of the figures are written together: all,
+    or where one fails none.
+    """
     from toolpaths.diagnostics import has_errors
 
-    for d in diagnostics:
+    told, failed = _written(target, values, dict(outputs or {}))
+    for d in (*diagnostics, *told):
         typer.echo(str(d), err=True)
-    failed = has_errors(diagnostics)
+    if failed and outputs:
+        values, text = {"diagnostics": [d.as_dict() for d in (*diagnostics, *told)]}, ""
     if target == "-":
         print_json(rounded(values))
-    elif target:
-        failed |= not _json_file(target, values)
-    if target != "-" and text:
+    elif text:
         typer.echo(text)
-    if failed:
+    if failed or has_errors(diagnostics):
         raise typer.Exit(1)
 
 
-def _json_file(target: str, values: dict[str, Any]) -> bool:
-    """Write the figures; False, and why on standard error, where that fails."""
+def _written(target: str, values: dict[str, Any], outputs: dict[Path, str | bytes]) -> tuple[list[Diagnostic], bool]:
+    """Write the figures, where they go to a file, and the outputs; diagnostics, and True where that failed."""
     import json
 
-    from postproc.files import write_atomically
+    if target and target != "-":
+        figures = json.dumps(rounded(values), indent=2, allow_nan=False, default=str) + "\n"
+        outputs = {Path(target): figures, **outputs}
+    if not outputs:
+        return [], False
     from toolpaths.diagnostics import DiagnosticError
+    from toolpaths.transaction import write_together
 
     try:
-        write_atomically(Path(target), json.dumps(rounded(values), indent=2, allow_nan=False, default=str) + "\n")
+        return write_together(outputs), False
     except DiagnosticError as fault:
-        typer.echo(str(fault), err=True)
-        return False
-    return True
+        return list(fault.diagnostics), True
 
 
 def rounded(value: Any) -> Any:
@@ -119,7 +127,7 @@ def refuse_overwriting(outputs: dict[str, str], inputs: dict[str, str]) -> None:
     file."""
     from toolpaths.input_files import place
 
-    known = [(at, what) for what, name in inputs.items() if name for at in (place(name), *_named_in(name))]
+    known = _places(inputs)
     for option, name in outputs.items():
         if not name or (name == "-" and option == "--json"):
             continue
@@ -137,6 +145,44 @@ def refuse_overwriting(outputs: dict[str, str], inputs: dict[str, str]) -> None:
         if same or kind:
             raise typer.BadParameter(f"the output would replace {same}" if same else f"{name} is {kind}", param_hint=option)
         known.append((target, f"the file of {option}"))
+
+
+def own_files(machine: str, controller: str = "") -> dict[str, str]:
+    """Files of machine and controller among the inputs of a command; names of built-in ones are no files."""
+    given = {"the machine file": machine, "the controller file": controller}
+    return {what: name for what, name in given.items() if name.lower().endswith(".toml")}
+
+
+def refuse_inputs(outputs: list[Path], inputs: dict[str, str]) -> None:
+    """An error where a file that comes with an output would replace an input.
+
+    Raises:
+        DiagnosticError: names both.
+    """
+    from toolpaths.diagnostics import DiagnosticError, error
+    from toolpaths.input_files import place
+
+    known = _places(inputs)
+    for output in outputs:
+        target = place(output)
+        what = next((what for other, what in known if other == target or _same(other, target)), "")
+        if what:
+            raise DiagnosticError([error("file.input", f"the output would replace {what}", file=str(output),
+                                         hint="write into another folder, or under another name")])
+
+
+def _places(inputs: dict[str, str]) -> list[tuple[Path, str]]:
+    """Where inputs, and files that they name, stand."""
+    from toolpaths.input_files import place
+
+    return [(at, what) for what, name in inputs.items() if name for at in (place(name), *_named_in(name))]
+
+
+def _same(a: Path, b: Path) -> bool:
+    try:
+        return a.samefile(b)
+    except OSError:
+        return False
 
 
 def _named_in(name: str) -> list[Path]:

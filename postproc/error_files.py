@@ -138,22 +138,19 @@ def tables_of(file: Path) -> list[Path]:
 
 def finish(files: dict[str, str], folder: Path, inputs: Sequence[Path], json: str, found: Sequence[Diagnostic],
            told: Sequence[str], figures: dict[str, Any], beside: dict[Path, str] | None = None) -> None:
-    """Write all files, or none where one would replace an input; report them."""
+    """Write all files together, none where one would replace an input; report them."""
     from postproc.error_text import export_text
-    from postproc.files import write_atomically
     from toolpaths.diagnostics import DiagnosticError, error
     from toolpaths.input_files import place
 
     last = sorted(files, key=lambda name: name.endswith(".toml"))  # a model is there when its tables are
-    outputs = {**{folder / name: files[name] for name in last}, **(beside or {})}
+    outputs: dict[Path, str | bytes] = {**{folder / name: files[name] for name in last}, **(beside or {})}
     known = {place(path) for given in inputs for path in (given, *(tables_of(given) if given.suffix == ".toml" else []))}
     with shown_errors(json):
         for path in outputs:
             if place(path) in known:
                 raise DiagnosticError([error("error-export.input", "the output would replace an input", file=str(path),
                                              hint="write into another folder, or under another name")])
-        for path, text in outputs.items():
-            write_atomically(path, text)
     values = {"files": [str(path) for path in outputs], "told": list(told), **figures,
               "diagnostics": [d.as_dict() for d in found]}
-    report(tuple(found), json, values, export_text(values))
+    report(tuple(found), json, values, export_text(values), outputs)

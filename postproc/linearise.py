@@ -53,6 +53,8 @@ def linearise(control: Control, kin: Kinematics, curves: Curves, q0: Floats, q1:
     `keep` (N,) marks curves whose block follows them by itself (kept arcs).
     """
     exact = keep | _straight_already(control, kin, curves, q0, q1)
+    if exact.all():
+        return Pieces(np.arange(len(exact)), np.ones(len(exact)), q1, np.zeros(0, dtype=np.int64), 0.0, 0.0)
     front = _Front(control, kin, curves, q0, q1, np.flatnonzero(~exact), tolerance, axis_tolerance)
     while len(front.index):
         front.advance()
@@ -214,6 +216,8 @@ def family_turns(kin: Kinematics, curves: Curves, q0: Floats, q1: Floats) -> tup
     the direction. Returns (indices (K,), joints (K, J)); the tool stays where it is in that turn.
     """
     rotary = np.array(kin.rotary)
+    if not rotary.any():
+        return np.zeros(0, dtype=np.int64), np.zeros((0, kin.joints))
     turns = np.abs(wrap(q1[:, rotary] - q0[:, rotary])).max(axis=1, initial=0.0) > 1e-9
     rows = np.flatnonzero(turns & kin.singular(np.nan_to_num(q0)))
     if not len(rows):
@@ -227,18 +231,18 @@ def family_turns(kin: Kinematics, curves: Curves, q0: Floats, q1: Floats) -> tup
     return rows[needed], turned
 
 
-def approached(kin: Kinematics, curves: Curves, q: Floats) -> Floats:
-    """Joints (N + 1, J) of a run of curves (N); at poses where the tool lies along a rotary axis, that axis as the curve
-    that leads there needs it. With axes at right angles that is the value it has before, with nutating ones it is not."""
-    singular = kin.singular(np.nan_to_num(q))
-    rows = np.flatnonzero(singular[1:] & ~singular[:-1])
+def approached(kin: Kinematics, curves: Curves, q0: Floats, q1: Floats) -> tuple[Ints, Floats]:
+    """(curves (K,), joints (K, J)): those of N curves from q0 to q1 (N, J) that end where the tool lies along a rotary axis,
+    with that axis as the curve needs it, where it is another one than in q1. With axes at right angles it has the value
+    from before, with nutating ones it has not."""
+    rows = np.zeros(0, dtype=np.int64)
+    if any(kin.rotary):
+        rows = np.flatnonzero(kin.singular(np.nan_to_num(q1)) & ~kin.singular(np.nan_to_num(q0)))
     if not len(rows):
-        return q
-    limit = _limit(kin, curves.take(rows), q[rows], 1.0)
-    off = _apart(kin, limit, q[rows + 1])
-    result = q.copy()
-    result[rows[off] + 1] = limit[off]
-    return result
+        return rows, q1[:0]
+    limit = _limit(kin, curves.take(rows), q0[rows], 1.0)
+    off = _apart(kin, limit, q1[rows])
+    return rows[off], limit[off]
 
 
 def _limit(kin: Kinematics, curves: Curves, q: Floats, end: float) -> Floats:

@@ -23,14 +23,14 @@ from toolpaths.rotations import angle_between
 from toolpaths.shape import Curves
 from toolpaths.toolpath import Kind
 
-_RISE = 10.0
+RISE = 10.0
 """mm above the safe plane for index moves, so that their dips stay above it"""
 _MARGINS = (1.0, 0.4, 0.2, 0.1)
 """shares of the set-up's margin that are tried where travel is short"""
 _STEPS = (0, 1, 3, 7, 15)
-_SAMPLES = 17
+SAMPLES = 17
 _TURN = 2.0 * np.pi
-_LEG_TOLERANCE = 0.01
+LEG_TOLERANCE = 0.01
 """mm off the straight line for retract and approach"""
 
 
@@ -169,14 +169,14 @@ def _link(control: Control, kin0: Kinematics, kin1: Kinematics, space: SafeSpace
     approach = none if after is None or up1 is None else _leg(after.law or control, kin1, up1, after)
     slack = 0.5 * share * space.margin
     home, home_state, way = none, none > 0.0, True
-    if by_home and _has_retract_axis(control):
+    if by_home and has_retract_axis(control):
         home, home_state = _lift_home(control, up0, after is None)
     elif by_home:
         home, way = _all_home(control, kin0, space, up0, share, slack)
         home_state = np.ones(home.shape, dtype=bool)
     if up1 is None:
         return Link(retract, home, none, none, home_state, none > 0.0, way)
-    if by_home and _has_retract_axis(control):
+    if by_home and has_retract_axis(control):
         index, state = _from_home(control, home[-1], up1)
         clear = stays_clear(control, kin1, space, np.concatenate([home[-1:], index]), slack)
         return Link(retract, home, index, approach, home_state, state, clear)
@@ -187,7 +187,7 @@ def _link(control: Control, kin0: Kinematics, kin1: Kinematics, space: SafeSpace
 
 def _above(kin: Kinematics, space: SafeSpace, pose: Pose, turning: bool, share: float) -> Pose:
     """The pose lifted along its tool axis to its safe plane; left where it is already above."""
-    rise = _RISE if turning else 0.0
+    rise = RISE if turning else 0.0
     lift = space.plane(pose.axis, turning, share) + rise - float(pose.axis @ (pose.tip - space.centre))
     tip = pose.tip + max(lift, 0.0) * pose.axis
     if pose.law is not None and pose.law.law == "tilted":
@@ -203,10 +203,11 @@ def _leg(control: Control, kin: Kinematics, start: Pose, end: Pose) -> Floats:
         return np.zeros((0, len(end.q)))
     line = Curves(start.tip[None], end.tip[None], start.axis[None], end.axis[None], np.zeros(1, dtype=bool),
                   np.zeros((1, 3)), np.zeros((1, 3)), np.zeros(1))
-    return linearise(control, kin, line, start.q[None], end.q[None], np.zeros(1, dtype=bool), _LEG_TOLERANCE, 1e-3).q
+    return linearise(control, kin, line, start.q[None], end.q[None], np.zeros(1, dtype=bool), LEG_TOLERANCE, 1e-3).q
 
 
-def _has_retract_axis(control: Control) -> bool:
+def has_retract_axis(control: Control) -> bool:
+    """True where one axis lifts the tool on its way home."""
     return control.machine.retract_axis >= 0 and not control.tip_law
 
 
@@ -254,7 +255,7 @@ def _index(control: Control, kin: Kinematics, space: SafeSpace, begin: Floats, u
         near = begin + t[:, None] * (up.q - begin)
         if count:
             _, axes = kin.forward(near)
-            near = nearest_solution(kin, space.centre + (floor + _RISE) * axes, axes, near)
+            near = nearest_solution(kin, space.centre + (floor + RISE) * axes, axes, near)
         q = np.concatenate([near, up.q[None, :]])
         start = begin[None, :] if lifted is None else lifted[None, :]
         if np.isfinite(q).all() and stays_clear(control, kin, space, np.concatenate([start, q]), slack):
@@ -267,14 +268,14 @@ def _lifted(kin: Kinematics, space: SafeSpace, q: Floats, floor: float, slack: f
     tip, axis = kin.forward(q[None, :])
     if bool(space.clear(tip, axis, slack)[0]):
         return None
-    lift = floor + _RISE - float(axis[0] @ (tip[0] - space.centre))
+    lift = floor + RISE - float(axis[0] @ (tip[0] - space.centre))
     return np.asarray(nearest_solution(kin, tip + lift * axis, axis, q[None, :])[0])
 
 
 def stays_clear(control: Control, kin: Kinematics, space: SafeSpace, q: Floats, slack: float) -> bool:
     """True where the tool is clear at even places of all ways between the joints q (K, J), looked at together."""
     count = len(q) - 1
-    t = np.repeat(np.linspace(0.0, 1.0, _SAMPLES), count)
-    begin, end = np.tile(q[:-1], (_SAMPLES, 1)), np.tile(q[1:], (_SAMPLES, 1))
+    t = np.repeat(np.linspace(0.0, 1.0, SAMPLES), count)
+    begin, end = np.tile(q[:-1], (SAMPLES, 1)), np.tile(q[1:], (SAMPLES, 1))
     tip, axis, _ = control.between(begin, end, t, kin, np.ones(len(t), dtype=bool))
     return bool(space.clear(tip, axis, slack).all())

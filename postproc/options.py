@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Literal
 
 FeedMode = Literal["auto", "per-minute", "inverse-time"]
 OutputMode = Literal["auto", "axes", "tcp", "tilted"]
 FeedSource = Literal["programmed", "planned"]
 Orientation = Literal["keep", "per-pass", "whole-part", "auto"]
+SETUP_MARK = "fingerprint of the set-up"
+"""before the eight hex digits, in the header of a program, of the set-up that it was written with"""
 
 
 @dataclass(frozen=True)
@@ -19,6 +22,7 @@ class Options:
     axis_tolerance: float = 0.05
     feed_mode: FeedMode = "auto"
     setup: str = ""
+    """file of the set-up"""
     units: str = ""
     dialect: str = ""
     allow_unknown: tuple[str, ...] = ()
@@ -38,11 +42,13 @@ class Options:
 
     require_proof: bool = False
     """True: programs whose deviation is not bounded in every block are refused"""
+    setup_mark: str = ""
+    """fingerprint of the set-up that `setup` was when it was read; put here by what reads it"""
     name: str = ""
     """of the program and its subprograms' files; default: that of the CL file"""
 
     def header(self) -> list[str]:
-        """The options as comment lines of an output file."""
+        """The options as comment lines of an output file; files by their names, wherever they stand."""
         lines = [f"tolerance {self.tolerance:g} mm, axis tolerance {self.axis_tolerance:g} degrees",
                  f"feed mode {self.feed_mode}"]
         if self.output != "auto":
@@ -54,8 +60,12 @@ class Options:
         if self.smooth:
             lines.append("points smoothed")
         if self.error_model:
-            lines.append(f"error model {self.error_model}" + (", beyond its range too" if self.error_beyond else ""))
-        for name in ("setup", "units", "dialect"):
+            beyond = ", beyond its range too" if self.error_beyond else ""
+            lines.append(f"error model {Path(self.error_model).name}{beyond}")
+        if self.setup:
+            mark = f", {SETUP_MARK} {self.setup_mark}" if self.setup_mark else ""
+            lines.append(f"setup {Path(self.setup).name}{mark}")
+        for name in ("units", "dialect"):
             if getattr(self, name):
                 lines.append(f"{name} {getattr(self, name)}")
         if self.allow_unknown:

@@ -8,31 +8,32 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from machines.kinematics.base import Kinematics
+from machines.machine import Machine
 from postproc import joint_faults
 from postproc import path_faults as faults
 from postproc.blocks import ARC as ARC
 from postproc.blocks import FEED as FEED
+from postproc.blocks import LEG, Builder, add_run, rapid_codes
 from postproc.blocks import TRAVERSE as TRAVERSE
-from postproc.blocks import Builder, add_run, rapid_codes
 from postproc.control import Control
 from postproc.groups import groups
+from postproc.home_links import add_home_links
 from postproc.joints.lead import Event
 from postproc.linearise import approached
 from postproc.links import Link, Pose, SafeSpace, plan_link
 from postproc.memory import give_back
-from postproc.modes import OutputModes, WordFrame, stands_still, turning_run
+from postproc.modes import OutputModes, WordFrame
 from postproc.moves import Moves
 from postproc.rewinds import Drawing
 from postproc.run_plan import RunPlan, plan_moves
+from postproc.solved_runs import Run, Runs, solved_runs
 from postproc.zero_entry import ZeroEntry, cost, needed, zero_entry
-from toolpaths.arrays import Array, Bools, Floats, Ints
+from toolpaths.arrays import Array, Bools, Floats, Ints, as_slice, taken
 from toolpaths.diagnostics import Diagnostic, has_errors
 from toolpaths.shape import Curves
 from toolpaths.toolpath import Kind
 
 Progress = Callable[[str, int, int], None]
-_LEG = 0.01, 1e-3
-"""mm and rad that a rapid of a linking move may leave its line by before it is written as a feed move"""
 
 
 @dataclass(frozen=True)
@@ -114,50 +115,45 @@ def build_path(modes: OutputModes, kinematics: Callable[[int], Kinematics], move
     moves, home_rows = plan.refined.moves, plan.refined.among(home_rows)
     out = Builder(moves, len(machine.axis_names))
     out.frame(modes.base)
+    runs, diagnostics = solved_runs(plan, modes, kinematics, road.operation, axis_tolerance, file)
+    if has_errors(diagnostics):
+        return None, faults.merged(diagnostics)
+    runs, worst, turns, more = _add_runs(out, road, runs, tolerance, machine)
+    diagnostics += more
     state: Pose | None = None
-    frame, kin = modes.base, kinematics(int(moves.tool[0]))
-    diagnostics: list[Diagnostic] = []
-    worst, turns, longer = np.zeros(2), [np.zeros(0, dtype=np.int64)], list[float]()
-    starts = np.flatnonzero(moves.link)
-    for first, last in zip(starts, [*starts[1:], len(moves)], strict=True):
-        before, kin = kin, kinematics(int(moves.tool[first]))
-        rows = np.arange(first, last)
-        run, found = _solve_run(road, kin, rows)
-        diagnostics += found
-        if run is None or has_errors(diagnostics):
+    longer = list[float]()
+    frame, before = modes.base, kinematics(int(moves.tool[0]))
+    linked = np.array([run.first in home_rows and not plan.refined.rewind[run.first] for run in runs.each], dtype=np.bool_)
+    done = add_home_links(out, modes.base, space, runs, moves, linked)
+    for run, there in zip(runs.each, done.tolist(), strict=True):
+        first, by_home, end = run.first, run.first in home_rows, run.last - 1
+        if there:
+            state = Pose(moves.tip[end], runs.axis[end], runs.q[end], run.frame.control)
+            frame, before = run.frame, run.kin
             continue
-        target = Pose(moves.tip[first], run.axis[0], run.q[0], run.frame.control)
-        by_home = first in home_rows
+        target = Pose(moves.tip[first], runs.axis[first], runs.q[first], run.frame.control)
         way = _way(modes, frame, run.frame, by_home)
         enters = modes.at_zero and run.frame is modes.tcp and way is not modes.tcp
-        link = drawing.link(way.control, kin, state, target) if plan.refined.rewind[first] else plan_link(
-            way.control, before, kin, space, state, target, by_home)
+        link = drawing.link(way.control, run.kin, state, target) if plan.refined.rewind[first] else plan_link(
+            way.control, before, run.kin, space, state, target, by_home)
         entry = None
         if enters and needed(modes.control, link):
-            link = link if by_home else plan_link(way.control, before, kin, space, state, target, True)
-            entry = zero_entry(modes.control, modes.tcp.control, kin, space, link)
+            link = link if by_home else plan_link(way.control, before, run.kin, space, state, target, True)
+            entry = zero_entry(modes.control, modes.tcp.control, run.kin, space, link)
             longer.append(entry.seconds)
             link = replace(link, clear=link.clear and entry.clear)
-        _add_link(out, moves, int(first), link, _Legs(frame, way, run.frame, before, kin, state, entry))
+        _add_link(out, moves, first, link, _Legs(frame, way, run.frame, before, run.kin, state, entry))
         if not link.clear:
-            diagnostics.append(faults.no_way(moves, int(first), file))
-        q = run.q
-        if len(rows) > 1:
-            curves = _with_axes(moves.run(int(first), int(last)), run.axis)
-            q = approached(kin, curves, q)
-            left, turned, broken = add_run(out, run.frame, kin, moves, rows[1:], curves, q, tolerance, run.left)
-            worst = np.maximum(worst, left)
-            turns.append(turned)
-            diagnostics += faults.broken(machine, moves, broken, q[[broken - first - 1, broken - first]], file)
-        state, frame = Pose(moves.tip[last - 1], run.axis[-1], q[-1], run.frame.control), run.frame
+            diagnostics.append(faults.no_way(moves, first, file))
+        state, frame, before = Pose(moves.tip[end], runs.axis[end], runs.q[end], run.frame.control), run.frame, run.kin
         if progress:
-            progress("blocks", int(last), len(moves))
+            progress("blocks", run.last, len(moves))
     if has_errors(diagnostics):
         return None, faults.merged(diagnostics)
     if state is not None:
-        _add_end(out, modes, frame, kin, space, state, len(moves) - 1)
+        _add_end(out, modes, frame, before, space, state, len(moves) - 1)
     out.begin[len(moves)] = out.count
-    columns = {k: out.joined(k) for k in [*out.columns]}
+    columns = out.joined()
     give_back()
     path = _of_given(columns, out, plan, len(given), np.concatenate(turns), worst)
     diagnostics += joint_faults.planned(plan, machine, given, file)
@@ -176,38 +172,32 @@ def _of_given(columns: dict[str, Array], out: Builder, plan: RunPlan, count: int
                 rewinds=parts.origin[parts.rewind], events=plan.events)
 
 
-@dataclass(frozen=True)
-class _Run:
-    """The joints of a run: frame of its words, axes (N, 3) and joints (N, J) as the control will take them."""
-
-    frame: WordFrame
-    axis: Floats
-    q: Floats
-    left: float
-    """rad of the axis tolerance that linearising may use"""
-
-
-def _solve_run(road: _Road, kin: Kinematics, rows: Ints) -> tuple[_Run | None, list[Diagnostic]]:
-    """The joints of the moves `rows` as planned, in the output mode that is theirs."""
-    plan, modes = road.plan, road.modes
-    moves, q, left = plan.refined.moves, plan.q[rows], float(plan.left[rows[0]])
-    axis = moves.axis[rows]
-    diagnostics = faults.moved_axes(moves, rows, plan.moved[rows], road.file)
-    diagnostics += faults.unreachable(modes.control, kin, moves, rows, axis, q, road.file)
-    if has_errors(diagnostics):
-        return None, diagnostics
-    diagnostics += faults.spun(kin, moves, rows, axis, q, road.axis_tolerance, road.file)
-    still = stands_still(axis, road.axis_tolerance)
-    law = modes.law(int(modes.asked[road.operation[rows[-1]]]), still)
-    if law == "tilted" and not still:
-        return None, [*diagnostics, turning_run(np.unique(moves.line[rows]).tolist(), road.file)]
-    if law != "tilted":
-        frame = modes.tcp if law == "tcp" else modes.base
-        return _Run(frame, axis, q, left), diagnostics
-    frame, at = modes.plane(kin, q[0])
-    q = frame.control.slides_for(kin, moves.tip[rows], np.tile(at, (len(rows), 1)))
-    axis = np.repeat(kin.forward(q[:1])[1], len(rows), axis=0)
-    return _Run(frame, axis, q, left), diagnostics
+def _add_runs(out: Builder, road: _Road, runs: Runs, tolerance: float,
+              machine: Machine) -> tuple[Runs, Floats, list[Ints], list[Diagnostic]]:
+    """The blocks of all runs, those of one frame and tool together: (runs as their ends are approached, worst deviations
+    (2,), rows with turns, faults)."""
+    worst, turns, found = np.zeros(2), [np.zeros(0, dtype=np.int64)], list[Diagnostic]()
+    moves = road.plan.refined.moves
+    together: dict[tuple[int, int, float], list[Run]] = {}
+    for run in runs.each:
+        out.frame(run.frame)
+        if run.last - run.first > 1:
+            together.setdefault((id(run.frame), id(run.kin), run.left), []).append(run)
+    for some in together.values():
+        kin, rows = some[0].kin, np.concatenate([np.arange(run.first + 1, run.last) for run in some])
+        ends, starts = as_slice(rows), as_slice(rows - 1)
+        curves = moves.run(some[0].first, some[0].last) if len(some) == 1 else moves.curves(ends)
+        curves = _with_axes(curves, taken(runs.axis, starts), taken(runs.axis, ends))
+        where, joints = approached(kin, curves, runs.q[starts], runs.q[ends])
+        if len(where):
+            runs = replace(runs, q=runs.q.copy())
+            runs.q[rows[where]] = joints
+        left, turned, broken = add_run(out, some[0].frame, kin, moves, rows, curves, runs.q[starts], runs.q[ends].copy(),
+                                       tolerance, some[0].left)
+        worst = np.maximum(worst, left)
+        turns.append(turned)
+        found += faults.broken(machine, moves, broken, runs.q[[broken - 1, broken]], road.file)
+    return runs, worst, turns, found
 
 
 def _way(modes: OutputModes, before: WordFrame, after: WordFrame, by_home: bool) -> WordFrame:
@@ -216,9 +206,8 @@ def _way(modes: OutputModes, before: WordFrame, after: WordFrame, by_home: bool)
     return before if stays else modes.base
 
 
-def _with_axes(curves: Curves, axis: Floats) -> Curves:
-    return Curves(curves.start, curves.end, axis[:-1], axis[1:], curves.is_arc, curves.center, curves.normal,
-                  curves.sweep)
+def _with_axes(curves: Curves, axis0: Floats, axis1: Floats) -> Curves:
+    return Curves(curves.start, curves.end, axis0, axis1, curves.is_arc, curves.center, curves.normal, curves.sweep)
 
 
 @dataclass(frozen=True)
@@ -267,12 +256,13 @@ def _add_link(out: Builder, moves: Moves, row: int, link: Link, legs: _Legs) -> 
 
 def _leg(out: Builder, frame: WordFrame, kin: Kinematics, begin: Floats, q: Floats, row: int) -> None:
     """Blocks (K, J) along the tool axis in rapid, at feed where rapids would leave the line."""
-    code = rapid_codes(frame.control, kin, np.concatenate([begin[None], q[:-1]]) if len(q) else q, q, *_LEG)
+    code = rapid_codes(frame.control, kin, np.concatenate([begin[None], q[:-1]]) if len(q) else q, q, *LEG)
     out.link(frame, q, row, code=code, seconds=np.where(code == TRAVERSE, np.nan, 0.0))
 
 
 def _add_end(out: Builder, modes: OutputModes, frame: WordFrame, kin: Kinematics, space: SafeSpace, state: Pose,
              row: int) -> None:
+    out.ended = 1
     link = plan_link(modes.base.control, kin, kin, space, state, None, True)
     _leg(out, frame, kin, state.q, link.retract, row)
     out.link(modes.base, link.home, row, not modes.base.control.tip_law, link.home_state)

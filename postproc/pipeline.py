@@ -30,13 +30,14 @@ from postproc.program import Program
 from postproc.program_header import header_lines
 from postproc.reach import check_reach
 from postproc.readback.compare import Comparison
-from postproc.readback.files import Beside
+from postproc.readback.files import Beside, unfinished
 from postproc.readback.slow import with_fingerprint
-from postproc.readback.verify import other_axes, read_back
+from postproc.readback.verify import other_axes, other_setup, read_back
 from postproc.rewinds import drawing_of
 from postproc.rounding import rounding_problem
 from postproc.second_witness import second_witness
 from postproc.setup import SetupFile, load_setup
+from postproc.setup_fingerprint import fingerprint
 from postproc.setup_system import standing, with_system
 from postproc.singular import check_singular
 from postproc.smoothed_stages import Left, with_passes_taken_back, written_moves
@@ -153,6 +154,7 @@ def _loaded(controller: str | FilePath, machine: Machine | str | FilePath, setup
         setup, more = load_setup(options.setup or None)
         toolpaths.diagnostics.require(more)
     assert spec is not None and setup is not None
+    options = replace(options, setup_mark=fingerprint(setup, options.setup) if options.setup else "")
     return spec.divided(setup.output.files), machine, setup, options
 
 
@@ -396,11 +398,11 @@ def verify(gcode: str | FilePath, path: Toolpath, machine: Machine | str | FileP
         data = read_input(gcode, standard_input=True)
     except OSError as fault:
         raise DiagnosticError([unreadable(fault, "gcode.open", gcode, "name the program that is checked")]) from fault
-    known = _reading(path, diagnostics)
+    known = (*_reading(path, diagnostics), *unfinished(FilePath(gcode)))
     if other := other_axes(data, options, str(gcode)):
         return VerifyResult(str(gcode), None, (*other, *known))
-    start = _begun(path, PostResult("", options, machine, spec, FilePath(controller).stem, setup, known))
-    start, _ = _oriented(start, progress)
+    begun = PostResult("", options, machine, spec, FilePath(controller).stem, setup, known)
+    start, _ = _oriented(_begun(path, begun), progress)
     path, found = start.toolpath or path, list(start.diagnostics)
     if has_errors(found):
         return VerifyResult(str(gcode), None, tuple(found))
@@ -409,7 +411,7 @@ def verify(gcode: str | FilePath, path: Toolpath, machine: Machine | str | FileP
     if job is None or has_errors(found):
         return VerifyResult(str(gcode), None, tuple(found))
     comparison, more = read_back(data, job, path.file, progress, str(gcode), Beside(gcode))
-    found += more
+    found = [*other_setup(data, options, has_errors(more), str(gcode)), *found, *more]
     said = None
     if comparison is not None and not has_errors(found):
         said, more = second_witness(start.source, start.asked or start.setup, options, job, comparison)

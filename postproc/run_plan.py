@@ -9,6 +9,7 @@ import numpy as np
 
 from machines.kinematics.base import Kinematics
 from machines.machine import Machine
+from postproc.groups import groups
 from postproc.joint_path import reachable_axes
 from postproc.joints.lattice import Run
 from postproc.joints.lead import Event, Led, lead_past, whole
@@ -97,8 +98,10 @@ def plan_moves(machine: Machine, kinematics: Callable[[int], Kinematics], moves:
                progress: Callable[[int], None] | None = None) -> RunPlan:
     """The joints of all moves (in the table frame), run by run as `moves.link` divides them."""
     starts, parts = np.flatnonzero(moves.link), []
-    for first, last in zip(starts, [*starts[1:], len(moves)], strict=True):
-        parts.append(_part(machine, kinematics(int(moves.tool[first])), moves, int(first), int(last), manner))
+    tools = {k: kinematics(k) for k in np.unique(moves.tool[starts]).tolist()}
+    given = _reached(tools, moves, starts, AXIS_SHARE * manner.tolerance)
+    for first, last in zip(starts.tolist(), [*starts[1:].tolist(), len(moves)], strict=True):
+        parts.append(_part(machine, tools[int(moves.tool[first])], moves, first, last, given, manner))
     runs = [_run(part, moves, manner, machine.home) for part in parts]
     found = plan_runs(runs, machine.limits, machine.home, manner.wishes, manner.may_rewind, progress)
     if manner.may_rewind and any(s.outside for s in found):
@@ -108,9 +111,24 @@ def plan_moves(machine: Machine, kinematics: Callable[[int], Kinematics], moves:
     return _together(moves, parts, found, manner)
 
 
-def _part(machine: Machine, kin: Kinematics, moves: Moves, first: int, last: int, manner: Manner) -> _Part:
+def _reached(tools: dict[int, Kinematics], moves: Moves, starts: Ints, tolerance: float) -> tuple[Floats, Floats]:
+    """Axes (R, 3) that the machine can take with the tool of each run, and by how much (R,) rad they are moved."""
+    if len(tools) == 1 or moves.axis.strides[0] == 0:
+        found = [reachable_axes(kin, moves.axis, tolerance) for kin in tools.values()]
+        if all(not moved.any() for _, moved in found):
+            return found[0]
+    axis, moved = np.array(moves.axis), np.zeros(len(moves))
+    of_run = np.repeat(moves.tool[starts], np.diff(np.append(starts, len(moves))))
+    for rows in groups(of_run):
+        axis[rows], moved[rows] = reachable_axes(tools[int(of_run[rows[0]])], moves.axis[rows], tolerance)
+    return axis, moved
+
+
+def _part(machine: Machine, kin: Kinematics, moves: Moves, first: int, last: int, given: tuple[Floats, Floats],
+          manner: Manner) -> _Part:
+    """A run with the axes `given` (R, 3), which are moved by as much (R,)."""
     rows, curves = np.arange(first, last), moves.run(first, last)
-    axis, moved = reachable_axes(kin, moves.axis[first:last], AXIS_SHARE * manner.tolerance)
+    axis, moved = given[0][first:last], given[1][first:last]
     curves = Curves(curves.start, curves.end, axis[:-1], axis[1:], curves.is_arc, curves.center, curves.normal, curves.sweep)
     led = whole(curves)
     if len(curves) and any(kin.rotary):

@@ -22,7 +22,7 @@ def file_keys(values: Mapping[str, Any]) -> list[Key]:
     fixtures = bodies.get("fixtures")
     keys += [("bodies", "fixtures", k, "file") for k in range(len(fixtures) if isinstance(fixtures, list) else 0)]
     keys += [("tools", number, "holder_mesh") for number in tools]
-    return [key for key in keys if isinstance(_value(values, key), str)]
+    return [key for key in keys if isinstance(value_at(values, key), str)]
 
 
 def seen_from_here(file: UserFile) -> UserFile:
@@ -30,7 +30,7 @@ def seen_from_here(file: UserFile) -> UserFile:
     here, values = Path(file.file).parent, deepcopy(dict(file.values))
     for key in file_keys(values):
         there = Path(file.origin(key).file).parent
-        _value(values, key[:-1])[key[-1]] = renamed(str(_value(values, key)), there, here)
+        value_at(values, key[:-1])[key[-1]] = renamed(str(value_at(values, key)), there, here)
     return replace(file, values=values)
 
 
@@ -44,7 +44,7 @@ def _table(value: Any) -> Mapping[str, Any]:
     return value if isinstance(value, Mapping) else {}
 
 
-def _value(values: Any, key: Key) -> Any:
+def value_at(values: Any, key: Key) -> Any:
     """The value at a path of keys, None where there is none."""
     for step in key:
         if isinstance(values, Mapping):

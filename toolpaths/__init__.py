@@ -35,5 +35,6 @@ def write(toolpath: Toolpath, path: str | Path | None = None) -> str:
     from toolpaths.cl.write import text_of
     text = text_of(toolpath)
     if path is not None:
-        Path(path).write_text(text, encoding="utf-8", newline="\n")
+        from toolpaths.transaction import write_together
+        write_together({Path(path): text})
     return text

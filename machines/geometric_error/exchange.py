@@ -17,6 +17,7 @@ from machines.geometric_error.names import ErrorName
 from machines.geometric_error.rods import RodErrors
 from machines.geometric_error.serial_errors import Component, SerialErrors
 from toolpaths.arrays import Floats
+from toolpaths.transaction import write_together
 from toolpaths.units import DEG
 
 ROTARY = "ABC"
@@ -42,11 +43,9 @@ def write_model(model: ErrorModel, description: str = "") -> dict[str, str]:
 
 def save(model: ErrorModel, folder: Path, description: str = "") -> list[Path]:
     """Write the files of a model into a folder; their paths, the TOML file first."""
-    paths = []
-    for name, text in write_model(model, description).items():
-        paths.append(folder / name)
-        paths[-1].write_text(text, encoding="utf-8")
-    return paths
+    files = {folder / name: text for name, text in write_model(model, description).items()}
+    write_together(dict(reversed(files.items())))
+    return list(files)
 
 
 def _quoted(text: str) -> str:

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from machines.machine import Limits
+from postproc.joints.direct import direct
 from postproc.joints.greedy import greedy
 from postproc.joints.lattice import Lattice, Run, lattice_of
 from postproc.joints.search import Choice, Piece, cheapest, pieces, wrong_side
@@ -88,6 +89,8 @@ def plan_runs(runs: list[Run], limits: Limits, start: Floats, wishes: Wishes | N
         may_rewind: False where no run may be interrupted
         progress: called with the number of runs looked at
     """
+    if (only := direct(runs, limits)) is not None:
+        return [Solution(q, np.zeros(len(q), dtype=np.bool_)) for q in only]
     wishes = wishes or Wishes()
     start = start.copy()
     for joint, angle in wishes.start.items():

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from toolpaths.diagnostics import DiagnosticError
+from toolpaths.diagnostics import Diagnostic, DiagnosticError, warning
 from toolpaths.input_files import is_regular, read_input, unreadable
+from toolpaths.leftovers import interrupted
 
 
 class Beside(Mapping[str, bytes]):
@@ -32,3 +33,12 @@ class Beside(Mapping[str, bytes]):
 
     def __len__(self) -> int:
         return sum(1 for _ in self)
+
+
+def unfinished(program: Path) -> list[Diagnostic]:
+    """That a killed run was replacing files where a program stands: they may be of two programs."""
+    if interrupted(program.resolve().parent) is None:
+        return []
+    return [warning("file.unfinished", "a run that was killed had begun to replace files in this folder: subprograms next "
+                    "to the program may be new where it is old", file=str(program),
+                    hint="convert again: the next command that writes here puts the old files back first")]

@@ -5,12 +5,13 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
 from postproc.job import Job
 from postproc.memory import give_back
-from postproc.options import Options
+from postproc.options import SETUP_MARK, Options
 from postproc.program_header import FINGERPRINT
 from postproc.readback.canonical import placed
 from postproc.readback.changes import check_changes
@@ -33,6 +34,7 @@ _CORRECTED = re.compile(rb"(?im)^[^\n]*geometric errors ([^\n]*?):? corrected in
 _FINGERPRINT = re.compile(rb"(?im)^[^\n]*" + FINGERPRINT.encode("ascii") + rb" ([0-9a-f]{8})\b")
 _BY_CONTROL = re.compile(rb"(?im)^[^\n]*geometric errors [^\n]*corrected by the control")
 _ORIENTED = re.compile(rb"(?im)^[^\n]*tool axes chosen: orient ([a-z-]+), max tilt ([^ \n]+) degrees")
+_SETUP = re.compile(rb"(?im)^[ \t(;\dN]*setup ([^\n]*?)(?:, " + SETUP_MARK.encode("ascii") + rb" ([0-9a-f]{8})\b|$)")
 _OURS = re.compile(rb"(?im)^[^\n]*postproc \d+\.\d[^\n]*\n(?:[^\n]*part [^\n]*\n)?[^\n]*source ")
 CAUSES = frozenset({"verify.start", "verify.tool", "verify.tool_change", "verify.state", "verify.tap", "verify.hole"})
 """told first: a path that is off follows from them"""
@@ -51,6 +53,21 @@ def other_axes(data: bytes, options: Options, gcode: str) -> list[Diagnostic]:
         return []
     return [error("verify.orient", f"the header says orient {plan}, max tilt {tilt} degrees, {given} is given", file=gcode,
                   hint=f"verify with --orient {plan} --max-tilt {tilt}")]
+
+
+def other_setup(data: bytes, options: Options, off: bool, gcode: str) -> list[Diagnostic]:
+    """What the header of a program says of its set-up where that is not the one given; `off`: the program fails."""
+    head = data[:HEADER]
+    stated = _SETUP.search(head)
+    then = stated[2].decode("ascii").lower() if stated and stated[2] else ""
+    if then == options.setup_mark or (stated and not then) or not _OURS.search(head):
+        return []
+    given = f"{Path(options.setup).name} (fingerprint {options.setup_mark})" if options.setup_mark else "none"
+    named = stated[1].decode("utf-8", "replace").strip() if stated else ""
+    says = f"the set-up {named} (fingerprint {then})" if stated else "no set-up"
+    judge, so = (error, "what is off may follow from that alone") if off else (warning, "it is right under the one given")
+    return [judge("verify.setup", f"the header of the program names {says}, {given} is given: {so}", file=gcode,
+                  hint=f"verify with --setup {named} as it was, or convert again" if stated else "verify without --setup")]
 
 
 def read_back(data: bytes | str, job: Job, file: str, progress: Callable[[str, int, int], None] | None = None,

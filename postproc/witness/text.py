@@ -141,10 +141,13 @@ def _written_out(text: bytes) -> tuple[bytes, Array]:
     if b"DEFSUB" not in text:
         return text, np.arange(1, count + 1)
     bodies: dict[bytes, tuple[bytes, int]] = {}
+    at = before = 0
 
     def define(found: re.Match[bytes]) -> bytes:
-        first = _ends(text[:found.start(2)])
-        bodies[found[1].strip()] = found[2], first
+        nonlocal at, before
+        before += _ends(text[at:found.start(2)])
+        at = found.start(2)
+        bodies[found[1].strip().upper()] = found[2], before
         return b"\n" * _ends(found[0])
 
     rest = _SUBROUTINE.sub(define, text)
@@ -159,12 +162,13 @@ def _ends(text: bytes) -> int:
 
 def _expand(text: bytes, first: int, bodies: dict[bytes, tuple[bytes, int]], parts: list[tuple[bytes, Array]],
             deep: int) -> None:
-    at = 0
+    at, line_at = 0, first
     for call in _CALL.finditer(text):
-        name = call[1].strip()
-        _piece(text[at:call.start()].removesuffix(b"\n"), first + _ends(text[:at]), parts, at < call.start())
-        here = first + _ends(text[:call.start()])
+        name = call[1].strip().upper()
+        _piece(text[at:call.start()].removesuffix(b"\n"), line_at, parts, at < call.start())
+        here = line_at + _ends(text[at:call.start()])
         at = min(call.end() + 1, len(text))
+        line_at = here + _ends(text[call.start():at])
         if name in bodies and deep < _DEEP:
             body, line = bodies[name]
             _piece(b"SUB-BEGIN", here, parts)
@@ -172,7 +176,7 @@ def _expand(text: bytes, first: int, bodies: dict[bytes, tuple[bytes, int]], par
             _piece(b"SUB-END", here, parts)
         else:
             _piece(b"SUB-UNKNOWN", here, parts)
-    _piece(text[at:], first + _ends(text[:at]), parts, at < len(text))
+    _piece(text[at:], line_at, parts, at < len(text))
 
 
 def _piece(text: bytes, first: int, parts: list[tuple[bytes, Array]], some: bool = True) -> None:

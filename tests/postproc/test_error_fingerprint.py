@@ -10,6 +10,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from postproc.cli import app
+from postproc.program_header import FINGERPRINT
 
 ERRORS = Path("samples/errors")
 CONTROLLERS = ["linuxcnc", "generic-iso", "fanuc-30i", "haas-ngc", "siemens-840d", "heidenhain-tnc640"]
@@ -89,7 +90,7 @@ def test_programs_without_a_fingerprint_verify_as_ever(model: Path) -> None:
 def test_a_program_that_the_control_corrects_names_no_fingerprint(model: Path) -> None:
     model.write_text('corrected_by = "control"\n' + MODEL)
     program = written(model)
-    assert "fingerprint" not in program.read_text()
+    assert FINGERPRINT not in program.read_text()
     model.write_text(model.read_text().replace("6.0", "6.5"))
     assert not told(verified(program, model), "verify.error_model")
 

@@ -245,6 +245,20 @@ def test_trans_and_subprograms_under_changing_frames() -> None:
     assert p.line.tolist() == [9, 5, 7, 13, 5, 7]
 
 
+def test_subprograms_bear_numbers_or_names() -> None:
+    head = "UNITS/MM\nFEDRAT/1\nDEFSUB/7\nGOTO/7,0,0\nENDSUB\nDEFSUB/Hole-7\nGOTO/1,0,0\nENDSUB\n"
+    p = read(head + "CALSUB/HOLE-7\nDEFSUB/hole-7\nGOTO/2,0,0\nCALSUB/LATER\nENDSUB\nCALSUB / hole-7\n"
+             "DEFSUB/LATER\nGOTO/3,0,0\nENDSUB\nCALSUB/7\n")
+    assert p.tip[:, 0].tolist() == [1, 2, 3, 7]
+    for call, said in (("HOLE", "HOLE: the subprogram is not defined; the file defines HOLE-7"), ("", "is not defined"),
+                       ("8", "8: the subprogram is not defined")):
+        found = read_bytes(f"{head}CALSUB/{call}\n").diagnostics
+        assert sum(said in str(d) for d in found if d.code == "cl.subprogram") == 1
+    assert any("no CALSUB runs subroutine HOLE-7" in str(d) for d in read_bytes(head).diagnostics)
+    found = read_bytes("UNITS/MM\nFEDRAT/1\nDEFSUB\nGOTO/7,0,0\nENDSUB\nGOTO/1,1,1\n").diagnostics
+    assert [str(d) for d in found if "DEFSUB without the number or name of its subprogram; write DEFSUB/1" in str(d)]
+
+
 def test_points_of_subprograms_are_local_even_with_six_numbers() -> None:
     text = ("$$-> MFGNO / A\nUNITS/MM\nFEDRAT/1\nMULTAX / ON\nDEFSUB / 1\nGOTO/1,0,0,0,0,1\nENDSUB\n"
             "$$-> CSYS / 1,0,0,10, $\n0,1,0,0, $\n0,0,1,0\nCALSUB / 1\nGOTO/1,0,0,0,0,1\n"

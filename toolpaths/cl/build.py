@@ -18,6 +18,7 @@ from toolpaths.cl.dialects import SCALE, Dialect
 from toolpaths.cl.log import Log
 from toolpaths.cl.scan import Points
 from toolpaths.cl.statements import Program, Statement
+from toolpaths.cl.subprograms import Called, Subprograms
 from toolpaths.toolpath import Cycle, Event, FeedMode, Frame, Operation, Role, Tool
 
 Triple = tuple[float, float, float]
@@ -136,7 +137,7 @@ class Builder:
         """(operation, row) where words of turning stood"""
         self.declared: Declared | None = None
         self.zsurf: float | None = None
-        self.subprograms: dict[float, tuple[int, int]] | None = None
+        self.subprograms: Subprograms | None = None
         self.open_paths: list[tuple[int, str]] = []
         """line and name of the operations that END-OF-PATH has yet to end"""
         self.paths_ended = False
@@ -153,7 +154,7 @@ class Builder:
         self.turns_at: list[int] = []
         """rows before which ROTATE stands"""
         self.about_axis = False
-        self.indexed_subs: frozenset[float] | None = None
+        self.indexed_subs: frozenset[Called] | None = None
         self.caller_row = 0
         """first row since the last subroutine ended"""
         self.entries: list[tuple[int, int]] = []

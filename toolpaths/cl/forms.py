@@ -17,6 +17,7 @@ from toolpaths.cl.feeds import UNITS
 from toolpaths.cl.log import Log
 from toolpaths.cl.near import nearest
 from toolpaths.cl.statements import COMMENT, DATA_COMMENT, Program, Statement
+from toolpaths.cl.subprograms import NAME
 from toolpaths.cl.words import BARE_WORDS, NEUTRAL, SILENT, TEXT_WORDS
 
 
@@ -30,10 +31,13 @@ class Form:
     gaps: bool = False
     lengths: bool = False
     """numbers are lengths: whole ones that begin with 0 are what is left of another"""
+    named: bool = False
+    """its first field may be a name: what a damaged one leaves has no counterpart in the file, which is an error there"""
 
 
-def _form(words: str = "", *counts: int, closed: bool = False, gaps: bool = False, lengths: bool = False) -> Form:
-    return Form(frozenset(words.split()), frozenset(counts), not closed, gaps, lengths)
+def _form(words: str = "", *counts: int, closed: bool = False, gaps: bool = False, lengths: bool = False,
+          named: bool = False) -> Form:
+    return Form(frozenset(words.split()), frozenset(counts), not closed, gaps, lengths, named)
 
 
 _TABLE = _form("AAXIS BAXIS CAXIS INCR ABS CLW CCLW TABLE HEAD ATANGL NEXT ROTREF AXIS", 1)
@@ -68,7 +72,7 @@ FORMS: dict[str, Form] = {
     "STOP": _ALONE, "OPSTOP": _ALONE, "FINI": _ALONE, "END": _ALONE, "END-OF-PATH": _ALONE, "ENDSUB": _form("", 0, 1),
     "NURBS": _ALONE, "AUTOPS": _ALONE,
     "DELAY": _form("REV SEC TIME NOW NEXT", 1), "DWELL": _form("REV SEC TIME NOW NEXT", 1),
-    "CALSUB": _form("", 0, 1), "DEFSUB": _form("", 0, 1),
+    "CALSUB": _form("", 0, 1, named=True), "DEFSUB": _form("", 0, 1, named=True),
     "OPSKIP": _form("ON OFF", 0, 1), "SEQNO": _form("INCR ON OFF NEXT", 0, 1, 2), "PREFUN": _form("NOW NEXT", 1, 2, 3, 4),
     "AUXFUN": _form("NOW NEXT", 1, 2, 3, 4), "SET": _form("MODE ABSOL INCR INCRE INCREM LINTOL LINEAR ON OFF"),
     "MODE": _form("MILL TURN INCR INCRE INCREM ON OFF TOOL XYPLAN YZPLAN ZXPLAN ABSOL"),
@@ -157,7 +161,7 @@ def _words_fault(s: Statement, form: Form, allow: frozenset[str]) -> str:
             if not form.gaps and not _bare_gap(s):
                 return "an empty field"
             continue
-        fault = _word_fault(word, form)
+        fault = "" if form.named and word is s.words[0] and NAME.fullmatch(word) else _word_fault(word, form)
         if fault:
             return fault
     return ""

@@ -14,6 +14,7 @@ from toolpaths.rotations import rotation
 
 if TYPE_CHECKING:
     from toolpaths.cl.build import Builder, Map
+from toolpaths.cl.subprograms import Called, called
 
 SAME_AXIS = 2e-3
 """rad: angles of three decimals that add up over a turn, and rows of CSYS remarks"""
@@ -31,15 +32,15 @@ def in_force(b: Builder) -> bool:
     return b.dialect.table_frames and (any(b.table) or b.about_axis)
 
 
-def indexed_subprograms(b: Builder) -> frozenset[float]:
-    """Numbers of the subroutines that some CALSUB calls after a ROTATE, found once."""
+def indexed_subprograms(b: Builder) -> frozenset[Called]:
+    """Numbers and names of the subroutines that some CALSUB calls after a ROTATE, found once."""
     if b.indexed_subs is None:
         turned, found = False, set()
         for s in b.program.statements:
             if s.major == "ROTATE":
                 turned = True
-            elif s.major == "CALSUB" and turned and s.numbers:
-                found.add(s.numbers[0])
+            elif s.major == "CALSUB" and turned and s.words:
+                found.add(called(s))
         b.indexed_subs = frozenset(found) if b.dialect.table_frames else frozenset()
     return b.indexed_subs
 

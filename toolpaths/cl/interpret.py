@@ -9,6 +9,7 @@ from toolpaths.cl import curves, cycles, feeds, frames, indexing, listing_text, 
 from toolpaths.cl.build import Builder
 from toolpaths.cl.near import nearest
 from toolpaths.cl.statements import DATA_COMMENT, TEXT, Statement
+from toolpaths.cl.subprograms import Subprograms, called, shown, subprograms_of
 from toolpaths.cl.words import SILENT, UNSUPPORTED_MOTION
 
 Handler = Callable[[Builder, Statement], None]
@@ -55,47 +56,44 @@ def run(b: Builder, start: int, stop: int) -> None:
     b.stop = outer
 
 
-def subprograms(b: Builder) -> dict[float, tuple[int, int]]:
-    """Statements of DEFSUB and ENDSUB by number, found once."""
+def _subprograms(b: Builder) -> Subprograms:
+    """Where the subprograms of the file stand, found once."""
     if b.subprograms is None:
-        b.subprograms = {}
-        begun: list[tuple[float, int]] = []
-        for i, s in enumerate(b.program.statements):
-            if s.major == "DEFSUB":
-                begun.append((s.numbers[0] if s.numbers else -1.0, i))
-            elif s.major == "ENDSUB" and begun:
-                number, start = begun.pop()
-                b.subprograms[number] = (start, i)
+        b.subprograms = subprograms_of(b.program.statements)
     return b.subprograms
 
 
 def defsub(b: Builder, s: Statement) -> None:
     """Pass over the subprogram; CALSUB carries it out."""
-    for start, end in subprograms(b).values():
-        if start == b.index:
-            b.jump(b.program.before[end])
-            b.index = end
-            return
-    b.log.error("cl.subprogram", "DEFSUB without ENDSUB", b.line)
+    end = _subprograms(b).ends.get(b.index)
+    if end is None or called(s) == "":
+        why, hint = ("without ENDSUB", "write ENDSUB after its last record") if end is None else (
+            "without the number or name of its subprogram", "write DEFSUB/1 and CALSUB/1")
+        b.log.error("cl.subprogram", f"DEFSUB {why}", b.line, hint)
+        return
+    b.jump(b.program.before[end])
+    b.index = end
 
 
 def calsub(b: Builder, s: Statement) -> None:
     """Carry out the statements and points of a subprogram here, under the frame that holds here."""
-    if not s.numbers and s.words:
+    known, name = _subprograms(b), called(s)
+    found = known.place(name, b.index) if name != "" else None
+    if found is None and known.elsewhere(name):
         b.log.warning("cl.subprogram", f"CALSUB/{s.body}: no subprogram of the file, left out", b.line,
                       "moves of a program that the machine keeps are not checked", key="named")
         return
-    found = subprograms(b).get(s.numbers[0]) if s.numbers else None
     if found is None or len(b.calls) >= _DEEPEST or found in b.calls or b.row > _MOST_ROWS:
         why = "is not defined" if found is None else "calls itself" if found in b.calls else "makes too many points"
-        b.log.error("cl.subprogram", f"CALSUB/{s.body}: the subprogram {why}", b.line)
+        hint = f"the file defines {', '.join(known.names[:6])}" if found is None and known.names else ""
+        b.log.error("cl.subprogram", f"CALSUB/{s.body}: the subprogram {why}", b.line, hint)
         return
     start, end = found
     index, fast, about_axis = b.index, b.fast, b.about_axis
     b.calls.append(found)
     b.called.add(found)
     b.in_subprogram.set(b.row, True)
-    _stand_about_axis(b, about_axis or s.numbers[0] in indexing.indexed_subprograms(b))
+    _stand_about_axis(b, about_axis or name in indexing.indexed_subprograms(b))
     indexing.note_call(b, b.caller_row)
     b.caller_row = b.row
     b.jump(b.program.before[start])
@@ -189,15 +187,16 @@ def report_others(b: Builder) -> dict[str, int]:
 
 def _report_uncalled(b: Builder) -> None:
     """What stands in a subroutine that no CALSUB runs is not executed."""
-    for number, (start, end) in subprograms(b).items():
+    known = _subprograms(b)
+    for name, start, end in ((name, *place) for name, places in known.named.items() for place in places):
         if (start, end) in b.called:
             continue
         if "DEFSUB" in b.allow_unknown:
             before = b.program.before
             b.uncalled += end - start + before[end] - before[start]
         else:
-            b.log.error("cl.subprogram", f"no CALSUB runs subroutine {number:g}: its records are not executed",
-                        b.program.lines[start], "--allow-unknown DEFSUB leaves it out", key=f"uncalled {number}")
+            b.log.error("cl.subprogram", f"no CALSUB runs subroutine {shown(name)}: its records are not executed",
+                        b.program.lines[start], "--allow-unknown DEFSUB leaves it out", key=f"uncalled {name}")
 
 
 def _report_word(b: Builder, word: str, found: list[tuple[int, int, int]]) -> None:

@@ -1,0 +1,31 @@
+"""Eight hex digits of what a set-up says, so that a program can be compared with the set-up that it was written with."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+
+from postproc.setup import SetupFile
+from postproc.setup_files import file_keys, value_at
+from toolpaths.input_files import read_input
+
+DIGITS = 8
+_ASIDE = {"description", "placement"}
+"""keys that change no word of a program: what `place` may choose from"""
+
+
+def fingerprint(setup: SetupFile, file: str) -> str:
+    """The same for set-ups that say the same, whatever their names, comments, bases, order and folders.
+
+    Meshes count by what they hold, not by their names. `file` is that of the set-up, whose folder meshes are named from.
+    """
+    values = setup.model_dump(mode="json", exclude=_ASIDE)
+    for key in file_keys(values):
+        try:
+            data = read_input(Path(file).parent / str(value_at(values, key)))
+        except OSError:  # said where the mesh is read
+            continue
+        value_at(values, key[:-1])[key[-1]] = hashlib.sha256(data).hexdigest()
+    text = json.dumps(values, sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()[:DIGITS]

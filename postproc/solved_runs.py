@@ -1,0 +1,96 @@
+"""The runs of a program with their joints as the control will take them, each in the frame that its words are in."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from machines.kinematics.base import Kinematics
+from postproc import path_faults as faults
+from postproc.modes import CONSTANT, OutputModes, WordFrame, turning_run
+from postproc.run_plan import RunPlan
+from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.diagnostics import Diagnostic, has_errors
+from toolpaths.rotations import angle_between
+
+
+@dataclass(frozen=True)
+class Run:
+    """Rows `first` to before `last` of Moves, with the frame of their words and the tool's kinematics."""
+
+    first: int
+    last: int
+    frame: WordFrame
+    kin: Kinematics
+    left: float
+    """rad of the axis tolerance that linearising may use"""
+
+
+@dataclass(frozen=True)
+class Runs:
+    """All runs, and the axes (R, 3) and joints (R, J) of their rows."""
+
+    each: tuple[Run, ...]
+    axis: Floats
+    q: Floats
+
+
+def solved_runs(plan: RunPlan, modes: OutputModes, kinematics: Callable[[int], Kinematics], operation: Ints,
+                axis_tolerance: float, file: str) -> tuple[Runs, list[Diagnostic]]:
+    """The runs of a plan in the output modes that are theirs; those that cannot be solved are left out, with errors.
+
+    Args:
+        operation: (R,) of each row
+        axis_tolerance: rad
+    """
+    moves, machine = plan.refined.moves, modes.control.machine
+    starts = np.flatnonzero(moves.link)
+    lasts, firsts = [*starts[1:].tolist(), len(moves)], starts.tolist()
+    still = _still(moves.axis, starts, axis_tolerance)
+    asked, left, tool = modes.asked[operation[np.array(lasts) - 1]].tolist(), plan.left[starts].tolist(), moves.tool[starts]
+    good = machine.kinematics.slides_affine and bool(np.isfinite(plan.q).all()) and not bool((plan.moved > 1e-6).any()) \
+        and not bool(np.isfinite(moves.spin).any())
+    laws = {(a, s): modes.law(a, s) for a, s in set(zip(asked, still.tolist(), strict=True))}
+    tools = {k: kinematics(k) for k in np.unique(tool).tolist()}
+    q, axis, found, each = plan.q, moves.axis, list[Diagnostic](), list[Run]()
+    for k, (first, last) in enumerate(zip(firsts, lasts, strict=True)):
+        kin, law = tools[int(tool[k])], laws[asked[k], bool(still[k])]
+        if not good:
+            more = _faults(plan, modes, kin, np.arange(first, last), axis_tolerance, file)
+            found += more
+            if has_errors(more):
+                continue
+        if law == "tilted" and not still[k]:
+            found.append(turning_run(np.unique(moves.line[first:last]).tolist(), file))
+            continue
+        frame = modes.tcp if law == "tcp" else modes.base
+        if law == "tilted":
+            if axis is moves.axis:
+                axis, q = np.array(axis), q.copy()
+            frame, at = modes.plane(kin, q[first])
+            q[first:last] = frame.control.slides_for(kin, moves.tip[first:last], np.tile(at, (last - first, 1)))
+            axis[first:last] = kin.forward(q[first:first + 1])[1]
+        each.append(Run(first, last, frame, kin, left[k]))
+    return Runs(tuple(each), axis, q), found
+
+
+def _still(axis: Floats, starts: Ints, axis_tolerance: float) -> Bools:
+    """(runs,) True where the tool axes of a run are one within a share of the tolerance (rad)."""
+    if axis.strides[0] == 0 or not len(starts):
+        return np.ones(len(starts), dtype=np.bool_)
+    of_first = np.repeat(axis[starts], np.diff(np.append(starts, len(axis))), axis=0)
+    near = angle_between(axis[starts[0]:], of_first) <= CONSTANT * axis_tolerance
+    return np.asarray(np.logical_and.reduceat(near, starts - starts[0]))
+
+
+def _faults(plan: RunPlan, modes: OutputModes, kin: Kinematics, rows: Ints, axis_tolerance: float,
+            file: str) -> list[Diagnostic]:
+    """What stands against the joints of a run."""
+    moves, q, axis = plan.refined.moves, plan.q[rows], plan.refined.moves.axis[rows]
+    found = faults.moved_axes(moves, rows, plan.moved[rows], file)
+    found += faults.unreachable(modes.control, kin, moves, rows, axis, q, file)
+    if has_errors(found):
+        return found
+    return found + faults.spun(kin, moves, rows, axis, q, axis_tolerance, file)

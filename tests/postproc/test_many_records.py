@@ -1,0 +1,69 @@
+"""Work grows in proportion to the file: counted in calls, not in seconds."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+import toolpaths
+from postproc import home_links, path
+from postproc.pipeline import PostResult, convert
+from postproc.setup import SetupFile
+from tests.benchmarks.bench_many import KINDS, text_of
+
+MOST = {"tool changes": 2000}
+"""calls for each; 20,000 of them are to take seconds"""
+SETUP = SetupFile.model_validate({"tools": {str(k): {"gauge_length": 100.0 + k % 3} for k in range(1, 21)}})
+
+
+def converted(kind: str, count: int, machine: str = "mill-3axis", controller: str = "linuxcnc") -> PostResult:
+    read, found = toolpaths.read_bytes(text_of(kind, count))
+    result = convert(read, machine, controller, SETUP, diagnostics=found)
+    assert result.ok, [str(d) for d in result.diagnostics]
+    return result
+
+
+def calls(work: Callable[[], Any]) -> int:
+    """How many functions of Python and C were called."""
+    count = 0
+
+    def counting(frame: Any, event: str, arg: Any) -> None:
+        nonlocal count
+        count += event in ("call", "c_call")
+
+    sys.setprofile(counting)
+    try:
+        work()
+    finally:
+        sys.setprofile(None)
+    return count
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_calls_grow_no_faster_than_the_file(kind: str) -> None:
+    converted(kind, 5)  # imports, compiled code
+    few, more, many = (calls(lambda n=n: converted(kind, n)) for n in (22, 44, 66))
+    assert many - more <= 1.1 * (more - few) + 500, (few, more, many)
+    assert (many - more) / 22 < MOST.get(kind, np.inf), "each is worked out by itself"
+
+
+@pytest.mark.parametrize(("machine", "controller"), [("mill-3axis", "linuxcnc"), ("mikron-ucp710", "linuxcnc")])
+def test_links_by_home_together_are_those_made_one_by_one(machine: str, controller: str,
+                                                         monkeypatch: pytest.MonkeyPatch) -> None:
+    together, done = home_links.add_home_links, []
+
+    def watched(*args: Any) -> Any:
+        done.append(together(*args))
+        return done[-1]
+
+    monkeypatch.setattr(path, "add_home_links", watched)
+    result = converted("tool changes", 7, machine, controller)
+    assert any(some.sum() >= 5 for some in done) or machine != "mill-3axis"
+    monkeypatch.setattr(path, "add_home_links", lambda out, base, space, runs, *_: np.zeros(len(runs.each), dtype=bool))
+    alone = converted("tool changes", 7, machine, controller)
+    assert alone.text == result.text and alone.path is not None and result.path is not None
+    assert alone.path.begin.tolist() == result.path.begin.tolist() and (alone.path.move == result.path.move).all()
