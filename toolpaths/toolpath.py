@@ -265,7 +265,7 @@ class Toolpath:
     def equals(self, other: Toolpath) -> bool:
         """True where every value is the same bit for bit, apart from source lines, faults, counts and the file's name."""
         for f in fields(self):
-            if f.name in ("line", "file", "faults", "records"):
+            if f.name in ("line", "file", "faults", "records", "source"):
                 continue
             if not _same(getattr(self, f.name), getattr(other, f.name)):
                 return False

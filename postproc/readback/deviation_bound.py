@@ -14,6 +14,7 @@ import numpy as np
 
 from machines.kinematics import columns
 from machines.kinematics.base import Kinematics
+from machines.kinematics.columns import Columns
 from machines.kinematics.jets import Angle, Jet, straight
 from machines.straight_blocks import pose_jets
 from postproc.bound import SHORT, axis_reference, curve_parameter, tip_reference
@@ -37,6 +38,8 @@ SAME = 1e-5
 """mm: what the law of a block and the reader may differ by in its middle"""
 CHUNK = 20_000
 _STANDS = 1e-12
+_REACH = 0.9
+"""of the tolerance: how far from the nearest point the axis may be compared"""
 
 
 @dataclass(frozen=True)
@@ -92,9 +95,18 @@ class _Values:
     tip: Floats
     axis: Floats
 
-    def take(self, index: Bools) -> _Values:
+    def take(self, index: Bools | Ints) -> _Values:
         """Some of them."""
         return _Values(self.seen_tip[index], self.seen_axis[index], self.tip[index], self.axis[index])
+
+    def replaced(self, index: Ints, other: _Values) -> _Values:
+        """With others in the place of some."""
+        changed = []
+        for name in ("seen_tip", "seen_axis", "tip", "axis"):
+            column = np.array(getattr(self, name))
+            column[index] = getattr(other, name)
+            changed.append(column)
+        return _Values(*changed)
 
 
 def deviation_bound(motion: Motion, executed: Executed, moves: Moves, rows: Ints, owner: Ints, begin: Floats,
@@ -110,14 +122,14 @@ def deviation_bound(motion: Motion, executed: Executed, moves: Moves, rows: Ints
     worst = _Worst(allowed)
     for at in range(0, len(rows), CHUNK):
         for pieces in _whole(motion, executed, ends, np.arange(at, min(at + CHUNK, len(rows)))):
-            worst.add(pieces, _values(motion, executed, moves, ends, pieces))
+            worst.add(pieces, _values(motion, executed, moves, ends, pieces, allowed))
     for _ in range(HALVINGS):
         halves = worst.taken().halves()
         if not len(halves):
             break
         for at in range(0, len(halves), CHUNK):
             part = halves.take(slice(at, at + CHUNK))
-            worst.add(part, _values(motion, executed, moves, ends, part))
+            worst.add(part, _values(motion, executed, moves, ends, part, allowed))
     return worst.result(rows)
 
 
@@ -194,25 +206,54 @@ def _whole(motion: Motion, executed: Executed, ends: _Ends, k: Ints) -> list[_Pi
     return [p for p in pieces if len(p)]
 
 
-def _values(motion: Motion, executed: Executed, moves: Moves, ends: _Ends, pieces: _Pieces) -> _Values:
-    """Deviations and bounds of pieces."""
-    rows, n = ends.rows[pieces.k], len(pieces)
+def _values(motion: Motion, executed: Executed, moves: Moves, ends: _Ends, pieces: _Pieces,
+            allowed: tuple[float, float]) -> _Values:
+    """Deviations and bounds of pieces: from the nearest points of the curves, where that is outside the tolerance from the
+    places whose axis fits best among those whose tip is near enough, as `Curves.deviation` has it."""
+    rows = ends.rows[pieces.k]
     curves = moves.curves(ends.owner[pieces.k])
     places = pieces.a, 0.5 * (pieces.a + pieces.b), pieces.b
     poses = [executed.poses(motion, rows, t) for t in places]
     guess = [np.minimum(ends.begin[pieces.k] + t * ends.share[pieces.k], 1.0) for t in places]
-    u = [curves.project(np.nan_to_num(tip), g) for (tip, _), g in zip(poses, guess, strict=True)]
+    nearest = [curves.project(np.nan_to_num(tip), g) for (tip, _), g in zip(poses, guess, strict=True)]
     law = _Law.of(motion, executed, rows, pieces, poses)
     even = law.straight_tip & ~curves.is_arc
-    even_parameter = even | (curves.length() <= SHORT)
+    found = _compared(curves, poses, nearest, law, even, even | (curves.length() <= SHORT))
+    outside = np.isfinite(found.tip) & (_excess(found, allowed) > 1.0)
+    if outside.any():
+        k = np.flatnonzero(outside)
+        some, there = curves.take(k), [(tip[k], axis[k]) for tip, axis in poses]
+        fit = [_best_fit(some, *pose, u[k], _REACH * allowed[0]) for pose, u in zip(there, nearest, strict=True)]
+        other = _compared(some, there, fit, law.take(k), np.zeros(len(k), dtype=bool), np.zeros(len(k), dtype=bool))
+        better = _excess(other, allowed) < _excess(found.take(k), allowed)
+        found = found.replaced(k[better], other.take(better))
+    return found
+
+
+def _excess(values: _Values, allowed: tuple[float, float]) -> Floats:
+    """The larger bound over its tolerance."""
+    return np.asarray(np.maximum(values.tip / allowed[0], values.axis / allowed[1]))
+
+
+def _best_fit(curves: Curves, tip: Floats, axis: Floats, u: Floats, within: float) -> Floats:
+    """The parameter whose axis is nearest, among those whose tip is `within` mm; `u`: that of the nearest point."""
+    off = lengths(tip - curves.tip_at(u))
+    reach = np.sqrt(np.maximum(within**2 - off**2, 0.0)) / np.maximum(curves.length(), _STANDS)
+    return np.asarray(np.clip(np.clip(curves.turned(axis, u), u - reach, u + reach), 0.0, 1.0))
+
+
+def _compared(curves: Curves, poses: list[tuple[Floats, Floats]], u: list[Floats], law: _Law, even: Bools,
+              even_parameter: Bools) -> _Values:
+    """Deviations and bounds of N pieces from the poses of their curves at `u`, where they begin, in their middle, where they
+    end; `even`: the difference of the tips is straight."""
+    n = len(even)
     way = curve_parameter(u[0], np.where(even_parameter, 0.5 * (u[0] + u[2]), u[1]), u[2])
     on = [curves.at(np.clip(v, 0.0, 1.0)) for v in (u[0], np.asarray(way.value + np.zeros(n)), u[2])]
     tip_off = np.max([lengths(p[0] - c[0]) for p, c in zip(poses, on, strict=True)], axis=0)
     axis_off = np.max([lengths(p[1] - c[1]) for p, c in zip(poses, on, strict=True)], axis=0)
     turn = angle_between(curves.axis0, curves.axis1)
-    tip = law.tip - tip_reference(curves, way)
-    axis = law.axis - axis_reference(curves, way, turn)
-    bend = [np.where(law.known, _bend(jet) + np.zeros(n), np.inf) for jet in (tip, axis)]
+    differences = law.tip - tip_reference(curves, way), law.axis - axis_reference(curves, way, turn)
+    bend = [np.where(law.known, _bend(jet) + np.zeros(n), np.inf) for jet in differences]
     # A straight tip beside a straight line: with both parameters even the difference is straight, so largest at an end.
     bend[0] = np.where(even & law.known, 0.0, bend[0])
     return _Values(_known(tip_off), _angle(_known(axis_off)), _known(tip_off + bend[0] / 32.0),
@@ -271,6 +312,16 @@ class _Law:
         tip, axis = (Jet(list(value[i, 0]), list(value[i, 1]), list(value[i, 2]), third[i]) for i in range(2))
         apart = lengths(value[0, 0].T - poses[1][0])
         return cls(tip, axis, known & (apart <= SAME), straight_tip)
+
+
+    def take(self, k: Ints) -> _Law:
+        """Some of the pieces."""
+        def some(part: Columns) -> list[Floats | float]:
+            return [np.broadcast_to(x, self.known.shape)[k] for x in part]
+
+        jets = [Jet(some(jet.value), some(jet.first), some(jet.second), np.broadcast_to(jet.third, self.known.shape)[k])
+                for jet in (self.tip, self.axis)]
+        return _Law(jets[0], jets[1], self.known[k], self.straight_tip[k])
 
 
 _LINE, _JOINTS, _TIP, _CIRCLE = range(4)

@@ -11,7 +11,7 @@ import pytest
 import postproc
 from postproc.blocks import rapid_codes
 from postproc.control import Control
-from postproc.links import SafeSpace, _stays_clear
+from postproc.links import SafeSpace, stays_clear
 from postproc.setup import load_setup
 from postproc.travel import extremes
 from tests.postproc.kit import angle, codes, convert, goto, machine, tilted, tool_setup, toolpath
@@ -185,7 +185,7 @@ def test_a_way_is_looked_at_along_its_dog_leg() -> None:
     space = SafeSpace(np.zeros(3), 10.0, corners, None, 5.0)
     way = np.array([[-40.0, -40.0, 0.0], [40.0, 0.0, 0.0]])
     for rapids, clear in (("straight", True), ("dog-leg", False)):
-        assert _stays_clear(Control(m, "axes", np.zeros(3), rapids=rapids), m.kinematics, space, way, 1.0) == clear
+        assert stays_clear(Control(m, "axes", np.zeros(3), rapids=rapids), m.kinematics, space, way, 1.0) == clear
 
 
 def test_linking_moves_are_clear_along_their_dog_legs(tmp_path: Path) -> None:
