@@ -77,7 +77,7 @@ def check_slow(motion: Motion, executed: Executed, job: Job, moves: Moves, owner
     """
     cutting = (owner < len(moves)) & (motion.code > 0)
     length = moves.lengths()
-    asked = np.where(moves.seconds > 0.0, moves.seconds, length / moves.feed)
+    asked = _asked(moves, owner, cutting, tip, length)
     total, again = _by_move(owner, cutting, seconds, len(moves)), _pecked(moves, owner, cutting, tip, length)
     total = total / again
     rules = _Slack.of(job, bool(motion.inch.any()))
@@ -103,6 +103,15 @@ def check_slow(motion: Motion, executed: Executed, job: Job, moves: Moves, owner
     return [faults.error("verify.slow", f"the move runs at {asked[k] / total[k]:.3f} times the programmed feed, and no axis "
                          "needs that", int(moves.line[k]), int(motion.line[match[k]]), len(slow),
                          "correct the F word; where a lower feed is meant, state it in the CAM system")]
+
+
+def _asked(moves: Moves, owner: Ints, cutting: Bools, tip: Floats, length: Floats) -> Floats:
+    """(M,) s that the CL file asks for; moves that rounding or smoothing of their points made longer, by so much more."""
+    asked = np.where(moves.seconds > 0.0, moves.seconds, length / moves.feed)
+    path = _by_move(owner, cutting, np.concatenate([[0.0], lengths(np.diff(tip, axis=0))]), len(moves))
+    longer = (path > length) & (moves.phase != Phase.DRILL)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(np.where(longer, np.where(length > 0.0, asked * path / length, path / moves.feed), asked))
 
 
 @dataclass(frozen=True)

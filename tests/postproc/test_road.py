@@ -126,8 +126,8 @@ def test_spindle_and_coolant_go_on_with_the_next_tool() -> None:
 
 
 def test_spindle_on_turns_the_way_it_turned() -> None:
-    path = toolpath("SPINDL/RPM,300,CCLW", "RAPID", "GOTO/0,0,5", "GOTO/1,0,5", "SPINDL/OFF", "GOTO/2,0,5", "SPINDL/ON",
-                    "GOTO/3,0,5")
+    path = toolpath("SPINDL/RPM,300,CCLW", "RAPID", "GOTO/0,0,5", "GOTO/1,0,5", "SPINDL/OFF", "RAPID", "GOTO/2,0,5",
+                    "SPINDL/ON", "GOTO/3,0,5")
     turns = re.findall(r"^S300 (M\d)$", good(convert(path, "mill-3axis")).text, re.MULTILINE)
     assert turns == ["M4", "M4"]
 
