@@ -7,8 +7,9 @@ from pathlib import Path
 import pytest
 
 import toolpaths
+from toolpaths.cl import interpret
 from toolpaths.cl.read import read_bytes, read_file
-from toolpaths.diagnostics import has_errors
+from toolpaths.diagnostics import Severity, has_errors
 from toolpaths.inspect import inspect, summary
 from toolpaths.toolpath import Records
 
@@ -30,6 +31,9 @@ def test_every_record_of_a_sample_is_executed_or_neutral(path: Path) -> None:
     (HEAD + "$$ note\nPAINT/PATH\nRAPID\nGOTO/1,2,3\nGOTO/1,2, $\n4\nFINI\n", Records(7, 6, 1, 0)),
     (HEAD + "GOTO/1,2,3\nFLUB/1\n@@ text\nTRACUT/5\nGOTO/1,2,4\n", Records(7, 4, 0, 3)),
     ("$$-> MFGNO / A\n" + HEAD + "DEFSUB / 1\nGOTO / 1,2,3\nENDSUB\nCALSUB / 1\nCALSUB / 1\n", Records(7, 7, 0, 0)),
+    (HEAD + "RAPID\nGOTO/0,0,0\nNURBS/\nKNOT/0.5\n$$ note\nKNOT/1.0\nCNTRL/1,0,0\nCNTRL/3,1,0\nCNTRL/5,2,0\nCNTRL/8,2,0\n"
+     "GOTO/9,2,0\n", Records(12, 12, 0, 0)),
+    (HEAD + "COPY/NOMORE\nGOTO/1,2,3\nTRACUT/NOMORE\n", Records(5, 5, 0, 0)),
     ("=====\nDate : today\n" + HEAD + "GOTO/1,2,3\nTool Path Listing has 5 lines.\n", Records(6, 3, 3, 0)),
 ])
 def test_counts(text: str, counts: Records) -> None:
@@ -42,6 +46,45 @@ def test_what_is_allowed_is_neutral() -> None:
     text = HEAD + "GOTO/1,2,3\nFLUB/1\n@@ text\nGOTO/1,2,4\n"
     result = read_bytes(text, allow_unknown=["FLUB", "(TEXT)"])
     assert not has_errors(result.diagnostics) and result.toolpath.records == Records(6, 4, 2, 0)
+
+
+def test_a_dropped_record_that_nobody_names_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A motion word without an answer, planted; its hint is followed."""
+    text = "a listing\n" + HEAD + "GOTO/1,2,3\nTRACUT/5\nGOTO/1,2,4\nCOPY/2\nTRACUT/6\n"
+    assert "cl.dropped" not in {d.code for d in read_bytes(text).diagnostics}
+    monkeypatch.setattr(interpret, "_unsupported", lambda *_: None)
+    result = read_bytes(text)
+    found = [d for d in result.diagnostics if d.severity is Severity.ERROR]
+    assert [(d.code, d.lines) for d in found] == [("cl.dropped", (5,))] and result.toolpath.records.dropped == 3
+    assert "--allow-unknown TRACUT leaves such records out" in found[0].hint
+    rest = read_bytes(text, allow_unknown=["TRACUT"])
+    assert rest.toolpath.records.dropped == 1 and [d.lines for d in rest.diagnostics if d.code == "cl.dropped"] == [(7,)]
+    whole = read_bytes(text, allow_unknown=["TRACUT", "COPY"])
+    assert not has_errors(whole.diagnostics) and whole.toolpath.records == Records(8, 4, 4, 0)
+
+
+def test_an_uncalled_subroutine_with_motion_words_is_left_out_once() -> None:
+    text = "$$-> MFGNO / A\n" + HEAD + "DEFSUB / 1\nTRACUT/5\nGOTO / 1,2,3\nENDSUB\nGOTO / 1,2,4\n"
+    result = read_bytes(text, allow_unknown=["DEFSUB"])
+    assert not has_errors(result.diagnostics) and result.toolpath.records.dropped == 0
+
+
+@pytest.mark.parametrize(("remark", "refused"), [
+    ("CUTTER COMP OFF", False), ("TOOL CHANGE / 4", False), ("TOOL 4", False), ("CSYS OF TABLE 2", False),
+    ("TOOL LIST / CUTTER 10", False), ("CUTTER 10.5", True), ("CUTTER X 10.5", True), ("CUTER / 10.5", True),
+    ("CUT TER / 10.5", True), ("CUTT/ER / 10.5", True), ("/CUTTER / 10.5", True), ("FEATNO 10", True),
+    ("CSYS 1,0,0,0,0,1,0,0,0,0,1,0", True), ('TOOL {"number": 1}', True)])
+def test_remarks_are_refused_only_as_what_is_left_of_one_that_says_something(remark: str, refused: bool) -> None:
+    text = f"$$-> MFGNO / A\n{HEAD}GOTO/1,2,3\n$$-> {remark}\nGOTO/1,2,4\nFINI\n"
+    found = [(d.code, d.lines) for d in read_bytes(text).diagnostics if d.severity is Severity.ERROR]
+    assert found == ([("cl.data-comment", (5,))] if refused else [])
+
+
+@pytest.mark.parametrize(("dialect", "refused"), [("ncl", False), ("generic", False), ("solidworks", True), ("creo", True)])
+def test_six_numbers_of_cutter(dialect: str, refused: bool) -> None:
+    text = HEAD + "LOADTL/1\nCUTTER/10.0,2.0,50.0,0.0,0.0,0.0\nGOTO/1,2,3\n"
+    found = read_bytes(text, dialect=dialect).diagnostics
+    assert [d.code for d in found if d.severity is Severity.ERROR] == (["cl.form"] if refused else [])
 
 
 def test_a_subroutine_that_nothing_calls_is_refused_or_left_out() -> None:

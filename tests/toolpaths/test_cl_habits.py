@@ -10,7 +10,7 @@ import pytest
 
 import toolpaths
 from toolpaths.cl.read import ReadResult, read_bytes
-from toolpaths.diagnostics import Severity
+from toolpaths.diagnostics import Severity, has_errors
 from toolpaths.inspect import inspect
 from toolpaths.toolpath import Role, Toolpath
 
@@ -156,9 +156,21 @@ def test_the_long_form_of_toolno_leaves_the_sizes_to_cutter() -> None:
 
 
 def test_modifiers_of_fedrat_are_no_feed() -> None:
-    p = read(ISO + "FEDRAT/SCALE,2\nGOTO/1,1,1\nFEDRAT/LENGTH,5,MMPM,60\nGOTO/2,2,2\nFEDRAT/LOCK,ON\nGOTO/3,3,3\n",
-             "cl.feed-option")
-    assert p.feed.tolist() == [10, 1, 1]
+    p = read(ISO + "FEDRAT/MAXRPM,2\nGOTO/1,1,1\nFEDRAT/OVPLOT,5,MMPM,60\nGOTO/2,2,2\n", "cl.feed-option")
+    assert p.feed.tolist() == [10, 1]
+
+
+@pytest.mark.parametrize(("record", "word", "feed"), [
+    ("FEDRAT/MMPM,120,SCALE,0.5", "SCALE", 2), ("FEDRAT/SCALE,2", "SCALE", 10), ("FEDRAT/LENGTH,5,MMPM,60", "LENGTH", 1),
+    ("FEDRAT/LOCK,ON", "LOCK", 10), ("FEDRAT/MMPM,120,MAXIPM,20", "MAXIPM", 2)])
+def test_what_changes_the_feed_is_refused_and_left_out_as_the_hint_says(record: str, word: str, feed: float) -> None:
+    text = f"{ISO}{record}\nGOTO/1,1,1\nFINI\n"
+    found = [d for d in read_bytes(text).diagnostics if d.severity is Severity.ERROR]
+    assert [(d.code, d.lines) for d in found] == [("cl.feed-option", (ISO.count("\n") + 1,))]
+    assert f"--allow-unknown {word} takes the feed as it stands" in found[0].hint
+    result = read_bytes(text, allow_unknown=[word])
+    assert not has_errors(result.diagnostics) and "cl.feed-option" in {d.code for d in result.diagnostics}
+    assert result.toolpath.feed.tolist() == [feed]
 
 
 def test_dwell_is_delay() -> None:

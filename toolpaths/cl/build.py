@@ -173,6 +173,8 @@ class Builder:
         """subroutines that ran"""
         self.uncalled = 0
         """records of subroutines that nothing calls, left out as asked"""
+        self.taken: set[int] = set()
+        """statements of `UNSUPPORTED_MOTION` that mean something where they stand: those of a spline, NOMORE, left out"""
         self.memory: dict[str, object] = {}
         """what one file of handlers keeps between records (tool in hand, last cycle)"""
         self.cycle_records = 0

@@ -180,6 +180,7 @@ def _gather(b: Builder) -> tuple[list[float], list[Triple]]:
         if major not in ("KNOT", "CNTRL", COMMENT):
             break
         b.index += 1
+        b.taken.add(b.index)
         last = last if major == COMMENT else major
         if major == COMMENT:
             continue

@@ -37,6 +37,7 @@ class Dialect:
         frame_turns: ROTABL turns the frame of the points by its angle, not the table
         table_frames: under ROTATE and TRANS points stand about the rotation axis (`indexing`)
         axis_reset: the axis is the local z again at each operation
+        six_sizes: CUTTER may have six numbers
         planes: how cycles state their planes
     """
 
@@ -51,11 +52,12 @@ class Dialect:
     frame_turns: bool = False
     table_frames: bool = False
     axis_reset: bool = False
+    six_sizes: bool = False
     planes: Planes = Planes.RELATIVE
 
 
 DIALECTS = {d.name: d for d in (
-    Dialect("generic", "APT text"),
+    Dialect("generic", "APT text", six_sizes=True),
     Dialect("nx", "Siemens NX", arc_sense=-1, full_circles=False, depth_sign=-1, axis_reset=True),
     Dialect("makino", "Makino FF/CAM", arc_sense=-1, full_circles=False),
     Dialect("creo", "PTC Creo", six_common=True, table_frames=True),
@@ -63,7 +65,7 @@ DIALECTS = {d.name: d for d in (
     Dialect("solidworks-clt", "SolidWorks CAM .clt", arc_sense=0, six_common=True, insert_is_comment=True,
             rotabl_radians=True, frame_turns=True),
     Dialect("catia", "CATIA"),
-    Dialect("ncl", "NCL"),
+    Dialect("ncl", "NCL", six_sizes=True),
     Dialect("camplete", "Autodesk APT for CAMplete or MANUSnc", arc_sense=-1, planes=Planes.HEIGHTS),
     Dialect("mfgsuite", "Autodesk APT for MfgSuite", planes=Planes.DOWN),
     Dialect("autodesk-iso", "Autodesk Common ISO 4343 APT", planes=Planes.BOTTOM),

@@ -17,7 +17,9 @@ PER_SECOND = {"MMPS": 1.0, "IPS": MM_PER_INCH}
 PER_REVOLUTION = {"MMPR": 1.0, "IPR": MM_PER_INCH, "FPR": MM_PER_FOOT, "PERREV": math.nan}
 UNITS = frozenset(PER_MINUTE) | frozenset(PER_SECOND) | frozenset(PER_REVOLUTION)
 """NaN: the unit of the part."""
-_MODIFIERS = ("SCALE", "LENGTH", "LOCK", "MAXIPM", "MAXRPM", "OVPLOT")
+_CHANGING = ("SCALE", "LENGTH", "LOCK", "MAXIPM")
+"""Words of FEDRAT (NCL) that change the feed of the moves behind them."""
+_MODIFIERS = (*_CHANGING, "MAXRPM", "OVPLOT")
 """Words of FEDRAT (NCL) whose number is no feed."""
 
 
@@ -41,6 +43,12 @@ def fedrat(b: Builder, s: Statement) -> None:
     """Set the modal feed."""
     if s.has("INVERS"):
         _inverse(b, s)
+        return
+    changing = next((w for w in _CHANGING if s.has(w) and w not in b.allow_unknown), "")
+    if changing:
+        b.log.error("cl.feed-option", f"FEDRAT/{s.body}: {changing} changes the feed, and is not supported", b.line,
+                    f"have the CAM system write the feed itself; --allow-unknown {changing} takes the feed as it stands",
+                    key=changing)
         return
     numbers = _feeds(s.words)
     if not numbers and s.has(*_MODIFIERS):

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from toolpaths.cl.cycle_words import CYCLE_WORDS
-from toolpaths.cl.dialects import UNIT_WORDS
+from toolpaths.cl.dialects import UNIT_WORDS, Dialect
 from toolpaths.cl.feeds import UNITS
 from toolpaths.cl.log import Log
 from toolpaths.cl.near import nearest
@@ -108,13 +108,13 @@ _STARTS_NUMBER = frozenset("+-.0123456789")
 _LEADING_ZEROS = re.compile(r"[+-]?(?:0\d+|\.0*)")
 
 
-def check_forms(program: Program, log: Log, allowed: Iterable[str]) -> None:
+def check_forms(program: Program, log: Log, allowed: Iterable[str], dialect: Dialect) -> None:
     """An error for each different statement that departs from the form of its word, where its line has none yet."""
     allow, refused = frozenset(allowed), log.lines_with_errors()
     for statement, line in program.first.items():
         if statement.major in allow or line in refused:
             continue
-        fault = fault_of(statement, allow)
+        fault = fault_of(statement, allow) or ("" if dialect.six_sizes else _six_sizes(statement))
         if fault:
             name = statement.major.removeprefix(DATA_COMMENT)
             between = "/" if statement.body and statement.slash else " " if statement.body else ""
@@ -209,8 +209,6 @@ def _numbers_fault(s: Statement, form: Form) -> str:
     counts = form.counts
     if s.major == "TLDATA" and s.words[:1] == ("MILL",):
         counts = _MILL_COUNTS
-    if s.major == "CUTTER" and count == _CLT_CUTTER and not s.body.endswith(","):
-        return "6 numbers: one of seven is missing, or the comma behind the last"
     if s.major in _VALUED_IN:
         bare = [w for w, after in zip(s.words, (*s.words[1:], ""), strict=True) if w in _VALUED and isinstance(after, str)]
         if bare:
@@ -221,4 +219,11 @@ def _numbers_fault(s: Statement, form: Form) -> str:
         return f"{count} numbers, it takes {' or '.join(map(str, sorted(counts)))}"
     if form.lengths and any(_LEADING_ZEROS.fullmatch(part.strip()) for part in re.split(r"[,\s]+", s.body)):
         return "a number is cut off at its point"
+    return ""
+
+
+def _six_sizes(s: Statement) -> str:
+    """Systems with seven numbers in CUTTER: six are seven but one."""
+    if s.major == "CUTTER" and len(s.numbers) == _CLT_CUTTER and not s.body.endswith(","):
+        return "6 numbers: one of seven is missing, or the comma behind the last"
     return ""

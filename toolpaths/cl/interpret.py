@@ -8,7 +8,7 @@ from collections.abc import Callable
 from toolpaths.cl import curves, cycles, feeds, frames, indexing, listing_text, motion, structure, tools
 from toolpaths.cl.build import Builder
 from toolpaths.cl.near import nearest
-from toolpaths.cl.statements import DATA_COMMENT, TEXT, Statement
+from toolpaths.cl.statements import DATA_COMMENT, TEXT, Statement, words_of
 from toolpaths.cl.subprograms import Subprograms, called, shown, subprograms_of
 from toolpaths.cl.words import SILENT, UNSUPPORTED_MOTION
 
@@ -113,6 +113,10 @@ def _stand_about_axis(b: Builder, value: bool) -> None:
 
 
 HANDLERS.update({"DEFSUB": defsub, "CALSUB": calsub, "ENDSUB": structure.nothing})
+_SAYING = {**dict.fromkeys((w.removeprefix(DATA_COMMENT) for w in HANDLERS if w.startswith(DATA_COMMENT)), 0),
+           "CSYS": 12, "CUTTER": 1, "FEATNO": 1, "USE": 2, "SPLINE": 1}
+"""`$$->` remarks that say something, with the count of their numbers; 0: lists of our own writer"""
+_FIRST = re.compile(r"[^A-Z]*([A-Z]+)(?![A-Z])")
 VOCABULARY = frozenset(HANDLERS) | UNSUPPORTED_MOTION
 """Every word the reader has an answer to"""
 
@@ -132,16 +136,33 @@ def _other(b: Builder, s: Statement) -> None:
 
 
 def _remark(b: Builder, s: Statement) -> None:
-    """A `$$->` remark that nobody reads is a comment, unless its word is one edit from one that says something."""
+    """A `$$->` remark that nobody reads is a comment, unless it is what a damaged byte leaves of one that says something:
+    its word is one edit from that word, or that word stands with a body in its form and no slash between."""
     word = s.major.removeprefix(DATA_COMMENT)
-    known = [w.removeprefix(DATA_COMMENT) for w in HANDLERS if w.startswith(DATA_COMMENT)]
-    first = re.split(r"[^A-Z]", word + " ")[0]
+    if re.split(r"[^A-Z]", word + " ")[0] in REMARKS:
+        return
     inner = re.split(r"[^A-Z]", s.body.upper() + " ")[0] if "/" in s.body or not word else ""
-    heads = {word, first, inner, word + inner, word.replace(" ", ""), re.sub(r"[^A-Z]", "", word)} - {""}
-    meant = next((h if h in known else nearest(h, known) for h in sorted(heads) if h in known or nearest(h, known)), "")
-    if meant and first not in REMARKS:
+    heads = sorted({word, word + inner} - {""})
+    meant = next((h if h in _SAYING else nearest(h, _SAYING) for h in heads if h in _SAYING or nearest(h, _SAYING)), "")
+    joined = word.replace(" ", "")
+    meant = meant or (joined if joined in _SAYING else "") or _bodied(f"{word} {s.body}".strip())
+    if meant:
         b.log.error("cl.data-comment", f"$$-> {word[:40]}: no remark that is known, {meant}?", b.line,
                     "correct the word, or write $$ without -> before a comment", key=meant)
+
+
+def _bodied(text: str) -> str:
+    """The known word that `text` begins with where all behind it, but for one sign in place of the slash, is its body."""
+    first = _FIRST.match(text)
+    numbers = _SAYING.get(first[1]) if first else None
+    if first is None or numbers is None:
+        return ""
+    rest = text[first.end():].lstrip()
+    body = words_of(rest)
+    if len(body) > 1 and isinstance(body[0], str) and len(body[0]) == 1:
+        body = body[1:]
+    whole = len(body) >= numbers > 0 and all(isinstance(w, float) for w in body)
+    return first[1] if whole or (numbers == 0 and rest[:3].lstrip()[:1] in ("{", "[") and rest) else ""
 
 
 def _unsupported(b: Builder, s: Statement, word: str) -> None:
@@ -149,6 +170,7 @@ def _unsupported(b: Builder, s: Statement, word: str) -> None:
         b.note_unknown(s, word)
         return
     if s.words[-1:] == ("NOMORE",) and len(s.words) == 1 + len(s.numbers):
+        b.taken.add(b.index)
         return
     b.log.error("cl.unsupported-motion", f"{word} moves the tool or changes how it moves, and is not supported",
                 b.line, f"have the CAM system write out the points it makes; --allow-unknown {word} leaves the record out",
@@ -194,6 +216,7 @@ def _report_uncalled(b: Builder) -> None:
         if "DEFSUB" in b.allow_unknown:
             before = b.program.before
             b.uncalled += end - start + before[end] - before[start]
+            b.taken.update(range(start, end + 1))
         else:
             b.log.error("cl.subprogram", f"no CALSUB runs subroutine {shown(name)}: its records are not executed",
                         b.program.lines[start], "--allow-unknown DEFSUB leaves it out", key=f"uncalled {name}")

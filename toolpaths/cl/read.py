@@ -95,9 +95,10 @@ def read_bytes(data: bytes | str, *, file: str = "", units: str | None = None, d
         log.error("cl.empty", "the file holds no point", hint="a CL file has GOTO records")
     toolpath = assemble(b)
     _check_rapids(b, toolpath)
-    check_forms(program, log, b.allow_unknown)
+    check_forms(program, log, b.allow_unknown, found)
+    records = counted(b, frozenset(HANDLERS))
     diagnostics = log.diagnostics()
-    read = replace(_with_faults(toolpath, diagnostics), records=counted(b, frozenset(HANDLERS)))
+    read = replace(_with_faults(toolpath, diagnostics), records=records)
     raw = data.encode("utf-8", "replace") if isinstance(data, str) else bytes(data)
     object.__setattr__(read, "source", ClSource(raw, units or "", dialect or ""))
     return ReadResult(read, diagnostics, counts, found.name, evidence,
