@@ -12,6 +12,8 @@ FeedSource = Literal["programmed", "planned"]
 Orientation = Literal["keep", "per-pass", "whole-part", "auto"]
 SETUP_MARK = "fingerprint of the set-up"
 """before the eight hex digits, in the header of a program, of the set-up that it was written with"""
+NO_FILE = "without a file"
+"""name, in the header of a program, of a set-up that was given as a SetupFile"""
 
 
 @dataclass(frozen=True)
@@ -43,7 +45,7 @@ class Options:
     require_proof: bool = False
     """True: programs whose deviation is not bounded in every block are refused"""
     setup_mark: str = ""
-    """fingerprint of the set-up that `setup` was when it was read; put here by what reads it"""
+    """fingerprint of the set-up that was given, as a file or as a SetupFile; put here by what reads it"""
     name: str = ""
     """of the program and its subprograms' files; default: that of the CL file"""
 
@@ -62,9 +64,9 @@ class Options:
         if self.error_model:
             beyond = ", beyond its range too" if self.error_beyond else ""
             lines.append(f"error model {Path(self.error_model).name}{beyond}")
-        if self.setup:
+        if self.setup or self.setup_mark:
             mark = f", {SETUP_MARK} {self.setup_mark}" if self.setup_mark else ""
-            lines.append(f"setup {Path(self.setup).name}{mark}")
+            lines.append(f"setup {Path(self.setup).name or NO_FILE}{mark}")
         for name in ("units", "dialect"):
             if getattr(self, name):
                 lines.append(f"{name} {getattr(self, name)}")

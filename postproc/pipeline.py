@@ -154,7 +154,8 @@ def _loaded(controller: str | FilePath, machine: Machine | str | FilePath, setup
         setup, more = load_setup(options.setup or None)
         toolpaths.diagnostics.require(more)
     assert spec is not None and setup is not None
-    options = replace(options, setup_mark=fingerprint(setup, options.setup) if options.setup else "")
+    given = bool(options.setup) or setup != SetupFile()
+    options = replace(options, setup_mark=fingerprint(setup, options.setup) if given else "")
     return spec.divided(setup.output.files), machine, setup, options
 
 

@@ -198,7 +198,9 @@ def _check_spindle(event: Event, report: Report) -> None:
                "write SPINDL/RPM,n,CLW")
     elif speed is not None and speed <= 0.0 and "OFF" not in said:
         report(Severity.ERROR, "spindle.speed", f"SPINDL: the speed is {speed:g} rev/min", event.line,
-               "a speed above 0, or SPINDL/OFF")
+               "a speed above 0, or SPINDL/OFF" if speed < 0.0 else
+               "state a speed above 0, or SPINDL/OFF, in the CAM system, or add the speed to the set-up: [tools.N], or "
+               "for all tools [output], spindle = { rpm = ..., direction = \"clockwise\" }")
 
 
 def _check_delay(event: Event, spindle: Spindle, report: Report) -> None:

@@ -48,7 +48,7 @@ def with_defaults(toolpath: Toolpath, setup: SetupFile) -> tuple[Toolpath, State
     `[output]` behind it.
     """
     new: list[tuple[int, Event]] = []
-    stated: Stated = {}
+    toolpath, stated = _with_speeds(toolpath, setup)
     spindle, flowing = Spindle(), False
     cuts = np.flatnonzero(cutting(toolpath))
     for use in uses(toolpath):
@@ -72,6 +72,26 @@ def with_defaults(toolpath: Toolpath, setup: SetupFile) -> tuple[Toolpath, State
             spindle = spindle_after(event, spindle) if event.word == "SPINDL" else spindle
             flowing = "OFF" not in words(event) if event.word == "COOLNT" else flowing
     return (replace(toolpath, events=_placed(toolpath.events, new)) if new else toolpath), stated
+
+
+def _with_speeds(toolpath: Toolpath, setup: SetupFile) -> tuple[Toolpath, Stated]:
+    """The path with the set-up's speed in records that state 0 rev/min, as CAM systems write where nobody has entered one;
+    the direction is the record's, where it says one."""
+    if not any(e.word == "SPINDL" and speed_said(e) == 0.0 for e in toolpath.events):
+        return toolpath, {}
+    result, stated = list(toolpath.events), Stated()
+    for use in uses(toolpath):
+        wanted = setup.tools.get(str(use.number), ToolSetup()).spindle or setup.output.spindle
+        for k in range(use.begin, use.end):
+            event = result[k]
+            said = set(words(event))
+            if wanted is None or event.word != "SPINDL" or speed_said(event) != 0.0 or said - {"RPM", "CLW", "CCLW", "ON"}:
+                continue
+            own = "CLW" if "CLW" in said else "CCLW" if "CCLW" in said else ""
+            side = own or ("CLW" if wanted.direction == "clockwise" else "CCLW")
+            result[k] = replace(event, values=("RPM", wanted.rpm, side))
+            stated.setdefault((use.number, f"{wanted.rpm:g} rev/min" if own else str(wanted)), []).append(event.line)
+    return replace(toolpath, events=tuple(result)), stated
 
 
 def stated_by_setup(toolpath: Toolpath, stated: Stated) -> list[Diagnostic]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from postproc.events import TOOL_WORDS, cutting, loaded_tools
 from postproc.setup import SetupFile
+from postproc.tools_alike import differ
 from postproc.unnumbered_tools import measured, named_by, with_loads, with_tools, without_number
 from toolpaths.arrays import Ints
 from toolpaths.diagnostics import Diagnostic, Severity, error, info
@@ -81,7 +82,7 @@ def check_numbers(toolpath: Toolpath, report: Report) -> None:
             continue
         tool, line = toolpath.tools[index], int(lines[at])
         others = known.setdefault(tool.number, [])
-        other = next((o for o in others if _differ(o[0], tool)), None)
+        other = next((o for o in others if differ(o[0], tool)), None)
         if other:
             hint = f"cutting begins at lines {other[1]} and {line}; {_remedy(other[0], tool)}number them in the CAM system"
             named = other[0].name or tool.name or other[0].shape or tool.shape
@@ -96,15 +97,6 @@ def _remedy(a: Tool, b: Tool) -> str:
         return ""
     first, second = json.dumps(a.name, ensure_ascii=False), json.dumps(b.name, ensure_ascii=False)
     return f"number them by name in the set-up ([tool_numbers] {first} = 1, {second} = 2, on lines of their own), or "
-
-
-def _differ(a: Tool, b: Tool) -> bool:
-    """True where a text or size that both state is not the same."""
-    pairs = ((a.diameter, b.diameter), (a.corner_radius, b.corner_radius), (a.tip_angle, b.tip_angle), (a.taper, b.taper))
-    stated = [abs(x - y) > 1e-6 for x, y in pairs if x is not None and y is not None]
-    names = a.name and b.name and a.name.upper() != b.name.upper() and not stated
-    shapes = a.shape and b.shape and a.shape != b.shape
-    return bool(names or shapes or any(stated))
 
 
 def _called(tool: Tool) -> str:

@@ -9,7 +9,8 @@ import numpy as np
 
 from postproc.events import TOOL_WORDS, cutting, numbers
 from postproc.setup import SetupFile
-from toolpaths.arrays import Array
+from postproc.tools_alike import differ, differ_in_length
+from toolpaths.arrays import Array, Bools
 from toolpaths.diagnostics import Diagnostic, error, info
 from toolpaths.toolpath import Event, Role, Tool, Toolpath
 
@@ -118,8 +119,27 @@ def measured(toolpath: Toolpath, setup: SetupFile) -> tuple[Toolpath, list[Diagn
                                 "work offset cannot hold the lengths of several tools", file=toolpath.file,
                                 hint="take tool_call out of the set-up and number the tools under [tool_numbers], or "
                                 "convert the operations of each tool by themselves")]
+    if found := _of_other_form(toolpath, moving):
+        return toolpath, [found]
     events = tuple(e for e in toolpath.events if e.word not in _PREPARES)
     return replace(toolpath, events=events), []
+
+
+def _of_other_form(toolpath: Toolpath, moving: Bools) -> Diagnostic | None:
+    """An error where tools of one name that move have different forms or heights, with the first line of each."""
+    rows = np.flatnonzero(moving & (toolpath.tool >= 0))
+    used, at = np.unique(toolpath.tool[rows], return_index=True)
+    first = [(int(rows[at[k]]), toolpath.tools[int(used[k])]) for k in np.argsort(at)]
+    for j, (row, tool) in enumerate(first):
+        for before, other in first[:j]:
+            if differ(other, tool) or differ_in_length(other, tool):
+                lines = [int(toolpath.line[before]), int(toolpath.line[row])]
+                return error("tool.measured", f"[output] tool_call = false, but the CL file uses two tools: {_form(other)} "
+                             f"from line {lines[0]}, {_form(tool)} from line {lines[1]}: one work offset cannot hold the "
+                             "lengths of several tools", file=toolpath.file, lines=lines,
+                             hint="convert the operations of each tool by themselves, or take tool_call out of the set-up "
+                             "and number the tools in the CAM system")
+    return None
 
 
 def measured_length(toolpath: Toolpath, setup: SetupFile) -> float:
@@ -132,3 +152,8 @@ def measured_length(toolpath: Toolpath, setup: SetupFile) -> float:
 def _called(tool: Tool) -> str:
     name = f" {tool.name}" if tool.name else ""
     return (f"T{tool.number}{name}" if tool.number > 0 else name.strip() or "a tool without a name")
+
+
+def _form(tool: Tool) -> str:
+    sizes = ((" diameter", tool.diameter), (" height", tool.length), (" flutes", tool.flute_length))
+    return _called(tool) + "".join(f"{what} {size:g} mm" for what, size in sizes if size is not None)

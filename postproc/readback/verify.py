@@ -11,7 +11,7 @@ import numpy as np
 
 from postproc.job import Job
 from postproc.memory import give_back
-from postproc.options import SETUP_MARK, Options
+from postproc.options import NO_FILE, SETUP_MARK, Options
 from postproc.program_header import FINGERPRINT
 from postproc.readback.canonical import placed
 from postproc.readback.changes import check_changes
@@ -62,12 +62,13 @@ def other_setup(data: bytes, options: Options, off: bool, gcode: str) -> list[Di
     then = stated[2].decode("ascii").lower() if stated and stated[2] else ""
     if then == options.setup_mark or (stated and not then) or not _OURS.search(head):
         return []
-    given = f"{Path(options.setup).name} (fingerprint {options.setup_mark})" if options.setup_mark else "none"
+    given = f"{Path(options.setup).name or NO_FILE} (fingerprint {options.setup_mark})" if options.setup_mark else "none"
     named = stated[1].decode("utf-8", "replace").strip() if stated else ""
     says = f"the set-up {named} (fingerprint {then})" if stated else "no set-up"
     judge, so = (error, "what is off may follow from that alone") if off else (warning, "it is right under the one given")
+    hint = "verify with the SetupFile as it was" if named == NO_FILE else f"verify with --setup {named} as it was"
     return [judge("verify.setup", f"the header of the program names {says}, {given} is given: {so}", file=gcode,
-                  hint=f"verify with --setup {named} as it was, or convert again" if stated else "verify without --setup")]
+                  hint=f"{hint}, or convert again" if stated else "verify without --setup")]
 
 
 def read_back(data: bytes | str, job: Job, file: str, progress: Callable[[str, int, int], None] | None = None,

@@ -294,7 +294,7 @@ def _spindl(e: Execution, r: Record, line: int) -> None:
         return
     direction = -1 if r.has("CCLW") else 1 if r.has("CLW") else e.last_direction
     e.last_direction = direction
-    e.spindle.set(e.row, (direction, rpm if said is None else said))
+    e.spindle.set(e.row, (direction, rpm if said is None else said or math.nan))
 
 
 def _coolnt(e: Execution, r: Record, line: int) -> None:

@@ -40,7 +40,7 @@ class Commanded:
         feed (N,): mm/min, or mm per turn where `per_turn` (N,), or 1/min where `inverse` (N,); NaN: none
         arc (N,): index into centre, normal (K, 3), sweep (K,) rad; -1
         cycle (N,): index into cycles, -1; tool, spindle, coolant (N,): number; -1, 0, 1; "" to words; UNKNOWN
-        rpm (N,): NaN where not stated; name (N,): index into names of tools
+        rpm (N,): NaN where not stated; turned (N,): row of the last SPINDL record; name (N,): index into names of tools
         system: origin and rotation of every system of the file by its name, in order
         unread: what was not understood, by its text
     """
@@ -65,6 +65,7 @@ class Commanded:
     names: tuple[str, ...]
     spindle: Array
     rpm: Array
+    turned: Array
     coolant: Array
     systems: dict[str, tuple[Array, Array]]
     unread: dict[str, int] = field(default_factory=dict)

@@ -47,13 +47,15 @@ def assembled(e: Execution) -> Commanded:
     kind[rapid[kind[rapid] != HOLE]] = RAPID
     kind[start[start < n]] = START
     feed = np.array(e.feed.values, np.float64)[_index(e.feed, n)]
-    spindle = np.array(e.spindle.values, np.float64)[_index(e.spindle, n)]
+    state = _index(e.spindle, n)
+    spindle, turned = np.array(e.spindle.values, np.float64)[state], np.array(e.spindle.rows, np.int64)[state]
     known = e.known.column(n, bool) & np.isfinite(tip).all(axis=1) & np.isfinite(axis).all(axis=1)
     gap = np.zeros(n, bool)
     gap[[row for row in e.gap if row < n] + doubtful] = True
     return Commanded(tip, axis, kind, line, known, gap, feed[:, 0], feed[:, 1] > 0, feed[:, 2] > 0, arc, centre, normal,
                      sweep, cycle, tuple(e.cycles), e.tool.column(n, np.int64), e.name.column(n, np.int64), tuple(e.names),
-                     spindle[:, 0].astype(np.int64), spindle[:, 1], e.coolant.column(n, np.int64), e.systems, e.unread)
+                     spindle[:, 0].astype(np.int64), spindle[:, 1], turned, e.coolant.column(n, np.int64), e.systems,
+                     e.unread)
 
 
 def _index(track: Track, n: int) -> Array:

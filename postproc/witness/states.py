@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,29 @@ ALLOWED = 1.02
 """share by which a feed may be off: short blocks carry the rounding of their words"""
 _PECKED = ("DEEP", "BRKCHP")
 _FEED_OUT = ("BORE", "REAM", "TAP")
+
+
+def with_spindle(c: Commanded, setup: dict[str, Any]) -> Commanded:
+    """With the set-up's spindle where it counts: `[tools.N]` for a tool that no SPINDL record is for, `[output]` where the
+    spindle stands there too, and the speed of either where the file turns the spindle without one."""
+    output, tools = (setup.get("output") or {}).get("spindle"), setup.get("tools") or {}
+    if not len(c) or not (output or any(t.get("spindle") for t in tools.values())):
+        return c
+    tool = _tools(c, setup)
+    begin = np.maximum.accumulate(np.where(np.diff(tool, prepend=tool[:1] - 1) != 0, np.arange(len(c)), 0))
+    others = (c.turned < begin) | ((c.turned == begin) & (c.spindle == 0))
+    known = c.spindle != UNKNOWN
+    spindle, rpm = c.spindle.copy(), c.rpm.copy()
+    for number in np.unique(tool).tolist():
+        own = (tools.get(str(max(number, 0))) or {}).get("spindle")
+        wanted, here = own or output, known & (tool == number)
+        if not wanted:
+            continue
+        none = here & np.isnan(c.rpm)
+        taken = here & others & (np.full(len(c), bool(own)) | (c.spindle == 0) | none)
+        rpm[taken | none] = wanted["rpm"]
+        spindle[taken] = 1 if wanted["direction"] == "clockwise" else -1
+    return replace(c, spindle=spindle, rpm=rpm)
 
 
 def feeds_of(c: Commanded, setup: dict[str, Any]) -> Array:

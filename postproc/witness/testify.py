@@ -13,7 +13,7 @@ from postproc.witness.evidence import Case, Executed, Finding, Testimony
 from postproc.witness.machine import ROD, kinematics_of, merged
 from postproc.witness.motion import Walked, check_arcs, check_way
 from postproc.witness.place import Poses, Unplaced, cut_of, placement
-from postproc.witness.states import check_feeds, check_holes, check_states
+from postproc.witness.states import check_feeds, check_holes, check_states, with_spindle
 from postproc.witness.stretches import BOTTOM, matched, targets_of, turns_of
 from postproc.witness.text import Array
 
@@ -24,7 +24,7 @@ def testify(case: Case, executed: Executed) -> Testimony:
     if case.oriented:
         return _nothing("all (the tool axes were chosen, the CL file has others)", began)
     try:
-        c = commanded(case.cl, case.units, case.dialect)
+        c = with_spindle(commanded(case.cl, case.units, case.dialect), case.setup)
         place = placement(case.setup, c)
     except Unplaced as fault:
         return _nothing(f"all (system {fault} was not found)", began)

@@ -10,6 +10,7 @@ import pytest
 
 from postproc.pipeline import PostResult
 from postproc.readback.verify import read_back
+from postproc.setup import SetupFile
 from tests.postproc.kit import codes, convert, good, goto, tilted, toolpath
 from toolpaths.diagnostics import Diagnostic, Severity
 
@@ -184,28 +185,33 @@ def test_linuxcnc_takes_the_tool_in_the_spindle() -> None:
 # ---- no tool ----------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("controller", "name", "code"), [("fanuc-30i", "mikron-ucp710", "G43.4 H"),
-                                                          ("haas-ngc", "trunnion-bc", "G234 H")])
-def test_a_file_without_a_tool_is_told_where_a_register_is_needed(controller: str, name: str, code: str) -> None:
+TURNS = {"spindle": {"rpm": 1000}}
+NUMBERED = SetupFile.model_validate({"output": TURNS, "tool_numbers": {"unnamed": 7},
+                                     "tools": {"7": {"gauge_length": 90.0}}})
+MEASURED = SetupFile.model_validate({"output": {**TURNS, "tool_call": False}})
+
+
+@pytest.mark.parametrize(("controller", "name", "code"), [
+    ("fanuc-30i", "mikron-ucp710", "G43.4 H7"), ("haas-ngc", "trunnion-bc", "G234 H7"),
+    ("linuxcnc", "mikron-ucp710", "G43 H7"),
+    ("siemens-840d", "mikron-ucp710", "TRAORI"), ("heidenhain-tnc640", "mikron-ucp710", "TOOL CALL 7 Z")])
+def test_a_file_without_a_tool_is_written_with_the_number_of_the_set_up(controller: str, name: str, code: str) -> None:
+    """Its register is that of the number; without one the file is refused in every mode, the tool's first line named."""
     path = toolpath(*BARE, head=["UNITS/MM"])
-    told = errors(convert(path, name, controller))
-    assert [(d.code, d.lines) for d in told] == [("tool.missing", (3,))]
-    assert code in told[0].message and "LOADTL/1" in told[0].hint and "--output-mode axes" in told[0].hint
-    assert good(convert(path, name, controller, output="axes")).text
-    assert good(convert(toolpath("LOADTL/1", *BARE, head=["UNITS/MM"]), name, controller)).text
-
-
-@pytest.mark.parametrize("controller", ["siemens-840d", "heidenhain-tnc640", "linuxcnc"])
-def test_it_is_written_where_none_is(controller: str) -> None:
-    assert good(convert(toolpath(*BARE, head=["UNITS/MM"]), "mikron-ucp710", controller)).text
+    for output in ("auto", "axes"):
+        found = errors(convert(path, name, controller, output=output))
+        assert [(d.code, d.lines) for d in found] == [("tool.number", (3,)), ("spindle.not_started", (3, 4))]
+        assert '"unnamed" = 1' in found[0].hint
+    assert code in good(convert(path, name, controller, NUMBERED)).text
+    assert good(convert(path, name, controller, NUMBERED, output="axes")).text
 
 
 def test_compensation_without_a_tool_needs_its_register() -> None:
     head = ["UNITS/MM", "FEDRAT/MMPM,600"]
-    told = errors(convert(toolpath(*ROUND, head=head), "mill-3axis", "fanuc-30i"))
-    assert [(d.code, d.lines) for d in told] == [("tool.missing", (7,))] and "CUTCOM/LEFT,1" in told[0].hint
-    zero = errors(convert(toolpath(*ROUND, head=["LOADTL/0", *head]), "mill-3axis", "fanuc-30i"))
+    found = errors(convert(toolpath(*ROUND, head=head), "mill-3axis", "fanuc-30i", MEASURED))
+    assert [(d.code, d.lines) for d in found] == [("tool.missing", (7,))] and "CUTCOM/LEFT,1" in found[0].hint
+    zero = errors(convert(toolpath(*ROUND, head=["LOADTL/0", *head]), "mill-3axis", "fanuc-30i", MEASURED))
     assert [d.code for d in zero] == ["tool.missing"], "D0 is no register"
     named = [line.replace("LEFT", "LEFT,4") for line in ROUND]
-    assert "tool.missing" not in codes(convert(toolpath(*named, head=head), "mill-3axis", "fanuc-30i").diagnostics)
-    assert "tool.missing" not in codes(convert(toolpath(*ROUND, head=head), "mill-3axis", "linuxcnc").diagnostics)
+    assert "G41 D4" in good(convert(toolpath(*named, head=head), "mill-3axis", "fanuc-30i", MEASURED)).text
+    assert good(convert(toolpath(*ROUND, head=head), "mill-3axis", "linuxcnc", MEASURED)).text

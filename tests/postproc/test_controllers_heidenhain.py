@@ -110,7 +110,8 @@ def test_tcpm_is_entered_and_reset() -> None:
 
 def test_safe_start_resets_the_modes_that_are_used() -> None:
     text = lines("heidenhain-tnc640", program([step("rapid", X=0.0)], sections=(Section(0, "axes"), TILTED)))
-    assert "option 8" in text[2] and text[3] == "3 PLANE RESET STAY" and not any("TCPM" in line for line in text)
+    assert "option 8" in text[2] and "rotary values of 0" in text[3] and text[4] == "4 PLANE RESET STAY"
+    assert not any("TCPM" in line for line in text)
 
 
 def test_tolerance_cycle_states_both_tolerances() -> None:

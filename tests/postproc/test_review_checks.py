@@ -38,7 +38,7 @@ def faults(result: postproc.PostResult, text: str, tmp_path: Path) -> set[str]:
 @pytest.mark.parametrize(("pattern", "new", "code"), [
     ("Q5", "Q25", "verify.hole"), ("Q5", "Q6", "verify.hole"), ("G83", "G73", "verify.hole"),
     (r"G83(.*) Q5", r"G81\1", "verify.hole"), ("S1000 M3", "S1000 M3\n%", "gcode.after_end"),
-    (r"(?m)^G54\n", "", "verify.state"), ("G80\n", "G80 X4\n", "gcode.no_motion"),
+    (r"(?m)^G54\n", "", "gcode.unstated"), ("(?m)^G80\n", "G80 X4\n", "gcode.no_motion"),
     (r"(?m)^M2\n", "", "gcode.no_end"), ("G43 H1", "G43 H2", "verify.not_reached"),
     ("S1000 M3\n", "S1000 M3\nM30\n", "gcode.after_end"),
 ])

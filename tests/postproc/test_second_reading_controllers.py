@@ -137,7 +137,10 @@ def test_stops_and_rests_are_missed(controller: str, code: str, fault: str, tmp_
     text = good(convert(WAITS, "mill-3axis", controller)).text
     kept = [n for n in text.splitlines() if not re.fullmatch(rf"(N?\d+ )?{code}", n)]
     if controller == "heidenhain-tnc640" and "DWELL" in code and fault == "verify.dwell":
-        kept.remove(next(n for n in kept if n.endswith("DWELL TIME")))
+        whole = text.splitlines()
+        gone = next(k for k, n in enumerate(whole) if re.fullmatch(rf"(N?\d+ )?{code}", n))
+        assert whole[gone - 1].endswith("DWELL TIME")
+        kept = [*whole[:gone - 1], *whole[gone + 1:]]
     assert len(kept) < len(text.splitlines())
     file = tmp_path / "TEST.nc"
     for lines_, expected in ((text.splitlines(), set()), (kept, {fault})):

@@ -59,7 +59,7 @@ def test_each_tool_has_its_own_and_the_rest_that_of_output(name: str, controller
     other = postproc.verify(tmp_path / "p.nc", path, machine(name), controller,
                             setup=setup({"spindle": {"rpm": 4100}, "coolant": "flood"}, t2=of.tools["2"].model_dump(
                                 include={"spindle", "coolant"})))
-    assert [d.code for d in other.diagnostics if d.severity is Severity.ERROR] == ["verify.state"]
+    assert [d.code for d in other.diagnostics if d.severity is Severity.ERROR] == ["verify.setup", "verify.state"]
 
 
 @pytest.mark.parametrize(("controller", "name"), list(zip(CONTROLLERS, ("head-table", "mikron-ucp710") * 3, strict=True)))
@@ -112,6 +112,21 @@ def test_a_direction_without_a_speed_takes_the_speed_of_the_set_up() -> None:
     lines = ["UNITS/MM", "FEDRAT/MMPM,600", "LOADTL/1", "SPINDL/CCLW", *CUT]
     assert [d.code for d in errors(made(lines))] == ["spindle.no_speed"]
     assert "S4000 M4" in switched(good(made(lines, setup({"spindle": {"rpm": 4000}}))).text)
+
+
+@pytest.mark.parametrize("tables", ["[output]", "[tools.1]"])
+def test_a_speed_of_0_is_none_and_the_set_up_counts(tables: str) -> None:
+    """As CAM writes it where nobody has entered a speed; the direction is the record's, and the tool before counts not."""
+    lines = ["UNITS/MM", "FEDRAT/MMPM,600", "LOADTL/1", "SPINDL/RPM,0,CCLW", *CUT]
+    found = errors(made(lines))
+    assert {d.code for d in found} <= {"spindle.speed", "spindle.no_speed"} and all(tables[:7] in d.hint for d in found)
+    turns = {"spindle": {"rpm": 4000}}
+    of = setup(turns) if tables == "[output]" else setup(t1=turns)
+    result = good(made(lines, of))
+    assert "S4000 M4" in switched(result.text) and "spindle.of_setup" in {d.code for d in result.diagnostics}
+    after = ["UNITS/MM", "FEDRAT/MMPM,600", "LOADTL/2", "SPINDL/RPM,1500,CLW", *CUT, *lines[2:]]
+    assert "S4000 M4" in switched(good(made(after, of)).text) and "spindle.speed" in {d.code for d in errors(made(after))}
+    assert errors(made([n.replace(",0,", ",-5,") for n in lines], of))[0].code == "spindle.speed"
 
 
 def test_feeds_per_revolution_dwells_and_taps_count_with_it() -> None:

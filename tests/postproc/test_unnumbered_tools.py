@@ -171,6 +171,22 @@ def test_where_it_cannot_be_right_it_is_refused(name: str, controller: str, head
     assert len(found) == 1 and why in found[0].message and found[0].hint and not result.text
 
 
+@pytest.mark.parametrize(("one", "other"), [
+    (["TPRINT/EM", "TLDATA/MILL,20,0,75,0,0"], ["TPRINT/EM", "TLDATA/MILL,6,0,75,0,0"]),
+    (["TPRINT/EM", "TLDATA/MILL,20,0,75,0,0"], ["TPRINT/EM", "TLDATA/MILL,20,0,60,0,0"]),
+    (["CUTTER/10,0,5,0,0,0,38"], ["CUTTER/10,0,5,0,0,0,90"])])
+def test_two_tools_of_one_name_are_not_measured_as_one(one: list[str], other: list[str], tmp_path: Path) -> None:
+    """Other diameters, lengths and heights: both tools are named by their first lines; the same form again is one tool."""
+    of = setup_of(MEASURED + LENGTH, tmp_path)
+    begin = ["UNITS/MM", *SPINDLE, *one, *CUT]
+    found = errors(convert(toolpath(head=[*begin, *other, *CUT]), "mill-3axis", setup=of))
+    second = len(begin) + len(other)
+    assert [d.code for d in found] == ["tool.measured"] and "two tools" in found[0].message
+    assert found[0].lines == (len(begin) - len(CUT) + 2, second + 2)
+    again = convert(toolpath(head=[*begin, *one, *CUT]), "mill-3axis", setup=of)
+    assert "tool.measured" not in {d.code for d in errors(again)}
+
+
 @pytest.mark.parametrize("mode", ["tcp", "tilted"])
 def test_modes_that_need_the_length_cannot_be_had(mode: str, tmp_path: Path) -> None:
     path, setup = toolpath(head=NOTHING), setup_of(MEASURED + LENGTH, tmp_path)
