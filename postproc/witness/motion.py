@@ -153,16 +153,15 @@ def _explained(w: Walked, rows: Array, margin: float, table: dict[str, object]) 
     if not isinstance(machine, Chain):
         return np.ones(len(rows), bool)
     travel, _ = limits_of(table, e.letters)
-    result = np.zeros(len(rows), bool)
-    for owner in np.unique(w.owner[rows]).tolist():
-        link = np.flatnonzero(w.owner == owner)
-        axis = w.axis[link]
-        linear, ways = machine.slides(e.joints[link], e.letters)
-        lift = np.linalg.solve(ways, 0.95 * margin * axis[:, :, None])[:, :, 0]
-        q = e.joints[link][:, linear] + lift
-        beyond = (q < travel[linear, 0]) | (q > travel[linear, 1])
-        result[w.owner[rows] == owner] = bool(beyond.any())
-    return result
+    link = np.flatnonzero(np.isin(w.owner, w.owner[rows]))
+    beyond = np.zeros(len(w.targets) + 1, bool)
+    for first in range(0, len(link), CHUNK):
+        k = link[first:first + CHUNK]
+        linear, ways = machine.slides(e.joints[k], e.letters)
+        lift = np.linalg.solve(ways, 0.95 * margin * w.axis[k][:, :, None])[:, :, 0]
+        q = e.joints[k][:, linear] + lift
+        beyond[w.owner[k[((q < travel[linear, 0]) | (q > travel[linear, 1])).any(axis=1)]]] = True
+    return np.asarray(beyond[w.owner[rows]])
 
 
 def check_arcs(w: Walked, turns: Array, lines: Array) -> list[Finding]:

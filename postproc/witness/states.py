@@ -92,7 +92,7 @@ def check_states(w: Walked, c: Commanded, case: Case) -> tuple[list[Finding], di
     e = w.poses.executed
     rows = np.flatnonzero(w.inside & (w.code > 0) & ((w.kind == LINE) | (w.kind == ARC) | (w.kind == BOTTOM)))
     row = w.targets.row[w.owner[rows]]
-    tool, direction, rpm, coolant = _tools(c, case.setup)[row], c.spindle[row], c.rpm[row], c.coolant[row]
+    tool, direction, rpm, coolant = tools_of(c, case.setup)[row], c.spindle[row], c.rpm[row], c.coolant[row]
     tap = np.array([x.kind == "TAP" for x in c.cycles] + [False])[c.cycle[row]]
     flow = e.coolant[rows]
     stated = direction != UNKNOWN
@@ -100,23 +100,38 @@ def check_states(w: Walked, c: Commanded, case: Case) -> tuple[list[Finding], di
     some = _states_coolant(case.setup.get("tools")) or _states_coolant(case.setup.get("output"))
     wet = np.where(coolant == UNKNOWN, some | (flow == 0), np.where(coolant == 0, flow == 0, flow > 0))
     wet &= (coolant != 1) | ((flow & 1) > 0)
-    checks = (("tool", "the tool is T{0:g}, the CL file cuts with T{1:g}", tool != UNKNOWN, e.tool[rows], tool,
+    checks = (("tool", "the tool is {0}, the CL file cuts with {1}", tool != UNKNOWN, e.tool[rows], tool,
                e.tool[rows] == tool),
-              ("spindle", "the spindle turns {0:g} (1 M3, -1 M4, 0 stopped), the CL file says {1:g}", stated & ~tap,
+              ("spindle", "the spindle is {0}, the CL file says {1}", stated & ~tap,
                e.spindle[rows], direction, e.spindle[rows] == direction),
-              ("spindle", "the spindle speed is {0:g}, the CL file says {1:g}", speed, e.rpm[rows], rpm,
+              ("speed", "the spindle speed is {0}, the CL file says {1}", speed, e.rpm[rows], rpm,
                np.abs(e.rpm[rows] - rpm) <= 0.5 + 1e-3 * np.abs(rpm)),
-              ("coolant", "the coolant is {0:g} (0 off), the CL file says {1:g} (0 off, 1 flood, 2 on)",
+              ("coolant", "the coolant is {0}, the CL file says {1}",
                (coolant != UNFOLLOWED) & ((coolant != UNKNOWN) | (not some)), flow, coolant, wet))
     found, counts = [], dict[str, int]()
     for code, text, compared, is_, wanted, good in checks:
         bad = np.flatnonzero(compared & ~good)
-        counts[code] = counts.get(code, 0) + int(compared.sum())
+        code_of = "spindle" if code == "speed" else code
+        counts[code_of] = counts.get(code_of, 0) + int(compared.sum())
         if len(bad):
             k = int(bad[0])
-            found.append(Finding(code, text.format(float(is_[k]), float(wanted[k])), int(c.line[row[k]]),
+            found.append(Finding(code_of, text.format(_said(code, is_[k]), _said(code, wanted[k])), int(c.line[row[k]]),
                                  int(e.line[rows[k]]), len(bad)))
     return found, counts
+
+
+_SPINDLE = {1: "turning clockwise (M3)", -1: "turning anti-clockwise (M4)", 0: "stopped"}
+_COOLANT = {0: "off", 1: "flood", 2: "on"}
+
+
+def _said(code: str, value: float) -> str:
+    """A state in words; UNKNOWN of the file as nothing that is stated."""
+    if value == UNKNOWN:
+        return "nothing"
+    if code == "tool":
+        return f"T{value:g}" if value >= 0 else "not called"
+    names = _SPINDLE if code == "spindle" else _COOLANT if code == "coolant" else {}
+    return names.get(int(value), f"{value:g}") if code != "coolant" or value < 3 else "on"
 
 
 def _states_coolant(table: Any) -> bool:
@@ -126,13 +141,17 @@ def _states_coolant(table: Any) -> bool:
     return any((key == "coolant" and bool(value)) or _states_coolant(value) for key, value in table.items())
 
 
-def _tools(c: Commanded, setup: dict[str, Any]) -> Array:
-    """(N,) number of the tool, by its name where the set-up numbers that; UNKNOWN where nothing is loaded."""
+def tools_of(c: Commanded, setup: dict[str, Any]) -> Array:
+    """(N,) number of the tool: of the set-up by its name, else of the file; UNKNOWN where neither is sure.
+
+    Where [tool_numbers] has names that this witness has not read, a tool without a name could be one of them.
+    """
     asked = {str(name).upper(): int(n) for name, n in (setup.get("tool_numbers") or {}).items()}
     if not asked:
         return c.tool
     own = np.array([asked.get(name, UNKNOWN) for name in c.names] + [UNKNOWN])[c.name]
-    return np.asarray(np.where(own != UNKNOWN, own, UNKNOWN))
+    sure = (c.name >= 0) | asked.keys().issubset(c.names)
+    return np.asarray(np.where(own != UNKNOWN, own, np.where(sure & (c.tool > 0), c.tool, UNKNOWN)))
 
 
 def check_holes(w: Walked, c: Commanded, case: Case, match: Array) -> tuple[list[Finding], int]:

@@ -13,7 +13,7 @@ from postproc.witness.evidence import Case, Executed, Finding, Testimony
 from postproc.witness.machine import ROD, kinematics_of, merged
 from postproc.witness.motion import Walked, check_arcs, check_way
 from postproc.witness.place import Poses, Unplaced, cut_of, placement
-from postproc.witness.states import check_feeds, check_holes, check_states
+from postproc.witness.states import check_feeds, check_holes, check_states, tools_of
 from postproc.witness.stretches import BOTTOM, matched, targets_of, turns_of
 from postproc.witness.text import Array
 
@@ -36,7 +36,7 @@ def testify(case: Case, executed: Executed) -> Testimony:
     if machine is None:
         missing.append("kinematics (machine with geometric errors: poses of the read-back)" if case.errors
                        else "kinematics (no machine file of a known family: poses of the read-back)")
-    poses = Poses(case, executed, machine, machine is not None, [])
+    poses = Poses(case, executed, machine, machine is not None, [], max(int(tools_of(c, case.setup).max(initial=0)), 0))
     with np.errstate(all="ignore"):
         found, worst, counts = _compare(case, executed, c, place, poses, table)
     compared = [f"{n} {what}" for what, n in counts.items() if n]

@@ -245,7 +245,15 @@ def units_dropped(patch: Patch) -> None:
 
 
 def subroutine_skipped(patch: Patch) -> None:
-    patch.setitem(toolpaths.cl.interpret.HANDLERS, "CALSUB", lambda b, s: None)
+    """A call that carries nothing out and counts as made."""
+    patch.setitem(toolpaths.cl.interpret.HANDLERS, "CALSUB",
+                  lambda b, s: b.called.add(subprograms.subprograms(b).place(subprograms.called(s), b.index)))
+
+
+def next_tools(p: Toolpath) -> Toolpath:
+    """Every number one more, of the tools and of the records that load them."""
+    events = tuple(replace(e, values=(float(e.values[0]) + 1.0, *e.values[1:])) if e.word == "LOADTL" else e for e in p.events)
+    return replace(p, tools=tuple(replace(t, number=t.number + 1) for t in p.tools), events=events)
 
 
 def delta_turned(old: Any, b: Builder, rows: Any) -> None:
@@ -325,7 +333,7 @@ FAULTS: dict[str, tuple[str, str, str, str, Plant]] = {
     "part placement transposed": (NX, "mill-3axis", "linuxcnc", "turned",
                                   wrapped(postproc.job, "part_placement", transposed)),
     "wrong tool number": (NX, "mill-3axis", "linuxcnc", "turned",
-                          of_word("LOADTL", lambda v: (v[0] + 1.0, *v[1:]))),
+                          path_changed(next_tools)),
     "spindle the other way": (NX, "mill-3axis", "linuxcnc", "plain", events(other_way)),
     "spindle speed": (NX, "mill-3axis", "linuxcnc", "plain",
                       of_word("SPINDL", lambda v: tuple(2000.0 if x == 3000.0 else x for x in v))),
