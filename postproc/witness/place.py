@@ -45,7 +45,8 @@ def placement(setup: dict[str, Any], c: Commanded) -> tuple[Array, Array]:
 class Poses:
     """Poses of a program's blocks by this witness's own kinematics; on rods those of the reader, held against the rods.
 
-    `uncalled` numbers the tool that stands in the spindle where the set-up lets the program call none. `own` False: the machine has geometric errors that the program corrects; poses are then those of the reader.
+    `uncalled`: number of the tool in the spindle where the set-up lets the program call none.
+    `own` False: the machine has geometric errors that the program corrects; poses are then those of the reader.
     """
 
     case: Case

@@ -246,13 +246,14 @@ def units_dropped(patch: Patch) -> None:
 
 def subroutine_skipped(patch: Patch) -> None:
     """A call that carries nothing out and counts as made."""
-    patch.setitem(toolpaths.cl.interpret.HANDLERS, "CALSUB",
-                  lambda b, s: b.called.add(subprograms.subprograms(b).place(subprograms.called(s), b.index)))
+    patch.setitem(toolpaths.cl.interpret.HANDLERS, "CALSUB", lambda b, s: b.called.add(
+        toolpaths.cl.interpret._subprograms(b).place(toolpaths.cl.interpret.called(s), b.index)))
 
 
 def next_tools(p: Toolpath) -> Toolpath:
     """Every number one more, of the tools and of the records that load them."""
-    events = tuple(replace(e, values=(float(e.values[0]) + 1.0, *e.values[1:])) if e.word == "LOADTL" else e for e in p.events)
+    events = tuple(replace(e, values=(float(e.values[0]) + 1.0, *e.values[1:])) if e.word == "LOADTL" else e
+                   for e in p.events)
     return replace(p, tools=tuple(replace(t, number=t.number + 1) for t in p.tools), events=events)
 
 
