@@ -25,6 +25,7 @@ import toolpaths.cl.frames
 import toolpaths.cl.interpret
 import toolpaths.cl.motion
 import toolpaths.cl.read
+import toolpaths.cl.subprograms
 from machines.serial_models import SerialModel
 from machines.slider_models import SliderModel
 from postproc.job import Job
@@ -247,7 +248,7 @@ def units_dropped(patch: Patch) -> None:
 def subroutine_skipped(patch: Patch) -> None:
     """A call that carries nothing out and counts as made."""
     patch.setitem(toolpaths.cl.interpret.HANDLERS, "CALSUB", lambda b, s: b.called.add(
-        toolpaths.cl.interpret._subprograms(b).place(toolpaths.cl.interpret.called(s), b.index)))
+        toolpaths.cl.interpret._subprograms(b).place(toolpaths.cl.subprograms.called(s), b.index)))
 
 
 def next_tools(p: Toolpath) -> Toolpath:
