@@ -83,10 +83,11 @@ def resolved(given: dict[int, Given], tip: Array, place: Array, common: Array, f
     centre = scale * np.array([g.centre for g in own])
     normal = unit(np.array([g.normal for g in own]))
     toward = np.array([g.toward or (np.nan,) * 3 for g in own])
-    for k in np.unique(place[row]).tolist():
-        at = np.flatnonzero((place[row] == k) & ~common[row])
-        matrix, origin = frames[k]
-        centre[at], normal[at], toward[at] = centre[at] @ matrix.T + origin, normal[at] @ matrix.T, toward[at] @ matrix.T
+    matrices, origins = stacked(frames)
+    at = np.flatnonzero(~common[row])
+    matrix = matrices[place[row[at]]]
+    centre[at], normal[at], toward[at] = (np.einsum("nij,nj->ni", matrix, v[at]) for v in (centre, normal, toward))
+    centre[at] += origins[place[row[at]]]
     u, v = tip[row - 1] - centre, tip[row] - centre
     against = np.einsum("ni,ni->n", np.cross(normal, u), toward) < 0.0
     normal[against] = -normal[against]
@@ -94,6 +95,11 @@ def resolved(given: dict[int, Given], tip: Array, place: Array, common: Array, f
     sweep, sure = _sweeps(u, v, normal, own, dialect)
     arc[row] = np.arange(len(row))
     return arc, centre + height[:, None] * normal, normal, sweep, row[~sure].tolist()
+
+
+def stacked(frames: list[tuple[Array, Array]]) -> tuple[Array, Array]:
+    """(matrices (K, 3, 3), origins (K, 3)) of systems."""
+    return np.stack([m for m, _ in frames]), np.stack([o for _, o in frames])
 
 
 def _sweeps(u: Array, v: Array, normal: Array, own: list[Given], dialect: Dialect) -> tuple[Array, Array]:

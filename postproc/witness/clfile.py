@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 from postproc.witness import arcs, cycles
-from postproc.witness.commanded import UNFOLLOWED, UNKNOWN, Commanded, unit
+from postproc.witness.commanded import UNFOLLOWED, Commanded, unit
 from postproc.witness.dialect import ALL, dialect_of, scale_of
 from postproc.witness.execution import Execution, Z
 from postproc.witness.rows import assembled
@@ -290,7 +290,7 @@ def _spindl(e: Execution, r: Record, line: int) -> None:
     said = said if said is not None else loose[0] if len(loose) == 1 else None
     if r.has("SFM", "SMM", "MAXRPM"):
         e.lost("SPINDL by cutting speed", line)
-        e.spindle.set(e.row, (UNKNOWN, math.nan))
+        e.spindle.set(e.row, (UNFOLLOWED, math.nan))
         return
     direction = -1 if r.has("CCLW") else 1 if r.has("CLW") else e.last_direction
     e.last_direction = direction
@@ -306,7 +306,7 @@ def _by_code(e: Execution, r: Record, line: int) -> None:
     if r.major == "INSERT" and e.dialect.name.startswith("solidworks"):
         return
     e.lost(f"spindle and coolant after {r.major}", line)
-    e.spindle.set(e.row, (UNKNOWN, math.nan))
+    e.spindle.set(e.row, (UNFOLLOWED, math.nan))
     e.coolant.set(e.row, UNFOLLOWED)
 
 

@@ -13,7 +13,7 @@ RAPID, LINE, ARC, HOLE, START = range(5)
 UNKNOWN = -9
 """of tool, spindle or coolant: the file does not say"""
 UNFOLLOWED = -8
-"""of coolant: switched by codes of the machine, which this witness does not follow"""
+"""of spindle or coolant: switched by codes of the machine, which this witness does not follow"""
 
 
 @dataclass(frozen=True)

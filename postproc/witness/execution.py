@@ -53,7 +53,7 @@ class Execution:
         self.unread: dict[str, int] = {}
         self.axes: dict[int, tuple[float, ...]] = {}
         self.systems: dict[str, tuple[Array, Array]] = {}
-        self.frame, self.frames = Track(0), [(np.eye(3), np.zeros(3))]
+        self.frame, self.frames, self._seen = Track(0), [(np.eye(3), np.zeros(3))], dict[bytes, int]()
         self.known, self.gap = Track(True), set[int]()
         self.feed: Track = Track((math.nan, False, False))
         self.tool, self.name, self.names = Track(UNKNOWN), Track(-1), list[str]()
@@ -80,10 +80,12 @@ class Execution:
 
     def system(self, matrix: Array, origin: Array, word: str, row: int) -> None:
         """Positions from here on are in a system, along its z until they say otherwise."""
-        if not any((r == matrix).all() and (o == origin).all() for r, o in self.systems.values()):
+        key = (np.append(matrix, origin) + 0.0).tobytes()
+        if key not in self._seen:
             self.systems[f"{word} {len(self.systems) + 1}"] = matrix, origin
-        self.frames.append((matrix, origin))
-        self.frame.set(row, len(self.frames) - 1)
+            self._seen[key] = len(self.frames)
+            self.frames.append((matrix, origin))
+        self.frame.set(row, self._seen[key])
         self.axes[row] = Z
         if not self.shifted:
             self.known.set(row, True)

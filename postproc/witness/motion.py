@@ -108,11 +108,14 @@ def _low(w: Walked, rows: Array, cut: Cut | None, margin: float, bent: bool, tab
     entry = w.targets.free[to] & is_rapid(w.targets.kind[to])
     start, start_axis = w.targets.start[to], w.targets.start_axis[to]
     here = np.maximum(w.first[rows] - 1, 0)
+    # A rewind draws back within a move: from where the cut was left, and back to there.
+    left = np.maximum.accumulate(np.where(w.on_way(), np.arange(len(w.owner)), 0))[rows]
     low = np.zeros(len(rows), bool)
     tight = np.zeros(len(rows), bool)
     for t in (0.25, 0.5, 0.75, 1.0):
         tip, axis = w.poses.at(rows, t)
         line = np.fmin(_above(tip, w.targets.tip[before], w.targets.axis[before]), _above(tip, w.tip[here], w.axis[here]))
+        line = np.fmin(line, _above(tip, w.tip[left], w.axis[left]))
         line = np.where(begins, np.inf, line)
         line = np.fmin(line, np.where(ends, np.inf, _above(tip, w.targets.tip[to], w.targets.axis[to])))
         line = np.fmin(line, np.where(ends | entry, np.inf, _above(tip, start, start_axis)))
@@ -153,16 +156,15 @@ def _explained(w: Walked, rows: Array, margin: float, table: dict[str, object]) 
     if not isinstance(machine, Chain):
         return np.ones(len(rows), bool)
     travel, _ = limits_of(table, e.letters)
-    result = np.zeros(len(rows), bool)
-    for owner in np.unique(w.owner[rows]).tolist():
-        link = np.flatnonzero(w.owner == owner)
-        axis = w.axis[link]
-        linear, ways = machine.slides(e.joints[link], e.letters)
-        lift = np.linalg.solve(ways, 0.95 * margin * axis[:, :, None])[:, :, 0]
-        q = e.joints[link][:, linear] + lift
-        beyond = (q < travel[linear, 0]) | (q > travel[linear, 1])
-        result[w.owner[rows] == owner] = bool(beyond.any())
-    return result
+    link = np.flatnonzero(np.isin(w.owner, w.owner[rows]))
+    beyond = np.zeros(len(w.targets) + 1, bool)
+    for first in range(0, len(link), CHUNK):
+        k = link[first:first + CHUNK]
+        linear, ways = machine.slides(e.joints[k], e.letters)
+        lift = np.linalg.solve(ways, 0.95 * margin * w.axis[k][:, :, None])[:, :, 0]
+        q = e.joints[k][:, linear] + lift
+        beyond[w.owner[k[((q < travel[linear, 0]) | (q > travel[linear, 1])).any(axis=1)]]] = True
+    return np.asarray(beyond[w.owner[rows]])
 
 
 def check_arcs(w: Walked, turns: Array, lines: Array) -> list[Finding]:

@@ -45,6 +45,7 @@ def placement(setup: dict[str, Any], c: Commanded) -> tuple[Array, Array]:
 class Poses:
     """Poses of a program's blocks by this witness's own kinematics; on rods those of the reader, held against the rods.
 
+    `uncalled`: number of the tool in the spindle where the set-up lets the program call none.
     `own` False: the machine has geometric errors that the program corrects; poses are then those of the reader.
     """
 
@@ -53,10 +54,14 @@ class Poses:
     machine: Chain | Rods | None
     own: bool
     misfits: list[tuple[float, int]]
+    uncalled: int = 0
 
     def lengths(self, rows: Array) -> Array:
-        """(K,) gauge length of the tool in the spindle; 0 where the program calls none: its tip is in the work offset."""
+        """(K,) gauge length of the tool in the spindle: of a tool that the program does not call, its length is in the work
+        offset, and the joints hold it too; 0 where the set-up states none."""
         tools, number = self.case.setup.get("tools", {}), self.executed.tool[rows]
+        if not (self.case.setup.get("output") or {}).get("tool_call", True):
+            number = np.full(len(rows), self.uncalled)
         result = np.zeros(len(rows))
         for n in np.unique(number).tolist():
             result[number == n] = float((tools.get(str(int(n))) or {}).get("gauge_length") or 0.0)

@@ -9,6 +9,7 @@ from postproc.witness.commanded import ARC, HOLE, LINE, RAPID, START, Commanded,
 from postproc.witness.execution import Execution, Track, Z
 from postproc.witness.text import Array
 
+_CHUNK = 100_000
 
 def assembled(e: Execution) -> Commanded:
     """All positions of a file that is read."""
@@ -25,12 +26,14 @@ def assembled(e: Execution) -> Commanded:
     common = given & (e.inside.column(n, np.int64) == 0) if e.dialect.local_three else np.zeros(n, bool)
     axis = unit(_axes(e, numbers[:, 3:], given))
     place = e.frame.column(n, np.int64)
-    for k in np.unique(place).tolist():
-        matrix, origin = e.frames[k]
-        if (matrix == np.eye(3)).all() and not origin.any():
-            continue
-        at = np.flatnonzero((place == k) & ~common)
-        tip[at], axis[at] = np.einsum("ij,nj->ni", matrix, tip[at]) + origin, np.einsum("ij,nj->ni", matrix, axis[at])
+    matrices, origins = arcs.stacked(e.frames)
+    turned = (matrices != np.eye(3)).any(axis=(1, 2)) | origins.any(axis=1)
+    rows = np.flatnonzero(turned[place] & ~common)
+    for first in range(0, len(rows), _CHUNK):
+        at = rows[first:first + _CHUNK]
+        matrix = matrices[place[at]]
+        tip[at] = np.einsum("nij,nj->ni", matrix, tip[at]) + origins[place[at]]
+        axis[at] = np.einsum("nij,nj->ni", matrix, axis[at])
     for row, step in e.deltas:
         matrix = np.eye(3) if common[row] else e.frames[place[row]][0]
         move = step[0] * axis[row] if len(step) == 1 else matrix @ np.array(step)

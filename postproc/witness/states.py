@@ -27,7 +27,7 @@ def with_spindle(c: Commanded, setup: dict[str, Any]) -> Commanded:
     output, tools = (setup.get("output") or {}).get("spindle"), setup.get("tools") or {}
     if not len(c) or not (output or any(t.get("spindle") for t in tools.values())):
         return c
-    tool = _tools(c, setup)
+    tool = tools_of(c, setup)
     begin = np.maximum.accumulate(np.where(np.diff(tool, prepend=tool[:1] - 1) != 0, np.arange(len(c)), 0))
     others = (c.turned < begin) | ((c.turned == begin) & (c.spindle == 0))
     known = c.spindle != UNKNOWN
@@ -111,36 +111,69 @@ def _feed_finding(w: Walked, c: Commanded, at: Array, ratio: Array, match: Array
                     int(w.poses.executed.line[match[k]]), len(at))]
 
 
-def check_states(w: Walked, c: Commanded, case: Case) -> tuple[list[Finding], dict[str, int]]:
-    """Tool, spindle, speed and coolant while cutting; how many blocks each was compared in."""
+def check_states(w: Walked, c: Commanded, case: Case) -> tuple[list[Finding], dict[str, int], list[str]]:
+    """Tool, spindle, speed and coolant while cutting; how many blocks each was compared in; what could not be."""
     e = w.poses.executed
     rows = np.flatnonzero(w.inside & (w.code > 0) & ((w.kind == LINE) | (w.kind == ARC) | (w.kind == BOTTOM)))
     row = w.targets.row[w.owner[rows]]
-    tool, direction, rpm, coolant = _tools(c, case.setup)[row], c.spindle[row], c.rpm[row], c.coolant[row]
+    tool, coolant = tools_of(c, case.setup)[row], c.coolant[row]
+    direction, rpm = _spindles(tool, c.spindle[row], c.rpm[row], case.setup)
+    if not (case.setup.get("output") or {}).get("tool_call", True):
+        tool = np.full(len(rows), -1)
     tap = np.array([x.kind == "TAP" for x in c.cycles] + [False])[c.cycle[row]]
     flow = e.coolant[rows]
-    stated = direction != UNKNOWN
+    stated = (direction != UNKNOWN) & (direction != UNFOLLOWED)
     speed = stated & (direction != 0) & np.isfinite(rpm) & ~tap
     some = _states_coolant(case.setup.get("tools")) or _states_coolant(case.setup.get("output"))
     wet = np.where(coolant == UNKNOWN, some | (flow == 0), np.where(coolant == 0, flow == 0, flow > 0))
     wet &= (coolant != 1) | ((flow & 1) > 0)
-    checks = (("tool", "the tool is T{0:g}, the CL file cuts with T{1:g}", tool != UNKNOWN, e.tool[rows], tool,
+    checks = (("tool", "the program cuts with {0}, the CL file with {1}", tool != UNKNOWN, e.tool[rows], tool,
                e.tool[rows] == tool),
-              ("spindle", "the spindle turns {0:g} (1 M3, -1 M4, 0 stopped), the CL file says {1:g}", stated & ~tap,
+              ("spindle", "the spindle is {0}, the CL file says {1}", stated & ~tap,
                e.spindle[rows], direction, e.spindle[rows] == direction),
-              ("spindle", "the spindle speed is {0:g}, the CL file says {1:g}", speed, e.rpm[rows], rpm,
+              ("speed", "the spindle speed is {0}, the CL file says {1}", speed, e.rpm[rows], rpm,
                np.abs(e.rpm[rows] - rpm) <= 0.5 + 1e-3 * np.abs(rpm)),
-              ("coolant", "the coolant is {0:g} (0 off), the CL file says {1:g} (0 off, 1 flood, 2 on)",
+              ("coolant", "the coolant is {0}, the CL file says {1}",
                (coolant != UNFOLLOWED) & ((coolant != UNKNOWN) | (not some)), flow, coolant, wet))
     found, counts = [], dict[str, int]()
     for code, text, compared, is_, wanted, good in checks:
         bad = np.flatnonzero(compared & ~good)
-        counts[code] = counts.get(code, 0) + int(compared.sum())
+        code_of = "spindle" if code == "speed" else code
+        counts[code_of] = counts.get(code_of, 0) + int(compared.sum())
         if len(bad):
             k = int(bad[0])
-            found.append(Finding(code, text.format(float(is_[k]), float(wanted[k])), int(c.line[row[k]]),
+            found.append(Finding(code_of, text.format(_said(code, is_[k]), _said(code, wanted[k])), int(c.line[row[k]]),
                                  int(e.line[rows[k]]), len(bad)))
-    return found, counts
+    silent = np.flatnonzero((direction == UNKNOWN) & ~tap)
+    return found, counts, [f"spindle (stated by no record, line {c.line[row[silent[0]]]})"] if len(silent) else []
+
+
+def _spindles(tool: Array, direction: Array, rpm: Array, setup: dict[str, Any]) -> tuple[Array, Array]:
+    """(direction, rpm) (K,) with those of the set-up where no record states any: of the tool, else of [output] where no tool
+    has its own, which could still be in force."""
+    own = {int(n): t["spindle"] for n, t in (setup.get("tools") or {}).items() if (t or {}).get("spindle")}
+    default = (setup.get("output") or {}).get("spindle")
+    pairs = [(direction == UNKNOWN, default)] if default and not own else [
+        ((direction == UNKNOWN) & (tool == n), spindle) for n, spindle in own.items()]
+    direction, rpm = direction.copy(), rpm.copy()
+    for at, spindle in pairs:
+        direction[at] = 1 if spindle.get("direction", "clockwise") == "clockwise" else -1
+        rpm[at] = float(spindle["rpm"])
+    return direction, rpm
+
+
+_SPINDLE = {1: "turning clockwise (M3)", -1: "turning anti-clockwise (M4)", 0: "stopped"}
+_COOLANT = {0: "off", 1: "flood", 2: "on"}
+
+
+def _said(code: str, value: float) -> str:
+    """A state in words; UNKNOWN of the file as nothing that is stated."""
+    if value == UNKNOWN:
+        return "nothing"
+    if code == "tool":
+        return f"T{value:g}" if value >= 0 else "the tool in the spindle"
+    names = _SPINDLE if code == "spindle" else _COOLANT if code == "coolant" else {}
+    return names.get(int(value), f"{value:g}") if code != "coolant" or value < 3 else "on"
 
 
 def _states_coolant(table: Any) -> bool:
@@ -150,13 +183,17 @@ def _states_coolant(table: Any) -> bool:
     return any((key == "coolant" and bool(value)) or _states_coolant(value) for key, value in table.items())
 
 
-def _tools(c: Commanded, setup: dict[str, Any]) -> Array:
-    """(N,) number of the tool, by its name where the set-up numbers that; UNKNOWN where nothing is loaded."""
+def tools_of(c: Commanded, setup: dict[str, Any]) -> Array:
+    """(N,) number of the tool: of the set-up by its name, else of the file; UNKNOWN where neither is sure.
+
+    Where [tool_numbers] has names that this witness has not read, a tool without a name could be one of them.
+    """
     asked = {str(name).upper(): int(n) for name, n in (setup.get("tool_numbers") or {}).items()}
     if not asked:
         return c.tool
     own = np.array([asked.get(name, UNKNOWN) for name in c.names] + [UNKNOWN])[c.name]
-    return np.asarray(np.where(own != UNKNOWN, own, UNKNOWN))
+    sure = (c.name >= 0) | set(asked).issubset(c.names)
+    return np.asarray(np.where(own != UNKNOWN, own, np.where(sure & (c.tool > 0), c.tool, UNKNOWN)))
 
 
 def check_holes(w: Walked, c: Commanded, case: Case, match: Array) -> tuple[list[Finding], int]:

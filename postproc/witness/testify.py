@@ -13,7 +13,7 @@ from postproc.witness.evidence import Case, Executed, Finding, Testimony
 from postproc.witness.machine import ROD, kinematics_of, merged
 from postproc.witness.motion import Walked, check_arcs, check_way
 from postproc.witness.place import Poses, Unplaced, cut_of, placement
-from postproc.witness.states import check_feeds, check_holes, check_states, with_spindle
+from postproc.witness.states import check_feeds, check_holes, check_states, tools_of, with_spindle
 from postproc.witness.stretches import BOTTOM, matched, targets_of, turns_of
 from postproc.witness.text import Array
 
@@ -36,11 +36,11 @@ def testify(case: Case, executed: Executed) -> Testimony:
     if machine is None:
         missing.append("kinematics (machine with geometric errors: poses of the read-back)" if case.errors
                        else "kinematics (no machine file of a known family: poses of the read-back)")
-    poses = Poses(case, executed, machine, machine is not None, [])
+    poses = Poses(case, executed, machine, machine is not None, [], max(int(tools_of(c, case.setup).max(initial=0)), 0))
     with np.errstate(all="ignore"):
-        found, worst, counts = _compare(case, executed, c, place, poses, table)
+        found, worst, counts, silent = _compare(case, executed, c, place, poses, table)
     compared = [f"{n} {what}" for what, n in counts.items() if n]
-    return Testimony(tuple(compared), tuple(missing), tuple(found), int(c.known.sum()), *worst, process_time() - began)
+    return Testimony(tuple(compared), (*missing, *silent), tuple(found), int(c.known.sum()), *worst, process_time() - began)
 
 
 def _nothing(why: str, began: float) -> Testimony:
@@ -48,7 +48,7 @@ def _nothing(why: str, began: float) -> Testimony:
 
 
 def _compare(case: Case, executed: Executed, c: Commanded, place: tuple[Array, Array], poses: Poses,
-             table: dict[str, object]) -> tuple[list[Finding], tuple[float, float], dict[str, int]]:
+             table: dict[str, object]) -> tuple[list[Finding], tuple[float, float], dict[str, int], list[str]]:
     rotation, origin = place
     same = bool((rotation == np.eye(3)).all())
     tip = c.tip if same and not origin.any() else c.tip @ rotation.T + origin
@@ -56,7 +56,7 @@ def _compare(case: Case, executed: Executed, c: Commanded, place: tuple[Array, A
     centre, normal = c.centre @ rotation.T + origin, c.normal @ rotation.T
     targets = targets_of(c, tip, axis, centre, normal)
     if not len(targets):
-        return [], (0.0, 0.0), {}
+        return [], (0.0, 0.0), {}, []
     cut = cut_of(case, c, tip, axis, centre, normal, place)
     there, along = poses.at(np.arange(len(executed)), 1.0)
     turns = turns_of(poses)
@@ -79,7 +79,7 @@ def _compare(case: Case, executed: Executed, c: Commanded, place: tuple[Array, A
     found += faults
     faults, feeds = check_feeds(w, c, case, table, match)
     found += faults
-    faults, states = check_states(w, c, case)
+    faults, states, silent = check_states(w, c, case)
     found += faults
     found += _rods(poses)
     good = w.on_way() & np.isin(w.kind, (LINE, ARC, BOTTOM))
@@ -87,7 +87,7 @@ def _compare(case: Case, executed: Executed, c: Commanded, place: tuple[Array, A
     counts = {"positions": int((match >= 0).sum()), "arcs": int((targets.sweep != 0.0).sum()), "holes": holes,
               "feeds": feeds, **{{"tool": "tools", "spindle": "spindle states", "coolant": "coolant states"}[k]: v
                                  for k, v in states.items()}}
-    return found, worst, counts
+    return found, worst, counts, silent
 
 
 def _arriving(axis: Array) -> str:

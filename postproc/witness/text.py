@@ -19,13 +19,16 @@ _THREE = _NUMBER + rb"," + _NUMBER + rb"," + _NUMBER
 _PLAIN = rb"[ \t]*GOTO[ \t]*/" + _THREE + rb"(?:," + _THREE + rb")?"
 _OTHER = re.compile(rb"^(?!" + _PLAIN + rb"$)[^\n]*", re.MULTILINE)
 _COMMENT = re.compile(rb"\$\$[^\n]*")
-_GOES_ON = re.compile(rb"(?<!\$)\$(?!\$)[^\n]*\n")
+_GOES_ON = re.compile(rb"(?<!\$)\$(?!\$)([^\n]*)\n(?:[ \t]*\n)*")
 _SUBROUTINE = re.compile(rb"^[ \t]*DEFSUB[ \t]*/([^\n$]*)\n(.*?)^[ \t]*ENDSUB[^\n]*$", re.MULTILINE | re.DOTALL)
 _CALL = re.compile(rb"^[ \t]*CALSUB[ \t]*/([^\n$]*)$", re.MULTILINE)
 _CATIA = re.compile(rb"^[ \t]*\$\$\*CATIA0[^\n]*\n[ \t]*\$\$[^\n]*\n((?:[ \t]*\$\$[^\n]*\n){3})", re.MULTILINE)
 _MAJOR = re.compile(r"(\$\$->\s*[\w-]+|[^/]*)/?(.*)", re.DOTALL)
 TEXT_WORDS = ("PARTNO", "PPRINT", "INSERT", "REMARK", "TPRINT", "LPRINT", "PPLABEL", "LETTER")
-_BARE = re.compile(r"(?:" + "|".join(TEXT_WORDS) + r")\b", re.IGNORECASE)
+_BARE = re.compile("|".join(TEXT_WORDS), re.IGNORECASE)
+_TEXT = re.compile(rb"[ \t]*(?:" + "|".join(TEXT_WORDS).encode() + rb")", re.IGNORECASE)
+_STATEMENT = re.compile(rb"[ \t]*(?:" + "|".join(TEXT_WORDS).encode() + rb"|(?:RAPID|FINI|END|STOP|OPSTOP|GOHOME|ENDSUB)\b"
+                        rb"|\$\$|[A-Z][\w ,-]*/)", re.IGNORECASE)
 _CHUNK = 1 << 23
 _DEEP = 10
 
@@ -117,13 +120,32 @@ def _plain(data: bytes) -> bytes:
     if b"$" not in data:
         return data
     data = _COMMENT.sub(_without_comment, data)
-    return _GOES_ON.sub(b" " + JOIN, data) if b"$" in data else data
+    return _joined(data) if b"$" in data else data
+
+
+def _joined(data: bytes) -> bytes:
+    """Lines that a `$` continues, joined by JOIN: within a text only a `$` that ends the line, and no statement follows."""
+    end, text = -1, False
+
+    def join(found: re.Match[bytes]) -> bytes:
+        nonlocal end, text
+        begin = data.rfind(b"\n", 0, found.start()) + 1
+        text = text if begin == end else _TEXT.match(data, begin) is not None
+        if text and ((found[1].strip() and not found[1].rstrip().endswith(b"$")) or _STATEMENT.match(data, found.end())):
+            return found[0]
+        end = found.end()
+        return b" " + JOIN * found[0].count(b"\n")
+
+    return _GOES_ON.sub(join, data)
 
 
 def _without_comment(found: re.Match[bytes]) -> bytes:
-    """A comment of data stays, where it begins its line."""
+    """A comment of data stays, where it begins its line; in a text `$$` is text."""
     at, text = found.start(), found.string
-    alone = not text[text.rfind(b"\n", 0, at) + 1:at].strip()
+    begin = text.rfind(b"\n", 0, at) + 1
+    if _TEXT.match(text, begin):
+        return found[0]
+    alone = not text[begin:at].strip()
     return found[0] if alone and found[0].startswith(b"$$->") else b""
 
 

@@ -25,6 +25,7 @@ import toolpaths.cl.frames
 import toolpaths.cl.interpret
 import toolpaths.cl.motion
 import toolpaths.cl.read
+import toolpaths.cl.subprograms
 from machines.serial_models import SerialModel
 from machines.slider_models import SliderModel
 from postproc.job import Job
@@ -245,7 +246,16 @@ def units_dropped(patch: Patch) -> None:
 
 
 def subroutine_skipped(patch: Patch) -> None:
-    patch.setitem(toolpaths.cl.interpret.HANDLERS, "CALSUB", lambda b, s: None)
+    """A call that carries nothing out and counts as made."""
+    patch.setitem(toolpaths.cl.interpret.HANDLERS, "CALSUB", lambda b, s: b.called.add(
+        toolpaths.cl.interpret._subprograms(b).place(toolpaths.cl.subprograms.called(s), b.index)))
+
+
+def next_tools(p: Toolpath) -> Toolpath:
+    """Every number one more, of the tools and of the records that load them."""
+    events = tuple(replace(e, values=(float(e.values[0]) + 1.0, *e.values[1:])) if e.word == "LOADTL" else e
+                   for e in p.events)
+    return replace(p, tools=tuple(replace(t, number=t.number + 1) for t in p.tools), events=events)
 
 
 def delta_turned(old: Any, b: Builder, rows: Any) -> None:
@@ -325,7 +335,7 @@ FAULTS: dict[str, tuple[str, str, str, str, Plant]] = {
     "part placement transposed": (NX, "mill-3axis", "linuxcnc", "turned",
                                   wrapped(postproc.job, "part_placement", transposed)),
     "wrong tool number": (NX, "mill-3axis", "linuxcnc", "turned",
-                          of_word("LOADTL", lambda v: (v[0] + 1.0, *v[1:]))),
+                          path_changed(next_tools)),
     "spindle the other way": (NX, "mill-3axis", "linuxcnc", "plain", events(other_way)),
     "spindle speed": (NX, "mill-3axis", "linuxcnc", "plain",
                       of_word("SPINDL", lambda v: tuple(2000.0 if x == 3000.0 else x for x in v))),

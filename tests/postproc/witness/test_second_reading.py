@@ -28,8 +28,10 @@ TEXTS = {
     "MOVARC": "GOTO/10,0,0\nMOVARC/0,0,0,0,0,1,10,ANGLE,90\nGOTO/0,10,0\nFINI\n",
     "GODLTA along the axis": "GOTO/1,2,3,0,0.6,0.8\nGODLTA/5\nGODLTA/1,1,1\nRAPID\nGODLTA/-2\n",
     "GODLTA in a turned system": "TOOL PATH/A,TOOL,B\nMSYS/1,2,3,0,1,0,-1,0,0\nGOTO/1,2,3\nGODLTA/1,0,2\nEND-OF-PATH\n",
-    "continued and commented": ("goto / 1, $ after the mark\n 2, 3 $$ a remark\n$$ alone\nGOTO/1,2,$\n4\n"
+    "continued and commented": ("goto / 1, $\n 2, 3 $$ a remark\n$$ alone\nGOTO/1,2,$\n4\n"
                                 "PPRINT $$ text / 1,2,3\nGOTO/4,5,6\n"),
+    "dollars in texts": ("PPRINT FINISH 5$ PASS\nGOTO/1,2,3\nREMARK PRICE 20$\nGOTO/4,5,6\nPARTNO A $US 120 $$ EACH\nRAPID\n"
+                         "TPRINT/D10 $\n 20$ B\nGOTO/7,8,9\nGOTO/1,2,$\n\n$$ alone\n3\n"),
     "carriage returns": "GOTO/1,2,3\r\nRAPID\r\nGOTO/4,5,6\r\n",
     "blanks for commas": "GOTO/1 2 3\nGOTO/4 5 6 0 0 1\n",
     "FROM and GOHOME": "FROM/0,0,100\nGOTO/1,2,3\nGOHOME/0,0,100\nGOHOME\nGOTO/1,2,3\n",
@@ -45,9 +47,10 @@ def agrees(text: bytes) -> None:
     path, found = toolpaths.read_bytes(text)
     assert not has_errors(found), [str(d) for d in found]
     c = commanded(text)
-    assert len(c) == len(path) and (c.line == path.line).all() and c.known.all()
-    np.testing.assert_allclose(c.tip, path.tip, atol=1e-9)
-    np.testing.assert_allclose(c.axis, path.axis, atol=1e-12)
+    assert len(c) == len(path) and (c.line == path.line).all()
+    assert c.known.all() or "ROTATE" in c.unread, c.unread
+    np.testing.assert_allclose(c.tip[c.known], path.tip[c.known], atol=1e-9)
+    np.testing.assert_allclose(c.axis[c.known], path.axis[c.known], atol=1e-12)
     assert ((c.kind == HOLE) == (path.role == Role.HOLE)).all()
     assert ((c.arc >= 0) == (path.kind == Kind.ARC)).all()
     assert ((c.kind == LINE) == ((path.kind == Kind.FEED) & (path.role != Role.START))).all()
