@@ -31,6 +31,10 @@ class Walked:
         m = np.minimum(owner, max(len(targets) - 1, 0))
         self.begin = np.concatenate([[0], np.flatnonzero(np.diff(owner)) + 1])
         self.first = self.begin[np.searchsorted(self.begin, np.arange(len(owner)), side="right") - 1]
+        plain = np.where(poses.executed.hole, len(owner), np.arange(len(owner)))
+        first = np.minimum.reduceat(plain, self.begin)[np.searchsorted(self.begin, np.arange(len(owner)), side="right") - 1]
+        self.leaves = np.where(first < len(owner), first, self.first)
+        """first block of the target that is no return of a hole"""
         self.kind = np.where(self.inside, targets.kind[m], -1)
         self.gap = np.where(self.inside, targets.gap[m], False)
         self.away, self.tilt = np.zeros(len(owner)), np.zeros(len(owner))
@@ -40,7 +44,7 @@ class Walked:
         i = self.owner[rows]
         free = self.targets.free[i]
         start, axis = self.targets.start[i].copy(), self.targets.start_axis[i].copy()
-        before = self.first[rows[free]] - 1
+        before = np.minimum(self.leaves[rows[free]], rows[free]) - 1
         start[free] = np.where((before >= 0)[:, None], self.tip[before], self.targets.tip[i[free]])
         axis[free] = np.where((before >= 0)[:, None], self.axis[before], self.targets.axis[i[free]])
         return start, axis

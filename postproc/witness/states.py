@@ -30,7 +30,7 @@ def with_spindle(c: Commanded, setup: dict[str, Any]) -> Commanded:
     tool = tools_of(c, setup)
     begin = np.maximum.accumulate(np.where(np.diff(tool, prepend=tool[:1] - 1) != 0, np.arange(len(c)), 0))
     others = (c.turned < begin) | ((c.turned == begin) & (c.spindle == 0))
-    known = c.spindle != UNKNOWN
+    known = (c.spindle != UNKNOWN) & (c.spindle != UNFOLLOWED)
     spindle, rpm = c.spindle.copy(), c.rpm.copy()
     for number in np.unique(tool).tolist():
         own = (tools.get(str(max(number, 0))) or {}).get("spindle")
