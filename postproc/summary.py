@@ -246,7 +246,7 @@ def verify_dict(result: VerifyResult) -> dict[str, Any]:
     c = result.comparison
     return {
         "gcode": result.gcode,
-        "proved": result.ok,
+        "proved": result.ok and c is not None and not c.unbounded,
         "blocks": len(c.owner) if c else 0,
         **deviations(c),
         "worst_tip_lines": list(c.worst_tip_line) if c else None,
