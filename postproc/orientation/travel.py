@@ -21,8 +21,8 @@ _APART = 10.0 * DEG
 """of the axes that are looked at first"""
 _LEANS, _RING = (0.5 * DEG, 2.0 * DEG, 5.0 * DEG, 10.0 * DEG), 36
 """beside an axis along a rotary joint, where that joint goes far: angles from it, and axes of each"""
-_STARTS, _ROUNDS = 4, 3
-_STEPS = (5.0 * DEG, 2.5 * DEG, 1.2 * DEG, 0.6 * DEG)
+_STARTS, _ROUNDS = 8, 8
+_STEPS = (5.0 * DEG, 2.5 * DEG, 1.2 * DEG, 0.6 * DEG, 0.3 * DEG)
 _PER_RAD = 100.0
 """mm that a radian counts as"""
 _SOME = 24
