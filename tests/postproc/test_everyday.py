@@ -40,6 +40,11 @@ def said(result: postproc.PostResult, code: str) -> Diagnostic:
     return one
 
 
+def blocks_of(result: postproc.PostResult) -> list[str]:
+    """The program without the line of its header that tells one set-up from another."""
+    return [row for row in result.text.splitlines() if "fingerprint of the set-up" not in row]
+
+
 def errors(result: postproc.PostResult) -> list[str]:
     return [str(d) for d in result.diagnostics if d.severity is Severity.ERROR]
 
@@ -47,7 +52,7 @@ def errors(result: postproc.PostResult) -> list[str]:
 @pytest.mark.parametrize("name", ["mill-3axis", "mikron-ucp710", "linuxcnc-xyzac-trt"])
 def test_the_length_of_tool_0_is_not_in_the_spindle_before_the_first_tool(name: str) -> None:
     with_it, without = converted(HEAD + CUT, name), converted(HEAD + CUT, name, of=setup(tools={"1": {"gauge_length": 100}}))
-    assert not errors(with_it) and with_it.text == without.text
+    assert not errors(with_it) and blocks_of(with_it) == blocks_of(without) != []
 
 
 def test_what_cuts_before_the_first_tool_change_needs_a_number() -> None:
@@ -87,7 +92,7 @@ def test_a_missing_feed_is_refused_and_the_set_up_is_named() -> None:
 
 def test_the_feed_of_the_set_up_replaces_none_that_is_stated() -> None:
     asked, plain = converted(HEAD + CUT, of=setup(output={"feed": 50.0})), converted(HEAD + CUT)
-    assert asked.ok and asked.text == plain.text
+    assert asked.ok and blocks_of(asked) == blocks_of(plain) != []
 
 
 def test_a_tap_takes_no_feed_of_the_set_up() -> None:
