@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 Json = Annotated[str, typer.Option("--json", metavar="FILE", help="write the figures as JSON; - for standard output")]
 
+SCHEMA_VERSION = 1
+"""of the JSON objects of all commands; it rises where a key changes its meaning or goes"""
 LONGEST_NAME = 255
 """characters that the name of a file may have"""
 
@@ -82,17 +84,23 @@ def report(diagnostics: tuple[Diagnostic, ...], target: str, values: dict[str, A
     """
     from toolpaths.diagnostics import has_errors
 
-    told, failed = _written(target, values, dict(outputs or {}))
-    for d in (*diagnostics, *told):
+    ok = not has_errors(diagnostics)
+    more, failed = _written(target, _headed(values, ok), dict(outputs or {}))
+    for d in (*diagnostics, *more):
         typer.echo(str(d), err=True)
     if failed and outputs:
-        values, text = {"diagnostics": [d.as_dict() for d in (*diagnostics, *told)]}, ""
+        values, text = {"diagnostics": [d.as_dict() for d in (*diagnostics, *more)]}, ""
     if target == "-":
-        print_json(rounded(values))
+        print_json(rounded(_headed(values, ok and not failed)))
     elif text:
         typer.echo(text)
-    if failed or has_errors(diagnostics):
+    if failed or not ok:
         raise typer.Exit(1)
+
+
+def _headed(values: dict[str, Any], ok: bool) -> dict[str, Any]:
+    """The keys that every JSON object of a command begins with (DESIGN, section 5)."""
+    return {"schema_version": SCHEMA_VERSION, "ok": ok} | values
 
 
 def _written(target: str, values: dict[str, Any], outputs: dict[Path, str | bytes]) -> tuple[list[Diagnostic], bool]:

@@ -27,7 +27,9 @@ def run(*arguments: str | Path) -> Result:
 def figures(*arguments: str | Path) -> dict[str, Any]:
     got = run(*arguments, "--json", "-")
     assert got.exit_code == 0, got.stderr
-    return json.loads(got.stdout)
+    found = json.loads(got.stdout)
+    assert (found["schema_version"], found["ok"]) == (1, True)
+    return found
 
 
 def cl(folder: Path, *lines: str) -> Path:
@@ -103,10 +105,12 @@ def test_json_dash_prints_json_alone_even_where_it_fails(tmp_path: Path) -> None
     got = run("convert", path, *MILL, "-o", tmp_path / "p.ngc", "--json", "-")
     d = json.loads(got.stdout)
     assert got.exit_code == 1 and d["output"] is None
+    assert (d["schema_version"], d["ok"]) == (1, False)
     assert {x["code"] for x in d["diagnostics"] if x["severity"] == "error"} == {"travel.exceeded"}
     assert "travel.exceeded" in got.stderr
     got = run("convert", path, "-m", "nothing", "-c", "linuxcnc", "-o", tmp_path / "p.ngc", "--json", "-")
-    assert got.exit_code == 1 and json.loads(got.stdout)["diagnostics"]
+    d = json.loads(got.stdout)
+    assert got.exit_code == 1 and d["diagnostics"] and d["ok"] is False
 
 
 def test_header_is_enough_to_verify_again(tmp_path: Path) -> None:

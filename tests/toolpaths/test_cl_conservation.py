@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 
 import pytest
@@ -46,6 +47,16 @@ def test_what_is_allowed_is_neutral() -> None:
     text = HEAD + "GOTO/1,2,3\nFLUB/1\n@@ text\nGOTO/1,2,4\n"
     result = read_bytes(text, allow_unknown=["FLUB", "(TEXT)"])
     assert not has_errors(result.diagnostics) and result.toolpath.records == Records(6, 4, 2, 0)
+
+
+@pytest.mark.parametrize("record", ["STOP/1", "OPSTOP/ON", "MULTAX/ON,LINEAR", "COOLNT/FLOOD,1,2,3", "$$-> CUTTER / 10.5, 3",
+                                    "UNITS/MM,3", "DELAY/1,2", "MODE/1X", "ROTATE/CAXIS,1,2"])
+def test_the_hint_of_a_form_names_the_word_that_takes_it(record: str) -> None:
+    text = f"{HEAD}GOTO/1,2,3\n{record}\nGOTO/1,2,4\n"
+    (found,) = [d for d in read_bytes(text).diagnostics if d.severity is Severity.ERROR]
+    assert found.code == "cl.form" and found.lines == (4,)
+    word = shlex.split(found.hint.partition("--allow-unknown ")[2])[0]
+    assert not has_errors(read_bytes(text, allow_unknown=[word]).diagnostics)
 
 
 def test_a_dropped_record_that_nobody_names_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -7,6 +7,7 @@ like a number, or holds another record. A number that does not fit, an empty fie
 from __future__ import annotations
 
 import re
+import shlex
 from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import pairwise
@@ -119,7 +120,8 @@ def check_forms(program: Program, log: Log, allowed: Iterable[str], dialect: Dia
             name = statement.major.removeprefix(DATA_COMMENT)
             between = "/" if statement.body and statement.slash else " " if statement.body else ""
             log.error("cl.form", f"{name}{between}{statement.body[:60]}: {fault}", line, "compare the record with the CAM "
-                      "system; --allow-unknown WORD takes a word as it stands", key=f"{name} {fault}")
+                      f"system; where it is right, --allow-unknown {shlex.quote(statement.major)} takes it as it stands",
+                      key=f"{name} {fault}")
 
 
 def fault_of(s: Statement, allow: frozenset[str] = frozenset()) -> str:
