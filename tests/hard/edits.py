@@ -35,6 +35,25 @@ def edits(text: str, most: int | None = None, seed: int = 1) -> Iterator[tuple[s
         yield f"cut off at {at}", text[:at]
 
 
+def deletions(text: str, alike: int | None = None) -> Iterator[tuple[str, str]]:
+    """(what was done, program) with each block deleted in turn. With `alike` only so many, evenly spread, of blocks that
+    have the same words as each other and as the blocks before and after them."""
+    lines = text.splitlines()
+    shapes = ["", *(re.sub(r"[-+]?\d[\d.]*", "", n.split("(")[0].split(";")[0]) + _codes(n) for n in lines), ""]
+    classes: dict[tuple[str, ...], list[int]] = {}
+    for i in range(len(lines)):
+        classes.setdefault(tuple(shapes[i:i + 3]), []).append(i)
+    for members in classes.values():
+        step = 1 if alike is None else max(1, -(-len(members) // alike))
+        for i in members[::step]:
+            yield f"line {i + 1}, deleted", "\n".join([*lines[:i], *lines[i + 1:]]) + "\n"
+
+
+def _codes(block: str) -> str:
+    """The preparatory and miscellaneous functions of a block, whose numbers are names."""
+    return " ".join(re.findall(r"\b[GM]\d+(?:\.\d+)?", block))
+
+
 def _blocks(lines: list[str], i: int, chance: random.Random) -> Iterator[tuple[str, list[str]]]:
     """(what was done, blocks in the place of block i); of its words one is changed."""
     yield "deleted", []

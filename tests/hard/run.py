@@ -1,10 +1,13 @@
 """Every sample, and every file of a folder, on every machine and control: what comes out, by kind (`make hard`).
 
-    python tests/hard/run.py [FOLDER] [--machine NAME ...] [--controller NAME ...] [--edits N | --edits all] [--workers 2]
+    python tests/hard/run.py [FOLDER] [--machine NAME ...] [--controller NAME ...] [--workers 2]
+                             [--edits N | --edits all | --edits deleted [--alike N] [--first]]
 
 Each conversion is written and proved, or refused with a code; the estimate of its time and all texts are made too. With
---edits each program is changed in N blocks (`edits.py`) and goes through `time` and `verify` again. Internal errors, and
-conversions without an end, are failures: exit code 1.
+--edits each program is changed in N blocks (`edits.py`) and goes through `time` and `verify` again; `--edits deleted` takes
+each block out in turn (with --alike N at most N of blocks that are alike in themselves and their neighbours), with --first
+on the first machine of the list that the file can be written for. Internal errors, and conversions without an end, are
+failures: exit code 1.
 """
 
 from __future__ import annotations
@@ -48,6 +51,10 @@ class Task:
     machine: str
     controllers: tuple[str, ...]
     edits: int | None
+    """blocks that are changed in the program, None: all"""
+    deleted: bool = False
+    """blocks are taken out, each by itself, and nothing else is changed"""
+    alike: int | None = None
 
 
 def files_of(folder: Path | None) -> list[Path]:
@@ -92,9 +99,10 @@ def _outcomes(task: Task, controller: str) -> Iterator[tuple[str, str, str]]:
         yield (PROVED, "", "") if result.ok else (REFUSED, _reason(result.diagnostics), "")
         if not result.ok or task.edits == 0:
             return
-        from tests.hard.edits import edits, timed, verified
+        from tests.hard.edits import deletions, edits, timed, verified
 
-        for what, program in edits(result.text, task.edits):
+        changed = deletions(result.text, task.alike) if task.deleted else edits(result.text, task.edits)
+        for what, program in changed:
             step = f", {what}"
             timed(program, result, result.machine, result.controller, controller)
             yield (f"edited: {'proved' if verified(program, result) else 'refused'}", "", step)
@@ -197,6 +205,12 @@ def run(tasks: list[Task], workers: int) -> Counter[tuple[str, str, str]]:
     return found
 
 
+def _first(file: Path, names: list[str], controllers: list[str]) -> list[str]:
+    """The first machine that the file can be written for with any of the controllers; none where there is none."""
+    return next(([name] for name in names for controller in controllers
+                 if _converted(Task(file, name, (controller,), 0), controller).ok), [])
+
+
 def main() -> int:
     import machines
     from postproc.controllers.model import builtin_files
@@ -206,14 +220,18 @@ def main() -> int:
     wanted.add_argument("--machine", nargs="*", default=list(machines.names()))
     wanted.add_argument("--controller", nargs="*", default=sorted(builtin_files()))
     wanted.add_argument("--edits", default="1")
+    wanted.add_argument("--alike", type=int)
+    wanted.add_argument("--first", action="store_true")
     wanted.add_argument("--workers", type=int, default=2)
     wanted.add_argument("--match", default="", help="part of the files' names")
     a = wanted.parse_args()
     if a.folder and not a.folder.is_dir():
         wanted.error(f"{a.folder} is no folder")
-    edits = None if a.edits == "all" else int(a.edits)
-    tasks = [Task(file, machine, tuple(a.controller), edits) for file in files_of(a.folder) if a.match in file.name
-             for machine in a.machine]
+    deleted = a.edits == "deleted"
+    edits = None if deleted or a.edits == "all" else int(a.edits)
+    files = [file for file in files_of(a.folder) if a.match in file.name]
+    tasks = [Task(file, machine, tuple(a.controller), edits, deleted, a.alike) for file in files
+             for machine in (_first(file, a.machine, a.controller) if a.first else a.machine)]
     found = run(tasks, a.workers)
     print(table(found))
     print(f"{failures(found)} failures")

@@ -9,7 +9,7 @@ import pytest
 from postproc.controllers.model import load_controller
 from postproc.cycle_time.source import from_gcode
 from postproc.pipeline import PostResult
-from tests.hard.edits import edits, timed, verified
+from tests.hard.edits import deletions, edits, timed, verified
 from tests.postproc.kit import codes, convert, good, machine, sample, tool_setup, toolpath
 
 CONTROLLERS = ("fanuc-30i", "siemens-840d", "heidenhain-tnc640", "haas-ngc", "linuxcnc", "generic-iso")
@@ -38,6 +38,14 @@ def test_nothing_is_raised(name: str, programs: dict[str, PostResult]) -> None:
     for _, program in edits(result.text, MOST_VERIFIED):
         refused += not verified(program, result)
     assert refused > 0
+
+
+def test_each_block_is_deleted_and_of_blocks_alike_as_many_as_asked() -> None:
+    text = "G21 G90\nG0 X1.\n" + "".join(f"G1 X{i}. F100.\n" for i in range(2, 50)) + "G0 Z5.\nM30\n"
+    lines = text.splitlines()
+    assert sorted(p for _, p in deletions(text)) == sorted("\n".join(lines[:i] + lines[i + 1:]) + "\n" for i in range(52))
+    some = [what for what, _ in deletions(text, 3)]
+    assert len(some) < 12 and {f"line {i}, deleted" for i in (1, 2, 3, 50, 51, 52)} <= set(some)
 
 
 def refused(name: str, text: str) -> set[str]:
