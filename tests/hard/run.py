@@ -229,7 +229,7 @@ def main() -> int:
         wanted.error(f"{a.folder} is no folder")
     deleted = a.edits == "deleted"
     edits = None if deleted or a.edits == "all" else int(a.edits)
-    files = [file for file in files_of(a.folder) if a.match in file.name]
+    files = sorted((file for file in files_of(a.folder) if a.match in file.name), key=lambda file: file.stat().st_size)
     tasks = [Task(file, machine, tuple(a.controller), edits, deleted, a.alike) for file in files
              for machine in (_first(file, a.machine, a.controller) if a.first else a.machine)]
     found = run(tasks, a.workers)
