@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -12,7 +13,7 @@ from postproc.control import Control
 from postproc.coolant import FLOOD, MIST
 from postproc.readback import frames
 from postproc.readback.canonical import CALL, LAW, REST, TURNS, Canonical, Law, Text, in_files, placed
-from postproc.readback.frames import AXES, Frame
+from postproc.readback.frames import AXES, Frame, FrameTable
 from postproc.readback.modal import Modal, columns, fill, fill_values, modal_state, number_of
 from postproc.readback.rows import INCH, Rows, Section
 from postproc.readback.sections import run_section
@@ -73,6 +74,11 @@ class Motion:
     def __len__(self) -> int:
         return len(self.line)
 
+    @cached_property
+    def table(self) -> FrameTable:
+        """The frames side by side."""
+        return FrameTable.of(self.frames)
+
     @property
     def flood(self) -> Bools:
         """(E,) flood coolant flows."""
@@ -121,8 +127,8 @@ def run(code: Canonical, letters: tuple[str, ...], offsets: Offsets, file: str =
         frame = AXES
         if law is not None:
             where = file, int(code.line[first])
-            faults = found if first in begun else []
-            frame = frames.frame_of(law, offsets.control, offsets.length(register), position, where, faults)
+            frame = frames.frame_of(law, offsets.control, offsets.length(register), position, where,
+                                    found if first in begun else None)
             used.append(frame)
         number = len(used) - 1 if law is not None else 0
         part = run_section(section.cut(first, last), frame, number, position, code, offsets, file, found)

@@ -6,6 +6,7 @@ tip in the frame of a plane; rotary words are rotary positions under every law.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -14,7 +15,7 @@ from machines.kinematics.base import Kinematics
 from postproc.control import Control
 from postproc.readback.canonical import Law, LawName
 from postproc.zero_entry import table_axes
-from toolpaths.arrays import Floats
+from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.rotations import angle_between
 from toolpaths.units import DEG
@@ -39,33 +40,75 @@ class Frame:
 
     def coordinates(self, position: Floats) -> Floats:
         """(N, J) what the words would say at machine positions (N, J) (mm, degrees)."""
-        if self.control is None or self.kinematics is None:
-            return position
-        result = np.array(position)
-        for at in range(0, len(position), _CHUNK):
-            part = slice(at, at + _CHUNK)
-            tip, _ = self.kinematics.forward(position[part] / self.control.unit)
-            result[part, self.control.xyz] = (tip - self.origin) @ self.rotation
-        return result
+        return FrameTable.of((self,)).coordinates(np.zeros(len(position), dtype=np.int64), position)
 
     def position(self, coordinates: Floats) -> Floats:
-        """(N, J) machine positions of coordinates (N, J): the slides that bring the tip there at the rotary positions.
+        """(N, J) machine positions of coordinates (N, J): the slides that bring the tip there at the rotary positions."""
+        return FrameTable.of((self,)).position(np.zeros(len(coordinates), dtype=np.int64), coordinates)
+
+
+@dataclass(frozen=True, eq=False)
+class FrameTable:
+    """F frames side by side: the blocks of all that share control and tool length are placed at once."""
+
+    owner: Ints
+    """(F,) the first frame with the same control and tool length"""
+    frames: tuple[Frame, ...]
+    rotation: Floats
+    """(F, 3, 3)"""
+    origin: Floats
+    """(F, 3)"""
+
+    @property
+    def plain(self) -> bool:
+        """True where the words of all are machine positions."""
+        return all(frame.kinematics is None or frame.control is None for frame in self.frames)
+
+    @classmethod
+    def of(cls, frames: tuple[Frame, ...]) -> FrameTable:
+        first: dict[tuple[int, float], int] = {}
+        keys = [(id(f.control), f.kinematics.tool_length) if f.kinematics is not None else (0, 0.0) for f in frames]
+        owner = [first.setdefault(key, k) for k, key in enumerate(keys)]
+        return cls(np.array(owner), frames, np.stack([f.rotation for f in frames]), np.stack([f.origin for f in frames]))
+
+    def coordinates(self, number: Ints, position: Floats) -> Floats:
+        """(N, J) what the words would say at machine positions (N, J) (mm, degrees) in the frames `number` (N,)."""
+        if self.plain:
+            return position
+        result = np.array(position)
+        for control, kin, k in self._parts(number):
+            tip, _ = kin.forward(position[k] / control.unit)
+            at = number[k]
+            result[np.ix_(k, control.xyz)] = np.einsum("nj,nji->ni", tip - self.origin[at], self.rotation[at])
+        return result
+
+    def position(self, number: Ints, coordinates: Floats) -> Floats:
+        """(N, J) machine positions of coordinates (N, J) in the frames `number` (N,).
 
         The tip is an affine function of the slides, t = t0(rotaries) + D(rotaries) s, solved for s.
         """
-        control, kin = self.control, self.kinematics
-        if control is None or kin is None:
+        if self.plain:
             return coordinates
         result = np.array(coordinates)
-        for at in range(0, len(coordinates), _CHUNK):
-            part = slice(at, at + _CHUNK)
-            q = coordinates[part] / control.unit
+        for control, kin, k in self._parts(number):
+            q, at = coordinates[k] / control.unit, number[k]
             q[:, control.slides] = 0.0
-            tip = coordinates[part][:, control.xyz] @ self.rotation.T + self.origin
+            tip = np.einsum("nij,nj->ni", self.rotation[at], coordinates[np.ix_(k, control.xyz)]) + self.origin[at]
             rest = tip - kin.forward(q)[0]
             slopes = kin.jacobian(q)[:, :3][:, :, control.slides]
-            result[part, control.slides] = np.linalg.solve(slopes, rest[:, :, None])[:, :, 0]
+            result[np.ix_(k, control.slides)] = np.linalg.solve(slopes, rest[:, :, None])[:, :, 0]
         return result
+
+    def _parts(self, number: Ints) -> Iterator[tuple[Control, Kinematics, Ints]]:
+        """Rows of one control and tool length at a time, not too many; none where the words are machine positions."""
+        owners = self.owner[number]
+        for owner in np.flatnonzero(np.bincount(owners)).tolist():
+            control, kin = self.frames[owner].control, self.frames[owner].kinematics
+            if control is None or kin is None:
+                continue
+            rows = np.flatnonzero(owners == owner)
+            for at in range(0, len(rows), _CHUNK):
+                yield control, kin, rows[at:at + _CHUNK]
 
 
 AXES = Frame("axes")
@@ -90,12 +133,14 @@ def tool_frame(kin: Kinematics, q: Floats) -> Floats:
 
 
 def frame_of(law: Law, control: Control | None, length: float, position: Floats, at: tuple[str, int],
-             found: list[Diagnostic]) -> Frame:
+             found: list[Diagnostic] | None) -> Frame:
     """The frame of a law entered at machine position (J,), with a tool of that length; `at` is file and line.
 
-    A law that the machine cannot have, and rotary axes that do not stand as the control would put them, are errors.
+    A law that the machine cannot have, and rotary axes that do not stand as the control would put them, are errors; None
+    for `found` asks for the frame alone.
     """
-    file, line = at
+    checked, (file, line) = found is not None, at
+    found = [] if found is None else found
     if law.name == "axes":
         return AXES
     kin = control.kinematics if control is not None else None
@@ -114,7 +159,7 @@ def frame_of(law: Law, control: Control | None, length: float, position: Floats,
         return Frame("tcp", control, kin, rotation, origin)
     q = position / control.unit
     rotation = tool_frame(kin, q) if law.rotation is None else law.rotation
-    if law.rotation is not None:
+    if checked and law.rotation is not None:
         found += _wrong_pose(law, control, kin, q, file, line)
     return Frame("tilted", control, kin, rotation, control.origin + law.shift)
 

@@ -11,9 +11,8 @@ from machines.kinematics.base import Kinematics
 from postproc.control import Control
 from postproc.readback import assembly
 from postproc.readback.execute import Motion
-from postproc.readback.frames import Frame
 from postproc.word_arcs import PLANE_COLUMNS
-from toolpaths.arrays import Bools, Floats, Ints, as_slice, repeated, taken
+from toolpaths.arrays import Bools, Floats, Ints, repeated, taken
 
 SAMPLES = (0.2, 0.4, 0.6, 0.8, 1.0)
 """where each block is looked at; other places than those that linearising looks at"""
@@ -46,11 +45,7 @@ class Executed:
         """Tips (K, 3) where X, Y, Z of the frames of blocks stand at `xyz` (K, 3), all else as in `beginning` (K, J)."""
         position = np.array(beginning)
         position[:, self.control.xyz] = xyz
-        numbers = motion.frame[rows]
-        for number in np.unique(numbers).tolist():
-            k = np.flatnonzero(numbers == number)
-            position[k] = motion.frames[number].position(position[k])
-        return self._placed(motion, rows, position)[0]
+        return self._placed(motion, rows, motion.table.position(motion.frame[rows], position))[0]
 
     def _placed(self, motion: Motion, rows: Ints, position: Floats) -> tuple[Floats, Floats]:
         """(tip, axis) (K, 3) of machine coordinates (K, J) with the tools and registers of the blocks `rows`."""
@@ -155,30 +150,29 @@ def _whole(t: float | Floats) -> bool:
 @dataclass(frozen=True)
 class Ways:
     """Blocks `rows` (K,) with what of their motion does not depend on the fraction: machine coordinates (K, J) at both ends,
-    and by law the blocks (of those) with their coordinates at both ends."""
+    and the coordinates of their frames there."""
 
     motion: Motion
     control: Control
     rows: Ints
     before: Floats
     end: Floats
-    laws: tuple[tuple[Ints | slice, Frame, Floats, Floats], ...]
+    frame: Ints
+    first: Floats
+    last: Floats
 
     @classmethod
     def of(cls, motion: Motion, control: Control, rows: Ints) -> Ways:
         """What `at` needs."""
-        before, end, numbers = begins(motion, rows), motion.end[rows], taken(motion.frame, rows)
-        laws = []
-        for number in np.unique(numbers).tolist():
-            k, frame = as_slice(np.flatnonzero(numbers == number)), motion.frames[number]
-            laws.append((k, frame, frame.coordinates(before[k]), frame.coordinates(end[k])))
-        return cls(motion, control, rows, before, end, tuple(laws))
+        before, end, frame = begins(motion, rows), motion.end[rows], taken(motion.frame, rows)
+        first, last = motion.table.coordinates(frame, before), motion.table.coordinates(frame, end)
+        return cls(motion, control, rows, before, end, frame, first, last)
 
     def at(self, t: float | Floats) -> Floats:
         """Machine coordinates (K, J) at fraction t, one or (K,)."""
-        share, result = np.broadcast_to(np.asarray(t), len(self.rows)), np.empty_like(self.end)
-        for k, frame, first, last in self.laws:
-            result[k] = frame.position(_along(self.motion, self.control.xyz, self.rows[k], first, last, share[k]))
+        share = np.broadcast_to(np.asarray(t), len(self.rows))
+        along = _along(self.motion, self.control.xyz, self.rows, self.first, self.last, share)
+        result: Floats = self.motion.table.position(self.frame, along)
         k = np.flatnonzero(_bent(self.motion, self.control, self.rows))
         if len(k):
             speed = self.control.machine.limits.velocity * self.control.unit
@@ -232,12 +226,8 @@ def signed_sweep(first: Floats, last: Floats, ccw: Bools) -> Floats:
 
 def coordinates(motion: Motion, rows: Ints) -> tuple[Floats, Floats]:
     """Coordinates (K, J) where blocks begin and end, each in the frame of its block."""
-    before, end = begins(motion, rows), motion.end[rows]
-    numbers = motion.frame[rows]
-    for number in np.unique(numbers[numbers > 0]).tolist():
-        k, frame = np.flatnonzero(numbers == number), motion.frames[number]
-        before[k], end[k] = frame.coordinates(before[k]), frame.coordinates(end[k])
-    return before, end
+    table, frame = motion.table, motion.frame[rows]
+    return table.coordinates(frame, begins(motion, rows)), table.coordinates(frame, motion.end[rows])
 
 
 def arc_sweeps(motion: Motion, control: Control) -> Floats:
