@@ -8,9 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from postproc.controllers.iso import CHUNK
 from postproc.controllers.polar_arc import polar_arc
-from postproc.controllers.writer import SKIP, Writer
+from postproc.controllers.writer import CHUNK, SKIP, Writer
 from postproc.program import Command, Hole
 from postproc.word_arcs import PLANE_AXIS
 from toolpaths.arrays import Floats
@@ -55,25 +54,12 @@ class KlartextWriter(Writer):
 
     # ---- motion -------------------------------------------------------------------------------------------------
 
-    def word_columns(self, at: int, stop: int) -> list[list[str]]:
-        """The axis words of blocks at..stop by letter, '' where a block does not state one."""
-        p = self.program
-        columns = []
-        for j, letter in enumerate(p.letters):
-            rows = np.flatnonzero(p.write[at:stop, j])
-            column = [""] * (stop - at)
-            for row, text in zip(rows.tolist(), self.number_text(p.words[at + rows, j], int(p.decimals[j])), strict=True):
-                column[row] = f" {letter}{text}"
-            columns.append(column)
-        return columns
-
     def blocks(self, at: int, stop: int) -> Iterator[str]:
         """Motion blocks at..stop."""
         machine = " " + self.controller.codes.machine_coordinates
         for first in range(at, stop, CHUNK):
             last = min(first + CHUNK, stop)
-            words = ["".join(row) for row in zip(*self.word_columns(first, last), strict=True)]
-            p = self.program
+            p, words = self.program, self.axis_words(first, last)
             for k, text, code, feed, home in zip(range(first, last), words, p.code[first:last].tolist(),
                                                  self.feeds(first, last), p.home[first:last].tolist(), strict=True):
                 if code == 2:

@@ -9,55 +9,37 @@ import numpy as np
 
 from postproc.controllers.model import CannedCycle
 from postproc.controllers.state import peck_of
-from postproc.controllers.writer import Writer
+from postproc.controllers.writer import CHUNK, Writer
 from postproc.program import INVERSE, PER_MINUTE, Hole
 from postproc.word_arcs import PLANE_AXIS
-from toolpaths.arrays import Array, Bools, Floats
+from toolpaths.arrays import Array, Bools, Floats, Ints
 from toolpaths.toolpath import Cycle
-
-CHUNK = 20000
 
 
 class IsoWriter(Writer):
     """Blocks of words as ISO 6983 has them."""
 
-    def word_columns(self, at: int, stop: int) -> list[list[str]]:
-        """The axis words of blocks at..stop by letter, '' where a block does not state one."""
-        p = self.program
-        columns = []
-        for j, letter in enumerate(p.letters):
-            rows = np.flatnonzero(p.write[at:stop, j])
-            column = [""] * (stop - at)
-            texts = self.number_text(p.words[at + rows, j], int(p.decimals[j]))
-            head = self.space + letter
-            for row, text in zip(rows.tolist(), texts, strict=True):
-                column[row] = head + text
-            columns.append(column)
-        return columns
-
     def blocks(self, at: int, stop: int) -> Iterator[str]:
         """Motion blocks at..stop."""
         for first in range(at, stop, CHUNK):
             last = min(first + CHUNK, stop)
-            words = self.word_columns(first, last)
             heads = self.heads(first, last)
             self.add_length(heads, first, last)
             feeds = self.feeds(first, last)
             arcs = self.arc_words(first, last)
-            for head, axes, arc, feed in zip(heads, zip(*words, strict=True), arcs, feeds, strict=True):
-                text = "".join((head, *axes, arc, feed))
+            for head, words, arc, feed in zip(heads, self.axis_words(first, last), arcs, feeds, strict=True):
+                text = f"{head}{words}{arc}{feed}"
                 yield text[1:] if text.startswith(" ") else text
 
     def heads(self, first: int, last: int) -> list[str]:
         """Motion, plane and feed mode codes, '' where they stand already."""
         p, codes = self.program, self.controller.codes
         names = (codes.traverse, codes.feed, codes.arc_cw, codes.arc_ccw)
-        motion = np.where(p.code[first:last] == 2, 2 + p.ccw[first:last], p.code[first:last])
-        state = np.stack([motion, p.plane[first:last], p.mode[first:last]])
-        differs = np.append(True, (state[:, 1:] != state[:, :-1]).any(axis=0)) | p.home[first:last]
         result = [""] * (last - first)
-        for row in np.flatnonzero(differs).tolist():
-            code, home, words = int(motion[row]), bool(p.home[first + row]), []
+        changes = self.changes[slice(*np.searchsorted(self.changes, (first + 1, last)))]
+        for row in (0, *(changes - first).tolist()) if last > first else ():
+            code, home, words = int(p.code[first + row]), bool(p.home[first + row]), []
+            code += code == 2 and bool(p.ccw[first + row])
             plane, mode = int(p.plane[first + row]), int(p.mode[first + row])
             if code and mode != self.mode:
                 words.append(codes.inverse_time if mode == INVERSE else codes.per_minute)
@@ -108,20 +90,36 @@ class IsoWriter(Writer):
         """One of them."""
         return self.feed_texts(np.array([value]))[0]
 
+    @cached_property
+    def changes(self) -> Ints:
+        """Blocks, in order, with a motion, plane or feed mode that the block before has not, or in machine coordinates."""
+        p = self.program
+        state = np.stack([np.where(p.code == 2, 2 + p.ccw, p.code), p.plane, p.mode])
+        return np.flatnonzero(np.append(True, (state[:, 1:] != state[:, :-1]).any(axis=0)) | p.home)
+
     def feeds(self, first: int, last: int) -> list[str]:
         """Feed words, '' where the feed stands already (each block of inverse time states it)."""
-        p = self.program
         result = [""] * (last - first)
-        rows = np.flatnonzero(p.code[first:last] > 0)
-        values, inverse = p.feed[first + rows], p.mode[first + rows] == INVERSE
-        needed = self.mode_changes[first + rows] | (inverse & self.controller.feed.word_every_inverse_block)
-        differs = np.append(True, values[1:] != values[:-1]) if len(rows) else needed
-        stated = np.flatnonzero(needed | differs)
-        for k, text in zip(stated.tolist(), self.feed_texts(values[stated]), strict=True):
+        cutting, stated, needed = self.fed
+        begin, end = np.searchsorted(cutting, (first, last)).tolist()
+        rows = stated[slice(*np.searchsorted(stated, (begin, end)))]
+        if end > begin and (not len(rows) or rows[0] != begin):
+            rows = np.append(begin, rows)
+        for k, text in zip(rows.tolist(), self.feed_texts(self.program.feed[cutting[rows]]), strict=True):
             if needed[k] or text != self.feed:
-                result[int(rows[k])] = f"{self.space}F{text}"
+                result[int(cutting[k]) - first] = f"{self.space}F{text}"
             self.feed = text
         return result
+
+    @cached_property
+    def fed(self) -> tuple[Ints, Ints, Bools]:
+        """Blocks that cut, in order; those of them (by number) that have another feed than the one before or must state it;
+        and (C,) whether each must."""
+        p, cutting = self.program, np.flatnonzero(self.program.code > 0)
+        values, inverse = p.feed[cutting], p.mode[cutting] == INVERSE
+        needed = self.mode_changes[cutting] | (inverse & self.controller.feed.word_every_inverse_block)
+        differs = np.append(True, values[1:] != values[:-1])[:len(cutting)]
+        return cutting, np.flatnonzero(needed | differs), needed
 
     @cached_property
     def mode_changes(self) -> Bools:

@@ -22,7 +22,7 @@ class WriterState:
     negative: anti-clockwise, 0 unknown), `rounded` its ratio to what was asked. `files` are the subprograms in files of
     their own, by name, once the program is written. `turning` and `cooling` say whether spindle and coolant run, None where
     nobody knows, `flowing` the kinds of coolant that may run (`postproc.coolant`); `taken` are block numbers that
-    subprograms bear.
+    subprograms bear; `ahead` the axis words of a stretch of blocks, and the first of them.
     """
 
     def __init__(self, controller: ControllerFile, program: Program, cycles: tuple[Cycle, ...], length_offsets: bool,
@@ -44,6 +44,7 @@ class WriterState:
         self.cooling: bool | None = None
         self.flowing = 0
         self.taken: set[int] = set()
+        self.ahead: tuple[int, list[str]] = (0, [])
         self.restate()
 
     def restate(self) -> None:

@@ -27,6 +27,8 @@ OF_PROGRAM = "of program"
 """begins the comment by which a subprogram's file names the program that calls it"""
 FULL_TURN = 360.0
 """degrees"""
+CHUNK = 20_000
+"""blocks whose words are made at a time"""
 _TOGETHER = 10_000
 """blocks that are put together at a time, so that a long program is never a list of all its blocks"""
 NEXT = "\1"
@@ -187,6 +189,27 @@ class Writer(WriterState, ABC):
             yield self.controller.cycles.cancel
         if self.in_cycle:
             self.in_cycle, self.motion, self.cycle_text = False, "", ""
+
+    def axis_words(self, at: int, stop: int) -> list[str]:
+        """The axis words of blocks at..stop; of the blocks behind them too, for the next time, where they are few."""
+        first, texts = self.ahead
+        if not first <= at <= stop <= first + len(texts):
+            first, texts = at, self.words_of(at, min(max(stop, at + CHUNK), len(self.program)))
+            self.ahead = first, texts
+        return texts[at - first:stop - first]
+
+    def words_of(self, at: int, stop: int) -> list[str]:
+        """The axis words of blocks at..stop."""
+        p = self.program
+        columns = []
+        for j, letter in enumerate(p.letters):
+            rows = np.flatnonzero(p.write[at:stop, j])
+            column = [""] * (stop - at)
+            head = self.space + letter
+            for row, text in zip(rows.tolist(), self.number_text(p.words[at + rows, j], int(p.decimals[j])), strict=True):
+                column[row] = head + text
+            columns.append(column)
+        return ["".join(row) for row in zip(*columns, strict=True)]
 
     @abstractmethod
     def blocks(self, at: int, stop: int) -> Iterator[str]:
