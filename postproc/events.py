@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -41,10 +42,16 @@ def cutting(toolpath: Toolpath) -> Bools:
     return np.asarray(moved | (toolpath.cycle >= 0))
 
 
-def tool_loads(toolpath: Toolpath) -> list[tuple[ToolChange, int, bool]]:
+def tool_loads(toolpath: Toolpath) -> tuple[tuple[ToolChange, int, bool], ...]:
     """Every record that names a tool: (the record, length register then in force, True where it is another tool)."""
+    return _loads(toolpath.events)
+
+
+@lru_cache(maxsize=4)
+def _loads(events: tuple[Event, ...]) -> tuple[tuple[ToolChange, int, bool], ...]:
+    """Kept, as most stages ask for it."""
     result: list[tuple[ToolChange, int, bool]] = []
-    for event in toolpath.events:
+    for event in events:
         if event.word not in TOOL_WORDS or not numbers(event):
             continue
         number, *rest = (int(v) for v in numbers(event))
@@ -52,7 +59,7 @@ def tool_loads(toolpath: Toolpath) -> list[tuple[ToolChange, int, bool]]:
         other = not result or result[-1][0].number != number
         register = said.register if said.register is not None else number if other else result[-1][1]
         result.append((said, register, other))
-    return result
+    return tuple(result)
 
 
 def tool_changes(toolpath: Toolpath) -> list[ToolChange]:
