@@ -11,78 +11,24 @@ from machines.kinematics.base import Kinematics
 from machines.machine import Machine
 from postproc import joint_faults
 from postproc import path_faults as faults
-from postproc.blocks import ARC as ARC
-from postproc.blocks import FEED as FEED
 from postproc.blocks import LEG, Builder, add_run, rapid_codes
-from postproc.blocks import TRAVERSE as TRAVERSE
-from postproc.control import Control
-from postproc.groups import groups
 from postproc.home_links import add_home_links
-from postproc.joints.lead import Event
 from postproc.linearise import approached
 from postproc.links import Link, Pose, SafeSpace, plan_link
 from postproc.memory import give_back
 from postproc.modes import OutputModes, WordFrame
 from postproc.moves import Moves
+from postproc.path_model import FEED, TRAVERSE, Path
 from postproc.rewinds import Drawing
 from postproc.run_plan import RunPlan, plan_moves
 from postproc.solved_runs import Run, Runs, solved_runs
 from postproc.zero_entry import ZeroEntry, cost, needed, zero_entry
-from toolpaths.arrays import Array, Bools, Floats, Ints, as_slice, taken
+from toolpaths.arrays import Array, Floats, Ints, as_slice, taken
 from toolpaths.diagnostics import Diagnostic, has_errors
 from toolpaths.shape import Curves
 from toolpaths.toolpath import Kind
 
 Progress = Callable[[str, int, int], None]
-
-
-@dataclass(frozen=True)
-class Path:
-    """Blocks in joints, K of them, and where the rows of Moves begin among them.
-
-    Attributes:
-        q (K, J): joints at the end of the block
-        move (K,): row of Moves that the block serves
-        u (K,): where on that row's curve it ends; NaN for linking blocks
-        code (K,): TRAVERSE, FEED, ARC
-        home (K,): True where the block is meant in machine coordinates
-        seconds (K,): time it should take at the tip's feed; NaN for rapids, 0 for turns on the spot and rapids at feed
-        plane, ccw, center: of the ARC blocks (K rows); the centre is relative to the block's start, in its words
-        state (K, J): axes that the block states; where it names none, it states those that change
-        frame (K,): index into `frames`: what the words of the block mean
-        begin (M + 1,): the block before which the records without motion of a move act
-        singular (M,): moves whose pose lies along a rotary axis; turns: moves that begin with a turn on the spot
-        worst_tip, worst_axis: bound of the deviation between points, mm and rad
-        rewinds (W,): moves before or in which the tool is drawn back to unwind an axis
-        events: passages by singular directions: first and last move, and what was done
-    """
-
-    q: Floats
-    move: Ints
-    u: Floats
-    code: Array
-    home: Bools
-    seconds: Floats
-    plane: Array
-    ccw: Bools
-    center: Floats
-    state: Bools
-    frame: Ints
-    begin: Ints
-    singular: Bools
-    turns: Ints
-    worst_tip: float
-    worst_axis: float
-    frames: tuple[WordFrame, ...]
-    rewinds: Ints
-    events: tuple[tuple[int, int, Event], ...]
-
-    def __len__(self) -> int:
-        return len(self.q)
-
-    def by_control(self) -> list[tuple[Control, Ints]]:
-        """Each control with the numbers of its blocks, in order."""
-        return [(self.frames[int(self.frame[k[0]])].control, k) for k in groups(self.frame)]
 
 
 @dataclass(frozen=True)

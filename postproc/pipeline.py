@@ -23,7 +23,8 @@ from postproc.moves import Moves
 from postproc.not_canned import only_canned
 from postproc.options import Options
 from postproc.pass_geometry import stops_of
-from postproc.path import Path, build_path
+from postproc.path import build_path
+from postproc.path_model import Path
 from postproc.planned import PlannedMotion, Source, planned_motion
 from postproc.planned_errors import PlannedCorrection, on_written, planned_correction
 from postproc.program import Program

@@ -12,7 +12,7 @@ from machines.geometric_error.model import ErrorModel
 from machines.kinematics.base import Kinematics
 from postproc.feedrate.geometry import MachinePath
 from postproc.looks import changes
-from postproc.path import Path
+from postproc.path_model import Path
 from toolpaths.arrays import Floats, Ints
 
 if TYPE_CHECKING:

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from postproc import VERSION
+from postproc.control import table_axes
 from postproc.job import Job
 from postproc.program import Program
-from postproc.zero_entry import table_axes
 
 if TYPE_CHECKING:
     from postproc.pipeline import PostResult

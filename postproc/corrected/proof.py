@@ -11,7 +11,7 @@ from postproc.corrected.runs import Runs
 from postproc.groups import groups
 from postproc.holes import Phase
 from postproc.moves import Moves
-from postproc.path import Path
+from postproc.path_model import Path
 from postproc.readback.compare import Comparison
 from postproc.rounding import decimals
 from toolpaths.arrays import Bools, Floats, Ints

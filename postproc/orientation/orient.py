@@ -12,7 +12,7 @@ from machines.machine import Machine
 from postproc.collision.passes import pass_bodies
 from postproc.options import Options, Orientation
 from postproc.orientation.allowed import Allowed
-from postproc.orientation.candidates import APART, Lost, Tried, tried
+from postproc.orientation.candidates import tried
 from postproc.orientation.limited import limit_faults
 from postproc.orientation.passes import Work, work_of
 from postproc.orientation.plans import OrientationPlan, StateTable, plans_of, table_of
@@ -20,6 +20,7 @@ from postproc.orientation.proved import Convert, proved
 from postproc.orientation.ranking import prepare
 from postproc.orientation.reoriented import reoriented
 from postproc.orientation.rounds import PassFault, Progress, each_pass
+from postproc.orientation.search import APART, Lost, Tried
 from postproc.orientation.timed import Turned
 from postproc.orientation.unfit import REACH, out_of_travel, unfit
 from postproc.setup import SetupFile

@@ -6,12 +6,12 @@ import math
 from typing import Any
 
 from postproc.options import Orientation
-from postproc.orientation.candidates import Tried
 from postproc.orientation.losers import best_loser, grouped
 from postproc.orientation.orient import OrientationChoice
 from postproc.orientation.passes import Work
 from postproc.orientation.plans import OrientationPlan
 from postproc.orientation.reaches import binding, feed_of, reaches
+from postproc.orientation.search import Tried
 from postproc.orientation.shares import shares_of
 from postproc.orientation.timed import Turned
 from toolpaths.diagnostics import Diagnostic, warning

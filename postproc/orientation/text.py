@@ -7,12 +7,12 @@ from collections import Counter
 from collections.abc import Sequence
 
 from postproc.options import Orientation
-from postproc.orientation.candidates import Kind, Lost, Tried
 from postproc.orientation.losers import KINDS, best_loser, grouped, listed
 from postproc.orientation.orient import OrientationChoice
 from postproc.orientation.plans import OrientationPlan
 from postproc.orientation.reaches import binding, feed_of, reaches
 from postproc.orientation.report import NAMES, UNITS, gain
+from postproc.orientation.search import Kind, Lost, Tried
 from postproc.orientation.shares import shares_of, turns
 from postproc.orientation.timed import Turned
 from toolpaths.rotations import angle_between

@@ -18,8 +18,9 @@ from postproc.readback.changes import check_changes
 from postproc.readback.compare import Comparison, compare
 from postproc.readback.dialects import reader_for
 from postproc.readback.dialects.base import UNITS_UNSTATED, as_bytes
-from postproc.readback.execute import Motion, Offsets, run
+from postproc.readback.execute import Motion, run
 from postproc.readback.faults import Faults
+from postproc.readback.offsets import Offsets
 from postproc.readback.poses import Executed, poses_before
 from postproc.readback.slow import HEADER, planned_feeds
 from postproc.readback.starts import check_end, check_start

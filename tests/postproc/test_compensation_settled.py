@@ -16,7 +16,7 @@ from postproc.corrected import walk_loop
 from postproc.corrected.proof import after_formatting
 from postproc.corrected.walk import Ends
 from postproc.options import Options
-from postproc.path import TRAVERSE
+from postproc.path_model import TRAVERSE
 from postproc.pipeline import PostResult
 from postproc.readback.checks import _turning_points
 from postproc.setup import SetupFile, load_setup

@@ -11,7 +11,8 @@ import pytest
 import toolpaths
 from postproc.pipeline import PostResult
 from postproc.readback.dialects import reader_for
-from postproc.readback.execute import Motion, Offsets, run
+from postproc.readback.execute import Motion, run
+from postproc.readback.offsets import Offsets
 from tests.postproc.kit import convert, good, tool_setup
 from tests.postproc.test_golden import GOLDEN
 from toolpaths.diagnostics import has_errors

@@ -10,7 +10,8 @@ import pytest
 
 from postproc.pipeline import PostResult
 from postproc.readback.dialects import reader_for
-from postproc.readback.execute import Motion, Offsets, run
+from postproc.readback.execute import Motion, run
+from postproc.readback.offsets import Offsets
 from postproc.readback.verify import read_back
 from tests.postproc.kit import codes, sample
 from tests.postproc.reader_kit import FANUC, HAAS, SIEMENS, TNC
