@@ -11,9 +11,9 @@ import numpy as np
 from postproc.coolant import coolant_states, label
 from postproc.events import spindle_states
 from postproc.options import Orientation
-from postproc.pipeline import PostResult
 from postproc.readback.canonical import in_files
 from postproc.readback.compare import Comparison
+from postproc.result import PostResult
 from postproc.word_arcs import PLANE_AXIS
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
@@ -22,15 +22,13 @@ from toolpaths.toolpath import Kind, Role
 from toolpaths.units import DEG
 
 if TYPE_CHECKING:
-    from postproc.orientation.orient import OrientationChoice
+    from postproc.orientation.choice import OrientationChoice
 
 
 def trace_line(result: PostResult, line: int) -> tuple[dict[str, Any], list[Diagnostic]]:
     """The stages of the points that CL line `line` commands, as far as the conversion went; mm and degrees."""
     toolpath = result.toolpath
-    stages: dict[str, Any] = {"line": line, "record": _record(toolpath.file if toolpath else "", line), "points": []}
-    if toolpath is None:
-        return stages, []
+    stages: dict[str, Any] = {"line": line, "record": _record(toolpath.file, line), "points": []}
     rows = np.flatnonzero(toolpath.line == line)
     if not len(rows):
         near = toolpath.line[np.argsort(np.abs(toolpath.line - line))[:2]].tolist() if len(toolpath) else []
@@ -54,7 +52,6 @@ def _record(file: str, line: int) -> str:
 
 def _point(result: PostResult, row: int) -> dict[str, Any]:
     toolpath = result.toolpath
-    assert toolpath is not None
     operation = toolpath.operations[int(toolpath.operation[row])]
     point: dict[str, Any] = {
         "toolpath": {"tip_mm": toolpath.tip[row].tolist(), "axis": toolpath.axis[row].tolist(),
