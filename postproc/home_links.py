@@ -11,8 +11,8 @@ from itertools import pairwise
 
 import numpy as np
 
+import postproc.reach as reach
 from machines.kinematics.base import Kinematics
-from postproc import reach
 from postproc.blocks import LEG, PARTS, Builder, rapid_codes
 from postproc.control import Control
 from postproc.groups import groups

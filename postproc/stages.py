@@ -11,8 +11,8 @@ from pathlib import Path as FilePath
 from typing import Any
 
 from postproc.compile import compile_program, writing_of
-from postproc.controllers import writer_for
 from postproc.controllers.unwritable import unwritable
+from postproc.controllers.writers import writer_for
 from postproc.feed import Planned as PlannedFeeds
 from postproc.job import Job, prepare
 from postproc.moves import Moves

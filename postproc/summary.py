@@ -12,7 +12,7 @@ import numpy as np
 from postproc.events import cutting, spindle_states
 from postproc.readback.compare import Comparison
 from postproc.result import PostResult, VerifyResult
-from postproc.witness import Testimony
+from postproc.witness.evidence import Testimony
 from toolpaths.diagnostics import Severity
 from toolpaths.input_files import there_is
 from toolpaths.toolpath import Toolpath

@@ -15,7 +15,7 @@ from postproc.cycle_time.blocks import Blocks
 from postproc.cycle_time.program import Origin, blocks_of
 from postproc.moves import Phase
 from postproc.readback.canonical import Canonical
-from postproc.readback.dialects import reader_for
+from postproc.readback.dialects.readers import reader_for
 from postproc.readback.execute import Motion, run
 from postproc.readback.offsets import Offsets
 from postproc.result import PostResult

@@ -16,8 +16,8 @@ from postproc.options import NO_FILE, SETUP_MARK, Options
 from postproc.readback.canonical import placed
 from postproc.readback.changes import check_changes
 from postproc.readback.compare import Comparison, compare
-from postproc.readback.dialects import reader_for
 from postproc.readback.dialects.base import UNITS_UNSTATED, as_bytes
+from postproc.readback.dialects.readers import reader_for
 from postproc.readback.execute import Motion, run
 from postproc.readback.faults import Faults
 from postproc.readback.offsets import Offsets

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import toolpaths
-from postproc.readback.dialects import reader_for
+from postproc.readback.dialects.readers import reader_for
 from postproc.readback.execute import Motion, run
 from postproc.readback.offsets import Offsets
 from postproc.result import PostResult

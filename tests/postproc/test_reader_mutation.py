@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from postproc.readback.dialects import reader_for
+from postproc.readback.dialects.readers import reader_for
 from postproc.readback.execute import Motion, run
 from postproc.readback.offsets import Offsets
 from postproc.readback.verify import read_back
