@@ -64,6 +64,8 @@ class PostResult:
     """what the second witness says"""
     after_formatting: AfterFormatting | None = None
     """what is left of geometric errors at the CL points; None where none are corrected"""
+    reached: str = ""
+    """name of the last stage that ran, "" where none did"""
 
     @property
     def ok(self) -> bool:

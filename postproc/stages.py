@@ -78,7 +78,7 @@ def staged(result: PostResult, progress: Progress | None = None, left: Left = fr
     made: Any = Begun(**shared_fields(Begun, result), left=left)
     for stage in STAGES:
         made, found = stage.run(made, progress)
-        result = _recorded(result, made, found)
+        result = replace(_recorded(result, made, found), reached=stage.name)
         if not result.ok:
             return result
         made = replace(made, diagnostics=result.diagnostics)

@@ -15,6 +15,7 @@ from postproc.options import Options
 from postproc.pipeline import convert
 from postproc.stage_values import Begun, Verified
 from postproc.stages import STAGES, Stage
+from postproc.trace import as_text, trace_line
 from toolpaths.diagnostics import error
 
 README = Path(stages.__file__).parent / "README.md"
@@ -51,7 +52,17 @@ def test_an_error_ends_the_conversion(at: int, monkeypatch: pytest.MonkeyPatch) 
     path, found = toolpaths.read_bytes(CL)
     result = convert(path, machines.load("mill-3axis"), options=Options(), diagnostics=found)
     assert ran == [stage.name for stage in STAGES[:at + 1]] and not result.ok and result.text == "" and not result.files
+    traced, _ = trace_line(result, 5)
+    assert [one["stage"] for one in traced["stages"] if one["done"]] == ran[:-1] and result.reached == ran[-1]
+    assert f"ends before  {ran[-1]} (" in as_text(traced)
     assert result.job is not None and (result.program is not None) == ("compile" in ran)
+
+
+def test_a_conversion_that_is_written_has_run_them_all() -> None:
+    path, found = toolpaths.read_bytes(CL)
+    result = convert(path, machines.load("mill-3axis"), options=Options(), diagnostics=found)
+    traced, _ = trace_line(result, 5)
+    assert result.ok and all(one["done"] for one in traced["stages"]) and "ends before" not in as_text(traced)
 
 
 def test_the_readme_lists_the_stages() -> None:
