@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 import machines
+import postproc
 import toolpaths
 from postproc import stages
 from postproc.options import Options
@@ -18,7 +19,7 @@ from postproc.stages import STAGES, Stage
 from postproc.trace import as_text, trace_line
 from toolpaths.diagnostics import error
 
-README = Path(stages.__file__).parent / "README.md"
+README = Path(postproc.__file__).parent / "README.md"
 CL = b"UNITS/MM\nLOADTL/1\nSPINDL/3000,RPM,CLW\nRAPID\nGOTO/0,0,20\nFEDRAT/400,MMPM\nGOTO/0,0,0\nGOTO/9,0,0\nFINI\n"
 
 
