@@ -12,13 +12,13 @@ from postproc.joint_path import nearest_solution
 from postproc.linearise import family_turns, linearise
 from postproc.modes import WordFrame
 from postproc.moves import Moves, Phase
+from postproc.path_model import ARC, FEED, TRAVERSE
 from postproc.word_arcs import PLANE_COLUMNS, WordArcs, word_arcs
 from toolpaths.arrays import Array, Bools, Floats, Ints, joined, repeated, taken
 from toolpaths.rotations import angle_between
 from toolpaths.shape import Curves
 from toolpaths.toolpath import Kind
 
-TRAVERSE, FEED, ARC = 0, 1, 2
 LEG = 0.01, 1e-3
 """mm and rad that a rapid of a linking move may leave its line by before it is written as a feed move"""
 PARTS, LINK, RUN = 8, 0, 7

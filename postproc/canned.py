@@ -8,7 +8,7 @@ from postproc.control import Control
 from postproc.controllers.model import ControllerFile
 from postproc.events import spindle_states
 from postproc.moves import Moves, Phase
-from postproc.path import FEED, TRAVERSE, Path
+from postproc.path_model import FEED, TRAVERSE, Path
 from postproc.program import Hole
 from postproc.word_rows import WordRows
 from toolpaths.arrays import Bools, Ints

@@ -45,7 +45,7 @@ from postproc.guard import guarded
 
 if TYPE_CHECKING:
     from postproc.options import Options
-    from postproc.pipeline import PostResult
+    from postproc.result import PostResult
     from toolpaths.diagnostics import Diagnostic
     from toolpaths.toolpath import Toolpath
 
@@ -69,7 +69,7 @@ Errors = Annotated[str, typer.Option("--error-model", metavar="E.toml", help="fi
 
 def _version(wanted: bool) -> None:
     if wanted:
-        from postproc import VERSION
+        from postproc.version import VERSION
 
         typer.echo(f"postproc {VERSION}")
         raise typer.Exit
@@ -114,6 +114,7 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
                        inputs := {"the CL file": str(file), "the set-up": setup, "the error model": error_model,
                                   **own_files(machine, controller)})
     from postproc import summary
+    from postproc.cycle_time.conversion import estimate_of
     from postproc.files import program_files
     from postproc.pipeline import convert as run
 
@@ -124,7 +125,8 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
         result = run(path, m, spec, options=options, diagnostics=found, progress=progress)
         told, why = _fields(result, fields) if fields else ([], [])
         result = replace(result, diagnostics=(*result.diagnostics, *why))
-        values, text = summary.as_dict(result, str(output)), summary.as_text(result, str(output))  # before a file is written
+        time = estimate_of(result)  # all before a file is written
+        values, text = summary.as_dict(result, str(output), time), summary.as_text(result, str(output), time)
         more: list[Diagnostic] = []
         if result.ok:
             texts, more = program_files(output, result.text, result.files or {})
@@ -212,7 +214,7 @@ def _residual_files(files: list[Path], error_model: str) -> list[Path]:
     """The files of --residuals; wrong use without an error model, or where one is neither table nor drawing."""
     if not files:
         return []
-    from postproc.residuals import ENDINGS
+    from postproc.residual_files import ENDINGS
 
     if not error_model:
         raise typer.BadParameter("there are none without --error-model", param_hint="--residuals")
@@ -223,7 +225,7 @@ def _residual_files(files: list[Path], error_model: str) -> list[Path]:
 
 
 def _fields(result: PostResult, files: list[Path]) -> tuple[list[str | bytes], list[Diagnostic]]:
-    from postproc.residuals import contents
+    from postproc.residual_files import contents
 
     return contents(result, [name.suffix.lower() for name in files])
 

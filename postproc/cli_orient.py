@@ -22,7 +22,7 @@ from postproc.console import (
 if TYPE_CHECKING:
     from machines.machine import Machine
     from postproc.options import Options
-    from postproc.orientation.orient import OrientationChoice
+    from postproc.orientation.choice import OrientationChoice
     from toolpaths.diagnostics import Diagnostic
 
 ORIENTATIONS = ("keep", "per-pass", "whole-part", "auto")

@@ -22,7 +22,7 @@ from postproc.events import (
     words,
 )
 from postproc.moves import Moves, Phase
-from postproc.path import Path
+from postproc.path_model import Path
 from postproc.program import Command, Commands
 from postproc.switched import Switched
 from toolpaths.arrays import Bools

@@ -28,7 +28,7 @@ from postproc.groups import groups
 from postproc.looks import looks_between
 from postproc.modes import OutputModes
 from postproc.moves import Moves
-from postproc.path import Path
+from postproc.path_model import Path
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.diagnostics import Diagnostic, Severity, error, has_errors
 from toolpaths.units import DEG

@@ -12,7 +12,7 @@ from postproc.feed import Feeds, Planned, plan_feeds
 from postproc.job import Job
 from postproc.moves import Moves
 from postproc.not_canned import not_native
-from postproc.path import ARC, Path
+from postproc.path_model import ARC, Path
 from postproc.program import Command, Commands, Hole, Program
 from postproc.rounding import decimals
 from postproc.sections import sections_of, with_sections

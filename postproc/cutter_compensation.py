@@ -7,7 +7,7 @@ import numpy as np
 from postproc.controllers.model import ControllerFile
 from postproc.events import compensation_side, numbers
 from postproc.moves import Moves
-from postproc.path import TRAVERSE, Path
+from postproc.path_model import TRAVERSE, Path
 from postproc.program import Command
 from toolpaths.arrays import Bools, Ints
 from toolpaths.diagnostics import Diagnostic, error, warning

@@ -9,7 +9,7 @@ import numpy as np
 from postproc.control import Control
 from postproc.controllers.model import Feed as FeedRules
 from postproc.merged_feeds import merged
-from postproc.path import ARC, Path
+from postproc.path_model import ARC, Path
 from postproc.program import INVERSE, PER_MINUTE
 from postproc.word_arcs import PLANE_COLUMNS
 from toolpaths.arrays import Array, Bools, Floats, Ints

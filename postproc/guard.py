@@ -58,7 +58,7 @@ def report_text(fault: BaseException, arguments: list[str]) -> str:
     import platform
     import traceback
 
-    from postproc import VERSION
+    from postproc.version import VERSION
 
     return "\n".join([
         f"internal error [{fingerprint(fault)}]", "", f"postproc {VERSION}",

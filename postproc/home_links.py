@@ -11,9 +11,9 @@ from itertools import pairwise
 
 import numpy as np
 
+import postproc.reach as reach
 from machines.kinematics.base import Kinematics
-from postproc import reach
-from postproc.blocks import LEG, PARTS, TRAVERSE, Builder, rapid_codes
+from postproc.blocks import LEG, PARTS, Builder, rapid_codes
 from postproc.control import Control
 from postproc.groups import groups
 from postproc.joint_path import TRAVEL_SLACK, nearest_solution
@@ -21,6 +21,7 @@ from postproc.linearise import linearise
 from postproc.links import LEG_TOLERANCE, RISE, SAMPLES, SafeSpace, has_retract_axis
 from postproc.modes import WordFrame
 from postproc.moves import Moves
+from postproc.path_model import TRAVERSE
 from postproc.solved_runs import Run, Runs
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.rotations import angle_between

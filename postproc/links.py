@@ -10,9 +10,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+import postproc.reach as reach
 from machines.kinematics.base import Kinematics
 from machines.machine import Machine
-from postproc import reach
 from postproc.control import Control
 from postproc.joint_path import TRAVEL_SLACK, nearest_solution
 from postproc.linearise import linearise

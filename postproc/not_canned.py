@@ -8,7 +8,7 @@ from postproc.canned import cycle_key, may_cycle
 from postproc.controllers.model import ControllerFile
 from postproc.events import spindle_states
 from postproc.moves import Moves, Phase
-from postproc.path import Path
+from postproc.path_model import Path
 from toolpaths.arrays import Bools, Ints
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.toolpath import Cycle, Toolpath

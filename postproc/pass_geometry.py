@@ -15,7 +15,7 @@ import numpy as np
 from machines.kinematics.base import Kinematics
 from postproc.feedrate.geometry import MachinePath, Stretch, machine_paths
 from postproc.moves import Moves
-from postproc.path import TRAVERSE, Path
+from postproc.path_model import TRAVERSE, Path
 from postproc.planned_errors import PlannedCorrection
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error

@@ -7,28 +7,23 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+import postproc.joint_faults as joint_faults
+import postproc.path_faults as faults
 from machines.kinematics.base import Kinematics
 from machines.machine import Machine
-from postproc import joint_faults
-from postproc import path_faults as faults
-from postproc.blocks import ARC as ARC
-from postproc.blocks import FEED as FEED
 from postproc.blocks import LEG, Builder, add_run, rapid_codes
-from postproc.blocks import TRAVERSE as TRAVERSE
-from postproc.control import Control
-from postproc.groups import groups
 from postproc.home_links import add_home_links
-from postproc.joints.lead import Event
 from postproc.linearise import approached
 from postproc.links import Link, Pose, SafeSpace, plan_link
 from postproc.memory import give_back
 from postproc.modes import OutputModes, WordFrame
 from postproc.moves import Moves
+from postproc.path_model import FEED, TRAVERSE, Path
 from postproc.rewinds import Drawing
 from postproc.run_plan import RunPlan, plan_moves
 from postproc.solved_runs import Run, Runs, solved_runs
 from postproc.zero_entry import ZeroEntry, cost, needed, zero_entry
-from toolpaths.arrays import Array, Bools, Floats, Ints, as_slice, taken
+from toolpaths.arrays import Array, Floats, Ints, as_slice, taken
 from toolpaths.diagnostics import Diagnostic, has_errors
 from toolpaths.shape import Curves
 from toolpaths.toolpath import Kind
@@ -37,63 +32,25 @@ Progress = Callable[[str, int, int], None]
 
 
 @dataclass(frozen=True)
-class Path:
-    """Blocks in joints, K of them, and where the rows of Moves begin among them.
-
-    Attributes:
-        q (K, J): joints at the end of the block
-        move (K,): row of Moves that the block serves
-        u (K,): where on that row's curve it ends; NaN for linking blocks
-        code (K,): TRAVERSE, FEED, ARC
-        home (K,): True where the block is meant in machine coordinates
-        seconds (K,): time it should take at the tip's feed; NaN for rapids, 0 for turns on the spot and rapids at feed
-        plane, ccw, center: of the ARC blocks (K rows); the centre is relative to the block's start, in its words
-        state (K, J): axes that the block states; where it names none, it states those that change
-        frame (K,): index into `frames`: what the words of the block mean
-        begin (M + 1,): the block before which the records without motion of a move act
-        singular (M,): moves whose pose lies along a rotary axis; turns: moves that begin with a turn on the spot
-        worst_tip, worst_axis: bound of the deviation between points, mm and rad
-        rewinds (W,): moves before or in which the tool is drawn back to unwind an axis
-        events: passages by singular directions: first and last move, and what was done
-    """
-
-    q: Floats
-    move: Ints
-    u: Floats
-    code: Array
-    home: Bools
-    seconds: Floats
-    plane: Array
-    ccw: Bools
-    center: Floats
-    state: Bools
-    frame: Ints
-    begin: Ints
-    singular: Bools
-    turns: Ints
-    worst_tip: float
-    worst_axis: float
-    frames: tuple[WordFrame, ...]
-    rewinds: Ints
-    events: tuple[tuple[int, int, Event], ...]
-
-    def __len__(self) -> int:
-        return len(self.q)
-
-    def by_control(self) -> list[tuple[Control, Ints]]:
-        """Each control with the numbers of its blocks, in order."""
-        return [(self.frames[int(self.frame[k[0]])].control, k) for k in groups(self.frame)]
-
-
-@dataclass(frozen=True)
 class _Road:
-    """What building a path needs throughout; tolerances in mm and rad."""
+    """What building a path needs throughout; `home_rows`: linked rows whose link goes by home."""
 
     plan: RunPlan
     modes: OutputModes
     operation: Ints
-    axis_tolerance: float
+    space: SafeSpace
+    drawing: Drawing
+    home_rows: frozenset[int]
     file: str
+
+
+@dataclass(frozen=True)
+class _Stand:
+    """Where the tool stands, None before the first run, the frame of its words, the tool's kinematics."""
+
+    pose: Pose | None
+    frame: WordFrame
+    kin: Kinematics
 
 
 def build_path(modes: OutputModes, kinematics: Callable[[int], Kinematics], moves: Moves, space: SafeSpace,
@@ -111,8 +68,8 @@ def build_path(modes: OutputModes, kinematics: Callable[[int], Kinematics], move
     machine, given, drawing = modes.control.machine, moves, drawing or Drawing.default(space)
     plan = plan_moves(machine, kinematics, moves, drawing.manner(machine, axis_tolerance),
                       None if progress is None else lambda run: progress("joints", run, int(given.link.sum())))
-    road = _Road(plan, modes, operation[plan.refined.origin], axis_tolerance, file)
-    moves, home_rows = plan.refined.moves, plan.refined.among(home_rows)
+    moves = plan.refined.moves
+    road = _Road(plan, modes, operation[plan.refined.origin], space, drawing, plan.refined.among(home_rows), file)
     out = Builder(moves, len(machine.axis_names))
     out.frame(modes.base)
     runs, diagnostics = solved_runs(plan, modes, kinematics, road.operation, axis_tolerance, file)
@@ -120,38 +77,12 @@ def build_path(modes: OutputModes, kinematics: Callable[[int], Kinematics], move
         return None, faults.merged(diagnostics)
     runs, worst, turns, more = _add_runs(out, road, runs, tolerance, machine)
     diagnostics += more
-    state: Pose | None = None
-    longer = list[float]()
-    frame, before = modes.base, kinematics(int(moves.tool[0]))
-    linked = np.array([run.first in home_rows and not plan.refined.rewind[run.first] for run in runs.each], dtype=np.bool_)
-    done = add_home_links(out, modes.base, space, runs, moves, linked)
-    for run, there in zip(runs.each, done.tolist(), strict=True):
-        first, by_home, end = run.first, run.first in home_rows, run.last - 1
-        if there:
-            state = Pose(moves.tip[end], runs.axis[end], runs.q[end], run.frame.control)
-            frame, before = run.frame, run.kin
-            continue
-        target = Pose(moves.tip[first], runs.axis[first], runs.q[first], run.frame.control)
-        way = _way(modes, frame, run.frame, by_home)
-        enters = modes.at_zero and run.frame is modes.tcp and way is not modes.tcp
-        link = drawing.link(way.control, run.kin, state, target) if plan.refined.rewind[first] else plan_link(
-            way.control, before, run.kin, space, state, target, by_home)
-        entry = None
-        if enters and needed(modes.control, link):
-            link = link if by_home else plan_link(way.control, before, run.kin, space, state, target, True)
-            entry = zero_entry(modes.control, modes.tcp.control, run.kin, space, link)
-            longer.append(entry.seconds)
-            link = replace(link, clear=link.clear and entry.clear)
-        _add_link(out, moves, first, link, _Legs(frame, way, run.frame, before, run.kin, state, entry))
-        if not link.clear:
-            diagnostics.append(faults.no_way(moves, first, file))
-        state, frame, before = Pose(moves.tip[end], runs.axis[end], runs.q[end], run.frame.control), run.frame, run.kin
-        if progress:
-            progress("blocks", run.last, len(moves))
+    start = _Stand(None, modes.base, kinematics(int(moves.tool[0])))
+    stand, longer, more = _add_links(out, road, runs, start, progress)
+    diagnostics += more
     if has_errors(diagnostics):
         return None, faults.merged(diagnostics)
-    if state is not None:
-        _add_end(out, modes, frame, before, space, state, len(moves) - 1)
+    _add_end(out, modes, stand, space, len(moves) - 1)
     out.begin[len(moves)] = out.count
     columns = out.joined()
     give_back()
@@ -198,6 +129,38 @@ def _add_runs(out: Builder, road: _Road, runs: Runs, tolerance: float,
         turns.append(turned)
         found += faults.broken(machine, moves, broken, runs.q[[broken - 1, broken]], road.file)
     return runs, worst, turns, found
+
+
+def _add_links(out: Builder, road: _Road, runs: Runs, stand: _Stand,
+               progress: Progress | None) -> tuple[_Stand, list[float], list[Diagnostic]]:
+    """The linking moves to all runs in order: (where the tool stands at the end, s that entries at zero cost, faults)."""
+    modes, space, refined = road.modes, road.space, road.plan.refined
+    moves, longer, found = refined.moves, list[float](), list[Diagnostic]()
+    linked = np.array([run.first in road.home_rows and not refined.rewind[run.first] for run in runs.each], dtype=np.bool_)
+    done = add_home_links(out, modes.base, space, runs, moves, linked)
+    for run, there in zip(runs.each, done.tolist(), strict=True):
+        first, by_home, end = run.first, run.first in road.home_rows, run.last - 1
+        before, pose = stand, Pose(moves.tip[end], runs.axis[end], runs.q[end], run.frame.control)
+        stand = _Stand(pose, run.frame, run.kin)
+        if there:
+            continue
+        target = Pose(moves.tip[first], runs.axis[first], runs.q[first], run.frame.control)
+        way = _way(modes, before.frame, run.frame, by_home)
+        enters = modes.at_zero and run.frame is modes.tcp and way is not modes.tcp
+        link = road.drawing.link(way.control, run.kin, before.pose, target) if refined.rewind[first] else plan_link(
+            way.control, before.kin, run.kin, space, before.pose, target, by_home)
+        entry = None
+        if enters and needed(modes.control, link):
+            link = link if by_home else plan_link(way.control, before.kin, run.kin, space, before.pose, target, True)
+            entry = zero_entry(modes.control, modes.tcp.control, run.kin, space, link)
+            longer.append(entry.seconds)
+            link = replace(link, clear=link.clear and entry.clear)
+        _add_link(out, moves, first, link, _Legs(before.frame, way, run.frame, before.kin, run.kin, before.pose, entry))
+        if not link.clear:
+            found.append(faults.no_way(moves, first, road.file))
+        if progress:
+            progress("blocks", run.last, len(moves))
+    return stand, longer, found
 
 
 def _way(modes: OutputModes, before: WordFrame, after: WordFrame, by_home: bool) -> WordFrame:
@@ -260,9 +223,11 @@ def _leg(out: Builder, frame: WordFrame, kin: Kinematics, begin: Floats, q: Floa
     out.link(frame, q, row, code=code, seconds=np.where(code == TRAVERSE, np.nan, 0.0))
 
 
-def _add_end(out: Builder, modes: OutputModes, frame: WordFrame, kin: Kinematics, space: SafeSpace, state: Pose,
-             row: int) -> None:
+def _add_end(out: Builder, modes: OutputModes, stand: _Stand, space: SafeSpace, row: int) -> None:
+    """The way home behind the last run."""
+    if stand.pose is None:
+        return
     out.ended = 1
-    link = plan_link(modes.base.control, kin, kin, space, state, None, True)
-    _leg(out, frame, kin, state.q, link.retract, row)
+    link = plan_link(modes.base.control, stand.kin, stand.kin, space, stand.pose, None, True)
+    _leg(out, stand.frame, stand.kin, stand.pose.q, link.retract, row)
     out.link(modes.base, link.home, row, not modes.base.control.tip_law, link.home_state)

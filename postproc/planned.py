@@ -18,7 +18,7 @@ from postproc.feedrate.shares import Shares
 from postproc.feedrate.trajectory import JointTrajectory
 from postproc.moves import Moves
 from postproc.pass_geometry import PassGeometry, pass_geometry
-from postproc.path import Path
+from postproc.path_model import Path
 from postproc.planned_errors import PlannedCorrection
 from postproc.steady_feed import CORNER, steady_seconds
 from toolpaths.arrays import Floats, Ints

@@ -12,11 +12,12 @@ from machines.geometric_error.model import ErrorModel
 from machines.kinematics.base import Kinematics
 from postproc.feedrate.geometry import MachinePath
 from postproc.looks import changes
-from postproc.path import Path
+from postproc.path_model import Path
 from toolpaths.arrays import Floats, Ints
 
 if TYPE_CHECKING:
-    from postproc.pipeline import PostResult
+    from postproc.compensation import Compensation
+    from postproc.job import Job
 
 SEEN = 3.0
 """sites while an error runs one way, at the least"""
@@ -77,15 +78,13 @@ class PlannedCorrection:
         return np.append(first + share * np.repeat(np.diff(one.s), count), one.s[-1])
 
 
-def planned_correction(result: PostResult) -> PlannedCorrection | None:
-    """How the joints of a conversion's passes are corrected; None where they are not."""
-    job, found, path = result.job, result.compensation, result.path
-    if job is None or job.errors is None or found is None or path is None:
+def planned_correction(job: Job, found: Compensation | None, path: Path) -> PlannedCorrection | None:
+    """How the joints of a conversion's passes are corrected, `path` being the corrected one; None where they are not."""
+    if job.errors is None or found is None:
         return None
     return PlannedCorrection(job.errors, path, found.owner, job.axis_tolerance)
 
 
-def on_written(result: PostResult, seconds: Floats) -> Floats:
+def on_written(found: Compensation | None, seconds: Floats) -> Floats:
     """Seconds of the planned blocks on the blocks that are written; those of corrected ones are parts of nominal ones."""
-    found = result.compensation
     return seconds if found is None else np.asarray(seconds[found.owner] * found.part)

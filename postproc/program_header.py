@@ -3,60 +3,49 @@
 from __future__ import annotations
 
 from pathlib import Path as FilePath
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from postproc import VERSION
+from postproc.control import table_axes
+from postproc.header_words import FEEDS, FINGERPRINT, UNKNOWN
 from postproc.job import Job
 from postproc.program import Program
-from postproc.zero_entry import table_axes
-
-if TYPE_CHECKING:
-    from postproc.pipeline import PostResult
-
-FINGERPRINT = "fingerprint of the geometric errors"
-"""before the eight hex digits of the error model that a program was written with"""
-FEEDS = "fingerprint of the planned feeds"
-"""before the eight hex digits of the F words"""
-UNKNOWN = "--------"
-"""in their place while the program is written"""
+from postproc.stage_values import Compiled
+from postproc.version import VERSION
 
 
-def header_lines(result: PostResult) -> list[str]:
+def header_lines(made: Compiled) -> list[str]:
     """The head of the program of a conversion that is compiled."""
-    assert result.program is not None and result.toolpath is not None and result.job is not None
-    job, machine = result.job, result.machine
+    job, machine = made.job, made.machine
     letters = zip(machine.axis_names, job.control.work_offset, strict=True)
     offset = " ".join(f"{k}{v:.4f}" for k, v in letters)
-    header = [f"postproc {VERSION}", f"source {FilePath(result.toolpath.file).name}", f"machine {machine.name}",
-              f"controller {result.controller_name}", *result.options.header(),
-              f"words: {_meanings(result.program)}",
-              f"work offset {result.controller.program.offset_name(result.setup.work_offset_code)} in machine coordinates: "
+    header = [f"postproc {VERSION}", f"source {FilePath(made.toolpath.file).name}", f"machine {machine.name}",
+              f"controller {made.controller_name}", *made.options.header(),
+              f"words: {_meanings(made.program)}",
+              f"work offset {made.controller.program.offset_name(made.setup.work_offset_code)} in machine coordinates: "
               f"{offset}"]
     header += _measured(job)
-    if result.setup.tool_numbers:
-        numbers = dict.fromkeys(f"{t.name} = T{t.number}" for t in result.toolpath.tools if t.name)
+    if made.setup.tool_numbers:
+        numbers = dict.fromkeys(f"{t.name} = T{t.number}" for t in made.toolpath.tools if t.name)
         header.append("tool numbers of the set-up: " + ", ".join(numbers))
-    if any(d.code == "feed.of_setup" for d in result.diagnostics):
-        header.append(f"feed {result.setup.output.feed:g} mm/min of the set-up where the CL file states none")
-    if result.motion is not None:
+    if any(d.code == "feed.of_setup" for d in made.diagnostics):
+        header.append(f"feed {made.setup.output.feed:g} mm/min of the set-up where the CL file states none")
+    if made.motion is not None:
         header.append(f"{FEEDS} {UNKNOWN}")
     header += [f"T{number}: {what}, of the set-up" for number, what in job.stated]
-    header += [*_tip_frame(result), *_corrections(result), *_orientations(result), *_tools(job)]
-    if result.toolpath.name:
-        header.insert(1, f"part {result.toolpath.name}")
+    header += [*_tip_frame(made), *_corrections(made), *_orientations(made), *_tools(job)]
+    if made.toolpath.name:
+        header.insert(1, f"part {made.toolpath.name}")
     return header
 
 
-def _tip_frame(result: PostResult) -> list[str]:
+def _tip_frame(made: Compiled) -> list[str]:
     """What is relied on where the frame of the tip's mode is not known for turned tables."""
-    assert result.program is not None and result.job is not None
-    mode, control = result.controller.modes.tcp, result.job.control
-    if mode is None or mode.frame == "table" or all(s.law != "tcp" for s in result.program.sections):
+    mode, control = made.controller.modes.tcp, made.job.control
+    if mode is None or mode.frame == "table" or all(s.law != "tcp" for s in made.program.sections):
         return []
-    code = result.job.modes.tcp_code
-    if result.job.modes.at_zero:
+    code = made.job.modes.tcp_code
+    if made.job.modes.at_zero:
         return [f"{code} is switched on with the tables at zero, right by both readings of its frame"]
     return [f"relies on the frame of {code} being the part's, turned with the table by its scale"] if len(
         table_axes(control)) else []
@@ -89,27 +78,27 @@ def _tools(job: Job) -> list[str]:
     return list(found.values())
 
 
-def _orientations(result: PostResult) -> list[str]:
+def _orientations(made: Compiled) -> list[str]:
     """Header lines that say which tool axes were chosen."""
-    if result.choice is None:
+    if made.choice is None:
         return []
     from postproc.orientation.text import header
 
-    return header(result.choice, result.options.orient)
+    return header(made.choice, made.options.orient)
 
 
-def _corrections(result: PostResult) -> list[str]:
+def _corrections(made: Compiled) -> list[str]:
     """Header lines that say who corrects geometric errors."""
-    if result.job is None or result.job.errors is None:
+    if made.job.errors is None:
         return []
-    name = result.job.errors.name
-    if result.compensation is None:
+    name = made.job.errors.name
+    if made.compensation is None:
         return [f"geometric errors {name}: corrected by the control, not in this program"]
     from machines.geometric_error.fingerprint import fingerprint
 
     return [f"geometric errors {name}: corrected in this program; the control must not correct them again",
             "they are corrected for this work offset and these gauge lengths: convert again for others",
-            f"{FINGERPRINT} {fingerprint(result.job.errors)}", *result.compensation.lines()]
+            f"{FINGERPRINT} {fingerprint(made.job.errors)}", *made.compensation.lines()]
 
 
 def _meanings(program: Program) -> str:

@@ -16,7 +16,7 @@ from toolpaths.units import DEG
 if TYPE_CHECKING:
     from postproc.control import Control
     from postproc.moves import Moves
-    from postproc.path import Path
+    from postproc.path_model import Path
 
 _SAMPLES = (0.25, 0.5, 0.75)
 _SLACK = 1e-5

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,16 +11,10 @@ from machines.geometric_error.actual import approach
 from postproc.corrected.proof import last_blocks, planned_moves
 from postproc.groups import groups
 from postproc.holes import Phase
+from postproc.result import PostResult
 from toolpaths.arrays import Floats, Ints
-from toolpaths.diagnostics import Diagnostic, error
-from toolpaths.drawing import FORMATS
 from toolpaths.units import DEG
 
-if TYPE_CHECKING:
-    from postproc.pipeline import PostResult
-
-ENDINGS = (".csv", *FORMATS)
-"""of files that a field is written to: a table, drawings"""
 UM, ARCSEC = 1e-3, DEG / 3600.0
 WAY = 1e-9
 """mm or rad of a joint that count as motion"""
@@ -77,23 +70,9 @@ def _steady(q: Floats) -> Floats:
     return result
 
 
-def contents(result: PostResult, endings: list[str]) -> tuple[list[str | bytes], list[Diagnostic]]:
-    """What files of these endings (of ENDINGS) hold: the field as a table, or drawn; nothing, and why, where there is none.
-
-    Raises:
-        ValueError: for another ending.
-    """
-    found = residuals(result) if result.ok else None
-    if found is None:
-        return [], [no_field(result.options.error_model)] if result.ok else []
-    from postproc.residual_figure import residual_figure
-
-    return [as_csv(found, result) if ending == ".csv" else residual_figure(found, _title(result), ending)
-            for ending in endings], []
-
-
-def _title(result: PostResult) -> str:
-    assert result.job is not None and result.job.errors is not None and result.toolpath is not None
+def title(result: PostResult) -> str:
+    """What a field is of."""
+    assert result.job is not None and result.job.errors is not None
     name = result.toolpath.name or Path(result.toolpath.file).stem
     return f"{name} on {result.machine.name}, errors of {result.job.errors.name}"
 
@@ -109,12 +88,6 @@ def as_csv(found: Residuals, result: PostResult) -> str:
     values = np.column_stack([found.line, found.tip, found.axis, found.q / np.where(turns, DEG, 1.0), found.before / units,
                               found.after / units]) + 0.0
     form = ",".join(["%d", *["%.6f"] * (6 + len(joints)), *["%.4f"] * 12])
-    notes = [f"# {_title(result)}", "# x y z, i j k and differences (actual less wanted) along the axes of the part frame; "
+    notes = [f"# {title(result)}", "# x y z, i j k and differences (actual less wanted) along the axes of the part frame; "
              "joints nominal", "# before: nominal joints commanded; after: the program as it is read back"]
     return "\n".join([*notes, ",".join(head), *(form % tuple(row) for row in values.tolist()), ""])
-
-
-def no_field(file: str) -> Diagnostic:
-    """Why a conversion without correction has none."""
-    return error("residuals.none", "the error model says that the control corrects: the program is nominal and leaves no "
-                 "residuals to write", file=file, hint='leave --residuals out, or corrected_by = "post" in the model')

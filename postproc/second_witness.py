@@ -17,7 +17,8 @@ from postproc.readback.compare import Comparison
 from postproc.readback.poses import Executed as Poses
 from postproc.readback.poses import arc_sweeps, begins
 from postproc.setup import SetupFile
-from postproc.witness import Case, Executed, Testimony, testify
+from postproc.witness.evidence import Case, Executed, Testimony
+from postproc.witness.testify import testify
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.toolpath import ClSource

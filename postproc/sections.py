@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from postproc.path import Path
+from postproc.path_model import Path
 from postproc.program import Command, Commands, Section
 from toolpaths.arrays import Ints
 

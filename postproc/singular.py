@@ -7,7 +7,7 @@ import numpy as np
 from machines.singular_distance import NAMES, has_singular_distance, singular_distance_between
 from postproc.control import Control
 from postproc.moves import Moves
-from postproc.path import Path
+from postproc.path_model import Path
 from toolpaths.diagnostics import Diagnostic, error, info
 
 

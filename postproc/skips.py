@@ -12,7 +12,7 @@ import numpy as np
 
 from postproc.events import words
 from postproc.moves import Moves
-from postproc.path import Path
+from postproc.path_model import Path
 from postproc.program import Command, Commands
 from toolpaths.arrays import Bools, Ints
 from toolpaths.diagnostics import Diagnostic, error, warning

@@ -4,25 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from postproc.job import Job
 from postproc.moves import Moves
 from postproc.pass_geometry import stops_of
+from postproc.result import PostResult
 from postproc.smoothed_moves import Smoothed, smoothed_moves
 from toolpaths.arrays import Ints
 from toolpaths.diagnostics import Diagnostic, Severity, info, warning
 from toolpaths.smoothing.smooth import Tolerance
 from toolpaths.units import DEG
 
-if TYPE_CHECKING:
-    from postproc.pipeline import PostResult
-
 Left = frozenset[tuple[int, int]]
 """passes that are not smoothed, as `Smoothed.ranges`"""
-Staged = Callable[["PostResult", Left], "PostResult"]
+Staged = Callable[[PostResult, Left], PostResult]
 """A conversion without smoothing of some passes"""
 GRAIN = 2e-3, 2e-5
 """mm, rad: least of what a written point must be nearer to its own CL point than to its neighbours"""

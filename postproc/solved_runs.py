@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+import postproc.path_faults as faults
 from machines.kinematics.base import Kinematics
-from postproc import path_faults as faults
 from postproc.modes import CONSTANT, OutputModes, WordFrame, turning_run
 from postproc.run_plan import RunPlan
 from toolpaths.arrays import Bools, Floats, Ints

@@ -5,22 +5,28 @@ from __future__ import annotations
 import math
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from postproc.events import cutting, spindle_states
-from postproc.pipeline import PostResult, VerifyResult, points_in
 from postproc.readback.compare import Comparison
-from postproc.witness import Testimony
+from postproc.result import PostResult, VerifyResult
+from postproc.witness.evidence import Testimony
 from toolpaths.diagnostics import Severity
 from toolpaths.input_files import there_is
-from toolpaths.toolpath import Records
+from toolpaths.toolpath import Toolpath
 from toolpaths.units import DEG
 
+if TYPE_CHECKING:
+    from postproc.cycle_time.estimate import Estimate
 
-def as_dict(result: PostResult, output: str) -> dict[str, Any]:
-    """The keys of `convert --json`; lengths mm, angles degrees, times s; null where a stage was not reached."""
+
+def as_dict(result: PostResult, output: str, estimate: Estimate | None = None) -> dict[str, Any]:
+    """The keys of `convert --json`; lengths mm, angles degrees, times s; null where a stage was not reached.
+
+    `estimate`: of its time (`cycle_time.conversion.estimate_of`).
+    """
     from postproc.cycle_time import conversion
 
     c = result.comparison
@@ -29,11 +35,11 @@ def as_dict(result: PostResult, output: str) -> dict[str, Any]:
         "files": files_beside(result, output),
         "machine": result.machine.name,
         "controller": result.controller_name,
-        "points_in": points_in(result.toolpath) if result.toolpath is not None else 0,
-        "records": asdict(result.toolpath.records) if result.toolpath is not None else asdict(Records()),
+        "points_in": points_in(result.toolpath),
+        "records": asdict(result.toolpath.records),
         "blocks_out": len(result.program) if result.program is not None else 0,
         "points_added": points_added(result),
-        **conversion.figures(result.estimate),
+        **conversion.figures(estimate),
         **deviations(c),
         "rewinds": len(result.path.rewinds) if result.path is not None else 0,
         "singular_events": len(result.path.turns) + len(result.path.events) if result.path is not None else 0,
@@ -49,6 +55,11 @@ def as_dict(result: PostResult, output: str) -> dict[str, Any]:
         "witness": witness_dict(result.witness),
         "diagnostics": [d.as_dict() for d in result.diagnostics],
     }
+
+
+def points_in(toolpath: Toolpath) -> int:
+    """Commanded positions, without FROM and GOHOME."""
+    return int(np.isin(toolpath.role, (0, 1)).sum())
 
 
 def deviations(c: Comparison | None) -> dict[str, Any]:
@@ -144,7 +155,7 @@ def _places(value: float) -> str:
 def output_modes(result: PostResult) -> dict[str, list[str]]:
     """By operation, the laws ("axes", "tcp", "tilted") that its cutting blocks are written under."""
     p, toolpath = result.program, result.toolpath
-    if p is None or toolpath is None:
+    if p is None:
         return {}
     section = np.searchsorted([s.first for s in p.sections], np.arange(len(p)), side="right") - 1
     cut = np.flatnonzero((p.code > 0) & ~p.link)
@@ -195,11 +206,11 @@ def points_added(result: PostResult) -> int:
     return int((np.isfinite(result.path.u) & (result.path.u < 1.0)).sum())
 
 
-def as_text(result: PostResult, output: str) -> str:
-    """The summary on standard output."""
+def as_text(result: PostResult, output: str, estimate: Estimate | None = None) -> str:
+    """The summary on standard output; arguments as of `as_dict`."""
     if not result.ok:
         return f"nothing written; {output} is left as it was" if there_is(output) else "nothing written"
-    d = as_dict(result, output)
+    d = as_dict(result, output, estimate)
     shares = d["tolerance_shares"]
     lines = [f"{output}: {d['blocks_out']} blocks from {d['points_in']} points ({d['points_added']} added) for "
              f"{d['machine']}, {d['controller']}",
@@ -207,7 +218,7 @@ def as_text(result: PostResult, output: str) -> str:
              *witness_lines(result.witness),
              f"tolerance: linearising {shares['linearising']:.4f}, control's smoothing {shares['smoothing']:.4f}, "
              f"rounding at most {shares['rounding']:.5f} mm"]
-    if result.toolpath is not None and result.toolpath.records.total:
+    if result.toolpath.records.total:
         lines.append(f"read: {result.toolpath.records}")
     if any(laws != ["axes"] for laws in d["output_modes"].values()):
         lines.append("output: " + ", ".join(f"{name} {' and '.join(laws)}" for name, laws in d["output_modes"].items()))
@@ -222,10 +233,10 @@ def as_text(result: PostResult, output: str) -> str:
             result.machine.axis_names, result.job.control.work_offset, strict=True))
         lines.append(f"work offset {result.controller.program.offset_name(result.setup.work_offset_code)}: {offset}")
     lines += tool_lines(result)
-    if result.estimate is not None:
+    if estimate is not None:
         from postproc.cycle_time.conversion import text
 
-        lines.append(text(result.estimate))
+        lines.append(text(estimate))
     lines.append("axes: " + ", ".join(f"{k} {_places(lo)} to {_places(hi)}" for k, (lo, hi) in d["axis_extents"].items()))
     if d["geometric_errors"] is not None and d["geometric_errors"]["corrected_by"] == "control":
         lines.append(f"geometric errors {d['geometric_errors']['model']}: left to the control, not corrected here")

@@ -11,9 +11,10 @@ import numpy as np
 from postproc.coolant import coolant_states, label
 from postproc.events import spindle_states
 from postproc.options import Orientation
-from postproc.pipeline import PostResult
 from postproc.readback.canonical import in_files
 from postproc.readback.compare import Comparison
+from postproc.result import PostResult
+from postproc.stages import STAGES
 from postproc.word_arcs import PLANE_AXIS
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
@@ -22,15 +23,13 @@ from toolpaths.toolpath import Kind, Role
 from toolpaths.units import DEG
 
 if TYPE_CHECKING:
-    from postproc.orientation.orient import OrientationChoice
+    from postproc.orientation.choice import OrientationChoice
 
 
 def trace_line(result: PostResult, line: int) -> tuple[dict[str, Any], list[Diagnostic]]:
     """The stages of the points that CL line `line` commands, as far as the conversion went; mm and degrees."""
     toolpath = result.toolpath
-    stages: dict[str, Any] = {"line": line, "record": _record(toolpath.file if toolpath else "", line), "points": []}
-    if toolpath is None:
-        return stages, []
+    stages: dict[str, Any] = {"line": line, "record": _record(toolpath.file, line), "points": [], "stages": _stages(result)}
     rows = np.flatnonzero(toolpath.line == line)
     if not len(rows):
         near = toolpath.line[np.argsort(np.abs(toolpath.line - line))[:2]].tolist() if len(toolpath) else []
@@ -41,6 +40,13 @@ def trace_line(result: PostResult, line: int) -> tuple[dict[str, Any], list[Diag
         stages["geometric_errors"] = {"model": result.job.errors.name, "corrected_by": result.job.errors.corrected_by}
     stages["points"] = [_point(result, int(row)) for row in rows]
     return stages, []
+
+
+def _stages(result: PostResult) -> list[dict[str, Any]]:
+    """The table of stages: what each does, and whether it ran without an error."""
+    names = [stage.name for stage in STAGES]
+    done = 0 if result.reached not in names else names.index(result.reached) + int(result.ok)
+    return [{"stage": stage.name, "does": stage.does, "done": k < done} for k, stage in enumerate(STAGES)]
 
 
 def _record(file: str, line: int) -> str:
@@ -54,7 +60,6 @@ def _record(file: str, line: int) -> str:
 
 def _point(result: PostResult, row: int) -> dict[str, Any]:
     toolpath = result.toolpath
-    assert toolpath is not None
     operation = toolpath.operations[int(toolpath.operation[row])]
     point: dict[str, Any] = {
         "toolpath": {"tip_mm": toolpath.tip[row].tolist(), "axis": toolpath.axis[row].tolist(),
@@ -181,6 +186,9 @@ def as_text(stages: dict[str, Any]) -> str:
             lines.append(_turned_text(point["orientation"]))
         for move in point.get("moves", []):
             lines += _move_text(move)
+    left = [f"{stage['stage']} ({stage['does']})" for stage in stages["stages"] if not stage["done"]]
+    if left:
+        lines.append(f"  ends before  {left[0]}")
     return "\n".join(lines)
 
 

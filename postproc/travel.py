@@ -11,7 +11,7 @@ from postproc.control import Control
 from postproc.groups import groups
 from postproc.joint_path import TRAVEL_SLACK
 from postproc.moves import Moves
-from postproc.path import ARC, Path
+from postproc.path_model import ARC, Path
 from postproc.word_arcs import PLANE_COLUMNS
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error

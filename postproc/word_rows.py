@@ -11,7 +11,7 @@ from machines.kinematics.base import Kinematics
 from postproc.control import Control
 from postproc.groups import groups
 from postproc.moves import Moves
-from postproc.path import ARC, FEED, Path
+from postproc.path_model import ARC, FEED, Path
 from postproc.word_arcs import PLANE_AXIS
 from toolpaths.arrays import Bools, Floats, Ints
 

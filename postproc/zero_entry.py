@@ -15,9 +15,9 @@ import numpy as np
 
 from machines.kinematics.base import Kinematics
 from machines.machine import Machine
-from postproc.control import Control
+from postproc.control import Control, table_axes
 from postproc.links import Link, SafeSpace, stays_clear
-from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.arrays import Bools, Floats
 from toolpaths.diagnostics import Diagnostic, info
 from toolpaths.units import DEG
 
@@ -40,22 +40,6 @@ class ZeroEntry:
     inside: Floats
     clear: bool
     seconds: float
-
-
-def table_axes(control: Control) -> Ints:
-    """Joint numbers of the rotary axes that carry the part: those that turn the slides as the table sees them."""
-    kin = control.machine.kinematics
-    if not control.has_tip_modes:
-        return np.zeros(0, dtype=np.int64)
-    q = np.zeros((2, kin.joints))
-    found = []
-    for j in control.rotary.tolist():
-        q[1] = 0.0
-        q[1, j] = 0.7
-        slides = kin.jacobian(q)[:, :3][:, :, control.xyz]
-        if not np.allclose(slides[0], slides[1], atol=1e-9):
-            found.append(j)
-    return np.array(found, dtype=np.int64)
 
 
 def needed(control: Control, link: Link) -> bool:

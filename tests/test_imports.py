@@ -1,4 +1,4 @@
-"""The shape of the repository: one-way imports, light start-up, nothing stray at the top."""
+"""The shape of the repository: one-way imports without circles, light start-up, sizes, nothing stray at the top."""
 
 from __future__ import annotations
 
@@ -6,7 +6,10 @@ import ast
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -19,30 +22,97 @@ TOP = {"README.md", "LICENSE", "CHANGELOG.md", "pyproject.toml", "requirements.l
        "postproc", "machines", "toolpaths", "tests", "samples"}
 
 
-def imported(source: str) -> Iterator[str]:
-    """Top-level names of all modules that the text imports, wherever the import stands; relative ones left out."""
+MOST_LINES, MOST_IN_FUNCTION = 400, 60
+
+
+@dataclass(frozen=True)
+class Text:
+    """What is looked at of a file."""
+
+    imports: frozenset[str]
+    """all modules and names that it imports, wherever the import stands (in a function, for the type checker alone);
+    `from a import b` gives a and a.b"""
+    lines: int
+    functions: dict[str, int]
+    """lines by name"""
+
+
+def looked_at(source: str, package: str) -> Text:
+    """A file of a package, from which relative imports count."""
+    imports, functions = set[str](), dict[str, int]()
     for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.Import):
-            yield from (alias.name.split(".")[0] for alias in node.names)
-        elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
-            yield node.module.split(".")[0]
+            imports |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            above = package.split(".")[:len(package.split(".")) + 1 - node.level] if node.level else []
+            base = ".".join([*above, *([node.module] if node.module else [])])
+            imports |= {base, *(f"{base}.{alias.name}" for alias in node.names)}
+        elif isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            functions[f"{node.name}:{node.lineno}"] = (node.end_lineno or 0) - node.lineno + 1
+    return Text(frozenset(imports), source.count("\n"), functions)
 
 
-def against_the_road(package: str, source: str) -> set[str]:
-    return {name for name in imported(source) if name == "tests" or name in ROAD[ROAD.index(package) + 1:]}
+@cache
+def texts() -> Mapping[str, Text]:
+    """Every module of the three packages by its dotted name."""
+    found = {}
+    for package in ROAD:
+        for path in sorted((ROOT / package).rglob("*.py")):
+            parts = path.relative_to(ROOT).with_suffix("").parts
+            folder = ".".join(parts[:-1])
+            found[folder if parts[-1] == "__init__" else ".".join(parts)] = looked_at(path.read_text("utf-8"), folder)
+    return found
 
 
-@pytest.mark.parametrize("package", ROAD)
-def test_imports_go_one_way(package: str) -> None:
-    files = sorted((ROOT / package).rglob("*.py"))
-    wrong = {str(path.relative_to(ROOT)): against_the_road(package, path.read_text()) for path in files}
-    assert files and {name: found for name, found in wrong.items() if found} == {}
+def graph(found: Mapping[str, Text]) -> dict[str, set[str]]:
+    """By module, the modules that it imports."""
+    return {name: {other for other in text.imports if other in found and other != name} for name, text in found.items()}
+
+
+def circle(links: Mapping[str, set[str]]) -> list[str]:
+    """One circle of a graph; empty where there is none."""
+    try:
+        TopologicalSorter(links).prepare()
+    except CycleError as fault:
+        return list(fault.args[1])
+    return []
+
+
+def against_the_road(package: str, text: Text) -> set[str]:
+    tops = {name.split(".")[0] for name in text.imports}
+    return {name for name in tops if name == "tests" or name in ROAD[ROAD.index(package) + 1:]}
+
+
+def test_imports_go_one_way() -> None:
+    wrong = {name: against_the_road(name.split(".")[0], text) for name, text in texts().items()}
+    assert wrong.keys() >= set(ROAD) and {name: found for name, found in wrong.items() if found} == {}
+
+
+def test_no_circle_of_files() -> None:
+    """Imports in functions and for the type checker count too."""
+    assert circle(graph(texts())) == []
+
+
+def test_a_circle_is_noticed() -> None:
+    found = {name: looked_at(text, name.rpartition(".")[0]) for name, text in {
+        "a": "from b import c", "a.x": "def f():\n    from a import y",
+        "a.y": "if TYPE_CHECKING:\n    from .x import g", "b": "", "b.c": ""}.items()}
+    links = graph(found)
+    assert links["a"] == {"b", "b.c"} and circle({name: links[name] - {"a"} for name in links})[1:] in (
+        ["a.x", "a.y"], ["a.y", "a.x"])
+
+
+def test_files_and_functions_are_short() -> None:
+    long = {name: text.lines for name, text in texts().items() if text.lines > MOST_LINES}
+    longer = {f"{name}.{function}": lines for name, text in texts().items() for function, lines in text.functions.items()
+              if lines > MOST_IN_FUNCTION}
+    assert long == {} and longer == {}
 
 
 def test_a_wrong_way_is_noticed() -> None:
-    assert against_the_road("toolpaths", "def f():\n    from machines.load import x\n    import postproc.cli") == {
-        "machines", "postproc"}
-    assert against_the_road("postproc", "import machines, toolpaths, tests.linuxcnc") == {"tests"}
+    upwards = looked_at("def f():\n    from machines.load import x\n    import postproc.cli", "toolpaths")
+    assert against_the_road("toolpaths", upwards) == {"machines", "postproc"}
+    assert against_the_road("postproc", looked_at("import machines, toolpaths, tests.linuxcnc", "postproc")) == {"tests"}
 
 
 @pytest.mark.parametrize("module", [*ROAD, "postproc.cli"])

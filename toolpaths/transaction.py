@@ -19,7 +19,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from toolpaths import leftovers
+import toolpaths.leftovers as leftovers
 from toolpaths.diagnostics import Diagnostic, DiagnosticError, error
 
 READ_ONLY = "it is read-only"

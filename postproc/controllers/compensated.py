@@ -6,7 +6,7 @@ import numpy as np
 
 from postproc.controllers.model import ControllerFile
 from postproc.events import state_at
-from postproc.path import ARC
+from postproc.path_model import ARC
 from postproc.program import Command, Program
 from toolpaths.arrays import Bools, Ints
 from toolpaths.diagnostics import Diagnostic, error

@@ -11,7 +11,7 @@ from postproc.corrected.reversals import LOOSE
 from postproc.corrected.work import Work, on_arc
 from postproc.groups import groups
 from postproc.looks import changes, looks_between
-from postproc.path import ARC, FEED, Path
+from postproc.path_model import ARC, FEED, Path
 from postproc.word_arcs import PLANE_AXIS, PLANE_COLUMNS
 from toolpaths.arrays import Bools, Floats, Ints
 

@@ -14,7 +14,7 @@ from postproc.corrected.runs import Runs
 from postproc.corrected.work import ALONE, LIFTS, Work
 from postproc.groups import groups
 from postproc.moves import Moves
-from postproc.path import FEED, Path
+from postproc.path_model import FEED, Path
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.toolpath import Kind
 

@@ -10,7 +10,7 @@ from postproc.corrected.arcs import LOOKS as ARC_LOOKS
 from postproc.corrected.reversals import LOOSE, SHORTEST, Divided, Starts, inserted, reversals, stretches
 from postproc.corrected.work import ALONE, MOMENT, Work
 from postproc.looks import looks_between
-from postproc.path import ARC, FEED, TRAVERSE, Path
+from postproc.path_model import ARC, FEED, TRAVERSE, Path
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.units import DEG
 

@@ -2,26 +2,26 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from dataclasses import replace
+from typing import Protocol
 
 import numpy as np
 
+from postproc.compensation import Compensation
+from postproc.corrected.formatted import AfterFormatting
 from postproc.corrected.runs import Runs
 from postproc.groups import groups
 from postproc.holes import Phase
+from postproc.job import Job
 from postproc.moves import Moves
-from postproc.path import Path
+from postproc.path_model import Path
 from postproc.readback.compare import Comparison
 from postproc.rounding import decimals
-from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.arrays import Bools, Ints
 from toolpaths.diagnostics import Diagnostic, warning
 from toolpaths.rotations import angle_between
 from toolpaths.toolpath import Kind
 from toolpaths.units import DEG
-
-if TYPE_CHECKING:
-    from postproc.pipeline import PostResult
 
 LOOKS = 500
 """blocks at which lost motion is weighed"""
@@ -29,38 +29,35 @@ SLACK = 1e-6, 1e-9
 """mm and rad beyond a bound that are numbers' own: errors change by as much over a last decimal"""
 
 
-@dataclass(frozen=True)
-class AfterFormatting:
-    """Deviation of the machine with errors at the CL points of a written program, mm and rad.
+class Corrected(Protocol):
+    """What is looked at of a conversion."""
 
-    Attributes:
-        tip, axis: (M,) at each of the `points`
-        points: (M,) numbers of the moves without pecks that come there
-        blocks: (M,) of the program, ending there
-        tip_bound, axis_bound: what correction, rounding of the words and lost motion may leave together
-    """
+    @property
+    def job(self) -> Job | None:
+        """The reference."""
 
-    tip: Floats
-    axis: Floats
-    points: Ints
-    blocks: Ints
-    tip_bound: float
-    axis_bound: float
+    @property
+    def moves(self) -> Moves | None:
+        """That are written."""
 
-    def line(self) -> str:
-        """One line for the summary."""
-        arcsec = DEG / 3600.0
-        return (f"geometric errors after formatting, at {len(self.points)} CL points: tip {_worst(self.tip) * 1e3:.2f} um, "
-                f"axis {_worst(self.axis) / arcsec:.2f} arcsec; bound {self.tip_bound * 1e3:.2f} um and "
-                f"{self.axis_bound / arcsec:.2f} arcsec")
+    @property
+    def path(self) -> Path | None:
+        """Corrected."""
 
-    def figures(self) -> dict[str, float]:
-        """The worst, and the bounds: mm and degrees."""
-        return {"tip_after_mm": _worst(self.tip), "axis_after_deg": _worst(self.axis) / DEG,
-                "tip_bound_mm": self.tip_bound, "axis_bound_deg": self.axis_bound / DEG}
+    @property
+    def nominal(self) -> Path | None:
+        """Before correction."""
+
+    @property
+    def compensation(self) -> Compensation | None:
+        """What was corrected."""
+
+    @property
+    def comparison(self) -> Comparison | None:
+        """What the program does."""
 
 
-def after_formatting(result: PostResult) -> AfterFormatting | None:
+def after_formatting(result: Corrected) -> AfterFormatting | None:
     """The deviations of a conversion that corrects geometric errors; None of one that does not or that is not proved.
 
     CL points are where the tool cuts to: ends of feed moves and arcs, bottoms of holes; as the path before correction has
@@ -82,7 +79,7 @@ def after_formatting(result: PostResult) -> AfterFormatting | None:
     return AfterFormatting(tip, axis, points, block[points], *bounds)
 
 
-def planned_moves(result: PostResult) -> Moves:
+def planned_moves(result: Corrected) -> Moves:
     """The moves without pecks, ending at tip and axis (M, 3) of the path before correction."""
     job, moves, path = result.job, result.moves, result.nominal
     assert job is not None and moves is not None and path is not None
@@ -100,10 +97,9 @@ def last_blocks(path: Path, moves: int) -> Ints:
     return result
 
 
-def beyond_bound(result: PostResult) -> list[Diagnostic]:
+def beyond_bound(found: AfterFormatting | None, job: Job) -> list[Diagnostic]:
     """A warning where points of the CL file are farther off than `after_formatting` counts on."""
-    found, job = result.after_formatting, result.job
-    if found is None or job is None:
+    if found is None:
         return []
     tip, axis = found.tip - found.tip_bound, found.axis - found.axis_bound
     off = np.flatnonzero((tip > SLACK[0]) | (axis > SLACK[1]))
@@ -121,7 +117,7 @@ def beyond_bound(result: PostResult) -> list[Diagnostic]:
                     + "more decimals in the controller's [format] help")]
 
 
-def _play(result: PostResult) -> tuple[float, float]:
+def _play(result: Corrected) -> tuple[float, float]:
     """(mm, rad) that a last decimal of the words of joints with lost motion comes to, at up to LOOKS blocks."""
     job, path = result.job, result.path
     assert job is not None and job.errors is not None and path is not None
@@ -163,7 +159,3 @@ def _nearest(comparison: Comparison, moves: Moves, bounds: tuple[float, float]) 
     result = np.full(len(moves), -1)
     result[owner[best]] = block[best]
     return result
-
-
-def _worst(values: Floats) -> float:
-    return float(values.max(initial=0.0))

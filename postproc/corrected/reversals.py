@@ -9,7 +9,7 @@ import numpy as np
 
 from machines.geometric_error.lost_motion import carried_on
 from postproc.corrected.work import ALONE, EDGES, Work
-from postproc.path import ARC, FEED, TRAVERSE, Path
+from postproc.path_model import ARC, FEED, TRAVERSE, Path
 from postproc.word_arcs import PLANE_COLUMNS
 from toolpaths.arrays import Bools, Floats, Ints
 

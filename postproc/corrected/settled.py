@@ -14,7 +14,7 @@ from postproc.corrected.reversals import Divided
 from postproc.corrected.runs import Runs
 from postproc.corrected.walk import Ends, walk
 from postproc.corrected.work import ALONE, LIFTS, Work, axis_positions, bent_blocks, on_arc
-from postproc.path import ARC, FEED, TRAVERSE, Path
+from postproc.path_model import ARC, FEED, TRAVERSE, Path
 from postproc.word_arcs import PLANE_COLUMNS
 from toolpaths.arrays import Bools, Floats, Ints
 

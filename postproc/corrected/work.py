@@ -15,7 +15,7 @@ from machines.geometric_error.model import ErrorModel
 from machines.kinematics.base import Kinematics
 from postproc.groups import groups
 from postproc.looks import changes
-from postproc.path import ARC, TRAVERSE, Path
+from postproc.path_model import ARC, TRAVERSE, Path
 from postproc.word_arcs import PLANE_COLUMNS
 from toolpaths.arrays import Bools, Floats, Ints
 

@@ -9,7 +9,7 @@ from postproc.cycle_time.model import load_model, model_name
 from postproc.cycle_time.report import as_dict, clock
 from postproc.cycle_time.source import from_conversion
 from postproc.memory import give_back
-from postproc.pipeline import PostResult
+from postproc.result import PostResult
 from toolpaths.diagnostics import require
 
 BAND_UP_TO = 20_000

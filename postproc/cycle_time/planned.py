@@ -12,9 +12,9 @@ from postproc.cycle_time.model import CycleTimeModel
 from postproc.cycle_time.phases import Timed
 from postproc.moves import Moves
 from postproc.pass_geometry import stops_of
-from postproc.pipeline import PostResult
 from postproc.planned import PlannedMotion, Source
 from postproc.planned_errors import planned_correction
+from postproc.result import PostResult
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic, DiagnosticError, warning
 from toolpaths.smoothing.smooth import Tolerance
@@ -29,7 +29,7 @@ def planned_times(result: PostResult, blocks: Blocks, model: CycleTimeModel) -> 
     moves = result.moves or job.moves
     source = Source(result.nominal or path, moves, job.machine, job.kinematics,
                     Tolerance(job.options.tolerance, job.axis_tolerance), stops_of(job.toolpath, moves), job.toolpath.file,
-                    planned_correction(result))
+                    planned_correction(job, result.compensation, path))
     motion = result.motion or PlannedMotion(source, np.zeros(0))
     try:
         spans = [(int(one.move.min()), int(one.move.max()), made.seconds)

@@ -14,10 +14,11 @@ from postproc.controllers.model import ControllerFile
 from postproc.cycle_time.blocks import Blocks
 from postproc.cycle_time.program import Origin, blocks_of
 from postproc.moves import Phase
-from postproc.pipeline import PostResult
 from postproc.readback.canonical import Canonical
-from postproc.readback.dialects import reader_for
-from postproc.readback.execute import Motion, Offsets, run
+from postproc.readback.dialects.readers import reader_for
+from postproc.readback.execute import Motion, run
+from postproc.readback.offsets import Offsets
+from postproc.result import PostResult
 from postproc.setup import SetupFile, part_placement
 from toolpaths.diagnostics import Diagnostic, DiagnosticError, error, has_errors
 from toolpaths.input_files import read_input, unreadable

@@ -6,7 +6,6 @@ So any cutter keeps its contact, and passes may gain whose tool axis must not be
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,12 +14,10 @@ from machines.polytope import held_axis_polytope
 from postproc.joints.poles import poles_of
 from postproc.joints.spin import free_joint
 from postproc.orientation.passes import Pass
+from postproc.orientation.search import Search
 from postproc.orientation.timed import Turned
 from toolpaths.arrays import Floats, Ints
 from toolpaths.units import DEG
-
-if TYPE_CHECKING:
-    from postproc.orientation.candidates import Search
 
 _RING = 72
 """angles looked at round the free joint"""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable
 
-from postproc.orientation.candidates import Kind, Tried
+from postproc.orientation.search import Kind, Tried
 from postproc.orientation.timed import Turned
 
 KINDS: dict[Kind, str] = {

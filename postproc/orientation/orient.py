@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,14 +11,14 @@ from machines.machine import Machine
 from postproc.collision.passes import pass_bodies
 from postproc.options import Options, Orientation
 from postproc.orientation.allowed import Allowed
-from postproc.orientation.candidates import APART, Lost, Tried, tried
+from postproc.orientation.candidates import tried
+from postproc.orientation.choice import OrientationChoice
 from postproc.orientation.limited import limit_faults
 from postproc.orientation.passes import Work, work_of
-from postproc.orientation.plans import OrientationPlan, StateTable, plans_of, table_of
-from postproc.orientation.proved import Convert, proved
+from postproc.orientation.plans import OrientationPlan, plans_of, table_of
 from postproc.orientation.ranking import prepare
-from postproc.orientation.reoriented import reoriented
 from postproc.orientation.rounds import PassFault, Progress, each_pass
+from postproc.orientation.search import APART, Lost, Tried
 from postproc.orientation.timed import Turned
 from postproc.orientation.unfit import REACH, out_of_travel, unfit
 from postproc.setup import SetupFile
@@ -27,43 +26,28 @@ from toolpaths.diagnostics import Diagnostic, error, has_errors, warning
 from toolpaths.toolpath import Toolpath
 from toolpaths.units import DEG
 
-if TYPE_CHECKING:
-    from postproc.pipeline import PostResult
-
-
-@dataclass(frozen=True)
-class OrientationChoice:
-    """What was found: per pass what was tried, and the plans side by side.
-
-    Attributes:
-        table: the states out of which the plans are made
-        paper: the paper's choice in each pass (a vertex along the mean direction, smallest angles), elsewhere the own axis
-        program: the conversion of the plan that was asked for, written or refused; None where none was made
-    """
-
-    work: Work
-    tried: tuple[Tried, ...]
-    table: StateTable
-    plans: dict[Orientation, OrientationPlan]
-    paper: OrientationPlan
-    program: PostResult | None = None
-
-    def toolpath(self, name: Orientation) -> Toolpath:
-        """The CL path with the axes of a plan."""
-        return reoriented(self.work, self.plans[name].picked)
-
 
 def orient(toolpath: Toolpath, machine: Machine, setup: SetupFile, options: Options | None = None,
-           progress: Progress | None = None, workers: int | None = None,
-           convert: Convert | None = None) -> tuple[OrientationChoice | None, list[Diagnostic]]:
+           progress: Progress | None = None,
+           workers: int | None = None) -> tuple[OrientationChoice | None, list[Diagnostic]]:
     """Orientations of all passes of a toolpath, within `options.max_tilt`; None where a diagnostic is an ERROR.
+
+    No program is made: `programs.oriented` proves the plan that is asked for.
 
     Args:
         workers: processes for many passes, None for as many as there are cores; the choice does not depend on it
-        convert: makes the program of the plan `options.orient` of a choice; where it is refused that plan avoids what it
-            was refused for. None: no program is made
     """
     options = options or Options()
+    choice, found = planned_choice(toolpath, machine, setup, options, progress, workers)
+    if choice is None:
+        return None, found
+    return bettered(choice), [*found, *unsolved(choice, options.orient)]
+
+
+def planned_choice(toolpath: Toolpath, machine: Machine, setup: SetupFile, options: Options,
+                   progress: Progress | None = None, workers: int | None = None
+                   ) -> tuple[OrientationChoice | None, list[Diagnostic]]:
+    """The plans of a toolpath as they were made; arguments as of `orient`."""
     work, found = work_of(toolpath, machine, setup, options)
     if work is None:
         return None, found
@@ -89,13 +73,10 @@ def orient(toolpath: Toolpath, machine: Machine, setup: SetupFile, options: Opti
     found += _unlinked(work, plans.named["auto"], any(np.isfinite(one.seconds) for one in plans.named.values()))
     if has_errors(found):
         return None, found
-    choice, more = OrientationChoice(work, tuple(results), table, plans.named, plans.paper), []
-    if convert is not None:
-        choice, more = proved(choice, options.orient, convert)
-    return _bettered(choice), [*found, *more, *_unsolved(choice, options.orient)]
+    return OrientationChoice(work, tuple(results), table, plans.named, plans.paper), found
 
 
-def _unsolved(choice: OrientationChoice, plan: Orientation) -> list[Diagnostic]:
+def unsolved(choice: OrientationChoice, plan: Orientation) -> list[Diagnostic]:
     """A warning where times that are compared are those of plans that were not solved."""
     compared = [made for name in dict.fromkeys((plan, "keep", "auto")) for made in choice.plans[name].picked]
     lines = sorted({made.one.line for made in compared if not made.solved})
@@ -105,7 +86,7 @@ def _unsolved(choice: OrientationChoice, plan: Orientation) -> list[Diagnostic]:
                     "need be, within all limits", file=choice.work.toolpath.file, lines=lines[:6], count=len(lines))]
 
 
-def _bettered(choice: OrientationChoice) -> OrientationChoice:
+def bettered(choice: OrientationChoice) -> OrientationChoice:
     """With the fastest of all that was planned in full as the best of each pass: ranked times may be off by some 1e-3."""
     plans = [*choice.plans.values(), choice.paper]
     results = [_best_of(tried, [plan.picked[k] for plan in plans]) for k, tried in enumerate(choice.tried)]

@@ -8,10 +8,10 @@ import numpy as np
 
 from postproc.options import Orientation
 from postproc.orientation.allowed import Allowed
-from postproc.orientation.candidates import Tried
 from postproc.orientation.choose import groupwise, shortest
 from postproc.orientation.passes import Work
 from postproc.orientation.rounds import Progress, each_pass
+from postproc.orientation.search import Tried
 from postproc.orientation.states import CLUSTER, groups_of, index, pools_of, ranked, states_of
 from postproc.orientation.timed import Turned
 from postproc.orientation.turns import Ends, all_ends, unwinding, ways_between

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
+import postproc.reach as reach
 from machines.machine import Machine
-from postproc import reach
 from postproc.joint_path import reachable_axes
 from postproc.joints.tracks import TRAVEL_SLACK
 from postproc.orientation.passes import Pass

@@ -4,34 +4,36 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from postproc.options import Options
-from postproc.orientation.orient import OrientationChoice, orient
+from postproc.orientation.choice import OrientationChoice
+from postproc.orientation.orient import bettered, planned_choice, unsolved
+from postproc.orientation.proved import proved
 from postproc.orientation.rounds import Progress
+from postproc.result import PostResult
 
-if TYPE_CHECKING:
-    from postproc.pipeline import PostResult
-
-Stages = Callable[["PostResult", Progress | None], "PostResult"]
+Stages = Callable[[PostResult, Progress | None], PostResult]
 
 
-def oriented(start: PostResult, stages: Stages, progress: Progress | None = None) -> PostResult:
-    """`start`, a conversion before its first stage, with the tool axes of the plan `orient` of its options.
+def oriented(start: PostResult, stages: Stages, progress: Progress | None = None) -> tuple[PostResult, PostResult | None]:
+    """`start`, a conversion before its first stage, with the tool axes of the plan `orient` of its options; the program that
+    proved the plan, written or refused, None where there is no choice.
 
     The plan is proved by `stages` (from a path to its program) with what convert, verify and trace all know: feeds, output
     mode, smoothing and geometric errors are left out, so that the three choose the same axes.
     """
-    assert start.toolpath is not None
     plan, options = start.options.orient, common(start.options)
 
-    def program(choice: OrientationChoice) -> PostResult:
+    def program_of(choice: OrientationChoice) -> PostResult:
         begun = replace(start, options=options, diagnostics=(), toolpath=choice.toolpath(plan), choice=choice)
         return stages(begun, progress)
 
-    choice, found = orient(start.toolpath, start.machine, start.setup, start.options, progress, convert=program)
-    path = start.toolpath if choice is None else choice.toolpath(plan)
-    return replace(start, toolpath=path, choice=choice, diagnostics=(*start.diagnostics, *found))
+    choice, found = planned_choice(start.toolpath, start.machine, start.setup, start.options, progress)
+    if choice is None:
+        return start.with_found(found), None
+    made, more = proved(choice, plan, program_of)
+    choice, found = bettered(made.choice), [*found, *more, *unsolved(made.choice, plan)]
+    return start.with_found(found, toolpath=choice.toolpath(plan), choice=choice), made.program
 
 
 def common(options: Options) -> Options:
@@ -41,9 +43,8 @@ def common(options: Options) -> Options:
                    smooth=plain.smooth, error_model=plain.error_model, error_beyond=plain.error_beyond)
 
 
-def written(start: PostResult) -> PostResult | None:
+def written(start: PostResult, program: PostResult | None) -> PostResult | None:
     """The program that proved the choice of `start`, where it is what `start` would come to."""
-    program = None if start.choice is None else start.choice.program
-    if program is None or program.options != start.options:
+    if start.choice is None or program is None or program.options != start.options:
         return None
     return replace(program, diagnostics=(*start.diagnostics, *program.diagnostics), choice=start.choice)

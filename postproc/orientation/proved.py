@@ -8,21 +8,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from postproc.options import Orientation
+from postproc.orientation.choice import OrientationChoice, Proof
 from postproc.orientation.passes import Work
 from postproc.orientation.plans import OrientationPlan, plans_of
+from postproc.result import PostResult
 from toolpaths.arrays import Ints
 from toolpaths.diagnostics import Diagnostic, Severity, info, warning
 
-if TYPE_CHECKING:
-    from postproc.orientation.orient import OrientationChoice
-    from postproc.pipeline import PostResult
-
-Convert = Callable[["OrientationChoice"], "PostResult"]
+Convert = Callable[[OrientationChoice], PostResult]
 _ROUNDS = 24
 """programs that are made of plans chosen anew"""
 _TOLD = 3
@@ -40,33 +37,43 @@ class _Blame:
     bodies: bool
 
 
-def proved(choice: OrientationChoice, plan: Orientation, convert: Convert) -> tuple[OrientationChoice, list[Diagnostic]]:
+@dataclass(frozen=True)
+class Proved:
+    """A choice with the program of the plan that was asked for, written or refused."""
+
+    choice: OrientationChoice
+    program: PostResult
+
+    @classmethod
+    def of(cls, choice: OrientationChoice, plan: Orientation, convert: Convert) -> Proved:
+        """The choice with its program as `convert` makes it."""
+        program = convert(choice)
+        return cls(replace(choice, proof=Proof(plan, program.controller_name, program.ok)), program)
+
+
+def proved(choice: OrientationChoice, plan: Orientation, convert: Convert) -> tuple[Proved, list[Diagnostic]]:
     """The choice with the program of `plan`, chosen anew where it was refused; what was passed over is told.
 
     Where nothing else is left, `auto` is the fastest of the other plans whose program is written; where none is, the first
     choice stands, with a warning: the conversion will tell its errors.
     """
     passed: list[tuple[OrientationPlan, str]] = []
-    now = replace(choice, program=convert(choice))
-    first = now
+    now = first = Proved.of(choice, plan, convert)
     for _ in range(_ROUNDS):
-        assert now.program is not None
         if now.program.ok:
-            return now, _told(passed, now, plan)
-        blame = _blame(now, now.program)
-        passed.append((now.plans[plan], blame.why))
+            return now, _told(passed, now.choice, plan)
+        blame = _blame(now.choice, now.program)
+        passed.append((now.choice.plans[plan], blame.why))
         if not blame.bodies and _of_the_file(now, plan, convert):
             return first, [_unproved(first, plan, passed)]
-        after = _anew(now, plan, blame)
+        after = _anew(now.choice, plan, blame)
         if after is None:
             break
-        now = replace(after, program=convert(after))
-    for other in _others(now, first) if plan == "auto" else ():
-        made = replace(first, plans=first.plans | {"auto": other})
-        made = replace(made, program=convert(made))
-        assert made.program is not None
+        now = Proved.of(after, plan, convert)
+    for other in _others(now.choice, first.choice) if plan == "auto" else ():
+        made = Proved.of(replace(first.choice, plans=first.choice.plans | {"auto": other}), plan, convert)
         if made.program.ok:
-            return made, _told(passed, made, plan)
+            return made, _told(passed, made.choice, plan)
     return first, [_unproved(first, plan, passed)]
 
 
@@ -139,11 +146,10 @@ def _where(work: Work, part: int) -> str:
     return f"{'on the way to' if part >= 0 else 'in'} pass {n} (line {work.passes[n].line})"
 
 
-def _of_the_file(choice: OrientationChoice, plan: Orientation, convert: Convert) -> bool:
+def _of_the_file(made: Proved, plan: Orientation, convert: Convert) -> bool:
     """Whether a program is refused for what the file says, whatever its tool axes: the CL's own are refused alike."""
-    assert choice.program is not None
-    own = convert(replace(choice, plans=choice.plans | {plan: choice.plans["keep"]}))
-    mine, keep = ({d.code for d in made.diagnostics if d.severity is Severity.ERROR} for made in (choice.program, own))
+    own = convert(replace(made.choice, plans=made.choice.plans | {plan: made.choice.plans["keep"]}))
+    mine, keep = ({d.code for d in each.diagnostics if d.severity is Severity.ERROR} for each in (made.program, own))
     return not mine.isdisjoint(keep)
 
 
@@ -158,11 +164,9 @@ def _told(passed: list[tuple[OrientationPlan, str]], choice: OrientationChoice, 
                  f"{'; '.join(reasons[:_TOLD])}{more}", file=choice.work.toolpath.file)]
 
 
-def _unproved(choice: OrientationChoice, plan: Orientation, passed: list[tuple[OrientationPlan, str]]) -> Diagnostic:
+def _unproved(made: Proved, plan: Orientation, passed: list[tuple[OrientationPlan, str]]) -> Diagnostic:
     """No plan was found whose program is written."""
-    program = choice.program
-    assert program is not None
     tried = f", nor are those of {len(passed) - 1} other plans" if len(passed) > 1 else ""
-    return warning("orient.unproved", f"the program of {plan} for {program.controller_name} is refused{tried}: "
-                   f"{passed[0][1]}", file=choice.work.toolpath.file,
+    return warning("orient.unproved", f"the program of {plan} for {made.program.controller_name} is refused{tried}: "
+                   f"{passed[0][1]}", file=made.choice.work.toolpath.file,
                    hint="convert tells all that stands against it; --orient keep leaves the axes of the CL file")

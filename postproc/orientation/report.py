@@ -6,12 +6,12 @@ import math
 from typing import Any
 
 from postproc.options import Orientation
-from postproc.orientation.candidates import Tried
+from postproc.orientation.choice import OrientationChoice
 from postproc.orientation.losers import best_loser, grouped
-from postproc.orientation.orient import OrientationChoice
 from postproc.orientation.passes import Work
 from postproc.orientation.plans import OrientationPlan
 from postproc.orientation.reaches import binding, feed_of, reaches
+from postproc.orientation.search import Tried
 from postproc.orientation.shares import shares_of
 from postproc.orientation.timed import Turned
 from toolpaths.diagnostics import Diagnostic, warning
@@ -25,9 +25,9 @@ def as_dict(choice: OrientationChoice, plan: Orientation = "auto") -> dict[str, 
     """The keys of `orient --json`; passes as `plan` has them."""
     picked, keep = choice.plans[plan].picked, choice.plans["keep"].seconds
     plans = {name.replace("-", "_"): _plan(choice.plans[name], keep) for name in NAMES}
-    program = choice.program
-    return {"machine": choice.work.machine.name, "plan": plan, "controller": program.controller_name if program else None,
-            "proved": program.ok if program else None,
+    proof = choice.proof
+    return {"machine": choice.work.machine.name, "plan": plan, "controller": proof.controller if proof else None,
+            "proved": proof.ok if proof else None,
             "passes": [_pass(tried, made, choice.work) for tried, made in zip(choice.tried, picked, strict=True)],
             "plans": plans | {"paper_per_pass": _plan(choice.paper, keep)}}
 

@@ -4,21 +4,17 @@ that is left lies on such a ridge, which steps in tilt or azimuth alone do not f
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from machines.machine import Machine
 from machines.polytope import held_axis_polytope
 from postproc.orientation.passes import Pass
+from postproc.orientation.search import Search
 from postproc.orientation.seeds import across, sharpest
 from postproc.orientation.timed import Turned
 from toolpaths.arrays import Floats, Ints
 from toolpaths.rotations import angle_between
 from toolpaths.units import DEG
-
-if TYPE_CHECKING:
-    from postproc.orientation.candidates import Search
 
 _RING = 5.0 * DEG
 _FINER = 8

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from postproc.orientation.allowed import Allowed
-from postproc.orientation.candidates import Tried
 from postproc.orientation.held import common_angles
 from postproc.orientation.ranking import Ranking
+from postproc.orientation.search import Tried
 from postproc.orientation.timed import Turned, turned_all
 from toolpaths.arrays import Floats
 from toolpaths.units import DEG

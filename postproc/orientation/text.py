@@ -7,12 +7,12 @@ from collections import Counter
 from collections.abc import Sequence
 
 from postproc.options import Orientation
-from postproc.orientation.candidates import Kind, Lost, Tried
+from postproc.orientation.choice import OrientationChoice
 from postproc.orientation.losers import KINDS, best_loser, grouped, listed
-from postproc.orientation.orient import OrientationChoice
 from postproc.orientation.plans import OrientationPlan
 from postproc.orientation.reaches import binding, feed_of, reaches
 from postproc.orientation.report import NAMES, UNITS, gain
+from postproc.orientation.search import Kind, Lost, Tried
 from postproc.orientation.shares import shares_of, turns
 from postproc.orientation.timed import Turned
 from toolpaths.rotations import angle_between
@@ -190,11 +190,10 @@ def _plans(choice: OrientationChoice) -> list[str]:
 
 def _proof(choice: OrientationChoice) -> list[str]:
     """Whether the program of the plan that was asked for is written."""
-    program = choice.program
-    if program is None:
+    proof = choice.proof
+    if proof is None:
         return []
-    said = "proved" if program.ok else "refused"
-    return [f"the program of {program.options.orient} for {program.controller_name} is {said}"]
+    return [f"the program of {proof.plan} for {proof.controller} is {'proved' if proof.ok else 'refused'}"]
 
 
 def _unaimed(choice: OrientationChoice) -> list[str]:

@@ -9,10 +9,10 @@ from collections.abc import Callable
 import numpy as np
 
 from postproc.orientation.allowed import Allowed
-from postproc.orientation.candidates import Lost, Tried
 from postproc.orientation.losers import KINDS
 from postproc.orientation.passes import Pass, Work
 from postproc.orientation.poses import OUT_OF_REACH
+from postproc.orientation.search import Lost, Tried
 from postproc.orientation.timed import Turned, turned
 from postproc.orientation.travel import Lack, nearest_inside
 from toolpaths.diagnostics import Diagnostic, error, warning

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from postproc.options import Options
-from postproc.orientation.orient import OrientationChoice, orient
+from postproc.orientation.choice import OrientationChoice
+from postproc.orientation.orient import orient
 from postproc.orientation.passes import Work
 from postproc.placement.bodies import Beside
 from postproc.placement.space import Space

@@ -9,7 +9,7 @@ from postproc.holes import PECKING, Phase
 from postproc.job import Job
 from postproc.links import SafeSpace
 from postproc.moves import Moves
-from postproc.readback.dialects import reader_for
+from postproc.readback.dialects.readers import reader_for
 from postproc.readback.execute import Motion
 from postproc.readback.faults import Faults
 from postproc.readback.poses import Executed, arc_sweeps, coordinates

@@ -8,7 +8,7 @@ import numpy as np
 
 from postproc.job import Job
 from postproc.moves import Moves, Phase
-from postproc.path import FEED, TRAVERSE
+from postproc.path_model import FEED, TRAVERSE
 from postproc.readback.align import align, unreached
 from postproc.readback.canonical import Canonical
 from postproc.readback.checks import (

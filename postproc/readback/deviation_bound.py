@@ -20,7 +20,7 @@ from machines.straight_blocks import pose_jets
 from postproc.bound import SHORT, axis_reference, curve_parameter, tip_reference
 from postproc.groups import groups
 from postproc.moves import Moves
-from postproc.path import ARC
+from postproc.path_model import ARC
 from postproc.readback.execute import Motion
 from postproc.readback.poses import Executed, coordinates, signed_sweep
 from postproc.word_arcs import PLANE_AXIS, PLANE_COLUMNS

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
 
-from postproc.control import Control
 from postproc.coolant import FLOOD, MIST
 from postproc.readback import frames
 from postproc.readback.canonical import CALL, LAW, REST, TURNS, Canonical, Law, Text, in_files, placed
 from postproc.readback.frames import AXES, Frame, FrameTable
 from postproc.readback.modal import Modal, columns, fill, fill_values, modal_state, number_of
+from postproc.readback.offsets import Offsets
 from postproc.readback.rows import INCH, Rows, Section
 from postproc.readback.sections import run_section
 from postproc.readback.words import Words
@@ -88,30 +87,6 @@ class Motion:
     def mist(self) -> Bools:
         """(E,) mist flows."""
         return self.coolant & MIST > 0
-
-
-@dataclass(frozen=True)
-class Offsets:
-    """What the control holds: work offset (J,) in machine coordinates, column of Z, tool lengths by register.
-
-    `control` is needed where a program uses laws of its own; `rises_first`: a canned cycle brings a tool that is below its
-    plane, or below the level where the cycle ends, up before it is over the hole (RS274/NGC, see `cycles.legs`);
-    `arc_slack`: mm by which the radius may differ between the ends of an arc.
-    """
-
-    work: Floats
-    xyz: Ints
-    lengths: dict[int, float]
-    home: Floats
-    on_z: bool
-    peck_relief: float
-    control: Control | None = None
-    rises_first: bool = True
-    arc_slack: float = math.inf
-
-    def length(self, register: int) -> float:
-        """Tool length of a register, 0 for none."""
-        return self.lengths.get(register, 0.0) if register >= 0 else 0.0
 
 
 def run(code: Canonical, letters: tuple[str, ...], offsets: Offsets, file: str = "") -> tuple[Motion, list[Diagnostic]]:

@@ -6,7 +6,7 @@ import numpy as np
 
 from machines.geometric_error.volume import measured
 from postproc.job import Job
-from postproc.path import TRAVERSE
+from postproc.path_model import TRAVERSE
 from postproc.readback.actual import ARC_LOOKS, ActualExecuted
 from postproc.readback.execute import Motion
 from postproc.readback.faults import Faults

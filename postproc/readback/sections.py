@@ -19,7 +19,7 @@ from toolpaths.arrays import Bools, Floats, Ints, repeated, shared
 from toolpaths.diagnostics import Diagnostic, error
 
 if TYPE_CHECKING:
-    from postproc.readback.execute import Offsets
+    from postproc.readback.offsets import Offsets
 
 _STILL = 1e-6
 """degrees"""

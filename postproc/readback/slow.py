@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from postproc.control import Control
+from postproc.header_words import FEEDS, UNKNOWN
 from postproc.job import Job
 from postproc.moves import Moves, Phase
-from postproc.program_header import FEEDS, UNKNOWN
 from postproc.readback.checks import CHUNK, STILL
 from postproc.readback.execute import Motion
 from postproc.readback.faults import Faults

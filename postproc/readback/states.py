@@ -23,8 +23,8 @@ from postproc.events import (
 from postproc.job import Job
 from postproc.moves import Moves
 from postproc.readback.checks import CHUNK
-from postproc.readback.dialects import reader_for
 from postproc.readback.dialects.base import Reader
+from postproc.readback.dialects.readers import reader_for
 from postproc.readback.execute import Motion
 from postproc.readback.faults import Faults
 from toolpaths.arrays import Array, Bools, Floats, Ints, shared

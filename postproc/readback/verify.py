@@ -9,19 +9,20 @@ from pathlib import Path
 
 import numpy as np
 
+from postproc.header_words import FINGERPRINT, HEADER
 from postproc.job import Job
 from postproc.memory import give_back
 from postproc.options import NO_FILE, SETUP_MARK, Options
-from postproc.program_header import FINGERPRINT
 from postproc.readback.canonical import placed
 from postproc.readback.changes import check_changes
 from postproc.readback.compare import Comparison, compare
-from postproc.readback.dialects import reader_for
 from postproc.readback.dialects.base import UNITS_UNSTATED, as_bytes
-from postproc.readback.execute import Motion, Offsets, run
+from postproc.readback.dialects.readers import reader_for
+from postproc.readback.execute import Motion, run
 from postproc.readback.faults import Faults
+from postproc.readback.offsets import Offsets
 from postproc.readback.poses import Executed, poses_before
-from postproc.readback.slow import HEADER, planned_feeds
+from postproc.readback.slow import planned_feeds
 from postproc.readback.starts import check_end, check_start
 from postproc.readback.stated import check_stated
 from postproc.readback.states import check_lengths

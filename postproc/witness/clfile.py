@@ -7,7 +7,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from postproc.witness import arcs, cycles
+import postproc.witness.arcs as arcs
+import postproc.witness.cycles as cycles
 from postproc.witness.commanded import UNFOLLOWED, Commanded, unit
 from postproc.witness.dialect import ALL, dialect_of, scale_of
 from postproc.witness.execution import Execution, Z

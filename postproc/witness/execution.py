@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from postproc.witness import arcs
+import postproc.witness.arcs as arcs
 from postproc.witness.commanded import UNKNOWN, Cycle
 from postproc.witness.dialect import Dialect
 from postproc.witness.text import Array, Text

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from postproc.witness import arcs
+import postproc.witness.arcs as arcs
 from postproc.witness.commanded import ARC, HOLE, LINE, RAPID, START, Commanded, unit
 from postproc.witness.execution import Execution, Track, Z
 from postproc.witness.text import Array

@@ -21,7 +21,8 @@ from machines.machine import Machine
 from postproc.options import Options
 from postproc.orientation.allowed import Allowed
 from postproc.orientation.candidates import tried
-from postproc.orientation.orient import OrientationChoice, orient
+from postproc.orientation.choice import OrientationChoice
+from postproc.orientation.orient import orient
 from postproc.orientation.passes import Pass, work_of
 from postproc.orientation.ranking import Ranking, prepare
 from postproc.orientation.timed import turned, turned_all

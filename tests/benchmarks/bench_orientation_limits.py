@@ -20,8 +20,9 @@ from machines.machine import Machine, Timing
 from postproc.options import Options
 from postproc.orientation.allowed import Allowed
 from postproc.orientation.candidates import tried
+from postproc.orientation.choice import OrientationChoice
 from postproc.orientation.choose import shortest
-from postproc.orientation.orient import OrientationChoice, orient
+from postproc.orientation.orient import orient
 from postproc.orientation.passes import Pass, Work, work_of
 from postproc.orientation.seeds import across
 from postproc.orientation.timed import Turned, turned_all

@@ -35,8 +35,9 @@ from postproc.feedrate.limits import JointLimits
 from postproc.feedrate.paths import SplinePath
 from postproc.feedrate.plan import Options, plan
 from postproc.pass_geometry import PassGeometry, pass_geometry, stops_of
-from postproc.pipeline import PostResult, plan_motion
 from postproc.planned import joint_limits
+from postproc.result import PostResult
+from postproc.stages import plan_motion
 from tests.postproc.feedrate_kit import MIKRON
 from tests.postproc.kit import SAMPLES, good, machine
 from tests.toolpaths.test_smoothing import chain, off, wave

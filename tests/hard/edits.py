@@ -14,8 +14,8 @@ from postproc.cycle_time import report
 from postproc.cycle_time.estimate import estimate
 from postproc.cycle_time.model import load_model, model_name
 from postproc.cycle_time.source import from_gcode
-from postproc.pipeline import PostResult, VerifyResult
 from postproc.readback.verify import read_back
+from postproc.result import PostResult, VerifyResult
 from postproc.summary import verify_dict, verify_text
 from toolpaths.diagnostics import DiagnosticError, has_errors
 

@@ -122,6 +122,7 @@ def _converted(task: Task, controller: str) -> Any:
     from postproc import summary
     from postproc.console import rounded
     from postproc.cycle_time import report
+    from postproc.cycle_time.conversion import estimate_of
     from postproc.cycle_time.estimate import estimate
     from postproc.cycle_time.model import load_model, model_name
     from postproc.cycle_time.source import from_conversion
@@ -129,8 +130,9 @@ def _converted(task: Task, controller: str) -> Any:
     path, found = _read(task.file)
     machine, setup = _machine(task.machine, str(_setup_of(task)))
     result = postproc.convert(path, machine, controller=controller, setup=setup, diagnostics=list(found))
-    summary.as_text(result, "out.nc")
-    json.dumps(rounded(summary.as_dict(result, "out.nc")), allow_nan=False, default=str)
+    time = estimate_of(result)
+    summary.as_text(result, "out.nc", time)
+    json.dumps(rounded(summary.as_dict(result, "out.nc", time)), allow_nan=False, default=str)
     if result.ok:
         planner, _ = load_model(model_name(controller, result.controller.writer))
         assert planner is not None

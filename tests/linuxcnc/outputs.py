@@ -12,9 +12,10 @@ from pathlib import Path
 import numpy as np
 
 from machines.machine import Machine
-from postproc.pipeline import PostResult
-from postproc.readback.execute import Motion, Offsets, execute
+from postproc.readback.execute import Motion, execute
+from postproc.readback.offsets import Offsets
 from postproc.readback.words import Words, tokenise
+from postproc.result import PostResult
 from tests.linuxcnc.interpreter import Canonical, Move, ToolEntry
 from toolpaths.arrays import Array, Bools, Floats, Ints
 from toolpaths.diagnostics import has_errors

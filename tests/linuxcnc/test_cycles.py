@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from postproc.readback.execute import Offsets, execute
+from postproc.readback.execute import execute
+from postproc.readback.offsets import Offsets
 from postproc.readback.words import tokenise
 from tests.linuxcnc.interpreter import Move
 

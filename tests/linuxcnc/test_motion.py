@@ -12,7 +12,7 @@ import machines
 import postproc
 import toolpaths
 from machines.machine import Machine
-from postproc.pipeline import PostResult
+from postproc.result import PostResult
 from postproc.setup import load_setup
 from tests.linuxcnc import outputs
 from tests.linuxcnc.simulator import Run

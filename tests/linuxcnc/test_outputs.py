@@ -11,8 +11,8 @@ import pytest
 import machines
 import postproc
 import toolpaths
-from postproc.pipeline import PostResult
 from postproc.readback.checks import block_seconds
+from postproc.result import PostResult
 from postproc.setup import PartPlacement, SetupFile, ToolSetup, load_setup
 from tests.linuxcnc import outputs
 from tests.linuxcnc.interpreter import Move

@@ -10,7 +10,7 @@ import pytest
 import machines
 import postproc
 import toolpaths
-from postproc.pipeline import PostResult
+from postproc.result import PostResult
 from postproc.setup import load_setup
 from tests.linuxcnc import outputs
 from tests.linuxcnc.simulator import Run

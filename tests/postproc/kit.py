@@ -17,7 +17,7 @@ import numpy as np
 import machines
 import postproc
 import toolpaths
-from postproc.pipeline import PostResult
+from postproc.result import PostResult
 from postproc.setup import SetupFile, load_setup
 from tests.postproc.peer import Peer, Step
 from toolpaths.diagnostics import has_errors

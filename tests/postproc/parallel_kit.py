@@ -13,7 +13,7 @@ import numpy as np
 
 import postproc
 import toolpaths
-from postproc.pipeline import PostResult
+from postproc.result import PostResult
 from postproc.setup import SetupFile, load_setup
 from tests.postproc.kit import SAMPLES, Peer, Step, angle, machine
 from toolpaths.toolpath import Kind, Role

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from postproc.controllers import writer_for
 from postproc.controllers.model import load_controller
+from postproc.controllers.writers import writer_for
 from postproc.program import INVERSE, Command, Hole, Program, Section
 from toolpaths.toolpath import Cycle
 

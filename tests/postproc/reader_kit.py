@@ -10,8 +10,9 @@ import numpy as np
 from machines.kinematics.base import Kinematics
 from postproc.control import Control, Rapids
 from postproc.controllers.model import ControllerFile, load_controller
-from postproc.readback.dialects import reader_for
-from postproc.readback.execute import Motion, Offsets, run
+from postproc.readback.dialects.readers import reader_for
+from postproc.readback.execute import Motion, run
+from postproc.readback.offsets import Offsets
 from postproc.readback.poses import Executed
 from tests.postproc.kit import machine
 from toolpaths.diagnostics import Diagnostic, has_errors

@@ -12,8 +12,8 @@ import postproc
 import toolpaths
 from postproc.corrected.proof import after_formatting
 from postproc.options import Options
-from postproc.pipeline import PostResult
 from postproc.readback.actual import _turning
+from postproc.result import PostResult
 
 RADIUS = 50.0
 PLAY = "[components.EYY]\ntable = 'y.csv'\n"

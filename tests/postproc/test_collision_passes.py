@@ -14,7 +14,8 @@ import trimesh
 import toolpaths
 from postproc.collision.passes import PassBodies, pass_bodies
 from postproc.options import Options
-from postproc.orientation.orient import OrientationChoice, orient
+from postproc.orientation.choice import OrientationChoice
+from postproc.orientation.orient import orient
 from postproc.orientation.passes import work_of
 from postproc.setup import load_setup
 from tests.postproc.kit import SAMPLES, machine, toolpath

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from postproc.pipeline import PostResult
 from postproc.readback.verify import read_back
+from postproc.result import PostResult
 from postproc.setup import SetupFile
 from tests.postproc.kit import codes, convert, good, goto, tilted, toolpath
 from toolpaths.diagnostics import Diagnostic, Severity

@@ -23,7 +23,8 @@ from postproc.compensation import SHARE
 from postproc.corrected.arcs import LOOSE
 from postproc.corrected.work import one_orientation
 from postproc.options import Options
-from postproc.pipeline import PostResult, verify
+from postproc.pipeline import verify
+from postproc.result import PostResult
 from postproc.setup import load_setup
 from toolpaths.units import DEG
 

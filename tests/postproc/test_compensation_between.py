@@ -14,10 +14,10 @@ import toolpaths
 from machines.geometric_error import load
 from postproc.looks import changes, looks_between
 from postproc.options import Options
-from postproc.pipeline import PostResult
 from postproc.readback.checks import check_speeds
 from postproc.readback.compare import _taken_up
 from postproc.readback.faults import Faults
+from postproc.result import PostResult
 from toolpaths.diagnostics import Severity
 
 HEAD = "UNITS/MM\nLOADTL/1\nSPINDL/3000,RPM,CLW\nFEDRAT/400,MMPM\nRAPID\nGOTO/-160,0,20\nGOTO/-160,0,0\n"

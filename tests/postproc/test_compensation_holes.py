@@ -19,8 +19,8 @@ from postproc.corrected.runs import Runs
 from postproc.corrected.settled import _composed
 from postproc.corrected.walk import Ends, walk
 from postproc.options import Options
-from postproc.pipeline import PostResult
 from postproc.readback.compare import _taken_up
+from postproc.result import PostResult
 from postproc.setup import load_setup
 from tests.postproc.test_compensation_points import two_ways_of_all
 from toolpaths.arrays import Floats

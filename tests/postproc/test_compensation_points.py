@@ -18,7 +18,8 @@ from postproc.cli import app
 from postproc.compensation import unstated
 from postproc.corrected.proof import after_formatting, beyond_bound
 from postproc.options import Options
-from postproc.pipeline import PostResult, verify
+from postproc.pipeline import verify
+from postproc.result import PostResult
 from postproc.setup import load_setup
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Severity
@@ -183,11 +184,12 @@ def test_axes_with_lost_motion_never_turn_back_by_a_last_decimal(sample: str, ma
 def test_points_beyond_the_bound_are_told() -> None:
     result = converted("h4a_indexed.cls", "h4a-c-table", "linuxcnc", "h4a")
     found = after_formatting(result)
-    assert result.compensation is not None and found is not None and not beyond_bound(result)
+    assert result.compensation is not None and found is not None and result.job is not None
+    assert not beyond_bound(found, result.job)
     assert "geometric_errors.bound" not in {d.code for d in result.diagnostics}
     nearer = 0.5 * found.tip.max()
     less = replace(result.compensation, tip_after=result.compensation.tip_after + float(nearer) - found.tip_bound)
-    [told] = beyond_bound(replace(result, compensation=less))
+    [told] = beyond_bound(after_formatting(replace(result, compensation=less)), result.job)
     assert result.job is not None and told.severity == Severity.WARNING and told.code == "geometric_errors.bound"
     assert int(result.job.moves.line[found.points[np.argmax(found.tip)]]) in told.lines
     assert told.count == int((found.tip > nearer).sum())

@@ -16,9 +16,9 @@ from postproc.corrected import walk_loop
 from postproc.corrected.proof import after_formatting
 from postproc.corrected.walk import Ends
 from postproc.options import Options
-from postproc.path import TRAVERSE
-from postproc.pipeline import PostResult
+from postproc.path_model import TRAVERSE
 from postproc.readback.checks import _turning_points
+from postproc.result import PostResult
 from postproc.setup import SetupFile, load_setup
 from tests.postproc.test_compensation_points import two_ways_of_all
 from toolpaths.arrays import Floats

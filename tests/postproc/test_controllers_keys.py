@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import toolpaths
-from postproc.pipeline import PostResult
+from postproc.result import PostResult
 from tests.postproc.kit import convert, toolpath
 from toolpaths.diagnostics import has_errors
 from toolpaths.toolpath import Toolpath

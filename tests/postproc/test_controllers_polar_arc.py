@@ -16,8 +16,8 @@ import toolpaths
 from postproc.controllers.polar_arc import REACH, polar_arc
 from postproc.corrected.proof import after_formatting
 from postproc.options import Options
-from postproc.pipeline import PostResult
 from postproc.program import Hole
+from postproc.result import PostResult
 from tests.postproc.program_kit import blocks, program, step
 from toolpaths.arrays import Floats
 from toolpaths.toolpath import Cycle

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 import toolpaths
 from postproc.cli import app
 from postproc.controllers.model import load_controller
-from postproc.pipeline import PostResult
+from postproc.result import PostResult
 from postproc.setup import SetupFile
 from postproc.summary import as_dict, as_text
 from tests.postproc.kit import convert, good, tool_setup, toolpath

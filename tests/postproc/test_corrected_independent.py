@@ -20,7 +20,7 @@ import toolpaths
 from postproc.corrected.proof import after_formatting
 from postproc.holes import Phase
 from postproc.options import Options
-from postproc.pipeline import PostResult
+from postproc.result import PostResult
 from tests.machines.independent_machine import Errors, Machine
 from tests.machines.random_error_files import Draw
 from tests.postproc.independent_reader import End, read

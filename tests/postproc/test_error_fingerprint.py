@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from postproc.cli import app
-from postproc.program_header import FINGERPRINT
+from postproc.header_words import FINGERPRINT
 
 ERRORS = Path("samples/errors")
 CONTROLLERS = ["linuxcnc", "generic-iso", "fanuc-30i", "haas-ngc", "siemens-840d", "heidenhain-tnc640"]

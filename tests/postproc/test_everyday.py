@@ -12,6 +12,7 @@ import postproc
 import toolpaths
 from postproc.cli import app
 from postproc.cycle_time import source
+from postproc.cycle_time.conversion import estimate_of
 from postproc.orientation.passes import work_of
 from postproc.setup import SetupFile
 from tests.postproc.kit import machine
@@ -245,14 +246,15 @@ def test_the_estimate_takes_what_the_read_back_has_executed(controller: str, mon
     code, motion, _ = source._executed(result.text.encode(), result.controller, result.job.control,
                                        result.job.register_lengths(), "", {})
     assert code is not None and motion is not None
-    again = replace(result, comparison=replace(result.comparison, executed=(code, motion))).estimate
+    again = estimate_of(replace(result, comparison=replace(result.comparison, executed=(code, motion))))
 
     def read(*_: object) -> None:
         raise AssertionError("the text is read again")
 
     monkeypatch.setattr(source, "reader_for", read)
-    assert result.estimate is not None and again is not None and result.estimate.seconds == again.seconds > 0.0
-    assert result.estimate.band == again.band
+    first = estimate_of(result)
+    assert first is not None and again is not None and first.seconds == again.seconds > 0.0
+    assert first.band == again.band
 
 
 def test_a_feed_between_the_cycle_and_its_first_hole_is_the_cycles() -> None:

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 import toolpaths
-from postproc.pipeline import PostResult
+from postproc.result import PostResult
 from tests.postproc.kit import SAMPLES, convert, good
 from toolpaths.diagnostics import has_errors
 

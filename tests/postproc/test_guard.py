@@ -9,9 +9,10 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from postproc import VERSION, __main__
+from postproc import __main__
 from postproc.cli import app
 from postproc.guard import fingerprint, guarded
+from postproc.version import VERSION
 from tests.postproc.kit import SAMPLES
 from toolpaths.cl import read as reader
 

@@ -13,8 +13,8 @@ import pytest
 import machines
 import postproc
 import toolpaths
-from postproc.pipeline import PostResult
 from postproc.readback.verify import read_back
+from postproc.result import PostResult
 from postproc.setup import SetupFile, load_setup
 from postproc.summary import as_dict
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from postproc.pipeline import PostResult
 from postproc.readback.verify import read_back
+from postproc.result import PostResult
 from tests.postproc.kit import codes, convert, good, shop_file, toolpath
 from toolpaths.diagnostics import DiagnosticError
 

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 import toolpaths
-from postproc.pipeline import PostResult
-from postproc.readback.dialects import reader_for
-from postproc.readback.execute import Motion, Offsets, run
+from postproc.readback.dialects.readers import reader_for
+from postproc.readback.execute import Motion, run
+from postproc.readback.offsets import Offsets
+from postproc.result import PostResult
 from tests.postproc.kit import convert, good, tool_setup
 from tests.postproc.test_golden import GOLDEN
 from toolpaths.diagnostics import has_errors

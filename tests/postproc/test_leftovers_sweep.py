@@ -10,7 +10,7 @@ import pytest
 import toolpaths
 from postproc.links import safe_space
 from postproc.moves import Moves
-from postproc.pipeline import PostResult
+from postproc.result import PostResult
 from postproc.setup import Placement
 from tests.postproc.kit import HEAD, codes, convert, good, goto, tilted, tool_setup, toolpath
 from toolpaths.diagnostics import has_errors

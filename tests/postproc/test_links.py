@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from postproc.pipeline import PostResult
+from postproc.result import PostResult
 from postproc.setup import SetupFile
 from tests.postproc.kit import (
     Step,

@@ -11,7 +11,8 @@ import pytest
 
 import toolpaths
 from postproc import home_links, path
-from postproc.pipeline import PostResult, convert
+from postproc.pipeline import convert
+from postproc.result import PostResult
 from postproc.setup import SetupFile
 from tests.benchmarks.bench_many import KINDS, text_of
 

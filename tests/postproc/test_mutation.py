@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 
 import toolpaths
-from postproc.pipeline import PostResult
 from postproc.readback.verify import read_back
+from postproc.result import PostResult
 from tests.postproc.kit import codes, convert, execute, good, goto, sample, setup_of, tilted, toolpath
 from tests.postproc.mutation_kit import Effect, mutants, verdict
 from toolpaths.diagnostics import Severity

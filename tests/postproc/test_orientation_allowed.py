@@ -11,8 +11,9 @@ import trimesh
 
 from postproc.options import Options
 from postproc.orientation.allowed import Allowed, lattice, off_centre
+from postproc.orientation.choice import OrientationChoice
 from postproc.orientation.contact import Contact, contact_of
-from postproc.orientation.orient import OrientationChoice, orient
+from postproc.orientation.orient import orient
 from postproc.orientation.passes import Pass, work_of
 from postproc.orientation.surface import Surface
 from postproc.orientation.timed import turned_all

@@ -14,13 +14,14 @@ from machines.machine import Machine, Timing
 from postproc.collision.passes import pass_bodies
 from postproc.options import Options, Orientation
 from postproc.orientation.allowed import Allowed
-from postproc.orientation.candidates import Tried
+from postproc.orientation.choice import OrientationChoice
 from postproc.orientation.held import common_angles, free_value, held_angles
-from postproc.orientation.orient import OrientationChoice, orient
+from postproc.orientation.orient import orient
 from postproc.orientation.passes import work_of
 from postproc.orientation.reoriented import reoriented
+from postproc.orientation.search import Tried
 from postproc.orientation.timed import turned, turned_all
-from postproc.pipeline import PostResult
+from postproc.result import PostResult
 from postproc.setup import SetupFile, load_setup
 from tests.benchmarks.bench_orientation_limits import chosen, compared, strips, whole
 from tests.postproc.kit import SAMPLES, TOOLS, machine, toolpath

@@ -16,9 +16,10 @@ import toolpaths
 from machines.machine import Machine, Timing
 from postproc.cli import app
 from postproc.options import Options
+from postproc.orientation.choice import OrientationChoice
 from postproc.orientation.choose import seconds, shortest
 from postproc.orientation.cutter import ball_radius
-from postproc.orientation.orient import OrientationChoice, orient
+from postproc.orientation.orient import orient
 from postproc.setup import SetupFile
 from tests.postproc.kit import SAMPLES, machine
 from toolpaths.toolpath import Kind, Tool, Toolpath

@@ -16,11 +16,13 @@ from machines.machine import Machine, Timing
 from postproc import pipeline
 from postproc.cli import app
 from postproc.options import Options, Orientation
+from postproc.orientation.choice import OrientationChoice
 from postproc.orientation.choose import shortest
-from postproc.orientation.orient import OrientationChoice, orient
+from postproc.orientation.orient import orient
 from postproc.orientation.plans import OrientationPlan
 from postproc.orientation.proved import proved
-from postproc.pipeline import PostResult, choose_axes
+from postproc.pipeline import choose_axes
+from postproc.result import PostResult
 from postproc.setup import SetupFile
 from tests.benchmarks.bench_orientation_limits import strips
 from tests.postproc.kit import SAMPLES, machine
@@ -147,22 +149,25 @@ def fault(code: str = "travel.outside", *lines: int) -> Diagnostic:
 
 def test_the_axes_of_the_file_are_what_is_left() -> None:
     control = Control("auto", turned=fault())
-    choice, found = proved(some(), "auto", control)
-    assert choice.plans["auto"].states == (0,) * 16 and choice.program is not None and choice.program.ok
+    made, found = proved(some(), "auto", control)
+    choice = made.choice
+    assert choice.plans["auto"].states == (0,) * 16 and choice.proof is not None and choice.proof.ok and made.program.ok
     assert [d.code for d in found] == ["orient.passed_over"] and "refused" in found[0].message
 
 
 def test_what_the_file_is_refused_for_is_no_reason_to_choose_anew() -> None:
     line = int(some().work.moves.line[5])
     control = Control("auto", always=fault("feed.missing", line))
-    choice, found = proved(some(), "auto", control)
+    made, found = proved(some(), "auto", control)
+    choice = made.choice
     assert len(control.made) == 2 and choice.plans["auto"] is some().plans["auto"]
     assert [d.code for d in found] == ["orient.unproved"]
     assert f"auto for linuxcnc is refused: refused (line {line})" in found[0].message
 
 
 def test_only_auto_becomes_another_plan() -> None:
-    choice, found = proved(some(), "per-pass", Control("per-pass", turned=fault()))
+    made, found = proved(some(), "per-pass", Control("per-pass", turned=fault()))
+    choice = made.choice
     assert choice.plans["per-pass"] is some().plans["per-pass"] and [d.code for d in found] == ["orient.unproved"]
 
 
@@ -173,7 +178,8 @@ def test_lines_of_errors_say_what_is_barred(offset: int, whole: bool) -> None:
     one, first = some().work.passes[5], some().plans["auto"]
     line = int(some().work.moves.line[one.rows[0] + offset])
     control = Control("auto", turned=fault("travel.outside", line), once=True)
-    choice, found = proved(some(), "auto", control)
+    made, found = proved(some(), "auto", control)
+    choice = made.choice
     barred = choice.table.barred
     assert [k for k, bar in enumerate(barred) if bar.any()] == [5]
     assert bool(barred[5][:, first.states[5]].all()) == whole and barred[5][first.states[4], first.states[5]]

@@ -19,8 +19,9 @@ import toolpaths
 from postproc.cli import app
 from postproc.options import Options, Orientation
 from postproc.orientation import losers, reaches, report, shares, text
+from postproc.orientation.choice import OrientationChoice
 from postproc.orientation.figures import held, polytopes, sheet
-from postproc.orientation.orient import OrientationChoice, orient
+from postproc.orientation.orient import orient
 from postproc.orientation.plans import OrientationPlan
 from postproc.orientation.timed import turned
 from postproc.setup import SetupFile

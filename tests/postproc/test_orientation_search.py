@@ -15,8 +15,9 @@ from postproc.options import Options
 from postproc.orientation import rounds
 from postproc.orientation.allowed import Allowed
 from postproc.orientation.candidates import tried
+from postproc.orientation.choice import OrientationChoice
 from postproc.orientation.choose import groupwise, seconds
-from postproc.orientation.orient import OrientationChoice, orient
+from postproc.orientation.orient import orient
 from postproc.orientation.passes import Pass, Work, work_of
 from postproc.orientation.plans import plans_of, table_of
 from postproc.orientation.poses import held_poses

@@ -235,7 +235,7 @@ def test_a_place_that_cannot_be_converted_is_passed_over(monkeypatch: pytest.Mon
     def convert_but_first(*args: object, **kwargs: object) -> object:
         result = real(*args, **kwargs)  # type: ignore[arg-type]
         asked.append(args[3])
-        return pipeline._with(result, [error("test.no", "not there")]) if len(asked) == 1 else result
+        return result.with_found([error("test.no", "not there")]) if len(asked) == 1 else result
 
     monkeypatch.setattr(pipeline, "convert", convert_but_first)
     choice, found = place(passes((1.0, 0.0)), machine("mill-3axis"), setup_of(x=(-50.0, 50.0), turns=[0.0, 30.0]))

@@ -15,8 +15,8 @@ from postproc.feedrate.geometry import MachinePath, Stretch, machine_path, machi
 from postproc.feedrate.limits import JointLimits
 from postproc.feedrate.plan import Options
 from postproc.pass_geometry import PassGeometry, chains, pass_geometry, stops_of
-from postproc.pipeline import PostResult
 from postproc.planned import PassFeed, PlannedMotion, Source, joint_limits, plan_pass, planned_motion
+from postproc.result import PostResult
 from postproc.setup import load_setup
 from postproc.steady_feed import CORNER, steady_speed
 from tests.postproc.kit import SAMPLES, convert, good, goto, machine, toolpath

@@ -17,8 +17,8 @@ from postproc.cli import app
 from postproc.feedrate.limits import JointLimits
 from postproc.merged_feeds import merged
 from postproc.pass_geometry import pass_geometry, stops_of
-from postproc.pipeline import PostResult
 from postproc.planned import joint_limits
+from postproc.result import PostResult
 from postproc.steady_feed import CORNER
 from tests.postproc.kit import SAMPLES, Step, convert, execute, good, goto, machine, toolpath
 from toolpaths.arrays import Floats

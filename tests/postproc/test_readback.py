@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from postproc.readback import align
-from postproc.readback.execute import Motion, Offsets, execute
+from postproc.readback.execute import Motion, execute
+from postproc.readback.offsets import Offsets
 from postproc.readback.words import tokenise
 from tests.postproc.kit import Peer, codes, unit
 from toolpaths.diagnostics import Diagnostic

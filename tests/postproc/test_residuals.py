@@ -14,8 +14,9 @@ from machines.geometric_error import load
 from postproc.cli import app
 from postproc.corrected.proof import after_formatting
 from postproc.options import Options
-from postproc.pipeline import PostResult
-from postproc.residuals import ARCSEC, UM, Residuals, contents, residuals
+from postproc.residual_files import contents
+from postproc.residuals import ARCSEC, UM, Residuals, residuals
+from postproc.result import PostResult
 from postproc.setup import SetupFile, load_setup
 from toolpaths.arrays import Floats
 from toolpaths.units import DEG

@@ -12,7 +12,7 @@ import postproc
 import toolpaths
 from machines.geometric_error.loader import load
 from postproc.options import Options
-from postproc.pipeline import PostResult
+from postproc.result import PostResult
 
 OFF_ITS_LINE = """
 [components.EA{0}]

@@ -10,7 +10,7 @@ import pytest
 
 import postproc
 import toolpaths
-from postproc.pipeline import PostResult
+from postproc.result import PostResult
 from postproc.setup import Placement, SetupFile, load_setup, part_placement
 from tests.postproc.kit import (
     SAMPLES,

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from postproc import pipeline
-from postproc.pipeline import PostResult
+from postproc import stages
+from postproc.result import PostResult
 from tests.postproc.kit import codes, convert, good, toolpath
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Severity, error
@@ -90,7 +90,7 @@ def test_points_that_stay_are_reported_and_no_move_is_faster() -> None:
 
 def failing(monkeypatch: pytest.MonkeyPatch, fails: Any) -> None:
     """The proof of a program finds an error on the lines that `fails` (text, call) names."""
-    read_back, calls = pipeline.read_back, [0]
+    read_back, calls = stages.read_back, [0]
 
     def proof(text: str, job: Any, *rest: Any, **options: Any) -> Any:
         comparison, found = read_back(text, job, *rest, **options)
@@ -99,7 +99,7 @@ def failing(monkeypatch: pytest.MonkeyPatch, fails: Any) -> None:
         return comparison, found + ([error("verify.tip", "the tip is off by 1 mm", file=job.toolpath.file,
                                            lines=lines)] if lines is not None else [])
 
-    monkeypatch.setattr(pipeline, "read_back", proof)
+    monkeypatch.setattr(stages, "read_back", proof)
 
 
 def wavy(z: float) -> tuple[Floats, Floats]:

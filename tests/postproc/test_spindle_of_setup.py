@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 import postproc
 from postproc.cli import app
-from postproc.pipeline import PostResult
+from postproc.result import PostResult
 from postproc.setup import SetupFile, load_setup
 from tests.postproc.kit import convert, good, machine, toolpath
 from toolpaths.diagnostics import Diagnostic, Severity

@@ -11,8 +11,9 @@ import pytest
 import toolpaths
 from postproc import moves, travel
 from postproc.options import Options
-from postproc.pipeline import PostResult, convert
+from postproc.pipeline import convert
 from postproc.readback import checks, compare, modal, sections, slow, states, words
+from postproc.result import PostResult
 from tests.postproc.kit import good
 from toolpaths.rotations import cross, lengths
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from postproc.pipeline import PostResult
 from postproc.readback.verify import read_back
+from postproc.result import PostResult
 from tests.postproc.kit import convert, good, pose_of, setup_of, shop_file, tilted, toolpath
 from tests.postproc.reader_kit import FANUC
 from toolpaths.diagnostics import Severity

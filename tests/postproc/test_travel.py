@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 import machines
 from postproc.cli import app
-from postproc.pipeline import PostResult
+from postproc.result import PostResult
 from postproc.setup import SetupFile
 from tests.postproc.kit import NX, circle, codes, convert, execute, goto, machine, sample, tilted, toolpath
 

@@ -6,8 +6,8 @@ from functools import cache
 
 import pytest
 
-from postproc.pipeline import PostResult, VerifyResult
 from postproc.readback.verify import read_back
+from postproc.result import PostResult, VerifyResult
 from postproc.summary import verify_text
 from tests.postproc.kit import convert, good, sample, toolpath
 from toolpaths.diagnostics import Diagnostic, Severity

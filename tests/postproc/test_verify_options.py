@@ -11,7 +11,8 @@ import pytest
 import postproc
 import toolpaths
 from postproc.options import Options
-from postproc.pipeline import PostResult, VerifyResult, verify
+from postproc.pipeline import verify
+from postproc.result import PostResult, VerifyResult
 from tests.postproc.kit import SAMPLES, TOOLS
 from toolpaths.diagnostics import Severity
 from toolpaths.toolpath import Toolpath

@@ -144,6 +144,9 @@ class Builder:
         """END-OF-PATH stood in the file"""
         self.finished = -1
         """row at the first FINI"""
+        self._start_turned_and_called()
+
+    def _start_turned_and_called(self) -> None:
         self.calls: list[tuple[int, int]] = []
         self.table = [0.0, 0.0, 0.0]
         self.turned: Floats = np.eye(3)

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from postproc.joints.spin import free_joint
-from postproc.orientation.candidates import Lost, Tried
 from postproc.orientation.reaches import least_held
+from postproc.orientation.search import Lost, Tried
 from postproc.orientation.timed import Turned
 from toolpaths.drawing import plain
 from toolpaths.units import DEG

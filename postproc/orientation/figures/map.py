@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from postproc.orientation.candidates import Kind, Tried
 from postproc.orientation.losers import KINDS
 from postproc.orientation.passes import Work
 from postproc.orientation.reaches import least_under
+from postproc.orientation.search import Kind, Tried
 from postproc.orientation.timed import Turned
 from toolpaths.arrays import Floats
 from toolpaths.rotations import angle_between

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from postproc.options import Orientation
-from postproc.orientation.orient import OrientationChoice
+from postproc.orientation.choice import OrientationChoice
 from postproc.orientation.plans import OrientationPlan
 from postproc.orientation.report import NAMES, gain
 from postproc.orientation.shares import shares_of

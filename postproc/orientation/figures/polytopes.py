@@ -8,9 +8,9 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 from machines.polytope import Polytope
-from postproc.orientation.candidates import Tried
 from postproc.orientation.passes import Work
 from postproc.orientation.reaches import binding, direction_of, polytopes, reaches
+from postproc.orientation.search import Tried
 from postproc.orientation.timed import Turned
 from toolpaths.arrays import Floats, Ints
 

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from postproc.orientation.candidates import Tried
 from postproc.orientation.figures.polytopes import COLOURS, SCALE, SHOWN, short
 from postproc.orientation.reaches import Reach, feed_of, reaches
+from postproc.orientation.search import Tried
 from postproc.orientation.timed import Turned
 from toolpaths.drawing import plain
 

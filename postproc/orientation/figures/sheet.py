@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from postproc.options import Orientation
-from postproc.orientation.candidates import Tried
+from postproc.orientation.choice import OrientationChoice
 from postproc.orientation.figures.held import held_panel, is_held
 from postproc.orientation.figures.map import axes_map
 from postproc.orientation.figures.overview import angle_panel, gain_panel, plan_panel
 from postproc.orientation.figures.polytopes import box_panel, order_panel
 from postproc.orientation.figures.reach import reach_panel
-from postproc.orientation.orient import OrientationChoice
 from postproc.orientation.passes import Work
 from postproc.orientation.report import gain
+from postproc.orientation.search import Tried
 from postproc.orientation.text import orientation, percent, seconds
 from postproc.orientation.timed import Turned
 from toolpaths.drawing import image, plain

@@ -9,7 +9,7 @@ import postproc
 import postproc.second_witness
 import toolpaths
 from postproc.options import Options
-from postproc.pipeline import PostResult
+from postproc.result import PostResult
 from postproc.second_witness import second_witness
 from postproc.setup import SetupFile
 from postproc.witness.clfile import commanded

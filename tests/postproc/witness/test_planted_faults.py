@@ -29,7 +29,7 @@ import toolpaths.cl.subprograms
 from machines.serial_models import SerialModel
 from machines.slider_models import SliderModel
 from postproc.job import Job
-from postproc.pipeline import PostResult
+from postproc.result import PostResult
 from postproc.second_witness import second_witness
 from postproc.setup import Placement, SetupFile
 from toolpaths.cl.build import Builder

@@ -1,0 +1,33 @@
+"""The writer of each dialect."""
+
+from __future__ import annotations
+
+from postproc.controllers.model import ControllerFile
+from postproc.controllers.writer import Writer
+from postproc.program import Program
+from toolpaths.toolpath import Cycle
+
+
+def writer_for(controller: ControllerFile, program: Program, cycles: tuple[Cycle, ...], length_offsets: bool,
+               smoothing: float, work_offset: str = "G54", axis_smoothing: float = 0.0, name: str = "",
+               subprograms: bool = False) -> Writer:
+    """The writer that the controller file names.
+
+    Args:
+        length_offsets: axis positions of Z are less the tool's length, which a register of the control adds
+        smoothing, axis_smoothing: mm and degrees left to the controller's own smoothing
+        work_offset: the set-up's code, G54 to G59.3
+        name: of the program, where the controller's programs hold one
+        subprograms: each operation becomes a subprogram of the file, where the controller has such
+    """
+    from postproc.controllers.fanuc import FanucWriter
+    from postproc.controllers.haas import HaasWriter
+    from postproc.controllers.heidenhain import KlartextWriter
+    from postproc.controllers.iso import IsoWriter
+    from postproc.controllers.linuxcnc import LinuxcncWriter
+    from postproc.controllers.siemens import SiemensWriter
+
+    writers: dict[str, type[Writer]] = {"iso": IsoWriter, "linuxcnc": LinuxcncWriter, "fanuc": FanucWriter,
+                                        "haas": HaasWriter, "siemens": SiemensWriter, "heidenhain": KlartextWriter}
+    return writers[controller.writer](controller, program, cycles, length_offsets, smoothing, work_offset, axis_smoothing,
+                                      name, subprograms)

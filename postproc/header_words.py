@@ -1,0 +1,12 @@
+"""Words of the program's header that the reader looks for."""
+
+from __future__ import annotations
+
+FINGERPRINT = "fingerprint of the geometric errors"
+"""before the eight hex digits of the error model that a program was written with"""
+FEEDS = "fingerprint of the planned feeds"
+"""before the eight hex digits of the F words"""
+UNKNOWN = "--------"
+"""in their place while the program is written"""
+HEADER = 4000
+"""characters of a program that hold its header"""

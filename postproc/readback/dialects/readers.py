@@ -1,0 +1,22 @@
+"""The reader of each dialect."""
+
+from __future__ import annotations
+
+from postproc.controllers.model import ControllerFile
+from postproc.readback.dialects.base import Reader
+from toolpaths.arrays import Floats
+
+
+def reader_for(controller: ControllerFile, letters: tuple[str, ...], home: Floats | None = None,
+               stop: str = "") -> Reader:
+    """The reader of the dialect that the controller file's writer writes; `home` (J,): machine coordinates, mm, degrees;
+    `stop`: what stops switch off where the machine file says it."""
+    from postproc.readback.dialects.fanuc import FanucReader
+    from postproc.readback.dialects.haas import HaasReader
+    from postproc.readback.dialects.iso import IsoReader
+    from postproc.readback.dialects.klartext import KlartextReader
+    from postproc.readback.dialects.siemens import SiemensReader
+
+    readers: dict[str, type[Reader]] = {"iso": IsoReader, "linuxcnc": IsoReader, "fanuc": FanucReader, "haas": HaasReader,
+                                        "siemens": SiemensReader, "heidenhain": KlartextReader}
+    return readers[controller.writer](letters, controller, home, stop)

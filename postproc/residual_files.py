@@ -1,0 +1,32 @@
+"""The files of a residual field: a table, or drawn."""
+
+from __future__ import annotations
+
+from postproc.residuals import as_csv, residuals, title
+from postproc.result import PostResult
+from toolpaths.diagnostics import Diagnostic, error
+from toolpaths.drawing import FORMATS
+
+ENDINGS = (".csv", *FORMATS)
+"""of files that a field is written to: a table, drawings"""
+
+
+def contents(result: PostResult, endings: list[str]) -> tuple[list[str | bytes], list[Diagnostic]]:
+    """What files of these endings (of ENDINGS) hold: the field as a table, or drawn; nothing, and why, where there is none.
+
+    Raises:
+        ValueError: for another ending.
+    """
+    found = residuals(result) if result.ok else None
+    if found is None:
+        return [], [no_field(result.options.error_model)] if result.ok else []
+    from postproc.residual_figure import residual_figure
+
+    return [as_csv(found, result) if ending == ".csv" else residual_figure(found, title(result), ending)
+            for ending in endings], []
+
+
+def no_field(file: str) -> Diagnostic:
+    """Why a conversion without correction has none."""
+    return error("residuals.none", "the error model says that the control corrects: the program is nominal and leaves no "
+                 "residuals to write", file=file, hint='leave --residuals out, or corrected_by = "post" in the model')

@@ -1,0 +1,97 @@
+"""What a conversion and a verification come to: data only, with all that lies between CL file and text."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+from typing import TYPE_CHECKING, Any
+
+from machines.machine import Machine
+from postproc.controllers.model import ControllerFile
+from postproc.feed import Feeds
+from postproc.job import Job
+from postproc.moves import Moves
+from postproc.options import Options
+from postproc.path_model import Path
+from postproc.planned import PlannedMotion
+from postproc.program import Program
+from postproc.readback.compare import Comparison
+from postproc.setup import SetupFile
+from toolpaths.diagnostics import Diagnostic, has_errors
+from toolpaths.toolpath import ClSource, Toolpath
+
+if TYPE_CHECKING:
+    from postproc.compensation import Compensation
+    from postproc.corrected.formatted import AfterFormatting
+    from postproc.orientation.choice import OrientationChoice
+    from postproc.witness.evidence import Testimony
+
+
+@dataclass(frozen=True)
+class PostResult:
+    """A conversion with everything between: `text` is "" where a diagnostic is an ERROR."""
+
+    text: str
+    options: Options
+    machine: Machine
+    controller: ControllerFile
+    controller_name: str
+    setup: SetupFile
+    diagnostics: tuple[Diagnostic, ...]
+    toolpath: Toolpath
+    """as it was read, oriented and, where it could be, with its records spelt out"""
+    job: Job | None = None
+    moves: Moves | None = None
+    """that are written: those of `job`, with --smooth moved"""
+    path: Path | None = None
+    nominal: Path | None = None
+    """the path before geometric errors are corrected, where they are"""
+    compensation: Compensation | None = None
+    program: Program | None = None
+    feeds: Feeds | None = None
+    motion: PlannedMotion | None = None
+    comparison: Comparison | None = None
+    extents: dict[str, tuple[float, float]] | None = None
+    shares: dict[str, float] | None = None
+    files: dict[str, str] | None = None
+    """texts of subprograms in files of their own, by file name"""
+    choice: OrientationChoice | None = None
+    """of the tool axes that `toolpath` has instead of the CL file's, where --orient asked for one"""
+    source: ClSource | None = None
+    """of the path as it was read, for the second witness"""
+    asked: SetupFile | None = None
+    """the set-up as the shop has it, before [part] is said in the absolute frame"""
+    witness: Testimony | None = None
+    """what the second witness says"""
+    after_formatting: AfterFormatting | None = None
+    """what is left of geometric errors at the CL points; None where none are corrected"""
+    reached: str = ""
+    """name of the last stage that ran, "" where none did"""
+
+    @property
+    def ok(self) -> bool:
+        """True where nothing stands against writing the text."""
+        return not has_errors(self.diagnostics)
+
+    def with_found(self, found: list[Diagnostic], **values: Any) -> PostResult:
+        """With more diagnostics, and other values."""
+        return replace(self, diagnostics=(*self.diagnostics, *found), **values)
+
+
+@dataclass(frozen=True)
+class VerifyResult:
+    """What reading a G-code file back showed."""
+
+    gcode: str
+    comparison: Comparison | None
+    diagnostics: tuple[Diagnostic, ...]
+    witness: Testimony | None = None
+
+    @property
+    def ok(self) -> bool:
+        """True where the program does what the CL file says."""
+        return self.comparison is not None and not has_errors(self.diagnostics)
+
+
+def shared_fields(kind: type[Any], other: object) -> dict[str, Any]:
+    """The values that a dataclass has under the names of fields of `kind`."""
+    return {one.name: getattr(other, one.name) for one in fields(kind) if hasattr(other, one.name)}

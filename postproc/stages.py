@@ -1,0 +1,251 @@
+"""The journey of one toolpath as a table of stages; only reading and writing touch files.
+
+Each stage is a pure function: what the one before has handed on, and progress, to that with more fields, and diagnostics.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path as FilePath
+from typing import Any
+
+from postproc.compile import compile_program, writing_of
+from postproc.controllers.unwritable import unwritable
+from postproc.controllers.writers import writer_for
+from postproc.feed import Planned as PlannedFeeds
+from postproc.job import Job, prepare
+from postproc.moves import Moves
+from postproc.not_canned import only_canned
+from postproc.pass_geometry import stops_of
+from postproc.path import build_path
+from postproc.path_model import Path
+from postproc.planned import PlannedMotion, Source, planned_motion
+from postproc.planned_errors import PlannedCorrection, on_written, planned_correction
+from postproc.program_header import header_lines
+from postproc.reach import check_reach
+from postproc.readback.slow import with_fingerprint
+from postproc.readback.verify import read_back
+from postproc.result import PostResult, shared_fields
+from postproc.rewinds import drawing_of
+from postproc.second_witness import second_witness
+from postproc.setup import SetupFile
+from postproc.setup_system import with_system
+from postproc.singular import check_singular
+from postproc.smoothed_stages import Left, written_moves
+from postproc.stage_values import (
+    Begun,
+    Checked,
+    Compiled,
+    Corrected,
+    Placed,
+    Planned,
+    Prepared,
+    Shared,
+    Solved,
+    Verified,
+    Written,
+    handed_on,
+)
+from postproc.tolerance_shares import tolerance_shares
+from postproc.travel import check_travel
+from postproc.word_rows import block_tools
+from toolpaths.diagnostics import Diagnostic, error, has_errors
+from toolpaths.smoothing.smooth import Tolerance
+from toolpaths.units import DEG
+
+Progress = Callable[[str, int, int], None]
+Found = list[Diagnostic]
+_STRETCH = 1_000_000
+"""characters of a program that are looked at together"""
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One step of a conversion: its name, what it does, and the function.
+
+    Where the function cannot make its value it hands back what it was given, with the errors that say why; an error ends the
+    conversion either way.
+    """
+
+    name: str
+    does: str
+    run: Callable[[Any, Progress | None], tuple[Begun, Found]]
+
+
+def staged(result: PostResult, progress: Progress | None = None, left: Left = frozenset()) -> PostResult:
+    """A conversion through all stages, up to the first that finds an error; `left`: passes that --smooth leaves."""
+    made: Any = Begun(**shared_fields(Begun, result), left=left)
+    for stage in STAGES:
+        made, found = stage.run(made, progress)
+        result = replace(_recorded(result, made, found), reached=stage.name)
+        if not result.ok:
+            return result
+        made = replace(made, diagnostics=result.diagnostics)
+    return replace(result, text=made.text, files=made.files)
+
+
+def _recorded(result: PostResult, made: Begun, found: Found) -> PostResult:
+    """With what a stage has handed on; the text only stands in it at the end."""
+    known = shared_fields(PostResult, made)
+    return result.with_found(found, **{name: known[name] for name in known.keys() - {"text", "files", "diagnostics"}})
+
+
+def prepared(begun: Begun, progress: Progress | None) -> tuple[Begun | Prepared, Found]:
+    """Records, tools, cycles, output modes and linking moves of the path, as the machine and the control take them."""
+    options = begun.options
+    job, found = prepare(begun.toolpath, begun.machine, begun.controller, begun.setup, options)
+    found = [*found, *_bad_meshes(begun.setup, options.setup)]
+    if job is None:
+        return begun, found
+    return handed_on(Prepared, begun, job=job, toolpath=begun.toolpath if has_errors(found) else job.toolpath), found
+
+
+def _bad_meshes(setup: SetupFile, file: str) -> Found:
+    """Errors in the meshes of a set-up, told before anything is planned."""
+    if setup.bodies is None:
+        return []
+    from postproc.collision.bodies import mesh_errors
+
+    return mesh_errors(setup, file)
+
+
+def shared(made: Prepared, progress: Progress | None) -> tuple[Shared, Found]:
+    """The tolerance shared out."""
+    shares, found = tolerance_shares(made.job)
+    return handed_on(Shared, made, shares=shares), found
+
+
+def placed(made: Shared, progress: Progress | None) -> tuple[Placed, Found]:
+    """The moves that are written, with --smooth moved; how the tool is drawn back."""
+    job = made.job
+    moves, found = written_moves(job, made.shares, made.left)
+    drawing, more = drawing_of(job.setup, job.placement, job.space, job.machine, made.options.setup or made.toolpath.file)
+    return handed_on(Placed, made, moves=moves, drawing=drawing), [*found, *more]
+
+
+def solved(made: Placed, progress: Progress | None) -> tuple[Placed | Solved, Found]:
+    """Joints of every run, linking moves between them, points between."""
+    job, shares = made.job, made.shares
+    path, found = build_path(job.modes, job.kinematics, made.moves, job.space, job.home_rows(), job.operation,
+                             shares["linearising"], shares["axis_linearising"] * DEG, made.toolpath.file, progress,
+                             made.drawing)
+    found = with_system(found, job.work_system, job.placement)
+    return (made if path is None else handed_on(Solved, made, path=path)), found
+
+
+def corrected(made: Solved, progress: Progress | None) -> tuple[Solved | Corrected, Found]:
+    """The path on the machine with its geometric errors, where it is inside travel without."""
+    job, path = made.job, made.path
+    if job.errors is None or job.errors.corrected_by != "post":
+        return handed_on(Corrected, made, nominal=None, compensation=None), []
+    from postproc.compensation import compensate
+
+    options, file, moves = made.options, made.toolpath.file, made.moves
+    far = check_travel(path, job.moves, job.control, job.kinematics, file)[0]
+    far += check_reach(path, job.moves, job.control, file)
+    if has_errors(far):
+        return made, with_system(far, job.work_system, job.placement)
+    better, report, found = compensate(path, moves, block_tools(path, moves), job.kinematics, job.errors, job.modes,
+                                       options.tolerance, job.axis_tolerance, writing_of(job, moves),
+                                       only_canned(job.toolpath, job.controller), options.error_beyond, file)
+    if better is None:
+        return made, found
+    return handed_on(Corrected, made, path=better, nominal=path, compensation=report), found
+
+
+def checked(made: Corrected, progress: Progress | None) -> tuple[Checked, Found]:
+    """Travel, reach, distance from singular positions."""
+    job, path, file = made.job, made.path, made.toolpath.file
+    found, extents = check_travel(path, job.moves, job.control, job.kinematics, file)
+    found += check_reach(path, job.moves, job.control, file)
+    found += check_singular(path, job.moves, job.control, job.setup.joints.singular_distance, file)
+    return handed_on(Checked, made, extents=extents), with_system(found, job.work_system, job.placement)
+
+
+def planned(made: Checked, progress: Progress | None) -> tuple[Planned, Found]:
+    """What the passes allow under the limits of the axes, with --feed planned."""
+    correction = planned_correction(made.job, made.compensation, made.path)
+    motion, found = plan_motion(made.job, made.moves, made.nominal or made.path, correction)
+    return handed_on(Planned, made, motion=motion), found
+
+
+def plan_motion(job: Job, moves: Moves, path: Path,
+                correction: PlannedCorrection | None = None) -> tuple[PlannedMotion | None, Found]:
+    """The motion of a path within the limits of the axes; None without --feed planned."""
+    if job.options.feed != "planned":
+        return None, []
+    return planned_motion(Source(path, moves, job.machine, job.kinematics,
+                                 Tolerance(job.options.tolerance, job.axis_tolerance), stops_of(job.toolpath, moves),
+                                 job.toolpath.file, correction))
+
+
+def compiled(made: Planned, progress: Progress | None) -> tuple[Compiled, Found]:
+    """Canonical words, rounded, with feeds, commands, cycles and sections; what the control cannot write is refused."""
+    job, motion, compensation = made.job, made.motion, made.compensation
+    feeds_planned = None if motion is None else PlannedFeeds(on_written(compensation, motion.needed),
+                                                             made.options.merge_feeds)
+    program, feeds, found = compile_program(job, made.moves, made.path, feeds_planned,
+                                            None if compensation is None else compensation.apart)
+    found += unwritable(made.controller, program, made.toolpath.cycles, made.toolpath.file, job.control.length_on_z)
+    return handed_on(Compiled, made, program=program, feeds=feeds), found
+
+
+def written(made: Compiled, progress: Progress | None) -> tuple[Written, Found]:
+    """The text of the program, header with what made it, and of its subprograms in files of their own."""
+    file, setup, shares = made.toolpath.file, made.setup, made.shares
+    writer = writer_for(made.controller, made.program, made.toolpath.cycles, made.job.control.length_on_z,
+                        shares["smoothing"], setup.work_offset_code, axis_smoothing=shares["axis_smoothing"],
+                        name=made.options.name or FilePath(file).stem, subprograms=setup.output.divided)
+    text = writer.text(header_lines(made))
+    files = {name: "\n".join(blocks) + "\n" for name, blocks in writer.files.items()}
+    text, most = with_fingerprint(text, files), made.controller.format.line_length
+    return handed_on(Written, made, text=text, files=files), [
+        d for one in (text, *files.values()) for d in long_blocks(one, most, file)]
+
+
+def long_blocks(text: str, most: int, file: str) -> Found:
+    """Blocks with more characters than the controller reads."""
+    long, at, before = list[tuple[int, str]](), 0, 0
+    while at < len(text):
+        stop = text.find("\n", min(at + _STRETCH, len(text) - 1)) + 1 or len(text)
+        lines = text[at:stop].splitlines()
+        long += [(before + n, line) for n, line in enumerate(lines, 1) if len(line) > most]
+        at, before = stop, before + len(lines)
+    if not long:
+        return []
+    number, line = long[0]
+    return [error("write.line_length", f"block {number} of the program has {len(line)} characters, the controller reads "
+                  f"{most}: {line[:60]}", file=file, count=len(long), hint="format.line_length of the controller file")]
+
+
+def verified(made: Written, progress: Progress | None) -> tuple[Verified, Found]:
+    """The text executed as the control would, held against the CL file; then by the second witness."""
+    job, witness = made.job, None
+    comparison, found = read_back(made.text, job, made.toolpath.file, progress,
+                                  others={name: text.encode() for name, text in made.files.items()})
+    if comparison is not None and not has_errors(found):
+        witness, more = second_witness(made.source, made.asked or made.setup, made.options, job, comparison)
+        found = [*found, *more]
+    value = handed_on(Verified, made, comparison=comparison, witness=witness, after_formatting=None)
+    if made.compensation is None:
+        return value, found
+    from postproc.corrected.proof import after_formatting, beyond_bound
+
+    left = after_formatting(value)
+    return replace(value, after_formatting=left), [*found, *beyond_bound(left, job)]
+
+
+STAGES = (
+    Stage("prepare", "records, tools, cycles, output modes: the moves that everything is compared with", prepared),
+    Stage("share", "the tolerance shared out", shared),
+    Stage("place", "the moves that are written, with --smooth moved; how the tool is drawn back", placed),
+    Stage("solve", "joints, linking moves, points between", solved),
+    Stage("correct", "geometric errors", corrected),
+    Stage("check", "travel, reach, singular positions", checked),
+    Stage("plan", "feeds within the limits of the axes", planned),
+    Stage("compile", "canonical words, feeds, commands, cycles", compiled),
+    Stage("write", "text in the control's dialect", written),
+    Stage("verify", "read back, compared with the CL file, second witness", verified),
+)
+"""in order; each is given what the one before hands on"""

@@ -1,0 +1,42 @@
+"""Where the tolerance goes: the control's smoothing, rounding, geometric errors, moved points, linearising."""
+
+from __future__ import annotations
+
+from postproc.job import Job
+from postproc.rounding import rounding_problem
+from toolpaths.diagnostics import Diagnostic, error
+from toolpaths.units import DEG
+
+MARGIN = 0.85
+"""of what is left for linearising: deviations are looked at in samples, the read-back looks at others"""
+POINTS = 0.5
+"""of the share for linearising that --smooth may move points by"""
+
+
+def tolerance_shares(job: Job) -> tuple[dict[str, float], list[Diagnostic]]:
+    """Where the tolerance goes (mm; axis_ in degrees): what the control's smoothing and rounding leave is linearising."""
+    tolerance, axis = job.options.tolerance, job.options.axis_tolerance
+    bound = job.rounding
+    kinematics = job.controller.kinematics
+    fixed = kinematics.smoothing_fixed
+    smoothing = kinematics.smoothing_share * tolerance if fixed is None else fixed
+    axis_smoothing = kinematics.axis_smoothing_share * axis
+    shares = {"smoothing": smoothing, "axis_smoothing": axis_smoothing,
+              "rounding": bound.tip, "axis_rounding": bound.axis / DEG,
+              "linearising": MARGIN * (tolerance - smoothing - bound.tip),
+              "axis_linearising": MARGIN * (axis - axis_smoothing - bound.axis / DEG)}
+    if job.errors is not None and job.errors.corrected_by == "post":
+        from postproc.compensation import SHARE
+
+        shares |= {"geometric_errors": SHARE * tolerance, "axis_geometric_errors": SHARE * axis}
+        for name in ("linearising", "axis_linearising"):
+            shares[name] -= shares[name.replace("linearising", "geometric_errors")]
+    if job.options.smooth:
+        for name in ("linearising", "axis_linearising"):
+            shares[name.replace("linearising", "points")] = POINTS * shares[name]
+            shares[name] *= 1.0 - POINTS
+    if smoothing >= tolerance:
+        return shares, [error("tolerance.smoothing", f"the control's own smoothing takes {smoothing:g} mm, the tolerance is "
+                              f"{tolerance:g} mm", hint="a wider --tolerance, or a smaller kinematics.smoothing_fixed in "
+                              "the controller file")]
+    return shares, rounding_problem(bound, tolerance - smoothing, job.axis_tolerance - axis_smoothing * DEG)

@@ -1,0 +1,71 @@
+"""The table of stages: each takes what the one before hands on, an error ends the conversion, the README lists them."""
+
+from __future__ import annotations
+
+import typing
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+import machines
+import postproc
+import toolpaths
+from postproc import stages
+from postproc.options import Options
+from postproc.pipeline import convert
+from postproc.stage_values import Begun, Verified
+from postproc.stages import STAGES, Stage
+from postproc.trace import as_text, trace_line
+from toolpaths.diagnostics import error
+
+README = Path(postproc.__file__).parent / "README.md"
+CL = b"UNITS/MM\nLOADTL/1\nSPINDL/3000,RPM,CLW\nRAPID\nGOTO/0,0,20\nFEDRAT/400,MMPM\nGOTO/0,0,0\nGOTO/9,0,0\nFINI\n"
+
+
+def taken_and_handed_on(stage: Stage) -> tuple[type, set[type]]:
+    hints = typing.get_type_hints(stage.run)
+    value = typing.get_args(hints["return"])[0]
+    return hints[next(iter(hints))], set(typing.get_args(value)) or {value}
+
+
+def test_each_stage_takes_what_the_one_before_hands_on() -> None:
+    given: type = Begun
+    for stage in STAGES:
+        takes, hands_on = taken_and_handed_on(stage)
+        assert takes is given and hands_on <= {takes, given := max(hands_on, key=lambda kind: len(kind.__mro__))}
+        assert issubclass(given, takes) and given is not takes
+    assert given is Verified
+
+
+@pytest.mark.parametrize("at", range(len(STAGES)), ids=[stage.name for stage in STAGES])
+def test_an_error_ends_the_conversion(at: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    ran: list[str] = []
+
+    def counted(number: int, stage: Stage) -> Stage:
+        def run(made: Begun, progress: stages.Progress | None) -> tuple[Begun, list[stages.Diagnostic]]:
+            ran.append(stage.name)
+            value, found = stage.run(made, progress)
+            return value, [*found, error("test.stage", "planted", hint="none")] if number == at else found
+        return replace(stage, run=run)
+
+    monkeypatch.setattr(stages, "STAGES", tuple(counted(k, stage) for k, stage in enumerate(STAGES)))
+    path, found = toolpaths.read_bytes(CL)
+    result = convert(path, machines.load("mill-3axis"), options=Options(), diagnostics=found)
+    assert ran == [stage.name for stage in STAGES[:at + 1]] and not result.ok and result.text == "" and not result.files
+    traced, _ = trace_line(result, 5)
+    assert [one["stage"] for one in traced["stages"] if one["done"]] == ran[:-1] and result.reached == ran[-1]
+    assert f"ends before  {ran[-1]} (" in as_text(traced)
+    assert result.job is not None and (result.program is not None) == ("compile" in ran)
+
+
+def test_a_conversion_that_is_written_has_run_them_all() -> None:
+    path, found = toolpaths.read_bytes(CL)
+    result = convert(path, machines.load("mill-3axis"), options=Options(), diagnostics=found)
+    traced, _ = trace_line(result, 5)
+    assert result.ok and all(one["done"] for one in traced["stages"]) and "ends before" not in as_text(traced)
+
+
+def test_the_readme_lists_the_stages() -> None:
+    text = " ".join(README.read_text("utf-8").split())
+    assert f"stages: {', '.join(stage.name for stage in STAGES)}." in text
