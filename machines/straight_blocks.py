@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -19,7 +20,7 @@ from machines.kinematics.h4_linear import H4Linear
 from machines.kinematics.jets import ZERO, Angle, Jet, straight
 from machines.kinematics.linear_delta import LinearDelta
 from machines.kinematics.serial import Serial
-from machines.kinematics.sliders import Legs
+from machines.kinematics.sliders import Legs, solved
 from toolpaths.arrays import Floats
 
 _Z = (0.0, 0.0, 1.0)
@@ -143,30 +144,32 @@ class _Loop:
         return (Jet(_columns(place), _columns(first), _columns(c2), third),
                 Angle(tilt, rate, t2, third / self._lever if self.tilts else 0.0))
 
-    @property
+    @cached_property
     def _across(self) -> Floats:
         """f: the arms' part across x."""
         result: Floats = self.arms * np.array([0.0, 1.0, 1.0])
         return result
 
-    @property
+    @cached_property
     def _along(self) -> Floats:
         """e = x x b."""
-        return np.stack([np.zeros_like(self.arms[..., 0]), -self.arms[..., 2], self.arms[..., 1]], axis=-1)
+        along = np.zeros(self.arms.shape)
+        along[..., 1], along[..., 2] = -self.arms[..., 2], self.arms[..., 1]
+        return along
 
-    @property
+    @cached_property
     def _reach(self) -> Floats:
         """(K,) mm: |e| of each leg, the same at every tilt."""
         if not len(self.arms):
             return np.zeros(self.arms.shape[1])
         return np.asarray(np.linalg.norm(self._along, axis=2).max(axis=0), dtype=np.float64)
 
-    @property
+    @cached_property
     def _lever(self) -> float:
         """mm per rad that makes the tilt a length, so that norms mean something."""
         return max(float(self._reach.max(initial=0.0)), 1.0)
 
-    @property
+    @cached_property
     def _jx(self) -> Floats:
         if not self.tilts:
             return self.rods
@@ -174,11 +177,8 @@ class _Loop:
         return np.concatenate([self.rods, moment[..., None]], axis=2)
 
     def _solved(self, right: Floats) -> Floats:
-        jx = self._jx
-        bad = ~(np.abs(np.linalg.det(np.nan_to_num(jx))) > 0.0) | ~np.isfinite(right).all(axis=1)
-        safe = np.where(bad[:, None, None], np.eye(jx.shape[1]), jx)
-        result: Floats = np.asarray(np.linalg.solve(safe, np.nan_to_num(right)[..., None])[..., 0], dtype=np.float64)
-        result[bad] = np.nan
+        result = solved(self._jx, right)
+        result[~np.isfinite(right).all(axis=1)] = np.nan
         return result
 
     def _first(self) -> tuple[Floats, Floats, Floats]:

@@ -10,9 +10,17 @@ import pytest
 
 from tests import environment
 from tests.linuxcnc import interpreter, simulator
+from tests.processor_time import (
+    pytest_addoption,
+    pytest_runtest_protocol,
+    pytest_sessionfinish,
+    pytest_terminal_summary,
+    pytest_testnodedown,
+)
 from tests.tiers import QUICK
 
-__all__ = ["environment"]
+__all__ = ["environment", "pytest_addoption", "pytest_runtest_protocol", "pytest_sessionfinish", "pytest_terminal_summary",
+           "pytest_testnodedown"]
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

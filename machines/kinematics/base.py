@@ -72,6 +72,13 @@ class Kinematics(ABC):
         tip, axis, _ = self.pose(q, near)
         return tip, axis
 
+    def carried(self, pose: Floats, q0: Floats, q1: Floats) -> Floats:
+        """The pose (N, 6) at joints q0 (N, J) as the rotary joints outside the closed loops turn it on the way to q1 (N, J).
+
+        On parallel machines it is what `forward` at q1 takes as `near`: what is left between the two is the slides' part.
+        """
+        return pose
+
     @property
     def joints(self) -> int:
         """J"""

@@ -32,14 +32,16 @@ class H4TableAxis(H4Linear):
         return (tilt, both[0]), (-tilt, both[1])
 
     def _tool(self, turn: Floats) -> tuple[Floats, Floats, Floats]:
-        n = len(turn)
-        return (np.tile([0.0, 0.0, -self.gauge - self.tool_length], (n, 1)), np.tile([0.0, 0.0, 1.0], (n, 1)),
-                np.tile([1.0, 0.0, 0.0], (n, 1)))
+        columns = np.zeros((3, len(turn), 3))
+        columns[0, :, 2], columns[1, :, 2], columns[2, :, 0] = -self.gauge - self.tool_length, 1.0, 1.0
+        return columns[0], columns[1], columns[2]
 
     def _to_part(self, v: Floats, turn: Floats) -> Floats:
         shape = (len(turn),) + (1,) * (v.ndim - 2)
         c, s = np.cos(turn).reshape(shape), self.sense * np.sin(turn).reshape(shape)
-        return np.stack([c * v[:, 0] - s * v[:, 1], s * v[:, 0] + c * v[:, 1], v[:, 2]], axis=1)
+        turned = np.array(v)
+        turned[:, 0], turned[:, 1] = c * v[:, 0] - s * v[:, 1], s * v[:, 0] + c * v[:, 1]
+        return turned
 
     def _line(self, p: Floats) -> tuple[Floats, Floats]:
         return np.tile([0.0, 0.0, self.sense], (len(p), 1)), np.zeros((len(p), 3))

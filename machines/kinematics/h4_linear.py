@@ -133,6 +133,20 @@ class H4Linear(Kinematics):
         reach, axis, side = (tilted(v, p[:, 3]) for v in self._tool(turn))
         return self._to_part(p[:, :3] + reach, turn), self._to_part(axis, turn), self._to_part(side, turn)
 
+    def forward(self, q: Floats, near: Floats | None = None) -> tuple[Floats, Floats]:
+        """(tip (N, 3), axis (N, 3)) of joints q (N, 5): `pose` without the spin, which few ask for."""
+        q = as_points(q, 5, "q")
+        p, turn = self.solve_platform(q, near), q[:, 4]
+        reach, axis, _ = self._tool(turn)
+        return self._to_part(p[:, :3] + tilted(reach, p[:, 3]), turn), self._to_part(tilted(axis, p[:, 3]), turn)
+
+    def carried(self, pose: Floats, q0: Floats, q1: Floats) -> Floats:
+        """The pose (N, 6) at joints q0 (N, 5) with the rotary axis where it is at q1 (N, 5), the platform as it is."""
+        if bool((q0[:, 4] == q1[:, 4]).all()):
+            return pose
+        tip, axis, _ = self.place(self._platform_of(pose, q0[:, 4]), q1[:, 4])
+        return np.hstack([tip, axis])
+
     def pose(self, q: Floats, near: Floats | None = None) -> tuple[Floats, Floats, Floats]:
         """(tip (N, 3), axis (N, 3), spin (N,)) of joints q (N, 5), see the base class."""
         tip, axis, side = self.place(self.solve_platform(q, near), as_points(q, 5, "q")[:, 4])
@@ -190,7 +204,9 @@ class H4Linear(Kinematics):
 def tilted(v: Floats, tilt: Floats) -> Floats:
     """Rx(tilt) v (N, 3)."""
     c, s = np.cos(tilt), np.sin(tilt)
-    return np.stack([v[:, 0] + 0.0 * c, c * v[:, 1] - s * v[:, 2], s * v[:, 1] + c * v[:, 2]], axis=1)
+    turned = np.empty((len(tilt), 3))
+    turned[:, 0], turned[:, 1], turned[:, 2] = v[:, 0] + 0.0 * c, c * v[:, 1] - s * v[:, 2], s * v[:, 1] + c * v[:, 2]
+    return turned
 
 
 def unit(v: Floats) -> Floats:

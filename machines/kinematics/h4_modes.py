@@ -34,8 +34,10 @@ def candidates(carriages: Floats, joints: Floats, lengths: Floats) -> Floats:
         lengths: (4,) mm
     """
     tilt = _real_tilts(_coefficients(carriages, joints, lengths))
-    triples = ((0, 1, 2), (0, 2, 3))
-    return np.concatenate([_points(carriages, joints, lengths, t, legs) for t in tilt for legs in triples])
+    count, n = tilt.shape
+    every = np.tile(carriages, (count, 1, 1))
+    found = [_points(every, joints, lengths, tilt.ravel(), legs) for legs in ((0, 1, 2), (0, 2, 3))]
+    return np.stack(found).reshape(2, 2, count, n, 4).transpose(2, 0, 1, 3, 4).reshape(-1, n, 4)
 
 
 def _centres(carriages: Floats, joints: Floats, tilt: Floats) -> Floats:

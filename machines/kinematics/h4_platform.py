@@ -14,7 +14,7 @@ import numpy as np
 
 from machines.kinematics.columns import blocks
 from machines.kinematics.h4_modes import candidates
-from machines.kinematics.sliders import Legs, determinant, platform_rates, unsolvable
+from machines.kinematics.sliders import Legs, determinant, platform_rates, solved
 from machines.kinematics.workspace import Workspace
 from toolpaths.arrays import Bools, Floats, frozen
 
@@ -103,11 +103,13 @@ class H4Platform:
         """
         seeds = candidates(self.legs.carriages(q), self.joints, self.legs.lengths)
         count, n = seeds.shape[:2]
-        p, closed = self.newton(np.tile(q, (count, 1)), seeds.reshape(-1, 4))
-        p = np.where(closed[:, None], p, np.nan).reshape(count, n, 4)
-        p[..., 3] = _wrap(p[..., 3])
-        far = np.stack([_distance(mode, np.broadcast_to(self.home, mode.shape)) for mode in p])
-        away = np.stack([~self.at_home(mode, q) for mode in p])
+        every = np.tile(q, (count, 1))
+        p, closed = self.newton(every, seeds.reshape(-1, 4))
+        p = np.where(closed[:, None], p, np.nan)
+        p[:, 3] = _wrap(p[:, 3])
+        away = ~self.at_home(p, every).reshape(count, n)
+        p = p.reshape(count, n, 4)
+        far = _distance(p, self.home)
         order = np.argsort(np.where(np.isnan(far), np.inf, far) + np.where(away, 1e6, 0.0), axis=0)
         found = _distinct(np.take_along_axis(p, order[:, :, None], axis=0))
         return self.newton(np.tile(q, (len(found), 1)), found.reshape(-1, 4))[0].reshape(found.shape)
@@ -125,32 +127,33 @@ class H4Platform:
         p = np.array(start, dtype=np.float64)
         closed = np.zeros(len(q), dtype=np.bool_)
         live = np.flatnonzero(np.isfinite(q).all(axis=1) & np.isfinite(p).all(axis=1))
+        carriages, here = self.legs.carriages(q[live]), p[live]
         for _ in range(STEPS):
             if not len(live):
                 break
-            step, error = self._step(q[live], p[live])
-            p[live] -= step
+            step, error = self._step(carriages, here)
+            here -= step
             done = error < CLOSED
-            closed[live[done]] = True
-            live = live[~done & np.isfinite(step).all(axis=1)]
+            left = ~done & np.isfinite(step).all(axis=1)
+            if not left.all():
+                p[live], closed[live] = here, done
+                live, carriages, here = live[left], carriages[left], here[left]
+        p[live] = here
         return p, closed
 
-    def _step(self, q: Floats, p: Floats) -> tuple[Floats, Floats]:
+    def _step(self, carriages: Floats, p: Floats) -> tuple[Floats, Floats]:
         """(Newton step (N, 4), closure error (N,) relative to L^2)."""
-        jx = self.jx(p, q)
-        lengths = self.legs.lengths
-        gap = 0.5 * (np.einsum("nki,nki->nk", jx[:, :, :3], jx[:, :, :3]) - lengths**2)
-        bad = unsolvable(jx)
-        jx[bad] = np.eye(4)
-        step: Floats = np.linalg.solve(jx, gap[:, :, None])[:, :, 0]
-        step[bad] = np.nan
-        return step, np.max(np.abs(gap) / lengths**2, axis=1)
+        turned = self._turned(p[:, 3])
+        rods = p[:, None, :3] + turned - carriages
+        squares = self.legs.lengths**2
+        gap = 0.5 * (np.einsum("nki,nki->nk", rods, rods) - squares)
+        return solved(_rows(rods, turned), gap), (np.abs(gap) / squares).max(axis=1)
 
     def _pick(self, q: Floats, near: Floats | None) -> Floats:
         modes = self.modes(q)
         if near is None:
             return np.where(self.at_home(modes[0], q)[:, None], modes[0], np.nan)
-        far = np.stack([_distance(mode, near) for mode in modes])
+        far = _distance(modes, near)
         best = np.argmin(np.where(np.isnan(far), np.inf, far), axis=0)
         result: Floats = modes[best, np.arange(len(q))]
         return result
@@ -159,12 +162,16 @@ class H4Platform:
         """Rx(theta) b_k (N, 4, 3)."""
         c, s = np.cos(tilt)[:, None], np.sin(tilt)[:, None]
         x, y, z = self.joints.T
-        return np.stack([np.broadcast_to(x, (len(tilt), 4)), c * y - s * z, s * y + c * z], axis=2)
+        turned = np.empty((len(tilt), 4, 3))
+        turned[..., 0], turned[..., 1], turned[..., 2] = x, c * y - s * z, s * y + c * z
+        return turned
 
 
 def _rows(rods: Floats, arms: Floats) -> Floats:
-    moment = arms[..., 1] * rods[..., 2] - arms[..., 2] * rods[..., 1]
-    return np.concatenate([rods, moment[..., None]], axis=2)
+    rows = np.empty((*rods.shape[:2], 4))
+    rows[..., :3] = rods
+    rows[..., 3] = arms[..., 1] * rods[..., 2] - arms[..., 2] * rods[..., 1]
+    return rows
 
 
 def _wrap(angle: Floats) -> Floats:
@@ -173,10 +180,10 @@ def _wrap(angle: Floats) -> Floats:
 
 
 def _distance(a: Floats, b: Floats) -> Floats:
-    """(N,) rad: tilt and place (LEVER mm per rad) together."""
+    """(...,) rad between platforms (..., 4): tilt and place (LEVER mm per rad) together."""
     gap = a - b
-    turn = _wrap(gap[:, 3])
-    result: Floats = np.sqrt(np.sum(gap[:, :3] ** 2, axis=1) / LEVER**2 + turn**2)
+    turn = _wrap(gap[..., 3])
+    result: Floats = np.sqrt(np.sum(gap[..., :3] ** 2, axis=-1) / LEVER**2 + turn**2)
     return result
 
 
@@ -186,8 +193,10 @@ def _distinct(p: Floats) -> Floats:
     count = np.zeros(p.shape[1], dtype=np.int64)
     rows = np.arange(p.shape[1])
     for candidate in p:
-        apart = np.stack([_distance(candidate, mode) for mode in kept])
-        new = np.isfinite(candidate[:, 0]) & ~np.any(apart < 1e-7, axis=0) & (count < 8)
+        new = np.isfinite(candidate[:, 0]) & (count < 8)
+        if not new.any():
+            continue
+        new &= ~np.any(_distance(candidate, kept) < 1e-7, axis=0)
         kept[count[new], rows[new]] = candidate[new]
         count[new] += 1
     return kept

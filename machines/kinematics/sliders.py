@@ -127,6 +127,21 @@ def unsolvable(jx: Floats) -> Bools:
     return result
 
 
+def solved(jx: Floats, right: Floats) -> Floats:
+    """x (N, K) of jx x = right, matrices (N, K, K); NaN where one is exactly singular or not finite.
+
+    Only where the elimination meets a singular matrix are determinants asked which it is.
+    """
+    try:
+        return np.asarray(np.linalg.solve(jx, right[:, :, None])[:, :, 0], dtype=np.float64)
+    except np.linalg.LinAlgError:
+        bad = unsolvable(jx)
+        safe = np.where(bad[:, None, None], np.eye(jx.shape[1]), jx)
+        x: Floats = np.asarray(np.linalg.solve(safe, right[:, :, None])[:, :, 0], dtype=np.float64)
+        x[bad] = np.nan
+        return x
+
+
 def smallest_singular_value(jx: Floats) -> Floats:
     """(N,) of Jx (N, K, K) as it comes (mm for rods): the distance from a singular platform, III.7."""
     return np.asarray(np.linalg.svd(jx, compute_uv=False)[..., -1], dtype=np.float64)

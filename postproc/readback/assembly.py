@@ -41,19 +41,23 @@ def ends(kin: Kinematics, q: Floats, home: Floats) -> Floats:
 
 
 def walk(kin: Kinematics, q0: Floats, q1: Floats, pose: Floats) -> Floats:
-    """Pose (N, 6) at joints q1 (N, J), reached straight in the joints from q0 where it is `pose` (N, 6)."""
-    count = steps(kin, q0, q1)
-    result = np.array(pose)
+    """Pose (N, 6) at joints q1 (N, J), reached straight in the joints from q0 where it is `pose` (N, 6).
+
+    The rotary axes are outside the closed loops: no turn changes the mode, so that the steps are those of the slides.
+    """
+    count = steps(kin, q0, q1, np.inf)
+    result, at = np.array(pose), np.array(q0)
     for i in range(1, int(count.max(initial=0)) + 1):
         rows = np.flatnonzero(count >= i)
         here = q0[rows] + (i / count[rows])[:, None] * (q1 - q0)[rows]
-        result[rows] = np.hstack(kin.forward(here, near=result[rows]))
+        result[rows] = np.hstack(kin.forward(here, near=kin.carried(result[rows], at[rows], here)))
+        at[rows] = here
     return result
 
 
-def steps(kin: Kinematics, q0: Floats, q1: Floats) -> Ints:
-    """(N,) steps in which blocks are walked, 1 at least."""
-    longest = np.where(kin.rotary, ROTARY_STEP, LINEAR_STEP)
+def steps(kin: Kinematics, q0: Floats, q1: Floats, turn: float = ROTARY_STEP) -> Ints:
+    """(N,) steps of at most LINEAR_STEP mm and `turn` rad in which blocks are walked, 1 at least."""
+    longest = np.where(kin.rotary, turn, LINEAR_STEP)
     size = np.nan_to_num((np.abs(q1 - q0) / longest).max(axis=1, initial=0.0))
     return np.asarray(np.maximum(np.ceil(size), 1), dtype=np.int64)
 

@@ -93,9 +93,9 @@ class Output:
         return ["", *self.result.text.splitlines()]
 
 
-def readable(result: PostResult) -> bool:
-    """True where the machine that rs274 is, one with the axes X Y Z A B C, has all letters of the program."""
-    return set(result.machine.axis_names) <= set("XYZABC")
+def has_letters(machine: Machine) -> bool:
+    """True where the machine that rs274 is, one with the axes X Y Z A B C, has all letters of the machine's programs."""
+    return set(machine.axis_names) <= set("XYZABC")
 
 
 def read(result: PostResult) -> tuple[Words, Motion]:

@@ -17,6 +17,21 @@ CONTROLLERS = ["linuxcnc", "generic-iso", "fanuc-30i", "haas-ngc", "siemens-840d
 MODEL = 'machine = "mikron-ucp710"\n[location]\nEC0Y = 6.0\nEX0S = 4.0\n'
 
 
+PART = """UNITS/MM
+LOADTL/1
+SPINDL/RPM,1000,CLW
+FEDRAT/MMPM,600
+RAPID
+GOTO/0,0,20
+GOTO/0,0,0
+GOTO/40,0,0
+GOTO/40,30,-2
+RAPID
+GOTO/40,30,20
+FINI
+"""
+
+
 def run(*words: object) -> Result:
     return CliRunner().invoke(app, [str(word) for word in words])
 
@@ -37,13 +52,14 @@ def model(tmp_path: Path) -> Path:
 
 def written(model: Path, controller: str = "linuxcnc") -> Path:
     program = model.parent / "part.nc"
-    made = run("convert", "samples/pocket.cls", *common(controller), "--error-model", model, "-o", program)
+    program.with_suffix(".apt").write_text(PART)
+    made = run("convert", program.with_suffix(".apt"), *common(controller), "--error-model", model, "-o", program)
     assert made.exit_code == 0, made.output
     return program
 
 
 def verified(program: Path, model: Path, controller: str = "linuxcnc") -> Result:
-    return run("verify", program, "samples/pocket.cls", *common(controller), "--error-model", model)
+    return run("verify", program, program.with_suffix(".apt"), *common(controller), "--error-model", model)
 
 
 @pytest.mark.parametrize("controller", CONTROLLERS)

@@ -162,13 +162,13 @@ def random_case(name: str, rng: np.random.Generator) -> tuple[list[Run], Limits,
 def test_as_cheap_as_the_search_over_every_state(name: str) -> None:
     """Travel so short that many cases need rewinds, or cannot be done at all."""
     rng, rewound = np.random.default_rng(8), 0
-    for _ in range(14):
+    for _ in range(6):
         runs, limits, start = random_case(name, rng)
         got, want = measured(plan_runs(runs, limits, start), runs, limits, start), brute(runs, limits, start)
         assert got[:3] == want[:3]
         assert got[4] == pytest.approx(want[4], abs=1e-6)
         rewound += want[1] > 0
-    assert rewound >= 2 or name == "fork-head-ab", "its axes never wind up"
+    assert rewound >= 1 or name == "fork-head-ab", "its axes never wind up"
 
 
 def test_side_of_the_tilt_axis_comes_before_time_but_after_travel() -> None:

@@ -151,19 +151,27 @@ def test_radius_of_cutters() -> None:
 
 
 def test_drilling_and_turning_axes_are_fixed() -> None:
-    path, _ = toolpaths.read(SAMPLES / "blade.cls")
-    choice = chosen(path, machine("mikron-ucp710"))
-    assert choice.tried[0].own.one.fixed == "the tool axis turns within the pass"
-    path, _ = toolpaths.read(SAMPLES / "five_faces.cls")
-    choice = chosen(path, machine("mikron-ucp710"))
-    assert any(one.own.one.fixed.startswith("drilling") for one in choice.tried)
+    turning = ["MULTAX", "RAPID", "GOTO/0,0,9,0,0,1", "GOTO/0,0,0,0,0,1", "GOTO/80,0,0,0,0.6,0.8"]
+    holes = ["RAPID", "GOTO/0,0,30,0,0,1", "CYCLE/DRILL,DEPTH,9,MMPM,100,CLEAR,3", "GOTO/9,0,0", "GOTO/19,0,0", "CYCLE/OFF"]
+    path, _ = toolpaths.read_bytes("\n".join([*BALL, *turning, *holes, "FINI"]).encode(), file="both.apt")
+    fixed = [one.own.one.fixed for one in chosen(path, machine("mikron-ucp710")).tried]
+    assert fixed[0] == "the tool axis turns within the pass" and fixed[1].startswith("drilling")
 
 
-def test_command_and_its_keys() -> None:
-    got = CliRunner().invoke(app, ["orient", str(PART), "-m", "mikron-ucp710", "--json", "-"])
+@pytest.fixture
+def part(tmp_path: Path) -> Path:
+    """Three passes in a file."""
+    rows = [row for y in range(3) for row in ("RAPID", f"GOTO/0,{y},5,0,0,1", "RAPID", f"GOTO/0,{y},0,0,0,1",
+                                              f"GOTO/80,{y},0,0,0,1", "RAPID", f"GOTO/80,{y},5,0,0,1")]
+    (tmp_path / "passes.apt").write_text("\n".join([*BALL, "MULTAX", *rows, "FINI"]))
+    return tmp_path / "passes.apt"
+
+
+def test_command_and_its_keys(part: Path) -> None:
+    got = CliRunner().invoke(app, ["orient", str(part), "-m", "mikron-ucp710", "--json", "-"])
     assert got.exit_code == 0, got.stderr
     values = json.loads(got.stdout)
-    assert values["machine"] == "mikron-ucp710" and len(values["passes"]) == 7
+    assert values["machine"] == "mikron-ucp710" and len(values["passes"]) == 3
     assert {"pass", "orientation_deg", "time_s", "reference_time_s", "limiting_axis", "rejected"} <= set(values["passes"][0])
     assert values["passes"][0]["limiting_axis"] in ("X", "Y", "Z")
     assert set(values["passes"][0]["orientation_deg"]) == {"A", "C"}
@@ -171,15 +179,15 @@ def test_command_and_its_keys() -> None:
     assert all(values["plans"][name]["time_s"] > 0.0 for name in ("keep", "per_pass", "whole_part", "auto"))
 
 
-def test_converted_and_proved(tmp_path: Path) -> None:
+def test_converted_and_proved(tmp_path: Path, part: Path) -> None:
     """The re-oriented toolpath is what is written and read back; `verify` with the same choice agrees."""
     out = tmp_path / "p.ngc"
     common = ["-m", "mikron-ucp710", "-c", "linuxcnc", "--setup", str(SAMPLES / "tools.setup.toml"), "--orient", "per-pass"]
-    got = CliRunner().invoke(app, ["convert", str(PART), *common, "-o", str(out)])
+    got = CliRunner().invoke(app, ["convert", str(part), *common, "-o", str(out)])
     assert got.exit_code == 0, got.stderr
     text = out.read_text()
     assert "orient per-pass" in text and "A45" in text.replace(".0000", "")
-    got = CliRunner().invoke(app, ["verify", str(out), str(PART), *common])
+    got = CliRunner().invoke(app, ["verify", str(out), str(part), *common])
     assert got.exit_code == 0, got.stderr
-    got = CliRunner().invoke(app, ["verify", str(out), str(PART), *common[:-1], "keep"])
+    got = CliRunner().invoke(app, ["verify", str(out), str(part), *common[:-1], "keep"])
     assert got.exit_code == 1

@@ -25,10 +25,12 @@ from postproc.pipeline import choose_axes
 from postproc.result import PostResult
 from postproc.setup import SetupFile
 from tests.benchmarks.bench_orientation_limits import strips
-from tests.postproc.kit import SAMPLES, machine
+from tests.postproc.kit import machine
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.toolpath import Toolpath
 
+COUNT = 10
+"""strips: as many as gain by leaning"""
 Box = tuple[list[float], list[float]]
 POSTS: tuple[Box, ...] = (([-37.0, -127.0, -30.0], [-2.0, -51.0, 292.0]),)
 """beside the part: where the table leans, the tool would pass through it on its way from home"""
@@ -54,7 +56,7 @@ def converted(path: Toolpath, setup: SetupFile, plan: Orientation = "auto") -> P
 @cache
 def refused() -> tuple[OrientationChoice, PostResult, list[Diagnostic]]:
     """The choice without a proof beside a post, the conversion with one, and what that says of orientations."""
-    path, setup = strips([0.0] * 16), beside(*POSTS)
+    path, setup = strips([0.0] * COUNT), beside(*POSTS)
     choice, _ = orient(path, quick(), setup)
     assert choice is not None
     result = converted(path, setup)
@@ -87,13 +89,13 @@ def test_verify_chooses_the_same(tmp_path: Path) -> None:
     _, result, _ = refused()
     file = tmp_path / "p.ngc"
     file.write_text(result.text)
-    verified = pipeline.verify(file, strips([0.0] * 16), quick(), "linuxcnc", beside(*POSTS), Options(orient="auto"))
+    verified = pipeline.verify(file, strips([0.0] * COUNT), quick(), "linuxcnc", beside(*POSTS), Options(orient="auto"))
     assert verified.ok, [str(d) for d in verified.diagnostics]
 
 
 @pytest.mark.parametrize("plan", ["per-pass", "whole-part"])
 def test_other_plans_avoid_it_too(plan: Orientation) -> None:
-    result = converted(strips([0.0] * 16), beside(*POSTS), plan)
+    result = converted(strips([0.0] * COUNT), beside(*POSTS), plan)
     assert result.ok and result.choice is not None and not result.choice.plans[plan].barred
 
 
@@ -115,8 +117,8 @@ def test_the_program_that_proved_is_not_made_again(monkeypatch: pytest.MonkeyPat
 
 @cache
 def some() -> OrientationChoice:
-    """Sixteen strips that gain by leaning."""
-    choice, _ = orient(strips([0.0] * 16), quick(), beside())
+    """Strips that gain by leaning."""
+    choice, _ = orient(strips([0.0] * COUNT), quick(), beside())
     assert choice is not None and choice.plans["auto"].states != choice.plans["keep"].states
     return choice
 
@@ -151,7 +153,7 @@ def test_the_axes_of_the_file_are_what_is_left() -> None:
     control = Control("auto", turned=fault())
     made, found = proved(some(), "auto", control)
     choice = made.choice
-    assert choice.plans["auto"].states == (0,) * 16 and choice.proof is not None and choice.proof.ok and made.program.ok
+    assert choice.plans["auto"].states == (0,) * COUNT and choice.proof is not None and choice.proof.ok and made.program.ok
     assert [d.code for d in found] == ["orient.passed_over"] and "refused" in found[0].message
 
 
@@ -189,11 +191,14 @@ def test_lines_of_errors_say_what_is_barred(offset: int, whole: bool) -> None:
 
 def test_the_command_proves_for_a_control(tmp_path: Path) -> None:
     out = tmp_path / "o.json"
-    arguments = ["orient", str(SAMPLES / "test_part.cls"), "-m", "mikron-ucp710", "--json", str(out)]
-    assert CliRunner().invoke(app, [*arguments, "-c", "fanuc-30i"]).exit_code == 0
+    file = tmp_path / "strip.apt"
+    file.write_text("\n".join(["UNITS/MM", "CUTTER/16,8", "LOADTL/1", "SPINDL/RPM,1000,CLW", "FEDRAT/MMPM,30000", "MULTAX",
+                               "RAPID", "GOTO/0,0,5,0,0,1", "GOTO/0,0,0,0,0,1", "GOTO/80,0,0,0,0,1", "FINI"]))
+    arguments = ["orient", str(file), "-m", "mikron-ucp710", "--json", str(out)]
+    done = CliRunner().invoke(app, [*arguments, "-c", "fanuc-30i"])
     values = json.loads(out.read_text())
-    assert (values["controller"], values["proved"]) == ("fanuc-30i", True)
-    assert "\nthe program of auto for fanuc-30i is proved" in CliRunner().invoke(app, [*arguments, "-c", "fanuc-30i"]).output
+    assert done.exit_code == 0 and (values["controller"], values["proved"]) == ("fanuc-30i", True)
+    assert "\nthe program of auto for fanuc-30i is proved" in done.output
     failed = CliRunner().invoke(app, [*arguments, "-c", "fanuk-30i"])
     assert failed.exit_code == 1 and "fanuc-30i" in failed.output
 

@@ -212,6 +212,30 @@ def test_walking_keeps_the_mode_it_starts_in(name: str) -> None:
     np.testing.assert_allclose(there[0], np.hstack(kin.forward((m.home + step)[None]))[0], atol=1e-6)
 
 
+def in_small_steps(m: Machine, q0: np.ndarray, q1: np.ndarray, near: np.ndarray, count: int = 200) -> np.ndarray:
+    """Pose (1, 6) at q1 (J,), followed from `near` at q0 (J,)."""
+    for share in np.linspace(0.0, 1.0, count + 1)[1:]:
+        near = np.hstack(m.kinematics.forward((q0 + share * (q1 - q0))[None], near))
+    return near
+
+
+@pytest.mark.parametrize(("name", "turn"), [("h4a-c-table", 9.0), ("h4a-spindle-axis", 1.2)])
+def test_a_turning_axis_changes_no_mode(name: str, turn: float) -> None:
+    """Off the middle, the rotary axis turns far with some of the slides: what is found is what small steps lead to, in every
+    mode that they lead back from."""
+    m, compared = machine(name), 0
+    tip, axis = m.kinematics.forward(m.home[None])
+    here = m.kinematics.inverse(tip + np.array([150.0, 100.0, 0.0]), axis, near=m.home)[0, 0]
+    there = here + np.where(m.rotary, turn, 15.0) * np.resize([1.0, 0.9, 1.0, 0.8, 1.0], len(here))
+    modes = np.hstack([part[:, 0] for part in m.kinematics.assembly_modes(here[None])])
+    for pose in modes[np.isfinite(modes).all(axis=1)]:
+        want = in_small_steps(m, here, there, pose[None])
+        if np.isfinite(want).all() and np.abs(in_small_steps(m, there, here, want) - pose).max() < 1e-6:
+            compared += 1
+            np.testing.assert_allclose(assembly.walk(m.kinematics, here[None], there[None], pose[None]), want, atol=1e-6)
+    assert compared >= 2
+
+
 class Forgetful:
     """A Delta that takes the other mode for the home mode at some joints, as a machine with two such modes could."""
 
@@ -224,6 +248,9 @@ class Forgetful:
             tip = tip.copy()
             tip[self.at:self.at + 3] = self.kin.assembly_modes(q)[0][1, self.at:self.at + 3]
         return tip, axis
+
+    def carried(self, pose: np.ndarray, q0: np.ndarray, q1: np.ndarray) -> np.ndarray:
+        return self.kin.carried(pose, q0, q1)
 
 
 def test_ends_follow_the_blocks_and_not_the_home_mode() -> None:

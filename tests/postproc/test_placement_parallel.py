@@ -51,10 +51,10 @@ def test_as_good_as_a_grid() -> None:
     choice = placed(passes((1.0, 0.0), 2, 120.0), slow(), setup)
     timer = timer_of(setup, slow(), choice.space)
     grid = [np.array([x, y, -270.0, turn, 0.0, 0.0]) for x, y, turn in
-            product(np.linspace(-240, 120, 5), np.linspace(-240, 240, 5), choice.space.dims[ANGLES].values)]
+            product(np.linspace(-240, 120, 4), np.linspace(-240, 240, 4), choice.space.dims[ANGLES].values)]
     tried = [timer.tried(one) for one in grid]
     times = [one.seconds for one in tried if np.isfinite(one.seconds)]
-    assert len(times) > 40
+    assert len(times) > 25
     assert choice.best.seconds <= min(times)
     assert max(one.cutting for one in tried if np.isfinite(one.seconds)) > 1.15 * min(one.cutting for one in tried)
     assert choice.best.seconds < 0.95 * choice.found.now.seconds
@@ -157,7 +157,7 @@ def test_a_place_that_only_its_links_make_worse_is_not_taken() -> None:
     that counts, and the part stays."""
     setup, found = load_setup(SAMPLES / "delta.setup.toml")
     assert setup is not None and not found
-    limits = PlacementLimits(x=(-100.0, 100.0), y=(-100.0, 100.0), turn=(0.0, 180.0))
+    limits = PlacementLimits(x=(-100.0, 100.0), turns=[0.0])
     path, _ = toolpaths.read(SAMPLES / "test_part.cls")
     choice, more = place(path, machine(DELTA), setup.model_copy(update={"placement": limits}))
     assert choice is not None, more

@@ -24,7 +24,7 @@ def fill(sheet: Figure) -> None:
 
 @pytest.mark.parametrize("ending", FORMATS)
 def test_sheets_repeat(ending: str) -> None:
-    assert len({image((6.0, 7.0), "a sheet", fill, ending) for _ in range(5)}) == 1
+    assert len({image((6.0, 7.0), "a sheet", fill, ending) for _ in range(2)}) == 1
 
 
 def test_panels_stand_on_rounded_places() -> None:
