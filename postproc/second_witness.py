@@ -12,6 +12,7 @@ import numpy as np
 from machines.loader import builtin
 from machines.machine import Machine
 from postproc.control import Control
+from postproc.coolant import COMMANDS, switching
 from postproc.job import Job
 from postproc.options import Options
 from postproc.readback.compare import Comparison
@@ -92,10 +93,12 @@ def second_witness(source: ClSource | None, setup: SetupFile, options: Options, 
     if options.orient != "keep" or source is None or comparison.executed is None or comparison.poses is None:
         why = "the tool axes were chosen" if options.orient != "keep" else "the path is not as it was read from a file"
         return Testimony((), (f"all ({why})",)), []
+    control, codes = job.control, job.controller.codes
     case = Case(source.data, machine_tables(job.machine), setup.model_dump(), options.tolerance, job.axis_tolerance,
-                source.units or None, source.dialect or None, job.control.rapids == "dog-leg", comparison.planned,
-                job.corrects, "{register}" in job.controller.codes.length_offset,
-                origin=job.control.origin, work_offset=offset_joints(job.control))
+                source.units or None, source.dialect or None, control.rapids == "dog-leg", comparison.planned, job.corrects,
+                "{register}" in codes.length_offset,
+                sum(COMMANDS[kind] for kind, (on, _) in switching(codes).items() if on),
+                origin=control.origin, work_offset=offset_joints(control))
     try:
         said = testify(case, executed_of(comparison, comparison.poses, job))
     except (ArithmeticError, AssertionError, LookupError, TypeError, ValueError) as fault:

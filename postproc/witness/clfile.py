@@ -9,7 +9,7 @@ from itertools import takewhile
 import numpy as np
 
 from postproc.witness import arcs, cycles
-from postproc.witness.commanded import OWN, UNFOLLOWED, Commanded, unit
+from postproc.witness.commanded import KINDS, OWN, UNFOLLOWED, Commanded, unit
 from postproc.witness.dialect import ALL, dialect_of, scale_of
 from postproc.witness.execution import Execution, Z
 from postproc.witness.rows import assembled
@@ -313,7 +313,8 @@ def _spindl(e: Execution, r: Record, line: int) -> None:
 
 
 def _coolnt(e: Execution, r: Record, line: int) -> None:
-    e.coolant.set(e.row, 0 if r.has("OFF") else 1 if r.has("FLOOD") else 2)
+    kind = next((kind for word, kind in KINDS.items() if r.has(word)), 1)
+    e.coolant.set(e.row, 2 if r.words == ("ON",) else kind)
 
 
 def _by_code(e: Execution, r: Record, line: int) -> None:

@@ -15,6 +15,10 @@ UNKNOWN = -9
 UNFOLLOWED = -8
 """of spindle or coolant: switched by codes of the machine, which this witness does not follow"""
 
+KINDS = {"OFF": 0, "THRU": 12, "AIR": 13, "MIST": 11}
+"""coolant by the word that says it, in this order; 1 is flood, 2 whatever flows"""
+BITS = {1: 1, 11: 2, 12: 4, 13: 8}
+"""what flows then, as the reader counts it"""
 OWN = 0
 """of a length register: that of the tool's number"""
 

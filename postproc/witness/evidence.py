@@ -29,6 +29,8 @@ class Case:
     errors: bool = False
     registers: bool = True
     """False: the control has no length registers to be named, a tool brings its own length along"""
+    coolants: int = 15
+    """bits of the kinds of coolant that the control has codes for: it gives the nearest of them for others"""
     oriented: bool = False
     origin: Array | None = None
     """(3,) the zero of the work offset in the table frame, as the program takes it"""

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from postproc.witness.commanded import ARC, LINE, OWN, UNFOLLOWED, UNKNOWN, Commanded, Cycle
+from postproc.witness.commanded import ARC, BITS, LINE, OWN, UNFOLLOWED, UNKNOWN, Commanded, Cycle
 from postproc.witness.evidence import Case, Finding
 from postproc.witness.machine import limits_of
 from postproc.witness.motion import Walked
@@ -151,7 +151,8 @@ def check_states(w: Walked, c: Commanded, case: Case) -> tuple[list[Finding], di
     speed = stated & (direction != 0) & np.isfinite(rpm) & ~tap
     some = _states_coolant(case.setup.get("tools")) or _states_coolant(case.setup.get("output"))
     wet = np.where(coolant == UNKNOWN, some | (flow == 0), np.where(coolant == 0, flow == 0, flow > 0))
-    wet &= (coolant != 1) | ((flow & 1) > 0)
+    for kind, bit in BITS.items():
+        wet &= (coolant != kind) | ((flow & bit) > 0) | (not case.coolants & bit)
     checks = (("length", "the length register is {0}, by the CL file it is {1}", tool != UNKNOWN, e.register[rows],
                register, e.register[rows] == register),
               ("tool", "the program cuts with {0}, the CL file with {1}", tool != UNKNOWN, e.tool[rows], tool,
@@ -197,12 +198,12 @@ def _coolants(tool: Array, coolant: Array, setup: dict[str, Any]) -> Array:
     result = coolant.copy()
     for number, word in own.items() if own else ([(None, default)] if default else []):
         here = (coolant == UNKNOWN) & ((tool == number) if number is not None else np.ones(len(tool), bool))
-        result[here] = {"off": 0, "flood": 1}.get(str(word), 2)
+        result[here] = {"off": 0, "flood": 1, "mist": 11, "through": 12, "air": 13}.get(str(word), 2)
     return result
 
 
 _SPINDLE = {1: "turning clockwise (M3)", -1: "turning anti-clockwise (M4)", 0: "stopped"}
-_COOLANT = {0: "off", 1: "flood", 2: "on"}
+_COOLANT = {0: "off", 1: "flood", 2: "on", 11: "mist", 12: "through the tool", 13: "air"}
 
 
 def _said(code: str, value: float) -> str:
@@ -214,7 +215,7 @@ def _said(code: str, value: float) -> str:
     if code == "tool":
         return f"T{value:g}" if value >= 0 else "the tool in the spindle"
     names = _SPINDLE if code == "spindle" else _COOLANT if code == "coolant" else {}
-    return names.get(int(value), f"{value:g}") if code != "coolant" or value < 3 else "on"
+    return names.get(int(value), f"{value:g}") if code != "coolant" or value in names else "on"
 
 
 def _states_coolant(table: Any) -> bool:

@@ -214,6 +214,8 @@ RAPID
 GOTO/0,5,40
 FINI
 """
+BARE = MILLED.replace("SPINDL/RPM,3000,CLW\n", "").replace("COOLNT/FLOOD\n", "").replace("FEDRAT/MMPM,250\n", "")
+FAST = FIVE.replace("FEDRAT/400", "FEDRAT/20000").replace("FEDRAT/600", "FEDRAT/30000")
 TALL = """UNITS/MM
 LOADTL/1
 SPINDL/RPM,3000,CLW
@@ -268,7 +270,7 @@ CASES: dict[str, Case] = {
     "far arc": Case(HELIX, "mill-3axis", "linuxcnc", {"tools": LENGTHS, "part": {"origin": (-475.0, 0.0, 0.0)}}),
     "far tip": Case(FIVE, "trunnion-bc", "siemens-840d", {"tools": LENGTHS, "part": {"origin": (495.0, 0.0, 0.0)}},
                     {"output": "tcp"}),
-    "far rods": Case(MILLED, "uranesx", "linuxcnc", {**ON_DELTA, "part": {"origin": (12.0, -7.0, -20.0)}}),
+    "far rods": Case(MILLED, "uranesx", "linuxcnc", {**ON_DELTA, "part": {"origin": (12.0, -7.0, -560.0)}}),
     "milled": Case(MILLED, "mill-3axis", "linuxcnc"),
     "per turn": Case(PER_TURN, "mill-3axis", "fanuc-30i"),
     "timed": Case(TIMED, "mill-3axis", "linuxcnc"),
@@ -295,13 +297,18 @@ CASES: dict[str, Case] = {
     "errors": Case(SHORT, "mikron-ucp710", "linuxcnc", options=ERRORS),
     "errors flat": Case(NX, "mikron-ucp710", "siemens-840d", options=ERRORS),
     "errors laws": Case(LAWS, "mikron-ucp710", "siemens-840d", options=ERRORS),
+    "per minute": Case(FIVE, "mikron-ucp710", "linuxcnc", options={"feed_mode": "per-minute"}),
+    "fast": Case(FAST, "mikron-ucp710", "linuxcnc"),
+    "fast planned": Case(FAST, "mikron-ucp710", "linuxcnc", options={"feed": "planned"}),
+    "loose": Case(FIVE, "mikron-ucp710", "linuxcnc", options={"tolerance": 0.5}),
+    "whole circle": Case(HELIX.replace("GOTO/-40,30,-8\n", ""), "mill-3axis", "linuxcnc"),
+    "kept spindle": Case(FACES.replace("SPINDL/RPM,2000,CLW\n", ""), "trunnion-bc", "linuxcnc"),
     "planned": Case(FIVE, "mikron-ucp710", "linuxcnc", options={"feed": "planned"}),
     "smooth": Case(SHORT, "mikron-ucp710", "linuxcnc", options={"smooth": True}),
     "restart": Case(NX, "mill-3axis", "fanuc-30i", {**TURNED, "output": {"restart": True}}),
     "rewind": Case(SAMPLES / "joints" / "forced_rewind.cls", "mikron-ucp710", "linuxcnc",
                    {"file": str(SAMPLES / "joints" / "forced_rewind.setup.toml")}),
-    "set-up": Case(MILLED.replace("SPINDL/RPM,3000,CLW\n", "").replace("COOLNT/FLOOD\n", "").replace("FEDRAT/MMPM,250\n", ""),
-                   "mill-3axis", "linuxcnc", {**TURNED, "output": {
+    "set-up": Case(BARE, "mill-3axis", "linuxcnc", {**TURNED, "output": {
                        "spindle": {"rpm": 2500.0}, "coolant": "flood", "feed": 180.0}}),
 }
 LONG = 60.0

@@ -162,12 +162,11 @@ def verified(asked: Any, text: str, files: dict[str, str]) -> Made:
     from postproc.second_witness import second_witness
 
     comparison, found = read_back(text, asked.job, "part.cls", others={name: t.encode() for name, t in files.items()})
-    errors = [d for d in found if d.severity == 2]
+    errors, warned = [d for d in found if d.severity == 2], tuple(str(d) for d in found if d.severity == 1)
     if not errors and comparison is not None:
         found = second_witness(asked.source, asked.asked or asked.setup, asked.options, asked.job, comparison)[1]
         errors = [d for d in found if d.severity == 2]
     ok = comparison is not None and not errors
-    warned = tuple(str(d) for d in found if d.severity == 1)
     return Made(ok, text, tuple(d.code for d in errors), warned, (), effect_of(asked.job, comparison) if ok else None)
 
 

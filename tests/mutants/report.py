@@ -13,23 +13,27 @@ COLUMNS = ("conversion", "verify", "tests", "nothing", "no harm")
 HEAD = """\
 # Planted faults
 
-`make mutants` plants {count} faults, each in one function of the project, found by its name, in a process of its own, and says
-what catches it; and it changes written programs in {changes} places. `make mutants ROOM=arcs ONLY=sense JOBS=2` takes some.
+`make mutants` plants {count} faults, each in one function of the project, found by its name, in a process of its own, and
+says what catches it; and it changes written programs in {changes} places. `make mutants ROOM=arcs ONLY=sense JOBS=2` takes some.
 
-| what | how |
+| file | what it holds |
 |---|---|
 | `plant.py` | the text of a function is changed and compiled again; no file is touched, a moved function keeps its faults |
 | `faults_*.py`, `rooms.py` | the faults by room, the conversions in which each acts, the tests that are asked |
-| `battery.py` | small conversions: six controls, every output mode, 3 to 5 axes, heads, tables, rods, inch, cycles, geometric errors; the part off the rotary axes, tools of different lengths |
-| `judge.py` | a program with a fault is read by the project without it: is it refused, does it do what the right one does |
+| `battery.py` | small conversions: six controls, every output mode, 3 to 5 axes, heads, tables, rods, inch, cycles, errors |
+| `judge.py` | a program with a fault is read without it: is it refused, does it do what the right one does |
 | `programs.py` | changes of written programs, picked with a fixed seed |
 
-**conversion**: refused by the conversion itself wherever it acts, nothing is written. **verify**: some conversion lets it pass, the
-project without the fault refuses the program. **tests**: neither, and a test of the room fails. **no harm**: measured by the
-reader without the fault: every cut inside the tolerance, its time within 0.5 %, rests and states the same; or the program is the
-same, and all wrong programs that were tried stay refused.
-Rooms whose faults change no program but what is made of it (readers, proof) count by wrong programs that pass with the fault:
-such a fault lets a wrong program pass only where there is a second fault, and the tests catch it.
+In all of them the part stands off the rotary axes, and tools have different lengths.
+
+- **conversion**: refused by the conversion itself wherever it acts; nothing is written.
+- **verify**: some conversion lets it pass, `verify` of the project without the fault refuses the program.
+- **tests**: neither, and a test of the room fails.
+- **no harm**: measured by the reader without the fault: every cut inside the tolerance, its time within 0.5 %, rests and
+  states the same; or the program is the same, and all wrong programs that were tried stay refused.
+
+Readers and proof (the last rooms) change no program but what is made of it: they count by wrong programs that pass with the
+fault. Such a program needs a second fault to be written.
 
 """
 
@@ -73,8 +77,9 @@ def page(found: list[Outcome], programs: list[Found]) -> str:
     text += f"\n\n{_witness(found)} of those that the conversion refuses are seen by the second witness alone.\n"
     text += "\n## What is not caught by the conversion itself\n\n| room | fault | outcome | why |\n|---|---|---|---|\n"
     for one in found:
-        if column(one) != "conversion":
-            said = {"verify": "`verify`", "tests": f"`{one.test}`", "nothing": "**nothing**", "no harm": "no harm"}[column(one)]
+        kind = column(one)
+        if kind != "conversion":
+            said = {"verify": "`verify`", "tests": f"`{one.test}`", "nothing": "**nothing**"}.get(kind, kind)
             text += f"| {one.fault.room} | {one.fault.name} | {said} | {one.fault.why or one.detail} |\n"
     return text + "\n" + _programs(programs)
 
@@ -88,7 +93,8 @@ def _programs(programs: list[Found]) -> str:
         harmless += p.harmless
         kinds += p.kinds
         caught += p.caught
-    lines = [f"## Faults in {total:,} programs", "", "| control | changed | refused by verify | no harm | pass and do harm |",
+    lines = [f"## Faults in {total:,} programs", "",
+             "| control | changed | refused by verify | no harm | pass and do harm |",
              "|---|---|---|---|---|"]
     for control in dict.fromkeys(p.name.split()[-1] for p in programs):
         own = [p for p in programs if p.name.split()[-1] == control]
@@ -113,6 +119,7 @@ def as_dict(found: list[Outcome], programs: list[Found]) -> dict[str, Any]:
 def summary(found: list[Outcome], programs: list[Found]) -> str:
     """For the console."""
     lines = list(_table(found))
-    lines += [f"{column(o)}: {o.fault.room}: {o.fault.name}: {o.detail}" for o in found if column(o) in ("verify", "tests", "nothing")]
+    lines += [f"{column(o)}: {o.fault.room}: {o.fault.name}: {o.detail}" for o in found
+              if column(o) in ("verify", "tests", "nothing")]
     lines += [f"passes: {p.name}: {text}" for p in programs for text in p.survivors]
     return "\n".join(lines)

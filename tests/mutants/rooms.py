@@ -8,10 +8,7 @@ from tests.mutants import faults_reading as reading
 from tests.mutants.battery import CASES, SIX
 from tests.mutants.plant import Fault
 
-FAULTS: tuple[Fault, ...] = (
-    *reading.READER, *reading.FRAMES, *reading.PLACEMENT, *reading.CYCLES, *reading.ARCS, *reading.MOVES,
-    *machine.KINEMATICS, *machine.LINEARISING, *machine.LINKS, *machine.TRAVEL, *machine.COMPENSATION, *machine.CUTCOM,
-    *machine.COMMANDS, *machine.PLANNING, *controls.WRITERS, *controls.READERS, *controls.PROOF)
+FAULTS: tuple[Fault, ...] = (*reading.FAULTS, *machine.FAULTS, *controls.FAULTS)
 BATTERY: dict[str, tuple[str, ...]] = {
     "reader": ("flat linuxcnc", "flat siemens", "contact", "inch", "creo", "five linuxcnc"),
     "frames": ("flat linuxcnc", "laws linuxcnc", "creo", "catia", "solidworks", "system", "cycles fanuc"),
@@ -31,20 +28,25 @@ BATTERY: dict[str, tuple[str, ...]] = {
     "proof": ("flat linuxcnc", "five linuxcnc", "laws siemens"),
 }
 TESTS: dict[str, tuple[str, ...]] = {
-    "reader": ("toolpaths/test_cl_motion.py", "toolpaths/test_cl_records.py", "toolpaths/test_cl_habits.py", "test_samples.py"),
-    "frames": ("toolpaths/test_cl_motion.py", "toolpaths/test_cl_records.py", "postproc/test_setup_frames.py", "test_samples.py"),
+    "reader": ("toolpaths/test_cl_motion.py", "toolpaths/test_cl_records.py", "toolpaths/test_cl_habits.py",
+               "test_samples.py"),
+    "frames": ("toolpaths/test_cl_motion.py", "toolpaths/test_cl_records.py", "postproc/test_setup_frames.py",
+               "test_samples.py"),
     "placement": ("postproc/test_setup_frames.py", "postproc/test_road.py", "postproc/test_setup_system.py"),
-    "cycles": ("postproc/test_writer_cycles.py", "toolpaths/test_cl_records.py", "postproc/test_moves.py", "postproc/test_golden.py"),
-    "arcs": ("toolpaths/test_cl_motion.py", "postproc/test_writer_arcs.py", "postproc/test_linearise.py", "postproc/test_golden.py"),
+    "cycles": ("postproc/test_writer_cycles.py", "toolpaths/test_cl_records.py", "postproc/test_moves.py",
+               "postproc/test_golden.py"),
+    "arcs": ("toolpaths/test_cl_motion.py", "postproc/test_writer_arcs.py", "postproc/test_linearise.py",
+             "postproc/test_golden.py"),
     "feeds": ("postproc/test_moves.py", "postproc/test_writer.py", "postproc/test_golden.py", "postproc/test_road.py"),
     "kinematics": ("laws/test_kinematics_laws.py", "machines/test_serial_known.py", "machines/test_delta_linear.py"),
     "linearising": ("postproc/test_linearise.py", "postproc/test_road.py", "postproc/test_golden.py"),
     "links": ("postproc/test_links.py", "postproc/test_road.py", "postproc/test_golden.py"),
     "travel": ("postproc/test_travel.py",),
     "compensation": ("postproc/test_compensation.py", "postproc/test_compensation_points.py"),
-    "cutter compensation": ("postproc/test_leftovers_cutcom.py", "postproc/test_golden.py", "postproc/test_compensation_control.py"),
-    "states": ("postproc/test_stops.py", "postproc/test_writer.py", "postproc/test_spindle_of_setup.py", "postproc/test_golden.py",
-               "postproc/test_leftovers_restart.py"),
+    "cutter compensation": ("postproc/test_leftovers_cutcom.py", "postproc/test_golden.py",
+                            "postproc/test_compensation_control.py"),
+    "states": ("postproc/test_stops.py", "postproc/test_writer.py", "postproc/test_spindle_of_setup.py",
+               "postproc/test_golden.py", "postproc/test_leftovers_restart.py"),
     "joints": ("postproc/test_joint_plan.py", "postproc/test_joint_path.py"),
     "planning": ("postproc/test_planned_feed.py", "postproc/test_smoothed_moves.py", "postproc/test_writer.py"),
     "writer": ("postproc/test_golden.py", "postproc/test_writer.py", "postproc/test_writer_cycles.py",

@@ -41,14 +41,14 @@ class Outcome:
         return self.caught_by in ("survives", "verify") or (self.caught_by == "blind" and not self.test)
 
 
-def apart(work: Callable[[], Any]) -> Any:
+def apart(work: Callable[[], Any], seconds: int = SECONDS) -> Any:
     """What `work` gives in a process of its own; an exception, or no end, as a text."""
     sys.stdout.flush()
     read, write = os.pipe()
     child = os.fork()
     if child == 0:
         os.close(read)
-        signal.alarm(SECONDS)
+        signal.alarm(seconds)
         try:
             found = pickle.dumps(work())
         except BaseException as fault:
@@ -64,8 +64,9 @@ def apart(work: Callable[[], Any]) -> Any:
 
 
 class Bench:
-    """The conversions without a fault, made when they are first needed; what a process with a fault inherits is warm, but for
-    the caches of the project (`plant.forget`)."""
+    """The conversions without a fault, made when they are first needed.
+
+    What a process with a fault inherits is warm, but for the caches of the project (`plant.forget`)."""
 
     def __init__(self) -> None:
         functions()
@@ -125,7 +126,8 @@ def outcome(fault: Fault, bench: Bench, tests: bool = True) -> Outcome:
         result.cases = dict.fromkeys(names, f"conversion: {got}")
     else:
         passed = {n: m for n, m in got.items() if m.ok and (body(m.text) != body(base[n].text) or not base[n].ok)}
-        checked = apart(lambda: {n: verified(bench.results[n], m.text, m.files) for n, m in passed.items()}) if passed else {}
+        checked = {} if not passed else apart(
+            lambda: {n: verified(bench.results[n], m.text, m.files) for n, m in passed.items()})
         assert not isinstance(checked, str), checked
         result.cases = {n: _of_case(base[n], got[n], checked.get(n)) for n in names}
         if proves(fault.room):
@@ -195,6 +197,6 @@ def _tests(fault: Fault) -> str:
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
     signal.alarm(3 * SECONDS)
     with planted(fault):
-        pytest.main(["-x", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", *(f"tests/{name}" for name in tests_of(fault.room))],
-                    plugins=[first])
+        pytest.main(["-x", "-q", "-p", "no:cacheprovider", "-p", "no:xdist",
+                     *(f"tests/{name}" for name in tests_of(fault.room))], plugins=[first])
     return first.name
