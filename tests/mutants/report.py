@@ -14,7 +14,8 @@ HEAD = """\
 # Planted faults
 
 `make mutants` plants {count} faults, each in one function of the project, found by its name, in a process of its own, and
-says what catches it; and it changes written programs in {changes} places. `make mutants ROOM=arcs ONLY=sense JOBS=2` takes some.
+says what catches it; and it changes written programs in {changes} places. `make mutants ROOM=arcs ONLY=sense JOBS=2` takes
+some.
 
 | file | what it holds |
 |---|---|
