@@ -9,7 +9,7 @@ PYTEST_ARGS ?= -n auto --maxprocesses 4 --dist loadfile -rfEs
 SOURCES := toolpaths machines postproc
 NUMERIC = $(shell grep -rl --include='test_*.py' 'mark\.numeric' tests)
 
-.PHONY: demo test quick numeric hard damage changes lint lock clean
+.PHONY: demo test quick numeric hard damage changes mutants lint lock clean
 
 demo: $(STAMP)
 	@mkdir -p out
@@ -32,6 +32,12 @@ damage: $(STAMP)
 # Every word, block and number of written programs changed, on every control: minutes each.
 changes: $(STAMP)
 	$(BIN)/pytest $(PYTEST_ARGS) -m slow tests/postproc/test_mutation.py
+
+# Faults planted in the project's functions and in written programs, and what catches each: half an hour of processor.
+JOBS ?= 1
+mutants: $(STAMP)
+	$(BIN)/python -m tests.mutants --jobs $(JOBS) $(if $(ROOM),--room "$(ROOM)") $(if $(ONLY),--only "$(ONLY)") \
+		$(if $(ROOM)$(ONLY),,--json tests/mutants/results.json --page tests/mutants/README.md) $(MUTANTS_ARGS)
 
 # Under a minute on two processors once compiled code is kept (tests/tiers.py says what belongs to it).
 quick: $(STAMP)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -10,12 +11,13 @@ import numpy as np
 
 from machines.loader import builtin
 from machines.machine import Machine
+from postproc.control import Control
+from postproc.coolant import COMMANDS, switching
 from postproc.job import Job
 from postproc.options import Options
-from postproc.readback.checks import block_seconds
 from postproc.readback.compare import Comparison
 from postproc.readback.poses import Executed as Poses
-from postproc.readback.poses import arc_sweeps, begins
+from postproc.readback.poses import arc_sweeps, begins, coordinates
 from postproc.setup import SetupFile
 from postproc.witness.evidence import Case, Executed, Testimony
 from postproc.witness.testify import testify
@@ -40,14 +42,15 @@ def executed_of(comparison: Comparison, poses: Poses, job: Job) -> Executed:
     assert comparison.executed is not None
     motion, control = comparison.executed[1], job.control
     every = np.arange(len(motion))
-    joints = motion.end / control.unit if control.base != "tcp" else poses.joints(motion, every, 1.0)
+    degrees = _units(job.machine.axis_names)
+    joints = motion.end / degrees if control.base != "tcp" else poses.joints(motion, every, 1.0)
     straight = (motion.code != 2) & (motion.frame == 0) & (control.base != "tcp")
     if control.rapids == "dog-leg":
         straight &= motion.code != 0
 
     def joints_at(rows: Ints, t: float | Floats) -> Floats:
         if isinstance(t, np.ndarray) and not t.any() and control.base != "tcp":
-            return begins(motion, rows) / control.unit
+            return begins(motion, rows) / degrees
         return poses.joints(motion, rows, t)
 
     def poses_at(rows: Ints, t: float | Floats) -> tuple[Floats, Floats]:
@@ -55,11 +58,29 @@ def executed_of(comparison: Comparison, poses: Poses, job: Job) -> Executed:
             return comparison.tip[rows], comparison.axis[rows]
         return poses.poses(motion, rows, t)
 
-    seconds = block_seconds(motion, control, job.controller.feed.arc_inverse == "radius")
-    start = motion.start / control.unit if control.base != "tcp" else job.machine.home
+    def steps(rows: Ints) -> Floats:
+        before, end = coordinates(motion, rows)
+        return end - before
+
+    by_tip = np.asarray(motion.frame > 0) | (control.base == "tcp")
+    lengthless = np.array([f.law == "axes" for f in motion.frames])[motion.frame] & (not control.length_on_z)
+    start = motion.start / degrees if control.base != "tcp" else job.machine.home
     return Executed(job.machine.axis_names, joints, start, motion.line, motion.code, np.asarray(straight),
-                    arc_sweeps(motion, control), seconds, motion.tool, motion.spindle, motion.rpm, motion.coolant,
-                    motion.dwell, motion.pitch, motion.hole, joints_at, poses_at)
+                    arc_sweeps(motion, control), motion.feed, motion.inverse, motion.inch, by_tip, control.feed_rule,
+                    job.controller.feed.arc_inverse == "radius", motion.tool, motion.spindle, motion.rpm, motion.coolant,
+                    motion.dwell, motion.pitch, motion.hole, motion.register, lengthless, steps, joints_at, poses_at)
+
+
+def offset_joints(control: Control) -> Floats | None:
+    """(J,) joints of the program's zero; None where words are no axis positions by it, or it holds a tool's length."""
+    if control.base == "tcp" or control.measured or not control.machine.kinematics.slides_affine:
+        return None
+    return np.asarray(control.work_offset / _units(control.machine.axis_names))
+
+
+def _units(letters: tuple[str, ...]) -> Floats:
+    """(J,) word units per joint unit, by the letters of the axes alone."""
+    return np.array([math.degrees(1.0) if letter in "ABC" else 1.0 for letter in letters])
 
 
 def second_witness(source: ClSource | None, setup: SetupFile, options: Options, job: Job,
@@ -73,9 +94,12 @@ def second_witness(source: ClSource | None, setup: SetupFile, options: Options, 
     if options.orient != "keep" or source is None or comparison.executed is None or comparison.poses is None:
         why = "the tool axes were chosen" if options.orient != "keep" else "the path is not as it was read from a file"
         return Testimony((), (f"all ({why})",)), []
+    control, codes = job.control, job.controller.codes
     case = Case(source.data, machine_tables(job.machine), setup.model_dump(), options.tolerance, job.axis_tolerance,
-                source.units or None, source.dialect or None, job.control.rapids == "dog-leg", comparison.planned,
-                job.corrects)
+                source.units or None, source.dialect or None, control.rapids == "dog-leg", comparison.planned, job.corrects,
+                "{register}" in codes.length_offset,
+                sum(COMMANDS[kind] for kind, (on, _) in switching(codes).items() if on),
+                origin=control.origin, work_offset=offset_joints(control))
     try:
         said = testify(case, executed_of(comparison, comparison.poses, job))
     except (ArithmeticError, AssertionError, LookupError, TypeError, ValueError) as fault:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from itertools import takewhile
 
 import numpy as np
 
 import postproc.witness.arcs as arcs
 import postproc.witness.cycles as cycles
-from postproc.witness.commanded import UNFOLLOWED, Commanded, unit
+from postproc.witness.commanded import KINDS, OWN, UNFOLLOWED, Commanded, unit
 from postproc.witness.dialect import ALL, dialect_of, scale_of
 from postproc.witness.execution import Execution, Z
 from postproc.witness.rows import assembled
@@ -257,8 +258,22 @@ def feed_of(words: tuple[float | str, ...], scale: float) -> tuple[float, bool]:
 
 def _load(e: Execution, r: Record, line: int) -> None:
     number = r.after("TOOL", "TURRET") if r.major == "LOAD" else next(iter(r.numbers), None)
-    if number is not None and number == int(number) and 0 <= number < 1e9:
-        e.tool.set(e.row, int(number))
+    if number is None or number != int(number) or not 0 <= number < 1e9:
+        return
+    named = _register(r)
+    if named or number != e.tool.now:
+        e.register.set(e.row, named)
+    e.tool.set(e.row, int(number))
+
+
+def _register(r: Record) -> int:
+    """The length register that a record which loads a tool names: behind a word, else second of LOADTL's numbers, fourth of
+    four (ISO 4343); OWN without one."""
+    named: float | str | None = r.after("OSETNO") if r.major == "TURRET" else r.after("ADJUST", "OSETNO", "OFFSET")
+    if named is None and r.major == "LOADTL":
+        placed = list(takewhile(lambda w: isinstance(w, float), r.words))
+        named = placed[3] if len(placed) > 3 else placed[1] if len(placed) > 1 else None
+    return int(named) if isinstance(named, float) and named > 0.0 else OWN
 
 
 def _named(e: Execution, name: str) -> None:
@@ -299,7 +314,8 @@ def _spindl(e: Execution, r: Record, line: int) -> None:
 
 
 def _coolnt(e: Execution, r: Record, line: int) -> None:
-    e.coolant.set(e.row, 0 if r.has("OFF") else 1 if r.has("FLOOD") else 2)
+    kind = next((kind for word, kind in KINDS.items() if r.has(word)), 1)
+    e.coolant.set(e.row, 2 if r.words == ("ON",) else kind)
 
 
 def _by_code(e: Execution, r: Record, line: int) -> None:

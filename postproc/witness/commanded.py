@@ -15,6 +15,13 @@ UNKNOWN = -9
 UNFOLLOWED = -8
 """of spindle or coolant: switched by codes of the machine, which this witness does not follow"""
 
+KINDS = {"OFF": 0, "THRU": 12, "AIR": 13, "MIST": 11}
+"""coolant by the word that says it, in this order; 1 is flood, 2 whatever flows"""
+BITS = {1: 1, 11: 2, 12: 4, 13: 8}
+"""what flows then, as the reader counts it"""
+OWN = 0
+"""of a length register: that of the tool's number"""
+
 
 @dataclass(frozen=True)
 class Cycle:
@@ -27,6 +34,8 @@ class Cycle:
     per_turn: bool = False
     steps: tuple[float, ...] = ()
     dwell: float = 0.0
+    retract: float = math.nan
+    """where the tool leaves the hole to, NaN where no number says so"""
     line: int = 0
 
 
@@ -40,8 +49,10 @@ class Commanded:
         feed (N,): mm/min, or mm per turn where `per_turn` (N,), or 1/min where `inverse` (N,); NaN: none
         arc (N,): index into centre, normal (K, 3), sweep (K,) rad; -1
         cycle (N,): index into cycles, -1; tool, spindle, coolant (N,): number; -1, 0, 1; "" to words; UNKNOWN
+        register (N,): length register, OWN where no record names one
         rpm (N,): NaN where not stated; turned (N,): row of the last SPINDL record; name (N,): index into names of tools
-        system: origin and rotation of every system of the file by its name, in order
+        systems: rotation and origin of every system of the file by its name, in order; first: name of the one that the first
+            position is in, "" for the absolute frame, None where that is not sure
         unread: what was not understood, by its text
     """
 
@@ -61,6 +72,7 @@ class Commanded:
     cycle: Array
     cycles: tuple[Cycle, ...]
     tool: Array
+    register: Array
     name: Array
     names: tuple[str, ...]
     spindle: Array
@@ -68,6 +80,7 @@ class Commanded:
     turned: Array
     coolant: Array
     systems: dict[str, tuple[Array, Array]]
+    first: str | None
     unread: dict[str, int] = field(default_factory=dict)
 
     def __len__(self) -> int:

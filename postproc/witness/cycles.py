@@ -44,6 +44,8 @@ def _stated(made: Cycle, r: Record, dialect: Dialect, scale: float, line: int) -
         made = replace(made, depth=depth * dialect.depth * scale)
     if start is not None:
         made = replace(made, clearance=start * scale)
+    out = r.after("RTRCTO", "RETURN")
+    made = replace(made, retract=math.nan if out is None else out * scale)
     steps = tuple(v * scale for v in _steps(r) if v > 0.0)
     rest = r.after("DWELL") or 0.0
     rest = math.nan if "REV" in r.words else rest

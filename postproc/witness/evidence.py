@@ -27,7 +27,15 @@ class Case:
     bent_rapids: bool = False
     planned: bool = False
     errors: bool = False
+    registers: bool = True
+    """False: the control has no length registers to be named, a tool brings its own length along"""
+    coolants: int = 15
+    """bits of the kinds of coolant that the control has codes for: it gives the nearest of them for others"""
     oriented: bool = False
+    origin: Array | None = None
+    """(3,) the zero of the work offset in the table frame, as the program takes it"""
+    work_offset: Array | None = None
+    """(J,) joints, mm and rad, at which the tip of a tool without length stands there; None where it has no such joints"""
 
 
 @dataclass(frozen=True)
@@ -37,8 +45,13 @@ class Executed:
     Attributes:
         letters: of the joints; joints (E, J) at the end of every block, mm and rad; start (J,)
         line, code (E,): line of the program; 0 rapid, 1 feed, 2 arc; straight (E,): True where joints go straight
-        sweep (E,): rad of arcs, NaN; seconds (E,): at the feed in force, for blocks at feed
+        sweep (E,): rad of arcs, NaN; feed (E,): F word in force, mm or degrees, or inch where `inch` (E,), per minute, or
+            1/min where `inverse` (E,)
+        steps: words (K, J) of blocks less those where they begin, mm and degrees; by_tip (E,): X, Y, Z are the tip
+        rule: what a feed per minute refers to ("xyz-first", "geometry", "all"); by_angle: inverse time of arcs counts rad
         tool, spindle, rpm, coolant, dwell, pitch, hole (E,): as in force; pitch NaN outside taps, hole True in cycles
+        register (E,): length register in force, -1 for none; lengthless (E,): True where none may be, since the joints
+            hold the tool's length already
         joints_at: joints (K, J) of blocks (K,) at a fraction of each
         poses_at: (tip, axis) of blocks as the reader has them: the claim that rods are held against
     """
@@ -50,7 +63,12 @@ class Executed:
     code: Array
     straight: Array
     sweep: Array
-    seconds: Array
+    feed: Array
+    inverse: Array
+    inch: Array
+    by_tip: Array
+    rule: str
+    by_angle: bool
     tool: Array
     spindle: Array
     rpm: Array
@@ -58,6 +76,9 @@ class Executed:
     dwell: Array
     pitch: Array
     hole: Array
+    register: Array
+    lengthless: Array
+    steps: Callable[[Array], Array]
     joints_at: Callable[[Array, Any], Array]
     poses_at: Callable[[Array, Any], tuple[Array, Array]]
 

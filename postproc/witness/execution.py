@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 import postproc.witness.arcs as arcs
-from postproc.witness.commanded import UNKNOWN, Cycle
+from postproc.witness.commanded import OWN, UNKNOWN, Cycle
 from postproc.witness.dialect import Dialect
 from postproc.witness.text import Array, Text
 
@@ -57,6 +57,7 @@ class Execution:
         self.known, self.gap = Track(True), set[int]()
         self.feed: Track = Track((math.nan, False, False))
         self.tool, self.name, self.names = Track(UNKNOWN), Track(-1), list[str]()
+        self.register = Track(OWN)
         self.spindle: Track = Track((UNKNOWN, math.nan))
         self.last_direction = 1
         self.coolant, self.cycle, self.cycles = Track(UNKNOWN), Track(-1), list[Cycle]()

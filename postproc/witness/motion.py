@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from postproc.witness.commanded import RAPID
 from postproc.witness.evidence import Finding
 from postproc.witness.machine import Chain, limits_of
+from postproc.witness.pace import seconds_of
 from postproc.witness.place import Cut, Poses
 from postproc.witness.stretches import BOTTOM, ENTER, Targets, is_cut, is_rapid, off
 from postproc.witness.text import Array
@@ -38,6 +41,8 @@ class Walked:
         self.kind = np.where(self.inside, targets.kind[m], -1)
         self.gap = np.where(self.inside, targets.gap[m], False)
         self.away, self.tilt = np.zeros(len(owner)), np.zeros(len(owner))
+        self.seconds = seconds_of(poses.executed)
+        """(E,) of blocks at feed"""
 
     def start(self, rows: Array) -> tuple[Array, Array]:
         """(tip, axis) where the way of blocks `rows` begins: as commanded, or where the tool stood."""
@@ -66,9 +71,11 @@ class Walked:
         return self.inside & ~self.gap & (self.away <= self.tolerance[0] + EXACT) & (self.tilt <= self.tolerance[1] + EXACT)
 
 
-def check_way(w: Walked, lines: Array, cut: Cut | None, margin: float, bent: bool,
+def check_way(w: Walked, lines: Array, cut: Cut | None, margin: float, link_angle: float, bent: bool,
               table: dict[str, object]) -> list[Finding]:
-    """Blocks off their way that are no retract, approach or move clear of what is cut; rapids in cuts and the reverse."""
+    """Blocks off their way that are no retract, approach or move clear of what is cut; rapids in cuts and the reverse.
+
+    Rapids that turn the tool axis by more than `link_angle` (degrees) have to be clear, or on such a line, themselves."""
     good = w.on_way()
     step = np.diff(w.tip, axis=0, prepend=w.tip[:1])
     moved = np.sqrt((step * step).sum(axis=1))
@@ -79,6 +86,7 @@ def check_way(w: Walked, lines: Array, cut: Cut | None, margin: float, bent: boo
     after_hole = w.targets.kind[np.clip(w.owner - 1, 0, len(w.targets) - 1)] == BOTTOM
     fed = (w.kind == RAPID) & ~after_hole & ~w.gap & good & (w.code > 0) & (moved > STILL) & (not bent)
     found += _finding(w, np.flatnonzero(fed), lines, "kind", "feed motion on a rapid of the CL file")
+    good &= ~_turned_in_rapid(w, math.radians(link_angle))
     rows = np.flatnonzero(~good & ~w.gap & (np.arange(len(w.owner)) > 0) & ((w.code == 0) | cutting | rapid | ~w.inside))
     if not len(rows):
         return found
@@ -93,6 +101,13 @@ def check_way(w: Walked, lines: Array, cut: Cut | None, margin: float, bent: boo
     rest = bad[~np.isin(bad, cuts)]
     return found + _finding(w, rest, lines, "clearance", "motion that the CL file does not command comes nearer to what is "
                             "cut than the margin of the set-up")
+
+
+def _turned_in_rapid(w: Walked, angle: float) -> Array:
+    """(E,) blocks of rapids of the CL file that turn the tool axis by more than an angle."""
+    t = w.targets
+    turns = np.einsum("ni,ni->n", t.start_axis, t.axis) < math.cos(angle)
+    return w.inside & np.asarray((t.kind == RAPID) & ~t.free & turns)[np.minimum(w.owner, len(t) - 1)]
 
 
 def _finding(w: Walked, rows: Array, lines: Array, code: str, message: str) -> list[Finding]:

@@ -41,6 +41,17 @@ def placement(setup: dict[str, Any], c: Commanded) -> tuple[Array, Array]:
     return rotation @ matrix.T, origin - rotation @ matrix.T @ there
 
 
+def zero_of(setup: dict[str, Any], c: Commanded, place: tuple[Array, Array]) -> Array | None:
+    """(3,) origin in the table frame of the system that is the work offset: the set-up's, else the first position's; None
+    where that is not known."""
+    name = setup.get("work_offset") or c.first
+    if name is None:
+        return None
+    rotation, origin = place
+    there = next((at for k, (_, at) in c.systems.items() if k.lower() == name.lower()), None) if name else np.zeros(3)
+    return None if there is None else rotation @ there + origin
+
+
 @dataclass(frozen=True)
 class Poses:
     """Poses of a program's blocks by this witness's own kinematics; on rods those of the reader, held against the rods.

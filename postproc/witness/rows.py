@@ -56,9 +56,17 @@ def assembled(e: Execution) -> Commanded:
     gap = np.zeros(n, bool)
     gap[[row for row in e.gap if row < n] + doubtful] = True
     return Commanded(tip, axis, kind, line, known, gap, feed[:, 0], feed[:, 1] > 0, feed[:, 2] > 0, arc, centre, normal,
-                     sweep, cycle, tuple(e.cycles), e.tool.column(n, np.int64), e.name.column(n, np.int64), tuple(e.names),
+                     sweep, cycle, tuple(e.cycles), e.tool.column(n, np.int64), e.register.column(n, np.int64),
+                     e.name.column(n, np.int64), tuple(e.names),
                      spindle[:, 0].astype(np.int64), spindle[:, 1], turned, e.coolant.column(n, np.int64), e.systems,
-                     e.unread)
+                     _first_system(e, place), e.unread)
+
+
+def _first_system(e: Execution, place: Array) -> str | None:
+    """The system that the first position is in; frames that are turned with a table have no name."""
+    if e.shifted or len(e.frames) != len(e.systems) + 1:
+        return None
+    return list(e.systems)[int(place[0]) - 1] if len(place) and place[0] else ""
 
 
 def _index(track: Track, n: int) -> Array:

@@ -8,15 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from postproc.witness.commanded import ARC, LINE, UNFOLLOWED, UNKNOWN, Commanded, Cycle
+from postproc.witness.commanded import ARC, BITS, LINE, OWN, UNFOLLOWED, UNKNOWN, Commanded, Cycle
 from postproc.witness.evidence import Case, Finding
 from postproc.witness.machine import limits_of
 from postproc.witness.motion import Walked
 from postproc.witness.stretches import BOTTOM
 from postproc.witness.text import Array
 
-ALLOWED = 1.02
-"""share by which a feed may be off: short blocks carry the rounding of their words"""
+ALLOWED = 1.005
+"""share by which a feed may be off besides what the rounding of words may cost, in each move and in all of one feed"""
+_WAY_OUT = 12
+"""blocks behind the bottom of a hole in which the tool comes to its retract plane"""
 _PECKED = ("DEEP", "BRKCHP")
 _FEED_OUT = ("BORE", "REAM", "TAP")
 
@@ -60,10 +62,10 @@ def feeds_of(c: Commanded, setup: dict[str, Any]) -> Array:
 
 def check_feeds(w: Walked, c: Commanded, case: Case, table: dict[str, Any], match: Array) -> tuple[list[Finding], int]:
     """Cuts that are faster than programmed, or slower and no axis explains it; the number of cuts that were compared."""
-    t, e = w.targets, w.poses.executed
+    t = w.targets
     rows = np.flatnonzero(w.inside & (w.code > 0) & ~w.gap & ((w.kind == LINE) | (w.kind == ARC)) & w.on_way())
     m = len(t)
-    seconds = np.bincount(w.owner[rows], weights=e.seconds[rows], minlength=m)[:m]
+    seconds = np.bincount(w.owner[rows], weights=w.seconds[rows], minlength=m)[:m]
     length = np.sqrt(((t.tip - t.start) ** 2).sum(axis=1))
     round_ = t.sweep != 0.0
     flat = t.start - t.centre
@@ -76,14 +78,34 @@ def check_feeds(w: Walked, c: Commanded, case: Case, table: dict[str, Any], matc
     shorter = 0.002 + 4.0 * case.tolerance + np.abs(t.sweep) * case.tolerance
     slack = shorter * np.where(inverse, asked / np.maximum(length, 1e-3), 60.0 / feed)
     check = ((t.kind == LINE) | (t.kind == ARC)) & ~t.gap & ~t.free & (match >= 0) & (seconds > 0.0) & np.isfinite(asked)
-    fast = np.flatnonzero(check & (seconds * ALLOWED + slack < asked))
-    found = _feed_finding(w, c, fast, asked / np.where(seconds > 0.0, seconds, 1.0), match)
+    ratio = asked / np.where(seconds > 0.0, seconds, 1.0)
+    group = _groups(check, np.where(inverse, asked, feed))
+    fast = check & ((seconds * ALLOWED + slack < asked) | _off_in_all(group, asked, ALLOWED * seconds, slack))
+    found = _feed_finding(w, c, np.flatnonzero(fast), ratio, match)
     if not case.planned:
-        slow = np.flatnonzero(check & (seconds > ALLOWED * asked + slack))
-        needed = _needed(w, rows, slow, asked / np.maximum(length, 1e-9), table)
-        slow = slow[seconds[slow] > ALLOWED * np.maximum(asked[slow], needed[slow]) + slack[slow]]
-        found += _feed_finding(w, c, slow, asked / np.where(seconds > 0.0, seconds, 1.0), match)
+        late = check & ((seconds > ALLOWED * asked + slack) | _off_in_all(group, seconds, ALLOWED * asked, slack))
+        needed = np.maximum(asked, _needed(w, rows, np.flatnonzero(late), asked / np.maximum(length, 1e-9), table))
+        slow = late & ((seconds > ALLOWED * needed + slack)
+                       | _off_in_all(np.where(late, group, 0), seconds, ALLOWED * needed, slack))
+        found += _feed_finding(w, c, np.flatnonzero(slow), ratio, match)
     return found, int(check.sum())
+
+
+def _groups(check: Array, feed: Array) -> Array:
+    """(M,) number of the feed of each target, from 1; 0 for what is not compared."""
+    result = np.zeros(len(feed), np.int64)
+    if check.any():
+        result[check] = 1 + np.unique(feed[check], return_inverse=True)[1]
+    return result
+
+
+def _off_in_all(group: Array, more: Array, less: Array, slack: Array) -> Array:
+    """(M,) True for targets of a group whose sum of `more` s passes that of `less` by what rounding, which goes either way,
+    may make of the sum."""
+    n = int(group.max(initial=0)) + 1
+    over = np.bincount(group, weights=np.where(group > 0, more - less, 0.0), minlength=n)
+    allowed = np.sqrt(np.bincount(group, weights=np.where(group > 0, slack * slack, 0.0), minlength=n))
+    return np.asarray((over > allowed)[group] & (group > 0) & (more > less))
 
 
 def _needed(w: Walked, rows: Array, slow: Array, pace: Array, table: dict[str, Any]) -> Array:
@@ -117,17 +139,23 @@ def check_states(w: Walked, c: Commanded, case: Case) -> tuple[list[Finding], di
     rows = np.flatnonzero(w.inside & (w.code > 0) & ((w.kind == LINE) | (w.kind == ARC) | (w.kind == BOTTOM)))
     row = w.targets.row[w.owner[rows]]
     tool, coolant = tools_of(c, case.setup)[row], c.coolant[row]
+    register = np.where((c.register[row] == OWN) | (not case.registers), tool, c.register[row])
+    register = np.where(e.lengthless[rows] | (not (case.setup.get("output") or {}).get("tool_call", True)), -1, register)
     direction, rpm = _spindles(tool, c.spindle[row], c.rpm[row], case.setup)
     if not (case.setup.get("output") or {}).get("tool_call", True):
         tool = np.full(len(rows), -1)
+    coolant = _coolants(tool, coolant, case.setup)
     tap = np.array([x.kind == "TAP" for x in c.cycles] + [False])[c.cycle[row]]
     flow = e.coolant[rows]
     stated = (direction != UNKNOWN) & (direction != UNFOLLOWED)
     speed = stated & (direction != 0) & np.isfinite(rpm) & ~tap
     some = _states_coolant(case.setup.get("tools")) or _states_coolant(case.setup.get("output"))
     wet = np.where(coolant == UNKNOWN, some | (flow == 0), np.where(coolant == 0, flow == 0, flow > 0))
-    wet &= (coolant != 1) | ((flow & 1) > 0)
-    checks = (("tool", "the program cuts with {0}, the CL file with {1}", tool != UNKNOWN, e.tool[rows], tool,
+    for kind, bit in BITS.items():
+        wet &= (coolant != kind) | ((flow & bit) > 0) | (not case.coolants & bit)
+    checks = (("length", "the length register is {0}, by the CL file it is {1}", tool != UNKNOWN, e.register[rows],
+               register, e.register[rows] == register),
+              ("tool", "the program cuts with {0}, the CL file with {1}", tool != UNKNOWN, e.tool[rows], tool,
                e.tool[rows] == tool),
               ("spindle", "the spindle is {0}, the CL file says {1}", stated & ~tap,
                e.spindle[rows], direction, e.spindle[rows] == direction),
@@ -162,18 +190,32 @@ def _spindles(tool: Array, direction: Array, rpm: Array, setup: dict[str, Any]) 
     return direction, rpm
 
 
+def _coolants(tool: Array, coolant: Array, setup: dict[str, Any]) -> Array:
+    """(K,) coolant with that of the set-up where no record states any: of the tool, else of [output] where no tool has its
+    own, which could still be in force."""
+    own = {int(n): t["coolant"] for n, t in (setup.get("tools") or {}).items() if (t or {}).get("coolant")}
+    default = (setup.get("output") or {}).get("coolant")
+    result = coolant.copy()
+    for number, word in own.items() if own else ([(None, default)] if default else []):
+        here = (coolant == UNKNOWN) & ((tool == number) if number is not None else np.ones(len(tool), bool))
+        result[here] = {"off": 0, "flood": 1, "mist": 11, "through": 12, "air": 13}.get(str(word), 2)
+    return result
+
+
 _SPINDLE = {1: "turning clockwise (M3)", -1: "turning anti-clockwise (M4)", 0: "stopped"}
-_COOLANT = {0: "off", 1: "flood", 2: "on"}
+_COOLANT = {0: "off", 1: "flood", 2: "on", 11: "mist", 12: "through the tool", 13: "air"}
 
 
 def _said(code: str, value: float) -> str:
     """A state in words; UNKNOWN of the file as nothing that is stated."""
     if value == UNKNOWN:
         return "nothing"
+    if code == "length":
+        return f"{value:g}" if value >= 0 else "none"
     if code == "tool":
         return f"T{value:g}" if value >= 0 else "the tool in the spindle"
     names = _SPINDLE if code == "spindle" else _COOLANT if code == "coolant" else {}
-    return names.get(int(value), f"{value:g}") if code != "coolant" or value < 3 else "on"
+    return names.get(int(value), f"{value:g}") if code != "coolant" or value in names else "on"
 
 
 def _states_coolant(table: Any) -> bool:
@@ -238,6 +280,9 @@ def _hole_faults(w: Walked, i: int, blocks: Array, cycle: Cycle, rpm: float, tol
     wanted = cycle.feed if cycle.per_turn else cycle.feed / rpm if rpm > 0.0 else math.nan
     if cycle.kind == "TAP" and abs(abs(pitch) - wanted) > 0.001 * wanted + 1e-4:
         found.append(f"the thread has a pitch of {abs(pitch):g} mm, by the CL file {wanted:g} mm")
+    low = cycle.retract - _risen(w, i, int(blocks[-1]), cycle.depth, tolerance) if math.isfinite(cycle.retract) else 0.0
+    if low > tolerance + 1e-6:
+        found.append(f"the tool leaves the hole {low:.4f} mm below the retract plane of the CL file")
     out = blocks[-1] + 1
     if cycle.kind in _FEED_OUT and out < len(e) and e.code[out] == 0:
         found.append("the tool leaves the hole in rapid, the CL file asks for feed")
@@ -246,17 +291,26 @@ def _hole_faults(w: Walked, i: int, blocks: Array, cycle: Cycle, rpm: float, tol
     return found
 
 
+def _risen(w: Walked, i: int, last: int, depth: float, tolerance: float) -> float:
+    """mm above the top of hole i that the tool comes to before it leaves the axis of the hole, behind block `last`."""
+    t, stop = w.targets, min(last + _WAY_OUT, len(w.tip))
+    offset = w.tip[last:stop] - t.tip[i]
+    rise = offset @ t.axis[i]
+    rest = offset - rise[:, None] * t.axis[i]
+    leaves = np.flatnonzero((rest * rest).sum(axis=1) > (2.0 * tolerance) ** 2)
+    return float(rise[:leaves[0] if len(leaves) else None].max()) - depth
+
+
 def _feed_fault(w: Walked, blocks: Array, cycle: Cycle, rpm: float) -> list[str]:
-    """That a block which goes deeper than those before it is faster than the feed of the cycle."""
-    e = w.poses.executed
+    """That a block which goes deeper than those before it is faster than the feed of the cycle, or slower and no axis is at
+    its velocity."""
     feed = cycle.feed * rpm if cycle.per_turn else cycle.feed
     step = w.tip[blocks] - w.tip[np.maximum(blocks - 1, 0)]
     length = np.sqrt((step * step).sum(axis=1))
-    long = (length > 0.1) & (e.seconds[blocks] > 0.0)
+    long = (length > 0.1) & (w.seconds[blocks] > 0.0)
     if not math.isfinite(feed) or not long.any():
         return []
-    ratio = 60.0 * length[long] / e.seconds[blocks[long]] / feed
-    worst = int((ratio - 0.02 / length[long]).argmax())
-    if ratio[worst] <= ALLOWED + 0.02 / length[long][worst]:
-        return []
-    return [f"the hole is drilled at {ratio[worst]:.3f} times the feed of the CL file"]
+    ratio = 60.0 * length[long] / w.seconds[blocks[long]] / feed
+    slack = 0.01 / length[long]
+    wrong = (ratio > ALLOWED + slack) | (ratio < 1.0 / ALLOWED - slack)
+    return [f"the hole is drilled at {ratio[int(wrong.argmax())]:.3f} times the feed of the CL file"] if wrong.any() else []

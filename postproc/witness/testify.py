@@ -10,12 +10,16 @@ import numpy as np
 from postproc.witness.clfile import commanded
 from postproc.witness.commanded import ARC, LINE, Commanded
 from postproc.witness.evidence import Case, Executed, Finding, Testimony
-from postproc.witness.machine import ROD, kinematics_of, merged
+from postproc.witness.machine import ROD, Chain, kinematics_of, merged
 from postproc.witness.motion import Walked, check_arcs, check_way
-from postproc.witness.place import Poses, Unplaced, cut_of, placement
+from postproc.witness.place import Poses, Unplaced, cut_of, placement, zero_of
 from postproc.witness.states import check_feeds, check_holes, check_states, tools_of, with_spindle
 from postproc.witness.stretches import BOTTOM, matched, targets_of, turns_of
 from postproc.witness.text import Array
+
+_NAMES = {"tool": "tools", "length": "length registers", "spindle": "spindle states", "coolant": "coolant states"}
+ZERO = 1e-6
+"""mm that reckoning may move the zero of the work offset"""
 
 
 def testify(case: Case, executed: Executed) -> Testimony:
@@ -71,9 +75,10 @@ def _compare(case: Case, executed: Executed, c: Commanded, place: tuple[Array, A
                              + _arriving(targets.axis[i]), int(c.line[targets.row[i]]), int(executed.line[last]), len(lost)))
     w = Walked(poses, targets, owner, there, along, (case.tolerance, case.axis_tolerance))
     w.measure()
-    margin = float((case.setup.get("clearance") or {}).get("margin", 50.0))
+    clearance = case.setup.get("clearance") or {}
+    margin, link_angle = float(clearance.get("margin", 50.0)), float(clearance.get("link_angle", 5.0))
     if not len(lost):
-        found += check_way(w, c.line, cut, margin, case.bent_rapids, table)
+        found += check_way(w, c.line, cut, margin, link_angle, case.bent_rapids, table)
         found += check_arcs(w, turns, c.line)
     faults, holes = check_holes(w, c, case, match)
     found += faults
@@ -82,12 +87,27 @@ def _compare(case: Case, executed: Executed, c: Commanded, place: tuple[Array, A
     faults, states, silent = check_states(w, c, case)
     found += faults
     found += _rods(poses)
+    faults, zeros = _zero(case, c, place, poses)
+    found += faults
     good = w.on_way() & np.isin(w.kind, (LINE, ARC, BOTTOM))
     worst = float(w.away[good].max(initial=0.0)), float(w.tilt[good].max(initial=0.0))
-    counts = {"positions": int((match >= 0).sum()), "arcs": int((targets.sweep != 0.0).sum()), "holes": holes,
-              "feeds": feeds, **{{"tool": "tools", "spindle": "spindle states", "coolant": "coolant states"}[k]: v
-                                 for k, v in states.items()}}
+    counts = {"positions": int((match >= 0).sum()), "arcs": int((targets.sweep != 0.0).sum()),
+              "holes": holes, "feeds": feeds, **{_NAMES[k]: v for k, v in states.items()}, "work offset": zeros}
     return found, worst, counts, silent
+
+
+def _zero(case: Case, c: Commanded, place: tuple[Array, Array], poses: Poses) -> tuple[list[Finding], int]:
+    """The zero of the work offset, and the joints that it holds, against set-up and CL file; 1 where it was compared."""
+    wanted = zero_of(case.setup, c, place)
+    if wanted is None or case.origin is None:
+        return [], 0
+    off = float(np.abs(case.origin - wanted).max())
+    if off <= ZERO and case.work_offset is not None and isinstance(poses.machine, Chain):
+        there = poses.machine.pose(case.work_offset[None], poses.executed.letters, np.zeros(1))[0]
+        off = float(np.abs(there[0] - wanted).max())
+    if off <= ZERO:
+        return [], 1
+    return [Finding("offset", f"the work offset is {off:.6f} mm off the system of the CL file that it is for", 0, 0)], 1
 
 
 def _arriving(axis: Array) -> str:
