@@ -79,7 +79,7 @@ def _control_bends(path: Path) -> Bools:
 def feed_words(path: Path, control: Control, step: Floats, asked: Floats, needed: Floats, mode: Array,
                rules: FeedRules) -> Feeds:
     """The words of blocks that take the time asked for, or the time (K,) s needed where that is longer, in the feed mode
-    (K,) and under the law of each."""
+    (K,) and under the law of each. Blocks without a time of their own, retracts in feed motion, have no feed asked for."""
     cutting, arc = path.code != 0, path.code == ARC
     wanted = np.where(cutting, np.nan_to_num(path.seconds), np.nan)
     seconds = np.fmax(wanted, needed)
@@ -94,12 +94,13 @@ def feed_words(path: Path, control: Control, step: Floats, asked: Floats, needed
         inverse = 60.0 / seconds
         rate = np.nan_to_num(inverse * length)
         by_radius = inverse * length / _radius(path) if arc.any() and rules.arc_inverse == "radius" else inverse
-    same = cutting & ~slowed & np.isfinite(asked) & (turned == 0.0)
+    own = (wanted > 0.0) | (needed <= 0.0)
+    same = cutting & ~slowed & np.isfinite(asked) & (turned == 0.0) & own
     for law, k in path.by_control():
         same[k] &= law.tips_straight
         if law.tip_law:
             near = np.abs(length[k] - wanted[k] * asked[k]) <= _ROUNDING * length[k]
-            same[k] |= cutting[k] & near & (needed[k] <= (1.0 - _ROUNDING) * wanted[k]) & _moves_tip(step[k], law)
+            same[k] |= cutting[k] & own[k] & near & (needed[k] <= (1.0 - _ROUNDING) * wanted[k]) & _moves_tip(step[k], law)
     per_minute = np.where(same, 60.0 * asked, per_minute)
     if rules.least_inverse_rate > 0.0:
         mode = np.where((mode == INVERSE) & (length > 0.0) & (rate < rules.least_inverse_rate), PER_MINUTE, mode)

@@ -49,8 +49,8 @@ def test_what_is_allowed_is_neutral() -> None:
     assert not has_errors(result.diagnostics) and result.toolpath.records == Records(6, 4, 2, 0)
 
 
-@pytest.mark.parametrize("record", ["STOP/1", "OPSTOP/ON", "MULTAX/ON,LINEAR", "COOLNT/FLOOD,1,2,3", "$$-> CUTTER / 10.5, 3",
-                                    "UNITS/MM,3", "DELAY/1,2", "MODE/1X", "ROTATE/CAXIS,1,2"])
+@pytest.mark.parametrize("record", ["STOP/RAPID", "OPSTOP/CHECK GOTO/1", "MULTAX/ON,4", "COOLNT/FLOOD,1,2,3",
+                                    "$$-> CUTTER / 10.5, 3", "UNITS/MM,3", "DELAY/1,2", "MODE/1X", "ROTATE/CAXIS,1,2"])
 def test_the_hint_of_a_form_names_the_word_that_takes_it(record: str) -> None:
     text = f"{HEAD}GOTO/1,2,3\n{record}\nGOTO/1,2,4\n"
     (found,) = [d for d in read_bytes(text).diagnostics if d.severity is Severity.ERROR]

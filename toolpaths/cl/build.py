@@ -17,7 +17,7 @@ from toolpaths.cl.arcs import ArcTable
 from toolpaths.cl.dialects import SCALE, Dialect
 from toolpaths.cl.log import Log
 from toolpaths.cl.scan import Points
-from toolpaths.cl.statements import Program, Statement
+from toolpaths.cl.statements import COMMENT, Program, Statement
 from toolpaths.cl.subprograms import Called, Subprograms
 from toolpaths.toolpath import Cycle, Event, FeedMode, Frame, Operation, Role, Tool
 
@@ -248,10 +248,15 @@ class Builder:
         return x, y, z
 
     def next_point(self) -> Triple | None:
-        """Coordinates of the plain point that is the very next record, as written; None where there is none."""
-        i = self.index + 1
-        before = self.program.before[i] if i < len(self.program.before) else len(self.points)
-        if i > self.stop or before <= self.fast:
+        """Coordinates of the next point, as written; None where another record than those of `BETWEEN` stands before it."""
+        statements, before = self.program.statements, self.program.before
+        for i in range(self.index + 1, self.stop):
+            if before[i] > self.fast:
+                break
+            if statements[i].major not in BETWEEN:
+                n = statements[i].numbers if statements[i].major == "GOTO" else []
+                return (n[0], n[1], n[2]) if len(n) >= 3 else None
+        if self.fast >= (before[self.stop] if self.stop < len(before) else len(self.points)):
             return None
         x, y, z = self.points.xyz[self.fast].tolist()
         return x, y, z
@@ -268,9 +273,11 @@ class Builder:
         return end > self.fast
 
     def next_statement_is(self, major: str) -> bool:
-        """True where the very next record is of that word, without a point before it."""
-        i = self.index + 1
-        return i < self.stop and self.program.statements[i].major == major and self.program.before[i] == self.fast
+        """True where the very next record, remarks apart, is of that word, without a point before it."""
+        statements, i = self.program.statements, self.index + 1
+        while i < self.stop and statements[i].major == COMMENT:
+            i += 1
+        return i < self.stop and statements[i].major == major and self.program.before[i] == self.fast
 
     def note_unknown(self, statement: Statement, word: str) -> None:
         """Count a word that the reader does not know."""

@@ -11,7 +11,8 @@ from toolpaths.cl.statements import Word
 KINDS = {"DRILL": "DRILL", "DEEP": "DEEP", "DEEP2": "DEEP", "PECK": "DEEP", "BRKCHP": "BRKCHP", "BREAKCHP": "BRKCHP",
          "TAP": "TAP", "RIGID": "TAP", "BORE": "BORE", "BORE7": "BORE7", "BORE8": "BORE8", "BORE9": "BORE9", "REAM": "REAM",
          "FACE": "FACE", "CSINK": "CSINK", "THRU": "THRU", "MILL": "MILL", "REVERS": "REVERS", "SHIFT": "SHIFT",
-         "CIRCUL": "CIRCUL", "THREAD": "THREAD", "SPOT": "DRILL"}
+         "CIRCUL": "CIRCUL", "THREAD": "THREAD", "SPOT": "DRILL", "SPDRL": "DRILL", "CBORE": "DRILL", "DEEPHL": "DEEP",
+         "CNSINK": "CSINK"}
 _RETRACT = frozenset({"RTRCTO", "RETURN"})
 _PECKS = frozenset({"STEP", "INCR", "PECKING", "1STPECK", "SUBPECK"})
 _OTHER = frozenset({"DIAMET", "TLANGL", "TIMES", "BACK", "CSKDIA"})
@@ -80,6 +81,9 @@ def values(v: Values, words: tuple[Word, ...]) -> Values:
         while i < len(words) and isinstance(words[i], float):
             numbers.append(words[i])
             i += 1
+        if word in _PECKS and len(numbers) > 1 and _unit_alone(words[i:i + 2]):
+            i, numbers = i - 1, numbers[:-1]
+            words = (*words[:i], words[i + 1], words[i], *words[i + 2:])
         taken = _label(word, [float(x) for x in numbers], words[i] if i < len(words) else "", found, free, steps, empty,
                        strange)
         free.extend(float(x) for x in numbers[taken:])
@@ -88,6 +92,11 @@ def values(v: Values, words: tuple[Word, ...]) -> Values:
     if steps:
         found["steps"] = tuple(steps)
     return replace(v, **found, free=tuple(free), empty=tuple(empty), strange=tuple(strange))  # type: ignore[arg-type]
+
+
+def _unit_alone(words: tuple[Word, ...]) -> bool:
+    """True where a feed unit follows without a number behind it: the last number before it is the feed."""
+    return bool(words) and words[0] in UNITS and not (len(words) > 1 and isinstance(words[1], float))
 
 
 def _label(word: str, n: list[float], following: Word, found: dict[str, object], free: list[float],

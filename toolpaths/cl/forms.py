@@ -17,7 +17,7 @@ from toolpaths.cl.dialects import UNIT_WORDS, Dialect
 from toolpaths.cl.feeds import UNITS
 from toolpaths.cl.log import Log
 from toolpaths.cl.near import nearest
-from toolpaths.cl.statements import COMMENT, DATA_COMMENT, Program, Statement
+from toolpaths.cl.statements import COMMENT, DATA_COMMENT, Program, Statement, statement_of
 from toolpaths.cl.subprograms import NAME
 from toolpaths.cl.words import BARE_WORDS, NEUTRAL, SILENT, TEXT_WORDS
 
@@ -34,6 +34,8 @@ class Form:
     """numbers are lengths: whole ones that begin with 0 are what is left of another"""
     named: bool = False
     """its first field may be a name: what a damaged one leaves has no counterpart in the file, which is an error there"""
+    text: bool = False
+    """a message for people follows: any words but those of a record"""
 
 
 def _form(words: str = "", *counts: int, closed: bool = False, gaps: bool = False, lengths: bool = False,
@@ -43,15 +45,17 @@ def _form(words: str = "", *counts: int, closed: bool = False, gaps: bool = Fals
 
 _TABLE = _form("AAXIS BAXIS CAXIS INCR ABS CLW CCLW TABLE HEAD ATANGL NEXT ROTREF AXIS", 1)
 _ALONE = _form("", 0, closed=True)
+_MESSAGE = Form(text=True)
 _FEED_MODIFIERS = frozenset({"SCALE", "LENGTH", "LOCK", "MAXIPM", "MAXRPM", "OVPLOT"})
 FORMS: dict[str, Form] = {
     "FEDRAT": Form(UNITS | _FEED_MODIFIERS | {"INVERS", "AUTO", "ON", "OFF", "PERSEC"}, frozenset({0, 1})),
-    "SPINDL": _form("RPM SFM SMM CLW CCLW ON OFF LOCK UNLOCK MAXRPM ORIENT LOW MEDIUM HIGH RANGE NEUTRL AUTO MILL TURN "
-                    "RADIUS", 0, 1),
+    "SPINDL": _form("RPM SFM SMM CLW CCLW BOTH ON OFF LOCK UNLOCK MAXRPM ORIENT LOW MEDIUM HIGH RANGE NEUTRL AUTO MILL "
+                    "TURN RADIUS DIAMTR", 0, 1),
     "COOLNT": _form("ON OFF FLOOD MIST AIR TAP TAPKUL THRU LOW MEDIUM HIGH ALL NOW NEXT TOOL", 0, 1),
-    "CUTCOM": _form("LEFT RIGHT ON OFF XYPLAN YZPLAN ZXPLAN NORMAL NORMDS PERPTO MODIFY ADJUST LENGTH OSETNO", 0, 1, 2),
+    "CUTCOM": _form("LEFT RIGHT ON OFF SAME XYPLAN YZPLAN ZXPLAN NORMAL NORMDS NORMPS PERPTO MODIFY ADJUST LENGTH OSETNO",
+                    0, 1, 2),
     "LOADTL": _form("OSETNO ADJUST OFFSET LENGTH IN TURN MILL SPINDL MANUAL AUTO LARGE SMALL", lengths=False),
-    "LOAD": _form("TOOL TURRET WIRE ADJUST OSETNO MANUAL ZOFF NEXTTL", 0, 1, 2, 3),
+    "LOAD": _form("TOOL TURRET WIRE ADJUST OSETNO MANUAL LENGTH HOLDER XOFF YOFF ZOFF NEXTTL", 0, 1, 2, 3),
     "SELECT": _form("TOOL", 1),
     "TURRET": _form("OSETNO SETOOL ADJUST LENGTH CLW CCLW"),
     "CUTTER": _form("DISPLY ON OFF", 0, 1, 2, 3, 4, 5, 6, 7, lengths=True),
@@ -69,39 +73,46 @@ FORMS: dict[str, Form] = {
     "TRANS": _form("", 3), "ZERO": _form("", 1), "ORIGIN": _form("", 3, 9), "TRNTYP": _form("WORLD"),
     "ROTATE": _TABLE, "ROTABL": _TABLE, "ROTHED": _TABLE,
     "UNITS": Form(frozenset(UNIT_WORDS), frozenset({0}), False), "UNIT": Form(frozenset(UNIT_WORDS), frozenset({0}), False),
-    "MULTAX": _form("ON OFF", 0, closed=True),
-    "STOP": _ALONE, "OPSTOP": _ALONE, "FINI": _ALONE, "END": _ALONE, "END-OF-PATH": _ALONE, "ENDSUB": _form("", 0, 1),
+    "MULTAX": _form("ON OFF", 0),
+    "STOP": _MESSAGE, "OPSTOP": _MESSAGE, "FINI": _ALONE, "END": _ALONE, "END-OF-PATH": _ALONE, "ENDSUB": _form("", 0, 1),
     "NURBS": _ALONE, "AUTOPS": _ALONE,
     "DELAY": _form("REV SEC TIME NOW NEXT", 1), "DWELL": _form("REV SEC TIME NOW NEXT", 1),
     "CALSUB": _form("", 0, 1, named=True), "DEFSUB": _form("", 0, 1, named=True),
-    "OPSKIP": _form("ON OFF", 0, 1), "SEQNO": _form("INCR ON OFF NEXT", 0, 1, 2), "PREFUN": _form("NOW NEXT", 1, 2, 3, 4),
+    "OPSKIP": _form("ON OFF", 0, 1), "DELETE": _form("ON OFF", 0, closed=True),
+    "SEQNO": _form("INCR ON OFF NEXT AUTO START FREQ", 0, 1, 2, 3), "SELECTL": _form("", 1, closed=True),
+    "PREFUN": _form("NOW NEXT", 1, 2, 3, 4),
     "AUXFUN": _form("NOW NEXT", 1, 2, 3, 4), "SET": _form("MODE ABSOL INCR INCRE INCREM LINTOL LINEAR ON OFF"),
     "MODE": _form("MILL TURN INCR INCRE INCREM ON OFF TOOL XYPLAN YZPLAN ZXPLAN ABSOL"),
     "RETRCT": _form("ON OFF TOOL"), "CLEARP": _form("XYPLAN YZPLAN ZXPLAN ON OFF"), "APPLY": _form("MILL TURN"),
     "UNLOAD": _form("TOOL"), "REWIND": _form("", 0, 1), "LEADER": _form("", 1), "CHECK": _form(), "HEAD": _form(),
-    "CLAMP": _form("ON OFF AUTO XAXIS YAXIS ZAXIS AAXIS BAXIS CAXIS"), "AIR": _form("ON OFF"), "OFSTNO": _form("ON OFF"),
+    "CLAMP": _form("ON OFF AUTO AXIS XAXIS YAXIS ZAXIS AAXIS BAXIS CAXIS"), "AIR": _form("ON OFF"),
+    "OFSTNO": _form("ON OFF"),
 }
 _CLT_CUTTER = 6
 """numbers of CUTTER in `.clt`, which has a comma behind the last"""
 _MILL_COUNTS = frozenset({5, 7, 10})
-_ANY_NUMBERS = {"FEDRAT": _FEED_MODIFIERS, "SPINDL": frozenset({"MAXRPM", "RANGE", "RADIUS", "LOCK", "ORIENT"}),
-                "ROTABL": frozenset({"AXIS"}), "ROTHED": frozenset({"AXIS"})}
+_ANY_NUMBERS = {"FEDRAT": _FEED_MODIFIERS, "SPINDL": frozenset({"MAXRPM", "RANGE", "RADIUS", "DIAMTR", "LOCK", "ORIENT"}),
+                "LOAD": frozenset({"XOFF", "YOFF"}), "ROTABL": frozenset({"AXIS"}), "ROTHED": frozenset({"AXIS"})}
 """Words with which a record takes numbers of their own."""
 _VALUED, _VALUED_IN = frozenset({"OSETNO", "ADJUST", "OFFSET", "LENGTH"}), frozenset({"LOADTL", "LOAD", "TURRET"})
 """Words that a number must follow, and in which records."""
-_NAMED = frozenset({"TOOL PATH", "OPNAME", "CSI_TOOL_PATH", "OPFEATSTART", "TOOLNO", "$$->FEATNO", *TEXT_WORDS})
+_NAMED = frozenset({"TOOL PATH", "OPNAME", "OP_NAME", "CSI_TOOL_PATH", "OPFEATSTART", "TOOLNO", "$$->FEATNO", *TEXT_WORDS})
+_EVERYDAY = frozenset({"LOAD", "END", "STOP", "HEAD", "CHECK", "AIR", "SET", "DELETE"})
+"""Words that stand in sentences too."""
 _ACTING = tuple(word for word in (*FORMS, "GOTO", "GODLTA", "MCSYS", "TOOLNO", "KNOT", "CNTRL", "TOOL PATH",
-                             "TLON *, *GOFWD")
-                if word not in ("LOAD", "END", "STOP", "HEAD", "CHECK", "AIR", "SET") and not word.startswith(DATA_COMMENT))
+                             "TLON *, *GOFWD") if word not in _EVERYDAY and not word.startswith(DATA_COMMENT))
 _RECORD = r"(?:(?<!UN)LOAD|" + "|".join(_ACTING) + r")\s*/"
-_GLUED = re.compile(r"(?:[A-Za-z0-9.)\]%\"';:!?][^A-Za-z0-9\s]?|[-=*#_]{3})(?:" + _RECORD +
-                    r"|(?:RAPID|FINI|END-OF-PATH|GOHOME|OPSTOP|MULTAX|ENDSUB|(?<![A-Za-z])STOP)\s*$)")
-_BEHIND = re.compile(r"\S\s+" + _RECORD + r"\s*[^\s/]+(?:\s*,\s*[^\s/]+)*\s*$")
+_GLUED = re.compile(r"(?:[A-Za-z0-9.)\]%\"';:!?][^A-Za-z0-9\s]?|[-=*#_]{3})(?P<record>" + _RECORD +
+                    r"|(?:RAPID|FINI|END-OF-PATH|GOHOME|OPSTOP|MULTAX|ENDSUB|(?<![A-Za-z])(?<![A-Za-z]-)STOP)\s*$)")
+_BEHIND = re.compile(r"\S\s+(?P<record>" + _RECORD + r"\s*[^\s/]+(?:\s*,\s*[^\s/]+)*\s*$)")
 _GEOMETRY = frozenset({"PSIS", "SYN"})
 """Words whose parameters hold slashes."""
 _WITHIN = re.compile(_RECORD)
-_NAMES = frozenset({"$$->FEATNO", "TOOL PATH", "PARTNO", "TPRINT", "OPNAME", "CSI_TOOL_PATH", "OPFEATSTART"})
+_NAMES = frozenset({"$$->FEATNO", "TOOL PATH", "PARTNO", "TPRINT", "OPNAME", "OP_NAME", "CSI_TOOL_PATH", "OPFEATSTART",
+                    "MACHIN", "MACHINE", "PROGRAM", "PART_OPE", "CATPROCESS", "CATPRODUCT", "DISPLY"})
+"""Words whose parameters are a name or a text, which may hold slashes."""
 _NUMBER_LIKE = re.compile(r"[-+.]*\d[-+.\d]*|[-+.\d]*[eEdD][-+.\d]*\d[-+.\d]*|[-+.]+")
+_PLANE = re.compile(r"\(\s*PLANE\s*/(?:\s*[-+.\d]+\s*,){3}\s*[-+.\d]+\s*\)", re.IGNORECASE)
 _QUOTED = re.compile(r"'[^'/$]*'")
 _ONE_LETTER = re.compile(r"[-+.\d]*[^-+.\d][-+.\d]*")
 _TWO_NUMBERS = re.compile(r"[\d.]\s+[-+.\d]")
@@ -127,10 +138,12 @@ def check_forms(program: Program, log: Log, allowed: Iterable[str], dialect: Dia
 def fault_of(s: Statement, allow: frozenset[str] = frozenset()) -> str:
     """What is wrong with the form of a statement, "" where nothing is."""
     if s.major == COMMENT or s.major in _NAMED or s.major in NEUTRAL:
-        return _joined_fault(s)
+        return _joined_fault(s) or (_tdata_fault(s) if s.major == "TDATA" else "")
     form = FORMS.get(s.major)
-    if form is None:
+    if form is None or (s.major == "CLEARP" and _PLANE.fullmatch(s.body)):
         return ""
+    if form.text:
+        return _message_fault(s)
     return _words_fault(s, form, allow) or _numbers_fault(s, form)
 
 
@@ -140,12 +153,44 @@ def _joined_fault(s: Statement) -> str:
         parts = [p.strip().upper() for p in s.body.split(",")]
         if "TOOL" not in parts[1:] and (len(parts) > 1 or parts[0].endswith("TOOL") or "TOOL" in parts[0]):
             return "the name of the tool is not behind TOOL"
-    if s.major in SILENT and s.major not in _GEOMETRY and "/" in s.body:
+    if s.major in SILENT and s.major not in _GEOMETRY | _NAMES and "/" in s.body:
         return "a second slash"
-    found = _GLUED.search(s.body) or (_WITHIN if s.major in _NAMES else _BEHIND).search(s.body)
+    pattern = _WITHIN if s.major in _NAMES else _BEHIND
+    found = next((m for m in (_GLUED.search(s.body), pattern.search(s.body)) if m and _whole(s.body[_at(m):])), None)
     if found is None:
         return _words_fault(s, FORMS[s.major], frozenset()) or _numbers_fault(s, FORMS[s.major]) if s.major in FORMS else ""
     return f"a record stands within it, {found[0].strip()[:30]!r}: the end of a line is missing"
+
+
+def _at(found: re.Match[str]) -> int:
+    """Where the record begins in a match of `_GLUED`, `_BEHIND` or `_WITHIN`."""
+    return found.start("record") if "record" in found.re.groupindex else found.start()
+
+
+def _whole(text: str) -> bool:
+    """True where text is a record in its form and of known words: what a lost line end leaves, not a word of a sentence."""
+    s = statement_of(text)
+    form = FORMS.get(s.major)
+    if form is None:
+        return s.major not in ("GOTO", "GODLTA") or all(isinstance(w, float) for w in s.words)
+    if form.text:
+        return True
+    known = all(isinstance(w, float) or w in form.words or form.named for w in s.words)
+    return known and not _words_fault(s, form, frozenset()) and not _numbers_fault(s, form)
+
+
+def _tdata_fault(s: Statement) -> str:
+    """TDATA (tables of post-processor words of CATIA) has words that TLDATA has not: without them it may be what is left
+    of that."""
+    return "" if s.has("DIAM", "TYPE", "QUADRANT") else "it has DIAM, TYPE or QUADRANT; TLDATA?"
+
+
+def _message_fault(s: Statement) -> str:
+    """A message is any text, unless another record begins it or stands in it: the end of the line before that is lost."""
+    inner = next((w for w in s.body.upper().split() if w in BARE_WORDS or w.startswith(TEXT_WORDS)), "")
+    found = _WITHIN.search(s.body)
+    inner = inner or (found[0] if found else "")
+    return f"{inner[:30]} stands within it: the end of a line is missing" if inner else ""
 
 
 def _words_fault(s: Statement, form: Form, allow: frozenset[str]) -> str:

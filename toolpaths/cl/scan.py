@@ -1,7 +1,8 @@
 """Plain GOTO lines to arrays, all other lines to slices: the part of reading that must be fast.
 
-A line is plain where it is `GOTO`, blanks, `/` and 3, 6 or 9 numbers with commas between, nothing else. Its numbers go
-through numpy's text parser (correctly rounded); every doubtful line is left to the statements, which say what is wrong.
+A line is plain where it is blanks, `GOTO`, blanks, `/` and 3, 6 or 9 numbers with commas between, nothing else. Its
+numbers go through numpy's text parser (correctly rounded); every other line is left to the statements, which say what is
+wrong.
 """
 
 from __future__ import annotations
@@ -18,6 +19,8 @@ from toolpaths.arrays import Bools, Floats, Ints
 CHUNK = 1 << 22
 _NUMERIC = np.zeros(256, bool)
 _NUMERIC[list(b"0123456789+-.,eE \t\n")] = True
+_BLANK = np.zeros(256, bool)
+_BLANK[list(b" \t")] = True
 _MAX_BLANKS = 16
 LARGEST = 1e12
 """a number beyond it is no length, angle or feed, and is refused"""
@@ -111,7 +114,7 @@ class _Lines:
 
 def _split(c: Bytes, largest: float) -> _Lines:
     ends = np.flatnonzero(c == 10)
-    starts = np.concatenate([[0], ends[:-1] + 1])
+    starts = _inked(c, np.concatenate([[0], ends[:-1] + 1]))
     count = np.add.reduceat(c == 44, starts, dtype=np.int32) + 1
     plain = _looks_plain(c, starts, ends) & ((count == 3) | (count == 6) | (count == 9))
     _refuse_bare_exponents(c, ends, plain)
@@ -145,7 +148,7 @@ def _uncommented(c: Bytes) -> Bytes:
         return c
     ends = np.flatnonzero(c == 10)
     line, first = np.unique(np.searchsorted(ends, marks), return_index=True)
-    starts = np.where(line > 0, ends[line - 1] + 1, 0)
+    starts = _inked(c, np.where(line > 0, ends[line - 1] + 1, 0))
     good = _begins_goto(c, starts)
     edge = np.zeros(len(c), np.int8)
     edge[marks[first[good]]] = 1
@@ -153,6 +156,16 @@ def _uncommented(c: Bytes) -> Bytes:
     c = c.copy()
     c[np.cumsum(edge, dtype=np.int8).view(bool)] = 32
     return c
+
+
+def _inked(c: Bytes, starts: Ints) -> Ints:
+    """Where (K,) lines begin behind their first blanks and tabs, of which APT allows any number before a record."""
+    for _ in range(_MAX_BLANKS):
+        blank = _BLANK[c[starts]]
+        if not blank.any():
+            break
+        starts = starts + blank
+    return starts
 
 
 def _begins_goto(c: Bytes, starts: Ints) -> Bools:
@@ -170,7 +183,7 @@ def _joined(c: Bytes) -> tuple[Bytes, Ints]:
         return c, marks
     ends = np.flatnonzero(c == 10)
     line = np.searchsorted(ends, marks)
-    starts = np.concatenate([[0], ends[:-1] + 1])
+    starts = _inked(c, np.concatenate([[0], ends[:-1] + 1]))
     strange = np.add.reduceat(~_NUMERIC[c], starts, dtype=np.int32)
     ink = np.append(0, np.cumsum(c > 32))
     after = np.minimum(line + 1, len(ends) - 1)
@@ -191,7 +204,7 @@ def _looks_plain(c: Bytes, starts: Ints, ends: Ints) -> Bools:
     good = _begins_goto(c, at)
     slash = at + 4
     for _ in range(_MAX_BLANKS):
-        blank = good & (c[slash] == 32)
+        blank = good & _BLANK[c[slash]]
         if not blank.any():
             break
         slash = slash + blank

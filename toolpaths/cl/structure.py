@@ -113,6 +113,23 @@ def plain_event(b: Builder, s: Statement) -> None:
     b.event(s.major, words)
 
 
+def stop(b: Builder, s: Statement) -> None:
+    """STOP or OPSTOP, with the text for the operator (NX: stop_text and opstop_text of its events) printed before it."""
+    if s.body:
+        b.event("PPRINT", (s.body,))
+    b.event(s.major)
+
+
+def opskip(b: Builder, s: Statement) -> None:
+    """DELETE/ON or OFF: another word for OPSKIP (the vocabulary of APT CL files gives both one code)."""
+    b.event("OPSKIP", tuple(w for w in s.words if w != ""))
+
+
+def selctl(b: Builder, s: Statement) -> None:
+    """SELECTL/number: another spelling of SELCTL (CATIA V5)."""
+    b.event("SELCTL", s.words)
+
+
 def dwell(b: Builder, s: Statement) -> None:
     """DWELL/seconds, or revolutions with REV: another word for DELAY."""
     b.event("DELAY", tuple(w for w in s.words if w != ""))
@@ -245,6 +262,7 @@ HANDLERS: dict[str, Callable[[Builder, Statement], None]] = {
     "LETTER": nothing, "UNITS": nothing, "UNIT": nothing, "MULTAX": multax, "FINI": fini, "SET": mode,
     "$$->TOOLPATH": own_header, "$$->FRAME": own_item, "$$->TOOL": own_item, "$$->OPERATION": own_item,
     "$$->USE": own_use, "$$->SPLINE": own_spline, **dict.fromkeys(EVENTS, plain_event), "SPINDL": spindl, "DWELL": dwell,
+    "STOP": stop, "OPSTOP": stop, "DELETE": opskip, "SELECTL": selctl, "OP_NAME": named_operation,
     "MODE": mode, "CSI_TOOL_PATH": named_operation, "OPNAME": named_operation, "APPLY": apply,
     "OPFEATSTART": solidworks_feature, "TRNTYP": turn_type,
 }

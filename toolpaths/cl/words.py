@@ -14,9 +14,10 @@ EVENTS: dict[str, str] = {
     "COOLNT": "words as in the file",
     "CUTCOM": "words as in the file; a plain number is a register",
     "DELAY": "seconds, or revolutions where REV follows",
-    "STOP": "none",
-    "OPSTOP": "none",
+    "STOP": "none; its text is a PPRINT before it",
+    "OPSTOP": "none; its text is a PPRINT before it",
     "OPSKIP": "ON or OFF",
+    "DELETE": "another word for OPSKIP",
     "SEQNO": "numbers as in the file",
     "PREFUN": "number of the G function",
     "AUXFUN": "number of the M function, NOW or NEXT",
@@ -24,6 +25,7 @@ EVENTS: dict[str, str] = {
     "SELECT": "tool number to prepare",
     "UNLOAD": "as in the file",
     "SELCTL": "as in the file",
+    "SELECTL": "another spelling of SELCTL",
     "OFSTNO": "register",
     "CLAMP": "as in the file",
     "RETRCT": "as in the file; lengths mm",
@@ -47,18 +49,21 @@ LENGTH_EVENTS = frozenset({"RETRCT", "CLEARP", "CLRSRF", "LEADER"})
 """Events whose numbers are lengths: converted to mm."""
 
 _REASONS = {
-    "display": "PAINT DISPLY PLOT CLPRNT BOX",
+    "display": "PAINT DISPLY PLOT PPLOT OVPLOT DRAFT CLPRNT BOX",
     "listing and punching of APT systems": "PRINT PUNCH TITLES EJECT RESERV NOPOST PLABEL LPRINT PPLABEL LETTER REMARK "
-                                           "PARTNO",
+                                           "PARTNO PROGRM MDWRIT MDEND MAGTAP INTCOD TMARK LIBRY REDEF "
+                                           "CANON VERIFY",
     "vocabulary and settings of another post-processor": "PPWORD PPFUN SYN MACHIN ISN ARCSLP OPERATION BEGIN START "
-                                                         "TOOLPATH_TYPE",
-    "bookkeeping of the CAM system": "OPFEATEND MOVE_ATTRIB SETUP START_OP END_OP MATERL CSI_SET_PATH_PARAM "
-                                     "CSI_SET_EXTENSION_LENGTH",
-    "tolerances of a path that is computed already": "INTOL OUTTOL TOLER LINTOL MCHTOL CSI_PATH_TOLERANCE NUMPTS MAXDP "
-                                                     "MAXANG",
+                                                         "TOOLPATH_TYPE OPTYPE DMIS MAXDPM MAXVEL POSMAP REGBRK PIVOTZ",
+    "bookkeeping of the CAM system": "OPFEATEND MOVE_ATTRIB SETUP START_OP END_OP MATERL MATLNO CSI_SET_PATH_PARAM "
+                                     "CSI_SET_EXTENSION_LENGTH OPERTN SEQUENCE PART_OPE PROGRAM MACHINE CATPROCESS "
+                                     "CATPRODUCT",
+    "sizes of the tool by the user's table; CUTTER has them": "TDATA",
+    "tolerances of a path that is computed already": "INTOL OUTTOL OUTOL TOLER TOLTBL LINTOL MCHTOL PPTOL MCHFIN THICK "
+                                                     "CSI_PATH_TOLERANCE NUMPTS MAXDP MAXANG",
     "part surface of arcs that state their plane": "AUTOPS PSIS",
     "which point of the tool the lathe drives; said by the operation": "SWITCH",
-    "how the control runs the axes; chosen by the set-up": "ALIGN TCP CUT",
+    "how the control runs the axes; chosen by the set-up": "ALIGN TCP RTCP CUT",
     "the same work plane again, for another post-processor": "MCS2",
 }
 NEUTRAL: dict[str, str] = {word: reason for reason, words in _REASONS.items() for word in words.split()}
