@@ -107,7 +107,7 @@ def _turned_in_rapid(w: Walked, angle: float) -> Array:
     """(E,) blocks of rapids of the CL file that turn the tool axis by more than an angle."""
     t = w.targets
     turns = np.einsum("ni,ni->n", t.start_axis, t.axis) < math.cos(angle)
-    return w.inside & np.asarray((t.kind == RAPID) & ~t.free & turns)[np.minimum(w.owner, len(t) - 1)]
+    return np.asarray(w.inside & ((t.kind == RAPID) & ~t.free & turns)[np.minimum(w.owner, len(t) - 1)])
 
 
 def _finding(w: Walked, rows: Array, lines: Array, code: str, message: str) -> list[Finding]:
