@@ -281,19 +281,3 @@ def tool_frames(kin: Kinematics, q: Floats) -> Floats:
     second = np.cross(axis, first)
     c, s = np.cos(spin)[:, None], np.sin(spin)[:, None]
     return np.stack([c * first + s * second, c * second - s * first, axis], axis=2)
-
-
-def table_axes(control: Control) -> Ints:
-    """Joint numbers of the rotary axes that carry the part: those that turn the slides as the table sees them."""
-    kin = control.machine.kinematics
-    if not control.has_tip_modes:
-        return np.zeros(0, dtype=np.int64)
-    q = np.zeros((2, kin.joints))
-    found = []
-    for j in control.rotary.tolist():
-        q[1] = 0.0
-        q[1, j] = 0.7
-        slides = kin.jacobian(q)[:, :3][:, :, control.xyz]
-        if not np.allclose(slides[0], slides[1], atol=1e-9):
-            found.append(j)
-    return np.array(found, dtype=np.int64)

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from machines.kinematics.base import Kinematics
-from postproc.control import Control, Law, table_axes, tool_frames
+from postproc.control import Control, Law, tool_frames
 from postproc.controllers.model import ControllerFile, Mode
 from postproc.options import Options
 from postproc.planes import Plane, stated
@@ -186,3 +186,19 @@ def turning_run(lines: list[int], file: str) -> Diagnostic:
     """A run that turns the tool while it is to be written in a tilted plane."""
     return error("output.turning", "output mode tilted for a run that turns the tool axis", file=file, lines=lines[:6],
                  count=len(lines), hint="use auto or tcp for this operation")
+
+
+def table_axes(control: Control) -> Ints:
+    """Joint numbers of the rotary axes that carry the part: those that turn the slides as the table sees them."""
+    kin = control.machine.kinematics
+    if not control.has_tip_modes:
+        return np.zeros(0, dtype=np.int64)
+    q = np.zeros((2, kin.joints))
+    found = []
+    for j in control.rotary.tolist():
+        q[1] = 0.0
+        q[1, j] = 0.7
+        slides = kin.jacobian(q)[:, :3][:, :, control.xyz]
+        if not np.allclose(slides[0], slides[1], atol=1e-9):
+            found.append(j)
+    return np.array(found, dtype=np.int64)

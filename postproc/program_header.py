@@ -6,9 +6,9 @@ from pathlib import Path as FilePath
 
 import numpy as np
 
-from postproc.control import table_axes
 from postproc.header_words import FEEDS, FINGERPRINT, UNKNOWN
 from postproc.job import Job
+from postproc.modes import table_axes
 from postproc.program import Program
 from postproc.stage_values import Compiled
 from postproc.version import VERSION

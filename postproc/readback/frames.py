@@ -12,7 +12,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from machines.kinematics.base import Kinematics
-from postproc.control import Control, table_axes
+from postproc.control import Control
+from postproc.modes import table_axes
 from postproc.readback.canonical import Law, LawName
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
