@@ -33,7 +33,8 @@ MADE = {"bicubic.cls": ("mill-3axis", "uranesx"), "blade.cls": ("linuxcnc-xyzbc-
         "h4a_dome.cls": ("mikron-ucp710",), "h4a_indexed.cls": ("head-table",),
         "inch_plate.apt": ("mill-4axis", "nutating-head"),
         "indexed_4axis.cls": ("mill-4axis",),
-        "pocket.cls": ("mill-3axis", "mikron-ucp710", "delta-cone", "delta-coplanar", "delta-hybrid", "linuxcnc-lineardelta"),
+        "pocket.cls": ("mill-3axis", "mikron-ucp710", "delta-cone", "delta-coplanar", "delta-hybrid",
+                       "linuxcnc-lineardelta"),
         "test_part.cls": ("mill-3axis", "trunnion-bc", "delta-parallel-x", "delta-parallel-x-compact", "delta-parallel-z",
                           "delta-parallel-z-compact", "delta-star"),
         "tool_axis_tour.apt": ("linuxcnc-xyzac-trt", "fork-head-ab")}
