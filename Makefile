@@ -9,7 +9,7 @@ PYTEST_ARGS ?= -n auto --maxprocesses 4 --dist loadfile -rfEs
 SOURCES := toolpaths machines postproc
 NUMERIC = $(shell grep -rl --include='test_*.py' 'mark\.numeric' tests)
 
-.PHONY: demo test quick numeric hard damage changes mutants lint lock clean
+.PHONY: demo test quick numeric hard damage changes slow mutants lint lock clean
 
 demo: $(STAMP)
 	@mkdir -p out
@@ -32,6 +32,10 @@ damage: $(STAMP)
 # Every word, block and number of written programs changed, on every control: minutes each.
 changes: $(STAMP)
 	$(BIN)/pytest $(PYTEST_ARGS) -m slow tests/postproc/test_mutation.py
+
+# All that a smaller test of `make test` stands for: those changes, programs in the simulator whose times are kept.
+slow: $(STAMP)
+	$(BIN)/pytest $(PYTEST_ARGS) -m slow
 
 # Faults planted in the project's functions and in written programs, and what catches each: half an hour of processor.
 JOBS ?= 1

@@ -8,7 +8,7 @@ from functools import cache
 
 import pytest
 
-from tests import environment
+from tests import compile_once, environment
 from tests.linuxcnc import interpreter, simulator
 from tests.processor_time import (
     pytest_addoption,
@@ -33,9 +33,11 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 def pytest_collection_finish() -> None:
-    """What stays until the end is not looked through by each collection of garbage."""
+    """What stays until the end is not looked through by each collection of garbage, and there are fewer of them."""
     gc.collect()
     gc.freeze()
+    gc.set_threshold(50_000, 20, 20)
+    compile_once.install()
 
 
 @cache

@@ -29,7 +29,7 @@ def random_machine(seed):
     return Serial(tuple(chain), names, unit(rng)).with_tool(rng.uniform(0, 200)), rng
 
 
-@pytest.mark.parametrize("seed", range(60))
+@pytest.mark.parametrize("seed", range(24))
 def test_random_structures_keep_the_law(seed):
     k, rng = random_machine(seed)
     q = np.hstack([rng.uniform(-500, 500, (500, 3)), rng.uniform(-np.pi, np.pi, (500, k.joints - 3))])

@@ -23,6 +23,12 @@ from tests.linuxcnc.time_programs import END, HEAD, PROGRAMS, machine, random_li
 EACH, MEAN = 0.01, 0.003
 """shares of the time that an estimate may be off, each and on average"""
 seen: dict[str, float] = {}
+SIMULATED = ("zigzag, G61.1", "zigzag, G64", "circle of lines, G64 P0.01", "random lines, G64 P0.01", "arcs, G64 P0.05",
+             "canned cycles", "units that change", "cycles repeated, no G98", "5 axes at their feed, tip", "tool changes",
+             "5 axes, G94, G64 P0.01", "5 axes, G93, G64 P0.01", "short lines at speed", "small arcs in all planes",
+             "5 axes, control's kinematics")
+"""run in the simulator by every `make test`, the others with -m slow: all are compared with its recorded times by
+tests/postproc/test_cycle_time_models.py"""
 
 
 def blocks(text: str, on: Machine) -> Blocks:
@@ -53,7 +59,8 @@ def run(recorded: Callable[..., Run], text: str, on: Machine, folder: Path, fast
     return result
 
 
-@pytest.mark.parametrize("name", PROGRAMS)
+@pytest.mark.parametrize("name", [pytest.param(name, marks=() if name in SIMULATED else pytest.mark.slow)
+                                  for name in PROGRAMS])
 def test_estimate_is_the_simulators_time(recorded, tmp_path: Path, name: str) -> None:
     letters, program = PROGRAMS[name]
     on, text = machine(letters), program + END
@@ -69,7 +76,7 @@ def test_estimate_is_the_simulators_time(recorded, tmp_path: Path, name: str) ->
 
 
 def test_mean_of_all_programs() -> None:
-    if len(seen) < len(PROGRAMS):
+    if len(seen) < len(SIMULATED):
         pytest.skip("needs the whole table in one process")
     assert np.mean(np.abs(list(seen.values()))) < MEAN
 

@@ -31,11 +31,12 @@ MADE = {"bicubic.cls": ("mill-3axis", "uranesx"), "blade.cls": ("linuxcnc-xyzbc-
         "five_faces.cls": ("mikron-ucp710", "linuxcnc-xyzac-trt", "trunnion-bc"),
         "five_tilted.cls": ("fork-head-ab", "nutating-head", "linuxcnc-xyzbc-trt"),
         "h4a_dome.cls": ("mikron-ucp710",), "h4a_indexed.cls": ("head-table",),
-        "inch_plate.apt": ("mill-4axis", "delta-hybrid", "delta-star", "delta-parallel-x", "nutating-head"),
+        "inch_plate.apt": ("mill-4axis", "nutating-head"),
         "indexed_4axis.cls": ("mill-4axis",),
-        "pocket.cls": ("mill-3axis", "mikron-ucp710", "delta-cone", "delta-coplanar", "linuxcnc-lineardelta"),
-        "test_part.cls": ("mill-3axis", "trunnion-bc", "delta-parallel-z", "delta-parallel-x-compact",
-                          "delta-parallel-z-compact"),
+        "pocket.cls": ("mill-3axis", "mikron-ucp710", "delta-cone", "delta-coplanar", "delta-hybrid",
+                       "linuxcnc-lineardelta"),
+        "test_part.cls": ("mill-3axis", "trunnion-bc", "delta-parallel-x", "delta-parallel-x-compact", "delta-parallel-z",
+                          "delta-parallel-z-compact", "delta-star"),
         "tool_axis_tour.apt": ("linuxcnc-xyzac-trt", "fork-head-ab")}
 """machines on which each sample is made: every sample, and every machine whose letters LinuxCNC's interpreter has"""
 CODES = {73, 81, 82, 83, 84, 85, 86, 89}

@@ -168,8 +168,7 @@ def test_all_six_errors_from_a_file(folder: Path) -> None:
     assert refused["output"] is None and not (folder / "none.toml").exists()
 
 
-@pytest.mark.parametrize("ending", ["png", "SVG"])
-@pytest.mark.parametrize("source", ["reversal.toml", "probe.toml"])
+@pytest.mark.parametrize(("source", "ending"), [("reversal.toml", "SVG"), ("probe.toml", "png")])
 def test_figures_are_drawn_when_asked_for(folder: Path, source: str, ending: str) -> None:
     from xml.etree import ElementTree
 

@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 from postproc.cli import app
 
 SAMPLES = Path("samples").resolve()
-CL = str(SAMPLES / "five_faces.cls")
+CL = str(Path(__file__).parents[1].resolve() / "golden/short_five_axis.apt")
 OURS = str(SAMPLES / "errors/mikron-ucp710.toml")
 RUN = ["-m", "mikron-ucp710", "-c", "linuxcnc", "--setup", str(SAMPLES / "tools.setup.toml")]
 

@@ -57,7 +57,7 @@ def fit(truth: CycleTimeModel, rng: np.random.Generator) -> Fit:
 def test_hidden_parameters_are_found_and_bands_hold_on_other_programs() -> None:
     rng = np.random.default_rng(8)
     inside, off, narrower = [], [], []
-    for _ in range(7):
+    for _ in range(4):
         truth = hidden(rng)
         made = fit(truth, rng)
         off.append([abs(np.log(made.values[name][0] / getattr(truth, name))) / made.values[name][1]

@@ -29,7 +29,7 @@ from tests.postproc.kit import machine
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.toolpath import Toolpath
 
-COUNT = 10
+COUNT = 16
 """strips: as many as gain by leaning"""
 Box = tuple[list[float], list[float]]
 POSTS: tuple[Box, ...] = (([-37.0, -127.0, -30.0], [-2.0, -51.0, 292.0]),)

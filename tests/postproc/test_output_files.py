@@ -105,7 +105,7 @@ def test_header_has_names_and_no_places(tmp_path: Path, controller: str) -> None
         places[key].write_text(text)
     shutil.copy(SAMPLES / "errors" / "mikron-ucp710.toml", places["e"])
     shutil.copytree(SAMPLES / "errors", tmp_path / "secret_e", dirs_exist_ok=True)  # its tables
-    shutil.copy(SAMPLES / "five_faces.cls", tmp_path / "secret_m" / "part.cls")
+    shutil.copy(GOLDEN / "short_five_axis.apt", tmp_path / "secret_m" / "part.cls")
     out = tmp_path / "out" / "p.nc"
     errors = ["--error-model", places["e"]] if controller == "linuxcnc" else []
     arguments = [tmp_path / "secret_m" / "part.cls", "-m", places["m"], "-c", places["c"], "--setup", places["s"], *errors]
@@ -122,7 +122,7 @@ def test_header_has_names_and_no_places(tmp_path: Path, controller: str) -> None
 def test_verify_says_when_the_set_up_is_another(tmp_path: Path) -> None:
     setup, out = tmp_path / "shop.toml", tmp_path / "p.ngc"
     setup.write_text(Path(TOOLS).read_text())
-    part = [SAMPLES / "five_faces.cls", "-m", "mikron-ucp710", "-c", "linuxcnc"]
+    part = [GOLDEN / "short_five_axis.apt", "-m", "mikron-ucp710", "-c", "linuxcnc"]
     assert run("convert", *part, "--setup", setup, "-o", out).exit_code == 0
     setup.write_text("# a remark\n" + Path(TOOLS).read_text())
     assert "verify.setup" not in run("verify", out, *part, "--setup", setup).output

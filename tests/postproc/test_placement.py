@@ -154,7 +154,7 @@ def test_without_limits_it_says_what_to_write() -> None:
 
 
 def test_the_same_again() -> None:
-    m, setup = machine("mikron-ucp710"), setup_of(x=(-50.0, 50.0), y=(-50.0, 50.0), turn=(0.0, 90.0))
+    m, setup = machine("mikron-ucp710"), setup_of(x=(-50.0, 50.0), turns=[0.0, 45.0])
     first, second = (placed(passes((1.0, 0.0), 2), m, setup) for _ in range(2))
     assert (first.best.place == second.best.place).all()
     assert first.best.seconds == second.best.seconds

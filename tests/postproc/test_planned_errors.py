@@ -17,6 +17,8 @@ from postproc.result import PostResult
 LINE = ("UNITS/MM\nLOADTL/1\nSPINDL/3000,RPM,CLW\nFEDRAT/{},MMPM\nRAPID\nGOTO/-160,0,20\nGOTO/-160,0,0\nGOTO/160,0,0\n"
         "FINI\n")
 PERIOD, HEIGHT = 8.0, 0.015
+MOST = 300
+"""lines of a sample"""
 
 
 def screw(folder: Path) -> str:
@@ -54,7 +56,8 @@ def test_feeds_keep_the_jerk_of_what_corrects_a_screw(tmp_path: Path) -> None:
 def test_planned_joints_put_the_tool_where_it_belongs(sample: str, machine: str, setup: str) -> None:
     """On the machine with errors, mean of both ways; rotary axes stand where those that are written do."""
     model = f"samples/errors/{machine}.toml"
-    result = planned(Path(f"samples/{sample}").read_text(), machine, "linuxcnc", error_model=model,
+    lines = Path(f"samples/{sample}").read_text().splitlines()[:MOST]
+    result = planned("\n".join([*lines, *["FINI"] * (len(lines) == MOST)]), machine, "linuxcnc", error_model=model,
                      setup=f"samples/{setup}.setup.toml")
     assert result.motion is not None and result.job is not None and result.path is not None
     one = max(result.motion.passes, key=lambda each: len(each.move))

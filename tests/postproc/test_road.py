@@ -44,15 +44,18 @@ def test_the_tool_goes_through_every_point_in_order(file: str, name: str, contro
     want = np.flatnonzero((path.kind == 1) & (path.role == 0))
     at = 0
     for row in want.tolist():
-        window = slice(at, at + 20000)
-        off = np.linalg.norm(tips[window] - path.tip[row], axis=1) + 100 * angle(axes[window], path.axis[row][None])
-        hit = np.flatnonzero(off < 0.02)
+        for size in (400, 20000):
+            window = slice(at, at + size)
+            off = np.linalg.norm(tips[window] - path.tip[row], axis=1) + 100 * angle(axes[window], path.axis[row][None])
+            hit = np.flatnonzero(off < 0.02)
+            if len(hit):
+                break
         assert len(hit), f"CL line {path.line[row]}"
         at += int(hit[0])
     joined = np.flatnonzero((path.kind[1:] == 1) & (path.role[1:] == 0)) + 1
     p, d = path.tip[joined - 1], path.tip[joined] - path.tip[joined - 1]
     size = np.maximum((d**2).sum(axis=1), 1e-12)
-    for chunk in np.array_split(tips[::41] if not len(path.arcs) and not path.cycles else tips[:0], 40):
+    for chunk in np.array_split(tips[::211] if not len(path.arcs) and not path.cycles else tips[:0], 40):
         u = np.clip(np.einsum("kmi,mi->km", chunk[:, None] - p, d) / size, 0, 1)
         gap = np.linalg.norm(chunk[:, None] - p - u[..., None] * d, axis=2).min(axis=1, initial=np.inf)
         assert not len(chunk) or gap.max() < 0.0101
@@ -69,8 +72,8 @@ def test_turns_on_the_spot(name: str, a: tuple[float, float], b: tuple[float, fl
     result = good(convert(toolpath("RAPID", *goto([point], [first]), *goto([end], [last])), name))
     tips, axes = cut_poses(result)
     assert np.linalg.norm(tips - point, axis=1).max() < 0.01 + step
-    circle = great_circle(first, last, np.linspace(0, 1, 4001))
-    assert max(angle(axis[None], circle).min() for axis in axes[::3]) < np.radians(0.05)
+    circle = great_circle(first, last, np.linspace(0, 1, 2001))
+    assert max(angle(axis[None], circle).min() for axis in axes[::15]) < np.radians(0.05)
     assert angle(axes[-1], last) < 1e-5
 
 

@@ -45,7 +45,7 @@ def test_a_short_move_whose_axis_lags_behind_its_tip_is_off() -> None:
     assert off == pytest.approx(35.0 * DEG)
 
 
-@pytest.mark.parametrize("name", ["mikron-ucp710", "fork-head-ab"])
+@pytest.mark.parametrize("name", [pytest.param("mikron-ucp710", marks=pytest.mark.slow), "fork-head-ab"])
 def test_fast_turns_on_short_ways(name: str) -> None:
     """0.13 mm with 115 degrees of the axis: the rounding of the words stands for a tenth of a degree."""
     tip = np.array([[-5.0, 1.7, 7.0], [4.789, 56.358, -15.864], [4.807, 56.247, -15.804], [4.936, 55.477, -15.386]])

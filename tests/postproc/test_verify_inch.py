@@ -7,10 +7,13 @@ from pathlib import Path
 
 import pytest
 
-import toolpaths
 from postproc.options import Options
 from postproc.pipeline import convert, verify
-from tests.postproc.kit import SAMPLES, TOOLS
+from tests.postproc.kit import TOOLS, toolpath
+
+PART = ["RAPID", "GOTO/0,0,50", "RAPID", "GOTO/0,0,2", "FEDRAT/MMPM,200", "GOTO/0,0,-2", "FEDRAT/MMPM,600", "GOTO/20,0,-2",
+        "MOVARC/20,10,-2,0,0,1,10,ANGLE,90", "GOTO/30,20,-2", "RAPID", "GOTO/30,20,30",
+        "CYCLE/DRILL,DEPTH,9,MMPM,100,CLEAR,3", "GOTO/5,5,0", "GOTO/15,5,0", "CYCLE/OFF", "RAPID", "GOTO/0,0,50"]
 
 
 def in_inches(text: str, share: float) -> str:
@@ -25,7 +28,7 @@ def in_inches(text: str, share: float) -> str:
 
 @pytest.mark.parametrize("controller", ["linuxcnc", "generic-iso", "fanuc-30i"])
 def test_feeds_in_inches(controller: str, tmp_path: Path) -> None:
-    path, _ = toolpaths.read(SAMPLES / "pocket.cls")
+    path = toolpath(*PART)
     options = Options(setup=str(TOOLS))
     made = convert(path, "mill-3axis", controller, options=options)
     assert made.ok

@@ -210,7 +210,7 @@ def test_joining_at_once_changes_nothing(monkeypatch: pytest.MonkeyPatch) -> Non
     breaks = ["$\n", " $ \n", "$ \n ", "$$ c\n", "$ x\n", "\n", "$\n\n", "$\n$$ c\n", "", "", "", "", "", "", ""]
     heads = ["GOTO/", "GOTO / ", "goto/", "GOTO/", "GOTO", "GOXO/", "$$-> CSYS /", "CIRCLE/", "PPRINT ", "GODLTA/"]
     numbers = ["1", "2.5", "-3", "0", "1.", "0,0,1", "1 2", ""]
-    for _ in range(500):
+    for _ in range(150):
         text = HEAD
         for _ in range(rng.randint(1, 8)):
             fields = [rng.choice(numbers) + rng.choice(breaks) for _ in range(rng.randint(1, 7))]

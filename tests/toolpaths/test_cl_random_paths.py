@@ -19,7 +19,7 @@ from cltext import UP, WORLD, Frame, face_frame
 from make_dialects import DRILL, MILL, SYSTEMS
 from spellings import Operation, Spelling
 
-SEEDS = 20
+SEEDS = 10
 
 
 @dataclass
