@@ -11,12 +11,14 @@ import numpy as np
 from postproc.witness.commanded import ARC, BITS, LINE, OWN, UNFOLLOWED, UNKNOWN, Commanded, Cycle
 from postproc.witness.evidence import Case, Finding
 from postproc.witness.machine import limits_of
-from postproc.witness.motion import Walked
+from postproc.witness.motion import CHUNK, Walked
 from postproc.witness.stretches import BOTTOM
 from postproc.witness.text import Array
 
 ALLOWED = 1.005
 """share by which a feed may be off besides what the rounding of words may cost, in each move and in all of one feed"""
+VELOCITY = 1.02
+"""share of the velocity of an axis that rounded words may ask for"""
 _WAY_OUT = 12
 """blocks behind the bottom of a hole in which the tool comes to its retract plane"""
 _PECKED = ("DEEP", "BRKCHP")
@@ -80,7 +82,9 @@ def check_feeds(w: Walked, c: Commanded, case: Case, table: dict[str, Any], matc
     check = ((t.kind == LINE) | (t.kind == ARC)) & ~t.gap & ~t.free & (match >= 0) & (seconds > 0.0) & np.isfinite(asked)
     ratio = asked / np.where(seconds > 0.0, seconds, 1.0)
     group = _groups(check, np.where(inverse, asked, feed))
-    fast = check & ((seconds * ALLOWED + slack < asked) | _off_in_all(group, asked, ALLOWED * seconds, slack))
+    hurried = w.owner[rows[_fast_blocks(w, rows, asked / np.maximum(length, 1e-9), case.tolerance)]]
+    fast = check & ((seconds * ALLOWED + slack < asked) | (np.bincount(hurried, minlength=m) > 0)
+                    | _off_in_all(group, asked, ALLOWED * seconds, slack))
     found = _feed_finding(w, c, np.flatnonzero(fast), ratio, match)
     if not case.planned:
         late = check & ((seconds > ALLOWED * asked + slack) | _off_in_all(group, seconds, ALLOWED * asked, slack))
@@ -89,6 +93,13 @@ def check_feeds(w: Walked, c: Commanded, case: Case, table: dict[str, Any], matc
                        | _off_in_all(np.where(late, group, 0), seconds, ALLOWED * needed, slack))
         found += _feed_finding(w, c, np.flatnonzero(slow), ratio, match)
     return found, int(check.sum())
+
+
+def _fast_blocks(w: Walked, rows: Array, pace: Array, tolerance: float) -> Array:
+    """(K,) True for blocks of cuts that take the tip farther than their time, at `pace` (M,) s/mm, allows."""
+    step = w.tip[rows] - w.tip[np.maximum(rows - 1, 0)]
+    length = np.sqrt((step * step).sum(axis=1))
+    return np.asarray((length - 0.002 - 2.0 * tolerance) * pace[w.owner[rows]] > ALLOWED * w.seconds[rows])
 
 
 def _groups(check: Array, feed: Array) -> Array:
@@ -123,6 +134,23 @@ def _needed(w: Walked, rows: Array, slow: Array, pace: Array, table: dict[str, A
             q = after
         np.add.at(result, w.owner[here], most)
     return result
+
+
+def check_velocities(w: Walked, c: Commanded, table: dict[str, Any]) -> list[Finding]:
+    """Straight blocks at feed whose F word asks an axis for more than its velocity."""
+    e = w.poses.executed
+    _, speed = limits_of(table, e.letters)
+    bad = list[int]()
+    for first in range(0, len(e), CHUNK):
+        rows = np.arange(first, min(first + CHUNK, len(e)))
+        rows = rows[(e.code[rows] == 1) & (w.seconds[rows] > 0.0)]
+        needed = (np.abs(e.joints[rows] - w.poses.before(rows)) / speed).max(axis=1)
+        bad += rows[w.seconds[rows] * VELOCITY + 1e-3 < needed].tolist()
+    if not bad:
+        return []
+    owner = int(w.owner[bad[0]])
+    line = int(c.line[w.targets.row[owner]]) if owner < len(w.targets) else 0
+    return [Finding("velocity", "the feed asks an axis for more than its velocity", line, int(e.line[bad[0]]), len(bad))]
 
 
 def _feed_finding(w: Walked, c: Commanded, at: Array, ratio: Array, match: Array) -> list[Finding]:

@@ -13,7 +13,14 @@ from postproc.witness.evidence import Case, Executed, Finding, Testimony
 from postproc.witness.machine import ROD, Chain, kinematics_of, merged
 from postproc.witness.motion import Walked, check_arcs, check_way
 from postproc.witness.place import Poses, Unplaced, cut_of, placement, zero_of
-from postproc.witness.states import check_feeds, check_holes, check_states, tools_of, with_spindle
+from postproc.witness.states import (
+    check_feeds,
+    check_holes,
+    check_states,
+    check_velocities,
+    tools_of,
+    with_spindle,
+)
 from postproc.witness.stretches import BOTTOM, matched, targets_of, turns_of
 from postproc.witness.text import Array
 
@@ -84,6 +91,7 @@ def _compare(case: Case, executed: Executed, c: Commanded, place: tuple[Array, A
     found += faults
     faults, feeds = check_feeds(w, c, case, table, match)
     found += faults
+    found += check_velocities(w, c, table)
     faults, states, silent = check_states(w, c, case)
     found += faults
     found += _rods(poses)

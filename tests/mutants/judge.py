@@ -138,7 +138,7 @@ def change(before: Effect, after: Effect) -> str:
         both = ~(np.isnan(values) | np.isnan(other))
         bad = both & (values != other)
         if name == "blend":
-            bad = both & ~(np.abs(values - other) <= 1e-6)
+            bad = both & (other > values + 1e-6)  # less is nearer to the path
         if bad.any():
             k = int(bad.argmax())
             return f"{name} {values[k]:g} becomes {other[k]:g} in {int(bad.sum())} moves"

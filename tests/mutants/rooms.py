@@ -79,11 +79,11 @@ def cases_of(fault: Fault) -> tuple[str, ...]:
                  if f"{kind} {control}" in CASES)
 
 
-def tests_of(room: str) -> tuple[str, ...]:
+def files_asked(room: str) -> tuple[str, ...]:
     """Test files that are asked about a room, from the folder `tests`."""
     control = control_of(room)
     if not control:
         return TESTS[room]
     table = READERS if room.startswith("reader") else FILES
     names = TESTS["reader of" if room.startswith("reader") else "writer"]
-    return tuple(n.format(table[control]) for n in names if "{}" not in n or control in table)
+    return tuple(n.format(table.get(control, "")) for n in names if "{}" not in n or control in table)

@@ -16,7 +16,7 @@ from typing import Any
 from tests.mutants.battery import CASES
 from tests.mutants.judge import Made, blind, body, change, converted, edits_of, made, short, verified
 from tests.mutants.plant import Fault, functions, planted
-from tests.mutants.rooms import cases_of, proves, tests_of
+from tests.mutants.rooms import cases_of, files_asked, proves
 
 SECONDS = 60
 """s that a process may take"""
@@ -198,5 +198,5 @@ def _tests(fault: Fault) -> str:
     signal.alarm(3 * SECONDS)
     with planted(fault):
         pytest.main(["-x", "-q", "-p", "no:cacheprovider", "-p", "no:xdist",
-                     *(f"tests/{name}" for name in tests_of(fault.room))], plugins=[first])
+                     *(f"tests/{name}" for name in files_asked(fault.room))], plugins=[first])
     return first.name

@@ -10,7 +10,7 @@ from tests.mutants.battery import CASES, SIX
 from tests.mutants.judge import change, converted, made, short, verified
 from tests.mutants.plant import Fault, NotPlanted, place_of, planted, spoilt
 from tests.mutants.programs import picked
-from tests.mutants.rooms import BATTERY, FAULTS, cases_of, tests_of
+from tests.mutants.rooms import BATTERY, FAULTS, cases_of, files_asked
 
 NAMED = {f.name: f for f in FAULTS}
 SEVEN = {"MSYS ignored": "flat linuxcnc", "arcs in the other sense": "milled", "cycle depth + 1 mm": "flat fanuc",
@@ -33,7 +33,7 @@ def test_a_fault_can_be_planted(fault: Fault) -> None:
     place, text = spoilt(fault)
     assert text != place.path.read_text("utf-8")
     compile(text, str(place.path), "exec")
-    assert set(cases_of(fault)) <= set(CASES) and cases_of(fault) and tests_of(fault.room)
+    assert set(cases_of(fault)) <= set(CASES) and cases_of(fault) and files_asked(fault.room)
 
 
 def test_every_room_has_faults() -> None:
