@@ -180,11 +180,12 @@ def cutcom(b: Builder, s: Statement) -> None:
 
 
 def tldata(b: Builder, s: Statement) -> None:
-    """TLDATA/MILL, d, r, length, taper, tip, ... or DRILL[, MILL], d, r, length, point angle, flute length."""
+    """TLDATA/MILL, d, r, length, taper, tip, ... or DRILL[, MILL], d, r, length, point angle, flute length; with MILL
+    behind it THREAD is a thread mill, without a tool of a lathe."""
     kinds = [w for w in s.words if isinstance(w, str) and w]
     n = [w for w in s.words if isinstance(w, float)]
     shape = kinds[0] if kinds else ""
-    if shape in TURNING:
+    if shape in TURNING and kinds[1:2] != ["MILL"]:
         b.turns()
         describe(b, shape=shape)
         return

@@ -1,0 +1,117 @@
+"""Forms of records that manuals and systems write are taken; what is left of one, or changes the motion, is refused."""
+
+from __future__ import annotations
+
+import pytest
+
+from toolpaths.cl.interpret import HANDLERS
+from toolpaths.cl.near import one_edit
+from toolpaths.cl.read import ReadResult, read_bytes
+from toolpaths.cl.words import NEUTRAL, UNSUPPORTED_MOTION
+from toolpaths.diagnostics import Severity, has_errors
+from toolpaths.toolpath import Cycle, Toolpath
+
+HEADS = {
+    "nx": "TOOL PATH/A,TOOL,D10\nTLDATA/MILL,10.0,0.0,75.0,0.0,0.0\nMSYS/0,0,0,1,0,0,0,1,0\nFEDRAT/MMPM,250.0\n",
+    "creo": "$$-> MFGNO / A\nUNITS / MM\nLOADTL / 1\nFEDRAT / 200.0, MMPM\n",
+    "catia": "$$ CATIA APT VERSION 1.0\nPARTNO PLATE\nLOADTL/1\nFEDRAT/ 300.0,MMPM\n",
+    "ncl": "$$ NCL\nPARTNO PLATE\nUNITS/MM\nLOADTL/1\nFEDRAT/200.0\n",
+    "generic": "PARTNO PLATE\nUNITS/MM\nLOADTL/1\nFEDRAT/200.0\n",
+}
+TAKEN = [
+    # NX: events of the operations, with their texts
+    "nx STOP/REMOVE THE CLAMPS", "nx OPSTOP/CHECK THE BORE 10.5 +/-.1", "nx AUXFUN/10,CLAMP TABLE", "nx OPSKIP/ON,1",
+    "nx LOAD/TOOL,2,ZOFF,100.0,ADJUST,2", "nx LOAD/TOOL,1,HOLDER,3", "nx CUTCOM/LEFT,XYPLAN,OSETNO,5", "nx DELAY/REV,2",
+    "nx SPINDL/RPM,500.0,CLW,RANGE,2", "nx COOLNT/FLOOD,HIGH", "nx CUTCOM/ON,LENGTH,1", "nx TLDATA/WEDM,0.2,25.0,0.0",
+    # Creo: supported CL data commands
+    "creo DMIS / OFF", "creo COOLNT / THRU, LOW", "creo LOADTL / 1, LENGTH, 100.0, OSETNO, 2", "creo CUTCOM / LEFT, 0",
+    "creo SPINDL / RPM, 1000.0, CLW, RANGE, LOW", "creo $$-> CUTCOM_GEOMETRY_TYPE / OUTPUT_ON_CENTER",
+    # CATIA: PP word tables, syntaxes of APT import
+    "catia CUTCOM/NORMPS", "catia CUTCOM/SAME,NORMDS", "catia SPINDL/RPM,CLW,70.0", "catia SELECTL/2", "catia OUTOL/ 0.01",
+    "catia TDATA/MILL,38.0,38.0,DIAM,1.0,TYPE,MfgEndMillTool,WEIGHT,,PITCH,,CORE,0.0", "catia PART_OPE/Part Operation.1",
+    "catia CATPROCESS/D:/parts/A.CATProcess", "catia LOADTL/10,ADJUST,1,SPINDL,15915.5,MILL", "catia OP_NAME/Roughing.1",
+    # PostWorks (NCL): clamp, seqno, spindl, cutcom, loadtl
+    "ncl CLAMP/AXIS,1,2,OFF", "ncl SEQNO/100,INCR,10,2", "ncl SPINDL/1000,BOTH,AUTO", "ncl CUTCOM/OFF,MODIFY,1,2",
+    "ncl LOADTL/1,LENGTH,100.0,OFFSET,1,2,LARGE,HIGH,AUTO", "ncl MODE/TOOL,0,0,1",
+    # vocabulary of APT CL files, SURFCAM (INC2APT), Mastercam (NCI2APT), post-processors of part programs
+    "generic TMARK", "generic MAXDPM/720", "generic DELETE/ON", "generic PPTOL/.001", "generic PIVOTZ/200.0",
+    "generic OPERTN/CUT3AX,DRILL,1", "generic LOAD/ TOOL,   1.,LENGTH,  0.0000,ADJUST,   1.", "generic RTCP/ON",
+    "generic MACHIN/ MILL,UNITS,INCHES,OUT,INCHES", "generic MACHIN/FANUC 15/30,1", "generic MULTAX/ON,LENGTH",
+    "generic CLEARP/(PLANE/0,0,1,3.5)", "generic DISPLY/LOAD PART 1/2", "generic SEQUENCE/ BEGIN,toolpath",
+    # texts that name a word of the language
+    "generic PPRINT TOOL CUTTER / D10", "generic PPRINT ORIGIN / TOP LEFT", "generic PPRINT MODE / AUTO",
+    "generic PPRINT EMERGENCY-STOP", "generic TPRINT/MILL CUTTER/D10", "generic PARTNO PLATE, ZERO / X0 Y0",
+]
+
+
+def errors(result: ReadResult) -> list[str]:
+    return [str(d.code) for d in result.diagnostics if d.severity is Severity.ERROR]
+
+
+def read(line: str, after: str = "") -> ReadResult:
+    system, _, record = line.partition(" ")
+    result = read_bytes(f"{HEADS[system]}RAPID\nGOTO/1,2,30\n{record}\nGOTO/1,2,4\n{after}", file="part.cl")
+    assert system == "ncl" or result.dialect == system
+    return result
+
+
+@pytest.mark.parametrize("line", TAKEN)
+def test_what_systems_write_is_taken(line: str) -> None:
+    result = read(line)
+    assert not errors(result), [str(d) for d in result.diagnostics]
+    assert len(result.toolpath) == 2 and result.toolpath.records.dropped == 0
+
+
+@pytest.mark.parametrize(("line", "code"), [
+    ("nx STOP/RAPID", "cl.form"), ("nx OPSTOP/CHECK GOTO/1,2,3", "cl.form"), ("nx STOP/PPRINT SETUP 2", "cl.form"),
+    ("catia TDATA/MILL,10.0,0.0,75.0,0.0,0.0", "cl.form"), ("catia SELECTL/TOOL,2", "cl.form"),
+    ("generic PPRINT SETUP CUTTER/10.0,2.0", "cl.form"), ("generic MACHIN/MILL,1/UNITS/MM", "cl.form"),
+    ("generic MULTAX/XN", "cl.form"), ("generic CLEARP/(PLANE/0,0,1)", "cl.form"), ("generic DELETE/ONN", "cl.form"),
+    ("generic CUTCOM/NORMP", "cl.form"), ("generic GOCLER/1,2,3", "cl.unknown-motion"), ("generic RESET", "cl.unknown-word"),
+    ("generic COUPLE/AUTO", "cl.unknown-word"), ("generic POSTN/1", "cl.unknown-word"),
+    ("generic THREAD/LEAD,2.0", "cl.unsupported-motion")])
+def test_what_is_left_of_a_record_or_changes_the_motion_is_refused(line: str, code: str) -> None:
+    assert code in errors(read(line))
+
+
+def test_no_neutral_word_is_one_edit_from_a_word_that_acts() -> None:
+    """A damaged byte would make the one of the other, and nobody would know: TDATA has a form of its own."""
+    acting = [w for w in {*HANDLERS, *UNSUPPORTED_MOTION} - {*NEUTRAL} if not w.startswith("$$")]
+    near = {(n, a) for n in NEUTRAL for a in acting if one_edit(n, a)}
+    texts = {(n, a) for n in ("PRINT", "LPRINT") for a in ("PPRINT", "TPRINT")}
+    assert near == {("TDATA", "TLDATA"), ("MCS2", "MCS")} | texts
+
+
+def path(line: str, after: str = "") -> Toolpath:
+    result = read(line, after)
+    assert not has_errors(result.diagnostics)
+    return result.toolpath
+
+
+def test_the_text_of_a_stop_is_printed_before_it() -> None:
+    events = path("nx OPSTOP/Check the bore").events
+    assert [(e.word, e.values) for e in events[-2:]] == [("PPRINT", ("Check the bore",)), ("OPSTOP", ())]
+    assert path("nx STOP").events[-1].word == "STOP" and "PPRINT" not in {e.word for e in path("nx STOP/").events}
+
+
+def test_words_of_one_meaning() -> None:
+    assert path("generic DELETE/ON").events == path("generic OPSKIP/ON").events
+    assert [o.name for o in path("catia OP_NAME/Roughing.1").operations][-1:] == ["Roughing.1"]
+    assert not any(o.turning for o in path("nx TLDATA/THREAD,MILL,10.0,0.0,50.0,0.0,0.0").operations)
+    assert any(o.turning for o in path("nx TLDATA/THREAD,STD,0.8,50.0,2.0,9").operations)
+
+
+def cycle(words: str) -> Cycle:
+    return path(f"catia CYCLE/{words}", "CYCLE/OFF\n").cycles[0]
+
+
+@pytest.mark.parametrize(("words", "like"), [
+    ("DEEPHL, 10.0, INCR, 2.0, 0.4,MMPR,CLEAR,1.0", "DEEP,DEPTH,10.0,STEP,2.0,MMPR,0.4,CLEAR,1.0"),
+    ("BRKCHP, 10.0, INCR, 2.0, 400.0,MMPM,CLEAR,1.0", "BRKCHP,DEPTH,10.0,STEP,2.0,MMPM,400.0,CLEAR,1.0"),
+    ("CBORE,DEPTH,5.0,MMPM,90.0,CLEAR,1.0,DWELL,0.5", "DRILL,DEPTH,5.0,MMPM,90.0,CLEAR,1.0,DWELL,0.5"),
+    ("SPDRL,DEPTH,5.0,MMPM,90.0,CLEAR,1.0", "DRILL,DEPTH,5.0,MMPM,90.0,CLEAR,1.0"),
+    ("CNSINK,DEPTH,5.0,MMPM,90.0,CLEAR,1.0", "CSINK,DEPTH,5.0,MMPM,90.0,CLEAR,1.0")])
+def test_cycles_of_catia_by_other_words(words: str, like: str) -> None:
+    a, b = cycle(words), cycle(like)
+    assert (a.kind, a.depth, a.clearance, a.retract, a.steps, a.dwell, a.feed, a.feed_mode) == (
+        b.kind, b.depth, b.clearance, b.retract, b.steps, b.dwell, b.feed, b.feed_mode)
