@@ -101,6 +101,15 @@ def test_words_of_one_meaning() -> None:
     assert any(o.turning for o in path("nx TLDATA/THREAD,STD,0.8,50.0,2.0,9").operations)
 
 
+def test_a_number_to_select_alone_is_no_tool() -> None:
+    """SURFCAM writes the work offset so: two of them are refused, and the hint takes them out."""
+    assert "SELECT" not in {e.word for e in path("generic SELECT/1").events}
+    assert "SELECT" in {e.word for e in path("generic SELECT/TOOL,1").events}
+    assert errors(read("generic SELECT/1\nSELECT/2")) == ["cl.select"]
+    text = f"{HEADS['generic']}RAPID\nGOTO/1,2,30\nSELECT/1\nSELECT/2\nGOTO/1,2,4\n"
+    assert not errors(read_bytes(text, allow_unknown=["SELECT"]))
+
+
 def cycle(words: str) -> Cycle:
     return path(f"catia CYCLE/{words}", "CYCLE/OFF\n").cycles[0]
 

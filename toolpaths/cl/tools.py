@@ -20,6 +20,7 @@ _MAX_NUMBER = 10 ** 9
 _NOT_SHAPE = {"name", "length_register"}
 _CUTTER_ANGLES = (4, 5)
 _ISO_REGISTER = 3
+_SELECTED = "number selected"
 _SHORT_TOOLNO = 5
 """number, kind and three sizes; longer forms follow the user's table, and CUTTER has the sizes"""
 
@@ -225,9 +226,15 @@ def tprint(b: Builder, s: Statement) -> None:
 
 
 def select(b: Builder, s: Statement) -> None:
-    """SELECT/TOOL, number: the tool to prepare."""
+    """SELECT/TOOL, number: the tool to prepare. SELECT/number alone is a work offset in SURFCAM (INC2APT) and a tool to
+    prepare elsewhere: one number says nothing under either reading, two are refused."""
     number = next((w for w in s.words if isinstance(w, float)), None)
-    b.event("SELECT", () if number is None else (number,))
+    if number is None or s.has("TOOL"):
+        b.event("SELECT", () if number is None else (number,))
+    elif b.memory.setdefault(_SELECTED, number) != number and s.major not in b.allow_unknown:
+        b.log.error("cl.select", f"SELECT/{s.body}: a tool to prepare or a work offset, the file does not say", b.line,
+                    "write SELECT/TOOL and the number for a tool; --allow-unknown SELECT leaves such records out",
+                    key=_SELECTED)
 
 
 HANDLERS = {"LOADTL": loadtl, "LOAD": load, "TURRET": turret, "TOOLNO": toolno, "TLDATA": tldata, "CUTTER": cutter,
