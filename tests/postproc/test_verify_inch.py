@@ -12,7 +12,7 @@ from postproc.pipeline import convert, verify
 from tests.postproc.kit import TOOLS, toolpath
 
 PART = ["RAPID", "GOTO/0,0,50", "RAPID", "GOTO/0,0,2", "FEDRAT/MMPM,200", "GOTO/0,0,-2", "FEDRAT/MMPM,600", "GOTO/20,0,-2",
-        "MOVARC/20,10,-2,0,0,1,10,ANGLE,90", "GOTO/30,20,-2", "RAPID", "GOTO/30,20,30",
+        "MOVARC/20,10,-2,0,0,1,10,ANGLE,90", "GOTO/30,10,-2", "GOTO/30,20,-2", "RAPID", "GOTO/30,20,30",
         "CYCLE/DRILL,DEPTH,9,MMPM,100,CLEAR,3", "GOTO/5,5,0", "GOTO/15,5,0", "CYCLE/OFF", "RAPID", "GOTO/0,0,50"]
 
 
