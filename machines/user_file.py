@@ -90,6 +90,23 @@ def read_toml(source: str | FilePath, builtin: Mapping[str, FilePath] | None = N
     return _read(str(source), builtin or {}, kind, None, ())
 
 
+def base_chain(source: str | FilePath, builtin: Mapping[str, FilePath] | None = None) -> list[FilePath]:
+    """The file of a built-in name or a path, then its base, and so on; for what `read_toml` reads without faults.
+
+    Raises:
+        OSError: where one cannot be read.
+    """
+    known, found = builtin or {}, list[FilePath]()
+    name: object = str(source)
+    while isinstance(name, str):
+        path = known[name] if name in known else found[-1].parent / name if found else FilePath(name)
+        if path in found:
+            break
+        found.append(path)
+        name = tomllib.loads(read_input(path).decode("utf-8-sig")).get("base")
+    return found
+
+
 def validate(file: UserFile, model: type[M]) -> tuple[M | None, list[Diagnostic]]:
     """`file` as a `model`; None and one diagnostic per fault where it does not fit."""
     try:

@@ -19,6 +19,8 @@ from postproc.cli_options import (
     ClFile,
     Dialect,
     MachineName,
+    Proof,
+    ProofOf,
     RequireProof,
     Tolerance,
     Units,
@@ -99,7 +101,7 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
             residuals: Annotated[list[Path] | None, typer.Option("--residuals", metavar="FILE", help="what errors do at "
                                  "each CL point, before and after correction: .csv, or drawn: .png, .svg; again for "
                                  "more")] = None,
-            require_proof: RequireProof = False, json: Json = "") -> None:
+            require_proof: RequireProof = False, proof: Proof = False, json: Json = "") -> None:
     """Convert a CL file to G-code, read it back and prove it; nothing is written where a proof fails."""
     _choice("--orient", orient, ORIENTATIONS)
     _choice("--feed", feed, ("programmed", "planned"))
@@ -110,16 +112,19 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
                       max_tilt=max_tilt, name=output.stem, require_proof=require_proof)
     only_with_errors(beyond, error_model)
     fields = _residual_files(residuals or [], error_model)
-    refuse_overwriting({"-o": str(output), "--json": json, **{f"--residuals {name}": str(name) for name in fields}},
+    refuse_overwriting({"-o": str(output), "--json": json, "--proof": f"{output}.proof.json" if proof else "",
+                        **{f"--residuals {name}": str(name) for name in fields}},
                        inputs := {"the CL file": str(file), "the set-up": setup, "the error model": error_model,
                                   **own_files(machine, controller)})
     from postproc import summary
     from postproc.cycle_time.conversion import estimate_of
     from postproc.files import program_files
     from postproc.pipeline import convert as run
+    from postproc.proof import command
 
     outputs: dict[Path, str | bytes] = {}
     with shown_errors(json), progress_bar() as progress:
+        known = command.hashed(machine, controller, options) if proof else None
         m, spec = machine_of(machine), controller_of(controller)
         path, found = _read(file, options, progress)
         result = run(path, m, spec, options=options, diagnostics=found, progress=progress)
@@ -131,7 +136,9 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
         if result.ok:
             texts, more = program_files(output, result.text, result.files or {})
             refuse_inputs(list(texts)[:-1], inputs)
-            outputs = {**dict(zip(fields, told, strict=True)), **texts}
+            kept, unlike = command.kept(result, machine, controller, proof, known, output)
+            more += unlike
+            outputs = {**dict(zip(fields, told, strict=True)), **kept, **texts}
     found = [*result.diagnostics, *more]
     report(tuple(found), json, values | {"diagnostics": [d.as_dict() for d in found]}, text, outputs)
 
@@ -141,22 +148,28 @@ def verify(gcode: Annotated[Path, typer.Argument(metavar="GCODE", help="G-code f
            machine: MachineName, controller: ControllerName, setup: Setup = "", tolerance: Tolerance = 0.01,
            axis_tolerance: AxisTolerance = 0.05, units: Units = "", dialect: Dialect = "", allow_unknown: Allow = None,
            error_model: Errors = "", orient: Orient = "keep", max_tilt: MaxTilt = 60.0,
-           require_proof: RequireProof = False, json: Json = "") -> None:
+           require_proof: RequireProof = False, proof: ProofOf = "", json: Json = "") -> None:
     """Read a G-code file back and compare its motion with a CL file."""
     _choice("--orient", orient, ORIENTATIONS)
     options = replace(_options(tolerance, axis_tolerance, "auto", setup, units, dialect, allow_unknown),
                       error_model=error_model, orient=orient, max_tilt=max_tilt,  # type: ignore[arg-type]
                       require_proof=require_proof)
     refuse_overwriting({"--json": json}, {"the CL file": str(file), "the G-code file": str(gcode), "the set-up": setup,
-                                         "the error model": error_model, **own_files(machine, controller)})
+                                         "the error model": error_model, "the proof file": proof or f"{gcode}.proof.json",
+                                         **own_files(machine, controller)})
     from postproc import summary
     from postproc.pipeline import verify as run
+    from postproc.proof import command
 
     with shown_errors(json), progress_bar() as progress:
         m, spec = machine_of(machine), controller_of(controller)
         path, found = _read(file, options, progress)
         result = run(gcode, path, m, spec, options=options, diagnostics=found, progress=progress)
-    report(result.diagnostics, json, summary.verify_dict(result), summary.verify_text(result))
+        kept, more = command.compared_with(result, machine, controller, proof)
+    text = summary.verify_text(result) + (f"\n{kept.line()}" if kept else "")
+    found = [*result.diagnostics, *more]
+    report(tuple(found), json, summary.verify_dict(result) | {"proof": kept.as_dict() if kept else None,
+                                                              "diagnostics": [d.as_dict() for d in found]}, text)
 
 
 @app.command(epilog="Example: postproc trace part.cls --line 120 -m mikron-ucp710 -c linuxcnc")

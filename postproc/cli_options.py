@@ -18,6 +18,10 @@ Beyond = Annotated[bool, typer.Option("--error-model-beyond", help="outside the 
                                       "its end")]
 RequireProof = Annotated[bool, typer.Option("--require-proof", help="refuse a program where some block has no bound of its "
                                             "deviation and is only checked at places")]
+Proof = Annotated[bool, typer.Option("--proof", help="write what was proved, and the hashes of all files that it rests on, "
+                                     "next to the program: OUT.proof.json")]
+ProofOf = Annotated[str, typer.Option("--proof", metavar="FILE", help="name what has changed since this proof was written; "
+                                      "default: GCODE.proof.json, where it is there")]
 Allow = Annotated[list[str] | None, typer.Option("--allow-unknown", metavar="WORD",
                                                  help="leave this word out although it looks like motion")]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import replace
 from pathlib import Path as FilePath
 
@@ -122,20 +123,21 @@ def verify(gcode: str | FilePath, path: Toolpath, machine: Machine | str | FileP
     except OSError as fault:
         raise DiagnosticError([unreadable(fault, "gcode.open", gcode, "name the program that is checked")]) from fault
     known = (*_reading(path, diagnostics), *unfinished(FilePath(gcode)))
+    begun = VerifyResult(str(gcode), None, (), None, options, path.source, path.file, hashlib.sha256(data).hexdigest())
     if other := other_axes(data, options, str(gcode)):
-        return VerifyResult(str(gcode), None, (*other, *known))
+        return replace(begun, diagnostics=(*other, *known))
     start, _ = _oriented(_begun(path, machine, controller, spec, setup, options, known), progress)
     path, found = start.toolpath, list(start.diagnostics)
     if has_errors(found):
-        return VerifyResult(str(gcode), None, tuple(found))
+        return replace(begun, diagnostics=tuple(found))
     job, more = prepare(path, machine, spec, start.setup, options)
     found += more
     if job is None or has_errors(found):
-        return VerifyResult(str(gcode), None, tuple(found))
+        return replace(begun, diagnostics=tuple(found))
     comparison, more = read_back(data, job, path.file, progress, str(gcode), Beside(gcode))
     found = [*other_setup(data, options, has_errors(more), str(gcode)), *found, *more]
     said = None
     if comparison is not None and not has_errors(found):
         said, more = second_witness(start.source, start.asked or start.setup, options, job, comparison)
         found += more
-    return VerifyResult(str(gcode), comparison, tuple(found), said)
+    return replace(begun, comparison=comparison, diagnostics=tuple(found), witness=said)

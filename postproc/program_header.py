@@ -6,7 +6,7 @@ from pathlib import Path as FilePath
 
 import numpy as np
 
-from postproc.header_words import FEEDS, FINGERPRINT, UNKNOWN
+from postproc.header_words import FEEDS, FINGERPRINT, PENDING, UNKNOWN
 from postproc.job import Job
 from postproc.modes import table_axes
 from postproc.program import Program
@@ -20,7 +20,7 @@ def header_lines(made: Compiled) -> list[str]:
     letters = zip(machine.axis_names, job.control.work_offset, strict=True)
     offset = " ".join(f"{k}{v:.4f}" for k, v in letters)
     header = [f"postproc {VERSION}", f"source {FilePath(made.toolpath.file).name}", f"machine {machine.name}",
-              f"controller {made.controller_name}", *made.options.header(),
+              f"controller {made.controller_name}", PENDING, *made.options.header(),
               f"words: {_meanings(made.program)}",
               f"work offset {made.controller.program.offset_name(made.setup.work_offset_code)} in machine coordinates: "
               f"{offset}"]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any
 
 from machines.machine import Machine
@@ -85,6 +85,12 @@ class VerifyResult:
     comparison: Comparison | None
     diagnostics: tuple[Diagnostic, ...]
     witness: Testimony | None = None
+    options: Options = field(default_factory=Options)
+    source: ClSource | None = None
+    """of the path as it was read"""
+    cl_file: str = ""
+    sha256: str = ""
+    """of the bytes of the program"""
 
     @property
     def ok(self) -> bool:

@@ -11,6 +11,7 @@ import numpy as np
 
 from machines.loader import builtin
 from machines.machine import Machine
+from machines.user_file import base_chain
 from postproc.control import Control
 from postproc.coolant import COMMANDS, switching
 from postproc.job import Job
@@ -23,18 +24,17 @@ from postproc.witness.evidence import Case, Executed, Testimony
 from postproc.witness.testify import testify
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
+from toolpaths.input_files import read_input
 from toolpaths.toolpath import ClSource
 
 
 def machine_tables(machine: Machine) -> list[dict[str, Any]]:
     """The machine's file as parsed, then that of its base and so on; none where there is no file."""
-    found: list[dict[str, Any]] = []
-    path: Path | None = Path(machine.file) if machine.file else builtin().get(machine.name)
-    while path is not None and path.is_file():
-        found.append(tomllib.loads(path.read_text("utf-8")))
-        base = found[-1].get("base")
-        path = None if base is None else builtin().get(base, path.parent / str(base))
-    return found
+    known = builtin()
+    path = Path(machine.file) if machine.file else known.get(machine.name)
+    if path is None or not path.is_file():
+        return []
+    return [tomllib.loads(read_input(file).decode("utf-8-sig")) for file in base_chain(path, known)]
 
 
 def executed_of(comparison: Comparison, poses: Poses, job: Job) -> Executed:

@@ -23,6 +23,7 @@ from postproc.path_model import Path
 from postproc.planned import PlannedMotion, Source, planned_motion
 from postproc.planned_errors import PlannedCorrection, on_written, planned_correction
 from postproc.program_header import header_lines
+from postproc.proof.text import with_statement
 from postproc.reach import check_reach
 from postproc.readback.slow import with_fingerprint
 from postproc.readback.verify import read_back
@@ -236,6 +237,14 @@ def verified(made: Written, progress: Progress | None) -> tuple[Verified, Found]
     return replace(value, after_formatting=left), [*found, *beyond_bound(left, job)]
 
 
+def stated(made: Verified, progress: Progress | None) -> tuple[Verified, Found]:
+    """What is proved, in the head of the program: another comment in the place of the one that was read back."""
+    if made.comparison is None:
+        return made, []
+    text, found = with_statement(made.text, made.controller, made.comparison, made.witness, made.toolpath.file)
+    return replace(made, text=text), found
+
+
 STAGES = (
     Stage("prepare", "records, tools, cycles, output modes: the moves that everything is compared with", prepared),
     Stage("share", "the tolerance shared out", shared),
@@ -247,5 +256,6 @@ STAGES = (
     Stage("compile", "canonical words, feeds, commands, cycles", compiled),
     Stage("write", "text in the control's dialect", written),
     Stage("verify", "read back, compared with the CL file, second witness", verified),
+    Stage("state", "what is proved, in the head of the program", stated),
 )
 """in order; each is given what the one before hands on"""

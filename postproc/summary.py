@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from postproc.events import cutting, spindle_states
+from postproc.proof.text import statement
 from postproc.readback.compare import Comparison
 from postproc.result import PostResult, VerifyResult
 from postproc.witness.evidence import Testimony
@@ -68,24 +69,15 @@ def deviations(c: Comparison | None) -> dict[str, Any]:
             "worst_axis_deviation_deg": _number(c.axis_bound / DEG) if c else None,
             "sampled_tip_deviation_mm": _number(c.worst_tip) if c else None,
             "sampled_axis_deviation_deg": _number(c.worst_axis / DEG) if c else None,
-            "blocks_without_bound": c.unbounded if c else None}
+            "blocks_without_bound": c.unbounded if c else None,
+            "cuts": c.cuts if c else None, "cuts_bounded": c.bounded_cuts if c else None}
 
 
 def _proof(result: PostResult) -> list[str]:
-    """What the read-back shows: bounds, or where some blocks have none what was seen of them."""
+    """What is proved and by what: bounds, or where some blocks have none what was seen of them."""
     c = result.comparison
-    return [] if c is None else [f"{deviation_text(c)} (allowed {result.options.tolerance:g} mm, "
+    return [] if c is None else [f"{statement(c, result.witness)} (allowed {result.options.tolerance:g} mm, "
                                  f"{result.options.axis_tolerance:g} degrees)"]
-
-
-def deviation_text(c: Comparison) -> str:
-    """The deviation of a program from its CL file in a sentence."""
-    seen = f"{c.worst_tip:.6f} mm and {c.worst_axis / DEG:.6f} degrees"
-    if c.unbounded:
-        return (f"checked, not proved: {c.unbounded} of {len(c.owner)} blocks have no bound; tip and axis are within {seen} "
-                "of the CL file at the places looked at")
-    return (f"proved: tip within {c.tip_bound:.6f} mm, axis within {c.axis_bound / DEG:.6f} degrees of the CL file all "
-            f"along every block, {seen} at the places looked at")
 
 
 def files_beside(result: PostResult, output: str) -> list[str]:
@@ -133,11 +125,8 @@ def witness_dict(said: Testimony | None) -> dict[str, Any] | None:
 
 
 def witness_lines(said: Testimony | None) -> list[str]:
-    """The same for people: that it agrees, and what it has not compared."""
-    if said is None:
-        return []
-    lines = [f"second witness agrees: {', '.join(said.compared)}"] if said.compared and not said.findings else []
-    return lines + ([f"second witness: not compared: {'; '.join(said.not_compared)}"] if said.not_compared else [])
+    """What the second witness has compared, for people."""
+    return [f"second witness agrees: {', '.join(said.compared)}"] if said and said.compared and not said.findings else []
 
 
 def _number(value: float) -> float | None:
@@ -276,5 +265,5 @@ def verify_text(result: VerifyResult) -> str:
         errors = sum(d.severity is Severity.ERROR for d in result.diagnostics)
         return f"NOT proved: {len(c.owner)} blocks, {errors} error{'s' * (errors > 1)}; the first may cause the rest"
     said = "".join(f"\n{line}" for line in witness_lines(result.witness))
-    return (f"{deviation_text(c)} ({len(c.owner)} blocks; worst at CL line {c.worst_tip_line[0]}, block line "
+    return (f"{statement(c, result.witness)} ({len(c.owner)} blocks; worst at CL line {c.worst_tip_line[0]}, block line "
             f"{c.worst_tip_line[1]}, the axis at CL line {c.worst_axis_line[0]}, block line {c.worst_axis_line[1]}){said}")

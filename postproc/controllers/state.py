@@ -9,6 +9,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from postproc.controllers.model import CannedCycle, ControllerFile, Mode
+from postproc.controllers.texts import clean
 from postproc.program import PER_MINUTE, Hole, Program, Section
 from toolpaths.arrays import Floats
 from toolpaths.toolpath import Cycle
@@ -62,9 +63,7 @@ class WriterState:
 
     def clean(self, text: str) -> str:
         """The text without characters that a comment must not hold, cut to the line length."""
-        style = self.controller.comment
-        room = self.controller.format.line_length - len(style.open) - len(style.close) - 12
-        return "".join(" " if c in style.forbidden or not 32 <= ord(c) < 127 else c for c in text[:room])
+        return clean(self.controller, text)
 
     # ---- numbers ------------------------------------------------------------------------------------------------
 

@@ -35,6 +35,7 @@ from toolpaths.arrays import Bools, Floats, Ints, as_slice, shared
 from toolpaths.diagnostics import Diagnostic, has_errors
 from toolpaths.rotations import angle_between, lengths
 from toolpaths.shape import Curves
+from toolpaths.toolpath import Kind
 from toolpaths.units import DEG
 
 
@@ -47,6 +48,7 @@ class Comparison:
         tip_bound, axis_bound: what no block exceeds anywhere, see `deviation_bound`; blocks without a bound count by the
             places that were looked at
         unbounded: how many blocks have no bound, which makes the program checked, not proved
+        cuts, bounded_cuts: moves of the CL file at feed, and how many of them have a bound in every block
         executed: what was compared, the words of the program and their motion, so that nothing reads it again
     """
 
@@ -62,6 +64,8 @@ class Comparison:
     tip_bound: float
     axis_bound: float
     unbounded: int
+    cuts: int = 0
+    bounded_cuts: int = 0
     executed: tuple[Canonical, Motion] | None = None
     poses: Executed | None = None
     planned: bool = False
@@ -110,7 +114,14 @@ def compare(motion: Motion, job: Job, executed: Executed, gcode: str = "", plann
     diagnostics += check_travel(motion, executed, moves, owner, faults)
     diagnostics += check_smoothing(motion, job, moves, owner, faults)
     return Comparison(worst_tip, worst_axis, tip_line, axis_line, tip, axis, match, owner, tuple(diagnostics),
-                      max(bound.tip, worst_tip), max(bound.axis, worst_axis), bound.unbounded)
+                      max(bound.tip, worst_tip), max(bound.axis, worst_axis), bound.unbounded, *_cuts(moves, owner, bound))
+
+
+def _cuts(moves: Moves, owner: Ints, bound: DeviationBound) -> tuple[int, int]:
+    """(moves at feed, those of them of which every block has a bound)."""
+    cutting = (moves.kind != Kind.RAPID) & ~moves.link
+    without = np.unique(owner[bound.unbounded_rows])
+    return int(cutting.sum()), int(cutting.sum() - cutting[without].sum())
 
 
 def _ends(motion: Motion, executed: Executed) -> tuple[Floats, Floats]:

@@ -8,7 +8,7 @@ Blocks whose bound is above the worst that was seen anywhere are halved until bo
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -45,13 +45,14 @@ _REACH = 0.9
 @dataclass(frozen=True)
 class DeviationBound:
     """Upper bounds over all blocks: tip (mm), axis (rad), each with the block (row) that has it, -1 where there are none;
-    how many blocks have no bound, because kinematics or law give none (they are only checked at places)."""
+    how many blocks have no bound, because kinematics or law give none (they are only checked at places), and which."""
 
     tip: float
     axis: float
     tip_row: int
     axis_row: int
     unbounded: int
+    unbounded_rows: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
 
 @dataclass(frozen=True)
@@ -117,7 +118,7 @@ def deviation_bound(motion: Motion, executed: Executed, moves: Moves, rows: Ints
     (mm) and axis (rad). Rapids that are dog-legs are bounded piece by piece between their corners.
     """
     if not executed.nominal_machine:
-        return DeviationBound(0.0, 0.0, -1, -1, len(rows))
+        return DeviationBound(0.0, 0.0, -1, -1, len(rows), rows)
     ends = _Ends(rows, owner, begin, share)
     worst = _Worst(allowed)
     for at in range(0, len(rows), CHUNK):
@@ -190,7 +191,8 @@ class _Worst:
             self._close(pieces, values)
         tip, axis = np.maximum(self.closed, self.seen).tolist()
         tip_row, axis_row = (int(rows[k]) if k >= 0 else -1 for k in self.k)
-        return DeviationBound(tip, axis, tip_row, axis_row, len(self.unbounded))
+        without = rows[np.array(sorted(self.unbounded), dtype=np.int64)]
+        return DeviationBound(tip, axis, tip_row, axis_row, len(without), without)
 
 
 def _whole(motion: Motion, executed: Executed, ends: _Ends, k: Ints) -> list[_Pieces]:

@@ -1,0 +1,76 @@
+"""SHA-256 of the bytes of every file that a conversion reads: its bases, tables and meshes included."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from machines.loader import builtin
+from machines.user_file import UserFile, base_chain, read_toml
+from postproc.controllers.model import builtin_files
+from postproc.options import Options
+from postproc.setup_files import file_keys, seen_from_here, value_at
+from toolpaths.input_files import read_input
+
+Hashes = tuple["FileHash", ...]
+
+
+@dataclass(frozen=True)
+class FileHash:
+    """A file by its name without its folder, and the SHA-256 of its bytes in hex."""
+
+    file: str
+    sha256: str
+
+
+def sha256(data: bytes) -> str:
+    """In hex."""
+    return hashlib.sha256(data).hexdigest()
+
+
+def input_hashes(machine: str, controller: str, options: Options) -> dict[str, Hashes]:
+    """By input (set-up, machine, controller, error model): its file, the files of its `base` chain, files that it names.
+
+    Args:
+        machine, controller: built-in names or paths
+
+    Raises:
+        OSError: where a file cannot be read any more.
+    """
+    return {"setup": _with_files(options.setup, {}, _meshes) if options.setup else (),
+            "machine": _with_files(machine, builtin(), _none),
+            "controller": _with_files(controller, builtin_files(), _none),
+            "error_model": _with_files(options.error_model, {}, _tables) if options.error_model else ()}
+
+
+def _with_files(source: str, known: Mapping[str, Path], named: Callable[[UserFile], list[Path]]) -> Hashes:
+    chain = base_chain(source, known)
+    file, _ = read_toml(source, known)
+    more = [] if file is None else named(file)
+    return tuple(FileHash(path.name, sha256(read_input(path))) for path in (*chain, *dict.fromkeys(more)))
+
+
+def _none(file: UserFile) -> list[Path]:
+    return []
+
+
+def _meshes(file: UserFile) -> list[Path]:
+    """Mesh files of a set-up, as it sees them."""
+    seen = seen_from_here(file)
+    return [Path(seen.file).parent / str(value_at(seen.values, key)) for key in file_keys(seen.values)]
+
+
+def _tables(file: UserFile) -> list[Path]:
+    """CSV tables of an error model, each next to the file that names it."""
+    found = list[Path]()
+    todo: list[tuple[tuple[str, ...], Any]] = [((key,), value) for key, value in file.values.items()]
+    while todo:
+        path, value = todo.pop(0)
+        if isinstance(value, dict):
+            todo += [((*path, key), part) for key, part in value.items()]
+        elif path[-1] == "table" and isinstance(value, str):
+            found.append(Path(file.origin(path).file).parent / value)
+    return found

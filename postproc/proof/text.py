@@ -1,0 +1,95 @@
+"""What the proof of a program covers and by what: a line for the summary, and one for the head of the program.
+
+The head is part of the text that is read back. So it is written with a line in its place first (`PENDING`), and that line
+is replaced when the proof is complete; the control sees a comment before and after, which is checked.
+"""
+
+from __future__ import annotations
+
+import math
+
+from postproc.controllers.model import ControllerFile
+from postproc.controllers.texts import clean, comment_room
+from postproc.header_words import HEADER, PENDING
+from postproc.readback.compare import Comparison
+from postproc.readback.words import plain
+from postproc.witness.evidence import Testimony
+from toolpaths.diagnostics import Diagnostic, error
+from toolpaths.units import DEG
+
+PLACES = 4
+"""decimals of mm and degrees in the head"""
+_MARGIN = 1e-6
+"""of the last decimal: a bound that stands on it goes to the next, on every processor"""
+_KINEMATICS = "kinematics "
+"""begins what the second reading says of a machine file that it has not used"""
+
+
+def statement(c: Comparison, said: Testimony | None) -> str:
+    """The proof of a program in one line: how much of it, how near, by what, and what was not compared."""
+    seen = f"{c.worst_tip:.6f} mm, {c.worst_axis / DEG:.6f} degrees"
+    if c.unbounded:
+        text = (f"checked, not proved: {c.unbounded} of {len(c.owner)} blocks have no bound, in {c.cuts - c.bounded_cuts} "
+                f"of {c.cuts} cuts; tip and axis are within {seen} of the CL file at the places looked at")
+    else:
+        text = (f"proved: tip within {c.tip_bound:.6f} mm, axis within {c.axis_bound / DEG:.6f} degrees of the CL file all "
+                f"along every block of {c.bounded_cuts} of {c.cuts} cuts ({seen} at the places looked at)")
+    left = [] if said is None else list(said.not_compared)
+    return f"{text}, by {_means(said)}" + (f"; not compared by the second reading: {'; '.join(left)}" if left else "")
+
+
+def _means(said: Testimony | None) -> str:
+    if said is None or not said.compared:
+        return "read-back alone"
+    machine = not any(what.startswith(_KINEMATICS) for what in said.not_compared)
+    return f"read-back and second reading of {'CL file and machine file' if machine else 'the CL file'}"
+
+
+def head_line(c: Comparison, said: Testimony | None, room: int) -> str:
+    """The same for the head of the program, in at most `room` characters; bounds are rounded up.
+
+    Without room for the names of what was not compared it says how many that are.
+    """
+    second = said is not None and bool(said.compared)
+    by = "read-back, second reading" if second else "read-back"
+    if c.unbounded:
+        near = f"{_up(c.worst_tip)} mm, {_up(c.worst_axis / DEG)} degrees at places"
+        text = f"checked, not proved: {c.cuts - c.bounded_cuts} of {c.cuts} cuts unbounded; {near}"
+    else:
+        cuts = f"all {c.cuts} cuts" if c.cuts == c.bounded_cuts else f"{c.bounded_cuts} of {c.cuts} cuts"
+        text = f"proved by {by}: {cuts} within {_up(c.tip_bound)} mm, {_up(c.axis_bound / DEG)} degrees"
+    left = [] if said is None else list(said.not_compared)
+    named = "; not in the second reading: " + "; ".join(left).replace("(", "- ").replace(")", "")
+    short = f"; {len(left)} not read twice"
+    return text if not left else text + (named if len(text + named) <= room else short)
+
+
+def _up(value: float) -> str:
+    return f"{math.ceil(value * 10.0**PLACES + _MARGIN) / 10.0**PLACES:.{PLACES}f}" if math.isfinite(value) else "unknown"
+
+
+def with_statement(text: str, controller: ControllerFile, comparison: Comparison, witness: Testimony | None,
+                   file: str) -> tuple[str, list[Diagnostic]]:
+    """The text of a proved program with its proof in the head; an error where a comment of the controller cannot hold it.
+
+    Args:
+        file: the CL file, for messages
+    """
+    style = controller.comment
+    capitals = f"{style.open}{_cleaned(controller, PENDING, True)}{style.close}" in text[:HEADER]
+    mark = f"{style.open}{_cleaned(controller, PENDING, capitals)}{style.close}"
+    at = text.find(mark, 0, HEADER)
+    if at < 0:
+        return text, []
+    line = head_line(comparison, witness, comment_room(controller))
+    line = f"{style.open}{_cleaned(controller, line, capitals)}{style.close}"
+    begin, end = text.rfind("\n", 0, at) + 1, at + len(mark)
+    if plain(text[begin:end].encode()) != plain((text[begin:at] + line).encode()):
+        return text, [error("proof.comment", f"the proof cannot stand in a comment of the head: {line}",
+                            file=file, hint="comment.forbidden of the controller file must name all that "
+                            "ends a comment")]
+    return text[:at] + line + text[end:], []
+
+
+def _cleaned(controller: ControllerFile, text: str, capitals: bool) -> str:
+    return clean(controller, text.upper() if capitals else text)
