@@ -11,6 +11,7 @@ from abc import ABC, abstractmethod
 
 import numpy as np
 
+from machines.geometric_error.error_rates import ErrorRates
 from machines.geometric_error.lost_motion import carried_on
 from machines.kinematics.base import Kinematics
 from toolpaths.arrays import Bools, Floats
@@ -64,6 +65,13 @@ class Actual(ABC):
     @abstractmethod
     def outside(self, w: Floats, margin: float = EDGE) -> Bools:
         """True (N, J) where a joint stands outside what was measured of it by more than `margin` mm or rad."""
+
+    def error_rates(self, q: Floats, reach: Floats) -> ErrorRates | None:
+        """How fast errors may change near joints q (N, J) while each joint moves by up to `reach` (N, J).
+
+        None where no bound is known: the machine is then only checked at places.
+        """
+        return None
 
     def deviation(self, w: Floats, values: Floats, direction: Floats | None = None) -> Floats:
         """First-order displacement of the tip and turn (N, 6) for parameters (P,)."""

@@ -7,7 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from machines.geometric_error.actual import EDGE, Actual, Placed
+from machines.geometric_error.error_rates import ErrorRates, arms_of
 from machines.geometric_error.lattice import POINT, ErrorMap
+from machines.geometric_error.serial_errors import SerialErrors
 from machines.kinematics.base import Kinematics
 from machines.kinematics.h4_axes import H4TableAxis
 from machines.kinematics.serial import Serial
@@ -76,6 +78,25 @@ class ActualByMap(Actual):
             error = np.concatenate([np.einsum("nij,nj->ni", turned, v) for v in (error[:, :3], error[:, 3:])], axis=1)
         arm = -self.arm * axis
         return (tip + error[:, :3] + (spun(arm, error[:, 3:]) - arm), spun(axis, error[:, 3:]), spun(side, error[:, 3:]))
+
+    def error_rates(self, q: Floats, reach: Floats) -> ErrorRates | None:
+        """See the base class: by the slopes of the map, along its coordinates, times how fast a joint moves those."""
+        kin = self.kinematics
+        if not isinstance(kin, Serial):
+            return None
+        arms = arms_of(kin, SerialErrors(), q, reach)
+        (shift, turn), arm = self.map.most, abs(self.arm)
+        none = np.zeros(q.shape)
+        tip, axis = np.zeros(q.shape), np.zeros(q.shape)
+        for joint, own in zip(kin.chain, arms, strict=True):
+            j = kin.axis_names.index(joint.name)
+            speed = own + arm if joint.rotary else np.ones(len(q))  # of the point, mm per mm or rad
+            by = [np.where(letter == joint.name, 1.0, speed if letter in POINT else 0.0) for letter in self.map.letters]
+            shifts, turns = (sum(x * slope[k] for x, slope in zip(by, self.map.steepest, strict=True)) for k in (0, 1))
+            turned = 1.0 if joint.name in self.map.bed else 0.0  # with the directions of the bed
+            axis[:, j] = turns + turn * (turned + joint.rotary)
+            tip[:, j] = shifts + shift * turned + arm * axis[:, j]
+        return ErrorRates(tip, axis, none, none)
 
     def sensitivity(self, w: Floats, direction: Floats | None = None) -> Floats:
         """See the base class."""

@@ -14,6 +14,7 @@ import numpy as np
 
 from machines.geometric_error.actual import EDGE, Actual, Placed
 from machines.geometric_error.axis_motion import Line, actual_line, actual_tool, along, driven
+from machines.geometric_error.error_rates import ErrorRates, serial_rates
 from machines.geometric_error.names import SPINDLE, parse
 from machines.geometric_error.serial_errors import SerialErrors
 from machines.geometric_error.transforms import carried
@@ -57,6 +58,10 @@ class ActualSerial(Actual):
     def outside(self, w: Floats, margin: float = EDGE) -> Bools:
         """See the base class."""
         return self.errors.outside(self.kinematics.axis_names, w, margin)
+
+    def error_rates(self, q: Floats, reach: Floats) -> ErrorRates | None:
+        """See the base class."""
+        return serial_rates(self.kinematics, self.errors, q, reach)
 
     # ---- exact -----------------------------------------------------------------------------------------------------
 

@@ -8,11 +8,15 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field, replace
-from typing import Literal, Self
+from functools import cached_property
+from typing import TYPE_CHECKING, Literal, Self
 
 import numpy as np
 
 from toolpaths.arrays import Bools, Floats, frozen
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
 
 EVERYWHERE = (-np.inf, np.inf)
 FINEST = 1.0 / 2000.0
@@ -31,6 +35,21 @@ class Curve(ABC):
     @abstractmethod
     def detail(self) -> float:
         """mm or rad over which the curve runs one way at the most: what lies between looks as far apart is seen."""
+
+    @property
+    @abstractmethod
+    def most(self) -> float:
+        """mm or rad that no value exceeds anywhere, either way: a bound."""
+
+    @property
+    @abstractmethod
+    def steepest(self) -> float:
+        """mm or rad per mm or rad that no slope exceeds anywhere: a bound."""
+
+    @property
+    def apart(self) -> float:
+        """mm or rad by which the values of the two ways nowhere differ by more: a bound."""
+        return 0.0
 
     @abstractmethod
     def labels(self) -> list[str]:
@@ -84,6 +103,36 @@ class Table(Curve):
         """See the base class: the least distance between positions."""
         return least_apart(self.closed(self.values[: len(self.x)])[0])
 
+    @cached_property
+    def most(self) -> float:  # type: ignore[override]
+        """See the base class; linear tables reach it."""
+        return max(self._bounds(values)[0] for values in self._ways)
+
+    @cached_property
+    def steepest(self) -> float:  # type: ignore[override]
+        """See the base class; reached."""
+        return max(self._bounds(values)[1] for values in self._ways)
+
+    @cached_property
+    def apart(self) -> float:  # type: ignore[override]
+        """See the base class."""
+        return self._bounds(np.subtract(*self._ways))[0] if self.both else 0.0
+
+    @property
+    def _ways(self) -> list[Floats]:
+        return np.split(self.values, 2) if self.both else [self.values]
+
+    def _bounds(self, values: Floats) -> tuple[float, float]:
+        """(largest absolute value, steepest slope) between values (M,) at the positions, by the rule."""
+        x, at = self.closed(values)
+        largest, wide = float(np.abs(at).max()), float(np.diff(x).max(initial=0.0))
+        if len(x) == 1:
+            return largest, 0.0
+        if self.rule == "linear":
+            return largest, float(np.abs(np.diff(at) / np.diff(x)).max())
+        slope = _steepest_of_spline(self._curve(values))
+        return largest + 0.5 * wide * slope, slope
+
     def labels(self) -> list[str]:
         """[0], [1] ... by position; [0]+ forwards, [0]- backwards."""
         one = [f"[{k}]" for k in range(len(self.x))]
@@ -125,10 +174,13 @@ class Table(Curve):
         return self._spline(values, x) if self.rule == "spline" else np.interp(x, *self.closed(values))
 
     def _spline(self, values: Floats, x: Floats) -> Floats:
+        result: Floats = self._curve(values)(x)
+        return result
+
+    def _curve(self, values: Floats) -> CubicSpline:
         from scipy.interpolate import CubicSpline
 
-        result: Floats = CubicSpline(*self.closed(values), bc_type="periodic" if self.period else "not-a-knot")(x)
-        return result
+        return CubicSpline(*self.closed(values), bc_type="periodic" if self.period else "not-a-knot")
 
     def _hats(self, x: Floats) -> Floats:
         at_rest, n = self.closed(self.values[: len(self.x)])[0], len(self.x)
@@ -166,6 +218,22 @@ class Fourier(Curve):
         """See the base class: half a period of the highest harmonic."""
         order = len(self.values) // 2
         return 0.5 * self.period / order if order else np.inf
+
+    @property
+    def most(self) -> float:
+        """See the base class."""
+        return float(abs(self.values[0]) + self._amplitudes.sum())
+
+    @property
+    def steepest(self) -> float:
+        """See the base class."""
+        harmonics = np.arange(1, 1 + len(self.values) // 2)
+        return float((harmonics * self._amplitudes).sum() * 2.0 * np.pi / self.period)
+
+    @property
+    def _amplitudes(self) -> Floats:
+        _, cosine, sine = np.split(self.values, [1, 1 + len(self.values) // 2])
+        return np.hypot(cosine, sine)
 
     def labels(self) -> list[str]:
         """mean, cos1, ..., sin1, ..."""
@@ -206,6 +274,22 @@ class Polynomial(Curve):
         """See the base class: the range by the degree."""
         return (self.range[1] - self.range[0]) / max(len(self.values) - 1, 1)
 
+    @property
+    def most(self) -> float:
+        """See the base class."""
+        return float((np.abs(self.values) * self._reach ** np.arange(len(self.values))).sum())
+
+    @property
+    def steepest(self) -> float:
+        """See the base class."""
+        k = np.arange(1, len(self.values))
+        return float((k * np.abs(self.values[1:]) * self._reach ** (k - 1)).sum() / abs(self.scale))
+
+    @property
+    def _reach(self) -> float:
+        """Largest |x - origin| / scale."""
+        return max(abs(end - self.origin) for end in self.range) / abs(self.scale)
+
     def labels(self) -> list[str]:
         """.c0, .c1, ..."""
         return [f".c{k}" for k in range(len(self.values))]
@@ -223,6 +307,17 @@ class Polynomial(Curve):
         t = (np.clip(x, *self.range) - self.origin) / self.scale
         result: Floats = np.vander(t, len(self.values), increasing=True)
         return result
+
+
+def _steepest_of_spline(curve: CubicSpline) -> float:
+    """Largest absolute slope of a cubic spline: at a knot, or where the slope turns back between two."""
+    slope = curve.derivative()
+    second, first, _ = slope.c  # per cell: second h^2 + first h + slope at its beginning
+    width = np.diff(slope.x)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        vertex = np.where(second != 0.0, -0.5 * first / second, 0.0)
+    inside = slope.x[:-1] + np.clip(vertex, 0.0, width)
+    return float(np.abs(slope(np.concatenate([slope.x, inside]))).max())
 
 
 def least_apart(x: Floats) -> float:

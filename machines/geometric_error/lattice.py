@@ -76,6 +76,27 @@ class ErrorMap:
         return ", ".join(f"{x} {nodes[i] / (DEG if x in ROTARY else 1.0):g}"
                          for x, nodes, i in zip(self.letters, self.nodes, at, strict=True))
 
+    @property
+    def most(self) -> tuple[float, float]:
+        """Bounds of displacement (mm) and turn (rad) anywhere: values between nodes lie between theirs."""
+        parts = self.table.reshape(-1, 6)
+        return tuple(float(np.linalg.norm(part, axis=1).max()) for part in (parts[:, :3], parts[:, 3:]))  # type: ignore[return-value]
+
+    @property
+    def steepest(self) -> list[tuple[float, float]]:
+        """By coordinate, bounds of how fast displacement and turn change along it: as between neighbouring nodes."""
+        found = []
+        for d, (nodes, period) in enumerate(self.closed()):
+            table = np.moveaxis(self.table, d, 0)
+            table = np.concatenate([table, table[:1]]) if period else table
+            if len(nodes) < 2:
+                found.append((0.0, 0.0))
+                continue
+            slope = (np.diff(table, axis=0).reshape(len(nodes) - 1, -1, 6) / np.diff(nodes)[:, None, None]).reshape(-1, 6)
+            shift, turn = (float(np.linalg.norm(part, axis=1).max()) for part in (slope[:, :3], slope[:, 3:]))
+            found.append((shift, turn))
+        return found
+
     def closed(self) -> Iterator[tuple[Floats, float]]:
         """(nodes, period) of each coordinate, the first node of one that goes round repeated at the end of its period."""
         for nodes, period in zip(self.nodes, self.periods, strict=True):

@@ -26,6 +26,7 @@ class Kinematics(ABC):
     branches: int
     """B of `inverse`"""
     slides_affine: bool = False
+    slides_square: bool = False
     """True where, at fixed rotary joints, the tip is an affine function of the linear joints (serial machines)"""
 
     @abstractmethod

@@ -30,6 +30,8 @@ from toolpaths.rotations import angle_between
 
 ROUND_OFF = 1e-12
 """rad: directions nearer than this are the same (reach, singular direction)"""
+SQUARE = 1e-12
+"""of the cosine between slides"""
 DEPENDENT = 1e-9
 """least determinant of the three linear directions; below it they do not span space"""
 Turning = dict[str, tuple[Floats, Floats]]
@@ -81,6 +83,15 @@ class Serial(Kinematics):
     @cached_property
     def _turns(self) -> list[Joint]:
         return [joint for joint in self.chain if joint.rotary]
+
+    @property
+    def slides_square(self) -> bool:  # type: ignore[override]
+        """True where the slides are square to each other and no turning axis lies between them."""
+        kinds = [joint.rotary for joint in self.chain]
+        first = kinds.index(False) if False in kinds else 0
+        together = not any(kinds[first:first + len(self._slides)])
+        directions = np.stack([joint.direction for joint in self._slides])
+        return together and bool(np.abs(directions @ directions.T - np.eye(len(directions))).max() < SQUARE)
 
     @cached_property
     def _slides(self) -> list[Joint]:

@@ -9,11 +9,12 @@ from functools import cached_property
 import numpy as np
 
 from machines.geometric_error.actual import Actual
-from machines.geometric_error.lost_motion import Steps
+from machines.geometric_error.error_rates import STEEPEST_GAP, ErrorRates, joined, unknown_rates
+from machines.geometric_error.lost_motion import GRAIN, Steps
 from machines.geometric_error.model import ErrorModel
 from postproc.looks import changes, looks_between
 from postproc.readback.execute import Motion
-from postproc.readback.poses import Executed, begins
+from postproc.readback.poses import Executed, alike, begins
 from toolpaths.arrays import Bools, Floats, Ints
 
 ARC = 2
@@ -47,10 +48,32 @@ class ActualExecuted(Executed):
         """The same of the machine without errors."""
         return super().poses(motion, rows, t)
 
-    @property
-    def nominal_machine(self) -> bool:
-        """False: errors are looked at, not bounded."""
-        return False
+    def lawful(self, motion: Motion, rows: Ints, t: float | Floats) -> tuple[Floats, Floats]:
+        """See `Executed`: the law is that of the machine without errors."""
+        return self.nominal(motion, rows, t)
+
+    def off_law(self, motion: Motion, rows: Ints) -> Bools:
+        """See `Executed`: all blocks."""
+        return np.ones(len(rows), dtype=bool)
+
+    def error_rates(self, motion: Motion, rows: Ints, q: Floats, reach: Floats) -> ErrorRates:
+        """See `Executed`: of the errors; none are known where the control's pivots differ from the machine's besides."""
+        if self.control.own_kinematics is not None:
+            return unknown_rates(*q.shape)
+        return joined((k, self.actual(tool).error_rates(q[k], reach[k]) or unknown_rates(len(k), q.shape[1]))
+                      for k, (tool,) in alike(motion.tool[rows]))
+
+    def way(self, motion: Motion, rows: Ints, t: float | Floats) -> Floats:
+        """See `Executed`."""
+        return self._way(motion, rows, t)
+
+    def gaps(self, motion: Motion, rows: Ints, q: Floats, reach: Floats) -> Floats:
+        """See `Executed`: at q, less what it may change by within `reach`."""
+        result = np.full(q.shape, np.inf)
+        if self._two_way:
+            here = self.model.axes.gaps(self.control.machine.axis_names, q, self._two_way)
+            result[:, self._two_way] = np.maximum(here - STEEPEST_GAP * reach[:, self._two_way], min(GRAIN))
+        return result
 
     def corrected_on_the_way(self, motion: Motion, rows: Ints) -> Floats:
         """(K,) mm: what errors come to at both ends together; axes with rapids of their own take it up one by one."""

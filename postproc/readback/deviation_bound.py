@@ -23,6 +23,7 @@ from postproc.moves import Moves
 from postproc.path_model import ARC
 from postproc.readback.execute import Motion
 from postproc.readback.poses import Executed, coordinates, signed_sweep
+from postproc.readback.strays import CIRCLE, JOINTS, LINE, TIP, strays
 from postproc.word_arcs import PLANE_AXIS, PLANE_COLUMNS
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.rotations import angle_between, cross, lengths
@@ -30,7 +31,7 @@ from toolpaths.shape import Curves
 
 TIGHT = 1.01
 """bound over worst pose that is near enough"""
-HALVINGS = 14
+HALVINGS = 26
 """at most, of one block"""
 GRAIN = 1e-7, 1e-9
 """mm, rad: bounds below are not looked at more closely"""
@@ -117,8 +118,6 @@ def deviation_bound(motion: Motion, executed: Executed, moves: Moves, rows: Ints
     `begin`, `share` (K,): where on its curve each begins and what part of it it is, by count; `allowed`: tolerances of tip
     (mm) and axis (rad). Rapids that are dog-legs are bounded piece by piece between their corners.
     """
-    if not executed.nominal_machine:
-        return DeviationBound(0.0, 0.0, -1, -1, len(rows), rows)
     ends = _Ends(rows, owner, begin, share)
     worst = _Worst(allowed)
     for at in range(0, len(rows), CHUNK):
@@ -218,7 +217,8 @@ def _values(motion: Motion, executed: Executed, moves: Moves, ends: _Ends, piece
     poses = [executed.poses(motion, rows, t) for t in places]
     guess = [np.minimum(ends.begin[pieces.k] + t * ends.share[pieces.k], 1.0) for t in places]
     nearest = [curves.project(np.nan_to_num(tip), g) for (tip, _), g in zip(poses, guess, strict=True)]
-    law = _Law.of(motion, executed, rows, pieces, poses)
+    off = executed.off_law(motion, rows).any()
+    law = _Law.of(motion, executed, rows, pieces, [executed.lawful(motion, rows, t) for t in places] if off else poses)
     even = law.straight_tip & ~curves.is_arc
     found = _compared(curves, poses, nearest, law, even, even | (curves.length() <= SHORT))
     outside = np.isfinite(found.tip) & (_excess(found, allowed) > 1.0)
@@ -258,8 +258,8 @@ def _compared(curves: Curves, poses: list[tuple[Floats, Floats]], u: list[Floats
     bend = [np.where(law.known, _bend(jet) + np.zeros(n), np.inf) for jet in differences]
     # A straight tip beside a straight line: with both parameters even the difference is straight, so largest at an end.
     bend[0] = np.where(even & law.known, 0.0, bend[0])
-    return _Values(_known(tip_off), _angle(_known(axis_off)), _known(tip_off + bend[0] / 32.0),
-                   _angle(_known(axis_off + bend[1] / 32.0)))
+    return _Values(_known(tip_off), _angle(_known(axis_off)), _known(tip_off + bend[0] / 32.0 + law.strays[0]),
+                   _angle(_known(axis_off + bend[1] / 32.0 + law.strays[1])))
 
 
 def _known(values: Floats) -> Floats:
@@ -280,12 +280,13 @@ def _angle(chord: Floats) -> Floats:
 @dataclass(frozen=True)
 class _Law:
     """Jets of N pieces by the law of their blocks: tip, axis; `known` where there are any; `straight_tip` where the tip is
-    straight and even by the law itself."""
+    straight and even by the law itself; `strays` (2, N): what the machine may add to it, mm and rad."""
 
     tip: Jet
     axis: Jet
     known: Bools
     straight_tip: Bools
+    strays: Floats
 
     @classmethod
     def of(cls, motion: Motion, executed: Executed, rows: Ints, pieces: _Pieces,
@@ -303,7 +304,7 @@ class _Law:
                 made = _jets(kind, motion, executed, rows[some], pieces.take(some), kin, q0[some], q1[some],
                              [(tip[some], axis[some]) for tip, axis in poses])
                 known[some] = made is not None
-                straight_tip[some] = kind in (_LINE, _TIP)
+                straight_tip[some] = kind in (LINE, TIP)
                 if made is None:
                     continue
                 for i, jet in enumerate(made):
@@ -313,8 +314,8 @@ class _Law:
                             value[i, d, c, some] = part[c]
         tip, axis = (Jet(list(value[i, 0]), list(value[i, 1]), list(value[i, 2]), third[i]) for i in range(2))
         apart = lengths(value[0, 0].T - poses[1][0])
-        return cls(tip, axis, known & (apart <= SAME), straight_tip)
-
+        off = np.stack(strays(motion, executed, rows, (pieces.a, pieces.b), law))
+        return cls(tip, axis, known & (apart <= SAME), straight_tip, off)
 
     def take(self, k: Ints) -> _Law:
         """Some of the pieces."""
@@ -323,10 +324,7 @@ class _Law:
 
         jets = [Jet(some(jet.value), some(jet.first), some(jet.second), np.broadcast_to(jet.third, self.known.shape)[k])
                 for jet in (self.tip, self.axis)]
-        return _Law(jets[0], jets[1], self.known[k], self.straight_tip[k])
-
-
-_LINE, _JOINTS, _TIP, _CIRCLE = range(4)
+        return _Law(jets[0], jets[1], self.known[k], self.straight_tip[k], self.strays[:, k])
 
 
 def _kinds(motion: Motion, executed: Executed, rows: Ints) -> Ints:
@@ -338,25 +336,25 @@ def _kinds(motion: Motion, executed: Executed, rows: Ints) -> Ints:
     before = np.where((rows == 0)[:, None], motion.start, motion.end[np.maximum(rows - 1, 0)])
     stands = (before[:, control.rotary] == motion.end[rows][:, control.rotary]).all(axis=1)
     straight_slides = control.machine.kinematics.slides_affine
-    kind = np.where(by_tip, _TIP, _JOINTS)
-    kind = np.where(in_plane | (stands & (straight_slides | (by_tip & (control.base != "tcp")))), _LINE, kind)
-    return np.where(motion.code[rows] == ARC, _CIRCLE, kind)
+    kind = np.where(by_tip, TIP, JOINTS)
+    kind = np.where(in_plane | (stands & (straight_slides | (by_tip & (control.base != "tcp")))), LINE, kind)
+    return np.where(motion.code[rows] == ARC, CIRCLE, kind)
 
 
 def _jets(kind: int, motion: Motion, executed: Executed, rows: Ints, pieces: _Pieces, kin: Kinematics, q0: Floats,
           q1: Floats, poses: list[tuple[Floats, Floats]]) -> tuple[Jet, Jet] | None:
     """(tip, axis) of pieces of one kind; None where the kinematics gives no bound."""
     (tip0, axis0), _, (tip1, _) = poses
-    if kind == _CIRCLE:
+    if kind == CIRCLE:
         return _circle_jets(motion, executed, rows, pieces, tip0, axis0)
     line = straight(list(tip0.T), list(tip1.T))
-    if kind == _LINE or (kind == _TIP and not any(kin.rotary)):
+    if kind == LINE or (kind == TIP and not any(kin.rotary)):
         return line, Jet(list(axis0.T))
     try:
         tip, axis = pose_jets(kin, q0, q1)
     except TypeError:
         return None
-    return (line, axis) if kind == _TIP else (tip, axis)
+    return (line, axis) if kind == TIP else (tip, axis)
 
 
 def _circle_jets(motion: Motion, executed: Executed, rows: Ints, pieces: _Pieces, tip0: Floats,

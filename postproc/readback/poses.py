@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from machines.geometric_error.error_rates import ErrorRates, joined, pivot_rates, standing_arm
 from machines.kinematics.base import Kinematics
 from postproc.control import Control
 from postproc.readback import assembly
@@ -71,10 +72,42 @@ class Executed:
             q[k] = self._held(position[k], self.lengths.get(h, 0.0) if h >= 0 else 0.0)
         return q
 
-    @property
-    def nominal_machine(self) -> bool:
-        """True where the poses are those of the kinematics, whose motion in a block has proved bounds."""
-        return True
+    def lawful(self, motion: Motion, rows: Ints, t: float | Floats) -> tuple[Floats, Floats]:
+        """(tip, axis) (K, 3) where the law of the blocks has the tool: on the machine as the control holds it."""
+        tip, axis = self.poses(motion, rows, t)
+        numbers = motion.frame[rows]
+        for number in np.unique(numbers[self.off_law(motion, rows)]).tolist():
+            k, kin = np.flatnonzero(numbers == number), motion.frames[number].kinematics
+            assert kin is not None
+            tip[k], axis[k] = kin.forward(self.joints(motion, rows, t)[k])
+        return tip, axis
+
+    def off_law(self, motion: Motion, rows: Ints) -> Bools:
+        """(K,) blocks in which the machine is not that of the law: the control holds other pivots."""
+        other = np.array([self.control.own_kinematics is not None and frame.kinematics is not None
+                          for frame in motion.frames])
+        return np.asarray(other[motion.frame[rows]])
+
+    def error_rates(self, motion: Motion, rows: Ints, q: Floats, reach: Floats) -> ErrorRates:
+        """How fast what the machine adds to the law may change near joints q (K, J) that move by up to `reach` (K, J)."""
+        frames = motion.frame[rows], motion.tool[rows]
+        return joined((k, pivot_rates(self.kinematics(tool), motion.frames[frame].kinematics, q[k]))
+                      for k, (frame, tool) in alike(*frames))
+
+    def arm(self, motion: Motion, rows: Ints, q: Floats) -> Floats:
+        """(K,) mm from the tip to the farthest turning axis at q (K, J), and while the tip stands on the part."""
+        result = np.zeros(len(rows))
+        for k, (tool,) in alike(motion.tool[rows]):
+            result[k] = standing_arm(self.kinematics(tool), q[k])
+        return result
+
+    def way(self, motion: Motion, rows: Ints, t: float | Floats) -> Floats:
+        """(K, J) by which way each joint is where it is: 0 on a machine without lost motion."""
+        return np.zeros((len(rows), len(self.control.machine.axis_names)))
+
+    def gaps(self, motion: Motion, rows: Ints, q: Floats, reach: Floats) -> Floats:
+        """(K, J) mm or rad of lost motion, at the least; infinite where there is none."""
+        return np.full(q.shape, np.inf)
 
     def corrected_on_the_way(self, motion: Motion, rows: Ints) -> Floats:
         """(K,) mm that the corrections of the tip may change by in blocks: none on the machine without errors."""
@@ -245,3 +278,10 @@ def arc_sweeps(motion: Motion, control: Control) -> Floats:
             result[arcs[k]] = np.abs(signed_sweep(before[k][:, columns] - center, end[k][:, columns] - center,
                                                   motion.ccw[arcs[k]]))
     return result
+
+
+def alike(*columns: Ints) -> Iterator[tuple[Ints, tuple[int, ...]]]:
+    """(rows, values) of columns (K,), by their values."""
+    kinds, inverse = np.unique(np.stack(columns, axis=1), axis=0, return_inverse=True)
+    for number, values in enumerate(kinds.tolist()):
+        yield np.flatnonzero(inverse.ravel() == number), tuple(values)
