@@ -22,6 +22,8 @@ LOOKS = 16
 """parts of a block whose joints do not run straight, for the ways of its axes"""
 ARC_LOOKS = 0.25, 0.5, 0.75, 1.0
 """where the way of joints in a block is added up"""
+PLACES = 3
+"""whose poses are kept"""
 AT_ONCE = 50_000
 """such blocks that are looked at together"""
 
@@ -35,8 +37,7 @@ class ActualExecuted(Executed):
 
     def poses(self, motion: Motion, rows: Ints, t: float | Floats) -> tuple[Floats, Floats]:
         """(tip, axis) (K, 3) of the blocks `rows` at fraction t, errors in, by the way that each axis last moved."""
-        near = np.concatenate(self.nominal(motion, rows, t), axis=1)
-        q, way = self.joints(motion, rows, t), self._way(motion, rows, t)
+        near, q, way = self._at(motion, rows, t)
         tip, axis = np.empty((len(rows), 3)), np.empty((len(rows), 3))
         for number in np.unique(motion.tool[rows]).tolist():
             k = np.flatnonzero(motion.tool[rows] == number)
@@ -44,13 +45,35 @@ class ActualExecuted(Executed):
             tip[k], axis[k], _ = actual.place(actual.coordinates(q[k], near[k]), way[k])
         return tip, axis
 
+    def _at(self, motion: Motion, rows: Ints, t: float | Floats) -> tuple[Floats, Floats, Floats]:
+        """(nominal pose (K, 6), joints (K, J), their ways (K, J)); those of the places asked for last are kept: bounds ask
+        for the same ones several times."""
+        for kept, time, found in self._seen:
+            if kept is rows and time is t:
+                return found
+        found = (np.concatenate(self.nominal(motion, rows, t), axis=1), super().joints(motion, rows, t),
+                 self._way(motion, rows, t))
+        if len(rows) <= AT_ONCE:
+            self._seen[:] = [*self._seen[1 - PLACES:], (rows, t, found)]
+        return found
+
+    def joints(self, motion: Motion, rows: Ints, t: float | Floats) -> Floats:
+        """See `Executed`."""
+        known = next((found[1] for kept, time, found in self._seen if kept is rows and time is t), None)
+        return super().joints(motion, rows, t) if known is None else known
+
+    @cached_property
+    def _seen(self) -> list[tuple[Ints, float | Floats, tuple[Floats, Floats, Floats]]]:
+        return []
+
     def nominal(self, motion: Motion, rows: Ints, t: float | Floats) -> tuple[Floats, Floats]:
         """The same of the machine without errors."""
         return super().poses(motion, rows, t)
 
     def lawful(self, motion: Motion, rows: Ints, t: float | Floats) -> tuple[Floats, Floats]:
         """See `Executed`: the law is that of the machine without errors."""
-        return self.nominal(motion, rows, t)
+        pose = self._at(motion, rows, t)[0]
+        return pose[:, :3], pose[:, 3:]
 
     def off_law(self, motion: Motion, rows: Ints) -> Bools:
         """See `Executed`: all blocks."""
@@ -65,7 +88,7 @@ class ActualExecuted(Executed):
 
     def way(self, motion: Motion, rows: Ints, t: float | Floats) -> Floats:
         """See `Executed`."""
-        return self._way(motion, rows, t)
+        return self._at(motion, rows, t)[2]
 
     def gaps(self, motion: Motion, rows: Ints, q: Floats, reach: Floats) -> Floats:
         """See `Executed`: at q, less what it may change by within `reach`."""

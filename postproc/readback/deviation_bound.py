@@ -218,7 +218,8 @@ def _values(motion: Motion, executed: Executed, moves: Moves, ends: _Ends, piece
     guess = [np.minimum(ends.begin[pieces.k] + t * ends.share[pieces.k], 1.0) for t in places]
     nearest = [curves.project(np.nan_to_num(tip), g) for (tip, _), g in zip(poses, guess, strict=True)]
     off = executed.off_law(motion, rows).any()
-    law = _Law.of(motion, executed, rows, pieces, [executed.lawful(motion, rows, t) for t in places] if off else poses)
+    lawful = [executed.lawful(motion, rows, t) for t in places] if off else poses
+    law = _Law.of(motion, executed, rows, pieces, places, lawful)
     even = law.straight_tip & ~curves.is_arc
     found = _compared(curves, poses, nearest, law, even, even | (curves.length() <= SHORT))
     outside = np.isfinite(found.tip) & (_excess(found, allowed) > 1.0)
@@ -290,13 +291,13 @@ class _Law:
 
     @classmethod
     def of(cls, motion: Motion, executed: Executed, rows: Ints, pieces: _Pieces,
-           poses: list[tuple[Floats, Floats]]) -> _Law:
+           places: tuple[Floats, Floats, Floats], poses: list[tuple[Floats, Floats]]) -> _Law:
         """By kind: arcs; tip straight and axis standing; straight in joints; tip straight and rotary joints even."""
         n = len(rows)
         third, value = np.zeros((2, n)), np.zeros((2, 3, 3, n))
         known, straight_tip = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
         law = _kinds(motion, executed, rows)
-        q0, q1 = (executed.joints(motion, rows, t) for t in (pieces.a, pieces.b))
+        q0, q1 = (executed.joints(motion, rows, t) for t in (places[0], places[2]))
         for k in groups(motion.tool[rows]):
             kin = executed.kinematics(int(motion.tool[rows[k[0]]]))
             for kind in np.unique(law[k]).tolist():
@@ -314,7 +315,7 @@ class _Law:
                             value[i, d, c, some] = part[c]
         tip, axis = (Jet(list(value[i, 0]), list(value[i, 1]), list(value[i, 2]), third[i]) for i in range(2))
         apart = lengths(value[0, 0].T - poses[1][0])
-        off = np.stack(strays(motion, executed, rows, (pieces.a, pieces.b), law))
+        off = np.stack(strays(motion, executed, rows, places, law, (poses[0][0], poses[2][0])))
         return cls(tip, axis, known & (apart <= SAME), straight_tip, off)
 
     def take(self, k: Ints) -> _Law:

@@ -30,18 +30,23 @@ class _Travel:
     back: Floats
 
 
-def strays(motion: Motion, executed: Executed, rows: Ints, span: tuple[Floats, Floats],
-           kinds: Ints) -> tuple[Floats, Floats]:
-    """Bounds (tip (N,) mm, axis (N,) rad) for the parts `span` (begin (N,), end (N,)) of blocks `rows` (N,), by their laws
-    `kinds` (N,); 0 on a machine that is that of the law, infinity where nothing is known."""
+def strays(motion: Motion, executed: Executed, rows: Ints, times: tuple[Floats, Floats, Floats],
+           kinds: Ints, tips: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
+    """Bounds (tip (N,) mm, axis (N,) rad) for parts of blocks `rows` (N,) with begin, middle and end `times` (N,), by their
+    laws `kinds` (N,), with the tip at `tips` (N, 3) by that law where they begin and end.
+
+    0 on a machine that is that of the law, infinity where nothing is known.
+    """
     tip, axis = np.zeros(len(rows)), np.zeros(len(rows))
     mine = np.flatnonzero(executed.off_law(motion, rows))
     if not len(mine):
         return tip, axis
-    rows, a, b, kinds = rows[mine], span[0][mine], span[1][mine], kinds[mine]
-    times = a, 0.5 * (a + b), b
+    if len(mine) < len(rows):
+        rows, kinds, times = rows[mine], kinds[mine], (times[0][mine], times[1][mine], times[2][mine])
+        tips = tips[0][mine], tips[1][mine]
     q = [executed.joints(motion, rows, t) for t in times]
-    travel = _travel(motion, executed, rows, (a, b), kinds, q)
+    away = np.linalg.norm(tips[1] - tips[0], axis=1)
+    travel = _travel(motion, executed, rows, times[2] - times[0], kinds, q, away)
     rates = executed.error_rates(motion, rows, q[1], travel.half)
     way = [executed.way(motion, rows, t) for t in times]
     turned = np.maximum(np.abs(way[1] - way[0]), np.abs(way[2] - way[1]))
@@ -53,10 +58,9 @@ def strays(motion: Motion, executed: Executed, rows: Ints, span: tuple[Floats, F
     return np.nan_to_num(tip, nan=np.inf), np.nan_to_num(axis, nan=np.inf)
 
 
-def _travel(motion: Motion, executed: Executed, rows: Ints, span: tuple[Floats, Floats], kinds: Ints,
-            q: list[Floats]) -> _Travel:
+def _travel(motion: Motion, executed: Executed, rows: Ints, length: Floats, kinds: Ints, q: list[Floats],
+            away: Floats) -> _Travel:
     half, back = 0.5 * np.abs(q[2] - q[0]), np.zeros(q[0].shape)
-    length = span[1] - span[0]
     curved = np.flatnonzero((kinds == TIP) | (kinds == CIRCLE))
     if not len(curved):
         return _Travel(half, back)
@@ -65,8 +69,7 @@ def _travel(motion: Motion, executed: Executed, rows: Ints, span: tuple[Floats, 
     arcs, tips = np.flatnonzero(kinds == CIRCLE), np.flatnonzero(kinds == TIP)
     if executed.control.machine.kinematics.slides_square:
         path[arcs], bend[arcs] = _of_arcs(motion, executed, rows[arcs], length[arcs])
-        path[tips], bend[tips] = _of_tips(motion, executed, rows[tips], (span[0][tips], span[1][tips]),
-                                          [x[tips] for x in q])
+        path[tips], bend[tips] = _of_tips(motion, executed, rows[tips], [x[tips] for x in q], away[tips])
     block, bend = np.ix_(curved, slides), bend[curved][:, None]
     steps = np.maximum(np.abs(q[1] - q[0]), np.abs(q[2] - q[1]))[block]
     half[block] = np.minimum(0.5 * path[curved][:, None], steps + 0.25 * bend)
@@ -94,12 +97,10 @@ def _of_arcs(motion: Motion, executed: Executed, rows: Ints, part: Floats) -> tu
     return path, bend
 
 
-def _of_tips(motion: Motion, executed: Executed, rows: Ints, span: tuple[Floats, Floats],
-             q: list[Floats]) -> tuple[Floats, Floats]:
-    """The same where the tip goes straight and rotary axes turn evenly: slides make up for what those move the tip by."""
+def _of_tips(motion: Motion, executed: Executed, rows: Ints, q: list[Floats], away: Floats) -> tuple[Floats, Floats]:
+    """The same where the tip goes straight, `away` (N,) mm, and rotary axes turn evenly: slides make up for what those move
+    the tip by."""
     turning = np.array(executed.control.machine.rotary)
-    (first, _), (last, _) = (executed.lawful(motion, rows, t) for t in span)
-    away = np.linalg.norm(last - first, axis=1)
     turn = np.abs(q[2] - q[0])[:, turning].sum(axis=1)
     arm = executed.arm(motion, rows, q[1]) + away
     path = away + turn * arm

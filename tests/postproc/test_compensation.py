@@ -60,7 +60,8 @@ def test_corrected_programs_are_proved_on_the_machine_with_errors(sample: str, m
     found, comparison = result.compensation, result.comparison
     assert found is not None and comparison is not None
     assert found.tip_before > 0.02 and found.tip_after < 1e-4
-    assert comparison.worst_tip < 0.01 and comparison.worst_axis < 0.05 * DEG
+    assert comparison.tip_bound < 0.01 and comparison.axis_bound < 0.05 * DEG
+    assert (comparison.unbounded == 0) == (machine not in ("uranesx", "h4a-c-table")), "of rods no bound is known"
     assert found.axis_after < found.axis_before or machine == "uranesx"
 
 
@@ -287,8 +288,7 @@ def test_command_line_convert_verify_trace(tmp_path: Path) -> None:
     assert "geometric_errors" in json.loads(run.stdout)["tolerance_shares"]
     run = CliRunner().invoke(app, ["verify", str(out), "samples/five_faces.cls", *common])
     verified = json.loads(run.stdout)
-    assert run.exit_code == 0 and 0 < verified["blocks_without_bound"] <= verified["blocks"]
-    assert not verified["proved"], "errors are looked at, not bounded"
+    assert run.exit_code == 0 and verified["blocks_without_bound"] == 0 and verified["proved"]
     run = CliRunner().invoke(app, ["trace", "samples/five_faces.cls", "--line", "28", *common])
     moves = [m for p in json.loads(run.stdout)["points"] for m in p["moves"]]
     nominal, corrected = moves[0]["nominal_joints"][-1], moves[0]["joints"][-1]

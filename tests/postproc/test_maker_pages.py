@@ -1,0 +1,220 @@
+"""What reader and writers share, against the makers' pages: programs by hand, and what the page says that they do.
+
+Nothing here is taken from the project's own tables: numbers are worked out from the rule, codes typed from the page that
+stands next to them (the letters are those of `postproc/readback/SHARED.md` and `postproc/controllers/README.md`).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from postproc.controllers.model import builtin_files
+from postproc.readback.words import plain
+from postproc.zero_entry import table_axes
+from tests.postproc.kit import convert, toolpath
+from tests.postproc.kit import good as converted
+from tests.postproc.reader_kit import FANUC, HAAS, SIEMENS, TNC, control, faults, good, look, words
+from tests.postproc.reader_kit import controller as spec
+from toolpaths.units import DEG, PER_MINUTE
+
+ISO, NGC = "generic-iso", "linuxcnc"
+G_CODED = [FANUC, HAAS, SIEMENS, ISO, NGC]
+FLOOD, MIST, THROUGH, AIR = 1, 2, 4, 8
+
+
+def program(dialect: str, body: str) -> str:
+    """Body lines between the head and the end that the maker's manual asks for."""
+    if dialect == TNC:
+        rows = ["BEGIN PGM T1 MM", *body.splitlines(), "M30", "END PGM T1 MM"]
+        return "\n".join(f"{n} {row}" for n, row in enumerate(rows)) + "\n"
+    if dialect == SIEMENS:
+        return f"G17 G710 G90 G94 G40 G64\nG54\n{body}M30\n"
+    head = "G17 G21 G40 G49 G80 G90 G94\nG54\n" + ("G91.1\n" if dialect in (ISO, NGC) else "")
+    return f"%\n{'O0001' if dialect in (FANUC, HAAS) else ''}\n{head}{body}M30\n%\n".replace("%\n\n", "%\n")
+
+
+@pytest.mark.parametrize("dialect", G_CODED)
+@pytest.mark.parametrize(("plane", "arc", "axes", "quarter"), [
+    ("G17", "G3 X0. Y10. I-10. J0.", (0, 1), (0.0, 10.0, 0.0)), ("G18", "G3 Z0. X10. K-10. I0.", (2, 0), (10.0, 0.0, 0.0)),
+    ("G19", "G3 Y0. Z10. J-10. K0.", (1, 2), (0.0, 0.0, 10.0))])
+def test_planes_and_the_sense_of_arcs(dialect: str, plane: str, arc: str, axes: tuple[int, int],
+                                      quarter: tuple[float, float, float]) -> None:
+    """S6 p. 20: G17 is X-Y, G18 Z-X, G19 Y-Z; I, J, K from the start to the centre. S7 p. 1249: the plane of G18 is that of
+    the 3rd and the 1st axis. N 3.5.3: G3 is anti-clockwise seen from the positive end of the third axis.
+
+    A quarter from 10 on the plane's first axis to 10 on its second: its middle lies at 45 degrees on the side of both.
+    """
+    start = np.zeros(3)
+    start[axes[0]] = 10.0
+    at = "X{:.1f} Y{:.1f} Z{:.1f}".format(*start)
+    motion = good(dialect, program(dialect, f"G0 {at}\nG1 {at} F100.\n{plane}\n{arc}\nG17\n"))
+    row = int(np.flatnonzero(motion.code == 2)[0])
+    assert words(motion)[row] == list(quarter)
+    assert motion.code[:row].tolist() == [0] * (row - 1) + [1]
+    held = control()
+    middle, _ = look(motion, held).poses(motion, np.array([row]), 0.5)
+    wanted = np.array([10.0, 20.0, 30.0])
+    wanted[list(axes)] += 10.0 * np.sqrt(0.5)
+    assert middle[0] == pytest.approx(wanted, abs=1e-9)
+
+
+@pytest.mark.parametrize(("dialect", "code", "flows"), [
+    *((d, "M8", FLOOD) for d in (*G_CODED, TNC)), *((d, "M7", MIST) for d in (FANUC, SIEMENS, ISO, NGC, TNC)),
+    (HAAS, "M88", THROUGH), (HAAS, "M83", AIR)])
+def test_codes_of_coolant(dialect: str, code: str, flows: int) -> None:
+    """N 3.6.4: M7 mist, M8 flood, M9 both off. H1: M88 and M89 coolant through the spindle, M83 and M84 air jet; T7: M08
+    coolant on, M09 off."""
+    off = {"M88": "M89", "M83": "M84"}.get(code, "M9")
+    if dialect == TNC:
+        body = f"TOOL CALL 1 Z S500\nL X+1 Y+0 Z+9 R0 FMAX {code}\nL X+2 R0 F100\nL X+3 {off}\nL X+4\n"
+    else:
+        body = f"G0 X1. Y0. Z9.\n{code}\nG1 X2. F100.\n{off}\nX3.\n"
+    motion = good(dialect, program(dialect, body))
+    assert [int(c) & flows for c in motion.coolant[1:2].tolist()] == [flows] and motion.coolant[-1] == 0
+    assert motion.coolant[1] == flows, "and nothing else"
+
+
+@pytest.mark.parametrize(("dialect", "stop"), [(TNC, "both"), (HAAS, "both"), (FANUC, "both"), (SIEMENS, "both"),
+                                               (ISO, "both"), (NGC, "neither")])
+def test_a_stop_switches_off_what_the_maker_says(dialect: str, stop: str) -> None:
+    """T7, table of M functions: M00 stops program run and spindle and switches coolant off; H1: M00 stops the spindle and
+    turns coolant off. On the others the builder decides: the safe form. LinuxCNC's M0 only pauses."""
+    if dialect == TNC:
+        body = "TOOL CALL 1 Z S500\nL X+1 Y+0 Z+9 R0 FMAX M3\nL M8\nL X+2 R0 F100\nM0\nL X+3\n"
+    else:
+        body = "S500 M3\nM8\nG0 X1. Y0. Z9.\nG1 X2. F100.\nM0\nX3.\n"
+    motion = good(dialect, program(dialect, body))
+    before, after = (int(np.flatnonzero(np.isclose(motion.end[:, 0], x))[k]) for x, k in ((12.0, -1), (13.0, 0)))
+    assert motion.spindle[before] == 1 and motion.coolant[before] == FLOOD
+    runs = stop == "neither"
+    assert (motion.spindle[after] == 1) == runs and (motion.coolant[after] == FLOOD) == runs
+
+
+@pytest.mark.parametrize(("name", "carry"), [("mikron-ucp710", "AC"), ("trunnion-bc", "BC"), ("head-table", "C"),
+                                             ("fork-head-ab", ""), ("mill-4axis", "A")])
+def test_axes_that_carry_the_part(name: str, carry: str) -> None:
+    """Primed letters of the ISO 10791-6 code that the machine file states are on the part's side."""
+    held = control(name)
+    found = "".join(held.machine.axis_names[j] for j in table_axes(held))
+    primed = "".join(sorted(a for a in "ABC" if f"{a}'" in held.machine.structure))
+    assert primed == carry and found in (carry, "")  # none where the control has no tip mode for the machine
+
+
+@pytest.mark.parametrize("name", sorted(builtin_files()))
+def test_the_head_is_no_code(name: str) -> None:
+    """What both sides look for in the head stands in comments: without them not a word of it is left."""
+    result = converted(convert(toolpath("RAPID", "GOTO/0,0,5", "GOTO/9,0,5"), "mill-3axis", name))
+    head = "\n".join(result.text.splitlines()[:14])
+    left = plain(head.encode()).decode().lower()
+    assert "postproc" in head.lower() and "proved by" in head.lower()
+    assert not any(word in left for word in ("postproc", "fingerprint", "proved", "machine", "tolerance"))
+
+
+def test_units() -> None:
+    assert abs(DEG * 180.0 - np.pi) < 1e-15 and abs(PER_MINUTE * 60.0 - 1.0) < 1e-15
+
+
+@pytest.mark.parametrize(("dialect", "up", "above"), [
+    (FANUC, "G53 G0 Z300.", "G0 X1. Y0."), (HAAS, "G53 G0 Z300.", "G0 X1. Y0."), (NGC, "G53 G0 Z300.", "G0 X1. Y0."),
+    (SIEMENS, "G0 SUPA D0 Z300", "G0 X1 Y0"), (TNC, "L Z+300 R0 FMAX M91", "L X+1 Y+0 FMAX")])
+def test_machine_coordinates_are_for_one_block(dialect: str, up: str, above: str) -> None:
+    """S6 p. 3-42: G53 and SUPA suppress work offsets in their block alone; T7: M91, coordinates in the positioning block are
+    from the machine datum; F5 14.1.2, H1: G53 for one block."""
+    low = "L Z+9 FMAX\n" if dialect == TNC else "Z9.\n"
+    call = "TOOL CALL 3 Z S500\n" if dialect == TNC else ""
+    motion = good(dialect, program(dialect, f"{call}{up}\n{above}\n{low}"))
+    assert motion.end[0, 2] == 300.0 and motion.end[-1].tolist() == [11.0, 20.0, 39.0]
+
+
+def test_rigid_taps_on_fanuc_need_m29() -> None:
+    """F2 4.: M29 S before G84 makes it rigid, else spindle and feed are not coupled; H1: G84 is rigid without."""
+    body = "G98\nG0 X0. Y0. Z20.\n{}G84 X1. Y1. Z-9. R5. F500.\nG80\n"
+    for dialect, before in ((FANUC, "M29 S500\n"), (HAAS, "S500 M3\n")):
+        motion = good(dialect, program(dialect, body.format(before)))
+        tapped = np.isfinite(motion.pitch)
+        assert tapped.any() and not motion.floating[tapped].any() and motion.pitch[tapped].tolist() == [1.0] * tapped.sum()
+    assert "gcode.rigid_tap" in faults(FANUC, program(FANUC, body.format("S500 M3\n")))
+
+
+def test_no_built_in_file_has_passive_codes() -> None:
+    assert not any(spec(name).program.passive for name in builtin_files())
+
+
+@pytest.mark.parametrize(("dialect", "second", "eighth"), [
+    (FANUC, "G55", "G54.1 P2"), (HAAS, "G55", "G154 P2"), (SIEMENS, "G55", "G506"), (NGC, "G55", "G59.2")])
+def test_names_of_work_offsets(dialect: str, second: str, eighth: str) -> None:
+    """F1: G54 to G59, then G54.1 P1; H1: G154 P1; S1: G54 to G57, then G505 (G58 and G59 are programmable offsets); N: G59.1
+    to G59.3. The set-up counts G54 to G59, G59.1 to G59.3."""
+    names = spec(dialect).program.work_offsets
+    assert names.get("G55", "G55") == second
+    eighth = eighth if dialect in (FANUC, HAAS, NGC) else names["G59.2"]
+    assert names.get("G59.2", "G59.2") == eighth
+    if dialect == SIEMENS:
+        assert names["G58"].startswith("G5") and names["G58"] not in ("G58", "G59") and names["G59"] not in ("G58", "G59")
+
+
+def test_names_of_work_offsets_on_a_tnc() -> None:
+    """T3 cycle 247: Q339 is the number of the preset."""
+    names = spec(TNC).program.work_offsets
+    assert "247" in names["G54"] and "Q339=+1 " in names["G54"] and "Q339=+2 " in names["G55"]
+
+
+@pytest.mark.parametrize(("dialect", "on", "blend"), [
+    (HAAS, "G187 P3 E0.02\n", 0.02), (NGC, "G64 P0.02 Q0.01\n", 0.03), (SIEMENS, "CYCLE832(0.02,_ORI_FINISH,0.05)\n", 0.02),
+    (FANUC, "G05.1 Q1\n", 0.002)])
+def test_smoothing_is_what_the_program_says(dialect: str, on: str, blend: float) -> None:
+    """H1: E of G187 is corner rounding in mm; LinuxCNC: P and Q of G64 together (measured); S4 3.25: first parameter of
+    CYCLE832. Under G05.1 Q1 it is a parameter of the control, which the controller file states."""
+    motion = good(dialect, program(dialect, f"{on}G0 X1. Y0. Z9.\n"))
+    assert motion.blend[-1] == pytest.approx(blend)
+
+
+def test_only_generic_iso_has_states_of_its_own() -> None:
+    """States at the beginning of a program are parameters everywhere (3402 on Fanuc): no built-in file takes any for given
+    but the arc centres of ISO 6983-1."""
+    assert {name: spec(name).start.codes for name in builtin_files() if spec(name).start.codes} == {ISO: ("G91.1",)}
+
+
+def test_an_arc_begins_compensation_on_linuxcnc_alone() -> None:
+    """F (PS0034), H (alarms 340, 341), S (G0 or G1), T (no RL in a circle block); LinuxCNC begins on an arc, measured."""
+    rules = {name: spec(name).cutter_compensation for name in builtin_files()}
+    assert {name for name, rule in rules.items() if rule.begins_on_arc} == {NGC}
+    assert not any(rule.ends_on_arc for rule in rules.values())
+
+
+@pytest.mark.parametrize(("dialect", "modal"), [(FANUC, True), (HAAS, True), (ISO, True), (NGC, False)])
+def test_the_radius_register_is_modal(dialect: str, modal: bool) -> None:
+    """F1, H1: D stays until another is stated, whatever tool came since; LinuxCNC takes the tool in the spindle."""
+    head = "T1 M6\nG0 X0. Y0. Z9.\nG41 D1 G1 X5. F100.\nG40 X9.\nT2 M6\nG0 X0. Y0. Z9.\nG41 "
+    motion = good(dialect, program(dialect, head + ("" if modal else "D2 ") + "G1 X5. F100.\nG40 X9.\n"))
+    on = motion.radius[motion.compensation == 41]
+    assert on.tolist() == [1.0, 1.0] if modal else on.tolist() == [1.0, 2.0]
+
+
+@pytest.mark.parametrize(("dialect", "relief"), [(FANUC, 0.5), (HAAS, 1.27), (TNC, 0.2), (SIEMENS, 0.6)])
+def test_relief_of_pecks(dialect: str, relief: float) -> None:
+    """Parameters 5114 and 5115 (F2), as assumed; settings 22 and 52 (H1), 0.05 in; T3 cycle 200: 0.2 mm; S3 CYCLE83: 0.6 mm
+    for depths of up to 30 mm."""
+    assert spec(dialect).cycles.peck_relief == relief
+
+
+def test_inverse_time_in_arcs_is_by_the_radius_on_fanuc_alone() -> None:
+    """F4 5.: in circular interpolation F is feed over the radius of the arc; elsewhere over its length."""
+    assert {name for name in builtin_files() if spec(name).feed.arc_inverse == "radius"} == {FANUC}
+
+
+@pytest.mark.parametrize(("dialect", "linear", "feed", "writer"), [
+    (TNC, 4, 3, "heidenhain"), (HAAS, 3, 3, "haas"), (FANUC, 4, 4, "fanuc"), (SIEMENS, 4, 4, "siemens")])
+def test_last_decimals(dialect: str, linear: int, feed: int, writer: str) -> None:
+    """T6 p. 631: positions 5,4, feeds 5,3, speeds 5,3, angles 3,4; H1: 3 in mm; F1: 4 under IS-C; S: MD10200 of 10000."""
+    places = spec(dialect).format
+    assert (places.linear_decimals, places.feed_decimals, spec(dialect).writer) == (linear, feed, writer)
+    assert dialect != TNC or (places.rotary_decimals, places.speed_decimals) == (4, 3)
+
+
+def test_a_number_without_a_point_is_refused_where_its_unit_is_a_parameter() -> None:
+    """F1 2., H1: a number without a point counts in the least increment, by parameter 3401#0 (DPI)."""
+    for dialect in (FANUC, HAAS):
+        assert faults(dialect, program(dialect, "G0 X1. Y0. Z9.\n")) == {}
+        assert len(faults(dialect, program(dialect, "G0 X1 Y0. Z9.\n"))) == 1
