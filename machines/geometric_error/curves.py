@@ -104,17 +104,17 @@ class Table(Curve):
         return least_apart(self.closed(self.values[: len(self.x)])[0])
 
     @cached_property
-    def most(self) -> float:  # type: ignore[override]
+    def most(self) -> float:
         """See the base class; linear tables reach it."""
         return max(self._bounds(values)[0] for values in self._ways)
 
     @cached_property
-    def steepest(self) -> float:  # type: ignore[override]
+    def steepest(self) -> float:
         """See the base class; reached."""
         return max(self._bounds(values)[1] for values in self._ways)
 
     @cached_property
-    def apart(self) -> float:  # type: ignore[override]
+    def apart(self) -> float:
         """See the base class."""
         return self._bounds(np.subtract(*self._ways))[0] if self.both else 0.0
 
