@@ -54,6 +54,21 @@ class Turned(Curve):
         """See the base class: that of its curves, and a quarter of a turn."""
         return min(0.5 * np.pi, *(curve.detail for curve in self.curves))
 
+    @property
+    def most(self) -> float:
+        """See the base class: entries of a turn are at most 1."""
+        return sum(curve.most for curve in self.curves)
+
+    @property
+    def steepest(self) -> float:
+        """See the base class: entries of a turn change by at most 1 per rad."""
+        return sum(curve.steepest + curve.most for curve in self.curves)
+
+    @property
+    def apart(self) -> float:
+        """See the base class."""
+        return sum(curve.apart for curve in self.curves)
+
     @cached_property
     def values(self) -> Floats:  # type: ignore[override]
         """(P,) of all its curves."""
