@@ -18,7 +18,7 @@ ROOT = Path(__file__).parents[1]
 ROAD = ("toolpaths", "machines", "postproc")
 """Each package may import itself and those before it."""
 HEAVY = {"numpy", "numba", "scipy", "rich"}
-TOP = {"README.md", "LICENSE", "CHANGELOG.md", "pyproject.toml", "requirements.lock", "Makefile",
+TOP = {"README.md", "ARCHITECTURE.md", "LICENSE", "CHANGELOG.md", "pyproject.toml", "requirements.lock", "Makefile",
        "postproc", "machines", "toolpaths", "tests", "samples"}
 
 

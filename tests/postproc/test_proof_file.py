@@ -22,6 +22,7 @@ from postproc.controllers.texts import comment_room
 from postproc.program_header import PENDING
 from postproc.proof import command, text
 from postproc.proof.file import ENDING, digest, read_proof
+from postproc.proof.hashes import input_hashes
 from postproc.readback.words import plain
 from postproc.witness import Testimony as Said
 from tests.postproc.kit import HEAD, NX, codes, convert, good, toolpath
@@ -74,6 +75,17 @@ def test_every_file_that_the_program_rests_on_is_in_the_proof(shop: Path) -> Non
                                  Path(postproc.__file__).parent / "controllers" / one["file"]) if p.is_file())
         assert hashlib.sha256(place.read_bytes()).hexdigest() == one["sha256"], one["file"]
     assert str(shop) not in json.dumps(proof), "folders are nobody's business"
+
+
+def test_meshes_of_the_set_up_and_of_its_base_are_in_the_proof(tmp_path: Path) -> None:
+    (tmp_path / "under").mkdir()
+    (tmp_path / "under" / "base.toml").write_text('[bodies]\npart = "part.stl"\n')
+    (tmp_path / "s.toml").write_text('base = "under/base.toml"\n[tools.1]\nholder_mesh = "holder.stl"\n')
+    for place in ("under/part.stl", "holder.stl"):
+        (tmp_path / place).write_text(place)
+    found = input_hashes("mill-3axis", "linuxcnc", postproc.Options(setup=str(tmp_path / "s.toml")))["setup"]
+    assert {one.file: one.sha256 for one in found} == {Path(place).name: hashlib.sha256(
+        (tmp_path / place).read_bytes()).hexdigest() for place in ("s.toml", "under/base.toml", "under/part.stl", "holder.stl")}
 
 
 def test_the_proof_says_what_the_figures_say(shop: Path, tmp_path: Path) -> None:
