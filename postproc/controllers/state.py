@@ -9,7 +9,6 @@ from collections.abc import Iterator
 import numpy as np
 
 from postproc.controllers.model import CannedCycle, ControllerFile, Mode
-from postproc.controllers.texts import clean
 from postproc.program import PER_MINUTE, Hole, Program, Section
 from toolpaths.arrays import Floats
 from toolpaths.toolpath import Cycle
@@ -174,3 +173,14 @@ _MINUS_ZERO = re.compile(r"-0(?=\.?0* )")
 def peck_of(cycle: Cycle) -> float:
     """Depth of a peck, mm: the whole way down where the cycle names none."""
     return cycle.steps[0] if cycle.steps else cycle.depth + cycle.clearance
+
+def comment_room(controller: ControllerFile) -> int:
+    """Characters that a comment block holds, a block number before it counted."""
+    style = controller.comment
+    return controller.format.line_length - len(style.open) - len(style.close) - 12
+
+
+def clean(controller: ControllerFile, text: str) -> str:
+    """A comment's text without characters that it must not hold, cut to the line length."""
+    forbidden = controller.comment.forbidden
+    return "".join(" " if c in forbidden or not 32 <= ord(c) < 127 else c for c in text[:comment_room(controller)])

@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import re
 from string import Formatter
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from pydantic import AfterValidator
-
-if TYPE_CHECKING:
-    from postproc.controllers.model import ControllerFile
 
 WORK_OFFSETS = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
 """the codes that a set-up may name"""
@@ -50,15 +47,3 @@ Timed = Annotated[str, placeholders("seconds", "milliseconds")]
 def blocks_of(text: str) -> list[str]:
     """The blocks of a text of several lines; a line that ends with ~ goes on in the next (Klartext)."""
     return re.split(r"(?<!~)\n", text)
-
-
-def comment_room(controller: ControllerFile) -> int:
-    """Characters that a comment block holds, a block number before it counted."""
-    style = controller.comment
-    return controller.format.line_length - len(style.open) - len(style.close) - 12
-
-
-def clean(controller: ControllerFile, text: str) -> str:
-    """A comment's text without characters that it must not hold, cut to the line length."""
-    forbidden = controller.comment.forbidden
-    return "".join(" " if c in forbidden or not 32 <= ord(c) < 127 else c for c in text[:comment_room(controller)])

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from postproc.controllers.model import ControllerFile
-from postproc.controllers.texts import clean, comment_room
+from postproc.controllers.state import clean, comment_room
 from postproc.header_words import HEADER, PENDING
 from postproc.readback.compare import Comparison
 from postproc.readback.words import plain
