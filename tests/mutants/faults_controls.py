@@ -5,8 +5,7 @@ from __future__ import annotations
 from tests.mutants.plant import Fault
 
 FAULTS = (
-    Fault("G2 and G3 exchanged", "writer of linuxcnc", "IsoWriter.heads", "2 + p.ccw[first:last]",
-          "3 - p.ccw[first:last]"),
+    Fault("G2 and G3 exchanged", "writer of linuxcnc", "IsoWriter.heads", "2 + p.ccw, p.code", "3 - p.ccw, p.code"),
     Fault("feed word left out where it changes back", "writer of linuxcnc", "IsoWriter.feeds",
           "if needed[k] or text != self.feed:", "if needed[k] or float(text) > float(self.feed or 0):"),
     Fault("I and J exchanged", "writer of linuxcnc", "IsoWriter.arc_words", "{'IJK'[i]}", "{'JIK'[i]}"),
@@ -26,7 +25,7 @@ FAULTS = (
           ("flat iso", "flat haas", "flat fanuc")),
     Fault("planes not stated", "writer of iso", "IsoWriter.heads", "words.append(codes.planes[str(plane)])", "pass",
           ("leaning", "axes iso", "laws iso", "tall iso")),
-    Fault("Z word of every other block left out", "writer of iso", "IsoWriter.word_columns",
+    Fault("Z word of every other block left out", "writer of iso", "Writer.words_of",
           "rows = np.flatnonzero(p.write[at:stop, j])",
           "rows = np.flatnonzero(p.write[at:stop, j])[::2] if letter == 'Z' else "
           "np.flatnonzero(p.write[at:stop, j])"),

@@ -161,7 +161,7 @@ FAULTS = (
     Fault("spindle not started behind a tool change", "states", "Switched.change",
           'out += [] if "SPINDL" in follows else self.spindle(', '_ = [] if "SPINDL" in follows else self.spindle(',
           ("kept spindle",)),
-    Fault("length register kept over a tool change", "states", "tool_loads", "number if other else result[-1][1]",
+    Fault("length register kept over a tool change", "states", "_loads", "number if other else result[-1][1]",
           "result[-1][1] if result else number", ("flat linuxcnc", "contact", "faces fanuc")),
     Fault("branch of the other side", "joints", "_solution", "best = int(least_of(every))", "best = len(every) - 1"),
     Fault("rotary axes jump a turn", "joints", "_solution",
