@@ -26,6 +26,7 @@ from postproc.readback.deviation_bound import DeviationBound, deviation_bound
 from postproc.readback.execute import Motion
 from postproc.readback.faults import Faults
 from postproc.readback.poses import SAMPLES, Executed, arc_sweeps
+from postproc.readback.reach_bounds import check_reach_bounds
 from postproc.readback.rewinds import check_rewinds, rewinds
 from postproc.readback.slow import check_fed_rapids, check_slow
 from postproc.readback.spins import check_spins
@@ -112,6 +113,7 @@ def compare(motion: Motion, job: Job, executed: Executed, gcode: str = "", plann
     diagnostics += check_links(motion, executed, moves, owner, job.space, tolerance, faults)
     diagnostics += check_rewinds(motion, executed, number, tip, axis, job.space, tolerance, grain[1] + _kept(job), faults)
     diagnostics += check_travel(motion, executed, moves, owner, faults)
+    diagnostics += check_reach_bounds(motion, executed, moves, owner, faults)
     diagnostics += check_smoothing(motion, job, moves, owner, faults)
     return Comparison(worst_tip, worst_axis, tip_line, axis_line, tip, axis, match, owner, tuple(diagnostics),
                       max(bound.tip, worst_tip), max(bound.axis, worst_axis), bound.unbounded, *_cuts(moves, owner, bound))

@@ -86,11 +86,12 @@ def check_way(w: Walked, lines: Array, cut: Cut | None, margin: float, link_angl
     after_hole = w.targets.kind[np.clip(w.owner - 1, 0, len(w.targets) - 1)] == BOTTOM
     fed = (w.kind == RAPID) & ~after_hole & ~w.gap & good & (w.code > 0) & (moved > STILL) & (not bent)
     found += _finding(w, np.flatnonzero(fed), lines, "kind", "feed motion on a rapid of the CL file")
-    good &= ~_turned_in_rapid(w, math.radians(link_angle))
+    turned = _turned_in_rapid(w, math.radians(link_angle))
+    good &= ~turned
     rows = np.flatnonzero(~good & ~w.gap & (np.arange(len(w.owner)) > 0) & ((w.code == 0) | cutting | rapid | ~w.inside))
     if not len(rows):
         return found
-    low = _low(w, rows, cut, margin, bent, table)
+    low = _low(w, rows, cut, margin, bent, turned[rows], table)
     bad = rows[low]
     bad = bad[(w.code[bad] == 0) | (moved[bad] > EXACT)]
     cuts = bad[(w.code[bad] > 0) & is_cut(w.kind[bad])]
@@ -119,8 +120,10 @@ def _finding(w: Walked, rows: Array, lines: Array, code: str, message: str) -> l
     return [Finding(code, message, line, int(w.poses.executed.line[k]), len(rows))]
 
 
-def _low(w: Walked, rows: Array, cut: Cut | None, margin: float, bent: bool, table: dict[str, object]) -> Array:
-    """(K,) True for blocks that are neither clear nor on the line of a retract or an approach."""
+def _low(w: Walked, rows: Array, cut: Cut | None, margin: float, bent: bool, turned: Array,
+         table: dict[str, object]) -> Array:
+    """(K,) True for blocks that are neither clear nor on the line of a retract or an approach, nor, but for those that are
+    `turned` (K,), a rapid that keeps its height."""
     m, near = len(w.targets), w.tolerance[0] + EXACT
     to, before = np.minimum(w.owner[rows], m - 1), np.maximum(w.owner[rows] - 1, 0)
     ends, begins = w.owner[rows] >= m, w.owner[rows] == 0
@@ -139,7 +142,7 @@ def _low(w: Walked, rows: Array, cut: Cut | None, margin: float, bent: bool, tab
         line = np.fmin(line, np.where(ends, np.inf, _above(tip, w.targets.tip[to], w.targets.axis[to])))
         line = np.fmin(line, np.where(ends | entry, np.inf, _above(tip, start, start_axis)))
         beside = ~(line <= near)
-        beside &= ~_level(w, rows, to, ends | begins, tip, near, bent)
+        beside &= turned | ~_level(w, rows, to, ends | begins, tip, near, bent)
         if cut is not None:
             low |= beside & ~cut.clear(tip, axis, LEAST * margin)
             tight |= beside & ~cut.clear(tip, axis, FULL * margin)

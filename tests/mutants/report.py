@@ -80,7 +80,8 @@ def page(found: list[Outcome], programs: list[Found]) -> str:
     for one in found:
         kind = column(one)
         if kind != "conversion":
-            said = {"verify": "`verify`", "tests": f"`{one.test}`", "nothing": "**nothing**"}.get(kind, kind)
+            test = f"`{one.test}`" if one.test else ""
+            said = {"verify": f"`verify` {test}", "tests": test, "nothing": "**nothing**"}.get(kind, kind)
             text += f"| {one.fault.room} | {one.fault.name} | {said} | {one.fault.why or one.detail} |\n"
     return text + "\n" + _programs(programs)
 

@@ -42,7 +42,7 @@ TESTS: dict[str, tuple[str, ...]] = {
     "linearising": ("postproc/test_linearise.py", "postproc/test_road.py", "postproc/test_golden.py"),
     "links": ("postproc/test_links.py", "postproc/test_road.py", "postproc/test_golden.py"),
     "travel": ("postproc/test_travel.py",),
-    "compensation": ("postproc/test_compensation.py", "postproc/test_compensation_points.py"),
+    "compensation": ("machines/test_geometric_error_independent.py", "postproc/test_compensation_points.py"),
     "cutter compensation": ("postproc/test_leftovers_cutcom.py", "postproc/test_golden.py",
                             "postproc/test_compensation_control.py"),
     "states": ("postproc/test_stops.py", "postproc/test_writer.py", "postproc/test_spindle_of_setup.py",
@@ -51,7 +51,8 @@ TESTS: dict[str, tuple[str, ...]] = {
     "planning": ("postproc/test_planned_feed.py", "postproc/test_smoothed_moves.py", "postproc/test_writer.py"),
     "writer": ("postproc/test_golden.py", "postproc/test_writer.py", "postproc/test_writer_cycles.py",
                "postproc/test_controllers_{}.py"),
-    "reader of": ("postproc/test_reader_{}.py", "postproc/test_reader_laws.py", "postproc/test_readback.py",
+    "reader of": ("postproc/test_reader_{}.py", "postproc/test_second_reading_controllers.py",
+                  "postproc/test_verify_edits.py", "postproc/test_reader_laws.py", "postproc/test_readback.py",
                   "postproc/test_mutation.py"),
     "proof": ("postproc/test_readback.py", "postproc/test_mutation.py"),
 }

@@ -15,7 +15,7 @@ from typing import Any
 
 from tests.mutants.battery import CASES
 from tests.mutants.judge import Made, blind, body, change, converted, edits_of, made, short, verified
-from tests.mutants.plant import Fault, functions, planted
+from tests.mutants.plant import Fault, NotPlanted, functions, planted
 from tests.mutants.rooms import cases_of, files_asked, proves
 
 SECONDS = 60
@@ -60,7 +60,7 @@ def apart(work: Callable[[], Any], seconds: int = SECONDS) -> Any:
     with os.fdopen(read, "rb") as pipe:
         data = pipe.read()
     os.waitpid(child, 0)
-    return pickle.loads(data) if data else "the process ended without a word"
+    return pickle.loads(data) if data else f"no end within {seconds} s"
 
 
 class Bench:
@@ -122,6 +122,8 @@ def outcome(fault: Fault, bench: Bench, tests: bool = True) -> Outcome:
             return {n: made(CASES[n]) for n in names}
     got = apart(with_fault)
     result = Outcome(fault)
+    if isinstance(got, str) and got.startswith(NotPlanted.__name__):
+        raise NotPlanted(got)
     if isinstance(got, str):
         result.cases = dict.fromkeys(names, f"conversion: {got}")
     else:
