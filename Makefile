@@ -31,7 +31,7 @@ damage: $(STAMP)
 
 # Every word, block and number of written programs changed, on every control: minutes each.
 changes: $(STAMP)
-	$(BIN)/pytest $(PYTEST_ARGS) -m slow tests/postproc/test_mutation.py
+	$(BIN)/pytest $(PYTEST_ARGS) -m slow tests/postproc/readback/test_program_mutation.py
 
 # All that a smaller test of `make test` stands for: those changes, programs in the simulator whose times are kept.
 slow: $(STAMP)

@@ -6,13 +6,13 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from postproc.options import Options
-    from postproc.pipeline import convert, verify
-    from postproc.result import PostResult, VerifyResult
-    from postproc.version import VERSION
+    from postproc.base.options import Options
+    from postproc.base.version import VERSION
+    from postproc.pipeline.convert import convert, verify
+    from postproc.pipeline.result import PostResult, VerifyResult
 
-_HOME = {"VERSION": "version", "Options": "options", "PostResult": "result", "VerifyResult": "result",
-         "convert": "pipeline", "verify": "pipeline"}
+_HOME = {"VERSION": "base.version", "Options": "base.options", "PostResult": "pipeline.result",
+         "VerifyResult": "pipeline.result", "convert": "pipeline.convert", "verify": "pipeline.convert"}
 __all__ = ["VERSION", "Options", "PostResult", "VerifyResult", "convert", "verify"]
 
 

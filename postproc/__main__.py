@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from postproc.guard import guarded
+from postproc.cli.guard import guarded
 
 
 def command() -> None:
     """The command line."""
-    from postproc.cli import app
+    from postproc.cli.app import app
 
     app()
 

@@ -13,7 +13,7 @@ import numpy as np
 import machines
 import postproc
 import toolpaths
-from postproc.setup import load_setup
+from postproc.setup.model import load_setup
 
 HERE = Path(__file__).parent
 WIDTH, HEIGHT, LEFT = 960, 420, 440

@@ -110,12 +110,12 @@ def test_files_and_functions_are_short() -> None:
 
 
 def test_a_wrong_way_is_noticed() -> None:
-    upwards = looked_at("def f():\n    from machines.load import x\n    import postproc.cli", "toolpaths")
+    upwards = looked_at("def f():\n    from machines.load import x\n    import postproc.cli.app", "toolpaths")
     assert against_the_road("toolpaths", upwards) == {"machines", "postproc"}
     assert against_the_road("postproc", looked_at("import machines, toolpaths, tests.linuxcnc", "postproc")) == {"tests"}
 
 
-@pytest.mark.parametrize("module", [*ROAD, "postproc.cli"])
+@pytest.mark.parametrize("module", [*ROAD, "postproc.cli.app"])
 def test_importing_is_light(module: str) -> None:
     """Help and messages must not wait for numerical libraries."""
     code = f"import sys, {module}; print(*sys.modules)"

@@ -10,11 +10,11 @@ import numpy as np
 from machines.calibration.problem import CalibrationResult
 from machines.calibration.rotary_fit import RotaryFit
 from machines.calibration.simulator import PARTS
-from machines.geometric_error.covariance import angular
-from machines.geometric_error.csv_table import UNITS
-from machines.geometric_error.curves import Table
-from machines.geometric_error.model import ErrorModel
-from machines.geometric_error.table_curves import ROTARY
+from machines.geometric_error.actual.model import ErrorModel
+from machines.geometric_error.files.covariance import angular
+from machines.geometric_error.tables.csv_table import UNITS
+from machines.geometric_error.tables.curves import Table
+from machines.geometric_error.tables.table_curves import ROTARY
 from toolpaths.arrays import Floats
 
 CURVE = 5

@@ -9,7 +9,7 @@ from machines.calibration.measurement_file import COLUMNS, MeasurementModel, Rev
 from machines.calibration.outcome import Calibration
 from machines.calibration.rotary_run import reversal, rotary
 from machines.calibration.run import Run
-from machines.geometric_error.csv_table import CsvTable, read_csv
+from machines.geometric_error.tables.csv_table import CsvTable, read_csv
 from machines.loader import load_checked as load_machine
 from machines.user_file import read_toml, validate
 from toolpaths.diagnostics import Diagnostic, has_errors

@@ -15,8 +15,8 @@ import numpy as np
 
 from machines.calibration.folded import near
 from machines.calibration.problem import CalibrationProblem, CalibrationResult, solve
-from machines.geometric_error.actual import Actual
-from machines.geometric_error.model import ErrorModel
+from machines.geometric_error.actual.actual import Actual
+from machines.geometric_error.actual.model import ErrorModel
 from machines.kinematics.base import Kinematics
 from toolpaths.arrays import Floats
 

@@ -14,10 +14,10 @@ from machines.calibration.measurement_file import COLUMNS, BarModel, Column, Las
 from machines.calibration.outcome import MEANT, Calibration, done, doubtful
 from machines.calibration.run import Run, way_column
 from machines.calibration.slips import machine_slip
-from machines.geometric_error.csv_table import LENGTHS, CsvTable
-from machines.geometric_error.curves import Table
-from machines.geometric_error.loader import load_checked as load_errors
-from machines.geometric_error.model import ErrorModel
+from machines.geometric_error.actual.model import ErrorModel
+from machines.geometric_error.files.loader import load_checked as load_errors
+from machines.geometric_error.tables.csv_table import LENGTHS, CsvTable
+from machines.geometric_error.tables.curves import Table
 from machines.kinematics.base import Kinematics
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import has_errors

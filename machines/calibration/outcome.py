@@ -10,8 +10,8 @@ from machines.calibration.account import parameters
 from machines.calibration.noise import CHANCE, Noise
 from machines.calibration.run import Run
 from machines.calibration.slips import Slip
-from machines.geometric_error.model import ErrorModel
-from machines.geometric_error.sizes import too_large
+from machines.geometric_error.actual.model import ErrorModel
+from machines.geometric_error.files.sizes import too_large
 
 UNFIT = 5.0
 """the same, where the errors found do not help: no model"""

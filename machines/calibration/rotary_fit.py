@@ -14,10 +14,10 @@ import numpy as np
 
 from machines.calibration.problem import CalibrationResult, linear, solve
 from machines.calibration.simulator import MOUNTS, PARTS, Bench, motion_jacobian, mount_jacobian
-from machines.geometric_error.curves import Fourier
-from machines.geometric_error.model import ErrorModel
-from machines.geometric_error.names import DIRECTIONS, ErrorName
-from machines.geometric_error.serial_errors import Component, Frame, SerialErrors
+from machines.geometric_error.actual.model import ErrorModel
+from machines.geometric_error.actual.serial_errors import Component, Frame, SerialErrors
+from machines.geometric_error.tables.curves import Fourier
+from machines.geometric_error.tables.names import DIRECTIONS, ErrorName
 from toolpaths.arrays import Bools, Floats
 
 ENOUGH = 3

@@ -15,12 +15,12 @@ from machines.calibration.rotary_fit import RotaryFit, error_model, fit_rotary, 
 from machines.calibration.run import Run
 from machines.calibration.simulator import PARTS, Bench
 from machines.calibration.slips import reversal_slip, rotary_slip
-from machines.geometric_error.axis_motion import ALONG
-from machines.geometric_error.csv_table import UNITS, CsvTable
-from machines.geometric_error.curves import Table
-from machines.geometric_error.model import ErrorModel
-from machines.geometric_error.names import DIRECTIONS, ErrorName
-from machines.geometric_error.serial_errors import Component, SerialErrors
+from machines.geometric_error.actual.axis_motion import ALONG
+from machines.geometric_error.actual.model import ErrorModel
+from machines.geometric_error.actual.serial_errors import Component, SerialErrors
+from machines.geometric_error.tables.csv_table import UNITS, CsvTable
+from machines.geometric_error.tables.curves import Table
+from machines.geometric_error.tables.names import DIRECTIONS, ErrorName
 from machines.kinematics.h4_axes import H4TableAxis
 from machines.kinematics.serial import Serial
 from toolpaths.arrays import Floats

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from machines.calibration.measurement_file import Column, MeasurementModel
-from machines.geometric_error.csv_table import ANGLES, LENGTHS, CsvTable
-from machines.geometric_error.names import parse
+from machines.geometric_error.tables.csv_table import ANGLES, LENGTHS, CsvTable
+from machines.geometric_error.tables.names import parse
 from machines.machine import Machine
 from machines.user_file import UserFile, nearest
 from toolpaths.arrays import Floats, Ints

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from machines.geometric_error.transforms import carried, homogeneous, inverse
+from machines.geometric_error.actual.transforms import carried, homogeneous, inverse
 from toolpaths.arrays import Floats
 
 MOUNTS = ("C0", "RX0", "RL")

@@ -6,15 +6,16 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from machines.geometric_error.actual import Actual, approach
-    from machines.geometric_error.actual_kinematics import ActualKinematics
-    from machines.geometric_error.correction import Corrected, correct
-    from machines.geometric_error.loader import error_model_schema, load, load_checked
-    from machines.geometric_error.model import Doubt, ErrorModel, doubt
+    from machines.geometric_error.actual.actual import Actual, approach
+    from machines.geometric_error.actual.actual_kinematics import ActualKinematics
+    from machines.geometric_error.actual.correction import Corrected, correct
+    from machines.geometric_error.actual.model import Doubt, ErrorModel, doubt
+    from machines.geometric_error.files.loader import error_model_schema, load, load_checked
 
-_HOME = {"Actual": "actual", "approach": "actual", "ActualKinematics": "actual_kinematics", "Corrected": "correction",
-         "correct": "correction", "error_model_schema": "loader", "load": "loader", "load_checked": "loader",
-         "Doubt": "model", "ErrorModel": "model", "doubt": "model"}
+_HOME = {"Actual": "actual.actual", "approach": "actual.actual",
+         "ActualKinematics": "actual.actual_kinematics", "Corrected": "actual.correction", "correct": "actual.correction",
+         "error_model_schema": "files.loader", "load": "files.loader", "load_checked": "files.loader",
+         "Doubt": "actual.model", "ErrorModel": "actual.model", "doubt": "actual.model"}
 __all__ = ["Actual", "ActualKinematics", "Corrected", "Doubt", "ErrorModel", "approach", "correct", "doubt",
            "error_model_schema", "load", "load_checked"]
 

@@ -7,7 +7,7 @@ FINGERPRINT = "fingerprint of the geometric errors"
 FEEDS = "fingerprint of the planned feeds"
 """before the eight hex digits of the F words"""
 PENDING = "proof pending"
-"""the line that says what is proved, while the program is written (`proof/text.py`)"""
+"""the line that says what is proved, while the program is written (`verification/proof_text.py`)"""
 UNKNOWN = "--------"
 """in their place while the program is written"""
 HEADER = 4000

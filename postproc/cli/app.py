@@ -8,11 +8,24 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from postproc.cli_calibrate import calibrate
-from postproc.cli_catalogue import controller_app, machine_app, setup_app
-from postproc.cli_errors import errors_app
-from postproc.cli_group import Group
-from postproc.cli_options import (
+from postproc.cli.calibrate import calibrate
+from postproc.cli.console import (
+    Json,
+    controller_of,
+    machine_of,
+    own_files,
+    progress_bar,
+    refuse_inputs,
+    refuse_overwriting,
+    report,
+    shown_errors,
+)
+from postproc.cli.console import rounded as rounded
+from postproc.cli.errors import errors_app
+from postproc.cli.group import Group
+from postproc.cli.guard import guarded
+from postproc.cli.machines_controllers import controller_app, machine_app, setup_app
+from postproc.cli.options import (
     Allow,
     AxisTolerance,
     Beyond,
@@ -26,28 +39,15 @@ from postproc.cli_options import (
     Units,
     only_with_errors,
 )
-from postproc.cli_orient import EXAMPLES, ORIENTATIONS, MaxTilt, Orient
-from postproc.cli_orient import orient as orient_command
-from postproc.cli_place import EXAMPLES as PLACES
-from postproc.cli_place import place
-from postproc.cli_time import time
-from postproc.console import (
-    Json,
-    controller_of,
-    machine_of,
-    own_files,
-    progress_bar,
-    refuse_inputs,
-    refuse_overwriting,
-    report,
-    shown_errors,
-)
-from postproc.console import rounded as rounded
-from postproc.guard import guarded
+from postproc.cli.orient import EXAMPLES, ORIENTATIONS, MaxTilt, Orient
+from postproc.cli.orient import orient as orient_command
+from postproc.cli.place import EXAMPLES as PLACES
+from postproc.cli.place import place
+from postproc.cli.time import time
 
 if TYPE_CHECKING:
-    from postproc.options import Options
-    from postproc.result import PostResult
+    from postproc.base.options import Options
+    from postproc.pipeline.result import PostResult
     from toolpaths.diagnostics import Diagnostic
     from toolpaths.toolpath import Toolpath
 
@@ -71,7 +71,7 @@ Errors = Annotated[str, typer.Option("--error-model", metavar="E.toml", help="fi
 
 def _version(wanted: bool) -> None:
     if wanted:
-        from postproc.version import VERSION
+        from postproc.base.version import VERSION
 
         typer.echo(f"postproc {VERSION}")
         raise typer.Exit
@@ -116,11 +116,11 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
                         **{f"--residuals {name}": str(name) for name in fields}},
                        inputs := {"the CL file": str(file), "the set-up": setup, "the error model": error_model,
                                   **own_files(machine, controller)})
-    from postproc import summary
     from postproc.cycle_time.conversion import estimate_of
-    from postproc.files import program_files
-    from postproc.pipeline import convert as run
+    from postproc.pipeline.convert import convert as run
     from postproc.proof import command
+    from postproc.report import summary
+    from postproc.writing.program_files import program_files
 
     outputs: dict[Path, str | bytes] = {}
     with shown_errors(json), progress_bar() as progress:
@@ -157,9 +157,9 @@ def verify(gcode: Annotated[Path, typer.Argument(metavar="GCODE", help="G-code f
     refuse_overwriting({"--json": json}, {"the CL file": str(file), "the G-code file": str(gcode), "the set-up": setup,
                                          "the error model": error_model, "the proof file": proof or f"{gcode}.proof.json",
                                          **own_files(machine, controller)})
-    from postproc import summary
-    from postproc.pipeline import verify as run
+    from postproc.pipeline.convert import verify as run
     from postproc.proof import command
+    from postproc.report import summary
 
     with shown_errors(json), progress_bar() as progress:
         m, spec = machine_of(machine), controller_of(controller)
@@ -186,8 +186,8 @@ def trace(file: ClFile, line: Annotated[int, typer.Option("--line", metavar="L",
                       max_tilt=max_tilt)
     refuse_overwriting({"--json": json}, {"the CL file": str(file), "the set-up": setup, "the error model": error_model,
                                          **own_files(machine, controller)})
-    from postproc.pipeline import convert as run
-    from postproc.trace import as_text, trace_line
+    from postproc.pipeline.convert import convert as run
+    from postproc.report.trace import as_text, trace_line
 
     with shown_errors(json), progress_bar() as progress:
         m, spec = machine_of(machine), controller_of(controller)
@@ -202,9 +202,9 @@ def inspect(file: ClFile, units: Units = "", dialect: Dialect = "", allow_unknow
     """Show what a CL file holds: operations, tools, points, extents, unknown words."""
     options = _options(0.01, 0.05, "auto", "", units, dialect, allow_unknown)
     refuse_overwriting({"--json": json}, {"the CL file": str(file)})
+    from toolpaths.cl.inspect import inspect as figures
+    from toolpaths.cl.inspect import summary as text_of
     from toolpaths.cl.read import read_file
-    from toolpaths.inspect import inspect as figures
-    from toolpaths.inspect import summary as text_of
 
     with progress_bar() as progress:
         result = read_file(file, units=options.units or None, dialect=options.dialect or None,
@@ -227,7 +227,7 @@ def _residual_files(files: list[Path], error_model: str) -> list[Path]:
     """The files of --residuals; wrong use without an error model, or where one is neither table nor drawing."""
     if not files:
         return []
-    from postproc.residual_files import ENDINGS
+    from postproc.report.residual_files import ENDINGS
 
     if not error_model:
         raise typer.BadParameter("there are none without --error-model", param_hint="--residuals")
@@ -238,14 +238,14 @@ def _residual_files(files: list[Path], error_model: str) -> list[Path]:
 
 
 def _fields(result: PostResult, files: list[Path]) -> tuple[list[str | bytes], list[Diagnostic]]:
-    from postproc.residual_files import contents
+    from postproc.report.residual_files import contents
 
     return contents(result, [name.suffix.lower() for name in files])
 
 
 def _options(tolerance: float, axis_tolerance: float, feed_mode: str, setup: str, units: str, dialect: str,
              allow_unknown: list[str] | None) -> Options:
-    from postproc.options import Options
+    from postproc.base.options import Options
 
     for option, value in (("--tolerance", tolerance), ("--axis-tolerance", axis_tolerance)):
         if not 1e-6 <= value <= 10.0:
@@ -254,7 +254,7 @@ def _options(tolerance: float, axis_tolerance: float, feed_mode: str, setup: str
     if units:
         _choice("--units", units, ("mm", "inch"))
     if dialect:
-        from toolpaths.cl.dialects import DIALECTS
+        from toolpaths.cl.text.dialects import DIALECTS
 
         _choice("--dialect", dialect, tuple(DIALECTS))
     return Options(tolerance, axis_tolerance, feed_mode, setup, units, dialect,  # type: ignore[arg-type]

@@ -7,8 +7,8 @@ from typing import Annotated, Any
 
 import typer
 
-from postproc.cli_options import figure_ending
-from postproc.console import Json, print_json, refuse_inputs, refuse_overwriting, report, shown_errors
+from postproc.cli.console import Json, print_json, refuse_inputs, refuse_overwriting, report, shown_errors
+from postproc.cli.options import figure_ending
 
 
 def _schema(wanted: bool) -> None:
@@ -37,7 +37,7 @@ def calibrate(file: Annotated[Path, typer.Argument(metavar="MEASUREMENTS.toml", 
 
     from machines.calibration.calibrate import calibrate as run
     from machines.calibration.text import text
-    from machines.geometric_error.exchange import write_model
+    from machines.geometric_error.exchange.exchange import write_model
 
     outputs: dict[Path, str | bytes] = {}
     with shown_errors(json):

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import typer
 
-from postproc.console import report, shown_errors
+from postproc.cli.console import report, shown_errors
 
 if TYPE_CHECKING:
-    from machines.geometric_error.model import ErrorModel
+    from machines.geometric_error.actual.model import ErrorModel
     from machines.machine import Machine
     from toolpaths.diagnostics import Diagnostic
 
@@ -27,7 +27,7 @@ def loaded(file: Path, machine: Machine) -> tuple[ErrorModel, list[Diagnostic]]:
     Raises:
         DiagnosticError: where the file has errors.
     """
-    from machines.geometric_error.loader import load_checked
+    from machines.geometric_error.files.loader import load_checked
 
     model, found = load_checked(file, machine)
     return required(model, found), found
@@ -83,7 +83,7 @@ def pairs(option: str, given: Sequence[str] | None, known: Sequence[str]) -> dic
 
 def writable(model: ErrorModel, made: ErrorModel) -> tuple[ErrorModel, list[str]]:
     """A model made of another one, with a covariance that a table can hold, and what that loses."""
-    from machines.geometric_error.exports import MOST_DOUBT, correlated
+    from machines.geometric_error.exchange.exports import MOST_DOUBT, correlated
 
     if model.covariance is None:
         return made, []
@@ -95,7 +95,7 @@ def writable(model: ErrorModel, made: ErrorModel) -> tuple[ErrorModel, list[str]
 
 def model_files(model: ErrorModel, stem: str, description: str, name: str = "") -> dict[str, str]:
     """File name -> text, the tables first, the model, called `name`, last."""
-    from machines.geometric_error.exchange import write_model
+    from machines.geometric_error.exchange.exchange import write_model
 
     files = write_model(replace(model, name=stem), description)
     text = files.pop(f"{stem}.toml")
@@ -113,7 +113,7 @@ def merged_into(model: ErrorModel, into: Path, machine: Machine) -> tuple[ErrorM
     Raises:
         DiagnosticError: where the file has errors, or either is a map.
     """
-    from machines.geometric_error.tabulate import merged, replaced
+    from machines.geometric_error.exchange.tabulate import merged, replaced
     from toolpaths.diagnostics import DiagnosticError, error
 
     old, _ = loaded(into, machine)
@@ -139,7 +139,7 @@ def tables_of(file: Path) -> list[Path]:
 def finish(files: dict[str, str], folder: Path, inputs: Sequence[Path], json: str, found: Sequence[Diagnostic],
            told: Sequence[str], figures: dict[str, Any], beside: dict[Path, str] | None = None) -> None:
     """Write all files together, none where one would replace an input; report them."""
-    from postproc.error_text import export_text
+    from postproc.cli.error_text import export_text
     from toolpaths.diagnostics import DiagnosticError, error
     from toolpaths.input_files import place
 

@@ -6,7 +6,7 @@ from typing import Any
 
 
 def check_text(file: str, found: dict[str, Any]) -> str:
-    """What `machines.geometric_error.survey` gives."""
+    """What `machines.geometric_error.exchange.survey` gives."""
     who = {"post": "corrected by the post-processor", "control": "corrected by the control"}[found["corrected_by"]]
     lines = [f"{file}: good: errors of {found['machine']}, {found['parameters']} parameters, {who}; fingerprint "
              f"{found['fingerprint']}", *_components(found)]
@@ -122,7 +122,7 @@ def screw_warning(names: list[str], file: str, rest: object) -> Any:
 
 def map_figures(model: Any, made: Any) -> tuple[dict[str, Any], list[str]]:
     """(figures, text) of a `MadeMap` of a model."""
-    from machines.geometric_error.csv_table import UNITS
+    from machines.geometric_error.tables.csv_table import UNITS
 
     um, arcsec = UNITS["um"], UNITS["arcsec"]
     lattice = made.model.map

@@ -7,11 +7,11 @@ from typing import Annotated
 
 import typer
 
-from postproc.cli_errors_import import EXAMPLE, import_
-from postproc.cli_group import Group
-from postproc.cli_options import MachineName, figure_ending
-from postproc.console import Json, machine_of, own_files, print_json, refuse_overwriting, report, shown_errors
-from postproc.error_files import finish, loaded, model_files, or_refused, pairs, writable
+from postproc.cli.console import Json, machine_of, own_files, print_json, refuse_overwriting, report, shown_errors
+from postproc.cli.error_files import finish, loaded, model_files, or_refused, pairs, writable
+from postproc.cli.errors_import import EXAMPLE, import_
+from postproc.cli.group import Group
+from postproc.cli.options import MachineName, figure_ending
 
 errors_app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None,
                          help="Error models: check, export to tables, maps and "
@@ -52,8 +52,8 @@ def check(file: ModelFile, machine: MachineName, tool_length: ToolLength = 100.0
     """Check an error model: what it holds, how far it reaches, worst tip and axis over the work volume, doubt."""
     refuse_overwriting({"--figure": str(figure or ""), "--json": json}, {"the error model": str(file), **own_files(machine)})
     ending = figure_ending(figure)
-    from machines.geometric_error.survey import beyond_travel, survey, unmeasured
-    from postproc.error_text import check_text
+    from machines.geometric_error.exchange.survey import beyond_travel, survey, unmeasured
+    from postproc.cli.error_text import check_text
 
     outputs: dict[Path, str | bytes] = {}
     with shown_errors(json):
@@ -62,7 +62,7 @@ def check(file: ModelFile, machine: MachineName, tool_length: ToolLength = 100.0
         figures = survey(model, m, tool_length)
         found += [*beyond_travel(model, m, str(file)), *unmeasured(model, m, str(file))]
         if figure is not None:
-            from machines.geometric_error.figures import model_figure
+            from machines.geometric_error.exchange.figures import model_figure
 
             outputs[figure] = model_figure(model, m, tool_length, ending)
     report(tuple(found), json, figures | {"diagnostics": [d.as_dict() for d in found]}, check_text(str(file), figures),
@@ -74,9 +74,9 @@ def to_tables(file: ModelFile, machine: MachineName, output: Folder, step: Step 
               angle_loss: AngleLoss = 0.1, json: Json = "") -> None:
     """Write every component error as a table per axis with ISO 230-1 names, and a model that reads them."""
     refuse_overwriting({"--json": json}, {"the error model": str(file), **own_files(machine)})
-    from machines.geometric_error import exports
-    from machines.geometric_error.csv_table import UNITS
-    from postproc.error_text import table_figures
+    from machines.geometric_error.exchange import exports
+    from machines.geometric_error.tables.csv_table import UNITS
+    from postproc.cli.error_text import table_figures
 
     with shown_errors(json):
         m = machine_of(machine)
@@ -96,9 +96,9 @@ def to_linuxcnc(file: ModelFile, machine: MachineName, output: Folder, rest: Res
                 loss: Loss = 0.1, angle_loss: AngleLoss = 0.1, tool_length: ToolLength = 100.0, json: Json = "") -> None:
     """Write positioning errors as LinuxCNC's screw compensation, one file per joint, and say what they leave."""
     refuse_overwriting({"--rest": str(rest or ""), "--json": json}, {"the error model": str(file), **own_files(machine)})
-    from machines.geometric_error import exports
-    from machines.geometric_error.csv_table import UNITS
-    from postproc.error_text import screw_figures, screw_warning
+    from machines.geometric_error.exchange import exports
+    from machines.geometric_error.tables.csv_table import UNITS
+    from postproc.cli.error_text import screw_figures, screw_warning
 
     with shown_errors(json):
         m = machine_of(machine)
@@ -123,9 +123,9 @@ def to_map(file: ModelFile, machine: MachineName, output: MapFile, over: Over = 
     refuse_overwriting({"-o": str(output), "--json": json}, {"the error model": str(file), **own_files(machine)})
     if directions not in ("machine", "table"):
         raise typer.BadParameter(f"{directions!r} is not available; choose from machine, table", param_hint="--directions")
-    from machines.geometric_error import exports
-    from machines.geometric_error.csv_table import UNITS
-    from postproc.error_text import map_figures
+    from machines.geometric_error.exchange import exports
+    from machines.geometric_error.tables.csv_table import UNITS
+    from postproc.cli.error_text import map_figures
 
     with shown_errors(json):
         m = machine_of(machine)
@@ -146,6 +146,6 @@ def to_map(file: ModelFile, machine: MachineName, output: MapFile, over: Over = 
 @errors_app.command("schema")
 def errors_schema() -> None:
     """Print the JSON schema of an error model file."""
-    from machines.geometric_error.loader import error_model_schema
+    from machines.geometric_error.files.loader import error_model_schema
 
     print_json(error_model_schema())

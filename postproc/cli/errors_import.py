@@ -7,9 +7,9 @@ from typing import Annotated
 
 import typer
 
-from postproc.cli_options import MachineName
-from postproc.console import Json, machine_of, own_files, refuse_overwriting, shown_errors
-from postproc.error_files import doubted, finish, merged_into, model_files, pairs, required
+from postproc.cli.console import Json, machine_of, own_files, refuse_overwriting, shown_errors
+from postproc.cli.error_files import doubted, finish, merged_into, model_files, pairs, required
+from postproc.cli.options import MachineName
 
 EXAMPLE = "Example: postproc errors import X=x.comp y.csv -m mill-3axis -o errors.toml"
 Sources = Annotated[list[str], typer.Argument(metavar="SOURCE...", help="tables per axis or of location errors (x.csv), of "
@@ -52,9 +52,9 @@ def import_(sources: Sources, machine: MachineName, output: Output, into: Into =
                        {**{name: name for name in files_of}, **own_files(machine)})
     refuse_overwriting({"--json": json}, {"the model of --into": str(into or ""),
                                          "the table of --covariance": str(covariance or "")})
-    from machines.geometric_error.exports import in_units
-    from machines.geometric_error.imports import How, read_sources, with_covariance
-    from machines.geometric_error.survey import beyond_travel, unmeasured
+    from machines.geometric_error.exchange.exports import in_units
+    from machines.geometric_error.exchange.imports import How, read_sources, with_covariance
+    from machines.geometric_error.exchange.survey import beyond_travel, unmeasured
 
     with shown_errors(json):
         m = machine_of(machine)

@@ -58,7 +58,7 @@ def report_text(fault: BaseException, arguments: list[str]) -> str:
     import platform
     import traceback
 
-    from postproc.version import VERSION
+    from postproc.base.version import VERSION
 
     return "\n".join([
         f"internal error [{fingerprint(fault)}]", "", f"postproc {VERSION}",
@@ -109,7 +109,7 @@ _NEW = os.O_WRONLY | os.O_CREAT | os.O_TRUNC | getattr(os, "O_NOFOLLOW", 0)
 
 def _own_places(fault: BaseException) -> Iterator[tuple[str, str]]:
     """(file below the package's folder, function) of each frame in our own code, outermost first."""
-    root = Path(__file__).parents[1]
+    root = Path(__file__).parents[2]
     for frame in _frames(fault.__traceback__):
         file = Path(frame.tb_frame.f_code.co_filename)
         if file.is_relative_to(root) and file.relative_to(root).parts[0] in _ROOMS:

@@ -6,8 +6,7 @@ from typing import Annotated
 
 import typer
 
-from postproc.cli_group import Group
-from postproc.console import (
+from postproc.cli.console import (
     Json,
     controller_file,
     controller_of,
@@ -17,6 +16,7 @@ from postproc.console import (
     report,
     shown_errors,
 )
+from postproc.cli.group import Group
 
 machine_app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None,
                           help="Machines: list, show, check, analyse, schema.")
@@ -40,7 +40,7 @@ def machine_list(json: Json = "") -> None:
 @machine_app.command("show")
 def machine_show(name: Annotated[str, typer.Argument(help="name or TOML file")], json: Json = "") -> None:
     """Show a machine: axes, travel, limits, which values are assumed."""
-    from postproc.catalogue import machine_dict, machine_text
+    from postproc.cli.catalogue import machine_dict, machine_text
 
     with shown_errors(json):
         m = machine_of(name)
@@ -61,7 +61,7 @@ def machine_check(file: Annotated[str, typer.Argument(help="TOML file or name")]
 def machine_analyse(name: Annotated[str, typer.Argument(help="name or TOML file")], json: Json = "") -> None:
     """Condition number, speed and force transmission, reachable box of a parallel machine, over its workspace."""
     from machines.analysis.report import analyse
-    from postproc.catalogue import analysis_text
+    from postproc.cli.catalogue import analysis_text
 
     with shown_errors(json):
         found = analyse(machine_of(name))
@@ -79,7 +79,7 @@ def machine_schema() -> None:
 @setup_app.command("check", epilog="Example: postproc setup check part.setup.toml")
 def setup_check(file: Annotated[str, typer.Argument(help="TOML file")], json: Json = "") -> None:
     """Check a set-up file and say what is wrong with it."""
-    from postproc.setup import load_setup, part_placement
+    from postproc.setup.model import load_setup, part_placement
     from toolpaths.diagnostics import has_errors, info
 
     refuse_overwriting({"--json": json}, {"the set-up": file})
@@ -103,7 +103,7 @@ def setup_check(file: Annotated[str, typer.Argument(help="TOML file")], json: Js
 def setup_schema() -> None:
     """Print the JSON schema of a set-up file."""
     from machines.user_file import schema
-    from postproc.setup import SetupFile
+    from postproc.setup.model import SetupFile
 
     print_json(schema(SetupFile))
 
@@ -122,7 +122,7 @@ def controller_list(json: Json = "") -> None:
 @controller_app.command("show")
 def controller_show(name: Annotated[str, typer.Argument(help="name or TOML file")], json: Json = "") -> None:
     """Show every value of a controller with its bases merged in, and the file and line that it comes from."""
-    from postproc.catalogue import controller_text, controller_values
+    from postproc.cli.catalogue import controller_text, controller_values
 
     with shown_errors(json):
         values, origins = controller_values(controller_of(name))

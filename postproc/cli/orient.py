@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from postproc.cli_options import Allow, AxisTolerance, ClFile, Dialect, MachineName, Tolerance, Units, figure_ending
-from postproc.console import (
+from postproc.cli.console import (
     Json,
     controller_of,
     machine_of,
@@ -18,11 +17,12 @@ from postproc.console import (
     report,
     shown_errors,
 )
+from postproc.cli.options import Allow, AxisTolerance, ClFile, Dialect, MachineName, Tolerance, Units, figure_ending
 
 if TYPE_CHECKING:
     from machines.machine import Machine
-    from postproc.options import Options
-    from postproc.orientation.choice import OrientationChoice
+    from postproc.base.options import Options
+    from postproc.orientation.plans.choice import OrientationChoice
     from toolpaths.diagnostics import Diagnostic
 
 ORIENTATIONS = ("keep", "per-pass", "whole-part", "auto")
@@ -65,7 +65,7 @@ def orient(file: ClFile,
     refuse_overwriting({"--figure": str(figure or ""), "--json": json},
                        {"the CL file": str(file), "the set-up": setup, "the error model": error_model,
                         **own_files(machine, controller)})
-    from postproc.options import Options
+    from postproc.base.options import Options
 
     options = Options(tolerance, axis_tolerance, setup=setup, units=units, dialect=dialect, error_model=error_model,
                       allow_unknown=tuple(w.upper() for w in allow_unknown or ()), max_tilt=max_tilt,
@@ -76,8 +76,8 @@ def orient(file: ClFile,
     with shown_errors(json), progress_bar() as progress:
         choice, found = _chosen(file, machine_of(machine), controller_of(controller), options, progress)
         if choice is not None:
-            from postproc.orientation.report import as_dict
-            from postproc.orientation.text import as_text
+            from postproc.orientation.report.figures_of_choice import as_dict
+            from postproc.orientation.report.text import as_text
 
             shown = _known(passes or [], choice)
             values, text = as_dict(choice, options.orient), as_text(choice, options.orient, shown)
@@ -94,7 +94,7 @@ def _check(plan: str, figure: Path | None, units: str, dialect: str, passes: lis
         if value not in known:
             raise typer.BadParameter(f"{value!r} is not available; choose from {', '.join(known)}", param_hint=option)
     if dialect:
-        from toolpaths.cl.dialects import DIALECTS
+        from toolpaths.cl.text.dialects import DIALECTS
 
         if dialect not in DIALECTS:
             raise typer.BadParameter(f"{dialect!r} is not available; choose from {', '.join(DIALECTS)}",
@@ -109,7 +109,7 @@ def _chosen(file: Path, machine: Machine, controller: str, options: Options,
             progress: Any) -> tuple[OrientationChoice | None, list[Diagnostic]]:
     """The choice for a file; None where a diagnostic is an ERROR."""
     import toolpaths
-    from postproc.pipeline import choose_axes
+    from postproc.pipeline.convert import choose_axes
 
     path, found = toolpaths.read(file, units=options.units or None, dialect=options.dialect or None,
                                  allow_unknown=options.allow_unknown,
@@ -122,7 +122,7 @@ def _errors(options: Options, machine: Machine) -> list[Diagnostic]:
     """What is wrong with the error model; else that it changes nothing here."""
     if not options.error_model:
         return []
-    from machines.geometric_error.loader import load_checked
+    from machines.geometric_error.files.loader import load_checked
     from toolpaths.diagnostics import info
 
     model, found = load_checked(options.error_model, machine)

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from postproc.cli_options import (
+from postproc.cli.console import Json, machine_of, own_files, progress_bar, refuse_overwriting, report, shown_errors
+from postproc.cli.options import (
     Allow,
     AxisTolerance,
     Beyond,
@@ -19,12 +20,11 @@ from postproc.cli_options import (
     figure_ending,
     only_with_errors,
 )
-from postproc.cli_orient import ORIENTATIONS, MaxTilt, Orient
-from postproc.console import Json, machine_of, own_files, progress_bar, refuse_overwriting, report, shown_errors
+from postproc.cli.orient import ORIENTATIONS, MaxTilt, Orient
 
 if TYPE_CHECKING:
     from machines.machine import Machine
-    from postproc.options import Options
+    from postproc.base.options import Options
     from postproc.placement.place import PlacementChoice
     from toolpaths.diagnostics import Diagnostic
 
@@ -65,7 +65,7 @@ def place(file: ClFile,
     refuse_overwriting({"-o": str(output), "--json": json, "--figure": str(figure or "")},
                        {"the CL file": str(file), "the set-up": str(setup), "the error model": error_model,
                         **own_files(machine, controller)})
-    from postproc.options import Options
+    from postproc.base.options import Options
     from postproc.placement import report as figures
     from postproc.placement.write import placed_text
 
@@ -94,7 +94,7 @@ def _check(orient: str, units: str, dialect: str, setup: Path, figure: Path | No
     Raises:
         typer.BadParameter: says what there is to choose from.
     """
-    from toolpaths.cl.dialects import DIALECTS
+    from toolpaths.cl.text.dialects import DIALECTS
     from toolpaths.input_files import is_regular, there_is
 
     for option, value, known in (("--orient", orient, ORIENTATIONS), ("--units", units or "mm", ("mm", "inch")),
@@ -111,7 +111,7 @@ def _chosen(file: Path, machine: Machine, controller: str, options: Options,
     """The choice for a file; None where a diagnostic is an ERROR."""
     import toolpaths
     from postproc.placement.place import place as run
-    from postproc.setup import load_setup
+    from postproc.setup.model import load_setup
     from toolpaths.diagnostics import has_errors, require
 
     settings, found = load_setup(options.setup)

@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from postproc.cli_options import AxisTolerance, Beyond, MachineName, Tolerance, Units, only_with_errors
-from postproc.console import Json, machine_of, own_files, progress_bar, refuse_overwriting, report, shown_errors
+from postproc.cli.console import Json, machine_of, own_files, progress_bar, refuse_overwriting, report, shown_errors
+from postproc.cli.options import AxisTolerance, Beyond, MachineName, Tolerance, Units, only_with_errors
 
 if TYPE_CHECKING:
     from machines.machine import Machine
+    from postproc.base.options import Options
     from postproc.cycle_time.blocks import Blocks
     from postproc.cycle_time.model import CycleTimeModel
     from postproc.cycle_time.phases import Timed
-    from postproc.options import Options
     from toolpaths.diagnostics import Diagnostic
 
 
@@ -47,9 +47,9 @@ def time(file: Annotated[Path, typer.Argument(metavar="FILE", help="CL file, or 
     refuse_overwriting({"-o": output, "--json": json}, {"the file": str(file), "the set-up": setup, "the log": calibrate,
                                                         "the error model": error_model, **own_files(machine, controller),
                                                         "the model": model if Path(model).suffix else ""})
+    from postproc.base.options import Options
     from postproc.cycle_time import report as figures
     from postproc.cycle_time.estimate import estimate
-    from postproc.options import Options
 
     options = Options(tolerance, axis_tolerance, "auto", setup, units, dialect, error_model=error_model,
                       error_beyond=beyond)
@@ -78,7 +78,7 @@ def _check(output: str, calibrate: str, units: str, dialect: str) -> None:
     if units and units not in ("mm", "inch"):
         raise typer.BadParameter(f"{units!r} is not available; choose from mm, inch", param_hint="--units")
     if dialect:
-        from toolpaths.cl.dialects import DIALECTS
+        from toolpaths.cl.text.dialects import DIALECTS
 
         if dialect not in DIALECTS:
             raise typer.BadParameter(f"{dialect!r} is not available; choose from {', '.join(DIALECTS)}",
@@ -91,8 +91,8 @@ def _blocks(file: Path, machine: Machine, controller: str, model: str, options: 
     from postproc.controllers.model import load_controller
     from postproc.cycle_time.model import load_model, model_name
     from postproc.cycle_time.source import from_conversion, from_gcode, looks_like_gcode, read_file
-    from postproc.readback.files import Beside
-    from postproc.setup import load_setup
+    from postproc.setup.model import load_setup
+    from postproc.verification.files_beside import Beside
     from toolpaths.diagnostics import require
 
     spec, found = load_controller(controller)
@@ -108,7 +108,7 @@ def _blocks(file: Path, machine: Machine, controller: str, model: str, options: 
         blocks, found = from_gcode(data, machine, spec, setup, str(file), Beside(file))
         return blocks, planner, None, found
     import toolpaths
-    from postproc.pipeline import convert
+    from postproc.pipeline.convert import convert
 
     path, found = toolpaths.read_bytes(data, file=str(file), units=options.units or None, dialect=options.dialect or None)
     del data

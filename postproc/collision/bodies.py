@@ -13,9 +13,9 @@ from postproc.collision.mesh import load_mesh
 from postproc.collision.search import nearest
 from postproc.collision.solid import Solid, solid
 from postproc.collision.swept import Swept
-from postproc.setup import Placement, SetupFile
-from postproc.setup_bodies import Bodies, Units
-from postproc.setup_bodies import Solid as Given
+from postproc.setup.bodies import Bodies, Units
+from postproc.setup.bodies import Solid as Given
+from postproc.setup.model import Placement, SetupFile
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic, error, has_errors
 

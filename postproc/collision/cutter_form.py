@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from postproc.orientation.cutter import ball_radius
-from postproc.setup_bodies import ToolBody
+from postproc.reference.cutter import ball_radius
+from postproc.setup.bodies import ToolBody
 from toolpaths.arrays import Floats
 from toolpaths.toolpath import Tool
 from toolpaths.units import DEG

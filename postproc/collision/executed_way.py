@@ -7,10 +7,10 @@ import numpy as np
 from machines.kinematics.base import Kinematics
 from machines.straight_blocks import in_blocks, pose_jets
 from postproc.collision.swept import OFF, Swept
-from postproc.readback.assembly import ends, steps
-from postproc.readback.execute import Motion
-from postproc.readback.poses import SAMPLES, Executed, arc_sweeps, coordinates
-from postproc.word_arcs import PLANE_COLUMNS
+from postproc.control.word_arcs import PLANE_COLUMNS
+from postproc.readback.execution.assembly import ends, steps
+from postproc.readback.execution.execute import Motion
+from postproc.readback.execution.poses import SAMPLES, Executed, arc_sweeps, coordinates
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.units import DEG
 

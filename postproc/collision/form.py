@@ -10,8 +10,8 @@ import numpy as np
 from postproc.collision.cutter_form import Cutter, cutter_pieces, stated_cutter
 from postproc.collision.mesh import load_mesh
 from postproc.collision.spun import spun
-from postproc.setup import ToolSetup
-from postproc.setup_bodies import Section
+from postproc.setup.bodies import Section
+from postproc.setup.model import ToolSetup
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, info, warning
 from toolpaths.toolpath import Tool

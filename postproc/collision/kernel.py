@@ -1,5 +1,5 @@
 """Plain loops of `search.py`, compiled for long ways and fine meshes; the numpy search there is the reference. How they are
-rounded: `feedrate/compiled.py`.
+rounded: `base/compiled.py`.
 
 A cell is a row of 21 numbers: the corners of a triangle, two tips, two axes. `out` holds the least distance so far, the
 place on the way, the point, the cells looked at since something was too near, and whether a leaf was cut short.
@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from postproc.feedrate.compiled import compiled
+from postproc.base.compiled import compiled
 
 _DEPTH = 512
 _CORNERS, _TIPS, _AXES = 0, 9, 15

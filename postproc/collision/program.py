@@ -11,15 +11,15 @@ from postproc.collision.bodies import Scene, Touch, scene, touches
 from postproc.collision.executed_way import way_of
 from postproc.collision.form import PARTS, Form, lever_of, tool_form
 from postproc.collision.swept import Swept
-from postproc.moves import Moves, Phase
-from postproc.readback.execute import Motion
-from postproc.readback.faults import Faults
-from postproc.readback.poses import Executed, begins
+from postproc.readback.comparison.faults import Faults
+from postproc.readback.execution.execute import Motion
+from postproc.readback.execution.poses import Executed, begins
+from postproc.reference.moves import Moves, Phase
 from toolpaths.arrays import Bools, Ints
 from toolpaths.diagnostics import Diagnostic, has_errors, info
 
 if TYPE_CHECKING:
-    from postproc.job import Job
+    from postproc.job.job import Job
 
 
 def check_bodies(motion: Motion, executed: Executed, job: Job, owner: Ints, faults: Faults) -> list[Diagnostic]:

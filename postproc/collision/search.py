@@ -14,10 +14,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from postproc.base.compiled import compiled, wanted
 from postproc.collision.revolution import around, bend, lever, middle, raised, support
 from postproc.collision.solid import Solid
 from postproc.collision.swept import TURN, Swept
-from postproc.feedrate.compiled import compiled, wanted
 from toolpaths.arrays import Floats, Ints
 
 EXACT = 1e-3

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from postproc.collision.tree import Tree, tree, z_order
-from postproc.setup import Placement
+from postproc.setup.model import Placement
 from toolpaths.arrays import Floats
 
 if TYPE_CHECKING:

@@ -10,10 +10,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from postproc.events import words
-from postproc.moves import Moves
-from postproc.path_model import Path
-from postproc.program import Command, Commands
+from postproc.compile.program import Command, Commands
+from postproc.path.model import Path
+from postproc.reference.events import words
+from postproc.reference.moves import Moves
 from toolpaths.arrays import Bools, Ints
 from toolpaths.diagnostics import Diagnostic, error, warning
 from toolpaths.toolpath import Toolpath

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from postproc.control import Control
+from postproc.compile.program import Hole
+from postproc.compile.word_rows import WordRows
+from postproc.control.control import Control
 from postproc.controllers.model import ControllerFile
-from postproc.events import spindle_states
-from postproc.moves import Moves, Phase
-from postproc.path_model import FEED, TRAVERSE, Path
-from postproc.program import Hole
-from postproc.word_rows import WordRows
+from postproc.path.model import FEED, TRAVERSE, Path
+from postproc.reference.events import spindle_states
+from postproc.reference.moves import Moves, Phase
 from toolpaths.arrays import Bools, Ints
 from toolpaths.toolpath import Kind, Toolpath
 

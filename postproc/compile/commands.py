@@ -7,10 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from postproc.compile.cutter_compensation import Compensation
+from postproc.compile.program import Command, Commands
+from postproc.compile.spindle_coolant_state import Switched
 from postproc.controllers.model import ControllerFile
-from postproc.coolant import written
-from postproc.cutter_compensation import Compensation
-from postproc.events import (
+from postproc.path.model import Path
+from postproc.reference.coolant import written
+from postproc.reference.events import (
     Spindle,
     ToolChange,
     cutting,
@@ -21,10 +24,7 @@ from postproc.events import (
     tool_changes,
     words,
 )
-from postproc.moves import Moves, Phase
-from postproc.path_model import Path
-from postproc.program import Command, Commands
-from postproc.switched import Switched
+from postproc.reference.moves import Moves, Phase
 from toolpaths.arrays import Bools
 from toolpaths.diagnostics import Diagnostic, warning
 from toolpaths.toolpath import Event, Toolpath

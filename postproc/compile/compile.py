@@ -6,23 +6,23 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from postproc.canned import holes_of
-from postproc.commands import commands_of
-from postproc.feed import Feeds, Planned, plan_feeds
-from postproc.job import Job
-from postproc.moves import Moves
-from postproc.not_canned import not_native
-from postproc.path_model import ARC, Path
-from postproc.program import Command, Commands, Hole, Program
-from postproc.rounding import decimals
-from postproc.sections import sections_of, with_sections
-from postproc.skips import after, skipped, with_skips
-from postproc.word_rows import WordRows, block_tools, joints_of, with_turns, word_rows
+from postproc.compile.block_delete import after, skipped, with_skips
+from postproc.compile.canned import holes_of
+from postproc.compile.commands import commands_of
+from postproc.compile.cycle_refusals import not_native
+from postproc.compile.feed import Feeds, Planned, plan_feeds
+from postproc.compile.program import Command, Commands, Hole, Program
+from postproc.compile.sections import sections_of, with_sections
+from postproc.compile.word_rows import WordRows, block_tools, joints_of, with_turns, word_rows
+from postproc.job.job import Job
+from postproc.job.rounding import decimals
+from postproc.path.model import ARC, Path
+from postproc.reference.moves import Moves
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.diagnostics import Diagnostic, info
 
 if TYPE_CHECKING:
-    from postproc.corrected.settled import Writing
+    from postproc.correction.settled import Writing
 
 
 def compile_program(job: Job, moves: Moves, path: Path,
@@ -66,7 +66,7 @@ def words_of(job: Job, moves: Moves, path: Path, anew: Ints | None = None) -> Wo
 
 def writing_of(job: Job, moves: Moves) -> Writing:
     """How paths along `moves` are written, for the correction of geometric errors."""
-    from postproc.corrected.settled import Writing
+    from postproc.correction.settled import Writing
 
     def joints(path: Path, words: Floats, rows: Ints) -> Floats:
         return joints_of(path, words, rows, block_tools(path, moves), job.kinematics, job.offset_length)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from postproc.compile.program import Command
 from postproc.controllers.model import ControllerFile
-from postproc.events import compensation_side, numbers
-from postproc.moves import Moves
-from postproc.path_model import TRAVERSE, Path
-from postproc.program import Command
+from postproc.path.model import TRAVERSE, Path
+from postproc.reference.events import compensation_side, numbers
+from postproc.reference.moves import Moves
 from toolpaths.arrays import Bools, Ints
 from toolpaths.diagnostics import Diagnostic, error, warning
 from toolpaths.toolpath import Event, Kind

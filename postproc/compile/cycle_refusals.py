@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from postproc.canned import cycle_key, may_cycle
+from postproc.compile.canned import cycle_key, may_cycle
 from postproc.controllers.model import ControllerFile
-from postproc.events import spindle_states
-from postproc.moves import Moves, Phase
-from postproc.path_model import Path
+from postproc.path.model import Path
+from postproc.reference.events import spindle_states
+from postproc.reference.moves import Moves, Phase
 from toolpaths.arrays import Bools, Ints
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.toolpath import Cycle, Toolpath

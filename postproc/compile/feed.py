@@ -6,12 +6,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from postproc.control import Control
+from postproc.compile.merged_feeds import merged
+from postproc.compile.program import INVERSE, PER_MINUTE
+from postproc.control.control import Control
+from postproc.control.word_arcs import PLANE_COLUMNS
 from postproc.controllers.model import Feed as FeedRules
-from postproc.merged_feeds import merged
-from postproc.path_model import ARC, Path
-from postproc.program import INVERSE, PER_MINUTE
-from postproc.word_arcs import PLANE_COLUMNS
+from postproc.path.model import ARC, Path
 from toolpaths.arrays import Array, Bools, Floats, Ints
 
 

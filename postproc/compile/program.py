@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from postproc.control import Law
-from postproc.planes import Plane
+from postproc.control.control import Law
+from postproc.control.planes import Plane
 from toolpaths.arrays import Array, Bools, Floats, Ints
 
 PER_MINUTE, INVERSE = 0, 1

@@ -6,8 +6,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from postproc.path_model import Path
-from postproc.program import Command, Commands, Section
+from postproc.compile.program import Command, Commands, Section
+from postproc.path.model import Path
 from toolpaths.arrays import Ints
 
 _BELONG_BEFORE = frozenset({"CUTTER_COMPENSATION_OFF", "DWELL"})

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from postproc.events import ToolChange
-from postproc.program import Command
+from postproc.compile.program import Command
+from postproc.reference.events import ToolChange
 
 _STOPPED, _DRY = "STOP_SPINDLE_TURNING", "COOLANT_OFF"
 

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from machines.kinematics.base import Kinematics
-from postproc.control import Control
-from postproc.groups import groups
-from postproc.moves import Moves
-from postproc.path_model import ARC, FEED, Path
-from postproc.word_arcs import PLANE_AXIS
+from postproc.base.group_rows import groups
+from postproc.control.control import Control
+from postproc.control.word_arcs import PLANE_AXIS
+from postproc.path.model import ARC, FEED, Path
+from postproc.reference.moves import Moves
 from toolpaths.arrays import Bools, Floats, Ints
 
 SNAP = 2.5
@@ -136,7 +136,7 @@ def _held(words: Floats, path: Path, control: Control, tool: Ints, places: Ints,
     """Words (rounded) in which rotary axes among `joints` never turn back by one last decimal: the word before stays.
 
     An axis that loses motion would have another error there, more than the decimal is worth. What is left out never adds
-    up: each block is compared with the last written position. Slides have their words from `postproc.corrected.settled`.
+    up: each block is compared with the last written position. Slides have their words from `postproc.correction.settled`.
     """
     turning = [j for j in joints if j in control.rotary]
     if not turning:

@@ -18,7 +18,7 @@ import numpy as np
 from machines.kinematics.base import Kinematics
 from machines.kinematics.frames import reference_x
 from machines.machine import Machine
-from postproc.planes import Plane
+from postproc.control.planes import Plane
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.units import DEG
 

@@ -8,11 +8,11 @@ from functools import cached_property
 import numpy as np
 
 from machines.kinematics.base import Kinematics
-from postproc.control import Control, Law, tool_frames
+from postproc.base.options import Options
+from postproc.control.control import Control, Law, tool_frames
+from postproc.control.planes import Plane, stated
 from postproc.controllers.model import ControllerFile, Mode
-from postproc.options import Options
-from postproc.planes import Plane, stated
-from postproc.setup import SetupFile
+from postproc.setup.model import SetupFile
 from toolpaths.arrays import Array, Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.rotations import angle_between

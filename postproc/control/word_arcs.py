@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from machines.kinematics.base import Kinematics
-from postproc.control import Control
+from postproc.control.control import Control
 from toolpaths.arrays import Array, Bools, Floats, Ints, repeated
 from toolpaths.shape import Curves
 

@@ -7,12 +7,12 @@ from itertools import pairwise
 
 import numpy as np
 
-from postproc.corrected.reversals import LOOSE
-from postproc.corrected.work import Work, on_arc
-from postproc.groups import groups
-from postproc.looks import changes, looks_between
-from postproc.path_model import ARC, FEED, Path
-from postproc.word_arcs import PLANE_AXIS, PLANE_COLUMNS
+from postproc.base.group_rows import groups
+from postproc.control.word_arcs import PLANE_AXIS, PLANE_COLUMNS
+from postproc.correction.error_context import Work, on_arc
+from postproc.correction.error_sampling import changes, looks_between
+from postproc.correction.reversals import LOOSE
+from postproc.path.model import ARC, FEED, Path
 from toolpaths.arrays import Bools, Floats, Ints
 
 LOOKS = (0.25, 0.5, 0.75)

@@ -14,21 +14,21 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from machines.geometric_error.model import ErrorModel, doubt
-from machines.geometric_error.volume import measured
+from machines.geometric_error.actual.model import ErrorModel, doubt
+from machines.geometric_error.exchange.volume import measured
 from machines.kinematics.base import Kinematics
-from postproc.control import Control
-from postproc.corrected.arcs import fitted_arcs
-from postproc.corrected.cycles import whole_holes
-from postproc.corrected.points import between, divided
-from postproc.corrected.reversals import Divided, arcs_cut, inserted, starts_of
-from postproc.corrected.settled import Writing, settled
-from postproc.corrected.work import CorrectedEnds, Work
-from postproc.groups import groups
-from postproc.looks import looks_between
-from postproc.modes import OutputModes
-from postproc.moves import Moves
-from postproc.path_model import Path
+from postproc.base.group_rows import groups
+from postproc.control.control import Control
+from postproc.control.modes import OutputModes
+from postproc.correction.arcs import fitted_arcs
+from postproc.correction.cycles import whole_holes
+from postproc.correction.error_context import CorrectedEnds, Work
+from postproc.correction.error_sampling import looks_between
+from postproc.correction.points import between, divided
+from postproc.correction.reversals import Divided, arcs_cut, inserted, starts_of
+from postproc.correction.settled import Writing, settled
+from postproc.path.model import Path
+from postproc.reference.moves import Moves
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.diagnostics import Diagnostic, Severity, error, has_errors
 from toolpaths.units import DEG

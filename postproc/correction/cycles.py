@@ -7,14 +7,14 @@ from functools import cached_property
 
 import numpy as np
 
-from machines.geometric_error.lost_motion import GRAIN
-from postproc.corrected.arcs import LOOKS
-from postproc.corrected.reversals import LOOSE
-from postproc.corrected.runs import Runs
-from postproc.corrected.work import ALONE, LIFTS, Work
-from postproc.groups import groups
-from postproc.moves import Moves
-from postproc.path_model import FEED, Path
+from machines.geometric_error.actual.lost_motion import GRAIN
+from postproc.base.group_rows import groups
+from postproc.correction.arcs import LOOKS
+from postproc.correction.error_context import ALONE, LIFTS, Work
+from postproc.correction.reversals import LOOSE
+from postproc.correction.runs import Runs
+from postproc.path.model import FEED, Path
+from postproc.reference.moves import Moves
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.toolpath import Kind
 

@@ -8,15 +8,15 @@ from functools import cached_property
 
 import numpy as np
 
-from machines.geometric_error.actual import Actual, moving_sign
-from machines.geometric_error.correction import correct
-from machines.geometric_error.lost_motion import GRAIN, Steps, turning_sign
-from machines.geometric_error.model import ErrorModel
+from machines.geometric_error.actual.actual import Actual, moving_sign
+from machines.geometric_error.actual.correction import correct
+from machines.geometric_error.actual.lost_motion import GRAIN, Steps, turning_sign
+from machines.geometric_error.actual.model import ErrorModel
 from machines.kinematics.base import Kinematics
-from postproc.groups import groups
-from postproc.looks import changes
-from postproc.path_model import ARC, TRAVERSE, Path
-from postproc.word_arcs import PLANE_COLUMNS
+from postproc.base.group_rows import groups
+from postproc.control.word_arcs import PLANE_COLUMNS
+from postproc.correction.error_sampling import changes
+from postproc.path.model import ARC, TRAVERSE, Path
 from toolpaths.arrays import Bools, Floats, Ints
 
 MOMENT = 1e-3

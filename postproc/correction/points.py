@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from postproc.corrected.arcs import LOOKS as ARC_LOOKS
-from postproc.corrected.reversals import LOOSE, SHORTEST, Divided, Starts, inserted, reversals, stretches
-from postproc.corrected.work import ALONE, MOMENT, Work
-from postproc.looks import looks_between
-from postproc.path_model import ARC, FEED, TRAVERSE, Path
+from postproc.correction.arcs import LOOKS as ARC_LOOKS
+from postproc.correction.error_context import ALONE, MOMENT, Work
+from postproc.correction.error_sampling import looks_between
+from postproc.correction.reversals import LOOSE, SHORTEST, Divided, Starts, inserted, reversals, stretches
+from postproc.path.model import ARC, FEED, TRAVERSE, Path
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.units import DEG
 

@@ -7,10 +7,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from machines.geometric_error.lost_motion import carried_on
-from postproc.corrected.work import ALONE, EDGES, Work
-from postproc.path_model import ARC, FEED, TRAVERSE, Path
-from postproc.word_arcs import PLANE_COLUMNS
+from machines.geometric_error.actual.lost_motion import carried_on
+from postproc.control.word_arcs import PLANE_COLUMNS
+from postproc.correction.error_context import ALONE, EDGES, Work
+from postproc.path.model import ARC, FEED, TRAVERSE, Path
 from toolpaths.arrays import Bools, Floats, Ints
 
 BISECTIONS = 14

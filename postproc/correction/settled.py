@@ -8,14 +8,14 @@ from itertools import pairwise
 
 import numpy as np
 
-from machines.geometric_error.lost_motion import Steps
-from postproc.corrected.arcs import new_centers
-from postproc.corrected.reversals import Divided
-from postproc.corrected.runs import Runs
-from postproc.corrected.walk import Ends, walk
-from postproc.corrected.work import ALONE, LIFTS, Work, axis_positions, bent_blocks, on_arc
-from postproc.path_model import ARC, FEED, TRAVERSE, Path
-from postproc.word_arcs import PLANE_COLUMNS
+from machines.geometric_error.actual.lost_motion import Steps
+from postproc.control.word_arcs import PLANE_COLUMNS
+from postproc.correction.arcs import new_centers
+from postproc.correction.error_context import ALONE, LIFTS, Work, axis_positions, bent_blocks, on_arc
+from postproc.correction.reversals import Divided
+from postproc.correction.runs import Runs
+from postproc.correction.walk import Ends, walk
+from postproc.path.model import ARC, FEED, TRAVERSE, Path
 from toolpaths.arrays import Bools, Floats, Ints
 
 AT_ONCE = 50_000

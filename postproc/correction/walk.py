@@ -2,11 +2,11 @@
 
 Every block may end at any words X, Y, Z of the grid of last decimals. What the machine with errors then makes of them
 follows from the ways of its axes, and these from the words before and the words chosen (play operator, see
-`machines.geometric_error.lost_motion`). Words that were planned stay where the tip is as near as rounding lets it be; else
-those are taken that bring it nearest: by the ways that the words themselves make, by other ways, by last decimals beside.
-Ways by which the next block does not begin count a little: it would first take up what they are off by. So do, where words
-are axis positions, steps back by less than an axis loses: who takes the way of an axis for the sign of its last step sees
-another machine there. For long programs `walk_loop` does the same compiled.
+`machines.geometric_error.actual.lost_motion`). Words that were planned stay where the tip is as near as rounding lets it be;
+else those are taken that bring it nearest: by the ways that the words themselves make, by other ways, by last decimals
+beside. Ways by which the next block does not begin count a little: it would first take up what they are off by. So do, where
+words are axis positions, steps back by less than an axis loses: who takes the way of an axis for the sign of its last step
+sees another machine there. For long programs `walk_loop` does the same compiled.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from postproc.corrected import walk_loop
+from postproc.correction import walk_loop
 from toolpaths.arrays import Bools, Floats, Ints
 
 PLAIN, BETWEEN = 0.05, 0.25

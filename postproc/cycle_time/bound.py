@@ -10,13 +10,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from postproc.base.compiled import compiled
 from postproc.cycle_time.blocks import Blocks, Path
 from postproc.cycle_time.linuxcnc_kernels import speeds
 from postproc.cycle_time.linuxcnc_segments import KERNEL_FROM, merge
 from postproc.cycle_time.model import CycleTimeModel
 from postproc.cycle_time.phases import ramps
 from postproc.cycle_time.shape import Shape, axis_limit, shape
-from postproc.feedrate.compiled import compiled
 from toolpaths.arrays import Floats
 
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
+from postproc.base.memory import give_back
 from postproc.cycle_time.estimate import Estimate, estimate
 from postproc.cycle_time.model import load_model, model_name
 from postproc.cycle_time.report import as_dict, clock
 from postproc.cycle_time.source import from_conversion
-from postproc.memory import give_back
-from postproc.result import PostResult
+from postproc.pipeline.result import PostResult
 from toolpaths.diagnostics import require
 
 BAND_UP_TO = 20_000

@@ -13,14 +13,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from postproc.base.compiled import compiled
+from postproc.base.memory import give_back
 from postproc.cycle_time.blocks import Blocks, Cause, Path
 from postproc.cycle_time.linuxcnc_corners import KINK, Blends, Corners, blends, corners
 from postproc.cycle_time.linuxcnc_kernels import speeds, timeline
 from postproc.cycle_time.linuxcnc_segments import KERNEL_FROM, NORMAL_SHARE, Segments, clamped, segments
 from postproc.cycle_time.phases import Ramps, Timed, ramps, summed
 from postproc.cycle_time.shape import NOTHING, shape
-from postproc.feedrate.compiled import compiled
-from postproc.memory import give_back
 from toolpaths.arrays import Array, Bools, Floats, Ints
 from toolpaths.units import DEG
 

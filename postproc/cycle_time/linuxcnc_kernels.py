@@ -1,5 +1,5 @@
 """Plain loops of the LinuxCNC model: interpreted for small programs, compiled for large ones, to the same bits
-(`feedrate/compiled.py`)."""
+(`base/compiled.py`)."""
 
 from __future__ import annotations
 

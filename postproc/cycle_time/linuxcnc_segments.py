@@ -10,10 +10,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from postproc.base.compiled import compiled
 from postproc.cycle_time.blocks import Axes, Blocks, Path
 from postproc.cycle_time.linuxcnc_kernels import chain_ends
 from postproc.cycle_time.shape import Shape, axis_limit, shape
-from postproc.feedrate.compiled import compiled
 from toolpaths.arrays import Bools, Floats, Ints
 
 NORMAL_SHARE = np.sqrt(3.0) / 2.0

@@ -10,11 +10,11 @@ from postproc.cycle_time.blocks import Blocks
 from postproc.cycle_time.lookahead import lookahead
 from postproc.cycle_time.model import CycleTimeModel
 from postproc.cycle_time.phases import Timed
-from postproc.moves import Moves
-from postproc.pass_geometry import stops_of
-from postproc.planned import PlannedMotion, Source
-from postproc.planned_errors import planned_correction
-from postproc.result import PostResult
+from postproc.pipeline.result import PostResult
+from postproc.planning.pass_geometry import stops_of
+from postproc.planning.planned import PlannedMotion, Source
+from postproc.planning.planned_errors import planned_correction
+from postproc.reference.moves import Moves
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic, DiagnosticError, warning
 from toolpaths.smoothing.smooth import Tolerance

@@ -7,14 +7,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from machines.machine import Machine
-from postproc.control import Control
+from postproc.control.control import Control
 from postproc.cycle_time.blocks import Axes, Blocks, Cause, Path, Pauses
 from postproc.cycle_time.shape import NOTHING, shape
-from postproc.readback.canonical import LOADED, OFFSET, REGISTER, REST, SMOOTH, Canonical
-from postproc.readback.execute import Motion
-from postproc.readback.modal import columns, fill_values, modal_state
-from postproc.readback.poses import arc_sweeps, coordinates, positions
-from postproc.readback.words import Words
+from postproc.readback.execution.execute import Motion
+from postproc.readback.execution.poses import arc_sweeps, coordinates, positions
+from postproc.readback.text.canonical import LOADED, OFFSET, REGISTER, REST, SMOOTH, Canonical
+from postproc.readback.text.modal import columns, fill_values, modal_state
+from postproc.readback.text.words import Words
 from toolpaths.arrays import Array, Bools, Floats, Ints, repeated
 from toolpaths.units import DEG
 

@@ -9,17 +9,17 @@ from pathlib import Path
 import numpy as np
 
 from machines.machine import Machine
-from postproc.control import Control, Law
+from postproc.control.control import Control, Law
 from postproc.controllers.model import ControllerFile
 from postproc.cycle_time.blocks import Blocks
 from postproc.cycle_time.program import Origin, blocks_of
-from postproc.moves import Phase
-from postproc.readback.canonical import Canonical
+from postproc.pipeline.result import PostResult
 from postproc.readback.dialects.readers import reader_for
-from postproc.readback.execute import Motion, run
-from postproc.readback.offsets import Offsets
-from postproc.result import PostResult
-from postproc.setup import SetupFile, part_placement
+from postproc.readback.execution.execute import Motion, run
+from postproc.readback.execution.offsets import Offsets
+from postproc.readback.text.canonical import Canonical
+from postproc.reference.moves import Phase
+from postproc.setup.model import SetupFile, part_placement
 from toolpaths.diagnostics import Diagnostic, DiagnosticError, error, has_errors
 from toolpaths.input_files import read_input, unreadable
 

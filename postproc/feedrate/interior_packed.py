@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from postproc.feedrate.coefficient_kernel import advance, begin, relative, tie_ends
-from postproc.feedrate.compiled import compiled
+from postproc.base.compiled import compiled
 from postproc.feedrate.interior import Multipliers, NumpySteps
-from postproc.feedrate.interior_kernel import COMMON, LANES, PER_JOINT, assemble, band, direction, pentadiagonal
+from postproc.feedrate.kernels.coefficients import advance, begin, relative, tie_ends
+from postproc.feedrate.kernels.interior import COMMON, LANES, PER_JOINT, assemble, band, direction, pentadiagonal
 from postproc.feedrate.problem import Problem
 from toolpaths.arrays import Floats
 

@@ -14,8 +14,8 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from scipy.interpolate import BSpline
 
-from postproc.feedrate.compiled import compiled, wanted
-from postproc.feedrate.spline_kernel import spline
+from postproc.base.compiled import compiled, wanted
+from postproc.feedrate.kernels.splines import spline
 from toolpaths.arrays import Floats
 
 KERNEL_FROM = 200_000

@@ -20,8 +20,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from postproc.feedrate.compiled import compiled, wanted
-from postproc.feedrate.second_order_kernel import STEPS, sweep
+from postproc.base.compiled import compiled, wanted
+from postproc.feedrate.kernels.second_order import STEPS, sweep
 from toolpaths.arrays import Bools, Floats
 
 KERNEL_FROM = 4000

@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from postproc.feedrate.compiled import compiled
+from postproc.base.compiled import compiled
+from postproc.feedrate.kernels.tightening import worst
 from postproc.feedrate.limits import JointLimits
 from postproc.feedrate.paths import Derivatives
 from postproc.feedrate.problem import Knots
 from postproc.feedrate.profile import Profile
 from postproc.feedrate.rows import tool
-from postproc.feedrate.tightening_kernel import worst
 from toolpaths.arrays import Bools, Floats, Ints
 
 ENOUGH = 1.002

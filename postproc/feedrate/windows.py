@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from postproc.feedrate.compiled import wanted
+from postproc.base.compiled import wanted
 from postproc.feedrate.interior import NumpySteps, Solution, Steps, solve
 from postproc.feedrate.problem import Knots, Problem
 from postproc.feedrate.shares import weigh

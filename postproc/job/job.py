@@ -10,32 +10,32 @@ import numpy as np
 
 from machines.kinematics.base import Kinematics
 from machines.machine import Machine
-from postproc.control import Control, Law
+from postproc.base.options import Options
+from postproc.control.control import Control, Law
+from postproc.control.modes import OutputModes, output_modes
 from postproc.controllers.model import ControllerFile
-from postproc.events import register_changes, tool_changes
-from postproc.hole_depths import unfit_holes
-from postproc.length_registers import own_registers
-from postproc.links import SafeSpace, safe_space
-from postproc.modes import OutputModes, output_modes
-from postproc.moves import Moves, build_moves
-from postproc.options import Options
-from postproc.parts import cut_operations
-from postproc.pivots import control_kinematics
-from postproc.records import checked_records, plain_records
-from postproc.rounding import Rounding, decimals, helix_bound, rounding_bound
-from postproc.setup import Placement, SetupFile, part_placement, work_frame
-from postproc.setup_system import standing
-from postproc.spindle_defaults import standing_cuts, stated_by_setup, with_defaults
-from postproc.stated_feeds import without_feed
-from postproc.tool_numbers import numbered
-from postproc.unnumbered_tools import measured_length
+from postproc.job.pivots import control_kinematics
+from postproc.job.rounding import Rounding, decimals, helix_bound, rounding_bound
+from postproc.path.links import SafeSpace, safe_space
+from postproc.reference.events import register_changes, tool_changes
+from postproc.reference.hole_depths import unfit_holes
+from postproc.reference.length_registers import own_registers
+from postproc.reference.moves import Moves, build_moves
+from postproc.reference.records import checked_records, plain_records
+from postproc.reference.spindle_defaults import standing_cuts, stated_by_setup, with_defaults
+from postproc.reference.split_operations import cut_operations
+from postproc.reference.stated_feeds import without_feed
+from postproc.reference.tool_numbers import numbered
+from postproc.reference.unnumbered_tools import measured_length
+from postproc.setup.model import Placement, SetupFile, part_placement, work_frame
+from postproc.setup.system import standing
 from toolpaths.arrays import Floats, Ints, shared, taken
 from toolpaths.diagnostics import Diagnostic, Severity, error, has_errors, info, warning
 from toolpaths.toolpath import Frame, Role, Toolpath
 from toolpaths.units import DEG
 
 if TYPE_CHECKING:
-    from machines.geometric_error.model import ErrorModel
+    from machines.geometric_error.actual.model import ErrorModel
 
 
 @dataclass(frozen=True)
@@ -225,7 +225,7 @@ def _measured(control: Control, controller: ControllerFile, axis: Floats, setup:
 def _error_model(machine: Machine, options: Options) -> tuple[ErrorModel | None, list[Diagnostic]]:
     if not options.error_model:
         return None, []
-    from machines.geometric_error.loader import load_checked
+    from machines.geometric_error.files.loader import load_checked
 
     model, found = load_checked(options.error_model, machine)
     if model is not None and model.corrected_by == "control":

@@ -9,8 +9,8 @@ import numpy as np
 from machines.kinematics.base import Kinematics
 from machines.kinematics.serial import Serial
 from machines.machine import Machine
-from postproc.options import Options
-from postproc.setup import SetupFile
+from postproc.base.options import Options
+from postproc.setup.model import SetupFile
 from toolpaths.diagnostics import Diagnostic, error
 
 ALLOWED = 0.1

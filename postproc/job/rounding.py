@@ -9,9 +9,9 @@ from itertools import product
 import numpy as np
 
 from machines.kinematics.base import Kinematics
-from postproc.control import Control, Law
+from postproc.control.control import Control, Law
 from postproc.controllers.model import ControllerFile
-from postproc.moves import Moves
+from postproc.reference.moves import Moves
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.units import DEG

@@ -6,9 +6,9 @@ import numpy as np
 
 from machines.machine import Machine
 from postproc.joints.plan import Loser, Rewind
+from postproc.joints.run_plan import RunPlan
 from postproc.joints.states import BAD, CUTS, REWINDS, SECONDS, WRONG
-from postproc.moves import Moves
-from postproc.run_plan import RunPlan
+from postproc.reference.moves import Moves
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic, info, warning
 from toolpaths.units import DEG

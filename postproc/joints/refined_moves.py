@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from postproc.moves import Moves
+from postproc.reference.moves import Moves
 from toolpaths.arrays import Bools, Floats, Ints, as_slice, repeated, shared, taken
 from toolpaths.toolpath import Arcs, Kind
 

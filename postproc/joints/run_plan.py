@@ -9,14 +9,14 @@ import numpy as np
 
 from machines.kinematics.base import Kinematics
 from machines.machine import Machine
-from postproc.groups import groups
-from postproc.joint_path import reachable_axes
+from postproc.base.group_rows import groups
+from postproc.joints.joint_path import reachable_axes
 from postproc.joints.lattice import Run
 from postproc.joints.lead import Event, Led, lead_past, whole
 from postproc.joints.plan import Solution, Wishes, plan_runs
+from postproc.joints.refined_moves import Refined, cut, with_rewinds
 from postproc.joints.spin import held_joints
-from postproc.moves import Moves
-from postproc.refined import Refined, cut, with_rewinds
+from postproc.reference.moves import Moves
 from toolpaths.arrays import Bools, Floats, Ints, shared
 from toolpaths.shape import Curves
 from toolpaths.toolpath import Kind

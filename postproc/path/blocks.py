@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 
 from machines.kinematics.base import Kinematics
-from postproc.control import Control
-from postproc.joint_path import nearest_solution
-from postproc.linearise import family_turns, linearise
-from postproc.modes import WordFrame
-from postproc.moves import Moves, Phase
-from postproc.path_model import ARC, FEED, TRAVERSE
-from postproc.word_arcs import PLANE_COLUMNS, WordArcs, word_arcs
+from postproc.control.control import Control
+from postproc.control.modes import WordFrame
+from postproc.control.word_arcs import PLANE_COLUMNS, WordArcs, word_arcs
+from postproc.joints.joint_path import nearest_solution
+from postproc.path.linearise import family_turns, linearise
+from postproc.path.model import ARC, FEED, TRAVERSE
+from postproc.reference.moves import Moves, Phase
 from toolpaths.arrays import Array, Bools, Floats, Ints, joined, repeated, taken
 from toolpaths.rotations import angle_between
 from toolpaths.shape import Curves

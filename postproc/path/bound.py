@@ -17,7 +17,7 @@ from machines.kinematics import columns
 from machines.kinematics.base import Kinematics
 from machines.kinematics.jets import ZERO, Angle, Jet
 from machines.straight_blocks import in_blocks, pose_jets, tip_rule_jets
-from postproc.control import Control
+from postproc.control.control import Control
 from toolpaths.arrays import Bools, Floats
 from toolpaths.rotations import angle_between, cross, lengths
 from toolpaths.shape import Curves

@@ -7,22 +7,22 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-import postproc.joint_faults as joint_faults
-import postproc.path_faults as faults
+import postproc.joints.faults as joint_faults
+import postproc.path.faults as faults
 from machines.kinematics.base import Kinematics
 from machines.machine import Machine
-from postproc.blocks import LEG, Builder, add_run, rapid_codes
-from postproc.home_links import add_home_links
-from postproc.linearise import approached
-from postproc.links import Link, Pose, SafeSpace, plan_link
-from postproc.memory import give_back
-from postproc.modes import OutputModes, WordFrame
-from postproc.moves import Moves
-from postproc.path_model import FEED, TRAVERSE, Path
-from postproc.rewinds import Drawing
-from postproc.run_plan import RunPlan, plan_moves
-from postproc.solved_runs import Run, Runs, solved_runs
-from postproc.zero_entry import ZeroEntry, cost, needed, zero_entry
+from postproc.base.memory import give_back
+from postproc.control.modes import OutputModes, WordFrame
+from postproc.joints.run_plan import RunPlan, plan_moves
+from postproc.path.blocks import LEG, Builder, add_run, rapid_codes
+from postproc.path.home_links import add_home_links
+from postproc.path.linearise import approached
+from postproc.path.links import Link, Pose, SafeSpace, plan_link
+from postproc.path.model import FEED, TRAVERSE, Path
+from postproc.path.rewinds import Drawing
+from postproc.path.solved_runs import Run, Runs, solved_runs
+from postproc.path.zero_entry import ZeroEntry, cost, needed, zero_entry
+from postproc.reference.moves import Moves
 from toolpaths.arrays import Array, Floats, Ints, as_slice, taken
 from toolpaths.diagnostics import Diagnostic, has_errors
 from toolpaths.shape import Curves

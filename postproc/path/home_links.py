@@ -11,18 +11,18 @@ from itertools import pairwise
 
 import numpy as np
 
-import postproc.reach as reach
+import postproc.path.reach as reach
 from machines.kinematics.base import Kinematics
-from postproc.blocks import LEG, PARTS, Builder, rapid_codes
-from postproc.control import Control
-from postproc.groups import groups
-from postproc.joint_path import TRAVEL_SLACK, nearest_solution
-from postproc.linearise import linearise
-from postproc.links import LEG_TOLERANCE, RISE, SAMPLES, SafeSpace, has_retract_axis
-from postproc.modes import WordFrame
-from postproc.moves import Moves
-from postproc.path_model import TRAVERSE
-from postproc.solved_runs import Run, Runs
+from postproc.base.group_rows import groups
+from postproc.control.control import Control
+from postproc.control.modes import WordFrame
+from postproc.joints.joint_path import TRAVEL_SLACK, nearest_solution
+from postproc.path.blocks import LEG, PARTS, Builder, rapid_codes
+from postproc.path.linearise import linearise
+from postproc.path.links import LEG_TOLERANCE, RISE, SAMPLES, SafeSpace, has_retract_axis
+from postproc.path.model import TRAVERSE
+from postproc.path.solved_runs import Run, Runs
+from postproc.reference.moves import Moves
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.rotations import angle_between
 from toolpaths.shape import Curves

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from machines.kinematics.base import Kinematics
-from postproc.bound import Stretch, bounds
-from postproc.control import Control
-from postproc.joint_path import branch_of, nearest_solution, wrap
+from postproc.control.control import Control
+from postproc.joints.joint_path import branch_of, nearest_solution, wrap
+from postproc.path.bound import Stretch, bounds
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.rotations import angle_between
 from toolpaths.shape import Curves

@@ -10,14 +10,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-import postproc.reach as reach
+import postproc.path.reach as reach
 from machines.kinematics.base import Kinematics
 from machines.machine import Machine
-from postproc.control import Control
-from postproc.joint_path import TRAVEL_SLACK, nearest_solution
-from postproc.linearise import linearise
-from postproc.moves import Moves
-from postproc.setup import Placement, SetupFile
+from postproc.control.control import Control
+from postproc.joints.joint_path import TRAVEL_SLACK, nearest_solution
+from postproc.path.linearise import linearise
+from postproc.reference.moves import Moves
+from postproc.setup.model import Placement, SetupFile
 from toolpaths.arrays import Bools, Floats
 from toolpaths.rotations import angle_between
 from toolpaths.shape import Curves

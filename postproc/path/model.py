@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from postproc.control import Control
-from postproc.groups import groups
+from postproc.base.group_rows import groups
+from postproc.control.control import Control
+from postproc.control.modes import WordFrame
 from postproc.joints.lead import Event
-from postproc.modes import WordFrame
 from toolpaths.arrays import Array, Bools, Floats, Ints
 
 TRAVERSE, FEED, ARC = 0, 1, 2

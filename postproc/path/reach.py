@@ -14,9 +14,9 @@ from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.units import DEG
 
 if TYPE_CHECKING:
-    from postproc.control import Control
-    from postproc.moves import Moves
-    from postproc.path_model import Path
+    from postproc.control.control import Control
+    from postproc.path.model import Path
+    from postproc.reference.moves import Moves
 
 _SAMPLES = (0.25, 0.5, 0.75)
 _SLACK = 1e-5

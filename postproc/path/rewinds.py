@@ -13,11 +13,11 @@ import numpy as np
 
 from machines.kinematics.base import Kinematics
 from machines.machine import Machine
-from postproc.control import Control
+from postproc.control.control import Control
 from postproc.joints.plan import Wishes
-from postproc.links import Link, Pose, SafeSpace, plan_link
-from postproc.run_plan import Manner
-from postproc.setup import Placement, Rewind, SetupFile
+from postproc.joints.run_plan import Manner
+from postproc.path.links import Link, Pose, SafeSpace, plan_link
+from postproc.setup.model import Placement, Rewind, SetupFile
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.units import DEG

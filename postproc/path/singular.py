@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from machines.singular_distance import NAMES, has_singular_distance, singular_distance_between
-from postproc.control import Control
-from postproc.moves import Moves
-from postproc.path_model import Path
+from postproc.control.control import Control
+from postproc.path.model import Path
+from postproc.reference.moves import Moves
 from toolpaths.diagnostics import Diagnostic, error, info
 
 

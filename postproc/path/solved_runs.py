@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-import postproc.path_faults as faults
+import postproc.path.faults as faults
 from machines.kinematics.base import Kinematics
-from postproc.modes import CONSTANT, OutputModes, WordFrame, turning_run
-from postproc.run_plan import RunPlan
+from postproc.control.modes import CONSTANT, OutputModes, WordFrame, turning_run
+from postproc.joints.run_plan import RunPlan
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.diagnostics import Diagnostic, has_errors
 from toolpaths.rotations import angle_between

@@ -7,12 +7,12 @@ from collections.abc import Callable
 import numpy as np
 
 from machines.kinematics.base import Kinematics
-from postproc.control import Control
-from postproc.groups import groups
-from postproc.joint_path import TRAVEL_SLACK
-from postproc.moves import Moves
-from postproc.path_model import ARC, Path
-from postproc.word_arcs import PLANE_COLUMNS
+from postproc.base.group_rows import groups
+from postproc.control.control import Control
+from postproc.control.word_arcs import PLANE_COLUMNS
+from postproc.joints.joint_path import TRAVEL_SLACK
+from postproc.path.model import ARC, Path
+from postproc.reference.moves import Moves
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.units import DEG

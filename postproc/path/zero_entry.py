@@ -15,9 +15,9 @@ import numpy as np
 
 from machines.kinematics.base import Kinematics
 from machines.machine import Machine
-from postproc.control import Control
-from postproc.links import Link, SafeSpace, stays_clear
-from postproc.modes import table_axes
+from postproc.control.control import Control
+from postproc.control.modes import table_axes
+from postproc.path.links import Link, SafeSpace, stays_clear
 from toolpaths.arrays import Bools, Floats
 from toolpaths.diagnostics import Diagnostic, info
 from toolpaths.units import DEG

@@ -8,18 +8,18 @@ from pathlib import Path as FilePath
 
 from machines.loader import load as load_machine
 from machines.machine import Machine
+from postproc.base.options import Options
 from postproc.controllers.model import ControllerFile, load_controller
-from postproc.job import prepare
-from postproc.options import Options
-from postproc.readback.files import Beside, unfinished
-from postproc.readback.verify import other_axes, other_setup, read_back
-from postproc.result import PostResult, VerifyResult
-from postproc.second_witness import second_witness
-from postproc.setup import SetupFile, load_setup
-from postproc.setup_fingerprint import fingerprint
-from postproc.setup_system import standing
-from postproc.smoothed_stages import with_passes_taken_back
-from postproc.stages import Progress, staged
+from postproc.job.job import prepare
+from postproc.pipeline.result import PostResult, VerifyResult
+from postproc.pipeline.smoothed_stages import with_passes_taken_back
+from postproc.pipeline.stages import Progress, staged
+from postproc.setup.fingerprint import fingerprint
+from postproc.setup.model import SetupFile, load_setup
+from postproc.setup.system import standing
+from postproc.verification.files_beside import Beside, unfinished
+from postproc.verification.read_back import other_axes, other_setup, read_back
+from postproc.verification.second_witness import second_witness
 from toolpaths.diagnostics import Diagnostic, DiagnosticError, has_errors, require
 from toolpaths.input_files import read_input, unreadable
 from toolpaths.toolpath import Toolpath
@@ -75,8 +75,8 @@ def _oriented(start: PostResult, progress: Progress | None) -> tuple[PostResult,
     """With the tool axes that --orient asks for, where the path can be read at all; its program where that is known."""
     if start.options.orient == "keep" or not start.ok:
         return start, None
-    from postproc.orientation.programs import oriented, written
-    from postproc.orientation.report import slower
+    from postproc.orientation.report.figures_of_choice import slower
+    from postproc.pipeline.oriented import oriented, written
 
     start, program = oriented(start, _stages, progress)
     if start.choice is not None:
@@ -88,7 +88,7 @@ def choose_axes(path: Toolpath, machine: Machine, controller: str | FilePath, op
                 diagnostics: list[Diagnostic], progress: Progress | None = None) -> PostResult:
     """The tool axes of a path as `options.orient` has them, in `choice` (None where an ERROR stands against them), proved by
     the program for a controller; arguments and errors as of `convert`."""
-    from postproc.orientation.programs import oriented
+    from postproc.pipeline.oriented import oriented
 
     spec, machine, setup, options = _loaded(controller, machine, None, options)
     start = _begun(path, machine, controller, spec, setup, options, _reading(path, diagnostics))

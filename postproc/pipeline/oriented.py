@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from postproc.options import Options
-from postproc.orientation.choice import OrientationChoice
-from postproc.orientation.orient import bettered, planned_choice, unsolved
-from postproc.orientation.proved import proved
-from postproc.orientation.rounds import Progress
-from postproc.result import PostResult
+from postproc.base.options import Options
+from postproc.orientation.passes.rounds import Progress
+from postproc.orientation.plans.choice import OrientationChoice
+from postproc.orientation.plans.orient import bettered, planned_choice, unsolved
+from postproc.pipeline.proved_axes import proved
+from postproc.pipeline.result import PostResult
 
 Stages = Callable[[PostResult, Progress | None], PostResult]
 

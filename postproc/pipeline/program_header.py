@@ -6,12 +6,12 @@ from pathlib import Path as FilePath
 
 import numpy as np
 
-from postproc.header_words import FEEDS, FINGERPRINT, PENDING, UNKNOWN
-from postproc.job import Job
-from postproc.modes import table_axes
-from postproc.program import Program
-from postproc.stage_values import Compiled
-from postproc.version import VERSION
+from postproc.base.header_words import FEEDS, FINGERPRINT, PENDING, UNKNOWN
+from postproc.base.version import VERSION
+from postproc.compile.program import Program
+from postproc.control.modes import table_axes
+from postproc.job.job import Job
+from postproc.pipeline.stage_values import Compiled
 
 
 def header_lines(made: Compiled) -> list[str]:
@@ -82,7 +82,7 @@ def _orientations(made: Compiled) -> list[str]:
     """Header lines that say which tool axes were chosen."""
     if made.choice is None:
         return []
-    from postproc.orientation.text import header
+    from postproc.orientation.report.text import header
 
     return header(made.choice, made.options.orient)
 
@@ -94,7 +94,7 @@ def _corrections(made: Compiled) -> list[str]:
     name = made.job.errors.name
     if made.compensation is None:
         return [f"geometric errors {name}: corrected by the control, not in this program"]
-    from machines.geometric_error.fingerprint import fingerprint
+    from machines.geometric_error.files.fingerprint import fingerprint
 
     return [f"geometric errors {name}: corrected in this program; the control must not correct them again",
             "they are corrected for this work offset and these gauge lengths: convert again for others",

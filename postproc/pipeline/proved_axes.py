@@ -11,11 +11,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from postproc.options import Orientation
-from postproc.orientation.choice import OrientationChoice, Proof
-from postproc.orientation.passes import Work
-from postproc.orientation.plans import OrientationPlan, plans_of
-from postproc.result import PostResult
+from postproc.base.options import Orientation
+from postproc.orientation.passes.passes import Work
+from postproc.orientation.plans.choice import OrientationChoice, Proof
+from postproc.orientation.plans.plans import OrientationPlan, plans_of
+from postproc.pipeline.result import PostResult
 from toolpaths.arrays import Ints
 from toolpaths.diagnostics import Diagnostic, Severity, info, warning
 
@@ -110,7 +110,7 @@ def _blame(choice: OrientationChoice, program: PostResult) -> _Blame:
 def _touched(work: Work, program: PostResult) -> _Blame:
     """Every way and pass on which a tool touches something."""
     from postproc.collision.program import touching_parts
-    from postproc.readback.poses import Executed, poses_before
+    from postproc.readback.execution.poses import Executed, poses_before
 
     job, comparison = program.job, program.comparison
     assert job is not None and comparison is not None and comparison.executed is not None

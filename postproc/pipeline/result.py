@@ -6,23 +6,23 @@ from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any
 
 from machines.machine import Machine
+from postproc.base.options import Options
+from postproc.compile.feed import Feeds
+from postproc.compile.program import Program
 from postproc.controllers.model import ControllerFile
-from postproc.feed import Feeds
-from postproc.job import Job
-from postproc.moves import Moves
-from postproc.options import Options
-from postproc.path_model import Path
-from postproc.planned import PlannedMotion
-from postproc.program import Program
-from postproc.readback.compare import Comparison
-from postproc.setup import SetupFile
+from postproc.job.job import Job
+from postproc.path.model import Path
+from postproc.planning.planned import PlannedMotion
+from postproc.readback.comparison.compare import Comparison
+from postproc.reference.moves import Moves
+from postproc.setup.model import SetupFile
 from toolpaths.diagnostics import Diagnostic, has_errors
 from toolpaths.toolpath import ClSource, Toolpath
 
 if TYPE_CHECKING:
-    from postproc.compensation import Compensation
-    from postproc.corrected.formatted import AfterFormatting
-    from postproc.orientation.choice import OrientationChoice
+    from postproc.correction.compensation import Compensation
+    from postproc.correction.formatted import AfterFormatting
+    from postproc.orientation.plans.choice import OrientationChoice
     from postproc.witness.evidence import Testimony
 
 

@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from postproc.job import Job
-from postproc.moves import Moves
-from postproc.pass_geometry import stops_of
-from postproc.result import PostResult
-from postproc.smoothed_moves import Smoothed, smoothed_moves
+from postproc.job.job import Job
+from postproc.pipeline.result import PostResult
+from postproc.planning.pass_geometry import stops_of
+from postproc.planning.smoothed_moves import Smoothed, smoothed_moves
+from postproc.reference.moves import Moves
 from toolpaths.arrays import Ints
 from toolpaths.diagnostics import Diagnostic, Severity, info, warning
 from toolpaths.smoothing.smooth import Tolerance

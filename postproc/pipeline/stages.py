@@ -10,31 +10,21 @@ from dataclasses import dataclass, replace
 from pathlib import Path as FilePath
 from typing import Any
 
-from postproc.compile import compile_program, writing_of
-from postproc.controllers.unwritable import unwritable
-from postproc.controllers.writers import writer_for
-from postproc.feed import Planned as PlannedFeeds
-from postproc.job import Job, prepare
-from postproc.moves import Moves
-from postproc.not_canned import only_canned
-from postproc.pass_geometry import stops_of
-from postproc.path import build_path
-from postproc.path_model import Path
-from postproc.planned import PlannedMotion, Source, planned_motion
-from postproc.planned_errors import PlannedCorrection, on_written, planned_correction
-from postproc.program_header import header_lines
-from postproc.proof.text import with_statement
-from postproc.reach import check_reach
-from postproc.readback.slow import with_fingerprint
-from postproc.readback.verify import read_back
-from postproc.result import PostResult, shared_fields
-from postproc.rewinds import drawing_of
-from postproc.second_witness import second_witness
-from postproc.setup import SetupFile
-from postproc.setup_system import with_system
-from postproc.singular import check_singular
-from postproc.smoothed_stages import Left, written_moves
-from postproc.stage_values import (
+from postproc.compile.compile import compile_program, writing_of
+from postproc.compile.cycle_refusals import only_canned
+from postproc.compile.feed import Planned as PlannedFeeds
+from postproc.compile.word_rows import block_tools
+from postproc.job.job import Job, prepare
+from postproc.path.build import build_path
+from postproc.path.model import Path
+from postproc.path.reach import check_reach
+from postproc.path.rewinds import drawing_of
+from postproc.path.singular import check_singular
+from postproc.path.travel import check_travel
+from postproc.pipeline.program_header import header_lines
+from postproc.pipeline.result import PostResult, shared_fields
+from postproc.pipeline.smoothed_stages import Left, written_moves
+from postproc.pipeline.stage_values import (
     Begun,
     Checked,
     Compiled,
@@ -48,9 +38,19 @@ from postproc.stage_values import (
     Written,
     handed_on,
 )
-from postproc.tolerance_shares import tolerance_shares
-from postproc.travel import check_travel
-from postproc.word_rows import block_tools
+from postproc.pipeline.tolerance_shares import tolerance_shares
+from postproc.planning.pass_geometry import stops_of
+from postproc.planning.planned import PlannedMotion, Source, planned_motion
+from postproc.planning.planned_errors import PlannedCorrection, on_written, planned_correction
+from postproc.readback.comparison.slow import with_fingerprint
+from postproc.reference.moves import Moves
+from postproc.setup.model import SetupFile
+from postproc.setup.system import with_system
+from postproc.verification.proof_text import with_statement
+from postproc.verification.read_back import read_back
+from postproc.verification.second_witness import second_witness
+from postproc.writing.unwritable import unwritable
+from postproc.writing.writers import writer_for
 from toolpaths.diagnostics import Diagnostic, error, has_errors
 from toolpaths.smoothing.smooth import Tolerance
 from toolpaths.units import DEG
@@ -140,7 +140,7 @@ def corrected(made: Solved, progress: Progress | None) -> tuple[Solved | Correct
     job, path = made.job, made.path
     if job.errors is None or job.errors.corrected_by != "post":
         return handed_on(Corrected, made, nominal=None, compensation=None), []
-    from postproc.compensation import compensate
+    from postproc.correction.compensation import compensate
 
     options, file, moves = made.options, made.toolpath.file, made.moves
     far = check_travel(path, job.moves, job.control, job.kinematics, file)[0]
@@ -231,7 +231,7 @@ def verified(made: Written, progress: Progress | None) -> tuple[Verified, Found]
     value = handed_on(Verified, made, comparison=comparison, witness=witness, after_formatting=None)
     if made.compensation is None:
         return value, found
-    from postproc.corrected.proof import after_formatting, beyond_bound
+    from postproc.verification.errors_left import after_formatting, beyond_bound
 
     left = after_formatting(value)
     return replace(value, after_formatting=left), [*found, *beyond_bound(left, job)]

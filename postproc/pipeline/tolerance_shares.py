@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from postproc.job import Job
-from postproc.rounding import rounding_problem
+from postproc.job.job import Job
+from postproc.job.rounding import rounding_problem
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.units import DEG
 
@@ -26,7 +26,7 @@ def tolerance_shares(job: Job) -> tuple[dict[str, float], list[Diagnostic]]:
               "linearising": MARGIN * (tolerance - smoothing - bound.tip),
               "axis_linearising": MARGIN * (axis - axis_smoothing - bound.axis / DEG)}
     if job.errors is not None and job.errors.corrected_by == "post":
-        from postproc.compensation import SHARE
+        from postproc.correction.compensation import SHARE
 
         shares |= {"geometric_errors": SHARE * tolerance, "axis_geometric_errors": SHARE * axis}
         for name in ("linearising", "axis_linearising"):

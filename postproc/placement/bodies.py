@@ -16,12 +16,12 @@ import numpy as np
 from postproc.collision.bodies import Scene, scene
 from postproc.collision.form import Form
 from postproc.collision.mesh import load_mesh
-from postproc.collision.passes import PassBodies, forms_of
 from postproc.collision.solid import Solid, solid
-from postproc.orientation.passes import Work
-from postproc.setup import Placement, SetupFile
-from postproc.setup_bodies import Bodies
-from postproc.setup_bodies import Solid as Given
+from postproc.orientation.passes.pass_bodies import PassBodies, forms_of
+from postproc.orientation.passes.passes import Work
+from postproc.setup.bodies import Bodies
+from postproc.setup.bodies import Solid as Given
+from postproc.setup.model import Placement, SetupFile
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic, has_errors
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from postproc.links import safe_space
-from postproc.orientation.passes import Pass, Stretch, Work
-from postproc.setup import Placement
+from postproc.orientation.passes.passes import Pass, Stretch, Work
+from postproc.path.links import safe_space
+from postproc.setup.model import Placement
 
 
 def moved(work: Work, placement: Placement) -> Work:

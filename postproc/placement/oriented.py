@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from postproc.options import Options
-from postproc.orientation.choice import OrientationChoice
-from postproc.orientation.orient import orient
-from postproc.orientation.passes import Work
+from postproc.base.options import Options
+from postproc.orientation.passes.passes import Work
+from postproc.orientation.plans.choice import OrientationChoice
+from postproc.orientation.plans.orient import orient
 from postproc.placement.bodies import Beside
 from postproc.placement.space import Space
 from postproc.placement.timed import Timer, Tried, extents
-from postproc.setup import SetupFile
+from postproc.setup.model import SetupFile
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Severity
 

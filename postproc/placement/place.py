@@ -9,18 +9,18 @@ from pathlib import Path
 import numpy as np
 
 from machines.machine import Machine
+from postproc.base.options import Options
 from postproc.controllers.model import load_controller
-from postproc.job import prepare
-from postproc.links import safe_space
-from postproc.options import Options
-from postproc.orientation.passes import Work, work_of
+from postproc.job.job import prepare
+from postproc.orientation.passes.passes import Work, work_of
+from postproc.path.links import safe_space
 from postproc.placement.bodies import beside
 from postproc.placement.oriented import OrientedTimer
 from postproc.placement.search import Found, Progress, Search
 from postproc.placement.space import ANGLES, Space, space_of
 from postproc.placement.timed import Timer, Tried
-from postproc.setup import PartPlacement, SetupFile, part_placement
-from postproc.setup_system import standing
+from postproc.setup.model import PartPlacement, SetupFile, part_placement
+from postproc.setup.system import standing
 from toolpaths.diagnostics import Diagnostic, error, has_errors, info, require, warning
 from toolpaths.toolpath import Toolpath
 from toolpaths.units import DEG
@@ -192,7 +192,7 @@ class _Proof:
 
     def of(self, one: Tried) -> tuple[float, Diagnostic | None]:
         """Seconds of the program there (NaN where none is written), and the worst that stands against it."""
-        from postproc.pipeline import convert
+        from postproc.pipeline.convert import convert
         from postproc.placement.program import program_seconds
 
         if id(one) not in self.done:

@@ -8,7 +8,7 @@ from postproc.cycle_time.estimate import estimate
 from postproc.cycle_time.model import load_model
 from postproc.cycle_time.planned import planned_times
 from postproc.cycle_time.source import from_conversion
-from postproc.result import PostResult
+from postproc.pipeline.result import PostResult
 from toolpaths.diagnostics import require
 
 

@@ -18,12 +18,12 @@ from machines.kinematics.base import Kinematics
 from machines.machine import Machine
 from machines.singular_distance import NAMES as SINGULAR
 from machines.singular_distance import has_singular_distance, singular_distance
-from postproc.orientation.passes import Work
-from postproc.orientation.timed import Turned, turned
-from postproc.orientation.turns import ends
+from postproc.orientation.candidates.timed import Turned, turned
+from postproc.orientation.passes.passes import Work
+from postproc.orientation.plans.turns import ends
+from postproc.path.reach import is_checked
 from postproc.placement.moved import moved
 from postproc.placement.space import ANGLES, Space
-from postproc.reach import is_checked
 from toolpaths.arrays import Floats, Ints
 from toolpaths.units import DEG
 

@@ -12,8 +12,8 @@ from itertools import product
 
 import numpy as np
 
-from postproc.setup import PartPlacement, Placement
-from postproc.setup_place import PlaceBox, PlacementLimits
+from postproc.setup.model import PartPlacement, Placement
+from postproc.setup.place import PlaceBox, PlacementLimits
 from toolpaths.arrays import Floats
 from toolpaths.rotations import rotation
 from toolpaths.units import DEG

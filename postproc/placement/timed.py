@@ -11,11 +11,11 @@ import numpy as np
 from machines.machine import Machine
 from machines.singular_distance import NAMES as SINGULAR
 from machines.singular_distance import has_singular_distance, singular_distance
-from postproc.orientation.choose import seconds
-from postproc.orientation.passes import Work
-from postproc.orientation.ranking import prepare
-from postproc.orientation.timed import Turned, turned
-from postproc.orientation.turns import Ends, ends, ways_between
+from postproc.orientation.candidates.ranking import prepare
+from postproc.orientation.candidates.timed import Turned, turned
+from postproc.orientation.passes.passes import Work
+from postproc.orientation.plans.choose import seconds
+from postproc.orientation.plans.turns import Ends, ends, ways_between
 from postproc.placement.bodies import Beside
 from postproc.placement.moved import moved
 from postproc.placement.space import Space

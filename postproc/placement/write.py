@@ -7,8 +7,8 @@ from operator import getitem
 from pathlib import Path
 from typing import Any
 
-from postproc.setup import PartPlacement
-from postproc.setup_files import file_keys, renamed
+from postproc.setup.files import file_keys, renamed
+from postproc.setup.model import PartPlacement
 from toolpaths.input_files import read_input
 
 

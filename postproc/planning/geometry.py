@@ -15,10 +15,10 @@ import numpy as np
 from scipy.interpolate import BSpline, make_interp_spline
 
 from machines.kinematics.base import Kinematics
-from postproc.feedrate.geometry_poles import near_poles, past_poles
-from postproc.feedrate.geometry_sites import sites
 from postproc.feedrate.paths import Derivatives, SplinePath
-from postproc.joint_path import nearest_solution
+from postproc.joints.joint_path import nearest_solution
+from postproc.planning.geometry_poles import near_poles, past_poles
+from postproc.planning.geometry_sites import sites
 from toolpaths.arrays import Array, Bools, Floats
 from toolpaths.rotations import angle_between
 from toolpaths.smoothing.smooth import Smooth

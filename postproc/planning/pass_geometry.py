@@ -13,10 +13,10 @@ from itertools import groupby, islice, pairwise
 import numpy as np
 
 from machines.kinematics.base import Kinematics
-from postproc.feedrate.geometry import MachinePath, Stretch, machine_paths
-from postproc.moves import Moves
-from postproc.path_model import TRAVERSE, Path
-from postproc.planned_errors import PlannedCorrection
+from postproc.path.model import TRAVERSE, Path
+from postproc.planning.geometry import MachinePath, Stretch, machine_paths
+from postproc.planning.planned_errors import PlannedCorrection
+from postproc.reference.moves import Moves
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.rotations import angle_between

@@ -16,11 +16,11 @@ from postproc.feedrate.motion import Plan
 from postproc.feedrate.plan import Options, plan, plan_second_order
 from postproc.feedrate.shares import Shares
 from postproc.feedrate.trajectory import JointTrajectory
-from postproc.moves import Moves
-from postproc.pass_geometry import PassGeometry, pass_geometry
-from postproc.path_model import Path
-from postproc.planned_errors import PlannedCorrection
-from postproc.steady_feed import CORNER, steady_seconds
+from postproc.path.model import Path
+from postproc.planning.pass_geometry import PassGeometry, pass_geometry
+from postproc.planning.planned_errors import PlannedCorrection
+from postproc.planning.steady_feed import CORNER, steady_seconds
+from postproc.reference.moves import Moves
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, DiagnosticError, error, require
 from toolpaths.smoothing.blend import SHARPEST

@@ -7,17 +7,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from machines.geometric_error.correction import correct
-from machines.geometric_error.model import ErrorModel
+from machines.geometric_error.actual.correction import correct
+from machines.geometric_error.actual.model import ErrorModel
 from machines.kinematics.base import Kinematics
-from postproc.feedrate.geometry import MachinePath
-from postproc.looks import changes
-from postproc.path_model import Path
+from postproc.correction.error_sampling import changes
+from postproc.path.model import Path
+from postproc.planning.geometry import MachinePath
 from toolpaths.arrays import Floats, Ints
 
 if TYPE_CHECKING:
-    from postproc.compensation import Compensation
-    from postproc.job import Job
+    from postproc.correction.compensation import Compensation
+    from postproc.job.job import Job
 
 SEEN = 3.0
 """sites while an error runs one way, at the least"""

@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from postproc.moves import Moves
-from postproc.pass_geometry import chains
+from postproc.planning.pass_geometry import chains
+from postproc.reference.moves import Moves
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.smoothing.smooth import STILL, Smooth, Tolerance, smooth_all
 

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from postproc.feedrate.geometry import DEGREE, MachinePath
 from postproc.feedrate.limits import JointLimits
-from postproc.pass_geometry import PassGeometry
+from postproc.planning.geometry import DEGREE, MachinePath
+from postproc.planning.pass_geometry import PassGeometry
 from toolpaths.arrays import Floats
 
 CORNER = 0.2

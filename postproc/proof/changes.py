@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from postproc.base.version import VERSION
+from postproc.pipeline.result import VerifyResult
 from postproc.proof.file import AGAIN, ENDING, HashedFile, ProofFile, options_of, read_proof
 from postproc.proof.hashes import FileHash, Hashes, sha256
-from postproc.result import VerifyResult
-from postproc.version import VERSION
 from toolpaths.diagnostics import Diagnostic, Severity, error, info, warning
 from toolpaths.input_files import STANDARD_INPUT, is_regular, read_input
 

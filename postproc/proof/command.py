@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from postproc.options import Options
+from postproc.base.options import Options
+from postproc.pipeline.result import PostResult, VerifyResult
 from postproc.proof.changes import Kept, compared, proof_place
 from postproc.proof.file import proof_text
 from postproc.proof.hashes import Hashes, input_hashes
-from postproc.result import PostResult, VerifyResult
 from toolpaths.diagnostics import Diagnostic, DiagnosticError, error, warning
 from toolpaths.input_files import is_regular, reason, shown
 

@@ -9,11 +9,11 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from postproc.base.version import VERSION
+from postproc.pipeline.result import PostResult
 from postproc.proof.hashes import FileHash, Hashes, sha256
-from postproc.proof.text import statement
-from postproc.readback.compare import Comparison
-from postproc.result import PostResult
-from postproc.version import VERSION
+from postproc.readback.comparison.compare import Comparison
+from postproc.verification.proof_text import statement
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.input_files import read_input, unreadable
 from toolpaths.toolpath import Records

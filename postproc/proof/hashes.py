@@ -10,9 +10,9 @@ from typing import Any
 
 from machines.loader import builtin
 from machines.user_file import UserFile, base_chain, read_toml
+from postproc.base.options import Options
 from postproc.controllers.model import builtin_files
-from postproc.options import Options
-from postproc.setup_files import file_keys, seen_from_here, value_at
+from postproc.setup.files import file_keys, seen_from_here, value_at
 from toolpaths.input_files import read_input
 
 Hashes = tuple["FileHash", ...]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from postproc.controllers.spelling import Codes
-from postproc.events import state_at, words
+from postproc.reference.events import state_at, words
 from toolpaths.arrays import Ints
 from toolpaths.toolpath import Toolpath
 

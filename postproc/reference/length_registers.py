@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from postproc.controllers.model import ControllerFile
-from postproc.events import TOOL_WORDS, ToolChange, tool_loads
+from postproc.reference.events import TOOL_WORDS, ToolChange, tool_loads
 from toolpaths.diagnostics import Diagnostic, error, info, warning
 from toolpaths.toolpath import Event, Toolpath
 

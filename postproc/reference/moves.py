@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 
 from machines.kinematics.frames import spin_about, tool_x
-from postproc.events import tool_changes
-from postproc.holes import Phase as Phase
-from postproc.holes import hole_legs
-from postproc.setup import Placement, SetupFile
-from postproc.stated_feeds import feeds_of
+from postproc.reference.events import tool_changes
+from postproc.reference.holes import Phase as Phase
+from postproc.reference.holes import hole_legs
+from postproc.reference.stated_feeds import feeds_of
+from postproc.setup.model import Placement, SetupFile
 from toolpaths.arrays import Array, Bools, Floats, Ints, as_slice, repeated, shared, taken
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.rotations import angle_between

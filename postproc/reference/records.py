@@ -13,9 +13,9 @@ from dataclasses import replace
 import numpy as np
 
 from postproc.controllers.model import ControllerFile
-from postproc.coolant import COMMANDS, LABELS, asked, coolant_words, written
-from postproc.events import Spindle, numbers, speed_said, spindle_after, spindle_states, words
-from postproc.tool_numbers import Report, check_numbers
+from postproc.reference.coolant import COMMANDS, LABELS, asked, coolant_words, written
+from postproc.reference.events import Spindle, numbers, speed_said, spindle_after, spindle_states, words
+from postproc.reference.tool_numbers import Report, check_numbers
 from toolpaths.diagnostics import Diagnostic, Severity
 from toolpaths.toolpath import Event, Toolpath
 from toolpaths.units import PER_MINUTE

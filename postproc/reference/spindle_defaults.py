@@ -8,9 +8,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from postproc.events import TOOL_WORDS, Spindle, cutting, numbers, speed_said, spindle_after, spindle_states, words
-from postproc.setup import SetupFile, ToolSetup
-from postproc.setup_spindle import CoolantKind, SpindleSetup
+from postproc.reference.events import TOOL_WORDS, Spindle, cutting, numbers, speed_said, spindle_after, spindle_states, words
+from postproc.setup.model import SetupFile, ToolSetup
+from postproc.setup.spindle import CoolantKind, SpindleSetup
 from toolpaths.arrays import Bools, Ints
 from toolpaths.diagnostics import Diagnostic, error, info
 from toolpaths.toolpath import Event, Toolpath

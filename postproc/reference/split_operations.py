@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from postproc.events import compensation_states, words
+from postproc.reference.events import compensation_states, words
 from toolpaths.arrays import Bools, Ints
 from toolpaths.diagnostics import Diagnostic, warning
 from toolpaths.toolpath import Kind, Role, Toolpath

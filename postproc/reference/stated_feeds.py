@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from postproc.events import spindle_speed
+from postproc.reference.events import spindle_speed
 from toolpaths.arrays import Array, Bools, Floats
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.toolpath import FeedMode, Kind, Role, Toolpath

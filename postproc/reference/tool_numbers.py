@@ -8,10 +8,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from postproc.events import TOOL_WORDS, cutting, loaded_tools
-from postproc.setup import SetupFile
-from postproc.tools_alike import differ
-from postproc.unnumbered_tools import measured, named_by, with_loads, with_tools, without_number
+from postproc.reference.events import TOOL_WORDS, cutting, loaded_tools
+from postproc.reference.tools_alike import differ
+from postproc.reference.unnumbered_tools import measured, named_by, with_loads, with_tools, without_number
+from postproc.setup.model import SetupFile
 from toolpaths.arrays import Ints
 from toolpaths.diagnostics import Diagnostic, Severity, error, info
 from toolpaths.toolpath import Event, Kind, Tool, Toolpath

@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from postproc.events import TOOL_WORDS, cutting, numbers
-from postproc.setup import SetupFile
-from postproc.tools_alike import differ, differ_in_length
+from postproc.reference.events import TOOL_WORDS, cutting, numbers
+from postproc.reference.tools_alike import differ, differ_in_length
+from postproc.setup.model import SetupFile
 from toolpaths.arrays import Array, Bools
 from toolpaths.diagnostics import Diagnostic, error, info
 from toolpaths.toolpath import Event, Role, Tool, Toolpath

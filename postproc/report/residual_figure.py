@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from postproc.residuals import ARCSEC, UM, Residuals
+from postproc.report.residuals import ARCSEC, UM, Residuals
 from toolpaths.arrays import Floats, Ints
 from toolpaths.drawing import image
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from postproc.residuals import as_csv, residuals, title
-from postproc.result import PostResult
+from postproc.pipeline.result import PostResult
+from postproc.report.residuals import as_csv, residuals, title
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.drawing import FORMATS
 
@@ -20,7 +20,7 @@ def contents(result: PostResult, endings: list[str]) -> tuple[list[str | bytes],
     found = residuals(result) if result.ok else None
     if found is None:
         return [], [no_field(result.options.error_model)] if result.ok else []
-    from postproc.residual_figure import residual_figure
+    from postproc.report.residual_figure import residual_figure
 
     return [as_csv(found, result) if ending == ".csv" else residual_figure(found, title(result), ending)
             for ending in endings], []

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from postproc.events import cutting, spindle_states
-from postproc.proof.text import statement
-from postproc.readback.compare import Comparison
-from postproc.result import PostResult, VerifyResult
+from postproc.pipeline.result import PostResult, VerifyResult
+from postproc.readback.comparison.compare import Comparison
+from postproc.reference.events import cutting, spindle_states
+from postproc.verification.proof_text import statement
 from postproc.witness.evidence import Testimony
 from toolpaths.diagnostics import Severity
 from toolpaths.input_files import there_is
@@ -111,7 +111,7 @@ def _orientation(result: PostResult) -> dict[str, Any] | None:
     """The tool axes that were chosen; None where those of the CL file are kept."""
     if result.choice is None:
         return None
-    from postproc.orientation.report import chosen
+    from postproc.orientation.report.figures_of_choice import chosen
 
     return chosen(result.choice, result.options.orient)
 

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from postproc.coolant import coolant_states, label
-from postproc.events import spindle_states
-from postproc.options import Orientation
-from postproc.readback.canonical import in_files
-from postproc.readback.compare import Comparison
-from postproc.result import PostResult
-from postproc.stages import STAGES
-from postproc.word_arcs import PLANE_AXIS
+from postproc.base.options import Orientation
+from postproc.control.word_arcs import PLANE_AXIS
+from postproc.pipeline.result import PostResult
+from postproc.pipeline.stages import STAGES
+from postproc.readback.comparison.compare import Comparison
+from postproc.readback.text.canonical import in_files
+from postproc.reference.coolant import coolant_states, label
+from postproc.reference.events import spindle_states
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.input_files import check_input
@@ -23,7 +23,7 @@ from toolpaths.toolpath import Kind, Role
 from toolpaths.units import DEG
 
 if TYPE_CHECKING:
-    from postproc.orientation.choice import OrientationChoice
+    from postproc.orientation.plans.choice import OrientationChoice
 
 
 def trace_line(result: PostResult, line: int) -> tuple[dict[str, Any], list[Diagnostic]]:

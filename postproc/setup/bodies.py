@@ -7,7 +7,7 @@ from typing import Literal
 from pydantic import Field, model_validator
 
 from machines.user_file import UserModel
-from postproc.setup_place import PlaceBox
+from postproc.setup.place import PlaceBox
 
 Units = Literal["mm", "inch"]
 

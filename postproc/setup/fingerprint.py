@@ -6,8 +6,8 @@ import hashlib
 import json
 from pathlib import Path
 
-from postproc.setup import SetupFile
-from postproc.setup_files import file_keys, value_at
+from postproc.setup.files import file_keys, value_at
+from postproc.setup.model import SetupFile
 from toolpaths.input_files import read_input
 
 DIGITS = 8

@@ -10,11 +10,11 @@ import numpy as np
 from pydantic import Field
 
 from machines.user_file import UserModel, read_toml, validate
-from postproc.setup_bodies import Bodies, ToolBody
-from postproc.setup_files import seen_from_here
-from postproc.setup_orientation import OrientationLimits
-from postproc.setup_place import PlacementLimits
-from postproc.setup_spindle import CoolantKind, SpindleSetup
+from postproc.setup.bodies import Bodies, ToolBody
+from postproc.setup.files import seen_from_here
+from postproc.setup.orientation import OrientationLimits
+from postproc.setup.place import PlacementLimits
+from postproc.setup.spindle import CoolantKind, SpindleSetup
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.toolpath import Frame, Toolpath

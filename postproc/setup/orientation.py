@@ -7,7 +7,7 @@ from typing import Annotated
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from machines.user_file import UserModel
-from postproc.setup_ranges import pair
+from postproc.setup.ranges import pair
 
 Angle = Annotated[float, Field(ge=-90.0, le=90.0)]
 

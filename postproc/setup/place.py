@@ -7,7 +7,7 @@ from typing import Annotated
 from pydantic import BeforeValidator, Field, model_validator
 
 from machines.user_file import UserModel
-from postproc.setup_ranges import pair
+from postproc.setup.ranges import pair
 
 Place = Annotated[tuple[float, float, float], Field(description="x, y, z")]
 Range = Annotated[tuple[float, float], BeforeValidator(pair), Field(description="least, greatest")]

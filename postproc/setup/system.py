@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from postproc.setup import PartPlacement, Placement, SetupFile, part_placement, system_of, work_frame
+from postproc.setup.model import PartPlacement, Placement, SetupFile, part_placement, system_of, work_frame
 from toolpaths.diagnostics import Diagnostic, Severity, info
 from toolpaths.toolpath import Frame, Toolpath
 from toolpaths.units import DEG

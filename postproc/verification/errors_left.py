@@ -7,16 +7,16 @@ from typing import Protocol
 
 import numpy as np
 
-from postproc.compensation import Compensation
-from postproc.corrected.formatted import AfterFormatting
-from postproc.corrected.runs import Runs
-from postproc.groups import groups
-from postproc.holes import Phase
-from postproc.job import Job
-from postproc.moves import Moves
-from postproc.path_model import Path
-from postproc.readback.compare import Comparison
-from postproc.rounding import decimals
+from postproc.base.group_rows import groups
+from postproc.correction.compensation import Compensation
+from postproc.correction.formatted import AfterFormatting
+from postproc.correction.runs import Runs
+from postproc.job.job import Job
+from postproc.job.rounding import decimals
+from postproc.path.model import Path
+from postproc.readback.comparison.compare import Comparison
+from postproc.reference.holes import Phase
+from postproc.reference.moves import Moves
 from toolpaths.arrays import Bools, Ints
 from toolpaths.diagnostics import Diagnostic, warning
 from toolpaths.rotations import angle_between

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import math
 
+from postproc.base.header_words import HEADER, PENDING
 from postproc.controllers.model import ControllerFile
-from postproc.controllers.state import clean, comment_room
-from postproc.header_words import HEADER, PENDING
-from postproc.readback.compare import Comparison
-from postproc.readback.words import plain
+from postproc.readback.comparison.compare import Comparison
+from postproc.readback.text.words import plain
 from postproc.witness.evidence import Testimony
+from postproc.writing.state import clean, comment_room
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.units import DEG
 

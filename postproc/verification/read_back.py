@@ -9,24 +9,24 @@ from pathlib import Path
 
 import numpy as np
 
-from postproc.header_words import FINGERPRINT, HEADER
-from postproc.job import Job
-from postproc.memory import give_back
-from postproc.options import NO_FILE, SETUP_MARK, Options
-from postproc.readback.canonical import placed
-from postproc.readback.changes import check_changes
-from postproc.readback.compare import Comparison, compare
+from postproc.base.header_words import FINGERPRINT, HEADER
+from postproc.base.memory import give_back
+from postproc.base.options import NO_FILE, SETUP_MARK, Options
+from postproc.job.job import Job
+from postproc.readback.comparison.changes import check_changes
+from postproc.readback.comparison.compare import Comparison, compare
+from postproc.readback.comparison.faults import Faults
+from postproc.readback.comparison.slow import planned_feeds
+from postproc.readback.comparison.starts import check_end, check_start
+from postproc.readback.comparison.stated import check_stated
+from postproc.readback.comparison.states import check_lengths
+from postproc.readback.comparison.stops import check_stops
 from postproc.readback.dialects.base import UNITS_UNSTATED, as_bytes
 from postproc.readback.dialects.readers import reader_for
-from postproc.readback.execute import Motion, run
-from postproc.readback.faults import Faults
-from postproc.readback.offsets import Offsets
-from postproc.readback.poses import Executed, poses_before
-from postproc.readback.slow import planned_feeds
-from postproc.readback.starts import check_end, check_start
-from postproc.readback.stated import check_stated
-from postproc.readback.states import check_lengths
-from postproc.readback.stops import check_stops
+from postproc.readback.execution.execute import Motion, run
+from postproc.readback.execution.offsets import Offsets
+from postproc.readback.execution.poses import Executed, poses_before
+from postproc.readback.text.canonical import placed
 from toolpaths.diagnostics import Diagnostic, Severity, error, has_errors, warning
 from toolpaths.rotations import angle_between
 from toolpaths.units import DEG
@@ -125,8 +125,8 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Callable[[str, i
 
 
 def _unmeasured(motion: Motion, executed: Executed, job: Job, faults: Faults) -> list[Diagnostic]:
-    from postproc.readback.actual import ActualExecuted
-    from postproc.readback.measured import check_measured
+    from postproc.readback.comparison.measured import check_measured
+    from postproc.readback.execution.actual import ActualExecuted
 
     return check_measured(motion, executed, job, faults) if isinstance(executed, ActualExecuted) else []
 
@@ -165,7 +165,7 @@ def _uncorrected(head: bytes, job: Job, motion: Motion, executed: Executed, comp
 def _of_model(named: bytes, head: bytes, job: Job, gcode: str, off: bool) -> list[Diagnostic]:
     """What its header tells of the model that a program corrects, `named` and by its fingerprint, where that is not the one
     that it is verified with; `off`: the program fails. Programs without a fingerprint have only the name."""
-    from machines.geometric_error.fingerprint import fingerprint
+    from machines.geometric_error.files.fingerprint import fingerprint
 
     assert job.errors is not None
     name, stated, now = named.decode("utf-8", "replace"), _FINGERPRINT.search(head), fingerprint(job.errors)
@@ -228,6 +228,6 @@ def _executed(job: Job, motion: Motion, lengths: dict[int, float]) -> Executed:
     before = poses_before(motion, job.control)
     if job.errors is None or not _by_post(job):
         return Executed(job.control, job.kinematics_of, lengths, before)
-    from postproc.readback.actual import ActualExecuted
+    from postproc.readback.execution.actual import ActualExecuted
 
     return ActualExecuted(job.control, job.kinematics_of, lengths, before, model=job.errors, motion=motion)

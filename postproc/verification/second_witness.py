@@ -12,14 +12,14 @@ import numpy as np
 from machines.loader import builtin
 from machines.machine import Machine
 from machines.user_file import base_chain
-from postproc.control import Control
-from postproc.coolant import COMMANDS, switching
-from postproc.job import Job
-from postproc.options import Options
-from postproc.readback.compare import Comparison
-from postproc.readback.poses import Executed as Poses
-from postproc.readback.poses import arc_sweeps, begins, coordinates
-from postproc.setup import SetupFile
+from postproc.base.options import Options
+from postproc.control.control import Control
+from postproc.job.job import Job
+from postproc.readback.comparison.compare import Comparison
+from postproc.readback.execution.poses import Executed as Poses
+from postproc.readback.execution.poses import arc_sweeps, begins, coordinates
+from postproc.reference.coolant import COMMANDS, switching
+from postproc.setup.model import SetupFile
 from postproc.witness.evidence import Case, Executed, Testimony
 from postproc.witness.testify import testify
 from toolpaths.arrays import Floats, Ints

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from postproc.compile.program import Command, Program
 from postproc.controllers.model import ControllerFile
-from postproc.events import state_at
-from postproc.path_model import ARC
-from postproc.program import Command, Program
+from postproc.path.model import ARC
+from postproc.reference.events import state_at
 from toolpaths.arrays import Bools, Ints
 from toolpaths.diagnostics import Diagnostic, error
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from postproc.controllers.iso import IsoWriter
+from postproc.writing.iso import IsoWriter
 
 
 class FanucWriter(IsoWriter):

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from postproc.controllers.fanuc import FanucWriter
-from postproc.program import Section
+from postproc.compile.program import Section
+from postproc.writing.fanuc import FanucWriter
 
 
 class HaasWriter(FanucWriter):

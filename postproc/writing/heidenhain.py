@@ -8,10 +8,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from postproc.controllers.polar_arc import polar_arc
-from postproc.controllers.writer import CHUNK, SKIP, Writer
-from postproc.program import Command, Hole
-from postproc.word_arcs import PLANE_AXIS
+from postproc.compile.program import Command, Hole
+from postproc.control.word_arcs import PLANE_AXIS
+from postproc.writing.polar_arc import polar_arc
+from postproc.writing.writer import CHUNK, SKIP, Writer
 from toolpaths.arrays import Floats
 from toolpaths.units import DEG
 

@@ -7,11 +7,11 @@ from functools import cached_property
 
 import numpy as np
 
+from postproc.compile.program import INVERSE, PER_MINUTE, Hole
+from postproc.control.word_arcs import PLANE_AXIS
 from postproc.controllers.model import CannedCycle
-from postproc.controllers.state import peck_of
-from postproc.controllers.writer import CHUNK, Writer
-from postproc.program import INVERSE, PER_MINUTE, Hole
-from postproc.word_arcs import PLANE_AXIS
+from postproc.writing.state import peck_of
+from postproc.writing.writer import CHUNK, Writer
 from toolpaths.arrays import Array, Bools, Floats, Ints
 from toolpaths.toolpath import Cycle
 

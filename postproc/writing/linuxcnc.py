@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from postproc.controllers.iso import IsoWriter
+from postproc.writing.iso import IsoWriter
 
 ACTIVE = re.compile(r"\s*(ABORT|LOG|LOGOPEN|LOGAPPEND|LOGCLOSE|PY|PYRUN|PYRELOAD|PROBEOPEN|PROBECLOSE|DEBUG|PRINT)\b",
                     re.IGNORECASE)

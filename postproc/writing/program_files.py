@@ -14,7 +14,7 @@ def program_files(output: Path, text: str, files: dict[str, str]) -> tuple[dict[
     Raises:
         DiagnosticError: where a subprogram would bear the program's own name.
     """
-    from postproc.controllers.writer import OF_PROGRAM
+    from postproc.writing.writer import OF_PROGRAM
 
     if output.name.lower() in {name.lower() for name in files}:
         raise DiagnosticError([error("file.own_name", "the program and one of its subprograms would bear the same name",

@@ -6,8 +6,8 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from postproc.controllers.iso import IsoWriter
-from postproc.program import Hole
+from postproc.compile.program import Hole
+from postproc.writing.iso import IsoWriter
 
 
 class SiemensWriter(IsoWriter):

@@ -8,8 +8,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from postproc.compile.program import PER_MINUTE, Hole, Program, Section
 from postproc.controllers.model import CannedCycle, ControllerFile, Mode
-from postproc.program import PER_MINUTE, Hole, Program, Section
 from toolpaths.arrays import Floats
 from toolpaths.toolpath import Cycle
 
@@ -21,7 +21,7 @@ class WriterState:
     register is not in force and waits for the next block that states Z; `speed` is the spindle's as it is written (1/min,
     negative: anti-clockwise, 0 unknown), `rounded` its ratio to what was asked. `files` are the subprograms in files of
     their own, by name, once the program is written. `turning` and `cooling` say whether spindle and coolant run, None where
-    nobody knows, `flowing` the kinds of coolant that may run (`postproc.coolant`); `taken` are block numbers that
+    nobody knows, `flowing` the kinds of coolant that may run (`postproc.reference.coolant`); `taken` are block numbers that
     subprograms bear; `ahead` the axis words of a stretch of blocks, and the first of them.
     """
 

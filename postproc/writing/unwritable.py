@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from postproc.controllers.compensated import compensated_arcs
+from postproc.compile.program import Program
 from postproc.controllers.model import ControllerFile
-from postproc.program import Program
+from postproc.writing.compensated import compensated_arcs
 from toolpaths.diagnostics import Diagnostic, error, warning
 from toolpaths.toolpath import Cycle
 

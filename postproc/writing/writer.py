@@ -9,11 +9,11 @@ from itertools import chain
 
 import numpy as np
 
+from postproc.compile.program import PER_MINUTE, Command, Hole
 from postproc.controllers.model import Mode
-from postproc.controllers.state import WriterState
 from postproc.controllers.texts import blocks_of
-from postproc.coolant import COMMANDS, switching
-from postproc.program import PER_MINUTE, Command, Hole
+from postproc.reference.coolant import COMMANDS, switching
+from postproc.writing.state import WriterState
 
 _LABEL = re.compile(r"%|[NO]\d")
 """blocks that carry a number of their own"""

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from postproc.compile.program import Program
 from postproc.controllers.model import ControllerFile
-from postproc.controllers.writer import Writer
-from postproc.program import Program
+from postproc.writing.writer import Writer
 from toolpaths.toolpath import Cycle
 
 
@@ -20,12 +20,12 @@ def writer_for(controller: ControllerFile, program: Program, cycles: tuple[Cycle
         name: of the program, where the controller's programs hold one
         subprograms: each operation becomes a subprogram of the file, where the controller has such
     """
-    from postproc.controllers.fanuc import FanucWriter
-    from postproc.controllers.haas import HaasWriter
-    from postproc.controllers.heidenhain import KlartextWriter
-    from postproc.controllers.iso import IsoWriter
-    from postproc.controllers.linuxcnc import LinuxcncWriter
-    from postproc.controllers.siemens import SiemensWriter
+    from postproc.writing.fanuc import FanucWriter
+    from postproc.writing.haas import HaasWriter
+    from postproc.writing.heidenhain import KlartextWriter
+    from postproc.writing.iso import IsoWriter
+    from postproc.writing.linuxcnc import LinuxcncWriter
+    from postproc.writing.siemens import SiemensWriter
 
     writers: dict[str, type[Writer]] = {"iso": IsoWriter, "linuxcnc": LinuxcncWriter, "fanuc": FanucWriter,
                                         "haas": HaasWriter, "siemens": SiemensWriter, "heidenhain": KlartextWriter}

@@ -15,12 +15,12 @@ import numpy as np
 
 import machines
 from machines.calibration.simulator import PARTS, Bench, simulate
-from machines.geometric_error.csv_table import write_csv
-from machines.geometric_error.curves import Fourier, Table
-from machines.geometric_error.exchange import save
-from machines.geometric_error.model import ErrorModel
-from machines.geometric_error.names import parse
-from machines.geometric_error.serial_errors import Component, SerialErrors
+from machines.geometric_error.actual.model import ErrorModel
+from machines.geometric_error.actual.serial_errors import Component, SerialErrors
+from machines.geometric_error.exchange.exchange import save
+from machines.geometric_error.tables.csv_table import write_csv
+from machines.geometric_error.tables.curves import Fourier, Table
+from machines.geometric_error.tables.names import parse
 from toolpaths.units import DEG
 
 ARCSEC = DEG / 3600.0

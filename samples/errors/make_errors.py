@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 
 import machines
-from machines.geometric_error.covariance import angular
-from machines.geometric_error.csv_table import write_csv
-from machines.geometric_error.curves import Curve, Fourier, Table
-from machines.geometric_error.exchange import save
-from machines.geometric_error.model import ErrorModel
-from machines.geometric_error.names import DIRECTIONS, parse
-from machines.geometric_error.rods import RodErrors, rod_frame, rod_names
-from machines.geometric_error.serial_errors import Component, Frame, SerialErrors
+from machines.geometric_error.actual.model import ErrorModel
+from machines.geometric_error.actual.rods import RodErrors, rod_frame, rod_names
+from machines.geometric_error.actual.serial_errors import Component, Frame, SerialErrors
+from machines.geometric_error.exchange.exchange import save
+from machines.geometric_error.files.covariance import angular
+from machines.geometric_error.tables.csv_table import write_csv
+from machines.geometric_error.tables.curves import Curve, Fourier, Table
+from machines.geometric_error.tables.names import DIRECTIONS, parse
 from toolpaths.units import DEG
 
 ARCSEC = DEG / 3600.0

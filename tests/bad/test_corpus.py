@@ -9,11 +9,11 @@ from pathlib import Path
 
 import pytest
 
-from toolpaths.cl.dialects import DIALECTS
+from toolpaths.cl.inspect import inspect, summary
 from toolpaths.cl.read import read_bytes
+from toolpaths.cl.text.dialects import DIALECTS
 from toolpaths.cl.write import text_of
 from toolpaths.diagnostics import has_errors
-from toolpaths.inspect import inspect, summary
 
 FILES = sorted((Path(__file__).parent / "corpus").iterdir())
 

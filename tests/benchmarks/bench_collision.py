@@ -18,13 +18,13 @@ import trimesh
 import machines
 import postproc
 import toolpaths
+from postproc.base.options import Options
 from postproc.collision import search
-from postproc.collision.passes import PassBodies, pass_bodies
 from postproc.collision.solid import solid
 from postproc.collision.swept import Swept
-from postproc.options import Options
-from postproc.orientation.passes import work_of
-from postproc.setup import Placement, load_setup
+from postproc.orientation.passes.pass_bodies import PassBodies, pass_bodies
+from postproc.orientation.passes.passes import work_of
+from postproc.setup.model import Placement, load_setup
 from toolpaths.arrays import Floats
 
 SAMPLES = Path(__file__).parents[2] / "samples"

@@ -23,9 +23,9 @@ import numpy as np
 import machines
 import postproc
 import toolpaths
-from machines.geometric_error.correction import correct
-from postproc.corrected.proof import after_formatting
-from postproc.options import Options
+from machines.geometric_error.actual.correction import correct
+from postproc.base.options import Options
+from postproc.verification.errors_left import after_formatting
 from tests.machines.error_models import joints, model
 from toolpaths.units import DEG
 

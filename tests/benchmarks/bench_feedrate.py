@@ -28,7 +28,6 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from postproc.feedrate.geometry import MachinePath
 from postproc.feedrate.interior import NumpySteps
 from postproc.feedrate.limits import JointLimits, squared_speed
 from postproc.feedrate.mesh import Spacing
@@ -37,11 +36,12 @@ from postproc.feedrate.paths import Eased, SplinePath
 from postproc.feedrate.plan import Options, plan, plan_second_order
 from postproc.feedrate.second_order import least_time, second_order
 from postproc.feedrate.windows import Method, solve_problem
+from postproc.planning.geometry import MachinePath
 from tests.benchmarks.copp_reference import copp_times
 from tests.benchmarks.feedrate_paths import blended, cl_path
+from tests.postproc.feedrate.test_feedrate_second_order import toppra_time
 from tests.postproc.feedrate_kit import MIKRON, bezier, random_path, uniform, zigzag
 from tests.postproc.feedrate_reference import least_jerk_time
-from tests.postproc.test_feedrate_second_order import toppra_time
 from toolpaths.arrays import Floats
 
 STEP = 0.1

@@ -16,13 +16,13 @@ import numpy as np
 
 import machines
 from machines.machine import Limits, Machine
-from postproc.control import Control
-from postproc.joint_path import solve
+from postproc.control.control import Control
 from postproc.joints.greedy import greedy
+from postproc.joints.joint_path import solve
 from postproc.joints.lattice import Run, lattice_of
 from postproc.joints.lead import lead_past
 from postproc.joints.plan import plan_runs
-from postproc.linearise import linearise
+from postproc.path.linearise import linearise
 from toolpaths.shape import Curves
 from toolpaths.units import DEG
 

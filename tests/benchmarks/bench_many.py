@@ -16,8 +16,8 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import toolpaths
-from postproc.pipeline import convert
-from postproc.setup import SetupFile
+from postproc.pipeline.convert import convert
+from postproc.setup.model import SetupFile
 
 HEAD = "UNITS/MM\nLOAD/TOOL,1\nSPINDL/RPM,3000,CLW\nFEDRAT/MMPM,500\n"
 CUT = "RAPID\nGOTO/{x},{y},20\nFEDRAT/MMPM,500\nGOTO/{x},{y},-1\nGOTO/{x1},{y},-1\nRAPID\nGOTO/{x},{y},20\n"

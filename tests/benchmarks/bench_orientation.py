@@ -18,15 +18,15 @@ import numpy as np
 import machines
 import toolpaths
 from machines.machine import Machine
-from postproc.options import Options
-from postproc.orientation.allowed import Allowed
-from postproc.orientation.candidates import tried
-from postproc.orientation.choice import OrientationChoice
-from postproc.orientation.orient import orient
-from postproc.orientation.passes import Pass, work_of
-from postproc.orientation.ranking import Ranking, prepare
-from postproc.orientation.timed import turned, turned_all
-from postproc.setup import load_setup
+from postproc.base.options import Options
+from postproc.orientation.candidates.candidates import tried
+from postproc.orientation.candidates.ranking import Ranking, prepare
+from postproc.orientation.candidates.timed import turned, turned_all
+from postproc.orientation.passes.allowed import Allowed
+from postproc.orientation.passes.passes import Pass, work_of
+from postproc.orientation.plans.choice import OrientationChoice
+from postproc.orientation.plans.orient import orient
+from postproc.setup.model import load_setup
 from toolpaths.toolpath import Toolpath
 from toolpaths.units import DEG
 

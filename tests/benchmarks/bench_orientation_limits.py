@@ -17,17 +17,17 @@ import numpy as np
 import machines
 import toolpaths
 from machines.machine import Machine, Timing
-from postproc.options import Options
-from postproc.orientation.allowed import Allowed
-from postproc.orientation.candidates import tried
-from postproc.orientation.choice import OrientationChoice
-from postproc.orientation.choose import shortest
-from postproc.orientation.orient import orient
-from postproc.orientation.passes import Pass, Work, work_of
-from postproc.orientation.seeds import across
-from postproc.orientation.timed import Turned, turned_all
-from postproc.orientation.turns import all_ends, ways_between
-from postproc.setup import SetupFile, load_setup
+from postproc.base.options import Options
+from postproc.orientation.candidates.candidates import tried
+from postproc.orientation.candidates.seeds import across
+from postproc.orientation.candidates.timed import Turned, turned_all
+from postproc.orientation.passes.allowed import Allowed
+from postproc.orientation.passes.passes import Pass, Work, work_of
+from postproc.orientation.plans.choice import OrientationChoice
+from postproc.orientation.plans.choose import shortest
+from postproc.orientation.plans.orient import orient
+from postproc.orientation.plans.turns import all_ends, ways_between
+from postproc.setup.model import SetupFile, load_setup
 from toolpaths.arrays import Floats
 from toolpaths.toolpath import Toolpath
 from toolpaths.units import DEG

@@ -19,16 +19,16 @@ import numpy as np
 import machines
 import toolpaths
 from machines.machine import Machine
+from postproc.base.options import Options
 from postproc.cycle_time.conversion import from_conversion
 from postproc.cycle_time.estimate import estimate
 from postproc.cycle_time.model import load_model
 from postproc.cycle_time.planned import planned_times
-from postproc.options import Options
-from postproc.pipeline import convert
+from postproc.pipeline.convert import convert
 from postproc.placement.place import PlacementChoice, place
 from postproc.placement.timed import Timer
-from postproc.setup import PartPlacement, SetupFile, load_setup
-from postproc.setup_place import PlacementLimits
+from postproc.setup.model import PartPlacement, SetupFile, load_setup
+from postproc.setup.place import PlacementLimits
 from toolpaths.toolpath import Toolpath
 
 SAMPLES = Path(__file__).parents[2] / "samples"

@@ -40,7 +40,7 @@ def main() -> None:
             source, target = Path(folder, "big.cls"), Path(folder, "big.ngc")
             extra = ["--five-axis"] if kind == "5 axes" else []
             measured(sys.executable, "samples/make_big.py", points, str(source), *extra)
-            convert = (sys.executable, "-m", "postproc.cli", "convert", str(source), "-m", machine, "-c", controller,
+            convert = (sys.executable, "-m", "postproc.cli.app", "convert", str(source), "-m", machine, "-c", controller,
                        "-o", str(target))
             measured(*convert)
             base = measured(sys.executable, "-c", COUNT, str(source))

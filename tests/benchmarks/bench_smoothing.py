@@ -30,17 +30,17 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 import postproc
 import toolpaths
 from machines.machine import Machine
-from postproc.feedrate.geometry import MachinePath
 from postproc.feedrate.limits import JointLimits
 from postproc.feedrate.paths import SplinePath
 from postproc.feedrate.plan import Options, plan
-from postproc.pass_geometry import PassGeometry, pass_geometry, stops_of
-from postproc.planned import joint_limits
-from postproc.result import PostResult
-from postproc.stages import plan_motion
+from postproc.pipeline.result import PostResult
+from postproc.pipeline.stages import plan_motion
+from postproc.planning.geometry import MachinePath
+from postproc.planning.pass_geometry import PassGeometry, pass_geometry, stops_of
+from postproc.planning.planned import joint_limits
 from tests.postproc.feedrate_kit import MIKRON
 from tests.postproc.kit import SAMPLES, good, machine
-from tests.toolpaths.test_smoothing import chain, off, wave
+from tests.toolpaths.smoothing.test_smoothing import chain, off, wave
 from toolpaths.arrays import Floats
 from toolpaths.shape import Curves
 from toolpaths.smoothing.smooth import Smooth, Tolerance, smooth

@@ -16,7 +16,7 @@ from typing import Any
 
 import postproc
 import toolpaths
-from postproc.readback import compare
+from postproc.readback.comparison import compare
 
 ROOT = Path(__file__).parents[2]
 LARGE = 1_000_000

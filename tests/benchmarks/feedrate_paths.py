@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 import machines
-from postproc.feedrate.geometry import MachinePath, machine_path
 from postproc.feedrate.limits import JointLimits
 from postproc.feedrate.paths import SplinePath
+from postproc.planning.geometry import MachinePath, machine_path
 from toolpaths.arrays import Floats
 from toolpaths.shape import Curves
 from toolpaths.smoothing.smooth import Tolerance, smooth

@@ -12,7 +12,7 @@ from pathlib import Path
 import machines
 import postproc
 import toolpaths
-from postproc.setup import load_setup
+from postproc.setup.model import load_setup
 from toolpaths.diagnostics import Severity
 from toolpaths.units import DEG
 

@@ -14,9 +14,9 @@ import numpy as np
 import machines
 import postproc
 import toolpaths
+from postproc.base.options import OutputMode
 from postproc.controllers.model import builtin_files
-from postproc.options import OutputMode
-from postproc.setup import load_setup
+from postproc.setup.model import load_setup
 
 SAMPLES = Path(__file__).parents[2] / "samples"
 

@@ -8,15 +8,15 @@ import re
 from collections.abc import Iterator
 
 import machines.machine
-from postproc.console import rounded
+from postproc.cli.console import rounded
 from postproc.controllers.model import ControllerFile
 from postproc.cycle_time import report
 from postproc.cycle_time.estimate import estimate
 from postproc.cycle_time.model import load_model, model_name
 from postproc.cycle_time.source import from_gcode
-from postproc.readback.verify import read_back
-from postproc.result import PostResult, VerifyResult
-from postproc.summary import verify_dict, verify_text
+from postproc.pipeline.result import PostResult, VerifyResult
+from postproc.report.summary import verify_dict, verify_text
+from postproc.verification.read_back import read_back
 from toolpaths.diagnostics import DiagnosticError, has_errors
 
 _WORD = re.compile(r"[A-Z]+=?[-+]?\d[\d.]*")

@@ -91,7 +91,7 @@ def _endless(*_: object) -> None:
 
 def _outcomes(task: Task, controller: str) -> Iterator[tuple[str, str, str]]:
     """(kind, detail, what was done to the program) of one conversion and of its edits."""
-    from postproc.guard import fingerprint
+    from postproc.cli.guard import fingerprint
 
     step = ""
     try:
@@ -119,13 +119,13 @@ def _outcomes(task: Task, controller: str) -> Iterator[tuple[str, str, str]]:
 def _converted(task: Task, controller: str) -> Any:
     """The conversion, with all that is said of it."""
     import postproc
-    from postproc import summary
-    from postproc.console import rounded
+    from postproc.cli.console import rounded
     from postproc.cycle_time import report
     from postproc.cycle_time.conversion import estimate_of
     from postproc.cycle_time.estimate import estimate
     from postproc.cycle_time.model import load_model, model_name
     from postproc.cycle_time.source import from_conversion
+    from postproc.report import summary
 
     path, found = _read(task.file)
     machine, setup = _machine(task.machine, str(_setup_of(task)))
@@ -152,7 +152,7 @@ def _read(file: Path) -> Any:
 @cache
 def _machine(name: str, setup: str) -> Any:
     import machines
-    from postproc.setup import load_setup
+    from postproc.setup.model import load_setup
 
     return machines.load(name), load_setup(setup)[0]
 

@@ -31,7 +31,7 @@ def test_faults_are_failures(monkeypatch: pytest.MonkeyPatch) -> None:
     def fail(*_: object) -> None:
         raise ZeroDivisionError
 
-    monkeypatch.setattr("postproc.stages.prepare", fail)
+    monkeypatch.setattr("postproc.pipeline.stages.prepare", fail)
     found = worked(Task(NX, "mill-3axis", ("generic-iso",), 0))
     assert kinds(found) == {INTERNAL: 1} and failures(found) == 1 and "ZeroDivisionError" in table(found)
 

@@ -10,10 +10,10 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from toolpaths import write
-from toolpaths.cl.log import Log
 from toolpaths.cl.read import read_bytes
-from toolpaths.cl.scan import scan
-from toolpaths.cl.source import normalise
+from toolpaths.cl.text.log import Log
+from toolpaths.cl.text.scan import scan
+from toolpaths.cl.text.source import normalise
 from toolpaths.diagnostics import has_errors
 from toolpaths.toolpath import FeedMode, Toolpath
 
@@ -134,7 +134,7 @@ def test_numbers_are_correctly_rounded() -> None:
 
 
 def test_chunks_do_not_matter(monkeypatch: object) -> None:
-    from toolpaths.cl import scan as module
+    from toolpaths.cl.text import scan as module
     text = "UNITS/MM\n" + "".join(f"GOTO/{k},{-k}.5,0{',0,0,1' if k % 3 else ''}\n{'RAPID' if k % 5 else ''}\n"
                                   for k in range(400))
     whole = read_bytes(text).toolpath

@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 
 from machines.machine import Machine
-from postproc.readback.execute import Motion, execute
-from postproc.readback.offsets import Offsets
-from postproc.readback.words import Words, tokenise
-from postproc.result import PostResult
+from postproc.pipeline.result import PostResult
+from postproc.readback.execution.execute import Motion, execute
+from postproc.readback.execution.offsets import Offsets
+from postproc.readback.text.words import Words, tokenise
 from tests.linuxcnc.interpreter import Canonical, Move, ToolEntry
 from toolpaths.arrays import Array, Bools, Floats, Ints
 from toolpaths.diagnostics import has_errors

@@ -16,7 +16,7 @@ from postproc.cycle_time.estimate import Estimate, estimate
 from postproc.cycle_time.log import Log
 from postproc.cycle_time.model import load_model
 from postproc.cycle_time.source import from_gcode
-from postproc.setup import SetupFile
+from postproc.setup.model import SetupFile
 from tests.linuxcnc.simulator import Run
 from tests.linuxcnc.time_programs import END, HEAD, PROGRAMS, machine, random_lines
 
@@ -28,7 +28,7 @@ SIMULATED = ("zigzag, G61.1", "zigzag, G64", "circle of lines, G64 P0.01", "rand
              "5 axes, G94, G64 P0.01", "5 axes, G93, G64 P0.01", "short lines at speed", "small arcs in all planes",
              "5 axes, control's kinematics")
 """run in the simulator by every `make test`, the others with -m slow: all are compared with its recorded times by
-tests/postproc/test_cycle_time_models.py"""
+tests/postproc/cycle_time/test_cycle_time_models.py"""
 
 
 def blocks(text: str, on: Machine) -> Blocks:

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from postproc.readback.execute import execute
-from postproc.readback.offsets import Offsets
-from postproc.readback.words import tokenise
+from postproc.readback.execution.execute import execute
+from postproc.readback.execution.offsets import Offsets
+from postproc.readback.text.words import tokenise
 from tests.linuxcnc.interpreter import Move
 
 LETTERS = ("X", "Y", "Z")

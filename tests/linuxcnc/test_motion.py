@@ -12,8 +12,8 @@ import machines
 import postproc
 import toolpaths
 from machines.machine import Machine
-from postproc.result import PostResult
-from postproc.setup import load_setup
+from postproc.pipeline.result import PostResult
+from postproc.setup.model import load_setup
 from tests.linuxcnc import outputs
 from tests.linuxcnc.simulator import Run
 from toolpaths.arrays import Floats, Ints

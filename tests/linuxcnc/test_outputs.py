@@ -11,9 +11,9 @@ import pytest
 import machines
 import postproc
 import toolpaths
-from postproc.readback.checks import block_seconds
-from postproc.result import PostResult
-from postproc.setup import PartPlacement, SetupFile, ToolSetup, load_setup
+from postproc.pipeline.result import PostResult
+from postproc.readback.comparison.checks import block_seconds
+from postproc.setup.model import PartPlacement, SetupFile, ToolSetup, load_setup
 from tests.linuxcnc import outputs
 from tests.linuxcnc.interpreter import Move
 from tests.linuxcnc.outputs import Output

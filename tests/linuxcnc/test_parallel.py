@@ -10,8 +10,8 @@ import pytest
 import machines
 import postproc
 import toolpaths
-from postproc.result import PostResult
-from postproc.setup import load_setup
+from postproc.pipeline.result import PostResult
+from postproc.setup.model import load_setup
 from tests.linuxcnc import outputs
 from tests.linuxcnc.simulator import Run
 from tests.linuxcnc.test_motion import EXACT_STOP, cutting, deviations, poses, simulated

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 import machines
-from machines.geometric_error.curves import Table
-from machines.geometric_error.exports import to_screws
-from machines.geometric_error.model import ErrorModel
-from machines.geometric_error.names import parse
-from machines.geometric_error.serial_errors import Component, SerialErrors
+from machines.geometric_error.actual.model import ErrorModel
+from machines.geometric_error.actual.serial_errors import Component, SerialErrors
+from machines.geometric_error.exchange.exports import to_screws
+from machines.geometric_error.tables.curves import Table
+from machines.geometric_error.tables.names import parse
 from tests.linuxcnc import config
 from toolpaths.arrays import Floats
 

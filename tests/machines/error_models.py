@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from machines.geometric_error.axis_motion import effect
-from machines.geometric_error.curves import Fourier, Polynomial, Table
-from machines.geometric_error.model import ErrorModel
-from machines.geometric_error.names import DIRECTIONS, parse
-from machines.geometric_error.rods import RodErrors, rod_frame, rod_names
-from machines.geometric_error.serial_errors import Component, SerialErrors
+from machines.geometric_error.actual.axis_motion import effect
+from machines.geometric_error.actual.model import ErrorModel
+from machines.geometric_error.actual.rods import RodErrors, rod_frame, rod_names
+from machines.geometric_error.actual.serial_errors import Component, SerialErrors
+from machines.geometric_error.tables.curves import Fourier, Polynomial, Table
+from machines.geometric_error.tables.names import DIRECTIONS, parse
 from machines.kinematics.base import Kinematics
 from machines.kinematics.serial import Serial
 from toolpaths.arrays import Floats

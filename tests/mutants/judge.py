@@ -94,14 +94,14 @@ def _machine(case: Case) -> Any:
 
 
 def _setup(case: Case) -> Any:
-    from postproc.setup import SetupFile
+    from postproc.setup.model import SetupFile
 
     return case.setup["file"] if "file" in case.setup else SetupFile.model_validate(case.setup)
 
 
 def effect_of(job: Any, comparison: Any) -> Effect:
     """What a program that was read back does."""
-    from postproc.readback.checks import block_seconds
+    from postproc.readback.comparison.checks import block_seconds
 
     motion, moves = comparison.executed[1], job.moves.without_pecks()
     n = len(moves)
@@ -158,8 +158,8 @@ def change(before: Effect, after: Effect) -> str:
 
 def verified(asked: Any, text: str, files: dict[str, str]) -> Made:
     """What `verify` finds in a text, made for the job of a conversion: the read-back and the second witness."""
-    from postproc.readback.verify import read_back
-    from postproc.second_witness import second_witness
+    from postproc.verification.read_back import read_back
+    from postproc.verification.second_witness import second_witness
 
     comparison, found = read_back(text, asked.job, "part.cls", others={name: t.encode() for name, t in files.items()})
     errors, warned = [d for d in found if d.severity == 2], tuple(str(d) for d in found if d.severity == 1)

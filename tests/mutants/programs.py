@@ -89,7 +89,7 @@ def judged(name: str, count: int = EACH) -> Found:
 
 def _said(asked: Any, base: Made, plain: Effect, one: Mutant) -> str:
     """"caught: CODE", "harmless: why" or "survivor: what it changes"."""
-    from postproc.readback.verify import read_back
+    from postproc.verification.read_back import read_back
 
     try:
         got = verified(asked, one.text, base.files)

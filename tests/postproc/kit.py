@@ -17,8 +17,8 @@ import numpy as np
 import machines
 import postproc
 import toolpaths
-from postproc.result import PostResult
-from postproc.setup import SetupFile, load_setup
+from postproc.pipeline.result import PostResult
+from postproc.setup.model import SetupFile, load_setup
 from tests.postproc.peer import Peer, Step
 from toolpaths.diagnostics import has_errors
 from toolpaths.toolpath import Toolpath

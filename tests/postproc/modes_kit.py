@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from postproc.program import Section
-from postproc.result import PostResult
+from postproc.compile.program import Section
+from postproc.pipeline.result import PostResult
 from tests.postproc.kit import convert, pose_of, toolpath
 
 TCP = '[modes.tcp]\nenter = ["G43.4 H{register}"]\nleave = ["G49"]\n'

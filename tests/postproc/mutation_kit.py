@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from postproc.job import Job
-from postproc.readback.compare import Comparison
-from postproc.readback.verify import read_back
+from postproc.job.job import Job
+from postproc.readback.comparison.compare import Comparison
+from postproc.verification.read_back import read_back
 from toolpaths.diagnostics import Severity
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)"

@@ -13,8 +13,8 @@ import numpy as np
 
 import postproc
 import toolpaths
-from postproc.result import PostResult
-from postproc.setup import SetupFile, load_setup
+from postproc.pipeline.result import PostResult
+from postproc.setup.model import SetupFile, load_setup
 from tests.postproc.kit import SAMPLES, Peer, Step, angle, machine
 from toolpaths.toolpath import Kind, Role
 

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from postproc.compile.program import INVERSE, Command, Hole, Program, Section
 from postproc.controllers.model import load_controller
-from postproc.controllers.writers import writer_for
-from postproc.program import INVERSE, Command, Hole, Program, Section
+from postproc.writing.writers import writer_for
 from toolpaths.toolpath import Cycle
 
 CODES = {"rapid": 0, "feed": 1, "cw": 2, "ccw": 2}

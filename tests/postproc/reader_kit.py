@@ -8,12 +8,12 @@ from functools import cache
 import numpy as np
 
 from machines.kinematics.base import Kinematics
-from postproc.control import Control, Rapids
+from postproc.control.control import Control, Rapids
 from postproc.controllers.model import ControllerFile, load_controller
 from postproc.readback.dialects.readers import reader_for
-from postproc.readback.execute import Motion, run
-from postproc.readback.offsets import Offsets
-from postproc.readback.poses import Executed
+from postproc.readback.execution.execute import Motion, run
+from postproc.readback.execution.offsets import Offsets
+from postproc.readback.execution.poses import Executed
 from tests.postproc.kit import machine
 from toolpaths.diagnostics import Diagnostic, has_errors
 

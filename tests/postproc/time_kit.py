@@ -14,7 +14,7 @@ from postproc.controllers.model import load_controller
 from postproc.cycle_time.blocks import Blocks
 from postproc.cycle_time.model import CycleTimeModel, load_model
 from postproc.cycle_time.source import from_gcode
-from postproc.setup import SetupFile
+from postproc.setup.model import SetupFile
 
 HEAD = "G21 G90 G94 G17"
 

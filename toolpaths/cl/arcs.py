@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from toolpaths.arrays import Bools, Floats, Ints
-from toolpaths.cl.log import Log
+from toolpaths.cl.text.log import Log
 from toolpaths.toolpath import Arcs
 
 UNIT_EXACT = 1e-14

@@ -14,11 +14,11 @@ import numpy as np
 
 from toolpaths.arrays import Floats
 from toolpaths.cl.arcs import ArcTable
-from toolpaths.cl.dialects import SCALE, Dialect
-from toolpaths.cl.log import Log
-from toolpaths.cl.scan import Points
-from toolpaths.cl.statements import COMMENT, Program, Statement
-from toolpaths.cl.subprograms import Called, Subprograms
+from toolpaths.cl.text.dialects import SCALE, Dialect
+from toolpaths.cl.text.log import Log
+from toolpaths.cl.text.scan import Points
+from toolpaths.cl.text.statements import COMMENT, Program, Statement
+from toolpaths.cl.text.subprograms import Called, Subprograms
 from toolpaths.toolpath import Cycle, Event, FeedMode, Frame, Operation, Role, Tool
 
 Triple = tuple[float, float, float]

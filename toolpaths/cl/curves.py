@@ -9,7 +9,7 @@ import numpy as np
 
 from toolpaths.arrays import Floats
 from toolpaths.cl.build import Builder, Triple
-from toolpaths.cl.statements import COMMENT, TEXT, Statement, Word, words_of
+from toolpaths.cl.text.statements import COMMENT, TEXT, Statement, Word, words_of
 from toolpaths.toolpath import Role
 
 SPLINE_CHORD = 0.001

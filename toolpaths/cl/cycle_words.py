@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, field, replace
 
 from toolpaths.cl.feeds import UNITS
-from toolpaths.cl.statements import Word
+from toolpaths.cl.text.statements import Word
 
 KINDS = {"DRILL": "DRILL", "DEEP": "DEEP", "DEEP2": "DEEP", "PECK": "DEEP", "BRKCHP": "BRKCHP", "BREAKCHP": "BRKCHP",
          "TAP": "TAP", "RIGID": "TAP", "BORE": "BORE", "BORE7": "BORE7", "BORE8": "BORE8", "BORE9": "BORE9", "REAM": "REAM",

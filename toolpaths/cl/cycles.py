@@ -8,9 +8,9 @@ from dataclasses import replace
 
 from toolpaths.cl.build import Builder, Heights
 from toolpaths.cl.cycle_words import KINDS, Values, kind_of, values
-from toolpaths.cl.dialects import Planes
 from toolpaths.cl.feeds import feed_in
-from toolpaths.cl.statements import Statement, Word
+from toolpaths.cl.text.dialects import Planes
+from toolpaths.cl.text.statements import Statement, Word
 from toolpaths.toolpath import Cycle, FeedMode
 from toolpaths.units import MM_PER_INCH
 

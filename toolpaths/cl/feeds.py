@@ -6,7 +6,7 @@ import math
 
 from toolpaths.arrays import Floats
 from toolpaths.cl.build import Builder
-from toolpaths.cl.statements import Statement, Word
+from toolpaths.cl.text.statements import Statement, Word
 from toolpaths.toolpath import FeedMode
 from toolpaths.units import MM_PER_FOOT, MM_PER_INCH
 

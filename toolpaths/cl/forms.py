@@ -13,13 +13,13 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from toolpaths.cl.cycle_words import CYCLE_WORDS
-from toolpaths.cl.dialects import UNIT_WORDS, Dialect
 from toolpaths.cl.feeds import UNITS
-from toolpaths.cl.log import Log
-from toolpaths.cl.near import nearest
-from toolpaths.cl.statements import COMMENT, DATA_COMMENT, Program, Statement, statement_of
-from toolpaths.cl.subprograms import NAME
-from toolpaths.cl.words import BARE_WORDS, NEUTRAL, SILENT, TEXT_WORDS
+from toolpaths.cl.text.dialects import UNIT_WORDS, Dialect
+from toolpaths.cl.text.log import Log
+from toolpaths.cl.text.near import nearest
+from toolpaths.cl.text.statements import COMMENT, DATA_COMMENT, Program, Statement, statement_of
+from toolpaths.cl.text.subprograms import NAME
+from toolpaths.cl.text.words import BARE_WORDS, NEUTRAL, SILENT, TEXT_WORDS
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ import numpy as np
 from toolpaths.arrays import Floats
 from toolpaths.cl import indexing
 from toolpaths.cl.build import Builder, Map
-from toolpaths.cl.statements import Statement, words_of
+from toolpaths.cl.text.statements import Statement, words_of
 from toolpaths.rotations import rotation
 from toolpaths.toolpath import Frame
 from toolpaths.units import DEG

@@ -14,7 +14,7 @@ from toolpaths.rotations import rotation
 
 if TYPE_CHECKING:
     from toolpaths.cl.build import Builder, Map
-from toolpaths.cl.subprograms import Called, called
+from toolpaths.cl.text.subprograms import Called, called
 
 SAME_AXIS = 2e-3
 """rad: angles of three decimals that add up over a turn, and rows of CSYS remarks"""

@@ -8,8 +8,8 @@ from dataclasses import asdict
 import numpy as np
 
 from toolpaths.arrays import Bools, Floats
-from toolpaths.cl.dialects import DIALECTS
 from toolpaths.cl.read import ReadResult
+from toolpaths.cl.text.dialects import DIALECTS
 from toolpaths.rotations import angle_between
 from toolpaths.toolpath import Frame, Kind, Role, Tool, Toolpath
 from toolpaths.units import DEG

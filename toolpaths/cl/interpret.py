@@ -5,12 +5,13 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 
-from toolpaths.cl import curves, cycles, feeds, frames, indexing, listing_text, motion, structure, tools
+from toolpaths.cl import curves, cycles, feeds, frames, indexing, motion, structure, tools
 from toolpaths.cl.build import Builder
-from toolpaths.cl.near import nearest
-from toolpaths.cl.statements import DATA_COMMENT, TEXT, Statement, words_of
-from toolpaths.cl.subprograms import Subprograms, called, shown, subprograms_of
-from toolpaths.cl.words import SILENT, UNSUPPORTED_MOTION
+from toolpaths.cl.text import listing_text
+from toolpaths.cl.text.near import nearest
+from toolpaths.cl.text.statements import DATA_COMMENT, TEXT, Statement, words_of
+from toolpaths.cl.text.subprograms import Subprograms, called, shown, subprograms_of
+from toolpaths.cl.text.words import SILENT, UNSUPPORTED_MOTION
 
 Handler = Callable[[Builder, Statement], None]
 HANDLERS: dict[str, Handler] = {**dict.fromkeys(SILENT, structure.nothing), **structure.HANDLERS, **feeds.HANDLERS,

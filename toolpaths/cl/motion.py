@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 from toolpaths.cl.build import NO_NUMBERS, Builder, Triple
-from toolpaths.cl.dialects import Planes
 from toolpaths.cl.frames import use_world_axis
-from toolpaths.cl.statements import Statement
+from toolpaths.cl.text.dialects import Planes
+from toolpaths.cl.text.statements import Statement
 from toolpaths.toolpath import Role
 
 _NAN = math.nan

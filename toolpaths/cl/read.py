@@ -9,17 +9,17 @@ from pathlib import Path
 
 from toolpaths.cl.assemble import assemble
 from toolpaths.cl.build import Builder
-from toolpaths.cl.dialects import DIALECTS, Dialect, detect, units_said
 from toolpaths.cl.forms import check_forms
 from toolpaths.cl.indexing import TRANS_HINT
 from toolpaths.cl.interpret import HANDLERS, known, report_others, run
-from toolpaths.cl.log import Log
 from toolpaths.cl.rapid_heights import low_rapids
 from toolpaths.cl.records import counted
-from toolpaths.cl.scan import LARGEST, LARGEST_OWN, Progress, scan
-from toolpaths.cl.source import normalise
-from toolpaths.cl.statements import Lexer, Program
 from toolpaths.cl.structure import open_paths
+from toolpaths.cl.text.dialects import DIALECTS, Dialect, detect, units_said
+from toolpaths.cl.text.log import Log
+from toolpaths.cl.text.scan import LARGEST, LARGEST_OWN, Progress, scan
+from toolpaths.cl.text.source import normalise
+from toolpaths.cl.text.statements import Lexer, Program
 from toolpaths.diagnostics import Diagnostic, Severity
 from toolpaths.input_files import read_input, unreadable
 from toolpaths.toolpath import ClSource, Toolpath

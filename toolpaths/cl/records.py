@@ -6,8 +6,8 @@ from collections import Counter
 from operator import attrgetter
 
 from toolpaths.cl.build import Builder
-from toolpaths.cl.statements import COMMENT, DATA_COMMENT
-from toolpaths.cl.words import NEUTRAL, UNSUPPORTED_MOTION
+from toolpaths.cl.text.statements import COMMENT, DATA_COMMENT
+from toolpaths.cl.text.words import NEUTRAL, UNSUPPORTED_MOTION
 from toolpaths.diagnostics import has_errors
 from toolpaths.toolpath import Records
 

@@ -8,9 +8,9 @@ from collections.abc import Callable
 
 from toolpaths.cl import frames
 from toolpaths.cl.build import Builder, Declared
-from toolpaths.cl.statements import Statement
+from toolpaths.cl.text.statements import Statement
+from toolpaths.cl.text.words import EVENTS, LENGTH_EVENTS
 from toolpaths.cl.tools import describe
-from toolpaths.cl.words import EVENTS, LENGTH_EVENTS
 from toolpaths.toolpath import Frame, Operation, Role, Tool
 
 _TOOL_PATH = re.compile(r"(.*?),\s*TOOL\s*(?:,(.*))?$", re.IGNORECASE | re.DOTALL)

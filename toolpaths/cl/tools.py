@@ -12,7 +12,7 @@ from itertools import takewhile
 from typing import Any
 
 from toolpaths.cl.build import Builder
-from toolpaths.cl.statements import Statement
+from toolpaths.cl.text.statements import Statement
 from toolpaths.toolpath import Tool
 
 TURNING = frozenset({"TURN", "GROOVE", "THREAD", "TURNING"})

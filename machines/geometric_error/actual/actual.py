@@ -11,8 +11,8 @@ from abc import ABC, abstractmethod
 
 import numpy as np
 
-from machines.geometric_error.error_rates import ErrorRates
-from machines.geometric_error.lost_motion import carried_on
+from machines.geometric_error.actual.error_rates import ErrorRates
+from machines.geometric_error.actual.lost_motion import carried_on
 from machines.kinematics.base import Kinematics
 from toolpaths.arrays import Bools, Floats
 

@@ -7,9 +7,9 @@ from typing import Self
 
 import numpy as np
 
-from machines.geometric_error.actual import Actual
-from machines.geometric_error.correction import correct
-from machines.geometric_error.model import ErrorModel
+from machines.geometric_error.actual.actual import Actual
+from machines.geometric_error.actual.correction import correct
+from machines.geometric_error.actual.model import ErrorModel
 from machines.kinematics.base import Kinematics, as_points
 from machines.kinematics.frames import spin_about
 from toolpaths.arrays import Bools, Floats

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from machines.geometric_error.actual import EDGE, Actual, Placed
-from machines.geometric_error.error_rates import ErrorRates, arms_of
-from machines.geometric_error.lattice import POINT, ErrorMap
-from machines.geometric_error.serial_errors import SerialErrors
+from machines.geometric_error.actual.actual import EDGE, Actual, Placed
+from machines.geometric_error.actual.error_rates import ErrorRates, arms_of
+from machines.geometric_error.actual.serial_errors import SerialErrors
+from machines.geometric_error.tables.lattice import POINT, ErrorMap
 from machines.kinematics.base import Kinematics
 from machines.kinematics.h4_axes import H4TableAxis
 from machines.kinematics.serial import Serial

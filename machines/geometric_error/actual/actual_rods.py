@@ -12,12 +12,12 @@ from functools import cached_property
 
 import numpy as np
 
-from machines.geometric_error.actual import EDGE, Actual, Placed
-from machines.geometric_error.axis_motion import Line, actual_line, actual_tool, along, driven
-from machines.geometric_error.names import SPINDLE, parse
-from machines.geometric_error.rods import RodErrors, RodFrame, platform_turn, rod_frame
-from machines.geometric_error.serial_errors import SerialErrors
-from machines.geometric_error.transforms import carried
+from machines.geometric_error.actual.actual import EDGE, Actual, Placed
+from machines.geometric_error.actual.axis_motion import Line, actual_line, actual_tool, along, driven
+from machines.geometric_error.actual.rods import RodErrors, RodFrame, platform_turn, rod_frame
+from machines.geometric_error.actual.serial_errors import SerialErrors
+from machines.geometric_error.actual.transforms import carried
+from machines.geometric_error.tables.names import SPINDLE, parse
 from machines.kinematics import columns
 from machines.kinematics.columns import Columns
 from machines.kinematics.h4_axes import H4SpindleAxis

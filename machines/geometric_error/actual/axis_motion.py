@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from machines.geometric_error.names import DIRECTIONS, OWN, SPINDLE, ErrorName
-from machines.geometric_error.serial_errors import SerialErrors
-from machines.geometric_error.transforms import homogeneous
+from machines.geometric_error.actual.serial_errors import SerialErrors
+from machines.geometric_error.actual.transforms import homogeneous
+from machines.geometric_error.tables.names import DIRECTIONS, OWN, SPINDLE, ErrorName
 from machines.kinematics import columns
 from machines.kinematics.base import Kinematics
 from machines.kinematics.columns import Columns

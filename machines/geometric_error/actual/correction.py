@@ -19,7 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from machines.geometric_error.actual import Actual
+from machines.geometric_error.actual.actual import Actual
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.units import DEG
 

@@ -20,8 +20,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from machines.geometric_error.names import SPINDLE
-from machines.geometric_error.serial_errors import SerialErrors
+from machines.geometric_error.actual.serial_errors import SerialErrors
+from machines.geometric_error.tables.names import SPINDLE
 from machines.kinematics.base import Kinematics
 from machines.kinematics.serial import Joint, Serial
 from toolpaths.arrays import Floats, Ints

@@ -7,14 +7,14 @@ from typing import Literal, Self
 
 import numpy as np
 
-from machines.geometric_error.actual import Actual
-from machines.geometric_error.actual_map import ActualByMap
-from machines.geometric_error.actual_rods import ActualDelta, ActualH4
-from machines.geometric_error.actual_serial import ActualSerial
-from machines.geometric_error.curves import least_apart
-from machines.geometric_error.lattice import ErrorMap
-from machines.geometric_error.rods import RodErrors, gives_rods, rod_frame, rod_names
-from machines.geometric_error.serial_errors import SerialErrors
+from machines.geometric_error.actual.actual import Actual
+from machines.geometric_error.actual.actual_map import ActualByMap
+from machines.geometric_error.actual.actual_rods import ActualDelta, ActualH4
+from machines.geometric_error.actual.actual_serial import ActualSerial
+from machines.geometric_error.actual.rods import RodErrors, gives_rods, rod_frame, rod_names
+from machines.geometric_error.actual.serial_errors import SerialErrors
+from machines.geometric_error.tables.curves import least_apart
+from machines.geometric_error.tables.lattice import ErrorMap
 from machines.kinematics.base import Kinematics
 from machines.kinematics.h4_linear import H4Linear
 from machines.kinematics.linear_delta import LinearDelta

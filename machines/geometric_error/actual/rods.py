@@ -17,8 +17,8 @@ from typing import Self
 
 import numpy as np
 
-from machines.geometric_error.rods_loop import compiled, wanted
-from machines.geometric_error.transforms import turns
+from machines.geometric_error.actual.rods_loop import compiled, wanted
+from machines.geometric_error.actual.transforms import turns
 from machines.kinematics.h4_linear import H4Linear
 from machines.kinematics.linear_delta import LinearDelta
 from toolpaths.arrays import Floats, Ints, frozen

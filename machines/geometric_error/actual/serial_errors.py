@@ -28,10 +28,10 @@ from typing import Literal, Self
 
 import numpy as np
 
-from machines.geometric_error.curve_banks import Bank, banks
-from machines.geometric_error.curves import Curve, Table
-from machines.geometric_error.lost_motion import GRAIN
-from machines.geometric_error.names import OWN, ErrorName, parse
+from machines.geometric_error.actual.lost_motion import GRAIN
+from machines.geometric_error.tables.curve_banks import Bank, banks
+from machines.geometric_error.tables.curves import Curve, Table
+from machines.geometric_error.tables.names import OWN, ErrorName, parse
 from toolpaths.arrays import Bools, Floats
 
 Frame = Literal["fixed", "moving"]

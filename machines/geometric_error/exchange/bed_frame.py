@@ -12,11 +12,11 @@ from functools import cached_property
 
 import numpy as np
 
-from machines.geometric_error.actual_map import part_side
-from machines.geometric_error.curves import EVERYWHERE, Curve, Fourier, Table
-from machines.geometric_error.model import ErrorModel
-from machines.geometric_error.names import DIRECTIONS, ErrorName
-from machines.geometric_error.serial_errors import Component, Frame
+from machines.geometric_error.actual.actual_map import part_side
+from machines.geometric_error.actual.model import ErrorModel
+from machines.geometric_error.actual.serial_errors import Component, Frame
+from machines.geometric_error.tables.curves import EVERYWHERE, Curve, Fourier, Table
+from machines.geometric_error.tables.names import DIRECTIONS, ErrorName
 from machines.kinematics.h4_axes import H4SpindleAxis
 from machines.kinematics.h4_linear import H4Linear
 from machines.kinematics.serial import Serial

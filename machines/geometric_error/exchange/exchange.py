@@ -7,15 +7,15 @@ from pathlib import Path
 
 import numpy as np
 
-from machines.geometric_error.covariance import angular, write_covariance
-from machines.geometric_error.csv_table import UNITS, write_csv
-from machines.geometric_error.curves import EVERYWHERE, Fourier, Polynomial, Table
-from machines.geometric_error.lattice import ErrorMap
-from machines.geometric_error.lattice_file import map_to_csv
-from machines.geometric_error.model import ErrorModel
-from machines.geometric_error.names import ErrorName
-from machines.geometric_error.rods import RodErrors
-from machines.geometric_error.serial_errors import Component, SerialErrors
+from machines.geometric_error.actual.model import ErrorModel
+from machines.geometric_error.actual.rods import RodErrors
+from machines.geometric_error.actual.serial_errors import Component, SerialErrors
+from machines.geometric_error.files.covariance import angular, write_covariance
+from machines.geometric_error.tables.csv_table import UNITS, write_csv
+from machines.geometric_error.tables.curves import EVERYWHERE, Fourier, Polynomial, Table
+from machines.geometric_error.tables.lattice import ErrorMap
+from machines.geometric_error.tables.lattice_file import map_to_csv
+from machines.geometric_error.tables.names import ErrorName
 from toolpaths.arrays import Floats
 from toolpaths.transaction import write_together
 from toolpaths.units import DEG

@@ -8,24 +8,24 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from machines.geometric_error.actual import Actual
-from machines.geometric_error.actual_map import ActualByMap, part_side
-from machines.geometric_error.averages import SAME
-from machines.geometric_error.axis_motion import ALONG, sense
-from machines.geometric_error.bed_frame import bed_side, in_bed_frame, on_line
-from machines.geometric_error.covariance import angular
-from machines.geometric_error.csv_table import UNITS, write_csv
-from machines.geometric_error.curves import Polynomial, Table
-from machines.geometric_error.lattice import POINT, ROTARY, ErrorMap
-from machines.geometric_error.lattice_making import MapLoss, map_loss, map_of, nodes_of, probes, refined
-from machines.geometric_error.model import ErrorModel
-from machines.geometric_error.names import DIRECTIONS, OWN
-from machines.geometric_error.screw_tables import LINUXCNC_ROWS, to_linuxcnc
-from machines.geometric_error.serial_errors import Component, SerialErrors
-from machines.geometric_error.survey import PLACES as WORST_PLACES
-from machines.geometric_error.survey import apart
-from machines.geometric_error.tabulate import Rows, loss, merged, rows_for, sampled, tabulated, without
-from machines.geometric_error.volume import corners, middle, ranges, samples
+from machines.geometric_error.actual.actual import Actual
+from machines.geometric_error.actual.actual_map import ActualByMap, part_side
+from machines.geometric_error.actual.axis_motion import ALONG, sense
+from machines.geometric_error.actual.model import ErrorModel
+from machines.geometric_error.actual.serial_errors import Component, SerialErrors
+from machines.geometric_error.exchange.bed_frame import bed_side, in_bed_frame, on_line
+from machines.geometric_error.exchange.lattice_making import MapLoss, map_loss, map_of, nodes_of, probes, refined
+from machines.geometric_error.exchange.survey import PLACES as WORST_PLACES
+from machines.geometric_error.exchange.survey import apart
+from machines.geometric_error.exchange.tabulate import Rows, loss, merged, rows_for, sampled, tabulated, without
+from machines.geometric_error.exchange.volume import corners, middle, ranges, samples
+from machines.geometric_error.files.covariance import angular
+from machines.geometric_error.tables.averages import SAME
+from machines.geometric_error.tables.csv_table import UNITS, write_csv
+from machines.geometric_error.tables.curves import Polynomial, Table
+from machines.geometric_error.tables.lattice import POINT, ROTARY, ErrorMap
+from machines.geometric_error.tables.names import DIRECTIONS, OWN
+from machines.geometric_error.tables.screw_tables import LINUXCNC_ROWS, to_linuxcnc
 from machines.kinematics.serial import Serial
 from machines.machine import Machine
 from toolpaths.arrays import Floats

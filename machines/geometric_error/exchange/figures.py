@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from machines.geometric_error.csv_table import UNITS
-from machines.geometric_error.model import ErrorModel
-from machines.geometric_error.serial_errors import Component
-from machines.geometric_error.tabulate import both_ways
-from machines.geometric_error.volume import INSIDE, ranges, section
+from machines.geometric_error.actual.model import ErrorModel
+from machines.geometric_error.actual.serial_errors import Component
+from machines.geometric_error.exchange.tabulate import both_ways
+from machines.geometric_error.exchange.volume import INSIDE, ranges, section
+from machines.geometric_error.tables.csv_table import UNITS
 from machines.machine import Machine
 from toolpaths.arrays import Floats
 from toolpaths.drawing import BESIDE, image

@@ -10,23 +10,30 @@ from typing import Literal
 
 import numpy as np
 
-from machines.geometric_error.actual_map import part_side
-from machines.geometric_error.averages import Averaged, averaged
-from machines.geometric_error.axis_motion import effect
-from machines.geometric_error.bed_frame import bed_side
-from machines.geometric_error.covariance import angular, read_covariance
-from machines.geometric_error.csv_table import ANGLES, LENGTHS, UNITS, CsvTable, read_csv, read_text
-from machines.geometric_error.exports import joint_sense, leans
-from machines.geometric_error.lattice_file import COORDINATES, map_from_csv, zeroed
-from machines.geometric_error.model import ErrorModel
-from machines.geometric_error.names import DIRECTIONS, OWN, ErrorName, parse
-from machines.geometric_error.readings import by_iso_names, run_of, runs_as_rows, together, turned_back, unknown_columns
-from machines.geometric_error.scatter import with_scatter
-from machines.geometric_error.screw_tables import from_linuxcnc
-from machines.geometric_error.serial_errors import Component, Frame, SerialErrors
-from machines.geometric_error.sizes import too_large
-from machines.geometric_error.table_curves import Fault, table_curve
-from machines.geometric_error.tabulate import merged
+from machines.geometric_error.actual.actual_map import part_side
+from machines.geometric_error.actual.axis_motion import effect
+from machines.geometric_error.actual.model import ErrorModel
+from machines.geometric_error.actual.serial_errors import Component, Frame, SerialErrors
+from machines.geometric_error.exchange.bed_frame import bed_side
+from machines.geometric_error.exchange.exports import joint_sense, leans
+from machines.geometric_error.exchange.scatter import with_scatter
+from machines.geometric_error.exchange.tabulate import merged
+from machines.geometric_error.files.covariance import angular, read_covariance
+from machines.geometric_error.files.sizes import too_large
+from machines.geometric_error.tables.averages import Averaged, averaged
+from machines.geometric_error.tables.csv_table import ANGLES, LENGTHS, UNITS, CsvTable, read_csv, read_text
+from machines.geometric_error.tables.lattice_file import COORDINATES, map_from_csv, zeroed
+from machines.geometric_error.tables.names import DIRECTIONS, OWN, ErrorName, parse
+from machines.geometric_error.tables.readings import (
+    by_iso_names,
+    run_of,
+    runs_as_rows,
+    together,
+    turned_back,
+    unknown_columns,
+)
+from machines.geometric_error.tables.screw_tables import from_linuxcnc
+from machines.geometric_error.tables.table_curves import Fault, table_curve
 from machines.kinematics.serial import Serial
 from machines.machine import Machine
 from machines.user_file import nearest

@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from machines.geometric_error.actual import Actual
-from machines.geometric_error.actual_map import ActualByMap
-from machines.geometric_error.averages import SAME
-from machines.geometric_error.lattice import POINT, ErrorMap
+from machines.geometric_error.actual.actual import Actual
+from machines.geometric_error.actual.actual_map import ActualByMap
+from machines.geometric_error.tables.averages import SAME
+from machines.geometric_error.tables.lattice import POINT, ErrorMap
 from toolpaths.arrays import Floats
 
 STEPS = 8

@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from machines.geometric_error.averages import Averaged, levels_of
-from machines.geometric_error.csv_table import UNITS
-from machines.geometric_error.exports import MOST_DOUBT
-from machines.geometric_error.lattice import COLUMNS
-from machines.geometric_error.lattice_file import zeroed_covariance
-from machines.geometric_error.model import ErrorModel
+from machines.geometric_error.actual.model import ErrorModel
+from machines.geometric_error.exchange.exports import MOST_DOUBT
+from machines.geometric_error.tables.averages import Averaged, levels_of
+from machines.geometric_error.tables.csv_table import UNITS
+from machines.geometric_error.tables.lattice import COLUMNS
+from machines.geometric_error.tables.lattice_file import zeroed_covariance
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic, info
 

@@ -6,17 +6,17 @@ from typing import Any
 
 import numpy as np
 
-from machines.geometric_error.actual import Actual
-from machines.geometric_error.correction import correct
-from machines.geometric_error.covariance import angular
-from machines.geometric_error.csv_table import UNITS
-from machines.geometric_error.curves import Curve, Fourier, Polynomial, Table
-from machines.geometric_error.fingerprint import fingerprint
-from machines.geometric_error.lattice import COLUMNS, ErrorMap
-from machines.geometric_error.model import ErrorModel, doubt
-from machines.geometric_error.names import DIRECTIONS, SPINDLE, parse
-from machines.geometric_error.rods import RodErrors
-from machines.geometric_error.volume import ranges, samples
+from machines.geometric_error.actual.actual import Actual
+from machines.geometric_error.actual.correction import correct
+from machines.geometric_error.actual.model import ErrorModel, doubt
+from machines.geometric_error.actual.rods import RodErrors
+from machines.geometric_error.exchange.volume import ranges, samples
+from machines.geometric_error.files.covariance import angular
+from machines.geometric_error.files.fingerprint import fingerprint
+from machines.geometric_error.tables.csv_table import UNITS
+from machines.geometric_error.tables.curves import Curve, Fourier, Polynomial, Table
+from machines.geometric_error.tables.lattice import COLUMNS, ErrorMap
+from machines.geometric_error.tables.names import DIRECTIONS, SPINDLE, parse
 from machines.machine import Machine
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic, warning

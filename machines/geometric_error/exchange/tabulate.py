@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from machines.geometric_error.bed_frame import Turned
-from machines.geometric_error.curves import Curve, Fourier, Table
-from machines.geometric_error.model import ErrorModel
-from machines.geometric_error.names import ErrorName
-from machines.geometric_error.serial_errors import Component, Frame
+from machines.geometric_error.actual.model import ErrorModel
+from machines.geometric_error.actual.serial_errors import Component, Frame
+from machines.geometric_error.exchange.bed_frame import Turned
+from machines.geometric_error.tables.curves import Curve, Fourier, Table
+from machines.geometric_error.tables.names import ErrorName
 from toolpaths.arrays import Floats
 
 PROBES = 16

@@ -6,8 +6,8 @@ from itertools import product
 
 import numpy as np
 
-from machines.geometric_error.actual import Actual
-from machines.geometric_error.model import ErrorModel
+from machines.geometric_error.actual.actual import Actual
+from machines.geometric_error.actual.model import ErrorModel
 from machines.kinematics.h4_linear import H4Linear
 from machines.kinematics.linear_delta import LinearDelta
 from machines.machine import Machine

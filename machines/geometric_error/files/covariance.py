@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from machines.geometric_error.csv_table import UNITS, read_text
-from machines.geometric_error.file_models import ErrorFileModel
-from machines.geometric_error.model import ErrorModel
-from machines.geometric_error.names import parse
+from machines.geometric_error.actual.model import ErrorModel
+from machines.geometric_error.files.file_models import ErrorFileModel
+from machines.geometric_error.tables.csv_table import UNITS, read_text
+from machines.geometric_error.tables.names import parse
 from machines.user_file import UserFile, nearest
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic, Severity, error

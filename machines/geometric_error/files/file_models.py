@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from machines.geometric_error.names import parse
+from machines.geometric_error.tables.names import parse
 from machines.models import Positive, Vector
 from machines.slider_models import Span
 from machines.user_file import UserModel

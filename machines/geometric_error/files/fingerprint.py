@@ -6,14 +6,14 @@ import hashlib
 
 import numpy as np
 
-from machines.geometric_error.covariance import angular
-from machines.geometric_error.csv_table import UNITS
-from machines.geometric_error.curves import Curve, Fourier, Polynomial, Table
-from machines.geometric_error.lattice import ROTARY, ErrorMap
-from machines.geometric_error.model import ErrorModel
-from machines.geometric_error.names import ErrorName
-from machines.geometric_error.rods import RodErrors
-from machines.geometric_error.serial_errors import SerialErrors
+from machines.geometric_error.actual.model import ErrorModel
+from machines.geometric_error.actual.rods import RodErrors
+from machines.geometric_error.actual.serial_errors import SerialErrors
+from machines.geometric_error.files.covariance import angular
+from machines.geometric_error.tables.csv_table import UNITS
+from machines.geometric_error.tables.curves import Curve, Fourier, Polynomial, Table
+from machines.geometric_error.tables.lattice import ROTARY, ErrorMap
+from machines.geometric_error.tables.names import ErrorName
 from toolpaths.arrays import Floats
 from toolpaths.units import DEG
 

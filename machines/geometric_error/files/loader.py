@@ -7,20 +7,20 @@ from pathlib import Path
 
 import numpy as np
 
-from machines.geometric_error.actual_map import part_side
-from machines.geometric_error.axis_motion import effect
-from machines.geometric_error.covariance import covariance_of
-from machines.geometric_error.csv_table import UNITS, CsvTable, read_csv
-from machines.geometric_error.curves import EVERYWHERE, Curve, Fourier, Polynomial
-from machines.geometric_error.file_models import CurveModel, ErrorFileModel
-from machines.geometric_error.lattice import ErrorMap
-from machines.geometric_error.lattice_file import map_from_csv, zeroed, zeroed_covariance
-from machines.geometric_error.model import ErrorModel
-from machines.geometric_error.names import SPINDLE, ErrorName, parse
-from machines.geometric_error.rods import RodErrors, gives_rods, rod_frame, rod_names
-from machines.geometric_error.serial_errors import Component, Frame, SerialErrors
-from machines.geometric_error.sizes import too_large
-from machines.geometric_error.table_curves import ROTARY, Fault, table_curve
+from machines.geometric_error.actual.actual_map import part_side
+from machines.geometric_error.actual.axis_motion import effect
+from machines.geometric_error.actual.model import ErrorModel
+from machines.geometric_error.actual.rods import RodErrors, gives_rods, rod_frame, rod_names
+from machines.geometric_error.actual.serial_errors import Component, Frame, SerialErrors
+from machines.geometric_error.files.covariance import covariance_of
+from machines.geometric_error.files.file_models import CurveModel, ErrorFileModel
+from machines.geometric_error.files.sizes import too_large
+from machines.geometric_error.tables.csv_table import UNITS, CsvTable, read_csv
+from machines.geometric_error.tables.curves import EVERYWHERE, Curve, Fourier, Polynomial
+from machines.geometric_error.tables.lattice import ErrorMap
+from machines.geometric_error.tables.lattice_file import map_from_csv, zeroed, zeroed_covariance
+from machines.geometric_error.tables.names import SPINDLE, ErrorName, parse
+from machines.geometric_error.tables.table_curves import ROTARY, Fault, table_curve
 from machines.kinematics.h4_axes import H4TableAxis
 from machines.kinematics.h4_linear import H4Linear
 from machines.kinematics.linear_delta import LinearDelta

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from machines.geometric_error.covariance import angular
-from machines.geometric_error.curves import largest
-from machines.geometric_error.lattice import COLUMNS
-from machines.geometric_error.model import ErrorModel
+from machines.geometric_error.actual.model import ErrorModel
+from machines.geometric_error.files.covariance import angular
+from machines.geometric_error.tables.curves import largest
+from machines.geometric_error.tables.lattice import COLUMNS
 from toolpaths.units import DEG
 
 LARGE = {False: (1.0, 100.0), True: (0.5 * DEG, 10.0 * DEG)}

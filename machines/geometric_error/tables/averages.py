@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from machines.geometric_error.csv_table import CsvTable
-from machines.geometric_error.table_curves import ROTARY, Fault
+from machines.geometric_error.tables.csv_table import CsvTable
+from machines.geometric_error.tables.table_curves import ROTARY, Fault
 from toolpaths.arrays import Floats, Ints
 from toolpaths.units import DEG
 

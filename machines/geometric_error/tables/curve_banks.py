@@ -7,7 +7,7 @@ from collections.abc import Hashable, Sequence
 
 import numpy as np
 
-from machines.geometric_error.curves import Curve, Fourier, Polynomial, Table
+from machines.geometric_error.tables.curves import Curve, Fourier, Polynomial, Table
 from toolpaths.arrays import Floats
 
 

@@ -8,9 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from machines.geometric_error.averages import SAME, levels_of
-from machines.geometric_error.csv_table import ANGLES, LENGTHS, CsvTable, write_csv
-from machines.geometric_error.lattice import COLUMNS, POINT, ROTARY, ErrorMap
+from machines.geometric_error.tables.averages import SAME, levels_of
+from machines.geometric_error.tables.csv_table import ANGLES, LENGTHS, CsvTable, write_csv
+from machines.geometric_error.tables.lattice import COLUMNS, POINT, ROTARY, ErrorMap
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.units import DEG

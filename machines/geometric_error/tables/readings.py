@@ -11,9 +11,9 @@ from pathlib import Path
 
 import numpy as np
 
-from machines.geometric_error.csv_table import LENGTHS, CsvTable
-from machines.geometric_error.names import ErrorName, parse
-from machines.geometric_error.table_curves import CLOSES, Fault
+from machines.geometric_error.tables.csv_table import LENGTHS, CsvTable
+from machines.geometric_error.tables.names import ErrorName, parse
+from machines.geometric_error.tables.table_curves import CLOSES, Fault
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic, error
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from machines.geometric_error.curves import Table
-from machines.geometric_error.names import ErrorName
+from machines.geometric_error.tables.curves import Table
+from machines.geometric_error.tables.names import ErrorName
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.units import DEG
 

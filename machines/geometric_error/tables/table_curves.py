@@ -7,9 +7,9 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from machines.geometric_error.csv_table import ANGLES, LENGTHS, UNITS, CsvTable
-from machines.geometric_error.curves import Table
-from machines.geometric_error.names import ErrorName
+from machines.geometric_error.tables.csv_table import ANGLES, LENGTHS, UNITS, CsvTable
+from machines.geometric_error.tables.curves import Table
+from machines.geometric_error.tables.names import ErrorName
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.units import DEG

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from postproc.feedrate.compiled import compiled
+from postproc.base.compiled import compiled
 
 _N = np.uint64
 LANES = 32

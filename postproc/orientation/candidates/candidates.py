@@ -7,14 +7,14 @@ from collections import Counter
 import numpy as np
 
 from machines.machine import Machine
-from postproc.orientation.allowed import SAME, Allowed
-from postproc.orientation.held import best_held
-from postproc.orientation.passes import Pass
-from postproc.orientation.ridges import best_on_ridge
-from postproc.orientation.search import Kind, Search, Tried
-from postproc.orientation.seeds import aimed_axes, around, reaching_axes
-from postproc.orientation.timed import Turned
-from postproc.orientation.travel import nearest_inside
+from postproc.orientation.candidates.held import best_held
+from postproc.orientation.candidates.ridges import best_on_ridge
+from postproc.orientation.candidates.search import Kind, Search, Tried
+from postproc.orientation.candidates.seeds import aimed_axes, around, reaching_axes
+from postproc.orientation.candidates.timed import Turned
+from postproc.orientation.candidates.travel import nearest_inside
+from postproc.orientation.passes.allowed import SAME, Allowed
+from postproc.orientation.passes.passes import Pass
 from toolpaths.arrays import Floats
 from toolpaths.rotations import angle_between, slerp
 from toolpaths.units import DEG

@@ -13,9 +13,9 @@ from machines.machine import Machine
 from machines.polytope import held_axis_polytope
 from postproc.joints.poles import poles_of
 from postproc.joints.spin import free_joint
-from postproc.orientation.passes import Pass
-from postproc.orientation.search import Search
-from postproc.orientation.timed import Turned
+from postproc.orientation.candidates.search import Search
+from postproc.orientation.candidates.timed import Turned
+from postproc.orientation.passes.passes import Pass
 from toolpaths.arrays import Floats, Ints
 from toolpaths.units import DEG
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable
 
-from postproc.orientation.search import Kind, Tried
-from postproc.orientation.timed import Turned
+from postproc.orientation.candidates.search import Kind, Tried
+from postproc.orientation.candidates.timed import Turned
 
 KINDS: dict[Kind, str] = {
     "limits": "outside the allowed angles", "reach": "out of reach", "travel": "travel of an axis",

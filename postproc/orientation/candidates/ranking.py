@@ -13,10 +13,9 @@ import numpy as np
 from scipy.interpolate import BSpline, make_interp_spline
 from scipy.sparse import csr_matrix, diags, identity, vstack
 
-from postproc.feedrate.compiled import compiled, wanted
+from postproc.base.compiled import compiled, wanted
 from postproc.feedrate.feed import Allowed
-from postproc.feedrate.geometry import DEGREE, MachinePath
-from postproc.feedrate.interior_kernel import pentadiagonal
+from postproc.feedrate.kernels.interior import pentadiagonal
 from postproc.feedrate.limits import JointLimits, squared_speed, steady_cap
 from postproc.feedrate.paths import Eased
 from postproc.feedrate.plan import Options
@@ -25,8 +24,9 @@ from postproc.feedrate.rows import UNBOUND
 from postproc.feedrate.second_order import least_time, second_order
 from postproc.feedrate.spline import rest_basis
 from postproc.feedrate.windows import KERNEL_FROM, Method, solve_problem
-from postproc.orientation.passes import Pass
-from postproc.orientation.timed import Turned
+from postproc.orientation.candidates.timed import Turned
+from postproc.orientation.passes.passes import Pass
+from postproc.planning.geometry import DEGREE, MachinePath
 from toolpaths.arrays import Floats
 
 _MOVES = 1e-9

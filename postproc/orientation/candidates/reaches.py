@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from machines.polytope import Polytope, held_axis_polytope
-from postproc.orientation.passes import Stretch
-from postproc.orientation.timed import Turned
-from postproc.planned import ORDERS
+from postproc.orientation.candidates.timed import Turned
+from postproc.orientation.passes.passes import Stretch
+from postproc.planning.planned import ORDERS
 from toolpaths.arrays import Floats
 
 

@@ -8,10 +8,10 @@ import numpy as np
 
 from machines.machine import Machine
 from machines.polytope import held_axis_polytope
-from postproc.orientation.passes import Pass
-from postproc.orientation.search import Search
-from postproc.orientation.seeds import across, sharpest
-from postproc.orientation.timed import Turned
+from postproc.orientation.candidates.search import Search
+from postproc.orientation.candidates.seeds import across, sharpest
+from postproc.orientation.candidates.timed import Turned
+from postproc.orientation.passes.passes import Pass
 from toolpaths.arrays import Floats, Ints
 from toolpaths.rotations import angle_between
 from toolpaths.units import DEG

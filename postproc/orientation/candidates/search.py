@@ -8,10 +8,10 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from machines.machine import Machine
-from postproc.orientation.allowed import SAME, Allowed
-from postproc.orientation.passes import Pass
-from postproc.orientation.ranking import Ranking
-from postproc.orientation.timed import Turned, turned, turned_all
+from postproc.orientation.candidates.ranking import Ranking
+from postproc.orientation.candidates.timed import Turned, turned, turned_all
+from postproc.orientation.passes.allowed import SAME, Allowed
+from postproc.orientation.passes.passes import Pass
 from toolpaths.arrays import Floats
 from toolpaths.rotations import angle_between
 from toolpaths.units import DEG

@@ -9,8 +9,8 @@ import numpy as np
 from machines.kinematics.base import Kinematics
 from machines.machine import Machine
 from machines.polytope import held_axis_polytope
-from postproc.orientation.passes import Pass
-from postproc.orientation.vertices import vertex_angles
+from postproc.orientation.candidates.vertices import vertex_angles
+from postproc.orientation.passes.passes import Pass
 from toolpaths.arrays import Bools, Floats
 from toolpaths.rotations import angle_between
 from toolpaths.units import DEG

@@ -10,16 +10,16 @@ from math import isnan, sin
 import numpy as np
 
 from machines.machine import Machine
-from postproc.feedrate.geometry import MachinePath
 from postproc.feedrate.limits import JointLimits
 from postproc.feedrate.motion import Plan
 from postproc.feedrate.plan import plan, plan_second_order
 from postproc.feedrate.rest_to_rest import Law, rest_seconds
 from postproc.feedrate.shares import Shares
-from postproc.orientation.allowed import SAME
-from postproc.orientation.passes import Pass, Stretch
-from postproc.orientation.poses import held_poses, poses
-from postproc.planned import ORDERS, joint_limits
+from postproc.orientation.passes.allowed import SAME
+from postproc.orientation.passes.passes import Pass, Stretch
+from postproc.orientation.passes.poses import held_poses, poses
+from postproc.planning.geometry import MachinePath
+from postproc.planning.planned import ORDERS, joint_limits
 from toolpaths.arrays import Floats
 from toolpaths.units import DEG
 

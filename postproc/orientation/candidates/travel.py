@@ -8,11 +8,11 @@ import numpy as np
 
 from machines.machine import Machine
 from postproc.joints.tracks import TRAVEL_SLACK
-from postproc.orientation.allowed import Allowed
-from postproc.orientation.held import poles, ring_of
-from postproc.orientation.passes import Pass
-from postproc.orientation.poses import Solved, held_poses
-from postproc.orientation.seeds import around, cap, ring
+from postproc.orientation.candidates.held import poles, ring_of
+from postproc.orientation.candidates.seeds import around, cap, ring
+from postproc.orientation.passes.allowed import Allowed
+from postproc.orientation.passes.passes import Pass
+from postproc.orientation.passes.poses import Solved, held_poses
 from toolpaths.arrays import Floats
 from toolpaths.rotations import angle_between
 from toolpaths.units import DEG

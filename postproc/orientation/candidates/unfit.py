@@ -8,13 +8,13 @@ from collections.abc import Callable
 
 import numpy as np
 
-from postproc.orientation.allowed import Allowed
-from postproc.orientation.losers import KINDS
-from postproc.orientation.passes import Pass, Work
-from postproc.orientation.poses import OUT_OF_REACH
-from postproc.orientation.search import Lost, Tried
-from postproc.orientation.timed import Turned, turned
-from postproc.orientation.travel import Lack, nearest_inside
+from postproc.orientation.candidates.losers import KINDS
+from postproc.orientation.candidates.search import Lost, Tried
+from postproc.orientation.candidates.timed import Turned, turned
+from postproc.orientation.candidates.travel import Lack, nearest_inside
+from postproc.orientation.passes.allowed import Allowed
+from postproc.orientation.passes.passes import Pass, Work
+from postproc.orientation.passes.poses import OUT_OF_REACH
 from toolpaths.diagnostics import Diagnostic, error, warning
 from toolpaths.rotations import angle_between
 from toolpaths.units import DEG

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from postproc.joints.spin import free_joint
-from postproc.orientation.reaches import least_held
-from postproc.orientation.search import Lost, Tried
-from postproc.orientation.timed import Turned
+from postproc.orientation.candidates.reaches import least_held
+from postproc.orientation.candidates.search import Lost, Tried
+from postproc.orientation.candidates.timed import Turned
 from toolpaths.drawing import plain
 from toolpaths.units import DEG
 

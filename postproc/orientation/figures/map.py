@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from postproc.orientation.losers import KINDS
-from postproc.orientation.passes import Work
-from postproc.orientation.reaches import least_under
-from postproc.orientation.search import Kind, Tried
-from postproc.orientation.timed import Turned
+from postproc.orientation.candidates.losers import KINDS
+from postproc.orientation.candidates.reaches import least_under
+from postproc.orientation.candidates.search import Kind, Tried
+from postproc.orientation.candidates.timed import Turned
+from postproc.orientation.passes.passes import Work
 from toolpaths.arrays import Floats
 from toolpaths.rotations import angle_between
 from toolpaths.units import DEG

@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from postproc.options import Orientation
-from postproc.orientation.choice import OrientationChoice
-from postproc.orientation.plans import OrientationPlan
-from postproc.orientation.report import NAMES, gain
-from postproc.orientation.shares import shares_of
-from postproc.orientation.timed import Turned
+from postproc.base.options import Orientation
+from postproc.orientation.candidates.timed import Turned
+from postproc.orientation.plans.choice import OrientationChoice
+from postproc.orientation.plans.plans import OrientationPlan
+from postproc.orientation.plans.shares import shares_of
+from postproc.orientation.report.figures_of_choice import NAMES, gain
 from toolpaths.arrays import Floats
 from toolpaths.drawing import BESIDE
 

@@ -8,10 +8,10 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 from machines.polytope import Polytope
-from postproc.orientation.passes import Work
-from postproc.orientation.reaches import binding, direction_of, polytopes, reaches
-from postproc.orientation.search import Tried
-from postproc.orientation.timed import Turned
+from postproc.orientation.candidates.reaches import binding, direction_of, polytopes, reaches
+from postproc.orientation.candidates.search import Tried
+from postproc.orientation.candidates.timed import Turned
+from postproc.orientation.passes.passes import Work
 from toolpaths.arrays import Floats, Ints
 
 Axes3D = Any

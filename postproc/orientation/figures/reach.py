@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from postproc.orientation.candidates.reaches import Reach, feed_of, reaches
+from postproc.orientation.candidates.search import Tried
+from postproc.orientation.candidates.timed import Turned
 from postproc.orientation.figures.polytopes import COLOURS, SCALE, SHOWN, short
-from postproc.orientation.reaches import Reach, feed_of, reaches
-from postproc.orientation.search import Tried
-from postproc.orientation.timed import Turned
 from toolpaths.drawing import plain
 
 if TYPE_CHECKING:

@@ -8,18 +8,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from postproc.options import Orientation
-from postproc.orientation.choice import OrientationChoice
+from postproc.base.options import Orientation
+from postproc.orientation.candidates.search import Tried
+from postproc.orientation.candidates.timed import Turned
 from postproc.orientation.figures.held import held_panel, is_held
 from postproc.orientation.figures.map import axes_map
 from postproc.orientation.figures.overview import angle_panel, gain_panel, plan_panel
 from postproc.orientation.figures.polytopes import box_panel, order_panel
 from postproc.orientation.figures.reach import reach_panel
-from postproc.orientation.passes import Work
-from postproc.orientation.report import gain
-from postproc.orientation.search import Tried
-from postproc.orientation.text import orientation, percent, seconds
-from postproc.orientation.timed import Turned
+from postproc.orientation.passes.passes import Work
+from postproc.orientation.plans.choice import OrientationChoice
+from postproc.orientation.report.figures_of_choice import gain
+from postproc.orientation.report.text import orientation, percent, seconds
 from toolpaths.drawing import image, plain
 
 if TYPE_CHECKING:

@@ -7,8 +7,8 @@ from typing import Protocol
 
 import numpy as np
 
-from postproc.orientation.passes import Pass
-from postproc.setup_orientation import OrientationLimits
+from postproc.orientation.passes.passes import Pass
+from postproc.setup.orientation import OrientationLimits
 from toolpaths.arrays import Bools, Floats
 from toolpaths.rotations import angle_between
 from toolpaths.units import DEG

@@ -8,8 +8,8 @@ import numpy as np
 
 from postproc.feedrate.limits import JointLimits
 from postproc.feedrate.rest_to_rest import Law, rest_seconds
-from postproc.holes import Phase
-from postproc.moves import Moves
+from postproc.reference.holes import Phase
+from postproc.reference.moves import Moves
 from toolpaths.arrays import Floats, Ints
 from toolpaths.toolpath import Kind, Toolpath
 

@@ -6,9 +6,9 @@ from __future__ import annotations
 import numpy as np
 
 from machines.user_file import nearest, read_toml
-from postproc.orientation.allowed import off_centre, own_outside
-from postproc.orientation.passes import Pass, Work
-from postproc.setup_orientation import OrientationLimits
+from postproc.orientation.passes.allowed import off_centre, own_outside
+from postproc.orientation.passes.passes import Pass, Work
+from postproc.setup.orientation import OrientationLimits
 from toolpaths.diagnostics import Diagnostic, error, info, warning
 from toolpaths.units import DEG
 

@@ -9,8 +9,8 @@ import numpy as np
 from postproc.collision.bodies import Scene, Touch, scene, touches
 from postproc.collision.form import Form, tool_form
 from postproc.collision.swept import Swept, along_curves, joined
-from postproc.moves import Phase
-from postproc.orientation.passes import Pass, Work
+from postproc.orientation.passes.passes import Pass, Work
+from postproc.reference.moves import Phase
 from toolpaths.arrays import Bools, Floats
 from toolpaths.diagnostics import Diagnostic, has_errors
 from toolpaths.rotations import angle_between

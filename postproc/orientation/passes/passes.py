@@ -9,19 +9,19 @@ import numpy as np
 
 from machines.kinematics.base import Kinematics
 from machines.machine import Machine
-from postproc.events import tool_changes
+from postproc.base.options import Options
 from postproc.feedrate.feed import StepFeed
-from postproc.feedrate.geometry_sites import sites
-from postproc.links import SafeSpace, safe_space
-from postproc.moves import Moves, build_moves
-from postproc.options import Options
-from postproc.orientation.contact import Contact, contact_of
-from postproc.orientation.cutter import ball_radius
-from postproc.orientation.drilled import Drilled, drilled_of
-from postproc.orientation.surface import Surface, surface_of
-from postproc.pass_geometry import chains, stops_of
-from postproc.setup import Placement, SetupFile, part_placement
-from postproc.tool_numbers import numbered
+from postproc.orientation.passes.contact import Contact, contact_of
+from postproc.orientation.passes.drilled import Drilled, drilled_of
+from postproc.orientation.passes.surface import Surface, surface_of
+from postproc.path.links import SafeSpace, safe_space
+from postproc.planning.geometry_sites import sites
+from postproc.planning.pass_geometry import chains, stops_of
+from postproc.reference.cutter import ball_radius
+from postproc.reference.events import tool_changes
+from postproc.reference.moves import Moves, build_moves
+from postproc.reference.tool_numbers import numbered
+from postproc.setup.model import Placement, SetupFile, part_placement
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.diagnostics import Diagnostic, Severity, error, has_errors
 from toolpaths.rotations import angle_between

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import numpy as np
 
-import postproc.reach as reach
+import postproc.path.reach as reach
 from machines.machine import Machine
-from postproc.joint_path import reachable_axes
+from postproc.joints.joint_path import reachable_axes
 from postproc.joints.tracks import TRAVEL_SLACK
-from postproc.orientation.passes import Pass
+from postproc.orientation.passes.passes import Pass
 from toolpaths.arrays import Bools, Floats
 from toolpaths.units import DEG
 

@@ -17,8 +17,8 @@ from itertools import repeat
 from multiprocessing import get_context
 from typing import Any, TypeVar
 
-from postproc.orientation.allowed import Allowed
-from postproc.orientation.passes import Work
+from postproc.orientation.passes.allowed import Allowed
+from postproc.orientation.passes.passes import Work
 
 Progress = Callable[[str, int, int], None]
 T = TypeVar("T")

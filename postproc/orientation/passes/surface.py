@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from postproc.orientation.contact import Contact, contact_of
-from postproc.setup import Placement, SetupFile
+from postproc.orientation.passes.contact import Contact, contact_of
+from postproc.setup.model import Placement, SetupFile
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic
 from toolpaths.shape import Curves

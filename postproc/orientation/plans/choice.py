@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from postproc.options import Orientation
-from postproc.orientation.passes import Work
-from postproc.orientation.plans import OrientationPlan, StateTable
-from postproc.orientation.reoriented import reoriented
-from postproc.orientation.search import Tried
+from postproc.base.options import Orientation
+from postproc.orientation.candidates.search import Tried
+from postproc.orientation.passes.passes import Work
+from postproc.orientation.plans.plans import OrientationPlan, StateTable
+from postproc.orientation.plans.reoriented import reoriented
 from toolpaths.toolpath import Toolpath
 
 

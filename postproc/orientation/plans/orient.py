@@ -8,20 +8,20 @@ from functools import partial
 import numpy as np
 
 from machines.machine import Machine
-from postproc.collision.passes import pass_bodies
-from postproc.options import Options, Orientation
-from postproc.orientation.allowed import Allowed
-from postproc.orientation.candidates import tried
-from postproc.orientation.choice import OrientationChoice
-from postproc.orientation.limited import limit_faults
-from postproc.orientation.passes import Work, work_of
-from postproc.orientation.plans import OrientationPlan, plans_of, table_of
-from postproc.orientation.ranking import prepare
-from postproc.orientation.rounds import PassFault, Progress, each_pass
-from postproc.orientation.search import APART, Lost, Tried
-from postproc.orientation.timed import Turned
-from postproc.orientation.unfit import REACH, out_of_travel, unfit
-from postproc.setup import SetupFile
+from postproc.base.options import Options, Orientation
+from postproc.orientation.candidates.candidates import tried
+from postproc.orientation.candidates.ranking import prepare
+from postproc.orientation.candidates.search import APART, Lost, Tried
+from postproc.orientation.candidates.timed import Turned
+from postproc.orientation.candidates.unfit import REACH, out_of_travel, unfit
+from postproc.orientation.passes.allowed import Allowed
+from postproc.orientation.passes.limited import limit_faults
+from postproc.orientation.passes.pass_bodies import pass_bodies
+from postproc.orientation.passes.passes import Work, work_of
+from postproc.orientation.passes.rounds import PassFault, Progress, each_pass
+from postproc.orientation.plans.choice import OrientationChoice
+from postproc.orientation.plans.plans import OrientationPlan, plans_of, table_of
+from postproc.setup.model import SetupFile
 from toolpaths.diagnostics import Diagnostic, error, has_errors, warning
 from toolpaths.toolpath import Toolpath
 from toolpaths.units import DEG

@@ -6,15 +6,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from postproc.options import Orientation
-from postproc.orientation.allowed import Allowed
-from postproc.orientation.choose import groupwise, shortest
-from postproc.orientation.passes import Work
-from postproc.orientation.rounds import Progress, each_pass
-from postproc.orientation.search import Tried
-from postproc.orientation.states import CLUSTER, groups_of, index, pools_of, ranked, states_of
-from postproc.orientation.timed import Turned
-from postproc.orientation.turns import Ends, all_ends, unwinding, ways_between
+from postproc.base.options import Orientation
+from postproc.orientation.candidates.search import Tried
+from postproc.orientation.candidates.timed import Turned
+from postproc.orientation.passes.allowed import Allowed
+from postproc.orientation.passes.passes import Work
+from postproc.orientation.passes.rounds import Progress, each_pass
+from postproc.orientation.plans.choose import groupwise, shortest
+from postproc.orientation.plans.states import CLUSTER, groups_of, index, pools_of, ranked, states_of
+from postproc.orientation.plans.turns import Ends, all_ends, unwinding, ways_between
 from toolpaths.arrays import Bools, Floats
 
 _EQUAL = 2e-4

@@ -8,11 +8,11 @@ import numpy as np
 
 from machines.kinematics.frames import spin_about, tool_x
 from postproc.joints.spin import spin_of
-from postproc.orientation.allowed import SAME
-from postproc.orientation.held import free_value
-from postproc.orientation.passes import Work
-from postproc.orientation.timed import Turned
-from postproc.setup import Placement
+from postproc.orientation.candidates.held import free_value
+from postproc.orientation.candidates.timed import Turned
+from postproc.orientation.passes.allowed import SAME
+from postproc.orientation.passes.passes import Work
+from postproc.setup.model import Placement
 from toolpaths.arrays import Floats, Ints
 from toolpaths.rotations import angle_between
 from toolpaths.toolpath import Arcs, Toolpath

@@ -8,9 +8,9 @@ from itertools import pairwise
 import numpy as np
 
 from machines.machine import Machine
-from postproc.orientation.allowed import SAME
-from postproc.orientation.plans import OrientationPlan
-from postproc.orientation.timed import Turned
+from postproc.orientation.candidates.timed import Turned
+from postproc.orientation.passes.allowed import SAME
+from postproc.orientation.plans.plans import OrientationPlan
 from toolpaths.arrays import Floats
 from toolpaths.rotations import angle_between
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from postproc.orientation.allowed import Allowed
-from postproc.orientation.held import common_angles
-from postproc.orientation.ranking import Ranking
-from postproc.orientation.search import Tried
-from postproc.orientation.timed import Turned, turned_all
+from postproc.orientation.candidates.held import common_angles
+from postproc.orientation.candidates.ranking import Ranking
+from postproc.orientation.candidates.search import Tried
+from postproc.orientation.candidates.timed import Turned, turned_all
+from postproc.orientation.passes.allowed import Allowed
 from toolpaths.arrays import Floats
 from toolpaths.units import DEG
 

@@ -1,7 +1,7 @@
 """What lies between two cuts, in seconds: rapids, and where the axis changes retract, unclamp, index, clamp, approach.
 
-The legs are those of `postproc.links`, straight in the joints; where one goes straight on from another, as the retract axis
-does above an upright tool, there is no stop between, else each is from rest to rest.
+The legs are those of `postproc.path.links`, straight in the joints; where one goes straight on from another, as the retract
+axis does above an upright tool, there is no stop between, else each is from rest to rest.
 """
 
 from __future__ import annotations
@@ -11,15 +11,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from machines.machine import Machine
-from postproc.events import tool_changes
 from postproc.feedrate.rest_to_rest import Law, rest_seconds
-from postproc.joint_path import nearest_solution
+from postproc.joints.joint_path import nearest_solution
 from postproc.joints.tracks import TRAVEL_SLACK
-from postproc.orientation.allowed import SAME
-from postproc.orientation.held import free_angle
-from postproc.orientation.passes import Pass, Work
-from postproc.orientation.timed import Turned
-from postproc.planned import joint_limits
+from postproc.orientation.candidates.held import free_angle
+from postproc.orientation.candidates.timed import Turned
+from postproc.orientation.passes.allowed import SAME
+from postproc.orientation.passes.passes import Pass, Work
+from postproc.planning.planned import joint_limits
+from postproc.reference.events import tool_changes
 from toolpaths.arrays import Bools, Floats
 from toolpaths.rotations import angle_between
 from toolpaths.units import DEG

@@ -5,15 +5,15 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from postproc.options import Orientation
-from postproc.orientation.choice import OrientationChoice
-from postproc.orientation.losers import best_loser, grouped
-from postproc.orientation.passes import Work
-from postproc.orientation.plans import OrientationPlan
-from postproc.orientation.reaches import binding, feed_of, reaches
-from postproc.orientation.search import Tried
-from postproc.orientation.shares import shares_of
-from postproc.orientation.timed import Turned
+from postproc.base.options import Orientation
+from postproc.orientation.candidates.losers import best_loser, grouped
+from postproc.orientation.candidates.reaches import binding, feed_of, reaches
+from postproc.orientation.candidates.search import Tried
+from postproc.orientation.candidates.timed import Turned
+from postproc.orientation.passes.passes import Work
+from postproc.orientation.plans.choice import OrientationChoice
+from postproc.orientation.plans.plans import OrientationPlan
+from postproc.orientation.plans.shares import shares_of
 from toolpaths.diagnostics import Diagnostic, warning
 from toolpaths.rotations import angle_between
 from toolpaths.units import DEG

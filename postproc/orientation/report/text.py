@@ -6,15 +6,15 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 
-from postproc.options import Orientation
-from postproc.orientation.choice import OrientationChoice
-from postproc.orientation.losers import KINDS, best_loser, grouped, listed
-from postproc.orientation.plans import OrientationPlan
-from postproc.orientation.reaches import binding, feed_of, reaches
-from postproc.orientation.report import NAMES, UNITS, gain
-from postproc.orientation.search import Kind, Lost, Tried
-from postproc.orientation.shares import shares_of, turns
-from postproc.orientation.timed import Turned
+from postproc.base.options import Orientation
+from postproc.orientation.candidates.losers import KINDS, best_loser, grouped, listed
+from postproc.orientation.candidates.reaches import binding, feed_of, reaches
+from postproc.orientation.candidates.search import Kind, Lost, Tried
+from postproc.orientation.candidates.timed import Turned
+from postproc.orientation.plans.choice import OrientationChoice
+from postproc.orientation.plans.plans import OrientationPlan
+from postproc.orientation.plans.shares import shares_of, turns
+from postproc.orientation.report.figures_of_choice import NAMES, UNITS, gain
 from toolpaths.rotations import angle_between
 from toolpaths.units import DEG
 

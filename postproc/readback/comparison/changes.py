@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from postproc.events import tool_loads
-from postproc.job import Job
-from postproc.readback.canonical import LOADED, REGISTER, Canonical, in_files
-from postproc.readback.execute import Motion
-from postproc.readback.faults import Faults
-from postproc.readback.modal import codes, fill
+from postproc.job.job import Job
+from postproc.readback.comparison.faults import Faults
+from postproc.readback.execution.execute import Motion
+from postproc.readback.text.canonical import LOADED, REGISTER, Canonical, in_files
+from postproc.readback.text.modal import codes, fill
+from postproc.reference.events import tool_loads
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic
 
@@ -52,7 +52,7 @@ def _corrected(job: Job, place: Floats, tool: Ints) -> Floats:
     """
     if job.errors is None or job.errors.corrected_by != "post":
         return np.zeros(place.shape)
-    from machines.geometric_error.correction import correct
+    from machines.geometric_error.actual.correction import correct
 
     control, gauge, names = job.control, job.machine.kinematics, job.machine.axis_names
     two_way, result = job.errors.axes.two_way(names), np.zeros(place.shape)

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from postproc.control import Control
-from postproc.holes import PECKING, Phase
-from postproc.job import Job
-from postproc.links import SafeSpace
-from postproc.moves import Moves
+from postproc.control.control import Control
+from postproc.control.word_arcs import PLANE_COLUMNS
+from postproc.job.job import Job
+from postproc.path.links import SafeSpace
+from postproc.readback.comparison.faults import Faults
 from postproc.readback.dialects.readers import reader_for
-from postproc.readback.execute import Motion
-from postproc.readback.faults import Faults
-from postproc.readback.poses import Executed, arc_sweeps, coordinates
-from postproc.readback.rows import INCH
-from postproc.word_arcs import PLANE_COLUMNS
+from postproc.readback.execution.execute import Motion
+from postproc.readback.execution.poses import Executed, arc_sweeps, coordinates
+from postproc.readback.execution.rows import INCH
+from postproc.reference.holes import PECKING, Phase
+from postproc.reference.moves import Moves
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.diagnostics import Diagnostic
 from toolpaths.toolpath import Kind

@@ -6,12 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from postproc.job import Job
-from postproc.moves import Moves, Phase
-from postproc.path_model import FEED, TRAVERSE
-from postproc.readback.align import align, unreached
-from postproc.readback.canonical import Canonical
-from postproc.readback.checks import (
+from postproc.job.job import Job
+from postproc.path.model import FEED, TRAVERSE
+from postproc.readback.comparison.align import align, unreached
+from postproc.readback.comparison.checks import (
     CHUNK,
     block_seconds,
     check_holes,
@@ -21,17 +19,19 @@ from postproc.readback.checks import (
     check_speeds,
     check_travel,
 )
-from postproc.readback.compensated import check_compensated
-from postproc.readback.deviation_bound import DeviationBound, deviation_bound
-from postproc.readback.execute import Motion
-from postproc.readback.faults import Faults
-from postproc.readback.poses import SAMPLES, Executed, arc_sweeps
-from postproc.readback.reach_bounds import check_reach_bounds
-from postproc.readback.rewinds import check_rewinds, rewinds
-from postproc.readback.slow import check_fed_rapids, check_slow
-from postproc.readback.spins import check_spins
-from postproc.readback.states import check_states
-from postproc.readback.taps import check_taps
+from postproc.readback.comparison.compensated import check_compensated
+from postproc.readback.comparison.deviation_bound import DeviationBound, deviation_bound
+from postproc.readback.comparison.faults import Faults
+from postproc.readback.comparison.reach_bounds import check_reach_bounds
+from postproc.readback.comparison.rewinds import check_rewinds, rewinds
+from postproc.readback.comparison.slow import check_fed_rapids, check_slow
+from postproc.readback.comparison.spins import check_spins
+from postproc.readback.comparison.states import check_states
+from postproc.readback.comparison.taps import check_taps
+from postproc.readback.execution.execute import Motion
+from postproc.readback.execution.poses import SAMPLES, Executed, arc_sweeps
+from postproc.readback.text.canonical import Canonical
+from postproc.reference.moves import Moves, Phase
 from toolpaths.arrays import Bools, Floats, Ints, as_slice, shared
 from toolpaths.diagnostics import Diagnostic, has_errors
 from toolpaths.rotations import angle_between, lengths
@@ -139,7 +139,7 @@ def _kept(job: Job) -> float:
     """rad: what the correction of geometric errors may turn the tool by between blocks, 0 without errors."""
     if job.errors is None:
         return 0.0
-    from postproc.compensation import SHARE
+    from postproc.correction.compensation import SHARE
 
     return SHARE * job.axis_tolerance
 
@@ -155,8 +155,8 @@ def _taken_up(job: Job, motion: Motion, tip: Floats) -> Bools:
     way = np.linalg.norm(np.diff(tip, axis=0, prepend=np.inf), axis=1)
     if job.errors is None:
         return np.asarray(way <= 2.0 * job.rounding.tip)
-    from postproc.compensation import SHARE
-    from postproc.corrected.cycles import IN_AIR
+    from postproc.correction.compensation import SHARE
+    from postproc.correction.cycles import IN_AIR
 
     still, air = (share * SHARE * job.options.tolerance + 2.0 * job.rounding.tip for share in (1.0, IN_AIR))
     rapid, feed, far = motion.code == TRAVERSE, motion.code == FEED, way > air

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from postproc.control import Control
-from postproc.job import Job
-from postproc.readback.execute import Motion
-from postproc.readback.faults import Faults
+from postproc.control.control import Control
+from postproc.job.job import Job
+from postproc.readback.comparison.faults import Faults
+from postproc.readback.execution.execute import Motion
 from toolpaths.diagnostics import Diagnostic
 
 STILL = 1e-7
@@ -16,7 +16,7 @@ OFF = 40
 
 
 def check_compensated(motion: Motion, job: Job, faults: Faults) -> list[Diagnostic]:
-    """Arcs under G41 and G42, or behind G40, where the controller cannot run them (`postproc.controllers.compensated`)."""
+    """Arcs under G41 and G42, or behind G40, where the controller cannot run them (`postproc.writing.compensated`)."""
     rules, arc = job.controller.cutter_compensation, motion.code == 2
     changes = np.flatnonzero(np.diff(motion.compensation, prepend=np.int8(OFF)))
     if not len(changes):

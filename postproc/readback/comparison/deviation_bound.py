@@ -1,9 +1,9 @@
 """The largest deviation of a program's blocks from the CL file as a bound that holds everywhere, by branch and bound.
 
 Between two places of a block the difference e of the executed pose and a pose of its curve bends by at most M, so that it
-stays within M / 32 of the largest value at the begin, middle and end (interpolation error, see `postproc.bound`). M comes
-from the law of the block by Taylor's theorem (`machines.straight_blocks`); the values themselves are poses of the reader.
-Blocks whose bound is above the worst that was seen anywhere are halved until bound and worst meet.
+stays within M / 32 of the largest value at the begin, middle and end (interpolation error, see `postproc.path.bound`). M
+comes from the law of the block by Taylor's theorem (`machines.straight_blocks`); the values themselves are poses of the
+reader. Blocks whose bound is above the worst that was seen anywhere are halved until bound and worst meet.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ from machines.kinematics.base import Kinematics
 from machines.kinematics.columns import Columns
 from machines.kinematics.jets import Angle, Jet, straight
 from machines.straight_blocks import pose_jets
-from postproc.bound import SHORT, axis_reference, curve_parameter, tip_reference
-from postproc.groups import groups
-from postproc.moves import Moves
-from postproc.path_model import ARC
-from postproc.readback.execute import Motion
-from postproc.readback.poses import Executed, coordinates, signed_sweep
-from postproc.readback.strays import CIRCLE, JOINTS, LINE, TIP, strays
-from postproc.word_arcs import PLANE_AXIS, PLANE_COLUMNS
+from postproc.base.group_rows import groups
+from postproc.control.word_arcs import PLANE_AXIS, PLANE_COLUMNS
+from postproc.path.bound import SHORT, axis_reference, curve_parameter, tip_reference
+from postproc.path.model import ARC
+from postproc.readback.comparison.strays import CIRCLE, JOINTS, LINE, TIP, strays
+from postproc.readback.execution.execute import Motion
+from postproc.readback.execution.poses import Executed, coordinates, signed_sweep
+from postproc.reference.moves import Moves
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.rotations import angle_between, cross, lengths
 from toolpaths.shape import Curves

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from machines.geometric_error.volume import measured
-from postproc.job import Job
-from postproc.path_model import TRAVERSE
-from postproc.readback.actual import ARC_LOOKS, ActualExecuted
-from postproc.readback.execute import Motion
-from postproc.readback.faults import Faults
+from machines.geometric_error.exchange.volume import measured
+from postproc.job.job import Job
+from postproc.path.model import TRAVERSE
+from postproc.readback.comparison.faults import Faults
+from postproc.readback.execution.actual import ARC_LOOKS, ActualExecuted
+from postproc.readback.execution.execute import Motion
 from toolpaths.diagnostics import Diagnostic
 
 CORRECTED = 0.1

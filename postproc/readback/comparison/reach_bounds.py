@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 
 from machines import reach
-from postproc.moves import Moves
-from postproc.readback.checks import CHUNK, ROUNDING_SLACK
-from postproc.readback.execute import Motion
-from postproc.readback.faults import Faults
-from postproc.readback.poses import Executed
+from postproc.readback.comparison.checks import CHUNK, ROUNDING_SLACK
+from postproc.readback.comparison.faults import Faults
+from postproc.readback.execution.execute import Motion
+from postproc.readback.execution.poses import Executed
+from postproc.reference.moves import Moves
 from toolpaths.arrays import Ints
 from toolpaths.diagnostics import Diagnostic
 from toolpaths.units import DEG

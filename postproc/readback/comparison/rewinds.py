@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from postproc.links import SafeSpace
-from postproc.readback.execute import Motion
-from postproc.readback.faults import Faults
-from postproc.readback.poses import Executed
+from postproc.path.links import SafeSpace
+from postproc.readback.comparison.faults import Faults
+from postproc.readback.execution.execute import Motion
+from postproc.readback.execution.poses import Executed
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.diagnostics import Diagnostic
 

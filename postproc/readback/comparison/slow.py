@@ -9,17 +9,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from postproc.control import Control
-from postproc.header_words import FEEDS, UNKNOWN
-from postproc.job import Job
-from postproc.moves import Moves, Phase
-from postproc.readback.checks import CHUNK, STILL
-from postproc.readback.execute import Motion
-from postproc.readback.faults import Faults
-from postproc.readback.poses import Executed, arc_sweeps, coordinates
-from postproc.readback.rows import INCH
-from postproc.readback.words import plain
-from postproc.word_arcs import PLANE_COLUMNS
+from postproc.base.header_words import FEEDS, UNKNOWN
+from postproc.control.control import Control
+from postproc.control.word_arcs import PLANE_COLUMNS
+from postproc.job.job import Job
+from postproc.readback.comparison.checks import CHUNK, STILL
+from postproc.readback.comparison.faults import Faults
+from postproc.readback.execution.execute import Motion
+from postproc.readback.execution.poses import Executed, arc_sweeps, coordinates
+from postproc.readback.execution.rows import INCH
+from postproc.readback.text.words import plain
+from postproc.reference.moves import Moves, Phase
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.rotations import lengths

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from postproc.joints.spin import spins_off
-from postproc.moves import Moves
-from postproc.readback.execute import Motion
-from postproc.readback.faults import Faults
-from postproc.readback.poses import Executed
+from postproc.readback.comparison.faults import Faults
+from postproc.readback.execution.execute import Motion
+from postproc.readback.execution.poses import Executed
+from postproc.reference.moves import Moves
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic
 from toolpaths.units import DEG

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from postproc.job import Job
-from postproc.readback.canonical import INCREMENTAL, LAW, Canonical, in_files
-from postproc.readback.changes import AWAY, lifting
-from postproc.readback.execute import Motion
-from postproc.readback.faults import Faults
-from postproc.readback.modal import codes
-from postproc.readback.words import Words
+from postproc.job.job import Job
+from postproc.readback.comparison.changes import AWAY, lifting
+from postproc.readback.comparison.faults import Faults
+from postproc.readback.execution.execute import Motion
+from postproc.readback.text.canonical import INCREMENTAL, LAW, Canonical, in_files
+from postproc.readback.text.modal import codes
+from postproc.readback.text.words import Words
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic
 

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from postproc.readback.canonical import INCREMENTAL, LAW, OFFSET, REGISTER, Canonical
-from postproc.readback.modal import CYCLES, GROUPS, codes, fill
-from postproc.readback.words import Words
+from postproc.readback.text.canonical import INCREMENTAL, LAW, OFFSET, REGISTER, Canonical
+from postproc.readback.text.modal import CYCLES, GROUPS, codes, fill
+from postproc.readback.text.words import Words
 from toolpaths.arrays import Ints
 from toolpaths.diagnostics import Diagnostic, error
 

@@ -9,8 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from postproc.coolant import ANY, coolant_states, label
-from postproc.events import (
+from postproc.job.job import Job
+from postproc.readback.comparison.checks import CHUNK
+from postproc.readback.comparison.faults import Faults
+from postproc.readback.dialects.base import Reader
+from postproc.readback.dialects.readers import reader_for
+from postproc.readback.execution.execute import Motion
+from postproc.reference.coolant import ANY, coolant_states, label
+from postproc.reference.events import (
     compensation_side,
     compensation_states,
     loaded_registers,
@@ -20,13 +26,7 @@ from postproc.events import (
     state_at,
     tool_loads,
 )
-from postproc.job import Job
-from postproc.moves import Moves
-from postproc.readback.checks import CHUNK
-from postproc.readback.dialects.base import Reader
-from postproc.readback.dialects.readers import reader_for
-from postproc.readback.execute import Motion
-from postproc.readback.faults import Faults
+from postproc.reference.moves import Moves
 from toolpaths.arrays import Array, Bools, Floats, Ints, shared
 from toolpaths.diagnostics import Diagnostic
 from toolpaths.toolpath import Kind

@@ -6,13 +6,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from postproc.events import Spindle, numbers, spindle_after, words
-from postproc.holes import Phase
-from postproc.job import Job
-from postproc.readback.canonical import Canonical, in_files
-from postproc.readback.execute import Motion
-from postproc.readback.faults import Faults
-from postproc.readback.modal import codes
+from postproc.job.job import Job
+from postproc.readback.comparison.faults import Faults
+from postproc.readback.execution.execute import Motion
+from postproc.readback.text.canonical import Canonical, in_files
+from postproc.readback.text.modal import codes
+from postproc.reference.events import Spindle, numbers, spindle_after, words
+from postproc.reference.holes import Phase
 from toolpaths.diagnostics import Diagnostic
 from toolpaths.units import PER_MINUTE
 

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from postproc.readback.execute import Motion
-from postproc.readback.poses import Executed, coordinates, signed_sweep
-from postproc.word_arcs import PLANE_COLUMNS
+from postproc.control.word_arcs import PLANE_COLUMNS
+from postproc.readback.execution.execute import Motion
+from postproc.readback.execution.poses import Executed, coordinates, signed_sweep
 from toolpaths.arrays import Floats, Ints
 
 LINE, JOINTS, TIP, CIRCLE = range(4)

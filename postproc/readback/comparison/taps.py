@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from postproc.events import spindle_states
-from postproc.job import Job
-from postproc.moves import Moves, Phase
-from postproc.readback.execute import Motion
-from postproc.readback.faults import Faults
+from postproc.job.job import Job
+from postproc.readback.comparison.faults import Faults
+from postproc.readback.execution.execute import Motion
+from postproc.reference.events import spindle_states
+from postproc.reference.moves import Moves, Phase
 from toolpaths.arrays import Bools, Ints
 from toolpaths.diagnostics import Diagnostic
 

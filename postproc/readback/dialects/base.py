@@ -11,8 +11,7 @@ from typing import ClassVar
 import numpy as np
 
 from postproc.controllers.model import ControllerFile, Stops
-from postproc.coolant import ALL, switched_by
-from postproc.readback.canonical import (
+from postproc.readback.text.canonical import (
     COOLANT,
     EXTENDED_OFFSETS,
     LOADED,
@@ -24,10 +23,11 @@ from postproc.readback.canonical import (
     offset_number,
     placed,
 )
-from postproc.readback.flow import Structure, expand
-from postproc.readback.magnitude import negative_smoothing, too_large
-from postproc.readback.modal import GROUPS, Groups, check_codes, check_end, codes, drop_passive
-from postproc.readback.words import Words
+from postproc.readback.text.flow import Structure, expand
+from postproc.readback.text.magnitude import negative_smoothing, too_large
+from postproc.readback.text.modal import GROUPS, Groups, check_codes, check_end, codes, drop_passive
+from postproc.readback.text.words import Words
+from postproc.reference.coolant import ALL, switched_by
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, has_errors, warning
 
@@ -78,7 +78,7 @@ class Reader(ABC):
         self.stop, self.changes = stop or stops.switch_off, stops.tool_change
         self.main_file = ""
         self.switches = switched_by(controller.codes if controller is not None else None)
-        """(bits on, bits off) by M number, see `postproc.coolant`"""
+        """(bits on, bits off) by M number, see `postproc.reference.coolant`"""
 
     @abstractmethod
     def tokens(self, data: bytes, file: str) -> tuple[Text, list[Diagnostic]]:

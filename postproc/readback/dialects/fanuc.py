@@ -15,23 +15,13 @@ from typing import ClassVar
 
 import numpy as np
 
-from postproc.readback.canonical import (
-    LAW,
-    OFFSET,
-    REGISTER,
-    SMOOTH,
-    Canonical,
-    Law,
-    LawName,
-    Text,
-    offset_number,
-)
 from postproc.readback.dialects.base import M_CODES, Reader
 from postproc.readback.dialects.iso import IsoReader, New, motion_of
-from postproc.readback.flow import Call, Structure
-from postproc.readback.modal import CYCLES, GROUPS, Groups, codes, number_of
-from postproc.readback.turns import turned
-from postproc.readback.words import Words, tokenise
+from postproc.readback.text.canonical import LAW, OFFSET, REGISTER, SMOOTH, Canonical, Law, LawName, Text, offset_number
+from postproc.readback.text.flow import Call, Structure
+from postproc.readback.text.modal import CYCLES, GROUPS, Groups, codes, number_of
+from postproc.readback.text.turns import turned
+from postproc.readback.text.words import Words, tokenise
 from toolpaths.arrays import Bools, Ints
 from toolpaths.diagnostics import Diagnostic, error
 

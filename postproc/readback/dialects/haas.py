@@ -11,13 +11,13 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from postproc.readback.canonical import SMOOTH, LawName, Text
 from postproc.readback.dialects.base import M_CODES
 from postproc.readback.dialects.fanuc import MILLISECONDS, FanucReader, block, take
 from postproc.readback.dialects.iso import New
-from postproc.readback.flow import Call, Structure
-from postproc.readback.modal import GROUPS, Groups, codes
-from postproc.readback.words import Words
+from postproc.readback.text.canonical import SMOOTH, LawName, Text
+from postproc.readback.text.flow import Call, Structure
+from postproc.readback.text.modal import GROUPS, Groups, codes
+from postproc.readback.text.words import Words
 from toolpaths.arrays import Bools, Ints
 from toolpaths.diagnostics import Diagnostic
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from postproc.readback.canonical import (
+from postproc.readback.dialects.base import Reader, whole
+from postproc.readback.text.canonical import (
     INCREMENTAL,
     LOADED,
     OFFSET,
@@ -16,10 +17,9 @@ from postproc.readback.canonical import (
     Text,
     added,
 )
-from postproc.readback.dialects.base import Reader, whole
-from postproc.readback.flow import Structure
-from postproc.readback.modal import CYCLES, GROUPS, codes, columns, fill, number_of
-from postproc.readback.words import Words, tokenise
+from postproc.readback.text.flow import Structure
+from postproc.readback.text.modal import CYCLES, GROUPS, codes, columns, fill, number_of
+from postproc.readback.text.words import Words, tokenise
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
 

@@ -14,13 +14,13 @@ from typing import ClassVar
 
 import numpy as np
 
-from postproc.readback.canonical import STATEMENT, Canonical, LawName, Statement, Text, added
 from postproc.readback.dialects.base import M_CODES, Reader
 from postproc.readback.dialects.iso import New
 from postproc.readback.dialects.klartext_run import Run
-from postproc.readback.flow import Call, Structure
-from postproc.readback.modal import GROUPS, Groups
-from postproc.readback.words import Words, block_delete, lines_of, read_words
+from postproc.readback.text.canonical import STATEMENT, Canonical, LawName, Statement, Text, added
+from postproc.readback.text.flow import Call, Structure
+from postproc.readback.text.modal import GROUPS, Groups
+from postproc.readback.text.words import Words, block_delete, lines_of, read_words
 from toolpaths.arrays import Ints
 from toolpaths.diagnostics import Diagnostic, error, warning
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import math
 
-from postproc.readback.canonical import Drill
-from postproc.readback.cycles import pecks
+from postproc.readback.text.canonical import Drill
+from postproc.readback.text.cycles import pecks
 
 RAPID = 99999.0
 """mm/min and more: FMAX"""

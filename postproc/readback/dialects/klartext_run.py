@@ -7,7 +7,10 @@ import re
 
 import numpy as np
 
-from postproc.readback.canonical import (
+from postproc.readback.dialects.iso import New
+from postproc.readback.dialects.klartext_cycles import drill_of
+from postproc.readback.dialects.track import Track
+from postproc.readback.text.canonical import (
     CALL,
     LAW,
     LOADED,
@@ -24,11 +27,8 @@ from postproc.readback.canonical import (
     Text,
     added,
 )
-from postproc.readback.dialects.iso import New
-from postproc.readback.dialects.klartext_cycles import drill_of
-from postproc.readback.dialects.track import Track
-from postproc.readback.modal import GROUPS, codes, fill, number_of
-from postproc.readback.turns import turned
+from postproc.readback.text.modal import GROUPS, codes, fill, number_of
+from postproc.readback.text.turns import turned
 from toolpaths.arrays import Ints
 from toolpaths.diagnostics import Diagnostic, error
 

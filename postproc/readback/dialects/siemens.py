@@ -15,7 +15,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from postproc.readback.canonical import (
+from postproc.readback.dialects.base import M_CODES, Reader, as_bytes
+from postproc.readback.dialects.iso import New, relative_words
+from postproc.readback.dialects.siemens_cycles import CYCLES
+from postproc.readback.dialects.siemens_run import LENGTH_AXIS, Run
+from postproc.readback.text.canonical import (
     LOADED,
     OFFSET,
     REGISTER,
@@ -30,13 +34,9 @@ from postproc.readback.canonical import (
     Text,
     added,
 )
-from postproc.readback.dialects.base import M_CODES, Reader, as_bytes
-from postproc.readback.dialects.iso import New, relative_words
-from postproc.readback.dialects.siemens_cycles import CYCLES
-from postproc.readback.dialects.siemens_run import LENGTH_AXIS, Run
-from postproc.readback.flow import Call, Structure
-from postproc.readback.modal import GROUPS, Groups, codes, number_of
-from postproc.readback.words import Words, block_delete, lines_of, read_words
+from postproc.readback.text.flow import Call, Structure
+from postproc.readback.text.modal import GROUPS, Groups, codes, number_of
+from postproc.readback.text.words import Words, block_delete, lines_of, read_words
 from toolpaths.arrays import Bools, Ints
 from toolpaths.diagnostics import Diagnostic, error
 

@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import math
 
-from postproc.readback.canonical import Drill, Statement
-from postproc.readback.cycles import pecks
+from postproc.readback.text.canonical import Drill, Statement
+from postproc.readback.text.cycles import pecks
 
 CYCLES = ("CYCLE81", "CYCLE82", "CYCLE83", "CYCLE84", "CYCLE840", "CYCLE85", "CYCLE86")
 _SHALLOW, _LEAD, _MOST = 30.0, 0.6, 7.0

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from postproc.readback.canonical import CALL, LAW, SMOOTH, STATEMENT, Drill, Law, Statement, Text
 from postproc.readback.dialects.iso import New
 from postproc.readback.dialects.siemens_cycles import CYCLES, drill_of
-from postproc.readback.modal import codes, fill, number_of
-from postproc.readback.turns import turned
-from postproc.readback.words import Words
+from postproc.readback.text.canonical import CALL, LAW, SMOOTH, STATEMENT, Drill, Law, Statement, Text
+from postproc.readback.text.modal import codes, fill, number_of
+from postproc.readback.text.turns import turned
+from postproc.readback.text.words import Words
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
 

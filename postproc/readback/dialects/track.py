@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from postproc.readback.words import Words
+from postproc.readback.text.words import Words
 from toolpaths.arrays import Floats, Ints
 
 

@@ -8,13 +8,13 @@ from functools import cached_property
 
 import numpy as np
 
-from machines.geometric_error.actual import Actual
-from machines.geometric_error.error_rates import STEEPEST_GAP, ErrorRates, joined, unknown_rates
-from machines.geometric_error.lost_motion import GRAIN, Steps
-from machines.geometric_error.model import ErrorModel
-from postproc.looks import changes, looks_between
-from postproc.readback.execute import Motion
-from postproc.readback.poses import Executed, alike, begins
+from machines.geometric_error.actual.actual import Actual
+from machines.geometric_error.actual.error_rates import STEEPEST_GAP, ErrorRates, joined, unknown_rates
+from machines.geometric_error.actual.lost_motion import GRAIN, Steps
+from machines.geometric_error.actual.model import ErrorModel
+from postproc.correction.error_sampling import changes, looks_between
+from postproc.readback.execution.execute import Motion
+from postproc.readback.execution.poses import Executed, alike, begins
 from toolpaths.arrays import Bools, Floats, Ints
 
 ARC = 2

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from postproc.word_arcs import PLANE_AXIS, PLANE_COLUMNS
+from postproc.control.word_arcs import PLANE_AXIS, PLANE_COLUMNS
 from toolpaths.arrays import Array, Bools, Floats, Ints
 
 if TYPE_CHECKING:
-    from postproc.readback.rows import Rows
+    from postproc.readback.execution.rows import Rows
 
 _SMALL = 1e-9
 _RADIUS_SLACK = 0.01

@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from postproc.readback.canonical import Canonical, Drill
-from postproc.readback.cycles import MOST, Leg, Sticky, legs, unfit
-from postproc.readback.rows import Section, State
-from postproc.word_arcs import PLANE_AXIS
+from postproc.control.word_arcs import PLANE_AXIS
+from postproc.readback.execution.rows import Section, State
+from postproc.readback.text.canonical import Canonical, Drill
+from postproc.readback.text.cycles import MOST, Leg, Sticky, legs, unfit
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
 

@@ -8,15 +8,15 @@ from itertools import pairwise
 
 import numpy as np
 
-from postproc.coolant import FLOOD, MIST
-from postproc.readback import frames
-from postproc.readback.canonical import CALL, LAW, REST, TURNS, Canonical, Law, Text, in_files, placed
-from postproc.readback.frames import AXES, Frame, FrameTable
-from postproc.readback.modal import Modal, columns, fill, fill_values, modal_state, number_of
-from postproc.readback.offsets import Offsets
-from postproc.readback.rows import INCH, Rows, Section
-from postproc.readback.sections import run_section
-from postproc.readback.words import Words
+from postproc.readback.execution import frames
+from postproc.readback.execution.frames import AXES, Frame, FrameTable
+from postproc.readback.execution.offsets import Offsets
+from postproc.readback.execution.rows import INCH, Rows, Section
+from postproc.readback.execution.sections import run_section
+from postproc.readback.text.canonical import CALL, LAW, REST, TURNS, Canonical, Law, Text, in_files, placed
+from postproc.readback.text.modal import Modal, columns, fill, fill_values, modal_state, number_of
+from postproc.readback.text.words import Words
+from postproc.reference.coolant import FLOOD, MIST
 from toolpaths.arrays import Array, Bools, Floats, Ints, repeated, shared, taken
 from toolpaths.diagnostics import Diagnostic, error
 
@@ -31,7 +31,7 @@ class Motion:
         plane, ccw, center: of arcs; center (E, 3) in the coordinates X, Y, Z of the block's frame
         feed (E,): F word in force; inverse (E,): per 1/F minutes
         tool, register (E,): tool in the spindle, active length register (-1 none)
-        spindle (E,): -1, 0, 1; rpm (E,); coolant (E,): bits of what flows (`postproc.coolant`)
+        spindle (E,): -1, 0, 1; rpm (E,); coolant (E,): bits of what flows (`postproc.reference.coolant`)
         hole (E,): True inside a canned cycle
         missing_feed (E,): a cutting block without a feed in force
         dwell (E,): s that the tool rests at the end of the block

@@ -12,9 +12,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from machines.kinematics.base import Kinematics
-from postproc.control import Control
-from postproc.modes import table_axes
-from postproc.readback.canonical import Law, LawName
+from postproc.control.control import Control
+from postproc.control.modes import table_axes
+from postproc.readback.text.canonical import Law, LawName
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.rotations import angle_between

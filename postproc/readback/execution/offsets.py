@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from postproc.control import Control
+from postproc.control.control import Control
 from toolpaths.arrays import Floats, Ints
 
 

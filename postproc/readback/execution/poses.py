@@ -7,12 +7,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from machines.geometric_error.error_rates import ErrorRates, joined, pivot_rates, standing_arm
+from machines.geometric_error.actual.error_rates import ErrorRates, joined, pivot_rates, standing_arm
 from machines.kinematics.base import Kinematics
-from postproc.control import Control
-from postproc.readback import assembly
-from postproc.readback.execute import Motion
-from postproc.word_arcs import PLANE_COLUMNS
+from postproc.control.control import Control
+from postproc.control.word_arcs import PLANE_COLUMNS
+from postproc.readback.execution import assembly
+from postproc.readback.execution.execute import Motion
 from toolpaths.arrays import Bools, Floats, Ints, repeated, taken
 
 SAMPLES = (0.2, 0.4, 0.6, 0.8, 1.0)

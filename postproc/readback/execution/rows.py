@@ -11,7 +11,7 @@ import numpy as np
 from toolpaths.arrays import Array, Bools, Floats, Ints, joined
 
 if TYPE_CHECKING:
-    from postproc.readback.offsets import Offsets
+    from postproc.readback.execution.offsets import Offsets
 
 INCH = 25.4
 

@@ -7,19 +7,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from postproc.readback.arcs import centres, whole_turns
-from postproc.readback.canonical import Canonical
-from postproc.readback.cycles import Leg
-from postproc.readback.drilling import spell_holes
-from postproc.readback.frames import Frame
-from postproc.readback.modal import CYCLES
-from postproc.readback.rows import Rows, Section, State
-from postproc.word_arcs import PLANE_AXIS
+from postproc.control.word_arcs import PLANE_AXIS
+from postproc.readback.execution.arcs import centres, whole_turns
+from postproc.readback.execution.drilling import spell_holes
+from postproc.readback.execution.frames import Frame
+from postproc.readback.execution.rows import Rows, Section, State
+from postproc.readback.text.canonical import Canonical
+from postproc.readback.text.cycles import Leg
+from postproc.readback.text.modal import CYCLES
 from toolpaths.arrays import Bools, Floats, Ints, repeated, shared
 from toolpaths.diagnostics import Diagnostic, error
 
 if TYPE_CHECKING:
-    from postproc.readback.offsets import Offsets
+    from postproc.readback.execution.offsets import Offsets
 
 _STILL = 1e-6
 """degrees"""

@@ -12,7 +12,7 @@ from typing import Literal
 
 import numpy as np
 
-from postproc.readback.words import Words
+from postproc.readback.text.words import Words
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.diagnostics import Diagnostic
 
@@ -23,7 +23,7 @@ UNSTATED = -2.0
 LOADED = "$"
 """tool that this block puts into the spindle"""
 COOLANT = "^"
-"""bits of what flows from this block on (`postproc.coolant`)"""
+"""bits of what flows from this block on (`postproc.reference.coolant`)"""
 STANDS = "_"
 """a block before which the control itself has stopped the spindle: M0 or M1 in the one before it"""
 REST = "="

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from postproc.readback.canonical import Drill
+from postproc.readback.text.canonical import Drill
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic, error
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from postproc.readback.canonical import STATEMENT, Text
-from postproc.readback.words import Words
+from postproc.readback.text.canonical import STATEMENT, Text
+from postproc.readback.text.words import Words
 from toolpaths.arrays import Ints
 from toolpaths.diagnostics import Diagnostic, error
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from postproc.readback.canonical import SMOOTH, STATEMENT, Canonical, Text
+from postproc.readback.text.canonical import SMOOTH, STATEMENT, Canonical, Text
 from toolpaths.diagnostics import Diagnostic, error
 
 LARGEST = 1e10

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from postproc.readback.canonical import COOLANT, LOADED, OFFSET, REGISTER, SMOOTH, STANDS
-from postproc.readback.words import Words
+from postproc.readback.text.canonical import COOLANT, LOADED, OFFSET, REGISTER, SMOOTH, STANDS
+from postproc.readback.text.words import Words
 from toolpaths.arrays import Array, Floats, Ints, repeated, shared
 from toolpaths.diagnostics import Diagnostic, error
 
@@ -43,7 +43,7 @@ class Modal:
     """-1, 0, 1"""
     rpm: Floats
     coolant: Ints
-    """bits of what flows (`postproc.coolant`)"""
+    """bits of what flows (`postproc.reference.coolant`)"""
     machine: Array
     """G53 in this block"""
     compensation: Array

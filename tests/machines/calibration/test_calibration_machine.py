@@ -7,10 +7,10 @@ import pytest
 
 import machines
 from machines.calibration.machine_fit import Measurements, fit
-from machines.geometric_error.correction import correct
-from machines.geometric_error.model import ErrorModel
-from machines.geometric_error.rods import RodErrors, rod_frame, rod_names
-from machines.geometric_error.serial_errors import SerialErrors
+from machines.geometric_error.actual.correction import correct
+from machines.geometric_error.actual.model import ErrorModel
+from machines.geometric_error.actual.rods import RodErrors, rod_frame, rod_names
+from machines.geometric_error.actual.serial_errors import SerialErrors
 from tests.machines.error_models import ARCSEC, joints
 from toolpaths.arrays import Floats
 
@@ -87,9 +87,9 @@ def test_ball_bar_gives_the_squareness_of_the_slides() -> None:
 
 
 def test_laser_along_x_gives_the_positioning_table() -> None:
-    from machines.geometric_error.curves import Table
-    from machines.geometric_error.names import parse
-    from machines.geometric_error.serial_errors import Component
+    from machines.geometric_error.actual.serial_errors import Component
+    from machines.geometric_error.tables.curves import Table
+    from machines.geometric_error.tables.names import parse
 
     kin, name = mikron(), parse("EXX")
     assert name is not None

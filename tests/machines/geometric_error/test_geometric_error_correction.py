@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 import machines
-from machines.geometric_error.actual import Actual
-from machines.geometric_error.actual_kinematics import ActualKinematics
-from machines.geometric_error.correction import POLE, Corrected, correct
-from machines.geometric_error.curves import Table
-from machines.geometric_error.model import ErrorModel, doubt
-from machines.geometric_error.names import parse
-from machines.geometric_error.serial_errors import Component, SerialErrors
+from machines.geometric_error.actual.actual import Actual
+from machines.geometric_error.actual.actual_kinematics import ActualKinematics
+from machines.geometric_error.actual.correction import POLE, Corrected, correct
+from machines.geometric_error.actual.model import ErrorModel, doubt
+from machines.geometric_error.actual.serial_errors import Component, SerialErrors
+from machines.geometric_error.tables.curves import Table
+from machines.geometric_error.tables.names import parse
 from machines.kinematics.base import Kinematics
 from tests.machines.error_models import ARCSEC, REACH, joints, model
 from toolpaths.arrays import Floats

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from machines.geometric_error.actual import approach
-from machines.geometric_error.curve_banks import banks
-from machines.geometric_error.curves import FINEST, Curve, Fourier, Polynomial, Table
+from machines.geometric_error.actual.actual import approach
+from machines.geometric_error.tables.curve_banks import banks
+from machines.geometric_error.tables.curves import FINEST, Curve, Fourier, Polynomial, Table
 
 X = np.array([-100.0, 0.0, 50.0, 120.0])
 V = np.array([0.01, -0.02, 0.03, 0.0])

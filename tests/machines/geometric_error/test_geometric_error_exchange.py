@@ -9,28 +9,22 @@ import numpy as np
 import pytest
 
 import machines
-from machines.geometric_error.bed_frame import bed_side
-from machines.geometric_error.covariance import write_covariance
-from machines.geometric_error.curves import Fourier, Polynomial, Table
-from machines.geometric_error.exchange import save, write_model
-from machines.geometric_error.exports import (
-    ini_lines,
-    location_csv,
-    notices,
-    to_screws,
-    to_tables,
-)
-from machines.geometric_error.imports import How, read_sources, with_covariance
-from machines.geometric_error.loader import load
-from machines.geometric_error.model import ErrorModel, doubt
-from machines.geometric_error.serial_errors import SerialErrors
+from machines.geometric_error.actual.model import ErrorModel, doubt
+from machines.geometric_error.actual.serial_errors import SerialErrors
+from machines.geometric_error.exchange.bed_frame import bed_side
+from machines.geometric_error.exchange.exchange import save, write_model
+from machines.geometric_error.exchange.exports import ini_lines, location_csv, notices, to_screws, to_tables
+from machines.geometric_error.exchange.imports import How, read_sources, with_covariance
+from machines.geometric_error.files.covariance import write_covariance
+from machines.geometric_error.files.loader import load
+from machines.geometric_error.tables.curves import Fourier, Polynomial, Table
 from machines.kinematics.serial import Serial
 from machines.machine import Machine
 from tests.machines.error_models import ARCSEC, component, correlated, joints, model
 from toolpaths.arrays import Floats
 from toolpaths.units import DEG
 
-SAMPLES = Path(__file__).parents[2] / "samples" / "errors"
+SAMPLES = Path(__file__).parents[3] / "samples" / "errors"
 
 
 # ---- tables ----------------------------------------------------------------------------------------------------------

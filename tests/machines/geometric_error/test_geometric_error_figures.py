@@ -11,9 +11,9 @@ import pytest
 
 import machines
 from machines.geometric_error import load
-from machines.geometric_error.figures import _round_part, model_figure
-from machines.geometric_error.model import ErrorModel
-from machines.geometric_error.volume import ranges, section
+from machines.geometric_error.actual.model import ErrorModel
+from machines.geometric_error.exchange.figures import _round_part, model_figure
+from machines.geometric_error.exchange.volume import ranges, section
 
 
 def words(svg: bytes) -> str:

@@ -11,26 +11,26 @@ import numpy as np
 import pytest
 
 import machines
-from machines.geometric_error.actual_map import ActualByMap
-from machines.geometric_error.covariance import read_covariance
-from machines.geometric_error.csv_table import read_csv, write_csv
-from machines.geometric_error.curves import Fourier, Table
-from machines.geometric_error.exchange import save, table_to_csv
-from machines.geometric_error.lattice import ErrorMap
-from machines.geometric_error.lattice_file import map_from_csv, map_to_csv
-from machines.geometric_error.lattice_making import deviations, map_loss, map_of
-from machines.geometric_error.loader import error_model_schema, load, load_checked
-from machines.geometric_error.model import ErrorModel, doubt
-from machines.geometric_error.names import parse
-from machines.geometric_error.screw_tables import from_linuxcnc, to_linuxcnc
-from machines.geometric_error.serial_errors import Component, SerialErrors
-from machines.geometric_error.tabulate import merged, sampled
+from machines.geometric_error.actual.actual_map import ActualByMap
+from machines.geometric_error.actual.model import ErrorModel, doubt
+from machines.geometric_error.actual.serial_errors import Component, SerialErrors
+from machines.geometric_error.exchange.exchange import save, table_to_csv
+from machines.geometric_error.exchange.lattice_making import deviations, map_loss, map_of
+from machines.geometric_error.exchange.tabulate import merged, sampled
+from machines.geometric_error.files.covariance import read_covariance
+from machines.geometric_error.files.loader import error_model_schema, load, load_checked
+from machines.geometric_error.tables.csv_table import read_csv, write_csv
+from machines.geometric_error.tables.curves import Fourier, Table
+from machines.geometric_error.tables.lattice import ErrorMap
+from machines.geometric_error.tables.lattice_file import map_from_csv, map_to_csv
+from machines.geometric_error.tables.names import parse
+from machines.geometric_error.tables.screw_tables import from_linuxcnc, to_linuxcnc
 from machines.machine import Machine
 from tests.machines.error_models import ARCSEC, joints, model
 from toolpaths.arrays import Floats
 from toolpaths.units import DEG
 
-SAMPLES = Path(__file__).parents[2] / "samples" / "errors"
+SAMPLES = Path(__file__).parents[3] / "samples" / "errors"
 
 GOOD = """\
 machine = "mikron-ucp710"

@@ -10,9 +10,9 @@ import pytest
 
 import machines
 from machines.geometric_error import load
-from machines.geometric_error.exchange import save
-from machines.geometric_error.fingerprint import fingerprint
-from machines.geometric_error.model import ErrorModel
+from machines.geometric_error.actual.model import ErrorModel
+from machines.geometric_error.exchange.exchange import save
+from machines.geometric_error.files.fingerprint import fingerprint
 
 MIKRON = machines.load("mikron-ucp710")
 SAMPLES = [("mikron-ucp710.toml", "mikron-ucp710"), ("uranesx.toml", "uranesx"), ("h4a-c-table.toml", "h4a-c-table")]

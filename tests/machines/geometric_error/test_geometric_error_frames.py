@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import machines
-from machines.geometric_error.exchange import save
-from machines.geometric_error.loader import load
-from machines.geometric_error.model import ErrorModel
+from machines.geometric_error.actual.model import ErrorModel
+from machines.geometric_error.exchange.exchange import save
+from machines.geometric_error.files.loader import load
 from machines.kinematics.serial import Serial
 from toolpaths.arrays import Floats
 from toolpaths.rotations import rotation

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 import machines
-from machines.geometric_error.csv_table import UNITS, read_csv
-from machines.geometric_error.exchange import save
-from machines.geometric_error.fingerprint import fingerprint
-from machines.geometric_error.lattice_file import map_from_csv
-from machines.geometric_error.loader import load_checked
+from machines.geometric_error.exchange.exchange import save
+from machines.geometric_error.files.fingerprint import fingerprint
+from machines.geometric_error.files.loader import load_checked
+from machines.geometric_error.tables.csv_table import UNITS, read_csv
+from machines.geometric_error.tables.lattice_file import map_from_csv
 from toolpaths.diagnostics import Severity
 
 TABLE = '[components.EXX]\ntable = "x.csv"\n'

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 import machines
-from machines.geometric_error.actual import Actual
-from machines.geometric_error.correction import POLE, correct
-from machines.geometric_error.loader import load
-from machines.geometric_error.model import ErrorModel, doubt
+from machines.geometric_error.actual.actual import Actual
+from machines.geometric_error.actual.correction import POLE, correct
+from machines.geometric_error.actual.model import ErrorModel, doubt
+from machines.geometric_error.files.loader import load
 from machines.kinematics.base import Kinematics
 from tests.machines.independent_machine import Curve, Errors, Machine
 from tests.machines.random_error_files import Draw

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from machines.geometric_error.curves import Table
-from machines.geometric_error.lost_motion import GRAIN, Steps, turning_sign
-from machines.geometric_error.names import parse
-from machines.geometric_error.serial_errors import Component, SerialErrors
+from machines.geometric_error.actual.lost_motion import GRAIN, Steps, turning_sign
+from machines.geometric_error.actual.serial_errors import Component, SerialErrors
+from machines.geometric_error.tables.curves import Table
+from machines.geometric_error.tables.names import parse
 
 
 def test_walked_steps_are_the_play_of_a_loop() -> None:

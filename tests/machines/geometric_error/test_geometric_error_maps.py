@@ -9,16 +9,16 @@ import numpy as np
 import pytest
 
 import machines
-from machines.geometric_error.actual_map import ActualByMap, part_side
-from machines.geometric_error.csv_table import read_csv
-from machines.geometric_error.exchange import save
-from machines.geometric_error.lattice import ErrorMap
-from machines.geometric_error.lattice_file import map_from_csv
-from machines.geometric_error.lattice_making import map_loss, map_of, nodes_of, refined
-from machines.geometric_error.loader import load, load_checked
-from machines.geometric_error.model import ErrorModel, doubt
-from machines.geometric_error.serial_errors import SerialErrors
-from machines.geometric_error.volume import middle, samples
+from machines.geometric_error.actual.actual_map import ActualByMap, part_side
+from machines.geometric_error.actual.model import ErrorModel, doubt
+from machines.geometric_error.actual.serial_errors import SerialErrors
+from machines.geometric_error.exchange.exchange import save
+from machines.geometric_error.exchange.lattice_making import map_loss, map_of, nodes_of, refined
+from machines.geometric_error.exchange.volume import middle, samples
+from machines.geometric_error.files.loader import load, load_checked
+from machines.geometric_error.tables.csv_table import read_csv
+from machines.geometric_error.tables.lattice import ErrorMap
+from machines.geometric_error.tables.lattice_file import map_from_csv
 from tests.machines.error_models import ARCSEC, joints, model
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic, Severity
@@ -262,7 +262,7 @@ def test_the_doubt_of_more_parameters_than_are_held_is_left_out_and_told(tmp_pat
     some, faults = loaded(tmp_path, table, covariance)
     assert some is not None and some.covariance is not None and not faults
     assert some.covariance[0, [0, 7]] == pytest.approx([9e-6, 1e-6]) and np.count_nonzero(some.covariance) == 4
-    monkeypatch.setattr("machines.geometric_error.covariance.MOST", 11)
+    monkeypatch.setattr("machines.geometric_error.files.covariance.MOST", 11)
     for keys, code in (("[sigma]\nnode = 0.5\n", "error-model.sigma"), (covariance, "error-model.covariance")):
         found, faults = loaded(tmp_path, table, keys)
         assert found is not None and found.map is not None and found.covariance is None

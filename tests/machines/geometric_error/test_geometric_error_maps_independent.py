@@ -11,8 +11,8 @@ from scipy.interpolate import RegularGridInterpolator
 from scipy.spatial.transform import Rotation
 
 import machines
-from machines.geometric_error.correction import correct
-from machines.geometric_error.loader import load
+from machines.geometric_error.actual.correction import correct
+from machines.geometric_error.files.loader import load
 from tests.machines.independent_machine import UNITS, Machine, moved
 from toolpaths.arrays import Floats
 

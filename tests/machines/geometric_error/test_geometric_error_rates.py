@@ -7,16 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from machines.geometric_error.bed_frame import Turned
-from machines.geometric_error.curves import Curve, Fourier, Polynomial, Table
-from machines.geometric_error.error_rates import pivot_rates, standing_arm
-from machines.geometric_error.lattice import ErrorMap
-from machines.geometric_error.model import ErrorModel
-from machines.geometric_error.names import parse
-from machines.geometric_error.serial_errors import Component, SerialErrors
+from machines.geometric_error.actual.error_rates import pivot_rates, standing_arm
+from machines.geometric_error.actual.model import ErrorModel
+from machines.geometric_error.actual.serial_errors import Component, SerialErrors
+from machines.geometric_error.exchange.bed_frame import Turned
+from machines.geometric_error.tables.curves import Curve, Fourier, Polynomial, Table
+from machines.geometric_error.tables.lattice import ErrorMap
+from machines.geometric_error.tables.names import parse
 from machines.kinematics.serial import Serial
 from tests.machines.error_models import joints, serial_errors
-from tests.machines.test_geometric_error_serial import NAMES, kinematics
+from tests.machines.geometric_error.test_geometric_error_serial import NAMES, kinematics
 from toolpaths.arrays import Floats
 
 RNG = np.random.default_rng(5)

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import machines
-from machines.geometric_error.imports import How, read_sources
-from machines.geometric_error.model import ErrorModel
+from machines.geometric_error.actual.model import ErrorModel
+from machines.geometric_error.exchange.imports import How, read_sources
 from toolpaths.diagnostics import Diagnostic
 
 MILL = machines.load("mill-3axis")

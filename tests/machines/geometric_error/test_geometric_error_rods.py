@@ -11,14 +11,14 @@ from scipy.optimize import root
 from scipy.spatial.transform import Rotation
 
 import machines
-from machines.geometric_error import rods, rods_loop
-from machines.geometric_error.actual_rods import ActualDelta, ActualH4
-from machines.geometric_error.correction import correct
-from machines.geometric_error.exchange import save
-from machines.geometric_error.loader import load, load_checked
-from machines.geometric_error.model import ErrorModel
-from machines.geometric_error.rods import RodErrors, RodFrame, platform_turn, rod_frame
-from machines.geometric_error.serial_errors import SerialErrors
+from machines.geometric_error.actual import rods, rods_loop
+from machines.geometric_error.actual.actual_rods import ActualDelta, ActualH4
+from machines.geometric_error.actual.correction import correct
+from machines.geometric_error.actual.model import ErrorModel
+from machines.geometric_error.actual.rods import RodErrors, RodFrame, platform_turn, rod_frame
+from machines.geometric_error.actual.serial_errors import SerialErrors
+from machines.geometric_error.exchange.exchange import save
+from machines.geometric_error.files.loader import load, load_checked
 from machines.kinematics.h4_linear import H4Linear
 from machines.kinematics.linear_delta import LinearDelta
 from tests.machines.error_models import joints, model, rod_errors

@@ -7,11 +7,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import machines
-from machines.geometric_error.actual_serial import ActualSerial
-from machines.geometric_error.curves import Polynomial, Table
-from machines.geometric_error.names import parse
-from machines.geometric_error.serial_errors import Component, SerialErrors
-from machines.geometric_error.transforms import about, homogeneous, inverse, transport, turns
+from machines.geometric_error.actual.actual_serial import ActualSerial
+from machines.geometric_error.actual.serial_errors import Component, SerialErrors
+from machines.geometric_error.actual.transforms import about, homogeneous, inverse, transport, turns
+from machines.geometric_error.tables.curves import Polynomial, Table
+from machines.geometric_error.tables.names import parse
 from machines.kinematics.serial import Serial
 from tests.machines.error_models import joints, serial_errors
 from toolpaths.arrays import Floats

@@ -8,26 +8,22 @@ import numpy as np
 import pytest
 
 import machines
-from machines.geometric_error.correction import correct
-from machines.geometric_error.curves import Fourier, Table
-from machines.geometric_error.exports import (
-    lattice_for,
-    to_map,
-    worst,
-)
-from machines.geometric_error.imports import How, read_sources
-from machines.geometric_error.loader import load
-from machines.geometric_error.model import ErrorModel, doubt
-from machines.geometric_error.names import parse
-from machines.geometric_error.serial_errors import SerialErrors
-from machines.geometric_error.survey import absent, beyond_travel, survey, unmeasured
-from machines.geometric_error.tabulate import without
-from machines.geometric_error.volume import ranges
+from machines.geometric_error.actual.correction import correct
+from machines.geometric_error.actual.model import ErrorModel, doubt
+from machines.geometric_error.actual.serial_errors import SerialErrors
+from machines.geometric_error.exchange.exports import lattice_for, to_map, worst
+from machines.geometric_error.exchange.imports import How, read_sources
+from machines.geometric_error.exchange.survey import absent, beyond_travel, survey, unmeasured
+from machines.geometric_error.exchange.tabulate import without
+from machines.geometric_error.exchange.volume import ranges
+from machines.geometric_error.files.loader import load
+from machines.geometric_error.tables.curves import Fourier, Table
+from machines.geometric_error.tables.names import parse
 from tests.machines.error_models import ARCSEC, component, correlated, model
 from toolpaths.diagnostics import Severity
 from toolpaths.units import DEG
 
-SAMPLES = Path(__file__).parents[2] / "samples" / "errors"
+SAMPLES = Path(__file__).parents[3] / "samples" / "errors"
 
 
 @pytest.mark.parametrize(("name", "over"), [("mill-3axis", ""), ("mill-4axis", "XYZA"), ("uranesx", ""),

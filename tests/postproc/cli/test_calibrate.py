@@ -16,13 +16,13 @@ import machines
 import postproc
 import toolpaths
 from machines.calibration.calibrate import calibrate
-from machines.geometric_error.loader import load
-from postproc.cli import app
-from postproc.options import Options
-from postproc.pipeline import verify
+from machines.geometric_error.files.loader import load
+from postproc.base.options import Options
+from postproc.cli.app import app
+from postproc.pipeline.convert import verify
 from toolpaths.units import DEG
 
-SAMPLES = Path(__file__).parents[2] / "samples"
+SAMPLES = Path(__file__).parents[3] / "samples"
 ARCSEC = DEG / 3600.0
 
 
@@ -147,7 +147,7 @@ def test_a_fit_without_support_is_refused(folder: Path) -> None:
 
 def test_all_six_errors_from_a_file(folder: Path) -> None:
     from machines.calibration.simulator import PARTS, Bench, simulate
-    from machines.geometric_error.csv_table import write_csv
+    from machines.geometric_error.tables.csv_table import write_csv
 
     rng, bench = np.random.default_rng(1), Bench(12)
     wave = np.zeros((12, 6))

@@ -16,14 +16,14 @@ import machines
 from machines.calibration.calibrate import calibrate
 from machines.calibration.measurement_file import COLUMNS, JOINT, WAY, MeasurementModel
 from machines.calibration.text import text
-from machines.geometric_error.csv_table import read_csv, write_csv
-from machines.geometric_error.exchange import save
-from machines.geometric_error.loader import load
-from machines.geometric_error.model import ErrorModel
-from machines.geometric_error.rods import RodErrors, rod_frame, rod_names
-from postproc.cli import app
+from machines.geometric_error.actual.model import ErrorModel
+from machines.geometric_error.actual.rods import RodErrors, rod_frame, rod_names
+from machines.geometric_error.exchange.exchange import save
+from machines.geometric_error.files.loader import load
+from machines.geometric_error.tables.csv_table import read_csv, write_csv
+from postproc.cli.app import app
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 README = (ROOT / "machines/calibration/README.md").read_text(encoding="utf-8")
 COMMANDS = [line.split("#")[0].strip() for block in re.findall(r"```sh\n(.*?)```", README, re.DOTALL)
             for line in block.splitlines() if line.startswith("postproc")]

@@ -14,12 +14,12 @@ from typer.testing import CliRunner
 
 import machines
 from machines.calibration.calibrate import calibrate
-from machines.geometric_error.exchange import save
-from machines.geometric_error.loader import load
-from postproc.cli import app
+from machines.geometric_error.exchange.exchange import save
+from machines.geometric_error.files.loader import load
+from postproc.cli.app import app
 from toolpaths.diagnostics import Severity
 
-SAMPLES = Path(__file__).parents[2] / "samples" / "calibration"
+SAMPLES = Path(__file__).parents[3] / "samples" / "calibration"
 Rows = Callable[[dict[str, float]], None]
 
 

@@ -10,8 +10,8 @@ import pytest
 from typer.testing import CliRunner
 
 import machines
-from postproc.catalogue import machine_text, rotary_lines
-from postproc.cli import app
+from postproc.cli.app import app
+from postproc.cli.catalogue import machine_text, rotary_lines
 from tests.postproc.kit import machine
 
 NAMES = [name for name in machines.names() if any(machine(name).rotary)]

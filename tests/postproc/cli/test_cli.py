@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner, Result
 
-from postproc.cli import app, main
+from postproc.cli.app import app, main
 from tests.postproc.kit import HEAD, SAMPLES, TOOLS
 
 MILL = ["-m", "mill-3axis", "-c", "linuxcnc"]
@@ -209,7 +209,7 @@ def test_unknown_motion_word_stops_unless_allowed(tmp_path: Path) -> None:
 
 
 def test_help_is_instant_and_lists_the_commands() -> None:
-    got = subprocess.run([sys.executable, "-X", "importtime", "-m", "postproc.cli", "--help"], capture_output=True,
+    got = subprocess.run([sys.executable, "-X", "importtime", "-m", "postproc.cli.app", "--help"], capture_output=True,
                          text=True, check=True, timeout=30)
     assert all(word in got.stdout for word in ("convert", "verify", "inspect", "trace", "machine", "controller"))
     assert not re.search(r"\| +(numpy|numba|pydantic)\s*$", got.stderr, re.MULTILINE)
@@ -235,7 +235,7 @@ def test_an_output_that_is_full_is_told(monkeypatch: pytest.MonkeyPatch, capsys:
     def full() -> None:
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr("postproc.cli.app", full)
+    monkeypatch.setattr("postproc.cli.app.app", full)
     with pytest.raises(SystemExit) as end:
         main()
     assert end.value.code == 1 and "standard output cannot be written: No space left" in capsys.readouterr().err

@@ -13,10 +13,10 @@ import pytest
 from typer.testing import CliRunner, Result
 
 import machines
-from machines.geometric_error.loader import load
-from postproc.cli import app
+from machines.geometric_error.files.loader import load
+from postproc.cli.app import app
 
-SAMPLES = Path(__file__).parents[2] / "samples" / "errors"
+SAMPLES = Path(__file__).parents[3] / "samples" / "errors"
 MIKRON = SAMPLES / "mikron-ucp710.toml"
 
 
@@ -314,6 +314,7 @@ def test_schema_and_help() -> None:
     assert "components" in json.loads(run("schema").stdout)["properties"]
     for command in ("check", "to-tables", "to-map", "to-linuxcnc", "import"):
         assert "Example: postproc errors" in run(command, "--help").stdout
-    got = subprocess.run([sys.executable, "-X", "importtime", "-m", "postproc.cli", "errors", "--help"], capture_output=True,
+    got = subprocess.run([sys.executable, "-X", "importtime", "-m", "postproc.cli.app", "errors", "--help"],
+                         capture_output=True,
                          text=True, check=True, timeout=60)
     assert not {"numpy", "scipy", "numba"} & {line.split("|")[-1].strip() for line in got.stderr.splitlines()}

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner, Result
 
-from postproc.cli import app
+from postproc.cli.app import app
 from postproc.cycle_time.estimate import timed
 from tests.postproc.kit import SAMPLES, TOOLS
 from tests.postproc.time_kit import blocks, model

@@ -13,9 +13,9 @@ from typer.testing import CliRunner
 
 import machines
 from machines.geometric_error import load
-from postproc.cli import app
+from postproc.cli.app import app
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 TEXT = (ROOT / "machines/geometric_error/README.md").read_text(encoding="utf-8")
 SAMPLES = ROOT / "samples/errors"
 COMMANDS = [line.split("#")[0].strip() for block in re.findall(r"```sh\n(.*?)```", TEXT, re.DOTALL)

@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 
 import postproc
-from postproc.cli import rounded
+from postproc.cli.app import rounded
+from tests.postproc.cli.test_cli import MILL, POCKET, cl, run
 from tests.postproc.kit import SAMPLES, TOOLS
-from tests.postproc.test_cli import MILL, POCKET, cl, run
 
 GOOD = ["RAPID", "GOTO/0,0,5", "GOTO/1,0,5"]
 

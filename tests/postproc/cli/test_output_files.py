@@ -11,13 +11,13 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner, Result
 
-from postproc.cli import app
-from postproc.setup import load_setup
-from postproc.setup_fingerprint import fingerprint
+from postproc.cli.app import app
+from postproc.setup.fingerprint import fingerprint
+from postproc.setup.model import load_setup
 from tests.postproc.kit import SAMPLES, TOOLS
 from toolpaths import leftovers
 
-GOLDEN = Path(__file__).parents[1] / "golden"
+GOLDEN = Path(__file__).parents[2] / "golden"
 MIKRON = ["-m", "mikron-ucp710", "-c", "fanuc-30i"]
 CONTROLLERS = ("fanuc-30i", "siemens-840d", "heidenhain-tnc640", "linuxcnc", "generic-iso")
 

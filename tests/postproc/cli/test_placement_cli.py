@@ -11,19 +11,19 @@ import pytest
 from typer.testing import CliRunner
 
 import toolpaths
-from postproc.cli import app
-from postproc.options import Options
-from postproc.orientation.orient import orient
-from postproc.pipeline import convert
+from postproc.base.options import Options
+from postproc.cli.app import app
+from postproc.orientation.plans.orient import orient
+from postproc.pipeline.convert import convert
 from postproc.placement.bodies import RESTS, beside
 from postproc.placement.figure import margins_at
 from postproc.placement.place import place
 from postproc.placement.space import ANGLES
 from postproc.placement.write import placed_text
-from postproc.setup import PartPlacement, Placement, load_setup
-from postproc.setup_bodies import Bodies
+from postproc.setup.bodies import Bodies
+from postproc.setup.model import PartPlacement, Placement, load_setup
 from tests.postproc.kit import SAMPLES, machine
-from tests.postproc.test_placement import passes, placed, setup_of
+from tests.postproc.placement.test_placement import passes, placed, setup_of
 
 PART = SAMPLES / "test_part.cls"
 MILL = SAMPLES / "placement" / "mill.setup.toml"
@@ -227,7 +227,7 @@ def test_the_sample(tmp_path: Path) -> None:
 
 def test_a_place_that_cannot_be_converted_is_passed_over(monkeypatch: pytest.MonkeyPatch) -> None:
     """The proof has the last word: what it refuses is told and the next place taken."""
-    from postproc import pipeline
+    from postproc.pipeline import convert as pipeline
     from toolpaths.diagnostics import error
 
     real, asked = pipeline.convert, []

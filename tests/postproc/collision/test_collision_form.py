@@ -9,13 +9,13 @@ import pytest
 import trimesh
 from typer.testing import CliRunner
 
-from postproc.cli import app
+from postproc.cli.app import app
 from postproc.collision.form import CUTTER, HOLDER, SHANK, Form, tool_form
 from postproc.collision.mesh import load_mesh
 from postproc.collision.revolution import signed
 from postproc.collision.spun import spun
-from postproc.setup import SetupFile, ToolSetup, load_setup
-from postproc.setup_bodies import Section
+from postproc.setup.bodies import Section
+from postproc.setup.model import SetupFile, ToolSetup, load_setup
 from tests.postproc.kit import SAMPLES
 from toolpaths.arrays import Floats
 from toolpaths.toolpath import Tool

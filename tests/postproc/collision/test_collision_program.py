@@ -11,8 +11,8 @@ import trimesh
 import postproc
 from postproc.collision import search
 from postproc.collision.program import touching_parts
-from postproc.readback.poses import Executed
-from postproc.result import PostResult
+from postproc.pipeline.result import PostResult
+from postproc.readback.execution.poses import Executed
 from tests.postproc.kit import machine, toolpath
 from toolpaths.diagnostics import Diagnostic
 from toolpaths.toolpath import Toolpath

@@ -13,7 +13,7 @@ from postproc.collision.revolution import around, signed, support
 from postproc.collision.search import EXACT, PART, Nearest, nearest
 from postproc.collision.solid import Solid, solid
 from postproc.collision.swept import Swept, joined
-from postproc.setup import Placement
+from postproc.setup.model import Placement
 from toolpaths.arrays import Floats
 from toolpaths.rotations import slerp
 

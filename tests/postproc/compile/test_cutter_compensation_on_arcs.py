@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from postproc.readback.verify import read_back
-from postproc.result import PostResult
-from postproc.setup import SetupFile
+from postproc.pipeline.result import PostResult
+from postproc.setup.model import SetupFile
+from postproc.verification.read_back import read_back
 from tests.postproc.kit import codes, convert, good, goto, tilted, toolpath
 from toolpaths.diagnostics import Diagnostic, Severity
 

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 import toolpaths
-from postproc import summary
-from postproc.planes import angles_of, rotation_of, stated
-from postproc.setup import SetupFile, load_setup
+from postproc.control.planes import angles_of, rotation_of, stated
+from postproc.report import summary
+from postproc.setup.model import SetupFile, load_setup
 from tests.postproc.kit import SAMPLES, angle, codes, convert, goto, tilted, tool_setup, toolpath
 from tests.postproc.modes_kit import TCP, TILTED, made, run, shop
 
-GOLDEN = Path(__file__).parents[1] / "golden"
+GOLDEN = Path(__file__).parents[2] / "golden"
 FOUR = ["mikron-ucp710", "trunnion-bc", "head-table", "fork-head-ab"]
 FIRST, THEN = tilted(25.0, 40.0), tilted(31.0, 65.0)
 

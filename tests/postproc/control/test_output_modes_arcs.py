@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 
 import postproc
-from postproc.blocks import rapid_codes
-from postproc.control import Control
-from postproc.links import SafeSpace, stays_clear
-from postproc.setup import load_setup
-from postproc.travel import extremes
+from postproc.control.control import Control
+from postproc.path.blocks import rapid_codes
+from postproc.path.links import SafeSpace, stays_clear
+from postproc.path.travel import extremes
+from postproc.setup.model import load_setup
+from tests.postproc.control.test_output_modes import FOUR, indexed, turning
 from tests.postproc.kit import angle, codes, convert, goto, machine, tilted, tool_setup, toolpath
 from tests.postproc.modes_kit import TCP, TILTED, made, run, shop
-from tests.postproc.test_output_modes import FOUR, indexed, turning
 
 NX = ["TOOL PATH/A,TOOL,T", "MSYS/0,0,0,1,0,0,0,1,0", "LOAD/TOOL,1", "SPINDL/RPM,1000,CLW"]
 AXIS = tilted(30.0, 50.0)
@@ -312,7 +312,7 @@ def test_pivots_of_the_control(point: str, code: str, tmp_path: Path) -> None:
 
 
 def test_a_pivot_of_no_axis_is_an_error(tmp_path: Path) -> None:
-    own = tool_setup().model_copy(update={"control_pivots": {"A": postproc.setup.Pivot(point=(0, 0, 0))}})
+    own = tool_setup().model_copy(update={"control_pivots": {"A": postproc.setup.model.Pivot(point=(0, 0, 0))}})
     result = convert(toolpath("RAPID", "GOTO/0,0,50", "GOTO/0,0,5"), "mill-3axis", shop(tmp_path), own)
     assert "setup.pivot" in codes(result.diagnostics) and result.program is None
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from postproc.readback.verify import read_back
-from postproc.result import PostResult
+from postproc.pipeline.result import PostResult
+from postproc.verification.read_back import read_back
 from tests.postproc.kit import convert, good, pose_of, setup_of, shop_file, tilted, toolpath
 from tests.postproc.reader_kit import FANUC
 from toolpaths.diagnostics import Severity
@@ -79,7 +79,7 @@ def test_entered_with_turned_tables_the_readings_differ(tmp_path: Path, machine:
 
 def test_the_frame_of_the_other_reading_against_the_machine_in_plain_matrices() -> None:
     """A point of the work offset's frame, as it lies in the machine, seen from the table where the tables stand."""
-    from postproc.readback.frames import entered
+    from postproc.readback.execution.frames import entered
 
     result = swept(FANUC, "trunnion-bc")
     assert result.job is not None

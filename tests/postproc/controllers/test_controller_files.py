@@ -8,11 +8,11 @@ import pytest
 from typer.testing import CliRunner
 
 from machines.user_file import schema
-from postproc.catalogue import controller_values
-from postproc.cli import app
+from postproc.cli.app import app
+from postproc.cli.catalogue import controller_values
+from postproc.compile.program import Program
 from postproc.controllers.model import ControllerFile, builtin_files, load_controller
-from postproc.controllers.unwritable import unwritable
-from postproc.program import Program
+from postproc.writing.unwritable import unwritable
 from tests.postproc.program_kit import LOAD, command, drilled, program, step
 from toolpaths.diagnostics import Diagnostic
 from toolpaths.toolpath import Cycle

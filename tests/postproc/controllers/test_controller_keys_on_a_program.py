@@ -8,12 +8,12 @@ from pathlib import Path
 import pytest
 
 import toolpaths
-from postproc.result import PostResult
+from postproc.pipeline.result import PostResult
 from tests.postproc.kit import convert, toolpath
 from toolpaths.diagnostics import has_errors
 from toolpaths.toolpath import Toolpath
 
-PIECE = Path(__file__).parents[1] / "golden" / "three_laws.cls"
+PIECE = Path(__file__).parents[2] / "golden" / "three_laws.cls"
 HELIX = ["RAPID", "GOTO/10,0,5,0,0,1", "FEDRAT/MMPM,600", "GOTO/10,0,0", "CIRCLE/0,0,0,0,0,-1,10,0.03,0.5,10,0",
          "GOTO/0,10,-2", "END-OF-PATH"]
 HOLES = ["RAPID", "GOTO/10,0,30", "CYCLE/DRILL,DEPTH,5,MMPM,100,CLEAR,3", "GOTO/10,0,0", "GOTO/20,0,0", "CYCLE/OFF",

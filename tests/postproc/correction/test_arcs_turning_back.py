@@ -10,10 +10,10 @@ import pytest
 
 import postproc
 import toolpaths
-from postproc.corrected.proof import after_formatting
-from postproc.options import Options
-from postproc.readback.actual import _turning
-from postproc.result import PostResult
+from postproc.base.options import Options
+from postproc.pipeline.result import PostResult
+from postproc.readback.execution.actual import _turning
+from postproc.verification.errors_left import after_formatting
 
 RADIUS = 50.0
 PLAY = "[components.EYY]\ntable = 'y.csv'\n"

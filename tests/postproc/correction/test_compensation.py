@@ -14,18 +14,18 @@ from typer.testing import CliRunner
 import machines
 import postproc
 import toolpaths
-from machines.geometric_error.exchange import save
-from machines.geometric_error.loader import load
-from machines.geometric_error.model import ErrorModel
-from machines.geometric_error.serial_errors import SerialErrors
-from postproc.cli import app
-from postproc.compensation import SHARE
-from postproc.corrected.arcs import LOOSE
-from postproc.corrected.work import one_orientation
-from postproc.options import Options
-from postproc.pipeline import verify
-from postproc.result import PostResult
-from postproc.setup import load_setup
+from machines.geometric_error.actual.model import ErrorModel
+from machines.geometric_error.actual.serial_errors import SerialErrors
+from machines.geometric_error.exchange.exchange import save
+from machines.geometric_error.files.loader import load
+from postproc.base.options import Options
+from postproc.cli.app import app
+from postproc.correction.arcs import LOOSE
+from postproc.correction.compensation import SHARE
+from postproc.correction.error_context import one_orientation
+from postproc.pipeline.convert import verify
+from postproc.pipeline.result import PostResult
+from postproc.setup.model import load_setup
 from toolpaths.units import DEG
 
 SAMPLES = Path("samples")

@@ -12,12 +12,12 @@ import pytest
 import postproc
 import toolpaths
 from machines.geometric_error import load
-from postproc.looks import changes, looks_between
-from postproc.options import Options
-from postproc.readback.checks import check_speeds
-from postproc.readback.compare import _taken_up
-from postproc.readback.faults import Faults
-from postproc.result import PostResult
+from postproc.base.options import Options
+from postproc.correction.error_sampling import changes, looks_between
+from postproc.pipeline.result import PostResult
+from postproc.readback.comparison.checks import check_speeds
+from postproc.readback.comparison.compare import _taken_up
+from postproc.readback.comparison.faults import Faults
 from toolpaths.diagnostics import Severity
 
 HEAD = "UNITS/MM\nLOADTL/1\nSPINDL/3000,RPM,CLW\nFEDRAT/400,MMPM\nRAPID\nGOTO/-160,0,20\nGOTO/-160,0,0\n"
@@ -65,8 +65,8 @@ def test_errors_with_a_period_are_corrected_along_a_long_line(period: float, tmp
 
 
 def test_the_proof_looks_between_points_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("postproc.corrected.points.looks_between", lambda count: iter(()))
-    monkeypatch.setattr("postproc.corrected.points.LOOKS", (0.25, 0.5, 0.75))  # whole periods, as those of any program
+    monkeypatch.setattr("postproc.correction.points.looks_between", lambda count: iter(()))
+    monkeypatch.setattr("postproc.correction.points.LOOKS", (0.25, 0.5, 0.75))  # whole periods, as those of any program
     result = converted(tmp_path, LINE, *periodic(4.0))
     assert not result.ok and "verify.tip" in {d.code for d in result.diagnostics}
 
@@ -132,7 +132,7 @@ def test_a_tilted_plane_that_was_not_measured_is_refused(tmp_path: Path) -> None
 
 
 def test_a_part_out_of_travel_is_told_before_it_is_corrected(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("postproc.compensation.compensate", lambda *args: pytest.fail("corrected"))
+    monkeypatch.setattr("postproc.correction.compensation.compensate", lambda *args: pytest.fail("corrected"))
     path, found = toolpaths.read("samples/systems/upside_down.cls")
     result = postproc.convert(path, "mikron-ucp710", "fanuc-30i", diagnostics=found, options=Options(
         setup="samples/tools.setup.toml", error_model="samples/errors/mikron-ucp710.toml"))

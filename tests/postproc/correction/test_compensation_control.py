@@ -10,10 +10,10 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from postproc.cli import app
+from postproc.cli.app import app
 
 SAMPLES = Path("samples").resolve()
-CL = str(Path(__file__).parents[1].resolve() / "golden/short_five_axis.apt")
+CL = str(Path(__file__).parents[2].resolve() / "golden/short_five_axis.apt")
 OURS = str(SAMPLES / "errors/mikron-ucp710.toml")
 RUN = ["-m", "mikron-ucp710", "-c", "linuxcnc", "--setup", str(SAMPLES / "tools.setup.toml")]
 

@@ -12,17 +12,17 @@ import pytest
 
 import postproc
 import toolpaths
-from machines.geometric_error.lost_motion import Steps
-from postproc.corrected import settled
-from postproc.corrected.proof import after_formatting
-from postproc.corrected.runs import Runs
-from postproc.corrected.settled import _composed
-from postproc.corrected.walk import Ends, walk
-from postproc.options import Options
-from postproc.readback.compare import _taken_up
-from postproc.result import PostResult
-from postproc.setup import load_setup
-from tests.postproc.test_compensation_points import two_ways_of_all
+from machines.geometric_error.actual.lost_motion import Steps
+from postproc.base.options import Options
+from postproc.correction import settled
+from postproc.correction.runs import Runs
+from postproc.correction.settled import _composed
+from postproc.correction.walk import Ends, walk
+from postproc.pipeline.result import PostResult
+from postproc.readback.comparison.compare import _taken_up
+from postproc.setup.model import load_setup
+from postproc.verification.errors_left import after_formatting
+from tests.postproc.correction.test_compensation_points import two_ways_of_all
 from toolpaths.arrays import Floats
 
 CONTROLLERS = ["linuxcnc", "fanuc-30i", "siemens-840d", "heidenhain-tnc640", "haas-ngc"]
@@ -200,7 +200,7 @@ def test_blocks_of_a_hole_are_moved_as_far_as_its_first(monkeypatch: pytest.Monk
         seen.append(ends)
         return walk(ends)
 
-    monkeypatch.setattr("postproc.corrected.settled.walk", kept)
+    monkeypatch.setattr("postproc.correction.settled.walk", kept)
     path, found = toolpaths.read("samples/five_faces.cls")
     result = postproc.convert(path, "mikron-ucp710", "fanuc-30i", diagnostics=found, options=Options(
         setup="samples/tools.setup.toml", error_model="samples/errors/mikron-ucp710.toml"))

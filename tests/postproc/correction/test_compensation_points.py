@@ -14,13 +14,13 @@ from typer.testing import CliRunner
 
 import postproc
 import toolpaths
-from postproc.cli import app
-from postproc.compensation import unstated
-from postproc.corrected.proof import after_formatting, beyond_bound
-from postproc.options import Options
-from postproc.pipeline import verify
-from postproc.result import PostResult
-from postproc.setup import load_setup
+from postproc.base.options import Options
+from postproc.cli.app import app
+from postproc.correction.compensation import unstated
+from postproc.pipeline.convert import verify
+from postproc.pipeline.result import PostResult
+from postproc.setup.model import load_setup
+from postproc.verification.errors_left import after_formatting, beyond_bound
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Severity
 from toolpaths.units import DEG

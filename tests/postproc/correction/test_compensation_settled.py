@@ -11,16 +11,16 @@ import pytest
 
 import postproc
 import toolpaths
-from postproc.corrected import walk as walking
-from postproc.corrected import walk_loop
-from postproc.corrected.proof import after_formatting
-from postproc.corrected.walk import Ends
-from postproc.options import Options
-from postproc.path_model import TRAVERSE
-from postproc.readback.checks import _turning_points
-from postproc.result import PostResult
-from postproc.setup import SetupFile, load_setup
-from tests.postproc.test_compensation_points import two_ways_of_all
+from postproc.base.options import Options
+from postproc.correction import walk as walking
+from postproc.correction import walk_loop
+from postproc.correction.walk import Ends
+from postproc.path.model import TRAVERSE
+from postproc.pipeline.result import PostResult
+from postproc.readback.comparison.checks import _turning_points
+from postproc.setup.model import SetupFile, load_setup
+from postproc.verification.errors_left import after_formatting
+from tests.postproc.correction.test_compensation_points import two_ways_of_all
 from toolpaths.arrays import Floats
 from toolpaths.toolpath import Kind
 

@@ -17,10 +17,10 @@ from scipy.spatial import cKDTree
 
 import postproc
 import toolpaths
-from postproc.corrected.proof import after_formatting
-from postproc.holes import Phase
-from postproc.options import Options
-from postproc.result import PostResult
+from postproc.base.options import Options
+from postproc.pipeline.result import PostResult
+from postproc.reference.holes import Phase
+from postproc.verification.errors_left import after_formatting
 from tests.machines.independent_machine import Errors, Machine
 from tests.machines.random_error_files import Draw
 from tests.postproc.independent_reader import End, read
@@ -31,7 +31,7 @@ from toolpaths.units import DEG
 Case = tuple[str, str, str, str, int]
 """sample, machine, controller, output mode, seed of the errors"""
 ARCSEC = DEG / 3600.0
-SAMPLES = Path(__file__).parents[2] / "samples"
+SAMPLES = Path(__file__).parents[3] / "samples"
 ARM = 30.0
 """mm: how far along the tool a second point is looked at when positions are compared"""
 SAME = 2e-6

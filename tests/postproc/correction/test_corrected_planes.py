@@ -8,8 +8,8 @@ import pytest
 
 import postproc
 import toolpaths
-from postproc.corrected.proof import after_formatting
-from postproc.options import Options
+from postproc.base.options import Options
+from postproc.verification.errors_left import after_formatting
 
 PART = """PARTNO P
 UNITS/MM

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner, Result
 
-from postproc.cli import app
-from postproc.header_words import FINGERPRINT
+from postproc.base.header_words import FINGERPRINT
+from postproc.cli.app import app
 
 ERRORS = Path("samples/errors")
 CONTROLLERS = ["linuxcnc", "generic-iso", "fanuc-30i", "haas-ngc", "siemens-840d", "heidenhain-tnc640"]

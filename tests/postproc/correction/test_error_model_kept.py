@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from postproc.cli import app
+from postproc.cli.app import app
 
 ERRORS = Path("samples/errors")
 COMMON = ["-m", "mikron-ucp710", "-c", "linuxcnc", "--setup", "samples/tools.setup.toml"]

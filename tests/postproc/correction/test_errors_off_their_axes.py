@@ -10,9 +10,9 @@ import pytest
 import machines
 import postproc
 import toolpaths
-from machines.geometric_error.loader import load
-from postproc.options import Options
-from postproc.result import PostResult
+from machines.geometric_error.files.loader import load
+from postproc.base.options import Options
+from postproc.pipeline.result import PostResult
 
 OFF_ITS_LINE = """
 [components.EA{0}]

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from ruckig import InputParameter, Ruckig, Trajectory
 
+from postproc.base.compiled import compiled
 from postproc.cycle_time.blocks import Blocks
 from postproc.cycle_time.bound import lower_bound
 from postproc.cycle_time.estimate import estimate, timed, total
@@ -18,7 +19,6 @@ from postproc.cycle_time.lookahead import rest_to_rest
 from postproc.cycle_time.model import CycleTimeModel
 from postproc.cycle_time.shape import shape
 from postproc.cycle_time.shares import most_expensive, operations, shares
-from postproc.feedrate.compiled import compiled
 from tests.linuxcnc import time_programs
 from tests.postproc.time_kit import HEAD, blocks, machine, model, random_program
 

@@ -13,7 +13,7 @@ from postproc.cycle_time.bound import lower_bound
 from postproc.cycle_time.estimate import estimate, timed, total
 from postproc.cycle_time.planned import planned_times, with_seconds
 from postproc.cycle_time.source import from_conversion
-from postproc.result import PostResult
+from postproc.pipeline.result import PostResult
 from tests.postproc.kit import SAMPLES, TOOLS, toolpath
 from tests.postproc.time_kit import model
 

@@ -12,7 +12,7 @@ from postproc.cycle_time.blocks import Blocks, Cause, Path
 from postproc.cycle_time.estimate import estimate
 from postproc.cycle_time.shape import shape
 from postproc.cycle_time.source import from_conversion, from_gcode, looks_like_gcode
-from postproc.setup import SetupFile
+from postproc.setup.model import SetupFile
 from tests.postproc.kit import SAMPLES, TOOLS
 from tests.postproc.time_kit import HEAD, blocks, machine, model
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.interpolate import BSpline, make_interp_spline
 
-from postproc.feedrate.coefficient_kernel import tie_ends
-from postproc.feedrate.compiled import compiled
+from postproc.base.compiled import compiled
 from postproc.feedrate.interior import NumpySteps, solve_tied
 from postproc.feedrate.interior_packed import PackedSteps
+from postproc.feedrate.kernels.coefficients import tie_ends
 from postproc.feedrate.limits import JointLimits
 from postproc.feedrate.mesh import Spacing, mesh
 from postproc.feedrate.paths import Eased, SplinePath

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from postproc.feedrate.compiled import compiled
+from postproc.base.compiled import compiled
+from postproc.feedrate.kernels.splines import spline
 from postproc.feedrate.limits import JointLimits, squared_speed, steady_cap
 from postproc.feedrate.mesh import FEWEST, Spacing, mesh
 from postproc.feedrate.paths import Eased, SplinePath
-from postproc.feedrate.spline_kernel import spline
 from tests.postproc.feedrate_kit import MIKRON, PolynomialPath, random_path, unlimited
 
 

@@ -14,7 +14,7 @@ from postproc.feedrate.limits import JointLimits
 from postproc.feedrate.rest_to_rest import Law, rest_seconds, rest_to_rest
 from tests.postproc.feedrate_kit import MIKRON
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 LIMITS = JointLimits(np.array([100.0, 50.0, 3.0]), np.array([1000.0, 800.0, 20.0]), np.array([5000.0, 60000.0, 300.0]))
 
 

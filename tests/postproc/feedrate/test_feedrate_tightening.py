@@ -16,8 +16,8 @@ from postproc.feedrate.profile import spline_profile
 from postproc.feedrate.spline import rest_basis
 from postproc.feedrate.tightening import BETWEEN, tightened, worst_ratios
 from postproc.feedrate.windows import solve_problem
+from tests.postproc.feedrate.test_feedrate_motion import Circle, Screw
 from tests.postproc.feedrate_kit import MIKRON, random_path, uniform, unlimited
-from tests.postproc.test_feedrate_motion import Circle, Screw
 
 
 @pytest.mark.numeric

@@ -25,7 +25,7 @@ print(f"{made.seconds:.9f} {small.seconds:.9f}")
 
 
 def test_plans_without_a_compiler_are_the_same() -> None:
-    root = Path(__file__).parents[2]
+    root = Path(__file__).parents[3]
     compiled = PROGRAM.replace('sys.modules["numba"] = None\n', "").replace("=True)", "=True, method=Method(kernel=True))")
     found = [subprocess.run([sys.executable, "-c", text], cwd=root, capture_output=True, text=True, check=True).stdout
              for text in (PROGRAM, compiled)]

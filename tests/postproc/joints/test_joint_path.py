@@ -11,7 +11,7 @@ import pytest
 
 import machines
 from machines.machine import Limits
-from postproc.joint_path import nearest_solution, reachable_axes, solve, wrap
+from postproc.joints.joint_path import nearest_solution, reachable_axes, solve, wrap
 from tests.postproc.kit import angle, great_circle, machine, tilted, unit
 
 DEG = np.pi / 180.0

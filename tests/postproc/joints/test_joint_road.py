@@ -11,8 +11,8 @@ import pytest
 import machines
 import postproc
 from machines.machine import Machine
-from postproc.result import PostResult
-from postproc.setup import Joints, SetupFile
+from postproc.pipeline.result import PostResult
+from postproc.setup.model import Joints, SetupFile
 from tests.postproc.joint_kit import DEG, machine, tilted
 from tests.postproc.kit import goto, tool_setup, toolpath
 

@@ -13,12 +13,12 @@ import pytest
 import machines
 import postproc
 import toolpaths
-from postproc.readback.verify import read_back
-from postproc.result import PostResult
-from postproc.setup import SetupFile, load_setup
-from postproc.summary import as_dict
+from postproc.pipeline.result import PostResult
+from postproc.report.summary import as_dict
+from postproc.setup.model import SetupFile, load_setup
+from postproc.verification.read_back import read_back
 
-FOLDER = Path(__file__).parents[2] / "samples"
+FOLDER = Path(__file__).parents[3] / "samples"
 JOINTS = FOLDER / "joints"
 LIMITED = JOINTS / "limited_c.toml"
 

@@ -11,9 +11,9 @@ import pytest
 import postproc
 import toolpaths
 from machines.kinematics.frames import reference_x, spin_about, tool_x
+from postproc.base.options import Options, OutputMode
 from postproc.joints.spin import free_joint, held_joints, spin_of
-from postproc.options import Options, OutputMode
-from postproc.setup import PartPlacement, Placement, SetupFile, load_setup
+from postproc.setup.model import PartPlacement, Placement, SetupFile, load_setup
 from tests.postproc.kit import SAMPLES, TOOLS, codes, machine, toolpath
 from toolpaths.arrays import Floats
 from toolpaths.toolpath import Toolpath
@@ -107,11 +107,12 @@ def test_the_read_back_sees_another_angle(tmp_path: Path) -> None:
     result = postproc.convert(path, machine("mikron-ucp710"), "linuxcnc", options=Options(setup=str(TOOLS)))
     assert result.ok, [str(d) for d in result.diagnostics]
     file.write_text(result.text)
-    same = postproc.pipeline.verify(file, path, machine("mikron-ucp710"), "linuxcnc", TOOLS)
+    same = postproc.pipeline.convert.verify(file, path, machine("mikron-ucp710"), "linuxcnc", TOOLS)
     assert same.ok, [str(d) for d in same.diagnostics]
     spin = path.spin
     assert spin is not None
-    other = postproc.pipeline.verify(file, replace(path, spin=spin + np.radians(5.0)), machine("mikron-ucp710"), "linuxcnc",
+    other = postproc.pipeline.convert.verify(file, replace(path, spin=spin + np.radians(5.0)), machine("mikron-ucp710"),
+                                             "linuxcnc",
                                      TOOLS)
     told = [d for d in other.diagnostics if d.code == "verify.spin"]
     assert len(told) == 1 and "5.0000 degrees turned about its axis" in told[0].message

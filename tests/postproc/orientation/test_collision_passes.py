@@ -12,12 +12,12 @@ import pytest
 import trimesh
 
 import toolpaths
-from postproc.collision.passes import PassBodies, pass_bodies
-from postproc.options import Options
-from postproc.orientation.choice import OrientationChoice
-from postproc.orientation.orient import orient
-from postproc.orientation.passes import work_of
-from postproc.setup import load_setup
+from postproc.base.options import Options
+from postproc.orientation.passes.pass_bodies import PassBodies, pass_bodies
+from postproc.orientation.passes.passes import work_of
+from postproc.orientation.plans.choice import OrientationChoice
+from postproc.orientation.plans.orient import orient
+from postproc.setup.model import load_setup
 from tests.postproc.kit import SAMPLES, machine, toolpath
 from toolpaths.diagnostics import Diagnostic
 from toolpaths.toolpath import Toolpath

@@ -11,11 +11,11 @@ import machines
 import toolpaths
 from postproc.collision.form import CUTTER, tool_form
 from postproc.collision.mesh import load_mesh
-from postproc.orientation.cutter import ball_radius
-from postproc.orientation.orient import orient
-from postproc.orientation.text import as_text
+from postproc.orientation.plans.orient import orient
+from postproc.orientation.report.text import as_text
 from postproc.placement.write import placed_text
-from postproc.setup import PartPlacement, SetupFile, ToolSetup, load_setup
+from postproc.reference.cutter import ball_radius
+from postproc.setup.model import PartPlacement, SetupFile, ToolSetup, load_setup
 from toolpaths.units import DEG
 
 _LINES = "UNITS/MM\n{cutter}\nLOADTL/1\nRAPID\nGOTO/0,0,9,0,0,1\nFEDRAT/900,MMPM\nGOTO/9,0,9,0,0,1\nFINI\n"

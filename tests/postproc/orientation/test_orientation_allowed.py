@@ -9,16 +9,16 @@ import numpy as np
 import pytest
 import trimesh
 
-from postproc.options import Options
-from postproc.orientation.allowed import Allowed, lattice, off_centre
-from postproc.orientation.choice import OrientationChoice
-from postproc.orientation.contact import Contact, contact_of
-from postproc.orientation.orient import orient
-from postproc.orientation.passes import Pass, work_of
-from postproc.orientation.surface import Surface
-from postproc.orientation.timed import turned_all
-from postproc.setup import Placement, SetupFile, load_setup
-from postproc.setup_orientation import OrientationLimits
+from postproc.base.options import Options
+from postproc.orientation.candidates.timed import turned_all
+from postproc.orientation.passes.allowed import Allowed, lattice, off_centre
+from postproc.orientation.passes.contact import Contact, contact_of
+from postproc.orientation.passes.passes import Pass, work_of
+from postproc.orientation.passes.surface import Surface
+from postproc.orientation.plans.choice import OrientationChoice
+from postproc.orientation.plans.orient import orient
+from postproc.setup.model import Placement, SetupFile, load_setup
+from postproc.setup.orientation import OrientationLimits
 from tests.postproc.kit import codes, machine, toolpath
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic

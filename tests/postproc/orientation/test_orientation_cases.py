@@ -11,21 +11,21 @@ import pytest
 
 import postproc
 from machines.machine import Machine, Timing
-from postproc.collision.passes import pass_bodies
-from postproc.options import Options, Orientation
-from postproc.orientation.allowed import Allowed
-from postproc.orientation.choice import OrientationChoice
-from postproc.orientation.held import common_angles, free_value, held_angles
-from postproc.orientation.orient import orient
-from postproc.orientation.passes import work_of
-from postproc.orientation.reoriented import reoriented
-from postproc.orientation.search import Tried
-from postproc.orientation.timed import turned, turned_all
-from postproc.result import PostResult
-from postproc.setup import SetupFile, load_setup
+from postproc.base.options import Options, Orientation
+from postproc.orientation.candidates.held import common_angles, free_value, held_angles
+from postproc.orientation.candidates.search import Tried
+from postproc.orientation.candidates.timed import turned, turned_all
+from postproc.orientation.passes.allowed import Allowed
+from postproc.orientation.passes.pass_bodies import pass_bodies
+from postproc.orientation.passes.passes import work_of
+from postproc.orientation.plans.choice import OrientationChoice
+from postproc.orientation.plans.orient import orient
+from postproc.orientation.plans.reoriented import reoriented
+from postproc.pipeline.result import PostResult
+from postproc.setup.model import SetupFile, load_setup
 from tests.benchmarks.bench_orientation_limits import chosen, compared, strips, whole
 from tests.postproc.kit import SAMPLES, TOOLS, machine, toolpath
-from tests.postproc.test_orientation_paper import jerk_only
+from tests.postproc.orientation.test_orientation_paper import jerk_only
 from toolpaths.toolpath import Toolpath
 from toolpaths.units import DEG
 

@@ -9,13 +9,13 @@ import pytest
 
 from machines.machine import Machine
 from machines.polytope import box_vertices, held_axis_polytope
-from postproc.options import Options
-from postproc.orientation.allowed import Allowed
-from postproc.orientation.candidates import tried
-from postproc.orientation.passes import Pass, work_of
-from postproc.orientation.timed import turned
-from postproc.orientation.vertices import Table, closed_form, numeric, rotation, table_of, vertex_angles
-from postproc.setup import SetupFile
+from postproc.base.options import Options
+from postproc.orientation.candidates.candidates import tried
+from postproc.orientation.candidates.timed import turned
+from postproc.orientation.candidates.vertices import Table, closed_form, numeric, rotation, table_of, vertex_angles
+from postproc.orientation.passes.allowed import Allowed
+from postproc.orientation.passes.passes import Pass, work_of
+from postproc.setup.model import SetupFile
 from tests.postproc.kit import SAMPLES, machine
 from toolpaths.arrays import Floats
 from toolpaths.units import DEG

@@ -14,13 +14,13 @@ from typer.testing import CliRunner
 
 import toolpaths
 from machines.machine import Machine, Timing
-from postproc.cli import app
-from postproc.options import Options
-from postproc.orientation.choice import OrientationChoice
-from postproc.orientation.choose import seconds, shortest
-from postproc.orientation.cutter import ball_radius
-from postproc.orientation.orient import orient
-from postproc.setup import SetupFile
+from postproc.base.options import Options
+from postproc.cli.app import app
+from postproc.orientation.plans.choice import OrientationChoice
+from postproc.orientation.plans.choose import seconds, shortest
+from postproc.orientation.plans.orient import orient
+from postproc.reference.cutter import ball_radius
+from postproc.setup.model import SetupFile
 from tests.postproc.kit import SAMPLES, machine
 from toolpaths.toolpath import Kind, Tool, Toolpath
 

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 import toolpaths
-from postproc.options import Options
-from postproc.orientation.orient import orient
-from postproc.pipeline import convert
+from postproc.base.options import Options
+from postproc.orientation.plans.orient import orient
+from postproc.pipeline.convert import convert
 from postproc.placement.program import program_seconds
-from postproc.setup import load_setup
+from postproc.setup.model import load_setup
 from tests.postproc.kit import SAMPLES, machine
 from toolpaths.toolpath import Toolpath
 from toolpaths.units import DEG

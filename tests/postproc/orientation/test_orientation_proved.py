@@ -13,17 +13,17 @@ from typer.testing import CliRunner
 
 import postproc
 from machines.machine import Machine, Timing
-from postproc import pipeline
-from postproc.cli import app
-from postproc.options import Options, Orientation
-from postproc.orientation.choice import OrientationChoice
-from postproc.orientation.choose import shortest
-from postproc.orientation.orient import orient
-from postproc.orientation.plans import OrientationPlan
-from postproc.orientation.proved import proved
-from postproc.pipeline import choose_axes
-from postproc.result import PostResult
-from postproc.setup import SetupFile
+from postproc.base.options import Options, Orientation
+from postproc.cli.app import app
+from postproc.orientation.plans.choice import OrientationChoice
+from postproc.orientation.plans.choose import shortest
+from postproc.orientation.plans.orient import orient
+from postproc.orientation.plans.plans import OrientationPlan
+from postproc.pipeline import convert as pipeline
+from postproc.pipeline.convert import choose_axes
+from postproc.pipeline.proved_axes import proved
+from postproc.pipeline.result import PostResult
+from postproc.setup.model import SetupFile
 from tests.benchmarks.bench_orientation_limits import strips
 from tests.postproc.kit import machine
 from toolpaths.diagnostics import Diagnostic, error

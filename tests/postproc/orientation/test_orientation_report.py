@@ -16,15 +16,18 @@ import pytest
 from typer.testing import CliRunner, Result
 
 import toolpaths
-from postproc.cli import app
-from postproc.options import Options, Orientation
-from postproc.orientation import losers, reaches, report, shares, text
-from postproc.orientation.choice import OrientationChoice
+from postproc.base.options import Options, Orientation
+from postproc.cli.app import app
+from postproc.orientation.candidates import losers, reaches
+from postproc.orientation.candidates.timed import turned
 from postproc.orientation.figures import held, polytopes, sheet
-from postproc.orientation.orient import orient
-from postproc.orientation.plans import OrientationPlan
-from postproc.orientation.timed import turned
-from postproc.setup import SetupFile
+from postproc.orientation.plans import shares
+from postproc.orientation.plans.choice import OrientationChoice
+from postproc.orientation.plans.orient import orient
+from postproc.orientation.plans.plans import OrientationPlan
+from postproc.orientation.report import figures_of_choice as report
+from postproc.orientation.report import text
+from postproc.setup.model import SetupFile
 from tests.postproc.kit import SAMPLES, machine
 
 PART = SAMPLES / "test_part.cls"

@@ -11,22 +11,22 @@ import pytest
 
 import toolpaths
 from machines.machine import Machine
-from postproc.options import Options
-from postproc.orientation import rounds
-from postproc.orientation.allowed import Allowed
-from postproc.orientation.candidates import tried
-from postproc.orientation.choice import OrientationChoice
-from postproc.orientation.choose import groupwise, seconds
-from postproc.orientation.orient import orient
-from postproc.orientation.passes import Pass, Work, work_of
-from postproc.orientation.plans import plans_of, table_of
-from postproc.orientation.poses import held_poses
-from postproc.orientation.ranking import Ranking
-from postproc.orientation.rounds import CHUNK, PassFault, each_pass
-from postproc.orientation.seeds import around
-from postproc.orientation.timed import turned, turned_all
-from postproc.orientation.vertices import Table, closed_form, rotation
-from postproc.setup import SetupFile, load_setup
+from postproc.base.options import Options
+from postproc.orientation.candidates.candidates import tried
+from postproc.orientation.candidates.ranking import Ranking
+from postproc.orientation.candidates.seeds import around
+from postproc.orientation.candidates.timed import turned, turned_all
+from postproc.orientation.candidates.vertices import Table, closed_form, rotation
+from postproc.orientation.passes import rounds
+from postproc.orientation.passes.allowed import Allowed
+from postproc.orientation.passes.passes import Pass, Work, work_of
+from postproc.orientation.passes.poses import held_poses
+from postproc.orientation.passes.rounds import CHUNK, PassFault, each_pass
+from postproc.orientation.plans.choice import OrientationChoice
+from postproc.orientation.plans.choose import groupwise, seconds
+from postproc.orientation.plans.orient import orient
+from postproc.orientation.plans.plans import plans_of, table_of
+from postproc.setup.model import SetupFile, load_setup
 from tests.postproc.kit import SAMPLES, machine
 from toolpaths.arrays import Floats
 from toolpaths.rotations import angle_between

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 
 import toolpaths
-from postproc.options import Options
-from postproc.orientation.allowed import Allowed
-from postproc.orientation.candidates import tried
-from postproc.orientation.orient import orient
-from postproc.orientation.passes import Pass, work_of
-from postproc.orientation.timed import turned
-from postproc.orientation.travel import nearest_inside
-from postproc.orientation.unfit import unfit
-from postproc.setup import PartPlacement, SetupFile, ToolSetup
+from postproc.base.options import Options
+from postproc.orientation.candidates.candidates import tried
+from postproc.orientation.candidates.timed import turned
+from postproc.orientation.candidates.travel import nearest_inside
+from postproc.orientation.candidates.unfit import unfit
+from postproc.orientation.passes.allowed import Allowed
+from postproc.orientation.passes.passes import Pass, work_of
+from postproc.orientation.plans.orient import orient
+from postproc.setup.model import PartPlacement, SetupFile, ToolSetup
 from tests.postproc.kit import SAMPLES, machine, toolpath
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Severity
@@ -80,7 +80,7 @@ def at(x: float, y: float = 0.0, z: float = 0.0) -> SetupFile:
 
 def test_a_part_out_of_travel_is_told_before_any_search(monkeypatch: pytest.MonkeyPatch) -> None:
     """X ends at 355 mm and the table leans by 30 degrees one way and 120 the other: at 700 mm nothing helps."""
-    monkeypatch.setattr("postproc.orientation.orient.each_pass", None)
+    monkeypatch.setattr("postproc.orientation.plans.orient.each_pass", None)
     choice, found = orient(ball_passes(0.0, 1.0, 2.0), machine("mikron-ucp710"), at(700.0))
     assert choice is None and [(d.code, d.count, d.lines) for d in found] == [("orient.travel", 3, (11, 18, 25))]
     told = found[0].message
@@ -90,7 +90,7 @@ def test_a_part_out_of_travel_is_told_before_any_search(monkeypatch: pytest.Monk
 
 
 def test_holes_out_of_travel_have_no_other_axis(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("postproc.orientation.orient.each_pass", None)
+    monkeypatch.setattr("postproc.orientation.plans.orient.each_pass", None)
     lines = ["RAPID", "GOTO/0,0,9", "CYCLE/DRILL,DEPTH,5,MMPM,100,CLEAR,3", "GOTO/0,0,0", "CYCLE/OFF", "RAPID", "GOTO/0,0,9"]
     _, found = orient(toolpath(*lines, head=BALL), machine("mikron-ucp710"), at(0.0, 300.0))
     assert [d.code for d in found] == ["orient.travel"]

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from postproc.control import Control
-from postproc.joint_path import nearest_solution, solve
-from postproc.linearise import Pieces, _Front, family_turns, linearise
+from postproc.control.control import Control
+from postproc.joints.joint_path import nearest_solution, solve
+from postproc.path.linearise import Pieces, _Front, family_turns, linearise
 from tests.postproc.kit import angle, great_circle, machine, pose_of, tilted, unit
 from toolpaths.shape import Curves
 

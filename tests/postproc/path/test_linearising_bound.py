@@ -8,10 +8,10 @@ import pytest
 import machines
 from machines.kinematics.serial import Serial
 from machines.straight_blocks import UNBOUNDED, pose_jets
-from postproc.bound import Stretch, bounds
-from postproc.control import Control
-from postproc.joint_path import nearest_solution
-from postproc.linearise import linearise
+from postproc.control.control import Control
+from postproc.joints.joint_path import nearest_solution
+from postproc.path.bound import Stretch, bounds
+from postproc.path.linearise import linearise
 from tests.postproc.joint_kit import DEG, angle, machine, segments, tilted, unit
 from toolpaths.shape import Curves
 

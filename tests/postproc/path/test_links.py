@@ -7,8 +7,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from postproc.result import PostResult
-from postproc.setup import SetupFile
+from postproc.pipeline.result import PostResult
+from postproc.setup.model import SetupFile
 from tests.postproc.kit import (
     Step,
     angle,

@@ -15,10 +15,10 @@ import toolpaths
 from machines.kinematics.h4_linear import H4Linear
 from machines.kinematics.linear_delta import LinearDelta
 from machines.machine import Machine
-from postproc.readback import assembly
-from postproc.readback.verify import read_back
-from postproc.result import PostResult
-from postproc.setup import PartPlacement, SetupFile
+from postproc.pipeline.result import PostResult
+from postproc.readback.execution import assembly
+from postproc.setup.model import PartPlacement, SetupFile
+from postproc.verification.read_back import read_back
 from tests.postproc.kit import SAMPLES, codes, good, goto, machine, toolpath
 from tests.postproc.parallel_kit import converted, deviations, execute_dense, poses, setup
 

@@ -6,7 +6,7 @@ import numpy as np
 
 import postproc
 import toolpaths
-from postproc.options import Options
+from postproc.base.options import Options
 
 
 def passing_by(first: int, last: int, points: int = 30_000) -> str:

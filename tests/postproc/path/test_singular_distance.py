@@ -11,10 +11,10 @@ import machines
 import postproc
 import toolpaths
 from machines.singular_distance import has_singular_distance, singular_distance, singular_distance_between
-from postproc.setup import load_setup
+from postproc.setup.model import load_setup
 from tests.postproc.joint_kit import machine
 
-SAMPLES = Path(__file__).parents[2] / "samples"
+SAMPLES = Path(__file__).parents[3] / "samples"
 PARALLEL = [name for name in machines.names() if has_singular_distance(machine(name).kinematics)]
 
 

@@ -11,9 +11,9 @@ import pytest
 from typer.testing import CliRunner
 
 import machines
-from postproc.cli import app
-from postproc.result import PostResult
-from postproc.setup import SetupFile
+from postproc.cli.app import app
+from postproc.pipeline.result import PostResult
+from postproc.setup.model import SetupFile
 from tests.postproc.kit import NX, circle, codes, convert, execute, goto, machine, sample, tilted, toolpath
 
 HALF = ["TOOL PATH/A,TOOL,T", "MSYS/0,0,0,1,0,0,0,1,0", "LOAD/TOOL,1", "SPINDL/RPM,1000,CLW"]

@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 
 import toolpaths
-from postproc import home_links, path
-from postproc.pipeline import convert
-from postproc.result import PostResult
-from postproc.setup import SetupFile
+from postproc.path import build as path
+from postproc.path import home_links
+from postproc.pipeline.convert import convert
+from postproc.pipeline.result import PostResult
+from postproc.setup.model import SetupFile
 from tests.benchmarks.bench_many import KINDS, text_of
 
 MOST = {"tool changes": 2000}

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import toolpaths
-from postproc.links import safe_space
-from postproc.moves import Moves
-from postproc.result import PostResult
-from postproc.setup import Placement
+from postproc.path.links import safe_space
+from postproc.pipeline.result import PostResult
+from postproc.reference.moves import Moves
+from postproc.setup.model import Placement
 from tests.postproc.kit import HEAD, codes, convert, good, goto, tilted, tool_setup, toolpath
 from toolpaths.diagnostics import has_errors
 

@@ -8,8 +8,8 @@ import pytest
 
 import postproc
 import toolpaths
-from postproc.options import Options
-from postproc.program_header import header_lines
+from postproc.base.options import Options
+from postproc.pipeline.program_header import header_lines
 
 PART = """PARTNO TOOLS
 UNITS/MM

@@ -11,12 +11,12 @@ import pytest
 import machines
 import postproc
 import toolpaths
-from postproc import stages
-from postproc.options import Options
-from postproc.pipeline import convert
-from postproc.stage_values import Begun, Verified
-from postproc.stages import STAGES, Stage
-from postproc.trace import as_text, trace_line
+from postproc.base.options import Options
+from postproc.pipeline import stages
+from postproc.pipeline.convert import convert
+from postproc.pipeline.stage_values import Begun, Verified
+from postproc.pipeline.stages import STAGES, Stage
+from postproc.report.trace import as_text, trace_line
 from toolpaths.diagnostics import error
 
 README = Path(postproc.__file__).parent / "README.md"

@@ -10,7 +10,7 @@ import pytest
 import machines
 import postproc
 import toolpaths
-from postproc.setup import SetupFile
+from postproc.setup.model import SetupFile
 from toolpaths.diagnostics import Severity
 
 HEAD = "UNITS/MM\nLOADTL/1\nSPINDL/RPM,1000,CLW\n"

@@ -9,15 +9,18 @@ import numpy as np
 import pytest
 
 import toolpaths
-from postproc import moves, travel
-from postproc.options import Options
-from postproc.pipeline import convert
-from postproc.readback import checks, compare, modal, sections, slow, states, words
-from postproc.result import PostResult
+from postproc.base.options import Options
+from postproc.path import travel
+from postproc.pipeline.convert import convert
+from postproc.pipeline.result import PostResult
+from postproc.readback.comparison import checks, compare, slow, states
+from postproc.readback.execution import sections
+from postproc.readback.text import modal, words
+from postproc.reference import moves
 from tests.postproc.kit import good
 from toolpaths.rotations import cross, lengths
 
-SAMPLES = Path(__file__).parents[2] / "samples"
+SAMPLES = Path(__file__).parents[3] / "samples"
 SIZES = ((words, "_STRETCH", 64), (words, "_NEAR", 7), (modal, "_PART", 11), (sections, "_PART", 5), (checks, "CHUNK", 9),
          (compare, "CHUNK", 9), (slow, "CHUNK", 9), (states, "CHUNK", 9), (travel, "PART", 6), (moves, "_PART", 11))
 CASES = (("five_faces.cls", "linuxcnc"), ("five_faces.cls", "fanuc-30i"), ("five_faces.cls", "heidenhain-tnc640"),

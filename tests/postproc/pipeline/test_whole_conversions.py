@@ -7,7 +7,7 @@ import re
 import numpy as np
 import pytest
 
-from postproc.result import PostResult
+from postproc.pipeline.result import PostResult
 from tests.postproc.kit import (
     angle,
     body,

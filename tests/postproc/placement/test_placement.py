@@ -10,17 +10,17 @@ import pytest
 
 import toolpaths
 from machines.machine import Machine
-from postproc.options import Options
-from postproc.orientation.contact import Contact
-from postproc.orientation.orient import orient
-from postproc.orientation.passes import work_of
+from postproc.base.options import Options
+from postproc.orientation.passes.contact import Contact
+from postproc.orientation.passes.passes import work_of
+from postproc.orientation.plans.orient import orient
 from postproc.placement.moved import moved
 from postproc.placement.place import PlacementChoice, _proved, place
 from postproc.placement.search import EQUAL
 from postproc.placement.space import ANGLES, angles_of, matrix, space_of
 from postproc.placement.timed import Tried
-from postproc.setup import Clearance, PartPlacement, Placement, SetupFile, ToolSetup, part_placement
-from postproc.setup_place import PlaceBox, PlacementLimits
+from postproc.setup.model import Clearance, PartPlacement, Placement, SetupFile, ToolSetup, part_placement
+from postproc.setup.place import PlaceBox, PlacementLimits
 from tests.postproc.kit import machine
 from toolpaths.diagnostics import Diagnostic, error, has_errors
 from toolpaths.toolpath import Toolpath

@@ -11,17 +11,17 @@ import pytest
 import toolpaths
 from machines.machine import Machine
 from machines.singular_distance import singular_distance
-from postproc.options import Options
-from postproc.orientation.passes import work_of
+from postproc.base.options import Options
+from postproc.orientation.passes.passes import work_of
 from postproc.placement.place import place
 from postproc.placement.region import Slabs, region_of
 from postproc.placement.search import Search
 from postproc.placement.space import ANGLES, Space, matrix, space_of
 from postproc.placement.timed import Timer
-from postproc.setup import PartPlacement, Placement, SetupFile, load_setup, part_placement
-from postproc.setup_place import PlacementLimits
+from postproc.setup.model import PartPlacement, Placement, SetupFile, load_setup, part_placement
+from postproc.setup.place import PlacementLimits
 from tests.postproc.kit import SAMPLES, machine
-from tests.postproc.test_placement import passes, placed, refused, setup_of
+from tests.postproc.placement.test_placement import passes, placed, refused, setup_of
 
 DELTA = "uranesx"
 

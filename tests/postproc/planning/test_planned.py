@@ -11,14 +11,14 @@ import pytest
 from scipy.interpolate import BSpline
 
 from machines.machine import Machine
-from postproc.feedrate.geometry import MachinePath, Stretch, machine_path, machine_paths
 from postproc.feedrate.limits import JointLimits
 from postproc.feedrate.plan import Options
-from postproc.pass_geometry import PassGeometry, chains, pass_geometry, stops_of
-from postproc.planned import PassFeed, PlannedMotion, Source, joint_limits, plan_pass, planned_motion
-from postproc.result import PostResult
-from postproc.setup import load_setup
-from postproc.steady_feed import CORNER, steady_speed
+from postproc.pipeline.result import PostResult
+from postproc.planning.geometry import MachinePath, Stretch, machine_path, machine_paths
+from postproc.planning.pass_geometry import PassGeometry, chains, pass_geometry, stops_of
+from postproc.planning.planned import PassFeed, PlannedMotion, Source, joint_limits, plan_pass, planned_motion
+from postproc.planning.steady_feed import CORNER, steady_speed
+from postproc.setup.model import load_setup
 from tests.postproc.kit import SAMPLES, convert, good, goto, machine, toolpath
 from toolpaths import read
 from toolpaths.arrays import Floats

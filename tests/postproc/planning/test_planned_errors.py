@@ -11,8 +11,8 @@ import pytest
 import postproc
 import toolpaths
 from machines.geometric_error import correct, load
-from postproc.options import Options
-from postproc.result import PostResult
+from postproc.base.options import Options
+from postproc.pipeline.result import PostResult
 
 LINE = ("UNITS/MM\nLOADTL/1\nSPINDL/3000,RPM,CLW\nFEDRAT/{},MMPM\nRAPID\nGOTO/-160,0,20\nGOTO/-160,0,0\nGOTO/160,0,0\n"
         "FINI\n")

@@ -13,13 +13,13 @@ from scipy.interpolate import make_interp_spline
 from typer.testing import CliRunner
 
 from machines.kinematics.base import Kinematics
-from postproc.cli import app
+from postproc.cli.app import app
+from postproc.compile.merged_feeds import merged
 from postproc.feedrate.limits import JointLimits
-from postproc.merged_feeds import merged
-from postproc.pass_geometry import pass_geometry, stops_of
-from postproc.planned import joint_limits
-from postproc.result import PostResult
-from postproc.steady_feed import CORNER
+from postproc.pipeline.result import PostResult
+from postproc.planning.pass_geometry import pass_geometry, stops_of
+from postproc.planning.planned import joint_limits
+from postproc.planning.steady_feed import CORNER
 from tests.postproc.kit import SAMPLES, Step, convert, execute, good, goto, machine, toolpath
 from toolpaths.arrays import Floats
 from toolpaths.smoothing.smooth import Smooth, Tolerance

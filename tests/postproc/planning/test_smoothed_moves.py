@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from postproc import stages
-from postproc.result import PostResult
+from postproc.pipeline import stages
+from postproc.pipeline.result import PostResult
 from tests.postproc.kit import codes, convert, good, toolpath
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Severity, error

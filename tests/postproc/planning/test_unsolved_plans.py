@@ -9,17 +9,17 @@ import pytest
 
 import postproc
 import toolpaths
-from postproc import planned
+from postproc.base.options import Options
 from postproc.cycle_time.planned import planned_times
 from postproc.cycle_time.source import from_conversion
 from postproc.feedrate.motion import Plan
 from postproc.feedrate.plan import plan
-from postproc.options import Options
-from postproc.orientation import timed
-from postproc.orientation.orient import orient
-from postproc.setup import SetupFile
+from postproc.orientation.candidates import timed
+from postproc.orientation.plans.orient import orient
+from postproc.planning import planned
+from postproc.setup.model import SetupFile
 from tests.postproc.kit import TOOLS, machine, toolpath
-from tests.postproc.test_orientation_report import written
+from tests.postproc.orientation.test_orientation_report import written
 from tests.postproc.time_kit import model
 from toolpaths.diagnostics import Diagnostic, Severity
 

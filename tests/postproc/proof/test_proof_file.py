@@ -16,15 +16,16 @@ from typer.testing import CliRunner, Result
 import machines
 import postproc
 import toolpaths
-from postproc.cli import app
+from postproc.base.header_words import PENDING
+from postproc.cli.app import app
 from postproc.controllers.model import builtin_files, load_controller
-from postproc.controllers.state import comment_room
-from postproc.header_words import PENDING
-from postproc.proof import command, text
+from postproc.proof import command
 from postproc.proof.file import ENDING, digest, read_proof
 from postproc.proof.hashes import input_hashes
-from postproc.readback.words import plain
+from postproc.readback.text.words import plain
+from postproc.verification import proof_text as text
 from postproc.witness.evidence import Testimony as Said
+from postproc.writing.state import comment_room
 from tests.postproc.kit import HEAD, NX, codes, convert, good, toolpath
 
 CUT = ("RAPID", "GOTO/0,0,5", "GOTO/12.5,0,5", "GOTO/20,1,4", "GOTO/20,9,4")
@@ -224,7 +225,7 @@ def test_program_and_proof_are_written_together_or_not_at_all(shop: Path, tmp_pa
 def test_the_line_of_the_head_is_a_comment_and_short_enough(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     path = toolpath(*CUT)
     whole = good(convert(path, "mill-3axis", name))
-    monkeypatch.setattr("postproc.stages.with_statement", lambda written, *given: (written, []))
+    monkeypatch.setattr("postproc.pipeline.stages.with_statement", lambda written, *given: (written, []))
     read = good(convert(path, "mill-3axis", name))
     assert plain(whole.text.encode()) == plain(read.text.encode())
     (line,) = [line for line in whole.text.splitlines() if "proved by" in line.lower()]

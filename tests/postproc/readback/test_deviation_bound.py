@@ -11,15 +11,15 @@ import pytest
 
 from machines.kinematics.linear_delta import LinearDelta
 from machines.kinematics.serial import Serial
-from postproc.proof.text import statement
-from postproc.readback import compare as compare_module
-from postproc.readback import deviation_bound as bound_module
-from postproc.readback.verify import _executed
+from postproc.readback.comparison import compare as compare_module
+from postproc.readback.comparison import deviation_bound as bound_module
+from postproc.verification.proof_text import statement
+from postproc.verification.read_back import _executed
 from tests.postproc.kit import SAMPLES, codes, convert, good, goto, setup_of, toolpath
 from toolpaths import read
 from toolpaths.diagnostics import Severity
 
-GOLDEN = Path(__file__).parents[1] / "golden"
+GOLDEN = Path(__file__).parents[2] / "golden"
 PROGRAMS = [("short_five_axis.apt", "mikron-ucp710", "linuxcnc"), ("short_five_axis.apt", "mikron-ucp710", "fanuc-30i"),
             ("short_five_axis.apt", "head-table", "generic-iso"), ("pocket.cls", "mill-3axis", "heidenhain-tnc640"),
             ("pocket.cls", "delta-star", "generic-iso"), ("five_tilted.cls", "nutating-head", "linuxcnc"),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from postproc.readback.align import align
+from postproc.readback.comparison.align import align
 from tests.postproc.kit import convert, good, goto, sample, toolpath
 from toolpaths.shape import Curves
 from toolpaths.units import DEG

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from postproc.controllers.model import builtin_files
-from postproc.readback.words import plain
-from postproc.zero_entry import table_axes
+from postproc.path.zero_entry import table_axes
+from postproc.readback.text.words import plain
 from tests.postproc.kit import convert, toolpath
 from tests.postproc.kit import good as converted
 from tests.postproc.reader_kit import FANUC, HAAS, SIEMENS, TNC, control, faults, good, look, words

@@ -10,7 +10,7 @@ import pytest
 import machines
 import postproc
 import toolpaths
-from postproc.setup import SetupFile
+from postproc.setup.model import SetupFile
 
 TOOLS = SetupFile.model_validate({"tools": {"1": {"gauge_length": 100.0}, "2": {"gauge_length": 80.0}}})
 DEEP = ("LOADTL/1\nSPINDL/RPM,1000,CLW\nRAPID\nGOTO/0,0,20\nCYCLE/DEEP,DEPTH,22,STEP,5,MMPM,120,CLEAR,3,RETURN,20\n"

@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 
 import toolpaths
-from postproc.readback.verify import read_back
-from postproc.result import PostResult
+from postproc.pipeline.result import PostResult
+from postproc.verification.read_back import read_back
 from tests.postproc.kit import codes, convert, execute, good, goto, sample, setup_of, tilted, toolpath
 from tests.postproc.mutation_kit import Effect, mutants, verdict
 from toolpaths.diagnostics import Severity
@@ -241,7 +241,7 @@ gauge_length = 95.5
 gauge_length = 133.25
 """
 """the part off the rotary axes and turned about z, tools of different lengths: what stands on the crossing hides faults"""
-GOLDEN = Path(__file__).parents[1] / "golden"
+GOLDEN = Path(__file__).parents[2] / "golden"
 SIX = ("fanuc-30i", "siemens-840d", "heidenhain-tnc640", "haas-ngc", "linuxcnc", "generic-iso")
 CHANGED = [(source, controller, mode) for controller in SIX for source, mode in (
     (GOLDEN / "three_laws.cls", "auto"), (GOLDEN / "three_laws.cls", "axes"), (GOLDEN / "every_cycle.cls", "auto"))

@@ -7,10 +7,10 @@ import re
 import numpy as np
 import pytest
 
-from postproc.readback import align
-from postproc.readback.execute import Motion, execute
-from postproc.readback.offsets import Offsets
-from postproc.readback.words import tokenise
+from postproc.readback.comparison import align
+from postproc.readback.execution.execute import Motion, execute
+from postproc.readback.execution.offsets import Offsets
+from postproc.readback.text.words import tokenise
 from tests.postproc.kit import Peer, codes, unit
 from toolpaths.diagnostics import Diagnostic
 from toolpaths.shape import Curves

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import toolpaths
-from postproc.readback import compare
+from postproc.readback.comparison import compare
 from tests.postproc.kit import convert, good
 from toolpaths.diagnostics import Diagnostic, Severity, warning
 from toolpaths.shape import Curves

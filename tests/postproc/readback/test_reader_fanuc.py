@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from postproc.readback.files import Beside
+from postproc.verification.files_beside import Beside
 from tests.postproc.reader_kit import FANUC, HAAS, executed, faults, good, words
 from tests.postproc.reader_kit import controller as spec
 

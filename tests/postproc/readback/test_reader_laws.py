@@ -13,8 +13,8 @@ import pytest
 
 from machines.kinematics.base import Kinematics
 from machines.kinematics.serial import Serial
-from postproc.readback.checks import block_seconds
-from postproc.readback.execute import Motion
+from postproc.readback.comparison.checks import block_seconds
+from postproc.readback.execution.execute import Motion
 from tests.postproc.kit import angle, machine, pose_of
 from tests.postproc.reader_kit import (
     FANUC,

@@ -8,11 +8,11 @@ from functools import cache
 import numpy as np
 import pytest
 
+from postproc.pipeline.result import PostResult
 from postproc.readback.dialects.readers import reader_for
-from postproc.readback.execute import Motion, run
-from postproc.readback.offsets import Offsets
-from postproc.readback.verify import read_back
-from postproc.result import PostResult
+from postproc.readback.execution.execute import Motion, run
+from postproc.readback.execution.offsets import Offsets
+from postproc.verification.read_back import read_back
 from tests.postproc.kit import codes, sample
 from tests.postproc.reader_kit import FANUC, HAAS, SIEMENS, TNC
 from toolpaths.diagnostics import Severity

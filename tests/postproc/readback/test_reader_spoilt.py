@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tests.postproc.readback.test_reader_klartext import CYCLE, START
+from tests.postproc.readback.test_reader_klartext import program as klartext
+from tests.postproc.readback.test_reader_laws import TIPS, by_tip, in_plane
 from tests.postproc.reader_kit import FANUC, HAAS, SIEMENS, TNC, executed
-from tests.postproc.test_reader_klartext import CYCLE, START
-from tests.postproc.test_reader_klartext import program as klartext
-from tests.postproc.test_reader_laws import TIPS, by_tip, in_plane
 
 ROTARY = {"A": -30.0, "C": 40.0}
 PIECES = ["G91", "G18", "M99", "M30", "G43 H1", "G49", "Z1e", "=", "(", '"', ";", "~", "/", "G53", "G68.2", "G53.1", "G69",

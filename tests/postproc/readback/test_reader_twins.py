@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from postproc.readback.execute import Motion
+from postproc.readback.execution.execute import Motion
 from tests.postproc.reader_kit import FANUC, HAAS, SIEMENS, TNC, good
 
 Move = tuple[str, np.ndarray, tuple[float, ...]]

@@ -8,13 +8,15 @@ from pathlib import Path
 
 import pytest
 
-ROOM = Path(__file__).parents[2] / "postproc"
+ROOM = Path(__file__).parents[3] / "postproc"
 LISTED = (ROOM / "readback" / "SHARED.md").read_text("utf-8")
-WRITERS = ("compile", "word_rows", "rounding", "feed", "commands", "canned", "not_canned", "sections", "skips", "coolant",
-           "modes", "planes", "zero_entry", "word_arcs", "program", "program_header", "blocks", "parts")
-"""stages that a program goes through on its way to the text, beside controllers/"""
-OTHERS = ("readback", "dialects", "controllers", "cycle_time", "witness", "orientation", "joints", "feedrate", "collision",
-          "corrected", "placement", "proof")
+WRITERS = ("compile", "word_rows", "rounding", "feed", "commands", "canned", "cycle_refusals", "sections", "block_delete",
+           "coolant",
+           "modes", "planes", "zero_entry", "word_arcs", "program", "program_header", "blocks", "split_operations")
+"""stages that a program goes through on its way to the text, next to controllers/ and writing/"""
+OTHERS = ("text", "execution", "comparison", "dialects", "cycle_time", "witness", "orientation", "joints", "feedrate",
+          "collision",
+          "correction", "placement", "proof")
 PROJECT = ("postproc", "machines", "toolpaths")
 BOTH = re.compile(r"[A-Z][A-Z0-9_]*")
 KEYS = re.compile(r"(?:controller|codes_of|spec)\.([a-z_]+)(?:\.([a-z_]+))?")
@@ -33,7 +35,7 @@ def imported(files: list[Path]) -> set[tuple[str, str]]:
 
 
 def writer_files() -> list[Path]:
-    found = sorted((ROOM / "controllers").glob("*.py"))
+    found = sorted([*(ROOM / "controllers").glob("*.py"), *(ROOM / "writing").glob("*.py")])
     for stem in WRITERS:
         files = [f for f in ROOM.rglob(f"{stem}.py") if f.parent.name not in OTHERS]
         assert len(files) == 1, (stem, files)
@@ -42,7 +44,7 @@ def writer_files() -> list[Path]:
 
 
 def readers() -> list[Path]:
-    return sorted((ROOM / "readback").rglob("*.py"))
+    return [*sorted((ROOM / "readback").rglob("*.py")), ROOM / "verification" / "read_back.py"]
 
 
 def shared() -> set[str]:

@@ -6,8 +6,8 @@ import re
 
 import pytest
 
-from postproc.readback.verify import read_back
-from postproc.result import PostResult
+from postproc.pipeline.result import PostResult
+from postproc.verification.read_back import read_back
 from tests.postproc.kit import convert, good, toolpath
 from tests.postproc.reader_kit import executed
 from toolpaths.diagnostics import Diagnostic, Severity

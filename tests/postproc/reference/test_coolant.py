@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from postproc.readback.verify import read_back
-from postproc.result import PostResult
+from postproc.pipeline.result import PostResult
+from postproc.verification.read_back import read_back
 from tests.postproc.kit import codes, convert, good, shop_file, toolpath
 from toolpaths.diagnostics import DiagnosticError
 

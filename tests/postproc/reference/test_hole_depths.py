@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from postproc.console import controller_file
+from postproc.cli.console import controller_file
 from postproc.controllers.model import builtin_files
-from postproc.hole_depths import unfit_holes
+from postproc.reference.hole_depths import unfit_holes
 from tests.postproc.kit import HEAD, codes, convert, good
 from toolpaths import read_bytes
-from toolpaths.cl.dialects import DIALECTS
+from toolpaths.cl.text.dialects import DIALECTS
 from toolpaths.diagnostics import Diagnostic, Severity
 from toolpaths.toolpath import Toolpath
 

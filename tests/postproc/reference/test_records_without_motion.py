@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import toolpaths
-from postproc.result import PostResult
+from postproc.pipeline.result import PostResult
 from tests.postproc.kit import body, codes, convert, good, toolpath
 from toolpaths.diagnostics import Severity, has_errors
 

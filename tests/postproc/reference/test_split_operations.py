@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 import toolpaths
-from postproc.parts import cut_operations
-from postproc.pipeline import convert, verify
-from postproc.setup import SetupFile
+from postproc.pipeline.convert import convert, verify
+from postproc.reference.split_operations import cut_operations
+from postproc.setup.model import SetupFile
 from tests.postproc.kit import tool_setup
 from toolpaths.toolpath import Kind, Toolpath
 
-SAMPLES = Path(__file__).parents[2] / "samples"
+SAMPLES = Path(__file__).parents[3] / "samples"
 CONTROLLERS = ("fanuc-30i", "haas-ngc", "heidenhain-tnc640", "siemens-840d")
 
 

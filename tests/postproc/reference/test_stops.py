@@ -10,7 +10,7 @@ import pytest
 import machines
 import postproc
 from machines.loader import load_checked
-from postproc.setup import SetupFile
+from postproc.setup.model import SetupFile
 from tests.postproc.kit import convert, good, machine, shop_file, toolpath
 from toolpaths.toolpath import Toolpath
 

@@ -10,11 +10,11 @@ from typer.testing import CliRunner
 
 import postproc
 import toolpaths
-from postproc.cli import app
+from postproc.cli.app import app
 from postproc.cycle_time import source
 from postproc.cycle_time.conversion import estimate_of
-from postproc.orientation.passes import work_of
-from postproc.setup import SetupFile
+from postproc.orientation.passes.passes import work_of
+from postproc.setup.model import SetupFile
 from tests.postproc.kit import machine
 from toolpaths.diagnostics import Diagnostic, Severity
 

@@ -12,9 +12,9 @@ from typer.testing import CliRunner
 
 import postproc
 import toolpaths
-from postproc.cli import app
-from postproc.result import PostResult
-from postproc.setup import SetupFile, load_setup
+from postproc.cli.app import app
+from postproc.pipeline.result import PostResult
+from postproc.setup.model import SetupFile, load_setup
 from tests.postproc.kit import convert, good, machine, toolpath
 from toolpaths.diagnostics import Diagnostic, Severity
 
@@ -239,7 +239,7 @@ def test_inspect_shows_which_tools_lack_a_number_or_a_spindle(tmp_path: Path) ->
 
 def test_samples_lack_neither() -> None:
     from tests.postproc.kit import SAMPLES
-    from toolpaths.inspect import tools_lacking
+    from toolpaths.cl.inspect import tools_lacking
 
     files = [p for p in SAMPLES.rglob("*") if p.suffix in (".cls", ".apt", ".ncl", ".as", ".aptsource", ".clt")]
     lacking = {p.name: names for p in files for names in tools_lacking(toolpaths.read(p)[0]).values() if names}

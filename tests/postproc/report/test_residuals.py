@@ -11,13 +11,13 @@ from typer.testing import CliRunner
 import postproc
 import toolpaths
 from machines.geometric_error import load
-from postproc.cli import app
-from postproc.corrected.proof import after_formatting
-from postproc.options import Options
-from postproc.residual_files import contents
-from postproc.residuals import ARCSEC, UM, Residuals, residuals
-from postproc.result import PostResult
-from postproc.setup import SetupFile, load_setup
+from postproc.base.options import Options
+from postproc.cli.app import app
+from postproc.pipeline.result import PostResult
+from postproc.report.residual_files import contents
+from postproc.report.residuals import ARCSEC, UM, Residuals, residuals
+from postproc.setup.model import SetupFile, load_setup
+from postproc.verification.errors_left import after_formatting
 from toolpaths.arrays import Floats
 from toolpaths.units import DEG
 

@@ -10,8 +10,8 @@ import pytest
 
 import postproc
 import toolpaths
-from postproc.result import PostResult
-from postproc.setup import Placement, SetupFile, load_setup, part_placement
+from postproc.pipeline.result import PostResult
+from postproc.setup.model import Placement, SetupFile, load_setup, part_placement
 from tests.postproc.kit import (
     SAMPLES,
     angle,
@@ -123,7 +123,7 @@ def test_work_offset_of_a_placed_part_on_a_rotary_table() -> None:
 
 
 def test_verify_uses_the_same_setup(tmp_path: Path) -> None:
-    text = (Path(__file__).parents[2] / "samples" / "tools.setup.toml").read_text()
+    text = (Path(__file__).parents[3] / "samples" / "tools.setup.toml").read_text()
     file = tmp_path / "s.toml"
     file.write_text(f"{text}\n[part]\norigin = [1, 2, 3]\nx_axis = [0, 1, 0]\ny_axis = [-1, 0, 0]\n")
     path, _ = toolpaths.read(SAMPLES / "five_faces.cls")

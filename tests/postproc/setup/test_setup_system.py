@@ -13,10 +13,10 @@ from typer.testing import CliRunner
 
 import postproc
 import toolpaths
-from postproc.cli import app
+from postproc.cli.app import app
 from postproc.placement.write import placed_text
-from postproc.setup import PartPlacement, SetupFile, load_setup, part_placement, work_frame
-from postproc.setup_system import placed, standing
+from postproc.setup.model import PartPlacement, SetupFile, load_setup, part_placement, work_frame
+from postproc.setup.system import placed, standing
 from tests.postproc.kit import NX, SAMPLES, codes, convert, good, machine, tool_setup, toolpath
 from toolpaths.diagnostics import Severity
 from toolpaths.toolpath import Toolpath

@@ -11,9 +11,9 @@ import pytest
 from typer.testing import CliRunner
 
 import postproc
-from postproc.cli import app
-from postproc.result import PostResult
-from postproc.setup import SetupFile, load_setup
+from postproc.cli.app import app
+from postproc.pipeline.result import PostResult
+from postproc.setup.model import SetupFile, load_setup
 from tests.postproc.kit import convert, good, machine, toolpath
 from toolpaths.diagnostics import Diagnostic, Severity
 
@@ -172,7 +172,7 @@ def test_set_ups_that_say_nothing_sensible(text: str, says: str, tmp_path: Path)
 
 
 def test_the_set_up_of_the_readme_is_a_good_file(tmp_path: Path) -> None:
-    readme = (Path(__file__).parents[2] / "README.md").read_text()
+    readme = (Path(__file__).parents[3] / "README.md").read_text()
     (tmp_path / "s.toml").write_text(readme.split("## The set-up file")[1].split("```")[1].removeprefix("toml\n"))
     of, found = load_setup(tmp_path / "s.toml")
     assert not found and of is not None and of.output.spindle is not None and of.tools["1"].coolant == "flood"

@@ -8,7 +8,7 @@ import pytest
 
 from postproc.controllers.model import load_controller
 from postproc.cycle_time.source import from_gcode
-from postproc.result import PostResult
+from postproc.pipeline.result import PostResult
 from tests.hard.edits import deletions, edits, timed, verified
 from tests.postproc.kit import codes, convert, good, machine, sample, tool_setup, toolpath
 

@@ -6,9 +6,9 @@ from functools import cache
 
 import pytest
 
-from postproc.readback.verify import read_back
-from postproc.result import PostResult, VerifyResult
-from postproc.summary import verify_text
+from postproc.pipeline.result import PostResult, VerifyResult
+from postproc.report.summary import verify_text
+from postproc.verification.read_back import read_back
 from tests.postproc.kit import convert, good, sample, toolpath
 from toolpaths.diagnostics import Diagnostic, Severity
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from postproc.options import Options
-from postproc.pipeline import convert, verify
+from postproc.base.options import Options
+from postproc.pipeline.convert import convert, verify
 from tests.postproc.kit import TOOLS, toolpath
 
 PART = ["RAPID", "GOTO/0,0,50", "RAPID", "GOTO/0,0,2", "FEDRAT/MMPM,200", "GOTO/0,0,-2", "FEDRAT/MMPM,600", "GOTO/20,0,-2",

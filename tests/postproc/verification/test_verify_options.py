@@ -10,9 +10,9 @@ import pytest
 
 import postproc
 import toolpaths
-from postproc.options import Options
-from postproc.pipeline import verify
-from postproc.result import PostResult, VerifyResult
+from postproc.base.options import Options
+from postproc.pipeline.convert import verify
+from postproc.pipeline.result import PostResult, VerifyResult
 from tests.postproc.kit import SAMPLES, TOOLS
 from toolpaths.diagnostics import Severity
 from toolpaths.toolpath import Toolpath

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from postproc.readback.verify import read_back
-from postproc.result import PostResult
+from postproc.pipeline.result import PostResult
+from postproc.verification.read_back import read_back
 from tests.postproc.kit import convert, good, sample, shop_file, toolpath
 from tests.postproc.reader_kit import FANUC, HAAS, SIEMENS, TNC
 from toolpaths.diagnostics import Diagnostic, Severity

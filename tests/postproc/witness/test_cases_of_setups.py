@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 import postproc
-import postproc.second_witness
+import postproc.verification.second_witness
 import toolpaths
-from postproc.options import Options
-from postproc.result import PostResult
-from postproc.second_witness import second_witness
-from postproc.setup import SetupFile
+from postproc.base.options import Options
+from postproc.pipeline.result import PostResult
+from postproc.setup.model import SetupFile
+from postproc.verification.second_witness import second_witness
 from postproc.witness.clfile import commanded
 from postproc.witness.states import tools_of
 from toolpaths.cl.build import Builder
@@ -88,7 +88,7 @@ def test_a_finding_is_in_words(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_witness_that_fails_proves_nothing(proof: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     def fails(*_: object) -> None:
         raise IndexError("planted")
-    monkeypatch.setattr(postproc.second_witness, "testify", fails)
+    monkeypatch.setattr(postproc.verification.second_witness, "testify", fails)
     result = converted(LOADED, {}, require_proof=proof)
     assert result.witness is not None and "failed: IndexError: planted" in result.witness.not_compared[0]
     assert [d.code for d in result.diagnostics if d.code.startswith("witness")] == ["witness.failed"] * proof

@@ -39,7 +39,8 @@ def test_the_witness_imports_nothing_of_the_project(path: Path) -> None:
     assert foreign(path.read_text("utf-8")) == set()
 
 
-@pytest.mark.parametrize("line", ["from toolpaths.units import DEG", "def f():\n    import machines", "import postproc.job",
+@pytest.mark.parametrize("line", ["from toolpaths.units import DEG", "def f():\n    import machines",
+                                  "import postproc.job.job",
                                   "from .. import job", "import importlib\nimportlib.import_module('machines')"])
 def test_a_foreign_import_is_noticed(line: str) -> None:
     assert foreign(line)

@@ -16,8 +16,8 @@ import pytest
 
 import machines
 import postproc
-import postproc.job
-import postproc.moves
+import postproc.job.job
+import postproc.reference.moves
 import toolpaths
 import toolpaths.cl.assemble
 import toolpaths.cl.cycles
@@ -25,13 +25,13 @@ import toolpaths.cl.frames
 import toolpaths.cl.interpret
 import toolpaths.cl.motion
 import toolpaths.cl.read
-import toolpaths.cl.subprograms
+import toolpaths.cl.text.subprograms
 from machines.serial_models import SerialModel
 from machines.slider_models import SliderModel
-from postproc.job import Job
-from postproc.result import PostResult
-from postproc.second_witness import second_witness
-from postproc.setup import Placement, SetupFile
+from postproc.job.job import Job
+from postproc.pipeline.result import PostResult
+from postproc.setup.model import Placement, SetupFile
+from postproc.verification.second_witness import second_witness
 from toolpaths.cl.build import Builder
 from toolpaths.cl.feeds import PER_MINUTE
 from toolpaths.toolpath import Kind, Toolpath
@@ -220,7 +220,7 @@ def feeds(factor: float) -> Plant:
     def spoilt(old: Any, *given: Any) -> Any:
         feed, seconds, found = old(*given)
         return feed * factor, seconds, found
-    return wrapped(postproc.moves, "feeds_of", spoilt)
+    return wrapped(postproc.reference.moves, "feeds_of", spoilt)
 
 
 def turned_back(j: Any) -> Any:
@@ -248,7 +248,7 @@ def units_dropped(patch: Patch) -> None:
 def subroutine_skipped(patch: Patch) -> None:
     """A call that carries nothing out and counts as made."""
     patch.setitem(toolpaths.cl.interpret.HANDLERS, "CALSUB", lambda b, s: b.called.add(
-        toolpaths.cl.interpret._subprograms(b).place(toolpaths.cl.subprograms.called(s), b.index)))
+        toolpaths.cl.interpret._subprograms(b).place(toolpaths.cl.text.subprograms.called(s), b.index)))
 
 
 def next_tools(p: Toolpath) -> Toolpath:
@@ -323,7 +323,7 @@ FAULTS: dict[str, tuple[str, str, str, str, Plant]] = {
     "feed x 1.1, five axes": (FIVE, "mikron-ucp710", "linuxcnc", "turned", feeds(1.1)),
     "feed x 0.9, five axes": (FIVE, "mikron-ucp710", "fanuc-30i", "turned", feeds(0.9)),
     "safe margin 0": (SMALL, "mikron-ucp710", "linuxcnc", "turned",
-                      wrapped(postproc.job, "safe_space", lambda old, *a: replace(old(*a), margin=0.0))),
+                      wrapped(postproc.job.job, "safe_space", lambda old, *a: replace(old(*a), margin=0.0))),
     "gauge length x 1.001": (FIVE, "head-table", "linuxcnc", "turned",
                              wrapped(Job, "length_of", lambda old, self, n: 1.001 * old(self, n))),
     "gauge length x 1.001, rods": (MILLED, "h4a-c-table", "linuxcnc", "h4a",
@@ -333,7 +333,7 @@ FAULTS: dict[str, tuple[str, str, str, str, Plant]] = {
     "lines of the rotary axes off, tip modes": (FIVE, "mikron-ucp710", "siemens-840d", "turned", joint(beside)),
     "C the other way": (FIVE, "mikron-ucp710", "linuxcnc", "turned", joint(turned_back)),
     "part placement transposed": (NX, "mill-3axis", "linuxcnc", "turned",
-                                  wrapped(postproc.job, "part_placement", transposed)),
+                                  wrapped(postproc.job.job, "part_placement", transposed)),
     "wrong tool number": (NX, "mill-3axis", "linuxcnc", "turned",
                           path_changed(next_tools)),
     "spindle the other way": (NX, "mill-3axis", "linuxcnc", "plain", events(other_way)),

@@ -12,8 +12,8 @@ import machines
 import postproc
 import toolpaths
 from machines.loader import builtin
-from postproc.second_witness import machine_tables
-from postproc.summary import as_text
+from postproc.report.summary import as_text
+from postproc.verification.second_witness import machine_tables
 from postproc.witness.clfile import commanded
 from postproc.witness.commanded import HOLE, LINE
 from postproc.witness.machine import Chain, Rods, kinematics_of, limits_of, merged

@@ -1,7 +1,7 @@
 """Reviewed programs, byte for byte.
 
-After a wanted change: `GOLDEN=renew pytest tests/postproc/test_golden.py`, then read the difference (`git diff
-tests/golden`) block by block as if it went to the machine, and commit it with the change that caused it.
+After a wanted change: `GOLDEN=renew pytest tests/postproc/writing/test_golden_programs.py`, then read the difference (`git
+diff tests/golden`) block by block as if it went to the machine, and commit it with the change that caused it.
 """
 
 from __future__ import annotations
@@ -12,11 +12,11 @@ from pathlib import Path
 import pytest
 
 import toolpaths
-from postproc.result import PostResult
+from postproc.pipeline.result import PostResult
 from tests.postproc.kit import SAMPLES, convert, good
 from toolpaths.diagnostics import has_errors
 
-GOLDEN = Path(__file__).parents[1] / "golden"
+GOLDEN = Path(__file__).parents[2] / "golden"
 SUFFIX = {"fanuc-30i": "nc", "haas-ngc": "nc", "siemens-840d": "mpf", "heidenhain-tnc640": "h"}
 """of the files of a controller; ngc elsewhere"""
 LAWS = [("fanuc-30i", "mikron-ucp710"), ("haas-ngc", "trunnion-bc"), ("siemens-840d", "mikron-ucp710"),

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from postproc.result import PostResult
+from postproc.pipeline.result import PostResult
 from tests.linuxcnc import outputs
 from tests.linuxcnc.interpreter import Canonical, ToolEntry
 from tests.postproc.kit import convert, good, toolpath

@@ -10,14 +10,14 @@ import pytest
 from typer.testing import CliRunner
 
 import toolpaths
-from postproc.cli import app
-from postproc.program import Command, Program, Section
-from postproc.setup import SetupFile
+from postproc.cli.app import app
+from postproc.compile.program import Command, Program, Section
+from postproc.setup.model import SetupFile
 from tests.postproc.kit import SAMPLES, convert, good, tool_setup
 from tests.postproc.program_kit import LOAD, blocks, command, lines, program, step
 from toolpaths.diagnostics import has_errors
 
-GOLDEN = Path(__file__).parents[1] / "golden"
+GOLDEN = Path(__file__).parents[2] / "golden"
 
 
 def two_operations() -> Program:

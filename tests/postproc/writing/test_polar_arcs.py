@@ -13,11 +13,11 @@ import pytest
 
 import postproc
 import toolpaths
-from postproc.controllers.polar_arc import REACH, polar_arc
-from postproc.corrected.proof import after_formatting
-from postproc.options import Options
-from postproc.program import Hole
-from postproc.result import PostResult
+from postproc.base.options import Options
+from postproc.compile.program import Hole
+from postproc.pipeline.result import PostResult
+from postproc.verification.errors_left import after_formatting
+from postproc.writing.polar_arc import REACH, polar_arc
 from tests.postproc.program_kit import blocks, program, step
 from toolpaths.arrays import Floats
 from toolpaths.toolpath import Cycle

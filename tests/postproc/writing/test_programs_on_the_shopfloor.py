@@ -10,15 +10,15 @@ import pytest
 from typer.testing import CliRunner
 
 import toolpaths
-from postproc.cli import app
+from postproc.cli.app import app
 from postproc.controllers.model import load_controller
-from postproc.result import PostResult
-from postproc.setup import SetupFile
-from postproc.summary import as_dict, as_text
+from postproc.pipeline.result import PostResult
+from postproc.report.summary import as_dict, as_text
+from postproc.setup.model import SetupFile
 from tests.postproc.kit import convert, good, tool_setup, toolpath
 from tests.postproc.program_kit import command, lines, program, step
 
-GOLDEN = Path(__file__).parents[1] / "golden"
+GOLDEN = Path(__file__).parents[2] / "golden"
 CONTROLLERS = ("fanuc-30i", "haas-ngc", "siemens-840d", "heidenhain-tnc640")
 MACHINE = {"haas-ngc": "trunnion-bc"}
 OWN_OFFSET = {"fanuc-30i": "G54.1 P3", "haas-ngc": "G154 P3", "siemens-840d": "G509", "heidenhain-tnc640": "datum number 9"}

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 import toolpaths
+from postproc.pipeline.result import PostResult
 from postproc.readback.dialects.readers import reader_for
-from postproc.readback.execute import Motion, run
-from postproc.readback.offsets import Offsets
-from postproc.result import PostResult
+from postproc.readback.execution.execute import Motion, run
+from postproc.readback.execution.offsets import Offsets
 from tests.postproc.kit import convert, good, tool_setup
-from tests.postproc.test_golden import GOLDEN
+from tests.postproc.writing.test_golden_programs import GOLDEN
 from toolpaths.diagnostics import has_errors
 
 PAIRS = [("linuxcnc", "mikron-ucp710"), ("generic-iso", "head-table"), ("fanuc-30i", "mikron-ucp710"),

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from postproc.pipeline import verify
+from postproc.pipeline.convert import verify
 from tests.postproc.kit import TOOLS, convert, good, toolpath
 from tests.postproc.program_kit import LOAD, blocks, command, drilled, lines, program, step
 from tests.postproc.reader_kit import FANUC, HAAS, SIEMENS, faults

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from postproc.setup import SetupFile
+from postproc.setup.model import SetupFile
 from tests.postproc.kit import (
     body,
     codes,

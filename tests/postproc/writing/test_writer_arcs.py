@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from postproc.setup import SetupFile
+from postproc.setup.model import SetupFile
 from tests.postproc.kit import NX, angle, body, circle, convert, execute, good, goto, tilted, tool_poses, toolpath
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from postproc.planes import Plane
-from postproc.program import Section
+from postproc.compile.program import Section
+from postproc.control.planes import Plane
 from tests.postproc.program_kit import LOAD, blocks, command, drilled, lines, program, step
 from toolpaths.toolpath import Cycle
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from postproc.planes import Plane
-from postproc.program import Section
+from postproc.compile.program import Section
+from postproc.control.planes import Plane
 from tests.postproc.program_kit import LOAD, blocks, command, lines, program, step
 
 TILTED = Section(1, "tilted", Plane(np.eye(3), np.zeros(3)), (90.0, 45.0), (("B", 90.0), ("C", 45.0)))

@@ -8,9 +8,9 @@ import re
 import numpy as np
 import pytest
 
-from postproc.controllers.heidenhain import sweep
-from postproc.planes import Plane
-from postproc.program import Section
+from postproc.compile.program import Section
+from postproc.control.planes import Plane
+from postproc.writing.heidenhain import sweep
 from tests.postproc.program_kit import LOAD, blocks, command, drilled, lines, program, step
 from toolpaths.toolpath import Cycle
 

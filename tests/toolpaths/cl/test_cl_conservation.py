@@ -9,12 +9,12 @@ import pytest
 
 import toolpaths
 from toolpaths.cl import interpret
+from toolpaths.cl.inspect import inspect, summary
 from toolpaths.cl.read import read_bytes, read_file
 from toolpaths.diagnostics import Severity, has_errors
-from toolpaths.inspect import inspect, summary
 from toolpaths.toolpath import Records
 
-SAMPLES = Path(__file__).parents[2] / "samples"
+SAMPLES = Path(__file__).parents[3] / "samples"
 FILES = sorted(p for p in SAMPLES.rglob("*") if p.suffix in (".cls", ".apt", ".ncl", ".clt", ".as", ".aptsource"))
 HEAD = "UNITS/MM\nFEDRAT/100\n"
 

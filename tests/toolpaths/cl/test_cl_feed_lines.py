@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import toolpaths
-from toolpaths.cl import feed_lines
 from toolpaths.cl.feeds import UNITS
+from toolpaths.cl.text import feed_lines
 from toolpaths.diagnostics import Diagnostic
 from toolpaths.toolpath import Toolpath
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from toolpaths.cl.read import read_bytes
-from toolpaths.cl.scan import scan
-from toolpaths.cl.statements import words_of
+from toolpaths.cl.text.scan import scan
+from toolpaths.cl.text.statements import words_of
 
 HEAD = "UNITS/MM\nFEDRAT/600\n"
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from toolpaths.cl.interpret import HANDLERS
-from toolpaths.cl.near import one_edit
 from toolpaths.cl.read import ReadResult, read_bytes
-from toolpaths.cl.words import NEUTRAL, UNSUPPORTED_MOTION
+from toolpaths.cl.text.near import one_edit
+from toolpaths.cl.text.words import NEUTRAL, UNSUPPORTED_MOTION
 from toolpaths.diagnostics import Severity, has_errors
 from toolpaths.toolpath import Cycle, Toolpath
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import toolpaths
+from toolpaths.cl.inspect import inspect
 from toolpaths.cl.read import ReadResult, read_bytes
 from toolpaths.diagnostics import Severity, has_errors
-from toolpaths.inspect import inspect
 from toolpaths.toolpath import Role, Toolpath
 
 NX = "TOOL PATH/A,TOOL,T1\nTLDATA/MILL,10,0,50,0,0\nMSYS/0,0,0,1,0,0,0,1,0\nFEDRAT/MMPM,600\n"

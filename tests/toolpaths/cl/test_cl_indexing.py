@@ -12,7 +12,7 @@ from toolpaths.cl.read import ReadResult, read_bytes, read_file
 from toolpaths.diagnostics import Severity
 from toolpaths.toolpath import Kind, Toolpath
 
-SAMPLES = Path(__file__).parents[2] / "samples"
+SAMPLES = Path(__file__).parents[3] / "samples"
 sys.path.insert(0, str(SAMPLES))
 
 import make_indexing as m  # noqa: E402

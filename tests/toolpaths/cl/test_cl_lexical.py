@@ -7,11 +7,11 @@ import random
 import numpy as np
 import pytest
 
-from toolpaths.cl import scan
-from toolpaths.cl.log import Log
 from toolpaths.cl.read import ReadResult, read_bytes
-from toolpaths.cl.source import normalise
-from toolpaths.cl.statements import statement_of, words_of
+from toolpaths.cl.text import scan
+from toolpaths.cl.text.log import Log
+from toolpaths.cl.text.source import normalise
+from toolpaths.cl.text.statements import statement_of, words_of
 from toolpaths.cl.write import text_of
 from toolpaths.diagnostics import Severity, has_errors
 

@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from toolpaths.cl.inspect import inspect
 from toolpaths.cl.read import read_bytes
 from toolpaths.diagnostics import has_errors
-from toolpaths.inspect import inspect
 
-sys.path.insert(0, str(Path(__file__).parents[2] / "samples"))
+sys.path.insert(0, str(Path(__file__).parents[3] / "samples"))
 
 from cltext import UP, WORLD, Frame, face_frame
 from make_dialects import DRILL, MILL, SYSTEMS

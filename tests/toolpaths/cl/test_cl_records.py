@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 import toolpaths
+from toolpaths.cl.inspect import inspect, summary
 from toolpaths.cl.read import read_bytes, read_file
 from toolpaths.diagnostics import Severity, has_errors
-from toolpaths.inspect import inspect, summary
 from toolpaths.toolpath import Cycle, FeedMode, Kind, Role, Toolpath
 
-SAMPLES = Path(__file__).parents[2] / "samples"
+SAMPLES = Path(__file__).parents[3] / "samples"
 EXPECTED = json.loads((SAMPLES / "expected_counts.json").read_text(encoding="utf-8"))
 
 

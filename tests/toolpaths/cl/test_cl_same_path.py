@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 import toolpaths
+from toolpaths.cl.inspect import inspect
 from toolpaths.cl.read import ReadResult, read_file
 from toolpaths.diagnostics import Severity
-from toolpaths.inspect import inspect
 from toolpaths.toolpath import Kind, Role, Toolpath
 
-FOLDER = Path(__file__).parents[2] / "samples" / "dialects"
+FOLDER = Path(__file__).parents[3] / "samples" / "dialects"
 FILES = {"nx": "nx.cls", "creo": "creo.ncl", "solidworks": "solidworks.apt", "solidworks-clt": "solidworks.clt",
          "catia": "catia.aptsource", "ncl": "ncl.as"}
 WITHOUT_UNITS = ("nx", "catia")

@@ -11,7 +11,7 @@ import pytest
 from toolpaths.cl.read import ReadResult, read_bytes
 from toolpaths.diagnostics import Severity
 
-FOLDER = Path(__file__).parents[2] / "samples" / "dialects"
+FOLDER = Path(__file__).parents[3] / "samples" / "dialects"
 FILES = ("nx.cls", "creo.ncl", "solidworks.apt", "solidworks.clt", "catia.aptsource", "ncl.as")
 CATIA = """\
 $$     CATIA APT VERSION 1.0

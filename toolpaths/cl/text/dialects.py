@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
-from toolpaths.cl.statements import COMMENT, DATA_COMMENT, Program, Statement
+from toolpaths.cl.text.statements import COMMENT, DATA_COMMENT, Program, Statement
 from toolpaths.units import MM_PER_INCH
 
 

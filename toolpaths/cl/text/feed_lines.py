@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from toolpaths.arrays import Bools, Floats, Ints
-from toolpaths.cl.scan import Scan
+from toolpaths.cl.text.scan import Scan
 
 Bytes = npt.NDArray[np.uint8]
 FEWEST = 1000

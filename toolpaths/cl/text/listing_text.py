@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import re
 
-from toolpaths.cl.near import nearest
-from toolpaths.cl.words import SILENT, TEXT_WORDS
+from toolpaths.cl.text.near import nearest
+from toolpaths.cl.text.words import SILENT, TEXT_WORDS
 
 SINGLE = re.compile(r"[A-Z0-9_-]*[A-Z][A-Z0-9_-]*")
 _RULE = re.compile(r"([-=*_#~])\1{4,}")

@@ -6,7 +6,7 @@ import codecs
 import re
 from itertools import pairwise
 
-from toolpaths.cl.log import Log
+from toolpaths.cl.text.log import Log
 
 _BOMS = ((codecs.BOM_UTF32_LE, "utf-32"), (codecs.BOM_UTF32_BE, "utf-32"), (codecs.BOM_UTF8, "utf-8-sig"),
          (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))

@@ -8,12 +8,12 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 from toolpaths.arrays import Floats
-from toolpaths.cl.feed_lines import FeedLines, feed_lines
-from toolpaths.cl.log import Log
-from toolpaths.cl.near import nearest
-from toolpaths.cl.scan import LARGEST, LARGEST_OWN, Scan
-from toolpaths.cl.source import text_of
-from toolpaths.cl.words import BARE_WORDS, TEXT_WORDS
+from toolpaths.cl.text.feed_lines import FeedLines, feed_lines
+from toolpaths.cl.text.log import Log
+from toolpaths.cl.text.near import nearest
+from toolpaths.cl.text.scan import LARGEST, LARGEST_OWN, Scan
+from toolpaths.cl.text.source import text_of
+from toolpaths.cl.text.words import BARE_WORDS, TEXT_WORDS
 
 Word = str | float
 _NUMBER_ENDS, _NUMBER_STARTS = "0123456789.", "+-.0123456789"

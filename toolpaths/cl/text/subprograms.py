@@ -7,7 +7,7 @@ from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from toolpaths.cl.statements import Statement
+from toolpaths.cl.text.statements import Statement
 
 Called = float | str
 NAME = re.compile(r"[A-Z][A-Z0-9_.-]*")

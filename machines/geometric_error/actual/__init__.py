@@ -1,0 +1,1 @@
+"""The machine with errors, corrected commands."""

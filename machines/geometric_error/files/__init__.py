@@ -1,0 +1,1 @@
+"""Error model files: reading, covariance, fingerprint."""

@@ -1,0 +1,1 @@
+"""Options, version, memory, compiled loops."""

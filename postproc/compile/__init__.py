@@ -1,0 +1,1 @@
+"""Canonical program: words, feeds, commands, cycles."""

@@ -1,0 +1,1 @@
+"""What words mean: interpolation modes, planes, arcs."""

@@ -1,0 +1,1 @@
+"""One CL file on one machine, ready to be solved or compared with."""

@@ -1,0 +1,1 @@
+"""Tool axes of one pass, timed and ranked."""

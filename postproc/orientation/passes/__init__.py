@@ -1,0 +1,1 @@
+"""3+2 passes, their limits and poses."""

@@ -1,0 +1,1 @@
+"""Plans over all passes, the choice."""

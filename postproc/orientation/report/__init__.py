@@ -1,0 +1,1 @@
+"""The choice as figures and text."""

@@ -1,0 +1,1 @@
+"""Blocks in joints: links, points between, travel, reach."""

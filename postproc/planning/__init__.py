@@ -1,0 +1,1 @@
+"""Passes as smooth joint paths, feeds within the limits."""

@@ -1,0 +1,1 @@
+"""Canonical words to motion and poses."""

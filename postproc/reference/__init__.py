@@ -1,0 +1,1 @@
+"""Records spelt out: events, moves, holes, tools, coolant."""

@@ -1,0 +1,1 @@
+"""Summary, trace, residual field."""

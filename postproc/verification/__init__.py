@@ -1,0 +1,1 @@
+"""Reading a program back, second witness, errors that are left."""

@@ -1,0 +1,1 @@
+"""Characters and lines of CL files to statements, dialects, subprograms."""
