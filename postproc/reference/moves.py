@@ -12,13 +12,13 @@ import numpy as np
 
 from machines.kinematics.frames import spin_about, tool_x
 from postproc.reference.events import tool_changes
+from postproc.reference.holes import Leg, hole_legs
 from postproc.reference.holes import Phase as Phase
-from postproc.reference.holes import hole_legs
 from postproc.reference.stated_feeds import feeds_of
 from postproc.setup.model import Placement, SetupFile
 from toolpaths.arrays import Array, Bools, Floats, Ints, as_slice, repeated, shared, taken
 from toolpaths.diagnostics import Diagnostic, error
-from toolpaths.rotations import angle_between
+from toolpaths.rotations import angle_between, lengths
 from toolpaths.shape import Curves
 from toolpaths.toolpath import Arcs, Kind, Role, Toolpath
 from toolpaths.units import DEG
@@ -207,14 +207,13 @@ def build_moves(toolpath: Toolpath, setup: SetupFile, axis_tolerance: float) -> 
     again = back & (toolpath.role[pose] != Role.START)
     kind = np.where(back, np.where(again, Kind.FEED, Kind.RAPID), toolpath.kind[row]).astype(np.int8)
     there = as_slice(pose)
-    tip = toolpath.tip[there]
+    tip = _left_to(toolpath, holes, legs)[there]
     arc = np.where(back, -1, toolpath.arc[row])
     hole, phase = np.full(len(row), -1), np.zeros(len(row), dtype=np.int8)
     feed, seconds = np.where(back & ~again, np.nan, feed[row]), np.where(back & ~again, np.nan, seconds[row])
     if len(holes):
         where = np.flatnonzero(toolpath.role[row] == Role.HOLE)
         flat = [leg for of_hole in legs for leg in of_hole]
-        tip = tip.copy()
         tip[where] = [point for point, _, _ in flat]
         phase[where] = [p for _, p, _ in flat]
         kind[where] = [k for _, _, k in flat]
@@ -225,7 +224,16 @@ def build_moves(toolpath: Toolpath, setup: SetupFile, axis_tolerance: float) -> 
                   toolpath.line[as_slice(row)],
                   repeated(np.nan, len(row)) if toolpath.spin is None else toolpath.spin[pose], toolpath.arcs)
     return moves, diagnostics + _missing_feeds(toolpath, moves) + _opposite_axes(toolpath, moves) + _lone_arcs(
-        toolpath, moves)
+        toolpath, moves) + _arcs_behind_holes(toolpath, moves)
+
+
+def _left_to(toolpath: Toolpath, holes: Ints, legs: list[list[Leg]]) -> Floats:
+    """(N, 3) where the tool stands behind each row: at the end of its way out of a hole, else at the tip."""
+    if not len(holes):
+        return toolpath.tip
+    tip = toolpath.tip.copy()
+    tip[holes] = [leg[-1][0] for leg in legs]
+    return tip
 
 
 def _lone_arcs(toolpath: Toolpath, moves: Moves) -> list[Diagnostic]:
@@ -235,6 +243,19 @@ def _lone_arcs(toolpath: Toolpath, moves: Moves) -> list[Diagnostic]:
         return []
     return [error("arc.no_start", "an arc before any position is known", file=toolpath.file,
                   lines=moves.line[bad][:6].tolist(), count=len(bad), hint="put FROM or a GOTO before CIRCLE")]
+
+
+def _arcs_behind_holes(toolpath: Toolpath, moves: Moves) -> list[Diagnostic]:
+    """Arcs that begin at the top of a hole, which the tool has left to another level."""
+    bad = np.flatnonzero((moves.arc[1:] >= 0) & (moves.row[1:] > 0)) + 1
+    bad = bad[toolpath.role[moves.row[bad] - 1] == Role.HOLE]
+    off = lengths(moves.tip[bad - 1] - toolpath.tip[moves.row[bad] - 1])
+    bad, off = bad[off > 1e-6], off[off > 1e-6]
+    if not len(bad):
+        return []
+    return [error("arc.behind_hole", f"an arc straight behind a hole: the tool has left the hole to {off[0]:g} mm above the "
+                  "start of the arc", file=toolpath.file, lines=moves.line[bad][:6].tolist(), count=len(bad),
+                  hint="put a GOTO to the start of the arc between CYCLE/OFF and the arc")]
 
 
 def _missing_feeds(toolpath: Toolpath, moves: Moves) -> list[Diagnostic]:

@@ -34,15 +34,39 @@ class Walked:
         m = np.minimum(owner, max(len(targets) - 1, 0))
         self.begin = np.concatenate([[0], np.flatnonzero(np.diff(owner)) + 1])
         self.first = self.begin[np.searchsorted(self.begin, np.arange(len(owner)), side="right") - 1]
-        plain = np.where(poses.executed.hole, len(owner), np.arange(len(owner)))
-        first = np.minimum.reduceat(plain, self.begin)[np.searchsorted(self.begin, np.arange(len(owner)), side="right") - 1]
-        self.leaves = np.where(first < len(owner), first, self.first)
-        """first block of the target that is no return of a hole"""
         self.kind = np.where(self.inside, targets.kind[m], -1)
+        self.returns, departs = self._left_holes()
+        """(E,) blocks owned by a cut that leave the hole before it: they belong to the hole"""
+        plain = np.where(poses.executed.hole | self.returns, len(owner), np.arange(len(owner)))
+        first = np.minimum.reduceat(plain, self.begin)[np.searchsorted(self.begin, np.arange(len(owner)), side="right") - 1]
+        self.leaves = np.where(departs > 0, departs, np.where(first < len(owner), first, self.first))
+        """first block of the target that is no return of a hole"""
         self.gap = np.where(self.inside, targets.gap[m], False)
         self.away, self.tilt = np.zeros(len(owner)), np.zeros(len(owner))
         self.seconds = seconds_of(poses.executed)
         """(E,) of blocks at feed"""
+
+    def _left_holes(self) -> tuple[Array, Array]:
+        """Of cuts behind a hole: (E,) True for the first blocks, which rise along its axis as far as its record says, else
+        in rapid, in a cycle or up to its start plane; (E,) block behind the last one on that axis, where the cut leads off
+        it and the record names no level (a tool may have been changed over the hole), -1 for others."""
+        t, e, near = self.targets, self.poses.executed, self.tolerance[0] + EXACT
+        rows = np.flatnonzero(is_cut(self.kind) & (self.kind != BOTTOM) & (self.owner > 0))
+        rows = rows[(rows > 0) & (t.kind[self.owner[rows] - 1] == BOTTOM)]
+        to, i = self.owner[rows], self.owner[rows] - 1
+        along = t.axis[i]
+        before, rise = (np.einsum("ni,ni->n", self.tip[k] - t.tip[i], along) for k in (rows - 1, rows))
+        on = (_above(self.tip[rows], t.tip[i], along) <= near) & (
+            np.einsum("ni,ni->n", self.axis[rows], along) >= math.cos(self.tolerance[1] + EXACT))
+        plane = np.einsum("ni,ni->n", t.tip[i - 1] - t.tip[i], along)
+        free = (self.code[rows] == 0) | e.hole[rows] | (rise <= plane + near)
+        level = np.where(np.isfinite(t.out[i]), rise <= t.out[i] + near, free)
+        returns, last = np.zeros(len(self.owner), bool), np.full(len(t) + 1, -1)
+        returns[rows] = on & level & (rise >= before - near)
+        stays = np.append(0, np.cumsum(~returns))
+        leads_off = on & t.free[to] & (_above(t.tip[to], t.tip[i], along) > 2.0 * near)
+        np.maximum.at(last, to[leads_off], rows[leads_off] + 1)
+        return returns & (stays[1:] == stays[self.first]), last[np.minimum(self.owner, len(t))]
 
     def start(self, rows: Array) -> tuple[Array, Array]:
         """(tip, axis) where the way of blocks `rows` begins: as commanded, or where the tool stood."""
@@ -79,7 +103,7 @@ def check_way(w: Walked, lines: Array, cut: Cut | None, margin: float, link_angl
     good = w.on_way()
     step = np.diff(w.tip, axis=0, prepend=w.tip[:1])
     moved = np.sqrt((step * step).sum(axis=1))
-    cutting, rapid = is_cut(w.kind) & ~w.gap, is_rapid(w.kind) & ~w.gap
+    cutting, rapid = is_cut(w.kind) & ~w.gap & ~w.returns, is_rapid(w.kind) & ~w.gap
     found = []
     hurried = cutting & good & (w.code == 0) & (moved > STILL) & (w.kind != BOTTOM)
     found += _finding(w, np.flatnonzero(hurried), lines, "kind", "rapid motion on a cut of the CL file")
@@ -94,7 +118,7 @@ def check_way(w: Walked, lines: Array, cut: Cut | None, margin: float, link_angl
     low = _low(w, rows, cut, margin, bent, turned[rows], table)
     bad = rows[low]
     bad = bad[(w.code[bad] == 0) | (moved[bad] > EXACT)]
-    cuts = bad[(w.code[bad] > 0) & is_cut(w.kind[bad])]
+    cuts = bad[(w.code[bad] > 0) & cutting[bad]]
     if len(cuts):
         k = int(cuts[0])
         found += _finding(w, cuts, lines, "path", f"the tool is {w.away[k]:.6f} mm and {np.degrees(w.tilt[k]):.6f} degrees "
@@ -134,6 +158,8 @@ def _low(w: Walked, rows: Array, cut: Cut | None, margin: float, bent: bool, tur
     left = np.maximum.accumulate(np.where(w.on_way(), np.arange(len(w.owner)), 0))[rows]
     low = np.zeros(len(rows), bool)
     tight = np.zeros(len(rows), bool)
+    # What comes to the end of a cut at feed is that cut: it may be on such a line, and nowhere else, however high.
+    cuts = (w.code[rows] > 0) & is_cut(w.kind[rows]) & ~w.gap[rows] & (w.owner[rows] != np.append(w.owner, m + 1)[rows + 1])
     for t in (0.25, 0.5, 0.75, 1.0):
         tip, axis = w.poses.at(rows, t)
         line = np.fmin(_above(tip, w.targets.tip[before], w.targets.axis[before]), _above(tip, w.tip[here], w.axis[here]))
@@ -143,6 +169,7 @@ def _low(w: Walked, rows: Array, cut: Cut | None, margin: float, bent: bool, tur
         line = np.fmin(line, np.where(ends | entry, np.inf, _above(tip, start, start_axis)))
         beside = ~(line <= near)
         beside &= turned | ~_level(w, rows, to, ends | begins, tip, near, bent)
+        low |= beside & cuts
         if cut is not None:
             low |= beside & ~cut.clear(tip, axis, LEAST * margin)
             tight |= beside & ~cut.clear(tip, axis, FULL * margin)

@@ -65,7 +65,7 @@ def feeds_of(c: Commanded, setup: dict[str, Any]) -> Array:
 def check_feeds(w: Walked, c: Commanded, case: Case, table: dict[str, Any], match: Array) -> tuple[list[Finding], int]:
     """Cuts that are faster than programmed, or slower and no axis explains it; the number of cuts that were compared."""
     t = w.targets
-    rows = np.flatnonzero(w.inside & (w.code > 0) & ~w.gap & ((w.kind == LINE) | (w.kind == ARC)) & w.on_way())
+    rows = np.flatnonzero(w.inside & (w.code > 0) & ~w.gap & ~w.returns & ((w.kind == LINE) | (w.kind == ARC)) & w.on_way())
     m = len(t)
     seconds = np.bincount(w.owner[rows], weights=w.seconds[rows], minlength=m)[:m]
     length = np.sqrt(((t.tip - t.start) ** 2).sum(axis=1))
@@ -162,10 +162,13 @@ def _feed_finding(w: Walked, c: Commanded, at: Array, ratio: Array, match: Array
 
 
 def check_states(w: Walked, c: Commanded, case: Case) -> tuple[list[Finding], dict[str, int], list[str]]:
-    """Tool, spindle, speed and coolant while cutting; how many blocks each was compared in; what could not be."""
+    """Tool, spindle, speed and coolant while cutting; how many blocks each was compared in; what could not be.
+
+    Blocks that leave a hole at feed count with the hole; feed moves off the way are linking moves and belong to no cut."""
     e = w.poses.executed
-    rows = np.flatnonzero(w.inside & (w.code > 0) & ((w.kind == LINE) | (w.kind == ARC) | (w.kind == BOTTOM)))
-    row = w.targets.row[w.owner[rows]]
+    cuts = (w.kind == LINE) | (w.kind == ARC) | (w.kind == BOTTOM)
+    rows = np.flatnonzero(w.inside & (w.code > 0) & cuts & (w.on_way() | w.gap | w.returns))
+    row = w.targets.row[w.owner[rows] - w.returns[rows]]
     tool, coolant = tools_of(c, case.setup)[row], c.coolant[row]
     register = np.where((c.register[row] == OWN) | (not case.registers), tool, c.register[row])
     register = np.where(e.lengthless[rows] | (not (case.setup.get("output") or {}).get("tool_call", True)), -1, register)

@@ -23,6 +23,7 @@ class Targets:
         tip, axis (M, 3); kind (M,): RAPID, LINE, ARC, ENTER, BOTTOM; row (M,): of the CL file
         start (M, 3), start_axis: where the way there begins; free (M,): that is wherever the tool stands
         gap (M,): the way there is not known; centre, normal (M, 3), sweep (M,): of arcs, 0 for others
+        out (M,): of bottoms, mm above them to which the tool leaves the hole; NaN where no number says so
     """
 
     tip: Array
@@ -36,6 +37,7 @@ class Targets:
     centre: Array
     normal: Array
     sweep: Array
+    out: Array
 
     def __len__(self) -> int:
         return len(self.row)
@@ -59,6 +61,11 @@ def targets_of(c: Commanded, tip: Array, axis: Array, centre: Array, normal: Arr
     before = np.maximum(row - 1, 0)
     start, start_axis = tip[before], axis[before]
     free = (row == 0) | ~c.known[before] | hole[before] | on_hole
+    # A cut behind a hole begins where the tool has left it to, where the record says where that is.
+    out = np.array([np.maximum(x.clearance, x.retract) for x in c.cycles] + [np.nan])[c.cycle]
+    left = np.flatnonzero((row > 0) & is_cut(kind) & ~on_hole & good[before] & hole[before] & np.isfinite(out[before]))
+    start[left] += out[before[left], None] * start_axis[left]
+    free[left] = False
     if on_hole.any():
         start[second], start_axis[second], free = there[np.flatnonzero(second) - 1], axis[row[second]], free & ~second
     lost = np.concatenate([[0], np.cumsum(~good & (c.kind != START))])
@@ -72,7 +79,8 @@ def targets_of(c: Commanded, tip: Array, axis: Array, centre: Array, normal: Arr
     mid, about, sweep = np.zeros((m, 3)), np.zeros((m, 3)), np.zeros(m)
     mid[round_], about[round_], sweep[round_] = centre[arc[round_]], normal[arc[round_]], c.sweep[arc[round_]]
     gap = c.gap[row] | (skipped & ~second)
-    return Targets(there, axis[row], kind, row, start, start_axis, free, gap, mid, about, np.where(gap, 0.0, sweep))
+    return Targets(there, axis[row], kind, row, start, start_axis, free, gap, mid, about, np.where(gap, 0.0, sweep),
+                   np.where(second, depth[row] + out[row], np.nan))
 
 
 def matched(targets: Targets, tip: Array, axis: Array, turns: Array, tolerance: float,

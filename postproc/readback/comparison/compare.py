@@ -9,6 +9,7 @@ import numpy as np
 from postproc.job.job import Job
 from postproc.path.model import FEED, TRAVERSE
 from postproc.readback.comparison.align import align, unreached
+from postproc.readback.comparison.approaches import leads_down
 from postproc.readback.comparison.checks import (
     CHUNK,
     block_seconds,
@@ -101,7 +102,8 @@ def compare(motion: Motion, job: Job, executed: Executed, gcode: str = "", plann
     diagnostics += check_spins(motion, executed, moves, owner, tip, axis, axis_tolerance, faults)
     diagnostics += check_kinds(motion, moves, owner, tip, executed.control.rapids == "dog-leg",
                                _taken_up(job, motion, tip), faults)
-    diagnostics += check_states(motion, job, moves, owner, faults)
+    down = leads_down(motion, moves, owner, tip)
+    diagnostics += check_states(motion, job, moves, owner, down, faults)
     diagnostics += check_compensated(motion, job, faults)
     diagnostics += check_holes(motion, job, moves, tip, owner, faults)
     diagnostics += check_taps(motion, job, moves, owner, faults)
@@ -109,7 +111,7 @@ def compare(motion: Motion, job: Job, executed: Executed, gcode: str = "", plann
     diagnostics += check_speeds(motion, moves, owner, match, seconds, tolerance, faults)
     if not planned:
         diagnostics += check_slow(motion, executed, job, moves, owner, match, tip, seconds, faults)
-    diagnostics += check_fed_rapids(motion, executed, job, moves, owner, tip, seconds, faults)
+    diagnostics += check_fed_rapids(motion, executed, job, moves, owner, tip, seconds, down, faults)
     diagnostics += check_links(motion, executed, moves, owner, job.space, tolerance, faults)
     diagnostics += check_rewinds(motion, executed, number, tip, axis, job.space, tolerance, grain[1] + _kept(job), faults)
     diagnostics += check_travel(motion, executed, moves, owner, faults)

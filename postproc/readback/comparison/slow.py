@@ -210,9 +210,9 @@ def _allowed(owner: Ints, cutting: Bools, needs: Floats, tip: Floats, seconds: F
 
 
 def check_fed_rapids(motion: Motion, executed: Executed, job: Job, moves: Moves, owner: Ints, tip: Floats, seconds: Floats,
-                     faults: Faults) -> list[Diagnostic]:
+                     down: Bools, faults: Faults) -> list[Diagnostic]:
     """Feed moves for rapids, or on the way between operations, that are faster than the axes, or slower than both they
-    and the feed of the cut that they lead to."""
+    and, where they lead `down` (E,) to a cut, its feed."""
     if job.errors is not None and job.errors.corrected_by == "post":
         return []
     m = np.minimum(owner, len(moves) - 1)
@@ -222,10 +222,9 @@ def check_fed_rapids(motion: Motion, executed: Executed, job: Job, moves: Moves,
         return []
     needs = _least(motion, executed, rows)
     way = np.concatenate([[np.inf], lengths(np.diff(tip, axis=0))])
-    led = (owner < len(moves)) & moves.link[m] & (moves.kind[m] != Kind.RAPID)
-    feed = np.where(led & (moves.feed[m] > 0.0), moves.feed[m], np.inf)
+    feed = np.where(down & (moves.feed[m] > 0.0), moves.feed[m], np.inf)
     grain = _Slack.of(job, bool(motion.inch.any())).length
-    spot = np.where(led & (moves.seconds[m] > 0.0), moves.seconds[m], 0.0)
+    spot = np.where(down & (moves.seconds[m] > 0.0), moves.seconds[m], 0.0)
     allowed = np.fmax(np.fmax(needs, spot), way / feed)
     least = executed.control.machine.limits.velocity[executed.control.slides].min(initial=np.inf)
     slack = grain / np.minimum(feed, least) + 1e-4

@@ -59,11 +59,11 @@ class _Asked:
         return cls(offset, *map(shared, columns))
 
 
-def check_states(motion: Motion, job: Job, moves: Moves, owner: Ints, faults: Faults) -> list[Diagnostic]:
+def check_states(motion: Motion, job: Job, moves: Moves, owner: Ints, down: Bools, faults: Faults) -> list[Diagnostic]:
     """Tool, spindle, coolant, compensation and work offset while cutting, against the CL file and the set-up, in the
-    order of the program."""
+    order of the program; of linking moves only in what leads `down` (E,) to a cut at feed."""
     rows = np.flatnonzero((owner < len(moves)) & (motion.code > 0))
-    rows = rows[moves.kind[owner[rows]] != Kind.RAPID]
+    rows = rows[(moves.kind[owner[rows]] != Kind.RAPID) & (~moves.link[owner[rows]] | down[rows])]
     reader = reader_for(job.controller, job.machine.axis_names)
     asked, first, count = _Asked.of(job, reader), dict[str, tuple[int, str]](), Counter[str]()
     for at in range(0, len(rows), CHUNK):
@@ -74,18 +74,19 @@ def check_states(motion: Motion, job: Job, moves: Moves, owner: Ints, faults: Fa
                 k = int(bad[0])
                 first.setdefault(what, (int(here[k]), f"{what} is {name(found[k])}, it should be {name(wanted[k])}"))
                 count[what] += len(bad)
-    return _left_on(motion, job, moves, owner, asked, reader, faults) + [
+    return _left_on(motion, moves, owner, asked, reader, down, faults) + [
         faults.error("verify.state", said, int(moves.line[owner[k]]), int(motion.line[k]), count[what], _HINTS.get(what, ""))
             for what, (k, said) in sorted(first.items(), key=lambda one: (one[1][0], _ORDER.index(one[0])))]
 
 
-def _left_on(motion: Motion, job: Job, moves: Moves, owner: Ints, asked: _Asked, reader: Reader,
+def _left_on(motion: Motion, moves: Moves, owner: Ints, asked: _Asked, reader: Reader, down: Bools,
              faults: Faults) -> list[Diagnostic]:
     """Cutter compensation on rapids and linking moves for which the CL file has none: the control shifts those too."""
     on = np.flatnonzero(motion.compensation != 40) if np.any(motion.compensation != 40) else np.zeros(0, dtype=np.int64)
     serving = np.minimum(owner[on], len(moves) - 1)
     linking = (owner[on] >= len(moves)) | moves.link[serving]
-    cut = (motion.code[on] > 0) & (moves.kind[serving] != Kind.RAPID) & (owner[on] < len(moves))
+    cut = (motion.code[on] > 0) & (moves.kind[serving] != Kind.RAPID) & (owner[on] < len(moves)) & (
+        ~moves.link[serving] | down[on])
     bad = on[(linking | (asked.side[moves.row[serving]] == 40)) & ~cut]
     if not len(bad):
         return []
