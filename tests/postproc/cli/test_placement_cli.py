@@ -215,7 +215,7 @@ def test_axes_chosen_anew_at_each_place() -> None:
 
 
 def test_the_sample(tmp_path: Path) -> None:
-    """The sample's set-up on the mill gains what turning the box by 45 degrees gives the passes along y: here the first three."""
+    """The sample's set-up on the mill gains what turning the box by 45 degrees gives passes along y: here the first 3."""
     lines, first = PART.read_text().splitlines(), tmp_path / "three.cls"
     first.write_text("\n".join([*lines[:217], lines[-1], ""]))
     text = run(first, "-m", "mill-3axis", "--setup", MILL, "-o", tmp_path / "s2.toml", "--json", tmp_path / "f.json")

@@ -48,7 +48,7 @@ STEADY = 15000
 
 
 def jerk_only(m: Machine) -> Machine:
-    """No limit but jerk, the same on every slide; at STEADY no axis is asked for more than the file of the machine allows."""
+    """No limit but jerk, the same on every slide; at STEADY none is asked for more than the file of the machine allows."""
     free = np.full(len(m.rotary), 1e9)
     return replace(m, limits=replace(m.limits, velocity=free, acceleration=free, jerk=np.where(m.rotary, 1e12, 5000.0)))
 
