@@ -54,7 +54,8 @@ def image(size: tuple[float, float], title: str, fill: Callable[[Figure], None],
 
 def _settle(sheet: Figure) -> None:
     """Arrange the panels once, rounded: the solver's last digits change from run to run, and names in an SVG with them."""
-    sheet.draw_without_rendering()
+    if engine := sheet.get_layout_engine():
+        engine.execute(sheet)
     sheet.set_layout_engine("none")
     for place in sheet.axes:
         left, low, width, height = place.get_position(original=True).bounds

@@ -94,10 +94,18 @@ def run_of(result: PostResult, own: Machine, errors: Errors, controller: str) ->
     for tool in {end.tool for end in ends}:
         k = [k for k, end in enumerate(ends) if end.tool == tool]
         nominal[k] = np.hstack(result.machine.kinematics.with_tool(tool).forward(np.array([ends[i].q for i in k])))
-    _, few = cKDTree(nominal * np.repeat([1.0, ARM], 3)).query(wanted, k=3)  # the machine with errors is not far from there
+    arm = np.repeat([1.0, ARM], 3)
+    away, few = cKDTree(nominal * arm).query(wanted, k=3)  # the machine with errors is not far from there
     real = np.full((len(ends), 6), np.inf)
-    for k in np.unique(few):
-        real[k] = np.concatenate(own.pose(ends[k].q, ends[k].tool, errors, near=nominal[k]))
+
+    def posed(which: Ints) -> None:
+        for k in np.unique(which).tolist():
+            real[k] = np.concatenate(own.pose(ends[k].q, ends[k].tool, errors, near=nominal[k]))
+
+    posed(few[:, 0])
+    reached = np.unique(few[:, 0])
+    moved = np.linalg.norm((real[reached] - nominal[reached]) * arm, axis=1).max()
+    posed(np.setdiff1d(few[away <= away[:, :1] + 4.0 * moved], reached))  # farther ones cannot be the nearest
     off = np.linalg.norm(real[few] * np.repeat([1.0, ARM], 3) - wanted[:, None], axis=2)
     at = few[np.arange(len(few)), off.argmin(axis=1)]
     return Run(result, own, ends, rows, at, np.linalg.norm(real[at, :3] - moves.tip[rows], axis=1),
@@ -128,7 +136,7 @@ def test_the_second_reading_finds_the_points_inside_the_printed_bound(case: Case
     assert run.axis.max() <= told.axis_bound + 0.01 * ARCSEC
 
 
-@pytest.mark.parametrize("case", [case for case in CASES if case[0] == "five_faces.cls" or case[1] == "uranesx"], ids=name)
+@pytest.mark.parametrize("case", [CASES[0], CASES[3], *(case for case in CASES if case[1] == "uranesx")], ids=name)
 def test_without_correction_the_points_are_as_far_off_as_is_told(case: Case) -> None:
     found, bare = converted(case).result.compensation, converted(case, corrected=False)
     assert found is not None and 0.01 < bare.tip.max() <= found.tip_before + 1e-3

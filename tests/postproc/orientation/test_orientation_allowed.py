@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -288,6 +289,7 @@ def lines_of(start: Floats, end: Floats) -> Curves:
     return Curves(start, end, up, up, np.zeros(n, dtype=bool), none, none, np.zeros(n))
 
 
+@cache
 def sphere() -> Surface:
     """A ball of 40 mm about (5, 0, 0), as fine triangles, in a part that stands turned by 90 degrees and 100 mm up."""
     mesh = trimesh.creation.icosphere(subdivisions=5, radius=40.0)

@@ -79,8 +79,8 @@ def test_travel_decides() -> None:
 
 
 def test_indexing_time_decides() -> None:
-    """Ten strips gain a second by turning once: more than nothing, less than clamps of 5 s cost."""
-    fast, slow = (on("", strips([0.0] * 10), quick("mikron-ucp710", clamp)) for clamp in (0.0, 5.0))
+    """Eight strips gain half a second by turning once: more than nothing, less than clamps of 5 s cost."""
+    fast, slow = (on("", strips([0.0] * 8), quick("mikron-ucp710", clamp)) for clamp in (0.0, 5.0))
     assert {made.rotary()["A"] for made in fast.plans["auto"].picked} != {0.0}
     assert fast.plans["auto"].seconds < fast.plans["keep"].seconds - 0.3
     assert {made.rotary()["A"] for made in slow.plans["auto"].picked} == {0.0}
@@ -127,7 +127,7 @@ def test_between_two_walls_the_tool_leans_as_far_as_it_can() -> None:
     assert work is not None
     bodies, _ = pass_bodies(work, "")
     one, allowed = work.passes[0], Allowed(60.0 * DEG, bodies)
-    a, c = (g.ravel() * DEG for g in np.meshgrid(np.arange(10.0, 45.0, 2.5), np.arange(30.0, 60.0, 2.5)))
+    a, c = (g.ravel() * DEG for g in np.meshgrid(np.arange(10.0, 45.0, 3.5), np.arange(30.0, 60.0, 5.0)))
     axes = np.column_stack([np.sin(a) * np.sin(c), -np.sin(a) * np.cos(c), np.cos(a)])
     grid = turned_all(one, np.vstack([axes, -axes * [1.0, 1.0, -1.0]]), machine("mikron-ucp710"), allowed.touching)
     least = next(each.seconds for each in sorted(grid, key=lambda each: each.seconds) if not each.touching)
@@ -172,8 +172,8 @@ def test_a_ball_on_the_h4a_stands_up_and_the_table_turns() -> None:
 
 
 def test_the_h4a_turns_its_table_once() -> None:
-    """Strips along y are slow on the H4a: turned by 90 degrees they run along x, worth it for twenty, not for three."""
-    many, few = (strips([90.0] * count, "16,1") for count in (20, 3))
+    """Strips along y are slow on the H4a: turned by 90 degrees they run along x, worth it for twelve, not for two."""
+    many, few = (strips([90.0] * count, "16,1") for count in (12, 2))
     choice = on("h4a-c-table", many, quick("h4a-c-table"), 40.0)
     auto = choice.plans["auto"]
     assert near(90.0, {made.held / DEG for made in auto.picked})
@@ -208,11 +208,12 @@ def test_an_angle_for_passes_in_many_directions() -> None:
     assert not len(common_angles([turned(one, one.axis, level.machine) for one in level.passes]))
 
 
-@pytest.mark.parametrize("controller", ["siemens-840d", "heidenhain-tnc640", "linuxcnc"])
-def test_a_flat_cutter_on_a_trunnion(controller: str) -> None:
+@pytest.mark.parametrize(("controller", "plan", "count"), [
+    ("siemens-840d", "per-pass", 2), ("heidenhain-tnc640", "per-pass", 2), ("linuxcnc", "auto", 12)])
+def test_a_flat_cutter_on_a_trunnion(controller: str, plan: Orientation, count: int) -> None:
     """C at 45 degrees, A at 0, in planes or as axis positions; tips and axes of the file are as they were."""
-    path = strips([0.0] * 12, "16,1")
-    result = written("mikron-ucp710", path, controller)
+    path = strips([0.0] * count, "16,1")
+    result = written("mikron-ucp710", path, controller, plan)
     assert near(45.0, standing(result, "C")) and standing(result, "A") == {0.0}
     assert result.toolpath is not None
     assert result.toolpath.tip.tolist() == path.tip.tolist() and result.toolpath.axis.tolist() == path.axis.tolist()
@@ -246,18 +247,18 @@ def test_a_turned_part_is_held_as_a_straight_one() -> None:
     assert result.ok and standing(result, "C") == {round(placed.tried[0].best.held / DEG, 3)}
 
 
-@pytest.mark.parametrize(("directions", "cutter", "cap"), [([25.0], "16,8", 4.0), ([0.0], "16,8", 2.5)])
-def test_search_beside_a_full_grid(directions: list[float], cutter: str, cap: float) -> None:
+@pytest.mark.parametrize(("direction", "cap"), [(25.0, 4.0), (0.0, 2.5)])
+def test_search_beside_a_full_grid(direction: float, cap: float) -> None:
     """Every axis of a coarse grid within the cap planned in full: none is better by more than half a percent."""
     m = machine("mikron-ucp710")
-    work, _ = work_of(strips(directions, cutter), m, setup_of(""), Options())
+    work, _ = work_of(strips([direction]), m, setup_of(""), Options())
     assert work is not None
     one = work.passes[0]
-    assert -0.02 < compared("strip", one, m, Allowed(cap * DEG), one.axis, cap * DEG, 0.5 * DEG) < 0.005
+    assert -0.02 < compared("strip", one, m, Allowed(cap * DEG), one.axis, cap * DEG, cap / 5.0 * DEG) < 0.005
 
 
 def test_auto_beside_all_sequences() -> None:
     """Strips in two directions, every sequence of axes of a grid: `auto` is within half a percent of the best."""
     free = replace(machine("mikron-ucp710"), timing=Timing(0.0, 0.0, 0.0))
-    keep, auto, least = whole(free, strips([0.0, 0.0, 70.0, 70.0], length=160.0), 4.0 * DEG, 0.8 * DEG)
+    keep, auto, least = whole(free, strips([0.0, 0.0, 70.0, 70.0], length=160.0), 4.0 * DEG, 1.3 * DEG)
     assert auto <= keep and -0.03 < auto / least - 1.0 < 0.005

@@ -25,7 +25,7 @@ def strips() -> Toolpath:
         c, s = np.cos(turn * DEG), np.sin(turn * DEG)
         axis = np.array([np.sin(lean * DEG) * c, np.sin(lean * DEG) * s, np.cos(lean * DEG)])
         level = np.array([-s, c, 0.0])
-        for k in range(2):
+        for k in range(1):
             ends = [20.0 * np.array([c, s, 0.0]) + side * 25.0 * level + 4.0 * k * np.cross(level, axis)
                     for side in (-1.0, 1.0)]
             begin, end = ends

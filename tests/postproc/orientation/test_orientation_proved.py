@@ -29,8 +29,8 @@ from tests.postproc.kit import machine
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.toolpath import Toolpath
 
-COUNT = 16
-"""strips: as many as gain by leaning"""
+COUNT, POSTED = 8, 12
+"""strips: as many as gain by leaning; where a post stands beside them"""
 Box = tuple[list[float], list[float]]
 POSTS: tuple[Box, ...] = (([-37.0, -127.0, -30.0], [-2.0, -51.0, 292.0]),)
 """beside the part: where the table leans, the tool would pass through it on its way from home"""
@@ -56,7 +56,7 @@ def converted(path: Toolpath, setup: SetupFile, plan: Orientation = "auto") -> P
 @cache
 def refused() -> tuple[OrientationChoice, PostResult, list[Diagnostic]]:
     """The choice without a proof beside a post, the conversion with one, and what that says of orientations."""
-    path, setup = strips([0.0] * COUNT), beside(*POSTS)
+    path, setup = strips([0.0] * POSTED), beside(*POSTS)
     choice, _ = orient(path, quick(), setup)
     assert choice is not None
     result = converted(path, setup)
@@ -89,14 +89,15 @@ def test_verify_chooses_the_same(tmp_path: Path) -> None:
     _, result, _ = refused()
     file = tmp_path / "p.ngc"
     file.write_text(result.text)
-    verified = pipeline.verify(file, strips([0.0] * COUNT), quick(), "linuxcnc", beside(*POSTS), Options(orient="auto"))
+    verified = pipeline.verify(file, strips([0.0] * POSTED), quick(), "linuxcnc", beside(*POSTS), Options(orient="auto"))
     assert verified.ok, [str(d) for d in verified.diagnostics]
 
 
-@pytest.mark.parametrize("plan", ["per-pass", "whole-part"])
-def test_other_plans_avoid_it_too(plan: Orientation) -> None:
-    result = converted(strips([0.0] * COUNT), beside(*POSTS), plan)
+@pytest.mark.parametrize(("plan", "count"), [("per-pass", 2), ("whole-part", POSTED)])
+def test_other_plans_avoid_it_too(plan: Orientation, count: int) -> None:
+    result = converted(strips([0.0] * count), beside(*POSTS), plan)
     assert result.ok and result.choice is not None and not result.choice.plans[plan].barred
+    assert "orient.passed_over" in {d.code for d in result.diagnostics}
 
 
 def test_the_program_that_proved_is_not_made_again(monkeypatch: pytest.MonkeyPatch) -> None:

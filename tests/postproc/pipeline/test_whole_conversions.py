@@ -61,10 +61,12 @@ def test_the_tool_goes_through_every_point_in_order(file: str, name: str, contro
         assert not len(chunk) or gap.max() < 0.0101
 
 
-@pytest.mark.parametrize("name", ["mikron-ucp710", "trunnion-bc", "head-table", "fork-head-ab"])
-@pytest.mark.parametrize(("a", "b", "step"), [
-    ((10, 0), (20, 140), 0.0), ((10, 0), (20, 140), 0.05), ((10, 0), (60, 100), 0.0), ((0, 0), (60, 100), 0.0),
-    ((10, 30), (10, 210.01), 0.0)])
+@pytest.mark.parametrize(("name", "a", "b", "step"), [
+    ("mikron-ucp710", (10, 0), (20, 140), 0.0), ("head-table", (10, 0), (20, 140), 0.0),
+    ("mikron-ucp710", (10, 0), (20, 140), 0.05), ("fork-head-ab", (10, 0), (20, 140), 0.05),
+    ("trunnion-bc", (10, 0), (60, 100), 0.0), ("fork-head-ab", (10, 0), (60, 100), 0.0),
+    ("trunnion-bc", (0, 0), (60, 100), 0.0), ("head-table", (0, 0), (60, 100), 0.0),
+    ("mikron-ucp710", (10, 30), (10, 210.01), 0.0), ("head-table", (10, 30), (10, 210.01), 0.0)])
 def test_turns_on_the_spot(name: str, a: tuple[float, float], b: tuple[float, float], step: float) -> None:
     """However unevenly the turn is divided: the tip stays, the axis keeps to the great circle and arrives."""
     first, last, point = tilted(*a), tilted(*b), np.array([30, 10, 0.0])
@@ -88,13 +90,13 @@ def test_a_point_twice_is_one_point(lines: list[str]) -> None:
 
 @pytest.mark.parametrize("scale", [0.0, 0.01, 0.2, 1.0, 10.0])
 def test_trembling_paths(scale: float) -> None:
-    """Three hundred points of a random walk with steps of 0.004 mm times the scale, in three axes and in five."""
+    """Two hundred points of a random walk with steps of 0.004 mm times the scale, in three axes and in five."""
     rng = np.random.default_rng(1)
-    tips = scale * np.cumsum(rng.normal(0, 0.004, (300, 3)), axis=0)
-    axes = np.array([0.3, 0.1, 1]) + np.cumsum(rng.normal(0, 0.002, (300, 3)), axis=0)
+    tips = scale * np.cumsum(rng.normal(0, 0.004, (200, 3)), axis=0)
+    axes = np.array([0.3, 0.1, 1]) + np.cumsum(rng.normal(0, 0.002, (200, 3)), axis=0)
     axes /= np.linalg.norm(axes, axis=1, keepdims=True)
     good(convert(toolpath("RAPID", "GOTO/0,0,5", *goto(tips)), "mill-3axis"))
-    for name in ("mikron-ucp710", "linuxcnc-xyzac-trt"):
+    for name in ["mikron-ucp710"] if scale < 0.1 or scale > 1.0 else ["linuxcnc-xyzac-trt"]:
         good(convert(toolpath("RAPID", *goto([[0, 0, 5]], axes[:1]), *goto(tips, axes)), name))
 
 

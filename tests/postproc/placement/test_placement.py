@@ -26,11 +26,11 @@ from toolpaths.diagnostics import Diagnostic, error, has_errors
 from toolpaths.toolpath import Toolpath
 from toolpaths.units import DEG
 
-HEAD = ["UNITS/MM", "CUTTER/16,8", "LOADTL/1", "SPINDL/RPM,1000,CLW", "FEDRAT/MMPM,60000"]
+HEAD = ["UNITS/MM", "CUTTER/16,8", "LOADTL/1", "SPINDL/RPM,1000,CLW"]
 
 
-def passes(way: tuple[float, float], count: int = 3, length: float = 80.0) -> Toolpath:
-    """Level passes along `way`, 1 mm beside each other, 3-axis."""
+def passes(way: tuple[float, float], count: int = 3, length: float = 80.0, feed: int = 60000) -> Toolpath:
+    """Level passes along `way`, 1 mm from each other, 3-axis; `feed` in mm/min."""
     along, up = np.array([*way, 0.0]) * length, np.array([0.0, 0.0, 5.0])
     lines = []
     for k in range(count):
@@ -38,13 +38,17 @@ def passes(way: tuple[float, float], count: int = 3, length: float = 80.0) -> To
         for word, tip in (("RAPID", beside + up), ("RAPID", beside), ("", along + beside),
                           ("RAPID", along + beside + up)):
             lines += [word] * bool(word) + ["GOTO/{:.6f},{:.6f},{:.6f}".format(*tip)]
-    path, found = toolpaths.read_bytes("\n".join([*HEAD, *lines, "FINI"]).encode(), file="passes.apt")
+    path, found = toolpaths.read_bytes("\n".join([*HEAD, f"FEDRAT/MMPM,{feed}", *lines, "FINI"]).encode(), file="passes.apt")
     assert not has_errors(found), found
     return path
 
 
+STEADY = 15000
+"""mm/min: never reached within 80 mm under that jerk"""
+
+
 def jerk_only(m: Machine) -> Machine:
-    """No limit but jerk, the same on every slide."""
+    """No limit but jerk, the same on every slide; at STEADY none is asked for more than the file of the machine allows."""
     free = np.full(len(m.rotary), 1e9)
     return replace(m, limits=replace(m.limits, velocity=free, acceleration=free, jerk=np.where(m.rotary, 1e12, 5000.0)))
 
@@ -70,22 +74,22 @@ def test_turning_aims_a_vertex_of_the_box_along_the_passes() -> None:
     """Under jerk alone, J on each slide, a straight way D takes (32 D/J)^(1/3) along an axis; along the diagonal of X and
     Y each goes D/sqrt(2): 2^(-1/6) of it."""
     m = jerk_only(machine("mill-3axis"))
-    choice = placed(passes((1.0, 0.0)), m, setup_of(turn=(0.0, 90.0)))
-    assert choice.found.now.cutting == pytest.approx(3 * np.cbrt(32 * 80 / 5000.0), rel=1e-3)
+    choice = placed(passes((1.0, 0.0), 1, feed=STEADY), m, setup_of(turn=(0.0, 90.0)))
+    assert choice.found.now.cutting == pytest.approx(np.cbrt(32 * 80 / 5000.0), rel=1e-3)
     assert choice.best.cutting / choice.found.now.cutting == pytest.approx(2 ** (-1 / 6), rel=2e-3)
     assert choice.best.place[ANGLES] == pytest.approx(45 * DEG, abs=1.0 * DEG)
 
 
 def test_listed_turns_are_the_only_ones() -> None:
     m = jerk_only(machine("mill-3axis"))
-    choice = placed(passes((1.0, 0.0)), m, setup_of(turns=[0.0, 30.0, 90.0]))
+    choice = placed(passes((1.0, 0.0), 1, feed=STEADY), m, setup_of(turns=[0.0, 30.0, 90.0]))
     assert choice.best.place[ANGLES] == pytest.approx(30 * DEG)
     assert choice.best.cutting / choice.found.now.cutting == pytest.approx(np.cbrt(np.cos(30 * DEG)), rel=2e-3)
 
 
 def test_the_seconds_are_those_of_orient() -> None:
     """The choice of orientations, asked about the new set-up, finds the same time with the axes of the file."""
-    path, m, setup = passes((1.0, 0.0)), machine("mikron-ucp710"), setup_of(x=(-50.0, 50.0), turn=(0.0, 90.0))
+    path, m, setup = passes((1.0, 0.0), 1), machine("mikron-ucp710"), setup_of(x=(-50.0, 50.0), turns=[0.0, 30.0])
     choice = placed(path, m, setup)
     for part, one in ((setup.part, choice.found.now), (choice.part, choice.best)):
         oriented, _ = orient(path, m, setup.model_copy(update={"part": part}), Options())
@@ -124,7 +128,7 @@ def test_limits_and_table_hold() -> None:
     """Every place that is timed is inside the limits, and the part inside the table's box."""
     table = PlaceBox(low=(-100.0, -60.0, -50.0), high=(100.0, 60.0, 50.0))
     setup = setup_of(x=(-90.0, 90.0), y=(-40.0, 40.0), turn=(0.0, 180.0), point=(40.0, 0.0, 0.0), table=table)
-    choice = placed(passes((1.0, 0.0)), machine("mill-3axis"), setup)
+    choice = placed(passes((1.0, 0.0), 1), machine("mill-3axis"), setup)
     for one in choice.known:
         if np.isfinite(one.seconds) and one is not choice.found.now:
             assert choice.space.holds(one.place)
@@ -155,7 +159,7 @@ def test_without_limits_it_says_what_to_write() -> None:
 
 def test_the_same_again() -> None:
     m, setup = machine("mikron-ucp710"), setup_of(x=(-50.0, 50.0), turns=[0.0, 45.0])
-    first, second = (placed(passes((1.0, 0.0), 2), m, setup) for _ in range(2))
+    first, second = (placed(passes((1.0, 0.0), 1), m, setup) for _ in range(2))
     assert (first.best.place == second.best.place).all()
     assert first.best.seconds == second.best.seconds
     assert first.looked == second.looked

@@ -24,7 +24,7 @@ from toolpaths.diagnostics import Severity
 FLAT = [("pocket.cls", "mill-3axis", "linuxcnc"), ("inch_plate.apt", "mill-3axis", "generic-iso"),
         ("five_faces.cls", "mikron-ucp710", "linuxcnc"), ("indexed_4axis.cls", "mill-4axis", "linuxcnc")]
 FIVE = [("tool_axis_tour.apt", "mikron-ucp710", "linuxcnc"), ("tool_axis_tour.apt", "linuxcnc-xyzac-trt", "linuxcnc")]
-MOST = 7
+MOST = 4
 
 
 def found(result: PostResult, lines: list[str]) -> set[str]:
@@ -83,14 +83,15 @@ def test_wrong_number(case: tuple[str, str, str]) -> None:
     rows = some(cutting(case))
     assert not survivors(result, numbers(result, "XYZ", (0.021, -0.3, 7.0), rows))
     if case == FLAT[0]:
-        assert not survivors(result, numbers(result, "IJ", (-0.3, 7.0), rows))
+        arcs = [i for i in cutting(case) if re.search(r"\b[IJ]", result.text.splitlines()[i])]
+        assert not survivors(result, numbers(result, "IJ", (-0.3, 7.0), some(arcs, 2)))
 
 
 @pytest.mark.parametrize("case", FIVE)
 def test_wrong_number_in_five_axes(case: tuple[str, str, str]) -> None:
     result = sample(*case)
-    assert not survivors(result, numbers(result, "XYZ", (0.05, -7.0), some(cutting(case), 4)))
-    assert not survivors(result, numbers(result, "ABC", (10.0, -25.0), some(cutting(case), 4)))
+    assert not survivors(result, numbers(result, "XYZ", (0.05, -7.0), some(cutting(case), 3)))
+    assert not survivors(result, numbers(result, "ABC", (10.0, -25.0), some(cutting(case), 3)))
 
 
 @pytest.mark.parametrize("case", FLAT[:2])
@@ -99,7 +100,7 @@ def test_wrong_number_in_a_canned_cycle(case: tuple[str, str, str]) -> None:
     lines = result.text.splitlines()
     rows = [i for i, n in enumerate(lines) if re.search(r"G8[1-9]|G73", n)]
     rows += [i + 1 for i in rows if re.fullmatch(r"X\S+ Y\S+", lines[i + 1])]
-    assert not survivors(result, numbers(result, "XYZR", (0.021, -0.3, 7.0), some(rows, 4)))
+    assert not survivors(result, numbers(result, "XYZR", (0.021, -0.3, 7.0), some(rows, 3)))
 
 
 @pytest.mark.parametrize("case", FLAT[:3])
@@ -126,7 +127,7 @@ def test_wrong_motion_code(case: tuple[str, str, str], code: str, other: str) ->
     rows = [i for i in cutting(case) if re.search(rf"{code}\b", lines[i])]
     if rows:
         assert not survivors(result, ((f"{i + 1}: {lines[i]}", replaced(lines, i, re.sub(rf"{code}\b", other, lines[i])))
-                                      for i in some(rows, 4)))
+                                      for i in some(rows, 2)))
 
 
 @pytest.mark.parametrize("case", FLAT)
@@ -135,7 +136,7 @@ def test_feed_doubled(case: tuple[str, str, str]) -> None:
     lines = result.text.splitlines()
     rows = [i for i, n in enumerate(lines) if re.search(r"F[\d.]+$", n) and not n.startswith("(")]
     assert not survivors(result, ((f"{i + 1}: {lines[i]}", replaced(lines, i, re.sub(
-        r"F([\d.]+)", lambda m: f"F{2 * float(m[1]):.4f}", lines[i]))) for i in some(rows, 8)))
+        r"F([\d.]+)", lambda m: f"F{2 * float(m[1]):.4f}", lines[i]))) for i in some(rows)))
 
 
 def test_feed_doubled_all_over_a_five_axis_move() -> None:
@@ -246,7 +247,7 @@ SIX = ("fanuc-30i", "siemens-840d", "heidenhain-tnc640", "haas-ngc", "linuxcnc",
 CHANGED = [(source, controller, mode) for controller in SIX for source, mode in (
     (GOLDEN / "three_laws.cls", "auto"), (GOLDEN / "three_laws.cls", "axes"), (GOLDEN / "every_cycle.cls", "auto"))
     if controller not in ("linuxcnc", "generic-iso") or source.stem != "every_cycle"]
-EACH = 5
+EACH = 3
 """changes of each program that every run of the tests looks at; the whole of them with -m slow"""
 HARMLESS = {
     "same": "the same motion, states and times: words that state what holds already, a block twice that goes nowhere",
