@@ -98,9 +98,10 @@ def assemble(file: UserFile, model: MachineModel) -> Machine:
     names = kinematics.axis_names
     retract = names.index(model.retract_axis) if model.retract_axis else -1
     timing = model.timing
+    limits = _limits(model, kinematics)
     return Machine(
         name=file.name, description=model.description, structure=model.kinematics.describe(), kinematics=kinematics,
-        axis_names=names, rotary=kinematics.rotary, limits=_limits(model, kinematics),
+        axis_names=names, rotary=kinematics.rotary, limits=limits, stated=limits,
         home=np.array([model.axes[name].home for name in names]) * _scale(kinematics), retract_axis=retract,
         timing=Timing(timing.tool_change, timing.clamp, timing.unclamp, frozenset(timing.assumed)),
         control_kinematics=model.control_kinematics(), file=file.file,

@@ -72,6 +72,7 @@ class Machine:
         control_kinematics: set where the control owns the kinematics (programs in tip coordinates)
         stop: what a stop of the program switches off: "spindle and coolant", "spindle", "nothing", or "" where the machine
             file does not say
+        stated: the limits as the machine file has them; `limits` is another object where they were changed in memory
     """
 
     name: str
@@ -87,6 +88,7 @@ class Machine:
     control_kinematics: ControlKinematics | None = None
     file: str = ""
     stop: str = ""
+    stated: Limits | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "home", frozen(self.home, np.float64, (len(self.axis_names),), "Machine.home"))

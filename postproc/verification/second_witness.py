@@ -29,12 +29,23 @@ from toolpaths.toolpath import ClSource
 
 
 def machine_tables(machine: Machine) -> list[dict[str, Any]]:
-    """The machine's file as parsed, then that of its base and so on; none where there is no file."""
+    """The machine's file as parsed, then that of its base and so on; none where there is no file. Limits that a caller has
+    changed in memory stand before it."""
     known = builtin()
     path = Path(machine.file) if machine.file else known.get(machine.name)
     if path is None or not path.is_file():
         return []
-    return [tomllib.loads(read_input(file).decode("utf-8-sig")) for file in base_chain(path, known)]
+    tables = [tomllib.loads(read_input(file).decode("utf-8-sig")) for file in base_chain(path, known)]
+    return tables if machine.limits is machine.stated else [{"axes": _limits_table(machine)}, *tables]
+
+
+def _limits_table(machine: Machine) -> dict[str, dict[str, Any]]:
+    """Travel and velocity of each axis as a machine file states them."""
+    limits, units = machine.limits, _units(machine.axis_names).tolist()
+    return {letter: {"velocity": v * unit,
+                     "travel": [low * unit, high * unit] if math.isfinite(low) and math.isfinite(high) else "unlimited"}
+            for letter, unit, low, high, v in zip(machine.axis_names, units, limits.lower.tolist(), limits.upper.tolist(),
+                                                  limits.velocity.tolist(), strict=True)}
 
 
 def executed_of(comparison: Comparison, poses: Poses, job: Job) -> Executed:
