@@ -22,7 +22,8 @@ class Targets:
     Attributes:
         tip, axis (M, 3); kind (M,): RAPID, LINE, ARC, ENTER, BOTTOM; row (M,): of the CL file
         start (M, 3), start_axis: where the way there begins; free (M,): that is wherever the tool stands
-        gap (M,): the way there is not known; centre, normal (M, 3), sweep (M,): of arcs, 0 for others
+        gap (M,): the way there is not known; skipped (M,): by positions that are not known
+        centre, normal (M, 3), sweep (M,): of arcs, 0 for others
         out (M,): of bottoms, mm above them to which the tool leaves the hole; NaN where no number says so
     """
 
@@ -34,6 +35,7 @@ class Targets:
     start_axis: Array
     free: Array
     gap: Array
+    skipped: Array
     centre: Array
     normal: Array
     sweep: Array
@@ -78,8 +80,9 @@ def targets_of(c: Commanded, tip: Array, axis: Array, centre: Array, normal: Arr
     m = len(row)
     mid, about, sweep = np.zeros((m, 3)), np.zeros((m, 3)), np.zeros(m)
     mid[round_], about[round_], sweep[round_] = centre[arc[round_]], normal[arc[round_]], c.sweep[arc[round_]]
-    gap = c.gap[row] | (skipped & ~second)
-    return Targets(there, axis[row], kind, row, start, start_axis, free, gap, mid, about, np.where(gap, 0.0, sweep),
+    skipped &= ~second
+    gap = c.gap[row] | skipped
+    return Targets(there, axis[row], kind, row, start, start_axis, free, gap, skipped, mid, about, np.where(gap, 0.0, sweep),
                    np.where(second, depth[row] + out[row], np.nan))
 
 
@@ -87,7 +90,8 @@ def matched(targets: Targets, tip: Array, axis: Array, turns: Array, tolerance: 
             axis_tolerance: float) -> tuple[Array, Array]:
     """(block (M,) that ends at each target, -1; target (E,) that each block serves, M behind the last)."""
     around = np.concatenate([targets.centre, targets.normal], axis=1)
-    match = walk(tip, axis, turns, targets.tip, targets.axis, targets.sweep, around, (tolerance, axis_tolerance))
+    match = walk(tip, axis, turns, targets.tip, targets.axis, targets.sweep, around, targets.skipped,
+                 (tolerance, axis_tolerance))
     reached = match[:int(np.argmax(match < 0))] if (match < 0).any() else match
     return match, np.searchsorted(reached, np.arange(len(tip)), side="left")
 

@@ -18,17 +18,19 @@ _compiled: list[Callable[..., Any]] = []
 
 
 def walk(tip: Array, axis: Array, sweep: Array, targets: Array, directions: Array, arc: Array, around: Array,
-         within: tuple[float, float]) -> Array:
+         skipped: Array, within: tuple[float, float]) -> Array:
     """(M,) block that ends at each target, -1 from the first on that none ends at.
 
     Args:
         tip, axis (E, 3): tool at the end of every block; sweep (E, 3): rotation vector of blocks that are arcs
         targets, directions (M, 3): tips and axes to come to, in order
         arc (M,): rad that the tool turns about `around` (M, 6), centre and axis, on its way there; 0 for no arc
+        skipped (M,): positions that nobody knows stand before it, so that the tool leaves, though it may come back to
+            where it stood
         within: mm and rad
     """
     run = _walk if len(tip) < COMPILED_FROM else _fast()
-    return np.asarray(run(tip, axis, sweep, targets, directions, arc, around, *within))
+    return np.asarray(run(tip, axis, sweep, targets, directions, arc, around, skipped, *within))
 
 
 def _fast() -> Callable[..., Any]:
@@ -36,7 +38,8 @@ def _fast() -> Callable[..., Any]:
         from numba import njit, types
 
         rows, numbers = (types.Array(types.float64, n, "A", readonly=True) for n in (2, 1))
-        signature = (rows, rows, rows, rows, rows, numbers, rows, types.float64, types.float64)
+        flags = types.Array(types.boolean, 1, "A", readonly=True)
+        signature = (rows, rows, rows, rows, rows, numbers, rows, flags, types.float64, types.float64)
         for name in ("_apart", "_near", "_turned"):
             globals()[name] = njit(cache=True)(globals()[name])
         _compiled.append(njit(signature, cache=True)(_walk))
@@ -59,14 +62,14 @@ def _turned(a: Any, b: Any, c: Any) -> Any:
     return math.atan2(cross, px * qx + py * qy + pz * qz - h * g)
 
 
-def _walk(tip: Any, axis: Any, sweep: Any, targets: Any, directions: Any, arc: Any, around: Any, tol: float,
-          axis_tol: float) -> Any:
+def _walk(tip: Any, axis: Any, sweep: Any, targets: Any, directions: Any, arc: Any, around: Any,
+          skipped: Any, tol: float, axis_tol: float) -> Any:
     count = len(tip)
     match = np.full(len(targets), -1, np.int64)
     j = -1
     for i in range(len(targets)):
         goal, along, whole = targets[i], directions[i], arc[i]
-        if j >= 0 and abs(whole) < math.pi and _near(_apart(tip[j], goal), _apart(axis[j], along), 2e-3, 1e-5):
+        if j >= 0 and not skipped[i] and abs(whole) < math.pi and _near(_apart(tip[j], goal), _apart(axis[j], along), 2e-3, 1e-5):
             after = j + 1 < count and _near(_apart(tip[j + 1], goal), _apart(axis[j + 1], along), 2e-3, 1e-5)
             if not after:
                 match[i] = j
