@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from postproc.base.header_words import FINGERPRINT, HEADER
+from postproc.base.header_words import FINGERPRINT, HEADER, head_of
 from postproc.base.memory import give_back
 from postproc.base.options import NO_FILE, SETUP_MARK, Options
 from postproc.job.job import Job
@@ -43,7 +43,7 @@ CAUSES = frozenset({"verify.start", "verify.tool", "verify.tool_change", "verify
 
 def other_axes(data: bytes, options: Options, gcode: str) -> list[Diagnostic]:
     """An error where the header of a program names other chosen tool axes than the options; nothing without our header."""
-    head = data[:HEADER]
+    head = head_of(data)
     stated, chosen = _ORIENTED.search(head), options.orient != "keep"
     given = f"--orient {options.orient} --max-tilt {options.max_tilt:g}" if chosen else "no --orient"
     if stated is None:
@@ -58,7 +58,7 @@ def other_axes(data: bytes, options: Options, gcode: str) -> list[Diagnostic]:
 
 def other_setup(data: bytes, options: Options, off: bool, gcode: str) -> list[Diagnostic]:
     """What the header of a program says of its set-up where that is not the one given; `off`: the program fails."""
-    head = data[:HEADER]
+    head = head_of(data)
     stated = _SETUP.search(head)
     then = stated[2].decode("ascii").lower() if stated and stated[2] else ""
     if then == options.setup_mark or (stated and not then) or not _OURS.search(head):
@@ -85,7 +85,7 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Callable[[str, i
     home = control.words(machine.home[None, :], machine.kinematics, 0.0)[0] + control.work_offset
     reader = reader_for(job.controller, machine.axis_names, home, machine.stop)
     code, diagnostics = reader.read(data, gcode, others)
-    head = as_bytes(data[:HEADER])
+    head = head_of(as_bytes(data[:HEADER]))
     diagnostics = [_located(_judged(d, reader.units_stay), job.toolpath.file) for d in diagnostics]
     if gcode and not _by_post(job) and _CORRECTED.search(head):
         return None, [_twice(job, gcode), *diagnostics]
@@ -109,7 +109,8 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Callable[[str, i
         progress("read back", 0, len(motion))
     executed = _executed(job, motion, offsets.lengths)
     with np.errstate(invalid="ignore"):
-        planned, changed = planned_feeds(as_bytes(data), others or {}, gcode or job.toolpath.file)
+        called = {name: others[name] for name, _ in code.files[1:]} if others else {}
+        planned, changed = planned_feeds(as_bytes(data), called, gcode or job.toolpath.file)
         comparison = compare(motion, job, executed, gcode, planned)
     lengths = [] if any(d.code == "verify.state" for d in comparison.diagnostics) else check_lengths(motion, job, faults)
     unseen += [*lengths, *changed, *check_end(motion, job, home, faults), *check_changes(code, motion, job, home, faults),

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from postproc.base.header_words import FEEDS, UNKNOWN
+from postproc.base.header_words import FEEDS, HEADER, UNKNOWN, head_of
 from postproc.control.control import Control
 from postproc.control.word_arcs import PLANE_COLUMNS
 from postproc.job.job import Job
@@ -27,18 +27,19 @@ from toolpaths.toolpath import Kind
 
 _PLANNED = re.compile(rb"(?im)^[ \t(;\d]*feed planned")
 _STATED = re.compile(rb"(?im)^[^\n]*" + FEEDS.encode("ascii") + rb" ([0-9a-f]{8})\b")
+_PLACE = re.compile(f"(?i){FEEDS} {UNKNOWN}")
 _FEED = re.compile(rb"(?i)(?<![A-Z])F *(\d[\d.]*|\.\d+)")
-HEADER = 4000
-"""characters of a program that hold its header"""
 
 
 def planned_feeds(data: bytes, others: Mapping[str, bytes], gcode: str) -> tuple[bool, list[Diagnostic]]:
     """(True where the header of a program says that its feeds were planned, an error where they are others now).
 
+    `others`: the files of its subprograms, and no more: other files stand in the same folder.
+
     Feeds that were planned keep acceleration and jerk, which the program does not show: they count as explained only as they
     were written.
     """
-    head = data[:HEADER]
+    head = head_of(data)
     if not _PLANNED.search(head):
         return False, []
     stated, now = _STATED.search(head), feed_fingerprint(data, others)
@@ -60,9 +61,10 @@ def feed_fingerprint(data: bytes, others: Mapping[str, bytes]) -> str:
 
 def with_fingerprint(text: str, files: Mapping[str, str]) -> str:
     """The text of a program with the fingerprint of its F words in the place that the header has left for it."""
-    at = text.find(UNKNOWN, 0, HEADER)
-    if at < 0:
+    place = _PLACE.search(text, 0, HEADER)
+    if place is None:
         return text
+    at = place.end() - len(UNKNOWN)
     mark = feed_fingerprint(text.encode(), {name: t.encode() for name, t in files.items()})
     return text[:at] + mark + text[at + len(UNKNOWN):]
 
