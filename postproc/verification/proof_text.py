@@ -19,6 +19,8 @@ from toolpaths.units import DEG
 
 PLACES = 4
 """decimals of mm and degrees in the head"""
+ELSEWHERE = "proof: not said here"
+"""in the head of a program whose blocks are too short for it; the summary and the file of the proof say it"""
 _MARGIN = 1e-6
 """of the last decimal: a bound that stands on it goes to the next, on every processor"""
 _KINEMATICS = "kinematics "
@@ -46,22 +48,27 @@ def _means(said: Testimony | None) -> str:
 
 
 def head_line(c: Comparison, said: Testimony | None, room: int) -> str:
-    """The same for the head of the program, in at most `room` characters; bounds are rounded up.
+    """The same for the head of the program, in at most `room` characters, never cut short; bounds are rounded up.
 
-    Without room for the names of what was not compared it says how many that are.
+    Without room for the names of what was not compared it says how many that are; without room for that, how near alone; and
+    where not even that has room, that it is not said here.
     """
     second = said is not None and bool(said.compared)
     by = "read-back, second reading" if second else "read-back"
     if c.unbounded:
-        near = f"{_up(c.worst_tip)} mm, {_up(c.worst_axis / DEG)} degrees at places"
-        text = f"checked, not proved: {c.cuts - c.bounded_cuts} of {c.cuts} cuts unbounded; {near}"
+        near = f"{_up(c.worst_tip)}, {_up(c.worst_axis / DEG)}"
+        text = (f"checked, not proved: {c.cuts - c.bounded_cuts} of {c.cuts} cuts unbounded; "
+                f"{_up(c.worst_tip)} mm, {_up(c.worst_axis / DEG)} degrees at places")
     else:
         cuts = f"all {c.cuts} cuts" if c.cuts == c.bounded_cuts else f"{c.bounded_cuts} of {c.cuts} cuts"
+        near = f"{_up(c.tip_bound)}, {_up(c.axis_bound / DEG)}"
         text = f"proved by {by}: {cuts} within {_up(c.tip_bound)} mm, {_up(c.axis_bound / DEG)} degrees"
     left = [] if said is None else list(said.not_compared)
     named = "; not in the second reading: " + "; ".join(left).replace("(", "- ").replace(")", "")
-    short = f"; {len(left)} not read twice"
-    return text if not left else text + (named if len(text + named) <= room else short)
+    count = f"; {len(left)} not read twice" if left else ""
+    tight = f"{'not proved' if c.unbounded else 'proved'}: {near} mm, degrees{count}"
+    return next(line for line in ((text + named) if left else text, text + count, tight, ELSEWHERE, "")
+                if len(line) <= room)
 
 
 def _up(value: float) -> str:

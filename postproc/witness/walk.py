@@ -69,7 +69,8 @@ def _walk(tip: Any, axis: Any, sweep: Any, targets: Any, directions: Any, arc: A
     j = -1
     for i in range(len(targets)):
         goal, along, whole = targets[i], directions[i], arc[i]
-        if j >= 0 and not skipped[i] and abs(whole) < math.pi and _near(_apart(tip[j], goal), _apart(axis[j], along), 2e-3, 1e-5):
+        stands = j >= 0 and not skipped[i] and abs(whole) < math.pi
+        if stands and _near(_apart(tip[j], goal), _apart(axis[j], along), 2e-3, 1e-5):
             after = j + 1 < count and _near(_apart(tip[j + 1], goal), _apart(axis[j + 1], along), 2e-3, 1e-5)
             if not after:
                 match[i] = j

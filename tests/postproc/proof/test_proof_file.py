@@ -249,6 +249,22 @@ def test_the_line_is_never_cut_short(name: str) -> None:
     assert short.endswith("; not in the second reading: feeds - inverse time")
 
 
+@pytest.mark.parametrize("length", [40, 48, 72, 80, 100])
+def test_short_blocks_hold_the_line_whole_or_none(length: int, tmp_path: Path) -> None:
+    """`within 0.)` would be a lie: every figure stands whole, or the line says that none is said."""
+    shop = tmp_path / "short.toml"
+    shop.write_text(f'base = "linuxcnc"\n[format]\nline_length = {length}\n')
+    result = good(convert(toolpath(*CUT), "mill-3axis", shop))
+    room = comment_room(result.controller)
+    (line,) = [one[1:-1] for one in result.text.splitlines()[:8] if "proof" in one or "proved" in one]
+    assert line == text.head_line(result.comparison, result.witness, room) and len(line) <= room
+    assert line == text.ELSEWHERE or ("0.0001" in line and line.endswith(("degrees", "read twice")))
+    said = Said(("9 arcs",), tuple("abcdefghijkl"))
+    many = replace(result.comparison, cuts=1_000_000, bounded_cuts=999_999, unbounded=5)
+    line = text.head_line(many, said, room)
+    assert line == text.ELSEWHERE or ("not proved" in line and line.endswith("12 not read twice"))
+
+
 def test_a_bound_is_rounded_up() -> None:
     """What stands on the last decimal goes to the next, so that no processor's last bit changes a program."""
     assert [text._up(value) for value in (0.0, 1e-12, 0.0083, 0.0083 - 1e-13, 0.00831)] == [

@@ -1,4 +1,4 @@
-"""What verify takes from the head of a program and from its folder: no comments of the CL file, no files of other programs."""
+"""What verify takes from the head of a program and from its folder: no comments of the CL file, no other programs."""
 
 from __future__ import annotations
 

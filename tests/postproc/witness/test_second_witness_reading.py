@@ -117,7 +117,7 @@ def test_a_path_that_was_changed_after_reading_has_no_second_reading() -> None:
 
 @pytest.mark.parametrize("after", ["", "FEDRAT/100,MMPM\nGOTO/0,0,0\nGOTO/10,0,0\nRAPID\nGOTO/0,0,50\n"])
 def test_holes_that_are_not_read_refuse_no_program_that_comes_back_to_where_it_was(after: str) -> None:
-    """The position behind the holes is that before them: what is between is not compared, and no motion without a command."""
+    """The position behind the holes is that before them: what is between is not compared, and is no fault."""
     text = ("UNITS/MM\nLOADTL/1\nSPINDL/RPM,3000,CLW\nRAPID\nGOTO/0,0,50\nCYCLE/DRILL,FEDTO,10,RAPTO,3,FEDRAT,120,MMPM\n"
             f"GOTO/10,10,0\nGOTO/20,10,0\nCYCLE/OFF\nRAPID\nGOTO/0,0,50\n{after}FINI\n")
     path, found = toolpaths.read_bytes(text)
