@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator
+from textwrap import wrap
 
 import numpy as np
 
@@ -59,6 +60,11 @@ class WriterState:
     def comment(self, text: str) -> str:
         """One comment block."""
         return f"{self.controller.comment.open}{self.clean(text)}{self.controller.comment.close}"
+
+    def folded(self, text: str) -> list[str]:
+        """A text in parts that a comment holds whole: a figure that is cut short is another one."""
+        room = comment_room(self.controller)
+        return [text] if len(text) <= room else wrap(text, room, break_on_hyphens=False)
 
     def clean(self, text: str) -> str:
         """The text without characters that a comment must not hold, cut to the line length."""

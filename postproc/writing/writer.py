@@ -55,7 +55,7 @@ class Writer(WriterState, ABC):
         main, subs = self.sorted_blocks()
         inside = [block for blocks in subs.values() for block in blocks] if place != "files" else []
         yield from (self.framed(block.format(**named)) for block in frame.begin)
-        yield from map(self.framed, map(self.comment, (*header, *self.relies_on())))
+        yield from (self.framed(self.comment(part)) for line in (*header, *self.relies_on()) for part in self.folded(line))
         yield from map(self.numbered, inside if place == "before" else [])
         yield from map(self.numbered, main) if self.numbers_blocks else main
         yield from map(self.numbered, self.ending())
