@@ -34,6 +34,7 @@ class UserModel(BaseModel):
 
 
 M = TypeVar("M", bound=BaseModel)
+_HOW = "write key = value, text in quotes, each [table] and each key on a line of its own"
 
 
 @dataclass(frozen=True)
@@ -164,7 +165,7 @@ def _read(source: str, builtin: Mapping[str, FilePath], kind: str, wanted_by: Us
     except (ValueError, RecursionError) as fault:  # of Python's own: digits of a number, depth of lists
         why = "its lists or tables are nested too deeply" if isinstance(fault, RecursionError) else str(fault).split(";")[0]
         return None, [error("file.syntax", f"not valid TOML: {why}", file=str(path),
-                            hint="write key = value, text in quotes, [table] in brackets")]
+                            hint=_HOW)]
     origins = {p: Origin(str(path), line) for p, line in key_lines(text).items()}
     return _with_base(UserFile(name, str(path), values, origins), builtin, kind, (*above, key))
 
@@ -200,8 +201,7 @@ def _syntax(fault: tomllib.TOMLDecodeError, file: str, text: str) -> Diagnostic:
     if number:
         return error("file.syntax", f"{number} is no number", file=file, lines=[line],
                      hint=f"{POINT}: {number.replace(',', '.')}")
-    return error("file.syntax", f"not valid TOML: {what}", file=file, lines=[line],
-                 hint="write key = value, text in quotes, [table] in brackets")
+    return error("file.syntax", f"not valid TOML: {what}", file=file, lines=[line], hint=_HOW)
 
 
 def _with_base(file: UserFile, builtin: Mapping[str, FilePath], kind: str,

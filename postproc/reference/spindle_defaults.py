@@ -19,6 +19,7 @@ _COOLANT = {"off": "OFF", "flood": "FLOOD", "mist": "MIST", "through": "THRU", "
 _ALONG = 1e-9
 """by which the cosine between a straight retract and the tool axis may be less than 1"""
 _OFF = frozenset({"OFF", "NEUTRL", "NEUTRAL"})
+_DRY: tuple[str | float, ...] = ("OFF",)
 
 
 @dataclass(frozen=True)
@@ -44,34 +45,66 @@ def with_defaults(toolpath: Toolpath, setup: SetupFile) -> tuple[Toolpath, State
     what the set-up states so.
 
     A record states it for a tool where it stands between the tool's load and the next one; a start that stands right before
-    the load, without a motion between, is the tool's too. `[tools.N]` comes before what the tool before has left in force,
-    `[output]` behind it.
+    the load, without a motion between, is the tool's too. `[tools.N]` comes before what the records of the tool before have
+    left in force, `[output]` behind it; what the set-up states for one tool is never in force for the next.
     """
     new: list[tuple[int, Event]] = []
     toolpath, stated = _with_speeds(toolpath, setup)
-    spindle, flowing = Spindle(), False
+    filed = actual = Spindle()
+    cooling = running = _DRY
     cuts = np.flatnonzero(cutting(toolpath))
     for use in uses(toolpath):
         here = toolpath.events[use.begin:use.end]
         own = setup.tools.get(str(use.number), ToolSetup())
         first = int(cuts[np.searchsorted(cuts, use.first)]) if np.searchsorted(cuts, use.first) < len(cuts) else use.last
         if first < use.last:
-            wanted = _spindle_of(here, first, spindle, own, setup)
+            wanted = _spindle_of(here, first, filed, own, setup)
             if wanted is not None:
-                side = "CLW" if wanted.direction == "clockwise" else "CCLW"
-                record = Event(use.first, "SPINDL", ("RPM", wanted.rpm, side), use.line)
+                record = _record(wanted, use)
                 new.append((use.at, record))
-                spindle = spindle_after(record, spindle)
+                actual = spindle_after(record, actual)
                 stated.setdefault((use.number, str(wanted)), []).append(use.line)
-            cooled = _coolant_of(here, first, flowing, own, setup)
+            elif not _same(actual, filed) and not _said("SPINDL", here, first):
+                record = _again(filed, use)
+                new.append((use.at, record))
+                actual = spindle_after(record, actual)
+            cooled = _coolant_of(here, first, not _stops(cooling), own, setup)
+            flow = cooling if cooled is None else (_COOLANT[cooled],)
+            if cooled is not None or (flow != running and not _said("COOLNT", here, first)):
+                new.append((use.at, Event(use.first, "COOLNT", flow, use.line)))
+                running = flow
             if cooled is not None:
-                new.append((use.at, Event(use.first, "COOLNT", (_COOLANT[cooled],), use.line)))
-                flowing = cooled != "off"
                 stated.setdefault((use.number, f"coolant {cooled}"), []).append(use.line)
         for event in here:
-            spindle = spindle_after(event, spindle) if event.word == "SPINDL" else spindle
-            flowing = "OFF" not in words(event) if event.word == "COOLNT" else flowing
+            if event.word == "SPINDL":
+                filed, actual = spindle_after(event, filed), spindle_after(event, actual)
+            elif event.word == "COOLNT":
+                cooling = running = event.values
     return (replace(toolpath, events=_placed(toolpath.events, new)) if new else toolpath), stated
+
+
+def _record(wanted: SpindleSetup, use: Use) -> Event:
+    return Event(use.first, "SPINDL", ("RPM", wanted.rpm, "CLW" if wanted.direction == "clockwise" else "CCLW"), use.line)
+
+
+def _again(filed: Spindle, use: Use) -> Event:
+    """The spindle as the file's own records have left it; off, of line 0, where they state none."""
+    if filed.direction == 0 or not filed.rpm > 0.0:
+        return Event(use.first, "SPINDL", ("OFF",), 0)
+    return Event(use.first, "SPINDL", ("RPM", filed.rpm, "CLW" if filed.direction > 0 else "CCLW"), use.line)
+
+
+def _same(a: Spindle, b: Spindle) -> bool:
+    return a.direction == b.direction and (a.direction == 0 or a.rpm == b.rpm or (a.rpm != a.rpm and b.rpm != b.rpm))
+
+
+def _stops(values: tuple[str | float, ...]) -> bool:
+    return any(str(v).upper() == "OFF" for v in values)
+
+
+def _said(word: str, here: tuple[Event, ...], first: int) -> bool:
+    """Whether a record of the tool states it up to its first cut."""
+    return any(e.word == word and e.index <= first for e in here)
 
 
 def _with_speeds(toolpath: Toolpath, setup: SetupFile) -> tuple[Toolpath, Stated]:
@@ -224,5 +257,5 @@ def _of_another(toolpath: Toolpath, row: int) -> bool:
     """True where no record states the spindle of the tool that cuts row: the set-up's default counts there."""
     found = uses(toolpath)
     use = found[max(bisect_right([u.first for u in found], row) - 1, 0)]
-    return not any(e.word == "SPINDL" for e in toolpath.events[use.begin:use.end])
+    return not any(e.word == "SPINDL" and e.line > 0 for e in toolpath.events[use.begin:use.end])
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import count
 
 import numpy as np
 
-from postproc.reference.events import TOOL_WORDS, cutting, loaded_tools
+from postproc.reference.events import TOOL_WORDS, cutting, loaded_tools, numbers
 from postproc.reference.tools_alike import differ
 from postproc.reference.unnumbered_tools import measured, named_by, with_loads, with_tools, without_number
 from postproc.setup.model import SetupFile
@@ -77,6 +78,9 @@ def check_numbers(toolpath: Toolpath, report: Report) -> None:
     lines = toolpath.line[(toolpath.kind != Kind.RAPID) | (toolpath.cycle >= 0)]
     used, first = np.unique(cutting, return_index=True)
     known: dict[int, list[tuple[Tool, int]]] = {}
+    taken = {t.number for t in toolpath.tools} | {int(numbers(e)[0]) for e in toolpath.events
+                                                  if e.word in TOOL_WORDS and numbers(e)}
+    unused = (n for n in count(1) if n not in taken)
     for index, at in sorted(zip(used.tolist(), first.tolist(), strict=True), key=lambda pair: pair[1]):
         if index < 0 or toolpath.tools[index].number <= 0:
             continue
@@ -84,19 +88,21 @@ def check_numbers(toolpath: Toolpath, report: Report) -> None:
         others = known.setdefault(tool.number, [])
         other = next((o for o in others if differ(o[0], tool)), None)
         if other:
-            hint = f"cutting begins at lines {other[1]} and {line}; {_remedy(other[0], tool)}number them in the CAM system"
+            hint = (f"cutting begins at lines {other[1]} and {line}; {_remedy(other[0], tool, next(unused))}"
+                    "number them in the CAM system")
             named = other[0].name or tool.name or other[0].shape or tool.shape
             report(Severity.ERROR if named else Severity.WARNING, "tool.same_number", "different tools have the number "
                    f"{tool.number}: {_called(other[0])} and {_called(tool)}", other[1], hint)
         others.append((tool, line))
 
 
-def _remedy(a: Tool, b: Tool) -> str:
-    """How the set-up tells two tools of one number apart: by name, where they have different ones."""
+def _remedy(a: Tool, b: Tool, free: int) -> str:
+    """How the set-up keeps two tools of one number apart: by name, where these differ; the second gets `free`."""
     if not a.name or not b.name or a.name.upper() == b.name.upper():
         return ""
     first, second = json.dumps(a.name, ensure_ascii=False), json.dumps(b.name, ensure_ascii=False)
-    return f"number them by name in the set-up ([tool_numbers] {first} = 1, {second} = 2, on lines of their own), or "
+    return (f"number them by name in the set-up ([tool_numbers] {first} = {a.number}, {second} = {free}, "
+            "on lines of their own), or ")
 
 
 def _called(tool: Tool) -> str:

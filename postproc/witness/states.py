@@ -208,12 +208,12 @@ def check_states(w: Walked, c: Commanded, case: Case) -> tuple[list[Finding], di
 
 
 def _spindles(tool: Array, direction: Array, rpm: Array, setup: dict[str, Any]) -> tuple[Array, Array]:
-    """(direction, rpm) (K,) with those of the set-up where no record states any: of the tool, else of [output] where no tool
-    has its own, which could still be in force."""
+    """(direction, rpm) (K,) with those of the set-up where no record states any: of the tool, else of [output]."""
     own = {int(n): t["spindle"] for n, t in (setup.get("tools") or {}).items() if (t or {}).get("spindle")}
     default = (setup.get("output") or {}).get("spindle")
-    pairs = [(direction == UNKNOWN, default)] if default and not own else [
-        ((direction == UNKNOWN) & (tool == n), spindle) for n, spindle in own.items()]
+    none = direction == UNKNOWN
+    pairs = [(none & (tool == n), spindle) for n, spindle in own.items()]
+    pairs += [(none & ~np.isin(tool, list(own)), default)] if default else []
     direction, rpm = direction.copy(), rpm.copy()
     for at, spindle in pairs:
         direction[at] = 1 if spindle.get("direction", "clockwise") == "clockwise" else -1
@@ -222,14 +222,14 @@ def _spindles(tool: Array, direction: Array, rpm: Array, setup: dict[str, Any]) 
 
 
 def _coolants(tool: Array, coolant: Array, setup: dict[str, Any]) -> Array:
-    """(K,) coolant with that of the set-up where no record states any: of the tool, else of [output] where no tool has its
-    own, which could still be in force."""
+    """(K,) coolant with that of the set-up where no record states any: of the tool, else of [output]."""
     own = {int(n): t["coolant"] for n, t in (setup.get("tools") or {}).items() if (t or {}).get("coolant")}
     default = (setup.get("output") or {}).get("coolant")
     result = coolant.copy()
-    for number, word in own.items() if own else ([(None, default)] if default else []):
-        here = (coolant == UNKNOWN) & ((tool == number) if number is not None else np.ones(len(tool), bool))
-        result[here] = {"off": 0, "flood": 1, "mist": 11, "through": 12, "air": 13}.get(str(word), 2)
+    of = [(tool == number, word) for number, word in own.items()]
+    of += [(~np.isin(tool, list(own)), default)] if default else []
+    for here, word in of:
+        result[here & (coolant == UNKNOWN)] = {"off": 0, "flood": 1, "mist": 11, "through": 12, "air": 13}.get(str(word), 2)
     return result
 
 

@@ -241,3 +241,15 @@ def test_a_decimal_comma_is_told_with_its_line(text, number, tmp_path):
     assert (d.code, d.lines, d.message) == ("file.syntax", (5,), f"{number} is no number")
     assert d.hint == f"write a decimal point: {number.replace(',', '.')}"
     assert "no number" not in only(tmp_path, GOOD + "velocity 3\n").message
+
+
+def test_a_table_and_its_key_on_one_line_are_parted_as_the_hint_says(tmp_path):
+    d = only(tmp_path, "[axes.X] travel = [0, 1]\n")
+    assert (d.code, d.lines) == ("file.syntax", (1,)) and "each [table] and each key on a line of its own" in d.hint
+    assert "file.syntax" not in {d.code for d in load_toml(_written(tmp_path, "[axes.X]\ntravel = [0, 1]\n"), File)[1]}
+
+
+def _written(folder, text):
+    path = folder / "parted.toml"
+    path.write_text(text)
+    return path

@@ -93,6 +93,22 @@ def test_what_the_tool_before_has_left_in_force_counts_before_output() -> None:
     assert "S900 M3" in switched(good(made(lines, setup(t2={"spindle": {"rpm": 900}}))).text)[3:]
 
 
+def test_what_the_set_up_states_for_one_tool_is_not_in_force_for_the_next() -> None:
+    """T2 has none of its own: `[output]` counts, else what the file's own records have left, else it is refused."""
+    own: dict[str, object] = {"spindle": {"rpm": 900}, "coolant": "flood"}
+    text = good(made(TWO, setup({"spindle": {"rpm": 4000}, "coolant": "mist"}, t1=own))).text
+    assert switched(text) == ["T1 M6", "S900 M3", "M8", "M5", "M9", "T2 M6", "S4000 M3", "M7", "M5", "M9"]
+    refusal, = errors(made(TWO, setup(t1=own)))
+    assert refusal.code == "spindle.stopped" and refusal.lines == (13, 14) and "line" not in refusal.message
+    assert "[tools.2] spindle" in refusal.hint and "[tools.1]" not in refusal.hint
+    assert "M8" not in switched(good(made(TWO, setup(t1=own, t2={"spindle": {"rpm": 800}}))).text)[5:]
+    filed = [*HEAD[:2], "SPINDL/RPM,1500,CCLW", "COOLNT/MIST", "LOADTL/3", *CUT, *TWO[2:]]
+    of = setup({"spindle": {"rpm": 4000}}, t1={"spindle": {"rpm": 900}})
+    assert switched(good(made(filed, of)).text)[-5:] == ["T2 M6", "M7", "S1500 M4", "M5", "M9"]
+    later = [*TWO[:9], "SPINDL/RPM,1500,CLW", *TWO[9:]]
+    assert "S1500 M3" in switched(good(made(later, setup(t1=own))).text)
+
+
 @pytest.mark.parametrize("controller", CONTROLLERS)
 def test_a_cut_behind_spindl_off_is_refused(controller: str) -> None:
     lines = ["UNITS/MM", "FEDRAT/MMPM,600", "LOADTL/1", "SPINDL/RPM,1500,CLW", *CUT, "SPINDL/OFF", *CUT]
