@@ -189,6 +189,15 @@ def test_a_file_where_a_folder_is_needed_and_no_regular_files(tmp_path: Path) ->
     assert sorted(state(tmp_path)) == ["file", "pipe"]
 
 
+@pytest.fixture
+def interrupts() -> Iterator[None]:
+    """Ctrl-C as Python has it: shells start what runs in the background with interrupts ignored."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("interrupts")
 def test_an_interrupt_waits_for_the_renames(shop: tuple[Path, dict[Path, str]], monkeypatch: pytest.MonkeyPatch) -> None:
     folder, outputs = shop
     before, link = state(folder), Path.hardlink_to
