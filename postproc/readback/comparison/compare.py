@@ -92,7 +92,7 @@ def compare(motion: Motion, job: Job, executed: Executed, gcode: str = "", plann
     (worst_tip, tip_line), (worst_axis, axis_line) = _farthest(motion, executed, moves, tip, axis, match, owner, tolerance)
     diagnostics += _beyond("tip", "mm", worst_tip, tolerance, tip_line, faults)
     diagnostics += _beyond("axis", "degrees", worst_axis / DEG, axis_tolerance / DEG, axis_line, faults)
-    bound = _bound(motion, executed, moves, owner, (tolerance, axis_tolerance))
+    bound = _bound(motion, executed, moves, owner, (tolerance, axis_tolerance), job.corrects)
     if not has_errors(diagnostics):
         diagnostics += _unproved(bound, (tolerance, axis_tolerance), moves, motion, owner, faults)
     if bound.unbounded and job.options.require_proof:
@@ -202,14 +202,17 @@ def _not_reached(motion: Motion, moves: Moves, match: Ints, lost: int, faults: F
                         "the program is not made from this CL file with this machine, set-up and tools")
 
 
-def _bound(motion: Motion, executed: Executed, moves: Moves, owner: Ints, allowed: tuple[float, float]) -> DeviationBound:
-    """Bounds of every block of the moves that are no links; dog-legs from hole to hole are bounded in height."""
+def _bound(motion: Motion, executed: Executed, moves: Moves, owner: Ints, allowed: tuple[float, float],
+           corrects: bool) -> DeviationBound:
+    """Bounds of every block of the moves that are no links. From hole to hole dog-legs are looked at in height alone; so are
+    all ways where geometric errors are corrected: a control that drills the holes takes up lost motion on its way."""
     rows = np.flatnonzero((owner < len(moves)) & ~moves.link[np.minimum(owner, len(moves) - 1)])
     begin, share = _place(motion, executed, rows, owner, moves)
-    level = (moves.phase[owner[rows]] == Phase.POSITION) & executed.bent(motion, rows)
+    free = executed.bent(motion, rows) | corrects
+    level = (moves.phase[owner[rows]] == Phase.POSITION) & (motion.code[rows] == 0) & free
     some = as_slice(np.flatnonzero(~level))
     found = deviation_bound(motion, executed, moves, rows[some], owner[rows[some]], begin[some], share[some], allowed)
-    for corner in executed.corners(motion, rows[level]).T if level.any() else ():
+    for corner in (0.0, 0.5, *executed.corners(motion, rows[level]).T) if level.any() else ():
         tip, _ = executed.poses(motion, rows[level], corner)
         height = float(_off_level(moves.curves(owner[rows[level]]), tip).max())
         found = replace(found, tip=max(found.tip, height))
