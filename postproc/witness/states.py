@@ -27,22 +27,23 @@ _FEED_OUT = ("BORE", "REAM", "TAP")
 
 def with_spindle(c: Commanded, setup: dict[str, Any]) -> Commanded:
     """With the set-up's spindle where it counts: `[tools.N]` for a tool that no SPINDL record is for, `[output]` where the
-    spindle stands there too, and the speed of either where the file turns the spindle without one."""
-    output, tools = (setup.get("output") or {}).get("spindle"), setup.get("tools") or {}
-    if not len(c) or not (output or any(t.get("spindle") for t in tools.values())):
+    spindle stands there too, either where no record at all states one, and the speed of either where the file turns the
+    spindle without one."""
+    output = (setup.get("output") or {}).get("spindle")
+    own = {int(n): t["spindle"] for n, t in (setup.get("tools") or {}).items() if (t or {}).get("spindle")}
+    if not len(c) or not (output or own):
         return c
-    tool = tools_of(c, setup)
+    tool, silent = tools_of(c, setup), c.spindle == UNKNOWN
     begin = np.maximum.accumulate(np.where(np.diff(tool, prepend=tool[:1] - 1) != 0, np.arange(len(c)), 0))
     others = (c.turned < begin) | ((c.turned == begin) & (c.spindle == 0))
-    known = (c.spindle != UNKNOWN) & (c.spindle != UNFOLLOWED)
+    known = ~silent & (c.spindle != UNFOLLOWED)
     spindle, rpm = c.spindle.copy(), c.rpm.copy()
     for number in np.unique(tool).tolist():
-        own = (tools.get(str(max(number, 0))) or {}).get("spindle")
-        wanted, here = own or output, known & (tool == number)
+        wanted, here = own.get(number) or output, tool == number
         if not wanted:
             continue
-        none = here & np.isnan(c.rpm)
-        taken = here & others & (np.full(len(c), bool(own)) | (c.spindle == 0) | none)
+        none = here & known & np.isnan(c.rpm)
+        taken = here & (silent | (known & others & ((number in own) | (c.spindle == 0) | none)))
         rpm[taken | none] = wanted["rpm"]
         spindle[taken] = 1 if wanted["direction"] == "clockwise" else -1
     return replace(c, spindle=spindle, rpm=rpm)
@@ -172,7 +173,7 @@ def check_states(w: Walked, c: Commanded, case: Case) -> tuple[list[Finding], di
     tool, coolant = tools_of(c, case.setup)[row], c.coolant[row]
     register = np.where((c.register[row] == OWN) | (not case.registers), tool, c.register[row])
     register = np.where(e.lengthless[rows] | (not (case.setup.get("output") or {}).get("tool_call", True)), -1, register)
-    direction, rpm = _spindles(tool, c.spindle[row], c.rpm[row], case.setup)
+    direction, rpm = c.spindle[row], c.rpm[row]
     if not (case.setup.get("output") or {}).get("tool_call", True):
         tool = np.full(len(rows), -1)
     coolant = _coolants(tool, coolant, case.setup)
@@ -205,20 +206,6 @@ def check_states(w: Walked, c: Commanded, case: Case) -> tuple[list[Finding], di
                                  int(e.line[rows[k]]), len(bad)))
     silent = np.flatnonzero((direction == UNKNOWN) & ~tap)
     return found, counts, [f"spindle (stated by no record, line {c.line[row[silent[0]]]})"] if len(silent) else []
-
-
-def _spindles(tool: Array, direction: Array, rpm: Array, setup: dict[str, Any]) -> tuple[Array, Array]:
-    """(direction, rpm) (K,) with those of the set-up where no record states any: of the tool, else of [output]."""
-    own = {int(n): t["spindle"] for n, t in (setup.get("tools") or {}).items() if (t or {}).get("spindle")}
-    default = (setup.get("output") or {}).get("spindle")
-    none = direction == UNKNOWN
-    pairs = [(none & (tool == n), spindle) for n, spindle in own.items()]
-    pairs += [(none & ~np.isin(tool, list(own)), default)] if default else []
-    direction, rpm = direction.copy(), rpm.copy()
-    for at, spindle in pairs:
-        direction[at] = 1 if spindle.get("direction", "clockwise") == "clockwise" else -1
-        rpm[at] = float(spindle["rpm"])
-    return direction, rpm
 
 
 def _coolants(tool: Array, coolant: Array, setup: dict[str, Any]) -> Array:
