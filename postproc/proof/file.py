@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -16,7 +17,6 @@ from postproc.readback.comparison.compare import Comparison
 from postproc.verification.proof_text import statement
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.input_files import read_input, unreadable
-from toolpaths.toolpath import Records
 from toolpaths.units import DEG
 
 ENDING = ".proof.json"
@@ -127,7 +127,7 @@ def proof_text(result: PostResult, inputs: dict[str, Hashes], output: str) -> st
         "proved": not result.comparison.unbounded, "statement": statement(result.comparison, result.witness),
         "inputs": {name: [vars(one) for one in found] for name, found in {"cl_file": (cl,), **inputs}.items()},
         "program": [{"file": name, "sha256": sha256(text.encode())} for name, text in texts.items()],
-        "options": options_of(result), "records": vars_of(result.toolpath.records),
+        "options": options_of(result), "records": asdict(result.toolpath.records),
         "read_back": _read_back(result.comparison), "second_reading": _second(result)}
     values[OWN] = digest(values)
     return json.dumps(values, indent=2, allow_nan=False) + "\n"
@@ -139,11 +139,6 @@ def options_of(result: Any) -> dict[str, Any]:
     return {"tolerance_mm": o.tolerance, "axis_tolerance_deg": o.axis_tolerance, "units": o.units, "dialect": o.dialect,
             "allow_unknown": list(o.allow_unknown), "orient": o.orient, "max_tilt_deg": o.max_tilt,
             "error_model_beyond": o.error_beyond}
-
-
-def vars_of(records: Records) -> dict[str, int]:
-    """Counts by kind."""
-    return {"total": records.total, "executed": records.executed, "neutral": records.neutral, "dropped": records.dropped}
 
 
 def _read_back(c: Comparison) -> dict[str, Any]:
