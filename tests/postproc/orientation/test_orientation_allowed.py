@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -15,10 +14,9 @@ from postproc.orientation.candidates.timed import turned_all
 from postproc.orientation.passes.allowed import Allowed, lattice, off_centre
 from postproc.orientation.passes.contact import Contact, contact_of
 from postproc.orientation.passes.passes import Pass, work_of
-from postproc.orientation.passes.surface import Surface
 from postproc.orientation.plans.choice import OrientationChoice
 from postproc.orientation.plans.orient import orient
-from postproc.setup.model import Placement, SetupFile, load_setup
+from postproc.setup.model import SetupFile, load_setup
 from postproc.setup.orientation import OrientationLimits
 from tests.postproc.kit import codes, machine, toolpath
 from toolpaths.arrays import Floats
@@ -280,60 +278,6 @@ def test_set_up_file_that_is_right(tmp_path: Path) -> None:
     choice, found = oriented(along_x(), setup.model_copy(), setup=str(file))
     told = next(d for d in found if d.code == "orient.operation")
     assert choice is None and told.lines == (5,) and told.file == str(file)
-
-
-def lines_of(start: Floats, end: Floats) -> Curves:
-    """Straight moves with the tool along z."""
-    n = len(start)
-    none, up = np.zeros((n, 3)), np.tile(Z, (n, 1))
-    return Curves(start, end, up, up, np.zeros(n, dtype=bool), none, none, np.zeros(n))
-
-
-@cache
-def sphere() -> Surface:
-    """A ball of 40 mm about (5, 0, 0), as fine triangles, in a part that stands turned by 90 degrees and 100 mm up."""
-    mesh = trimesh.creation.icosphere(subdivisions=5, radius=40.0)
-    mesh.apply_translation((5.0, 0.0, 0.0))
-    turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-    return Surface(mesh, Placement(turn, np.array([0.0, 0.0, 100.0])), 0.05)
-
-
-def test_normals_from_the_part() -> None:
-    """On a ball they point from its centre, (0, 5, 100) where the part stands, to that of the cutter."""
-    centre = np.array([0.0, 5.0, 100.0])
-    way = np.random.default_rng(5).normal(size=(40, 3)) * [1.0, 1.0, 0.3] + [0.0, 0.0, 1.0]
-    way /= np.linalg.norm(way, axis=1, keepdims=True)
-    tip = centre + 48.0 * way - 8.0 * Z
-    at = sphere().contact(lines_of(tip[:-1], tip[:-1] + 1e-3 * X), np.arange(39), 8.0)
-    assert len(at) == 78 and at.unknown == 0
-    assert np.einsum("ni,ni->n", at.normal[::2], way[:-1]).min() > np.cos(1.0 * DEG)
-
-
-@pytest.mark.parametrize(("off", "touches"), [(0.0, True), (0.045, True), (-0.03, True), (0.08, False), (-0.08, False)])
-def test_a_ball_off_the_part_has_no_normal(off: float, touches: bool) -> None:
-    tip = np.array([[0.0, 5.0, 140.0 + off]])
-    at = sphere().contact(lines_of(tip, tip + 1e-3 * X), np.array([1]), 8.0)
-    assert (len(at), at.unknown) == ((2, 0) if touches else (0, 2))
-
-
-def test_inside_the_part_there_is_no_contact() -> None:
-    """A centre 8 mm under the surface is as far from it as one 8 mm above."""
-    tip = np.array([[0.0, 5.0, 124.0]])
-    at = sphere().contact(lines_of(tip, tip + 1e-3 * X), np.array([1]), 8.0)
-    assert len(at) == 0
-
-
-def test_long_moves_and_arcs_are_looked_at_between_their_ends() -> None:
-    """A parallel circle of the ball, whose feed turns once round; a chord of 40 mm over a plate in steps of the radius."""
-    start = np.array([[0.0, 5.0, 100.0]]) + 48.0 * np.array([[0.6, 0.0, 0.8]]) - 8.0 * Z
-    middle = np.array([[0.0, 5.0, start[0, 2]]])
-    arc = Curves(start, start, Z[None], Z[None], np.array([True]), middle, Z[None], np.array([2.0 * np.pi]))
-    at = sphere().contact(arc, np.array([1]), 8.0)
-    assert len(at) == 144 and np.ptp(np.arctan2(at.way[:, 1], at.way[:, 0])) > 6.0
-    assert np.abs(at.normal[:, 2] - 0.8).max() < 0.01
-    plate = Surface(trimesh.creation.box(extents=(100.0, 100.0, 10.0)), Placement(np.eye(3), np.zeros(3)), 0.01)
-    at = plate.contact(lines_of(np.array([[-20.0, 0.0, 5.0]]), np.array([[20.0, 0.0, 5.0]])), np.array([1]), 8.0)
-    assert len(at) == 10 and np.allclose(at.normal, Z)
 
 
 def test_a_part_mesh_instead_of_normals(tmp_path: Path) -> None:

@@ -13,6 +13,7 @@ from postproc.base.options import Options
 from postproc.orientation.candidates.candidates import tried
 from postproc.orientation.candidates.timed import turned
 from postproc.orientation.candidates.vertices import Table, closed_form, numeric, rotation, table_of, vertex_angles
+from postproc.orientation.figures import polytopes
 from postproc.orientation.passes.allowed import Allowed
 from postproc.orientation.passes.passes import Pass, work_of
 from postproc.setup.model import SetupFile
@@ -162,3 +163,15 @@ def test_bound_is_below_the_plan() -> None:
                 assert 0.5 * made.seconds < made.bound <= made.seconds * (1.0 + 1e-3)
     flat = turned(passes[30], passes[30].axis, m)
     assert flat.bound > 0.97 * flat.seconds
+
+
+def test_edges_of_a_box() -> None:
+    """Triangles of one face count as one: 12 edges of a turned box, none of a flat one."""
+    rng = np.random.default_rng(5)
+    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    corners = np.array([[x, y, z] for x in (-1, 1) for y in (-2, 2) for z in (-3, 3)]) @ turn.T
+    faces, edges = polytopes.hull(corners)
+    assert len(faces) == 12 and len(edges) == 12
+    assert sorted(np.round(np.linalg.norm(corners[edges[:, 0]] - corners[edges[:, 1]], axis=1), 9).tolist()) == [2.0] * 4 + [
+        4.0] * 4 + [6.0] * 4
+    assert len(polytopes.hull(corners * [1.0, 1.0, 0.0])[1]) == 0 and len(polytopes.hull(corners[:3])[1]) == 0

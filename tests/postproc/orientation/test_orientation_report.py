@@ -20,7 +20,7 @@ from postproc.base.options import Options, Orientation
 from postproc.cli.app import app
 from postproc.orientation.candidates import losers, reaches
 from postproc.orientation.candidates.timed import turned
-from postproc.orientation.figures import held, polytopes, sheet
+from postproc.orientation.figures import held, sheet
 from postproc.orientation.plans import shares
 from postproc.orientation.plans.choice import OrientationChoice
 from postproc.orientation.plans.orient import orient
@@ -249,18 +249,6 @@ def test_axes_that_cannot_be_run_are_told() -> None:
     drawn = texts(choice, "auto", [1])
     assert "cannot be run" in drawn and any("the CL file's own cannot be run" in one for one in drawn)
     assert report.slower(choice, "auto") == [] and text.header(choice, "auto")[1].endswith("of the CL file - s")
-
-
-def test_edges_of_a_box() -> None:
-    """Triangles of one face count as one: 12 edges of a turned box, none of a flat one."""
-    rng = np.random.default_rng(5)
-    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
-    corners = np.array([[x, y, z] for x in (-1, 1) for y in (-2, 2) for z in (-3, 3)]) @ turn.T
-    faces, edges = polytopes.hull(corners)
-    assert len(faces) == 12 and len(edges) == 12
-    assert sorted(np.round(np.linalg.norm(corners[edges[:, 0]] - corners[edges[:, 1]], axis=1), 9).tolist()) == [2.0] * 4 + [
-        4.0] * 4 + [6.0] * 4
-    assert len(polytopes.hull(corners * [1.0, 1.0, 0.0])[1]) == 0 and len(polytopes.hull(corners[:3])[1]) == 0
 
 
 @pytest.mark.usefixtures("as_laid_out")
