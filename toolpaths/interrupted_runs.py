@@ -97,7 +97,8 @@ def clean(folder: Path) -> list[Diagnostic]:
             told += _recovered(journal) if journal.exists() else []
             if not journal.exists():
                 path.unlink()
-    kept = {_NAME.fullmatch(p.name)["run"] for p, kind in _leftovers(folder) if kind in (JOURNAL, POINTER)}  # type: ignore[index]
+    kept = {_NAME.fullmatch(p.name)["run"]  # type: ignore[index]
+            for p, kind in _leftovers(folder) if kind in (JOURNAL, POINTER)}
     for path, _ in [x for x in found if x[1] in (NEW, OLD)]:
         if _NAME.fullmatch(path.name)["run"] not in kept:  # type: ignore[index]
             with contextlib.suppress(OSError):

@@ -13,7 +13,7 @@ from machines.calibration.simulator import PARTS
 from machines.geometric_error.actual.model import ErrorModel
 from machines.geometric_error.files.covariance import angular
 from machines.geometric_error.tables.csv_table import UNITS
-from machines.geometric_error.tables.curves import Table
+from machines.geometric_error.tables.curves import TableCurve
 from machines.geometric_error.tables.table_curves import ROTARY
 from toolpaths.arrays import Floats
 
@@ -53,7 +53,7 @@ def _places(model: ErrorModel) -> dict[str, str]:
     found = {}
     for component in model.axes.components:
         curve, axis = component.curve, component.name.axis
-        if isinstance(curve, Table):
+        if isinstance(curve, TableCurve):
             at = np.degrees(curve.x) if axis in ROTARY else curve.x
             for k, label in enumerate(curve.labels()):
                 found[f"{component.name}{label}"] = f"{axis} {at[k % len(at)]:.7g}{' ' + label[-1] if curve.both else ''}"

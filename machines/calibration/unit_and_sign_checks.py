@@ -45,7 +45,7 @@ TENFOLD = {"ten times as large": 10.0, "a tenth as large": 0.1}
 
 
 @dataclass(frozen=True)
-class Slip:
+class TableFault:
     """What explains the readings: `words` with the remedy; `size` True where it is their unit, for which the noise alone may
     speak."""
 
@@ -54,8 +54,8 @@ class Slip:
 
 
 @dataclass(frozen=True)
-class Tried:
-    """A slip put right: in words, what is then left; `size` as in `Slip`."""
+class TriedRemedy:
+    """A slip put right: in words, what is then left; `size` as in `TableFault`."""
 
     words: str
     noise: Noise | None
@@ -64,7 +64,7 @@ class Tried:
 
 def machine_slip(start: ErrorModel, kinematics: Kinematics, measured: Measurements, wanted: Sequence[str],
                  travel: tuple[Floats, Floats], units: Sequence[str], joints: Sequence[str],
-                 columns: Sequence[str]) -> Slip | None:
+                 columns: Sequence[str]) -> TableFault | None:
     """The slip of a table of poses, bar or laser, None where there is none.
 
     Args:
@@ -80,12 +80,12 @@ def machine_slip(start: ErrorModel, kinematics: Kinematics, measured: Measuremen
         result = solve(problem_of(start, kinematics, other, wanted))
         return result.noise if result.converged else None
 
-    def tried() -> Iterable[Tried]:
+    def tried() -> Iterable[TriedRemedy]:
         others = [*_positions(part, kinematics, travel, joints), *_other_directions(part, start, kinematics)]
         roughly = [(size, k) for k, (_, other) in enumerate(others)
                    if (size := _roughly(problem_of(start, kinematics, other, wanted))) is not None]
         for _, k in sorted(roughly)[:REFITTED]:
-            yield Tried(others[k][0], left(others[k][1]))
+            yield TriedRemedy(others[k][0], left(others[k][1]))
         if part.kind != "distance":
             yield from _readings(problem_of(start, kinematics, part, wanted), part.read, columns, units)
 
@@ -145,7 +145,8 @@ def _other_directions(m: Measurements, start: ErrorModel,
         yield "with dx, dy, dz along the machine instead of the table", replace(m, read=read)
 
 
-def _readings(problem: CalibrationProblem, read: Floats, columns: Sequence[str], units: Sequence[str]) -> Iterable[Tried]:
+def _readings(problem: CalibrationProblem, read: Floats, columns: Sequence[str],
+              units: Sequence[str]) -> Iterable[TriedRemedy]:
     """Slips of the readings (N,) or (N, C); what a fit leaves of them is taken at the first order, errors being small."""
     table = read.reshape(len(read), -1)
     rates = problem.jacobian(problem.guess)[:, problem.free] / problem.sigma[:, None]
@@ -153,7 +154,7 @@ def _readings(problem: CalibrationProblem, read: Floats, columns: Sequence[str],
     without = problem.predict(problem.guess)
     for words, other, size in _changed(table, columns, units):
         y = (other.ravel() - without) / problem.sigma
-        yield Tried(words, noise_of(y - span @ (span.T @ y), span.shape[1]), size)
+        yield TriedRemedy(words, noise_of(y - span @ (span.T @ y), span.shape[1]), size)
 
 
 def _changed(table: Floats, columns: Sequence[str], units: Sequence[str]) -> Iterable[tuple[str, Floats, bool]]:
@@ -186,7 +187,7 @@ def _sizes(unit: str) -> list[tuple[str, float]]:
             if other != unit] + list(TENFOLD.items())
 
 
-def rotary_slip(bench: Bench, readings: Floats, sigma: Floats, harmonics: int, units: Sequence[str]) -> Slip | None:
+def rotary_slip(bench: Bench, readings: Floats, sigma: Floats, harmonics: int, units: Sequence[str]) -> TableFault | None:
     """The slip of a table of all six readings (m, n, 6), None where there is none."""
     span, weights = rotary_span(bench, readings, sigma, harmonics)
 
@@ -195,13 +196,13 @@ def rotary_slip(bench: Bench, readings: Floats, sigma: Floats, harmonics: int, u
         y = values[np.isfinite(readings)] / weights
         return noise_of(y - span @ (span.T @ y), span.shape[1])
 
-    def tried() -> Iterable[Tried]:
+    def tried() -> Iterable[TriedRemedy]:
         for words, other, size in _changed(readings, PARTS, units):
-            yield Tried(words, left(other), size)
+            yield TriedRemedy(words, left(other), size)
         for size_words, other in _both_sizes(readings, units):
-            yield Tried(size_words, left(other), True)
+            yield TriedRemedy(size_words, left(other), True)
         for words, other in _rearranged(readings):
-            yield Tried(words, left(other))
+            yield TriedRemedy(words, left(other))
 
     return _best(left(readings), tried)
 
@@ -223,7 +224,7 @@ def _rearranged(readings: Floats) -> Iterable[tuple[str, Floats]]:
     return ((words, other) for words, other in others if (np.isfinite(other) == np.isfinite(readings)).all())
 
 
-def reversal_slip(readings: Floats, sigma: float, given: ReversalModel, unit: str) -> Slip | None:
+def reversal_slip(readings: Floats, sigma: float, given: ReversalModel, unit: str) -> TableFault | None:
     """The slip of a table of angular readings (m, n), None where there is none."""
     m, n = readings.shape
     shifts = given.shifts or tuple(range(m))
@@ -234,15 +235,15 @@ def reversal_slip(readings: Floats, sigma: float, given: ReversalModel, unit: st
         y = values[known] / sigma
         return noise_of(y - span @ (span.T @ y), span.shape[1])
 
-    def tried() -> Iterable[Tried]:
+    def tried() -> Iterable[TriedRemedy]:
         other = [(-k) % n for k in shifts]
-        yield Tried(f"with the indexer turned the other way, shifts = {other},",
-                    identify(readings, sigma, given.zeroed, shifts=other).result.noise)
+        yield TriedRemedy(f"with the indexer turned the other way, shifts = {other},",
+                          identify(readings, sigma, given.zeroed, shifts=other).result.noise)
         for words, size in _sizes(unit):
-            yield Tried(f"with reading {words}", left(size * readings), True)
+            yield TriedRemedy(f"with reading {words}", left(size * readings), True)
         for words, rearranged in _rearranged(readings):
             if "steps" not in words:
-                yield Tried(words, left(rearranged))
+                yield TriedRemedy(words, left(rearranged))
 
     return _best(left(readings), tried)
 
@@ -260,7 +261,7 @@ def _swapped(count: int, a: int, b: int) -> list[int]:
     return order
 
 
-def _best(now: Noise | None, tried: Callable[[], Iterable[Tried]]) -> Slip | None:
+def _best(now: Noise | None, tried: Callable[[], Iterable[TriedRemedy]]) -> TableFault | None:
     """The slips that come to the stated noise where `now` does not; without any those that leave least, where that is far
     less than is left now."""
     if now is None or now.meets:
@@ -280,8 +281,9 @@ def _best(now: Noise | None, tried: Callable[[], Iterable[Tried]]) -> Slip | Non
         alike = [one for one in alike if not one.size]
     left = next(noise.left for one, noise in known if one is alike[0])
     words = " or ".join(one.words for one in alike[:SHOWN])
-    return Slip(f"{words} only {left:.3g} times would be left" if now.left > 1.0 else f"{words} {left:.3g} times is left",
-                all(one.size for one in alike))
+    return TableFault(f"{words} only {left:.3g} times would be left" if now.left > 1.0
+                      else f"{words} {left:.3g} times is left",
+                      all(one.size for one in alike))
 
 
 def _nearer(noise: Noise, now: Noise) -> bool:

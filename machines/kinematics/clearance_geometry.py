@@ -8,7 +8,7 @@ from toolpaths.arrays import Floats, Ints
 
 
 @dataclass(frozen=True, eq=False)
-class Clearance:
+class ClearanceSizes:
     """Thickness and stops of rods, slides and spindle; a part that the machine file does not give is None.
 
     Attributes:
@@ -37,7 +37,7 @@ class Clearance:
 
 
 @dataclass(frozen=True, eq=False)
-class Rig:
+class ClearanceGeometry:
     """Where the parts are at N joints, in the machine frame, mm and rad.
 
     Attributes:

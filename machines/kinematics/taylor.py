@@ -21,7 +21,7 @@ ZERO: Columns = [0.0, 0.0, 0.0]
 
 
 @dataclass(frozen=True)
-class Angle:
+class TaylorAngle:
     """A number that moves along the block: value, first and second derivative (N,) at t = 1/2; |third| <= `third`."""
 
     value: Number
@@ -36,7 +36,7 @@ class Angle:
 
 
 @dataclass(frozen=True)
-class Jet:
+class TaylorVector:
     """A vector that moves along the block: columns of value, first and second derivative at t = 1/2, |third| <= `third`."""
 
     value: Columns
@@ -44,21 +44,21 @@ class Jet:
     second: Columns = (0.0, 0.0, 0.0)
     third: Number = 0.0
 
-    def __add__(self, other: Self) -> Jet:
-        return Jet(columns.plus(self.value, other.value), columns.plus(self.first, other.first),
-                   columns.plus(self.second, other.second), self.third + other.third)
+    def __add__(self, other: Self) -> TaylorVector:
+        return TaylorVector(columns.plus(self.value, other.value), columns.plus(self.first, other.first),
+                            columns.plus(self.second, other.second), self.third + other.third)
 
-    def __sub__(self, other: Self) -> Jet:
-        return Jet(columns.minus(self.value, other.value), columns.minus(self.first, other.first),
-                   columns.minus(self.second, other.second), self.third + other.third)
+    def __sub__(self, other: Self) -> TaylorVector:
+        return TaylorVector(columns.minus(self.value, other.value), columns.minus(self.first, other.first),
+                            columns.minus(self.second, other.second), self.third + other.third)
 
-    def slid(self, direction: Columns, by: Angle) -> Jet:
+    def slid(self, direction: Columns, by: TaylorAngle) -> TaylorVector:
         """Shifted along the unit `direction` by a number that moves."""
         value, first, second = (columns.plus(part, columns.times(size, direction)) for part, size in (
             (self.value, by.value), (self.first, by.first), (self.second, by.second)))
-        return Jet(value, first, second, self.third + by.third)
+        return TaylorVector(value, first, second, self.third + by.third)
 
-    def turned(self, direction: Columns, point: Columns, by: Angle) -> Jet:
+    def turned(self, direction: Columns, point: Columns, by: TaylorAngle) -> TaylorVector:
         """Turned about the line through `point` along the unit `direction` by an angle that moves.
 
         With W = direction x, r = R(angle) s: r' = R (a'W s + s'), r'' = R ((a''W + a'^2 W^2) s + 2 a'W s' + s''), and
@@ -72,9 +72,9 @@ class Jet:
         second = columns.plus(second, columns.times(2.0 * by.first, around[1]))
         cos, sin = np.cos(by.value), np.sin(by.value)
         turned = [_turn(direction, cos, sin, v) for v in (arm, first, second)]
-        return Jet(columns.plus(turned[0], point), turned[1], turned[2], self._third(around, by))
+        return TaylorVector(columns.plus(turned[0], point), turned[1], turned[2], self._third(around, by))
 
-    def _third(self, around: list[list[Floats | float]], by: Angle) -> Number:
+    def _third(self, around: list[list[Floats | float]], by: TaylorAngle) -> Number:
         s, v, a = (_norm(x) for x in around)
         a = a + 0.5 * self.third
         s, v = s + 0.5 * v + 0.125 * _norm(around[2]) + self.third / 48.0, v + 0.5 * _norm(around[2]) + 0.125 * self.third
@@ -87,9 +87,9 @@ class Jet:
         return _norm(self.second) + 0.5 * self.third
 
 
-def straight(start: Columns, end: Columns) -> Jet:
+def straight(start: Columns, end: Columns) -> TaylorVector:
     """From one vector to another at constant speed."""
-    return Jet(columns.times(0.5, columns.plus(start, end)), columns.minus(end, start))
+    return TaylorVector(columns.times(0.5, columns.plus(start, end)), columns.minus(end, start))
 
 
 def _norm(v: Columns) -> Number:

@@ -10,7 +10,7 @@ from postproc.collision.swept import OFF, Swept
 from postproc.control.word_arcs import PLANE_COLUMNS
 from postproc.readback.execution.assembly import ends, steps
 from postproc.readback.execution.execute import Motion
-from postproc.readback.execution.poses import SAMPLES, Executed, arc_sweeps, coordinates
+from postproc.readback.execution.poses import SAMPLES, BlockPoses, arc_sweeps, coordinates
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.units import DEG
 
@@ -21,7 +21,7 @@ Parts = tuple[Ints, Floats, Floats]
 """(block, from, to) of parts of blocks, (N,) each, in order"""
 
 
-def way_of(motion: Motion, executed: Executed, kin: Kinematics, rows: Ints, reach: float) -> tuple[Swept, Ints]:
+def way_of(motion: Motion, executed: BlockPoses, kin: Kinematics, rows: Ints, reach: float) -> tuple[Swept, Ints]:
     """The way of one tool through its blocks, and those of them for which the pieces are no proof.
 
     Args:
@@ -41,7 +41,7 @@ def way_of(motion: Motion, executed: Executed, kin: Kinematics, rows: Ints, reac
     return way.take(np.flatnonzero(reached)), np.unique(np.append(parts[0][~(need <= _MOST)], row[~reached]))
 
 
-def _poses(motion: Motion, executed: Executed, kin: Kinematics, parts: Parts) -> tuple[Floats, Floats]:
+def _poses(motion: Motion, executed: BlockPoses, kin: Kinematics, parts: Parts) -> tuple[Floats, Floats]:
     """(tips, axes) (N, 2, 3) at both ends; where joints have several poses they are followed from part to part."""
     row, *times = parts
     if executed.before is None:
@@ -61,7 +61,7 @@ def _cut(parts: Parts, count: Ints) -> Parts:
     return row[k], t0[k] + at * step, np.where(at + 1 == count[k], t1[k], t0[k] + (at + 1) * step)
 
 
-def _straight(motion: Motion, executed: Executed, rows: Ints) -> Parts:
+def _straight(motion: Motion, executed: BlockPoses, rows: Ints) -> Parts:
     """Whole blocks, or what is between the corners of a dog-leg, where each axis arrives: straight in the joints."""
     bent = executed.bent(motion, rows)
     plain, legs = rows[~bent], rows[bent]
@@ -76,7 +76,7 @@ def _straight(motion: Motion, executed: Executed, rows: Ints) -> Parts:
     return row[order], t0[order], t1[order]
 
 
-def _shorter(motion: Motion, executed: Executed, kin: Kinematics, parts: Parts, long: Bools) -> Parts:
+def _shorter(motion: Motion, executed: BlockPoses, kin: Kinematics, parts: Parts, long: Bools) -> Parts:
     """The long ones in steps of a few degrees, over which derivatives change little."""
     row, t0, t1 = parts
     count = np.ones(len(row), dtype=np.int64)
@@ -84,7 +84,7 @@ def _shorter(motion: Motion, executed: Executed, kin: Kinematics, parts: Parts, 
     return _cut(parts, count)
 
 
-def _needed(motion: Motion, executed: Executed, kin: Kinematics, parts: Parts, reach: float) -> Floats:
+def _needed(motion: Motion, executed: BlockPoses, kin: Kinematics, parts: Parts, reach: float) -> Floats:
     """(N,) pieces of a part, so that no point of the tool is off its place by more than OFF."""
     row, t0, t1 = parts
     bend = _circles(motion, executed, parts)
@@ -93,7 +93,7 @@ def _needed(motion: Motion, executed: Executed, kin: Kinematics, parts: Parts, r
     return np.ceil(np.sqrt(bend / (8.0 * OFF)))
 
 
-def _bends(motion: Motion, executed: Executed, kin: Kinematics, parts: Parts, reach: float) -> Floats:
+def _bends(motion: Motion, executed: BlockPoses, kin: Kinematics, parts: Parts, reach: float) -> Floats:
     """(N,) mm: bound of the second derivative of any point of the tool within `reach` of its tip, over each part.
 
     The tip's is that of the joints, 0 where the control keeps it straight; the pieces' great circles bend too, by the
@@ -108,7 +108,7 @@ def _bends(motion: Motion, executed: Executed, kin: Kinematics, parts: Parts, re
     return np.asarray(tip + reach * (axis + turn**2))
 
 
-def _circles(motion: Motion, executed: Executed, parts: Parts) -> Floats:
+def _circles(motion: Motion, executed: BlockPoses, parts: Parts) -> Floats:
     """(N,) mm: what arcs add to that bound: r sweep^2, and 2 r sweep turn where the part turns under them."""
     row, share = parts[0], parts[2] - parts[1]
     sweep = np.nan_to_num(arc_sweeps(motion, executed.control))[row]

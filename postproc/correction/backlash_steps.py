@@ -6,7 +6,7 @@ follows from the ways of its axes, and these from the words before and the words
 else those are taken that bring it nearest: by the ways that the words themselves make, by other ways, by last decimals
 beside. Ways by which the next block does not begin count a little: it would first take up what they are off by. So do, where
 words are axis positions, steps back by less than an axis loses: who takes the way of an axis for the sign of its last step
-sees another machine there. For long programs `walk_loop` does the same compiled.
+sees another machine there. For long programs `backlash_steps_loop` does the same compiled.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from postproc.correction import walk_loop
+from postproc.correction import backlash_steps_loop
 from toolpaths.arrays import Bools, Floats, Ints
 
 PLAIN, BETWEEN = 0.05, 0.25
@@ -38,7 +38,7 @@ STAYS = 1.0 - np.abs(WAYS)
 
 
 @dataclass(frozen=True)
-class Ends:
+class BlockEnds:
     """The ends of K blocks at their planned words, and what T joints that lose motion do there; mm and rad.
 
     Attributes:
@@ -73,12 +73,12 @@ class Ends:
     like: Ints
 
 
-def walk(ends: Ends) -> tuple[Floats, Floats]:
+def walk(ends: BlockEnds) -> tuple[Floats, Floats]:
     """Steps (K, 3) of whole last decimals to add to the words X, Y, Z of blocks, and the ways (K, T) at their ends then."""
     columns = vars(ends).values()
-    if walk_loop.wanted(len(ends.off)):
+    if backlash_steps_loop.wanted(len(ends.off)):
         settings = np.array([PLAIN, BETWEEN]), RESTS, NEARER, np.array(REACH)
-        steps, ways = walk_loop.compiled()(*map(np.ascontiguousarray, columns), *settings)
+        steps, ways = backlash_steps_loop.compiled()(*map(np.ascontiguousarray, columns), *settings)
     else:
         steps, ways = _walk(*columns)
     return steps, ways

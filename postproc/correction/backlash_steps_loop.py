@@ -1,4 +1,4 @@
-"""The walk of `postproc.correction.walk` block by block in plain loops over numbers, which numba compiles for long programs.
+"""The steps of `postproc.correction.backlash_steps` in plain loops over numbers, which numba compiles for long programs.
 
 It does what the plain walk there does; tests compare the two. `joint` (T, 13) and `space` (3, 8) hold what counts at one
 block: per joint START to BEFORE, and BY of the tip; per direction of space OFF, RATES, INVERSE and FREE.

@@ -8,14 +8,14 @@ from itertools import pairwise
 
 import numpy as np
 
-from machines.geometric_error.actual.lost_motion import Steps
+from machines.geometric_error.actual.lost_motion import PlaySteps
 from postproc.control.word_arcs import PLANE_COLUMNS
 from postproc.correction.arcs import new_centers
-from postproc.correction.error_context import ALONE, LIFTS, Work, axis_positions, bent_blocks, on_arc
+from postproc.correction.backlash_steps import BlockEnds, walk
+from postproc.correction.error_context import ALONE, LIFTS, ErrorContext, axis_positions, bent_blocks, on_arc
 from postproc.correction.reversals import Divided
-from postproc.correction.runs import Runs
-from postproc.correction.walk import Ends, walk
-from postproc.path.model import ARC, FEED, TRAVERSE, Path
+from postproc.correction.runs import RowRuns
+from postproc.path.model import ARC, FEED, TRAVERSE, JointPath
 from toolpaths.arrays import Bools, Floats, Ints
 
 AT_ONCE = 50_000
@@ -45,13 +45,13 @@ class Writing:
     grain: (J,) a last decimal of each word
     """
 
-    words: Callable[[Path], Floats]
-    joints: Callable[[Path, Floats, Ints], Floats]
-    turned: Callable[[Path, Floats, Ints], Floats]
+    words: Callable[[JointPath], Floats]
+    joints: Callable[[JointPath, Floats, Ints], Floats]
+    turned: Callable[[JointPath, Floats, Ints], Floats]
     grain: Floats
 
 
-def settled(made: Divided, work: Work, writing: Writing, allowed: float) -> tuple[Path, float, Floats]:
+def settled(made: Divided, work: ErrorContext, writing: Writing, allowed: float) -> tuple[JointPath, float, Floats]:
     """The path made of the blocks of `work`, with words by which axes that lose motion stand where they should; rad, the
     worst that is left of the axis at ends of CL moves where they do; and the ways (K, T) by which they do.
 
@@ -79,7 +79,7 @@ def settled(made: Divided, work: Work, writing: Writing, allowed: float) -> tupl
     return replace(path, q=q, center=center), left, ways
 
 
-def _columns(path: Path) -> Ints:
+def _columns(path: JointPath) -> Ints:
     """Columns of the words X, Y, Z; those of all slides where the machine has other letters."""
     control = path.frames[0].control
     return control.slides if (control.xyz < 0).any() else control.xyz
@@ -88,14 +88,14 @@ def _columns(path: Path) -> Ints:
 class _Written:
     """A path with its rounded words (K, J), the joints (K, J) that these mean, and what joints lose there (K, T)."""
 
-    def __init__(self, made: Divided, work: Work, writing: Writing) -> None:
+    def __init__(self, made: Divided, work: ErrorContext, writing: Writing) -> None:
         self.made, self.path, self.work, self.writing = made, made.path, work, writing
         self.words = writing.words(self.path)
         found = writing.joints(self.path, self.words, np.arange(len(self.path)))
         self.q = np.where(self.path.home[:, None], self.path.q, found)
         self.gap = work.gaps(self.q)
 
-    def ends(self, allowed: float) -> Ends:
+    def ends(self, allowed: float) -> BlockEnds:
         """What `walk` takes."""
         path, size = self.path, len(self.path)
         first, bottom = self._holes()
@@ -116,8 +116,9 @@ class _Written:
         enough = np.maximum(ROUNDED * near, np.where(between, allowed, 0.0))
         near = np.where(between, enough, near)
         plain = axis_positions(path, self.work.tools[self.made.owner])
-        return Ends(off, by_way, tip_rates, back, self.gap, bend, last, later, goes_on, weight, plain, near, enough, free,
-                    like)
+        return BlockEnds(off, by_way, tip_rates, back, self.gap, bend, last, later, goes_on, weight, plain, near, enough,
+                         free,
+                         like)
 
     def axis_left(self, ways: Floats) -> float:
         """rad, the worst deviation of the axis at ends of CL moves, by ways (K, T)."""
@@ -139,7 +140,7 @@ class _Written:
     def _holes(self) -> tuple[Ints, Ints]:
         """First blocks and bottoms of the holes that are corrected as a whole."""
         hole = self.work.whole[self.made.owner]
-        runs = Runs.of(hole)
+        runs = RowRuns.of(hole)
         runs = runs.some(hole[runs.begin] >= 0)
         depth = np.where(self.path.code == FEED, self.words[:, _columns(self.path)[2]], np.inf)
         return runs.begin, runs.rows[runs.least(depth[runs.rows])]
@@ -163,8 +164,8 @@ class _Written:
         return result
 
     def _motion(self) -> tuple[Floats, Floats, Floats]:
-        """`bend` and `last` of `Ends`, by pieces on arcs and where the words are the tip that turns; and the ways (K, T) by
-        which blocks begin, 0 for joints that move by less than they lose."""
+        """`bend` and `last` of `BlockEnds`, by pieces on arcs and where the words are the tip that turns; and the ways
+        (K, T) by which blocks begin, 0 for joints that move by less than they lose."""
         t = self.work.two_way
         last = 2.0 * np.nan_to_num(np.diff(self.q, axis=0, prepend=self.q[:1]))[:, t] / self.gap
         bend, begin = _none(3, *self.gap.shape), np.where(np.abs(last) >= 2.0, np.sign(last), 0.0)
@@ -197,7 +198,7 @@ class _Written:
         return result
 
     def _rates(self, k: Ints, counts: Ints) -> tuple[Floats, Floats, Floats, Floats]:
-        """back, tip_rates, off, by_way of `Ends`, 0 but for the blocks k (N,); the tip counts at those of `counts` (K,)."""
+        """back, tip_rates, off, by_way of `BlockEnds`, 0 but for blocks k (N,); the tip counts at those of `counts` (K,)."""
         lossy, size, until = len(self.work.two_way), len(self.path), self.made.until
         back, tip_rates = np.zeros((size, lossy, 3)), np.zeros((size, 3, 3))
         off, by_way = np.zeros((size, 3)), np.zeros((size, 3, lossy))
@@ -209,7 +210,7 @@ class _Written:
         return back, tip_rates, off, by_way
 
     def _moved(self, at: Ints) -> tuple[Floats, Floats]:
-        """back (N, T, 3) and tip_rates (N, 3, 3) of `Ends` at blocks (N,)."""
+        """back (N, T, 3) and tip_rates (N, 3, 3) of `BlockEnds` at blocks (N,)."""
         path, work, owner = self.path, self.work, self.made.owner[at]
         back, rates = np.zeros((len(at), len(work.two_way), 3)), np.zeros((len(at), 3, 3))
         here = work.poses(self.q[at], owner)[0]
@@ -222,7 +223,7 @@ class _Written:
         return back, rates
 
     def _left(self, at: Ints, until: Floats) -> tuple[Floats, Floats]:
-        """off (N, 3) and by_way (N, 3, T) of `Ends` at blocks (N,), `until` (N,) of the time of theirs in `work`."""
+        """off (N, 3) and by_way (N, 3, T) of `BlockEnds` at blocks (N,), `until` (N,) of the time of theirs in `work`."""
         work, owner = self.work, self.made.owner[at]
         wanted, way = work.nominal(owner, until), np.zeros((len(at), self.q.shape[1]))
         off = work.residual(wanted, self.q[at], owner, way)[:, :3]
@@ -238,11 +239,11 @@ def _runs(pieces: Iterable[Floats]) -> tuple[Floats, Floats, Floats]:
     """(3, N, T), (N, T), (N, T) of motion in pieces (N, T), 2 being what a joint loses: shift, low and high of all but the
     last run one way, that run, and the way of the first run, 0 where it is shorter than what the joint loses."""
     first, *rest = pieces
-    whole, run, gone, most = Steps(*_none(3, *first.shape)), first, first, np.abs(first)
+    whole, run, gone, most = PlaySteps(*_none(3, *first.shape)), first, first, np.abs(first)
     for piece in rest:
         turns = (run * piece < 0.0) & (np.minimum(np.abs(run), np.abs(piece)) > NOISE)
-        then = whole.then(Steps(run, np.full(run.shape, -1.0), np.full(run.shape, 1.0)))
-        whole = Steps(*(np.where(turns, getattr(then, name), getattr(whole, name)) for name in ("shift", "low", "high")))
+        then = whole.then(PlaySteps(run, np.full(run.shape, -1.0), np.full(run.shape, 1.0)))
+        whole = PlaySteps(*(np.where(turns, getattr(then, name), getattr(whole, name)) for name in ("shift", "low", "high")))
         run, gone = np.where(turns, piece, run + piece), gone + piece
         most = np.maximum(most, gone * np.sign(first))
     return np.stack([whole.shift, whole.low, whole.high]), run, np.where(most >= 2.0, np.sign(first), 0.0)
@@ -262,6 +263,6 @@ def _composed(bend: Floats, last: Floats, first: Ints, count: Ints) -> Floats:
         rows = np.flatnonzero(count > k)
         block = first[rows] + k
         ones = np.ones((len(rows), bend.shape[2]))
-        whole = Steps(*result[:, rows]).then(Steps(*bend[:, block])).then(Steps(last[block], -ones, ones))
+        whole = PlaySteps(*result[:, rows]).then(PlaySteps(*bend[:, block])).then(PlaySteps(last[block], -ones, ones))
         result[:, rows] = np.stack([whole.shift, whole.low, whole.high])
     return result

@@ -10,8 +10,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from postproc.feedrate.problem import Knots
-from postproc.feedrate.windows import Method, Solved, solved
+from postproc.feedrate.problem import MotionKnots
+from postproc.feedrate.windows import Method, SolvedWindows, solved
 from toolpaths.arrays import Floats
 
 WHOLE = 100_000
@@ -22,7 +22,7 @@ LARGEST = 4_000_000
 """knots beyond which they are not"""
 
 
-def solved_again(grid: Knots, method: Method, near: Floats | None = None) -> tuple[Knots, Solved]:
+def solved_again(grid: MotionKnots, method: Method, near: Floats | None = None) -> tuple[MotionKnots, SolvedWindows]:
     """The motion on its knots, or on finer ones where those do not solve it; `solved` is False where none did.
 
     Args:
@@ -42,7 +42,7 @@ def solved_again(grid: Knots, method: Method, near: Floats | None = None) -> tup
     return best
 
 
-def _others(grid: Knots, method: Method, c: Floats) -> Iterator[tuple[Knots, Method, Floats | None]]:
+def _others(grid: MotionKnots, method: Method, c: Floats) -> Iterator[tuple[MotionKnots, Method, Floats | None]]:
     """Knots, method and start of each further try: from where the first one stood, then from rest on halved intervals."""
     yield grid, _whole(grid, method), c
     for _ in range(FINER):
@@ -52,12 +52,12 @@ def _others(grid: Knots, method: Method, c: Floats) -> Iterator[tuple[Knots, Met
         yield grid, _whole(grid, method), None
 
 
-def _whole(grid: Knots, method: Method) -> Method:
+def _whole(grid: MotionKnots, method: Method) -> Method:
     return replace(method, window=len(grid.sigma)) if len(grid.sigma) <= WHOLE else replace(
         method, window=4 * method.window, overlap=4 * method.overlap)
 
 
-def halved(grid: Knots) -> Knots:
+def halved(grid: MotionKnots) -> MotionKnots:
     """All intervals in two; new knots as tight as the tighter of their neighbours."""
     sigma = np.insert(grid.sigma, np.arange(1, len(grid.sigma)), 0.5 * (grid.sigma[1:] + grid.sigma[:-1]))
     if grid.tight is None:
@@ -66,7 +66,7 @@ def halved(grid: Knots) -> Knots:
     return replace(grid, sigma=sigma, tight=np.insert(grid.tight, np.arange(1, grid.tight.shape[1]), between, axis=1))
 
 
-def seconds(grid: Knots, report: Solved) -> float:
+def seconds(grid: MotionKnots, report: SolvedWindows) -> float:
     """Time of a solve, as its objective has it."""
     problem = grid.problem()
     return float(np.sum(problem.weight * problem.basis.values(report.c)[0] ** -0.5))

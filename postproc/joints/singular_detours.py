@@ -3,9 +3,9 @@
 Where the tool comes near the direction of the rotary axis nearest the part (the pole), that axis has to follow the azimuth
 of the tool about it, however fast that turns. Seen along the path, an azimuth is allowed where a direction with it lies
 within the tolerance: on the sphere, sin d = sin(theta) sin(azimuth - wanted) for the distance d of a direction at the angle
-theta from the pole to a meridian (Napier). Of all azimuths in these gates the taut string turns least (`taut.py`); the
-nearest point of its meridian is the new direction. Where the pole itself is within the tolerance the axis is led through
-it, onto the opposite meridian, so that the azimuth need not turn at all.
+theta from the pole to a meridian (Napier). Of all azimuths in these gates the taut string turns least
+(`taut_string.py`); the nearest point of its meridian is the new direction. Where the pole itself is within the tolerance
+the axis is led through it, onto the opposite meridian, so that the azimuth need not turn at all.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy as np
 
 from machines.kinematics.base import Kinematics
 from postproc.joints.poles import Pole, passages, poles_of, stretches
-from postproc.joints.taut import taut_string
+from postproc.joints.taut_string import taut_string
 from toolpaths.arrays import Bools, Floats, Ints, repeated
 from toolpaths.rotations import angle_between
 from toolpaths.shape import Curves
@@ -35,7 +35,7 @@ _CORE = 0.02
 
 
 @dataclass(frozen=True)
-class Event:
+class SingularPassage:
     """One passage by a singular direction.
 
     Attributes:
@@ -63,7 +63,7 @@ class Led:
     parent: Ints
     u0: Floats
     u1: Floats
-    events: tuple[Event, ...]
+    events: tuple[SingularPassage, ...]
     is_whole: bool = False
     """the curves as they were given"""
 
@@ -135,8 +135,8 @@ class _Window:
                         picked.sweep * (u1 - u0))
         row = first + index
         span = led.u1[row] - led.u0[row]
-        event = Event(int(led.parent[first]), int(led.parent[first + len(self.curves) - 1]), pole.joint, self.miss,
-                      self.deviation, self.before, self.after)
+        event = SingularPassage(int(led.parent[first]), int(led.parent[first + len(self.curves) - 1]), pole.joint, self.miss,
+                                self.deviation, self.before, self.after)
         end_u = np.where(u1 == 1.0, led.u1[row], led.u0[row] + u1 * span)
         return Led(curves, led.parent[row], led.u0[row] + u0 * span, end_u, (event,))
 
@@ -246,7 +246,7 @@ def _part(led: Led, rows: Ints) -> Led:
     return Led(led.curves.take(rows), led.parent[rows], led.u0[rows], led.u1[rows], ())
 
 
-def _joined(parts: list[Led], events: tuple[Event, ...]) -> Led:
+def _joined(parts: list[Led], events: tuple[SingularPassage, ...]) -> Led:
     curves = Curves(*(np.concatenate([getattr(p.curves, k) for p in parts]) for k in Curves.__dataclass_fields__))
     parent, u0, u1 = (np.concatenate(column) for column in zip(*((p.parent, p.u0, p.u1) for p in parts), strict=True))
     return Led(curves, parent, u0, u1, events + tuple(e for p in parts for e in p.events))

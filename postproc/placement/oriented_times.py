@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from postproc.base.options import Options
-from postproc.orientation.passes.passes import Work
+from postproc.orientation.passes.passes import PassContext
 from postproc.orientation.plans.choice import OrientationChoice
 from postproc.orientation.plans.orient import orient
-from postproc.placement.bodies import Beside
+from postproc.placement.bodies import StationaryBodies
+from postproc.placement.place_times import TimedPlace, Timer, extents
 from postproc.placement.space import Space
-from postproc.placement.timed import Timer, Tried, extents
 from postproc.setup.model import SetupFile
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Severity
@@ -28,12 +28,13 @@ class OrientedTimer(Timer):
     costs a whole choice, so that few are looked at.
     """
 
-    def __init__(self, work: Work, space: Space, setup: SetupFile, options: Options, bodies: Beside | None) -> None:
+    def __init__(self, work: PassContext, space: Space, setup: SetupFile, options: Options,
+                 bodies: StationaryBodies | None) -> None:
         super().__init__(work, space, setup.joints.singular_distance, bodies)
         self.setup, self.options = setup, options
         self.most = min(_MOST, max(_LEAST, _CHOICES // len(work.passes)))
 
-    def _tried(self, place: Floats, best: float) -> Tried:
+    def _tried(self, place: Floats, best: float) -> TimedPlace:
         why = self.stands(place)
         if why:
             return self._refused(place, why)
@@ -43,7 +44,7 @@ class OrientedTimer(Timer):
             return self._refused(place, next(d.message for d in found if d.severity == Severity.ERROR))
         return self._of(place, choice)
 
-    def _of(self, place: Floats, choice: OrientationChoice) -> Tried:
+    def _of(self, place: Floats, choice: OrientationChoice) -> TimedPlace:
         plan = choice.plans[self.options.orient]
         low, high = extents(plan.picked)
         refused = next((f"line {made.one.line}: {made.refused}" for made in plan.picked if made.refused), "")
@@ -57,4 +58,5 @@ class OrientedTimer(Timer):
         for made, spent in zip(plan.picked, plan.cuts.tolist(), strict=True):
             name = " ".join(made.limiting).strip()
             limiting[name] = limiting.get(name, 0.0) + spent
-        return Tried(place, plan.seconds, cutting, plan.seconds - cutting, plan.seconds, low, high, singular, "", limiting)
+        return TimedPlace(place, plan.seconds, cutting, plan.seconds - cutting, plan.seconds, low, high, singular, "",
+                          limiting)

@@ -11,13 +11,13 @@ import numpy as np
 from machines.machine import Machine
 from machines.singular_distance import NAMES as SINGULAR
 from machines.singular_distance import has_singular_distance, singular_distance
+from postproc.orientation.candidates.candidate_times import Candidate, turned
 from postproc.orientation.candidates.ranking import prepare
-from postproc.orientation.candidates.timed import Turned, turned
-from postproc.orientation.passes.passes import Work
-from postproc.orientation.plans.choose import seconds
-from postproc.orientation.plans.turns import Ends, ends, ways_between
-from postproc.placement.bodies import Beside
-from postproc.placement.moved import moved
+from postproc.orientation.passes.passes import PassContext
+from postproc.orientation.plans.index_time import PassEnds, ends, ways_between
+from postproc.orientation.plans.shortest_sequence import seconds
+from postproc.placement.bodies import StationaryBodies
+from postproc.placement.rigid_move import moved
 from postproc.placement.space import Space
 from toolpaths.arrays import Floats
 
@@ -30,7 +30,7 @@ _DIGITS = 7
 
 
 @dataclass(frozen=True)
-class Tried:
+class TimedPlace:
     """A place that was looked at.
 
     Attributes:
@@ -92,12 +92,12 @@ class Timer:
         unsolved: lines of passes with a plan that was not solved, whose time is longer than need be
     """
 
-    def __init__(self, work: Work, space: Space, least: float, bodies: Beside | None = None) -> None:
+    def __init__(self, work: PassContext, space: Space, least: float, bodies: StationaryBodies | None = None) -> None:
         self.work, self.space, self.least, self.bodies = work, space, least, bodies
         self.planned, self.looked, self.pruned, self.refused = 0, 0, 0, 0
         self.unsolved: set[int] = set()
         self._cuts: dict[tuple[int, bytes], _Cut] = {}
-        self._known: dict[bytes, Tried] = {}
+        self._known: dict[bytes, TimedPlace] = {}
         prepare(work.passes)
         sites = sum(len(each.s) for one in work.passes for each in one.stretches)
         self.most = min(_MOST, max(_LEAST, _SITES // max(1, sites)))
@@ -106,11 +106,11 @@ class Timer:
     def machine(self) -> Machine:
         return self.work.machine
 
-    def known(self) -> list[Tried]:
+    def known(self) -> list[TimedPlace]:
         """Every place that was looked at."""
         return list(self._known.values())
 
-    def tried(self, place: Floats, best: float = np.inf) -> Tried:
+    def tried(self, place: Floats, best: float = np.inf) -> TimedPlace:
         """A place (6,); its seconds are inf where they are proved not to be below `best`."""
         key = (np.round(place, 9) + 0.0).tobytes()
         found = self._known.get(key)
@@ -122,7 +122,7 @@ class Timer:
         self.refused += bool(made.refused) and found is None
         return made
 
-    def _tried(self, place: Floats, best: float) -> Tried:
+    def _tried(self, place: Floats, best: float) -> TimedPlace:
         why = self.stands(place)
         if why:
             return self._refused(place, why)
@@ -141,12 +141,12 @@ class Timer:
         cuts, bound, lost = self._cutting(made, best - linking)
         if lost:
             self.pruned += 1
-            return Tried(place, np.inf, np.inf, linking, bound + linking, low, high, singular)
+            return TimedPlace(place, np.inf, np.inf, linking, bound + linking, low, high, singular)
         cutting = float(sum(each[0] for each in cuts))
         limiting: dict[str, float] = {}
         for spent, name in cuts:
             limiting[name] = limiting.get(name, 0.0) + spent
-        return Tried(place, cutting + linking, cutting, linking, bound + linking, low, high, singular, "", limiting)
+        return TimedPlace(place, cutting + linking, cutting, linking, bound + linking, low, high, singular, "", limiting)
 
     def stands(self, place: Floats) -> str:
         """What the part would stand in or hang over, "" where it stands free."""
@@ -154,12 +154,13 @@ class Timer:
         return over or ("" if self.bodies is None else self.bodies.against(self.space.placement(place)))
 
     def _refused(self, place: Floats, why: str, low: Floats | None = None, high: Floats | None = None,
-                 singular: float = np.nan) -> Tried:
+                 singular: float = np.nan) -> TimedPlace:
         none = np.full(len(self.machine.axis_names), np.nan)
-        return Tried(place, np.inf, np.inf, np.inf, np.inf, none if low is None else low, none if high is None else high,
-                     singular, why)
+        return TimedPlace(place, np.inf, np.inf, np.inf, np.inf, none if low is None else low,
+                          none if high is None else high,
+                          singular, why)
 
-    def _singular(self, made: Sequence[Turned]) -> tuple[float, str]:
+    def _singular(self, made: Sequence[Candidate]) -> tuple[float, str]:
         """Least distance from singular positions over all poses of a parallel machine, and what stands against it."""
         if not has_singular_distance(self.machine.kinematics):
             return np.inf, ""
@@ -169,7 +170,7 @@ class Timer:
         why = f"{SINGULAR[int(which)]} comes to {value:.4f} of a singular position, allowed at least {self.least:g}"
         return value, why if value < self.least else ""
 
-    def _cutting(self, made: Sequence[Turned], best: float) -> tuple[list[tuple[float, str]], float, bool]:
+    def _cutting(self, made: Sequence[Candidate], best: float) -> tuple[list[tuple[float, str]], float, bool]:
         """(seconds and what limits of each pass, bound, True where all together are proved not to be below `best`)."""
         keys = [(one.one.number, _way(one)) for one in made]
         for one, key in zip(made, keys, strict=True):
@@ -191,25 +192,25 @@ class Timer:
         return [one for one in done if one is not None], bound, False
 
 
-def _linking(work: Work, edge: list[Ends]) -> float:
+def _linking(work: PassContext, edge: list[PassEnds]) -> float:
     """Seconds of rapids, turns, and ways from home and back."""
     rapids = [np.array([one.rapids]) for one in edge]
     return seconds([0] * len(edge), rapids, ways_between(work, [[one] for one in edge]))
 
 
-def _no_height(edge: list[Ends], made: Sequence[Turned]) -> str:
+def _no_height(edge: list[PassEnds], made: Sequence[Candidate]) -> str:
     """A pass above which the safe plane is outside travel."""
     line = next((one.one.line for one, end in zip(made, edge, strict=True) if not np.isfinite(end.down + end.up)), None)
     return "" if line is None else f"line {line}: no safe plane above the pass is inside travel"
 
 
-def extents(made: Sequence[Turned]) -> tuple[Floats, Floats]:
+def extents(made: Sequence[Candidate]) -> tuple[Floats, Floats]:
     """Least and greatest joints (J,) of all rows and sites."""
     every = [q for one in made for q in (one.q, *one.sites)]
     return (np.min([q.min(axis=0) for q in every], axis=0), np.max([q.max(axis=0) for q in every], axis=0))
 
 
-def _way(made: Turned) -> bytes:
+def _way(made: Candidate) -> bytes:
     """A mark of how the joints go along the cuts of a pass, whatever they begin at."""
     mark = blake2b(digest_size=16)
     rows = made.one.drilled.rows

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from postproc.orientation.passes.passes import Pass, Stretch, Work
+from postproc.orientation.passes.passes import CuttingStretch, Pass, PassContext
 from postproc.path.links import safe_space
 from postproc.setup.model import Placement
 
 
-def moved(work: Work, placement: Placement) -> Work:
+def moved(work: PassContext, placement: Placement) -> PassContext:
     """The passes of `work`, which stands with the part frame on the table frame, at another placement.
 
     A smoothed cut is one of its points, wherever these stand: the sites along it stay what they are.
@@ -26,5 +26,5 @@ def _pass(one: Pass, placement: Placement) -> Pass:
                    stretches=tuple(_stretch(each, placement) for each in one.stretches))
 
 
-def _stretch(one: Stretch, placement: Placement) -> Stretch:
+def _stretch(one: CuttingStretch, placement: Placement) -> CuttingStretch:
     return replace(one, tip=placement.points(one.tip), axis=placement.directions(one.axis))

@@ -7,10 +7,10 @@ from pathlib import Path
 
 from toolpaths.diagnostics import Diagnostic, DiagnosticError, warning
 from toolpaths.input_files import is_regular, read_input, unreadable
-from toolpaths.leftovers import interrupted
+from toolpaths.interrupted_runs import interrupted
 
 
-class Beside(Mapping[str, bytes]):
+class NeighbourFiles(Mapping[str, bytes]):
     """Files of a program's folder by their names, without itself; read where they are asked for."""
 
     def __init__(self, program: str | Path) -> None:

@@ -8,12 +8,12 @@ from typing import Protocol
 import numpy as np
 
 from postproc.base.group_rows import groups
-from postproc.correction.compensation import Compensation
-from postproc.correction.formatted import AfterFormatting
-from postproc.correction.runs import Runs
+from postproc.correction.compensation import ErrorCorrection
+from postproc.correction.runs import RowRuns
+from postproc.correction.written_deviation import AfterFormatting
 from postproc.job.job import Job
 from postproc.job.rounding import decimals
-from postproc.path.model import Path
+from postproc.path.model import JointPath
 from postproc.readback.comparison.compare import Comparison
 from postproc.reference.holes import Phase
 from postproc.reference.moves import Moves
@@ -29,7 +29,7 @@ SLACK = 1e-6, 1e-9
 """mm and rad beyond a bound that are numbers' own: errors change by as much over a last decimal"""
 
 
-class Corrected(Protocol):
+class CorrectedConversion(Protocol):
     """What is looked at of a conversion."""
 
     @property
@@ -41,15 +41,15 @@ class Corrected(Protocol):
         """That are written."""
 
     @property
-    def path(self) -> Path | None:
+    def path(self) -> JointPath | None:
         """Corrected."""
 
     @property
-    def nominal(self) -> Path | None:
+    def nominal(self) -> JointPath | None:
         """Before correction."""
 
     @property
-    def compensation(self) -> Compensation | None:
+    def compensation(self) -> ErrorCorrection | None:
         """What was corrected."""
 
     @property
@@ -57,7 +57,7 @@ class Corrected(Protocol):
         """What the program does."""
 
 
-def after_formatting(result: Corrected) -> AfterFormatting | None:
+def after_formatting(result: CorrectedConversion) -> AfterFormatting | None:
     """The deviations of a conversion that corrects geometric errors; None of one that does not or that is not proved.
 
     CL points are where the tool cuts to: ends of feed moves and arcs, bottoms of holes; as the path before correction has
@@ -79,7 +79,7 @@ def after_formatting(result: Corrected) -> AfterFormatting | None:
     return AfterFormatting(tip, axis, points, block[points], *bounds)
 
 
-def planned_moves(result: Corrected) -> Moves:
+def planned_moves(result: CorrectedConversion) -> Moves:
     """The moves without pecks, ending at tip and axis (M, 3) of the path before correction."""
     job, moves, path = result.job, result.moves, result.nominal
     assert job is not None and moves is not None and path is not None
@@ -90,7 +90,7 @@ def planned_moves(result: Corrected) -> Moves:
     return replace(moves, tip=tip, axis=axis).without_pecks()
 
 
-def last_blocks(path: Path, moves: int) -> Ints:
+def last_blocks(path: JointPath, moves: int) -> Ints:
     """(M,) the block of a path that ends each of its moves; -1 where none does."""
     rows, result = np.flatnonzero((path.u == 1.0) & ~path.home), np.full(moves, -1)
     np.maximum.at(result, path.move[rows], rows)
@@ -117,7 +117,7 @@ def beyond_bound(found: AfterFormatting | None, job: Job) -> list[Diagnostic]:
                     + "more decimals in the controller's [format] help")]
 
 
-def _play(result: Corrected) -> tuple[float, float]:
+def _play(result: CorrectedConversion) -> tuple[float, float]:
     """(mm, rad) that a last decimal of the words of joints with lost motion comes to, at up to LOOKS blocks."""
     job, path = result.job, result.path
     assert job is not None and job.errors is not None and path is not None
@@ -150,7 +150,7 @@ def _nearest(comparison: Comparison, moves: Moves, bounds: tuple[float, float]) 
     other = np.concatenate([[0], at, [len(comparison.tip)]])
     first = other[np.searchsorted(at, at)]
     count = np.maximum(other[np.searchsorted(at, at, side="right") + 1] - first, 0)
-    near = Runs(first, count)
+    near = RowRuns(first, count)
     block, owner = np.concatenate([own, near.rows, at]), np.concatenate([comparison.owner[own], done[near.of_rows], done])
     tip_off = np.linalg.norm(comparison.tip[block] - moves.tip[owner], axis=1)
     axis_off = angle_between(comparison.axis[block], moves.axis[owner])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from postproc.witness.evidence import Executed
+from postproc.witness.evidence import ExecutedBlocks
 from postproc.witness.text import Array
 
 _INCH = 25.4
@@ -16,7 +16,7 @@ _CHUNK = 100_000
 _KINDS = ("XYZ", "UVW", "ABC")
 
 
-def seconds_of(e: Executed) -> Array:
+def seconds_of(e: ExecutedBlocks) -> Array:
     """(E,) s of every block at the feed in force; meaningless for rapids.
 
     Per minute the feed is that of the tip where X, Y, Z are the tip; of axis positions by `rule`: "all" the root of the
@@ -56,7 +56,7 @@ def _first_of(step: Array, letters: tuple[str, ...], kinds: tuple[str, ...]) -> 
     return result
 
 
-def _arc_lengths(e: Executed, rows: Array) -> Array:
+def _arc_lengths(e: ExecutedBlocks, rows: Array) -> Array:
     """(K,) mm along arcs and helices, by three places of each: the way to the middle says the radius."""
     start, middle, end = (e.poses_at(rows, np.full(len(rows), t))[0] for t in (0.0, 0.5, 1.0))
     angle = np.abs(e.sweep[rows])

@@ -9,7 +9,7 @@ import numpy as np
 
 from postproc.witness.clfile import commanded
 from postproc.witness.commanded import ARC, LINE, Commanded
-from postproc.witness.evidence import Case, Executed, Finding, Testimony
+from postproc.witness.evidence import Case, ExecutedBlocks, Finding, Testimony
 from postproc.witness.machine import ROD, Chain, kinematics_of, merged
 from postproc.witness.motion import Walked, check_arcs, check_way
 from postproc.witness.place import Poses, Unplaced, cut_of, placement, zero_of
@@ -29,7 +29,7 @@ ZERO = 1e-6
 """mm that reckoning may move the zero of the work offset"""
 
 
-def testify(case: Case, executed: Executed) -> Testimony:
+def testify(case: Case, executed: ExecutedBlocks) -> Testimony:
     """What this witness says of an executed program; it never raises for what it does not understand."""
     began = process_time()
     if case.oriented:
@@ -58,7 +58,7 @@ def _nothing(why: str, began: float) -> Testimony:
     return Testimony((), (why,), seconds=process_time() - began)
 
 
-def _compare(case: Case, executed: Executed, c: Commanded, place: tuple[Array, Array], poses: Poses,
+def _compare(case: Case, executed: ExecutedBlocks, c: Commanded, place: tuple[Array, Array], poses: Poses,
              table: dict[str, object]) -> tuple[list[Finding], tuple[float, float], dict[str, int], list[str]]:
     rotation, origin = place
     same = bool((rotation == np.eye(3)).all())

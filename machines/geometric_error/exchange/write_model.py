@@ -12,7 +12,7 @@ from machines.geometric_error.actual.rods import RodErrors
 from machines.geometric_error.actual.serial_errors import Component, SerialErrors
 from machines.geometric_error.files.covariance import angular, write_covariance
 from machines.geometric_error.tables.csv_table import UNITS, write_csv
-from machines.geometric_error.tables.curves import EVERYWHERE, Fourier, Polynomial, Table
+from machines.geometric_error.tables.curves import EVERYWHERE, Fourier, Polynomial, TableCurve
 from machines.geometric_error.tables.lattice import ErrorMap
 from machines.geometric_error.tables.lattice_file import map_to_csv
 from machines.geometric_error.tables.names import ErrorName
@@ -77,14 +77,14 @@ def _component_lines(axes: SerialErrors, stem: str, files: dict[str, str]) -> li
     for component in axes.components:
         name, curve = component.name, component.curve
         lines += ["", f"[components.{name}]"]
-        if not isinstance(curve, Table):
+        if not isinstance(curve, TableCurve):
             lines += _curve_lines(component)
             continue
         key = (name.axis, curve.x.tobytes())
         if key not in tables:
             more = sum(axis == name.axis for axis, _ in tables)
             tables[key] = f"{stem}-{name.axis}{more + 1 if more else ''}.csv"
-            same = [c for c in axes.components if c.name.axis == name.axis and isinstance(c.curve, Table)
+            same = [c for c in axes.components if c.name.axis == name.axis and isinstance(c.curve, TableCurve)
                     and c.curve.x.tobytes() == key[1]]
             files[tables[key]] = table_to_csv(same)
         period = [f"repeats = {curve.period / _scales(name)[0]:.15g}"] if curve.period else []
@@ -116,8 +116,8 @@ def table_to_csv(components: Sequence[Component]) -> str:
     return write_csv(columns, [f"errors of {axis}: actual less commanded, tool relative to part"])
 
 
-def _table_of(component: Component) -> Table:
-    assert isinstance(component.curve, Table)
+def _table_of(component: Component) -> TableCurve:
+    assert isinstance(component.curve, TableCurve)
     return component.curve
 
 

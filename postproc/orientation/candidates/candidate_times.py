@@ -13,10 +13,10 @@ from machines.machine import Machine
 from postproc.feedrate.limits import JointLimits
 from postproc.feedrate.motion import Plan
 from postproc.feedrate.plan import plan, plan_second_order
-from postproc.feedrate.rest_to_rest import Law, rest_seconds
-from postproc.feedrate.shares import Shares
+from postproc.feedrate.rest_to_rest import PointToPointMode, rest_seconds
+from postproc.feedrate.shares import LimitShares
 from postproc.orientation.passes.allowed import SAME
-from postproc.orientation.passes.passes import Pass, Stretch
+from postproc.orientation.passes.passes import CuttingStretch, Pass
 from postproc.orientation.passes.poses import held_poses, poses
 from postproc.planning.geometry import MachinePath
 from postproc.planning.planned import ORDERS, joint_limits
@@ -33,7 +33,7 @@ def no_bodies(one: Pass, axis: Floats) -> str:
 
 
 @dataclass(frozen=True)
-class Turned:
+class Candidate:
     """A pass turned to `axis` (3,) (the CL's own where it is fixed): joints of its rows `q` (n, J) and of the sites of
     each stretch; `refused` says why the machine cannot run it, else ""; `held` is the angle, rad, asked for of the rotary
     joint that the axis leaves free, NaN where none is; `told`: see `slim`."""
@@ -78,12 +78,12 @@ class Turned:
         return self.drilling + float(sum(self._least(stretch, q) for stretch, q in
                                          zip(self.one.stretches, self.sites, strict=True)))
 
-    def _least(self, stretch: Stretch, q: Floats) -> float:
+    def _least(self, stretch: CuttingStretch, q: Floats) -> float:
         way, length = np.abs(np.diff(q, axis=0)), np.diff(stretch.s)
         most = _largest_feed(stretch)
         fed = _ROUND * np.max(way / length[:, None], axis=0) * most
         limits = replace(self.limits, velocity=np.minimum(self.limits.velocity, np.maximum(fed, 1e-9)))
-        rest = float(rest_seconds(q[:1], q[-1:], limits, Law.DOG_LEG)[0])
+        rest = float(rest_seconds(q[:1], q[-1:], limits, PointToPointMode.DOG_LEG)[0])
         return max(rest, float(np.maximum(np.max(way / self.limits.velocity, axis=1), length / most).sum()))
 
     @cached_property
@@ -92,7 +92,7 @@ class Turned:
         if self.refused:
             return np.inf
         rows = np.flatnonzero(self.one.rapid[1:])
-        return float(rest_seconds(self.q[rows], self.q[rows + 1], self.limits, Law.STRAIGHT).sum())
+        return float(rest_seconds(self.q[rows], self.q[rows + 1], self.limits, PointToPointMode.STRAIGHT).sum())
 
     @cached_property
     def drilling(self) -> float:
@@ -154,7 +154,7 @@ class Turned:
         """Whether every joint has a limit of its jerk."""
         return bool(np.isfinite(self.limits.jerk).all())
 
-    def _binding(self, shares: list[Shares]) -> tuple[str, str]:
+    def _binding(self, shares: list[LimitShares]) -> tuple[str, str]:
         """See `limiting`."""
         if not shares:
             return "", ""
@@ -164,7 +164,7 @@ class Turned:
             return "feed", ""
         return self.machine.axis_names[int(joint)], ORDERS[int(order)]
 
-    def slim(self, seconds: float) -> Turned:
+    def slim(self, seconds: float) -> Candidate:
         """Without joints along the pass, but where its cuts begin: to be told about, not to be planned; with the `seconds`
         known of it, NaN where it was not timed."""
         first = int(np.argmin(self.one.rapid))
@@ -177,20 +177,20 @@ class Turned:
         return angles or dict(zip("IJK", self.axis.tolist(), strict=True))
 
 
-def _largest_feed(stretch: Stretch) -> float:
+def _largest_feed(stretch: CuttingStretch) -> float:
     """mm/s, over the stretch"""
     first, last = np.searchsorted(stretch.feed.edges, [stretch.s[0], stretch.s[-1]], side="right") - 1
     return float(stretch.feed.values[first:max(last, first + 1)].max())
 
 
 def turned(one: Pass, axis: Floats, machine: Machine, collides: Callable[[Pass, Floats], str] = no_bodies,
-           held: float = np.nan) -> Turned:
+           held: float = np.nan) -> Candidate:
     """The pass with its tool along `axis` (3,), on the branch inside travel whose rotary joints are least turned."""
     return turned_all(one, axis[None], machine, collides, held)[0]
 
 
 def turned_all(one: Pass, axes: Floats, machine: Machine, collides: Callable[[Pass, Floats], str] = no_bodies,
-               held: float = np.nan) -> list[Turned]:
+               held: float = np.nan) -> list[Candidate]:
     """`turned` along each of `axes` (S, 3); a pass whose axis is fixed stays as it is."""
     if one.fixed:
         solved = [poses(one, machine, np.concatenate([one.tip, *(s.tip for s in one.stretches)]),
@@ -201,5 +201,5 @@ def turned_all(one: Pass, axes: Floats, machine: Machine, collides: Callable[[Pa
     result = []
     for axis, (q, refused) in zip(axes, solved, strict=True):
         rows, *sites = np.split(q, cuts)
-        result.append(Turned(one, axis, machine, rows, tuple(sites), refused, collides, held))
+        result.append(Candidate(one, axis, machine, rows, tuple(sites), refused, collides, held))
     return result

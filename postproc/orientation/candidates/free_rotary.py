@@ -13,8 +13,8 @@ from machines.machine import Machine
 from machines.polytope import held_axis_polytope
 from postproc.joints.poles import poles_of
 from postproc.joints.spin import free_joint
-from postproc.orientation.candidates.search import Search
-from postproc.orientation.candidates.timed import Turned
+from postproc.orientation.candidates.candidate_times import Candidate
+from postproc.orientation.candidates.search import CandidateSearch
 from postproc.orientation.passes.passes import Pass
 from toolpaths.arrays import Floats, Ints
 from toolpaths.units import DEG
@@ -30,12 +30,12 @@ _TIE = 1e-2
 """relative: seeds that differ by less are equal, the least turned is tried first"""
 
 
-def free_value(made: Turned) -> float:
+def free_value(made: Candidate) -> float:
     """Where the rotary joint stands that the tool axis leaves free, rad; NaN where it leaves none."""
     return free_angle(made)[1]
 
 
-def free_angle(made: Turned) -> tuple[int, float]:
+def free_angle(made: Candidate) -> tuple[int, float]:
     """The rotary joint that the tool axis leaves free and where it stands, rad; -1 and NaN where it leaves none."""
     if made.refused or made.one.turns or not bool(made.one.kin.singular(made.q[:1])[0]):
         return -1, np.nan
@@ -43,7 +43,7 @@ def free_angle(made: Turned) -> tuple[int, float]:
     return joint, float(made.q[0, joint]) if joint >= 0 else np.nan
 
 
-def best_held(search: Search, best: Turned) -> Turned:
+def best_held(search: CandidateSearch, best: Candidate) -> Candidate:
     """The best of a candidate and of angles at which a free joint may be held, under every axis of the pass that has one."""
     one, machine = search.one, search.machine
     if one.fixed and not one.spins:
@@ -70,7 +70,7 @@ def held_angles(one: Pass, machine: Machine, axis: Floats) -> Floats:
     return _dips(_slowness(one, machine, axis, joint), machine, joint)
 
 
-def common_angles(owns: Sequence[Turned]) -> Floats:
+def common_angles(owns: Sequence[Candidate]) -> Floats:
     """Angles (H,) rad at which the joint that all these passes leave free, as the CL file has them, should serve them best
     together; some of them are looked at where they are many."""
     some = [owns[k] for k in np.unique(np.linspace(0, len(owns) - 1, min(len(owns), _SOME)).astype(np.int64)).tolist()]
@@ -148,7 +148,7 @@ def _places(count: int, stretches: int) -> Ints:
     return np.unique(np.linspace(0, count - 1, min(count, max(2, _DIRECTIONS // stretches + 1))).round().astype(np.int64))
 
 
-def _refined(search: Search, best: Turned, step: float) -> Turned:
+def _refined(search: CandidateSearch, best: Candidate, step: float) -> Candidate:
     """The best of a held angle and its two neighbours, going on where one gains."""
     for _ in range(3):
         start = best

@@ -8,12 +8,12 @@ from collections.abc import Callable
 
 import numpy as np
 
-from postproc.orientation.candidates.losers import KINDS
-from postproc.orientation.candidates.search import Lost, Tried
-from postproc.orientation.candidates.timed import Turned, turned
-from postproc.orientation.candidates.travel import Lack, nearest_inside
-from postproc.orientation.passes.allowed import Allowed
-from postproc.orientation.passes.passes import Pass, Work
+from postproc.orientation.candidates.candidate_times import Candidate, turned
+from postproc.orientation.candidates.rejections import KINDS
+from postproc.orientation.candidates.search import PassSearch, Rejection
+from postproc.orientation.candidates.travel import MissingTravel, nearest_inside
+from postproc.orientation.passes.allowed import AllowedAxes
+from postproc.orientation.passes.passes import Pass, PassContext
 from postproc.orientation.passes.poses import OUT_OF_REACH
 from toolpaths.diagnostics import Diagnostic, error, warning
 from toolpaths.rotations import angle_between
@@ -30,7 +30,7 @@ _SURE = 5.0
 """mm that every axis lacks at least: where it is less, the search decides"""
 
 
-def out_of_travel(work: Work, allowed: Allowed) -> list[Diagnostic]:
+def out_of_travel(work: PassContext, allowed: AllowedAxes) -> list[Diagnostic]:
     """Errors, before any search, where travel rules out passes whatever their tool axis: of those whose own axis is outside
     alike, the one that is farthest is looked at."""
     alike: dict[tuple[str, str], list[tuple[Pass, str]]] = {}
@@ -47,21 +47,21 @@ def out_of_travel(work: Work, allowed: Allowed) -> list[Diagnostic]:
     return found
 
 
-def _hopeless(work: Work, some: list[tuple[Pass, str]], one: Pass, why: str) -> Diagnostic:
+def _hopeless(work: PassContext, some: list[tuple[Pass, str]], one: Pass, why: str) -> Diagnostic:
     more = f"; the CL's axis is outside alike in {len(some) - 1} more passes" if len(some) > 1 else ""
     lines = [one.line, *(each.line for each, _ in some if each is not one)]
     return error("orient.travel", f"pass {one.number} with the axis of the CL file: {why}{more}", file=work.toolpath.file,
                  lines=lines[:6], count=len(some), hint=_hint(why, one.fixed))
 
 
-def _no_other(one: Pass, least: Lack) -> str:
+def _no_other(one: Pass, least: MissingTravel) -> str:
     """Why no other axis is left."""
     if one.fixed:
         return f"no other axis is allowed ({one.fixed})"
     return f"no other axis is inside travel, the nearest to it has {least.why.removeprefix('travel: ')}"
 
 
-def unfit(work: Work, results: list[Tried]) -> list[Diagnostic]:
+def unfit(work: PassContext, results: list[PassSearch]) -> list[Diagnostic]:
     """Warnings where another axis was found, else errors."""
     reached = [one for one in results if not one.own.refused]
     return [*_told(work, [one for one in results if one.own.refused], ("orient.own_reach", "orient.reach"),
@@ -70,7 +70,7 @@ def unfit(work: Work, results: list[Tried]) -> list[Diagnostic]:
                    lambda one: one.own.touching)]
 
 
-def _off(own: Turned) -> str:
+def _off(own: Candidate) -> str:
     """By how much a serial machine misses an axis that it cannot take at all."""
     if own.refused != OUT_OF_REACH or not own.one.kin.slides_affine:
         return ""
@@ -87,9 +87,10 @@ def _hint(why: str, fixed: str) -> str:
     return _APART_FIXED if fixed else _APART
 
 
-def _told(work: Work, bad: list[Tried], codes: tuple[str, str], why: Callable[[Tried], str]) -> list[Diagnostic]:
+def _told(work: PassContext, bad: list[PassSearch], codes: tuple[str, str],
+          why: Callable[[PassSearch], str]) -> list[Diagnostic]:
     """One diagnostic per kind; the deepest and the farthest beyond travel stands for all."""
-    alike: dict[tuple[bool, str, str], list[Tried]] = {}
+    alike: dict[tuple[bool, str, str], list[PassSearch]] = {}
     for one in bad:
         alike.setdefault((one.best is not one.own, _pair(why(one)), one.own.one.fixed), []).append(one)
     result = []
@@ -105,7 +106,7 @@ def _told(work: Work, bad: list[Tried], codes: tuple[str, str], why: Callable[[T
     return result
 
 
-def _others(some: list[Tried]) -> str:
+def _others(some: list[PassSearch]) -> str:
     """What all other axes of passes lost by."""
     lost = [each for one in some for each in one.rejected if each.made is not one.own]
     count = Counter(each.kind for each in lost)
@@ -114,7 +115,7 @@ def _others(some: list[Tried]) -> str:
     return f"none of {len(lost)} other axes tried can be taken: {', '.join(parts)}" if lost else "no other axis is in reach"
 
 
-def _nearest(lost: list[Lost]) -> str:
+def _nearest(lost: list[Rejection]) -> str:
     """The candidate that touches least."""
     least = min((each.why for each in lost if each.kind == "touches" and _BY.match(each.why)), key=_depth, default="")
     return f" (the least: {least})" if least else ""

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from postproc.joints.spin import free_joint
+from postproc.orientation.candidates.candidate_times import Candidate
 from postproc.orientation.candidates.reaches import least_held
-from postproc.orientation.candidates.search import Lost, Tried
-from postproc.orientation.candidates.timed import Turned
+from postproc.orientation.candidates.search import PassSearch, Rejection
 from toolpaths.drawing import plain
 from toolpaths.units import DEG
 
@@ -20,13 +20,13 @@ RING = 361
 """angles of the line"""
 
 
-def is_held(tried: Tried) -> bool:
+def is_held(tried: PassSearch) -> bool:
     """Whether held angles are what is to be seen of a pass: its axis is kept, or the best of it holds a joint."""
     angles = [lost for lost in tried.rejected if np.isfinite(lost.made.held)]
     return bool(np.isfinite(tried.best.held) or (tried.own.one.fixed and angles))
 
 
-def held_panel(place: Axes, tried: Tried, made: Turned) -> None:
+def held_panel(place: Axes, tried: PassSearch, made: Candidate) -> None:
     """Seconds over the held angle: the line is the least by the reach, marks are the angles tried."""
     best = tried.best
     joint = free_joint(best.one.kin, best.one.tip[0] + best.one.shift(best.axis), best.axis, best.machine.home)
@@ -52,12 +52,12 @@ def held_panel(place: Axes, tried: Tried, made: Turned) -> None:
     place.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=2, fontsize="x-small", frameon=False)
 
 
-def _here(tried: Tried) -> list[Lost]:
+def _here(tried: PassSearch) -> list[Rejection]:
     """Losers with the axis of the best one."""
     return [lost for lost in tried.rejected if lost.made.same(tried.best.axis, lost.made.held)]
 
 
-def _angle(made: Turned, joint: int) -> float:
+def _angle(made: Candidate, joint: int) -> float:
     """Degrees in (-180, 180]."""
     q = float(made.q[int(np.argmin(made.one.rapid)) if len(made.q) > 1 else 0, joint])
     return float(-(np.mod(-q + np.pi, 2.0 * np.pi) - np.pi)) / DEG

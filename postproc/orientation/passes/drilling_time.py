@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from postproc.feedrate.limits import JointLimits
-from postproc.feedrate.rest_to_rest import Law, rest_seconds
+from postproc.feedrate.rest_to_rest import PointToPointMode, rest_seconds
 from postproc.reference.holes import Phase
 from postproc.reference.moves import Moves
 from toolpaths.arrays import Floats, Ints
@@ -37,7 +37,7 @@ class Drilled:
                                 np.append(limits.jerk, np.inf))
         begin = np.hstack((q[self.rows - 1], np.zeros((len(self.rows), 1))))
         end = np.hstack((q[self.rows], self.fed[:, None]))
-        return self.dwell + float(rest_seconds(begin, end, with_feed, Law.STRAIGHT).sum())
+        return self.dwell + float(rest_seconds(begin, end, with_feed, PointToPointMode.STRAIGHT).sum())
 
 
 def drilled_of(toolpath: Toolpath, moves: Moves, rows: tuple[int, int]) -> Drilled:

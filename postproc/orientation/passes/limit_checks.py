@@ -7,7 +7,7 @@ import numpy as np
 
 from machines.user_file import nearest, read_toml
 from postproc.orientation.passes.allowed import off_centre, own_outside
-from postproc.orientation.passes.passes import Pass, Work
+from postproc.orientation.passes.passes import Pass, PassContext
 from postproc.setup.orientation import OrientationLimits
 from toolpaths.diagnostics import Diagnostic, error, info, warning
 from toolpaths.units import DEG
@@ -16,7 +16,7 @@ _NORMALS = ("have the CAM system write surface normals (GOTO with nine numbers),
             "limit the tilt from the CL's own axis alone (--max-tilt)")
 
 
-def limit_faults(work: Work, file: str = "", tilt: float = np.pi) -> list[Diagnostic]:
+def limit_faults(work: PassContext, file: str = "", tilt: float = np.pi) -> list[Diagnostic]:
     """Diagnostics of the set-up's `[orientation]` for the passes of a toolpath; `file` is that of the set-up, `tilt` the
     largest from the surface normals, rad."""
     limits = work.setup.orientation
@@ -27,14 +27,14 @@ def limit_faults(work: Work, file: str = "", tilt: float = np.pi) -> list[Diagno
             *_no_contact(work, free), *own]
 
 
-def _unknown_operations(work: Work, limits: OrientationLimits, file: str) -> list[Diagnostic]:
+def _unknown_operations(work: PassContext, limits: OrientationLimits, file: str) -> list[Diagnostic]:
     known = [op.name for op in work.toolpath.operations if op.name]
     return [error("orient.operation", f"fixed_operations names {name!r}, which is no operation of the CL file",
                   file=file or work.toolpath.file, lines=_line(file, "fixed_operations"), hint=nearest(name, known))
             for name in limits.fixed_operations if name not in known]
 
 
-def _no_normals(work: Work, limits: OrientationLimits, free: list[Pass]) -> list[Diagnostic]:
+def _no_normals(work: PassContext, limits: OrientationLimits, free: list[Pass]) -> list[Diagnostic]:
     bad = [one for one in free if not len(one.contact)] if limits.need_normals else []
     if not bad:
         return []
@@ -43,7 +43,7 @@ def _no_normals(work: Work, limits: OrientationLimits, free: list[Pass]) -> list
                   file=work.toolpath.file, lines=[one.line for one in bad][:6], count=len(bad), hint=_NORMALS)]
 
 
-def _too_wide(work: Work, limits: OrientationLimits, free: list[Pass], file: str) -> list[Diagnostic]:
+def _too_wide(work: PassContext, limits: OrientationLimits, free: list[Pass], file: str) -> list[Diagnostic]:
     radius = limits.contact_radius
     bad = [one for one in free if radius is not None and radius >= one.radius]
     if not bad:
@@ -53,7 +53,7 @@ def _too_wide(work: Work, limits: OrientationLimits, free: list[Pass], file: str
                   count=len(bad), hint="a distance below the ball's radius, or off_centre in degrees")]
 
 
-def _too_steep(work: Work, limits: OrientationLimits, free: list[Pass], file: str, tilt: float) -> list[Diagnostic]:
+def _too_steep(work: PassContext, limits: OrientationLimits, free: list[Pass], file: str, tilt: float) -> list[Diagnostic]:
     """Passes whose least angle to the normal is above the largest."""
     bad = [one for one in free if len(one.contact) and off_centre(limits, one.radius) > tilt]
     if not bad:
@@ -66,7 +66,7 @@ def _too_steep(work: Work, limits: OrientationLimits, free: list[Pass], file: st
                   hint=f"--max-tilt {_above(least)} or more, or a smaller {key}")]
 
 
-def _own_tilt(work: Work, free: list[Pass], tilt: float) -> list[Diagnostic]:
+def _own_tilt(work: PassContext, free: list[Pass], tilt: float) -> list[Diagnostic]:
     """Passes whose own axis leans farther than the largest tilt."""
     leans = {one.number: _lean(one) for one in free if len(one.contact)}
     bad = [one for one in free if leans.get(one.number, 0.0) > tilt + 1e-9]
@@ -90,7 +90,7 @@ def _above(angle: float) -> str:
     return f"{np.floor(10.0 * angle + 1.0 - 1e-6) / 10.0:g}"
 
 
-def _no_contact(work: Work, free: list[Pass]) -> list[Diagnostic]:
+def _no_contact(work: PassContext, free: list[Pass]) -> list[Diagnostic]:
     """Places where the part says nothing: the ball is not on it, or too deep in it."""
     some = [one for one in free if one.contact.unknown and work.toolpath.normal is None]
     if not some or work.setup.bodies is None:
@@ -102,7 +102,7 @@ def _no_contact(work: Work, free: list[Pass]) -> list[Diagnostic]:
                  file=work.toolpath.file, lines=[one.line for one in some][:6], count=len(some))]
 
 
-def _own(work: Work, limits: OrientationLimits, free: list[Pass]) -> list[Diagnostic]:
+def _own(work: PassContext, limits: OrientationLimits, free: list[Pass]) -> list[Diagnostic]:
     found = [(one, why) for one in free if (why := own_outside(one, limits))]
     if not found:
         return []

@@ -17,8 +17,8 @@ from itertools import repeat
 from multiprocessing import get_context
 from typing import Any, TypeVar
 
-from postproc.orientation.passes.allowed import Allowed
-from postproc.orientation.passes.passes import Work
+from postproc.orientation.passes.allowed import AllowedAxes
+from postproc.orientation.passes.passes import PassContext
 
 Progress = Callable[[str, int, int], None]
 T = TypeVar("T")
@@ -26,7 +26,7 @@ CHUNK = 8
 """passes that are done one after the other"""
 _FEWEST = 4 * CHUNK
 """passes from which processes pay"""
-_shared: list[tuple[Callable[[int, Any], Any], Work, Allowed]] = []
+_shared: list[tuple[Callable[[int, Any], Any], PassContext, AllowedAxes]] = []
 """what the workers are to do; theirs by inheritance"""
 
 
@@ -41,7 +41,7 @@ class PassFault(Exception):
         return str(self.args[0])
 
 
-def each_pass(function: Callable[[int, T | None], T], work: Work, allowed: Allowed, name: str,
+def each_pass(function: Callable[[int, T | None], T], work: PassContext, allowed: AllowedAxes, name: str,
               progress: Progress | None = None, workers: int | None = None) -> list[T]:
     """`function` of the numbers of all passes, in order; `progress` is told `name` and how far it is.
 
@@ -97,7 +97,7 @@ def _chunk(passes: range, which: int) -> bytes:
     return out.getvalue()
 
 
-def _in_turn(function: Callable[[int, T | None], T], passes: range, work: Work) -> Iterator[T]:
+def _in_turn(function: Callable[[int, T | None], T], passes: range, work: PassContext) -> Iterator[T]:
     """Of one pass after the other; faults of planning are told by the line of the pass."""
     before: T | None = None
     for one in work.passes[passes.start:passes.stop]:
@@ -111,7 +111,7 @@ def _in_turn(function: Callable[[int, T | None], T], passes: range, work: Work) 
 class _Packer(pickle.Pickler):
     """Names passes, machine and what is allowed, which the parent has."""
 
-    def __init__(self, out: io.BytesIO, work: Work, allowed: Allowed) -> None:
+    def __init__(self, out: io.BytesIO, work: PassContext, allowed: AllowedAxes) -> None:
         super().__init__(out, pickle.HIGHEST_PROTOCOL)
         self._names = {id(work.machine): "machine", id(allowed): "allowed"} | {id(one): one.number for one in work.passes}
 
@@ -123,7 +123,7 @@ class _Packer(pickle.Pickler):
 class _Unpacker(pickle.Unpickler):
     """The other way."""
 
-    def __init__(self, packed: bytes, work: Work, allowed: Allowed) -> None:
+    def __init__(self, packed: bytes, work: PassContext, allowed: AllowedAxes) -> None:
         super().__init__(io.BytesIO(packed))
         self._named: dict[str | int, Any] = {"machine": work.machine, "allowed": allowed}
         self._named |= {one.number: one for one in work.passes}
@@ -133,5 +133,5 @@ class _Unpacker(pickle.Unpickler):
         return self._named[name]
 
 
-def _unpacked(packed: bytes, work: Work, allowed: Allowed) -> Any:
+def _unpacked(packed: bytes, work: PassContext, allowed: AllowedAxes) -> Any:
     return _Unpacker(packed, work, allowed).load()

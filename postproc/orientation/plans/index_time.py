@@ -11,13 +11,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from machines.machine import Machine
-from postproc.feedrate.rest_to_rest import Law, rest_seconds
+from postproc.feedrate.rest_to_rest import PointToPointMode, rest_seconds
 from postproc.joints.joint_path import nearest_solution
 from postproc.joints.tracks import TRAVEL_SLACK
-from postproc.orientation.candidates.held import free_angle
-from postproc.orientation.candidates.timed import Turned
+from postproc.orientation.candidates.candidate_times import Candidate
+from postproc.orientation.candidates.free_rotary import free_angle
 from postproc.orientation.passes.allowed import SAME
-from postproc.orientation.passes.passes import Pass, Work
+from postproc.orientation.passes.passes import Pass, PassContext
 from postproc.planning.planned import joint_limits
 from postproc.reference.events import tool_changes
 from toolpaths.arrays import Bools, Floats
@@ -33,7 +33,7 @@ _STRAIGHT = 1e-3
 
 
 @dataclass(frozen=True)
-class Ends:
+class PassEnds:
     """A turned pass as its neighbours see it: joints (J,) where it begins, ends and stands above both, and the seconds of
     its own rapids, of coming down and drawing back; inf where no height above is inside travel. `held` is where the rotary
     joint `free` stands that the axis leaves free, NaN and -1 where none is. `second`, `last_but_one` are the joints at the
@@ -53,12 +53,12 @@ class Ends:
     rapids: float
 
 
-def ends(made: Turned, work: Work) -> Ends:
+def ends(made: Candidate, work: PassContext) -> PassEnds:
     """The ends of a turned pass; its seconds are infinite where the machine cannot run it."""
     return all_ends([made], work)[0]
 
 
-def all_ends(row: list[Turned], work: Work) -> list[Ends]:
+def all_ends(row: list[Candidate], work: PassContext) -> list[PassEnds]:
     """The ends of one pass turned to several axes."""
     one = row[0].one
     axis = np.stack([one.axes[[0, -1]] if one.fixed else np.tile(made.axis, (2, 1)) for made in row])
@@ -69,23 +69,23 @@ def all_ends(row: list[Turned], work: Work) -> list[Ends]:
     for k, made in enumerate(row):
         if made.refused:
             none = np.full(q.shape[2], np.nan)
-            result.append(Ends(made.axis, made.held, -1, none, none, none, none, none, none, np.inf, np.inf, np.inf))
+            result.append(PassEnds(made.axis, made.held, -1, none, none, none, none, none, none, np.inf, np.inf, np.inf))
             continue
         (free, held), (first, last), (above_first, above_last) = free_angle(made), q[k], above[k]
         second, last_but_one = made.q[list(beside)]
-        result.append(Ends(made.axis, held, free, first, last, second, last_but_one, above_first, above_last, 0.0, 0.0,
-                           made.rapids))
+        result.append(PassEnds(made.axis, held, free, first, last, second, last_but_one, above_first, above_last, 0.0, 0.0,
+                               made.rapids))
     return _with_legs(result, work.machine)
 
 
-def _with_legs(row: list[Ends], machine: Machine) -> list[Ends]:
+def _with_legs(row: list[PassEnds], machine: Machine) -> list[PassEnds]:
     """With the seconds of coming down and drawing back; inf where no height above is inside travel."""
     downs = _beside(_ways(row, "above_first", "first", "second"), True, machine).tolist()
     ups = _beside(_ways(row, "last_but_one", "last", "above_last"), False, machine).tolist()
     return [replace(each, down=down, up=up) for each, down, up in zip(row, downs, ups, strict=True)]
 
 
-def _above(work: Work, one: Pass, tip: Floats, axis: Floats, q: Floats) -> Floats:
+def _above(work: PassContext, one: Pass, tip: Floats, axis: Floats, q: Floats) -> Floats:
     """Joints (N, J) above poses on the safe plane; NaN where travel ends."""
     limits, above = work.machine.limits, np.full(q.shape, np.nan)
     for share in _SHARES if work.space.distance is None else (1.0,):
@@ -101,7 +101,7 @@ def _above(work: Work, one: Pass, tip: Floats, axis: Floats, q: Floats) -> Float
     return above
 
 
-def ways_between(work: Work, edge: list[list[Ends]]) -> list[Floats]:
+def ways_between(work: PassContext, edge: list[list[PassEnds]]) -> list[Floats]:
     """Seconds between the states of neighbouring passes, from home and back; tool changes with the way to their pass."""
     pause = work.machine.timing.tool_change * _changes(work)
     ways = [between(None, edge[0], work, True)]
@@ -110,14 +110,14 @@ def ways_between(work: Work, edge: list[list[Ends]]) -> list[Floats]:
     return [way + p for way, p in zip([*ways, between(edge[-1], None, work, True)], pause, strict=True)]
 
 
-def _changes(work: Work) -> Floats:
+def _changes(work: PassContext) -> Floats:
     """Tool changes (N + 1,) that come with each pass, and behind the last row."""
     at = np.searchsorted(work.moves.row, [change.index for change in tool_changes(work.toolpath)])
     starts = [*(one.rows[0] for one in work.passes[1:]), work.passes[-1].rows[1]]
     return np.bincount(np.searchsorted(starts, at, side="right"), minlength=len(starts) + 1).astype(np.float64)
 
 
-def between(before: list[Ends] | None, after: list[Ends] | None, work: Work, by_home: bool) -> Floats:
+def between(before: list[PassEnds] | None, after: list[PassEnds] | None, work: PassContext, by_home: bool) -> Floats:
     """Seconds (K0, K1) from each end to each beginning; None stands for home."""
     machine = work.machine
     if after is None:
@@ -137,7 +137,7 @@ def between(before: list[Ends] | None, after: list[Ends] | None, work: Work, by_
     return np.asarray(np.where((turn > work.setup.clearance.link_angle * DEG) | spun, linked, straight))
 
 
-def unwinding(picked: list[Ends], work: Work, spun: bool) -> float:
+def unwinding(picked: list[PassEnds], work: PassContext, spun: bool) -> float:
     """Seconds that the way back home takes longer for joints of endless travel that have been wound up on the way: from pass
     to pass they go the shortest way.
 
@@ -154,10 +154,10 @@ def unwinding(picked: list[Ends], work: Work, spun: bool) -> float:
     begin = _lifted(picked[-1:], machine)
     wound, home = np.where(endless, at, begin), machine.home[None]
     limits = joint_limits(machine.limits)
-    return float(rest_seconds(wound, home, limits, Law.STRAIGHT)[0] - _moved(begin, home, machine)[0, 0])
+    return float(rest_seconds(wound, home, limits, PointToPointMode.STRAIGHT)[0] - _moved(begin, home, machine)[0, 0])
 
 
-def _lifted(before: list[Ends], machine: Machine) -> Floats:
+def _lifted(before: list[PassEnds], machine: Machine) -> Floats:
     """Joints (K, J) above each end with the retract axis at home; without such an axis just above."""
     k, result = machine.retract_axis, np.stack([e.above_last for e in before])
     if k >= 0:
@@ -165,13 +165,13 @@ def _lifted(before: list[Ends], machine: Machine) -> Floats:
     return result
 
 
-def _leaving(before: list[Ends], machine: Machine) -> Floats:
+def _leaving(before: list[PassEnds], machine: Machine) -> Floats:
     """Seconds (K, 1) from each end to above it and on with the retract axis home."""
     way = [*_ways(before, "last_but_one", "last", "above_last"), _lifted(before, machine)]
     return _beside(way, False, machine)[:, None]
 
 
-def _arriving(after: list[Ends], machine: Machine) -> Floats:
+def _arriving(after: list[PassEnds], machine: Machine) -> Floats:
     """Seconds (1, K) of the retract axis from home to above each beginning and on down to it."""
     way = _ways(after, "above_first", "first", "second")
     k, begin = machine.retract_axis, way[0].copy()
@@ -180,7 +180,7 @@ def _arriving(after: list[Ends], machine: Machine) -> Floats:
     return _beside([begin, *way], True, machine)[None]
 
 
-def _ways(row: list[Ends], *names: str) -> list[Floats]:
+def _ways(row: list[PassEnds], *names: str) -> list[Floats]:
     """(K, J) joints of each name."""
     return [np.stack([getattr(each, name) for each in row]) for name in names]
 
@@ -242,7 +242,8 @@ def _each(q0: Floats, q1: Floats, machine: Machine) -> Floats:
     way = _shortest(q1 - q0, _endless(machine))
     good, seconds = np.isfinite(way).all(axis=1), np.full(len(way), np.inf)
     if good.any():
-        seconds[good] = rest_seconds(np.zeros_like(way[good]), way[good], joint_limits(machine.limits), Law.STRAIGHT)
+        seconds[good] = rest_seconds(np.zeros_like(way[good]), way[good], joint_limits(machine.limits),
+                                     PointToPointMode.STRAIGHT)
     return seconds
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from postproc.control.word_arcs import PLANE_COLUMNS
 from postproc.readback.execution.execute import Motion
-from postproc.readback.execution.poses import Executed, coordinates, signed_sweep
+from postproc.readback.execution.poses import BlockPoses, coordinates, signed_sweep
 from toolpaths.arrays import Floats, Ints
 
 LINE, JOINTS, TIP, CIRCLE = range(4)
@@ -30,7 +30,7 @@ class _Travel:
     back: Floats
 
 
-def strays(motion: Motion, executed: Executed, rows: Ints, times: tuple[Floats, Floats, Floats],
+def strays(motion: Motion, executed: BlockPoses, rows: Ints, times: tuple[Floats, Floats, Floats],
            kinds: Ints, tips: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
     """Bounds (tip (N,) mm, axis (N,) rad) for parts of blocks `rows` (N,) with begin, middle and end `times` (N,), by their
     laws `kinds` (N,), with the tip at `tips` (N, 3) by that law where they begin and end.
@@ -58,7 +58,7 @@ def strays(motion: Motion, executed: Executed, rows: Ints, times: tuple[Floats, 
     return np.nan_to_num(tip, nan=np.inf), np.nan_to_num(axis, nan=np.inf)
 
 
-def _travel(motion: Motion, executed: Executed, rows: Ints, length: Floats, kinds: Ints, q: list[Floats],
+def _travel(motion: Motion, executed: BlockPoses, rows: Ints, length: Floats, kinds: Ints, q: list[Floats],
             away: Floats) -> _Travel:
     half, back = 0.5 * np.abs(q[2] - q[0]), np.zeros(q[0].shape)
     curved = np.flatnonzero((kinds == TIP) | (kinds == CIRCLE))
@@ -77,7 +77,7 @@ def _travel(motion: Motion, executed: Executed, rows: Ints, length: Floats, kind
     return _Travel(half, back)
 
 
-def _of_arcs(motion: Motion, executed: Executed, rows: Ints, part: Floats) -> tuple[Floats, Floats]:
+def _of_arcs(motion: Motion, executed: BlockPoses, rows: Ints, part: Floats) -> tuple[Floats, Floats]:
     """(mm that a slide may go, mm that its second derivative comes to) in a part of blocks that are arcs, seen as 0 to 1."""
     begin, end = (xyz[:, executed.control.xyz] for xyz in coordinates(motion, rows))
     path, bend = np.full(len(rows), np.inf), np.full(len(rows), np.inf)
@@ -97,7 +97,7 @@ def _of_arcs(motion: Motion, executed: Executed, rows: Ints, part: Floats) -> tu
     return path, bend
 
 
-def _of_tips(motion: Motion, executed: Executed, rows: Ints, q: list[Floats], away: Floats) -> tuple[Floats, Floats]:
+def _of_tips(motion: Motion, executed: BlockPoses, rows: Ints, q: list[Floats], away: Floats) -> tuple[Floats, Floats]:
     """The same where the tip goes straight, `away` (N,) mm, and rotary axes turn evenly: slides make up for what those move
     the tip by."""
     turning = np.array(executed.control.machine.rotary)

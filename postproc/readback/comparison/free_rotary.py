@@ -7,14 +7,14 @@ import numpy as np
 from postproc.joints.spin import spins_off
 from postproc.readback.comparison.faults import Faults
 from postproc.readback.execution.execute import Motion
-from postproc.readback.execution.poses import Executed
+from postproc.readback.execution.poses import BlockPoses
 from postproc.reference.moves import Moves
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic
 from toolpaths.units import DEG
 
 
-def check_spins(motion: Motion, executed: Executed, moves: Moves, owner: Ints, tip: Floats, axis: Floats, tolerance: float,
+def check_spins(motion: Motion, executed: BlockPoses, moves: Moves, owner: Ints, tip: Floats, axis: Floats, tolerance: float,
                 faults: Faults) -> list[Diagnostic]:
     """Blocks that do not end with the tool held about its axis as the moves (`owner` (K,)) ask; `tolerance` in rad."""
     asked = np.append(moves.spin, [np.nan, np.nan])[owner]

@@ -8,7 +8,7 @@ from machines.geometric_error.exchange.volume import measured
 from postproc.job.job import Job
 from postproc.path.model import TRAVERSE
 from postproc.readback.comparison.faults import Faults
-from postproc.readback.execution.actual import ARC_LOOKS, ActualExecuted
+from postproc.readback.execution.actual import ARC_LOOKS, ActualBlockPoses
 from postproc.readback.execution.execute import Motion
 from toolpaths.diagnostics import Diagnostic
 
@@ -16,7 +16,7 @@ CORRECTED = 0.1
 """mm or rad by which a correction may leave the range"""
 
 
-def check_measured(motion: Motion, executed: ActualExecuted, job: Job, faults: Faults) -> list[Diagnostic]:
+def check_measured(motion: Motion, executed: ActualBlockPoses, job: Job, faults: Faults) -> list[Diagnostic]:
     """A warning for each axis that cuts where its errors were not measured: there those at the end count.
 
     Conversions look at the nominal joints, before they correct anything.

@@ -16,7 +16,7 @@ from postproc.job.job import Job
 from postproc.readback.comparison.checks import CHUNK, STILL
 from postproc.readback.comparison.faults import Faults
 from postproc.readback.execution.execute import Motion
-from postproc.readback.execution.poses import Executed, arc_sweeps, coordinates
+from postproc.readback.execution.poses import BlockPoses, arc_sweeps, coordinates
 from postproc.readback.execution.rows import INCH
 from postproc.readback.text.words import plain
 from postproc.reference.moves import Moves, Phase
@@ -69,7 +69,7 @@ def with_fingerprint(text: str, files: Mapping[str, str]) -> str:
     return text[:at] + mark + text[at + len(UNKNOWN):]
 
 
-def check_slow(motion: Motion, executed: Executed, job: Job, moves: Moves, owner: Ints, match: Ints, tip: Floats,
+def check_slow(motion: Motion, executed: BlockPoses, job: Job, moves: Moves, owner: Ints, match: Ints, tip: Floats,
                seconds: Floats, faults: Faults) -> list[Diagnostic]:
     """Moves that take longer than their programmed feed and the velocities of all axes ask for, once with their count.
 
@@ -180,7 +180,7 @@ def _taps(job: Job, moves: Moves) -> Bools:
     return np.asarray((moves.phase == Phase.DRILL) & taps[moves.cycle])
 
 
-def _needed(motion: Motion, executed: Executed, moves: Moves, owner: Ints, cutting: Bools) -> Floats:
+def _needed(motion: Motion, executed: BlockPoses, moves: Moves, owner: Ints, cutting: Bools) -> Floats:
     """(E,) s that the velocities of the axes ask of each block; in arcs those of X, Y, Z at the programmed feed."""
     needs = _least(motion, executed, cutting)
     control = executed.control
@@ -211,7 +211,7 @@ def _allowed(owner: Ints, cutting: Bools, needs: Floats, tip: Floats, seconds: F
     return np.asarray(np.bincount(m, weights=long, minlength=moves + 1)[:moves] / again)
 
 
-def check_fed_rapids(motion: Motion, executed: Executed, job: Job, moves: Moves, owner: Ints, tip: Floats, seconds: Floats,
+def check_fed_rapids(motion: Motion, executed: BlockPoses, job: Job, moves: Moves, owner: Ints, tip: Floats, seconds: Floats,
                      down: Bools, faults: Faults) -> list[Diagnostic]:
     """Feed moves for rapids, or on the way between operations, that are faster than the axes, or slower than both they
     and, where they lead `down` (E,) to a cut, its feed."""
@@ -250,7 +250,7 @@ def _by_move(owner: Ints, which: Bools, values: Floats, moves: int) -> Floats:
     return np.asarray(np.bincount(owner[which], weights=values[which], minlength=moves + 1)[:moves])
 
 
-def _least(motion: Motion, executed: Executed, cutting: Bools) -> Floats:
+def _least(motion: Motion, executed: BlockPoses, cutting: Bools) -> Floats:
     """(E,) s that the velocities of the axes ask of each cutting block, from joints at a few places of it."""
     control: Control = executed.control
     every, result = np.flatnonzero(cutting), np.zeros(len(motion))

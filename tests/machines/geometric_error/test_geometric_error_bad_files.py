@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import machines
-from machines.geometric_error.exchange.exchange import save
+from machines.geometric_error.exchange.write_model import save
 from machines.geometric_error.files.fingerprint import fingerprint
 from machines.geometric_error.files.loader import load_checked
 from machines.geometric_error.tables.csv_table import UNITS, read_csv

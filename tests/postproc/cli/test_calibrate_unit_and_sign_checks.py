@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 
 import machines
 from machines.calibration.calibrate import calibrate
-from machines.geometric_error.exchange.exchange import save
+from machines.geometric_error.exchange.write_model import save
 from machines.geometric_error.files.loader import load
 from postproc.cli.app import app
 from toolpaths.diagnostics import Severity

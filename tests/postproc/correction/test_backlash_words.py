@@ -12,14 +12,14 @@ import pytest
 import postproc
 import toolpaths
 from postproc.base.options import Options
-from postproc.correction import walk as walking
-from postproc.correction import walk_loop
-from postproc.correction.walk import Ends
+from postproc.correction import backlash_steps as walking
+from postproc.correction import backlash_steps_loop
+from postproc.correction.backlash_steps import BlockEnds
 from postproc.path.model import TRAVERSE
 from postproc.pipeline.result import PostResult
 from postproc.readback.comparison.checks import _turning_points
 from postproc.setup.model import SetupFile, load_setup
-from postproc.verification.errors_left import after_formatting
+from postproc.verification.residual_errors import after_formatting
 from tests.postproc.correction.test_compensation_points import two_ways_of_all
 from toolpaths.arrays import Floats
 from toolpaths.toolpath import Kind
@@ -37,7 +37,7 @@ def no_motion(*shape: int) -> Floats:
     return result
 
 
-def random_ends(rng: np.random.Generator, blocks: int, lossy: int, near: float, single: bool = False) -> Ends:
+def random_ends(rng: np.random.Generator, blocks: int, lossy: int, near: float, single: bool = False) -> BlockEnds:
     """Ends that are some micrometres off, joints that lose 1 to 6 um, steps around that."""
     i, size = np.arange(lossy), (blocks, lossy)
     gap = np.tile(rng.uniform(1e-3, 6e-3, lossy), (blocks, 1))
@@ -52,16 +52,17 @@ def random_ends(rng: np.random.Generator, blocks: int, lossy: int, near: float, 
     likes = np.where(rng.random(blocks) < 0.25, np.arange(blocks) - 1, -1)
     free = np.where(likes >= 0, 0.0, 1.0)[:, None] * (rng.random((blocks, 3)) < (1.0 if single else 0.95))
     nears = np.where(rng.random(blocks) < (0.0 if single else 0.2), 1.0, near)
-    return Ends(off=rng.normal(size=(blocks, 3)) * 1e-3, by_way=by_way,
-                tip_rates=np.eye(3) * GRAIN + rng.normal(size=(blocks, 3, 3)) * 0.05 * GRAIN, back=back, gap=gap, bend=bend,
-                last=2.0 * rng.choice([0.0, 1e-4, -1e-4, 5e-4, -5e-4, 3e-3, -3e-3, 1.0, -1.0], size) / gap, later=later,
-                goes_on=rng.choice([-1.0, 0.0, 1.0], size), weight=np.where(rng.random(blocks) < 0.3, 1.0, 0.01),
-                plain=(rng.random(blocks) < 0.5) & (not single), near=nears,
-                enough=nears * (1.0 if single else 2.5), free=free,
-                like=np.full(blocks, -1) if single else likes)
+    return BlockEnds(off=rng.normal(size=(blocks, 3)) * 1e-3, by_way=by_way,
+                     tip_rates=np.eye(3) * GRAIN + rng.normal(size=(blocks, 3, 3)) * 0.05 * GRAIN, back=back, gap=gap,
+                     bend=bend,
+                     last=2.0 * rng.choice([0.0, 1e-4, -1e-4, 5e-4, -5e-4, 3e-3, -3e-3, 1.0, -1.0], size) / gap, later=later,
+                     goes_on=rng.choice([-1.0, 0.0, 1.0], size), weight=np.where(rng.random(blocks) < 0.3, 1.0, 0.01),
+                     plain=(rng.random(blocks) < 0.5) & (not single), near=nears,
+                     enough=nears * (1.0 if single else 2.5), free=free,
+                     like=np.full(blocks, -1) if single else likes)
 
 
-def steps_of(ends: Ends) -> Floats:
+def steps_of(ends: BlockEnds) -> Floats:
     """(K, 3) of the plain walk."""
     return np.asarray(walking._walk(*vars(ends).values())[0])
 
@@ -71,9 +72,9 @@ def steps_of(ends: Ends) -> Floats:
 def test_the_compiled_walk_is_the_plain_one(lossy: int, monkeypatch: pytest.MonkeyPatch) -> None:
     ends = random_ends(np.random.default_rng(lossy), 400, lossy, 8.7e-5)
     plain, ways = (np.asarray(x) for x in walking._walk(*vars(ends).values()))
-    monkeypatch.setattr(walk_loop, "COMPILE_FROM", 400)
+    monkeypatch.setattr(backlash_steps_loop, "COMPILE_FROM", 400)
     fast = walking.walk(ends)
-    assert walk_loop.wanted(1)
+    assert backlash_steps_loop.wanted(1)
     np.testing.assert_array_equal(fast[0], plain)
     np.testing.assert_allclose(fast[1], ways, rtol=0.0, atol=1e-12)  # sums of other order
     assert np.abs(ways).max() == 1.0 and (np.abs(ways) < 1.0).any()
@@ -84,7 +85,7 @@ def test_the_compiled_walk_is_the_plain_one(lossy: int, monkeypatch: pytest.Monk
     assert not plain[(ends.free == 0.0) & (ends.like < 0)[:, None]].any()
 
 
-def costs(ends: Ends, steps: Floats) -> tuple[Floats, Floats]:
+def costs(ends: BlockEnds, steps: Floats) -> tuple[Floats, Floats]:
     """(N,) mm that the tip is off by after steps (N, 3) in the block of `ends`, and with what the next begins off by.
 
     From the play operator: the way 0 takes up a step by 2 / gap of it, held between -1 and 1; ways count by their share.

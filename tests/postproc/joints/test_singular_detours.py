@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from postproc.joints.lattice import Run
-from postproc.joints.lead import Led, lead_past
+from postproc.joints.lattice import PoseRun
 from postproc.joints.plan import plan_runs
 from postproc.joints.poles import poles_of
-from postproc.joints.taut import taut_string
+from postproc.joints.singular_detours import Led, lead_past
+from postproc.joints.taut_string import taut_string
 from tests.postproc.joint_kit import DEG, angle, lines, machine, tilted, unit
 from toolpaths.shape import Curves
 
@@ -82,7 +82,7 @@ def test_led_axis_stays_inside_the_tolerance_and_turns_the_table_less(miss: floa
     event, = led.events
     assert event.miss == pytest.approx(miss * DEG, rel=0.1) and event.joint == 4
     tip, axis = np.vstack([led.curves.start, led.curves.end[-1:]]), np.vstack([led.curves.axis0, led.curves.axis1[-1:]])
-    q = plan_runs([Run(m.kinematics, tip, axis)], m.limits, m.home)[0].q
+    q = plan_runs([PoseRun(m.kinematics, tip, axis)], m.limits, m.home)[0].q
     rate = np.abs(np.diff(q[:, 4])) / ((led.u1 - led.u0) * seconds[led.parent])
     assert rate.max() == pytest.approx(event.after, rel=0.02), "the machine's own table turns as the event says"
     if miss < 0.02:

@@ -9,11 +9,11 @@ import pytest
 
 import toolpaths
 from postproc.base.options import Options
+from postproc.orientation.candidates.candidate_times import turned
 from postproc.orientation.candidates.candidates import tried
-from postproc.orientation.candidates.timed import turned
+from postproc.orientation.candidates.infeasible_passes import unfit
 from postproc.orientation.candidates.travel import nearest_inside
-from postproc.orientation.candidates.unfit import unfit
-from postproc.orientation.passes.allowed import Allowed
+from postproc.orientation.passes.allowed import AllowedAxes
 from postproc.orientation.passes.passes import Pass, work_of
 from postproc.orientation.plans.orient import orient
 from postproc.setup.model import PartPlacement, SetupFile, ToolSetup
@@ -42,7 +42,7 @@ def test_passes_that_always_touch_are_one_error() -> None:
     path, m = toolpath(*LINES, head=BALL), machine("mikron-ucp710")
     work, _ = work_of(path, m, SetupFile(), Options())
     assert work is not None
-    results = [tried(one, m, Allowed(60.0 * DEG, Everywhere())) for one in work.passes]
+    results = [tried(one, m, AllowedAxes(60.0 * DEG, Everywhere())) for one in work.passes]
     found = unfit(work, results)
     assert [(d.code, d.severity, d.count) for d in found] == [("orient.touches", Severity.ERROR, 3)]
     lost = [each for one in results for each in one.rejected if each.made is not one.own]
@@ -103,7 +103,7 @@ def test_an_axis_inside_travel_is_found_and_tried() -> None:
     m, setup = machine("mikron-ucp710"), at(500.0).model_copy(update={"tools": {"5": ToolSetup(gauge_length=100.0)}})
     work, _ = work_of(toolpaths.read(SAMPLES / "bicubic.cls")[0], m, setup, Options())
     assert work is not None
-    one, allowed = work.passes[20], Allowed(60.0 * DEG)
+    one, allowed = work.passes[20], AllowedAxes(60.0 * DEG)
     found = nearest_inside(one, m, allowed)
     assert found.size == 0.0 and not turned(one, found.axis, m).refused and turned(one, one.axis, m).refused
     assert angle_between(found.axis, one.axis) < 60.0 * DEG
@@ -119,7 +119,7 @@ def test_a_joint_that_the_tool_leaves_free_may_bring_it_inside() -> None:
     for x, inside in ((370.0, True), (500.0, False)):
         work, _ = work_of(path, m, at(x), Options())
         assert work is not None and work.passes[0].fixed and turned(work.passes[0], work.passes[0].axis, m).refused
-        assert (nearest_inside(work.passes[0], m, Allowed(60.0 * DEG)).size == 0.0) == inside
+        assert (nearest_inside(work.passes[0], m, AllowedAxes(60.0 * DEG)).size == 0.0) == inside
 
 
 def test_travel_that_ends_alike_is_told_once() -> None:
@@ -149,5 +149,5 @@ def test_a_pass_out_of_reach_is_not_told_to_touch_too() -> None:
     path, m = toolpath(*LINES, head=BALL), machine("mikron-ucp710")
     work, _ = work_of(path, m, at(300.0), Options())
     assert work is not None
-    results = [tried(one, m, Allowed(5.0 * DEG, Everywhere())) for one in work.passes]
+    results = [tried(one, m, AllowedAxes(5.0 * DEG, Everywhere())) for one in work.passes]
     assert {d.code for d in unfit(work, results)} == {"orient.reach"}

@@ -14,7 +14,7 @@ from postproc.setup.model import SetupFile
 from postproc.verification.second_witness import second_witness
 from postproc.witness.clfile import commanded
 from postproc.witness.states import tools_of
-from toolpaths.cl.build import Builder
+from toolpaths.cl.build import ToolpathBuilder
 
 BARE = b"PARTNO bare\nFEDRAT/500\nGOTO/-10,5,30\nGOTO/-10,5,0\nGOTO/10,5,0\nGOTO/10,5,30\nFINI\n"
 LOADED = BARE.replace(b"FEDRAT", b"UNITS/MM\nLOADTL/1\nSPINDL/RPM,3000,CLW\nFEDRAT")
@@ -62,24 +62,24 @@ def test_the_spindle_of_the_setup_is_expected(setup: dict[str, object], monkeypa
     result = converted(text, setup)
     assert result.ok and result.witness is not None, [str(d) for d in result.diagnostics]
     assert not result.witness.not_compared and "spindle states" in str(result.witness.compared)
-    old = Builder.event
+    old = ToolpathBuilder.event
 
-    def hidden(self: Builder, word: str, values: tuple[object, ...]) -> None:
+    def hidden(self: ToolpathBuilder, word: str, values: tuple[object, ...]) -> None:
         old(self, word, values)  # type: ignore[arg-type]
         if word == "LOADTL":
             old(self, "SPINDL", ("RPM", 2000.0, "CLW"))
-    monkeypatch.setattr(Builder, "event", hidden)
+    monkeypatch.setattr(ToolpathBuilder, "event", hidden)
     assert "witness.spindle" in {d.code for d in converted(text, setup).diagnostics}
 
 
 def test_a_finding_is_in_words(monkeypatch: pytest.MonkeyPatch) -> None:
-    old = Builder.event
+    old = ToolpathBuilder.event
 
-    def flooded(self: Builder, word: str, values: tuple[object, ...]) -> None:
+    def flooded(self: ToolpathBuilder, word: str, values: tuple[object, ...]) -> None:
         old(self, word, values)  # type: ignore[arg-type]
         if word == "SPINDL":
             old(self, "COOLNT", ("FLOOD",))
-    monkeypatch.setattr(Builder, "event", flooded)
+    monkeypatch.setattr(ToolpathBuilder, "event", flooded)
     said = [d.message for d in converted(LOADED, {}).diagnostics if d.code == "witness.coolant"]
     assert said and "the coolant is flood, the CL file says nothing" in said[0]
 
