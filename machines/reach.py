@@ -2,7 +2,7 @@
 
 Rods, rails and spindle are round bars (segments with a radius); two bars clear each other by the distance of their
 middle lines less both radii. Source: Company 2000, II.4.2.1 (rods and slides), II.4.2.2 (rods), II.4.2.3 (rods and
-spindle). Rods that end in one joint (II-16) cannot be told apart there and are left out.
+spindle). Rods that end in one joint (II-16) cannot be distinguished there and are left out.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """How far a parallel machine stands from its singular positions, as numbers without unit between 0 and 1.
 
-Inverse singularity (a rod square to its slide, which then cannot be told or moved): |cos| of the angle between rod and
-slide. Direct singularity (the platform gives way with the slides held): the least singular value of Jx, rods as unit
+Inverse singularity (a rod square to its slide, which then cannot be reported or moved): |cos| of the angle between rod and
+slide. Direct singularity (the platform yields with the slides held): the least singular value of Jx, rods as unit
 vectors, moments about the platform's reference point by the largest arm. Source: Company 2000, II-16, III.7, V-23.
 """
 

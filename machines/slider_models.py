@@ -44,7 +44,7 @@ class LegModel(UserModel):
     root: Literal[1, -1] = 1
     """1 where the carriage stands on the positive side of the platform joint (larger q of two), -1 on the other"""
     rods: tuple[Vector, ...] = ()
-    """each rod's place beside the leg's line, the same at both ends: two for a pair of parallel rods"""
+    """each rod's place next to the leg's line, the same at both ends: two for a pair of parallel rods"""
     rail_offset: Vector = (0.0, 0.0, 0.0)
     """from the line of the carriage joint to the middle of the rail"""
     rail_ends: Interval | None = None

@@ -1,8 +1,8 @@
 """Tip and tool axis along straight joint moves, with a bound of their third derivative over the whole move.
 
-Each family of machines goes the way from joints to the tool once with jets instead of numbers (`kinematics/taylor.py`).
+Each family of machines goes the path from joints to the tool once with jets instead of numbers (`kinematics/taylor.py`).
 Serial: the chain of axes. Parallel: the platform follows from the rods' fixed lengths, differentiated three times; that
-Jx stays regular all along the move is proved on the way, and where it cannot be, there is no bound.
+Jx stays regular all along the move is proved on the path, and where it cannot be, there is no bound.
 """
 
 from __future__ import annotations

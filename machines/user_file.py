@@ -1,6 +1,6 @@
 """Files that a user writes (machine, controller, set-up, error model): TOML in, a checked model or diagnostics out.
 
-A file may begin with `base = "name"`: the values of that built-in file (or of a .toml file beside it) are taken
+A file may begin with `base = "name"`: the values of that built-in file (or of a .toml file next to it) are taken
 first, tables are merged key by key, everything else is replaced. Every problem names the file and line of the value.
 """
 
@@ -123,7 +123,7 @@ def schema(*models: type[BaseModel]) -> Values:
     """
     any_of: Any = Union[models]  # noqa: UP007
     result: Values = TypeAdapter(any_of).json_schema()
-    base = {"type": "string", "description": "built-in file (or .toml file beside this one) whose values hold where "
+    base = {"type": "string", "description": "built-in file (or .toml file next to this one) whose values hold where "
                                              "this file gives none"}
     several = [result["$defs"][choice["$ref"].split("/")[-1]] for choice in result.get("anyOf", [])]
     for top in several or [result]:
@@ -308,7 +308,7 @@ def _diagnostic(file: UserFile, model: type[BaseModel], fault: _Fault) -> Diagno
 
 
 def _described(model: type[BaseModel], path: Sequence[str | int]) -> str:
-    """What the docstring of the last field on the way along `path` says."""
+    """What the docstring of the last field on the path along `path` says."""
     found: list[Any] = [model]
     text = ""
     for part in path:

@@ -1,4 +1,4 @@
-"""Text of CL files: records as Siemens NX spells them, written from absolute positions and counted on the way."""
+"""Text of CL files: records as Siemens NX spells them, written from absolute positions and counted on the path."""
 
 from __future__ import annotations
 

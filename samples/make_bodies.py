@@ -97,7 +97,7 @@ def vise() -> Floats:
 
 
 def post() -> Floats:
-    """A post beside the part that a tool leaning to +x runs into."""
+    """A post next to the part that a tool leaning to +x runs into."""
     return box((80.0, -20.0, 20.0), (100.0, 20.0, 150.0))
 
 

@@ -60,47 +60,48 @@ def csys(angle: float, height: float) -> list[str]:
     return [f"$$-> CSYS / {text[0]},  $", f"\t    {text[1]},  $", f"\t    {text[2]}"]
 
 
-def goto(point: tuple[float, ...], manner: Manner) -> list[str]:
+def goto(point: tuple[float, ...], run_options: Manner) -> list[str]:
     """A point of the position's frame."""
-    scale = 1.0 if manner.units == "MM" else 25.4
+    scale = 1.0 if run_options.units == "MM" else 25.4
     text = "GOTO / " + ", ".join(number(v / scale, 10) for v in point)
-    return [f"{text}, $", " 0.0000000000, 0.0000000000, 1.0000000000"] if manner.multax else [text]
+    return [f"{text}, $", " 0.0000000000, 0.0000000000, 1.0000000000"] if run_options.multax else [text]
 
 
-def subroutine(n: int, points: tuple[tuple[float, ...], ...], manner: Manner) -> list[str]:
-    """DEFSUB with cuts and the way out."""
+def subroutine(n: int, points: tuple[tuple[float, ...], ...], run_options: Manner) -> list[str]:
+    """DEFSUB with cuts and the retract."""
     lines = [f"DEFSUB / {n}", "FEDRAT / 250.000000,  MMPM"]
     for point in points[:-1]:
-        lines += goto(point, manner)
-    return [*lines, "RAPID", *goto(points[-1], manner), "ENDSUB"]
+        lines += goto(point, run_options)
+    return [*lines, "RAPID", *goto(points[-1], run_options), "ENDSUB"]
 
 
-def position(n: int, angle: float, step: float, approach: tuple[float, ...], height: float, manner: Manner) -> list[str]:
+def position(n: int, angle: float, step: float, approach: tuple[float, ...], height: float,
+             run_options: Manner) -> list[str]:
     """One position of the table: ROTATE, remark, approach and the call."""
-    scale = 1.0 if manner.units == "MM" else 25.4
-    move = ["RAPID", *goto(approach, manner)]
+    scale = 1.0 if run_options.units == "MM" else 25.4
+    move = ["RAPID", *goto(approach, run_options)]
     h = number(height / scale, 10)
     call = [f"TRANS / 0.0000000000, 0.0000000000, {h}", f"CALSUB / {n}", f"TRANS / 0.0000000000, 0.0000000000, -{h}",
             "TRANS / 0.0000000000, 0.0000000000, 0.0000000000"] if height else [f"CALSUB / {n}"]
     parts = {"rotate": [f"ROTATE / AAXIS, INCR, {-step:.3f}, CCLW"], "csys": csys(angle, HEIGHT / scale), "move": move}
     order = {"before": ("move", "rotate", "csys"), "between": ("rotate", "move", "csys"),
-             "after": ("rotate", "csys", "move")}[manner.approach]
+             "after": ("rotate", "csys", "move")}[run_options.approach]
     return [line for name in order for line in parts[name]] + call
 
 
-def text_of(manner: Manner) -> str:
+def text_of(run_options: Manner) -> str:
     """The whole file."""
     lines = ["$$ A round part on a fourth axis: Pro/CLfile text, indexed by ROTATE, subroutines between TRANS.",
              "$$-> MFGNO / INDEXED", "PARTNO / INDEXED", "MACHIN / UNCX01, 1",
-             f"UNITS / {'MM' if manner.units == 'MM' else 'INCHES'}"]
-    lines += subroutine(1, SLOT, manner) + subroutine(2, HOLE, manner)
+             f"UNITS / {'MM' if run_options.units == 'MM' else 'INCHES'}"]
+    lines += subroutine(1, SLOT, run_options) + subroutine(2, HOLE, run_options)
     last = 0.0
     for n, start, approach, height, diameter in ((1, START, SLOT_APPROACH, HEIGHT, 8.0),
                                                  (2, START + STEP / 2, HOLE_APPROACH, 0.0, 6.0)):
         lines += [f"$$-> FEATNO / {100 + n}", f"LOADTL / {n}", f"$$-> CUTTER / {diameter:.6f}",
-                  *(["MULTAX / ON"] if manner.multax else []), "SPINDL / RPM, 3000.000000,  CLW", "COOLNT / FLOOD"]
+                  *(["MULTAX / ON"] if run_options.multax else []), "SPINDL / RPM, 3000.000000,  CLW", "COOLNT / FLOOD"]
         for angle in angles(start):
-            lines += position(n, angle, round(angle, 3) - last, approach, height, manner)
+            lines += position(n, angle, round(angle, 3) - last, approach, height, run_options)
             last = round(angle, 3)
         lines += ["COOLNT / OFF", "$$-> END /"]
     return "\n".join([*lines, f"ROTATE / AAXIS, INCR, {last:.3f}, CCLW", "FINI"]) + "\n"

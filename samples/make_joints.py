@@ -19,7 +19,7 @@ def leaning(tilt: Floats | float, heading: Floats | float) -> Floats:
 
 
 def singular_pass() -> str:
-    """Passes along x over a ridge, the axis on the way from -12 to 12 degrees of lean."""
+    """Passes along x over a ridge, the axis on the path from -12 to 12 degrees of lean."""
     nx = NxFile(("continuous 5-axis: three passes over a ridge, the tool axis leans from -12 to 12 degrees on the way; in",
                  "the first it goes through +z, in the second it passes 0.01 degrees beside it, in the third 0.5 degrees.",
                  "Top of the ridge at the origin, mm."), decimals=5, axis_decimals=9)

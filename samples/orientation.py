@@ -12,7 +12,7 @@ FEED = 60000.0
 
 
 def test_part() -> Sample:
-    """Planes Xp of the ball centre, y from 0 to 60, one way; each pass begins and ends in a rapid."""
+    """Planes Xp of the ball centre, y from 0 to 60, one direction; each pass begins and ends in a rapid."""
     nx = NxFile(("Passes Xp = 0, 10, 15, 20, 30, 45, 60 of the test part of Grandguillaume, Lavernhe, Tournier (2017),",
                  "ball cutter 16 mm, no feed that binds: what limits is the machine."), decimals=6)
     nx.operation("PASSES", Cutter(5, "BALL16", 16, 8, rpm=9000))
@@ -56,8 +56,8 @@ def fan(count: int = 36, length: float = 90.0) -> Sample:
     """Level strips from one point to all sides of half a turn: no orientation is good for all."""
     nx = started("Fan of straight strips over half a turn.")
     for k, angle in enumerate(np.linspace(0.0, np.pi, count, endpoint=False)):
-        way = np.array([np.cos(angle), np.sin(angle), 0.0])
-        ends = np.outer([8.0, length], way)
+        travel = np.array([np.cos(angle), np.sin(angle), 0.0])
+        ends = np.outer([8.0, length], travel)
         strip(nx, ends[:: -1 if k % 2 else 1], np.tile(UP, (2, 1)), UP)
     nx.end()
     return nx.text(), nx.expected()
@@ -70,9 +70,9 @@ def walls(levels: int = 12, half: tuple[float, float] = (60.0, 35.0), slope: flo
     for depth in np.linspace(2.0, 20.0, levels):
         inset = depth / np.tan(lean)
         for side in range(4):
-            way, inward = np.roll([1.0, 0.0], side % 2), np.roll([0.0, 1.0], side % 2) * (1.0 if side < 2 else -1.0)
+            travel, inward = np.roll([1.0, 0.0], side % 2), np.roll([0.0, 1.0], side % 2) * (1.0 if side < 2 else -1.0)
             along, across = half[side % 2] - 8.0, half[1 - side % 2] - inset
-            ends = np.array([np.append(s * along * way - across * inward, -depth) for s in (-1.0, 1.0)])
+            ends = np.array([np.append(s * along * travel - across * inward, -depth) for s in (-1.0, 1.0)])
             normal = np.append(np.sin(lean) * inward, np.cos(lean))
             strip(nx, ends[:: -1 if side >= 2 else 1], np.tile(normal, (2, 1)), UP)
     nx.end()
@@ -135,7 +135,7 @@ def surface(count: int = 500) -> Sample:
     nx = started("Bicubic test part in narrow strips, zig-zag.")
     x, y = np.meshgrid(np.linspace(0.0, 60.0, count), np.arange(61.0), indexing="ij")
     for k, tip in enumerate(ball_centers(x, y, 5.0) - [0.0, 0.0, 5.0]):
-        way = tip[:: -1 if k % 2 else 1]
-        strip(nx, way, np.tile(UP, (len(way), 1)), UP)
+        travel = tip[:: -1 if k % 2 else 1]
+        strip(nx, travel, np.tile(UP, (len(travel), 1)), UP)
     nx.end()
     return nx.text(), nx.expected()

@@ -39,7 +39,7 @@ def one_turn(count: int) -> Floats:
     return np.asarray(np.interp(np.linspace(0, 2, count, endpoint=False), measure, phi))
 
 
-def axis_beside(normal: Floats, tilt: Floats) -> Floats:
+def axis_adjacent(normal: Floats, tilt: Floats) -> Floats:
     """Axis (N, 3) leaning `tilt` rad from z towards the normal's level direction."""
     return leaning(tilt, np.arctan2(normal[:, 1], normal[:, 0]))
 
@@ -61,7 +61,7 @@ def blade() -> Sample:
     h = 1 - np.arange(phi.size) / (phi.size - 1)
     contact, normal = blade_surface(phi, h)
     tilt = np.radians(30 + 10 * np.cos(2 * phi) + 5 * np.cos(2 * np.pi * h * 3))
-    axis = axis_beside(normal, tilt)
+    axis = axis_adjacent(normal, tilt)
     follow(nx, ball_tip(contact, normal, axis, 3), axis, 1500)
     nx.end()
     nx.operation("BLADE_FLANK", ball, load=False)
@@ -165,9 +165,9 @@ def tour_directions() -> Floats:
 
 
 def near_pole() -> Floats:
-    """Directions (N, 3) on a straight way past the pole, 0.5 degrees beside it."""
-    along, beside = np.tan(np.radians(np.linspace(20, -30, 15))), np.tan(np.radians(0.5))
-    v = np.column_stack((along, np.full_like(along, beside), np.ones_like(along)))
+    """Directions (N, 3) on a straight path past the pole, 0.5 degrees next to it."""
+    along, adjacent = np.tan(np.radians(np.linspace(20, -30, 15))), np.tan(np.radians(0.5))
+    v = np.column_stack((along, np.full_like(along, adjacent), np.ones_like(along)))
     turn = np.radians(200)
     v[:, 0], v[:, 1] = turned(v[:, 0], v[:, 1], np.full_like(along, turn))
     return np.asarray(v / np.linalg.norm(v, axis=1, keepdims=True))

@@ -86,7 +86,7 @@ def test_small_explained_and_listed(name: str) -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_fits_a_table_of_the_mikron(name: str) -> None:
-    """Turned any way about the origin, the tip stays inside the shortest travel (Z +-250) with room for the tool."""
+    """Turned any path about the origin, the tip stays inside the shortest travel (Z +-250) with room for the tool."""
     corner = [max(abs(v) for v in pair) for pair in EXPECTED[name]["extents_mm"].values()]
     assert np.hypot(np.hypot(corner[0], corner[1]), corner[2]) < 150
     assert EXPECTED[name]["largest_tilt_deg"] <= (180 if "4axis" in name else 90)

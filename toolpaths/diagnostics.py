@@ -93,5 +93,5 @@ def warning(code: str, message: str, *, file: str = "", lines: Sequence[int] = (
 
 def info(code: str, message: str, *, file: str = "", lines: Sequence[int] = (), count: int = 1,
          hint: str = "") -> Diagnostic:
-    """A Diagnostic that only tells."""
+    """A Diagnostic that only says."""
     return Diagnostic(Severity.INFO, code, message, file, _stated(lines), count, hint)

@@ -17,7 +17,7 @@ FORMATS = (".png", ".svg")
 """by the ending of the file"""
 DOTS = 130
 """per inch, of PNG"""
-BESIDE: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (1.0, 1.0), "fontsize": "small", "frameon": False}
+ADJACENT: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (1.0, 1.0), "fontsize": "small", "frameon": False}
 """where legends stand"""
 TITLE = 90
 """characters of a title"""

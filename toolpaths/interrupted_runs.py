@@ -1,4 +1,4 @@
-"""What a run that was killed while writing left behind: temporary files of its own, told apart by their names.
+"""What a run that was killed while writing left behind: temporary files of its own, distinguished by their names.
 
 A temporary file is called `.NAME.postproc-WHERE-PID-START-RANDOM.KIND`: WHERE is the computer (and its space of process
 numbers), PID and START name the process beyond the reuse of its number. `new` is an output not yet in its place, `old` what
@@ -88,13 +88,13 @@ def undo(folder: Path, entries: Iterable[Entry]) -> tuple[int, list[OSError]]:
 def clean(folder: Path) -> list[Diagnostic]:
     """Take back unfinished replacements of runs that are dead, then remove their temporary files from a folder."""
     found = _leftovers(folder)
-    told: list[Diagnostic] = []
+    noted: list[Diagnostic] = []
     for path, _ in [x for x in found if x[1] == JOURNAL]:
-        told += _recovered(path)
+        noted += _recovered(path)
     for path, _ in [x for x in found if x[1] == POINTER]:
         with contextlib.suppress(OSError, UnicodeDecodeError):
             journal = folder / path.read_text(encoding="utf-8")
-            told += _recovered(journal) if journal.exists() else []
+            noted += _recovered(journal) if journal.exists() else []
             if not journal.exists():
                 path.unlink()
     kept = {_NAME.fullmatch(p.name)["run"]  # type: ignore[index]
@@ -103,7 +103,7 @@ def clean(folder: Path) -> list[Diagnostic]:
         if _NAME.fullmatch(path.name)["run"] not in kept:  # type: ignore[index]
             with contextlib.suppress(OSError):
                 path.unlink()
-    return told
+    return noted
 
 
 def interrupted(folder: Path) -> Path | None:

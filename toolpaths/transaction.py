@@ -54,7 +54,7 @@ def write_together(outputs: Mapping[Path, str | bytes]) -> list[Diagnostic]:
         for one in todo:
             with _for(one.path):
                 _make_folder(one.target.parent, made)
-        told = [d for folder in dict.fromkeys(one.target.parent for one in todo) for d in leftovers.clean(folder)]
+        noted = [d for folder in dict.fromkeys(one.target.parent for one in todo) for d in leftovers.clean(folder)]
         todo = [_output(one.path, run) for one in todo]  # as cleaning has left them
         for one, content in zip(todo, outputs.values(), strict=True):
             with _for(one.path):
@@ -68,7 +68,7 @@ def write_together(outputs: Mapping[Path, str | bytes]) -> list[Diagnostic]:
             with contextlib.suppress(OSError):
                 folder.rmdir()
         raise
-    return told
+    return noted
 
 
 def _checked(outputs: Mapping[Path, str | bytes], run: str) -> list[_Output]:

@@ -1,1 +1,1 @@
-"""Calibration: from measurements to an error model with its doubt."""
+"""Calibration: from measurements to an error model with its uncertainty."""

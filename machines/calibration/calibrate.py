@@ -36,8 +36,8 @@ def calibrate(source: str | Path, accept_residual: bool = False) -> tuple[Calibr
         return None, [file.problem("calibrate.kind", (), f"{len(given)} kinds of measurement, one is needed",
                                    "write one of " + ", ".join(f"[{k}]" for k in COLUMNS))]
     origin = file.origin(("machine",))
-    beside = Path(origin.file).parent / checked.machine
-    machine, found = load_machine(beside if beside.suffix == ".toml" and there_is(beside) else checked.machine)
+    adjacent = Path(origin.file).parent / checked.machine
+    machine, found = load_machine(adjacent if adjacent.suffix == ".toml" and there_is(adjacent) else checked.machine)
     if machine is None:
         return None, found
     return _worked(CalibrationRun(file, checked, machine, given[0]))

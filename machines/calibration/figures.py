@@ -1,4 +1,4 @@
-"""A calibration drawn: signatures (or parameters) with their doubt, residuals, condition number against set-ups.
+"""A calibration drawn: signatures (or parameters) with their uncertainty, residuals, condition number against set-ups.
 
 matplotlib is imported only when a figure is asked for. What comes from files is drawn as it stands, never as markup.
 """
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from toolpaths.drawing import BESIDE, image, plain
+from toolpaths.drawing import ADJACENT, image, plain
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -60,7 +60,7 @@ def _signatures(place: Axes, curves: dict[str, Any]) -> None:
         line, = place.plot(x, y, marker="." if len(x) < MANY else "", label=plain(name))
         place.fill_between(x, y - BOUND * sigma, y + BOUND * sigma, color=line.get_color(), alpha=0.2, linewidth=0.0)
     _labelled(place, "position [deg]", f"signature [{next(iter(curves.values()))['unit']}], 95 % bounds")
-    place.legend(**BESIDE)
+    place.legend(**ADJACENT)
 
 
 def _parameters(place: Axes, chosen: dict[str, Any]) -> None:
@@ -78,7 +78,7 @@ def _residuals(place: Axes, rows: dict[str, Any]) -> None:
     for bound in (-BOUND, BOUND):
         place.axhline(bound, color="gray", linewidth=0.8, linestyle="--")
     _labelled(place, "reading", "residual [standard deviations]")
-    place.legend(**BESIDE)
+    place.legend(**ADJACENT)
 
 
 def _conditions(place: Axes, plan: list[dict[str, Any]]) -> None:
@@ -88,9 +88,9 @@ def _conditions(place: Axes, plan: list[dict[str, Any]]) -> None:
     for m, value in zip(setups, number, strict=True):
         if np.isnan(value):
             place.axvline(m, color="tab:red", linewidth=0.8, linestyle=":",
-                          label="" if place.get_legend_handles_labels()[1] else "not told")
+                          label="" if place.get_legend_handles_labels()[1] else "not reported")
     if np.isnan(number).any():
-        place.legend(**BESIDE)
+        place.legend(**ADJACENT)
     _labelled(place, "set-ups m", "condition number")
 
 

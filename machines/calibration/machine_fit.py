@@ -37,7 +37,7 @@ class Measurements:
         sigma: mm, one or per reading
         centre: (3,) mm in the table frame, nominal centre of the ball-bar
         toward: (3,) unit direction in the table frame
-        ways: (N, J) by which way each joint came: +1, -1, 0 for the mean of both; None: the mean for all
+        approaches: (N, J) from which direction each joint came: +1, -1, 0 for the mean of both; None: the mean for all
         zeroed: True where the place of the ball (zero of the laser) is not known and is identified along
     """
 
@@ -47,7 +47,7 @@ class Measurements:
     sigma: float | Floats
     centre: Floats | None = None
     toward: Floats | None = None
-    ways: Floats | None = None
+    approaches: Floats | None = None
     zeroed: bool = True
 
 
@@ -74,12 +74,12 @@ def problem_of(model: ErrorModel, kinematics: Kinematics, measured: Measurements
         return model.with_values(values[:count]).on(kinematics)
 
     def predict(values: Floats) -> Floats:
-        return reader.read(actual(values).place(w, measured.ways)[0], values[count:])
+        return reader.read(actual(values).place(w, measured.approaches)[0], values[count:])
 
     def jacobian(values: Floats) -> Floats:
         machine = actual(values)
-        moved = machine.sensitivity(w, measured.ways)[:, :3]
-        return reader.rates(machine.place(w, measured.ways)[0], moved, values[count:])
+        moved = machine.sensitivity(w, measured.approaches)[:, :3]
+        return reader.rates(machine.place(w, measured.approaches)[0], moved, values[count:])
 
     read = np.asarray(measured.read, dtype=np.float64).ravel()
     sigma = np.broadcast_to(measured.sigma, np.shape(measured.read)).ravel()
@@ -141,7 +141,7 @@ class MachineFit:
 
 def fit(model: ErrorModel, kinematics: Kinematics, measured: Measurements, parameters: Sequence[str] = (),
         robust: bool = False) -> MachineFit:
-    """Identify; see `problem_of`. Where the data do not tell all, `result.not_identifiable` names it."""
+    """Identify; see `problem_of`. Where the data do not determine all, `result.not_identifiable` names it."""
     problem = problem_of(model, kinematics, measured, parameters)
     result = solve(problem, robust)
     count = len(model.names)

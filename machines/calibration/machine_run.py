@@ -10,10 +10,10 @@ import numpy as np
 from machines.calibration.folded_names import folded, near
 from machines.calibration.machine_fit import SETUP, MachineFit, MeasuredQuantity, Measurements, fit
 from machines.calibration.measurement_file import COLUMNS, BarModel, LaserModel, PosesModel, TableColumn
-from machines.calibration.outcome import MEANT, CalibrationOutcome, done, doubtful
+from machines.calibration.outcome import MEANT, CalibrationOutcome, done, uncertain
 from machines.calibration.result_figures import account, weighted
-from machines.calibration.run import CalibrationRun, way_column
-from machines.calibration.unit_and_sign_checks import machine_slip
+from machines.calibration.run import CalibrationRun, approach_column
+from machines.calibration.unit_and_sign_checks import machine_table_fault
 from machines.geometric_error.actual.model import ErrorModel
 from machines.geometric_error.files.loader import load_checked as load_errors
 from machines.geometric_error.tables.csv_table import LENGTHS, CsvTable
@@ -27,11 +27,11 @@ FAR = 1.0
 APART = 2.0
 """times the commanded distance, or one part of it, that the median of a bar's readings may be"""
 MOST = 3
-"""groups that are told"""
+"""groups that are reported"""
 SHORT = 1e-3
 """mm, a bar that is none"""
 SEEN = 1e-6
-"""mm or rad that an error differs by its way, to be told"""
+"""mm or rad that an error differs by its approach direction, to be reported"""
 
 
 def machine_errors(run: CalibrationRun, given: PosesModel | BarModel | LaserModel,
@@ -39,31 +39,31 @@ def machine_errors(run: CalibrationRun, given: PosesModel | BarModel | LaserMode
     """The parameters that are asked for; None where the file is at fault."""
     names = run.machine.axis_names
     joints = [TableColumn(n, "angle" if r else "length") for n, r in zip(names, run.machine.rotary, strict=True)]
-    if not run.columns(table, [*joints, *COLUMNS[run.kind]], [way_column(n) for n in names]):
+    if not run.columns(table, [*joints, *COLUMNS[run.kind]], [approach_column(n) for n in names]):
         return None
-    q, ways, start = run.joints(table), run.ways(table), _start(run)
+    q, approaches, start = run.joints(table), run.approaches(table), _start(run)
     if start is None or has_errors(run.found):
         return None
     kinematics = run.machine.kinematics.with_tool(given.tool_length)
     read = np.stack([table.columns[c.name] for c in COLUMNS[run.kind]], axis=1)
-    measured = _measured(given, q, read, ways)
+    measured = _measured(given, q, read, approaches)
     if not _reached(run, table, kinematics, q) or not _distances(run, table, kinematics, measured):
         return None
     if not _known(run, start):
         return None
-    _lost_motion(run, start, ways)
+    _lost_motion(run, start, approaches)
     fitted = fit(start, kinematics, measured, run.checked.parameters, run.checked.robust)
     return _judged(run, given, start, kinematics, measured, fitted, table)
 
 
-def _measured(given: PosesModel | BarModel | LaserModel, q: Floats, read: Floats, ways: Floats) -> Measurements:
+def _measured(given: PosesModel | BarModel | LaserModel, q: Floats, read: Floats, approaches: Floats) -> Measurements:
     sigma = given.sigma_um * 1e-3
     if isinstance(given, PosesModel):
-        return Measurements("position", q, read, sigma, zeroed=given.zeroed, ways=ways)
+        return Measurements("position", q, read, sigma, zeroed=given.zeroed, approaches=approaches)
     if isinstance(given, BarModel):
-        return Measurements("distance", q, read[:, 0], sigma, centre=np.array(given.centre), ways=ways)
+        return Measurements("distance", q, read[:, 0], sigma, centre=np.array(given.centre), approaches=approaches)
     toward = np.array(given.toward) / np.linalg.norm(given.toward)
-    return Measurements("along", q, read[:, 0], sigma, toward=toward, zeroed=given.zeroed, ways=ways)
+    return Measurements("along", q, read[:, 0], sigma, toward=toward, zeroed=given.zeroed, approaches=approaches)
 
 
 def _start(run: CalibrationRun) -> ErrorModel | None:
@@ -117,19 +117,20 @@ def _distances(run: CalibrationRun, table: CsvTable, kinematics: Kinematics, mea
     return False
 
 
-def _lost_motion(run: CalibrationRun, start: ErrorModel, ways: Floats) -> None:
-    """Axes that come to another place by either way, where the table does not say by which they came."""
+def _lost_motion(run: CalibrationRun, start: ErrorModel, approaches: Floats) -> None:
+    """Axes that come to another place from either direction, where the table does not say by which they came."""
     names = run.machine.axis_names
-    silent = [names[j] for j in start.axes.two_way(names) if not ways[:, j].any()]
+    silent = [names[j] for j in start.axes.bidirectional(names) if not approaches[:, j].any()]
     if silent:
         gaps = [f"{axis} (up to {1e3 * gap:.4g} um)" if (gap := _gap(start, axis)) > SEEN else axis for axis in silent]
-        run.tell("calibrate.ways", f"{run.checked.model} has errors of both ways for {', '.join(gaps)}, the table does not "
-                 "say by which way it came: the mean is taken", f"add a column {way_column(silent[0])}, 1 or -1: readings "
-                 "from one side alone are off by half of what the ways differ")
+        run.note("calibrate.ways", f"{run.checked.model} has errors by approach direction for {', '.join(gaps)}, the "
+                 "table does not say from which direction it came: the mean is taken",
+                 f"add a column {approach_column(silent[0])}, 1 or -1: readings "
+                 "from one side alone are off by half of what the approach directions differ")
 
 
 def _gap(start: ErrorModel, axis: str) -> float:
-    """mm, the most that a displacement of an axis differs by its way."""
+    """mm, the most that a displacement of an axis differs by its approach direction."""
     both = [c.curve for c in start.axes.components
             if c.name.axis == axis and not c.name.angular and isinstance(c.curve, TableCurve) and c.curve.both]
     return max((float(np.abs(np.diff(curve.values.reshape(2, -1), axis=0)).max()) for curve in both), default=0.0)
@@ -158,20 +159,21 @@ def _judged(run: CalibrationRun, given: PosesModel | BarModel | LaserModel, star
     columns = [c.name for c in COLUMNS[run.kind]]
     units, joints = ([table.unit[name] for name in names] for names in (columns, run.machine.axis_names))
     return done(run, fitted.model, figures, result.noise, f"sigma_um = {given.sigma_um:g}",
-                lambda: machine_slip(start, kinematics, measured, wanted, travel, units, joints, columns), start, wanted)
+                lambda: machine_table_fault(start, kinematics, measured, wanted, travel, units, joints, columns), start,
+                wanted)
 
 
 def _untold(run: CalibrationRun, groups: Sequence[tuple[str, ...]]) -> None:
-    """Parameters that the readings do not tell, alone or from each other."""
+    """Parameters that the readings do not determine, alone or from each other."""
     alone, together = [g[0] for g in groups if len(g) == 1], [folded(g) for g in groups if len(g) > 1]
-    ways = any({name[-1] for name in g} == {"+", "-"} for g in groups)
+    approaches = any({name[-1] for name in g} == {"+", "-"} for g in groups)
     hint = "measure where they differ, or name fewer under parameters"
     if alone:
-        run.problem("calibrate.rank", f"the readings do not tell {folded(alone)}", hint)
+        run.problem("calibrate.rank", f"the readings do not determine {folded(alone)}", hint)
     if together:
         more = f", and of {len(together) - MOST} more" if len(together) > MOST else ""
-        run.problem("calibrate.rank", f"the readings tell only combinations of {'; of '.join(together[:MOST])}{more}",
-                    f"say in columns such as X way by which way each axis came; or {hint}" if ways else hint)
+        run.problem("calibrate.rank", f"the readings determine only combinations of {'; of '.join(together[:MOST])}{more}",
+                    f"say in columns such as X way from which direction each axis came; or {hint}" if approaches else hint)
 
 
 def _far(run: CalibrationRun, given: PosesModel | BarModel | LaserModel, kind: MeasuredQuantity,
@@ -182,12 +184,13 @@ def _far(run: CalibrationRun, given: PosesModel | BarModel | LaserModel, kind: M
     if isinstance(given, BarModel):
         at = "[" + ", ".join(f"{c + d:.4f}" for c, d in zip(given.centre, off, strict=False)) + "]"
         if away > FAR:
-            doubtful(run, "calibrate.place", f"the ball is found at {at}, {away:.4g} mm from centre = {list(given.centre)}",
-                     f"look at tool_length = {given.tool_length:g} and centre; centre = {at} where that is right", "centre")
+            uncertain(run, "calibrate.place", f"the ball is found at {at}, {away:.4g} mm from centre = {list(given.centre)}",
+                      f"look at tool_length = {given.tool_length:g} and centre; centre = {at} where that is right", "centre")
         if abs(off[3]) > FAR:
-            doubtful(run, "calibrate.place", f"distances are {abs(off[3]):.4g} mm too {'short' if off[3] > 0.0 else 'long'}",
-                     f"distance is the whole length from ball to ball; look at its unit; {MEANT}")
+            uncertain(run, "calibrate.place",
+                      f"distances are {abs(off[3]):.4g} mm too {'short' if off[3] > 0.0 else 'long'}",
+                      f"distance is the whole length from ball to ball; look at its unit; {MEANT}")
     elif away > FAR:
         what = "the tip" if isinstance(given, PosesModel) else "the zero"
-        doubtful(run, "calibrate.place", f"{what} is found {away:.4g} mm from where it should be",
-                 f"readings are actual less nominal; look at their unit and at tool_length; {MEANT}")
+        uncertain(run, "calibrate.place", f"{what} is found {away:.4g} mm from where it should be",
+                  f"readings are actual less nominal; look at their unit and at tool_length; {MEANT}")

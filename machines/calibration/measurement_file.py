@@ -30,23 +30,25 @@ _PLACES = (TableColumn("setup", "", "number of the set-up: 0, 1, ..."),
 _SIX = (*(TableColumn(f"d{x}", "length", f"displacement along {x} of what the axis moves, + along {x}") for x in "xyz"),
         *(TableColumn(f"e{x}", "angle", f"turn about {x} of what the axis moves, + as a right-hand screw") for x in "xyz"))
 COLUMNS: dict[str, tuple[TableColumn, ...]] = {
-    "reversal": (*_PLACES, TableColumn("reading", "angle", "actual less commanded angle, + the way the axis counts")),
+    "reversal": (*_PLACES, TableColumn("reading", "angle",
+                                       "actual less commanded angle, + the approach direction the axis counts")),
     "rotary": (*_PLACES, *_SIX),
     "poses": tuple(TableColumn(f"d{x}", "length", f"actual less nominal place of the tip along {x} of the table frame")
                    for x in "xyz"),
     "ball_bar": (TableColumn("distance", "length", "whole length from the ball on the table to the ball in the spindle"),),
     "laser": (TableColumn("reading", "length", "actual less nominal displacement of the tip, + along `toward`"),),
 }
-"""what was read, by kind of measurement; poses, ball_bar and laser have a column for each axis of the machine beside"""
+"""what was read, by kind of measurement; poses, ball_bar and laser have a column for each axis of the machine next to"""
 JOINT = "commanded position of each axis of the machine, slides in a length, rotary axes in an angle"
-WAY = "may be left out: way by which X came there (so for any axis), 1 from lesser values, -1 from greater ones, 0 not known"
+DIRECTION = ("may be left out: approach direction of X (so for any axis), 1 from lesser values, -1 from greater ones, "
+             "0 not known")
 
 
 class ReversalModel(UserModel):
     """`[reversal]`: axis against indexer."""
 
     table: str
-    """CSV file beside this one"""
+    """CSV file next to this one"""
     axis: Literal["A", "B", "C"]
     """rotary axis that was measured"""
     steps: StepCount
@@ -57,14 +59,14 @@ class ReversalModel(UserModel):
     """increments by which the indexer was turned in each set-up: step i then meets its increment i + shift; default 0, 1,
     2, ..."""
     zeroed: bool = True
-    """the instrument was zeroed anew at each set-up"""
+    """the instrument was zeroed again at each set-up"""
 
 
 class RotaryMeasurementModel(UserModel):
     """`[rotary]`: all six errors by reversal."""
 
     table: str
-    """CSV file beside this one; empty cells are not allowed, leave whole rows out"""
+    """CSV file next to this one; empty cells are not allowed, leave whole rows out"""
     axis: Literal["A", "B", "C"]
     """rotary axis that was measured. Readings are of what it moves, tool or part: z where that turns to at positive
     commands, x along the machine's X (axis C), Y (A) or Z (B)"""
@@ -88,7 +90,7 @@ class PosesModel(UserModel):
     """`[poses]`: tips measured at commanded positions."""
 
     table: str
-    """CSV file beside this one"""
+    """CSV file next to this one"""
     sigma_um: Sigma
     """standard deviation of a displacement"""
     tool_length: NotNegative = 0.0
@@ -101,7 +103,7 @@ class BarModel(UserModel):
     """`[ball_bar]`: distances at commanded positions."""
 
     table: str
-    """CSV file beside this one"""
+    """CSV file next to this one"""
     sigma_um: Sigma
     """standard deviation of a distance"""
     centre: tuple[Coordinate, Coordinate, Coordinate]
@@ -115,7 +117,7 @@ class LaserModel(UserModel):
     """`[laser]`: displacements along a direction at commanded positions."""
 
     table: str
-    """CSV file beside this one"""
+    """CSV file next to this one"""
     sigma_um: Sigma
     """standard deviation of a reading"""
     toward: Vector
@@ -157,7 +159,7 @@ class MeasurementModel(UserModel):
     minutes_per_setup: NotNegative = 20.0
     """machine time to turn the indexer and align"""
     reversal: ReversalModel | None = None
-    """axis and indexer told apart"""
+    """axis and indexer distinguished"""
     rotary: RotaryMeasurementModel | None = None
     """all six errors of a rotary axis"""
     poses: PosesModel | None = None
@@ -176,6 +178,6 @@ def measurement_schema() -> dict[str, Any]:
         found = [{"name": c.name, "unit": c.unit, "meaning": c.meaning} for c in columns]
         if kind not in ("reversal", "rotary"):
             found += [{"name": "X, Y, ...", "unit": "length or angle", "meaning": JOINT},
-                      {"name": "X way, ...", "unit": "", "meaning": WAY}]
+                      {"name": "X way, ...", "unit": "", "meaning": DIRECTION}]
         result["$defs"][reference]["properties"]["table"]["columns"] = found
     return result

@@ -1,4 +1,4 @@
-"""What becomes of a fit: a model, or none where what was found cannot be; what is doubtful is told."""
+"""What becomes of a fit: a model, or none where what was found cannot be; what is uncertain is reported."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ DIFFERENCES = "reversal", "poses", "laser"
 """kinds whose readings are actual less nominal"""
 MEANT = "write large = true at the top of the file where it is so"
 MOST = 6
-"""errors above what machines have, that are told"""
+"""errors above what machines have, that are reported"""
 FEW = 8
-"""readings more than unknowns, below which what is left shows no unit slipped by 5 or more"""
+"""readings more than unknowns, below which what is left shows no unit is wrong by 5 or more"""
 
 
 @dataclass(frozen=True)
@@ -46,19 +46,19 @@ class CalibrationOutcome:
 
 
 def done(run: CalibrationRun, model: ErrorModel, figures: dict[str, Any], noise: Noise | None, sigma: str,
-         slip: Callable[[], TableFault | None], start: ErrorModel | None = None,
+         fault: Callable[[], TableFault | None], start: ErrorModel | None = None,
          wanted: Sequence[str] = ()) -> CalibrationOutcome:
     """The calibration, its parameters in the figures.
 
     Args:
         noise: what is left of the readings
         sigma: how the file states their noise
-        slip: looks for a wrong unit, sign or order in the table that would explain the readings, None where there is none
+        fault: looks for a wrong unit, sign or order in the table that would explain the readings, None where there is none
         start, wanted: model that was begun from, and beginnings of names that were asked for
     """
     model = replace(model, machine=run.machine.name, large=bool(too_large(model)))
     _large(run, model, start)
-    _residual(run, figures, noise, sigma, slip)
+    _residual(run, figures, noise, sigma, fault)
     found = parameters(model, wanted)
     figures |= {"parameters": found, "kept": len(model.names) - len(found)}
     return CalibrationOutcome(model, figures)
@@ -77,7 +77,7 @@ def _large(run: CalibrationRun, model: ErrorModel, start: ErrorModel | None) -> 
             run.warn("error-model.large", message, hint)
 
 
-def doubtful(run: CalibrationRun, code: str, message: str, hint: str, key: str = "table") -> None:
+def uncertain(run: CalibrationRun, code: str, message: str, hint: str, key: str = "table") -> None:
     """An error, a warning where the file says `large = true`."""
     if run.checked.large:
         run.warn(code, message)
@@ -86,22 +86,22 @@ def doubtful(run: CalibrationRun, code: str, message: str, hint: str, key: str =
 
 
 def _residual(run: CalibrationRun, figures: dict[str, Any], noise: Noise | None, sigma: str,
-              slip: Callable[[], TableFault | None]) -> None:
+              fault: Callable[[], TableFault | None]) -> None:
     """What is left of the readings against what the file says of their noise."""
     if noise is None:
-        run.tell("calibrate.unchecked", f"{figures['readings']} readings for as many unknowns: nothing is left over that "
+        run.note("calibrate.unchecked", f"{figures['readings']} readings for as many unknowns: nothing is left over that "
                  "could show a mistake", "measure more than is asked for")
         return
     message = (f"what is left is {noise.left:.3g} times the stated standard deviation of the readings "
                f"({figures['spare']} more readings than unknowns)")
-    found = None if noise.meets else slip()
+    found = None if noise.meets else fault()
     stated = f"where the noise of the readings is so, write {_stated(sigma, noise.left)}"
     if noise.less <= CHANCE:
         _silent(run, noise, message, found, stated)
     elif noise.more <= CHANCE:
         _loud(run, figures, noise, message, found, stated)
     elif figures["spare"] < FEW:
-        run.tell("calibrate.few", f"{figures['spare']} more readings than unknowns: a wrong unit could not be seen in what "
+        run.note("calibrate.few", f"{figures['spare']} more readings than unknowns: a wrong unit could not be seen in what "
                  "is left of them", "measure more than is asked for")
 
 

@@ -1,4 +1,5 @@
-"""One form for every identification: what is guessed, what is free, how well it is measured; what comes out, with its doubt.
+"""One form for every identification: what is guessed, what is free, how well it is measured; what comes out, with its
+uncertainty.
 
 Weighted least squares by Gauss-Newton steps; for linear models one step is the answer. Columns are scaled to one length
 before ranks are taken, so that mm and rad count alike.
@@ -17,7 +18,7 @@ from toolpaths.arrays import Bools, Floats, frozen
 RANK = 1e-9
 """singular values (of the scaled, weighted Jacobian) below this part of the largest count as none"""
 PART = 1e-6
-"""least share of a parameter in what cannot be told, to be named"""
+"""least share of a parameter in what cannot be reported, to be named"""
 HUBER = 1.345
 """standard deviations beyond which a residual counts linearly in a robust fit (Huber 1964: 95 % efficient)"""
 STEPS, ROBUST_STEPS = 30, 300
@@ -89,12 +90,13 @@ class CalibrationResult:
 
     @property
     def supported(self) -> bool:
-        """True where the data tell every free parameter."""
+        """True where the data determine every free parameter."""
         return self.converged and not self.not_identifiable
 
 
 def solve(problem: CalibrationProblem, robust: bool = False) -> CalibrationResult:
-    """Least squares; where the data do not tell all, the smallest change from the guess, and the groups that they leave."""
+    """Least squares; where the data do not determine all, the smallest change from the guess, and the groups that they
+    leave."""
     values, weights = np.array(problem.guess), np.ones(len(problem.observed))
     start = problem.observed - problem.predict(values)
     residual, converged = start, False
@@ -152,8 +154,8 @@ class _Decomposed:
 
     def step(self, residual: Floats) -> Floats:
         """The smallest (scaled) change that fits best."""
-        told = slice(0, self.rank)
-        result: Floats = self.vt[told].T @ ((self.u[:, told].T @ residual) / self.s[told]) * self.size
+        noted = slice(0, self.rank)
+        result: Floats = self.vt[noted].T @ ((self.u[:, noted].T @ residual) / self.s[noted]) * self.size
         return result
 
     def effect(self, step: Floats) -> Floats:
@@ -163,14 +165,14 @@ class _Decomposed:
         return result
 
     def covariance(self, count: int) -> Floats:
-        """(count, count): of what the data tell."""
-        told = self.vt[: self.rank].T / self.s[: self.rank] * self.size[:, None]
+        """(count, count): of what the data determine."""
+        noted = self.vt[: self.rank].T / self.s[: self.rank] * self.size[:, None]
         result = np.zeros((count, count))
-        result[np.ix_(self.free, self.free)] = told @ told.T
+        result[np.ix_(self.free, self.free)] = noted @ noted.T
         return result
 
     def groups(self) -> tuple[tuple[str, ...], ...]:
-        """Parameters that share a direction which the data do not tell, each set once."""
+        """Parameters that share a direction which the data do not determine, each set once."""
         names = [name for name, free in zip(self.names, self.free, strict=True) if free]
         untold = self.full[self.rank:].T
         projector = np.abs(untold @ untold.T)

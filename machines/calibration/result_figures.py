@@ -38,7 +38,8 @@ def account(result: CalibrationResult, rank: int, number: float, unknowns: int, 
 
 def parameters(model: ErrorModel, wanted: Sequence[str] = ()) -> dict[str, Any]:
     """By name, of those that begin as one of `wanted` (all without): value, sigma (None where it is not known), unit (um or
-    arcsec), at: the position that a value of a table is of, "X -300", "X -300 +" with its way ("" for all others)."""
+    arcsec), at: the position that a value of a table is of, "X -300", "X -300 +" with its approach direction ("" for all
+    others)."""
     sigma = np.zeros(len(model.names)) if model.covariance is None else np.sqrt(np.diag(model.covariance))
     units = ["arcsec" if angular(name) else "um" for name in model.names]
     places = _places(model)
@@ -67,7 +68,7 @@ def signature(degrees: Floats, values: Floats, sigma: Floats, unit: str) -> dict
 
 
 def series_signatures(fitted: RotaryFit) -> dict[str, Any]:
-    """The six series of a rotary axis over a turn, by reading; amplitudes that are not told count as 0."""
+    """The six series of a rotary axis over a turn, by reading; amplitudes that are not reported count as 0."""
     degrees = np.arange(0.0, 360.0 + CURVE, CURVE)
     phase = np.radians(degrees)[:, None] * np.arange(1, fitted.amplitudes.shape[2] + 1)
     waves = np.concatenate([np.cos(phase), np.sin(phase)], axis=1)

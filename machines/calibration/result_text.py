@@ -6,15 +6,15 @@ import math
 from typing import Any
 
 FIGURES = 4
-"""of a number without a doubt of its own"""
+"""of a number without an uncertainty of its own"""
 MOST = 9
 """decimals"""
-DOUBTS = 3
-"""figures that a doubt is written with, and its value to the same decimal"""
+UNCERTAINTY_DIGITS = 3
+"""figures that an uncertainty is written with, and its value to the same decimal"""
 
 
 def text(figures: dict[str, Any], head: str) -> str:
-    """Lines: what was written, how well the readings tell it, where ball and bar are, then each error found."""
+    """Lines: what was written, how well the readings determine it, where ball and bar are, then each error found."""
     if not figures:
         return head
     return "\n".join([head, *_quality(figures), *_instrument(figures), *_errors(figures)])
@@ -57,17 +57,17 @@ def _ball(setup: dict[str, float]) -> tuple[float, ...]:
 
 def _errors(figures: dict[str, Any]) -> list[str]:
     """Each parameter that was found; how many others stay."""
-    told = {name: p for name, p in figures["parameters"].items() if p["sigma"] is not None}
-    untold, kept = [name for name in figures["parameters"] if name not in told], figures["kept"]
-    wide = max((len(name) for name in told), default=0)
-    lines = ["found, with one standard deviation:"] if told else []
+    noted = {name: p for name, p in figures["parameters"].items() if p["sigma"] is not None}
+    untold, kept = [name for name in figures["parameters"] if name not in noted], figures["kept"]
+    wide = max((len(name) for name in noted), default=0)
+    lines = ["found, with one standard deviation:"] if noted else []
     lines += [f"  {name:{wide}} {_value(p['value'], p['sigma'])} {p['unit']:6} {p['at'] and 'at '}{p['at']}".rstrip()
-              for name, p in told.items()]
+              for name, p in noted.items()]
     lines += [f"not known, 0 in the model: {', '.join(untold)}"] if untold else []
     return lines + ([f"other parameters, which stay as they were: {kept}"] if kept else [])
 
 
 def _value(value: float, sigma: float) -> str:
-    """Both to the decimal that the doubt has its DOUBTS figures at."""
-    decimals = min(max(DOUBTS - 1 - math.floor(math.log10(sigma)), 0), MOST)
+    """Both to the decimal that the uncertainty has its Uncertainties figures at."""
+    decimals = min(max(UNCERTAINTY_DIGITS - 1 - math.floor(math.log10(sigma)), 0), MOST)
     return f"{value:10.{decimals}f} +- {sigma:.{decimals}f}"

@@ -1,10 +1,10 @@
-"""Reversal: a rotary axis and the indexer on it told apart by turning one against the other.
+"""Reversal: a rotary axis and the indexer on it distinguished by turning one against the other.
 
 n steps of a full turn, m set-ups. In set-up k the indexer's zero is turned by k increments, so that step i of the axis meets
 increment i + k of the indexer: reading = axis_i - indexer_(i+k) + constant of the set-up. Steps are 0 .. n - 1.
 
 Each of the two signatures sums to 0 over the turn: that is set (closure), not measured, and so is the constant of every
-set-up when the instrument is zeroed anew. Source: Oueslati 2004 ("C"), 1.36 to 1.56, with 1.45 put right: the rows of
+set-up when the instrument is zeroed again. Source: Oueslati 2004 ("C"), 1.36 to 1.56, with 1.45 put right: the rows of
 set-up k are those of the identity, shifted by k.
 """
 
@@ -60,7 +60,7 @@ class Reversal:
 
     Attributes:
         axis, indexer: (n,) each with sum 0
-        axis_sigma, indexer_sigma: (n,) standard deviations, inf where the readings do not tell
+        axis_sigma, indexer_sigma: (n,) standard deviations, inf where the readings do not determine
         offsets: (m,) constant of each set-up (0 where they are not asked for)
         residuals: (m, n) reading less model, NaN where there is none
         result: of the fit, in parameters that keep the closures
@@ -80,7 +80,7 @@ class Reversal:
 
     @property
     def lacking(self) -> str:
-        """What is missing where the readings do not tell both signatures, "" where they do."""
+        """What is missing where the readings do not determine both signatures, "" where they do."""
         if self.result.supported:
             return ""
         return (f"rank {self.conditioning.rank} of {self.conditioning.unknowns}: measure one more set-up, the indexer "
@@ -93,7 +93,7 @@ def identify(readings: Floats, sigma: float | Floats, offsets: bool = True, robu
 
     Args:
         sigma: standard deviation of the readings, one or (m, n)
-        offsets: True where the instrument was zeroed anew at each set-up
+        offsets: True where the instrument was zeroed again at each set-up
         shifts: as in `reversal_matrix`
     """
     m, n = readings.shape
@@ -175,10 +175,11 @@ class Campaign:
 
 def plan(n: int, sigma: float, minutes_per_reading: float, minutes_per_setup: float, most: int | None = None,
          offsets: bool = True) -> list[Campaign]:
-    """Campaigns of 2 set-ups and more: expected doubt against machine time; sigma is infinite where it cannot be told."""
+    """Campaigns of 2 set-ups and more: expected uncertainty against machine time; sigma is infinite where it cannot be
+    reported."""
     found = []
     for m in range(2, (most or n) + 1):
-        told = identify(np.zeros((m, n)), sigma, offsets)
-        found.append(Campaign(m, float(np.sqrt(np.mean(told.axis_sigma**2))), told.conditioning.condition_number,
+        noted = identify(np.zeros((m, n)), sigma, offsets)
+        found.append(Campaign(m, float(np.sqrt(np.mean(noted.axis_sigma**2))), noted.conditioning.condition_number,
                               m * (minutes_per_setup + n * minutes_per_reading)))
     return found

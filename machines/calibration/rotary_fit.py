@@ -21,11 +21,11 @@ from machines.geometric_error.tables.names import DIRECTIONS, ErrorName
 from toolpaths.arrays import Bools, Floats
 
 ENOUGH = 3
-"""set-ups, turned by one increment each: more tell no other amplitudes"""
+"""set-ups, turned by one increment each: more determine no other amplitudes"""
 SPAN = 1e-9
 """of the largest singular value"""
-TOLD = 1e-6
-"""of a column's length: where mounting and indexer leave less of it, it is not told"""
+NOTED = 1e-6
+"""of a column's length: where mounting and indexer leave less of it, it is not reported"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,13 +33,13 @@ class RotaryFit:
     """Series of the six errors, (6, 2, H): cosine and sine amplitudes of harmonics 1 .. H, mm and rad.
 
     Attributes:
-        amplitudes, sigma: (6, 2, H); where they are not told amplitude 0 and sigma inf
+        amplitudes, sigma: (6, 2, H); where they are not reported amplitude 0 and sigma inf
         covariance: (12 H, 12 H) of the flattened amplitudes
         lost: names of the amplitudes that mounting or indexer can pretend as well
         result: of the fit; the smallest one where the readings leave it open
         residuals: (m, n, 6)
-        told, condition_number: how many amplitudes the readings tell, and how far apart (2-norm, columns of length 1), with
-            mounting and indexer taken out
+        noted, condition_number: how many amplitudes the readings determine, and how far apart (2-norm, columns of length 1),
+            with mounting and indexer taken out
         cost_instrument: sum of squared weighted residuals where nothing but indexer and mounting is found
     """
 
@@ -49,7 +49,7 @@ class RotaryFit:
     lost: tuple[str, ...]
     result: CalibrationResult
     residuals: Floats
-    told: int
+    noted: int
     condition_number: float
     cost_instrument: float
 
@@ -68,7 +68,7 @@ def fit_rotary(bench: Bench, readings: Floats, sigma: Floats, harmonics: int, ro
     weights = np.tile(sigma, m * n)[known]
     rows, observed = design[known], readings.ravel()[known]
     count = 12 * harmonics
-    lost, told = _told(_left(rows / weights[:, None], count))
+    lost, noted = _noted(_left(rows / weights[:, None], count))
     result = solve(linear(names, rows, observed, weights), robust)
     scale = np.sqrt(result.weights) / weights
     alone = np.linalg.lstsq(rows[:, count:] * scale[:, None], observed * scale, rcond=SPAN)[0]
@@ -80,7 +80,7 @@ def fit_rotary(bench: Bench, readings: Floats, sigma: Floats, harmonics: int, ro
     covariance = result.covariance[:count, :count] * np.outer(~lost, ~lost)
     return RotaryFit(values.reshape(shape), spread.reshape(shape), covariance,
                      tuple(np.array(names[:count])[lost].tolist()), result, residuals.reshape(readings.shape),
-                     len(told), _condition(told), float(np.sum((scale * (observed - rows[:, count:] @ alone)) ** 2)))
+                     len(noted), _condition(noted), float(np.sum((scale * (observed - rows[:, count:] @ alone)) ** 2)))
 
 
 def rotary_span(bench: Bench, readings: Floats, sigma: Floats, harmonics: int) -> tuple[Floats, Floats]:
@@ -116,19 +116,19 @@ def _design(bench: Bench, m: int, harmonics: int) -> tuple[Floats, tuple[str, ..
 def hidden(bench: Bench, sigma: Floats, harmonics: int) -> tuple[str, ...]:
     """Names of the amplitudes that the mounting can pretend however many set-ups are measured."""
     design, names = _design(bench, min(bench.steps, ENOUGH), harmonics)
-    lost, _ = _told(_left(design / np.tile(sigma, len(design) // 6)[:, None], 12 * harmonics))
+    lost, _ = _noted(_left(design / np.tile(sigma, len(design) // 6)[:, None], 12 * harmonics))
     return tuple(np.array(names[:12 * harmonics])[lost].tolist())
 
 
-def told_apart(bench: Bench, m: int, sigma: Floats, harmonics: int) -> float:
-    """Condition number (2-norm, columns of length 1) of the amplitudes that m set-ups tell, mounting and indexer taken out;
-    inf where they tell none."""
+def distinguishable(bench: Bench, m: int, sigma: Floats, harmonics: int) -> float:
+    """Condition number (2-norm, columns of length 1) of the amplitudes that m set-ups determine, mounting and indexer taken
+    out; inf where they determine none."""
     rows = _design(bench, m, harmonics)[0] / np.tile(sigma, m * bench.steps)[:, None]
-    return _condition(_told(_left(rows, 12 * harmonics))[1])
+    return _condition(_noted(_left(rows, 12 * harmonics))[1])
 
 
-def _condition(told: Floats) -> float:
-    return float(told[0] / told[-1]) if len(told) else float("inf")
+def _condition(noted: Floats) -> float:
+    return float(noted[0] / noted[-1]) if len(noted) else float("inf")
 
 
 def _left(rows: Floats, count: int) -> Floats:
@@ -140,12 +140,12 @@ def _left(rows: Floats, count: int) -> Floats:
     return result
 
 
-def _told(left: Floats) -> tuple[Bools, Floats]:
+def _noted(left: Floats) -> tuple[Bools, Floats]:
     """Of what mounting and indexer leave of the wanted columns (K, P): True (P,) for those that they or lost ones can make
-    up, and the singular values of what is told."""
+    up, and the singular values of what is reported."""
     square, count = np.linalg.qr(left, mode="r"), left.shape[1]
     _, values, vt = np.linalg.svd(np.concatenate([square, np.zeros((count - len(square), count))]))
-    return np.asarray(np.sum(vt[values <= TOLD] ** 2, axis=0) > 1e-6), values[values > TOLD]
+    return np.asarray(np.sum(vt[values <= NOTED] ** 2, axis=0) > 1e-6), values[values > NOTED]
 
 
 def error_model(fitted: RotaryFit, axis: str, machine: str = "", name: str = "", sense: int = 1,

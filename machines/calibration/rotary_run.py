@@ -1,4 +1,4 @@
-"""Reversal and rotary measurements: the errors of one rotary axis, told apart from those of the indexer on it."""
+"""Reversal and rotary measurements: the errors of one rotary axis, distinguished from those of the indexer on it."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from machines.calibration.measurement_file import COLUMNS, ReversalModel, Rotary
 from machines.calibration.outcome import CalibrationOutcome, done
 from machines.calibration.result_figures import account, finite, listed, series_signatures, signature, weighted
 from machines.calibration.reversal import Reversal, cost_without, identify, plan, statistics
-from machines.calibration.rotary_fit import RotaryFit, error_model, fit_rotary, hidden, told_apart
+from machines.calibration.rotary_fit import RotaryFit, distinguishable, error_model, fit_rotary, hidden
 from machines.calibration.run import CalibrationRun
 from machines.calibration.simulator import PARTS, Bench
-from machines.calibration.unit_and_sign_checks import reversal_slip, rotary_slip
+from machines.calibration.unit_and_sign_checks import reversal_table_fault, rotary_table_fault
 from machines.geometric_error.actual.axis_motion import ALONG
 from machines.geometric_error.actual.model import ErrorModel
 from machines.geometric_error.actual.serial_errors import Component, SerialErrors
@@ -27,7 +27,7 @@ from toolpaths.arrays import Floats
 
 ARCSEC = UNITS["arcsec"]
 SETUPS = 6
-"""up to which the condition number of a rotary axis's readings is told"""
+"""up to which the condition number of a rotary axis's readings is reported"""
 
 
 def reversal(run: CalibrationRun, given: ReversalModel, table: CsvTable) -> CalibrationOutcome | None:
@@ -45,14 +45,14 @@ def reversal(run: CalibrationRun, given: ReversalModel, table: CsvTable) -> Cali
     fitted = identify(readings, sigma, given.zeroed, run.checked.robust, given.shifts or None)
     figures = _reversal_figures(run, given, fitted, readings, sigma)
     if fitted.lacking:
-        run.problem("calibrate.rank", f"the readings do not tell axis and indexer apart: {fitted.lacking}")
+        run.problem("calibrate.rank", f"the readings do not distinguish axis and indexer: {fitted.lacking}")
         return CalibrationOutcome(None, figures)
     name = ErrorName(DIRECTIONS.index(given.axis), False, given.axis)
     x = 2.0 * np.pi * np.arange(given.steps) / given.steps
     model = ErrorModel(SerialErrors((Component(name, TableCurve(x, sense * fitted.axis, "spline", period=2.0 * np.pi)),)),
                        covariance=fitted.covariance[: given.steps, : given.steps])
     return done(run, model, figures, fitted.result.noise, f"sigma_arcsec = {given.sigma_arcsec:g}",
-                lambda: reversal_slip(readings, sigma, given, table.unit["reading"]))
+                lambda: reversal_table_fault(readings, sigma, given, table.unit["reading"]))
 
 
 def _reversal_figures(run: CalibrationRun, given: ReversalModel, fitted: Reversal, readings: Floats,
@@ -94,23 +94,23 @@ def rotary(run: CalibrationRun, given: RotaryMeasurementModel, table: CsvTable) 
     never = hidden(bench, sigma, given.harmonics) if fitted.lost else ()
     untold = [name for name in fitted.lost if name not in never]
     if untold:
-        run.problem("calibrate.rank", f"the readings do not tell {folded(untold)}",
+        run.problem("calibrate.rank", f"the readings do not determine {folded(untold)}",
                     "measure one more set-up, the indexer turned by one increment more")
         return CalibrationOutcome(None, figures)
     if fitted.lost:
-        run.tell("calibrate.hidden", f"the mounting can pretend {', '.join(fitted.lost)} as well; they are 0 in the model")
+        run.note("calibrate.hidden", f"the mounting can pretend {', '.join(fitted.lost)} as well; they are 0 in the model")
     model = error_model(fitted, given.axis, sense=sense, carries_part=_carries_part(run, given.axis))
     return done(run, model, figures, fitted.result.noise,
                 f"sigma_um = {given.sigma_um:g} or sigma_arcsec = {given.sigma_arcsec:g}",
-                lambda: rotary_slip(bench, readings, sigma, given.harmonics, [table.unit[p] for p in PARTS]))
+                lambda: rotary_table_fault(bench, readings, sigma, given.harmonics, [table.unit[p] for p in PARTS]))
 
 
 def _rotary_figures(given: RotaryMeasurementModel, bench: Bench, fitted: RotaryFit, sigma: Floats) -> dict[str, Any]:
     planned = _planned(given.steps, SETUPS, 216)
-    return account(fitted.result, fitted.told, fitted.condition_number, fitted.amplitudes.size, fitted.cost_instrument) | {
+    return account(fitted.result, fitted.noted, fitted.condition_number, fitted.amplitudes.size, fitted.cost_instrument) | {
         "not_identifiable": [[name] for name in fitted.lost], "signatures": series_signatures(fitted),
         "residuals": weighted(fitted.residuals.reshape(-1, 6).T, sigma[:, None], list(PARTS)),
-        "plan": [{"setups": k, "condition_number": finite(told_apart(bench, k, sigma, given.harmonics))}
+        "plan": [{"setups": k, "condition_number": finite(distinguishable(bench, k, sigma, given.harmonics))}
                  for k in range(1, planned + 1)]}
 
 
@@ -136,5 +136,5 @@ def _carries_part(run: CalibrationRun, letter: str) -> bool:
 
 
 def _planned(steps: int, most: int, readings: int) -> int:
-    """Set-ups up to which a campaign is planned: `most`, fewer where they have more readings than that; 2 at the least."""
+    """Set-ups up to which a campaign is planned: `most`, fewer where they have more readings than that; 2 at least."""
     return max(2, min(steps, most, readings // steps))

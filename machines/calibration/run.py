@@ -37,12 +37,12 @@ class CalibrationRun:
         """A warning of the whole file."""
         self.found.append(warning(code, message, file=self.file.file, hint=hint))
 
-    def tell(self, code: str, message: str, hint: str = "") -> None:
+    def note(self, code: str, message: str, hint: str = "") -> None:
         """An info of the whole file."""
         self.found.append(info(code, message, file=self.file.file, hint=hint))
 
     def columns(self, table: CsvTable, wanted: Sequence[TableColumn], optional: Sequence[str] = ()) -> bool:
-        """True where all columns are there with the right kind of unit; those that are not used are told."""
+        """True where all columns are there with the right kind of unit; those that are not used are reported."""
         self._missing(table, [column.name for column in wanted if column.name not in table.columns])
         for name, kind, _ in wanted:
             if name in table.columns and table.unit[name] not in UNIT[kind]:
@@ -53,11 +53,11 @@ class CalibrationRun:
         known = [column.name for column in wanted]
         other = [name for name in table.columns if name not in (*known, *optional)]
         for name in [name for name in other if optional and name.lower().endswith("way")]:
-            self.problem("calibrate.column", f"{Path(table.file).name}: {name!r} is the way of no axis",
+            self.problem("calibrate.column", f"{Path(table.file).name}: {name!r} is the approach direction of no axis",
                          "write " + ", ".join(optional))
         self._sizes(table, [column.name for column in wanted if column.unit])
         if other:
-            self.tell("calibrate.unused", f"{Path(table.file).name}: {', '.join(other)[:200]} not used",
+            self.note("calibrate.unused", f"{Path(table.file).name}: {', '.join(other)[:200]} not used",
                       "columns are " + ", ".join([*known, *optional]))
         return not has_errors(self.found)
 
@@ -106,7 +106,7 @@ class CalibrationRun:
         return setup.astype(np.int64), step.astype(np.int64), len(known)
 
     def joints(self, table: CsvTable) -> Floats:
-        """(N, J) commanded positions; those beyond the travel of their axis are told."""
+        """(N, J) commanded positions; those beyond the travel of their axis are reported."""
         names, limits = self.machine.axis_names, self.machine.limits
         q = np.stack([table.columns[n] for n in names], axis=1)
         beyond = (q < limits.lower - EDGE) | (q > limits.upper + EDGE)
@@ -119,21 +119,21 @@ class CalibrationRun:
                     hint=f"look at the unit of {name} [{table.unit[name]}], and at its travel in the machine file"))
         return q
 
-    def ways(self, table: CsvTable) -> Floats:
-        """(N, J) by which way each axis came: +1, -1, 0 (the mean of both) where no column says."""
+    def approaches(self, table: CsvTable) -> Floats:
+        """(N, J) from which direction each axis came: +1, -1, 0 (the mean of both) where no column says."""
         result = np.zeros((len(table), len(self.machine.axis_names)))
         for j, name in enumerate(self.machine.axis_names):
-            given = table.columns.get(way_column(name))
+            given = table.columns.get(approach_column(name))
             if given is None:
                 continue
             if (bad := ~np.isin(given, (-1.0, 0.0, 1.0))).any():
                 row = int(np.argmax(bad))
-                self.row(table, row, f"{way_column(name)} is {given[row]:g}",
+                self.row(table, row, f"{approach_column(name)} is {given[row]:g}",
                          f"write 1 where {name} came from lesser values, -1 from greater ones, 0 where it is not known")
             result[:, j] = given
         return result
 
 
-def way_column(axis: str) -> str:
-    """Name of the column that says by which way an axis came."""
-    return f"{axis} way"
+def approach_column(axis: str) -> str:
+    """Name of the column that says from which direction an axis came."""
+    return f"{axis} approach direction"

@@ -2,7 +2,7 @@
 
 The mounting's columns of one reading (C 1.35) are as good as never independent (C 1.32 cannot be inverted): they are
 grouped by rank, and only their span is taken out, as an orthogonal projection. What the projection removes of a signal that
-the axis itself could have is told per harmonic.
+the axis itself could have is reported per harmonic.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ class SetupFilter:
 
     Attributes:
         reading: index into dx dy dz ex ey ez
-        result: fit of the 18 mounting errors: rank, groups that cannot be told apart
+        result: fit of the 18 mounting errors: rank, groups that cannot be distinguished
         span: (n, rank) orthonormal columns that are taken out
         removed: (n // 2 + 1,) share of the root mean square that is lost of a signal of harmonic 0, 1, 2, ...
             of the axis's own error of the same name

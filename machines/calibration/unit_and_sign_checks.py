@@ -1,6 +1,6 @@
-"""Slips of a measurement table that the readings themselves show: a wrong unit or sign, two columns changed over.
+"""Faults of a measurement table that the readings themselves show: a wrong unit or sign, two columns changed over.
 
-Where a fit does not leave the noise that is stated, the same fit is made with each slip put right; one that brings what is
+Where a fit does not leave the noise that is stated, the same fit is made with each fault put right; one that brings what is
 left to the stated noise, or far nearer to it, is named. What all readings share (one sign, a turn of the zero) cannot be
 seen: the errors found only have it too.
 """
@@ -25,21 +25,21 @@ from machines.kinematics.base import Kinematics
 from toolpaths.arrays import Floats
 
 BETTER = 3.0
-"""times less is left, for a slip that does not come to the stated noise to be named"""
+"""times less is left, for a fault that does not come to the stated noise to be named"""
 LOUD = 2.0
 """times the stated noise, from which on such a one is looked for"""
 ALIKE = 1.1
-"""times what the best of them leaves: slips that cannot be told from it"""
+"""times what the best of them leaves: faults that cannot be distinguished from it"""
 SHOWN = 3
-"""slips that are named"""
+"""faults that are named"""
 TURNED = 1e-6
 """of a direction: a table frame that never turns"""
 REFITTED = 5
-"""slips of the axes' columns, those that leave least at the first order, that are fitted in full"""
+"""faults of the axes' columns, those that leave least at the first order, that are fitted in full"""
 EDGE = 1e-6
 """mm or rad beyond a travel that are numbers' own"""
 ROWS = 400
-"""of a table that slips are looked for in"""
+"""of a table that faults are looked for in"""
 PAIRS = ((0, 1), (1, 2), (0, 2))
 TENFOLD = {"ten times as large": 10.0, "a tenth as large": 0.1}
 
@@ -55,17 +55,17 @@ class TableFault:
 
 @dataclass(frozen=True)
 class TriedRemedy:
-    """A slip put right: in words, what is then left; `size` as in `TableFault`."""
+    """A fault put right: in words, what is then left; `size` as in `TableFault`."""
 
     words: str
     noise: Noise | None
     size: bool = False
 
 
-def machine_slip(start: ErrorModel, kinematics: Kinematics, measured: Measurements, wanted: Sequence[str],
-                 travel: tuple[Floats, Floats], units: Sequence[str], joints: Sequence[str],
-                 columns: Sequence[str]) -> TableFault | None:
-    """The slip of a table of poses, bar or laser, None where there is none.
+def machine_table_fault(start: ErrorModel, kinematics: Kinematics, measured: Measurements, wanted: Sequence[str],
+                        travel: tuple[Floats, Floats], units: Sequence[str], joints: Sequence[str],
+                        columns: Sequence[str]) -> TableFault | None:
+    """The fault of a table of poses, bar or laser, None where there is none.
 
     Args:
         travel: lower and upper ends (J,) of the axes, mm and rad
@@ -74,7 +74,7 @@ def machine_slip(start: ErrorModel, kinematics: Kinematics, measured: Measuremen
     """
     some = np.unique(np.linspace(0, len(measured.q) - 1, ROWS).astype(np.int64))
     part = replace(measured, q=measured.q[some], read=measured.read[some],
-                   ways=None if measured.ways is None else measured.ways[some])
+                   approaches=None if measured.approaches is None else measured.approaches[some])
 
     def left(other: Measurements) -> Noise | None:
         result = solve(problem_of(start, kinematics, other, wanted))
@@ -93,7 +93,7 @@ def machine_slip(start: ErrorModel, kinematics: Kinematics, measured: Measuremen
 
 
 def _roughly(problem: CalibrationProblem) -> float | None:
-    """Logarithm of what a fit leaves, either way, taken at the first order; None where it leaves nothing."""
+    """Logarithm of what a fit leaves, in either direction, taken at the first order; None where it leaves nothing."""
     span = _span(problem.jacobian(problem.guess)[:, problem.free] / problem.sigma[:, None])
     y = (problem.observed - problem.predict(problem.guess)) / problem.sigma
     noise = noise_of(y - span @ (span.T @ y), span.shape[1])
@@ -102,7 +102,7 @@ def _roughly(problem: CalibrationProblem) -> float | None:
 
 def _positions(m: Measurements, kinematics: Kinematics, travel: tuple[Floats, Floats],
                units: Sequence[str]) -> Iterable[tuple[str, Measurements]]:
-    """Slips of the columns of the axes in words, and the measurements without them; all inside travel."""
+    """Faults of the columns of the axes in words, and the measurements without them; all inside travel."""
     names, one = kinematics.axis_names, np.eye(len(kinematics.axis_names))
     rotary = np.array(kinematics.rotary)
     moved = np.ptp(m.q, axis=0) + np.abs(m.q).max(axis=0) > 0.0
@@ -121,8 +121,8 @@ def _positions(m: Measurements, kinematics: Kinematics, travel: tuple[Floats, Fl
         inside = (q >= travel[0] - EDGE).all() and (q <= travel[1] + EDGE).all()
         if inside and np.isfinite(kinematics.forward(q)[0]).all():
             yield words, replace(m, q=q)
-    if m.ways is not None and m.ways.any():
-        yield "with the ways turned round", replace(m, ways=-m.ways)
+    if m.approaches is not None and m.approaches.any():
+        yield "with the approach directions turned round", replace(m, approaches=-m.approaches)
     if m.kind == "along" and m.toward is not None:
         for k, x in enumerate("xyz"):
             if abs(m.toward[k]) < 1.0 - TURNED:
@@ -147,7 +147,7 @@ def _other_directions(m: Measurements, start: ErrorModel,
 
 def _readings(problem: CalibrationProblem, read: Floats, columns: Sequence[str],
               units: Sequence[str]) -> Iterable[TriedRemedy]:
-    """Slips of the readings (N,) or (N, C); what a fit leaves of them is taken at the first order, errors being small."""
+    """Faults of the readings (N,) or (N, C); what a fit leaves of them is taken at the first order, errors being small."""
     table = read.reshape(len(read), -1)
     rates = problem.jacobian(problem.guess)[:, problem.free] / problem.sigma[:, None]
     span = _span(rates)
@@ -158,7 +158,7 @@ def _readings(problem: CalibrationProblem, read: Floats, columns: Sequence[str],
 
 
 def _changed(table: Floats, columns: Sequence[str], units: Sequence[str]) -> Iterable[tuple[str, Floats, bool]]:
-    """Readings (..., C) with each slip put right, in words; True where they have another size."""
+    """Readings (..., C) with each fault put right, in words; True where they have another size."""
     count = len(columns)
     kinds = [k for k in ({0, 1, 2}, {3, 4, 5}) if max(k) < count] if count > 1 else []
     groups = [list(range(count))] if len({u in LENGTHS for u in units}) == 1 else []
@@ -187,8 +187,9 @@ def _sizes(unit: str) -> list[tuple[str, float]]:
             if other != unit] + list(TENFOLD.items())
 
 
-def rotary_slip(bench: Bench, readings: Floats, sigma: Floats, harmonics: int, units: Sequence[str]) -> TableFault | None:
-    """The slip of a table of all six readings (m, n, 6), None where there is none."""
+def rotary_table_fault(bench: Bench, readings: Floats, sigma: Floats, harmonics: int,
+                       units: Sequence[str]) -> TableFault | None:
+    """The fault of a table of all six readings (m, n, 6), None where there is none."""
     span, weights = rotary_span(bench, readings, sigma, harmonics)
 
     def left(values: Floats) -> Noise | None:
@@ -215,7 +216,8 @@ def _both_sizes(readings: Floats, units: Sequence[str]) -> Iterable[tuple[str, F
 def _rearranged(readings: Floats) -> Iterable[tuple[str, Floats]]:
     """Set-ups and steps of readings (m, n, ...) counted otherwise, where the same ones are there."""
     back = np.roll(readings[:, ::-1], 1, axis=1)
-    others = [("with the set-ups in the other order", readings[::-1]), ("with the steps counted the other way", back)]
+    others = [("with the set-ups in the other order", readings[::-1]),
+              ("with the steps counted in the other direction", back)]
     others += [(f"with set-up {k} turned round", np.where(
         (np.arange(len(readings)) == k).reshape(-1, *[1] * (readings.ndim - 1)), -readings, readings))
         for k in range(len(readings))] if len(readings) > 1 else []
@@ -224,8 +226,8 @@ def _rearranged(readings: Floats) -> Iterable[tuple[str, Floats]]:
     return ((words, other) for words, other in others if (np.isfinite(other) == np.isfinite(readings)).all())
 
 
-def reversal_slip(readings: Floats, sigma: float, given: ReversalModel, unit: str) -> TableFault | None:
-    """The slip of a table of angular readings (m, n), None where there is none."""
+def reversal_table_fault(readings: Floats, sigma: float, given: ReversalModel, unit: str) -> TableFault | None:
+    """The fault of a table of angular readings (m, n), None where there is none."""
     m, n = readings.shape
     shifts = given.shifts or tuple(range(m))
     known = np.isfinite(readings)
@@ -237,7 +239,7 @@ def reversal_slip(readings: Floats, sigma: float, given: ReversalModel, unit: st
 
     def tried() -> Iterable[TriedRemedy]:
         other = [(-k) % n for k in shifts]
-        yield TriedRemedy(f"with the indexer turned the other way, shifts = {other},",
+        yield TriedRemedy(f"with the indexer turned in the other direction, shifts = {other},",
                           identify(readings, sigma, given.zeroed, shifts=other).result.noise)
         for words, size in _sizes(unit):
             yield TriedRemedy(f"with reading {words}", left(size * readings), True)
@@ -262,7 +264,7 @@ def _swapped(count: int, a: int, b: int) -> list[int]:
 
 
 def _best(now: Noise | None, tried: Callable[[], Iterable[TriedRemedy]]) -> TableFault | None:
-    """The slips that come to the stated noise where `now` does not; without any those that leave least, where that is far
+    """The faults that come to the stated noise where `now` does not; without any those that leave least, where that is far
     less than is left now."""
     if now is None or now.meets:
         return None

@@ -74,7 +74,8 @@ class Kinematics(ABC):
         return tip, axis
 
     def carried(self, pose: Floats, q0: Floats, q1: Floats) -> Floats:
-        """The pose (N, 6) at joints q0 (N, J) as the rotary joints outside the closed loops turn it on the way to q1 (N, J).
+        """The pose (N, 6) at joints q0 (N, J) as the rotary joints outside the closed loops turn it on the path to q1 (N,
+        J).
 
         On parallel machines it is what `forward` at q1 takes as `near`: what is left between the two is the slides' part.
         """

@@ -13,7 +13,7 @@ class ClearanceSizes:
 
     Attributes:
         leg: (R,) leg of each rod
-        shift: (R, 3) mm, each rod's place beside its leg's line, at both ends
+        shift: (R, 3) mm, each rod's place next to its leg's line, at both ends
         rod_radius: mm
         spindle_radius: mm
         spindle: (from, to) mm above the gauge point along the tool axis

@@ -239,8 +239,8 @@ class Serial(Kinematics):
         free = columns.along(columns.of_one(first.direction), axis, ROUND_OFF)
         value = wanted[:, self.axis_names.index(first.name)]
         if len(turns) == 1:
-            beside = float(azimuth(first.direction, columns.of_one(self.tool_axis)))
-            yield (np.where(free, value, wrap(heading - beside)),)
+            adjacent = float(azimuth(first.direction, columns.of_one(self.tool_axis)))
+            yield (np.where(free, value, wrap(heading - adjacent)),)
             return
         second = turns[1]
         for tilt in meet(first.direction, second.direction, self.tool_axis, from_pole):

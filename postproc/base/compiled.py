@@ -15,7 +15,8 @@ def compiled(function: Callable[..., Any], fused: bool = False) -> Callable[...,
     Each operation is rounded by itself and in the order of the text, so that a loop gives the same bits on every processor,
     and those of a numpy twin that does the same operations. `fused` lets the compiler join a product and a sum: faster,
     and the last bits depend on the processor; only where twins need to agree within a tolerance.
-    A function is compiled one way only: what is kept on disk is found by its file, whose text must change with the way.
+    A function is compiled one direction only: what is kept on disk is found by its file, whose text must change with the
+        path.
     """
     from numba import njit
 

@@ -130,7 +130,7 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
         m, spec = machine_of(machine), controller_of(controller)
         path, found = _read(file, options, progress)
         result = run(path, m, spec, options=options, diagnostics=found, progress=progress)
-        told, why = _fields(result, fields) if fields else ([], [])
+        noted, why = _fields(result, fields) if fields else ([], [])
         result = replace(result, diagnostics=(*result.diagnostics, *why))
         time = estimate_of(result)  # all before a file is written
         values, text = summary.as_dict(result, str(output), time), summary.as_text(result, str(output), time)
@@ -140,7 +140,7 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
             refuse_inputs(list(texts)[:-1], inputs)
             kept, unlike = command.kept(result, machine, controller, proof, known, output)
             more += unlike
-            outputs = {**dict(zip(fields, told, strict=True)), **kept, **texts}
+            outputs = {**dict(zip(fields, noted, strict=True)), **kept, **texts}
     found = [*result.diagnostics, *more]
     report(tuple(found), json, values | {"diagnostics": [d.as_dict() for d in found]}, text, outputs)
 

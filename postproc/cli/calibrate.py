@@ -21,7 +21,7 @@ def _schema(wanted: bool) -> None:
 
 def calibrate(file: Annotated[Path, typer.Argument(metavar="MEASUREMENTS.toml", help="what was measured, and how")],
               output: Annotated[Path, typer.Option("-o", "--output", metavar="ERROR_MODEL.toml",
-                                                   help="error model to write; its tables are put beside it")],
+                                                   help="error model to write; its tables are put next to it")],
               figure: Annotated[Path | None, typer.Option("--figure", metavar="FILE", help="drawing of signatures, "
                                                           "residuals and condition number, .png or .svg")] = None,
               accept_residual: Annotated[bool, typer.Option("--accept-residual", help="take a fit that leaves more of the "

@@ -83,14 +83,14 @@ def pairs(option: str, given: Sequence[str] | None, known: Sequence[str]) -> dic
 
 def writable(model: ErrorModel, made: ErrorModel) -> tuple[ErrorModel, list[str]]:
     """A model made of another one, with a covariance that a table can hold, and what that loses."""
-    from machines.geometric_error.exchange.exports import MOST_DOUBT, correlated
+    from machines.geometric_error.exchange.exports import MOST_UNCERTAINTY, correlated
 
     if model.covariance is None:
         return made, []
-    if made.covariance is not None and (len(made.names) <= MOST_DOUBT or not correlated(made)):
+    if made.covariance is not None and (len(made.names) <= MOST_UNCERTAINTY or not correlated(made)):
         return made, ["covariance kept"]
     return replace(made, covariance=None), [f"lost: the covariance; {len(made.names)} correlated parameters, at most "
-                                            f"{MOST_DOUBT} are written: take longer steps or greater losses"]
+                                            f"{MOST_UNCERTAINTY} are written: take longer steps or greater losses"]
 
 
 def model_files(model: ErrorModel, stem: str, description: str, name: str = "") -> dict[str, str]:
@@ -121,8 +121,8 @@ def merged_into(model: ErrorModel, into: Path, machine: Machine) -> tuple[ErrorM
         raise DiagnosticError([error("error-import.map", "a map stands alone", file=str(into), hint="leave --into out")])
     lost = replaced(old, model) if old.covariance is not None and model.covariance is None else set()
     names = sorted({name.split("[")[0].split(".")[0] for name in lost})
-    told = [f"no doubt is known of {', '.join(names)} any more: give --covariance, or sigma in the model"] if names else []
-    return merged(old, model), told
+    noted = [f"uncertainty unknown of {', '.join(names)}: give --covariance, or sigma in the model"] if names else []
+    return merged(old, model), noted
 
 
 def tables_of(file: Path) -> list[Path]:
@@ -137,20 +137,20 @@ def tables_of(file: Path) -> list[Path]:
 
 
 def finish(files: dict[str, str], folder: Path, inputs: Sequence[Path], json: str, found: Sequence[Diagnostic],
-           told: Sequence[str], figures: dict[str, Any], beside: dict[Path, str] | None = None) -> None:
+           noted: Sequence[str], figures: dict[str, Any], adjacent: dict[Path, str] | None = None) -> None:
     """Write all files together, none where one would replace an input; report them."""
     from postproc.cli.error_text import export_text
     from toolpaths.diagnostics import DiagnosticError, error
     from toolpaths.input_files import place
 
     last = sorted(files, key=lambda name: name.endswith(".toml"))  # a model is there when its tables are
-    outputs: dict[Path, str | bytes] = {**{folder / name: files[name] for name in last}, **(beside or {})}
+    outputs: dict[Path, str | bytes] = {**{folder / name: files[name] for name in last}, **(adjacent or {})}
     known = {place(path) for given in inputs for path in (given, *(tables_of(given) if given.suffix == ".toml" else []))}
     with shown_errors(json):
         for path in outputs:
             if place(path) in known:
                 raise DiagnosticError([error("error-export.input", "the output would replace an input", file=str(path),
                                              hint="write into another folder, or under another name")])
-    values = {"files": [str(path) for path in outputs], "told": list(told), **figures,
+    values = {"files": [str(path) for path in outputs], "told": list(noted), **figures,
               "diagnostics": [d.as_dict() for d in found]}
     report(tuple(found), json, values, export_text(values), outputs)

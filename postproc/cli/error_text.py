@@ -24,7 +24,7 @@ def _components(found: dict[str, Any]) -> list[str]:
         lines.append("error  kind           values  range                  largest          at   lost motion")
     for name, c in found["components"].items():
         span = "everywhere" if c["range"][0] is None else f"{c['range'][0]:g} to {c['range'][1]:g}"
-        lost = f"{c['lost_motion']:8.2f}" if c["both_ways"] else "        "
+        lost = f"{c['lost_motion']:8.2f}" if c["both_directions"] else "        "
         lines.append(f"{name:5}  {c['kind']:13} {c['values']:7}  {span:20} {c['largest']:9.2f} {c['unit']:6} {c['at']:9.2f} "
                      f"{lost}".rstrip())
     return lines + ([f"not given, so 0: {', '.join(found['absent'])}"] if found["absent"] else [])
@@ -42,7 +42,7 @@ def _map(found: dict[str, Any]) -> list[str]:
 
 def _covariance(found: dict[str, Any] | None) -> list[str]:
     if found is None:
-        return ["covariance: none, so no doubt can be told"]
+        return ["covariance: none, so the uncertainty is unknown"]
     kind = "correlated parameters" if found["correlated"] else "independent parameters"
     without = f"; {len(found['without'])} parameters have none" if found["without"] else ""
     return [f"covariance: {kind}, largest standard deviation {found['largest_um']:.3g} um, {found['largest_arcsec']:.3g} "
@@ -52,22 +52,22 @@ def _covariance(found: dict[str, Any] | None) -> list[str]:
 def _volume(found: dict[str, Any] | None) -> list[str]:
     if found is None:
         return ["the model holds nowhere within travel"]
-    ways = "; two ways at their mean" if found["ways_at_mean"] else ""
-    lines = [f"over the work volume, tool of {found['tool_length_mm']:g} mm, {found['places']} places{ways}:",
+    approaches = "; mean of both directions" if found["ways_at_mean"] else ""
+    lines = [f"over the work volume, tool of {found['tool_length_mm']:g} mm, {found['places']} places{approaches}:",
              f"  tip  worst {found['tip_worst_um']:.2f} um at {_at(found['tip_worst_at'])}, rms "
              f"{found['tip_rms_um']:.2f} um",
              f"  axis worst {found['axis_worst_arcsec']:.2f} arcsec at {_at(found['axis_worst_at'])}, rms "
              f"{found['axis_rms_arcsec']:.2f} arcsec", *_residual(found)]
     if "doubt_tip_um" in found:
-        lines.append(f"  doubt (one standard deviation): tip {found['doubt_tip_um']:.3g} um, axis "
+        lines.append(f"  uncertainty (one standard deviation): tip {found['doubt_tip_um']:.3g} um, axis "
                      f"{found['doubt_axis_arcsec']:.3g} arcsec")
     return lines
 
 
 def _residual(found: dict[str, Any]) -> list[str]:
     """What correction leaves, and why."""
-    why = " (near a pole, within the axis tolerance)" if found["residual_near_pole"] else \
-        {0: " (no rotary axis turns the tool)", 1: " (one rotary axis turns the tool one way alone)"}.get(found["turns"], "")
+    by_turns = {0: " (no rotary axis turns the tool)", 1: " (only one rotary axis turns the tool)"}
+    why = " (near a pole, within the axis tolerance)" if found["residual_near_pole"] else by_turns.get(found["turns"], "")
     lines = [f"  left after correction: tip {found['residual_tip_worst_um']:.3f} um; axis worst "
              f"{found['residual_axis_worst_arcsec']:.2f} arcsec at {_at(found['residual_axis_worst_at'])}, rms "
              f"{found['residual_axis_rms_arcsec']:.2f} arcsec{why}"]
@@ -86,12 +86,12 @@ def export_text(found: dict[str, Any]) -> str:
 
 def table_figures(model: Any, lost: dict[str, float]) -> tuple[dict[str, Any], list[str]]:
     """(figures, text) of tables per axis of a model that lose `lost`, um and arcsec by component."""
-    told = ["dimensions of legs stay in the model file: they have no tables per axis"] if model.rods is not None else []
+    noted = ["dimensions of legs stay in the model file: they have no tables per axis"] if model.rods is not None else []
     for unit, names in (("um", "XYZ"), ("arcsec", "ABC")):
         mine = {name: value for name, value in lost.items() if name[1] in names}
         worst = max(mine, key=lambda name: mine[name], default="")
-        told += [f"lost between the rows: at most {mine[worst]:.3g} {unit} ({worst})"] if worst else []
-    return {"losses": lost}, told
+        noted += [f"lost between the rows: at most {mine[worst]:.3g} {unit} ({worst})"] if worst else []
+    return {"losses": lost}, noted
 
 
 def screw_figures(model: Any, screws: Any, names: dict[str, str], lost: dict[str, float], worst: list[tuple[float, float]],
@@ -100,15 +100,15 @@ def screw_figures(model: Any, screws: Any, names: dict[str, str], lost: dict[str
     with a tool of that length (mm)."""
     before, left = worst
     both = any(table.both for table in screws.tables.values())
-    told = [f"{name}: {len(screws.tables[letter].x)} rows" + (", both ways" if screws.tables[letter].both else "")
-            for letter, name in names.items()]
-    told += [f"lost between the rows: {', '.join(f'{name} {value:.3g}' for name, value in lost.items())} (um, arcsec)",
-             f"worst over the work volume, tool of {tool_length:g} mm{', two ways at their mean' if both else ''}: tip "
-             f"{before[0]:.2f} um, {left[0]:.2f} um after; axis {before[1]:.2f} arcsec, {left[1]:.2f} arcsec after"]
+    noted = [f"{name}: {len(screws.tables[letter].x)} rows" + (", both directions" if screws.tables[letter].both else "")
+             for letter, name in names.items()]
+    noted += [f"lost between the rows: {', '.join(f'{name} {value:.3g}' for name, value in lost.items())} (um, arcsec)",
+              f"worst over the work volume, tool of {tool_length:g} mm{', mean of both directions' if both else ''}: tip "
+              f"{before[0]:.2f} um, {left[0]:.2f} um after; axis {before[1]:.2f} arcsec, {left[1]:.2f} arcsec after"]
     if model.covariance is not None:
-        told.append("lost: the covariance of what these files hold, as they have no place for it; a --rest keeps its own")
-    told += [f"{name} is left: {why}" for name, why in screws.left.items()]
-    return {"losses": lost, "worst_tip_um": [before[0], left[0]], "worst_axis_arcsec": [before[1], left[1]]}, told
+        noted.append("lost: the covariance of what these files hold, as they have no place for it; a --rest keeps its own")
+    noted += [f"{name} is left: {why}" for name, why in screws.left.items()]
+    return {"losses": lost, "worst_tip_um": [before[0], left[0]], "worst_axis_arcsec": [before[1], left[1]]}, noted
 
 
 def screw_warning(names: list[str], file: str, rest: object) -> Any:
@@ -127,17 +127,17 @@ def map_figures(model: Any, made: Any) -> tuple[dict[str, Any], list[str]]:
     um, arcsec = UNITS["um"], UNITS["arcsec"]
     lattice = made.model.map
     figures: dict[str, Any] = {"nodes": {x: len(n) for x, n in zip(lattice.letters, lattice.nodes, strict=True)}}
-    told = [f"{lattice.table.size // 6} nodes: " + ", ".join(f"{x} {n}" for x, n in figures["nodes"].items())]
+    noted = [f"{lattice.table.size // 6} nodes: " + ", ".join(f"{x} {n}" for x, n in figures["nodes"].items())]
     for where, loss in (("inside the lattice", made.inside), ("over the work volume", made.volume)):
         key = where.split()[-1]
         figures[key] = None if loss is None else {
             "tip_worst_um": loss.tip_worst / um, "tip_rms_um": loss.tip_rms / um,
             "axis_worst_arcsec": loss.axis_worst / arcsec, "axis_rms_arcsec": loss.axis_rms / arcsec}
-        told += [] if loss is None else [
+        noted += [] if loss is None else [
             f"lost {where}: tip worst {loss.tip_worst / um:.3g} um, rms {loss.tip_rms / um:.3g} um; axis worst "
             f"{loss.axis_worst / arcsec:.3g} arcsec, rms {loss.axis_rms / arcsec:.3g} arcsec"]
-    ways = [str(c.name) for c in model.axes.components if getattr(c.curve, "both", False)]
-    told += [f"lost: the two ways of {', '.join(ways)}; a map holds their mean"] if ways else []
+    approaches = [str(c.name) for c in model.axes.components if getattr(c.curve, "both", False)]
+    noted += [f"lost: both approach directions of {', '.join(approaches)}; a map holds their mean"] if approaches else []
     if model.covariance is not None:
-        told.append("lost: the covariance, of more values than are written" if made.doubt_lost else "covariance kept")
-    return figures, told
+        noted.append("lost: the covariance, of more values than are written" if made.uncertainty_lost else "covariance kept")
+    return figures, noted

@@ -34,7 +34,7 @@ AngleLoss = Annotated[float, typer.Option("--angle-loss", metavar="ARCSEC", min=
 Rest = Annotated[Path | None, typer.Option("--rest", metavar="REST.toml",
                                            help="model of what LinuxCNC does not correct, for --error-model")]
 MapFile = Annotated[Path, typer.Option("-o", "--output", metavar="MAP.toml",
-                                       help="model to write; its lattice is put beside it")]
+                                       help="model to write; its lattice is put next to it")]
 Over = Annotated[str, typer.Option("--over", metavar="LETTERS", help="coordinates: axes, e.g. XYZ or XYZAC, or x y z of the "
                                    "point in the table frame; default the slides, xyz of machines on rods")]
 MapLossOption = Annotated[float | None, typer.Option("--loss", metavar="UM", min=1e-3, max=1e4,
@@ -53,7 +53,7 @@ MapDirectionsOption = Annotated[str, typer.Option("--directions",
 @errors_app.command("check", epilog="Example: postproc errors check errors.toml -m mikron-ucp710 --tool-length 120")
 def check(file: ModelFile, machine: MachineName, tool_length: ToolLength = 100.0, figure: FigureOption = None,
           json: Json = "") -> None:
-    """Check an error model: what it holds, how far it reaches, worst tip and axis over the work volume, doubt."""
+    """Check an error model: what it holds, how far it reaches, worst tip and axis over the work volume, uncertainty."""
     refuse_overwriting({"--figure": str(figure or ""), "--json": json}, {"the error model": str(file), **own_files(machine)})
     ending = figure_ending(figure)
     from machines.geometric_error.exchange.survey import beyond_travel, survey, unmeasured
@@ -88,11 +88,11 @@ def to_tables(file: ModelFile, machine: MachineName, output: Folder, step: Step 
         steps = exports.in_units(pairs("--step", step, m.axis_names))
         allowed = loss * UNITS["um"], angle_loss * UNITS["arcsec"]
         made, losses = or_refused(lambda: exports.to_tables(model, m, steps, *allowed), file)
-        made, told = writable(model, made)
+        made, noted = writable(model, made)
         files = model_files(made, file.stem, f"tables of {file.name}")
         files |= {f"{file.stem}-location.csv": exports.location_csv(made)} if made.axes.constants else {}
     figures, lost = table_figures(made, exports.named(losses))
-    finish(files, output, [file], json, found, [*lost, *told, *exports.notices(made, m)], figures)
+    finish(files, output, [file], json, found, [*lost, *noted, *exports.notices(made, m)], figures)
 
 
 @errors_app.command("to-linuxcnc", epilog="Example: postproc errors to-linuxcnc e.toml -m mill-3axis -o comp --rest r.toml")
@@ -112,12 +112,12 @@ def to_linuxcnc(file: ModelFile, machine: MachineName, output: Folder, rest: Res
         screws = or_refused(lambda: exports.to_screws(model, m, steps, *allowed), file)
         names = {letter: f"{file.stem}-{letter}.comp" for letter in screws.texts}
         worst = [exports.worst(x, m, tool_length, model) for x in (model, screws.rest)]
-        beside = {} if rest is None else {rest.parent / name: text for name, text in model_files(
+        adjacent = {} if rest is None else {rest.parent / name: text for name, text in model_files(
             screws.rest, rest.stem, f"{file.name} less what LinuxCNC corrects", rest.name).items()}
-    figures, told = screw_figures(model, screws, names, exports.named(screws.losses), worst, tool_length)
+    figures, noted = screw_figures(model, screws, names, exports.named(screws.losses), worst, tool_length)
     found.append(screw_warning(list(figures["losses"]), str(file), rest))
     finish({names[letter]: text for letter, text in screws.texts.items()}, output, [file], json, found,
-           [*told, *exports.notices(screws.held, m), "for the INI file:", *exports.ini_lines(m, names)], figures, beside)
+           [*noted, *exports.notices(screws.held, m), "for the INI file:", *exports.ini_lines(m, names)], figures, adjacent)
 
 
 @errors_app.command("to-map", epilog="Example: postproc errors to-map e.toml -m mikron-ucp710 -o map.toml --loss 2")
@@ -145,8 +145,8 @@ def to_map(file: ModelFile, machine: MachineName, output: MapFile, over: Over = 
         allowed = None if loss is None else loss * UNITS["um"]
         made = or_refused(lambda: exports.to_map(model, m, *empty, allowed), file)
         files = model_files(made.model, output.stem, f"map of {file.name}", output.name)
-    figures, told = map_figures(model, made)
-    finish(files, output.parent, [file], json, found, told, figures)
+    figures, noted = map_figures(model, made)
+    finish(files, output.parent, [file], json, found, noted, figures)
 
 
 @errors_app.command("schema")

@@ -17,7 +17,7 @@ Sources = Annotated[list[str], typer.Argument(metavar="SOURCE...", help="tables 
                                               "LinuxCNC's files (X=x.comp)")]
 OutputOption = Annotated[Path, typer.Option("-o", "--output", metavar="MODEL.toml",
                                             help="model to write; its tables are put "
-                                            "beside it")]
+                                            "next to it")]
 Into = Annotated[Path | None, typer.Option("--into", metavar="MODEL.toml", help="model whose other errors stay, with their "
                                            "covariance")]
 Covariance = Annotated[Path | None, typer.Option("--covariance", metavar="C.csv", help="square table of what is imported, "
@@ -33,11 +33,11 @@ ToolLengthOption = Annotated[float, typer.Option("--tool-length", metavar="MM", 
 Zero = Annotated[list[str] | None, typer.Option("--zero", metavar="AXIS=POSITION", help="place at which a map is to be 0, "
                                                 "all its coordinates, mm or degrees")]
 Average = Annotated[bool, typer.Option("--average", help="rows at the same place, columns of runs (EXX+1, EXX-1, EXX+2 ...) "
-                                       "and files of runs are readings: their mean counts, their scatter is the doubt")]
+                                       "and files of runs are readings: the mean counts, the scatter is the uncertainty")]
 NearOption = Annotated[list[str] | None, typer.Option("--near", metavar="AXIS=AMOUNT",
                                                       help="with --average: readings no farther "
                                                       "apart are of one place, given to that amount, mm or degrees")]
-Large = Annotated[bool, typer.Option("--large", help="errors above 1 mm or 0.5 degrees are so, and no unit slipped")]
+Large = Annotated[bool, typer.Option("--large", help="errors above 1 mm or 0.5 degrees are so, and no unit is wrong")]
 DirectionsOption = Annotated[str, typer.Option("--directions", help="of a map's values: machine or table")]
 
 
@@ -68,17 +68,17 @@ def import_(sources: Sources, machine: MachineName, output: OutputOption, into: 
         how = ImportOptions(interpolation, periods, float(sign), kind, tool_length, directions,  # type: ignore[arg-type]
                             at, average, apart, large)
         read, found = read_sources(sources, m, how)
-        model, told = required(read, found), [f"read: {', '.join(files_of)}"]
+        model, noted = required(read, found), [f"read: {', '.join(files_of)}"]
         found += [*beyond_travel(model, m, str(output)), *unmeasured(model, m, str(output))]
         if covariance is not None:
-            told += [f"the doubt is that of {covariance.name}, not of the scatter"] if model.covariance is not None else []
+            noted += [f"uncertainty from {covariance.name}, not from the scatter"] if model.covariance is not None else []
             model = required(*with_covariance(model, covariance))
         if into is not None:
             model, lost = merged_into(model, into, m)
-            told += lost
+            noted += lost
         files = model_files(model, output.stem, ("imported from " + ", ".join(Path(s).name for s in files_of))[:200],
                             output.name)
-    told.append(f"{len(model.names)} parameters, {doubted(model)} with a doubt")
+    noted.append(f"{len(model.names)} parameters, {doubted(model)} with an uncertainty")
     inputs = [Path(name) for name in (*files_of, into, covariance) if name is not None]
-    finish(files, output.parent, inputs, json, found, told,
+    finish(files, output.parent, inputs, json, found, noted,
            {"parameters": len(model.names), "covariance": model.covariance is not None})

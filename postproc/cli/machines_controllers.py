@@ -92,7 +92,7 @@ def setup_check(file: Annotated[str, typer.Argument(help="TOML file")], json: Js
         bodies, more = described(spec, placement, file)
         found += more
         if spec.part.system and spec.bodies is not None:
-            found.append(info("setup.system", "the part stands by a system of the CL file: bodies are told as if that were "
+            found.append(info("setup.system", "the part stands by a system of the CL file: bodies are shown as if that were "
                               "the file's absolute frame", file=file))
     count = len(spec.tools) if spec else 0
     good = "" if has_errors(found) else f"{file}: good: {count} tool{'s' * (count != 1)}{bodies}"

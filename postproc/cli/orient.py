@@ -135,9 +135,9 @@ def _errors(options: Options, machine: Machine) -> list[Diagnostic]:
     from toolpaths.diagnostics import info
 
     model, found = load_checked(options.error_model, machine)
-    told = info("orient.error_model", "times and travel are those of the machine without its geometric errors: corrections "
-                "of some micrometres change no choice", file=options.error_model, hint="convert corrects and proves them")
-    return [*found, told] if model is not None else list(found)
+    noted = info("orient.error_model", "times and travel are those of the machine without its geometric errors: corrections "
+                 "of some micrometres change no choice", file=options.error_model, hint="convert corrects and proves them")
+    return [*found, noted] if model is not None else list(found)
 
 
 def _known(passes: list[int], choice: OrientationChoice) -> list[int]:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 UNKNOWN: dict[str, Any] = {"cycle_time_s": None, "lower_bound_s": None, "band_s": None, "feed_s": None, "operations": [],
                            "limiting": {}}
-"""what is told of a file that is refused"""
+"""what is reported of a file that is refused"""
 
 
 def time(file: Annotated[Path, typer.Argument(metavar="FILE", help="CL file, or G-code file of the controller")],

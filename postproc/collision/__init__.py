@@ -1,1 +1,1 @@
-"""Part, fixtures and table beside cutter, shank and holder: what touches, and by how much (see README.md)."""
+"""Part, fixtures and table next to cutter, shank and holder: what touches, and by how much (see README.md)."""

@@ -1,4 +1,4 @@
-"""Part, table and fixtures where they stand, and what of a tool comes too near to them on its way."""
+"""Part, table and fixtures where they stand, and what of a tool comes too near to them on its path."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from toolpaths.diagnostics import Diagnostic, error, has_errors
 
 PART = "the part"
 _APART = 1e-3
-"""mm between the end of a piece of the way and the beginning of the next: another stretch"""
+"""mm between the end of a piece of the path and the beginning of the next: another stretch"""
 _TABLE = Placement(np.eye(3), np.zeros(3))
 
 
@@ -61,7 +61,7 @@ class Scene:
 class Touch:
     """A pair that is nearer than allowed: `distance`, `limit` in mm; -inf where the tool is inside altogether.
 
-    `place` is a piece of the way.
+    `place` is a piece of the path.
     """
 
     tool: int
@@ -157,30 +157,30 @@ def _solid(given: Given, where: Placement, folder: Path, units: MeshUnits,
     return solid(trimesh.creation.box(bounds=[given.box.low, given.box.high]), where), []
 
 
-def touches(all_bodies: Scene, form: ToolForm, way: Swept, cutting: Swept | None = None) -> list[Touch]:
-    """What of a tool comes too near to what on a way; a pair once, at its worst.
+def touches(all_bodies: Scene, form: ToolForm, travel: Swept, cutting: Swept | None = None) -> list[Touch]:
+    """What of a tool comes too near to what on a path; a pair once, at its worst.
 
     Args:
-        cutting: the way on which the cutter is compared with the part, where it is not the whole
+        cutting: the path on which the cutter is compared with the part, where it is not the whole
     """
     result = []
     for part, body, limit in all_bodies.pairs(form):
         gouging = part == CUTTER and body.is_part
-        on = cutting if gouging and cutting is not None else way
+        on = cutting if gouging and cutting is not None else travel
         if not len(on):
             continue
         found = nearest(body.solid, on, form.of(part), limit)
         if found.place >= 0:
             result.append(Touch(form.number, part, body, found.distance, limit, int(on.row[found.place])))
-    if not result and len(way):
-        result = [Touch(form.number, part, body, -np.inf, limit, int(way.row[k]))
-                  for part, body, limit in all_bodies.pairs(form) for k in _inside(body, form.of(part), way)[:1]]
+    if not result and len(travel):
+        result = [Touch(form.number, part, body, -np.inf, limit, int(travel.row[k]))
+                  for part, body, limit in all_bodies.pairs(form) for k in _inside(body, form.of(part), travel)[:1]]
     return result
 
 
-def _inside(body: Body, pieces: Floats, way: Swept) -> list[int]:
-    """Places where a stretch of the way begins with a tool that is inside: what no surface passes it never leaves there."""
-    apart = np.linalg.norm(way.tip[1:, 0] - way.tip[:-1, 1], axis=1) > _APART
+def _inside(body: Body, pieces: Floats, travel: Swept) -> list[int]:
+    """Places where a stretch of the path begins with a tool that is inside: what no surface passes it never leaves there."""
+    apart = np.linalg.norm(travel.tip[1:, 0] - travel.tip[:-1, 1], axis=1) > _APART
     first = np.append(0, np.flatnonzero(apart) + 1)
-    core = way.tip[first, 0] + 0.5 * (pieces[0, 1] + pieces[0, 3]) * way.axis[first, 0]
+    core = travel.tip[first, 0] + 0.5 * (pieces[0, 1] + pieces[0, 3]) * travel.axis[first, 0]
     return [k for k, point in zip(first.tolist(), core, strict=True) if body.solid.holds(point)]

@@ -1,7 +1,7 @@
 """The form of a cutter as CL file and set-up say it: point, corner and side, as pieces of revolution.
 
 Its lower line rises from the tip at an angle to the tip plane, its side leans by the taper against the axis; both meet at
-half the diameter, and the corner touches both (APT, CUTTER/d, r, e, f, a, b, h: centre of the corner e beside the axis and
+half the diameter, and the corner touches both (APT, CUTTER/d, r, e, f, a, b, h: centre of the corner e next to the axis and
 f over the tip, angles a and b, height h; ISO 4343).
 """
 
@@ -37,7 +37,7 @@ class Cutter:
     """between the lower line and the tip plane"""
     taper: float
     centre: tuple[float, float] | None
-    """of the corner, beside the axis and over the tip; None where the sizes fit no form"""
+    """of the corner, next to the axis and over the tip; None where the sizes fit no form"""
     flutes: float | None
     drawn: float | None
     """height as CAM draws it"""
@@ -95,7 +95,7 @@ def _centre(cutter: Cutter, params: tuple[float, ...], ball: bool) -> tuple[floa
     """Of the corner, mm; None where the sizes fit no form, as those of barrels and lenses.
 
     e = d/2 - r (cos a - sin b) / cos(a + b), f = (r + e sin a) / cos a. A file may state e and f itself, and count the
-    diameter of a tapered cutter beside the centre: e = d/2 - r.
+    diameter of a tapered cutter next to the centre: e = d/2 - r.
     """
     if cutter.diameter is None or abs(cutter.taper) >= _STEEP or cutter.point + cutter.taper >= _STEEP:
         return None

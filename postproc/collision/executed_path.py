@@ -1,4 +1,5 @@
-"""The way of a tool through the blocks of a program, as the control runs them, in pieces with a bound between their ends."""
+"""The path of a tool through the blocks of a program, as the control runs them, in pieces with a bound between their
+ends."""
 
 from __future__ import annotations
 
@@ -21,8 +22,8 @@ Parts = tuple[Ints, Floats, Floats]
 """(block, from, to) of parts of blocks, (N,) each, in order"""
 
 
-def way_of(motion: Motion, executed: BlockPoses, kin: Kinematics, rows: Ints, reach: float) -> tuple[Swept, Ints]:
-    """The way of one tool through its blocks, and those of them for which the pieces are no proof.
+def path_of(motion: Motion, executed: BlockPoses, kin: Kinematics, rows: Ints, reach: float) -> tuple[Swept, Ints]:
+    """The path of one tool through its blocks, and those of them for which the pieces are no proof.
 
     Args:
         kin: with the tool
@@ -36,9 +37,9 @@ def way_of(motion: Motion, executed: BlockPoses, kin: Kinematics, rows: Ints, re
         parts = _shorter(motion, executed, kin, parts, long)
         need = _needed(motion, executed, kin, parts, reach)
     row, t0, t1 = _cut(parts, np.clip(np.nan_to_num(need, nan=1.0), 1.0, _MOST).astype(np.int64))
-    way = Swept(*_poses(motion, executed, kin, (row, t0, t1)), row)
-    reached = np.isfinite(way.tip).all(axis=(1, 2)) & np.isfinite(way.axis).all(axis=(1, 2))
-    return way.take(np.flatnonzero(reached)), np.unique(np.append(parts[0][~(need <= _MOST)], row[~reached]))
+    travel = Swept(*_poses(motion, executed, kin, (row, t0, t1)), row)
+    reached = np.isfinite(travel.tip).all(axis=(1, 2)) & np.isfinite(travel.axis).all(axis=(1, 2))
+    return travel.take(np.flatnonzero(reached)), np.unique(np.append(parts[0][~(need <= _MOST)], row[~reached]))
 
 
 def _poses(motion: Motion, executed: BlockPoses, kin: Kinematics, parts: Parts) -> tuple[Floats, Floats]:

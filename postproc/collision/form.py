@@ -28,7 +28,7 @@ _ANY = ToolSetup(gauge_length=1.0)
 class ToolForm:
     """A tool's pieces (P, 5), see `revolution`, and which of PARTS each belongs to (P,).
 
-    `exact` is False where the cutter's pieces are only round it: they tell nothing of how far it cuts into the part.
+    `exact` is False where the cutter's pieces are only round it: they determine nothing of how far it cuts into the part.
     """
 
     number: int
@@ -42,7 +42,7 @@ class ToolForm:
 
 
 def tool_form(number: int, tool: Tool | None, setup: ToolSetup | None, file: str) -> tuple[ToolForm, list[Diagnostic]]:
-    """What is known of a tool's form; what is not is told, for it is not checked.
+    """What is known of a tool's form; what is not is reported, for it is not checked.
 
     Args:
         tool: as the CL file describes it
@@ -97,7 +97,7 @@ def _unformed(number: int, cutter: Cutter) -> list[Diagnostic]:
     if cutter.centre is None:
         found.append(warning("collision.corner", f"T{number}: a corner radius of {cutter.corner or 0.0:g} mm does not fit "
                              f"a diameter of {cutter.diameter:g} mm with a taper of {cutter.taper / DEG:g} degrees: the "
-                             "cutter is not checked against the part, and counts as a cylinder or cone beside all else",
+                             "cutter is not checked against the part, and counts as a cylinder or cone elsewhere",
                              hint=f"add diameter, corner_radius and taper of a form that is round it {key}"))
     if cutter.corner is None:
         found.append(warning("collision.corner", f"T{number}: its corner radius is not known, it is checked as sharp",

@@ -1,8 +1,8 @@
-"""Plain loops of `search.py`, compiled for long ways and fine meshes; the numpy search there is the reference. How they are
+"""Plain loops of `search.py`, compiled for long paths and fine meshes; the numpy search there is the reference. How they are
 rounded: `base/compiled.py`.
 
 A cell is a row of 21 numbers: the corners of a triangle, two tips, two axes. `out` holds the least distance so far, the
-place on the way, the point, the cells looked at since something was too near, and whether a leaf was cut short.
+place on the path, the point, the cells looked at since something was too near, and whether a leaf was cut short.
 """
 
 from __future__ import annotations
@@ -104,7 +104,7 @@ def _look(piece: Any, size: Any, cell: Any, normal: Any, place: Any, limit: Any,
 
 
 def _halve(cells: Any, i: Any, reach: Any) -> Any:
-    """Cell i in two, the second at i + 1: the triangle by its longest edge, or the way; False where it is too small."""
+    """Cell i in two, the second at i + 1: the triangle by its longest edge, or the path; False where it is too small."""
     cell, other = cells[i], cells[i + 1]
     step = math.sqrt((cell[12] - cell[9]) ** 2 + (cell[13] - cell[10]) ** 2 + (cell[14] - cell[11]) ** 2)
     chord = math.sqrt((cell[18] - cell[15]) ** 2 + (cell[19] - cell[16]) ** 2 + (cell[20] - cell[17]) ** 2)
@@ -164,53 +164,53 @@ def _leaf(piece: Any, size: Any, cells: Any, bounds: Any, normal: Any, place: An
         out[6] = 1.0
 
 
-def _bound(piece: Any, size: Any, body: Any, way: Any, k: Any, m: Any) -> Any:
-    """`search._Search._bound` of one pair; rows of body and way as `Solid.packed`, `Swept.packed` have them."""
-    b, w = body[k], way[m]
+def _bound(piece: Any, size: Any, body: Any, travel: Any, k: Any, m: Any) -> Any:
+    """`search._Search._bound` of one pair; rows of body and path as `Solid.packed`, `Swept.packed` have them."""
+    b, w = body[k], travel[m]
     distance, nx, ny, nz = around(piece, b[0] - w[0], b[1] - w[1], b[2] - w[2], w[6], w[7], w[8])
     middle, share = b[0] * b[6] + b[1] * b[7] + b[2] * b[8], nx * b[6] + ny * b[7] + nz * b[8]
     thick = abs(share) * max(b[10] - middle, middle - b[9])
     thick += math.sqrt(max(1.0 - share * share, 0.0)) * math.sqrt(b[3] * b[3] + b[4] * b[4] + b[5] * b[5])
     thick = min(thick, abs(nx) * b[3] + abs(ny) * b[4] + abs(nz) * b[5])
-    beside = distance - thick - abs(nx) * w[3] - abs(ny) * w[4] - abs(nz) * w[5]
+    adjacent = distance - thick - abs(nx) * w[3] - abs(ny) * w[4] - abs(nz) * w[5]
     above = (w[0] * b[6] + w[1] * b[7] + w[2] * b[8] - abs(b[6]) * w[3] - abs(b[7]) * w[4] - abs(b[8]) * w[5] - b[10]
              - support(piece, -(w[6] * b[6] + w[7] * b[7] + w[8] * b[8])))
-    return max(beside, above) - size[0] * w[9]
+    return max(adjacent, above) - size[0] * w[9]
 
 
 leaf, bound_of = compiled(_leaf), compiled(_bound)
 
 
-def search(piece: Any, high: Any, size: Any, body: Any, corners: Any, normals: Any, way: Any, pieces: Any, limit: Any,
+def search(piece: Any, high: Any, size: Any, body: Any, corners: Any, normals: Any, travel: Any, pieces: Any, limit: Any,
            rule: Any, out: Any) -> None:
     """One piece of a tool against a body; nearer pairs first, `out` is carried on.
 
     Args:
-        high: the piece as seen from its middle, which the boxes of the way are round
+        high: the piece as seen from its middle, which the boxes of the path are round
         size (3,): its lever, bend and lever from the tip
-        body (2 L - 1, 11), way (2 M - 1, 10): the trees
+        body (2 L - 1, 11), path (2 M - 1, 10): the trees
         corners (T, 9), normals (T, 3), pieces (N, 12): their leaves
     """
     pairs, bounds = np.empty((_DEPTH, 2), dtype=np.int64), np.empty(_DEPTH)
     cells, inner = np.empty((_DEPTH, 21)), np.empty(_DEPTH)
-    body_first, way_first = (len(body) + 1) // 2 - 1, (len(way) + 1) // 2 - 1
-    pairs[0, 0], pairs[0, 1], bounds[0] = 0, 0, bound_of(high, size, body, way, 0, 0)
+    body_first, path_first = (len(body) + 1) // 2 - 1, (len(travel) + 1) // 2 - 1
+    pairs[0, 0], pairs[0, 1], bounds[0] = 0, 0, bound_of(high, size, body, travel, 0, 0)
     top = 0
     while top >= 0:
         k, m, bound = pairs[top, 0], pairs[top, 1], bounds[top]
         top -= 1
         if bound >= enough(out, limit, rule):
             continue
-        if k >= body_first and m >= way_first:
-            cells[0, :9], cells[0, 9:] = corners[k - body_first], pieces[m - way_first]
-            leaf(piece, size, cells, inner, normals[k - body_first], m - way_first, limit, rule, out)
+        if k >= body_first and m >= path_first:
+            cells[0, :9], cells[0, 9:] = corners[k - body_first], pieces[m - path_first]
+            leaf(piece, size, cells, inner, normals[k - body_first], m - path_first, limit, rule, out)
             continue
-        spread = way[m, 3] + way[m, 4] + way[m, 5] + size[0] * way[m, 9]
-        by_body = m >= way_first or (k < body_first and body[k, 3] + body[k, 4] + body[k, 5] >= spread)
+        spread = travel[m, 3] + travel[m, 4] + travel[m, 5] + size[0] * travel[m, 9]
+        by_body = m >= path_first or (k < body_first and body[k, 3] + body[k, 4] + body[k, 5] >= spread)
         i, j, other_i, other_j = (2 * k + 1, m, 2 * k + 2, m) if by_body else (k, 2 * m + 1, k, 2 * m + 2)
-        first, other = bound_of(high, size, body, way, i, j), np.inf
-        if body[other_i, 3] >= 0.0 and way[other_j, 3] >= 0.0:
-            other = bound_of(high, size, body, way, other_i, other_j)
+        first, other = bound_of(high, size, body, travel, i, j), np.inf
+        if body[other_i, 3] >= 0.0 and travel[other_j, 3] >= 0.0:
+            other = bound_of(high, size, body, travel, other_i, other_j)
         if other < first:
             i, j, first, other_i, other_j, other = other_i, other_j, other, i, j, first
         if other < np.inf:

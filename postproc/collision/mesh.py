@@ -60,7 +60,7 @@ def _loaded(path: str, _changed: int, _size: int, units: str) -> tuple[Trimesh |
     except Exception as fault:  # the readers of the formats raise what comes up
         why = "" if isinstance(fault, ImportError) else f" ({type(fault).__name__}: {fault})"
         return None, (error("mesh.format", f"is no {path.rpartition('.')[2].upper()} file that can be read{why}", file=path,
-                            hint="export it anew"),)
+                            hint="export it again"),)
     faults = _broken(read, path)
     if faults:
         return None, faults
@@ -89,7 +89,7 @@ def _broken(mesh: Trimesh, path: str) -> tuple[Diagnostic, ...]:
     bad = np.flatnonzero(~np.isfinite(mesh.vertices).all(axis=1))
     if len(bad):
         return (error("mesh.number", f"{len(bad)} of {len(mesh.vertices)} vertices are no finite numbers", file=path,
-                      hint="export it anew"),)
+                      hint="export it again"),)
     return ()
 
 
@@ -110,14 +110,14 @@ def _no_solid(mesh: Trimesh, path: str) -> tuple[Diagnostic, ...]:
 
 
 def _edge_faults(mesh: Trimesh) -> tuple[int, int]:
-    """(edges with an odd number of triangles, edges that triangles do not pass as often one way as the other).
+    """(edges with an odd number of triangles, edges that triangles do not pass as often one direction as the other).
 
-    Bodies that touch along an edge share it: four triangles, two each way, are closed as well.
+    Bodies that touch along an edge share it: four triangles, two each path, are closed as well.
     """
     edges = np.asarray(mesh.edges)
     _, number, count = np.unique(np.sort(edges, axis=1), axis=0, return_inverse=True, return_counts=True)
-    way = np.bincount(number.ravel(), np.where(edges[:, 0] < edges[:, 1], 1.0, -1.0))
-    return int((count % 2 != 0).sum()), int((way != 0.0).sum())
+    travel = np.bincount(number.ravel(), np.where(edges[:, 0] < edges[:, 1], 1.0, -1.0))
+    return int((count % 2 != 0).sum()), int((travel != 0.0).sum())
 
 
 def _odd_size(mesh: Trimesh, path: str, units: str) -> tuple[Diagnostic, ...]:

@@ -1,4 +1,4 @@
-"""The whole program beside the bodies of the set-up: every block that is run, linking moves too, as the control runs it."""
+"""The whole program next to the bodies of the set-up: every block that is run, linking moves too, as the control runs it."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from postproc.collision.bodies import Scene, Touch, scene, touches
-from postproc.collision.executed_path import way_of
+from postproc.collision.executed_path import path_of
 from postproc.collision.form import PARTS, ToolForm, lever_of, tool_form
 from postproc.collision.swept import Swept
 from postproc.readback.comparison.faults import Faults
@@ -28,11 +28,11 @@ def check_bodies(motion: Motion, executed: BlockPoses, job: Job, owner: Ints, fa
     Args:
         owner: (E,) the move that each block serves
     """
-    ways, found = _ways(motion, executed, job, owner)
-    for one in ways:
+    travels, found = _travels(motion, executed, job, owner)
+    for one in travels:
         lost = one.unbounded
         found += [] if not len(lost) else [_unbounded(motion, one.moves, owner, lost, faults)]
-        found += _told(one, motion, owner, faults)
+        found += _noted(one, motion, owner, faults)
     return found
 
 
@@ -43,8 +43,8 @@ def touching_parts(motion: Motion, executed: BlockPoses, job: Job, owner: Ints, 
         part: (E,) the part of the program that each block belongs to
     """
     result: dict[int, Touch] = {}
-    for one in _ways(motion, executed, job, owner)[0]:
-        of = part[one.way.row]
+    for one in _travels(motion, executed, job, owner)[0]:
+        of = part[one.travel.row]
         order = np.argsort(of, kind="stable")
         for pieces in np.split(order, np.flatnonzero(np.diff(of[order])) + 1):
             for touch in one.touches(pieces):
@@ -54,30 +54,30 @@ def touching_parts(motion: Motion, executed: BlockPoses, job: Job, owner: Ints, 
 
 
 @dataclass(frozen=True)
-class _Way:
-    """All that one tool does in a program: its way beside the bodies.
+class _ToolMotion:
+    """All that one tool does in a program: its path next to the bodies.
 
     Attributes:
         moves: the reference, a hole without pecks
         drilling (E,): blocks in a hole
-        unbounded: blocks for which the pieces of the way are no proof
+        unbounded: blocks for which the pieces of the path are no proof
     """
 
     bodies: Scene
     form: ToolForm
-    way: Swept
+    travel: Swept
     moves: Moves
     drilling: Bools
     unbounded: Ints
 
     def touches(self, pieces: Ints) -> list[Touch]:
-        """What comes too near on some pieces of the way."""
-        way, drilling = self.way.take(pieces), self.drilling[self.way.row[pieces]]
-        return touches(self.bodies, self.form, way, way.take(np.flatnonzero(~drilling)) if drilling.any() else None)
+        """What comes too near on some pieces of the path."""
+        travel, drilling = self.travel.take(pieces), self.drilling[self.travel.row[pieces]]
+        return touches(self.bodies, self.form, travel, travel.take(np.flatnonzero(~drilling)) if drilling.any() else None)
 
 
-def _ways(motion: Motion, executed: BlockPoses, job: Job, owner: Ints) -> tuple[list[_Way], list[Diagnostic]]:
-    """The way of each tool whose form is known; none without [bodies]."""
+def _travels(motion: Motion, executed: BlockPoses, job: Job, owner: Ints) -> tuple[list[_ToolMotion], list[Diagnostic]]:
+    """The path of each tool whose form is known; none without [bodies]."""
     if job.setup.bodies is None:
         return [], []
     file = job.options.setup
@@ -95,8 +95,8 @@ def _ways(motion: Motion, executed: BlockPoses, job: Job, owner: Ints) -> tuple[
         found += [d for d in more if d not in found]
         if len(form.pieces) and not has_errors(more):
             rows = np.flatnonzero(index == one)
-            way, lost = way_of(motion, executed, job.kinematics_of(number), rows, lever_of(form))
-            result.append(_Way(bodies, form, way, moves, drilling, lost))
+            travel, lost = path_of(motion, executed, job.kinematics_of(number), rows, lever_of(form))
+            result.append(_ToolMotion(bodies, form, travel, moves, drilling, lost))
     return result, found
 
 
@@ -130,11 +130,11 @@ def _drilling(moves: Moves) -> Bools:
     return np.asarray((moves.hole >= 0) & (moves.phase > Phase.APPROACH))
 
 
-def _told(one: _Way, motion: Motion, owner: Ints, faults: Faults) -> list[Diagnostic]:
+def _noted(one: _ToolMotion, motion: Motion, owner: Ints, faults: Faults) -> list[Diagnostic]:
     """One error per pair, at its worst place; else what was compared."""
     result: list[Diagnostic] = []
-    found = one.touches(np.arange(len(one.way)))
-    if not found and len(one.way):
+    found = one.touches(np.arange(len(one.travel)))
+    if not found and len(one.travel):
         return [_clear(one.bodies, one.form, faults)]
     for touch in found:
         code = "collision.gouge" if touch.limit < 0.0 else "collision.near" if touch.distance > 0.0 else "collision.touch"
@@ -150,14 +150,14 @@ def _clear(bodies: Scene, form: ToolForm, faults: Faults) -> Diagnostic:
         kept = f"keeps {limit:g} mm from" if limit >= 0.0 else f"is at most {-limit:g} mm in"
         said.setdefault(f"{PARTS[part]} {kept}", []).append(body.name)
     text = "; ".join(f"{kept} {', '.join(names)}" for kept, names in said.items())
-    return info("collision.clear", f"T{form.number}, everywhere on its way: {text}", file=faults.gcode or faults.cl)
+    return info("collision.clear", f"T{form.number}, everywhere on its path: {text}", file=faults.gcode or faults.cl)
 
 
 def _hint(touch: Touch, motion: Motion) -> str:
     if touch.limit < 0.0:
         return "another tool axis or path; [bodies] gouge is what the tolerances of path and mesh may add up to"
     if motion.code[touch.place] == 0:
-        return "a higher clearance.distance, or move the fixture; --orient auto avoids ways that touch, where it can"
+        return "a higher clearance.distance, or move the fixture; --orient auto avoids paths that touch, where it can"
     return "another tool axis (postproc orient), a longer or slimmer tool, a higher clearance.distance, or move the fixture"
 
 
@@ -168,6 +168,6 @@ def _lines(row: int, motion: Motion, served: tuple[Moves, Ints]) -> tuple[int, i
 
 
 def _unbounded(motion: Motion, moves: Moves, owner: Ints, rows: Ints, faults: Faults) -> Diagnostic:
-    return faults.warning("collision.bound", "between its ends a block is looked at in places only: the way of the tool "
+    return faults.warning("collision.bound", "between its ends a block is looked at in places only: the path of the tool "
                           "has no bound there", *_lines(int(rows[0]), motion, (moves, owner)), count=len(rows),
                           hint="it comes near to where the machine is singular")

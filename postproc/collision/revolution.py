@@ -1,4 +1,4 @@
-"""Signed distance to a body of revolution, and planes that part it from what lies beside it.
+"""Signed distance to a body of revolution, and planes that part it from what lies next to it.
 
 A piece is a frustum of a cone about the tool axis, rounded by a ball: (r0, z0, r1, z1, c), radius r0 at height z0 and r1
 at z1 >= z0 over the tip, all grown by c. Cylinder, cone, disc (z0 = z1), torus bottom (disc with c), ball (r0 = r1 = 0,

@@ -1,10 +1,10 @@
-"""How near a moving tool comes to a solid: least signed distance over the whole way, by proved lower bounds.
+"""How near a moving tool comes to a solid: least signed distance over the whole path, by proved lower bounds.
 
-Two trees of boxes, round the triangles and round the pieces of the way, are gone through together. Over a pair of boxes
+Two trees of boxes, round the triangles and round the pieces of the path, are gone through together. Over a pair of boxes
 the body's normal n at their middles bounds the distance from below (see `revolution`); so does the mean normal of the
 surface in the box, or the triangle's own. A pair whose bound is not below the least distance found so far is done with;
 others are split, in the end the triangle and the piece themselves. What is left over is proved, not sampled: where
-nothing is found, the distance is nowhere on the way, between its points and between the corners of the mesh too, less
+nothing is found, the distance is nowhere on the path, between its points and between the corners of the mesh too, less
 than the limit by more than `EXACT`.
 """
 
@@ -25,10 +25,10 @@ EXACT = 1e-3
 PART = 0.01
 """of what is missing to the limit, where something is"""
 EFFORT, EACH = 100_000, (300, 10_000)
-"""cells, in all and of one triangle beside one piece of the way (in two rounds), that are looked at once something is too
-near, to learn by how much: the distance told is one that is had"""
+"""cells, in all and of one triangle next to one piece of the path (in two rounds), that are looked at once something is too
+near, to learn by how much: the distance reported is one that is had"""
 _LONG = 500
-"""pieces of a way, from which on loops are compiled"""
+"""pieces of a path, from which on loops are compiled"""
 _BATCH = 4096
 _SMALL = 1e-5
 """mm: smaller cells are not split"""
@@ -38,7 +38,7 @@ _SMALL = 1e-5
 class Nearest:
     """Least distance, mm, negative where the tool reaches into the solid; `limit` where nothing is nearer than that.
 
-    `piece` of the tool, `place` on the way (-1: nothing is nearer than the limit), `point` (3,) of the solid.
+    `piece` of the tool, `place` on the path (-1: nothing is nearer than the limit), `point` (3,) of the solid.
     """
 
     distance: float
@@ -47,21 +47,21 @@ class Nearest:
     point: tuple[float, float, float] = (np.nan, np.nan, np.nan)
 
 
-def nearest(body: TriangleSolid, way: Swept, pieces: Floats, limit: float) -> Nearest:
+def nearest(body: TriangleSolid, travel: Swept, pieces: Floats, limit: float) -> Nearest:
     """What of a tool's `pieces` (P, 5) comes nearest to a body, where that is less than `limit` mm."""
-    if wanted(len(way), _LONG):
-        return _compiled(body, way, pieces, limit)
+    if wanted(len(travel), _LONG):
+        return _compiled(body, travel, pieces, limit)
     best = Nearest(limit)
     for number, piece in enumerate(pieces):
         for each in EACH:
-            run = _Search(body, way, piece, number, best, limit, each)
+            run = _Search(body, travel, piece, number, best, limit, each)
             best = run.run()
             if not run.cut:
                 break
     return best
 
 
-def _compiled(body: TriangleSolid, way: Swept, pieces: Floats, limit: float) -> Nearest:
+def _compiled(body: TriangleSolid, travel: Swept, pieces: Floats, limit: float) -> Nearest:
     """The same by the loops of `kernel`."""
     from postproc.collision import kernel
 
@@ -74,7 +74,7 @@ def _compiled(body: TriangleSolid, way: Swept, pieces: Floats, limit: float) -> 
         out[5] = 0.0
         for each in EACH:
             out[6] = 0.0
-            run(piece, high, size, solid_nodes, corners, body.normal, way.packed(middle(piece)), way.poses, limit,
+            run(piece, high, size, solid_nodes, corners, body.normal, travel.packed(middle(piece)), travel.poses, limit,
                 np.array([EXACT, PART, EFFORT, each]), out)
             if not out[6]:
                 break
@@ -86,12 +86,12 @@ def _compiled(body: TriangleSolid, way: Swept, pieces: Floats, limit: float) -> 
 class _Search:
     """One piece of the tool; `best` is what was found so far."""
 
-    def __init__(self, body: TriangleSolid, way: Swept, piece: Floats, number: int, best: Nearest, limit: float,
+    def __init__(self, body: TriangleSolid, travel: Swept, piece: Floats, number: int, best: Nearest, limit: float,
                  each: int) -> None:
-        self.body, self.way, self.piece, self.number, self.best, self.limit = body, way, piece, number, best, limit
-        self.high, self.nodes = raised(piece, middle(piece)), way.tree_at(middle(piece))
+        self.body, self.travel, self.piece, self.number, self.best, self.limit = body, travel, piece, number, best, limit
+        self.high, self.nodes = raised(piece, middle(piece)), travel.tree_at(middle(piece))
         self.lever, self.looked, self.each, self.cut = lever(self.high), 0, each, False
-        self.body_first, self.way_first = body.tree.leaves - 1, way.tree.leaves - 1
+        self.body_first, self.path_first = body.tree.leaves - 1, travel.tree.leaves - 1
 
     @property
     def enough(self) -> float:
@@ -106,33 +106,34 @@ class _Search:
         bound = self._bound(pairs)
         while len(pairs):
             pairs, bound, batch = _next(pairs, bound, self.enough)
-            leaf = (batch[:, 0] >= self.body_first) & (batch[:, 1] >= self.way_first)
+            leaf = (batch[:, 0] >= self.body_first) & (batch[:, 1] >= self.path_first)
             if leaf.any():
-                self._cells(batch[leaf] - (self.body_first, self.way_first))
+                self._cells(batch[leaf] - (self.body_first, self.path_first))
             more = self._split(batch[~leaf])
             pairs, bound = np.concatenate((pairs, more)), np.concatenate((bound, self._bound(more)))
         return self.best
 
     def _bound(self, pairs: Ints) -> Floats:
-        """Bounds (N,) over pairs (N, 2) of nodes of the solid and of the way: by the tool's normal between the middles, and
+        """Bounds (N,) over pairs (N, 2) of nodes of the solid and of the path: by the tool's normal between the middles, and
         by the mean normal of the solid's surface there."""
-        axes, chord = self.way.axes
-        body, way, (k, m) = self.body.tree, self.nodes, pairs.T
+        axes, chord = self.travel.axes
+        body, travel, (k, m) = self.body.tree, self.nodes, pairs.T
         flat, low, high = (of_node[k] for of_node in self.body.slabs)
-        distance, n = around(self.high, body.centre[k] - way.centre[m], axes[m])
+        distance, n = around(self.high, body.centre[k] - travel.centre[m], axes[m])
         height, share = np.einsum("ni,ni->n", body.centre[k], flat), np.einsum("ni,ni->n", n, flat)
         thick = np.abs(share) * np.maximum(high - height, height - low)
         thick += np.sqrt(np.maximum(1.0 - share**2, 0.0)) * np.linalg.norm(body.half[k], axis=1)
-        beside = distance - np.minimum((np.abs(n) * body.half[k]).sum(axis=1), thick) - (np.abs(n) * way.half[m]).sum(axis=1)
-        above = (np.einsum("ni,ni->n", way.centre[m], flat) - (np.abs(flat) * way.half[m]).sum(axis=1) - high
+        adjacent = distance - np.minimum((np.abs(n) * body.half[k]).sum(axis=1),
+                                         thick) - (np.abs(n) * travel.half[m]).sum(axis=1)
+        above = (np.einsum("ni,ni->n", travel.centre[m], flat) - (np.abs(flat) * travel.half[m]).sum(axis=1) - high
                  - support(self.high, -np.einsum("ni,ni->n", axes[m], flat)))
-        return np.asarray(np.maximum(beside, above) - self.lever * chord[m])
+        return np.asarray(np.maximum(adjacent, above) - self.lever * chord[m])
 
     def _split(self, pairs: Ints) -> Ints:
         """Children of pairs (N, 2), the larger of the two nodes split; those that hold nothing are left out."""
-        body, way, (k, m) = self.body.tree.half, self.nodes.half, pairs.T
-        size = way[m].sum(axis=1) + self.lever * self.way.axes[1][m]
-        first = (m >= self.way_first) | ((k < self.body_first) & (body[k].sum(axis=1) >= size))
+        body, travel, (k, m) = self.body.tree.half, self.nodes.half, pairs.T
+        size = travel[m].sum(axis=1) + self.lever * self.travel.axes[1][m]
+        first = (m >= self.path_first) | ((k < self.body_first) & (body[k].sum(axis=1) >= size))
         one = pairs.copy()
         one[first, 0] = 2 * k[first] + 1
         one[~first, 1] = 2 * m[~first] + 1
@@ -140,11 +141,11 @@ class _Search:
         other[first, 0] += 1
         other[~first, 1] += 1
         both = np.concatenate((one, other))
-        return np.asarray(both[(body[both[:, 0], 0] >= 0.0) & (way[both[:, 1], 0] >= 0.0)])
+        return np.asarray(both[(body[both[:, 0], 0] >= 0.0) & (travel[both[:, 1], 0] >= 0.0)])
 
     def _cells(self, pairs: Ints) -> None:
-        """Triangles and pieces of the way themselves, halved until the least distance is known."""
-        cells = _Cells.of(self.body, self.way, pairs)
+        """Triangles and pieces of the path themselves, halved until the least distance is known."""
+        cells = _Cells.of(self.body, self.travel, pairs)
         bound, most = self._look(cells), self.looked + self.each * len(pairs)
         while self.looked <= most:
             keep = bound < self.enough
@@ -184,7 +185,7 @@ def _next(pairs: Ints, bound: Floats, enough: float) -> tuple[Ints, Floats, Ints
 class _Cells:
     """N pairs of a part of a triangle (N, 3, 3) with its normal and a part of a piece: tips and axes (N, 2, 3).
 
-    `place` (N,) on the way.
+    `place` (N,) on the path.
     """
 
     corners: Floats
@@ -194,9 +195,9 @@ class _Cells:
     place: Ints
 
     @classmethod
-    def of(cls, body: TriangleSolid, way: Swept, pairs: Ints) -> _Cells:
+    def of(cls, body: TriangleSolid, travel: Swept, pairs: Ints) -> _Cells:
         k, m = pairs.T
-        return cls(body.corners[k], body.normal[k], way.tip[m], way.axis[m], m)
+        return cls(body.corners[k], body.normal[k], travel.tip[m], travel.axis[m], m)
 
     def take(self, which: Ints | np.ndarray[tuple[int], np.dtype[np.bool_]]) -> _Cells:
         return _Cells(*(getattr(self, name)[which] for name in self.__dataclass_fields__))
@@ -212,7 +213,7 @@ class _Cells:
     def apart(self, n: Floats, piece: Floats) -> Floats:
         """Bounds (N,) mm by planes with the normals n (N, 3): the triangle's corners on one side, the tool on the other.
 
-        How far the tool reaches along n, tip and axis moving evenly, is nowhere more than at the ends of the way by more
+        How far the tool reaches along n, tip and axis moving evenly, is nowhere more than at the ends of the path by more
         than `bend` theta^2 / 8: its second derivative is no less than -bend theta^2 (|n x a|'' >= -|n x a|).
         """
         corner = np.einsum("nki,ni->nk", self.corners, n).min(axis=1)
@@ -222,21 +223,21 @@ class _Cells:
         return np.asarray(corner - reach.max(axis=0) - TURN * bend(piece) * chord**2 / 8.0)
 
     def size(self, reach: float) -> Floats:
-        """mm (N,): the larger of the triangle's longest edge and the way."""
-        return np.asarray(np.maximum(self._edges().max(axis=1), self._way(reach)))
+        """mm (N,): the larger of the triangle's longest edge and the path."""
+        return np.asarray(np.maximum(self._edges().max(axis=1), self._travel(reach)))
 
     def _edges(self) -> Floats:
         return np.asarray(np.linalg.norm(self.corners - np.roll(self.corners, -1, axis=1), axis=2))
 
-    def _way(self, reach: float) -> Floats:
+    def _travel(self, reach: float) -> Floats:
         step = np.linalg.norm(self.tip[:, 1] - self.tip[:, 0], axis=1)
         return np.asarray(step + reach * np.linalg.norm(self.axis[:, 1] - self.axis[:, 0], axis=1))
 
     def halved(self, reach: float) -> _Cells:
-        """Both halves of each: the triangle by its longest edge, or the way in its middle."""
+        """Both halves of each: the triangle by its longest edge, or the path in its middle."""
         edges = self._edges()
         longest = edges.argmax(axis=1)
-        by_edge = edges.max(axis=1) >= self._way(reach)
+        by_edge = edges.max(axis=1) >= self._travel(reach)
         n, rows = len(edges), np.flatnonzero(by_edge)
         corners, tip, axis = (np.concatenate((a, a)) for a in (self.corners, self.tip, self.axis))
         a, b = longest[rows], (longest[rows] + 1) % 3

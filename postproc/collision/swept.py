@@ -1,4 +1,4 @@
-"""The way of a tool as short pieces: tips straight, axes on great circles, nowhere off the true way by more than OFF."""
+"""The path of a tool as short pieces: tips straight, axes on great circles, nowhere off the true path by more than OFF."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class Swept:
     def tree_at(self, height: float) -> Tree:
         """Boxes round the points of the axis `height` mm over the tips: where a tool turns about them, not about its tip.
 
-        On the way from end to end such a point leaves its straight line by no more than height theta^2 / 8.
+        On the path from end to end such a point leaves its straight line by no more than height theta^2 / 8.
         """
         chord = np.linalg.norm(self.axis[:, 1] - self.axis[:, 0], axis=1)
         if height == 0.0 or not self.turns:
@@ -110,7 +110,7 @@ def _joined(axis: Floats, off: Floats) -> tuple[Floats, Floats]:
 
 
 def along_curves(curves: Curves, row: Ints) -> Swept:
-    """The pieces of N curves; `row` (N,) tells what each belongs to. Arcs are cut so that chords stay within OFF."""
+    """The pieces of N curves; `row` (N,) says what each belongs to. Arcs are cut so that chords stay within OFF."""
     count = np.ones(len(curves), dtype=np.int64)
     arc = np.flatnonzero(curves.is_arc)
     if len(arc):

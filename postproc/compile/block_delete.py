@@ -1,6 +1,6 @@
 """OPSKIP: blocks that a switch at the control leaves out ("/").
 
-What follows them must not depend on the switch, so that it states every axis and every modal code anew; modes, tools and
+What follows them must not depend on the switch, so that it states every axis and every modal code again; modes, tools and
 compensation must not change inside.
 """
 

@@ -22,14 +22,14 @@ STATES_RETRACT = ("{retract}", "{second}")
 
 _BACK_TO_THE_FIRST = ("linuxcnc", "iso")
 """writers for controls that, before a hole which ends at the first level of its sequence, bring a tool that stands at the
-plane of the hole to that level on the way there (see `readback.cycles.legs`)"""
+plane of the hole to that level on the path there (see `readback.cycles.legs`)"""
 
 
 def holes_of(toolpath: Toolpath, moves: Moves, path: JointPath, words: WordRows, control: Control,
              controller: ControllerFile, skip: Bools) -> tuple[Bools, list[Hole]]:
     """Blocks of holes that the controller can drill by itself, and the holes; not among blocks that a switch may `skip`.
 
-    Native where the tool stands along Z of the words, the kind is in the controller's table and the way out ends at
+    Native where the tool stands along Z of the words, the kind is in the controller's table and the retract ends at
     the clearance plane, at the level that the tool came from, or at one that the cycle states. Cycles that feed out and then
     rise higher end at the clearance plane, the rest is a rapid behind them. Controls of `_BACK_TO_THE_FIRST` go back to the
     first level of a sequence only from there.
@@ -170,5 +170,5 @@ def _hole(toolpath: Toolpath, moves: Moves, path: JointPath, rows: WordRows, con
 
 
 def cycle_key(kind: str, turning: int) -> str:
-    """The controller's table tells taps that turn anti-clockwise from the others; a tap that stands has no entry."""
+    """The controller's table says taps that turn anti-clockwise from the others; a tap that stands has no entry."""
     return kind if kind != "TAP" else {1: "TAP", -1: "TAP_LEFT"}.get(turning, "")

@@ -102,13 +102,13 @@ class _Writing:
                 self._restate(self.at(int(self.path.begin[move])), move, named.line)
 
     def _label(self, move: int) -> int:
-        """The block that an operation begins with: the way home, where it leads there, so that a program taken up at the
+        """The block that an operation begins with: the travel home, where it leads there, so that a program taken up at the
         operation goes home from wherever the tool is."""
         block = int(self.path.begin[move])
         return block - 1 if block > 0 and self.path.home[block - 1] else block
 
     def _restate(self, out: list[Command], move: int, line: int) -> None:
-        """The tool in the spindle anew, unless the operation changes it."""
+        """The tool in the spindle again, unless the operation changes it."""
         assert self.loaded is not None
         row = int(self.moves.row[move])
         here = [e for e in self.toolpath.events if e.index == row and e.line >= line]

@@ -58,10 +58,11 @@ def compile_program(job: Job, moves: Moves, path: JointPath,
                             *not_native(toolpath, moves, path, native, controller, skip)]
 
 
-def words_of(job: Job, moves: Moves, path: JointPath, anew: Ints | None = None) -> WordRows:
-    """The words of a path's blocks; the blocks `anew` state every axis."""
+def words_of(job: Job, moves: Moves, path: JointPath, again: Ints | None = None) -> WordRows:
+    """The words of a path's blocks; the blocks `again` state every axis."""
     return word_rows(path, moves, job.control, job.kinematics, job.offset_length, decimals(job.control, job.controller),
-                     np.zeros(0, dtype=np.int64) if anew is None else anew, job.rounding.made_up, job.two_way, job.corrects)
+                     np.zeros(0, dtype=np.int64) if again is None else again, job.rounding.made_up, job.bidirectional,
+                     job.corrects)
 
 
 def writing_of(job: Job, moves: Moves) -> Writing:
@@ -109,6 +110,6 @@ def _slowed(feeds: Feeds, moves: Moves, path: JointPath, planned: bool, file: st
         return []
     share = path.seconds[rows] / feeds.seconds[rows]
     excess = "exceed its velocity, acceleration or jerk" if planned else "be faster than its limit"
-    return [info("feed.reduced", f"feed reduced to {100.0 * share.min():.1f} % at the least, where an axis would "
+    return [info("feed.reduced", f"feed reduced to {100.0 * share.min():.1f} % at least, where an axis would "
                  f"{excess}", file=file, lines=np.unique(moves.line[path.move[rows]])[:6].tolist(),
                  count=len(rows))]

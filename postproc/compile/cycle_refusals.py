@@ -16,7 +16,7 @@ from toolpaths.toolpath import Cycle, Toolpath
 SINGLE_MOVES = frozenset({"DRILL", "THRU", "CSINK", "FACE", "DEEP", "BRKCHP", "BORE", "REAM"})
 """kinds of cycles that rapids, feeds and dwells replace"""
 _SPINDLE = ("its spindle stands", "state SPINDL/RPM,n,CLW before it")
-_OTHER = ("the tool does not stand along Z of the words, or the way out ends at none of the levels of the cycle",
+_OTHER = ("the tool does not stand along Z of the words, or the retract ends at none of the levels of the cycle",
           "an output mode in which it does (--output-mode tilted), or RTRCTO at the start plane or where the tool came from")
 
 

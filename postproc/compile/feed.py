@@ -60,9 +60,9 @@ def least_seconds(path: JointPath, control: Control, asked: Floats, step: Floats
     """(K,) s that the velocities of the axes ask of each block, by its joints and by its rounded words, step (K, J)."""
     joints = np.concatenate([control.machine.home[None, :], path.q[:-1]])
     velocity = control.machine.limits.velocity
-    way = np.abs(path.q - joints)
+    travel = np.abs(path.q - joints)
     joint = np.array([f.control.law == "axes" for f in path.frames])[path.frame][:, None] | np.array(control.machine.rotary)
-    needed = (np.where(joint, np.maximum(way, np.abs(step) / control.unit), way) / velocity).max(axis=1)
+    needed = (np.where(joint, np.maximum(travel, np.abs(step) / control.unit), travel) / velocity).max(axis=1)
     arc = (path.code == ARC) & ~_control_bends(path)
     if arc.any():
         top = asked / velocity[control.xyz].min()

@@ -20,7 +20,7 @@ class Command:
 
     ("ENTER_SECTION", (i,)) and ("LEAVE_SECTION", (i,)) stand where a section that needs codes begins and ends,
     ("OPERATION_START", (name,)) or (name, 1.0) where the program can be taken up, with 1.0 from home, ("RESTATE",) behind
-    blocks that a switch may leave out: modal codes are stated anew. `skip`: the block switch leaves it out.
+    blocks that a switch may leave out: modal codes are stated again. `skip`: the block switch leaves it out.
     """
 
     name: str

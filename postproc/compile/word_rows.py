@@ -16,7 +16,7 @@ from postproc.reference.moves import Moves
 from toolpaths.arrays import Bools, Floats, Ints
 
 SNAP = 2.5
-"""X, Y, Z residues beside a rotary move, in units of the last decimal, that are not written"""
+"""X, Y, Z residues next to a rotary move, in units of the last decimal, that are not written"""
 
 
 @dataclass(frozen=True)
@@ -29,20 +29,20 @@ class WordRows:
 
 
 def word_rows(path: JointPath, moves: Moves, control: Control, kinematics: Callable[[int], Kinematics],
-              lengths: Callable[[int], float], places: Ints, anew: Ints, made_up: bool = False,
-              two_way: Sequence[int] = (), exact: bool = False) -> WordRows:
+              lengths: Callable[[int], float], places: Ints, again: Ints, made_up: bool = False,
+              bidirectional: Sequence[int] = (), exact: bool = False) -> WordRows:
     """The words of all blocks; `lengths` gives the gauge length of the tool of an index, `places` (J,) the decimals,
-    `anew` the blocks that state every axis, `made_up` as in `Rounding`; `two_way` joints lose motion, see
+    `again` the blocks that state every axis, `made_up` as in `Rounding`; `bidirectional` joints lose motion, see
     `_held`; `exact` ends of CL moves keep the last decimals of their words."""
     begins = np.flatnonzero(np.diff(path.frame)) + 1
     tool = block_tools(path, moves)
     rounds = places if made_up else None
     unrounded = _words(path, path.q, np.arange(len(path)), tool, kinematics, lengths, rounds)
     end = _rounded(_snapped(_rounded(unrounded, places), path, control, places, exact), places)
-    end = _flat(_rounded(_held(end, path, control, tool, places, two_way), places), path, control)
+    end = _flat(_rounded(_held(end, path, control, tool, places, bidirectional), places), path, control)
     start = np.concatenate([end[:1], end[:-1]])
     start[begins] = _rounded(_words(path, path.q[begins - 1], begins, tool, kinematics, lengths, rounds), places)
-    return WordRows(end, start, _written(end, start, np.union1d(begins, anew), path, control))
+    return WordRows(end, start, _written(end, start, np.union1d(begins, again), path, control))
 
 
 def _rounded(words: Floats, places: Ints) -> Floats:
@@ -104,7 +104,7 @@ def _made_up(q: Floats, law: Control, kin: Kinematics, places: Ints) -> Floats:
 
 
 def _snapped(words: Floats, path: JointPath, control: Control, places: Ints, exact: bool) -> Floats:
-    """Words (rounded) without tiny X, Y, Z residues beside a rotary move.
+    """Words (rounded) without tiny X, Y, Z residues next to a rotary move.
 
     Under inverse time LinuxCNC takes the length of X, Y, Z alone where any of them moves, so that a residue of
     rounding would set the speed of the whole block. What is left out is at most SNAP last decimals, and never adds up:
@@ -156,15 +156,15 @@ def _held(words: Floats, path: JointPath, control: Control, tool: Ints, places: 
 def _walked(counts: Floats, same: Bools, along: Floats) -> list[float]:
     """Last decimals (K,) one after the other, those that turn back by one left out.
 
-    `same` (K,) False where a word means another place than the one before: there `along` (K,) says which way it went.
+    `same` (K,) False where a word means another place than the one before: there `along` (K,) says which path it went.
     """
-    result, way, last = [], 0.0, 0.0
+    result, travel, last = [], 0.0, 0.0
     for count, goes_on, sign in zip(counts.tolist(), same.tolist(), along.tolist(), strict=True):
         step = count - last
-        if goes_on and abs(step) == 1.0 and step * way < 0.0:
+        if goes_on and abs(step) == 1.0 and step * travel < 0.0:
             count = last
         elif (step if goes_on else sign) != 0.0:
-            way = 1.0 if (step if goes_on else sign) > 0.0 else -1.0
+            travel = 1.0 if (step if goes_on else sign) > 0.0 else -1.0
         last = count
         result.append(count)
     return result
@@ -180,14 +180,14 @@ def _flat(words: Floats, path: JointPath, control: Control) -> Floats:
     return words
 
 
-def _written(end: Floats, start: Floats, anew: Ints, path: JointPath, control: Control) -> Bools:
+def _written(end: Floats, start: Floats, again: Ints, path: JointPath, control: Control) -> Bools:
     """Words (K, J) that a block states: those it names, else those that change; both plane words of an arc.
 
-    The blocks `anew` state all, the first under another law among them; in a tilted plane rotary axes have no words.
+    The blocks `again` state all, the first under another law among them; in a tilted plane rotary axes have no words.
     """
     names = np.asarray(path.state.any(axis=1))
     first = np.zeros(len(path), dtype=bool)
-    first[anew] = True
+    first[again] = True
     changed: Bools = (end != start) | first[:, None]
     write: Bools = np.asarray(np.where(names[:, None], path.state, changed))
     for row in np.flatnonzero(path.code == ARC).tolist():

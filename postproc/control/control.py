@@ -253,7 +253,7 @@ class Control:
         return tip, axis, kin.inverse(tip, axis)[0]
 
     def bent(self, q0: Floats, q1: Floats, places: Floats, kin: Kinematics) -> Iterator[Floats]:
-        """Joints (N, J) at each of the fractions `places` of the way from q0 to q1 (N, J), under the law "tcp"."""
+        """Joints (N, J) at each of the fractions `places` of the path from q0 to q1 (N, J), under the law "tcp"."""
         tip0, tip1 = kin.forward(q0)[0], kin.forward(q1)[0]
         for t in places.tolist():
             if kin.slides_affine:

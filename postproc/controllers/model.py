@@ -61,7 +61,7 @@ class Cycles(UserModel):
     planes: tuple[int, ...] = (17,)
     """planes in which cycles may run"""
     rigid_only: tuple[str, ...] = ("TAP",)
-    """kinds that must not become single moves, beside those that never do"""
+    """kinds that must not become single moves, next to those that never do"""
     dwell_milliseconds: bool = False
     """the dwell of a cycle is a whole number of ms, else s"""
     peck_relief: float = Field(default=0.254, ge=0.0)
@@ -76,7 +76,7 @@ class FeedRules(UserModel):
     word_every_inverse_block: bool = True
     """every block of inverse time states its feed"""
     cleared_by_mode_change: bool = True
-    """the feed must be stated anew after a change of the feed mode"""
+    """the feed must be stated again after a change of the feed mode"""
     least_inverse_rate: float = Field(default=0.0, ge=0.0)
     """mm/min below which inverse time runs X, Y, Z faster than asked (LinuxCNC 0.1)"""
     length: Literal["xyz-first", "all", "geometry"] = "xyz-first"
@@ -87,7 +87,7 @@ class FeedRules(UserModel):
 
 
 class CutterCompensation(UserModel):
-    """Rules of cutter compensation beside its codes; moves are those in the plane of the words."""
+    """Rules of cutter compensation next to its codes; moves are those in the plane of the words."""
 
     begins_on_arc: bool = False
     """the first move behind G41 or G42 may be an arc"""
@@ -181,7 +181,7 @@ class TiltedMode(Mode):
 
 
 class Modes(UserModel):
-    """Output modes beside axis positions."""
+    """Output modes next to axis positions."""
 
     tcp: TcpMode | None = None
     """tool-centre-point mode"""

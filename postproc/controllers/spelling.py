@@ -172,6 +172,6 @@ class SubprogramFormat(UserModel):
     end: tuple[Named, ...] = ()
     """blocks that end one"""
     place: Literal["before", "after", "files"] = "after"
-    """before the main program's first block, behind its end, or each in a file of its own beside the program"""
+    """before the main program's first block, behind its end, or each in a file of its own next to the program"""
     file: Named = "{name}_{number}"
     """name of such a file"""

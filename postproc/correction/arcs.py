@@ -38,16 +38,16 @@ def fitted_arcs(path: JointPath, nominal: JointPath, work: ErrorContext, start: 
         for t in LOOKS:
             share = np.full(len(k), t)
             got = new.joints(on_arc(path.plane[k], path.ccw[k], center[k], c0, c1, share, xyz), kin, 0.0)
-            resolved[k] |= ~(work.off(work.nominal(k, share), got, k, work.way_at(k, share)) <= LOOSE * allowed)
+            resolved[k] |= ~(work.off(work.nominal(k, share), got, k, work.approach_at(k, share)) <= LOOSE * allowed)
         for r, share in looks_between(_changes(work, k)):
             got = new.joints(on_arc(path.plane[k[r]], path.ccw[k[r]], center[k[r]], c0[r], c1[r], share, xyz), kin, 0.0)
-            off = work.off(work.nominal(k[r], share), got, k[r], work.way_at(k[r], share))
+            off = work.off(work.nominal(k[r], share), got, k[r], work.approach_at(k[r], share))
             resolved[k[r][~(off <= LOOSE * allowed)]] = True
     return replace(path, center=center, code=np.where(resolved, FEED, path.code).astype(path.code.dtype)), resolved
 
 
 def _changes(work: ErrorContext, k: Ints) -> Ints:
-    """(N,) stretches of arcs k (N,) in which errors run one way."""
+    """(N,) stretches of arcs k (N,) in which errors run one direction."""
     places = [work.nominal(k, np.full(len(k), t)) for t in (0.0, *LOOKS, 1.0)]
     return changes(sum((np.abs(two - one) for one, two in pairwise(places)), np.zeros_like(places[0])), work.detail)
 

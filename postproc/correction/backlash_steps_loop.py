@@ -17,7 +17,7 @@ COMPILE_FROM = 20_000
 """blocks from which compiling pays"""
 START, BACK, GAP, GOES_ON, LATER, BEFORE, BY = 0, 1, 4, 5, 6, 9, 10
 OFF, RATES, INVERSE, FREE = 0, 1, 4, 7
-HELPERS = "_take", "_fill", "_invert", "_cost", "_nearest", "_toward", "_by_ways", "_beside"
+HELPERS = "_take", "_fill", "_invert", "_cost", "_nearest", "_toward", "_by_approach", "_adjacent"
 
 
 def wanted(blocks: int) -> bool:
@@ -42,39 +42,39 @@ def compiled() -> Callable[..., Any]:
     return jit(walk_all)
 
 
-def walk_all(off: Any, by_way: Any, tip_rates: Any, back: Any, gap: Any, bend: Any, last: Any, later: Any, goes_on: Any,
+def walk_all(off: Any, by_approach: Any, tip_rates: Any, back: Any, gap: Any, bend: Any, last: Any, later: Any, goes_on: Any,
              weight: Any, plain: Any, near: Any, enough: Any, free: Any, like: Any, weights: Any, rests: Any, nearer: Any,
              reach: Any) -> Any:
-    """Steps (K, 3) and ways (K, T) for the attributes of `Ends`; `weights` are (PLAIN, BETWEEN), then RESTS, NEARER, REACH
-    of the plain walk."""
+    """Steps (K, 3) and approach directions (K, T) for the attributes of `Ends`; `weights` are (PLAIN, BETWEEN), then RESTS,
+    NEARER, REACH of the plain walk."""
     blocks, lossy = gap.shape
-    result, ways = np.zeros((blocks, 3)), np.zeros((blocks, lossy))
-    joint, space, way, shifted = np.zeros((lossy, 13)), np.zeros((3, 8)), np.zeros(lossy), np.zeros(lossy)
+    result, approaches = np.zeros((blocks, 3)), np.zeros((blocks, lossy))
+    joint, space, approach, shifted = np.zeros((lossy, 13)), np.zeros((3, 8)), np.zeros(lossy), np.zeros(lossy)
     n, other, still = np.zeros(3), np.zeros(3), np.zeros(3)
     for k in range(blocks):
         for t in range(lossy):
-            start = way[t] - 2.0 * shifted[t] / gap[k, t] + bend[0, k, t]
+            start = approach[t] - 2.0 * shifted[t] / gap[k, t] + bend[0, k, t]
             joint[t, START] = min(max(start, bend[1, k, t]), bend[2, k, t]) + last[k, t]
         _take(n, still)
         if free[k, 0] + free[k, 1] + free[k, 2] > 0.0:
             weighed = 0.0 if not plain[k] else weights[1] if enough[k] <= near[k] else weights[0]
-            _fill(k, joint, space, off, by_way, tip_rates, back, gap, later, goes_on, free, way)
+            _fill(k, joint, space, off, by_approach, tip_rates, back, gap, later, goes_on, free, approach)
             cost = _cost(joint, space, n, weight[k], weighed, rests)
             if cost > near[k]:
                 cost = _toward(joint, space, n, other, cost, weight[k], weighed, rests)
             if cost > enough[k]:
-                cost = _beside(joint, space, n, other, cost, weight[k], weighed, rests, nearer, reach)
+                cost = _adjacent(joint, space, n, other, cost, weight[k], weighed, rests, nearer, reach)
             if cost > enough[k]:
-                cost = _by_ways(joint, space, n, other, cost, weight[k], weighed, rests)
-                cost = _beside(joint, space, n, other, cost, weight[k], weighed, rests, nearer, reach)
+                cost = _by_approach(joint, space, n, other, cost, weight[k], weighed, rests)
+                cost = _adjacent(joint, space, n, other, cost, weight[k], weighed, rests, nearer, reach)
         elif like[k] >= 0:
             _take(n, result[like[k]])
         for t in range(lossy):
             shifted[t] = n[0] * back[k, t, 0] + n[1] * back[k, t, 1] + n[2] * back[k, t, 2]
-            way[t] = min(max(joint[t, START] + 2.0 * shifted[t] / gap[k, t], -1.0), 1.0)
-            ways[k, t] = way[t]
+            approach[t] = min(max(joint[t, START] + 2.0 * shifted[t] / gap[k, t], -1.0), 1.0)
+            approaches[k, t] = approach[t]
         _take(result[k], n)
-    return result, ways
+    return result, approaches
 
 
 def _take(n: Any, other: Any) -> None:
@@ -83,13 +83,13 @@ def _take(n: Any, other: Any) -> None:
         n[i] = other[i]
 
 
-def _fill(k: Any, joint: Any, space: Any, off: Any, by_way: Any, tip_rates: Any, back: Any, gap: Any, later: Any,
-          goes_on: Any, free: Any, way: Any) -> None:
+def _fill(k: Any, joint: Any, space: Any, off: Any, by_approach: Any, tip_rates: Any, back: Any, gap: Any, later: Any,
+          goes_on: Any, free: Any, approach: Any) -> None:
     """What counts at block k."""
     for t in range(len(joint)):
-        joint[t, GAP], joint[t, GOES_ON], joint[t, BEFORE] = gap[k, t], goes_on[k, t], way[t]
+        joint[t, GAP], joint[t, GOES_ON], joint[t, BEFORE] = gap[k, t], goes_on[k, t], approach[t]
         for i in range(3):
-            joint[t, BACK + i], joint[t, LATER + i], joint[t, BY + i] = back[k, t, i], later[i, k, t], by_way[k, i, t]
+            joint[t, BACK + i], joint[t, LATER + i], joint[t, BY + i] = back[k, t, i], later[i, k, t], by_approach[k, i, t]
     for i in range(3):
         space[i, OFF], space[i, FREE] = off[k, i], free[k, i]
         for j in range(3):
@@ -123,9 +123,9 @@ def _cost(joint: Any, space: Any, n: Any, weight: Any, weighed: Any, rests: Any)
         row = joint[t]
         step = 2.0 * (n[0] * row[BACK] + n[1] * row[BACK + 1] + n[2] * row[BACK + 2]) / row[GAP]
         ended = min(max(row[START] + step, -1.0), 1.0)
-        way = min(max(ended + row[LATER], row[LATER + 1]), row[LATER + 2])
-        late = abs(row[GOES_ON]) * (row[GOES_ON] - way)
-        x, y, z = x + way * row[BY], y + way * row[BY + 1], z + way * row[BY + 2]
+        approach = min(max(ended + row[LATER], row[LATER + 1]), row[LATER + 2])
+        late = abs(row[GOES_ON]) * (row[GOES_ON] - approach)
+        x, y, z = x + approach * row[BY], y + approach * row[BY + 1], z + approach * row[BY + 2]
         x1, y1, z1 = x1 + late * row[BY], y1 + late * row[BY + 1], z1 + late * row[BY + 2]
         moved = row[START] - row[BEFORE] + step
         if abs(moved) > rests:
@@ -142,7 +142,8 @@ def _nearest(space: Any, other: Any, x: Any, y: Any, z: Any) -> None:
 
 
 def _toward(joint: Any, space: Any, n: Any, other: Any, cost: Any, weight: Any, weighed: Any, rests: Any) -> Any:
-    """The nearest steps for the ways that the steps n (3,) make, those of the next, as long as it comes nearer."""
+    """The nearest steps for the approach directions that the steps n (3,) make, those of the next, as long as it comes
+    nearer."""
     while True:
         x, y, z = space[0, OFF], space[1, OFF], space[2, OFF]
         for i in range(3):
@@ -151,8 +152,8 @@ def _toward(joint: Any, space: Any, n: Any, other: Any, cost: Any, weight: Any, 
             row = joint[t]
             step = 2.0 * (n[0] * row[BACK] + n[1] * row[BACK + 1] + n[2] * row[BACK + 2]) / row[GAP]
             ended = min(max(row[START] + step, -1.0), 1.0)
-            way = min(max(ended + row[LATER], row[LATER + 1]), row[LATER + 2])
-            x, y, z = x + way * row[BY], y + way * row[BY + 1], z + way * row[BY + 2]
+            approach = min(max(ended + row[LATER], row[LATER + 1]), row[LATER + 2])
+            x, y, z = x + approach * row[BY], y + approach * row[BY + 1], z + approach * row[BY + 2]
         _nearest(space, other, x, y, z)
         for i in range(3):
             other[i] += n[i]
@@ -163,14 +164,15 @@ def _toward(joint: Any, space: Any, n: Any, other: Any, cost: Any, weight: Any, 
         _take(n, other)
 
 
-def _by_ways(joint: Any, space: Any, n: Any, other: Any, cost: Any, weight: Any, weighed: Any, rests: Any) -> Any:
-    """The nearest steps for every way that is one of both or that before, where that comes nearer than n (3,)."""
+def _by_approach(joint: Any, space: Any, n: Any, other: Any, cost: Any, weight: Any, weighed: Any, rests: Any) -> Any:
+    """The nearest steps for every approach direction that is one of both or that before, where that comes nearer than n
+    (3,)."""
     for number in range(3 ** len(joint)):
         x, y, z, rest = space[0, OFF], space[1, OFF], space[2, OFF], number
         for t in range(len(joint)):
             row, digit = joint[t], rest % 3
-            way, rest = row[BEFORE] if digit == 0 else 1.0 if digit == 1 else -1.0, rest // 3
-            x, y, z = x + way * row[BY], y + way * row[BY + 1], z + way * row[BY + 2]
+            approach, rest = row[BEFORE] if digit == 0 else 1.0 if digit == 1 else -1.0, rest // 3
+            x, y, z = x + approach * row[BY], y + approach * row[BY + 1], z + approach * row[BY + 2]
         _nearest(space, other, x, y, z)
         there = _cost(joint, space, other, weight, weighed, rests)
         if there < cost:
@@ -179,8 +181,8 @@ def _by_ways(joint: Any, space: Any, n: Any, other: Any, cost: Any, weight: Any,
     return cost
 
 
-def _beside(joint: Any, space: Any, n: Any, other: Any, cost: Any, weight: Any, weighed: Any, rests: Any, nearer: Any,
-            reach: Any) -> Any:
+def _adjacent(joint: Any, space: Any, n: Any, other: Any, cost: Any, weight: Any, weighed: Any, rests: Any, nearer: Any,
+              reach: Any) -> Any:
     """The best steps around n (3,), near ones and far ones in turn, as long as one comes nearer."""
     for far in reach:
         found = True

@@ -1,4 +1,4 @@
-"""The last step of correction: words by whose own ways the machine brings the tip where it should be."""
+"""The last step of correction: words by whose own approach directions the machine brings the tip where it should be."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from toolpaths.arrays import Bools, Floats, Ints
 AT_ONCE = 50_000
 """blocks whose rates are found together"""
 PARTS = 16
-"""parts of a block whose joints do not run straight, for the ways of its axes"""
+"""parts of a block whose joints do not run straight, for the approach directions of its axes"""
 NOISE = 1e-3
-"""of the ways: turning back by less is none"""
+"""of the approach directions: turning back by less is none"""
 QUARTERS, NEAR = (0.25, 0.5, 0.75), 16.0
-"""where joints are looked at, and the part of their way off the straight one within which none turns back: bows of second
-and third order do where they leave it there by a fourth and by an eleventh"""
+"""where joints are looked at, and the part of their approach direction off the straight one within which none turns back:
+bows of second and third order do where they leave it there by a fourth and by an eleventh"""
 BEGINS = 0.01
-"""weight of what the beginning of a block is off by beside what the end before it is, but where lost motion is taken up"""
+"""weight of what the beginning of a block is off by next to what the end before it is, but where lost motion is taken up"""
 CLOSED = 0.05
 """mm between the ends of arcs that count as closed circles"""
 ROUNDED = 2.5
@@ -53,7 +53,7 @@ class Writing:
 
 def settled(made: Divided, work: ErrorContext, writing: Writing, allowed: float) -> tuple[JointPath, float, Floats]:
     """The path made of the blocks of `work`, with words by which axes that lose motion stand where they should; rad, the
-    worst that is left of the axis at ends of CL moves where they do; and the ways (K, T) by which they do.
+    worst that is left of the axis at ends of CL moves where they do; and the approach directions (K, T) by which they do.
 
     Blocks keep their words where these bring the tip as near as rounding lets them. Closed circles, linking moves and blocks
     that name their axes keep them anyway, points between ends and rapids where they are off by no more than `allowed` mm.
@@ -61,13 +61,13 @@ def settled(made: Divided, work: ErrorContext, writing: Writing, allowed: float)
     with their ends.
     """
     path = made.path
-    if not work.two_way or len(_columns(path)) != 3:
+    if not work.bidirectional or len(_columns(path)) != 3:
         return path, 0.0, np.zeros((len(path), 0))
     written = _Written(made, work, writing)
-    n, ways = walk(written.ends(allowed))
-    left, changed = written.axis_left(ways), np.flatnonzero(n.any(axis=1))
+    n, approaches = walk(written.ends(allowed))
+    left, changed = written.axis_left(approaches), np.flatnonzero(n.any(axis=1))
     if not len(changed):
-        return path, left, ways
+        return path, left, approaches
     chosen, xyz = written.words.copy(), _columns(path)
     chosen[:, xyz] += n * writing.grain[xyz]
     q = path.q.copy()
@@ -76,7 +76,7 @@ def settled(made: Divided, work: ErrorContext, writing: Writing, allowed: float)
     center = path.center.copy()
     center[arcs] = new_centers(path, arcs, *(words[rows][:, xyz] for words in (written.words, chosen)
                                              for rows in (arcs - 1, arcs)))
-    return replace(path, q=q, center=center), left, ways
+    return replace(path, q=q, center=center), left, approaches
 
 
 def _columns(path: JointPath) -> Ints:
@@ -104,7 +104,7 @@ class _Written:
         free[first] = np.isfinite(self.q[bottom]).all(axis=1, keepdims=True) * np.array([1.0, 1.0, 0.0])
         counts[first] = bottom
         like = self._like(first)
-        back, tip_rates, off, by_way = self._rates(np.flatnonzero(free.any(axis=1) | (like >= 0)), counts)
+        back, tip_rates, off, by_approach = self._rates(np.flatnonzero(free.any(axis=1) | (like >= 0)), counts)
         near = 0.5 * np.linalg.norm(tip_rates, axis=(1, 2))
         between = ((self.made.until < 1.0) | (path.code == TRAVERSE)) & (counts == np.arange(size))
         goes_on = np.append(begin[1:], np.zeros((1, begin.shape[1])), axis=0)
@@ -116,18 +116,19 @@ class _Written:
         enough = np.maximum(ROUNDED * near, np.where(between, allowed, 0.0))
         near = np.where(between, enough, near)
         plain = axis_positions(path, self.work.tools[self.made.owner])
-        return BlockEnds(off, by_way, tip_rates, back, self.gap, bend, last, later, goes_on, weight, plain, near, enough,
+        return BlockEnds(off, by_approach, tip_rates, back, self.gap, bend, last, later, goes_on, weight, plain, near,
+                         enough,
                          free,
                          like)
 
-    def axis_left(self, ways: Floats) -> float:
-        """rad, the worst deviation of the axis at ends of CL moves, by ways (K, T)."""
+    def axis_left(self, approaches: Floats) -> float:
+        """rad, the worst deviation of the axis at ends of CL moves, by approach directions (K, T)."""
         k = np.flatnonzero((self.path.u == 1.0) & (self.made.until == 1.0) & np.isfinite(self.q).all(axis=1))
         if not len(k):
             return 0.0
-        way, owner = np.zeros((len(k), self.q.shape[1])), self.made.owner[k]
-        way[:, self.work.two_way] = ways[k]
-        residual = self.work.residual(self.work.nominal(owner, np.ones(len(k))), self.path.q[k], owner, way)
+        approach, owner = np.zeros((len(k), self.q.shape[1])), self.made.owner[k]
+        approach[:, self.work.bidirectional] = approaches[k]
+        residual = self.work.residual(self.work.nominal(owner, np.ones(len(k))), self.path.q[k], owner, approach)
         return float(np.linalg.norm(residual[:, 3:], axis=1).max())
 
     def _like(self, first: Ints) -> Ints:
@@ -164,9 +165,9 @@ class _Written:
         return result
 
     def _motion(self) -> tuple[Floats, Floats, Floats]:
-        """`bend` and `last` of `BlockEnds`, by pieces on arcs and where the words are the tip that turns; and the ways
-        (K, T) by which blocks begin, 0 for joints that move by less than they lose."""
-        t = self.work.two_way
+        """`bend` and `last` of `BlockEnds`, by pieces on arcs and where the words are the tip that turns; and the approach
+        directions (K, T) by which blocks begin, 0 for joints that move by less than they lose."""
+        t = self.work.bidirectional
         last = 2.0 * np.nan_to_num(np.diff(self.q, axis=0, prepend=self.q[:1]))[:, t] / self.gap
         bend, begin = _none(3, *self.gap.shape), np.where(np.abs(last) >= 2.0, np.sign(last), 0.0)
         bent = np.flatnonzero(bent_blocks(self.path, self.work.rotary))
@@ -178,8 +179,8 @@ class _Written:
         return bend, last, begin
 
     def _turning(self, rows: Ints) -> Bools:
-        """(N,) blocks (N,) in which a joint may turn back: not where all stay near the straight way."""
-        t, gap = self.work.two_way, self.gap[rows]
+        """(N,) blocks (N,) in which a joint may turn back: not where all stay near the straight approach direction."""
+        t, gap = self.work.bidirectional, self.gap[rows]
         q0, step = self.q[rows - 1][:, t], (self.q[rows] - self.q[rows - 1])[:, t]
         apart = np.max([np.abs(self._along(rows, share)[:, t] - q0 - share * step) for share in QUARTERS], axis=0)
         return np.asarray(~(apart <= np.maximum(np.abs(step), 0.5 * NOISE * gap) / NEAR).all(axis=1))
@@ -199,45 +200,46 @@ class _Written:
 
     def _rates(self, k: Ints, counts: Ints) -> tuple[Floats, Floats, Floats, Floats]:
         """back, tip_rates, off, by_way of `BlockEnds`, 0 but for blocks k (N,); the tip counts at those of `counts` (K,)."""
-        lossy, size, until = len(self.work.two_way), len(self.path), self.made.until
+        lossy, size, until = len(self.work.bidirectional), len(self.path), self.made.until
         back, tip_rates = np.zeros((size, lossy, 3)), np.zeros((size, 3, 3))
-        off, by_way = np.zeros((size, 3)), np.zeros((size, 3, lossy))
+        off, by_approach = np.zeros((size, 3)), np.zeros((size, 3, lossy))
         for first in range(0, len(k), AT_ONCE):
             rows = k[first:first + AT_ONCE]
             at = counts[rows]
             back[rows], tip_rates[rows] = self._moved(at)
-            off[rows], by_way[rows] = self._left(at, until[at])
-        return back, tip_rates, off, by_way
+            off[rows], by_approach[rows] = self._left(at, until[at])
+        return back, tip_rates, off, by_approach
 
     def _moved(self, at: Ints) -> tuple[Floats, Floats]:
         """back (N, T, 3) and tip_rates (N, 3, 3) of `BlockEnds` at blocks (N,)."""
         path, work, owner = self.path, self.work, self.made.owner[at]
-        back, rates = np.zeros((len(at), len(work.two_way), 3)), np.zeros((len(at), 3, 3))
+        back, rates = np.zeros((len(at), len(work.bidirectional), 3)), np.zeros((len(at), 3, 3))
         here = work.poses(self.q[at], owner)[0]
         for i, column in enumerate(_columns(path).tolist()):
-            beside = self.words[at]
-            beside[:, column] += self.writing.grain[column]
-            moved = self.writing.joints(path, beside, at)
-            back[:, :, i] = (moved - self.q[at])[:, work.two_way]
+            adjacent = self.words[at]
+            adjacent[:, column] += self.writing.grain[column]
+            moved = self.writing.joints(path, adjacent, at)
+            back[:, :, i] = (moved - self.q[at])[:, work.bidirectional]
             rates[:, :, i] = work.poses(moved, owner)[0] - here
         return back, rates
 
     def _left(self, at: Ints, until: Floats) -> tuple[Floats, Floats]:
         """off (N, 3) and by_way (N, 3, T) of `BlockEnds` at blocks (N,), `until` (N,) of the time of theirs in `work`."""
         work, owner = self.work, self.made.owner[at]
-        wanted, way = work.nominal(owner, until), np.zeros((len(at), self.q.shape[1]))
-        off = work.residual(wanted, self.q[at], owner, way)[:, :3]
-        by_way = np.zeros((len(at), 3, len(work.two_way)))
-        for i, j in enumerate(work.two_way):
-            forward = way.copy()
+        wanted, approach = work.nominal(owner, until), np.zeros((len(at), self.q.shape[1]))
+        off = work.residual(wanted, self.q[at], owner, approach)[:, :3]
+        by_approach = np.zeros((len(at), 3, len(work.bidirectional)))
+        for i, j in enumerate(work.bidirectional):
+            forward = approach.copy()
             forward[:, j] = 1.0
-            by_way[:, :, i] = work.residual(wanted, self.q[at], owner, forward)[:, :3] - off
-        return off, by_way
+            by_approach[:, :, i] = work.residual(wanted, self.q[at], owner, forward)[:, :3] - off
+        return off, by_approach
 
 
 def _runs(pieces: Iterable[Floats]) -> tuple[Floats, Floats, Floats]:
     """(3, N, T), (N, T), (N, T) of motion in pieces (N, T), 2 being what a joint loses: shift, low and high of all but the
-    last run one way, that run, and the way of the first run, 0 where it is shorter than what the joint loses."""
+    last run one direction, that run, and the approach direction of the first run, 0 where it is shorter than what the joint
+    loses."""
     first, *rest = pieces
     whole, run, gone, most = PlaySteps(*_none(3, *first.shape)), first, first, np.abs(first)
     for piece in rest:

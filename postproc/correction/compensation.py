@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from machines.geometric_error.actual.model import ErrorModel, doubt
+from machines.geometric_error.actual.model import ErrorModel, uncertainty
 from machines.geometric_error.exchange.volume import measured
 from machines.kinematics.base import Kinematics
 from postproc.base.group_rows import groups
@@ -33,14 +33,16 @@ from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.diagnostics import Diagnostic, Severity, error, has_errors
 from toolpaths.units import DEG
 
-DOUBTS = 500
-"""blocks at which the doubt of the correction is computed"""
+UNCERTAINTY_DIGITS = 500
+"""blocks at which the uncertainty of the correction is computed"""
 SHARE = 0.1
 """of the tolerances: what the correction may be off between corrected points"""
 MOVED = 2
-"""how often points are put between ends: words may take ends farther by other ways, and blocks begin by those then"""
+"""how often points are put between ends: words may take ends farther by other approach directions, and blocks begin by those
+then"""
 SETTLED = 5
-"""how often the ways of the axes are looked for: a correction by new ways may turn other axes back"""
+"""how often the approach directions of the axes are looked for: a correction by new approach directions may turn other axes
+back"""
 
 
 @dataclass(frozen=True)
@@ -57,7 +59,8 @@ class ErrorCorrection:
         moved: (J,) largest correction of each joint
         apart: (K,) True for blocks that no canned cycle may stand for: each has its own correction
         owner, part: block of the nominal path that each block is of, and part of its time
-        doubt_tip, doubt_axis: largest standard deviation that the model's covariance gives; None where it has none
+        uncertainty_tip, uncertainty_axis: largest standard deviation that the model's covariance gives; None where it has
+            none
     """
 
     tip_before: float
@@ -73,8 +76,8 @@ class ErrorCorrection:
     owner: Ints
     part: Floats
     apart: Bools
-    doubt_tip: float | None = None
-    doubt_axis: float | None = None
+    uncertainty_tip: float | None = None
+    uncertainty_axis: float | None = None
 
     def lines(self) -> list[str]:
         """What happened, for header and summary."""
@@ -82,9 +85,9 @@ class ErrorCorrection:
         return [f"geometric errors corrected: tip {1e3 * self.tip_before:.1f} um, axis {self.axis_before / arcsec:.1f} "
                 f"arcsec before, {1e3 * self.tip_after:.2f} um and {self.axis_after / arcsec:.2f} arcsec left",
                 f"{self.added} points added, {self.resolved} arcs resolved, {self.partial} blocks near a pole",
-                *([] if self.doubt_tip is None or self.doubt_axis is None else
-                  [f"doubt of the correction (one standard deviation): tip {1e3 * self.doubt_tip:.2f} um, axis "
-                   f"{self.doubt_axis / arcsec:.2f} arcsec"])]
+                *([] if self.uncertainty_tip is None or self.uncertainty_axis is None else
+                  [f"uncertainty of the correction (one standard deviation): tip {1e3 * self.uncertainty_tip:.2f} um, axis "
+                   f"{self.uncertainty_axis / arcsec:.2f} arcsec"])]
 
 
 def compensate(path: JointPath, moves: Moves, tools: Ints, kinematics: Callable[[int], Kinematics], model: ErrorModel,
@@ -107,14 +110,14 @@ def compensate(path: JointPath, moves: Moves, tools: Ints, kinematics: Callable[
 
     work = work_on(path, np.arange(len(path)))
     cut = arcs_cut(path, work)
-    if work.two_way:
+    if work.bidirectional:
         cut = _points_by_mean(cut, moves, modes, work_on(cut.path, cut.owner, mean=True), allowed, always)
     path, work = cut.path, work_on(cut.path, cut.owner)
     corrected, found = _at_ends(path, moves, modes, work, allowed, always)
-    for k in range(SETTLED if work.two_way else 0):
-        before = work.way
-        work.take_ways(corrected, writing.words(corrected), drift=k == 0)
-        if np.array_equal(work.way, before):
+    for k in range(SETTLED if work.bidirectional else 0):
+        before = work.approach
+        work.take_approaches(corrected, writing.words(corrected), drift=k == 0)
+        if np.array_equal(work.approach, before):
             break
         corrected, found = _at_ends(path, moves, modes, work, allowed, always)
     live = ~path.home
@@ -134,33 +137,33 @@ def compensate(path: JointPath, moves: Moves, tools: Ints, kinematics: Callable[
     before, after = (x[done].max(axis=0, initial=0.0) for x in (found.before, found.after))
     tip_before, axis_before = np.maximum(before, _before_inside(path, work, done)).tolist()
     tip_after, axis_after = after.tolist()
-    doubt_tip, doubt_axis = _doubt(path, live, work, model)
+    uncertainty_tip, uncertainty_axis = _uncertainty(path, live, work, model)
     report = ErrorCorrection(
         tip_before, axis_before, tip_after, max(axis_after, axis_left), residual_tip=found.residual[:, :3],
         residual_axis=found.residual[:, 3:], added=len(corrected) - before_cut, resolved=int(resolved.sum()),
         partial=int(found.partial[live].sum()), moved=np.abs(found.q - path.q).max(axis=0, initial=0.0),
-        owner=whole.owner, part=whole.part, apart=apart, doubt_tip=doubt_tip, doubt_axis=doubt_axis)
+        owner=whole.owner, part=whole.part, apart=apart, uncertainty_tip=uncertainty_tip, uncertainty_axis=uncertainty_axis)
     return corrected, report, diagnostics
 
 
 def _written_out(corrected: JointPath, path: JointPath, work: ErrorContext, writing: Writing,
                  allowed: float) -> tuple[Divided, JointPath, Bools, float]:
     """The blocks with points between them, their path in words that stand where they should, arcs that became lines, and rad
-    left of the axis; anew where words take ends farther."""
+    left of the axis; again where words take ends farther."""
     again = MOVED
     while True:
         starts = starts_of(corrected, path, work, allowed)
         fitted, resolved = fitted_arcs(corrected, path, work, starts.q, allowed, float(writing.grain.min()))
         whole = divided(fitted, work, starts, allowed)
-        written, axis_left, ways = settled(whole, work, writing, allowed)
+        written, axis_left, approaches = settled(whole, work, writing, allowed)
         ends = np.flatnonzero(np.append(whole.owner[1:] != whole.owner[:-1], True))
         far = np.flatnonzero(np.abs(written.q[ends] - fitted.q).max(axis=1, initial=0.0) > allowed)
         again -= 1
         if not (again and len(far)):
             return whole, written, resolved, axis_left
         corrected.q[far] = written.q[ends[far]]
-        work.way[far[:, None], work.two_way] = ways[ends[far]]
-        del starts, fitted, whole, written, ways  # not to be held beside the next
+        work.approach[far[:, None], work.bidirectional] = approaches[ends[far]]
+        del starts, fitted, whole, written, approaches  # not to be held next to the next
 
 
 def _before_inside(path: JointPath, work: ErrorContext, where: Bools) -> Floats:
@@ -169,14 +172,15 @@ def _before_inside(path: JointPath, work: ErrorContext, where: Bools) -> Floats:
     for k, t in looks_between(work.changes(path.q[block - 1], path.q[block])):
         rows = block[k]
         q = work.nominal(rows, t)
-        off = work.residual(q, q, rows, work.way_at(rows, t)).reshape(-1, 2, 3)
+        off = work.residual(q, q, rows, work.approach_at(rows, t)).reshape(-1, 2, 3)
         worst = np.fmax(worst, np.fmax.reduce(np.linalg.norm(off, axis=2)))
     return worst
 
 
 def _points_by_mean(cut: Divided, moves: Moves, modes: OutputModes, work: ErrorContext, allowed: float,
                     always: Bools) -> Divided:
-    """The nominal path with the points that the correction by mean ways needs, so that the ways are those of all points."""
+    """The nominal path with the points that the correction by mean approach directions needs, so that the approach
+    directions are those of all points."""
     corrected, _ = _at_ends(cut.path, moves, modes, work, allowed, always)
     starts = starts_of(corrected, cut.path, work, allowed)
     block, share, _ = between(corrected, work, starts, allowed)
@@ -185,7 +189,8 @@ def _points_by_mean(cut: Divided, moves: Moves, modes: OutputModes, work: ErrorC
 
 def _at_ends(path: JointPath, moves: Moves, modes: OutputModes, work: ErrorContext, allowed: float,
              always: Bools) -> tuple[JointPath, CorrectedEnds]:
-    """The path with its block ends corrected by the ways of `work`, holes as a whole; and what the correction said."""
+    """The path with its block ends corrected by the approach directions of `work`, holes as a whole; and what the correction
+    said."""
     found = _turned_in_travel(work.ends(), path, modes.control, work)
     corrected = framed(replace(path, q=found.q), path, modes, work)
     corrected = replace(corrected, q=unstated(kept_in_travel(corrected.q, path, modes.control), path))
@@ -203,8 +208,8 @@ def _turned_in_travel(found: CorrectedEnds, path: JointPath, control: Control, w
     if not len(rows):
         return found
     q, after, residual = found.q.copy(), found.after.copy(), found.residual.copy()
-    q[rows] = work.at(path.q[rows], rows, work.way[rows], inside[rows][:, work.rotary])
-    residual[rows] = work.residual(path.q[rows], q[rows], rows, work.way[rows])
+    q[rows] = work.at(path.q[rows], rows, work.approach[rows], inside[rows][:, work.rotary])
+    residual[rows] = work.residual(path.q[rows], q[rows], rows, work.approach[rows])
     after[rows] = np.linalg.norm(residual[rows].reshape(-1, 2, 3), axis=2)
     return replace(found, q=q, after=after, residual=residual)
 
@@ -246,28 +251,28 @@ def framed(path: JointPath, nominal: JointPath, modes: OutputModes, work: ErrorC
     for run in np.unique(work.group[tilted & (work.group >= 0)]).tolist():
         k = np.flatnonzero((work.group == run) & tilted)
         whole = np.flatnonzero(work.group == run)
-        if not np.isfinite(path.q[k[0]]).all():  # out of reach, told by the caller
+        if not np.isfinite(path.q[k[0]]).all():  # out of reach, reported by the caller
             continue
         new, at = modes.plane(work.kinematics(int(work.tools[k[0]])), path.q[k[0]])
         if new not in frames:
             frames.append(new)
         frame[k] = frames.index(new)
-        q[whole] = work.at(nominal.q[whole], whole, work.way[whole], np.tile(at[work.rotary], (len(whole), 1)))
+        q[whole] = work.at(nominal.q[whole], whole, work.approach[whole], np.tile(at[work.rotary], (len(whole), 1)))
     return replace(path, q=q, frame=frame, frames=tuple(frames))
 
 
-def _doubt(path: JointPath, live: Bools, work: ErrorContext, model: ErrorModel) -> tuple[float | None, float | None]:
-    """Largest standard deviations at up to DOUBTS blocks spread over the path."""
+def _uncertainty(path: JointPath, live: Bools, work: ErrorContext, model: ErrorModel) -> tuple[float | None, float | None]:
+    """Largest standard deviations at up to Uncertainties blocks spread over the path."""
     if model.covariance is None or not live.any():
         return None, None
     rows = np.flatnonzero(live)
-    rows = rows[np.unique(np.linspace(0, len(rows) - 1, DOUBTS).astype(np.int64))]
+    rows = rows[np.unique(np.linspace(0, len(rows) - 1, UNCERTAINTY_DIGITS).astype(np.int64))]
     tip, axis = 0.0, 0.0
     for k in groups(work.tools[rows]):
         tool = int(work.tools[rows[k[0]]])
         actual, q = work.actual(tool), path.q[rows[k]]
         w = actual.coordinates(q, np.concatenate(work.kinematics(tool).forward(q), axis=1))
-        found = doubt(model, actual, w, work.way[rows[k]])
+        found = uncertainty(model, actual, w, work.approach[rows[k]])
         tip, axis = max(tip, float(found.tip_worst.max())), max(axis, float(found.axis.max()))
     return tip, axis
 
@@ -278,7 +283,7 @@ def _unmeasured(path: JointPath, moves: Moves, control: Control, where: Bools, r
                 known: dict[str, tuple[float, float]], severity: Severity, file: str) -> list[Diagnostic]:
     """One of each axis that goes where its errors were not measured, `where` (K, J), from and to `reached` (K, J); `known`:
     what was measured of it. Those that are no errors get the error at the end of the range: linking moves are INFO."""
-    told, linking = [], " in linking moves" if severity == Severity.INFO else ""
+    noted, linking = [], " in linking moves" if severity == Severity.INFO else ""
     for j in np.flatnonzero(where.any(axis=0)).tolist():
         rows = np.flatnonzero(where[:, j])
         low, high = reached[0][rows, j].min() * control.unit[j], reached[1][rows, j].max() * control.unit[j]
@@ -287,13 +292,13 @@ def _unmeasured(path: JointPath, moves: Moves, control: Control, where: Bools, r
         text = f"{name} goes from {low:.7g} to {high:.7g}{linking} where its errors were not measured" + (
             f": they were from {span}" if span else "")
         if severity != Severity.ERROR:
-            told.append(Diagnostic(severity, "compensation.range", text + "; the error at the end of the range is taken",
-                                   file=file, lines=tuple(lines), count=len(rows)))
+            noted.append(Diagnostic(severity, "compensation.range", text + "; the error at the end of the range is taken",
+                                    file=file, lines=tuple(lines), count=len(rows)))
             continue
         turn = "write repeats = 360 where a whole turn was measured, " if control.machine.rotary[j] else ""
-        told.append(error("compensation.range", text, file=file, lines=lines, count=len(rows),
-                          hint=f"{turn}measure farther, move the part, or take --error-model-beyond"))
-    return told
+        noted.append(error("compensation.range", text, file=file, lines=lines, count=len(rows),
+                           hint=f"{turn}measure farther, move the part, or take --error-model-beyond"))
+    return noted
 
 
 def _lost(path: JointPath, moves: Moves, lost: Bools, file: str) -> Diagnostic:

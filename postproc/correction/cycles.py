@@ -246,12 +246,12 @@ def _leads(path: JointPath, nominal: JointPath, work: ErrorContext, holes: _Hole
 
 
 def _near(nominal: JointPath, work: ErrorContext, holes: _Holes, joints: Floats, share: Floats) -> Bools:
-    """(H,) holes that joints (M, J) leave within LOOSE times `share` (M,) mm of where they belong by the ways at their
-    bottoms, and within IN_AIR times that by the ways of their blocks."""
+    """(H,) holes that joints (M, J) leave within LOOSE times `share` (M,) mm of where they belong by the approach directions
+    at their bottoms, and within IN_AIR times that by the approach directions of their blocks."""
     rows = holes.rows
-    bottom = work.way[rows[holes.bottom]][holes.hole]
+    bottom = work.approach[rows[holes.bottom]][holes.hole]
     fine = work.off(nominal.q[rows], joints, rows, bottom) <= LOOSE * share
-    return holes.runs.throughout(fine & (work.off(nominal.q[rows], joints, rows, work.way[rows]) <= IN_AIR * share))
+    return holes.runs.throughout(fine & (work.off(nominal.q[rows], joints, rows, work.approach[rows]) <= IN_AIR * share))
 
 
 def _approached(path: JointPath, work: ErrorContext, holes: _Holes, joints: Floats, share: Floats, near: Bools,
@@ -262,8 +262,8 @@ def _approached(path: JointPath, work: ErrorContext, holes: _Holes, joints: Floa
     follows = np.append(False, holes.runs.last[:-1] + 1 == row[1:]) & ~np.isin(row - 1, lead)
     both = np.flatnonzero(near & follows & np.append(False, near[:-1]))
     result, behind = near.copy(), np.zeros(len(near), dtype=np.bool_)
-    for k, q, told in ((np.flatnonzero(near), path.q[row - 1], result), (both, joints[holes.first - 1], behind)):
-        told[k] = _approach_off(path, work, q[k], joints[holes.first[k]], row[k], share[holes.first[k]]) <= limit[k]
+    for k, q, noted in ((np.flatnonzero(near), path.q[row - 1], result), (both, joints[holes.first - 1], behind)):
+        noted[k] = _approach_off(path, work, q[k], joints[holes.first[k]], row[k], share[holes.first[k]]) <= limit[k]
     for h in both.tolist():
         if result[h - 1]:
             result[h] = behind[h]
@@ -271,13 +271,14 @@ def _approached(path: JointPath, work: ErrorContext, holes: _Holes, joints: Floa
 
 
 def _approach_off(path: JointPath, work: ErrorContext, q0: Floats, q1: Floats, row: Ints, share: Floats) -> Floats:
-    """(N,) mm, largest distance from the nominal motion on the way from q0 to q1 (N, J), to holes (blocks `row`), which get
-    no points; 0 where the correction changes by no more than `share` (N,) mm over one stretch of the errors."""
+    """(N,) mm, largest distance from the nominal motion on the approach direction from q0 to q1 (N, J), to holes (blocks
+    `row`), which get no points; 0 where the correction changes by no more than `share` (N,) mm over one stretch of the
+    errors."""
     change = q1 - q0 - (work.path.q[row] - work.path.q[row - 1])
     near = (work.changes(q0, q1) == 1) & (np.abs(change).max(axis=1, initial=0.0) <= share)
     far, looks = np.flatnonzero(~near), len(LOOKS)
     k, t = np.repeat(far, looks), np.tile(LOOKS, len(far))
     got = work.straight(path, q0[k], q1[k], row[k], t)
     result = np.zeros(len(row))
-    result[far] = work.off(work.nominal(row[k], t), got, row[k], work.way[row[k]]).reshape(-1, looks).max(axis=1)
+    result[far] = work.off(work.nominal(row[k], t), got, row[k], work.approach[row[k]]).reshape(-1, looks).max(axis=1)
     return result

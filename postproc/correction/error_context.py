@@ -1,4 +1,5 @@
-"""The machine with errors along a path: nominal and corrected joints anywhere in its blocks, and the ways of its axes."""
+"""The machine with errors along a path: nominal and corrected joints anywhere in its blocks, and the approach directions of
+its axes."""
 
 from __future__ import annotations
 
@@ -48,8 +49,8 @@ class ErrorContext:
     """What is needed throughout: the machine with errors by tool, groups of one orientation.
 
     `whole`: (K,) the hole that a block is of where it is corrected as a whole, else ALONE or LIFTS; `level`: (K,) blocks
-    that end at the plane of such holes, whose Z stands; `way`: (K, J) sign of each joint's last motion at the ends of the
-    blocks, 0 for the mean of both; `drift`: (K, J) of the correction over each block; `beyond`, `beyond_inside`: (K,)
+    that end at the plane of such holes, whose Z stands; `approach`: (K, J) sign of each joint's last motion at the ends of
+    the blocks, 0 for the mean of both; `drift`: (K, J) of the correction over each block; `beyond`, `beyond_inside`: (K,)
     blocks that may end, or run, where errors were not measured.
     """
 
@@ -62,7 +63,7 @@ class ErrorContext:
         self.axis_share, self.mean = share * axis_tolerance, mean
         self.whole: Ints = np.full(len(path), ALONE)
         self.level: Bools = np.zeros(len(path), dtype=np.bool_)
-        self.way: Floats = np.zeros(path.q.shape)
+        self.approach: Floats = np.zeros(path.q.shape)
         self.drift: Floats = np.zeros(path.q.shape)
         self.rotary = np.array(kinematics(int(tools[0])).rotary)
         self.group = one_orientation(path.q[:, self.rotary], tools, path.home)
@@ -75,19 +76,20 @@ class ErrorContext:
         return self._actual[tool]
 
     @cached_property
-    def two_way(self) -> list[int]:
-        """Joints that have errors with two ways of approach; none where all go by their `mean`."""
-        return [] if self.mean else self.model.axes.two_way(self.names)
+    def bidirectional(self) -> list[int]:
+        """Joints that have errors with two approach directions; none where all go by their `mean`."""
+        return [] if self.mean else self.model.axes.bidirectional(self.names)
 
     @cached_property
     def names(self) -> tuple[str, ...]:
         """Letters of the joints."""
         return self.kinematics(int(self.tools[0])).axis_names
 
-    def take_ways(self, path: JointPath, words: Floats, drift: bool = True) -> None:
-        """Find `way` from the corrected `path` and its words (K, J) at block ends, and `drift` where that is by mean ways.
+    def take_approaches(self, path: JointPath, words: Floats, drift: bool = True) -> None:
+        """Find `approach` from the corrected `path` and its words (K, J) at block ends, and `drift` where that is by mean
+        approach directions.
 
-        Where words are axis positions their last change tells.
+        Where words are axis positions their last change says.
         A joint that the correction alone moves turns back too: what it loses is more than what it moves by; inside a
         hole, which is moved as a whole, it does so by shares. Where joints do not run straight it is the sign of the last
         moment.
@@ -103,21 +105,24 @@ class ErrorContext:
         last = self.moving(bent, np.ones(len(bent)), self.last(bent))
         step[bent] = np.where(last != 0.0, last, step[bent])
         inside = np.flatnonzero((self.whole[1:] != ALONE) & (self.whole[1:] == self.whole[:-1])) + 1
-        lateral = step[inside[:, None], self.two_way]
-        step[inside[:, None], self.two_way] = np.where(np.abs(lateral) >= self.gaps(q[inside]), lateral, 0.0)
-        self.way = turning_sign(step, self.rotary)
-        self._ways_inside(inside, q)
+        lateral = step[inside[:, None], self.bidirectional]
+        step[inside[:, None], self.bidirectional] = np.where(np.abs(lateral) >= self.gaps(q[inside]), lateral, 0.0)
+        self.approach = turning_sign(step, self.rotary)
+        self._approaches_inside(inside, q)
 
-    def _ways_inside(self, inside: Ints, q: Floats) -> None:
-        """Take up by shares in blocks `inside` (N,) of holes, which go to joints q (K, J), from the ways before them."""
+    def _approaches_inside(self, inside: Ints, q: Floats) -> None:
+        """Take up by shares in blocks `inside` (N,) of holes, which go to joints q (K, J), from the approach directions
+        before them."""
         if not len(inside):
             return
         before = np.setdiff1d(inside - 1, inside)
-        rows, two = np.union1d(before, inside), self.two_way
-        way, steps = self.way[rows][:, two], PlaySteps.of(np.nan_to_num(q[rows] - q[rows - 1])[:, two], self.gaps(q[rows]))
+        rows, two = np.union1d(before, inside), self.bidirectional
+        approach, steps = self.approach[rows][:, two], PlaySteps.of(np.nan_to_num(q[rows] - q[rows - 1])[:, two],
+                                                                    self.gaps(q[rows]))
         begins = np.isin(rows, before)[:, None]
-        steps = PlaySteps(*(np.where(begins, x, y) for x, y in ((0.0, steps.shift), (way, steps.low), (way, steps.high))))
-        self.way[rows[:, None], two] = steps.walked().at(way)
+        steps = PlaySteps(*(np.where(begins, x, y) for x,
+                            y in ((0.0, steps.shift), (approach, steps.low), (approach, steps.high))))
+        self.approach[rows[:, None], two] = steps.walked().at(approach)
 
     @cached_property
     def bent(self) -> Bools:
@@ -141,21 +146,21 @@ class ErrorContext:
         result: Floats = self.nominal(block, before + moment) - self.nominal(block, before)
         return result
 
-    def way_at(self, block: Ints, t: Floats) -> Floats:
+    def approach_at(self, block: Ints, t: Floats) -> Floats:
         """(N, J) sign of each joint's last motion inside blocks; a joint that rests there has that of the block's end."""
-        if not self.two_way:
+        if not self.bidirectional:
             return np.zeros((len(block), self.path.q.shape[1]))
         moving = self.moving(block, t)
-        return np.asarray(np.where(moving != 0.0, moving, self.way[block]))
+        return np.asarray(np.where(moving != 0.0, moving, self.approach[block]))
 
-    def begin_way(self, block: Ints) -> Floats:
+    def begin_approach(self, block: Ints) -> Floats:
         """(N, J) sign of each joint's first motion in blocks (N,).
 
         That of the block before for one that rests, or that the correction alone moves: it has the whole block to take up
         what it loses.
         """
         first = np.zeros((len(block), self.path.q.shape[1]))
-        if not self.two_way:
+        if not self.bidirectional:
             return first
         arc = self.path.code[block] == ARC
         for rows, edges in ((np.flatnonzero(arc), EDGES), (np.flatnonzero(~arc), (0.0, 1.0))):
@@ -163,19 +168,19 @@ class ErrorContext:
                 last = self.last(block[rows])
                 step, drift = self._step(block[rows], np.full(len(rows), t), last), last[:, None] * self.drift[block[rows]]
                 first[rows] = np.where(np.abs(step) > np.abs(drift), moving_sign(step + drift, self.rotary), first[rows])
-        return np.asarray(np.where(first != 0.0, first, self.way[np.maximum(block - 1, 0)]))
+        return np.asarray(np.where(first != 0.0, first, self.approach[np.maximum(block - 1, 0)]))
 
-    def played(self, way: Floats, q0: Floats, q: Floats) -> Floats:
-        """Ways (N, J) of joints that have gone from q0 to q (N, J), `way` (N, J) at q0."""
-        result = np.array(way)
-        if self.two_way:
-            j = self.two_way
-            result[:, j] = PlaySteps.of(np.nan_to_num((q - q0)[:, j]), self.gaps(q)).at(way[:, j])
+    def played(self, approach: Floats, q0: Floats, q: Floats) -> Floats:
+        """Approach directions (N, J) of joints that have gone from q0 to q (N, J), `approach` (N, J) at q0."""
+        result = np.array(approach)
+        if self.bidirectional:
+            j = self.bidirectional
+            result[:, j] = PlaySteps.of(np.nan_to_num((q - q0)[:, j]), self.gaps(q)).at(approach[:, j])
         return result
 
     def gaps(self, q: Floats) -> Floats:
-        """(N, T) lost motion of the joints in `two_way` at q (N, J)."""
-        return self.model.axes.gaps(self.names, np.nan_to_num(q), self.two_way)
+        """(N, T) lost motion of the joints in `bidirectional` at q (N, J)."""
+        return self.model.axes.gaps(self.names, np.nan_to_num(q), self.bidirectional)
 
     def nominal(self, block: Ints, t: Floats) -> Floats:
         """Nominal joints (N, J) at fraction t (N,) of blocks (N,), along the arc of those that are arcs."""
@@ -212,12 +217,12 @@ class ErrorContext:
         return self.model.detail(self.names)
 
     def changes(self, q0: Floats, q1: Floats) -> Ints:
-        """(N,) stretches of motion from q0 to q1 (N, J) in which errors run one way."""
+        """(N,) stretches of motion from q0 to q1 (N, J) in which errors run one direction."""
         return changes(q1 - q0, self.detail)
 
     def reached(self) -> tuple[Floats, Floats]:
-        """(K, J) least and greatest joints of blocks: at the end; where joints do not run straight on the way; where cuts
-        begin that a linking move leads to."""
+        """(K, J) least and greatest joints of blocks: at the end; where joints do not run straight on the approach
+        direction; where cuts begin that a linking move leads to."""
         low, high = self.path.q.copy(), self.path.q.copy()
         cuts = np.flatnonzero((self.path.code[1:] != TRAVERSE) & np.isnan(self.path.u[:-1]) & ~self.path.home[:-1]) + 1
         low[cuts], high[cuts] = (f(low[cuts], self.path.q[cuts - 1]) for f in (np.fmin, np.fmax))
@@ -238,7 +243,7 @@ class ErrorContext:
         return result
 
     def ends(self) -> CorrectedEnds:
-        """All block ends, by the ways `way`; home blocks as they are."""
+        """All block ends, by the approach directions `approach`; home blocks as they are."""
         n, joints = self.path.q.shape
         out = CorrectedEnds(self.path.q.copy(), np.zeros((n, 2)), np.zeros((n, 2)), np.zeros((n, 6)),
                             np.zeros(n, dtype=bool), np.zeros((n, joints), dtype=bool))
@@ -249,7 +254,7 @@ class ErrorContext:
             tool = int(self.tools[k[0]])
             q = self.path.q[rows]
             tip, axis = self.kinematics(tool).forward(q)
-            found = correct(self.actual(tool), q, tip, axis, group=self.group[rows], direction=self.way[rows],
+            found = correct(self.actual(tool), q, tip, axis, group=self.group[rows], direction=self.approach[rows],
                             axis_tolerance=self.axis_tolerance, beyond=self.beyond[rows])
             out.q[rows] = self._exact_turns(found.q, rows)
             out.before[rows] = np.stack([found.tip_before, found.axis_before], axis=1)
@@ -267,7 +272,7 @@ class ErrorContext:
         result[:, self.rotary] = q[first[inverse]][:, self.rotary]
         return result
 
-    def at(self, q: Floats, blocks: Ints, way: Floats, turns: Floats | None = None) -> Floats:
+    def at(self, q: Floats, blocks: Ints, approach: Floats, turns: Floats | None = None) -> Floats:
         """Corrected joints (N, J) of nominal q (N, J) inside blocks (N,); `turns` (N, R) fixes the rotary axes."""
         result = np.empty_like(q)
         for k in groups(self.tools[blocks]):
@@ -276,11 +281,11 @@ class ErrorContext:
             start = q[k].copy()
             if turns is not None:
                 start[:, self.rotary] = turns[k]
-            result[k] = correct(self.actual(tool), start, tip, axis, direction=way[k], turn=turns is None,
+            result[k] = correct(self.actual(tool), start, tip, axis, direction=approach[k], turn=turns is None,
                                 axis_tolerance=self.axis_tolerance, beyond=self.beyond_inside[blocks[k]]).q
         return result
 
-    def corrected(self, there: Floats, block: Ints, way: Floats, path: JointPath) -> Floats:
+    def corrected(self, there: Floats, block: Ints, approach: Floats, path: JointPath) -> Floats:
         """Corrected joints (N, J) of nominal ones inside blocks (N,) of the corrected `path`.
 
         Blocks at one orientation keep it.
@@ -290,7 +295,7 @@ class ErrorContext:
         q = np.empty_like(there)
         for rows, fixed in ((np.flatnonzero(held), True), (np.flatnonzero(~held), False)):
             if len(rows):
-                q[rows] = self.at(there[rows], block[rows], way[rows], ends[1][rows] if fixed else None)
+                q[rows] = self.at(there[rows], block[rows], approach[rows], ends[1][rows] if fixed else None)
         return q
 
     def poses(self, q: Floats, blocks: Ints) -> tuple[Floats, Floats]:
@@ -300,18 +305,18 @@ class ErrorContext:
             tip[k], axis[k] = self.kinematics(int(self.tools[blocks[k[0]]])).forward(q[k])
         return tip, axis
 
-    def off(self, nominal: Floats, q: Floats, blocks: Ints, way: Floats) -> Floats:
+    def off(self, nominal: Floats, q: Floats, blocks: Ints, approach: Floats) -> Floats:
         """Distance (N,) mm of the actual tip at q from the nominal one at `nominal` (N, J), inside blocks (N,)."""
-        return np.asarray(np.linalg.norm(self.residual(nominal, q, blocks, way)[:, :3], axis=1))
+        return np.asarray(np.linalg.norm(self.residual(nominal, q, blocks, approach)[:, :3], axis=1))
 
-    def residual(self, nominal: Floats, q: Floats, blocks: Ints, way: Floats) -> Floats:
+    def residual(self, nominal: Floats, q: Floats, blocks: Ints, approach: Floats) -> Floats:
         """Tip and axis (N, 6) of the actual machine at q less those of the nominal one at `nominal` (N, J)."""
         result = np.empty((len(q), 6))
         for k in groups(self.tools[blocks]):
             tool = int(self.tools[blocks[k[0]]])
             actual, wanted = self.actual(tool), np.concatenate(self.kinematics(tool).forward(nominal[k]), axis=1)
             w = actual.coordinates(q[k], wanted)
-            result[k] = np.concatenate(actual.aim(w, way[k]), axis=1) - wanted
+            result[k] = np.concatenate(actual.aim(w, approach[k]), axis=1) - wanted
         return result
 
 

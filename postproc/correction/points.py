@@ -37,10 +37,10 @@ def between(path: JointPath, work: ErrorContext, starts: Starts, allowed: float)
         if not len(pieces.block):
             break
         middle = 0.5 * (pieces.t0 + pieces.t1)
-        there, way = work.nominal(pieces.block, middle), work.way_at(pieces.block, middle)
-        q = work.corrected(there, pieces.block, way, path)
+        there, approach = work.nominal(pieces.block, middle), work.approach_at(pieces.block, middle)
+        q = work.corrected(there, pieces.block, approach, path)
         found.append((pieces.block, middle, q))
-        pieces = pieces.halved(middle, q, way)
+        pieces = pieces.halved(middle, q, approach)
         pieces = pieces.rows(_long(pieces, work))
     where, share, joints = (np.concatenate(column) for column in zip(*found, strict=True))
     return where, share, joints
@@ -48,26 +48,27 @@ def between(path: JointPath, work: ErrorContext, starts: Starts, allowed: float)
 
 @dataclass(frozen=True)
 class BlockPieces:
-    """Parts t0..t1 (N,) of blocks (N,) with the corrected joints (N, J) at their ends, and the ways (N, J) at t0; mm (N,)
-    that the tip is off at t0 of rapids behind holes that are corrected as a whole: no point between mends that."""
+    """Parts t0..t1 (N,) of blocks (N,) with the corrected joints (N, J) at their ends, and the approach directions (N, J) at
+    t0; mm (N,)
+    that the tip is off at t0 of rapids behind holes that are corrected as a whole: no point between fixes that."""
 
     block: Ints
     t0: Floats
     t1: Floats
     q0: Floats
     q1: Floats
-    way: Floats
+    approach: Floats
     behind: Floats
 
     def rows(self, keep: Bools | Ints) -> BlockPieces:
         """Some of them."""
-        return BlockPieces(self.block[keep], self.t0[keep], self.t1[keep], self.q0[keep], self.q1[keep], self.way[keep],
+        return BlockPieces(self.block[keep], self.t0[keep], self.t1[keep], self.q0[keep], self.q1[keep], self.approach[keep],
                            self.behind[keep])
 
-    def halved(self, middle: Floats, q: Floats, way: Floats) -> BlockPieces:
-        """Both halves of each, joints and ways in the middle being q and way."""
+    def halved(self, middle: Floats, q: Floats, approach: Floats) -> BlockPieces:
+        """Both halves of each, joints and approach directions in the middle being q and approach direction."""
         return BlockPieces(np.tile(self.block, 2), np.concatenate([self.t0, middle]), np.concatenate([middle, self.t1]),
-                       np.concatenate([self.q0, q]), np.concatenate([q, self.q1]), np.concatenate([self.way, way]),
+                       np.concatenate([self.q0, q]), np.concatenate([q, self.q1]), np.concatenate([self.approach, approach]),
                            np.concatenate([self.behind, np.zeros(len(q))]))
 
 
@@ -75,20 +76,21 @@ def _taken_up(path: JointPath, work: ErrorContext, starts: Starts, block: Ints,
               allowed: float) -> tuple[BlockPieces, list[tuple[Ints, Floats, Floats]]]:
     """The blocks as pieces, cut where an axis turns back, and the points that take up what it loses by that.
 
-    At a block's start that is one point, inside a block two at one place: corrected by the old way and by the new one.
+    At a block's start that is one point, inside a block two at one place: corrected by the old approach direction and by the
+    new one.
     """
     zero = np.zeros(len(block))
     turning, at = reversals(work, block[path.code[block] == FEED])
     there = work.nominal(turning, at)
-    before, after = (work.way_at(turning, t) for t in (at, np.minimum(at + 2.0 * MOMENT, 1.0)))
-    old, new = (work.corrected(there, turning, way, path) for way in (before, after))
+    before, after = (work.approach_at(turning, t) for t in (at, np.minimum(at + 2.0 * MOMENT, 1.0)))
+    old, new = (work.corrected(there, turning, approach, path) for approach in (before, after))
     cut = np.abs(new - old).max(axis=1, initial=0.0) > allowed
     turning, at, old, new, after = turning[cut], at[cut], old[cut], new[cut], after[cut]
     owner = np.concatenate([block, turning])
     t0, t1 = np.concatenate([zero, at]), np.concatenate([zero + 1.0, at])
     begins, ends = np.lexsort((t0, owner)), np.lexsort((t1, owner))
     pieces = BlockPieces(owner[begins], t0[begins], t1[ends], np.concatenate([starts.q[block], new])[begins],
-                         np.concatenate([path.q[block], old])[ends], np.concatenate([starts.way[block], after])[begins],
+                         np.concatenate([path.q[block], old])[ends], np.concatenate([starts.approach[block], after])[begins],
                          np.concatenate([_behind(path, work, starts, block), 0.0 * at])[begins])
     back = starts.block
     return pieces, [(back, np.zeros(len(back)), starts.q[back]), (turning, at, old), (turning, at, new)]
@@ -98,7 +100,7 @@ def _behind(path: JointPath, work: ErrorContext, starts: Starts, block: Ints) ->
     """`behind` (N,) of blocks (N,) as a whole."""
     result, k = np.zeros(len(block)), np.flatnonzero((path.code[block] == TRAVERSE) & (work.whole[block - 1] != ALONE))
     rows = block[k]
-    result[k] = work.off(work.nominal(rows, np.zeros(len(rows))), starts.q[rows], rows, starts.way[rows])
+    result[k] = work.off(work.nominal(rows, np.zeros(len(rows))), starts.q[rows], rows, starts.approach[rows])
     return result
 
 
@@ -116,16 +118,16 @@ def _off_at(pieces: BlockPieces, t: Floats, path: JointPath, work: ErrorContext)
     """(N,) mm from the nominal motion at t (N,) of pieces, beyond what is left of what their beginning is off by."""
     at = pieces.t0 + t * (pieces.t1 - pieces.t0)
     got = work.straight(path, pieces.q0, pieces.q1, pieces.block, t)
-    way = work.played(pieces.way, pieces.q0, got)
-    return np.asarray(work.off(work.nominal(pieces.block, at), got, pieces.block, way) - (1.0 - t) * pieces.behind)
+    approach = work.played(pieces.approach, pieces.q0, got)
+    return np.asarray(work.off(work.nominal(pieces.block, at), got, pieces.block, approach) - (1.0 - t) * pieces.behind)
 
 
 def _bound(pieces: BlockPieces, path: JointPath, work: ErrorContext, allowed: float) -> Floats:
     """(N,) mm: less where the axis turns so fast that the tip's being late would cost more than its share of the axis
     tolerance; LOOSE times as much for rapids and arcs."""
     ends = [np.concatenate(work.poses(work.nominal(pieces.block, t), pieces.block), axis=1) for t in (pieces.t0, pieces.t1)]
-    way, turn = (np.linalg.norm((ends[1] - ends[0])[:, part], axis=1) for part in (slice(0, 3), slice(3, 6)))
-    late = work.axis_share * way / np.where(turn > 0.0, turn, 1.0)
+    approach, turn = (np.linalg.norm((ends[1] - ends[0])[:, part], axis=1) for part in (slice(0, 3), slice(3, 6)))
+    late = work.axis_share * approach / np.where(turn > 0.0, turn, 1.0)
     cutting = np.where(turn > 0.0, np.clip(late, LEAST * allowed, allowed), allowed)
     loose = (path.code[pieces.block] != FEED) | (work.path.code[pieces.block] == ARC)
     result: Floats = np.where(loose, LOOSE * allowed, cutting)

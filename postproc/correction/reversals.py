@@ -1,4 +1,4 @@
-"""Where axes turn back: blocks begin by the new way, arcs are cut there; and points put into a path."""
+"""Where axes turn back: blocks begin by the new approach direction, arcs are cut there; and points put into a path."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ LOOSE = 4.0
 """times the share of the correction for rapids of the CL file, and for arcs and the lines that replace them, which take no
 share of linearising; linking moves only have to come to their ends"""
 SHORTEST = 0.05
-"""mm of tip way or degrees of a rotary axis: a block that short is not divided"""
+"""mm of tip approach direction or degrees of a rotary axis: a block that short is not divided"""
 
 
 def arcs_cut(path: JointPath, work: ErrorContext) -> Divided:
@@ -45,32 +45,32 @@ def arcs_cut(path: JointPath, work: ErrorContext) -> Divided:
 
 @dataclass(frozen=True)
 class Starts:
-    """Joints (K, J) and ways (K, J) where blocks begin when corrected; those of `block` (N,) after taking up what an axis
-    has lost."""
+    """Joints (K, J) and approach directions (K, J) where blocks begin when corrected; those of `block` (N,) after taking up
+    what an axis has lost."""
 
     q: Floats
-    way: Floats
+    approach: Floats
     block: Ints
 
 
 def starts_of(path: JointPath, nominal: JointPath, work: ErrorContext, allowed: float) -> Starts:
-    """Corrected joints where blocks begin; those in which an axis turns back begin by the new way, where that moves one by
-    more than `allowed` mm, rapids LOOSE times as much."""
-    start, begun = (np.concatenate([x[:1], x[:-1]]) for x in (path.q, work.way))
+    """Corrected joints where blocks begin; those in which an axis turns back begin by the new approach direction, where that
+    moves one by more than `allowed` mm, rapids LOOSE times as much."""
+    start, begun = (np.concatenate([x[:1], x[:-1]]) for x in (path.q, work.approach))
     block = np.flatnonzero(stretches(path) | ((path.code == ARC) & (np.arange(len(path)) > 0)))
     block = block[~path.home[block] & ~path.home[block - 1] & (work.whole[block] == ALONE)]
-    way = work.begin_way(block)
-    turned = np.any(way * work.way[block - 1] < 0.0, axis=1)
+    approach = work.begin_approach(block)
+    turned = np.any(approach * work.approach[block - 1] < 0.0, axis=1)
     back = block[turned]
-    q = work.corrected(nominal.q[back - 1], back, way[turned], path)
+    q = work.corrected(nominal.q[back - 1], back, approach[turned], path)
     loose = np.where(path.code[back] == TRAVERSE, LOOSE, 1.0)
     jump = np.abs(q - start[back]).max(axis=1, initial=0.0) > loose * allowed
-    start[back[jump]], begun[back[jump]] = q[jump], way[turned][jump]
+    start[back[jump]], begun[back[jump]] = q[jump], approach[turned][jump]
     return Starts(start, begun, back[jump])
 
 
 def stretches(path: JointPath) -> Bools:
-    """(K,) feed moves and rapids of the CL file, straight ones: their way counts, not their ends alone."""
+    """(K,) feed moves and rapids of the CL file, straight ones: their approach direction counts, not their ends alone."""
     straight = (path.code == FEED) | (path.code == TRAVERSE)
     return np.asarray(straight & np.isfinite(path.u) & ~path.home & (np.arange(len(path)) > 0))
 
@@ -91,11 +91,11 @@ def reversals(work: ErrorContext, block: Ints) -> tuple[Ints, Floats]:
 def _bisected(work: ErrorContext, block: Ints, edges: tuple[float, ...]) -> tuple[Ints, Floats]:
     """(block, fraction) of the places where the direction of a joint changes between two of the edges."""
     where, at = [np.zeros(0, dtype=np.int64)], [np.zeros(0)]
-    if not len(block) or not work.two_way:
+    if not len(block) or not work.bidirectional:
         return where[0], at[0]
     last = work.last(block)
     signs = np.stack([work.moving(block, np.full(len(block), t), last) for t in edges])
-    for j in work.two_way:
+    for j in work.bidirectional:
         sign = carried_on(signs[:, :, j])
         for i, (one, two) in enumerate(pairwise(sign)):
             rows = np.flatnonzero(one * two < 0.0)
@@ -128,7 +128,7 @@ class Divided:
         return np.asarray(np.where(last, 1.0, np.clip(gone - before, 0.0, 1.0)))
 
     def of(self, before: Divided) -> Divided:
-        """The same, told of the path that `before` was made from."""
+        """The same, reported of the path that `before` was made from."""
         return Divided(self.path, before.owner[self.owner], before.part[self.owner] * self.part)
 
 

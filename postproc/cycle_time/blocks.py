@@ -118,7 +118,7 @@ class MotionBlocks:
         pauses: rests by command
         cl_line (E,): line of the CL file that the block comes from, -1 where that is not known
         move (E,): row of the job's moves that the block does, -1 where none is known
-        given (E,): way that the feed refers to where the columns do not tell it (the tip's, under a control's own
+        given (E,): path that the feed refers to where the columns do not determine it (the tip's, under a control's own
             kinematics), NaN elsewhere
         pieces (E,): of how many rows its block of the program consists; None: all of one
     """

@@ -1,8 +1,8 @@
 """The parameters of a control's model from a measured run, and how sure they are.
 
 Least squares on the times of sections of the run, over the logarithms of the parameters, with a wide normal prior about
-the model that the fit begins with, so that what the run does not show stays where it was and keeps its doubt (maximum a
-posteriori; the covariance is the inverse of J'J/s^2 + prior, J the derivatives of the sections' times; e.g. A. Tarantola,
+the model that the fit begins with, so that what the run does not show stays where it was and keeps its uncertainty (maximum
+a posteriori; the covariance is the inverse of J'J/s^2 + prior, J the derivatives of the sections' times; e.g. A. Tarantola,
 Inverse Problem Theory, 2005, section 3.2).
 """
 
@@ -36,13 +36,13 @@ SECTIONS = 300
 STARTS = {"block_time": 1e-4, "stop_time": 1e-3}
 """where a fit begins with a value that is 0"""
 CLOCK = 1e-3
-"""s of doubt in any section: the clock of the log"""
+"""s of uncertainty in any section: the clock of the log"""
 CLEAR = 0.7
 """share of the misfit that decides for a model without jerk"""
 NEAR, FAR = 0.02, 0.35
 """steps in prior deviations at which derivatives are taken"""
 SEEN = 0.5
-"""share of its prior doubt below which a parameter counts as found"""
+"""share of its prior uncertainty below which a parameter counts as found"""
 
 
 @dataclass(frozen=True)
@@ -95,17 +95,17 @@ def _fitted(blocks: MotionBlocks, rows: Ints, measured: Floats, before: Floats, 
     x = _start(modelled, measured, free)
     scale = _scatter(measured - modelled(x), measured)
     for _ in range(3):
-        doubt = np.hypot(CLOCK, scale * np.sqrt(np.maximum(measured, 0.0) * measured.mean()))
+        uncertainty = np.hypot(CLOCK, scale * np.sqrt(np.maximum(measured, 0.0) * measured.mean()))
 
-        def residual(x: Floats, doubt: Floats = doubt) -> Floats:
-            return np.concatenate([(modelled(x) - measured) / doubt, x])
+        def residual(x: Floats, uncertainty: Floats = uncertainty) -> Floats:
+            return np.concatenate([(modelled(x) - measured) / uncertainty, x])
         result = least_squares(residual, x, loss="soft_l1", diff_step=[1e-3] * len(x), max_nfev=60, f_scale=3.0)
         x = result.x
         scale = max(_scatter(measured - modelled(x), measured), 1e-5)
     values = start.copy()
     values[free] += x * prior[free]
-    doubt = np.hypot(CLOCK, scale * np.sqrt(np.maximum(measured, 0.0) * measured.mean()))
-    covariance = _covariance(_slopes(modelled, x) / doubt[:, None], free, prior)
+    uncertainty = np.hypot(CLOCK, scale * np.sqrt(np.maximum(measured, 0.0) * measured.mean()))
+    covariance = _covariance(_slopes(modelled, x) / uncertainty[:, None], free, prior)
     return _fit(model, begin.with_values(values), covariance, free, prior, measured, before, modelled(x), file, machine)
 
 

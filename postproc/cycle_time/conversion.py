@@ -30,16 +30,16 @@ def estimate_of(result: PostResult) -> Estimate | None:
 
 
 def figures(e: Estimate | None) -> dict[str, Any]:
-    """The keys of `convert --json` that tell times; s, null where there are none."""
+    """The keys of `convert --json` that say times; s, null where there are none."""
     if e is None:
         return {"cycle_time_s": None, "lower_bound_s": None, "band_s": None, "time": None}
     d = as_dict(e)
-    band = d["band_s"] if e.doubts else None
+    band = d["band_s"] if e.uncertainties else None
     more = ("model", "assumed", "cutting_s", "rapids_s", "causes", "feed_s", "limiting", "operations", "most_expensive")
     return {"cycle_time_s": e.seconds, "lower_bound_s": e.lower_bound, "band_s": band, "time": {key: d[key] for key in more}}
 
 
 def text(e: Estimate) -> str:
     """One line for people."""
-    band = f", 95 % between {clock(e.band[0])} and {clock(e.band[1])}" if e.doubts else ""
+    band = f", 95 % between {clock(e.band[0])} and {clock(e.band[1])}" if e.uncertainties else ""
     return f"time: {clock(e.seconds)}{band} (model {e.model.kind}; no control is below {clock(e.lower_bound)})"

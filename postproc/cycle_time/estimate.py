@@ -27,7 +27,7 @@ class Estimate:
 
     Attributes:
         seconds: the model's time; lower_bound: no control is faster; band: 95 % of machines as described lie in it
-        doubts: standard deviation of the time by what it comes from, s
+        uncertainties: standard deviation of the time by what it comes from, s
     """
 
     blocks: MotionBlocks
@@ -36,7 +36,7 @@ class Estimate:
     seconds: float
     lower_bound: float
     band: tuple[float, float]
-    doubts: dict[str, float]
+    uncertainties: dict[str, float]
 
 
 def timed(blocks: MotionBlocks, model: CycleTimeModel) -> BlockTimes:
@@ -63,31 +63,31 @@ def estimate(blocks: MotionBlocks, machine: Machine, model: CycleTimeModel, with
 
     Args:
         with_band: False leaves the band at the time itself, for many programs in a row
-        times: of a motion that is planned already, instead of the model's; the doubts stay the model's
+        times: of a motion that is planned already, instead of the model's; the uncertainties stay the model's
     """
     times = times or timed(blocks, model)
     seconds = total(blocks, times)
     bound = lower_bound(blocks, model)
     if not with_band:
         return Estimate(blocks, model, times, seconds, bound, (seconds, seconds), {})
-    down, up, doubts = _doubts(blocks, machine, model, seconds)
+    down, up, uncertainties = _uncertainties(blocks, machine, model, seconds)
     low = seconds - down if machine.limits.assumed else max(seconds - down, min(bound, seconds))
-    return Estimate(blocks, model, times, seconds, bound, (max(low, 0.0), seconds + up), doubts)
+    return Estimate(blocks, model, times, seconds, bound, (max(low, 0.0), seconds + up), uncertainties)
 
 
-def _doubts(blocks: MotionBlocks, machine: Machine, model: CycleTimeModel,
-            seconds: float) -> tuple[float, float, dict[str, float]]:
-    """(s below, s above, standard deviation by origin): every doubtful value is moved by one standard deviation."""
+def _uncertainties(blocks: MotionBlocks, machine: Machine, model: CycleTimeModel,
+                   seconds: float) -> tuple[float, float, dict[str, float]]:
+    """(s below, s above, standard deviation by origin): every uncertain value is moved by one standard deviation."""
     own = model.calibration.relative if model.calibration else model.own_share
     low = high = (COVERAGE * own * seconds) ** 2
-    doubts = {"the model itself": own * seconds}
+    uncertainties = {"the model itself": own * seconds}
     begin = total(blocks, timed(blocks, model))
     for name, changed in _changes(blocks, machine, model):
         moved = sorted(total(b, timed(b, m)) - begin for b, m in changed)
         low += (COVERAGE * min(moved[0], 0.0)) ** 2
         high += (COVERAGE * max(moved[-1], 0.0)) ** 2
-        doubts[name] = (moved[-1] - moved[0]) / 2.0
-    return float(np.sqrt(low)), float(np.sqrt(high)), doubts
+        uncertainties[name] = (moved[-1] - moved[0]) / 2.0
+    return float(np.sqrt(low)), float(np.sqrt(high)), uncertainties
 
 
 Change = tuple[MotionBlocks, CycleTimeModel]

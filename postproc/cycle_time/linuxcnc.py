@@ -39,7 +39,7 @@ GAP_CYCLES = 4.0
 _TOGETHER = 100_000
 """corners that are looked at together"""
 COMMAND = {Cause.DWELL: 0.004, Cause.TOOL_CHANGE: 0.038, Cause.SPINDLE: 0.005, Cause.OTHER: 0.007, Cause.INDEXING: 0.0}
-"""s that a command takes beside its own time, measured: the task's cycle is 1 ms, that of tool changes (io) 10 ms"""
+"""s that a command takes next to its own time, measured: the task's cycle is 1 ms, that of tool changes (io) 10 ms"""
 SETTLED = 0.003
 """s from the planner's end to the joints' (cubic interpolation of motion's control.c, measured)"""
 
@@ -130,8 +130,8 @@ def _overlap(s: PlannerSegments, one: Ints, length: tuple[Floats, Floats], part:
     move alone the tolerance counts as degrees.
     """
     two = one + 1
-    reach = [np.minimum(np.sqrt(rate[k] * way * much), target[k])
-             for k, way, much in zip((one, two), length, part, strict=True)]
+    reach = [np.minimum(np.sqrt(rate[k] * travel * much), target[k])
+             for k, travel, much in zip((one, two), length, part, strict=True)]
     longest = np.minimum(length[0] / reach[0], length[1] / reach[1])
     seconds = np.minimum(longest, np.maximum(reach[0] / rate[one], reach[1] / rate[two]))
     speed, following = (np.minimum(v, seconds * rate[k]) for k, v in zip((one, two), reach, strict=True))

@@ -147,11 +147,11 @@ def _sizes(s: PlannerSegments, at: Ints, one: _Side, two: _Side, theta: Floats, 
     altitude = np.where(one.arc | two.arc, 0.0, _altitude(most[at], most[at + 1], turn, one.lean, two.lean))
     goal = np.minimum(asked, np.maximum(altitude, planar))
     by_tolerance = np.cos(theta) * tolerance / np.maximum(1.0 - np.sin(theta), 1e-300)
-    way = np.minimum(np.minimum(one.arm, two.arm), by_tolerance)
-    largest = np.tan(theta) * way
+    travel = np.minimum(np.minimum(one.arm, two.arm), by_tolerance)
+    largest = np.tan(theta) * travel
     planned = np.minimum(np.sqrt(NORMAL_SHARE * acceleration * largest), goal)
     ramp = 0.5 * acceleration
-    seconds = np.minimum(np.sqrt(2.0 * ramp * way), planned) / ramp
+    seconds = np.minimum(np.sqrt(2.0 * ramp * travel), planned) / ramp
     by_time = np.minimum(seconds * planned / np.maximum(turn, 1e-300), largest)
     return np.maximum(planned**2 / (NORMAL_SHARE * acceleration), by_time), planned, asked, acceleration, tolerance
 

@@ -28,7 +28,7 @@ class PlannerSegments:
 
     Attributes:
         block (N,): row of the (last) block behind it; fresh (N,): True where the queue has run empty before
-        length, asked, most, acceleration (N,): way, speed of the feed word, largest speed and acceleration of the axes
+        length, asked, most, acceleration (N,): path, speed of the feed word, largest speed and acceleration of the axes
         shape: geometry of the rows; blocks: the rows themselves, merged
     """
 
@@ -58,7 +58,7 @@ def segments(blocks: MotionBlocks, override: float = 1.0, rapid: float = 1.0) ->
 
 
 def _arc_limits(blocks: MotionBlocks, form: Shape, most: Floats, acceleration: Floats) -> None:
-    """Speed and acceleration of arcs: the plane's slower axis, centripetal acceleration, and the straight way's axes."""
+    """Speed and acceleration of arcs: the plane's slower axis, centripetal acceleration, and the straight path's axes."""
     at, axes = np.flatnonzero(blocks.arc), blocks.axes
     in_plane = np.abs(blocks.normal[at]) < 0.5
     velocity, accel = (np.where(in_plane, limit[axes.xyz], np.inf).min(axis=1)

@@ -41,8 +41,8 @@ def directions(blocks: MotionBlocks, form: Shape) -> PathDerivatives:
     if blocks.arc.any():
         first, last = step.copy(), step.copy()
         columns = blocks.axes.xyz
-        for way, tangent in ((first, form.first), (last, form.last)):
-            way[np.ix_(blocks.arc, columns)] = tangent[blocks.arc]
+        for travel, tangent in ((first, form.first), (last, form.last)):
+            travel[np.ix_(blocks.arc, columns)] = tangent[blocks.arc]
     return PathDerivatives(first, last)
 
 
@@ -78,8 +78,8 @@ def limits(blocks: MotionBlocks, form: Shape, model: CycleTimeModel) -> tuple[Fl
 
 def corner_speed(blocks: MotionBlocks, form: Shape, model: CycleTimeModel) -> Floats:
     """(E-1,) speed at which each corner is passed; 0 where the control stops."""
-    ways = directions(blocks, form)
-    change = np.abs(ways.first[1:] - ways.last[:-1])
+    travels = directions(blocks, form)
+    change = np.abs(travels.first[1:] - travels.last[:-1])
     stated = blocks.tolerance[:-1]
     tolerance = np.where(np.isfinite(stated), stated * model.stated_share, model.corner_tolerance)
     bend = np.linalg.norm(np.where(blocks.axes.xyz >= 0, change[:, blocks.axes.xyz], 0.0), axis=1)
@@ -103,12 +103,12 @@ def rest_to_rest(length: Floats, target: Floats, rate: Floats, jerk: Floats) -> 
     """(E,) least time from rest to rest under speed, acceleration and jerk: seven phases, fewer where limits are not
     reached (L. Biagiotti, C. Melchiorri, Trajectory Planning for Automatic Machines and Robots, 2008, section 3.4)."""
     rise = rate**2 / jerk
-    way = np.where(target >= rise, target * (target / rate + rate / jerk), 2.0 * target * np.sqrt(target / jerk))
+    travel = np.where(target >= rise, target * (target / rate + rate / jerk), 2.0 * target * np.sqrt(target / jerk))
     reached = np.where(target >= rise, target / rate + rate / jerk, 2.0 * np.sqrt(target / jerk)) + length / target
     peak = 0.5 * (np.sqrt(rise**2 + 4.0 * rate * length) - rise)
     short = np.where(length >= 2.0 * rate * rise / jerk, 2.0 * (peak / rate + rate / jerk),
                      4.0 * np.cbrt(length / (2.0 * jerk)))
-    return np.asarray(np.where(length >= way, reached, short))
+    return np.asarray(np.where(length >= travel, reached, short))
 
 
 def jerk_time(length: Floats, first: Floats, last: Floats, r: Ramps, rate: Floats, jerk: Floats, target: Floats) -> Floats:

@@ -14,7 +14,7 @@ from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic
 
 PARAMETERS = ("corner_tolerance", "block_time", "rapid", "override", "stop_time")
-"""what a log can tell, in the order of `CalibrationRecord.covariance`"""
+"""what a log can say, in the order of `CalibrationRecord.covariance`"""
 ASSUMED = {"corner_tolerance": 0.7, "block_time": 0.7, "rapid": 0.05, "override": 0.02, "stop_time": 0.7,
            "spindle_time": 0.7, "velocity": 0.15, "acceleration": 0.3, "jerk": 0.5, "tool_change": 0.3, "clamp": 0.3,
            "unclamp": 0.3}
@@ -37,7 +37,7 @@ class CalibrationRecord(UserModel):
     covariance: tuple[tuple[float, ...], ...]
     """of the logarithms of the five parameters"""
     not_identifiable: tuple[str, ...] = ()
-    """parameters that the run says nothing about; they keep their assumed doubt"""
+    """parameters that the run says nothing about; they keep their assumed uncertainty"""
 
 
 class CycleTimeModel(UserModel):

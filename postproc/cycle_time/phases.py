@@ -37,8 +37,8 @@ def ramps(length: Floats, first: Floats, last: Floats, target: Floats, rate: Flo
     peak = np.sqrt(np.maximum((2.0 * rate * length + first**2 + last**2) / 2.0, 0.0))
     peak = np.maximum(np.minimum(peak, target), np.maximum(first, last))
     up, down = (peak - first) / rate, (peak - last) / rate
-    way = (peak**2 - first**2 + peak**2 - last**2) / (2.0 * rate)
-    steady = np.maximum(length - way, 0.0) / np.where(peak > 0.0, peak, 1.0)
+    travel = (peak**2 - first**2 + peak**2 - last**2) / (2.0 * rate)
+    steady = np.maximum(length - travel, 0.0) / np.where(peak > 0.0, peak, 1.0)
     if gentle is not None and gentle.any():
         with np.errstate(over="ignore"):
             whole = 2.0 * length / np.maximum(first + last, 1e-300)

@@ -109,7 +109,7 @@ def _arcs(motion: Motion, control: Control, arc: Bools, start: Floats) -> tuple[
 
 
 def _tip_lengths(motion: Motion, control: Control) -> Floats:
-    """(E,) way of the tip where X, Y, Z are the tip and the joints follow; NaN elsewhere."""
+    """(E,) path of the tip where X, Y, Z are the tip and the joints follow; NaN elsewhere."""
     rows = np.flatnonzero(motion.frame > 0)
     if not len(rows):
         return repeated(np.nan, len(motion))

@@ -23,7 +23,7 @@ def as_dict(e: Estimate) -> dict[str, Any]:
         "model": e.model.kind,
         "model_description": e.model.description,
         "assumed": list(e.model.assumed),
-        "doubts_s": e.doubts,
+        "doubts_s": e.uncertainties,
         "blocks": len(e.blocks),
         "cutting_s": _cutting(cause),
         "rapids_s": cause["rapids_s"],

@@ -21,9 +21,9 @@ class Shape:
     Attributes:
         length (E,): that the feed refers to: of X, Y, Z where any moves, else of U, V, W, else of A, B, C
         turns (E,): True where an axis other than X, Y, Z moves
-        radius, climb (E,): of arcs: radius in the plane, way along the normal; 0 elsewhere
+        radius, climb (E,): of arcs: radius in the plane, path along the normal; 0 elsewhere
         first, last (E, 3): unit tangents in X, Y, Z at both ends; 0 where X, Y, Z stand
-        share (E, A): largest way of each axis per unit of `length` (of an arc: at its worst point)
+        share (E, A): largest path of each axis per unit of `length` (of an arc: at its worst point)
     """
 
     length: Floats

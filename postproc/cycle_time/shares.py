@@ -33,7 +33,7 @@ class TimeShares:
 
 
 def shares(e: Estimate) -> TimeShares:
-    """The time of an estimate by what it goes to."""
+    """The time of an estimate by activity."""
     blocks, times = e.blocks, e.timed
     form = shape(blocks)
     velocity, rate, jerk = (limit / np.maximum(form.share, 1e-300) for limit in (

@@ -43,7 +43,7 @@ A function that changes suddenly has the places in an attribute `breaks` (M,), a
 between them it is taken to be nearly constant.
 """
 TOUCH = 1e-9
-"""Within this, as a share of the way between the first break and the last, a place counts to both sides of a break."""
+"""Within this, as a share of the path between the first break and the last, a place counts to both sides of a break."""
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from postproc.feedrate.problem import SpeedProblem
 from toolpaths.arrays import Floats
 
 TAU = 0.99
-"""Share of the way to the nearest bound that a step may go."""
+"""Share of the path to the nearest bound that a step may go."""
 TOLERANCE = 1e-3
 """Duality gap over time at which to stop; time is then some 3e-5 above the optimum. Much below, profiles chatter."""
 MOST = 120

@@ -149,8 +149,8 @@ def place(at: Floats, h: Floats) -> Floats:
     rate = (high - low)[cell] / step[cell]
     ahead = (wanted - passed[cell]) * rate
     with np.errstate(divide="ignore", invalid="ignore"):
-        way = np.where(np.abs(ahead) > 1e-6, low[cell] * np.expm1(ahead) / rate,
-                       low[cell] * (wanted - passed[cell]) * (1.0 + 0.5 * ahead))
-    knots = at[cell] + way
+        travel = np.where(np.abs(ahead) > 1e-6, low[cell] * np.expm1(ahead) / rate,
+                          low[cell] * (wanted - passed[cell]) * (1.0 + 0.5 * ahead))
+    knots = at[cell] + travel
     knots[0], knots[-1] = at[0], at[-1]
     return np.asarray(knots)

@@ -100,8 +100,8 @@ class Plan:
     def _at_feed(self, piece: MotionPiece) -> float:
         """Seconds at the feed, which is read in the middle of the intervals."""
         sigma = piece.profile.sigma
-        way = np.diff(piece.eased.parameter(sigma)[0])
-        return float(np.sum(way / self.feed(piece.eased.parameter(0.5 * (sigma[1:] + sigma[:-1]))[0])))
+        travel = np.diff(piece.eased.parameter(sigma)[0])
+        return float(np.sum(travel / self.feed(piece.eased.parameter(0.5 * (sigma[1:] + sigma[:-1]))[0])))
 
     def speed(self, s: Floats) -> Floats:
         """Planned ds/dt (N,) at s (N,)."""

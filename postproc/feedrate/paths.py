@@ -136,8 +136,8 @@ class Eased:
         for first, edge, sense in ((True, self.first, 1.0), (False, self.last, -1.0)):
             bent = (sigma < self.ease) if first else (sigma > self.end - self.ease)
             if bent.any():
-                way = self.ease * _eased_back(np.maximum(sense * (s[bent] - edge), 0.0) / self.ease)
-                sigma[bent] = way if first else self.end - way
+                travel = self.ease * _eased_back(np.maximum(sense * (s[bent] - edge), 0.0) / self.ease)
+                sigma[bent] = travel if first else self.end - travel
         return sigma
 
     def speed_limit(self, sigma: Floats, feed: Callable[[Floats], Floats]) -> Floats:
@@ -169,12 +169,12 @@ class Eased:
         return outer
 
 
-def _eased_back(way: Floats) -> Floats:
-    """u (N,) in [0, 1] with 2 u^3 - 2 u^4 + 0.6 u^5 = way."""
-    u = np.minimum(np.cbrt(0.5 * way) * (1.0 + np.cbrt(0.5 * way) * (1.0 / 3.0 + 0.4 * way)), 1.0)
+def _eased_back(travel: Floats) -> Floats:
+    """u (N,) in [0, 1] with 2 u^3 - 2 u^4 + 0.6 u^5 = path."""
+    u = np.minimum(np.cbrt(0.5 * travel) * (1.0 + np.cbrt(0.5 * travel) * (1.0 / 3.0 + 0.4 * travel)), 1.0)
     for _ in range(6):
         slope = u**2 * (6.0 - 8.0 * u + 3.0 * u**2)
-        excess = u**3 * (2.0 - 2.0 * u + 0.6 * u**2) - way
+        excess = u**3 * (2.0 - 2.0 * u + 0.6 * u**2) - travel
         u = np.clip(u - np.divide(excess, slope, out=np.zeros_like(u), where=slope > 0.0), 0.0, 1.0)
     return u
 

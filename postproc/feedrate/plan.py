@@ -107,7 +107,7 @@ def plan_second_order(path: ParametricPath, limits: JointLimits, feed: FeedLimit
 
 
 def _mesh(eased: Eased, limits: JointLimits, feed: AllowedFeed, spacing: Spacing) -> Floats:
-    """Knots between two stops, fine enough beside them and where the feed changes."""
+    """Knots between two stops, fine enough next to them and where the feed changes."""
     ends = np.array([eased.first, np.nextafter(eased.last, eased.first)])
     ramp = ramp_time(eased.path.derivatives(ends).dq, limits, feed(ends))
     marks = None

@@ -39,24 +39,24 @@ class Profile:
         """The same motion, `factor` times as long: velocities fall by it, accelerations by its square, jerks by its cube."""
         return Profile(self.sigma, self.pieces / factor**2)
 
-    def squared(self, k: Ints, way: Floats) -> tuple[Floats, Floats, Floats]:
-        """x, x', x'' at `way` behind knots k."""
-        return _cubic(self.pieces[:, k], way)
+    def squared(self, k: Ints, travel: Floats) -> tuple[Floats, Floats, Floats]:
+        """x, x', x'' at `travel` behind knots k."""
+        return _cubic(self.pieces[:, k], travel)
 
     @cached_property
     def _linear(self) -> bool:
         return not np.any(self.pieces[2:])
 
-    def _spent(self, pieces: Floats, way: Floats) -> Floats:
-        """Time from the start of pieces (4, N) to `way` behind it."""
+    def _spent(self, pieces: Floats, travel: Floats) -> Floats:
+        """Time from the start of pieces (4, N) to `travel` behind it."""
         a, b, c, d = pieces
         if self._linear:
-            return np.asarray(2.0 * way / np.maximum(np.sqrt(a) + np.sqrt(np.maximum(a + way * b, 0.0)), 1e-300))
-        total = np.zeros(way.shape)
+            return np.asarray(2.0 * travel / np.maximum(np.sqrt(a) + np.sqrt(np.maximum(a + travel * b, 0.0)), 1e-300))
+        total = np.zeros(travel.shape)
         for node, weight in zip(*_GAUSS, strict=True):
-            u = (0.5 + 0.5 * node) * way
+            u = (0.5 + 0.5 * node) * travel
             total += weight / np.sqrt(a + u * (b + u * (c + u * d)))
-        return np.asarray(0.5 * way * total)
+        return np.asarray(0.5 * travel * total)
 
     def at(self, t: Floats) -> Places:
         """Places at times t (N,) within [0, times[-1]]."""
@@ -65,23 +65,24 @@ class Profile:
         a, b, c, d = pieces
         # Motion of constant jerk from the knot: exact where x is linear, else the start of Newton's method.
         speed = np.sqrt(a)
-        way = np.clip(rest * (speed + rest * (0.25 * b + rest * c * speed / 6.0)), 0.0, h)
+        travel = np.clip(rest * (speed + rest * (0.25 * b + rest * c * speed / 6.0)), 0.0, h)
         for _ in range(0 if self._linear else 2):
-            x = a + way * (b + way * (c + way * d))
-            way = np.clip(way + (rest - self._spent(pieces, way)) * np.sqrt(x), 0.0, h)
-        return _places(self.sigma[k] + way, *_cubic(pieces, way))
+            x = a + travel * (b + travel * (c + travel * d))
+            travel = np.clip(travel + (rest - self._spent(pieces, travel)) * np.sqrt(x), 0.0, h)
+        return _places(self.sigma[k] + travel, *_cubic(pieces, travel))
 
     def when(self, sigma: Floats) -> tuple[Floats, Places]:
         """Times (N,) at which places sigma (N,) are passed, and the motion there."""
         k = np.clip(np.searchsorted(self.sigma, sigma, side="right") - 1, 0, len(self.sigma) - 2)
-        way, pieces = sigma - self.sigma[k], self.pieces[:, k]
-        return self.times[k] + self._spent(pieces, way), _places(sigma, *_cubic(pieces, way))
+        travel, pieces = sigma - self.sigma[k], self.pieces[:, k]
+        return self.times[k] + self._spent(pieces, travel), _places(sigma, *_cubic(pieces, travel))
 
 
-def _cubic(pieces: Floats, way: Floats) -> tuple[Floats, Floats, Floats]:
-    """x, x', x'' at `way` behind the start of pieces (4, N)."""
+def _cubic(pieces: Floats, travel: Floats) -> tuple[Floats, Floats, Floats]:
+    """x, x', x'' at `travel` behind the start of pieces (4, N)."""
     a, b, c, d = pieces
-    return (a + way * (b + way * (c + way * d)), b + way * (2.0 * c + 3.0 * d * way), 2.0 * c + 6.0 * d * way)
+    return (a + travel * (b + travel * (c + travel * d)), b + travel * (2.0 * c + 3.0 * d * travel),
+            2.0 * c + 6.0 * d * travel)
 
 
 def _places(sigma: Floats, x: Floats, x1: Floats, x2: Floats) -> Places:

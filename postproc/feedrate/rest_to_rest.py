@@ -20,7 +20,7 @@ class PointToPointMode(StrEnum):
     """How a control moves the joints of a move without a path.
 
     STRAIGHT: on a straight line in the joints, as fast as the joint that allows least; DOG_LEG: each joint as fast as it
-    can, so that the short ways end first; SYNCHRONISED: each joint its own motion, all end together.
+    can, so that the short paths end first; SYNCHRONISED: each joint its own motion, all end together.
     """
 
     STRAIGHT = "straight"
@@ -31,7 +31,7 @@ class PointToPointMode(StrEnum):
 def rest_seconds(q0: Floats, q1: Floats, limits: JointLimits, law: PointToPointMode | str) -> Floats:
     """Least times (N,) of many moves from rest at q0 (N, J) to rest at q1 (N, J), in closed form.
 
-    Under velocity V, acceleration A and jerk J, of which A' = min(A, sqrt(V J)) is reached at most, a way D takes
+    Under velocity V, acceleration A and jerk J, of which A' = min(A, sqrt(V J)) is reached at most, a path D takes
         D/V + V/A' + A'/J               where D >= V (V/A' + A'/J),
         D/v + v/A' + A'/J               with v (v/A' + A'/J) = D, where D >= 2 A'^3/J^2,
         (32 D/J)^(1/3)                  below.
@@ -40,10 +40,10 @@ def rest_seconds(q0: Floats, q1: Floats, limits: JointLimits, law: PointToPointM
     Raises:
         ValueError: positions that are not finite; a joint that moves without any limit on acceleration and jerk.
     """
-    way = _way(q0, q1)
+    travel = _travel(q0, q1)
     if PointToPointMode(law) is PointToPointMode.STRAIGHT:
-        return np.asarray(_seconds(np.where(way.max(axis=1) > 0.0, 1.0, 0.0), *_along(way, limits)))
-    return np.asarray(_seconds(way, limits.velocity, limits.acceleration, limits.jerk).max(axis=1))
+        return np.asarray(_seconds(np.where(travel.max(axis=1) > 0.0, 1.0, 0.0), *_along(travel, limits)))
+    return np.asarray(_seconds(travel, limits.velocity, limits.acceleration, limits.jerk).max(axis=1))
 
 
 def rest_to_rest(q0: Floats, q1: Floats, limits: JointLimits, law: PointToPointMode | str,
@@ -54,44 +54,44 @@ def rest_to_rest(q0: Floats, q1: Floats, limits: JointLimits, law: PointToPointM
         ValueError: as `rest_seconds`.
         ArithmeticError: ruckig found no motion.
     """
-    way = _way(q0[None], q1[None])
+    travel = _travel(q0[None], q1[None])
     law = PointToPointMode(law)
-    if law is PointToPointMode.STRAIGHT and np.any(way > 0.0):
-        rates = _along(way, limits)
+    if law is PointToPointMode.STRAIGHT and np.any(travel > 0.0):
+        rates = _along(travel, limits)
         unit = _states(np.zeros(1), np.ones(1), rates, law, step)
         q, *rest = (values * (q1 - q0) for values in unit)
         return _sampled([q0 + q, *rest], step)
     return _sampled(_states(q0, q1, (limits.velocity, limits.acceleration, limits.jerk), law, step), step)
 
 
-def _way(q0: Floats, q1: Floats) -> Floats:
-    """Magnitudes of the ways (N, J)."""
-    way = np.abs(np.asarray(q1, dtype=np.float64) - q0)
-    if not np.all(np.isfinite(way)):
+def _travel(q0: Floats, q1: Floats) -> Floats:
+    """Magnitudes of the paths (N, J)."""
+    travel = np.abs(np.asarray(q1, dtype=np.float64) - q0)
+    if not np.all(np.isfinite(travel)):
         raise ValueError("a move from rest to rest needs finite positions")
-    return way
+    return travel
 
 
-def _along(way: Floats, limits: JointLimits) -> tuple[Floats, Floats, Floats]:
-    """Limits (N,) of the share of a straight way (N, J) that is covered."""
+def _along(travel: Floats, limits: JointLimits) -> tuple[Floats, Floats, Floats]:
+    """Limits (N,) of the share of a straight path (N, J) that is covered."""
     with np.errstate(divide="ignore"):
-        velocity, acceleration, jerk = (np.min(limit / way, axis=1)
+        velocity, acceleration, jerk = (np.min(limit / travel, axis=1)
                                         for limit in (limits.velocity, limits.acceleration, limits.jerk))
     return velocity, acceleration, jerk
 
 
-def _seconds(way: Floats, velocity: Floats, acceleration: Floats, jerk: Floats) -> Floats:
-    """See `rest_seconds`; arguments of one shape or broadcast to it; 0 where there is no way."""
-    v, a, j = (np.where(way > 0.0, limit, 1.0) for limit in (velocity, acceleration, jerk))
+def _seconds(travel: Floats, velocity: Floats, acceleration: Floats, jerk: Floats) -> Floats:
+    """See `rest_seconds`; arguments of one shape or broadcast to it; 0 where there is no path."""
+    v, a, j = (np.where(travel > 0.0, limit, 1.0) for limit in (velocity, acceleration, jerk))
     peak = np.minimum(a, np.sqrt(v * j))
     if np.any(np.isinf(peak) & np.isinf(j)):
         raise ValueError("a joint without limits of acceleration and jerk needs no time to start: state one of them")
     rise = peak / j
     with np.errstate(over="ignore", invalid="ignore"):
         # v (v/A' + A'/J) = D: the positive root, in the form that does not cancel.
-        top = 2.0 * way / (rise + np.sqrt(rise**2 + 4.0 * way / peak))
+        top = 2.0 * travel / (rise + np.sqrt(rise**2 + 4.0 * travel / peak))
         top = np.minimum(v, top)
-        return np.where(way >= 2.0 * peak * rise**2, way / top + top / peak + rise, np.cbrt(32.0 * way / j))
+        return np.where(travel >= 2.0 * peak * rise**2, travel / top + top / peak + rise, np.cbrt(32.0 * travel / j))
 
 
 def _states(q0: Floats, q1: Floats, limits: tuple[Floats, Floats, Floats], law: PointToPointMode,

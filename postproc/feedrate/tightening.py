@@ -1,4 +1,4 @@
-"""Strict mode: where limits are exceeded between knots, the rows of the two knots beside are made as much tighter."""
+"""Strict mode: where limits are exceeded between knots, the rows of the two knots next to are made as much tighter."""
 
 from __future__ import annotations
 
@@ -62,12 +62,12 @@ def _split(grid: MotionKnots, split: Bools) -> MotionKnots:
 
 def _ratios(grid: MotionKnots, profile: Profile, k: Ints, kernel: bool) -> Floats:
     """Velocity (feed included), acceleration and jerk over their limits, (3, N), the worst BETWEEN ends of intervals k."""
-    way = ((grid.sigma[k + 1] - grid.sigma[k])[:, None] * BETWEEN).ravel()
+    travel = ((grid.sigma[k + 1] - grid.sigma[k])[:, None] * BETWEEN).ravel()
     k = np.repeat(k, len(BETWEEN))
-    sigma = grid.sigma[k] + way
+    sigma = grid.sigma[k] + travel
     s = grid.eased.parameter(sigma)
     at = grid.eased.chained(sigma, s, grid.eased.path.derivatives(grid.eased.inside(s[0])))
-    x = np.array(profile.squared(k, way))
+    x = np.array(profile.squared(k, travel))
     limits, speed = grid.limits, np.sqrt(x[0])
     ratios = worst_ratios(at, x, limits, kernel)
     ratios[0] = np.maximum(ratios[0], s[1] * speed / grid.feed(s[0]))

@@ -134,11 +134,11 @@ class Job:
         return self.errors is not None and self.errors.corrected_by == "post"
 
     @cached_property
-    def two_way(self) -> list[int]:
+    def bidirectional(self) -> list[int]:
         """Joints that lose motion, where the program corrects it."""
         if self.errors is None or not self.corrects:
             return []
-        return self.errors.axes.two_way(self.machine.axis_names)
+        return self.errors.axes.bidirectional(self.machine.axis_names)
 
     @cached_property
     def operation(self) -> Ints:

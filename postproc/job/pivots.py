@@ -1,4 +1,4 @@
-"""The pivots that the control's own kinematics holds, beside those of the machine."""
+"""The pivots that the control's own kinematics holds, compared with those of the machine."""
 
 from __future__ import annotations
 

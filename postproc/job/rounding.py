@@ -90,5 +90,6 @@ def rounding_problem(bound: Rounding, tolerance: float, axis_tolerance: float) -
         return []
     return [error("tolerance.rounding", f"rounding of the words alone may move the tip by {bound.tip:.6f} mm and the axis "
                   f"by {bound.axis / DEG:.6f} degrees, of {tolerance:g} mm and {axis_tolerance / DEG:g} degrees that are "
-                  "allowed beside the control's own smoothing", hint="more decimals in the controller's [format], or a "
+                  "allowed in addition to the control's own smoothing",
+                  hint="more decimals in the controller's [format], or a "
                   "wider --tolerance, --axis-tolerance")]

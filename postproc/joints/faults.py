@@ -1,4 +1,4 @@
-"""What is told about the plan of the joints: rewinds, singular directions, why a branch was taken."""
+"""What is reported about the plan of the joints: rewinds, singular directions, why a branch was taken."""
 
 from __future__ import annotations
 
@@ -33,15 +33,15 @@ def _rewinds(plan: RunPlan, machine: Machine, moves: Moves, file: str) -> list[D
             first = next(r for r in done if r.cuts == cuts)
             where = "in the cut" if cuts else "where the tool does not cut"
             result.append(write("rewind.made", f"travel ends within a run: the tool is drawn back {where}, "
-                                f"{_ways(machine, first)} (nearest joints throughout would take {greedy} rewinds)",
+                                f"{_travels(machine, first)} (nearest joints throughout would take {greedy} rewinds)",
                                 file=file, lines=lines[:6], count=len(lines)))
     return result
 
 
-def _ways(machine: Machine, rewind: Rewind) -> str:
-    ways = [(k, a / DEG, b / DEG) for k, rotary, a, b in zip(
+def _travels(machine: Machine, rewind: Rewind) -> str:
+    travels = [(k, a / DEG, b / DEG) for k, rotary, a, b in zip(
         machine.axis_names, machine.rotary, rewind.before, rewind.after, strict=True) if rotary and abs(a - b) > 1e-9]
-    return ", ".join(f"{k} goes from {a:.3f} to {b:.3f} degrees" for k, a, b in ways)
+    return ", ".join(f"{k} goes from {a:.3f} to {b:.3f} degrees" for k, a, b in travels)
 
 
 def _events(plan: RunPlan, machine: Machine, moves: Moves, file: str) -> list[Diagnostic]:
@@ -57,15 +57,15 @@ def _choices(plan: RunPlan, moves: Moves, file: str) -> list[Diagnostic]:
     lines: dict[str, list[int]] = {}
     starts = np.flatnonzero(moves.link)
     for start, solution in zip(starts, plan.solutions, strict=True):
-        if solution.losers and _reason(solution.losers):
-            lines.setdefault(_reason(solution.losers), []).append(int(moves.line[start]))
+        if solution.rejected_starts and _reason(solution.rejected_starts):
+            lines.setdefault(_reason(solution.rejected_starts), []).append(int(moves.line[start]))
     return [info("joints.chosen", f"the other branches and windings {reason}", file=file, lines=found[:6], count=len(found))
             for reason, found in sorted(lines.items())]
 
 
-def _reason(losers: tuple[RejectedStart, ...]) -> str:
-    """What decides against the loser that comes nearest; "" where it is as good."""
-    best: Floats = min((x.dearer for x in losers), key=lambda cost: tuple(cost.tolist()))
+def _reason(rejected_starts: tuple[RejectedStart, ...]) -> str:
+    """What decides against the rejected candidate that comes nearest; "" where it is as good."""
+    best: Floats = min((x.extra_cost for x in rejected_starts), key=lambda cost: tuple(cost.tolist()))
     for column, text in _REASONS:
         if best[column] > 1e-9:
             return text

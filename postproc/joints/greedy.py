@@ -33,12 +33,12 @@ def greedy(lattice: Lattice, start: Floats) -> Greedy:
         if k + 1 == len(segments):
             return Greedy(rewinds, outside, time)
         after = segments[k + 1]
-        to, cost = min(leading(lattice, segment, after)[state], key=lambda way: (way[1][BAD], way[1][SECONDS]))
+        to, cost = min(leading(lattice, segment, after)[state], key=lambda travel: (travel[1][BAD], travel[1][SECONDS]))
         time += float(cost[SECONDS])
         if (after.bad[to] or cost[BAD]) and not after.bad.all():
             at = lattice.joints(after.states[to][0], after.first, after.states[to][1])
-            to, way = _nearest(lattice, after, after.first, at)
-            rewinds, time = rewinds + 1, time + way + float(lattice.away[segment.last])
+            to, travel = _nearest(lattice, after, after.first, at)
+            rewinds, time = rewinds + 1, time + travel + float(lattice.away[segment.last])
         state = to
     raise AssertionError("a run has at least one segment")
 
@@ -47,6 +47,6 @@ def _nearest(lattice: Lattice, segment: Segment, pose: int, q: Floats) -> tuple[
     """(state inside travel that is nearest to q (J,), time to go there); of those outside where no other is."""
     to = np.stack([lattice.joints(b, pose, turns) for b, turns in segment.states])
     step = np.where(lattice.endless, wrap(to - q), to - q)
-    way = np.nan_to_num(np.abs(np.where(lattice.rotary, step, 0.0)).sum(axis=1), nan=np.inf)
-    best = int(np.lexsort((way, segment.bad > 0))[0])
+    travel = np.nan_to_num(np.abs(np.where(lattice.rotary, step, 0.0)).sum(axis=1), nan=np.inf)
+    best = int(np.lexsort((travel, segment.bad > 0))[0])
     return best, float(lattice.seconds(step[best]))

@@ -1,4 +1,4 @@
-"""Joints of poses: the way through an unbroken run, the solution nearest to given joints, axes onto what can be reached."""
+"""Joints of poses: the path through an unbroken run, the solution nearest to given joints, axes onto what can be reached."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ class PoseRun:
         tip, axis: (N, 3) in the table frame
         rest: (N,) True where the tool does not cut, so that it may be drawn back; None: it cuts everywhere
         away: (N,) s that drawing back there and coming down again takes; None: nothing
-        held: (J,) where a rotary joint must stand that the tool lies along all the way; None: where it is best
+        held: (J,) where a rotary joint must stand that the tool lies along along the whole path; None: where it is best
     """
 
     kin: Kinematics
@@ -86,18 +86,18 @@ class Lattice:
         return q
 
     def on(self, branch: int, pose: int, turns: tuple[int, ...], target: int) -> tuple[tuple[int, ...], Floats]:
-        """(turns at the next pose on branch `target`, way (J,)), every rotary axis going the shorter way."""
+        """(turns at the next pose on branch `target`, path (J,)), every rotary axis going the shorter path."""
         step = self.values[target, pose + 1] - self.values[branch, pose]
-        way = np.where(self.rotary, wrap(step), step)
-        added = np.nan_to_num(np.rint((way - step) / TWO_PI)).astype(np.int64)[self.wound]
-        return tuple(int(k) for k in np.array(turns, dtype=np.int64) + added), way
+        travel = np.where(self.rotary, wrap(step), step)
+        added = np.nan_to_num(np.rint((travel - step) / TWO_PI)).astype(np.int64)[self.wound]
+        return tuple(int(k) for k in np.array(turns, dtype=np.int64) + added), travel
 
     def between(self, values: Floats, turns: tuple[int, ...], others: Floats, other_turns: tuple[int, ...]) -> Floats:
-        """Ways (..., J) from one state to another at standing tool; axes without limits go the shorter way."""
+        """Paths (..., J) from one state to another at standing tool; axes without limits go the shorter path."""
         step = others - values
-        way = np.where(self.endless, wrap(step), step)
-        way[..., self.wound] += TWO_PI * (np.array(other_turns, dtype=np.float64) - np.array(turns, dtype=np.float64))
-        return np.asarray(way)
+        travel = np.where(self.endless, wrap(step), step)
+        travel[..., self.wound] += TWO_PI * (np.array(other_turns, dtype=np.float64) - np.array(turns, dtype=np.float64))
+        return np.asarray(travel)
 
     @cached_property
     def endless(self) -> Bools:
@@ -106,13 +106,14 @@ class Lattice:
         result[self.wound] = False
         return result
 
-    def seconds(self, way: Floats) -> Floats:
-        """Time of joint ways (..., J), every axis at its velocity."""
-        return np.asarray(np.nan_to_num((np.abs(way) / self.limits.velocity).max(axis=-1)))
+    def seconds(self, travel: Floats) -> Floats:
+        """Time of joint paths (..., J), every axis at its velocity."""
+        return np.asarray(np.nan_to_num((np.abs(travel) / self.limits.velocity).max(axis=-1)))
 
 
 def lattice_of(run: PoseRun, limits: Limits, near: Floats) -> Lattice:
-    """The states of a run; where the tool lies along a rotary axis all the way, that axis stands as in `near` (F, J).
+    """The states of a run; where the tool lies along a rotary axis along the whole path, that axis stands as in `near` (F,
+    J).
 
     Such a run has a branch for each row of `near`.
     """

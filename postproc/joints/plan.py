@@ -1,7 +1,7 @@
 """Branches, windings and rewinds of a whole program: the least of what must not be, then the least time.
 
 Compared in this order: poses outside travel or without solution, rewinds, rewinds in the cut, poses on the wrong side of
-the preferred axis, time with every axis at its velocity, the ways between the runs included.
+the preferred axis, time with every axis at its velocity, the moves between the runs included.
 """
 
 from __future__ import annotations
@@ -34,13 +34,13 @@ class Rewind:
 
 @dataclass(frozen=True)
 class RejectedStart:
-    """A state that a run could have begun in: joints (J,), and by how much (5,) the best end from there is dearer.
+    """A state that a run could have begun in: joints (J,), and by how much (5,) the best end from there is more expensive.
 
     Infinitely where no winding of its branch goes through the run.
     """
 
     q: Floats
-    dearer: Floats
+    extra_cost: Floats
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class RunSolution:
     rewinds: tuple[Rewind, ...] = ()
     outside: int = 0
     """poses outside travel or without solution, and steps between poses that no state makes inside travel"""
-    losers: tuple[RejectedStart, ...] = ()
+    rejected_starts: tuple[RejectedStart, ...] = ()
     greedy: int = 0
     """rewinds if every pose took the nearest joints"""
 
@@ -79,12 +79,12 @@ class _Stage:
     choices: list[SegmentChoice] = field(default_factory=list)
 
 
-def plan_runs(runs: list[PoseRun], limits: Limits, start: Floats, wishes: JointPreferences | None = None,
+def plan_runs(runs: list[PoseRun], limits: Limits, start: Floats, preferences: JointPreferences | None = None,
               may_rewind: bool = True,
               progress: Callable[[int], None] | None = None) -> list[RunSolution]:
     """The joints of runs, in order, from a machine that stands at `start` (J,).
 
-    Between two runs the tool is drawn back, so that any state may follow any other at the price of the way there.
+    Between two runs the tool is drawn back, so that any state may follow any other at the price of the path there.
 
     Args:
         may_rewind: False where no run may be interrupted
@@ -92,14 +92,14 @@ def plan_runs(runs: list[PoseRun], limits: Limits, start: Floats, wishes: JointP
     """
     if (only := direct(runs, limits)) is not None:
         return [RunSolution(q, np.zeros(len(q), dtype=np.bool_)) for q in only]
-    wishes = wishes or JointPreferences()
+    preferences = preferences or JointPreferences()
     start = start.copy()
-    for joint, angle in wishes.start.items():
+    for joint, angle in preferences.start.items():
         start[joint] = angle
     stages = _stages(runs, limits, start, may_rewind, progress)
     end: Callable[[_Stage], Floats] = _free_end
     for stage in reversed(stages):
-        wrong = wrong_side(stage.lattice, dict(wishes.side))
+        wrong = wrong_side(stage.lattice, dict(preferences.side))
         stage.value, stage.choices = cheapest(stage.lattice, stage.segments, end(stage), stage.rewinds, wrong)
         end = _before(stage)
     solutions, at, end = [], start, _free_end
@@ -132,7 +132,7 @@ def _joints(stage: _Stage, segment: int, pose: int) -> Floats:
 
 
 def _link(lattice: Lattice, q: Floats, to: Floats) -> Floats:
-    """(S, 5) cost of the ways from joints q (J,) to joints (S, J); axes without limits go the shorter way."""
+    """(S, 5) cost of the paths from joints q (J,) to joints (S, J); axes without limits go the shorter path."""
     step = to - q
     result = np.zeros((len(to), 5))
     result[:, SECONDS] = lattice.seconds(np.where(lattice.endless, wrap(step), step))
@@ -143,7 +143,7 @@ def _stages(runs: list[PoseRun], limits: Limits, start: Floats, may_rewind: bool
             progress: Callable[[int], None] | None) -> list[_Stage]:
     """Every run with its states.
 
-    A run whose tool lies along a rotary axis all the way may take that axis as it stands before or after it; where
+    A run whose tool lies along a rotary axis along the whole path may take that axis as it stands before or after it; where
     neither is inside travel, at a quarter turn. One that holds it has no choice.
     """
     result: list[_Stage] = []
@@ -198,7 +198,7 @@ def _solution(stage: _Stage, at: Floats) -> RunSolution:
     low, high = lattice.limits.lower - TRAVEL_SLACK, lattice.limits.upper + TRAVEL_SLACK
     stood = np.concatenate([q, *(r.after[None] for r in rewinds)])
     outside = int((~((stood >= low) & (stood <= high)).all(axis=1)).sum()) + _jumps(lattice, taken, q)
-    return RunSolution(q, family, rewinds, outside, _losers(lattice, stage.segments[0], q0, every, best),
+    return RunSolution(q, family, rewinds, outside, _rejected(lattice, stage.segments[0], q0, every, best),
                        greedy(lattice, at).rewinds)
 
 
@@ -209,12 +209,12 @@ def _jumps(lattice: Lattice, taken: list[RunPiece], q: Floats) -> int:
     return int((step > np.pi + 1e-6).any(axis=1).sum())
 
 
-def _losers(lattice: Lattice, first: Segment, q0: Floats, every: Floats, best: int) -> tuple[RejectedStart, ...]:
+def _rejected(lattice: Lattice, first: Segment, q0: Floats, every: Floats, best: int) -> tuple[RejectedStart, ...]:
     """The other states of the first pose, and the branches that it has but the run has not."""
     shut = set(range(len(lattice.values))) - {branch for branch, _ in first.states}
     with np.errstate(invalid="ignore"):
-        dearer = np.where(every == np.inf, np.inf, every - every[best])
-    return (*(RejectedStart(q0[k], dearer[k]) for k in range(len(every)) if k != best),
+        extra_cost = np.where(every == np.inf, np.inf, every - every[best])
+    return (*(RejectedStart(q0[k], extra_cost[k]) for k in range(len(every)) if k != best),
             *(RejectedStart(lattice.values[b, 0], NEVER) for b in sorted(shut) if np.isfinite(lattice.values[b, 0]).all()))
 
 
@@ -227,7 +227,7 @@ def _rows(lattice: Lattice, piece: RunPiece, first: int) -> Floats:
 
 
 def _offsets(lattice: Lattice, taken: list[RunPiece], at: Floats) -> list[Floats]:
-    """What each piece's axes without limits are to be turned by (J,), so that they go on the shorter way."""
+    """What each piece's axes without limits are to be turned by (J,), so that they go on the shorter path."""
     result, before = [], at
     for piece in taken:
         begin = _rows(lattice, RunPiece(piece.first, piece.first, piece.state, False), piece.first)[0]

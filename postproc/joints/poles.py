@@ -33,7 +33,7 @@ class Pole:
 
 
 def poles_of(kin: Kinematics) -> list[Pole]:
-    """The singular directions that the tool can take: both ways along the rotary axis nearest the part, if it can.
+    """The singular directions that the tool can take: both directions along the rotary axis nearest the part, if it can.
 
     That axis is the one whose turning direction, seen from the part, does not depend on the joints.
     """
@@ -56,8 +56,8 @@ def _poles(kin: Kinematics) -> tuple[Pole, ...]:
     for j in rotary:
         direction = turn[0, :, j]
         if np.abs(direction - turn[1, :, j]).max() < 1e-9:
-            for way in (direction, -direction):
-                unit = way / np.linalg.norm(way)
+            for travel in (direction, -direction):
+                unit = travel / np.linalg.norm(travel)
                 if angle_between(kin.nearest_axis(unit[None]), unit[None])[0] < 1e-9:
                     result.append(Pole(_frame(unit), int(j)))
     return tuple(result)

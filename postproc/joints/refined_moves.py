@@ -17,7 +17,7 @@ class Refined:
     """Moves (R) of which number k is part u0..u1 (R,) of the move `origin` (R,) of the CL file.
 
     Attributes:
-        moves: their links are those of the CL file and the ways back to a pose after a rewind
+        moves: their links are those of the CL file and the returns to a pose after a rewind
         rewind: (R,) True for the latter
     """
 
@@ -69,7 +69,7 @@ def _arcs(moves: Moves, arc: Ints, share: Floats, part: Bools) -> tuple[Ints, Ar
 
 
 def with_rewinds(refined: Refined, rows: Ints, cuts: Bools, feed: float | None) -> Refined:
-    """The same with a linked row after each of `rows` (K,), at the same pose: the way back to it after a rewind.
+    """The same with a linked row after each of `rows` (K,), at the same pose: the return to it after a rewind.
 
     Args:
         cuts: (K,) True where the tool cuts there: it comes back at a feed
@@ -95,5 +95,5 @@ def with_rewinds(refined: Refined, rows: Ints, cuts: Bools, feed: float | None) 
 
 def _feeds(moves: Moves, rows: Ints) -> Floats:
     """Tip feeds (K,) mm/s of moves, also of those given by their time."""
-    way = moves.curves().take(rows).length()
-    return np.where(moves.feed[rows] > 0.0, moves.feed[rows], way / moves.seconds[rows])
+    travel = moves.curves().take(rows).length()
+    return np.where(moves.feed[rows] > 0.0, moves.feed[rows], travel / moves.seconds[rows])

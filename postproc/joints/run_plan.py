@@ -35,14 +35,14 @@ class RunOptions:
     """How runs are planned.
 
     Attributes:
-        wishes: of the set-up
+        preferences: of the set-up
         may_rewind: False where the set-up forbids it
-        feed: mm/s of the way back into the cut; None: that of the cut
+        feed: mm/s of the return into the cut; None: that of the cut
         away: (tips (N, 3), axes (N, 3)) -> s (N,) that drawing back and coming down takes
         tolerance: rad, of the axis
     """
 
-    wishes: JointPreferences
+    preferences: JointPreferences
     may_rewind: bool
     feed: float | None
     away: Callable[[Floats, Floats], Floats]
@@ -94,21 +94,21 @@ class _Part:
     """(N, 3) as given"""
 
 
-def plan_moves(machine: Machine, kinematics: Callable[[int], Kinematics], moves: Moves, manner: RunOptions,
+def plan_moves(machine: Machine, kinematics: Callable[[int], Kinematics], moves: Moves, run_options: RunOptions,
                progress: Callable[[int], None] | None = None) -> RunPlan:
     """The joints of all moves (in the table frame), run by run as `moves.link` divides them."""
     starts, parts = np.flatnonzero(moves.link), []
     tools = {k: kinematics(k) for k in np.unique(moves.tool[starts]).tolist()}
-    given = _reached(tools, moves, starts, AXIS_SHARE * manner.tolerance)
+    given = _reached(tools, moves, starts, AXIS_SHARE * run_options.tolerance)
     for first, last in zip(starts.tolist(), [*starts[1:].tolist(), len(moves)], strict=True):
-        parts.append(_part(machine, tools[int(moves.tool[first])], moves, first, last, given, manner))
-    runs = [_run(part, moves, manner, machine.home) for part in parts]
-    found = plan_runs(runs, machine.limits, machine.home, manner.wishes, manner.may_rewind, progress)
-    if manner.may_rewind and any(s.outside for s in found):
+        parts.append(_part(machine, tools[int(moves.tool[first])], moves, first, last, given, run_options))
+    runs = [_run(part, moves, run_options, machine.home) for part in parts]
+    found = plan_runs(runs, machine.limits, machine.home, run_options.preferences, run_options.may_rewind, progress)
+    if run_options.may_rewind and any(s.outside for s in found):
         parts = [_finer(part, s) if s.outside else part for part, s in zip(parts, found, strict=True)]
-        runs = [_run(part, moves, manner, machine.home) for part in parts]
-        found = plan_runs(runs, machine.limits, machine.home, manner.wishes, manner.may_rewind, progress)
-    return _together(moves, parts, found, manner)
+        runs = [_run(part, moves, run_options, machine.home) for part in parts]
+        found = plan_runs(runs, machine.limits, machine.home, run_options.preferences, run_options.may_rewind, progress)
+    return _together(moves, parts, found, run_options)
 
 
 def _reached(tools: dict[int, Kinematics], moves: Moves, starts: Ints, tolerance: float) -> tuple[Floats, Floats]:
@@ -125,14 +125,14 @@ def _reached(tools: dict[int, Kinematics], moves: Moves, starts: Ints, tolerance
 
 
 def _part(machine: Machine, kin: Kinematics, moves: Moves, first: int, last: int, given: tuple[Floats, Floats],
-          manner: RunOptions) -> _Part:
+          run_options: RunOptions) -> _Part:
     """A run with the axes `given` (R, 3), which are moved by as much (R,)."""
     rows, curves = np.arange(first, last), moves.run(first, last)
     axis, moved = given[0][first:last], given[1][first:last]
     curves = Curves(curves.start, curves.end, axis[:-1], axis[1:], curves.is_arc, curves.center, curves.normal, curves.sweep)
     led = whole(curves)
     if len(curves) and any(kin.rotary):
-        allowed = LEAD_SHARE * (manner.tolerance - float(moved.max()))
+        allowed = LEAD_SHARE * (run_options.tolerance - float(moved.max()))
         led = lead_past(kin, curves, _seconds(moves, rows[1:], curves), allowed, machine.limits.velocity)
     return _Part(kin, rows, axis, moved, led, moves.tip[first:last])
 
@@ -144,14 +144,14 @@ def _seconds(moves: Moves, rows: Ints, curves: Curves) -> Floats:
     return np.where((moves.kind[rows] == Kind.RAPID) | ~(time > 0.0), np.nan, time)
 
 
-def _run(part: _Part, moves: Moves, manner: RunOptions, home: Floats) -> PoseRun:
+def _run(part: _Part, moves: Moves, run_options: RunOptions, home: Floats) -> PoseRun:
     tip, axis = part.poses()
     owner = np.concatenate([part.rows[:1], part.rows[1:][part.led.parent]])
     rapid = moves.kind[owner] == Kind.RAPID
     rest = rapid | np.append(rapid[1:], True)
     spin = float(moves.spin[part.rows[0]])
     held = held_joints(part.kin, tip[0], axis[0], spin, home) if np.isfinite(spin) else None
-    return PoseRun(part.kin, tip, axis, rest, manner.away(tip, axis), held)
+    return PoseRun(part.kin, tip, axis, rest, run_options.away(tip, axis), held)
 
 
 def _finer(part: _Part, solution: RunSolution) -> _Part:
@@ -172,7 +172,7 @@ def _finer(part: _Part, solution: RunSolution) -> _Part:
     return _Part(part.kin, part.rows, part.axis, part.moved, finer, part._tip)
 
 
-def _together(moves: Moves, parts: list[_Part], found: list[RunSolution], manner: RunOptions) -> RunPlan:
+def _together(moves: Moves, parts: list[_Part], found: list[RunSolution], run_options: RunOptions) -> RunPlan:
     """All runs one after the other, cut where there are rewinds."""
     owner = [np.append(0, 1 + p.led.parent) for p in parts]
     refined = cut(moves, np.concatenate([p.rows[k] for p, k in zip(parts, owner, strict=True)]),
@@ -182,10 +182,10 @@ def _together(moves: Moves, parts: list[_Part], found: list[RunSolution], manner
     begin = np.cumsum([0, *(len(k) for k in owner)])
     rewinds = [(int(b) + r.row, r) for b, s in zip(begin, found, strict=False) for r in s.rewinds]
     rows = np.array([row for row, _ in rewinds], dtype=np.int64)
-    refined = with_rewinds(refined, rows, np.array([r.cuts for _, r in rewinds], dtype=np.bool_), manner.feed)
+    refined = with_rewinds(refined, rows, np.array([r.cuts for _, r in rewinds], dtype=np.bool_), run_options.feed)
     q, singular = np.concatenate([s.q for s in found]), np.concatenate([s.singular for s in found])
     moved = shared(np.concatenate([p.moved[k] for p, k in zip(parts, owner, strict=True)]))
-    left = shared(np.repeat([_left(p, manner) for p in parts], np.diff(begin)))
+    left = shared(np.repeat([_left(p, run_options) for p in parts], np.diff(begin)))
     if rewinds:
         q = np.insert(q, rows + 1, np.stack([r.after for _, r in rewinds]), axis=0)
         singular, moved, left = (np.insert(x, rows + 1, x[rows]) for x in (singular, moved, left))
@@ -202,7 +202,7 @@ def _joined(moves: Moves, parts: list[_Part]) -> tuple[Floats, Floats]:
     return tip, moves.axis if same else shared(np.concatenate([axis for _, axis in poses]))
 
 
-def _left(part: _Part, manner: RunOptions) -> float:
+def _left(part: _Part, run_options: RunOptions) -> float:
     """What moving and leading the axis leave of the tolerance."""
     led = max((e.deviation for e in part.led.events), default=0.0)
-    return manner.tolerance - float(part.moved.max()) - led
+    return run_options.tolerance - float(part.moved.max()) - led

@@ -1,7 +1,7 @@
 """The cheapest sequence of states of a run: backwards over its segments (Bellman), exact.
 
 Inside a segment travel admits the same states everywhere and no branch changes, so one rewind there is enough: two could
-be replaced by one that goes all the way. It is made at the cheapest pose.
+be replaced by one that goes along the whole path. It is made at the cheapest pose.
 """
 
 from __future__ import annotations
@@ -79,11 +79,11 @@ def cheapest(lattice: Lattice, segments: list[Segment], end: Floats, rewinds: bo
 def _onwards(lattice: Lattice, segment: Segment, after: Segment, value: Floats) -> tuple[Floats, Ints]:
     """(cost (S, 5) from the end of a segment on, state of the next segment (S,))."""
     out, following = np.tile(NEVER, (len(segment), 1)), np.full(len(segment), -1)
-    for s, ways in enumerate(leading(lattice, segment, after)):
-        if ways:
-            costs = np.stack([cost + value[k] for k, cost in ways])
+    for s, travels in enumerate(leading(lattice, segment, after)):
+        if travels:
+            costs = np.stack([cost + value[k] for k, cost in travels])
             best = int(least_of(costs))
-            out[s], following[s] = costs[best], ways[best][0]
+            out[s], following[s] = costs[best], travels[best][0]
     return out, following
 
 
@@ -105,7 +105,7 @@ def _rewind(lattice: Lattice, segment: Segment, s: int, t: int, wrong: Floats) -
     # Outside travel nothing is gained by waiting: the rewind is made at once, or as late as can be.
     only = first if segment.bad[s] else last if segment.bad[t] else -1
     rows = np.array([only]) if only >= 0 else np.arange(first, last + 1)
-    way = lattice.between(lattice.values[b, rows], turns, lattice.values[c, rows], others)
+    travel = lattice.between(lattice.values[b, rows], turns, lattice.values[c, rows], others)
     cost = np.zeros((len(rows), 5))
     cost[:, BAD] = (rows - first + 1) * (segment.bad[s] > 0) + (last - rows + 1) * (segment.bad[t] > 0)
     cost[:, REWINDS] = 1.0
@@ -113,7 +113,7 @@ def _rewind(lattice: Lattice, segment: Segment, s: int, t: int, wrong: Floats) -
     cost[:, WRONG] = wrong[b, rows + 1] - wrong[b, first] + wrong[c, last + 1] - wrong[c, rows]
     clock = lattice.clock
     cost[:, SECONDS] = (clock[b, rows] - clock[b, first] + clock[c, last] - clock[c, rows] + lattice.away[rows]
-                        + lattice.seconds(way))
+                        + lattice.seconds(travel))
     best = int(least_of(cost))
     return cost[best], int(rows[best])
 

@@ -164,12 +164,12 @@ def _led_axes(pole: Pole, given: Floats, azimuth: Floats, at: Floats, reach: flo
     theta = pole.polar(given)[0]
     free = theta <= reach * (1.0 - _CORE)
     free[[0, -1]] = False
-    ways = [(azimuth, np.ones(len(azimuth)))]
+    travels = [(azimuth, np.ones(len(azimuth)))]
     if free.any():
-        ways.append(_through(theta, azimuth, free))
-    strings = [_string(theta, flat, sign, free, at, reach) for flat, sign in ways]
+        travels.append(_through(theta, azimuth, free))
+    strings = [_string(theta, flat, sign, free, at, reach) for flat, sign in travels]
     best = int(np.argmin([np.abs(np.diff(s) / np.diff(at)).max() for s in strings]))
-    string, (flat, sign) = strings[best], ways[best]
+    string, (flat, sign) = strings[best], travels[best]
     signed = np.arctan(np.tan(sign * theta) * np.cos(string - flat))
     signed = sign * np.maximum(sign * signed, np.where(theta <= 1.1 * reach, _CORE * reach, 0.0))
     signed[_crossings(sign)] = 0.0
@@ -179,13 +179,13 @@ def _led_axes(pole: Pole, given: Floats, azimuth: Floats, at: Floats, reach: flo
 
 
 def _string(theta: Floats, flat: Floats, sign: Floats, free: Bools, at: Floats, reach: float) -> Floats:
-    """The azimuths (P,) of the taut string; beside the pole itself they stand still, so that nothing turns on it."""
+    """The azimuths (P,) of the taut string; next to the pole itself they stand still, so that nothing turns on it."""
     width = np.where(free, 1e3, np.arcsin(np.clip(np.sin(reach) / np.maximum(np.sin(theta), np.sin(reach)), 0.0, 1.0)))
     width[[0, -1]] = 0.0
     string = taut_string(at, flat - width, flat + width)
     for m in _crossings(sign):
-        beside = np.array([k for k in (m - 1, m + 1) if free[k]], dtype=np.int64)
-        string[beside] = string[m]
+        adjacent = np.array([k for k in (m - 1, m + 1) if free[k]], dtype=np.int64)
+        string[adjacent] = string[m]
     return string
 
 
@@ -197,7 +197,7 @@ def _crossings(sign: Floats) -> Ints:
 def _through(theta: Floats, azimuth: Floats, free: Bools) -> tuple[Floats, Floats]:
     """(azimuths on meridians (P,), side of the pole on them (P,)) where each free stretch is gone through straight.
 
-    The side changes behind the place nearest to the pole. Whether it does is told by the azimuths far from the pole,
+    The side changes behind the place nearest to the pole. Whether it does is reported by the azimuths far from the pole,
     before and after the stretch.
     """
     flat, sign = azimuth.copy(), np.ones(len(azimuth))
@@ -226,7 +226,7 @@ def _places(pole: Pole, curves: Curves, tolerance: float) -> tuple[Ints, Floats]
 
 def _inner(pole: Pole, a: Floats, b: Floats, tolerance: float) -> Floats:
     """Places u of a great circle from a to b (3,), within the cone that is led: from its foot f at the angle m from the
-    pole, the azimuth turns by atan(tan(psi) / sin(m)) over the way psi (Napier)."""
+    pole, the azimuth turns by atan(tan(psi) / sin(m)) over the path psi (Napier)."""
     normal = np.cross(a, b)
     turn, size = float(angle_between(a[None], b[None])[0]), float(np.linalg.norm(normal))
     normal = normal / size

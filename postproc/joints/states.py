@@ -99,15 +99,15 @@ def staying(lattice: Lattice, segment: Segment, wrong: Floats) -> Floats:
 def leading(lattice: Lattice, segment: Segment, after: Segment) -> list[list[tuple[int, Floats]]]:
     """For each state of a segment the states of the next one that it may lead to, with the cost (5,) of the step.
 
-    Where the branch is free the axis may go to any branch, either way round. A state that leads to none that is known
-    goes to the nearest of its branch, which counts as one more pose outside.
+    Where the branch is free the axis may go to any branch, in either direction round. A state that leads to none that is
+    known goes to the nearest of its branch, which counts as one more pose outside.
     """
     pose, result = segment.last, []
     for branch, turns in segment.states:
         found = []
         for target in range(len(lattice.values)) if lattice.free[pose] else [int(lattice.leads[branch, pose])]:
-            to, way = lattice.on(branch, pose, turns, target)
-            options = _round(lattice, to, way) if lattice.free[pose] and target != branch else [(to, way)]
+            to, travel = lattice.on(branch, pose, turns, target)
+            options = _round(lattice, to, travel) if lattice.free[pose] and target != branch else [(to, travel)]
             for wound, gone in options:
                 k = after.index.get((target, wound))
                 if k is not None:
@@ -125,13 +125,13 @@ def lattice_target(lattice: Lattice, branch: int, pose: int, turns: tuple[int, .
     return target, lattice.on(branch, pose, turns, target)[0]
 
 
-def _round(lattice: Lattice, turns: tuple[int, ...], way: Floats) -> list[tuple[tuple[int, ...], Floats]]:
-    """The shorter way, and for each wound joint that turns the longer one."""
-    result = [(turns, way)]
+def _round(lattice: Lattice, turns: tuple[int, ...], travel: Floats) -> list[tuple[tuple[int, ...], Floats]]:
+    """The shorter path, and for each wound joint that turns the longer one."""
+    result = [(turns, travel)]
     for w, j in enumerate(lattice.wound):
-        if abs(way[j]) > 1e-9:
-            sense = -1 if way[j] > 0.0 else 1
-            other = way.copy()
+        if abs(travel[j]) > 1e-9:
+            sense = -1 if travel[j] > 0.0 else 1
+            other = travel.copy()
             other[j] += 2.0 * np.pi * sense
             result.append(((*turns[:w], turns[w] + sense, *turns[w + 1:]), other))
     return result
@@ -144,8 +144,8 @@ def _nearest(segment: Segment, branch: int, turns: tuple[int, ...]) -> int:
     return min(far)[2] if far else -1
 
 
-def _step(lattice: Lattice, way: Floats, bad: int) -> Floats:
-    return np.array([bad, 0.0, 0.0, 0.0, float(lattice.seconds(way))])
+def _step(lattice: Lattice, travel: Floats, bad: int) -> Floats:
+    return np.array([bad, 0.0, 0.0, 0.0, float(lattice.seconds(travel))])
 
 
 def least_of(costs: Floats) -> Ints:

@@ -27,7 +27,7 @@ def taut_string(at: Floats, low: Floats, high: Floats) -> Floats:
 
 
 def _next_bend(at: Floats, low: Floats, high: Floats, corner: int, value: float) -> tuple[int, float]:
-    """(gate where the string bends next or ends, slope on the way there) from gate `corner`."""
+    """(gate where the string bends next or ends, slope on the path there) from gate `corner`."""
     steepest, flattest = np.inf, -np.inf
     upper = lower = corner + 1
     for k in range(corner + 1, len(at)):

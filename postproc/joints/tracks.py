@@ -12,7 +12,7 @@ TWO_PI = 2.0 * np.pi
 TRAVEL_SLACK = 1e-9
 """mm or rad: round-off that is no excess of travel"""
 _SMALL_STEP = 0.35
-"""rad of rotary way that a branch is followed without a look between"""
+"""rad of rotary path that a branch is followed without a look between"""
 _CROSSING = 1e-3
 _LEAST_STEP = 1e-10
 
@@ -27,7 +27,7 @@ def branches_of(kin: Kinematics, tip: Floats, axis: Floats, near: Floats) -> tup
     """(joints (B, N, J) of every branch, family (B, N)) of poses (N, 3), (N, 3), rotaries in (-pi, pi].
 
     Where the tool lies along a rotary axis the free joint is carried on from the rows before, at the beginning of the
-    run from the first other row. Where it does so all the way there is one branch for each row of `near` (F, J).
+    run from the first other row. Where it does so along the whole path there is one branch for each row of `near` (F, J).
     """
     rotary = np.array(kin.rotary)
     branches = kin.inverse(tip, axis, near=near[0])
@@ -55,7 +55,7 @@ def _fill_family(kin: Kinematics, tip: Floats, axis: Floats, branches: Floats, f
 
 
 def distance(a: Floats, b: Floats, rotary: Bools) -> Floats:
-    """Rotary way in rad where the machine has rotary joints, else linear way in mm; NaN counts as infinite."""
+    """Rotary path in rad where the machine has rotary joints, else linear path in mm; NaN counts as infinite."""
     d = wrap(b[..., rotary] - a[..., rotary]) if rotary.any() else b - a
     result: Floats = np.nan_to_num(np.abs(d).sum(axis=-1), nan=np.inf)
     return result
@@ -80,9 +80,9 @@ def following(kin: Kinematics, tip: Floats, axis: Floats, branches: Floats,
     best = np.where((stay <= step.min(axis=1) + 1e-9) | ~np.isfinite(step.min(axis=1)), own, nearest)
     there = np.asarray(family.any(axis=0), dtype=np.bool_)
     at_family = there[:-1] | there[1:]
-    doubtful = ((best != own) | (stay > _SMALL_STEP)) & np.isfinite(stay) & ~at_family
+    uncertain = ((best != own) | (stay > _SMALL_STEP)) & np.isfinite(stay) & ~at_family
     best = np.where(at_family & there[1:], own, best)
-    for b, i in np.argwhere(doubtful):
+    for b, i in np.argwhere(uncertain):
         end = _walk(kin, tip[i:i + 2], axis[i:i + 2], branches[b, i], int(b))
         best[b, i] = int(distance(end, branches[:, i + 1], rotary).argmin())
     return best.astype(np.int8), there[:-1] & ~there[1:]
@@ -92,7 +92,7 @@ def _walk(kin: Kinematics, tip: Floats, axis: Floats, q: Floats, branch: int) ->
     """Joints at the second of two poses, reached from joints q of the first without a jump.
 
     Steps are halved until the joints move little; the branch may only change where it comes as near as where the tool
-    passes through a singular direction. Where the way leaves the reach, as around the pole of axes that are not square to
+    passes through a singular direction. Where the path leaves the reach, as around the pole of axes that are not square to
     each other, it ends there.
     """
     rotary = np.array(kin.rotary)
@@ -101,12 +101,12 @@ def _walk(kin: Kinematics, tip: Floats, axis: Floats, q: Floats, branch: int) ->
         size = min(size, 1.0 - u)
         t = np.array([u + size])
         found = kin.inverse(tip[:1] + t[:, None] * (tip[1:] - tip[:1]), slerp(axis[:1], axis[1:], t), near=q[None, :])[:, 0]
-        way = distance(q, found, rotary)
-        near = int(way.argmin())
-        if way[near] > (_SMALL_STEP if near == branch else _CROSSING) and size > _LEAST_STEP:
+        travel = distance(q, found, rotary)
+        near = int(travel.argmin())
+        if travel[near] > (_SMALL_STEP if near == branch else _CROSSING) and size > _LEAST_STEP:
             size *= 0.5
             continue
-        if not np.isfinite(way[near]):
+        if not np.isfinite(travel[near]):
             break
         q, branch, u = found[near], near, u + size
         size *= 2.0

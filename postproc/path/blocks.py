@@ -114,10 +114,10 @@ def rapid_codes(control: Control, kin: Kinematics, q0: Floats, q1: Floats, toler
 
 def _off(tip: Floats, begin: Floats, end: Floats) -> Floats:
     """Distance (K,) of points from the straight lines between two points."""
-    way = end - begin
-    square = np.maximum((way**2).sum(axis=1), 1e-300)
-    along = np.clip(((tip - begin) * way).sum(axis=1) / square, 0.0, 1.0)
-    return np.asarray(np.linalg.norm(tip - begin - along[:, None] * way, axis=1))
+    travel = end - begin
+    square = np.maximum((travel**2).sum(axis=1), 1e-300)
+    along = np.clip(((tip - begin) * travel).sum(axis=1) / square, 0.0, 1.0)
+    return np.asarray(np.linalg.norm(tip - begin - along[:, None] * travel, axis=1))
 
 
 def add_run(out: PathBuilder, frame: WordFrame, kin: Kinematics, moves: Moves, rows: Ints, curves: Curves, q0: Floats,

@@ -4,7 +4,7 @@ With e(t) the difference of the block's pose and the reference's pose, both run 
 stays within M d^2 / 8 of the straight lines between its values at places d apart (interpolation error), and a straight
 line is nowhere longer than at its ends. So max |e| <= max |e(t_k)| + M d^2 / 8. M comes from the derivatives in the middle
 of the block and a bound of the third derivative over all of it (`machines.straight_blocks`). The reference may be run
-through in any way: here its parameter is the parabola through its values at the block's ends and middle.
+through at all: here its parameter is the parabola through its values at the block's ends and middle.
 """
 
 from __future__ import annotations
@@ -103,26 +103,26 @@ class _Offset:
     seen: _Seen
     bend: _Seen
     turn: Floats
-    way: TaylorAngle
+    travel: TaylorAngle
 
     @classmethod
     def of(cls, control: Control, kin: Kinematics, s: CurveBlocks) -> _Offset:
         """Looked at where the blocks begin and end and in their middle."""
         n, chord = len(s), _chord(s.curves)
         tip, axis = _law_jets(control, kin, s)
-        way, turn = _way(s, columns.to_rows(tip.value, n)), angle_between(s.curves.axis0, s.curves.axis1)
-        tip, axis = tip - tip_reference(s.curves, way), axis - axis_reference(s.curves, way, turn)
+        travel, turn = _travel(s, columns.to_rows(tip.value, n)), angle_between(s.curves.axis0, s.curves.axis1)
+        tip, axis = tip - tip_reference(s.curves, travel), axis - axis_reference(s.curves, travel, turn)
         seen = _Seen.at(columns.to_rows(tip.value, n), columns.to_rows(axis.value, n), chord)
         for pose, u in ((s.start, s.u0), (s.end, s.u1)):
             on_tip, on_axis = s.curves.at(u)
             seen = seen | _Seen.at(pose[0] - on_tip, pose[1] - on_axis, chord)
         along = np.abs(_dot(columns.to_rows(tip.second, n), chord)) + 0.5 * tip.third
-        return cls(seen, _Seen(tip.bend() + np.zeros(n), axis.bend() + np.zeros(n), along), turn, way)
+        return cls(seen, _Seen(tip.bend() + np.zeros(n), axis.bend() + np.zeros(n), along), turn, travel)
 
     def take(self, rows: Bools) -> _Offset:
         """Some of the blocks."""
         value, first, second = (np.broadcast_to(x, rows.shape)[rows] for x in (
-            self.way.value, self.way.first, self.way.second))
+            self.travel.value, self.travel.first, self.travel.second))
         return _Offset(self.seen.take(rows), self.bend.take(rows), self.turn[rows], TaylorAngle(value, first, second))
 
     def bound(self, curves: Curves, apart: float) -> tuple[Floats, Floats]:
@@ -130,11 +130,11 @@ class _Offset:
         share = apart * apart / 8.0
         tip = self.seen.tip + share * self.bend.tip
         with np.errstate(invalid="ignore"):  # unbounded, and so NaN: infinite below
-            axis = self.seen.axis + share * self.bend.axis + self.turn * self._slip(curves, tip, share)
+            axis = self.seen.axis + share * self.bend.axis + self.turn * self._deviation(curves, tip, share)
         angle = 2.0 * np.arcsin(np.minimum(0.5 * axis, 1.0))
         return np.nan_to_num(tip, nan=np.inf), np.nan_to_num(angle, nan=np.inf)
 
-    def _slip(self, curves: Curves, tip: Floats, share: float) -> Floats:
+    def _deviation(self, curves: Curves, tip: Floats, share: float) -> Floats:
         """Bound (N,) of the curve's parameter at the point nearest to the tip less the reference's."""
         length = curves.length()
         extent = np.where(length > SHORT, length, np.inf)
@@ -152,9 +152,10 @@ class _Offset:
         for t in (0.25, 0.75):
             tip, axis, _ = control.between(s.q0, s.q1, np.full(len(s), t), kin)
             h = t - 0.5
-            on_tip, on_axis = s.curves.at(np.asarray(self.way.value + h * (self.way.first + 0.5 * h * self.way.second)))
+            place = self.travel.value + h * (self.travel.first + 0.5 * h * self.travel.second)
+            on_tip, on_axis = s.curves.at(np.asarray(place))
             seen = seen | _Seen.at(tip - on_tip, axis - on_axis, chord)
-        return _Offset(seen, self.bend, self.turn, self.way).bound(s.curves, 0.25)
+        return _Offset(seen, self.bend, self.turn, self.travel).bound(s.curves, 0.25)
 
 
 def _law_jets(control: Control, kin: Kinematics, s: CurveBlocks) -> tuple[TaylorVector, TaylorVector]:
@@ -164,7 +165,7 @@ def _law_jets(control: Control, kin: Kinematics, s: CurveBlocks) -> tuple[Taylor
     return pose_jets(kin, s.q0, s.q1)
 
 
-def _way(s: CurveBlocks, middle: Floats) -> TaylorAngle:
+def _travel(s: CurveBlocks, middle: Floats) -> TaylorAngle:
     """The curve's parameter through both ends and the point nearest to the block's middle."""
     even = 0.5 * (s.u0 + s.u1)
     length = s.curves.length()
@@ -179,17 +180,17 @@ def curve_parameter(u0: Floats, middle: Floats, u1: Floats) -> TaylorAngle:
     return TaylorAngle(value, u1 - u0, 4.0 * (u0 - 2.0 * value + u1))
 
 
-def tip_reference(curves: Curves, way: TaylorAngle) -> TaylorVector:
+def tip_reference(curves: Curves, travel: TaylorAngle) -> TaylorVector:
     """The curve's tip: straight, or on arcs the radius vector, blended between the ends, turned about the centre."""
     span, start = curves.end - curves.start, curves.start
     arc = curves.is_arc
     if not arc.any():
-        return _run(start, span, way)
+        return _run(start, span, travel)
     first = np.where(arc[:, None], curves.start - curves.center, 0.0)
     last = _turned_back(curves)
-    jet = _run(np.where(arc[:, None], curves.center + first, start), np.where(arc[:, None], last - first, span), way)
+    jet = _run(np.where(arc[:, None], curves.center + first, start), np.where(arc[:, None], last - first, span), travel)
     sweep = np.where(arc, curves.sweep, 0.0)
-    turn = TaylorAngle(sweep * way.value, sweep * way.first, sweep * way.second)
+    turn = TaylorAngle(sweep * travel.value, sweep * travel.first, sweep * travel.second)
     normal = np.where(arc[:, None], curves.normal, [0.0, 0.0, 1.0])
     return jet.turned(list(normal.T), list(np.where(arc[:, None], curves.center, 0.0).T), turn)
 
@@ -205,24 +206,24 @@ def _turned_back(curves: Curves) -> Floats:
     return result
 
 
-def _run(start: Floats, span: Floats, way: TaylorAngle) -> TaylorVector:
+def _run(start: Floats, span: Floats, travel: TaylorAngle) -> TaylorVector:
     d = list(span.T)
-    return TaylorVector(columns.plus(list(start.T), columns.times(way.value, d)), columns.times(way.first, d),
-                        columns.times(way.second, d))
+    return TaylorVector(columns.plus(list(start.T), columns.times(travel.value, d)), columns.times(travel.first, d),
+                        columns.times(travel.second, d))
 
 
-def axis_reference(curves: Curves, way: TaylorAngle, turn: Floats) -> TaylorVector:
+def axis_reference(curves: Curves, travel: TaylorAngle, turn: Floats) -> TaylorVector:
     """The tool axis on the great circle."""
     normal = cross(curves.axis0, curves.axis1)
     size = np.linalg.norm(normal, axis=1, keepdims=True)
     normal = np.where(size > 0.0, normal / np.where(size > 0.0, size, 1.0), [0.0, 0.0, 1.0])
     whole = np.where(size[:, 0] > 0.0, turn, 0.0)
-    angle = TaylorAngle(whole * way.value, whole * way.first, whole * way.second)
+    angle = TaylorAngle(whole * travel.value, whole * travel.first, whole * travel.second)
     return TaylorVector(list(curves.axis0.T)).turned(list(normal.T), ZERO, angle)
 
 
 def _chord(curves: Curves) -> Floats:
-    """Unit vectors (N, 3) from start to end, 0 where there is no way."""
+    """Unit vectors (N, 3) from start to end, 0 where there is no path."""
     span = curves.end - curves.start
     size = np.linalg.norm(span, axis=1, keepdims=True)
     return np.asarray(span / np.where(size > 0.0, size, 1.0), dtype=np.float64)

@@ -67,7 +67,7 @@ def build_path(modes: OutputModes, kinematics: Callable[[int], Kinematics], move
         drawing: what the set-up says about rewinds and preferred joints; default: its defaults
     """
     machine, given, drawing = modes.control.machine, moves, drawing or RetractPlan.default(space)
-    plan = plan_moves(machine, kinematics, moves, drawing.manner(machine, axis_tolerance),
+    plan = plan_moves(machine, kinematics, moves, drawing.run_options(machine, axis_tolerance),
                       None if progress is None else lambda run: progress("joints", run, int(given.link.sum())))
     moves = plan.refined.moves
     road = _Road(plan, modes, operation[plan.refined.origin], space, drawing, plan.refined.among(home_rows), file)
@@ -148,26 +148,26 @@ def _add_links(out: PathBuilder, road: _Road, runs: SolvedRuns, stand: _Stand,
         if there:
             continue
         target = Pose(moves.tip[first], runs.axis[first], runs.q[first], run.frame.control)
-        way = _way(modes, before.frame, run.frame, by_home)
-        enters = modes.at_zero and run.frame is modes.tcp and way is not modes.tcp
-        link = road.drawing.link(way.control, run.kin, before.pose, target) if refined.rewind[first] else plan_link(
-            way.control, before.kin, run.kin, space, before.pose, target, by_home)
+        travel = _travel(modes, before.frame, run.frame, by_home)
+        enters = modes.at_zero and run.frame is modes.tcp and travel is not modes.tcp
+        link = road.drawing.link(travel.control, run.kin, before.pose, target) if refined.rewind[first] else plan_link(
+            travel.control, before.kin, run.kin, space, before.pose, target, by_home)
         entry = None
         if enters and needed(modes.control, link):
-            link = link if by_home else plan_link(way.control, before.kin, run.kin, space, before.pose, target, True)
+            link = link if by_home else plan_link(travel.control, before.kin, run.kin, space, before.pose, target, True)
             entry = zero_entry(modes.control, modes.tcp.control, run.kin, space, link)
             longer.append(entry.seconds)
             link = replace(link, clear=link.clear and entry.clear)
-        _add_link(out, moves, first, link, _Legs(before.frame, way, run.frame, before.kin, run.kin, before.pose, entry))
+        _add_link(out, moves, first, link, _Legs(before.frame, travel, run.frame, before.kin, run.kin, before.pose, entry))
         if not link.clear:
-            found.append(faults.no_way(moves, first, road.file))
+            found.append(faults.no_path(moves, first, road.file))
         if progress:
             progress("blocks", run.last, len(moves))
     return stand, longer, found
 
 
-def _way(modes: OutputModes, before: WordFrame, after: WordFrame, by_home: bool) -> WordFrame:
-    """The frame of the way between the safe planes: that of the tip where it is so on both sides."""
+def _travel(modes: OutputModes, before: WordFrame, after: WordFrame, by_home: bool) -> WordFrame:
+    """The frame of the path between the safe planes: that of the tip where it is so on both sides."""
     stays = before.control.law == "tcp" and after.control.law == "tcp" and not by_home
     return before if stays else modes.base
 
@@ -178,10 +178,10 @@ def _with_axes(curves: Curves, axis0: Floats, axis1: Floats) -> Curves:
 
 @dataclass(frozen=True)
 class _Legs:
-    """Frames and kinematics of a linking move: where it comes from, on the way, where it goes to."""
+    """Frames and kinematics of a linking move: where it comes from, on the path, where it goes to."""
 
     before: WordFrame
-    way: WordFrame
+    travel: WordFrame
     after: WordFrame
     kin_before: Kinematics
     kin_after: Kinematics
@@ -198,16 +198,16 @@ def _add_link(out: PathBuilder, moves: Moves, row: int, link: Link, legs: _Legs)
     """
     if legs.start is not None:
         _leg(out, legs.before, legs.kin_before, legs.start.q, link.retract, row)
-    out.link(legs.way, link.home, row, not legs.way.control.tip_law, link.home_state)
+    out.link(legs.travel, link.home, row, not legs.travel.control.tip_law, link.home_state)
     out.begin[row] = out.count
     if legs.entry is not None:
-        out.link(legs.way, legs.entry.before, row, False, legs.entry.state)
+        out.link(legs.travel, legs.entry.before, row, False, legs.entry.state)
         out.link(legs.after, legs.entry.inside, row)
     state = link.index_state.copy()
-    if len(state) and legs.after is not legs.way and not state[:, legs.way.control.rotary].any(axis=0).all():
+    if len(state) and legs.after is not legs.travel and not state[:, legs.travel.control.rotary].any(axis=0).all():
         state[-1] = True
     if legs.entry is None:
-        out.link(legs.way, link.index, row, False, state)
+        out.link(legs.travel, link.index, row, False, state)
     if not len(link.approach):
         return
     begin = link.index[-1]
@@ -215,8 +215,8 @@ def _add_link(out: PathBuilder, moves: Moves, row: int, link: Link, legs: _Legs)
         _leg(out, legs.after, legs.kin_after, begin, link.approach, row)
         return
     n = len(link.approach)
-    ways = np.linalg.norm(np.diff(np.concatenate([begin[None], link.approach]), axis=0), axis=1)
-    seconds = ways / moves.feed[row] if moves.feed[row] > 0.0 else np.full(n, moves.seconds[row] / n)
+    travels = np.linalg.norm(np.diff(np.concatenate([begin[None], link.approach]), axis=0), axis=1)
+    seconds = travels / moves.feed[row] if moves.feed[row] > 0.0 else np.full(n, moves.seconds[row] / n)
     out.link(legs.after, link.approach, row, code=np.full(n, FEED, dtype=np.int8), seconds=seconds)
 
 
@@ -227,7 +227,7 @@ def _leg(out: PathBuilder, frame: WordFrame, kin: Kinematics, begin: Floats, q: 
 
 
 def _add_end(out: PathBuilder, modes: OutputModes, stand: _Stand, space: SafeSpace, row: int) -> None:
-    """The way home behind the last run."""
+    """The travel home behind the last run."""
     if stand.pose is None:
         return
     out.ended = 1

@@ -85,7 +85,7 @@ def _elsewhere(kin: Kinematics, tip: Floats, q: Floats) -> Bools:
     return np.asarray(~(np.linalg.norm(there - tip, axis=1) <= _ELSEWHERE))
 
 
-def no_way(moves: Moves, row: int, file: str) -> Diagnostic:
+def no_path(moves: Moves, row: int, file: str) -> Diagnostic:
     return error("link.blocked", "no linking move stays above the safe planes", file=file, lines=[int(moves.line[row])],
                  hint="give clearance.centre and a larger clearance.distance in the set-up")
 

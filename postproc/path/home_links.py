@@ -135,11 +135,11 @@ def _inside(control: Control, joints: Sequence[Floats]) -> Bools:
     return np.asarray(np.all([((q >= low) & (q <= high)).all(axis=1) for q in joints], axis=0))
 
 
-def _clear(control: Control, space: SafeSpace, poses: _Poses, ways: Sequence[Floats]) -> Bools:
-    """(K,) True where the tool is clear at even places of the ways through joints (K, J), one after the other."""
+def _clear(control: Control, space: SafeSpace, poses: _Poses, travels: Sequence[Floats]) -> Bools:
+    """(K,) True where the tool is clear at even places of the paths through joints (K, J), one after the other."""
     result = np.ones(len(poses.tip), dtype=np.bool_)
     for kin, k in poses.each_tool():
-        for begin, end in pairwise(ways):
+        for begin, end in pairwise(travels):
             for t in np.linspace(0.0, 1.0, SAMPLES).tolist():
                 tip, axis, _ = control.between(begin[k], end[k], np.full(len(k), t), kin, np.ones(len(k), dtype=bool))
                 result[k] &= space.clear(tip, axis, 0.5 * space.margin)

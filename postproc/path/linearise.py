@@ -24,7 +24,7 @@ _AIM, _ENOUGH = 0.95, 0.85
 """of the tolerance: what a step aims at, and what is near enough to the longest"""
 _TURN = 2.0 * np.pi
 _HALVINGS, _FOLLOWED = 24, 1e-6
-"""of a curve, on the way to its end in a singular direction; rad to which the joints are then known"""
+"""of a curve, on the path to its end in a singular direction; rad to which the joints are then known"""
 _UNKNOWN = -2
 _NARROW = 1.05
 """a longest step that is known within this factor is known"""
@@ -90,7 +90,7 @@ class _Front:
         self.tolerance, self.axis_tolerance = tolerance, axis_tolerance
         self.index, self.at, self.until = _turns(kin, curves, q0, q1, index)
         index = self.index
-        self.joints, self.goal = self._on_the_way(self.at, q0, q0), self._on_the_way(self.until, q1, q0)
+        self.joints, self.goal = self._in_between(self.at, q0, q0), self._in_between(self.until, q1, q0)
         self.pose = kin.forward(self.joints)
         turn = np.where(curves.is_arc, curves.sweep, 0.0)[index]
         self.longest = np.minimum(0.5 * np.pi / np.maximum(turn, 1e-9), 1.0)
@@ -124,7 +124,7 @@ class _Front:
         self.even = halves
         self._keep(~(gone | (taken & (u1 == self.until))))
 
-    def _on_the_way(self, u: Floats, ends: Floats, near: Floats) -> Floats:
+    def _in_between(self, u: Floats, ends: Floats, near: Floats) -> Floats:
         """Joints (K, J) at `u` (K,) of the curves: `ends` at their own ends, nearest to `near` between."""
         q = ends[self.index]
         inner = np.flatnonzero((u > 0.0) & (u < 1.0))

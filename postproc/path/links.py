@@ -114,7 +114,7 @@ class Link:
     home_state: Bools
     index_state: Bools
     clear: bool
-    """False where no way above the safe planes was found"""
+    """False where no path above the safe planes was found"""
 
 
 @dataclass(frozen=True)
@@ -129,11 +129,11 @@ class Pose:
 
 def plan_link(control: Control, kin0: Kinematics, kin1: Kinematics, space: SafeSpace, before: Pose | None,
               after: Pose | None, by_home: bool, turning: bool | None = None) -> Link:
-    """The way from pose `before` (None: at home) to above pose `after` (None: home), with the tools of kin0, kin1.
+    """The path from pose `before` (None: at home) to above pose `after` (None: home), with the tools of kin0, kin1.
 
-    `control` is under the law of the way between the safe planes; retract and approach go by the law of their pose.
+    `control` is under the law of the path between the safe planes; retract and approach go by the law of their pose.
     Where travel is too short for any, the first is returned: the travel check then names the axis and the value.
-    `turning` tells whether the part turns under the tool on the way; by itself where the tool axis is another.
+    `turning` says whether the part turns under the tool on the path; by itself where the tool axis is another.
     """
     if turning is None:
         turning = before is None or after is None or bool(angle_between(before.axis, after.axis) > 1e-9)
@@ -168,21 +168,21 @@ def _link(control: Control, kin0: Kinematics, kin1: Kinematics, space: SafeSpace
     retract = none if before is None or up0 is None else _leg(before.law or control, kin0, before, up0)
     approach = none if after is None or up1 is None else _leg(after.law or control, kin1, up1, after)
     slack = 0.5 * share * space.margin
-    home, home_state, way = none, none > 0.0, True
+    home, home_state, travel = none, none > 0.0, True
     if by_home and has_retract_axis(control):
         home, home_state = _lift_home(control, up0, after is None)
     elif by_home:
-        home, way = _all_home(control, kin0, space, up0, share, slack)
+        home, travel = _all_home(control, kin0, space, up0, share, slack)
         home_state = np.ones(home.shape, dtype=bool)
     if up1 is None:
-        return Link(retract, home, none, none, home_state, none > 0.0, way)
+        return Link(retract, home, none, none, home_state, none > 0.0, travel)
     if by_home and has_retract_axis(control):
         index, state = _from_home(control, home[-1], up1)
         clear = stays_clear(control, kin1, space, np.concatenate([home[-1:], index]), slack)
         return Link(retract, home, index, approach, home_state, state, clear)
     begin = home[-1] if by_home else up0.q if up0 is not None else control.machine.home
     index, clear = _index(control, kin1, space, begin, up1, space.plane(up1.axis, turning, share), slack)
-    return Link(retract, home, index, approach, home_state, np.full(index.shape, by_home), clear and way)
+    return Link(retract, home, index, approach, home_state, np.full(index.shape, by_home), clear and travel)
 
 
 def _above(kin: Kinematics, space: SafeSpace, pose: Pose, turning: bool, share: float) -> Pose:
@@ -207,7 +207,7 @@ def _leg(control: Control, kin: Kinematics, start: Pose, end: Pose) -> Floats:
 
 
 def has_retract_axis(control: Control) -> bool:
-    """True where one axis lifts the tool on its way home."""
+    """True where one axis lifts the tool on its travel home."""
     return control.machine.retract_axis >= 0 and not control.tip_law
 
 
@@ -248,7 +248,7 @@ def _from_home(control: Control, begin: Floats, up: Pose) -> tuple[Floats, Bools
 
 def _index(control: Control, kin: Kinematics, space: SafeSpace, begin: Floats, up: Pose, floor: float,
            slack: float) -> tuple[Floats, bool]:
-    """Joints from `begin` to the pose above, by way of points over the centre where the straight way comes too near."""
+    """Joints from `begin` to the pose above, through points over the centre where the straight path comes too near."""
     lifted = _lifted(kin, space, begin, floor, slack)
     for count in _STEPS:
         t = np.arange(1, count + 1) / (count + 1)
@@ -273,7 +273,7 @@ def _lifted(kin: Kinematics, space: SafeSpace, q: Floats, floor: float, slack: f
 
 
 def stays_clear(control: Control, kin: Kinematics, space: SafeSpace, q: Floats, slack: float) -> bool:
-    """True where the tool is clear at even places of all ways between the joints q (K, J), looked at together."""
+    """True where the tool is clear at even places of all moves between the joints q (K, J), looked at together."""
     count = len(q) - 1
     t = np.repeat(np.linspace(0.0, 1.0, SAMPLES), count)
     begin, end = np.tile(q[:-1], (SAMPLES, 1)), np.tile(q[1:], (SAMPLES, 1))

@@ -29,19 +29,20 @@ class RetractPlan:
 
     space: SafeSpace
     rewind: RewindSettings = field(default_factory=RewindSettings)
-    wishes: JointPreferences = field(default_factory=JointPreferences)
+    preferences: JointPreferences = field(default_factory=JointPreferences)
 
     @classmethod
     def default(cls, space: SafeSpace) -> RetractPlan:
         """That of a set-up which says nothing."""
         return cls(space)
 
-    def manner(self, machine: Machine, axis_tolerance: float) -> RunOptions:
+    def run_options(self, machine: Machine, axis_tolerance: float) -> RunOptions:
         """How the runs of a program are planned on a machine."""
         feed = None if self.rewind.feed is None else self.rewind.feed / 60.0
         slow = machine.limits.velocity[~np.array(machine.rotary)]
         speed = float(slow.min()) if len(slow) else np.inf
-        return RunOptions(self.wishes, self.rewind.allowed, feed, partial(self._away, speed, feed or speed), axis_tolerance)
+        return RunOptions(self.preferences, self.rewind.allowed, feed, partial(self._away, speed, feed or speed),
+                          axis_tolerance)
 
     def _away(self, rapid: float, feed: float, tip: Floats, axis: Floats) -> Floats:
         """Time (N,) s to draw back from poses (N, 3) to the sphere about what is cut, and to come down again."""
@@ -50,7 +51,7 @@ class RetractPlan:
         return np.asarray(np.maximum(top - height, 0.0) * (1.0 / rapid + 1.0 / feed))
 
     def link(self, control: Control, kin: Kinematics, before: Pose | None, after: Pose) -> Link:
-        """The way from a pose back to it with other joints."""
+        """The path from a pose back to it with other joints."""
         return plan_link(control, kin, kin, self.space, before, after, False, True)
 
 
@@ -67,11 +68,11 @@ def drawing_of(setup: SetupFile, placement: Placement, space: SafeSpace, machine
     if diagnostics:
         return RetractPlan(space), diagnostics
     index = machine.axis_names.index
-    wishes = JointPreferences({index(k): 1 if v == "positive" else -1 for k, v in joints.side.items()},
-                              {index(k): v * DEG for k, v in joints.start.items()})
+    preferences = JointPreferences({index(k): 1 if v == "positive" else -1 for k, v in joints.side.items()},
+                                   {index(k): v * DEG for k, v in joints.start.items()})
     if rewind.stock is not None:
         space = _with_stock(space, placement.points(_box(np.array(rewind.stock.low), np.array(rewind.stock.high))))
-    return RetractPlan(space, rewind, wishes), []
+    return RetractPlan(space, rewind, preferences), []
 
 
 def _rotaries(machine: Machine) -> list[str]:

@@ -12,7 +12,7 @@ from toolpaths.diagnostics import Diagnostic, error, info
 
 
 def check_singular(path: JointPath, moves: Moves, control: Control, least: float, file: str = "") -> list[Diagnostic]:
-    """How near the blocks come to singular positions: told, and an error below `least`; nothing for serial machines."""
+    """How near the blocks come to singular positions: reported, and an error below `least`; nothing for serial machines."""
     kinematics = control.machine.kinematics
     if not has_singular_distance(kinematics) or not len(path):
         return []
@@ -28,7 +28,7 @@ def check_singular(path: JointPath, moves: Moves, control: Control, least: float
                                 f"at least {least:g}", file=file, lines=lines, count=len(bad),
                                 hint="move or turn the part in the set-up, or state another joints.singular_distance"))
     if not result:
-        told = ", ".join(f"{name} {np.nanmin(values):.3f}" for name, values in zip(NAMES, found.T, strict=True))
-        result.append(info("singular.distance", f"distance from singular positions: {told} (stated: at least {least:g})",
+        noted = ", ".join(f"{name} {np.nanmin(values):.3f}" for name, values in zip(NAMES, found.T, strict=True))
+        result.append(info("singular.distance", f"distance from singular positions: {noted} (stated: at least {least:g})",
                            file=file))
     return result

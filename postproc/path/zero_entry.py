@@ -2,9 +2,10 @@
 
 FANUC A-79348E p. 19 (and B-63783EN-1 p. 1116; Mitsubishi M700V p. 477): the programming frame is fixed to the table at
 switch-on, and "the angle of the table's rotary axis represents the initial state of the programming coordinate system". Read
-one way the frame is that of the part, turned with the table by its scale; read the other way it is the work offset's frame,
-unturned, at the angle at which the table stands. With the tables at zero both are one: so the mode is entered there, at the
-height of home, and the tables turn in it, the slides standing as nearly as straight paths of the tip let them.
+one direction the frame is that of the part, turned with the table by its scale; read in the other direction it is the work
+offset's frame, unturned, at the angle at which the table stands. With the tables at zero both are one: so the mode is
+entered there, at the height of home, and the tables turn in it, the slides standing as nearly as straight paths of the tip
+let them.
 """
 
 from __future__ import annotations
@@ -70,9 +71,9 @@ def zero_entry(base: Control, tcp: Control, kin: Kinematics, space: SafeSpace, l
         zero[-1, machine.retract_axis] -= sign * over
         steps[:, machine.retract_axis] -= sign * over
     inside = np.concatenate([steps, up[None]])
-    way = np.concatenate([zero[-1:], inside])
+    travel = np.concatenate([zero[-1:], inside])
     clear = stays_clear(base, kin, space, np.concatenate([link.home[-1:], zero]), 0.0) and stays_clear(
-        tcp, kin, space, way, 0.0)
+        tcp, kin, space, travel, 0.0)
     longer = _seconds(machine, np.concatenate([link.home[-1:], zero, moved[None], up[None]])) - _seconds(
         machine, np.concatenate([link.home[-1:], link.index]))
     return ZeroEntry(zero, link.index_state, inside, clear, max(longer, 0.0))
@@ -87,10 +88,10 @@ def _beyond(tcp: Control, kin: Kinematics, q: Floats, machine: Machine, axis: in
 
 def _seconds(machine: Machine, q: Floats) -> float:
     """s of rapids from rest to rest through joints (K, J), by the velocities and accelerations of the axes."""
-    way = np.abs(np.diff(q, axis=0))
+    travel = np.abs(np.diff(q, axis=0))
     v, a = machine.limits.velocity, machine.limits.acceleration
     with np.errstate(divide="ignore", invalid="ignore"):
-        each = np.where(way >= v**2 / a, way / v + v / a, 2.0 * np.sqrt(way / a))
+        each = np.where(travel >= v**2 / a, travel / v + v / a, 2.0 * np.sqrt(travel / a))
     return float(np.nan_to_num(each).max(axis=1, initial=0.0).sum())
 
 

@@ -1,7 +1,7 @@
-"""The plan that is asked for, proved as `convert` does: its program, ways between passes and from home included.
+"""The plan that is asked for, proved as `convert` does: its program, moves between passes and from home included.
 
-What is counted in `turns` says how long ways take, not what the tool touches on them. Where the program of a plan is
-refused, the ways and states that it was refused for are barred, and the plan is chosen anew, until one passes.
+What is counted in `turns` says how long paths take, not what the tool touches on them. Where the program of a plan is
+refused, the paths and states that it was refused for are barred, and the plan is chosen again, until one passes.
 """
 
 from __future__ import annotations
@@ -21,17 +21,17 @@ from toolpaths.diagnostics import Diagnostic, Severity, info, warning
 
 Convert = Callable[[OrientationChoice], PostResult]
 _ROUNDS = 24
-"""programs that are made of plans chosen anew"""
-_TOLD = 3
+"""programs that are made of plans chosen again"""
+_NOTED = 3
 _OF_BODIES = "collision."
 
 
 @dataclass(frozen=True)
 class _Blame:
-    """What a program was refused for: `ways` (number n leads to pass n, the last one home) and `passes`, and why; `bodies`
+    """What a program was refused for: `links` (number n leads to pass n, the last one home) and `passes`, and why; `bodies`
     where it is what tools touch."""
 
-    ways: frozenset[int]
+    links: frozenset[int]
     passes: frozenset[int]
     why: str
     bodies: bool
@@ -52,36 +52,36 @@ class Proved:
 
 
 def proved(choice: OrientationChoice, plan: Orientation, convert: Convert) -> tuple[Proved, list[Diagnostic]]:
-    """The choice with the program of `plan`, chosen anew where it was refused; what was passed over is told.
+    """The choice with the program of `plan`, chosen again where it was refused; what was passed over is reported.
 
     Where nothing else is left, `auto` is the fastest of the other plans whose program is written; where none is, the first
-    choice stands, with a warning: the conversion will tell its errors.
+    choice stands, with a warning: the conversion will say its errors.
     """
     passed: list[tuple[OrientationPlan, str]] = []
     now = first = Proved.of(choice, plan, convert)
     for _ in range(_ROUNDS):
         if now.program.ok:
-            return now, _told(passed, now.choice, plan)
+            return now, _noted(passed, now.choice, plan)
         blame = _blame(now.choice, now.program)
         passed.append((now.choice.plans[plan], blame.why))
         if not blame.bodies and _of_the_file(now, plan, convert):
             return first, [_unproved(first, plan, passed)]
-        after = _anew(now.choice, plan, blame)
+        after = _again(now.choice, plan, blame)
         if after is None:
             break
         now = Proved.of(after, plan, convert)
     for other in _others(now.choice, first.choice) if plan == "auto" else ():
         made = Proved.of(replace(first.choice, plans=first.choice.plans | {"auto": other}), plan, convert)
         if made.program.ok:
-            return made, _told(passed, made.choice, plan)
+            return made, _noted(passed, made.choice, plan)
     return first, [_unproved(first, plan, passed)]
 
 
-def _anew(choice: OrientationChoice, plan: Orientation, blame: _Blame) -> OrientationChoice | None:
+def _again(choice: OrientationChoice, plan: Orientation, blame: _Blame) -> OrientationChoice | None:
     """The choice without what a program was refused for; None where the plan stays what it was."""
-    if plan == "keep" or not (blame.ways or blame.passes):
+    if plan == "keep" or not (blame.links or blame.passes):
         return None
-    table = choice.table.without(choice.plans[plan], set(blame.ways), set(blame.passes))
+    table = choice.table.without(choice.plans[plan], set(blame.links), set(blame.passes))
     plans = plans_of(table)
     if plans.named[plan].barred:
         return None
@@ -103,12 +103,12 @@ def _blame(choice: OrientationChoice, program: PostResult) -> _Blame:
     if bodies and program.comparison is not None and program.comparison.executed is not None:
         return _touched(choice.work, program)
     rows = [int(row) for d in errors for row in np.flatnonzero(np.isin(choice.work.moves.line, d.lines))[:1]]
-    ways, passes = _split(_parts(choice.work, choice.work.moves.row[rows]))
-    return _Blame(ways, passes, errors[0].message + (f" (line {errors[0].lines[0]})" if errors[0].lines else ""), False)
+    links, passes = _split(_parts(choice.work, choice.work.moves.row[rows]))
+    return _Blame(links, passes, errors[0].message + (f" (line {errors[0].lines[0]})" if errors[0].lines else ""), False)
 
 
 def _touched(work: PassContext, program: PostResult) -> _Blame:
-    """Every way and pass on which a tool touches something."""
+    """Every path and pass on which a tool touches something."""
     from postproc.collision.program import touching_parts
     from postproc.readback.execution.poses import BlockPoses, poses_before
 
@@ -121,29 +121,29 @@ def _touched(work: PassContext, program: PostResult) -> _Blame:
     part = np.where(comparison.owner < len(moves), _parts(work, moves.row[serves], first), len(work.passes))
     touched = touching_parts(motion, executed, job, comparison.owner, part)
     worst = min(touched, key=lambda part: touched[part].distance - touched[part].limit)
-    ways, passes = _split(np.array(sorted(touched), dtype=np.int64))
-    return _Blame(ways, passes, f"{touched[worst]} {_where(work, worst)}", True)
+    links, passes = _split(np.array(sorted(touched), dtype=np.int64))
+    return _Blame(links, passes, f"{touched[worst]} {_where(work, worst)}", True)
 
 
 def _parts(work: PassContext, rows: Ints, first: Ints | bool = True) -> Ints:
-    """Parts (K,) of a program by rows of the CL path: n >= 0 for the way to pass n, which serves its first row (`first`: the
-    first move of a row), -1 - n inside it."""
+    """Parts (K,) of a program by rows of the CL path: n >= 0 for the path to pass n, which serves its first row (`first`:
+    the first move of a row), -1 - n inside it."""
     begins = work.moves.row[[one.rows[0] for one in work.passes]]
     n = np.maximum(np.searchsorted(begins, rows, side="right") - 1, 0)
     return np.where((begins[n] == rows) & first, n, -1 - n)
 
 
 def _split(parts: Ints) -> tuple[frozenset[int], frozenset[int]]:
-    """(ways, passes) of parts."""
+    """(paths, passes) of parts."""
     return frozenset(parts[parts >= 0].tolist()), frozenset((-1 - parts[parts < 0]).tolist())
 
 
 def _where(work: PassContext, part: int) -> str:
     """Part of a program in words."""
     if part == len(work.passes):
-        return "on the way home"
+        return "on the move home"
     n = part if part >= 0 else -1 - part
-    return f"{'on the way to' if part >= 0 else 'in'} pass {n} (line {work.passes[n].line})"
+    return f"{'on the move to' if part >= 0 else 'in'} pass {n} (line {work.passes[n].line})"
 
 
 def _of_the_file(made: Proved, plan: Orientation, convert: Convert) -> bool:
@@ -153,15 +153,15 @@ def _of_the_file(made: Proved, plan: Orientation, convert: Convert) -> bool:
     return not mine.isdisjoint(keep)
 
 
-def _told(passed: list[tuple[OrientationPlan, str]], choice: OrientationChoice, plan: Orientation) -> list[Diagnostic]:
+def _noted(passed: list[tuple[OrientationPlan, str]], choice: OrientationChoice, plan: Orientation) -> list[Diagnostic]:
     """What was passed over before a plan whose program is written."""
     if not passed:
         return []
     reasons = [f"{one.seconds:.3f} s, {why}" for one, why in passed]
-    more = f"; and {len(reasons) - _TOLD} more" if len(reasons) > _TOLD else ""
+    more = f"; and {len(reasons) - _NOTED} more" if len(reasons) > _NOTED else ""
     taken = choice.plans[plan].seconds
     return [info("orient.passed_over", f"passed over for the {taken:.3f} s of {plan}, as their programs are refused: "
-                 f"{'; '.join(reasons[:_TOLD])}{more}", file=choice.work.toolpath.file)]
+                 f"{'; '.join(reasons[:_NOTED])}{more}", file=choice.work.toolpath.file)]
 
 
 def _unproved(made: Proved, plan: Orientation, passed: list[tuple[OrientationPlan, str]]) -> Diagnostic:
@@ -169,4 +169,4 @@ def _unproved(made: Proved, plan: Orientation, passed: list[tuple[OrientationPla
     tried = f", nor are those of {len(passed) - 1} other plans" if len(passed) > 1 else ""
     return warning("orient.unproved", f"the program of {plan} for {made.program.controller_name} is refused{tried}: "
                    f"{passed[0][1]}", file=made.choice.work.toolpath.file,
-                   hint="convert tells all that stands against it; --orient keep leaves the axes of the CL file")
+                   hint="convert says all that stands against it; --orient keep leaves the axes of the CL file")

@@ -66,7 +66,7 @@ class Stage:
     """One step of a conversion: its name, what it does, and the function.
 
     Where the function cannot make its value it hands back what it was given, with the errors that say why; an error ends the
-    conversion either way.
+    conversion in either direction.
     """
 
     name: str
@@ -103,7 +103,7 @@ def prepared(begun: BegunStage, progress: Progress | None) -> tuple[BegunStage |
 
 
 def _bad_meshes(setup: SetupFile, file: str) -> DiagnosticList:
-    """Errors in the meshes of a set-up, told before anything is planned."""
+    """Errors in the meshes of a set-up, reported before anything is planned."""
     if setup.bodies is None:
         return []
     from postproc.collision.bodies import mesh_errors

@@ -1,4 +1,4 @@
-"""What stays where it is while the part is placed: table and fixtures of the set-up, beside the part and beside the tool.
+"""What stays where it is while the part is placed: table and fixtures of the set-up, next to the part and next to the tool.
 
 What moves with the part (its mesh, fixtures in its frame) stands to the tool as ever, wherever the part is placed: that is
 looked at by the conversion alone.
@@ -37,7 +37,7 @@ _HERE = Placement(np.eye(3), np.zeros(3))
 
 @dataclass(frozen=True)
 class StationaryBodies:
-    """Bodies that do not move, beside the part and the tools.
+    """Bodies that do not move, next to the part and the tools.
 
     Attributes:
         standing: bodies in the table frame, with what tools keep from them
@@ -68,8 +68,8 @@ class StationaryBodies:
 
     def tool(self, work: PassContext) -> str:
         """What the tools would touch on the passes of `work` with the axes of the file."""
-        beside = PassBodies(work, self.standing, self.forms)
-        return next((why for one in work.passes if (why := beside.touching(one, one.axis))), "")
+        adjacent = PassBodies(work, self.standing, self.forms)
+        return next((why for one in work.passes if (why := adjacent.touching(one, one.axis))), "")
 
     @cached_property
     def _standing(self) -> Any:
@@ -90,7 +90,7 @@ def _manager(meshes: dict[str, Trimesh]) -> Any:
     return manager
 
 
-def beside(work: PassContext, file: str) -> tuple[StationaryBodies | None, list[Diagnostic]]:
+def adjacent(work: PassContext, file: str) -> tuple[StationaryBodies | None, list[Diagnostic]]:
     """The bodies of the set-up `file` that do not move with the part; None where there are none, or a mesh is no good."""
     given = work.setup.bodies
     if given is None:

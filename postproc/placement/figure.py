@@ -12,7 +12,7 @@ from postproc.placement.place_times import TimedPlace
 from postproc.placement.region import region_of
 from postproc.placement.space import ANGLES, NAMES
 from toolpaths.arrays import Floats
-from toolpaths.drawing import BESIDE, image
+from toolpaths.drawing import ADJACENT, image
 from toolpaths.units import DEG
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ def placement_figure(choice: PlacementChoice, ending: str) -> bytes:
     return image(_SIZE, title, lambda sheet: _fill(sheet, choice), ending)
 
 
-def _beside(choice: PlacementChoice) -> str:
+def _adjacent(choice: PlacementChoice) -> str:
     """Coordinates that are free and not drawn: points that differ only in them lie on each other."""
     drawn = coordinates(choice)
     others = [f"{NAMES[k]} {_shown(choice.best.place[None], k)[0] + 0.0:.3f} {'degrees' if k >= ANGLES else 'mm'}"
@@ -60,10 +60,10 @@ def _fill(sheet: Figure, choice: PlacementChoice) -> None:
     _points(place, [choice.found.now], across, up, marker="s", facecolors="none", edgecolors="#333333", s=150,
             label="now: [part] of the set-up")
     _points(place, [choice.best], across, up, marker="*", color=_CHOSEN, s=230, label="chosen", zorder=4)
-    place.set_title(_beside(choice), fontsize="medium")
+    place.set_title(_adjacent(choice), fontsize="medium")
     place.set_xlabel(_named(across))
     place.set_ylabel("" if up is None else _named(up))
-    place.legend(**BESIDE)
+    place.legend(**ADJACENT)
 
 
 def coordinates(choice: PlacementChoice) -> tuple[int, int | None]:

@@ -1,4 +1,4 @@
-"""The planned time of a file whose tool axes are chosen anew at each place of its part."""
+"""The planned time of a file whose tool axes are chosen again at each place of its part."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ from postproc.controllers.model import load_controller
 from postproc.job.job import prepare
 from postproc.orientation.passes.passes import PassContext, work_of
 from postproc.path.links import safe_space
-from postproc.placement.bodies import beside
+from postproc.placement.bodies import adjacent
 from postproc.placement.oriented_times import OrientedTimer
 from postproc.placement.place_times import TimedPlace, Timer
 from postproc.placement.search import FoundPlaces, PlaceSearch, Progress
@@ -81,7 +81,7 @@ def place(toolpath: Toolpath, machine: Machine, setup: SetupFile, options: Optio
     found = [*stands, *found]
     if work is None or space is None:
         return None, found
-    bodies, more = beside(work, options.setup)
+    bodies, more = adjacent(work, options.setup)
     found += more
     if has_errors(found):
         return None, found
@@ -208,7 +208,7 @@ class _Proof:
 
 
 def _proved(proof: _Proof, timer: Timer, best: TimedPlace, now: TimedPlace) -> tuple[TimedPlace | None, list[Diagnostic]]:
-    """The best place whose conversion is proved; what stood against better ones is told.
+    """The best place whose conversion is proved; what stood against better ones is reported.
 
     After a failure come in turn the place farthest from all that failed and the fastest that is left: what stands against
     one place (a link that leaves the workspace) stands against its neighbours too. At last the part may stay where it is.

@@ -1,4 +1,4 @@
-"""The planned time of a whole file at one place of its part: cuts, rapids, turns, ways from home and back."""
+"""The planned time of a whole file at one place of its part: cuts, rapids, turns, travel from home and back."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from machines.singular_distance import has_singular_distance, singular_distance
 from postproc.orientation.candidates.candidate_times import Candidate, turned
 from postproc.orientation.candidates.ranking import prepare
 from postproc.orientation.passes.passes import PassContext
-from postproc.orientation.plans.index_time import PassEnds, ends, ways_between
+from postproc.orientation.plans.index_time import PassEnds, ends, links_between
 from postproc.orientation.plans.shortest_sequence import seconds
 from postproc.placement.bodies import StationaryBodies
 from postproc.placement.rigid_move import moved
@@ -36,7 +36,7 @@ class TimedPlace:
     Attributes:
         place (6,): see `postproc.placement.space`
         seconds: of the whole file; inf where it is refused or its bound lost
-        cutting, linking: seconds of the cuts, and of rapids, turns and ways home
+        cutting, linking: seconds of the cuts, and of rapids, turns and travel home
         bound: least seconds that the file can take there
         low, high (J,): extents of the joints over all cuts and rapids, NaN where the machine does not reach
         singular: least distance from singular positions, inf for serial machines
@@ -75,7 +75,7 @@ class _Cut:
 
 
 class Timer:
-    """Times of a file at places, each way of the joints planned once.
+    """Times of a file at places, each path of the joints planned once.
 
     A plan depends on how the joints go, not on where: on serial machines moving the part along its table does not change
     passes during which no rotary joint turns, and a table that turns back what the part is turned changes nothing at all.
@@ -172,7 +172,7 @@ class Timer:
 
     def _cutting(self, made: Sequence[Candidate], best: float) -> tuple[list[tuple[float, str]], float, bool]:
         """(seconds and what limits of each pass, bound, True where all together are proved not to be below `best`)."""
-        keys = [(one.one.number, _way(one)) for one in made]
+        keys = [(one.one.number, _link(one)) for one in made]
         for one, key in zip(made, keys, strict=True):
             if key not in self._cuts:
                 self._cuts[key] = _Cut(one.bound)
@@ -193,9 +193,9 @@ class Timer:
 
 
 def _linking(work: PassContext, edge: list[PassEnds]) -> float:
-    """Seconds of rapids, turns, and ways from home and back."""
+    """Seconds of rapids, turns, and travel from home and back."""
     rapids = [np.array([one.rapids]) for one in edge]
-    return seconds([0] * len(edge), rapids, ways_between(work, [[one] for one in edge]))
+    return seconds([0] * len(edge), rapids, links_between(work, [[one] for one in edge]))
 
 
 def _no_height(edge: list[PassEnds], made: Sequence[Candidate]) -> str:
@@ -210,10 +210,10 @@ def extents(made: Sequence[Candidate]) -> tuple[Floats, Floats]:
     return (np.min([q.min(axis=0) for q in every], axis=0), np.max([q.max(axis=0) for q in every], axis=0))
 
 
-def _way(made: Candidate) -> bytes:
+def _link(made: Candidate) -> bytes:
     """A mark of how the joints go along the cuts of a pass, whatever they begin at."""
     mark = blake2b(digest_size=16)
     rows = made.one.drilled.rows
-    for way in (*(q - q[0] for q in made.sites), made.q[rows] - made.q[rows - 1]):
-        mark.update((np.round(way, _DIGITS) + 0.0).tobytes())
+    for link in (*(q - q[0] for q in made.sites), made.q[rows] - made.q[rows - 1]):
+        mark.update((np.round(link, _DIGITS) + 0.0).tobytes())
     return mark.digest()

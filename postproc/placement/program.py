@@ -13,7 +13,7 @@ from toolpaths.diagnostics import require
 
 
 def program_seconds(result: PostResult) -> float:
-    """s, links and ways home as the program has them; NaN where nothing is written."""
+    """s, links and travel home as the program has them; NaN where nothing is written."""
     if not result.ok:
         return np.nan
     model, found = load_model("ideal")

@@ -1,4 +1,4 @@
-"""Where a part that is turned one way may stand: travel of all axes over all poses, before anything is planned.
+"""Where a part that is in one orientation may stand: travel of all axes over all poses, before anything is planned.
 
 On a serial machine the rotary joints of a pose do not depend on where the part stands, and its slides are affine functions
 of that place: what travel allows is a convex polytope, and the place of most margin solves a linear program.
@@ -35,7 +35,7 @@ _ROUNDS = 40
 _LITTLE = 1e-4
 _CHUNK = 2_000_000
 _POSES = 12
-"""of a tool and an axis that stand for all, beside the outermost"""
+"""of a tool and an axis that stand for all, next to the outermost"""
 _MANY = 20_000
 """rows, more are thinned out"""
 _LATTICE, _COARSE = 5, 3
@@ -48,7 +48,7 @@ _PER_RAD, _PER_SHARE = 100.0, 100.0
 
 
 class Region(Protocol):
-    """Places (M, 3) of the set-up's point, of a part that is turned one way."""
+    """Places (M, 3) of the set-up's point, of a part that is in one orientation."""
 
     def margins(self, places: Floats) -> Floats:
         """(M,) mm that every axis stays inside travel there, negative where one lacks it."""
@@ -283,9 +283,9 @@ def sampled(work: PassContext, least: float) -> Sampled:
 
 
 def _outermost(tip: Floats, axis: Floats) -> tuple[Floats, Floats]:
-    """Poses (K, 3) that reach farthest some way, and some between."""
-    ways = np.array([w for w in np.ndindex(3, 3, 3) if w != (1, 1, 1)], dtype=np.float64) - 1.0
-    picked = [*(tip @ ways.T).argmax(axis=0).tolist(), *np.linspace(0, len(tip) - 1, _POSES).astype(int).tolist(),
+    """Poses (K, 3) that reach farthest some path, and some between."""
+    links = np.array([w for w in np.ndindex(3, 3, 3) if w != (1, 1, 1)], dtype=np.float64) - 1.0
+    picked = [*(tip @ links.T).argmax(axis=0).tolist(), *np.linspace(0, len(tip) - 1, _POSES).astype(int).tolist(),
               *axis.argmax(axis=0).tolist(), *axis.argmin(axis=0).tolist()]
     rows = np.unique(picked)
     return tip[rows], axis[rows]

@@ -76,14 +76,14 @@ def as_text(choice: PlacementChoice) -> str:
     if turned:
         others = (f"{one.place[ANGLES] / DEG:.3f} deg {one.seconds:.3f} s" for one in turned)
         lines.append("best places turned otherwise: " + ", ".join(others))
-    lines.append(f"free: {', '.join(free)}; {choice.found.attitudes} ways to turn the part; {choice.looked} places looked "
+    lines.append(f"free: {', '.join(free)}; {choice.found.attitudes} part orientations; {choice.looked} places looked "
                  f"at: at {choice.refused} it cannot stand, {choice.pruned} cannot be faster than the best; "
                  f"{choice.planned} cuts planned")
     return "\n".join(lines)
 
 
 def _turned(choice: PlacementChoice) -> list[TimedPlace]:
-    """The best place of each way to turn the part, those within a few degrees as one; the best first."""
+    """The best place of each orientation of the part, those within a few degrees as one; the best first."""
     good = [one for one in choice.known if math.isfinite(one.seconds) and choice.space.holds(one.place)]
     kept = [choice.best]
     for one in sorted(good, key=lambda one: one.seconds):

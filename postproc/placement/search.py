@@ -1,4 +1,4 @@
-"""The search: every way to turn the part, places on a low-discrepancy set inside travel, then compass steps.
+"""The search: every orientation of the part, places on a low-discrepancy set inside travel, then compass steps.
 
 Places that travel rules out are never planned, nor are those whose bound is not below the best time so far.
 """

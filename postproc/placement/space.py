@@ -140,16 +140,16 @@ class Space:
     def neighbours(self, place: Floats, steps: Floats) -> Iterator[Floats]:
         """Places (6,) one step (6,) up and down each free coordinate; the next of a list where there is one."""
         for k in self.free:
-            for way in (1, -1):
+            for link in (1, -1):
                 other = place.copy()
                 values = sorted(self.dims[k].values)
                 if values:
-                    at = values.index(min(values, key=lambda v: abs(v - place[k]))) + way
+                    at = values.index(min(values, key=lambda v: abs(v - place[k]))) + link
                     if not 0 <= at < len(values):
                         continue
                     other[k] = values[at]
                 else:
-                    other[k] += way * steps[k]
+                    other[k] += link * steps[k]
                 other = self.snapped(other)
                 if not bool((other == place).all()):
                     yield other

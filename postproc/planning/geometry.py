@@ -156,7 +156,7 @@ def _groups(at: dict[int, Floats]) -> list[list[int]]:
 
 
 def _finer(s: Floats, bad: Bools) -> Floats:
-    """Sites with one more in the middle of bad intervals and of those beside."""
+    """Sites with one more in the middle of bad intervals and of those next to."""
     wide = bad.copy()
     wide[1:] |= bad[:-1]
     wide[:-1] |= bad[1:]

@@ -18,7 +18,7 @@ TURN = 0.1
 LONGEST = 0.125
 """Part of a line or arc between places."""
 SLOPE = 0.3
-"""Change of the distance of places per way."""
+"""Change of the distance of places per path."""
 ENDS = 8.0
 """Times denser at both ends: a spline through points is least exact there."""
 FEWEST = 12

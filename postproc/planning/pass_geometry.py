@@ -36,7 +36,7 @@ class PassGeometry:
     """One pass.
 
     Attributes:
-        move (C,): row of Moves of each curve that was smoothed; share (C,): how much of that move's way it is
+        move (C,): row of Moves of each curve that was smoothed; share (C,): how much of that move's path it is
         block (k,): blocks of the Path; begin, ends (k,): parameter s where they begin and end
         smooth: the smoothed tip and axis
         paths: joints along s, between one stop and the next

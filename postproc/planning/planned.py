@@ -36,7 +36,7 @@ def joint_limits(limits: Limits) -> JointLimits:
 
 @dataclass(frozen=True)
 class PassFeed:
-    """Largest ds/dt along a pass: the tip at the feed of each move, or the way of a move in its time.
+    """Largest ds/dt along a pass: the tip at the feed of each move, or the path of a move in its time.
 
     `s` (C + 1,) ends of the curves; `feed` (C,) mm/s, NaN where `seconds` (C,) counts.
     """
@@ -56,12 +56,12 @@ class PassFeed:
 
     @property
     def breaks(self) -> Floats:
-        """Where one move gives way to another feed; each move of a stated time has its own."""
+        """Where one move yields to another feed; each move of a stated time has its own."""
         before, behind = self.feed[:-1], self.feed[1:]
         return np.asarray(self.s[1:-1][(before != behind) & (np.diff(self.s)[1:] > 0.0)])
 
     def _tip_speed(self, s: Floats) -> Floats:
-        """(N,) mm of the tip per mm of way."""
+        """(N,) mm of the tip per mm of path."""
         starts = [path.start for path in self.geometry.paths[1:]]
         which, result = np.searchsorted(starts, s, side="right"), np.empty(len(s))
         for k in np.unique(which).tolist():
@@ -72,7 +72,7 @@ class PassFeed:
 
 
 STANDS = 1e-9
-"""mm of the tip per mm of way: less is round-off"""
+"""mm of the tip per mm of path: less is round-off"""
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from postproc.job.job import Job
 
 SEEN = 3.0
-"""sites while an error runs one way, at the least"""
+"""sites while an error runs one direction, at least"""
 STANDS = 1e-9
 """rad that rotary joints of one orientation may differ by"""
 
@@ -30,8 +30,8 @@ class PlannedCorrection:
     """How a conversion corrects its path.
 
     Attributes:
-        errors: the machine's; axes that lose motion count by the mean of both ways: what they take up where they turn back
-            is no part of the plan
+        errors: the machine's; axes that lose motion count by the mean of both directions: what they take up where they turn
+            back is no part of the plan
         corrected: the path; owner (K,): the block of the nominal path that each of its blocks is of
         axis_tolerance: rad
     """

@@ -73,11 +73,11 @@ def smoothed_moves(moves: Moves, tolerance: Tolerance, stops: Ints, grain: Toler
 
 
 def _shares(moves: Moves, tip: Floats, axis: Floats, grain: Tolerance) -> Floats:
-    """(M,) part of its way from `moves` to `tip`, `axis` (M, 3) that each point can go and keep its place in the order."""
+    """(M,) part of its path from `moves` to `tip`, `axis` (M, 3) that each point can go and keep its place in the order."""
     share = np.ones(len(moves))
-    way = np.linalg.norm(np.diff(moves.tip, axis=0), axis=1)
+    travel = np.linalg.norm(np.diff(moves.tip, axis=0), axis=1)
     turn = np.linalg.norm(np.diff(moves.axis, axis=0), axis=1)
-    repeated = (way <= STILL) & (turn <= STILL)
+    repeated = (travel <= STILL) & (turn <= STILL)
     cut = (moves.arc[1:] < 0) & ~moves.link[1:] & ~repeated
     for _ in range(HALVINGS + 1):
         bad = cut & ~_in_order(moves, *_part(moves, tip, axis, share), grain)
@@ -122,7 +122,7 @@ def _in_order(moves: Moves, tip: Floats, axis: Floats, grain: Tolerance) -> Bool
 
 
 def _part(moves: Moves, tip: Floats, axis: Floats, share: Floats) -> tuple[Floats, Floats]:
-    """Tips and axes (M, 3) moved by `share` (M,) of their way."""
+    """Tips and axes (M, 3) moved by `share` (M,) of their path."""
     less = np.flatnonzero(share < 1.0)
     if not len(less):
         return tip, axis

@@ -23,10 +23,10 @@ def steady_seconds(passes: list[PassGeometry], limits: JointLimits, count: int) 
     """(count,) least seconds of each block of a Path at a constant feed; 0 where no limit binds."""
     seconds = np.zeros(count)
     for one in passes:
-        way = one.ends - one.begin
+        travel = one.ends - one.begin
         with np.errstate(divide="ignore", invalid="ignore"):
-            needed = way / ((1.0 - ROUNDING) * steady_speed(one, limits))
-        np.maximum.at(seconds, one.block, np.where(way > 0.0, needed, 0.0))
+            needed = travel / ((1.0 - ROUNDING) * steady_speed(one, limits))
+        np.maximum.at(seconds, one.block, np.where(travel > 0.0, needed, 0.0))
     return seconds
 
 

@@ -75,11 +75,11 @@ def _cl(result: VerifyResult) -> Hashes:
 
 def _program(result: VerifyResult, kept: ProofFile, folder: Path) -> dict[str, str]:
     """The program, and the files of its subprograms, which stand next to it."""
-    beside = Path(result.gcode).parent if result.gcode not in STANDARD_INPUT else folder
+    adjacent = Path(result.gcode).parent if result.gcode not in STANDARD_INPUT else folder
     now = [FileHash(Path(result.gcode).name, result.sha256)]
     for one in kept.program[1:]:
         try:
-            now.append(FileHash(one.file, sha256(read_input(beside / one.file))))
+            now.append(FileHash(one.file, sha256(read_input(adjacent / one.file))))
         except OSError:
             now.append(FileHash(one.file, ""))
     return {"program": _differs(kept.program, tuple(now))}

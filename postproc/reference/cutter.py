@@ -15,7 +15,7 @@ def ball_radius(tool: Tool | None) -> float | None:
 
     A cutter with corner radius D/2 is a ball; one with a smaller corner radius has a flat end, and turning it moves the
     contact. Where the file gives all seven parameters of APT (CUTTER/d, r, e, f, a, b, h), e and f decide, the place of the
-    corner's centre beside the axis and above the tip: the diameter of a tapered ball is not twice its radius.
+    corner's centre next to the axis and above the tip: the diameter of a tapered ball is not twice its radius.
     """
     if tool is None or tool.diameter is None:
         return None
@@ -24,6 +24,6 @@ def ball_radius(tool: Tool | None) -> float | None:
     if tool.corner_radius is None:
         return None
     radius, half = tool.corner_radius, 0.5 * tool.diameter
-    beside, above = tool.cutter[2:4] if len(tool.cutter) == _APT else (0.0, 0.0)
-    off = max(abs(beside), abs(above - radius)) if beside or above else abs(radius - half)
+    adjacent, above = tool.cutter[2:4] if len(tool.cutter) == _APT else (0.0, 0.0)
+    off = max(abs(adjacent), abs(above - radius)) if adjacent or above else abs(radius - half)
     return radius if half > 0.0 and radius > 0.0 and off <= _SAME * radius else 0.0

@@ -21,7 +21,7 @@ class Phase(IntEnum):
     DRILL = 3
     """to the bottom at feed, in pecks where the cycle says so"""
     PECK = 4
-    """chip breaking on the way to the bottom: out or up, back, and the depths between"""
+    """chip breaking on the path to the bottom: out or up, back, and the depths between"""
     RETRACT = 5
 
 
@@ -50,7 +50,7 @@ def _legs(top: Floats, axis: Floats, cycle: Cycle, before: Floats | None, initia
     """Above the hole at the level the tool is at (never below the clearance plane), down, drill, out.
 
     Without a known level (`before` None: a linking move leads here) the tool comes straight to the clearance plane
-    and AUTO retracts to it. A tap stops on its way down at the retract level that it names: controls come back to the
+    and AUTO retracts to it. A tap stops on its path down at the retract level that it names: controls come back to the
     level that a cycle begins from.
     """
     height = float(axis @ top)

@@ -38,7 +38,7 @@ def own_registers(toolpath: Toolpath, controller: ControllerFile) -> tuple[Toolp
     found += _refused(toolpath, edges, "names what may be a length register or a cutting edge (D2 to D9): the lengths of "
                       f"further edges are not known, {text} would be written",
                       f"state ADJUST,1 or none in LOADTL where {text} is meant")
-    return replace(toolpath, events=tuple(_bare(e) for e in toolpath.events)), found + _told(toolpath, rest, text)
+    return replace(toolpath, events=tuple(_bare(e) for e in toolpath.events)), found + _noted(toolpath, rest, text)
 
 
 def _bare(event: Event) -> Event:
@@ -55,7 +55,7 @@ def _refused(toolpath: Toolpath, loads: list[ToolChange], what: str, hint: str) 
                   count=len(loads), hint=hint)] if loads else []
 
 
-def _told(toolpath: Toolpath, loads: list[ToolChange], text: str) -> list[Diagnostic]:
+def _noted(toolpath: Toolpath, loads: list[ToolChange], text: str) -> list[Diagnostic]:
     """What is written in place of registers; no more than a note where the text says the same number."""
     if not loads:
         return []

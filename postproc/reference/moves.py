@@ -40,7 +40,7 @@ class Moves:
         row (M,): row of the Toolpath
         hole (M,): running number of the hole, -1 elsewhere; `phase` (M,) its Phase
         cycle (M,): index into Toolpath.cycles or -1
-        link (M,): True where the way from the row before is a linking move (retract, index, approach), free of form
+        link (M,): True where the path from the row before is a linking move (retract, index, approach), free of form
         tool (M,): index into Toolpath.tools or -1
         line (M,): CL line
         spin (M,): rad about the tool axis as in Toolpath, NaN where any will do
@@ -75,7 +75,7 @@ class Moves:
                        spin=_spin_in(placement, self.axis, self.spin))
 
     def without_pecks(self) -> Moves:
-        """The rows but those of pecks: a hole is then one straight way to its bottom."""
+        """The rows but those of pecks: a hole is then one straight path to its bottom."""
         keep = self.phase != Phase.PECK
         if bool(keep.all()):
             return self
@@ -128,7 +128,7 @@ def link_rows(toolpath: Toolpath, setup: SetupFile, axis_tolerance: float) -> Bo
     The first motion, the first after a tool change, a bare GOHOME or a FROM elsewhere, the first of an operation whose
     tool axis differs from the last one's by more than `axis_tolerance` (rad), rapids that turn the axis by more than the
     set-up's link_angle, rapids from or to where the tool is held about its axis, and the first of an operation that begins
-    anew (`begins_anew`). Where such a row cuts, `build_moves` puts a linked row before it.
+    again (`begins_again`). Where such a row cuts, `build_moves` puts a linked row before it.
     """
     n = len(toolpath)
     link = np.zeros(n, dtype=bool)
@@ -142,9 +142,9 @@ def link_rows(toolpath: Toolpath, setup: SetupFile, axis_tolerance: float) -> Bo
     boundary[1:] = np.diff(toolpath.operation[moving]) != 0
     rapid = toolpath.kind[moving] == Kind.RAPID
     linked = rapid & ((boundary & (turn > axis_tolerance)) | (turn > setup.clearance.link_angle * DEG))
-    linked |= rapid & _spins_anew(toolpath, moving)
+    linked |= rapid & _spins_again(toolpath, moving)
     linked[0] = True
-    linked |= boundary & begins_anew(toolpath, setup)[toolpath.operation[moving]]
+    linked |= boundary & begins_again(toolpath, setup)[toolpath.operation[moving]]
     stops = [e.index for e in toolpath.events if e.word == "GOHOME"] + [c.index for c in tool_changes(toolpath)]
     for index in [*stops, *_starts_elsewhere(toolpath)]:
         at = int(np.searchsorted(moving, index))
@@ -154,7 +154,7 @@ def link_rows(toolpath: Toolpath, setup: SetupFile, axis_tolerance: float) -> Bo
     return link
 
 
-def _spins_anew(toolpath: Toolpath, moving: Ints) -> Bools:
+def _spins_again(toolpath: Toolpath, moving: Ints) -> Bools:
     """Rows of `moving` whose tool is held otherwise about its axis than in the row before."""
     result = np.zeros(len(moving), dtype=bool)
     if toolpath.spin is not None:
@@ -163,7 +163,7 @@ def _spins_anew(toolpath: Toolpath, moving: Ints) -> Bools:
     return result
 
 
-def begins_anew(toolpath: Toolpath, setup: SetupFile) -> Bools:
+def begins_again(toolpath: Toolpath, setup: SetupFile) -> Bools:
     """(operations,) True where an operation is reached from the safe planes, whatever its axis: where it can be a restart
     point, and where the set-up gives it, or the one before it, an output mode of its own."""
     own = np.array([op.name in setup.output.operations for op in toolpath.operations])
@@ -203,7 +203,7 @@ def build_moves(toolpath: Toolpath, setup: SetupFile, axis_tolerance: float) -> 
     first[np.cumsum(counts)[counts > 0] - counts[counts > 0]] = True
     back = first & (begin[row] >= 0)
     pose = np.where(back, begin[row], row)
-    # A position to return to may be in the material: the way down to it is made at the feed of the cut.
+    # A position to return to may be in the material: the approach to it is made at the feed of the cut.
     again = back & (toolpath.role[pose] != Role.START)
     kind = np.where(back, np.where(again, Kind.FEED, Kind.RAPID), toolpath.kind[row]).astype(np.int8)
     there = as_slice(pose)
@@ -228,7 +228,7 @@ def build_moves(toolpath: Toolpath, setup: SetupFile, axis_tolerance: float) -> 
 
 
 def _left_to(toolpath: Toolpath, holes: Ints, legs: list[list[HoleLeg]]) -> Floats:
-    """(N, 3) where the tool stands behind each row: at the end of its way out of a hole, else at the tip."""
+    """(N, 3) where the tool stands behind each row: at the end of its retract out of a hole, else at the tip."""
     if not len(holes):
         return toolpath.tip
     tip = toolpath.tip.copy()

@@ -16,7 +16,7 @@ from toolpaths.arrays import Floats, Ints
 from toolpaths.units import DEG
 
 UM, ARCSEC = 1e-3, DEG / 3600.0
-WAY = 1e-9
+DIRECTION = 1e-9
 """mm or rad of a joint that count as motion"""
 
 
@@ -49,13 +49,13 @@ def residuals(result: PostResult) -> Residuals | None:
         return None
     moves, move = planned_moves(result), np.flatnonzero(result.moves.phase != Phase.PECK)[found.points]
     block, here = last_blocks(nominal, len(result.moves))[move], found.points
-    q, way = nominal.q[block], approach(_steady(nominal.q))[block]
+    q, travel = nominal.q[block], approach(_steady(nominal.q))[block]
     before = np.empty((len(q), 6))
     for k in groups(moves.tool[here]):
         kinematics = job.kinematics(int(moves.tool[here[k[0]]]))
         assert job.errors is not None
         actual, wanted = job.errors.on(kinematics), np.concatenate(kinematics.forward(q[k]), axis=1)
-        before[k] = np.concatenate(actual.aim(actual.coordinates(q[k], wanted), way[k]), axis=1) - wanted
+        before[k] = np.concatenate(actual.aim(actual.coordinates(q[k], wanted), travel[k]), axis=1) - wanted
     there = result.comparison
     after = np.concatenate([there.tip[found.blocks] - moves.tip[here], there.axis[found.blocks] - moves.axis[here]], axis=1)
     part = job.placement.inverse()
@@ -66,7 +66,7 @@ def residuals(result: PostResult) -> Residuals | None:
 
 def _steady(q: Floats) -> Floats:
     """Joints (N, J), steps that are numbers' own left out."""
-    result: Floats = np.round(np.nan_to_num(q) / WAY) * WAY
+    result: Floats = np.round(np.nan_to_num(q) / DIRECTION) * DIRECTION
     return result
 
 

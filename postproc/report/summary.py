@@ -33,7 +33,7 @@ def as_dict(result: PostResult, output: str, estimate: Estimate | None = None) -
     c = result.comparison
     return {
         "output": output if result.ok else None,
-        "files": files_beside(result, output),
+        "files": neighbour_files(result, output),
         "machine": result.machine.name,
         "controller": result.controller_name,
         "points_in": points_in(result.toolpath),
@@ -80,8 +80,8 @@ def _proof(result: PostResult) -> list[str]:
                                  f"{result.options.axis_tolerance:g} degrees)"]
 
 
-def files_beside(result: PostResult, output: str) -> list[str]:
-    """The files of subprograms that are written beside `output`."""
+def neighbour_files(result: PostResult, output: str) -> list[str]:
+    """The files of subprograms that are written next to `output`."""
     return [str(Path(output).parent / name) for name in result.files or {}] if result.ok else []
 
 
@@ -103,8 +103,8 @@ def _errors(result: PostResult) -> dict[str, Any] | None:
     return {**who, "tip_before_mm": found.tip_before, "axis_before_deg": found.axis_before / DEG,
             "tip_residual_mm": found.tip_after, "axis_residual_deg": found.axis_after / DEG, "points_added": found.added,
             "arcs_resolved": found.resolved, "blocks_near_a_pole": found.partial,
-            **({} if proof is None else proof.figures()), "tip_sigma_mm": found.doubt_tip,
-            "axis_sigma_deg": None if found.doubt_axis is None else found.doubt_axis / DEG}
+            **({} if proof is None else proof.figures()), "tip_sigma_mm": found.uncertainty_tip,
+            "axis_sigma_deg": None if found.uncertainty_axis is None else found.uncertainty_axis / DEG}
 
 
 def _orientation(result: PostResult) -> dict[str, Any] | None:
@@ -212,11 +212,11 @@ def as_text(result: PostResult, output: str, estimate: Estimate | None = None) -
     if any(laws != ["axes"] for laws in d["output_modes"].values()):
         lines.append("output: " + ", ".join(f"{name} {' and '.join(laws)}" for name, laws in d["output_modes"].items()))
     if d["orientation"] is not None:
-        told = d["orientation"]
-        lines.append(f"tool axes, {told['plan']}: {told['turned']} of {len(told['passes'])} passes turned; planned "
-                     f"{_seconds(told['time_s'])}, with the axes of the CL file {_seconds(told['reference_time_s'])}")
+        noted = d["orientation"]
+        lines.append(f"tool axes, {noted['plan']}: {noted['turned']} of {len(noted['passes'])} passes turned; planned "
+                     f"{_seconds(noted['time_s'])}, with the axes of the CL file {_seconds(noted['reference_time_s'])}")
     if d["files"]:
-        lines.append(f"subprograms beside it: {', '.join(Path(file).name for file in d['files'])}")
+        lines.append(f"subprograms next to it: {', '.join(Path(file).name for file in d['files'])}")
     if result.job is not None:
         offset = " ".join(f"{k}{round(v, 4) + 0.0:.4f}" for k, v in zip(
             result.machine.axis_names, result.job.control.work_offset, strict=True))

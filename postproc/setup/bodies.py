@@ -30,7 +30,7 @@ class SolidModel(UserModel):
 
 
 class Fixture(SolidModel):
-    """A clamp, a vise, a fixture: what stands beside the part and is not cut."""
+    """A clamp, a vise, a fixture: what stands next to the part and is not cut."""
 
     name: str = Field(min_length=1)
     """as messages call it"""

@@ -82,7 +82,7 @@ class OutputSettings(UserModel):
     subprograms: bool = False
     """every operation is a subprogram, of the same file or (Siemens) in one of its own; it begins as with restart"""
     files: bool = False
-    """every operation is a subprogram in a file of its own beside the program, which calls them"""
+    """every operation is a subprogram in a file of its own next to the program, which calls them"""
     longest: int = Field(default=0, ge=0)
     """most CL points of one part: longer operations are cut at rapids, each part begins as with restart; 0: any"""
     feed: float | None = Field(default=None, gt=0.0)
@@ -129,7 +129,7 @@ class RewindSettings(UserModel):
     allowed: bool = True
     """false: a path that needs a rewind is refused"""
     feed: float | None = Field(default=None, gt=0.0)
-    """of the way back into a cut, mm/min; default: that of the cut"""
+    """of the return into a cut, mm/min; default: that of the cut"""
     stock: Stock | None = None
     """the tool is drawn out of this box (and of what is cut); default: to the safe plane"""
 
@@ -193,7 +193,7 @@ class Placement:
         return result
 
     def inverse(self) -> Placement:
-        """The way back."""
+        """The return."""
         return Placement(self.rotation.T, -self.rotation.T @ self.origin)
 
     @property

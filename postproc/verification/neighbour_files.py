@@ -1,4 +1,4 @@
-"""The files that stand beside a program, for the subprograms that it calls."""
+"""The files that stand next to a program, for the subprograms that it calls."""
 
 from __future__ import annotations
 

@@ -38,7 +38,7 @@ _ORIENTED = re.compile(rb"(?im)^[^\n]*tool axes chosen: orient ([a-z-]+), max ti
 _SETUP = re.compile(rb"(?im)^[ \t(;\dN]*setup ([^\n]*?)(?:, " + SETUP_MARK.encode("ascii") + rb" ([0-9a-f]{8})\b|$)")
 _OURS = re.compile(rb"(?im)^[^\n]*postproc \d+\.\d[^\n]*\n(?:[^\n]*part [^\n]*\n)?[^\n]*source ")
 CAUSES = frozenset({"verify.start", "verify.tool", "verify.tool_change", "verify.state", "verify.tap", "verify.hole"})
-"""told first: a path that is off follows from them"""
+"""reported first: a path that is off follows from them"""
 
 
 def other_axes(data: bytes, options: Options, gcode: str) -> list[Diagnostic]:
@@ -116,13 +116,13 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Callable[[str, i
     unseen += [*lengths, *changed, *check_end(motion, job, home, faults), *check_changes(code, motion, job, home, faults),
                *check_stops(code, motion, job, faults),
               *_bodies(motion, executed, job, comparison, faults)]
-    told = sorted([*unseen, *comparison.diagnostics], key=lambda d: d.code not in CAUSES)
+    noted = sorted([*unseen, *comparison.diagnostics], key=lambda d: d.code not in CAUSES)
     if gcode and _by_post(job):
         named = _CORRECTED.search(head)
-        told = [*(_of_model(named[1], head, job, gcode, has_errors(told)) if named else
-                  _uncorrected(head, job, motion, executed, comparison, gcode) if has_errors(told) else []), *told,
-                *_unmeasured(motion, executed, job, faults)]
-    return replace(comparison, executed=(code, motion), poses=executed, planned=planned), [*diagnostics, *told]
+        noted = [*(_of_model(named[1], head, job, gcode, has_errors(noted)) if named else
+                   _uncorrected(head, job, motion, executed, comparison, gcode) if has_errors(noted) else []), *noted,
+                 *_unmeasured(motion, executed, job, faults)]
+    return replace(comparison, executed=(code, motion), poses=executed, planned=planned), [*diagnostics, *noted]
 
 
 def _unmeasured(motion: Motion, executed: BlockPoses, job: Job, faults: Faults) -> list[Diagnostic]:
@@ -164,7 +164,7 @@ def _uncorrected(head: bytes, job: Job, motion: Motion, executed: BlockPoses, co
 
 
 def _of_model(named: bytes, head: bytes, job: Job, gcode: str, off: bool) -> list[Diagnostic]:
-    """What its header tells of the model that a program corrects, `named` and by its fingerprint, where that is not the one
+    """What its header says of the model that a program corrects, `named` and by its fingerprint, where that is not the one
     that it is verified with; `off`: the program fails. Programs without a fingerprint have only the name."""
     from machines.geometric_error.files.fingerprint import fingerprint
 
@@ -179,8 +179,8 @@ def _of_model(named: bytes, head: bytes, job: Job, gcode: str, off: bool) -> lis
         return [warning("verify.error_model_changed", f"the error model {job.errors.name} has changed since the program was "
                         f"written{marks}: the program corrects the errors as they were", file=gcode,
                         hint="convert again, or verify with the model as it was")]
-    tell, so = (error, "what is off may follow from that alone") if off else (warning, "the program corrects other errors")
-    return [tell("verify.error_model", f"the header of the program names the error model {name}, it is verified with "
+    note, so = (error, "what is off may follow from that alone") if off else (warning, "the program corrects other errors")
+    return [note("verify.error_model", f"the header of the program names the error model {name}, it is verified with "
                  f"{job.errors.name}{marks}: {so}", file=gcode,
                  hint="verify with the model that the program was written with")]
 

@@ -113,7 +113,7 @@ def beyond_bound(found: AfterFormatting | None, job: Job) -> list[Diagnostic]:
                     f"the bound: tip {1e3 * found.tip[k]:.2f} um of {1e3 * found.tip_bound:.2f} um, axis "
                     f"{found.axis[k] / arcsec:.2f} arcsec of {found.axis_bound / arcsec:.2f} arcsec at the worst of them",
                     file=job.toolpath.file, lines=[int(lines[k]), *rest[:5]], count=len(off),
-                    hint=("an axis turns back by less than it loses; " if job.two_way else "")
+                    hint=("an axis turns back by less than it loses; " if job.bidirectional else "")
                     + "more decimals in the controller's [format] help")]
 
 
@@ -121,7 +121,7 @@ def _play(result: CorrectedConversion) -> tuple[float, float]:
     """(mm, rad) that a last decimal of the words of joints with lost motion comes to, at up to LOOKS blocks."""
     job, path = result.job, result.path
     assert job is not None and job.errors is not None and path is not None
-    joints = job.errors.axes.two_way(job.machine.axis_names)
+    joints = job.errors.axes.bidirectional(job.machine.axis_names)
     rows = np.flatnonzero(~path.home)
     if not joints or not len(rows):
         return 0.0, 0.0

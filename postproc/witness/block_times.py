@@ -57,7 +57,7 @@ def _first_of(step: Array, letters: tuple[str, ...], kinds: tuple[str, ...]) -> 
 
 
 def _arc_lengths(e: ExecutedBlocks, rows: Array) -> Array:
-    """(K,) mm along arcs and helices, by three places of each: the way to the middle says the radius."""
+    """(K,) mm along arcs and helices, by three places of each: the path to the middle says the radius."""
     start, middle, end = (e.poses_at(rows, np.full(len(rows), t))[0] for t in (0.0, 0.5, 1.0))
     angle = np.abs(e.sweep[rows])
     chord = end - start

@@ -127,7 +127,7 @@ def _multax(e: Execution, r: Record, line: int) -> None:
 
 
 def _nurbs(e: Execution, r: Record, line: int) -> None:
-    """A spline: its way is not followed; it ends in the last CNTRL."""
+    """A spline: its path is not followed; it ends in the last CNTRL."""
     e.lost("NURBS", line)
 
 

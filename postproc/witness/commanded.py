@@ -45,7 +45,7 @@ class Commanded:
 
     Attributes:
         tip, axis (N, 3); kind (N,): RAPID, LINE, ARC, HOLE, START (not gone to); line (N,)
-        known (N,): False where the position was not understood; gap (N,): the way to it was not
+        known (N,): False where the position was not understood; gap (N,): the path to it was not
         feed (N,): mm/min, or mm per turn where `per_turn` (N,), or 1/min where `inverse` (N,); NaN: none
         arc (N,): index into centre, normal (K, 3), sweep (K,) rad; -1
         cycle (N,): index into cycles, -1; tool, spindle, coolant (N,): number; -1, 0, 1; "" to words; UNKNOWN

@@ -1,4 +1,5 @@
-"""Blocks against the way that the CL file commands: deviation, rapid or feed, arcs, clearance of what the post has added."""
+"""Blocks against the path that the CL file commands: deviation, rapid or feed, arcs, clearance of what the post has
+added."""
 
 from __future__ import annotations
 
@@ -23,7 +24,7 @@ EXACT = 1e-6
 
 
 class Walked:
-    """Blocks with what of them is known: `owner` (E,) target of each, pose at its end, its deviation from its way (E,)."""
+    """Blocks with what of them is known: `owner` (E,) target of each, pose at its end, its deviation from its path (E,)."""
 
     def __init__(self, poses: Poses, targets: Targets, owner: Array, tip: Array, axis: Array,
                  tolerance: tuple[float, float]) -> None:
@@ -69,7 +70,7 @@ class Walked:
         return returns & (stays[1:] == stays[self.first]), last[np.minimum(self.owner, len(t))]
 
     def start(self, rows: Array) -> tuple[Array, Array]:
-        """(tip, axis) where the way of blocks `rows` begins: as commanded, or where the tool stood."""
+        """(tip, axis) where the path of blocks `rows` begins: as commanded, or where the tool stood."""
         i = self.owner[rows]
         free = self.targets.free[i]
         start, axis = self.targets.start[i].copy(), self.targets.start_axis[i].copy()
@@ -90,17 +91,17 @@ class Walked:
                 self.away[k] = np.fmax(self.away[k], np.nan_to_num(d, nan=np.inf))
                 self.tilt[k] = np.fmax(self.tilt[k], np.nan_to_num(a, nan=np.inf))
 
-    def on_way(self) -> Array:
-        """(E,) blocks that stay on the way to their target."""
+    def on_path(self) -> Array:
+        """(E,) blocks that stay on the path to their target."""
         return self.inside & ~self.gap & (self.away <= self.tolerance[0] + EXACT) & (self.tilt <= self.tolerance[1] + EXACT)
 
 
-def check_way(w: Walked, lines: Array, cut: Cut | None, margin: float, link_angle: float, bent: bool,
-              table: dict[str, object]) -> list[Finding]:
-    """Blocks off their way that are no retract, approach or move clear of what is cut; rapids in cuts and the reverse.
+def check_path(w: Walked, lines: Array, cut: Cut | None, margin: float, link_angle: float, bent: bool,
+               table: dict[str, object]) -> list[Finding]:
+    """Blocks off their path that are no retract, approach or move clear of what is cut; rapids in cuts and the reverse.
 
     Rapids that turn the tool axis by more than `link_angle` (degrees) have to be clear, or on such a line, themselves."""
-    good = w.on_way()
+    good = w.on_path()
     step = np.diff(w.tip, axis=0, prepend=w.tip[:1])
     moved = np.sqrt((step * step).sum(axis=1))
     cutting, rapid = is_cut(w.kind) & ~w.gap & ~w.returns, is_rapid(w.kind) & ~w.gap
@@ -122,7 +123,7 @@ def check_way(w: Walked, lines: Array, cut: Cut | None, margin: float, link_angl
     if len(cuts):
         k = int(cuts[0])
         found += _finding(w, cuts, lines, "path", f"the tool is {w.away[k]:.6f} mm and {np.degrees(w.tilt[k]):.6f} degrees "
-                          "off the way of the CL file")
+                          "off the path of the CL file")
     rest = bad[~np.isin(bad, cuts)]
     return found + _finding(w, rest, lines, "clearance", "motion that the CL file does not command comes nearer to what is "
                             "cut than the margin of the set-up")
@@ -155,7 +156,7 @@ def _low(w: Walked, rows: Array, cut: Cut | None, margin: float, bent: bool, tur
     start, start_axis = w.targets.start[to], w.targets.start_axis[to]
     here = np.maximum(w.first[rows] - 1, 0)
     # A rewind draws back within a move: from where the cut was left, and back to there.
-    left = np.maximum.accumulate(np.where(w.on_way(), np.arange(len(w.owner)), 0))[rows]
+    left = np.maximum.accumulate(np.where(w.on_path(), np.arange(len(w.owner)), 0))[rows]
     low = np.zeros(len(rows), bool)
     tight = np.zeros(len(rows), bool)
     # What comes to the end of a cut at feed is that cut: it may be on such a line, and nowhere else, however high.
@@ -167,12 +168,12 @@ def _low(w: Walked, rows: Array, cut: Cut | None, margin: float, bent: bool, tur
         line = np.where(begins, np.inf, line)
         line = np.fmin(line, np.where(ends, np.inf, _above(tip, w.targets.tip[to], w.targets.axis[to])))
         line = np.fmin(line, np.where(ends | entry, np.inf, _above(tip, start, start_axis)))
-        beside = ~(line <= near)
-        beside &= turned | ~_level(w, rows, to, ends | begins, tip, near, bent)
-        low |= beside & cuts
+        adjacent = ~(line <= near)
+        adjacent &= turned | ~_level(w, rows, to, ends | begins, tip, near, bent)
+        low |= adjacent & cuts
         if cut is not None:
-            low |= beside & ~cut.clear(tip, axis, LEAST * margin)
-            tight |= beside & ~cut.clear(tip, axis, FULL * margin)
+            low |= adjacent & ~cut.clear(tip, axis, LEAST * margin)
+            tight |= adjacent & ~cut.clear(tip, axis, FULL * margin)
     short = np.flatnonzero(tight & ~low)
     if len(short):
         low[short] = ~_explained(w, rows[short], margin, table)
@@ -209,15 +210,15 @@ def _explained(w: Walked, rows: Array, margin: float, table: dict[str, object]) 
     beyond = np.zeros(len(w.targets) + 1, bool)
     for first in range(0, len(link), CHUNK):
         k = link[first:first + CHUNK]
-        linear, ways = machine.slides(e.joints[k], e.letters)
-        lift = np.linalg.solve(ways, 0.95 * margin * w.axis[k][:, :, None])[:, :, 0]
+        linear, travels = machine.slides(e.joints[k], e.letters)
+        lift = np.linalg.solve(travels, 0.95 * margin * w.axis[k][:, :, None])[:, :, 0]
         q = e.joints[k][:, linear] + lift
         beyond[w.owner[k[((q < travel[linear, 0]) | (q > travel[linear, 1])).any(axis=1)]]] = True
     return np.asarray(beyond[w.owner[rows]])
 
 
 def check_arcs(w: Walked, turns: Array, lines: Array) -> list[Finding]:
-    """Arcs of the CL file that the program turns the other way, or by another angle."""
+    """Arcs of the CL file that the program turns in the other direction, or by another angle."""
     t, m = w.targets, len(w.targets)
     if not t.sweep.any():
         return []

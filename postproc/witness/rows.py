@@ -39,7 +39,7 @@ def assembled(e: Execution) -> Commanded:
         move = step[0] * axis[row] if len(step) == 1 else matrix @ np.array(step)
         tip[row] = tip[row - 1] + e.scale * move if row else np.nan
     kind, cycle = np.full(n, LINE, np.int8), e.cycle.column(n, np.int64)
-    arc, centre, normal, sweep, doubtful = arcs.resolved(e.arcs, tip, place, common, e.frames, e.scale, e.dialect)
+    arc, centre, normal, sweep, uncertain = arcs.resolved(e.arcs, tip, place, common, e.frames, e.scale, e.dialect)
     kind[list(e.arcs.keys() & set(range(n)))] = ARC
     cycle[arc >= 0] = -1
     start = np.array(sorted(e.start), np.int64)
@@ -54,7 +54,7 @@ def assembled(e: Execution) -> Commanded:
     spindle, turned = np.array(e.spindle.values, np.float64)[state], np.array(e.spindle.rows, np.int64)[state]
     known = e.known.column(n, bool) & np.isfinite(tip).all(axis=1) & np.isfinite(axis).all(axis=1)
     gap = np.zeros(n, bool)
-    gap[[row for row in e.gap if row < n] + doubtful] = True
+    gap[[row for row in e.gap if row < n] + uncertain] = True
     return Commanded(tip, axis, kind, line, known, gap, feed[:, 0], feed[:, 1] > 0, feed[:, 2] > 0, arc, centre, normal,
                      sweep, cycle, tuple(e.cycles), e.tool.column(n, np.int64), e.register.column(n, np.int64),
                      e.name.column(n, np.int64), tuple(e.names),

@@ -11,7 +11,7 @@ from postproc.witness.clfile import commanded
 from postproc.witness.commanded import ARC, LINE, Commanded
 from postproc.witness.evidence import Case, ExecutedBlocks, Finding, Testimony
 from postproc.witness.machine import ROD, Chain, kinematics_of, merged
-from postproc.witness.motion import Walked, check_arcs, check_way
+from postproc.witness.motion import Walked, check_arcs, check_path
 from postproc.witness.place import Poses, Unplaced, cut_of, placement, zero_of
 from postproc.witness.states import (
     check_feeds,
@@ -85,7 +85,7 @@ def _compare(case: Case, executed: ExecutedBlocks, c: Commanded, place: tuple[Ar
     clearance = case.setup.get("clearance") or {}
     margin, link_angle = float(clearance.get("margin", 50.0)), float(clearance.get("link_angle", 5.0))
     if not len(lost):
-        found += check_way(w, c.line, cut, margin, link_angle, case.bent_rapids, table)
+        found += check_path(w, c.line, cut, margin, link_angle, case.bent_rapids, table)
         found += check_arcs(w, turns, c.line)
     faults, holes = check_holes(w, c, case, match)
     found += faults
@@ -97,7 +97,7 @@ def _compare(case: Case, executed: ExecutedBlocks, c: Commanded, place: tuple[Ar
     found += _rods(poses)
     faults, zeros = _zero(case, c, place, poses)
     found += faults
-    good = w.on_way() & np.isin(w.kind, (LINE, ARC, BOTTOM))
+    good = w.on_path() & np.isin(w.kind, (LINE, ARC, BOTTOM))
     worst = float(w.away[good].max(initial=0.0)), float(w.tilt[good].max(initial=0.0))
     counts = {"positions": int((match >= 0).sum()), "arcs": int((targets.sweep != 0.0).sum()),
               "holes": holes, "feeds": feeds, **{_NAMES[k]: v for k, v in states.items()}, "work offset": zeros}

@@ -19,7 +19,7 @@ ALLOWED = 1.005
 """share by which a feed may be off besides what the rounding of words may cost, in each move and in all of one feed"""
 VELOCITY = 1.02
 """share of the velocity of an axis that rounded words may ask for"""
-_WAY_OUT = 12
+_RETRACT = 12
 """blocks behind the bottom of a hole in which the tool comes to its retract plane"""
 _PECKED = ("DEEP", "BRKCHP")
 _FEED_OUT = ("BORE", "REAM", "TAP")
@@ -66,7 +66,7 @@ def feeds_of(c: Commanded, setup: dict[str, Any]) -> Array:
 def check_feeds(w: Walked, c: Commanded, case: Case, table: dict[str, Any], match: Array) -> tuple[list[Finding], int]:
     """Cuts that are faster than programmed, or slower and no axis explains it; the number of cuts that were compared."""
     t = w.targets
-    rows = np.flatnonzero(w.inside & (w.code > 0) & ~w.gap & ~w.returns & ((w.kind == LINE) | (w.kind == ARC)) & w.on_way())
+    rows = np.flatnonzero(w.inside & (w.code > 0) & ~w.gap & ~w.returns & ((w.kind == LINE) | (w.kind == ARC)) & w.on_path())
     m = len(t)
     seconds = np.bincount(w.owner[rows], weights=w.seconds[rows], minlength=m)[:m]
     length = np.sqrt(((t.tip - t.start) ** 2).sum(axis=1))
@@ -112,8 +112,8 @@ def _groups(check: Array, feed: Array) -> Array:
 
 
 def _off_in_all(group: Array, more: Array, less: Array, slack: Array) -> Array:
-    """(M,) True for targets of a group whose sum of `more` s passes that of `less` by what rounding, which goes either way,
-    may make of the sum."""
+    """(M,) True for targets of a group whose sum of `more` s passes that of `less` by what rounding, which goes in either
+    direction, may make of the sum."""
     n = int(group.max(initial=0)) + 1
     over = np.bincount(group, weights=np.where(group > 0, more - less, 0.0), minlength=n)
     allowed = np.sqrt(np.bincount(group, weights=np.where(group > 0, slack * slack, 0.0), minlength=n))
@@ -165,10 +165,10 @@ def _feed_finding(w: Walked, c: Commanded, at: Array, ratio: Array, match: Array
 def check_states(w: Walked, c: Commanded, case: Case) -> tuple[list[Finding], dict[str, int], list[str]]:
     """Tool, spindle, speed and coolant while cutting; how many blocks each was compared in; what could not be.
 
-    Blocks that leave a hole at feed count with the hole; feed moves off the way are linking moves and belong to no cut."""
+    Blocks that leave a hole at feed count with the hole; feed moves off the path are linking moves and belong to no cut."""
     e = w.poses.executed
     cuts = (w.kind == LINE) | (w.kind == ARC) | (w.kind == BOTTOM)
-    rows = np.flatnonzero(w.inside & (w.code > 0) & cuts & (w.on_way() | w.gap | w.returns))
+    rows = np.flatnonzero(w.inside & (w.code > 0) & cuts & (w.on_path() | w.gap | w.returns))
     row = w.targets.row[w.owner[rows] - w.returns[rows]]
     tool, coolant = tools_of(c, case.setup)[row], c.coolant[row]
     register = np.where((c.register[row] == OWN) | (not case.registers), tool, c.register[row])
@@ -311,7 +311,7 @@ def _hole_faults(w: Walked, i: int, blocks: Array, cycle: WitnessCycle, rpm: flo
 
 def _risen(w: Walked, i: int, last: int, depth: float, tolerance: float) -> float:
     """mm above the top of hole i that the tool comes to before it leaves the axis of the hole, behind block `last`."""
-    t, stop = w.targets, min(last + _WAY_OUT, len(w.tip))
+    t, stop = w.targets, min(last + _RETRACT, len(w.tip))
     offset = w.tip[last:stop] - t.tip[i]
     rise = offset @ t.axis[i]
     rest = offset - rise[:, None] * t.axis[i]

@@ -1,4 +1,4 @@
-"""Positions of the CL file as targets of a program, and how far blocks are from the way between two of them."""
+"""Positions of the CL file as targets of a program, and how far blocks are from the path between two of them."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ class Targets:
 
     Attributes:
         tip, axis (M, 3); kind (M,): RAPID, LINE, ARC, ENTER, BOTTOM; row (M,): of the CL file
-        start (M, 3), start_axis: where the way there begins; free (M,): that is wherever the tool stands
-        gap (M,): the way there is not known; skipped (M,): by positions that are not known
+        start (M, 3), start_axis: where the path there begins; free (M,): that is wherever the tool stands
+        gap (M,): the path there is not known; skipped (M,): by positions that are not known
         centre, normal (M, 3), sweep (M,): of arcs, 0 for others
         out (M,): of bottoms, mm above them to which the tool leaves the hole; NaN where no number says so
     """
@@ -123,7 +123,7 @@ def _pose_of(poses: Poses, rows: Array, q: Array, t: Array) -> Array:
 
 
 def off(targets: Targets, i: Array, tip: Array, axis: Array, start: Array, start_axis: Array) -> tuple[Array, Array]:
-    """(mm, rad) (K,) by which poses are off the way to the targets `i` (K,) from `start`: a line or an arc, and the great
+    """(mm, rad) (K,) by which poses are off the path to the targets `i` (K,) from `start`: a line or an arc, and the great
     circle of the axes."""
     away = from_line(tip, start, targets.tip[i])
     round_ = np.flatnonzero(targets.sweep[i] != 0.0)
@@ -136,10 +136,10 @@ def off(targets: Targets, i: Array, tip: Array, axis: Array, start: Array, start
 
 def from_line(tip: Array, start: Array, end: Array) -> Array:
     """(K,) mm from lines between two points."""
-    way, offset = end - start, tip - start
-    length = (way * way).sum(axis=1)
-    share = np.clip((offset * way).sum(axis=1) / np.where(length > 0.0, length, 1.0), 0.0, 1.0)
-    rest = offset - share[:, None] * way
+    travel, offset = end - start, tip - start
+    length = (travel * travel).sum(axis=1)
+    share = np.clip((offset * travel).sum(axis=1) / np.where(length > 0.0, length, 1.0), 0.0, 1.0)
+    rest = offset - share[:, None] * travel
     return np.asarray(np.sqrt((rest * rest).sum(axis=1)))
 
 

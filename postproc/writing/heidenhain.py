@@ -45,7 +45,7 @@ class KlartextWriter(Writer):
         return True
 
     def first_number(self) -> None:
-        """Begin to number blocks anew."""
+        """Begin to number blocks again."""
         self.count = -1
 
     def framed(self, block: str) -> str:
@@ -139,7 +139,7 @@ class KlartextWriter(Writer):
         yield f"L{place} R0 FMAX M99"
 
     def forget(self) -> None:
-        """State radius compensation and feed anew too."""
+        """State radius compensation and feed again too."""
         super().forget()
         self.side = ""
 

@@ -10,7 +10,7 @@ from toolpaths.arrays import Floats
 from toolpaths.units import DEG
 
 REACH = 3
-"""last decimals that the pole may be moved by, either way"""
+"""last decimals that the pole may be moved by, in either direction"""
 NEAR = 0.25
 """of a last decimal: ends as near as this are as good as any, the pole nearest to the centre is then taken"""
 
@@ -38,8 +38,8 @@ def polar_arc(start: Floats, end: Floats, centre: Floats, turn: float, grain: fl
         grain, angle_grain: last decimals of the pole in mm, of the angle in degrees
     """
     steps = np.arange(-REACH, REACH + 1)
-    beside = np.stack(np.meshgrid(steps, steps, indexing="ij"), axis=-1).reshape(-1, 2)
-    poles = (np.round(centre / grain) + beside) * grain
+    adjacent = np.stack(np.meshgrid(steps, steps, indexing="ij"), axis=-1).reshape(-1, 2)
+    poles = (np.round(centre / grain) + adjacent) * grain
     first, last = start - poles, end - poles
     begin = np.arctan2(first[:, 1], first[:, 0])
     wanted = (np.arctan2(last[:, 1], last[:, 0]) - begin) / DEG

@@ -16,7 +16,7 @@ from toolpaths.toolpath import Cycle
 
 
 class WriterState:
-    """One program on its way to text; the state is what the controller holds while it reads.
+    """One program on its path to text; the state is what the controller holds while it reads.
 
     `law` is that of the words; `register` the length register of the tool in the spindle; `length_off` is True where the
     register is not in force and waits for the next block that states Z; `speed` is the spindle's as it is written (1/min,
@@ -53,7 +53,7 @@ class WriterState:
         self.motion, self.feed = "", ""
 
     def forget(self) -> None:
-        """State every modal code anew: nobody knows what came before."""
+        """State every modal code again: nobody knows what came before."""
         self.restate()
         self.plane, self.mode = 0, -1
 
@@ -85,7 +85,7 @@ class WriterState:
         return _MINUS_ZERO.sub(f"{sign}0", text).split()
 
     def hole_feed(self, hole: Hole) -> float:
-        """Feed of a hole's way down, mm/min; that of a tap keeps the pitch at the speed that is written."""
+        """Feed of drilling down in a hole, mm/min; that of a tap keeps the pitch at the speed that is written."""
         return float(self.program.feed[hole.drill]) * (self.rounded if hole.key.startswith("TAP") else 1.0)
 
     def spindle_speed(self, asked: float) -> float:
@@ -177,7 +177,7 @@ _MINUS_ZERO = re.compile(r"-0(?=\.?0* )")
 
 
 def peck_of(cycle: Cycle) -> float:
-    """Depth of a peck, mm: the whole way down where the cycle names none."""
+    """Depth of a peck, mm: the whole depth where the cycle names none."""
     return cycle.steps[0] if cycle.steps else cycle.depth + cycle.clearance
 
 def comment_room(controller: ControllerFile) -> int:

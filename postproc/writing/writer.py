@@ -92,7 +92,7 @@ class Writer(WriterState, ABC):
         return bool(self.controller.format.sequence_step)
 
     def first_number(self) -> None:
-        """Begin to number blocks anew."""
+        """Begin to number blocks again."""
         self.number = 0
 
     def framed(self, block: str) -> str:
@@ -253,7 +253,7 @@ class Writer(WriterState, ABC):
             yield from self.numbered_command(command)
 
     def operation(self, name: str, restart: bool) -> Iterator[str]:
-        """The start of an operation: its blocks, and every modal code stated anew behind them.
+        """The start of an operation: its blocks, and every modal code stated again behind them.
 
         With `restart` the program is taken up there, so the safe start, the work offset and the smoothing come again.
         """

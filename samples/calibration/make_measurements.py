@@ -2,8 +2,8 @@
 
 A Mikron UCP 710 with known errors (truth.toml): the C axis by reversal (12 steps, 4 set-ups, indexer and mounting with
 errors of their own), then the places of its axes by a probe on a ball. start.toml is what the second fit starts from.
-Beside it, each with a start of its own: the squareness of the slides by a ball-bar, the screw of X by a laser (both ways,
-screw-truth.toml), all six errors of C by reversal.
+Next to it, each with a start of its own: the squareness of the slides by a ball-bar, the screw of X by a laser (both
+directions, screw-truth.toml), all six errors of C by reversal.
 """
 
 from __future__ import annotations
@@ -102,11 +102,11 @@ def laser(rng: np.random.Generator, runs: int = 2) -> str:
     """Table of X forwards and backwards."""
     kin = machines.load("mikron-ucp710").kinematics.with_tool(TOOL)
     x = np.tile(np.concatenate([SCREW, SCREW[::-1]]), runs)
-    way = np.tile(np.repeat([1.0, -1.0], len(SCREW)), runs)
-    q, ways = np.zeros((len(x), 5)), np.zeros((len(x), 5))
-    q[:, 0], ways[:, 0] = x, way
-    off = (screw().on(kin).place(q, ways)[0] - kin.forward(q)[0])[:, 0] + rng.normal(size=len(x)) * NOISE[1]
-    return write_csv(_joints(q) | {"X way": ("", way), "reading": ("um", _fine(off, 1e-3))},
+    approach = np.tile(np.repeat([1.0, -1.0], len(SCREW)), runs)
+    q, approaches = np.zeros((len(x), 5)), np.zeros((len(x), 5))
+    q[:, 0], approaches[:, 0] = x, approach
+    off = (screw().on(kin).place(q, approaches)[0] - kin.forward(q)[0])[:, 0] + rng.normal(size=len(x)) * NOISE[1]
+    return write_csv(_joints(q) | {"X way": ("", approach), "reading": ("um", _fine(off, 1e-3))},
                      ["interferometer along X: actual less nominal"])
 
 
@@ -167,10 +167,10 @@ sigma_um = 0.3
 centre = [0.0, 0.0, {-TOOL}]     # table frame: where the ball stands, under the spindle at X0 Y0 Z0
 tool_length = {TOOL}
 """
-SCREW_START = """[components.EXX]             # both ways: + reached forwards, - backwards
+SCREW_START = """[components.EXX]             # both directions: + reached forwards, - backwards
 table = "screw-start-X.csv"
 """
-LASER = f"""description = "screw of X by a laser, both ways, simulated"
+LASER = f"""description = "screw of X by a laser, both directions, simulated"
 machine = "mikron-ucp710"
 model = "screw-start.toml"
 

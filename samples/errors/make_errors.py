@@ -20,7 +20,7 @@ from machines.geometric_error.tables.names import DIRECTIONS, parse
 from toolpaths.units import DEG
 
 ARCSEC = DEG / 3600.0
-DOUBT = {False: 0.0005, True: 0.3 * ARCSEC}
+UNCERTAINTY = {False: 0.0005, True: 0.3 * ARCSEC}
 """standard deviation of every parameter: mm, rad"""
 
 
@@ -52,7 +52,7 @@ def serial(name: str, seed: int) -> ErrorModel:
                  "EB0A": 4 * ARCSEC, "EC0A": -5 * ARCSEC, "EX0C": 0.015, "EY0C": -0.010, "EA0C": 6 * ARCSEC,
                  "EB0C": -3 * ARCSEC, "EA0S": 5 * ARCSEC, "EB0S": -6 * ARCSEC}
     bed: dict[str, ErrorFrame] = {"A": "moving", "C": "moving"}  # both carry the part
-    return with_doubt(ErrorModel(SerialErrors(tuple(components), constants, frame=bed), name=name, machine=name))
+    return with_uncertainty(ErrorModel(SerialErrors(tuple(components), constants, frame=bed), name=name, machine=name))
 
 
 def parallel(name: str, seed: int) -> ErrorModel:
@@ -64,16 +64,16 @@ def parallel(name: str, seed: int) -> ErrorModel:
     size = [5 * ARCSEC if angular(n) else 0.008 for n in zero.names]
     unit = [ARCSEC if angular(n) else 0.001 for n in zero.names]
     values = np.round(rng.normal(size=len(size)) * np.divide(size, unit), 1) * unit
-    return with_doubt(ErrorModel(rods=zero.with_values(values), name=name, machine=name))
+    return with_uncertainty(ErrorModel(rods=zero.with_values(values), name=name, machine=name))
 
 
-def with_doubt(model: ErrorModel) -> ErrorModel:
-    """The model with the standard deviations of DOUBT."""
-    return replace(model, covariance=np.diag([DOUBT[angular(name)] ** 2 for name in model.names]))
+def with_uncertainty(model: ErrorModel) -> ErrorModel:
+    """The model with the standard deviations of Uncertainty."""
+    return replace(model, covariance=np.diag([UNCERTAINTY[angular(name)] ** 2 for name in model.names]))
 
 
 def runs(rng: np.random.Generator) -> str:
-    """Readings of X of mill-3axis as ISO 230-2 has them: five times there and back, each way its own column; any order."""
+    """Readings of X of mill-3axis as ISO 230-2 has them: five times there and back, each path its own column; any order."""
     x = np.linspace(-500.0, 500.0, 11)
     there = 0.012 * x / 500.0 + 0.004 * np.sin(x / 90.0)
     truth = np.stack([there, there - 0.003], axis=1)

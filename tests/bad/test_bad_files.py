@@ -1,4 +1,4 @@
-"""Every file here is bad in one way; its first line names the diagnostic that must come."""
+"""Every file here is bad in one direction; its first line names the diagnostic that must come."""
 
 from __future__ import annotations
 

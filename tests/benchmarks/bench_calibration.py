@@ -1,4 +1,5 @@
-"""Calibration: rank, condition number, doubt against set-ups, coverage of the stated bounds, what is left, the whole loop.
+"""Calibration: rank, condition number, uncertainty against set-ups, coverage of the stated bounds, what is left, the whole
+loop.
 
     python -m tests.benchmarks.bench_calibration [TRIALS]
 
@@ -50,7 +51,7 @@ def reversal(trials: int) -> None:
         clean = simulate(bench, torsors[0], torsors[1], np.zeros((m, 3, 6)))[:, :, 5] / ARCSEC
         left = np.nanmax(np.abs(identify(clean, NOISE).residuals))
         if known.rank < known.unknowns:
-            print(f"{m:4} {known.rank:5} {known.condition_number:10.4f}   not told apart")
+            print(f"{m:4} {known.rank:5} {known.condition_number:10.4f}   not distinguished")
             continue
         found = [identify(clean + NOISE * rng.normal(size=clean.shape), NOISE) for _ in range(trials)]
         off = np.array([np.concatenate([f.axis - axis, -f.indexer - indexer]) for f in found])

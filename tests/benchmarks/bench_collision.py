@@ -1,7 +1,7 @@
 """Figures of collisions: python tests/benchmarks/bench_collision.py.
 
-Seconds of the processor: candidates of 61 passes beside part, vise, post and table of samples/bodies, by compiled loops, by
-numpy, and by trimesh's collision manager at the points of the way only; a whole program with and without bodies; a cutter
+Seconds of the processor: candidates of 61 passes next to part, vise, post and table of samples/bodies, by compiled loops, by
+numpy, and by trimesh's collision manager at the points of the path only; a whole program with and without bodies; a cutter
 on a fine mesh.
 """
 
@@ -73,7 +73,7 @@ def candidates(bodies: PassBodies) -> None:
         each = 1e3 * (time.process_time() - begun) / count
         print(f"{name}: {each:.1f} ms a candidate ({count} candidates, {touched} touch)")
     search.wanted = wanted
-    print(f"collision manager, at the points of the way only: {1e3 * by_manager(bodies, all_axes):.1f} ms a candidate")
+    print(f"collision manager, at the points of the path only: {1e3 * by_manager(bodies, all_axes):.1f} ms a candidate")
 
 
 def by_manager(bodies: PassBodies, all_axes: Floats) -> float:
@@ -104,8 +104,8 @@ def programs() -> None:
     machine = machines.load("mikron-ucp710")
     options = Options(setup=str(SETUP))
     without = min(seconds(lambda: postproc.convert(path, machine, setup=bare, options=options)) for _ in range(3))
-    beside = min(seconds(lambda: postproc.convert(path, machine, setup=setup, options=options)) for _ in range(3))
-    print(f"bicubic.cls, {len(path)} points: {without:.2f} s without bodies, {beside:.2f} s with")
+    adjacent = min(seconds(lambda: postproc.convert(path, machine, setup=setup, options=options)) for _ in range(3))
+    print(f"bicubic.cls, {len(path)} points: {without:.2f} s without bodies, {adjacent:.2f} s with")
 
 
 def fine(count: int = 400, rows: int = 300) -> None:
@@ -123,10 +123,10 @@ def fine(count: int = 400, rows: int = 300) -> None:
     normal /= np.linalg.norm(normal, axis=2, keepdims=True)
     at = np.stack((u, v, 2.0 * np.sin(u / 9.0) * np.cos(v / 9.0)), axis=2) + 8.0 * normal - [0.0, 0.0, 8.0]
     tips = np.stack((at[:, :-1], at[:, 1:]), axis=2).reshape(-1, 2, 3)
-    way = Swept(tips, np.tile(np.array([0.0, 0.0, 1.0]), (len(tips), 2, 1)), np.arange(len(tips)))
+    travel = Swept(tips, np.tile(np.array([0.0, 0.0, 1.0]), (len(tips), 2, 1)), np.arange(len(tips)))
     pieces = np.array([[0.0, 8.0, 0.0, 8.0, 8.0], [8.0, 8.0, 8.0, 30.0, 0.0]])
-    taken = seconds(lambda: search.nearest(body, way, pieces, -0.02))
-    print(f"{len(way)} pieces of a way on {len(body)} triangles, in contact: {taken:.1f} s")
+    taken = seconds(lambda: search.nearest(body, travel, pieces, -0.02))
+    print(f"{len(travel)} pieces of a path on {len(body)} triangles, in contact: {taken:.1f} s")
 
 
 if __name__ == "__main__":

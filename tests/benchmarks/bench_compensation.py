@@ -1,4 +1,4 @@
-"""Correction of geometric errors: what is left, and its time beside the inverse kinematics, in one run.
+"""Correction of geometric errors: what is left, and its time compared with the inverse kinematics, in one run.
 
     python -m tests.benchmarks.bench_compensation [POINTS]
 
@@ -6,8 +6,8 @@ Realistic errors (all component errors and locations of serial machines, all dim
 20 arcsec and more at the tip). Joint commands before formatting; axis figures away from poles, where the turn is free, and
 over all points. Processor time, best of two. Then samples on machines, controllers and modes with the models of
 samples/errors: worst deviation of block ends before and after, before formatting; of the program as it is read back on the
-machine with errors at the CL points, beside the rounding of the words and the whole bound; and along the whole program. Last
-4000 drilled holes without a model, with tables of one way and of two.
+machine with errors at the CL points, next to the rounding of the words and the whole bound; and along the whole program.
+Last 4000 drilled holes without a model, with tables of one direction and of two.
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ def samples() -> None:
 
 
 def holes(count: int) -> None:
-    """Print the time of drilled holes without a model, and with slides that are off the same by both ways and not."""
+    """Print the time of drilled holes without a model, and with slides that are off the same by both directions and not."""
     x, y = (v.ravel() for v in np.meshgrid(np.linspace(-80.0, 80.0, 64), np.linspace(-80.0, 80.0, -(-count // 64))))
     places = (f"GOTO/{a:.4f},{b:.4f},0" for a, b in zip(x[:count], y[:count], strict=True))
     head = "UNITS/MM\nLOADTL/1\nSPINDL/1000,CLW\nRAPID\nGOTO/0,0,60\nCYCLE/DRILL,DEPTH,5,CLEAR,2,MMPM,250"
@@ -84,13 +84,13 @@ def holes(count: int) -> None:
     with tempfile.TemporaryDirectory() as folder:
         model = Path(folder, "e.toml")
         model.write_text("".join(f'[components.E{a}{a}]\ntable = "{a}.csv"\n' for a in "XYZ"))
-        for name, ways in (("no model", 0), ("one way", 1), ("two ways", 2)):
+        for name, travels in (("no model", 0), ("one direction", 1), ("two paths", 2)):
             for a in "XYZ":
-                titles = [f"E{a}{a} [um]"] if ways < 2 else [f"E{a}{a}+ [um]", f"E{a}{a}- [um]"]
+                titles = [f"E{a}{a} [um]"] if travels < 2 else [f"E{a}{a}+ [um]", f"E{a}{a}- [um]"]
                 rows = [[p, v, v + 3.0][:1 + len(titles)] for p, v in ((-500.0, 0.0), (0.0, 6.0), (500.0, 3.0))]
                 lines = [[f"{a} [mm]", *titles], *rows]
                 Path(folder, f"{a}.csv").write_text("".join(",".join(map(str, line)) + "\n" for line in lines))
-            options = Options(error_model=str(model) if ways else "")
+            options = Options(error_model=str(model) if travels else "")
             took = seconds(lambda o=options: postproc.convert(path, "mill-3axis", "linuxcnc", options=o))
             print(f"{name:10} {took:6.2f} s")
 

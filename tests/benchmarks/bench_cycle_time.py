@@ -1,7 +1,7 @@
 """Figures of the cycle time: `python tests/benchmarks/bench_cycle_time.py [simulator|speed|calibration] ...`
 
-simulator: our time beside LinuxCNC's machine time, program by program. speed: seconds per 10^6 blocks, and as a share of
-reading the program. calibration: hidden parameters found from noisy logs, and how often bands on other programs hold.
+simulator: our time compared with LinuxCNC's machine time, program by program. speed: seconds per 10^6 blocks, and as a share
+of reading the program. calibration: hidden parameters found from noisy logs, and how often bands on other programs hold.
 """
 
 from __future__ import annotations

@@ -1,11 +1,11 @@
-"""Speed, memory and optimality of the planned motion, beside toppra, Clarabel and copp-py in one run.
+"""Speed, memory and optimality of the planned motion, compared with toppra, Clarabel and copp-py in one run.
 
     python tests/benchmarks/bench_feedrate.py [speed] [cl] [copp] [memory] [optimality] [corners] [limits] [stops]
 
 speed: points per second against toppra (velocity and acceleration only), path evaluation included, medians of
 interleaved runs. cl: the same on smoothed CL points, knots by the mesh. copp: against copp-py's TOPP3-LP, where that is
 installed. memory: growth of the resident set at 10^6 knots, in a process of its own. optimality: 150 random paths
-against a converged sequence of convex problems. corners: strict beside the optimum on polylines with tight blends.
+against a converged sequence of convex problems. corners: strict next to the optimum on polylines with tight blends.
 limits: worst ratio in the 1 ms samples, fast and strict. stops: a stop each 2 mm. Compiled code is warm.
 """
 
@@ -152,7 +152,7 @@ def copp() -> None:
 
 
 def corners() -> None:
-    """Strict beside one solve on knots three times as dense, which exceeds limits between them but is no slower."""
+    """Strict next to one solve on knots three times as dense, which exceeds limits between them but is no slower."""
     worst = []
     for seed in range(6):
         for size in (0.004, 0.015, 0.06):

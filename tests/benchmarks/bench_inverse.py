@@ -1,4 +1,4 @@
-"""Time of the inverse for a million points, parallel machines beside a serial one, in one run.
+"""Time of the inverse for a million points, parallel machines compared with a serial one, in one run.
 
     python tests/benchmarks/bench_inverse.py [POINTS]
 

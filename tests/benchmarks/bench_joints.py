@@ -2,7 +2,7 @@
 
     python tests/benchmarks/bench_joints.py [POINTS]
 
-Every figure is of one run; processor times stand beside those of the inverse kinematics of the same points.
+Every figure is of one run; processor times stand compared with those of the inverse kinematics of the same points.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def leaning(tilt: np.ndarray, heading: np.ndarray) -> np.ndarray:
 
 
 def paths(rng: np.random.Generator) -> Iterator[tuple[str, np.ndarray, np.ndarray, np.ndarray]]:
-    """Twenty paths: (name, tip, axis, pauses): spirals, zig-zags, wavy rounds and ways past +z."""
+    """Twenty paths: (name, tip, axis, pauses): spirals, zig-zags, wavy rounds and paths past +z."""
     for k in range(20):
         n = int(rng.integers(600, 1500))
         t = np.linspace(0.0, 1.0, n)
@@ -73,8 +73,8 @@ def against_greedy() -> None:
             joined = [stops[0], stops[1]]
             for r, x in zip(found.rewinds, stops[2:], strict=True):
                 joined += [r.after[None], x]
-            way = np.abs(np.diff(np.concatenate(joined), axis=0)) / limits.velocity
-            row = np.array([len(found.rewinds), found.outside, way.max(axis=1).sum(), other.rewinds, other.outside,
+            travel = np.abs(np.diff(np.concatenate(joined), axis=0)) / limits.velocity
+            row = np.array([len(found.rewinds), found.outside, travel.max(axis=1).sum(), other.rewinds, other.outside,
                             other.seconds])
             total += row
             print(f"  {name:14} {label:12} {columns(row)}")
@@ -113,8 +113,8 @@ def moves(name: str, rng: np.random.Generator, count: int) -> tuple[Curves, np.n
 
 
 def against_truth() -> None:
-    """The worst bound beside the worst deviation at 201 places of every block."""
-    print(f"bound beside dense truth, allowed {TIP} mm and {AXIS / DEG:.3g} degrees")
+    """The worst bound next to the worst deviation at 201 places of every block."""
+    print(f"bound compared with dense truth, allowed {TIP} mm and {AXIS / DEG:.3g} degrees")
     for name in ("mikron-ucp710", "trunnion-bc", "head-table", "fork-head-ab", "nutating-head", "h4a-c-table",
                  "h4a-spindle-axis", "delta-parallel-z", "uranesx"):
         m = machines.load(name)
@@ -136,8 +136,8 @@ def clocked(label: str, n: int, base: float, call: object) -> float:
     start = time.process_time()
     call()  # type: ignore[operator]
     used = time.process_time() - start
-    beside = f"  {used / base:5.1f} x the inverse" if base else ""
-    print(f"  {label:34} {used:6.2f} s  {n / used / 1e6:6.2f} M points/s{beside}")
+    adjacent = f"  {used / base:5.1f} x the inverse" if base else ""
+    print(f"  {label:34} {used:6.2f} s  {n / used / 1e6:6.2f} M points/s{adjacent}")
     return used
 
 

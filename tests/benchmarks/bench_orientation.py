@@ -119,7 +119,7 @@ def _grid_best(one: Pass, m: Machine, limit: AllowedAxes) -> float:
 
 
 def brute() -> None:
-    """The search beside a grid (8, then 1.6 and 0.32 degrees round the best) on three passes."""
+    """The search compared with a grid (8, then 1.6 and 0.32 degrees round the best) on three passes."""
     m = machines.load("mikron-ucp710")
     settings, _ = load_setup(SAMPLES / "tools.setup.toml")
     assert settings is not None
@@ -150,7 +150,7 @@ def _read(text: str) -> Toolpath:
 
 
 def ranking() -> None:
-    """Times on shared knots beside plans on knots of their own, random axes of 20 passes."""
+    """Times on shared knots compared with plans on knots of their own, random axes of 20 passes."""
     m, rng, off, spent = machines.load("mikron-ucp710"), np.random.default_rng(1), [], [0.0, 0.0]
     settings, _ = load_setup(SAMPLES / "tools.setup.toml")
     assert settings is not None

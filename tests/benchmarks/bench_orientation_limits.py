@@ -1,7 +1,8 @@
-"""Choice of orientations beside all that it could choose, and what decides.
+"""Choice of orientations compared with all that it could choose, and what decides.
 
-python tests/benchmarks/bench_orientation_limits.py [brute | plans | cases]; brute: the search beside a grid of 0.25 degrees,
-every axis planned in full, on three passes of the test part; plans: `auto` beside all sequences of such axes on six strips;
+python tests/benchmarks/bench_orientation_limits.py [brute | plans | cases]; brute: the search compared with a grid of 0.25
+degrees, every axis planned in full, on three passes of the test part; plans: `auto` compared with all sequences of such axes
+on six strips;
 cases: what travel, indexing time and a free rotary axis decide.
 """
 
@@ -24,7 +25,7 @@ from postproc.orientation.candidates.initial_axes import across
 from postproc.orientation.passes.allowed import AllowedAxes
 from postproc.orientation.passes.passes import Pass, PassContext, work_of
 from postproc.orientation.plans.choice import OrientationChoice
-from postproc.orientation.plans.index_time import all_ends, ways_between
+from postproc.orientation.plans.index_time import all_ends, links_between
 from postproc.orientation.plans.orient import orient
 from postproc.orientation.plans.shortest_sequence import shortest
 from postproc.setup.model import SetupFile, load_setup
@@ -97,12 +98,12 @@ def brute() -> None:
 
 
 def strips(directions: list[float], cutter: str = "16,8", length: float = 80.0, pitch: float = 1.0) -> Toolpath:
-    """Level straight passes beside each other; directions in degrees from +x."""
+    """Level straight passes next to each other; directions in degrees from +x."""
     lines = ["UNITS/MM", f"CUTTER/{cutter}", "LOADTL/1", "SPINDL/RPM,1000,CLW", "FEDRAT/MMPM,60000"]
     for k, angle in enumerate(directions):
-        way = np.array([np.cos(angle * DEG), np.sin(angle * DEG)])
-        middle = pitch * k * np.array([-way[1], way[0]])
-        start, end = (f"{p[0]:.5f},{p[1]:.5f}" for p in (middle - 0.5 * length * way, middle + 0.5 * length * way))
+        travel = np.array([np.cos(angle * DEG), np.sin(angle * DEG)])
+        middle = pitch * k * np.array([-travel[1], travel[0]])
+        start, end = (f"{p[0]:.5f},{p[1]:.5f}" for p in (middle - 0.5 * length * travel, middle + 0.5 * length * travel))
         lines += ["RAPID", f"GOTO/{start},10", "RAPID", f"GOTO/{start},0", f"GOTO/{end},0", "RAPID", f"GOTO/{end},10"]
     path, found = toolpaths.read_bytes("\n".join([*lines, "FINI"]).encode(), file="strips.apt")
     assert not toolpaths.diagnostics.has_errors(found)
@@ -124,7 +125,7 @@ def whole(m: Machine, path: Toolpath, cap: float, step: float) -> tuple[float, f
     edges = [all_ends(row, work) for row in states]
     cost = [np.array([made.seconds for made in row]) + np.array([e.rapids for e in edge])
             for row, edge in zip(states, edges, strict=True)]
-    return choice.plans["keep"].seconds, choice.plans["auto"].seconds, shortest(cost, ways_between(work, edges))[1]
+    return choice.plans["keep"].seconds, choice.plans["auto"].seconds, shortest(cost, links_between(work, edges))[1]
 
 
 def plans() -> None:

@@ -1,7 +1,8 @@
 """Figures of placing: python tests/benchmarks/bench_placement.py [gain | grid | proof | long].
 
-gain: what the place gives samples on serial and parallel machines; grid: the search beside a grid of places that are all
-planned; proof: what place says beside the conversion of both places under the ideal control; long: a file of many points.
+gain: what the place gives samples on serial and parallel machines; grid: the search compared with a grid of places that are
+all planned; proof: what place says next to the conversion of both places under the ideal control; long: a file of many
+points.
 """
 
 from __future__ import annotations
@@ -88,7 +89,7 @@ def gain() -> None:
 
 
 def grid() -> None:
-    """The best place found beside the best of a grid, all planned."""
+    """The best place found next to the best of a grid, all planned."""
     path, _ = toolpaths.read(SAMPLES / "test_part.cls")
     mill, delta = machines.load("mill-3axis"), slow(machines.load("uranesx"))
     for m, setup in ((mill, "tools.setup.toml"), (delta, "delta.setup.toml")):

@@ -1,4 +1,4 @@
-"""Seconds and memory of reading points in each spelling, beside a bare count of the same file's lines, in one run.
+"""Seconds and memory of reading points in each spelling, compared with a bare count of the same file's lines, in one run.
 
     python tests/benchmarks/bench_read.py [POINTS]
 

@@ -1,4 +1,4 @@
-"""Speed and memory of the whole road, beside a bare count of the same file's lines, in one run.
+"""Speed and memory of the whole road, compared with a bare count of the same file's lines, in one run.
 
     python tests/benchmarks/bench_road.py [POINTS] [MACHINE] [CONTROLLER]
 

@@ -4,7 +4,7 @@
 
 speed: points per second of the processor and deviation over the tolerance, 10^3 to 10^6 points in steps of 0.05 to 0.4 mm.
 plan: planned time of smoothed points over that of the noise-free curve, and of a spline through the rounded points.
-samples: time of geometry and feeds beside the rest of the conversion, planned seconds beside those at the feed.
+samples: time of geometry and feeds next to the rest of the conversion, planned seconds next to those at the feed.
 parallel: one pass on `uranesx` and on `h4a-c-table` under the limits of the slides, and under the largest box of
 platform rates that keeps them anywhere in the workspace. Compiled code is warm.
 """
@@ -136,7 +136,7 @@ def samples() -> None:
         took = time.perf_counter() - start
         block = np.concatenate([one.block for one in motion.passes])
         asked_s, steady = path.seconds[block].sum(), np.fmax(path.seconds, motion.needed)[block].sum()
-        print(f"{file} on {name}: {len(motion.passes)} passes; feeds {own:.2f} s beside {plain:.2f} s of the conversion, "
+        print(f"{file} on {name}: {len(motion.passes)} passes; feeds {own:.2f} s next to {plain:.2f} s of the conversion, "
               f"plan {took:.2f} s; at the feed {asked_s:.1f} s, at planned F words {steady:.1f} s, planned motion "
               f"{seconds:.1f} s", flush=True)
 

@@ -114,7 +114,7 @@ def interpret(program: str | Path, tools: Mapping[int, ToolEntry | tuple[float, 
     with tempfile.TemporaryDirectory(prefix="postproc-rs274-") as name:
         folder = Path(name)
         shutil.copyfile(program, folder / "program.ngc")
-        events, error = ((), "") if _beside(folder / "program.ngc") else _run_rs274(folder, tools or {})
+        events, error = ((), "") if _adjacent(folder / "program.ngc") else _run_rs274(folder, tools or {})
         rows, exact_error = _run_exact(folder, tools or {})
     return _canonical(rows, events, error or exact_error)
 
@@ -130,7 +130,7 @@ def _run(folder: Path, *command: str | Path) -> subprocess.CompletedProcess[str]
                           capture_output=True, text=True, errors="replace", timeout=TIME_LIMIT, check=False)
 
 
-def _beside(program: Path) -> bool:
+def _adjacent(program: Path) -> bool:
     """True where a program moves U, V or W: the machine that rs274 is has none, the interpreter of exact.py has."""
     return re.search(r"[UVWuvw]\s*[-+.\d]", re.sub(r"\([^)]*\)|;.*", "", program.read_text(errors="replace"))) is not None
 
@@ -190,8 +190,8 @@ def _seconds(rows: Floats) -> Floats:
     kind, feed, dwell = rows[:, 0], rows[:, _REST], rows[:, _REST + 8]
     before = np.vstack([np.zeros((1, _AXES)), rows[:-1, _AT] + rows[:-1, _OFFSET]]) - rows[:, _OFFSET]
     delta = rows[:, _AT] - before
-    straight, beside = np.linalg.norm(delta[:, :3], axis=1), np.linalg.norm(delta[:, 6:], axis=1)
-    length = np.where(beside > UNMOVED, beside, np.linalg.norm(delta[:, 3:6], axis=1))
+    straight, adjacent = np.linalg.norm(delta[:, :3], axis=1), np.linalg.norm(delta[:, 6:], axis=1)
+    length = np.where(adjacent > UNMOVED, adjacent, np.linalg.norm(delta[:, 3:6], axis=1))
     length = np.where(straight > UNMOVED, straight, length)
     length = np.where(kind == Move.ARC, _arc_length(rows, before), length)
     cutting = np.isin(kind, (Move.FEED, Move.ARC, Move.PROBE)) & (feed > 0)

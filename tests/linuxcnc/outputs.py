@@ -132,7 +132,7 @@ def _without_stops(motion: Motion) -> Motion:
 def known(o: Output) -> Bools:
     """(E, J) False for axes that no block has stated since a tool change.
 
-    LinuxCNC's stand-alone interpreter takes its position anew after M6 and then counts the tool length twice; a whole
+    LinuxCNC's stand-alone interpreter takes its position again after M6 and then counts the tool length twice; a whole
     LinuxCNC reads it from its motion control.
     """
     words, line = o.words, o.motion.line

@@ -34,7 +34,7 @@ AGREE = 0.002
 HUNGRY = 0.01
 """Share of looks at a nearly empty motion queue from which short blocks may have been run slower than they could be."""
 STILL = 1e-10
-"""mm or degrees per servo cycle that count as no motion: LinuxCNC may compute a joint anew while it rests"""
+"""mm or degrees per servo cycle that count as no motion: LinuxCNC may compute a joint again while it rests"""
 REST = 8
 """Servo cycles without motion that count as standing still."""
 _APART = ("unshare", "--ipc", "--net", "--pid", "--fork", "--kill-child", "--mount-proc")
@@ -74,7 +74,7 @@ class Run:
         return float(self.t[moved[-1] + 1] - self.t[moved[0]]) if len(moved) else 0.0
 
     @property
-    def doubtful(self) -> bool:
+    def uncertain(self) -> bool:
         """Whether a busy host may have made the machine time longer: motion stood, or its queue was nearly empty, and the
         processes that feed it waited for a processor."""
         moves = np.any(np.diff(self.joints, axis=0) != 0, axis=1)
@@ -131,7 +131,7 @@ def recorded(machine: Machine, program: str | Path, tools: Mapping[int, ToolEntr
     runs: list[Run] = []
     for attempt in range(RECORDINGS):
         runs.append(simulate(machine, program, tools, Fraction(warp, 2**attempt)))
-        if runs[-1].errors or not runs[-1].doubtful:
+        if runs[-1].errors or not runs[-1].uncertain:
             return runs[-1]
         runs.sort(key=lambda run: run.seconds)
         if len(runs) > 1 and runs[1].seconds - runs[0].seconds <= AGREE * runs[0].seconds:
@@ -230,7 +230,7 @@ def _launch(folder: Path, time_limit: float) -> None:
 
 @contextmanager
 def _alone() -> Iterator[None]:
-    """Without isolation one session at a time, none beside a LinuxCNC of somebody else, and nothing left behind."""
+    """Without isolation one session at a time, none next to a LinuxCNC of somebody else, and nothing left behind."""
     lock = os.open(tempfile.gettempdir(), os.O_RDONLY)
     try:
         fcntl.flock(lock, fcntl.LOCK_EX)

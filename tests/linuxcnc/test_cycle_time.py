@@ -1,4 +1,4 @@
-"""Our estimate of LinuxCNC's time beside the machine time of its simulator."""
+"""Our estimate of LinuxCNC's time compared with the machine time of its simulator."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ from tests.linuxcnc.interpreter import Move
 
 LETTERS = ("X", "Y", "Z")
 WORDS = {81: "", 82: " P0.5", 83: " Q4", 73: " Q3", 86: " P0.5"}
-"""cycles and what they need beside Z and R; the way out at feed of 84, 85, 89 is cut in two by the reader"""
+"""cycles and what they need next to Z and R; the retract at feed of 84, 85, 89 is cut in two by the reader"""
 
 
 def program(rng: np.random.Generator) -> str:

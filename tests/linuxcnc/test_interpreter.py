@@ -142,7 +142,7 @@ def test_cycle_is_expanded_into_moves(run) -> None:
     assert canonical.seconds[canonical.kind == Move.DWELL].tolist() == [0.5, 0.5]
 
 
-def test_calls_beside_motion(run) -> None:
+def test_calls_next_to_motion(run) -> None:
     canonical = run("G21\nT7 M6\nS12000 M3\nM8\nG61\nG64 P0.01\nM5 M9\nM2\n")
     assert canonical.calls("SET_SPINDLE_SPEED") == ["0, 12000.0000"]
     assert canonical.calls("CHANGE_TOOL") and canonical.calls("FLOOD_ON")

@@ -101,10 +101,10 @@ def deviations(result: PostResult, tip: Floats, axis: Floats, move: Ints) -> tup
     best = np.full((2, len(tip)), np.inf)
     for step in (0, -1, 1):
         to = np.clip(move + step, 1, len(moves) - 1)
-        start, way = moves.tip[to - 1], moves.tip[to] - moves.tip[to - 1]
-        size = np.maximum((way**2).sum(axis=1), 1e-12)
-        u = np.clip(((tip - start) * way).sum(axis=1) / size, 0.0, 1.0)
-        off = np.linalg.norm(tip - start - u[:, None] * way, axis=1)
+        start, travel = moves.tip[to - 1], moves.tip[to] - moves.tip[to - 1]
+        size = np.maximum((travel**2).sum(axis=1), 1e-12)
+        u = np.clip(((tip - start) * travel).sum(axis=1) / size, 0.0, 1.0)
+        off = np.linalg.norm(tip - start - u[:, None] * travel, axis=1)
         tilt = np.degrees(angle_between(axis, slerp(moves.axis[to - 1], moves.axis[to], u)))
         better = off + tilt < best.sum(axis=0)
         best[:, better] = np.stack([off, tilt])[:, better]

@@ -26,7 +26,7 @@ EXACT = 1e-9
 ROUNDED = 1e-4
 """mm and degrees: half a last decimal of a word, and what the rounding of an angle does to the slides"""
 RESIDUE = 2e-4
-"""mm: shorter X, Y, Z moves beside a rotary one would set its speed"""
+"""mm: shorter X, Y, Z moves next to a rotary one would set its speed"""
 MADE = {"bicubic.cls": ("mill-3axis", "uranesx"), "blade.cls": ("linuxcnc-xyzbc-trt", "head-table"),
         "five_faces.cls": ("mikron-ucp710", "linuxcnc-xyzac-trt", "trunnion-bc"),
         "five_tilted.cls": ("fork-head-ab", "nutating-head", "linuxcnc-xyzbc-trt"),
@@ -148,8 +148,8 @@ def check_program(o: Output) -> None:
     rows = o.moves[alone]
     assert len(rows) == single.sum()
     theirs = np.where(p.home[single][:, None], c.machine[rows][:, o.columns], c.pos[rows][:, o.columns])
-    told = outputs.known(o)[alone] & (p.write[single] | ~p.home[single][:, None])
-    assert np.abs(theirs - p.words[single])[told].max() < EXACT
+    noted = outputs.known(o)[alone] & (p.write[single] | ~p.home[single][:, None])
+    assert np.abs(theirs - p.words[single])[noted].max() < EXACT
     np.testing.assert_array_equal(c.kind[rows], p.code[single])
     z = int(o.result.job.control.xyz[2]) if o.result.job else 2
     for line, hole in zip(cycle_lines, p.holes, strict=True):
@@ -229,7 +229,7 @@ def test_inverse_time_everywhere(interpret, machine: str) -> None:
         check(o)
 
 
-def test_no_tiny_residues_beside_a_turn(interpret, tmp_path: Path) -> None:
+def test_no_tiny_residues_next_to_a_turn(interpret, tmp_path: Path) -> None:
     """The tool turns about a point 2 um off the C axis: X and Y would move by tenths of a micron with C."""
     turn = np.radians(np.arange(0, 121, 4))
     points = [f"GOTO/0.002,0,0,{0.5 * np.cos(a):.9f},{0.5 * np.sin(a):.9f},{np.sqrt(0.75):.9f}" for a in turn]

@@ -131,7 +131,7 @@ def check_run(simulate, result: PostResult, folder: Path) -> None:
 
 
 def lengths(result: PostResult, run: Run, cycles: Ints) -> Floats:
-    """Gauge length (N,) of the tool in the spindle: joint words have no length offset that would tell it."""
+    """Gauge length (N,) of the tool in the spindle: joint words have no length offset that would say it."""
     assert result.job is not None
     motion = outputs.read(result)[1]
     by_line = np.zeros(int(max(motion.line.max(), run.line.max())) + 1)

@@ -1,4 +1,4 @@
-"""LinuxCNC with a screw compensation table of ours: its motors move by the table's value, each way its own."""
+"""LinuxCNC with a screw compensation table of ours: its motors move by the table's value, each path its own."""
 
 from __future__ import annotations
 
@@ -77,6 +77,6 @@ def test_the_motor_moves_by_the_tables_value(simulate, tmp_path: Path, compensat
             if np.isfinite(stands[on]).all():
                 break
     assert stands[False] == pytest.approx(STOPS, abs=1e-9)
-    way = np.sign(np.diff((-75.0, *STOPS)))
-    assert way.tolist() == [1, 1, 1, 1, -1, -1, -1]
-    assert stands[True] - stands[False] == pytest.approx(-TABLE.at(np.array(STOPS), way), abs=5e-7)
+    travel = np.sign(np.diff((-75.0, *STOPS)))
+    assert travel.tolist() == [1, 1, 1, 1, -1, -1, -1]
+    assert stands[True] - stands[False] == pytest.approx(-TABLE.at(np.array(STOPS), travel), abs=5e-7)

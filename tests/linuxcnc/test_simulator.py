@@ -1,4 +1,4 @@
-"""LinuxCNC's motion control beside our machines: the same joints for the same pose, and times that theory gives."""
+"""LinuxCNC's motion control next to our machines: the same joints for the same pose, and times that theory gives."""
 
 from __future__ import annotations
 
@@ -89,17 +89,17 @@ def test_pose_and_joints_belong_together_in_motion(simulate, tmp_path: Path) -> 
     assert set(run.line[run.line > 0]) == {5, 6}
 
 
-def test_what_the_control_refuses_is_told(simulate, tmp_path: Path) -> None:
+def test_what_the_control_refuses_is_reported(simulate, tmp_path: Path) -> None:
     run = simulate(machines.load("mill-3axis"), write(tmp_path, "G21 G90 G94\nG1 X600 F3000\nM2\n"))
     assert any("exceed" in error for error in run.errors)
 
 
 def recording(seconds: float, waited: float, still: float = 0.0) -> Run:
     """A run of one joint that moves for so long and stands in between; the host was busy for `waited` s of it."""
-    way = np.ones(round(1000 * seconds))
-    way[100:100 + round(1000 * still)] = 0.0
-    joints = np.cumsum(way)[:, None]
-    return Run(t=1e-3 * np.arange(len(way)), joints=joints, pose=joints, line=np.ones(len(way), dtype=int), axes="X",
+    travel = np.ones(round(1000 * seconds))
+    travel[100:100 + round(1000 * still)] = 0.0
+    joints = np.cumsum(travel)[:, None]
+    return Run(t=1e-3 * np.arange(len(travel)), joints=joints, pose=joints, line=np.ones(len(travel), dtype=int), axes="X",
                errors=(), starved=0.0, waited=waited)
 
 
@@ -112,7 +112,8 @@ def recording(seconds: float, waited: float, still: float = 0.0) -> Run:
     ([(10.5 - 0.1 * k, 5.0, 1.0) for k in range(6)], 10.0, 6)])
 def test_starved_recordings_are_made_again(monkeypatch: pytest.MonkeyPatch, taken: list[tuple[float, float, float]],
                                            seconds: float, made: int) -> None:
-    """Until one is beyond doubt or the two shortest agree, each at half the warp of the one before; the shortest counts."""
+    """Until one is beyond uncertainty or the two shortest agree, each at half the warp of the one before; the shortest
+    counts."""
     warps: list[Fraction] = []
 
     def simulated(machine: Machine, program: Path, tools: None, warp: Fraction) -> Run:

@@ -82,9 +82,9 @@ class Errors:
         """E L 0 L: how much farther the axis stands along or about x, y or z than it counts."""
         return float(self.toml.get("location", {}).get(f"E{letter}0{letter}", 0.0)) * self.unit(f"E{letter}")
 
-    def six(self, letter: str, position: float, way: Way = 0.0) -> np.ndarray:
+    def six(self, letter: str, position: float, approach: Way = 0.0) -> np.ndarray:
         names = [f"E{d}{letter}" for d in DIRECTIONS]
-        return np.array([self.curves[name](position, way) if name in self.curves else 0.0 for name in names])
+        return np.array([self.curves[name](position, approach) if name in self.curves else 0.0 for name in names])
 
     def curve(self, name: str, given: dict[str, Any]) -> Curve:
         place = UNITS["deg"] if name[2] in "ABC" else 1.0
@@ -120,9 +120,9 @@ class Errors:
             assert found is not None
             columns[found[1]] = np.array([float(row[k]) for row in rows]) * UNITS[found[2]]
         period, spline = given.get("repeats", 0.0) * place, given.get("interpolation") == "spline"
-        ways = [between(columns[name[2]], sign * self.rows(name, columns[key]), spline, period)
-                for key in (f"{name}+", f"{name}-", name) if key in columns]
-        return lambda x, way: (ways[0](x) * (1.0 + way) + ways[-1](x) * (1.0 - way)) / 2.0
+        approaches = [between(columns[name[2]], sign * self.rows(name, columns[key]), spline, period)
+                      for key in (f"{name}+", f"{name}-", name) if key in columns]
+        return lambda x, approach: (approaches[0](x) * (1.0 + approach) + approaches[-1](x) * (1.0 - approach)) / 2.0
 
 
 def between(x: np.ndarray, y: np.ndarray, spline: bool, period: float) -> Callable[[float], float]:
@@ -169,11 +169,11 @@ class Machine:
         turning = self.kinematics.get("rotary", {}).get("letter", "")
         return [*self.kinematics["legs"], *turning]
 
-    def pose(self, q: np.ndarray, tool: float, errors: Errors | None = None, way: np.ndarray | None = None,
+    def pose(self, q: np.ndarray, tool: float, errors: Errors | None = None, approach: np.ndarray | None = None,
              near: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
         """(tip, axis) (3,) in the table frame of joints q (J,); `near` (6,): roughly the same, for machines on rods."""
-        ways = np.zeros(len(q)) if way is None else way
-        now = dict(zip(self.letters, zip(q, ways, strict=True), strict=True))
+        approaches = np.zeros(len(q)) if approach is None else approach
+        now = dict(zip(self.letters, zip(q, approaches, strict=True), strict=True))
         frame = np.eye(4)
         if self.kinematics["family"] == "serial":
             for axis in self.chain:
@@ -232,12 +232,12 @@ class Machine:
             rail = slide + offset
             guide = guide_axes(u, -offset if np.any(offset) else self.middle - rail)
             turn = Rotation.from_euler("XYZ", np.array(given.get("guide", (0, 0, 0))) * rad).as_matrix()
-            for k, beside in enumerate(leg.get("rods") or self.pair(leg, given.get("pair", 50.0))):
+            for k, adjacent in enumerate(leg.get("rods") or self.pair(leg, given.get("pair", 50.0))):
                 own, far = (np.array(given[key][k]) * mm if given.get(key) else np.zeros(3)
                             for key in ("carriage", "platform"))
                 starts.append(rail + np.array(given.get("rail", (0, 0, 0))) * mm
-                              + turn @ (q * u + np.array(beside) - offset) + guide @ own)
-                ends.append(joint + np.array(beside) + far)
+                              + turn @ (q * u + np.array(adjacent) - offset) + guide @ own)
+                ends.append(joint + np.array(adjacent) + far)
                 lengths.append(leg["rod"] + (given["length"][k] * mm if given.get("length") else 0.0))
         return np.array(starts), np.array(ends), np.array(lengths)
 
@@ -265,7 +265,7 @@ class Machine:
         return matrix(Rotation.from_rotvec(found.x[3:] * 1e-3), found.x[:3])
 
 
-def moved(axis: Axis, position: float, way: Way, errors: Errors | None) -> np.ndarray:
+def moved(axis: Axis, position: float, approach: Way, errors: Errors | None) -> np.ndarray:
     """4 x 4 of one axis: its line as it lies, its own motion from its zero, its component errors."""
     zero = 0.0
     if errors is not None:
@@ -280,7 +280,7 @@ def moved(axis: Axis, position: float, way: Way, errors: Errors | None) -> np.nd
     centre = np.array(given.get("point", axis.point if axis.rotary else (0, 0, 0)), dtype=float)
     place = at(axis.point if axis.rotary else centre, torsor(errors.constants(axis.letter)))
     motion = place @ motion @ np.linalg.inv(place)
-    wrong = at(centre, torsor(errors.six(axis.letter, position, way)))
+    wrong = at(centre, torsor(errors.six(axis.letter, position, approach)))
     frame = given.get("frame", "bed")
     before = axis.rotary and (not axis.carries_part if frame == "bed" else frame == "fixed")
     return wrong @ motion if before else motion @ wrong

@@ -21,7 +21,7 @@ class Draw:
 
     Attributes:
         size: um and arcsec of one parameter
-        both: the axis's own error and its turn about y by two ways
+        both: the axis's own error and its turn about y by two paths
     """
 
     def __init__(self, folder: Path, machine: Machine, seed: int, size: tuple[float, float] = (8.0, 2.0), both: bool = False,
@@ -90,7 +90,7 @@ class Draw:
             x, y = np.linspace(low, high, 11), 0.6 * y
         gap = 0.2 * size * self.rng.random()
         columns = [y - gap, y + gap] if two else [y]
-        heads = [f"{name}{way} [{unit}]" for way in ("+-" if two else [""])]
+        heads = [f"{name}{approach} [{unit}]" for approach in ("+-" if two else [""])]
         rows = np.column_stack([x, *columns])
         place = "deg" if axis.rotary else "mm"
         (self.folder / f"{name}.csv").write_text("\n".join([f"{axis.letter} [{place}],{','.join(heads)}", *(

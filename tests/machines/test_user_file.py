@@ -157,7 +157,7 @@ def test_a_fault_in_the_base_names_the_base_file(tmp_path):
     assert (d.file, d.lines) == (str(base), (5,))
 
 
-def test_base_may_be_a_file_beside_this_one(tmp_path):
+def test_base_may_be_a_file_next_to_this_one(tmp_path):
     write(tmp_path, GOOD, "base.toml")
     assert load_toml(write(tmp_path, 'base = "base.toml"\n'), File)[0] is not None
 
@@ -200,7 +200,7 @@ class Every(UserModel):
     place: tuple[float, float, float] = (0.0, 0.0, 0.0)
     table: dict[str, float] = Field(default_factory=dict)
     axis: Axis | None = None
-    way: Literal["up", "down"] = "up"
+    course: Literal["up", "down"] = "up"
     sign: Literal[1, -1] = 1
     code: str = Field(default="G54", pattern=r"^G5[4-9]$")
     """register of the control: G54 to G59"""
@@ -221,13 +221,13 @@ class Every(UserModel):
     ("some = [1.0, 2.5, 3.5]", "allowed: 2 elements or fewer", ""),
     ("table = 5", "table = 5: allowed: a table of keys and values", ""),
     ("axis = 5", "allowed: a table of keys and values", ""),
-    ('way = "left"', "way = \"left\": allowed: 'up' or 'down'", ""), ("sign = 2", "sign = 2: allowed: 1 or -1", ""),
+    ('path = "left"', "path = \"left\": allowed: 'up' or 'down'", ""), ("sign = 2", "sign = 2: allowed: 1 or -1", ""),
     ('code = "G60"', "allowed: text of the form", "register of the control: G54 to G59"),
     ("code = 54", "allowed: text in quotes", "in quotes"),
     ("system = 2", "system = 2: allowed: true or false, or text in quotes", ""),
     ('system = ""', "true or false, or text of length 1 or more", ""),
     ("part = 0", "part = 0: allowed: more than 0", ""), ("part = 5.5", "part = 5.5: allowed: 5 or less", "")])
-def test_values_are_told_with_what_is_allowed(text, said, hint, tmp_path):
+def test_values_are_reported_with_what_is_allowed(text, said, hint, tmp_path):
     model, found = load_toml(write(tmp_path, text + "\n"), Every)
     assert model is None and len(found) == 1 and said in found[0].message and found[0].lines == (1,)
     assert hint in found[0].hint and bool(hint) == bool(found[0].hint)
@@ -236,7 +236,7 @@ def test_values_are_told_with_what_is_allowed(text, said, hint, tmp_path):
 
 @pytest.mark.parametrize(("text", "number"), [
     ("velocity = 6,5", "6,5"), ("velocity = -6,5   # fast", "-6,5"), ("velocity = 0,05\nreach = 3", "0,05")])
-def test_a_decimal_comma_is_told_with_its_line(text, number, tmp_path):
+def test_a_decimal_comma_is_reported_with_its_line(text, number, tmp_path):
     d = only(tmp_path, GOOD.replace("velocity = 500", text))
     assert (d.code, d.lines, d.message) == ("file.syntax", (5,), f"{number} is no number")
     assert d.hint == f"write a decimal point: {number.replace(',', '.')}"

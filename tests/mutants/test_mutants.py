@@ -68,7 +68,7 @@ def test_a_fault_is_gone_behind_its_block() -> None:
 
 
 def test_a_harmful_change_of_a_program_is_measured() -> None:
-    """The judge itself: a program that rests longer or runs another feed is told from the right one."""
+    """The judge itself: a program that rests longer or runs another feed is distinguished from the right one."""
     asked = converted(CASES["flat linuxcnc"])
     plain = short(asked)
     assert plain.effect is not None

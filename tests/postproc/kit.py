@@ -125,7 +125,7 @@ def flat(*lines: str, controller: str | Path = "linuxcnc", name: str = "mill-3ax
 
 
 def execute(result: PostResult, text: str | None = None) -> list[Step]:
-    """The steps of a conversion's text, with the offsets that its set-up tells the operator to enter."""
+    """The steps of a conversion's text, with the offsets that its set-up says the operator to enter."""
     job, m = result.job, result.machine
     assert job is not None
     lengths = {int(k): v.gauge_length for k, v in result.setup.tools.items()}
@@ -188,7 +188,7 @@ def angle(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def great_circle(a: np.ndarray, b: np.ndarray, t: np.ndarray) -> np.ndarray:
-    """Unit vectors (T, 3) at fractions t of the way from a to b (3,): a turned about a x b."""
+    """Unit vectors (T, 3) at fractions t of the path from a to b (3,): a turned about a x b."""
     normal = np.cross(a, b)
     size = np.linalg.norm(normal)
     if size < 1e-12:

@@ -31,7 +31,7 @@ class Step:
 
 @dataclass
 class Peer:
-    """The state of a control as its manual tells it (sections 3.5, 3.5.16, 3.7); X, Y, Z in mm, rotary axes in degrees."""
+    """The state of a control as its manual says it (sections 3.5, 3.5.16, 3.7); X, Y, Z in mm, rotary axes in degrees."""
 
     letters: tuple[str, ...]
     work: np.ndarray

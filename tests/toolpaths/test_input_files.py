@@ -38,8 +38,8 @@ def test_only_regular_files_are_read(kind: str, tmp_path: Path, monkeypatch: pyt
     name = faulty(tmp_path, kind)
     with pytest.raises(OSError) as fault:
         read_input(name)
-    told = unreadable(fault.value, "cl.open", name)
-    assert told.message.startswith("cannot be read: ") and told.hint and "\0" not in str(told) and len(str(told)) < 600
+    noted = unreadable(fault.value, "cl.open", name)
+    assert noted.message.startswith("cannot be read: ") and noted.hint and "\0" not in str(noted) and len(str(noted)) < 600
     found = read_file(name).diagnostics
     assert [d.code for d in found] == ["cl.open"]
 

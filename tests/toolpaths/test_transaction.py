@@ -127,8 +127,8 @@ def test_what_cannot_be_put_back_is_put_back_by_the_next_run(shop: tuple[Path, d
             write_together(outputs)
     assert (folder / "subs" / "O1").read_text() == "new O1"
     monkeypatch.setattr(interrupted_runs, "_alive", lambda path, name: False)
-    told = interrupted_runs.clean(folder)
-    assert [d.code for d in told] == ["file.recovered"]
+    noted = interrupted_runs.clean(folder)
+    assert [d.code for d in noted] == ["file.recovered"]
     interrupted_runs.clean(folder / "subs")
     assert {k: v for k, v in state(folder).items() if not k.startswith("made")} == before
 
@@ -311,7 +311,7 @@ def test_what_was_changed_since_a_kill_stays(tmp_path: Path, dead: int) -> None:
     journal.write_text(interrupted_runs.journal_text(entries))
     (tmp_path / "b.nc").write_text("by hand, in place")
     assert interrupted_runs.interrupted(tmp_path) == journal
-    told = write_together({tmp_path / "d.nc": "D"})
-    assert ["replaced 2 of 3 files" in str(d) for d in told] == [True] and interrupted_runs.interrupted(tmp_path) is None
+    noted = write_together({tmp_path / "d.nc": "D"})
+    assert ["replaced 2 of 3 files" in str(d) for d in noted] == [True] and interrupted_runs.interrupted(tmp_path) is None
     assert {p.name: p.read_text() for p in tmp_path.iterdir()} == {"a.nc": "old a.nc", "b.nc": "by hand, in place",
                                                                    "c.nc": "old c.nc", "d.nc": "D"}

@@ -1,1 +1,1 @@
-"""CL files: reading every dialect, writing generic APT text. README.md tells the journey of a record."""
+"""CL files: reading every dialect, writing generic APT text. README.md says the journey of a record."""

@@ -25,7 +25,7 @@ start; where it does and the arc is a helix"""
 _STEEP = 10.0
 """a helix that ends above its start and rises more than this times the chord between them makes a whole turn"""
 _SENSE_LEAST, _SENSE_ALL = 8, 3
-"""so many arcs of which most, or so many that all, sweep more than half a turn are told"""
+"""so many arcs of which most, or so many that all, sweep more than half a turn are reported"""
 _TURN = 2.0 * math.pi
 _MOST_TURNS = 10000
 """an arc of more turns is no arc that anybody cuts"""
@@ -108,7 +108,7 @@ def _sweep(u: Floats, v: Floats, normal: Floats, r: CircleRecords, full_circles:
            log: DiagnosticLog) -> tuple[Floats, Bools]:
     """Angle from u to v about the normal in (0, 2 pi], whole turns added; a written sweep is checked and kept.
 
-    Second: arcs that end behind their start by rounding, where no whole circles are written; they go back that way.
+    Second: arcs that end behind their start by rounding, where no whole circles are written; they go back that path.
     """
     angle = np.arctan2(np.einsum("ki,ki->k", np.cross(u, v), normal), np.einsum("ki,ki->k", u, v))
     angle = np.where(angle < 0.0, angle + _TURN, angle)

@@ -148,8 +148,8 @@ def _check_world_axes(b: ToolpathBuilder, rows: PointRows) -> None:
         if row < end and not np.abs(rows.axis[row] - unit(np.array([stated]))[0]).max() <= AXIS_AGREES:
             i, j, k = rows.axis[row].tolist()
             b.log.error("cl.tlaxis", f"TLAXIS states the tool axis ({stated[0]:.6g}, {stated[1]:.6g}, {stated[2]:.6g}), by "
-                        f"ROTABL it is ({i:.6g}, {j:.6g}, {k:.6g}): no telling where the points are", line,
-                        "write the file anew in the CAM system")
+                        f"ROTABL it is ({i:.6g}, {j:.6g}, {k:.6g}): it cannot be known where the points are", line,
+                        "write the file again in the CAM system")
 
 
 def _checked_axis(b: ToolpathBuilder, rows: PointRows) -> Floats:

@@ -17,7 +17,7 @@ _RETRACT = frozenset({"RTRCTO", "RETURN"})
 _PECKS = frozenset({"STEP", "INCR", "PECKING", "1STPECK", "SUBPECK"})
 _OTHER = frozenset({"DIAMET", "TLANGL", "TIMES", "BACK", "CSKDIA"})
 _UNUSED = frozenset({"OFFSET", "REPEAT", "PARAMS", "ORIENT", "PLUNGE"})
-"""What the hole would be drilled otherwise for: told, with their numbers."""
+"""What the hole would be drilled otherwise for: reported, with their numbers."""
 _PLAIN = frozenset({"G98", "G99", "AUTO", "MANUAL", "ON", "REV", "", "SEC", "NEXT"})
 _SIMPLE = {"FEDTO": "depth", "DEPTH": "depth", "RAPTO": "rapto", "CLEAR": "clear", "TPI": "threads",
            "PITCH": "pitch", "DIAMET": "diameter", "TLANGL": "angle"}

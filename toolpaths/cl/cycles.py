@@ -23,7 +23,7 @@ _BORES = frozenset({"DRAG", "NODRAG", "MANUAL"})
 _LEAST_STEP = 1e-3
 """file units: no control pecks by less"""
 _APPROACH = 1e-4
-"""file units between the second number of a cycle of CATIA and the way from the point before the cycle to its hole"""
+"""file units between the second number of a cycle of CATIA and the path from the point before the cycle to its hole"""
 _WORDS = "words"
 _LAST = "cycle"
 
@@ -108,7 +108,7 @@ def _approached(b: ToolpathBuilder, v: CycleValues) -> CycleValues:
 
 def _placed(v: CycleValues, planes: Planes) -> CycleValues:
     """Numbers without a word by their place: depth, then feed where no unit stands, then clearance and retract; in the
-    posts that tell RAPTO from the clearance, this stands beside it, and goes without a retract plane."""
+    posts that say RAPTO from the clearance, this stands next to it, and goes without a retract plane."""
     free = list(v.free)
     found: dict[str, object] = {}
     if math.isnan(v.depth) and free:

@@ -133,7 +133,7 @@ def zero(b: ToolpathBuilder, s: Statement) -> None:
 
 
 def work_offset(b: ToolpathBuilder, number: float) -> None:
-    """The file tells nothing of where work offsets lie, so all its points must be in one."""
+    """The file says nothing of where work offsets lie, so all its points must be in one."""
     first = b.memory.setdefault(_WORK_OFFSET, number)
     if first != number:
         b.log.error("cl.work-offset", f"points in work offset {number:g} after points in {first:g}: nothing in the file "

@@ -59,5 +59,5 @@ def _check_clearance(b: ToolpathBuilder, planes: Heights, height: Floats, cycle:
     if row == 0 or cycle[row - 1] >= 0 or abs(height[row - 1] - planes.retract) <= _AT_CLEARANCE:
         return
     b.log.error("cl.cycle-height", f"the cycle's clearance height is {planes.retract:g} mm, and the tool stands at "
-                f"{height[row - 1]:g} mm before it: no telling whether its points are tops or bottoms of holes",
+                f"{height[row - 1]:g} mm before it: it cannot be known whether its points are tops or bottoms of holes",
                 int(line[row]), "give the dialect: --dialect generic where the points are the tops")

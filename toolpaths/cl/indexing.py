@@ -75,7 +75,7 @@ def map_of(b: ToolpathBuilder) -> tuple[Map, str]:
     if _apart(place, b.shift) <= SAME_PLACE:
         return (matrix, b.shift.copy()), fault
     return (matrix, shift), fault or (
-        f"TRANS shifts the points by ({_text(b.shift)}) mm, the CSYS remark by ({_text(place)}): no telling whether they "
+        f"TRANS shifts the points by ({_text(b.shift)}) mm, the CSYS remark by ({_text(place)}): unknown whether they "
         "are one translation")
 
 

@@ -29,7 +29,7 @@ def inspect(result: ReadResult) -> dict[str, object]:
     """The JSON form: lengths mm, angles degrees.
 
     `points` counts each commanded position once (not FROM, GOHOME), `arcs` the CIRCLE and other arc records, `cycles`
-    the CYCLE records that name a kind, `rapids` the rapid moves; `arcs_over_180_deg` tells whether the sense of the
+    the CYCLE records that name a kind, `rapids` the rapid moves; `arcs_over_180_deg` says whether the sense of the
     arcs fits the dialect: few arcs of a real path sweep more than half a turn (whole turns apart); `axis_motion` is
     fixed, indexed (between cuts only) or continuous, and `five_axis` is true unless it is fixed; `extents` are those
     of the commanded positions; `normals` counts the positions that give a surface normal (GOTO with nine numbers).

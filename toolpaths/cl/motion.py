@@ -161,7 +161,8 @@ def movarc(b: ToolpathBuilder, s: Statement) -> None:
     if len(numbers) != 7 or (angle is None and not s.has("CENTER")):
         b.log.error("cl.circle", f"MOVARC/{s.body[:60]}: it takes center, axis, radius, ANGLE, degrees", b.line)
     elif b.dialect.planes is Planes.OVER_BOTTOM and angle is not None and abs(abs(angle) - 180.0) < _HALF_TURN:
-        b.log.error("cl.circle", f"MOVARC/...ANGLE, {angle:g}: this post does not tell the sense of half a turn", b.line,
+        b.log.error("cl.circle", f"MOVARC/...ANGLE, {angle:g}: this post does not determine the sense of half a turn",
+                    b.line,
                     "write the file with the post Common ISO 4343 APT")
     elif not b.next_is_point():
         b.log.error("cl.circle-end", "MOVARC is not followed by a GOTO, which gives its end", b.line)

@@ -123,7 +123,7 @@ def _cut_off(data: bytes | str, lines: int, log: DiagnosticLog) -> None:
     if last and not text and not last.upper().startswith((*_ENDS, b"$$")):
         found = last[:60].decode("ascii", "replace")
         log.warning("cl.cut-off", f"the file ends behind {found!r} without a line end: it may "
-                    "be cut off", lines, "compare the last line with the CAM system, or write the file anew")
+                    "be cut off", lines, "compare the last line with the CAM system, or write the file again")
 
 
 def _check_options(units: str | None, dialect: str | None) -> None:

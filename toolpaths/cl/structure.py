@@ -49,7 +49,7 @@ def open_paths(b: ToolpathBuilder) -> None:
         return
     for line, name in b.open_paths:
         b.log.warning("cl.no-end-of-path", f"operation {name} has no END-OF-PATH: its end may be missing", line,
-                      "write the file anew in the CAM system", key=name)
+                      "write the file again in the CAM system", key=name)
 
 
 def end_of_path(b: ToolpathBuilder, s: Statement) -> None:
@@ -147,7 +147,7 @@ def nothing(b: ToolpathBuilder, s: Statement) -> None:
 
 
 def multax(b: ToolpathBuilder, s: Statement) -> None:
-    """MULTAX/ON, OFF: the points tell by themselves; after OFF those of three numbers keep the last axis (CATIA: APT
+    """MULTAX/ON, OFF: the points say by themselves; after OFF those of three numbers keep the last axis (CATIA: APT
     formats, MULTAX influence on output), which others may not mean."""
     if s.has("OFF") and b.dialect.name != "catia":
         b.multax_off.append((b.row, b.line))

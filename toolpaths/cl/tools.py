@@ -1,7 +1,7 @@
-"""Tools: their numbers (LOADTL, LOAD/TOOL, TURRET, TOOLNO) and what the file tells of their shape.
+"""Tools: their numbers (LOADTL, LOAD/TOOL, TURRET, TOOLNO) and what the file says of their shape.
 
 Systems give the shape before or after the number. Records without a point between them describe one tool; after a
-point, a description begins anew.
+point, a description begins again.
 """
 
 from __future__ import annotations

@@ -28,7 +28,7 @@ _BREAK = re.compile(r",(?=[-+.\d])")
 
 
 def text_of(p: Toolpath) -> str:
-    """The text of `p`; its passes are not written but counted anew when it is read.
+    """The text of `p`; its passes are not written but counted again when it is read.
 
     Raises:
         ValueError: where `p` holds what a CL file cannot say (NaN positions, a feed that becomes unknown again, a

@@ -1,8 +1,8 @@
 """Where two segments meet: one turns into the other within a short distance, or the motion stops.
 
-With A before the joint and B behind it, D = B - A (zero at the joint) and x the way from the joint, the path is
+With A before the joint and B behind it, D = B - A (zero at the joint) and x the path from the joint, the path is
 A(s) + D(R(x)): R is the ramp max(x, 0) rounded over |x| < a by a polynomial of degree 6 whose third derivative is
-continuous. Outside it the path is A and B themselves; between two lines its direction turns one way only, and its
+continuous. Outside it the path is A and B themselves; between two lines its direction turns one direction only, and its
 speed never exceeds theirs. What it leaves is D where the ramp's rounding is highest, at x = 0: R(0) = 5/32 a.
 """
 
@@ -67,19 +67,19 @@ class SegmentBlends:
         return np.asarray(members.at(joint, s) + members.at(joint + 1, there) - members.at(joint, there))
 
 
-def chosen(members: Members, turn: Floats, tolerance: float, beside_splines: float, sharpest: float) -> SegmentBlends:
+def chosen(members: Members, turn: Floats, tolerance: float, adjacent_splines: float, sharpest: float) -> SegmentBlends:
     """Blends as long as room and tolerance allow.
 
     Args:
         turn (G - 1,): rad by which the direction changes at the joints
         tolerance: mm (tip, and scaled axis) for joints of lines and arcs
-        beside_splines: the same where one of the two is a spline
+        adjacent_splines: the same where one of the two is a spline
         sharpest: rad; the motion stops where it turns by more
     """
     s, size, reach = members.s[1:-1], np.diff(members.s), members.reach()
     stop = turn > sharpest
     half = np.minimum(np.minimum(ROOM * size[:-1], ROOM * size[1:]), reach[:-1])
-    allowed = FILL * np.where(members.spline[:-1] | members.spline[1:], beside_splines, tolerance)
+    allowed = FILL * np.where(members.spline[:-1] | members.spline[1:], adjacent_splines, tolerance)
     half[stop] = 0.0
     joint = np.flatnonzero(~stop)
     for _ in range(_ROUNDS):

@@ -212,10 +212,10 @@ def _bound(made: SplineFit, line: _Polyline, ratio: Floats, tolerance: float) ->
     curved = (end - begin) ** 2 / 8.0 * steepest(made.knots, made.c, begin, end) / tolerance
     off = np.max([ratio[line.row + j] for j in range(3)], axis=0)
     bound = off + curved / 4.0
-    doubt = np.flatnonzero((bound > 1.0) & (off <= 1.0))
-    for part in (0.125, 0.25, 0.375, 0.625, 0.75, 0.875) if len(doubt) else ():
-        off[doubt] = np.maximum(off[doubt], _ratio_at(made, line, doubt, part, tolerance))
-    bound[doubt] = off[doubt] + curved[doubt] / 64.0
+    uncertainty = np.flatnonzero((bound > 1.0) & (off <= 1.0))
+    for part in (0.125, 0.25, 0.375, 0.625, 0.75, 0.875) if len(uncertainty) else ():
+        off[uncertainty] = np.maximum(off[uncertainty], _ratio_at(made, line, uncertainty, part, tolerance))
+    bound[uncertainty] = off[uncertainty] + curved[uncertainty] / 64.0
     result = np.zeros(len(line.ends) - 1)
     result[line.chord] = bound
     return result
@@ -249,7 +249,7 @@ def steepest(knots: KnotVectors, c: Floats, begin: Floats, end: Floats) -> Float
 
 
 def _halved(knots: KnotVectors, s: Floats, bad: Bools) -> KnotVectors:
-    """Knots with one more in the middle of each span that a bad chord (P - 1,) touches, and of those beside."""
+    """Knots with one more in the middle of each span that a bad chord (P - 1,) touches, and of those next to."""
     values, begin = knots.simple()
     chord = np.flatnonzero(bad)
     mark = np.zeros(len(values) + 1, dtype=np.int64)

@@ -1,7 +1,7 @@
 """CL points as a curve that is three times continuously differentiable, within a tolerance of tip and axis.
 
-The parameter s is the way of the reference motion: tip in mm and axis times (tip tolerance over axis tolerance),
-together as root of squares, so that one tolerance holds for both and an axis that turns on the spot has a way, too.
+The parameter s is the path of the reference motion: tip in mm and axis times (tip tolerance over axis tolerance),
+together as root of squares, so that one tolerance holds for both and an axis that turns on the spot has a path, too.
 Rounded points on dense chords become splines, arcs and long lines stay what they are; where these meet, one turns into
 the other within a short distance, or the motion stops.
 """
@@ -23,7 +23,7 @@ from toolpaths.smoothing.stretches import ChainSegments, corners, segments
 from toolpaths.smoothing.tangents import lengths, rates, turns
 
 STILL = 1e-7
-"""mm: moves of less way are none"""
+"""mm: moves of less path are none"""
 SHARE = 0.8
 """of the tolerance for splines; what is left is for where they meet others"""
 RETRIES = 3
@@ -38,7 +38,7 @@ class Tolerance:
 
     @property
     def scale(self) -> float:
-        """mm of way per rad of the axis"""
+        """mm of path per rad of the axis"""
         return self.tip / self.axis
 
 
@@ -86,25 +86,25 @@ def smooth(curves: Curves, tolerance: Tolerance, sharpest: float = SHARPEST) -> 
 
 def smooth_all(curves: Curves, first: Ints, tolerance: Tolerance, sharpest: float = SHARPEST) -> list[Smooth | None]:
     """`smooth` of many chains, curves [first[k], first[k + 1]) of each; what comes out does not depend on the others."""
-    way = lengths(curves, tolerance.scale)
-    moving = way > STILL
+    travel = lengths(curves, tolerance.scale)
+    moving = travel > STILL
     begin = np.concatenate(([0], np.cumsum(moving)))[first]
     rows = np.flatnonzero(moving)
     if not len(rows):
         return [None] * (len(first) - 1)
-    kept, ends = curves if moving.all() else curves.take(rows), np.concatenate(([0.0], np.cumsum(way[rows])))
+    kept, ends = curves if moving.all() else curves.take(rows), np.concatenate(([0.0], np.cumsum(travel[rows])))
     apart = np.zeros(len(rows) + 1, dtype=bool)
     apart[begin] = True
     before, after = rates(kept, tolerance.scale)
     turn = np.where(apart[1:-1], 0.0, turns(after[:-1], before[1:]))
-    parts, splines = _fitted(kept, ends, way[rows], turn, apart[1:-1], tolerance)
+    parts, splines = _fitted(kept, ends, travel[rows], turn, apart[1:-1], tolerance)
     members = Members(kept, ends, parts.first, parts.spline, tolerance.scale, assembled(splines, 0.0))
     joint = parts.first[1:-1] - 1
     blends = chosen(members, np.where(apart[1:-1], np.inf, turn)[joint], tolerance.tip, (1.0 - SHARE) * tolerance.tip,
                     min(sharpest, SHARPEST))
     result: list[Smooth | None] = []
     for k in range(len(first) - 1):
-        own = np.where(moving, way, 0.0)[first[k]:first[k + 1]]
+        own = np.where(moving, travel, 0.0)[first[k]:first[k + 1]]
         s = np.concatenate(([0.0], np.cumsum(own)))
         result.append(_chain(members, blends, splines, begin[k:k + 2], s, tolerance) if begin[k + 1] > begin[k] else None)
     return result
@@ -128,14 +128,14 @@ def _chain(members: Members, blends: SegmentBlends, splines: list[Spline], rows:
     return Smooth(s, mine, joined, worst, tolerance)
 
 
-def _fitted(curves: Curves, s: Floats, way: Floats, turn: Floats, apart: Bools,
+def _fitted(curves: Curves, s: Floats, travel: Floats, turn: Floats, apart: Bools,
             tolerance: Tolerance) -> tuple[ChainSegments, list[Spline]]:
     """Segments, and the splines of those that are splines; `apart` are joints of two chains.
 
     Chords that no spline keeps to end up between corners; after some tries all chords of such a spline do, so that
     this ends.
     """
-    corner = corners(way, turn, curves.is_arc, apart, SHARE * tolerance.tip)
+    corner = corners(travel, turn, curves.is_arc, apart, SHARE * tolerance.tip)
     known: dict[tuple[int, int], Spline] = {}
     for retry in count():
         parts = segments(corner, curves.is_arc)
@@ -179,11 +179,11 @@ def _more_corners(corner: Bools, parts: ChainSegments, chord: Ints, all_of_it: b
 
 def deviation(found: Smooth, curves: Curves, parts: int = 4) -> tuple[float, float]:
     """Largest distance (tip mm, axis rad) from the curves at the same parameter, at `parts` places on each move."""
-    way = np.diff(found.s)
-    rows = np.flatnonzero(way > 0.0)
+    travel = np.diff(found.s)
+    rows = np.flatnonzero(travel > 0.0)
     worst = np.zeros(2)
     for part in np.linspace(0.0, 1.0, parts + 1):
-        tip, axis = found.at(found.s[rows] + part * way[rows])
+        tip, axis = found.at(found.s[rows] + part * travel[rows])
         wanted, wanted_axis = curves.take(rows).at(np.full(len(rows), part))
         worst = np.maximum(worst, [np.linalg.norm(tip - wanted, axis=1).max(), angle_between(axis, wanted_axis).max()])
     return float(worst[0]), float(worst[1])

@@ -15,7 +15,7 @@ LONG = 12.0
 HIGH = 1.6
 """Height of a curve over its chord, over the tolerance, that no smooth curve can share between points and chord."""
 ALONE = 3.0
-"""Times the turns beside it that a turn must be to be a corner for that."""
+"""Times the turns next to it that a turn must be to be a corner for that."""
 ROUND = 0.15
 """Part of the knot's distance, times the turn, by which a spline rounds a corner."""
 TURN_SPAN = 2.0
@@ -41,14 +41,14 @@ class ChainSegments:
 def corners(length: Floats, turn: Floats, is_arc: Bools, apart: Bools, tolerance: float) -> Bools:
     """(M - 1,) joints between M moves that no spline may cross.
 
-    Beside arcs and long chords; where the polyline turns by more than a curve within the tolerance of its chords
-    could, and where it turns much more than beside the joint; and at those that are `apart`.
+    Next to arcs and long chords; where the polyline turns by more than a curve within the tolerance of its chords
+    could, and where it turns much more than next to the joint; and at those that are `apart`.
     """
     long = _long(length, np.concatenate(([0], np.cumsum(apart)))) | is_arc
     shorter = np.minimum(length[1:], length[:-1])
     sharp = shorter * turn / 8.0 > HIGH * tolerance
-    beside = np.concatenate(([0.0], turn, [0.0]))
-    alone = turn > ALONE * np.maximum(beside[:-2], beside[2:])
+    adjacent = np.concatenate(([0.0], turn, [0.0]))
+    alone = turn > ALONE * np.maximum(adjacent[:-2], adjacent[2:])
     alone &= turn * TURN_SPAN * np.maximum(length[1:], length[:-1]) * ROUND > tolerance
     return np.asarray(apart | long[1:] | long[:-1] | sharp | alone)
 

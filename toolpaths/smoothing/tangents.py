@@ -33,7 +33,7 @@ def rates(curves: Curves, scale: float) -> tuple[Floats, Floats]:
 
 
 def lengths(curves: Curves, scale: float) -> Floats:
-    """(N,) way of tip and axis together, mm: the root of squares of the tip's length and of scale times the angle."""
+    """(N,) path of tip and axis together, mm: the root of squares of the tip's length and of scale times the angle."""
     return np.asarray(np.hypot(curves.length(), scale * angle_between(curves.axis0, curves.axis1)))
 
 

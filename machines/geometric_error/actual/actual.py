@@ -47,7 +47,8 @@ class Actual(ABC):
         """Where the tool is, exactly, when w (N, 3 + R) is commanded.
 
         Args:
-            direction: (N, J) sign of each joint's last motion, for tables with two ways; without it their mean
+            direction: (N, J) sign of each joint's last motion, for tables with two approach directions; without it their
+                mean
         """
 
     def aim(self, w: Floats, direction: Floats | None = None) -> tuple[Floats, Floats]:

@@ -17,7 +17,7 @@ from toolpaths.arrays import Bools, Floats
 
 @dataclass(frozen=True, eq=False)
 class ActualKinematics(Kinematics):
-    """`nominal` with the errors of `model`; tables with two ways count by their mean.
+    """`nominal` with the errors of `model`; tables with two approach directions count by their mean.
 
     Poses are exact, rates are those of the nominal machine (they differ by the size of the errors), `inverse` is the
     corrected one: tip exactly, axis as far as the machine can.
@@ -52,7 +52,7 @@ class ActualKinematics(Kinematics):
         return self.model.on(self.nominal)
 
     def inverse(self, tip: Floats, axis: Floats, spin: float | Floats = 0.0, near: Floats | None = None) -> Floats:
-        """Corrected joints (B, N, J) beside each nominal branch."""
+        """Corrected joints (B, N, J) next to each nominal branch."""
         actual = self.actual
         unit = axis / np.linalg.norm(axis, axis=1, keepdims=True)
         return np.stack([correct(actual, q, tip, unit).q for q in self.nominal.inverse(tip, axis, spin, near)])

@@ -181,14 +181,14 @@ class ActualH4(ActualRods):
         """See the base class."""
         if not self.any:
             return self.kinematics.place(w[:, :4], w[:, 4])
-        way = 0.0 if direction is None else direction[:, 4]
+        approach = 0.0 if direction is None else direction[:, 4]
         tool: list[Columns] = [columns.of_one(v) for v in actual_tool(UP, self.kinematics.tool_length, self.chain)]
         tool[0] = columns.plus(tool[0], columns.of_one(self.pivot * self._at_spindle - self.kinematics.gauge * UP))
         if self._at_spindle:
-            tool = driven(self.line, w[:, 4], way, self.chain, tool)
+            tool = driven(self.line, w[:, 4], approach, self.chain, tool)
         tool = self._carried(w, tool)
         if not self._at_spindle:
-            tool = driven(self.line, w[:, 4], way, self.chain, tool)
+            tool = driven(self.line, w[:, 4], approach, self.chain, tool)
         tip, axis, side = (columns.to_rows(v, len(w)) for v in tool)
         return tip, axis, side
 
@@ -208,7 +208,7 @@ class ActualH4(ActualRods):
 
     def _chain_columns(self, w: Floats, part: Floats, tip: Floats, axis: Floats, direction: Floats | None) -> Floats:
         """(N, 6, P) of the errors in `chain`: the rotary axis stands before the platform or after it."""
-        way = np.zeros(len(w)) if direction is None else direction[:, 4]
+        approach = np.zeros(len(w)) if direction is None else direction[:, 4]
         tilted = platform_turn(w[:, 3])
         before = tilted if self._at_spindle else np.tile(np.eye(3), (len(w), 1, 1))
         after = before @ rotation(self.line.joint.direction, w[:, 4])
@@ -219,7 +219,7 @@ class ActualH4(ActualRods):
         found = [np.zeros((len(w), 6, 0))]
         for component in self.chain.components:
             column = carried(after if self.line.moving else before, tip - reference)[:, :, component.name.part]
-            found.append(column[:, :, None] * component.curve.basis(w[:, 4], way)[:, None, :])
+            found.append(column[:, :, None] * component.curve.basis(w[:, 4], approach)[:, None, :])
         for text in self.chain.constants:
             torsor, name = SerialErrors(constants={text: 1.0}).location(text[-1]), parse(text)
             gauge, at_line = -self.kinematics.tool_length * axis, carried(before, tip - at_axis)

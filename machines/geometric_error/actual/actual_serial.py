@@ -81,8 +81,8 @@ class ActualSerial(Actual):
         for part in columns.blocks(len(q)):
             carried_along: list[Columns] = [columns.of_one(v) for v in tool]
             for line in reversed(self.lines):
-                way = 0.0 if direction is None else direction[part, line.index]
-                carried_along = driven(line, q[part, line.index], way, self.errors, carried_along)
+                approach = 0.0 if direction is None else direction[part, line.index]
+                carried_along = driven(line, q[part, line.index], approach, self.errors, carried_along)
             for rows, vector in zip(result, carried_along, strict=True):
                 rows[part] = columns.to_rows(vector, len(q[part]))
         return result
@@ -95,7 +95,7 @@ class ActualSerial(Actual):
 
     def sensitivity(self, w: Floats, direction: Floats | None = None) -> Floats:
         """See the base class: transport matrices (C 1.20, 1.25) times the basis of each curve."""
-        way = np.zeros(w.shape) if direction is None else direction
+        approach = np.zeros(w.shape) if direction is None else direction
         before, after, centres, tip = self._frames(w)
         result, at = np.zeros((len(w), 6, len(self.errors.names))), 0
         index = {line.joint.name: k for k, line in enumerate(self.lines)}
@@ -103,7 +103,7 @@ class ActualSerial(Actual):
             k = index[component.name.axis]
             line = self.lines[k]
             column = carried((after if line.moving else before)[k], tip - centres[k])[:, :, component.name.part]
-            basis = component.curve.basis(w[:, line.index], way[:, line.index])
+            basis = component.curve.basis(w[:, line.index], approach[:, line.index])
             result[:, :, at:at + basis.shape[1]] = column[:, :, None] * basis[:, None, :]
             at += basis.shape[1]
         for text in self.errors.constants:

@@ -66,10 +66,10 @@ def actual_tool(axis: Floats, length: float, errors: SerialErrors) -> tuple[Floa
     return turned[0] + spindle[:3, 3], turned[1], turned[2]
 
 
-def driven(line: Line, x: Floats, way: Floats | float, errors: SerialErrors,
+def driven(line: Line, x: Floats, approach: Floats | float, errors: SerialErrors,
            carried_along: Sequence[Columns]) -> list[Columns]:
-    """A point and directions by T_i of `serial_errors`: the axis commanded to x (N,), its last motion `way` (N,)."""
-    error = errors.torsors(line.joint.name, x, way)
+    """A point and directions by T_i of `serial_errors`: the axis commanded to x (N,), its last motion `approach` (N,)."""
+    error = errors.torsors(line.joint.name, x, approach)
     if line.moving:
         return moved(line, x, displaced(error, line.reference, carried_along))
     return displaced(error, line.reference, moved(line, x, carried_along))

@@ -39,19 +39,20 @@ class ErrorRates:
 
     Attributes:
         tip, axis (N, J): mm and rad of the tip and the tool axis per mm or rad of each joint
-        tip_way, axis_way (N, J): the same per unit of the way by which a joint is where it is (`lost_motion`)
+        tip_reversal, axis_reversal (N, J): the same per unit of the approach direction by which a joint is where it is
+            (`lost_motion`)
     """
 
     tip: Floats
     axis: Floats
-    tip_way: Floats
-    axis_way: Floats
+    tip_reversal: Floats
+    axis_reversal: Floats
 
 
 @dataclass(frozen=True)
 class AxisSizes:
     """Of one axis of the chain: largest turn (rad) and displacement (mm) by its component errors, their steepest slopes
-    per mm or rad, how far the two ways differ; turn and shift of its line, its zero position."""
+    per mm or rad, how far the two approach directions differ; turn and shift of its line, its zero position."""
 
     turn: float = 0.0
     shift: float = 0.0

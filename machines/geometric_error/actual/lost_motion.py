@@ -1,9 +1,11 @@
-"""Lost motion: by which way an axis is where it is, while it takes up what it loses by turning back.
+"""Lost motion: from which direction an axis is where it is, while it takes up what it loses by turning back.
 
-The way is a number per axis: +1 reached forwards, -1 backwards, between by shares. An axis that turns back first moves
-through the play g between its two ways: a step d changes the way by 2 d / g, held between -1 and 1 (the play operator;
-Brokate, Sprekels, Hysteresis and Phase Transitions, 1996, 2.1). Steps one after the other compose to one function of
-the way before them, again a shift held between two bounds, so that whole programs are walked in a few passes.
+The approach direction is a number per axis: +1 reached forwards, -1 backwards, between by shares. An axis that turns back
+    first moves
+through the play g between its two approach directions: a step d changes the approach direction by 2 d / g, held between -1
+and 1 (the play operator; Brokate, Sprekels, Hysteresis and Phase Transitions, 1996, 2.1). Steps one after the other compose
+to one function of the approach direction before them, again a shift held between two bounds, so that whole programs are
+walked in a few passes.
 """
 
 from __future__ import annotations
@@ -20,7 +22,7 @@ GRAIN = 5e-5, 1e-6
 
 @dataclass(frozen=True)
 class PlaySteps:
-    """Functions of the way: clip(way + shift, low, high); arrays of one shape."""
+    """Functions of the approach direction: clip(approach direction + shift, low, high); arrays of one shape."""
 
     shift: Floats
     low: Floats
@@ -36,9 +38,9 @@ class PlaySteps:
         low, high = (np.clip(bound + after.shift, after.low, after.high) for bound in (self.low, self.high))
         return PlaySteps(self.shift + after.shift, low, high)
 
-    def at(self, way: Floats) -> Floats:
-        """The way after them."""
-        result: Floats = np.clip(way + self.shift, self.low, self.high)
+    def at(self, approach: Floats) -> Floats:
+        """The approach direction after them."""
+        result: Floats = np.clip(approach + self.shift, self.low, self.high)
         return result
 
     def rows(self, part: slice) -> PlaySteps:
@@ -60,13 +62,13 @@ def turning_sign(step: Floats, rotary: Bools) -> Floats:
     """Sign (N, J) of the last motion of joints that go by steps (N, J) one after the other: what goes back by less than the
     grain of words, in one step or in many, turns nothing; 0 before a joint has moved by that much."""
     least = np.broadcast_to(np.where(rotary, GRAIN[1], GRAIN[0]), step.shape)
-    way = PlaySteps.of(step, least).walked().at(np.zeros((1, step.shape[1])))
-    return carried_on(np.where(np.abs(way) == 1.0, way, 0.0))
+    approach = PlaySteps.of(step, least).walked().at(np.zeros((1, step.shape[1])))
+    return carried_on(np.where(np.abs(approach) == 1.0, approach, 0.0))
 
 
-def carried_on(way: Floats) -> Floats:
+def carried_on(approach: Floats) -> Floats:
     """Signs (N, J) with every 0 replaced by the last sign before it."""
-    last = np.where(way != 0.0, np.arange(len(way))[:, None], 0)
+    last = np.where(approach != 0.0, np.arange(len(approach))[:, None], 0)
     np.maximum.accumulate(last, axis=0, out=last)
-    result: Floats = np.take_along_axis(way, last, axis=0)
+    result: Floats = np.take_along_axis(approach, last, axis=0)
     return result

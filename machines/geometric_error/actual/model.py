@@ -1,4 +1,4 @@
-"""The error model of a machine: its parameters, what is known of their doubt, and the machine that they make."""
+"""The error model of a machine: its parameters, what is known of their uncertainty, and the machine that they make."""
 
 from __future__ import annotations
 
@@ -143,8 +143,8 @@ class Uncertainty:
 
     Attributes:
         tip: (N, 3) mm along x, y, z of the table frame
-        tip_worst: (N,) mm in the direction of most doubt
-        axis: (N,) rad of the tool axis, in the direction of most doubt
+        tip_worst: (N,) mm in the direction of greatest uncertainty
+        axis: (N,) rad of the tool axis, in the direction of greatest uncertainty
     """
 
     tip: Floats
@@ -152,8 +152,8 @@ class Uncertainty:
     axis: Floats
 
 
-def doubt(model: ErrorModel, actual: Actual, w: Floats, direction: Floats | None = None) -> Uncertainty:
-    """Predicted doubt (one standard deviation) of tip and axis at w (N, 3 + R): J Sigma J^T, first order.
+def uncertainty(model: ErrorModel, actual: Actual, w: Floats, direction: Floats | None = None) -> Uncertainty:
+    """Predicted uncertainty (one standard deviation) of tip and axis at w (N, 3 + R): J Sigma J^T, first order.
 
     Raises:
         ValueError: where the model has no covariance.

@@ -1,4 +1,5 @@
-"""The closure of six rods point by point: a plain loop that numba compiles for many points, beside `RodFrame.solve`."""
+"""The closure of six rods point by point: a plain loop that numba compiles for many points, compared with
+`RodFrame.solve`."""
 
 from __future__ import annotations
 

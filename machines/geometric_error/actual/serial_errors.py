@@ -107,14 +107,14 @@ class SerialErrors:
             result[axis] = [([mine[k].name.part for k in numbers], bank) for numbers, bank in banks([c.curve for c in mine])]
         return result
 
-    def two_way(self, names: tuple[str, ...]) -> list[int]:
-        """Numbers of the axes `names` that have any error with two ways of approach."""
+    def bidirectional(self, names: tuple[str, ...]) -> list[int]:
+        """Numbers of the axes `names` that have any error with two approach directions."""
         found = {c.name.axis for c in self.components if isinstance(c.curve, TableCurve) and c.curve.both}
         return [j for j, name in enumerate(names) if name in found]
 
     def gaps(self, names: tuple[str, ...], q: Floats, joints: list[int]) -> Floats:
-        """Lost motion (N, len(joints)) of some axes at q (N, J): how far their positioning error differs by the way, and
-        no less than the grain of words."""
+        """Lost motion (N, len(joints)) of some axes at q (N, J): how far their positioning error differs by the approach
+        direction, and no less than the grain of words."""
         result = np.zeros((len(q), len(joints)))
         for k, j in enumerate(joints):
             for component in self.components:

@@ -27,7 +27,7 @@ from toolpaths.rotations import rotation
 NONE = 1e-12
 """an entry of a turn below this everywhere is 0"""
 ON_LINE = 1e-6
-"""mm that a reference point may lie beside its axis"""
+"""mm that a reference point may lie next to its axis"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +37,7 @@ class RotatedCurve(Curve):
     Attributes:
         parts: (entry (row, column) of the turn, component)
         direction: (3,) that the axis turns about
-        back: True takes the turn the other way
+        back: True takes the turn in the other direction
     """
 
     parts: tuple[tuple[tuple[int, int], Component], ...]
@@ -82,7 +82,7 @@ class RotatedCurve(Curve):
 
     @property
     def both(self) -> bool:
-        """True where any has two ways."""
+        """True where any has two approach directions."""
         return any(isinstance(curve, TableCurve) and curve.both for curve in self.curves)
 
     @cached_property

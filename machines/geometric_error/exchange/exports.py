@@ -1,4 +1,4 @@
-"""From a model to what controls and other programs hold: tables per axis, a map, screw compensation; the losses told."""
+"""From a model to what controls and other programs hold: tables per axis, a map, screw compensation; the losses reported."""
 
 from __future__ import annotations
 
@@ -35,12 +35,12 @@ MOST_ROWS = 20_000
 """of a table per axis"""
 MOST_NODES = 200_000
 """of a map"""
-MOST_DOUBT = 1200
+MOST_UNCERTAINTY = 1200
 """parameters whose covariance is written: a square table"""
 TURN = 13
 """levels of one turn, where nothing says how many"""
 TURNS = 2.0, 1.0, 0.5
-"""either way, of an axis that goes round: rows of screw compensation are tried over these"""
+"""in either direction, of an axis that goes round: rows of screw compensation are tried over these"""
 PLACES = 5000
 """of the work volume at which an export is compared with its model"""
 GridSteps = Mapping[str, float]
@@ -63,7 +63,7 @@ def to_tables(model: ErrorModel, machine: Machine, step: GridSteps, length: floa
     components, frame = in_bed_frame(model, machine)
     rows = rows_for(components, travel(machine), step, length, angle, MOST_ROWS)
     losses = {str(c.name): loss(c.curve, rows[str(c.name)]) for c in components}
-    return tabulated(model, components, frame, rows, MOST_DOUBT), losses
+    return tabulated(model, components, frame, rows, MOST_UNCERTAINTY), losses
 
 
 def location_csv(model: ErrorModel) -> str:
@@ -74,7 +74,7 @@ def location_csv(model: ErrorModel) -> str:
 
 
 def travel(machine: Machine, turns: float = 0.5) -> dict[str, tuple[float, float]]:
-    """mm or rad by axis letter: travel, so many turns either way where it is unlimited."""
+    """mm or rad by axis letter: travel, so many turns in either direction where it is unlimited."""
     lower, upper = machine.limits.lower, machine.limits.upper
     most = 2.0 * np.pi * turns
     return {letter: (float(a) if np.isfinite(a) else -most, float(b) if np.isfinite(b) else most)
@@ -100,7 +100,8 @@ class Screws:
 def to_screws(model: ErrorModel, machine: Machine, step: GridSteps, length: float, angle: float) -> Screws:
     """Positioning errors as LinuxCNC's files; arguments as `to_tables`.
 
-    Axes that go round have rows over two turns either way, or as many as rows allow. Beyond its rows LinuxCNC goes on with
+    Axes that go round have rows over two turns in either direction, or as many as rows allow. Beyond its rows LinuxCNC goes
+    on with
     the last: where a joint can go there the rest has a component of zeros that ends with them, so that programs stop too.
 
     Raises:
@@ -144,7 +145,7 @@ def _not_of_joint(model: ErrorModel, machine: Machine, component: Component) -> 
     if leans(machine, letter):
         return "its axis leans, and the error is not about the axis"
     if letter in ROTARY and not on_line(model, machine, letter):
-        return "the reference point of its axis lies beside the axis, so that it moves the tool sideways too"
+        return "the reference point of its axis lies next to the axis, so that it moves the tool sideways too"
     return ""
 
 
@@ -193,7 +194,7 @@ class MadeMap:
     model: ErrorModel
     inside: MapLoss
     volume: MapLoss | None
-    doubt_lost: bool
+    uncertainty_lost: bool
 
 
 def lattice_for(model: ErrorModel, machine: Machine, letters: str, step: GridSteps, at: Mapping[str, float], length: float,
@@ -278,7 +279,7 @@ def to_map(model: ErrorModel, machine: Machine, lattice: ErrorMap, fixed: Floats
     volume = samples(model, machine, actual, PLACES)
     volume = volume[~result.on(kinematics).outside(volume).any(axis=1)]
     lost = map_loss(result.on(kinematics), actual, volume) if len(volume) else None
-    if model.covariance is None or made.table.size > MOST_DOUBT:
+    if model.covariance is None or made.table.size > MOST_UNCERTAINTY:
         return MadeMap(result, inside, lost, model.covariance is not None)
     rows = _rows(ActualByMap(nominal, made), actual, fixed)
     return MadeMap(replace(result, covariance=rows @ model.covariance @ rows.T), inside, lost, False)
@@ -309,7 +310,7 @@ def _rows(by_map: ActualByMap, actual: Actual, fixed: Floats) -> Floats:
 
 def worst(model: ErrorModel, machine: Machine, tool_length: float, places_of: ErrorModel) -> tuple[float, float]:
     """Worst tip (um) and axis (arcsec) of a model at the places of `survey` where `places_of` holds; 0 where that is
-    nowhere. Two ways count by their mean."""
+    nowhere. Two approach directions count by their mean."""
     kinematics = machine.kinematics.with_tool(tool_length)
     w = samples(places_of, machine, places_of.on(kinematics), WORST_PLACES)
     tip, axis = apart(model.on(kinematics), model.zero().on(kinematics), w)

@@ -11,12 +11,12 @@ import numpy as np
 
 from machines.geometric_error.actual.model import ErrorModel
 from machines.geometric_error.actual.serial_errors import Component
-from machines.geometric_error.exchange.tabulate import both_ways
+from machines.geometric_error.exchange.tabulate import both_directions
 from machines.geometric_error.exchange.volume import INSIDE, ranges, section
 from machines.geometric_error.tables.csv_table import UNITS
 from machines.machine import Machine
 from toolpaths.arrays import Floats
-from toolpaths.drawing import BESIDE, image
+from toolpaths.drawing import ADJACENT, image
 from toolpaths.units import DEG
 
 if TYPE_CHECKING:
@@ -28,10 +28,10 @@ FINE = 721
 NODES = 21
 """places along each side of a section"""
 ARROWS = 2
-"""one arrow for so many places, each way"""
+"""one arrow for so many places, each approach direction"""
 _WIDTH, _HIGH, _SECTION = 11.0, 2.0, 4.2
 """inches: of the sheet, of a row of curves, of the sections"""
-_DOUBT = 2.0
+_UNCERTAINTY = 2.0
 """standard deviations of the band round a curve"""
 
 
@@ -71,7 +71,7 @@ def _axis(sheet: Any, model: ErrorModel, machine: Machine, letter: str) -> None:
             _curve(place, component, _positions(model, machine, component), DEG if turning else 1.0, known)
         place.set_xlabel(f"{letter}, {'degrees' if turning else 'mm'}")
         place.set_ylabel("arcsec" if angular else "um")
-        place.legend(**BESIDE)
+        place.legend(**ADJACENT)
 
 
 def _positions(model: ErrorModel, machine: Machine, component: Component) -> Floats:
@@ -82,16 +82,16 @@ def _positions(model: ErrorModel, machine: Machine, component: Component) -> Flo
 
 def _curve(place: Any, component: Component, x: Floats, position: float,
            covariance: Floats | None) -> None:
-    """A component, approached backwards as dots where that differs; a band of its doubt."""
+    """A component, approached backwards as dots where that differs; a band of its uncertainty."""
     curve, unit = component.curve, ARCSEC if component.name.angular else UM
-    both = both_ways(curve)
+    both = both_directions(curve)
     line, = place.plot(x / position, curve.at(x, 1.0 if both else 0.0) / unit, linewidth=1.1, label=str(component.name))
     if both:
         place.plot(x / position, curve.at(x, -1.0) / unit, linewidth=1.1, linestyle=":", color=line.get_color(),
                    label=f"{component.name}, backwards")
     if covariance is not None:
         middle, basis = curve.at(x) / unit, curve.basis(x, np.zeros(len(x)))
-        band = _DOUBT * np.sqrt(np.maximum(np.einsum("ni,ij,nj->n", basis, covariance, basis), 0.0)) / unit
+        band = _UNCERTAINTY * np.sqrt(np.maximum(np.einsum("ni,ij,nj->n", basis, covariance, basis), 0.0)) / unit
         place.fill_between(x / position, middle - band, middle + band, color=line.get_color(), alpha=0.15, linewidth=0.0,
                            rasterized=True)
 

@@ -45,7 +45,7 @@ _NAMED = re.compile(r"(E[A-Z][A-Z])=(.+)$")
 MAP_COLUMNS = {"dx", "dy", "dz"}
 
 
-_TOLD = re.compile(r"#\s*error map: (gauge point|tip of a tool of ([\d.e+-]+) mm),.* directions of the (table|machine)")
+_NOTED = re.compile(r"#\s*error map: (gauge point|tip of a tool of ([\d.e+-]+) mm),.* directions of the (table|machine)")
 _FIRST = 1000
 """bytes that hold the first line of a map"""
 
@@ -63,7 +63,7 @@ class ImportOptions:
         directions: of a map
         zero: mm or rad by coordinate: the place at which a map is to be 0; {} takes it as it is
         average: rows at the same place, columns of runs and files of runs are readings of it: their mean counts, and
-            their scatter is the doubt
+            their scatter is the uncertainty
         large: errors above 1 mm or 0.5 degrees are so
         near: mm or rad by axis or coordinate: readings no farther apart are of one place
     """
@@ -84,8 +84,9 @@ def read_sources(sources: Sequence[str], machine: Machine, how: ImportOptions) -
     """The model that all sources make together; None where any has a fault.
 
     Args:
-        sources: `x.csv`: tables per axis, location errors or a lattice, told by their columns; `EXX=x.csv`: positions and
-            runs of one component, whatever its columns are called; `X=x.comp`: LinuxCNC's screw compensation of the joint X
+        sources: `x.csv`: tables per axis, location errors or a lattice, reported by their columns; `EXX=x.csv`: positions
+            and runs of one component, whatever its columns are called; `X=x.comp`: LinuxCNC's screw compensation of the
+            joint X
     """
     model, places = ErrorModel(machine=machine.name), dict[str, str]()
     parts, found = _parts(sources, machine, how)
@@ -190,7 +191,7 @@ def _read(source: str, how: ImportOptions) -> tuple[CsvTable | None, list[Diagno
     if table is not None and fault is not None:
         return None, [fault.at(table)]
     assert not isinstance(made, Fault)
-    return made, [*found, *(_told_otherwise(made, how) if made is not None and MAP_COLUMNS & set(made.columns) else [])]
+    return made, [*found, *(_set_otherwise(made, how) if made is not None and MAP_COLUMNS & set(made.columns) else [])]
 
 
 def _gap(table: CsvTable) -> Fault | None:
@@ -209,7 +210,7 @@ def _csv(table: CsvTable, machine: Machine, how: ImportOptions) -> tuple[ErrorMo
     runs = [name for name in table.columns if run_of(name)[1]]
     if runs and not how.average:
         return None, [error("error-import.runs", f"columns {', '.join(runs)[:80]} are runs", file=table.file,
-                            lines=[table.head], hint="import with --average: their mean counts, their scatter is the doubt")]
+                            lines=[table.head], hint="import with --average: mean, and uncertainty from the scatter")]
     read = _averaged(table, places, how) if places and (how.average or _holes(table)) else None
     if isinstance(read, Fault):
         return None, [read.at(table)]
@@ -222,8 +223,8 @@ def _csv(table: CsvTable, machine: Machine, how: ImportOptions) -> tuple[ErrorMo
         return _location(table, how)
     if model is None or read is None or not read.scatter:
         return model, found
-    model, told = with_scatter(model, read, how.zero)
-    return model, [*found, told]
+    model, noted = with_scatter(model, read, how.zero)
+    return model, [*found, noted]
 
 
 def _averaged(table: CsvTable, places: list[str], how: ImportOptions) -> Averaged | Fault:
@@ -233,12 +234,12 @@ def _averaged(table: CsvTable, places: list[str], how: ImportOptions) -> Average
     read = averaged(rows, places, how.near)
     if isinstance(read, Averaged) and read.scatter and not how.average:
         return Fault("error-import.runs", f"{read.rows} rows are readings at {len(read.table)} places",
-                     "import with --average: their mean counts, their scatter is the doubt")
+                     "import with --average: their mean counts, their scatter is the uncertainty")
     return read
 
 
 def _holes(table: CsvTable) -> bool:
-    """True for two ways of files of their own, each without the other's values."""
+    """True for two approach directions of files of their own, each without the other's values."""
     return any(np.isnan(values).any() for values in table.columns.values())
 
 
@@ -255,18 +256,18 @@ def _map(table: CsvTable, machine: Machine, how: ImportOptions) -> tuple[ErrorMo
     return ErrorModel(map=moved), []
 
 
-def _told_otherwise(table: CsvTable, how: ImportOptions) -> list[Diagnostic]:
+def _set_otherwise(table: CsvTable, how: ImportOptions) -> list[Diagnostic]:
     """What the first line of a written map says of its directions and point, where the options say otherwise."""
-    told = _TOLD.match(read_input(table.file)[:_FIRST].decode("utf-8", "replace"))
-    if told is None:
+    noted = _NOTED.match(read_input(table.file)[:_FIRST].decode("utf-8", "replace"))
+    if noted is None:
         return []
-    length, found = float(told[2] or 0.0), []
-    if told[3] != how.directions:
-        found.append(error("error-import.directions", f"the map says that its directions are those of the {told[3]}, the "
+    length, found = float(noted[2] or 0.0), []
+    if noted[3] != how.directions:
+        found.append(error("error-import.directions", f"the map says that its directions are those of the {noted[3]}, the "
                            f"import those of the {how.directions}", file=table.file, lines=[1],
-                           hint=f"import with --directions {told[3]}"))
+                           hint=f"import with --directions {noted[3]}"))
     if abs(length - how.tool_length) > 1e-6:
-        found.append(error("error-import.tool_length", f"the map says that it is of the {told[1]}, the import of a tool of "
+        found.append(error("error-import.tool_length", f"the map says that it is of the {noted[1]}, the import of a tool of "
                            f"{how.tool_length:g} mm", file=table.file, lines=[1],
                            hint=f"import with --tool-length {length:g}"))
     return found

@@ -1,4 +1,4 @@
-"""What an error model holds and does: ranges, largest values, worst tip and axis over the work volume, doubt."""
+"""What an error model holds and does: ranges, largest values, worst tip and axis over the work volume, uncertainty."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from machines.geometric_error.actual.actual import Actual
 from machines.geometric_error.actual.correction import correct
-from machines.geometric_error.actual.model import ErrorModel, doubt
+from machines.geometric_error.actual.model import ErrorModel, uncertainty
 from machines.geometric_error.actual.rods import RodErrors
 from machines.geometric_error.exchange.volume import ranges, samples
 from machines.geometric_error.files.covariance import angular
@@ -26,8 +26,8 @@ ROTARY = "ABC"
 UM, ARCSEC = UNITS["um"], UNITS["arcsec"]
 PLACES = 20_000
 """of the work volume at which the model is looked at"""
-DOUBT_WORK = 4e8
-"""multiplications that looking for the largest doubt may take at one place after the other"""
+UNCERTAINTY_WORK = 4e8
+"""multiplications that looking for the largest uncertainty may take at one place after the other"""
 FINE = 4001
 """positions along a curve at which its largest value is looked for"""
 FAR = 0.1
@@ -109,14 +109,14 @@ def _curve(curve: Curve, turn: bool, axis: str, model: ErrorModel, machine: Mach
     x = np.linspace(lower, upper, FINE)
     if isinstance(curve, TableCurve):
         x = np.concatenate([x, curve.x])
-    ways = (1.0, -1.0) if isinstance(curve, TableCurve) and curve.both else (0.0,)
-    values = np.array([curve.at(x, way) for way in ways])
+    approaches = (1.0, -1.0) if isinstance(curve, TableCurve) and curve.both else (0.0,)
+    values = np.array([curve.at(x, approach) for approach in approaches])
     at = np.unravel_index(int(np.argmax(np.abs(values))), values.shape)
     span = [v / position if np.isfinite(v) else None for v in curve.range]
     kind = "series" if isinstance(curve, Fourier) else "polynomial" if isinstance(curve, Polynomial) else \
         f"{curve.rule} table" if isinstance(curve, TableCurve) else ""
     apart = float(np.abs(np.diff(values, axis=0)).max(initial=0.0)) / unit
-    return {"kind": kind, "values": len(curve.values), "range": span, "both_ways": len(ways) == 2,
+    return {"kind": kind, "values": len(curve.values), "range": span, "both_directions": len(approaches) == 2,
             "unit": "arcsec" if turn else "um", "largest": float(values[at]) / unit, "at": float(x[at[1]]) / position,
             "lost_motion": apart}
 
@@ -165,16 +165,16 @@ def _volume(model: ErrorModel, machine: Machine, tool_length: float) -> dict[str
         return None
     tip, axis = apart(actual, nominal, w)
     one, other = int(np.argmax(tip)), int(np.argmax(axis))
-    found = {"tool_length_mm": tool_length, "places": len(w), "ways_at_mean": both_ways(model),
+    found = {"tool_length_mm": tool_length, "places": len(w), "ways_at_mean": both_directions(model),
              "tip_worst_um": float(tip[one]) / UM, "tip_rms_um": float(np.sqrt(np.mean(tip**2))) / UM,
              "tip_worst_at": _joints(machine, actual, w[one]),
              "axis_worst_arcsec": float(axis[other]) / ARCSEC, "axis_rms_arcsec": float(np.sqrt(np.mean(axis**2))) / ARCSEC,
              "axis_worst_at": _joints(machine, actual, w[other])}
-    return found | _residual(actual, nominal, w, machine) | _doubt(model, actual, w)
+    return found | _residual(actual, nominal, w, machine) | _uncertainty(model, actual, w)
 
 
-def both_ways(model: ErrorModel) -> list[str]:
-    """Components with two ways of approach: where no motion is given their mean counts."""
+def both_directions(model: ErrorModel) -> list[str]:
+    """Components with two approach directions: where no motion is given their mean counts."""
     return [str(c.name) for c in model.axes.components if isinstance(c.curve, TableCurve) and c.curve.both]
 
 
@@ -197,11 +197,11 @@ def apart(one: Actual, other: Actual, w: Floats) -> tuple[Floats, Floats]:
     return np.linalg.norm(t1 - t0, axis=1), 2.0 * np.arcsin(np.minimum(0.5 * np.linalg.norm(a1 - a0, axis=1), 1.0))
 
 
-def _doubt(model: ErrorModel, actual: Actual, w: Floats) -> dict[str, Any]:
+def _uncertainty(model: ErrorModel, actual: Actual, w: Floats) -> dict[str, Any]:
     if model.covariance is None:
         return {}
-    count = int(np.clip(DOUBT_WORK / (6.0 * len(model.names) ** 2 + 1.0), 4, 2000))
-    found = doubt(model, actual, w[:count])
+    count = int(np.clip(UNCERTAINTY_WORK / (6.0 * len(model.names) ** 2 + 1.0), 4, 2000))
+    found = uncertainty(model, actual, w[:count])
     return {"doubt_tip_um": float(found.tip_worst.max()) / UM, "doubt_axis_arcsec": float(found.axis.max()) / ARCSEC}
 
 

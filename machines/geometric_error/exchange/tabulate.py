@@ -1,4 +1,5 @@
-"""Any curves as linear tables, as controls and tables per axis hold them; the covariance goes along, the loss is told."""
+"""Any curves as linear tables, as controls and tables per axis hold them; the covariance goes along, the loss is
+reported."""
 
 from __future__ import annotations
 
@@ -36,29 +37,30 @@ class TablePositions:
 
 
 def sampled(curve: Curve, x: Floats, period: float = 0.0) -> TableCurve:
-    """A curve as a linear table at positions (M,), mm or rad, both ways where it has them."""
+    """A curve as a linear table at positions (M,), mm or rad, both directions where it has them."""
     if isinstance(curve, TableCurve) and curve.rule == "linear" and curve.period == period and np.array_equal(x, curve.x):
         return curve
-    both = both_ways(curve)
-    ways = (1.0, -1.0) if both else (0.0,)
-    return TableCurve(x, np.concatenate([curve.at(x, way) for way in ways]), "linear", both, period)
+    both = both_directions(curve)
+    approaches = (1.0, -1.0) if both else (0.0,)
+    return TableCurve(x, np.concatenate([curve.at(x, approach) for approach in approaches]), "linear", both, period)
 
 
-def both_ways(curve: Curve) -> bool:
-    """True for a curve with two ways of approach."""
+def both_directions(curve: Curve) -> bool:
+    """True for a curve with two approach directions."""
     return isinstance(curve, TableCurve | RotatedCurve) and curve.both
 
 
 def loss(curve: Curve, rows: TablePositions) -> float:
-    """Largest difference of a curve and its table between the rows, mm or rad, the worse way."""
+    """Largest difference of a curve and its table between the rows, mm or rad, the worse approach direction."""
     closed, table = rows.closed, sampled(curve, rows.x, rows.period)
     count = max(PROBES * (len(closed) - 1), LEAST)
     jitter = np.random.default_rng(0).uniform(0.0, 1.0, count)  # a series would hide between even places
     places = np.interp((np.arange(count) + jitter) / count * (len(closed) - 1), np.arange(len(closed)), closed)
     if isinstance(curve, TableCurve):
         places = np.concatenate([places, curve.x[(curve.x >= closed[0]) & (curve.x <= closed[-1])]])
-    ways = (1.0, -1.0) if table.both else (0.0,)
-    return max(float(np.abs(table.at(places, way) - curve.at(places, way)).max(initial=0.0)) for way in ways)
+    approaches = (1.0, -1.0) if table.both else (0.0,)
+    return max(float(np.abs(table.at(places, approach) - curve.at(places, approach)).max(initial=0.0))
+               for approach in approaches)
 
 
 def rows_for(components: Sequence[Component], travel: Mapping[str, tuple[float, float]], step: Mapping[str, float],
@@ -172,7 +174,8 @@ def _derivatives(model: ErrorModel, components: Sequence[Component], made: Seque
 
 
 def _basis(curve: Curve, x: Floats) -> Floats:
-    return np.concatenate([curve.basis(x, np.full(len(x), way)) for way in ((1.0, -1.0) if both_ways(curve) else (0.0,))])
+    return np.concatenate([curve.basis(x, np.full(len(x), approach))
+                           for approach in ((1.0, -1.0) if both_directions(curve) else (0.0,))])
 
 
 # ---- parts of models ---------------------------------------------------------------------------------------------------
@@ -199,7 +202,7 @@ def merged(model: ErrorModel, more: ErrorModel) -> ErrorModel:
 
 
 def replaced(model: ErrorModel, more: ErrorModel) -> set[str]:
-    """Parameters of a model that another one gives anew."""
+    """Parameters of a model that another one gives again."""
     whole = {str(c.name) for c in more.axes.components}
     mine = [(str(c.name), label) for c in model.axes.components for label in c.curve.labels()]
     return {name + label for name, label in mine if name in whole} | (set(model.axes.constants) & set(more.axes.constants))

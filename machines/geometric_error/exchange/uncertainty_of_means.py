@@ -1,4 +1,4 @@
-"""The doubt of a model whose values are means of readings."""
+"""The uncertainty of a model whose values are means of readings."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from machines.geometric_error.actual.model import ErrorModel
-from machines.geometric_error.exchange.exports import MOST_DOUBT
+from machines.geometric_error.exchange.exports import MOST_UNCERTAINTY
 from machines.geometric_error.tables.averages import Averaged, levels_of
 from machines.geometric_error.tables.csv_table import UNITS
 from machines.geometric_error.tables.lattice import COLUMNS
@@ -18,21 +18,22 @@ from toolpaths.diagnostics import Diagnostic, info
 
 
 def with_scatter(model: ErrorModel, read: Averaged, zero: Mapping[str, float]) -> tuple[ErrorModel, Diagnostic]:
-    """The model with the doubt of its means, and what is told of it; none is written of more than `MOST_DOUBT` values."""
+    """The model with the uncertainty of its means, and what is reported of it; none is written of more than
+    `MOST_UNCERTAINTY` values."""
     units = {name: UNITS["arcsec" if name[0] == "r" or name[1] in "ABC" else "um"] for name in read.scatter}
     spread = ", ".join(f"{name} {value / units[name]:.3g}" for name, value in read.scatter.items())
-    told = info("error-import.averaged", f"{read.rows} readings at {len(read.table)} places; standard deviation "
-                f"of one: {spread} (um, arcsec)", file=read.table.file)
-    if len(model.names) > MOST_DOUBT:
-        return model, replace(told, message=f"{told.message}; the doubt of {len(model.names)} values is not written")
+    noted = info("error-import.averaged", f"{read.rows} readings at {len(read.table)} places; standard deviation "
+                 f"of one: {spread} (um, arcsec)", file=read.table.file)
+    if len(model.names) > MOST_UNCERTAINTY:
+        return model, replace(noted, message=f"{noted.message}; no uncertainty of {len(model.names)} values is written")
     covariance = np.diag(_variances(model, read))
     if model.map is not None and zero:
         covariance = zeroed_covariance(covariance, model.map, zero)
-    return replace(model, covariance=covariance), told
+    return replace(model, covariance=covariance), noted
 
 
 def _variances(model: ErrorModel, read: Averaged) -> Floats:
-    """(P,) of the means: those of a lattice by node, those of an axis by row and way."""
+    """(P,) of the means: those of a lattice by node, those of an axis by row and approach direction."""
     if model.map is not None:
         whole = [len(levels_of(read.table.columns[letter])[0]) for letter in model.map.letters]
         inner = tuple(slice(len(nodes)) for nodes in model.map.nodes)  # less the end of a period
@@ -40,7 +41,7 @@ def _variances(model: ErrorModel, read: Averaged) -> Floats:
         return np.stack([part.reshape(whole)[inner].ravel() for part in parts], axis=1).ravel()
     found = []
     for component in model.axes.components:
-        ways = [c for c in (f"{component.name}+", f"{component.name}-", str(component.name)) if c in read.runs]
-        rows = len(component.curve.values) // len(ways)
-        found += [read.variance(c)[:rows] for c in ways]
+        approaches = [c for c in (f"{component.name}+", f"{component.name}-", str(component.name)) if c in read.runs]
+        rows = len(component.curve.values) // len(approaches)
+        found += [read.variance(c)[:rows] for c in approaches]
     return np.concatenate(found)

@@ -14,7 +14,7 @@ from machines.machine import Machine
 from toolpaths.arrays import Floats
 
 TURN = np.pi
-"""rad either way from 0 of an axis that goes round"""
+"""rad in either direction from 0 of an axis that goes round"""
 CORNERS = 4
 """one place of so many is at a corner"""
 INSIDE = 1e-9
@@ -24,7 +24,7 @@ INSIDE = 1e-9
 def ranges(model: ErrorModel, machine: Machine) -> tuple[Floats, Floats]:
     """(lower, upper) (J,) of each joint: its travel, as far as the model was measured; empty where lower > upper.
 
-    Axes that go round are taken over what was measured of them, else half a turn either way.
+    Axes that go round are taken over what was measured of them, else half a turn in either direction.
     """
     lower, upper = (np.array(x) for x in (machine.limits.lower, machine.limits.upper))
     for letter, (least, most) in measured(model).items():

@@ -1,4 +1,4 @@
-"""Writing error models: a TOML file, and beside it tables per axis with ISO 230-1 names, maps, covariance."""
+"""Writing error models: a TOML file, and next to it tables per axis with ISO 230-1 names, maps, covariance."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def write_model(model: ErrorModel, description: str = "") -> dict[str, str]:
     if model.map is not None:
         files[f"{stem}-map.csv"] = map_to_csv(model.map)
         body += _map_lines(model.map, f"{stem}-map.csv")
-    body += _doubt_lines(model, stem, files)
+    body += _uncertainty_lines(model, stem, files)
     return {f"{stem}.toml": "\n".join([*head, *body, ""])} | files
 
 
@@ -52,7 +52,7 @@ def _quoted(text: str) -> str:
     return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'
 
 
-def _doubt_lines(model: ErrorModel, stem: str, files: dict[str, str]) -> list[str]:
+def _uncertainty_lines(model: ErrorModel, stem: str, files: dict[str, str]) -> list[str]:
     """Independent parameters as [sigma], one line per component where it is one number; else a covariance table."""
     if model.covariance is None:
         return []
@@ -105,14 +105,14 @@ def _curve_lines(component: Component) -> list[str]:
 
 
 def table_to_csv(components: Sequence[Component]) -> str:
-    """Tables of one axis at the same positions under their ISO 230-1 names, both ways where they have them."""
+    """Tables of one axis at the same positions under their ISO 230-1 names, both directions where they have them."""
     axis, x = components[0].name.axis, _table_of(components[0]).x
     columns = {axis: ("deg" if axis in ROTARY else "mm", x)}
     for component in components:
         table, name = _table_of(component), component.name
-        ways = np.split(table.values, 2) if table.both else [table.values]
+        approaches = np.split(table.values, 2) if table.both else [table.values]
         labels = [f"{name}+", f"{name}-"] if table.both else [str(name)]
-        columns |= {label: (ANGLE if name.angular else LENGTH, v) for label, v in zip(labels, ways, strict=True)}
+        columns |= {label: (ANGLE if name.angular else LENGTH, v) for label, v in zip(labels, approaches, strict=True)}
     return write_csv(columns, [f"errors of {axis}: actual less commanded, tool relative to part"])
 
 

@@ -41,13 +41,15 @@ def units(names: list[str], model: ErrorFileModel) -> Floats:
 
 
 def covariance_of(model: ErrorModel, file: UserFile, checked: ErrorFileModel) -> tuple[ErrorModel, list[Diagnostic]]:
-    """The model with the covariance that its file gives; without it, told, where it has more parameters than MOST."""
+    """The model with the covariance that its file gives; without it, reported, where it has more parameters than MOST."""
     given = "covariance" if checked.covariance is not None else "sigma"
     names, found = model.names, list[Diagnostic]()
     if len(names) > MOST and (checked.sigma or checked.covariance is not None):
-        told = file.problem(f"error-model.{given}", (given,), f"the doubt of {len(names)} parameters is not told, at most "
-                            f"that of {MOST} is", f"a map of fewer nodes, or take [{given}] out; the correction is the same")
-        return model, [replace(told, severity=Severity.WARNING)]
+        noted = file.problem(f"error-model.{given}", (given,),
+                             f"the uncertainty of {len(names)} parameters is not reported, at most "
+                             f"that of {MOST} is",
+                             f"a map of fewer nodes, or take [{given}] out; the correction is the same")
+        return model, [replace(noted, severity=Severity.WARNING)]
     if checked.covariance is not None:
         origin = file.origin(("covariance", "table"))
         path = Path(origin.file).parent / checked.covariance.table
@@ -141,7 +143,7 @@ def _checked(matrix: Floats, path: Path, names: list[str]) -> tuple[Floats | Non
     if apart.max(initial=0.0) > SYMMETRIC * size:
         i, j = sorted(np.unravel_index(int(np.argmax(apart)), apart.shape))
         return None, [error("error-table.covariance", f"the covariance is not symmetric: {names[i]} with {names[j]} is "
-                            f"{matrix[i, j]:g}, the other way round {matrix[j, i]:g}", file=str(path),
+                            f"{matrix[i, j]:g}, reversed {matrix[j, i]:g}", file=str(path),
                             hint="write the same number in both")]
     negative = np.flatnonzero(np.diag(matrix) < 0.0)
     if len(negative):

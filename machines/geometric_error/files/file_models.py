@@ -22,8 +22,8 @@ class CurveModel(UserModel):
     """`[components.NAME]`: one of `table`, `polynomial`, or `mean` / `cosine` / `sine`."""
 
     table: str | None = None
-    """CSV file beside this one: a column of positions named as the axis, e.g. X [mm], and one of values named as the
-    component, EXX [um]; or two for both ways of approach, EXX+ and EXX-"""
+    """CSV file next to this one: a column of positions named as the axis, e.g. X [mm], and one of values named as the
+    component, EXX [um]; or two for both approach directions, EXX+ and EXX-"""
     interpolation: Literal["linear", "spline"] = "linear"
     """between the rows of the table"""
     repeats: Positive | None = None
@@ -131,7 +131,7 @@ class ErrorFileModel(UserModel):
     angle_unit: Literal["arcsec", "urad", "deg"] = "arcsec"
     """of the numbers in this file"""
     large: bool = False
-    """true: errors above 1 mm or 0.5 degrees are so; else they are refused, as a unit that slipped, most likely. Those above
+    """true: errors above 1 mm or 0.5 degrees are so; else they are refused, as most likely a wrong unit. Those above
     100 mm or 10 degrees always are"""
     components: dict[str, CurveModel] = Field(default_factory=dict)
     """component errors by ISO 230-1 name, EXX, EYX, ... ECC"""

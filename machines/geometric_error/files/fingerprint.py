@@ -1,4 +1,4 @@
-"""Eight hex digits of what an error model says, so that a program can tell that its model has changed since."""
+"""Eight hex digits of what an error model says, so that a program can show that its model has changed since."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def fingerprint(model: ErrorModel) -> str:
     """The same for files that make the same corrections, whatever their names, units, signs, order and spelling.
 
     Aside stand the name, the machine and who corrects, which other checks look at, and the covariance: what is known of
-    the doubt changes no word of a program.
+    the uncertainty changes no word of a program.
     """
     lines = [*_axes(model.axes), *([] if model.rods is None else _rods(model.rods)),
              *([] if model.map is None else _map(model.map))]
@@ -48,9 +48,9 @@ def _curve(name: ErrorName, curve: Curve) -> str:
     position, unit = DEG if name.axis in ROTARY else 1.0, ANGLE if name.angular else LENGTH
     parts: list[str]
     if isinstance(curve, TableCurve):
-        ways = np.split(curve.values, 2) if curve.both else [curve.values]
+        approaches = np.split(curve.values, 2) if curve.both else [curve.values]
         parts = [f"table {curve.rule}", _text([curve.period], position), _text(curve.x, position),
-                 *(_text(way, unit) for way in ways)]
+                 *(_text(approach, unit) for approach in approaches)]
     elif isinstance(curve, Polynomial):  # coefficients of high powers are small numbers that count
         parts = ["polynomial", " ".join(f"{x:.10g}" for x in curve.values / unit),
                  _text([curve.origin, curve.scale, *curve.range], position)]

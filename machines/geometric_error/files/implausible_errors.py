@@ -41,7 +41,7 @@ class TooLarge:
         if not self.refused(large):
             return f"{key} says that it is so"
         may = self.size <= LARGE[self.turn][1]
-        return f"a unit that slipped, most likely: {units}" + (f"; {key} if it is so" if may else "")
+        return f"most likely a wrong unit: {units}" + (f"; {key} if it is so" if may else "")
 
     def _shown(self, size: float) -> str:
         return f"{size / DEG:.4g} degrees" if self.turn else f"{size:.4g} mm"

@@ -1,4 +1,4 @@
-"""From an error model file (TOML with CSV tables beside it) to an ErrorModel in mm and rad, or what is wrong with it."""
+"""From an error model file (TOML with CSV tables next to it) to an ErrorModel in mm and rad, or what is wrong with it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Measurements that go to the same place several times: their means, and the doubt of those from the scatter."""
+"""Measurements that go to the same place several times: their means, and the uncertainty of those from the scatter."""
 
 from __future__ import annotations
 

@@ -28,7 +28,7 @@ _THOUSANDS = re.compile(r"-?\d{1,3}(,\d{3})+$")
 TITLES = 60
 """lines at the most that stand above a header"""
 MOST = 8
-"""faults of a header that are told"""
+"""faults of a header that are reported"""
 _HEAD = re.compile(r"(?P<name>[^\[\]()]+?)\s*(?:[\[(](?P<unit>[^\])]*)[\])])?$")
 _CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f]")
 

@@ -100,9 +100,9 @@ class LinearBank(Bank):
 
     def __init__(self, first: TableCurve, values: Floats) -> None:
         self.first = first
-        ways = [first.closed(half) for values_of in values for half in np.split(values_of, 2 if first.both else 1)]
-        self.x = ways[0][0]
-        self.y = np.array([y for _, y in ways])
+        approaches = [first.closed(half) for values_of in values for half in np.split(values_of, 2 if first.both else 1)]
+        self.x = approaches[0][0]
+        self.y = np.array([y for _, y in approaches])
         self.slope = np.diff(self.y, axis=1) / np.diff(self.x)
 
     def at(self, x: Floats, direction: Floats | float) -> Floats:
@@ -114,14 +114,14 @@ class LinearBank(Bank):
 
 
 class SplineBank(Bank):
-    """Spline tables: one piecewise cubic with a value per curve and way."""
+    """Spline tables: one piecewise cubic with a value per curve and approach direction."""
 
     def __init__(self, first: TableCurve, values: Floats) -> None:
         from scipy.interpolate import CubicSpline
 
         self.first = first
-        ways = [first.closed(half) for values_of in values for half in np.split(values_of, 2 if first.both else 1)]
-        self.cubic = CubicSpline(ways[0][0], np.array([y for _, y in ways]), axis=1,
+        approaches = [first.closed(half) for values_of in values for half in np.split(values_of, 2 if first.both else 1)]
+        self.cubic = CubicSpline(approaches[0][0], np.array([y for _, y in approaches]), axis=1,
                                  bc_type="periodic" if first.period else "not-a-knot")
 
     def at(self, x: Floats, direction: Floats | float) -> Floats:
@@ -131,7 +131,7 @@ class SplineBank(Bank):
 
 
 def _shared(found: Floats, direction: Floats | float) -> Floats:
-    """(C, N) of values (2 C, N), forwards and backwards by turns, by shares of the way."""
+    """(C, N) of values (2 C, N), forwards and backwards by turns, by shares of the approach direction."""
     share = 0.5 * (1.0 + np.clip(direction, -1.0, 1.0))
     result: Floats = found[1::2] + share * (found[0::2] - found[1::2])
     return result

@@ -1,7 +1,7 @@
 """One component error as a function of the position of its axis: table, Fourier series or polynomial.
 
 All curves are linear in their parameters: value = basis(x) . values. Positions mm or rad, values mm or rad. Beyond its
-range a curve keeps its end value; `outside` tells, and callers refuse such positions unless they are told otherwise.
+range a curve keeps its end value; `outside` says, and callers refuse such positions unless they are set otherwise.
 """
 
 from __future__ import annotations
@@ -34,12 +34,12 @@ class Curve(ABC):
     @property
     @abstractmethod
     def detail(self) -> float:
-        """mm or rad over which the curve runs one way at the most: what lies between looks as far apart is seen."""
+        """mm or rad over which the curve runs one direction at the most: what lies between looks as far apart is seen."""
 
     @property
     @abstractmethod
     def most(self) -> float:
-        """mm or rad that no value exceeds anywhere, either way: a bound."""
+        """mm or rad that no value exceeds anywhere, in either direction: a bound."""
 
     @property
     @abstractmethod
@@ -48,7 +48,7 @@ class Curve(ABC):
 
     @property
     def apart(self) -> float:
-        """mm or rad by which the values of the two ways nowhere differ by more: a bound."""
+        """mm or rad by which the values of the two approach directions nowhere differ by more: a bound."""
         return 0.0
 
     @abstractmethod
@@ -76,7 +76,7 @@ class Curve(ABC):
 
 @dataclass(frozen=True, eq=False)
 class TableCurve(Curve):
-    """Values measured at M ascending positions, both ways where `both`.
+    """Values measured at M ascending positions, both directions where `both`.
 
     Attributes:
         x: (M,) ascending
@@ -106,20 +106,20 @@ class TableCurve(Curve):
     @cached_property
     def most(self) -> float:
         """See the base class; linear tables reach it."""
-        return max(self._bounds(values)[0] for values in self._ways)
+        return max(self._bounds(values)[0] for values in self._approaches)
 
     @cached_property
     def steepest(self) -> float:
         """See the base class; reached."""
-        return max(self._bounds(values)[1] for values in self._ways)
+        return max(self._bounds(values)[1] for values in self._approaches)
 
     @cached_property
     def apart(self) -> float:
         """See the base class."""
-        return self._bounds(np.subtract(*self._ways))[0] if self.both else 0.0
+        return self._bounds(np.subtract(*self._approaches))[0] if self.both else 0.0
 
     @property
-    def _ways(self) -> list[Floats]:
+    def _approaches(self) -> list[Floats]:
         return np.split(self.values, 2) if self.both else [self.values]
 
     def _bounds(self, values: Floats) -> tuple[float, float]:
@@ -142,8 +142,8 @@ class TableCurve(Curve):
         """See the base class."""
         inside = self.inside(x)
         if not self.both:
-            return self._way(inside, self.values)
-        forward, backward = (self._way(inside, half) for half in np.split(self.values, 2))
+            return self._approach(inside, self.values)
+        forward, backward = (self._approach(inside, half) for half in np.split(self.values, 2))
         share = 0.5 * (1.0 + np.clip(direction, -1.0, 1.0))
         result: Floats = backward + share * (forward - backward)
         return result
@@ -170,7 +170,7 @@ class TableCurve(Curve):
             return self.x, values
         return np.append(self.x, self.x[0] + self.period), np.concatenate([values, values[:1]])
 
-    def _way(self, x: Floats, values: Floats) -> Floats:
+    def _approach(self, x: Floats, values: Floats) -> Floats:
         return self._spline(values, x) if self.rule == "spline" else np.interp(x, *self.closed(values))
 
     def _spline(self, values: Floats, x: Floats) -> Floats:

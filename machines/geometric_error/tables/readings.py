@@ -1,4 +1,5 @@
-"""Tables as measuring programs deliver them: a column for each run, a file for each way or run, headers of their own.
+"""Tables as measuring programs deliver them: a column for each run, a file for each approach direction or run, headers of
+their own.
 
 What comes out are rows of single readings under ISO 230-1 names, NaN where there is none, which `averages` makes means of.
 """
@@ -21,8 +22,8 @@ POSITIONS = ("target", "position", "nominal", "sollposition")
 """columns of positions, besides the letter of the axis, in a table whose component is named outside"""
 _RUN = re.compile(r"(?P<name>E[XYZABC][XYZUVWABC]|run|lauf|error|deviation|abweichung)?[ _#]*(?P<before>\d*)[ _#]*"
                   r"(?P<way>[+-]?)[ _#]*(?P<after>\d*)$", re.IGNORECASE)
-_WAYS = (re.compile("\u2191|\\b(?:up|forward)\\b", re.IGNORECASE),
-         re.compile("\u2193|\u2212|\\b(?:down|backward|reverse)\\b", re.IGNORECASE))
+_DIRECTIONS = (re.compile("\u2191|\\b(?:up|forward)\\b", re.IGNORECASE),
+               re.compile("\u2193|\u2212|\\b(?:down|backward|reverse)\\b", re.IGNORECASE))
 """of ISO 230-2 and in words; a long minus"""
 _OF_RUN = re.compile(r"(E[XYZABC][XYZUVWABC][+-]?)(\d+)$")
 _NUMBERED = ("RUN", "LAUF")
@@ -55,8 +56,8 @@ def by_iso_names(table: CsvTable, name: ErrorName | None) -> CsvTable | Fault:
 
 
 def _match(column: str) -> re.Match[str] | None:
-    for way, sign in zip(_WAYS, "+-", strict=True):
-        column = way.sub(sign, column)
+    for approach, sign in zip(_DIRECTIONS, "+-", strict=True):
+        column = approach.sub(sign, column)
     return _RUN.match(column)
 
 
@@ -81,7 +82,8 @@ def _of_component(column: str, name: ErrorName) -> str | None:
 
 
 def run_of(column: str) -> tuple[str, str]:
-    """(component with its way, number of the run) of a column as EXX+3; (the column, "") for one of no run."""
+    """(component with its approach direction, number of the run) of a column as EXX+3; (the column, "") for one of no
+    run."""
     found = _OF_RUN.match(column)
     return (found[1], found[2]) if found else (column, "")
 
@@ -121,7 +123,8 @@ def stacked(tables: Sequence[CsvTable]) -> CsvTable:
 
 
 def together(tables: Sequence[CsvTable], average: bool) -> list[CsvTable]:
-    """Tables of one axis as one where they are readings of the same errors (`average`), or the two ways of one."""
+    """Tables of one axis as one where they are readings of the same errors (`average`), or the two approach directions of
+    one."""
     groups: list[list[CsvTable]] = []
     for table in tables:
         mine = next((group for group in groups if _belongs(table, group, average)), None)

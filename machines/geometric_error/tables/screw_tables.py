@@ -1,4 +1,4 @@
-"""LinuxCNC's screw compensation: one file per joint, nominal position and where the axis really is, both ways."""
+"""LinuxCNC's screw compensation: one file per joint, nominal position and where the axis really is, both directions."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ def to_linuxcnc(name: ErrorName, table: TableCurve, sense: float = 1.0) -> str:
     """A screw compensation file (COMP_FILE with COMP_FILE_TYPE = 0) of a positioning error: nominal, forward, reverse.
 
     Type 0 holds where the axis really is when it is sent to the nominal position; LinuxCNC adds nominal less actual to
-    the motor's command, linearly between the rows, by the way of the last motion (LinuxCNC, Integrator's manual, INI
-    configuration, [JOINT_n]). mm and degrees.
+    the motor's command, linearly between the rows, by the approach direction of the last motion (LinuxCNC, Integrator's
+    manual, INI configuration, [JOINT_n]). mm and degrees.
 
     Args:
         sense: -1 where the axis counts against the direction of ISO 841
@@ -67,7 +67,7 @@ def from_linuxcnc(text: str, name: ErrorName, sense: float = 1.0, kind: int = 0,
         return None, [error("error-table.empty", f"{len(rows)} rows; at least two are needed", file=file,
                             hint="write nominal, forward and reverse position in every row")]
     nominal, forward, backward = np.array(rows).T * (DEG if name.axis in ROTARY else 1.0)
-    errors = [sense * (way - nominal if kind == 0 else -way) for way in (forward, backward)]
+    errors = [sense * (approach - nominal if kind == 0 else -approach) for approach in (forward, backward)]
     worst = max(float(np.abs(e).max()) for e in errors)
     if worst > UNLIKELY[name.axis in ROTARY]:
         shown = f"{worst / DEG:.4g} degrees" if name.axis in ROTARY else f"{worst:.4g} mm"

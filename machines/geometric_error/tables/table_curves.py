@@ -44,7 +44,7 @@ def table_curve(name: ErrorName, table: CsvTable, rule: Literal["linear", "splin
     if isinstance(columns, Fault):
         return columns
     x, values = table.columns[name.axis], [table.columns[c] * sign for c in columns]
-    if len(x) > 1 and (np.diff(x) < 0.0).all():  # measured on the way back
+    if len(x) > 1 and (np.diff(x) < 0.0).all():  # measured on the return
         x, values = x[::-1], [v[::-1] for v in values]
     down = np.flatnonzero(np.diff(x) <= 0.0)
     if len(down):
@@ -69,7 +69,7 @@ def _order(table: CsvTable, name: ErrorName, row: int) -> Fault:
     unit, x = DEG if axis in ROTARY else 1.0, table.columns[axis]
     before, after = (float(v) / unit for v in x[row:row + 2])
     line = table.lines[row + 1]
-    hint = "several readings of one place: postproc errors import --average takes their mean; two ways: columns " \
+    hint = "several readings of one place: postproc errors import --average takes their mean; both approach directions: " \
         f"{name}+ and {name}-" if len(np.unique(x)) < len(x) else "sort the rows by position"
     return Fault("error-model.order", f"positions of {axis} do not ascend: {after:g} after {before:g}", hint, line)
 
@@ -79,8 +79,8 @@ def _columns(name: ErrorName, table: CsvTable) -> list[str] | Fault:
     both = [f"{name}+", f"{name}-"]
     wanted = both if both[0] in table.columns or both[1] in table.columns else [str(name)]
     if wanted == both and str(name) in table.columns:
-        return Fault("error-model.column", f"{Path(table.file).name} has {name} beside {name}+ or {name}-",
-                     f"write {name}+ and {name}- where both ways were measured, else {name} alone", table.head)
+        return Fault("error-model.column", f"{Path(table.file).name} has {name} next to {name}+ or {name}-",
+                     f"write {name}+ and {name}- where both directions were measured, else {name} alone", table.head)
     for column in (name.axis, *wanted):
         if column not in table.columns:
             return Fault("error-model.column", f"{Path(table.file).name} has no column {column!r}",

@@ -36,7 +36,7 @@ def no_bodies(one: Pass, axis: Floats) -> str:
 class Candidate:
     """A pass turned to `axis` (3,) (the CL's own where it is fixed): joints of its rows `q` (n, J) and of the sites of
     each stretch; `refused` says why the machine cannot run it, else ""; `held` is the angle, rad, asked for of the rotary
-    joint that the axis leaves free, NaN where none is; `told`: see `slim`."""
+    joint that the axis leaves free, NaN where none is; `noted`: see `slim`."""
 
     one: Pass
     axis: Floats
@@ -46,7 +46,7 @@ class Candidate:
     refused: str = ""
     collides: Callable[[Pass, Floats], str] = no_bodies
     held: float = np.nan
-    told: float | None = None
+    noted: float | None = None
 
     def same(self, axis: Floats, held: float = np.nan, apart: float = SAME) -> bool:
         """True where axis (3,) and held angle are within `apart` of those of this one."""
@@ -69,7 +69,7 @@ class Candidate:
     def bound(self) -> float:
         """Least seconds that the cuts can take, whatever the plan: inf where the machine cannot run them.
 
-        From rest to rest no joint is faster than over its own way under its own limits and the velocity that the feed gives
+        From rest to rest no joint is faster than over its own path under its own limits and the velocity that the feed gives
         it (along a straight pass that is the reach of the polytopes in its direction), and no interval than its velocities
         and the feed allow.
         """
@@ -79,12 +79,12 @@ class Candidate:
                                          zip(self.one.stretches, self.sites, strict=True)))
 
     def _least(self, stretch: CuttingStretch, q: Floats) -> float:
-        way, length = np.abs(np.diff(q, axis=0)), np.diff(stretch.s)
+        travel, length = np.abs(np.diff(q, axis=0)), np.diff(stretch.s)
         most = _largest_feed(stretch)
-        fed = _ROUND * np.max(way / length[:, None], axis=0) * most
+        fed = _ROUND * np.max(travel / length[:, None], axis=0) * most
         limits = replace(self.limits, velocity=np.minimum(self.limits.velocity, np.maximum(fed, 1e-9)))
         rest = float(rest_seconds(q[:1], q[-1:], limits, PointToPointMode.DOG_LEG)[0])
-        return max(rest, float(np.maximum(np.max(way / self.limits.velocity, axis=1), length / most).sum()))
+        return max(rest, float(np.maximum(np.max(travel / self.limits.velocity, axis=1), length / most).sum()))
 
     @cached_property
     def rapids(self) -> float:
@@ -100,7 +100,7 @@ class Candidate:
         return np.inf if self.refused else self.one.drilled.seconds(self.q, self.limits)
 
     def plans(self) -> tuple[Plan, ...]:
-        """The motion of each stretch, curvature included; planned anew at each call."""
+        """The motion of each stretch, curvature included; planned again at each call."""
         own = self.one.shift(self.axis)
         result = []
         for stretch, q in zip(self.one.stretches, self.sites, strict=True):
@@ -139,8 +139,8 @@ class Candidate:
     @cached_property
     def _planned(self) -> tuple[float, tuple[str, str], tuple[Floats, ...], bool]:
         """Seconds, what limits, the knots of the plans, and whether all were solved."""
-        if self.told is not None:
-            return self.told, ("", ""), (), True
+        if self.noted is not None:
+            return self.noted, ("", ""), (), True
         if self.refused:
             return np.inf, ("", ""), (), True
         plans = self.plans()
@@ -165,10 +165,10 @@ class Candidate:
         return self.machine.axis_names[int(joint)], ORDERS[int(order)]
 
     def slim(self, seconds: float) -> Candidate:
-        """Without joints along the pass, but where its cuts begin: to be told about, not to be planned; with the `seconds`
-        known of it, NaN where it was not timed."""
+        """Without joints along the pass, but where its cuts begin: to be reported about, not to be planned; with the
+        `seconds` known of it, NaN where it was not timed."""
         first = int(np.argmin(self.one.rapid))
-        return replace(self, q=self.q[first:first + 1], sites=(), told=seconds)
+        return replace(self, q=self.q[first:first + 1], sites=(), noted=seconds)
 
     def rotary(self) -> dict[str, float]:
         """Rotary positions at the start of the cuts, degrees; of machines without rotary joints the axis as I, J, K."""

@@ -29,7 +29,7 @@ _SWIFT = (3.0 * DEG, 1.5 * DEG)
 """steps round the axis of least cuts and rapids together"""
 _ROUNDS = 3
 _SHARES = np.arange(15, 0, -1) / 16.0
-"""of the way to a neighbour that is not allowed"""
+"""of the path to a neighbour that is not allowed"""
 
 
 def tried(one: Pass, machine: Machine, allowed: AllowedAxes, before: PassSearch | None = None) -> PassSearch:
@@ -100,7 +100,7 @@ def _refined(search: CandidateSearch, best: Candidate, step: float) -> Candidate
 
 
 def _hastened(search: CandidateSearch, best: Candidate, step: float) -> Candidate:
-    """Neighbours of the swiftest so far, and of what is swifter; the best by cuts among all that."""
+    """Neighbours of the fastest so far, and of what is swifter; the best by cuts among all that."""
     for _ in range(_ROUNDS):
         start = search.swift
         for made in search.add(search.one.kin.nearest_axis(_neighbours(search, start.axis, step))):
@@ -111,7 +111,7 @@ def _hastened(search: CandidateSearch, best: Candidate, step: float) -> Candidat
 
 
 def _neighbours(search: CandidateSearch, start: Floats, step: float) -> Floats:
-    """Axes (M, 3) beside one; those that are not allowed as far towards them as is."""
+    """Axes (M, 3) next to one; those that are not allowed as far towards them as is."""
     one, axes = search.one, around(start, search.one.axis, step)
     for k in np.flatnonzero(~search.allowed.mask(one, axes)):
         nearer = slerp(np.tile(start, (len(_SHARES), 1)), np.tile(axes[k], (len(_SHARES), 1)), _SHARES)

@@ -61,8 +61,8 @@ def held_angles(one: Pass, machine: Machine, axis: Floats) -> Floats:
     """Angles (H,) rad of the joint that `axis` (3,) leaves free at which the pass should be fast, the best first; none where
     it leaves none free.
 
-    They are the least sums, over the ways of the pass, of length over cube root of the reach: with its cube root goes the
-    time from rest to rest along a straight way under bounded jerk.
+    They are the least sums, over the paths of the pass, of length over cube root of the reach: with its cube root goes the
+    time from rest to rest along a straight path under bounded jerk.
     """
     joint = _free(one, axis, machine)
     if joint < 0 or not one.stretches:
@@ -120,8 +120,8 @@ def poles(one: Pass) -> list[Floats]:
 
 
 def _slowness(one: Pass, machine: Machine, axis: Floats, joint: int) -> Floats:
-    """Sum over the ways of a pass of length over cube root of reach (in its middle), the free joint all round `_ring`."""
-    stretch, ways, ring = max(one.stretches, key=lambda s: s.length), _ways(one), _ring(machine, joint)
+    """Sum over the paths of a pass of length over cube root of reach (in its middle), the free joint all round `_ring`."""
+    stretch, travels, ring = max(one.stretches, key=lambda s: s.length), _travels(one), _ring(machine, joint)
     limits = machine.limits
     limit = limits.jerk if np.isfinite(limits.jerk).all() else limits.acceleration
     near = np.tile(machine.home, (len(ring), 1))
@@ -129,18 +129,18 @@ def _slowness(one: Pass, machine: Machine, axis: Floats, joint: int) -> Floats:
     tip = np.tile(stretch.tip[len(stretch.tip) // 2] + one.shift(axis), (len(ring), 1))
     pose = np.hstack((tip, np.tile(axis, (len(ring), 1))))
     boxes = [held_axis_polytope(one.kin, q, limit, pose) for q in one.kin.inverse(tip, pose[:, 3:], near=near)]
-    size = np.linalg.norm(ways, axis=1)
-    reach = np.stack([np.nan_to_num(np.stack([box.reach(way) for box in boxes]), nan=0.0).max(axis=0)
-                      for way in ways / size[:, None]])
+    size = np.linalg.norm(travels, axis=1)
+    reach = np.stack([np.nan_to_num(np.stack([box.reach(travel) for box in boxes]), nan=0.0).max(axis=0)
+                      for travel in travels / size[:, None]])
     with np.errstate(divide="ignore"):
         return np.asarray((size[:, None] / np.cbrt(reach)).sum(axis=0))
 
 
-def _ways(one: Pass) -> Floats:
-    """Ways (K, 3) that the cuts of a pass are made of, some of each stretch."""
+def _travels(one: Pass) -> Floats:
+    """Paths (K, 3) that the cuts of a pass are made of, some of each stretch."""
     tips = [stretch.tip[_places(len(stretch.tip), len(one.stretches))] for stretch in one.stretches]
-    way = np.concatenate([np.diff(tip, axis=0) for tip in tips])
-    return np.asarray(way[np.linalg.norm(way, axis=1) > 0.0])
+    travel = np.concatenate([np.diff(tip, axis=0) for tip in tips])
+    return np.asarray(travel[np.linalg.norm(travel, axis=1) > 0.0])
 
 
 def _places(count: int, stretches: int) -> Ints:
@@ -152,8 +152,8 @@ def _refined(search: CandidateSearch, best: Candidate, step: float) -> Candidate
     """The best of a held angle and its two neighbours, going on where one gains."""
     for _ in range(3):
         start = best
-        for way in (step, -step):
-            for made in search.add(start.axis[None], held=start.held + way):
+        for travel in (step, -step):
+            for made in search.add(start.axis[None], held=start.held + travel):
                 best = search.better(best, made)
         if best is start:
             break

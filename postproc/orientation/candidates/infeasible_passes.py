@@ -64,10 +64,10 @@ def _no_other(one: Pass, least: MissingTravel) -> str:
 def unfit(work: PassContext, results: list[PassSearch]) -> list[Diagnostic]:
     """Warnings where another axis was found, else errors."""
     reached = [one for one in results if not one.own.refused]
-    return [*_told(work, [one for one in results if one.own.refused], ("orient.own_reach", "orient.reach"),
-                   lambda one: one.own.refused + _off(one.own)),
-            *_told(work, [one for one in reached if one.own.touching], ("orient.own_touches", "orient.touches"),
-                   lambda one: one.own.touching)]
+    return [*_noted(work, [one for one in results if one.own.refused], ("orient.own_reach", "orient.reach"),
+                    lambda one: one.own.refused + _off(one.own)),
+            *_noted(work, [one for one in reached if one.own.touching], ("orient.own_touches", "orient.touches"),
+                    lambda one: one.own.touching)]
 
 
 def _off(own: Candidate) -> str:
@@ -87,8 +87,8 @@ def _hint(why: str, fixed: str) -> str:
     return _APART_FIXED if fixed else _APART
 
 
-def _told(work: PassContext, bad: list[PassSearch], codes: tuple[str, str],
-          why: Callable[[PassSearch], str]) -> list[Diagnostic]:
+def _noted(work: PassContext, bad: list[PassSearch], codes: tuple[str, str],
+           why: Callable[[PassSearch], str]) -> list[Diagnostic]:
     """One diagnostic per kind; the deepest and the farthest beyond travel stands for all."""
     alike: dict[tuple[bool, str, str], list[PassSearch]] = {}
     for one in bad:

@@ -71,7 +71,7 @@ def _in_travel(q: Floats, machine: Machine) -> Bools:
 
 
 def _apart(axes: Floats, reach: Floats) -> Floats:
-    """The axes (S, 3) of greatest reach that are not beside one another."""
+    """The axes (S, 3) of greatest reach that are not next to one another."""
     taken = np.zeros((0, 3))
     for k in np.argsort(-reach, kind="stable").tolist():
         if len(taken) == _SEEDS or reach[k] <= 0.0:
@@ -82,7 +82,7 @@ def _apart(axes: Floats, reach: Floats) -> Floats:
 
 
 def around(start: Floats, centre: Floats, step: float) -> Floats:
-    """Axes (M, 3) `step` rad beside `start`: nearer to `centre`, farther, and to both sides at the same angle from it; all
+    """Axes (M, 3) `step` rad next to `start`: nearer to `centre`, farther, and to both sides at the same angle from it; all
     round where `start` is the centre."""
     tilt = float(angle_between(start, centre))
     if tilt < 0.5 * step:
@@ -92,8 +92,8 @@ def around(start: Floats, centre: Floats, step: float) -> Floats:
     out = start - np.cos(tilt) * centre
     out /= np.linalg.norm(out)
     side, aside = np.cross(centre, out), min(step / np.sin(tilt), 0.5 * np.pi)
-    ways = [(max(tilt - step, 0.0), 0.0), (tilt + step, 0.0), (tilt, aside), (tilt, -aside)]
-    return np.stack([np.cos(a) * centre + np.sin(a) * (np.cos(b) * out + np.sin(b) * side) for a, b in ways])
+    travels = [(max(tilt - step, 0.0), 0.0), (tilt + step, 0.0), (tilt, aside), (tilt, -aside)]
+    return np.stack([np.cos(a) * centre + np.sin(a) * (np.cos(b) * out + np.sin(b) * side) for a, b in travels])
 
 
 def cap(axis: Floats, tilt: float, apart: float) -> Floats:

@@ -1,6 +1,6 @@
 """What each order of motion allows along the mean direction of a pass: the reach of its polytope, and the seconds of that.
 
-Velocity, acceleration and jerk have different units; they compare by the time that a straight way as long as the pass is
+Velocity, acceleration and jerk have different units; they compare by the time that a straight path as long as the pass is
 takes from rest to rest where only this order is limited. The slowest binds.
 """
 

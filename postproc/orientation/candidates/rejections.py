@@ -20,7 +20,7 @@ def grouped(every: Iterable[PassSearch]) -> dict[str, int]:
     return {kind: count[kind] for kind in KINDS if count[kind]}
 
 
-def best_loser(tried: PassSearch) -> Candidate | None:
+def runner_up(tried: PassSearch) -> Candidate | None:
     """The fastest candidate that was timed and not taken, the own axis among them; None where none was."""
     timed = [lost.made for lost in tried.rejected if lost.kind == "slower"]
     return min(timed, key=lambda made: made.seconds, default=None)

@@ -26,7 +26,7 @@ _LEVELS = 3
 _LATTICES = (4.0 * DEG, 2.0 * DEG, 1.0 * DEG, 0.5 * DEG)
 _SOME = 12
 _LEAST = 1.01
-"""reach that the best of a ring must have beside the CL's own axis to be worth anything"""
+"""reach that the best of a ring must have next to the CL's own axis to be worth anything"""
 
 
 def best_on_ridge(search: CandidateSearch, best: Candidate) -> Candidate:

@@ -17,7 +17,7 @@ from toolpaths.rotations import angle_between
 from toolpaths.units import DEG
 
 APART = 0.1 * DEG
-"""of orientations that are told as two"""
+"""of orientations that are reported as two"""
 _WORTH = 1e-4
 """least part of the time that a candidate must gain to be planned, or to be taken"""
 RejectionKind = Literal["limits", "reach", "travel", "touches", "bound", "slower"]
@@ -40,8 +40,8 @@ class PassSearch:
         own, best, swift: the CL's axis, that of the least cuts, that of the least cuts and rapids together
         aimed: the paper's choice for the mean direction, None without a vertex in travel
         gains: seconds as ranked that `best` and `swift` gain over `own`
-        rejected: candidates with what they lost by, but those that stand where the best does; ranked times are told beside
-            the planned one of the best
+        rejected: candidates with what they lost by, but those that stand where the best does; ranked times are reported next
+            to the planned one of the best
         unaimed: why there is no `aimed`, "" where there is one and where none is looked for
         pruned, planned: how many were discarded by the bound alone, how many timed
     """
@@ -102,9 +102,9 @@ class CandidateSearch:
         return not (why or made.refused)
 
     def lose(self, made: Candidate, why: str, kind: RejectionKind) -> None:
-        """Note what a candidate lost by; times are told at the end."""
-        told = made if made is self.own else made.slim(self._times.get(id(made), np.nan))
-        self.lost[id(made)] = Rejection(told, why, kind)
+        """Note what a candidate lost by; times are reported at the end."""
+        noted = made if made is self.own else made.slim(self._times.get(id(made), np.nan))
+        self.lost[id(made)] = Rejection(noted, why, kind)
 
     def better(self, best: Candidate, made: Candidate) -> Candidate:
         """The better of two by their cuts, `made` being runnable.
@@ -163,26 +163,26 @@ class CandidateSearch:
         """The result, `winner` being the best as ranked."""
         best = self.settled(winner)
         lost = [made for made in self.known if id(made) in self.lost and made is not best]
-        rejected = tuple(self._told(made, winner) for made in lost if not self._beside(made, best))
+        rejected = tuple(self._noted(made, winner) for made in lost if not self._adjacent(made, best))
         gains = _gain(self.seconds(self.own), self.seconds(best)), _gain(self.whole(self.own), self.whole(self.swift))
         return PassSearch(self.own, best, self.swift, aimed, gains, rejected, self.pruned, self.planned, unaimed)
 
-    def _beside(self, made: Candidate, best: Candidate) -> bool:
-        """Whether a slower candidate is the best itself to all that can be told of it."""
+    def _adjacent(self, made: Candidate, best: Candidate) -> bool:
+        """Whether a slower candidate is the best itself to all that can be reported of it."""
         return made is not self.own and self.lost[id(made)].kind == "slower" and made.same(best.axis, best.held, APART)
 
-    def _told(self, made: Candidate, winner: Candidate) -> Rejection:
+    def _noted(self, made: Candidate, winner: Candidate) -> Rejection:
         """What a candidate lost by; a time as ranked by as much longer as the winner is when planned in full, and no gain
         that is not worth to be taken."""
         lost = self.lost[id(made)]
         if lost.kind != "slower":
             return lost
         if made is self.own or made is winner:
-            return Rejection(lost.made if made is self.own else replace(lost.made, told=made.seconds),
+            return Rejection(lost.made if made is self.own else replace(lost.made, noted=made.seconds),
                              f"takes {made.seconds:.4f} s", "slower")
         longer = winner.seconds / self._ranked(winner) if self._ranked(winner) > 0.0 else 1.0
         about = max(longer * self._ranked(made), winner.seconds)
-        return Rejection(replace(lost.made, told=about), f"takes about {about:.4f} s", "slower")
+        return Rejection(replace(lost.made, noted=about), f"takes about {about:.4f} s", "slower")
 
 
 def _gain(before: float, after: float) -> float:

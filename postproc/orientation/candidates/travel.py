@@ -20,13 +20,13 @@ from toolpaths.units import DEG
 _APART = 10.0 * DEG
 """of the axes that are looked at first"""
 _LEANS, _RING = (0.5 * DEG, 2.0 * DEG, 5.0 * DEG, 10.0 * DEG), 36
-"""beside an axis along a rotary joint, where that joint goes far: angles from it, and axes of each"""
+"""next to an axis along a rotary joint, where that joint goes far: angles from it, and axes of each"""
 _STARTS, _ROUNDS = 8, 8
 _STEPS = (5.0 * DEG, 2.5 * DEG, 1.2 * DEG, 0.6 * DEG, 0.3 * DEG)
 _PER_RAD = 100.0
 """mm that a radian counts as"""
 _SOME = 24
-"""positions of a pass, beside those that are outermost"""
+"""positions of a pass, next to those that are outermost"""
 
 
 @dataclass(frozen=True)
@@ -55,14 +55,14 @@ def _by_size(lack: MissingTravel) -> float:
 
 
 def _seeds(one: Pass, allowed: AllowedAxes) -> Floats:
-    """Axes (S, 3) all round the own one, more of them beside axes along a rotary joint."""
+    """Axes (S, 3) all round the own one, more of them next to axes along a rotary joint."""
     tilt = np.pi / 2.0 if len(one.normal) else allowed.tilt
-    beside = [ring(pole, lean, _RING) for pole in poles(one) for lean in _LEANS]
-    return _allowed(one, np.concatenate([cap(one.axis, min(tilt, np.pi - 0.1), _APART), *beside]), allowed)
+    adjacent = [ring(pole, lean, _RING) for pole in poles(one) for lean in _LEANS]
+    return _allowed(one, np.concatenate([cap(one.axis, min(tilt, np.pi - 0.1), _APART), *adjacent]), allowed)
 
 
 def _apart(lacks: list[MissingTravel]) -> list[MissingTravel]:
-    """The best of those that are not beside one another."""
+    """The best of those that are not next to one another."""
     taken: list[MissingTravel] = []
     for lack in sorted(lacks, key=_by_size):
         if all(angle_between(lack.axis, other.axis) > _APART for other in taken):
@@ -124,7 +124,7 @@ def _thinned(one: Pass) -> Pass:
     if one.turns:
         return one
     tips = np.concatenate([one.tip, *(stretch.tip for stretch in one.stretches)])
-    ways = np.array([way for way in np.ndindex(3, 3, 3) if way != (1, 1, 1)], dtype=np.float64) - 1.0
-    rows = np.unique([*(tips @ ways.T).argmax(axis=0).tolist(),
+    travels = np.array([travel for travel in np.ndindex(3, 3, 3) if travel != (1, 1, 1)], dtype=np.float64) - 1.0
+    rows = np.unique([*(tips @ travels.T).argmax(axis=0).tolist(),
                       *np.linspace(0, len(tips) - 1, min(len(tips), _SOME)).astype(int).tolist()])
     return replace(one, tip=tips[rows], axes=np.tile(one.axis, (len(rows), 1)), stretches=())

@@ -41,10 +41,10 @@ def held_panel(place: Axes, tried: PassSearch, made: Candidate) -> None:
         at = np.array([_angle(lost.made, joint) for lost in rest])
         place.plot(at, least_held(best, joint, at * DEG), linestyle="", marker="d", markersize=4.5, markerfacecolor="white",
                    color="#555555", label=f"not planned: could not be fast enough, or refused ({len(rest)})")
-    for it, mark, told in ((best, "*", "best"), (made, "o", "plan")):
+    for it, mark, noted in ((best, "*", "best"), (made, "o", "plan")):
         if np.isfinite(it.seconds):
             place.plot(_angle(it, joint), it.seconds, linestyle="", marker=mark, markersize=12.0, markerfacecolor="none",
-                       color="#c2453a", label=told)
+                       color="#c2453a", label=noted)
     place.set_xlabel(plain(f"{name} [degrees]"))
     place.set_ylabel("seconds of the cuts")
     place.set_title(f"angles at which {plain(name)} is held: the tool stands along it,\nso that only the polytope turns",
@@ -53,7 +53,7 @@ def held_panel(place: Axes, tried: PassSearch, made: Candidate) -> None:
 
 
 def _here(tried: PassSearch) -> list[Rejection]:
-    """Losers with the axis of the best one."""
+    """Rejected candidates with the axis of the best one."""
     return [lost for lost in tried.rejected if lost.made.same(tried.best.axis, lost.made.held)]
 
 

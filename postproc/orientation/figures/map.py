@@ -29,7 +29,7 @@ ROUND, OUT = 73, 25
 """grid of the ground"""
 LEVELS = 12
 FLAT = 1e-3
-"""part by which times differ that are not to be told apart"""
+"""part by which times differ that are not to be distinguished"""
 
 
 def axes_map(sheet: Figure, place: PolarAxes, tried: PassSearch, made: Candidate, work: PassContext) -> None:
@@ -41,7 +41,7 @@ def axes_map(sheet: Figure, place: PolarAxes, tried: PassSearch, made: Candidate
     timed = _once([*groups.get("slower", []), *(one for one in (tried.own, tried.best, made) if np.isfinite(one.seconds))])
     most = WIDER * float(max([_polar(timed, frame, work)[1].max() if timed else 0.0, 20.0]))
     place.set_rlim(0.0, min(most, 180.0))
-    told = _ground(place, tried, frame, work, most)
+    noted = _ground(place, tried, frame, work, most)
     _timed(sheet, place, timed, frame, work)
     for kind, (mark, colour) in MARKS.items():
         if kind in groups:
@@ -56,7 +56,7 @@ def axes_map(sheet: Figure, place: PolarAxes, tried: PassSearch, made: Candidate
             place.scatter(*_polar([it], frame, work), marker=mark, s=size, facecolors="none", edgecolors="#c2453a",
                           linewidths=1.3, label=name, zorder=4)
     place.set_title("tool axes tried: degrees from the CL axis outwards,\n"
-                    f"azimuth about it from {_named(frame[1])} to {_named(frame[2])} of the part{told}", fontsize="small")
+                    f"azimuth about it from {_named(frame[1])} to {_named(frame[2])} of the part{noted}", fontsize="small")
     place.tick_params(labelsize="x-small")
     place.legend(loc="upper center", bbox_to_anchor=(0.6, -0.08), ncols=2, fontsize="x-small", frameon=False)
 
@@ -117,7 +117,7 @@ def _polar(made: list[Candidate], frame: tuple[Floats, ...], work: PassContext) 
     return np.arctan2(axis @ y, axis @ x), angle_between(axis, own) / DEG
 
 
-def _named(way: Floats) -> str:
+def _named(travel: Floats) -> str:
     """The axis of the part that a direction is nearest to."""
-    k = int(np.abs(way).argmax())
-    return ("+" if way[k] > 0.0 else "-") + "xyz"[k] + ("" if abs(way[k]) > 1.0 - 1e-9 else " (about)")
+    k = int(np.abs(travel).argmax())
+    return ("+" if travel[k] > 0.0 else "-") + "xyz"[k] + ("" if abs(travel[k]) > 1.0 - 1e-9 else " (about)")

@@ -13,7 +13,7 @@ from postproc.orientation.plans.plans import OrientationPlan
 from postproc.orientation.plans.shares import shares_of
 from postproc.orientation.report.figures_of_choice import NAMES, gain
 from toolpaths.arrays import Floats
-from toolpaths.drawing import BESIDE
+from toolpaths.drawing import ADJACENT
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -29,34 +29,34 @@ def plan_panel(place: Axes, choice: OrientationChoice) -> None:
     left = np.zeros(len(parts))
     for name, colour in (("cutting", "#1f5f8b"), ("turning", "#d08a3c"), ("other", "#bbbbbb")):
         width = np.nan_to_num([getattr(one, name) for one in parts], posinf=0.0, neginf=0.0)
-        place.barh(list(plans), width, left=left, color=colour, label=WAYS[name])
+        place.barh(list(plans), width, left=left, color=colour, label=DIRECTIONS[name])
         left += width
     before = choice.plans["keep"].seconds
     for k, (plan, one) in enumerate(zip(plans.values(), parts, strict=True)):
         saved = gain(plan.seconds, before)
-        place.annotate(_told(plan.seconds, saved, one.turns), (left[k], k), xytext=(4, 0), textcoords="offset points",
+        place.annotate(_noted(plan.seconds, saved, one.turns), (left[k], k), xytext=(4, 0), textcoords="offset points",
                        va="center", fontsize="small")
     place.invert_yaxis()
     place.set_xlim(0.0, 1.42 * max(float(left.max()), 1e-9))
     place.set_xlabel("seconds of the whole part")
     place.set_title("plans", fontsize="medium")
     place.grid(False, axis="y")
-    place.legend(**BESIDE)
+    place.legend(**ADJACENT)
 
 
-def _told(seconds: float, saved: float | None, turns: int) -> str:
+def _noted(seconds: float, saved: float | None, turns: int) -> str:
     """Behind a bar."""
     if not np.isfinite(seconds):
         return "cannot be run"
-    beside = "" if saved is None or abs(saved) < 0.05 else f", {abs(saved):.1f} % {'less' if saved > 0.0 else 'more'}"
-    return f"{seconds:.1f} s{beside}, {turns} turns"
+    adjacent = "" if saved is None or abs(saved) < 0.05 else f", {abs(saved):.1f} % {'less' if saved > 0.0 else 'more'}"
+    return f"{seconds:.1f} s{adjacent}, {turns} turns"
 
 
-WAYS = {"cutting": "cutting", "turning": "turning: back,\nindex, approach", "other": "rapids, home,\ntool changes"}
+DIRECTIONS = {"cutting": "cutting", "turning": "turning: back,\nindex, approach", "other": "rapids, home,\ntool changes"}
 
 
 def angle_panel(place: Axes, choice: OrientationChoice, plan: Orientation) -> None:
-    """Rotary positions of the passes, those of the CL file beside."""
+    """Rotary positions of the passes, those of the CL file next to."""
     picked = choice.plans[plan].picked
     number = np.arange(len(picked))
     for name, colour in zip(picked[0].rotary(), COLOURS, strict=False):
@@ -70,7 +70,7 @@ def angle_panel(place: Axes, choice: OrientationChoice, plan: Orientation) -> No
     (low, high), flat = place.get_ylim(), FLAT if any(choice.work.machine.rotary) else 2.2
     if high - low < flat:
         place.set_ylim(0.5 * (low + high - flat), 0.5 * (low + high + flat))
-    place.legend(**BESIDE)
+    place.legend(**ADJACENT)
 
 
 FLAT = 10.0
@@ -100,7 +100,7 @@ def gain_panel(place: Axes, choice: OrientationChoice, plan: Orientation) -> Non
     low, high = place.get_ylim()
     place.set_ylim(min(0.0, low), max(1.1 * high, 1.0))
     _labelled(place, "pass", "% of the planned cut", "time saved in each pass, without turns")
-    place.legend(**BESIDE)
+    place.legend(**ADJACENT)
 
 
 def _saved(made: Floats, own: Floats) -> Floats:

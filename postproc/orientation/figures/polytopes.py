@@ -1,4 +1,4 @@
-"""Polytopes of a pass in space: the box turned against the mean direction, and the orders of motion beside each other."""
+"""Polytopes of a pass in space: the box turned against the mean direction, and the orders of motion next to each other."""
 
 from __future__ import annotations
 
@@ -131,8 +131,8 @@ def _finish(place: Axes3D, size: float, title: str, tried: PassSearch, work: Pas
     limit = (-size, size)
     place.set(xlim=limit, ylim=limit, zlim=limit, xlabel="x", ylabel="y", zlabel="z")
     place.set_box_aspect((1.0, 1.0, 1.0), zoom=1.15)
-    way = _direction(tried.own, work)
-    place.view_init(elev=24.0, azim=float(np.degrees(np.arctan2(way[1], way[0]))) - 62.0)
+    travel = _direction(tried.own, work)
+    place.view_init(elev=24.0, azim=float(np.degrees(np.arctan2(travel[1], travel[0]))) - 62.0)
     for axis in (place.xaxis, place.yaxis, place.zaxis):
         axis.labelpad = -4.0
         axis.get_major_locator().set_params(nbins=5)

@@ -1,4 +1,4 @@
-"""Bars: seconds that each order of motion alone takes along the mean direction, beside the planned time."""
+"""Bars: seconds that each order of motion alone takes along the mean direction, next to the planned time."""
 
 from __future__ import annotations
 

@@ -94,6 +94,6 @@ def _headline(tried: PassSearch) -> str:
     if tried.best is tried.own:
         return f"{head}: best is the CL file's own orientation, {own} s"
     saved = gain(tried.best.seconds, tried.own.seconds)
-    beside = ", the CL file's own cannot be run" if saved is None else f" instead of {own} s ({percent(saved)} % less)"
+    adjacent = ", the CL file's own cannot be run" if saved is None else f" instead of {own} s ({percent(saved)} % less)"
     kept = ", axis kept" if one.fixed else ""
-    return f"{head}{kept}: best {orientation(tried.best)}, {seconds(tried.best.seconds)} s{beside}"
+    return f"{head}{kept}: best {orientation(tried.best)}, {seconds(tried.best.seconds)} s{adjacent}"

@@ -21,7 +21,7 @@ NO_LIMITS = OrientationLimits()
 
 
 class CollisionBodies(Protocol):
-    """Part, fixtures and table beside cutter, shank and holder."""
+    """Part, fixtures and table next to cutter, shank and holder."""
 
     def touching(self, one: Pass, axis: Floats) -> str:
         """Which pair touches where a pass is run with its tool along `axis` (3,), and by how much; "" where none does."""
@@ -64,13 +64,13 @@ class AllowedAxes:
 
     def outside(self, one: Pass, axis: Floats) -> str:
         """Which limit an axis (3,) breaks worst, by the place, the angle there and what is allowed; "" where none."""
-        worst, told = _SLACK, ""
+        worst, noted = _SLACK, ""
         for bound in self._bounds(one, axis[None]):
             over = bound.over()[0]
             k = int(over.argmax())
             if over[k] > worst:
-                worst, told = float(over[k]), _told(one, bound, k)
-        return told
+                worst, noted = float(over[k]), _noted(one, bound, k)
+        return noted
 
     def mask(self, one: Pass, axes: Floats) -> Bools:
         """(M,) True for the unit axes (M, 3) that are inside the limits at every point of a pass; memory for some of them at
@@ -103,7 +103,7 @@ class AllowedAxes:
         if not len(at):
             return [(-one.axis[None], -np.cos(self.tilt))]
         result = [(-at.normal, -float(np.cos(self.tilt))), (at.normal, float(np.cos(off_centre(limits, one.radius))))]
-        for given, side in ((limits.lead, at.way), (limits.tilt, at.right)):
+        for given, side in ((limits.lead, at.travel), (limits.tilt, at.right)):
             for angle, sign in ((given[0] * DEG, -1.0), (given[1] * DEG, 1.0)) if given is not None else ():
                 result.append((sign * (np.cos(angle) * side - np.sin(angle) * at.normal), 0.0))
         return result
@@ -141,7 +141,7 @@ def lattice(apart: float) -> Floats:
     return np.column_stack((flat * np.cos(turn), flat * np.sin(turn), z))
 
 
-def _told(one: Pass, bound: _Bound, k: int) -> str:
+def _noted(one: Pass, bound: _Bound, k: int) -> str:
     """A broken limit in words."""
     where = f" at line {int(one.contact.line[k])}" if len(one.contact) else ""
     low, high = f"{bound.low / DEG:.3f}", f"{bound.high / DEG:.3f}"

@@ -23,13 +23,13 @@ class Contact:
 
     Attributes:
         normal (K, 3): unit surface normal, out of the material
-        way (K, 3): unit direction of the feed in the tangent plane, NaN where the tool feeds along the normal
+        travel (K, 3): unit direction of the feed in the tangent plane, NaN where the tool feeds along the normal
         line (K,): of the CL file
         unknown: places that were looked at and have no normal
     """
 
     normal: Floats
-    way: Floats
+    travel: Floats
     line: Ints
     unknown: int = 0
 
@@ -43,7 +43,7 @@ class Contact:
 
     def turned(self, rotation: Floats) -> Contact:
         """The same in a frame turned by `rotation` (3, 3)."""
-        return Contact(self.normal @ rotation.T, self.way @ rotation.T, self.line, self.unknown)
+        return Contact(self.normal @ rotation.T, self.travel @ rotation.T, self.line, self.unknown)
 
     def inclination(self, axes: Floats) -> Floats:
         """Angle (M, K) rad between unit axes (M, 3) and the normals; of a ball of radius R the contact is R sin of it
@@ -53,7 +53,7 @@ class Contact:
     def lead(self, axes: Floats) -> Floats:
         """Lead (M, K) rad of unit axes (M, 3): in the plane of feed and normal, positive towards the feed; NaN without a
         feed direction."""
-        return np.asarray(np.arctan2(axes @ self.way.T, axes @ self.normal.T))
+        return np.asarray(np.arctan2(axes @ self.travel.T, axes @ self.normal.T))
 
     def tilt(self, axes: Floats) -> Floats:
         """Tilt (M, K) rad of unit axes (M, 3): in the plane square to the feed, positive to its right; NaN likewise."""
@@ -62,7 +62,7 @@ class Contact:
     @cached_property
     def right(self) -> Floats:
         """(K, 3) unit directions to the right of the feed, the normal upwards; NaN likewise."""
-        return np.cross(self.way, self.normal)
+        return np.cross(self.travel, self.normal)
 
     def parts(self, axes: int) -> int:
         """Axes to look at at a time, of so many."""
@@ -73,12 +73,12 @@ def contact_of(curves: Curves, normal: Floats, line: Ints) -> Contact:
     """The contact at both ends of N cutting moves: unit normals (N, 2, 3), NaN where none is known, and CL lines (N, 2)."""
     begin, end = (each[:, :3] for each in rates(curves, 0.0))
     normal0, line = normal.reshape(-1, 3), line.reshape(-1)
-    way = np.stack((begin, end), axis=1).reshape(-1, 3)
-    known = np.isfinite(normal0).all(axis=1) & (np.abs(way).max(axis=1, initial=0.0) > 0.0)
-    normal, way = normal0[known], way[known]
+    travel = np.stack((begin, end), axis=1).reshape(-1, 3)
+    known = np.isfinite(normal0).all(axis=1) & (np.abs(travel).max(axis=1, initial=0.0) > 0.0)
+    normal, travel = normal0[known], travel[known]
     normal = normal / np.linalg.norm(normal, axis=1, keepdims=True)
-    across = way - np.einsum("ni,ni->n", way, normal)[:, None] * normal
+    across = travel - np.einsum("ni,ni->n", travel, normal)[:, None] * normal
     size = np.linalg.norm(across, axis=1, keepdims=True)
-    level = size > _ALONG * np.linalg.norm(way, axis=1, keepdims=True)
+    level = size > _ALONG * np.linalg.norm(travel, axis=1, keepdims=True)
     return Contact(normal, np.where(level, across / np.where(level, size, 1.0), np.nan), line[known],
                    int((~np.isfinite(normal0).all(axis=1)).sum()))

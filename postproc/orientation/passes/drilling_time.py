@@ -47,7 +47,7 @@ def drilled_of(toolpath: Toolpath, moves: Moves, rows: tuple[int, int]) -> Drill
     fed = np.flatnonzero(inside & (moves.kind[here] != Kind.RAPID))
     fed = fed[fed > 0]
     at = rows[0] + fed
-    way = np.linalg.norm(moves.tip[at] - moves.tip[at - 1], axis=1)
-    seconds = np.where(np.isnan(moves.feed[at]), moves.seconds[at], way / moves.feed[at])
+    travel = np.linalg.norm(moves.tip[at] - moves.tip[at - 1], axis=1)
+    seconds = np.where(np.isnan(moves.feed[at]), moves.seconds[at], travel / moves.feed[at])
     bottoms = moves.cycle[here][inside & (moves.phase[here] == Phase.DRILL)]
     return Drilled(fed, seconds, float(sum(toolpath.cycles[k].dwell for k in bottoms.tolist())))

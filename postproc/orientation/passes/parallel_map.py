@@ -43,7 +43,7 @@ class PassFault(Exception):
 
 def each_pass(function: Callable[[int, T | None], T], work: PassContext, allowed: AllowedAxes, name: str,
               progress: Progress | None = None, workers: int | None = None) -> list[T]:
-    """`function` of the numbers of all passes, in order; `progress` is told `name` and how far it is.
+    """`function` of the numbers of all passes, in order; `progress` is reported `name` and how far it is.
 
     Args:
         function: of the number and of what it gave for the pass before, None for the first of each CHUNK
@@ -98,7 +98,7 @@ def _chunk(passes: range, which: int) -> bytes:
 
 
 def _in_turn(function: Callable[[int, T | None], T], passes: range, work: PassContext) -> Iterator[T]:
-    """Of one pass after the other; faults of planning are told by the line of the pass."""
+    """Of one pass after the other; faults of planning are reported by the line of the pass."""
     before: T | None = None
     for one in work.passes[passes.start:passes.stop]:
         try:
@@ -121,7 +121,7 @@ class _Packer(pickle.Pickler):
 
 
 class _Unpacker(pickle.Unpickler):
-    """The other way."""
+    """In the other direction."""
 
     def __init__(self, packed: bytes, work: PassContext, allowed: AllowedAxes) -> None:
         super().__init__(io.BytesIO(packed))

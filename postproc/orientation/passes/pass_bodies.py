@@ -1,4 +1,4 @@
-"""Bodies beside the passes of a choice of orientations: a tool that stands along one axis only moves, it does not turn."""
+"""Bodies next to the passes of a choice of orientations: a tool that stands along one axis only moves, it does not turn."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class PassBodies:
 
     def __init__(self, work: PassContext, bodies: Scene, forms: dict[int, ToolForm]) -> None:
         self.work, self.bodies, self.forms = work, bodies, forms
-        self._ways: dict[int, Swept] = {}
+        self._travels: dict[int, Swept] = {}
 
     def touching(self, one: Pass, axis: Floats) -> str:
         """Which pair comes nearest to being through each other where a pass is run with its tool along `axis` (3,)."""
@@ -44,18 +44,18 @@ class PassBodies:
         form = self.forms[one.tool]
         if one.fixed or angle_between(axis, one.axis) < _SAME:
             rows = np.arange(*one.rows)
-            way = along_curves(self._curves.take(rows), rows)
+            travel = along_curves(self._curves.take(rows), rows)
         else:
-            way = joined([self._way(one).turned(one.shift(axis), axis), self._legs(one, axis)])
-        drilling = self._drilling[way.row]
-        return touches(self.bodies, form, way, way.take(np.flatnonzero(~drilling)) if drilling.any() else None)
+            travel = joined([self._travel(one).turned(one.shift(axis), axis), self._legs(one, axis)])
+        drilling = self._drilling[travel.row]
+        return touches(self.bodies, form, travel, travel.take(np.flatnonzero(~drilling)) if drilling.any() else None)
 
-    def _way(self, one: Pass) -> Swept:
+    def _travel(self, one: Pass) -> Swept:
         """From the first pose of a pass to its last, with the axis of the file."""
-        if one.number not in self._ways:
+        if one.number not in self._travels:
             rows = np.arange(one.rows[0] + 1, one.rows[1])
-            self._ways[one.number] = along_curves(self._curves.take(rows), rows)
-        return self._ways[one.number]
+            self._travels[one.number] = along_curves(self._curves.take(rows), rows)
+        return self._travels[one.number]
 
     def _legs(self, one: Pass, axis: Floats) -> Swept:
         """Down to the first pose and up from the last."""
@@ -77,7 +77,7 @@ class PassBodies:
 
 
 def pass_bodies(work: PassContext, file: str) -> tuple[PassBodies | None, list[Diagnostic]]:
-    """The bodies of a set-up beside the passes of `work`; None where it (`file`) names none, or a mesh is no good."""
+    """The bodies of a set-up next to the passes of `work`; None where it (`file`) names none, or a mesh is no good."""
     bodies, found = scene(work.setup, work.placement, file)
     if bodies is None:
         return None, found

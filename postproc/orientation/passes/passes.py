@@ -50,9 +50,9 @@ class CuttingStretch:
 
     def directions(self) -> dict[str, Floats]:
         """Unit feed directions (3,): that of the chord ("mean"), and where the stretch begins and ends (section IV.D)."""
-        ways = {"mean": self.tip[-1] - self.tip[0], "initial": self.tip[1] - self.tip[0],
-                "final": self.tip[-1] - self.tip[-2]}
-        return {name: way / size for name, way in ways.items() if (size := float(np.linalg.norm(way))) > 0.0}
+        travels = {"mean": self.tip[-1] - self.tip[0], "initial": self.tip[1] - self.tip[0],
+                   "final": self.tip[-1] - self.tip[-2]}
+        return {name: travel / size for name, travel in travels.items() if (size := float(np.linalg.norm(travel))) > 0.0}
 
 
 @dataclass(frozen=True)
@@ -192,9 +192,9 @@ def _beginnings(toolpath: Toolpath, moves: Moves) -> Ints:
     Rapids that still have another axis than the cuts they lead to belong to the pass before.
     """
     rapid = (moves.kind == Kind.RAPID) & (moves.hole < 0)
-    anew = rapid & np.append(False, np.diff(toolpath.pass_[moves.row]) != 0)
+    again = rapid & np.append(False, np.diff(toolpath.pass_[moves.row]) != 0)
     cut = np.flatnonzero(~rapid)
-    first = np.flatnonzero(anew)
+    first = np.flatnonzero(again)
     first = first[(first > cut[:1].min(initial=len(moves))) & (first < cut[-1:].max(initial=0))]
     leads = cut[np.searchsorted(cut, first)]
     rows = np.arange(len(moves))
@@ -217,9 +217,9 @@ def _stretches(toolpath: Toolpath, moves: Moves, tolerance: Tolerance) -> dict[i
 
 def _cut(path: Smooth, moves: Moves, rows: Ints) -> list[CuttingStretch]:
     """A smoothed chain from stop to stop."""
-    way = np.diff(path.s)
-    moving = way > 0.0
-    feed = np.where(np.isnan(moves.feed[rows]), way / moves.seconds[rows], moves.feed[rows])[moving]
+    travel = np.diff(path.s)
+    moving = travel > 0.0
+    feed = np.where(np.isnan(moves.feed[rows]), travel / moves.seconds[rows], moves.feed[rows])[moving]
     edges = np.append(path.s[0], path.s[1:][moving])
     result = []
     for low, high in pairwise(np.unique(np.concatenate((path.s[:1], path.stops, path.s[-1:]))).tolist()):

@@ -21,7 +21,7 @@ OUT_OF_REACH = "out of reach"
 _ROUNDED = 1e-4
 """rad, by which an axis of a CL file may be off by its decimals"""
 _OVER = 1e6
-"""weight of a joint outside travel beside angles of rotary joints"""
+"""weight of a joint outside travel next to angles of rotary joints"""
 
 
 def held_poses(one: Pass, machine: Machine, axes: Floats, held: float = np.nan) -> list[Solved]:
@@ -63,13 +63,13 @@ def _near(machine: Machine, held: float) -> Floats:
 
 
 def _corners(tips: Floats) -> Floats:
-    """Tips (4, 3): one, and one beside it along each axis, as far as `tips` reach."""
+    """Tips (4, 3): one, and one next to it along each axis, as far as `tips` reach."""
     first = tips[0]
     return np.asarray(first + max(1.0, float(np.ptp(tips, axis=0).max())) * np.vstack((np.zeros(3), np.eye(3))))
 
 
 def _affine(corner: Floats, share: Floats, rotary: Bools) -> Floats:
-    """Joints (B, N, J) from those of the four corners (B, 4, J); `share` (N, 3) of the way to each."""
+    """Joints (B, N, J) from those of the four corners (B, 4, J); `share` (N, 3) of the path to each."""
     result = np.repeat(corner[:, :1], len(share), axis=1)
     slopes = corner[:, 1:, ~rotary] - corner[:, :1, ~rotary]
     result[:, :, ~rotary] += share @ slopes

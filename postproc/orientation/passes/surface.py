@@ -29,7 +29,7 @@ class Surface:
 
     Attributes:
         placement: that frame in that of the moves
-        slack: mm by which a ball may miss the mesh, either way, and still touch it
+        slack: mm by which a ball may miss the mesh, in either direction, and still touch it
     """
 
     mesh: Trimesh

@@ -65,14 +65,14 @@ def all_ends(row: list[Candidate], work: PassContext) -> list[PassEnds]:
     tip = np.stack([(one.tip + one.shift(made.axis))[[0, -1]] for made in row])
     q = np.stack([made.q[[0, -1]] for made in row])
     above = _above(work, one, tip.reshape(-1, 3), axis.reshape(-1, 3), q.reshape(-1, q.shape[2])).reshape(q.shape)
-    result, beside = [], (int(one.rapid[1:2].any()), -1 - int(one.rapid[-1] and len(one.rapid) > 1))
+    result, adjacent = [], (int(one.rapid[1:2].any()), -1 - int(one.rapid[-1] and len(one.rapid) > 1))
     for k, made in enumerate(row):
         if made.refused:
             none = np.full(q.shape[2], np.nan)
             result.append(PassEnds(made.axis, made.held, -1, none, none, none, none, none, none, np.inf, np.inf, np.inf))
             continue
         (free, held), (first, last), (above_first, above_last) = free_angle(made), q[k], above[k]
-        second, last_but_one = made.q[list(beside)]
+        second, last_but_one = made.q[list(adjacent)]
         result.append(PassEnds(made.axis, held, free, first, last, second, last_but_one, above_first, above_last, 0.0, 0.0,
                                made.rapids))
     return _with_legs(result, work.machine)
@@ -80,8 +80,8 @@ def all_ends(row: list[Candidate], work: PassContext) -> list[PassEnds]:
 
 def _with_legs(row: list[PassEnds], machine: Machine) -> list[PassEnds]:
     """With the seconds of coming down and drawing back; inf where no height above is inside travel."""
-    downs = _beside(_ways(row, "above_first", "first", "second"), True, machine).tolist()
-    ups = _beside(_ways(row, "last_but_one", "last", "above_last"), False, machine).tolist()
+    downs = _adjacent(_links(row, "above_first", "first", "second"), True, machine).tolist()
+    ups = _adjacent(_links(row, "last_but_one", "last", "above_last"), False, machine).tolist()
     return [replace(each, down=down, up=up) for each, down, up in zip(row, downs, ups, strict=True)]
 
 
@@ -101,13 +101,13 @@ def _above(work: PassContext, one: Pass, tip: Floats, axis: Floats, q: Floats) -
     return above
 
 
-def ways_between(work: PassContext, edge: list[list[PassEnds]]) -> list[Floats]:
-    """Seconds between the states of neighbouring passes, from home and back; tool changes with the way to their pass."""
+def links_between(work: PassContext, edge: list[list[PassEnds]]) -> list[Floats]:
+    """Seconds between the states of neighbouring passes, from home and back; tool changes with the path to their pass."""
     pause = work.machine.timing.tool_change * _changes(work)
-    ways = [between(None, edge[0], work, True)]
+    links = [between(None, edge[0], work, True)]
     for n in range(1, len(edge)):
-        ways.append(between(edge[n - 1], edge[n], work, work.passes[n].by_home))
-    return [way + p for way, p in zip([*ways, between(edge[-1], None, work, True)], pause, strict=True)]
+        links.append(between(edge[n - 1], edge[n], work, work.passes[n].by_home))
+    return [link + p for link, p in zip([*links, between(edge[-1], None, work, True)], pause, strict=True)]
 
 
 def _changes(work: PassContext) -> Floats:
@@ -138,8 +138,8 @@ def between(before: list[PassEnds] | None, after: list[PassEnds] | None, work: P
 
 
 def unwinding(picked: list[PassEnds], work: PassContext, spun: bool) -> float:
-    """Seconds that the way back home takes longer for joints of endless travel that have been wound up on the way: from pass
-    to pass they go the shortest way.
+    """Seconds that the return home takes longer for joints of endless travel that have been wound up on the path: from pass
+    to pass they go the shortest path.
 
     Args:
         spun: False where nothing says the angle of a joint that the axis leaves free, so that it stays where it is
@@ -167,26 +167,26 @@ def _lifted(before: list[PassEnds], machine: Machine) -> Floats:
 
 def _leaving(before: list[PassEnds], machine: Machine) -> Floats:
     """Seconds (K, 1) from each end to above it and on with the retract axis home."""
-    way = [*_ways(before, "last_but_one", "last", "above_last"), _lifted(before, machine)]
-    return _beside(way, False, machine)[:, None]
+    link = [*_links(before, "last_but_one", "last", "above_last"), _lifted(before, machine)]
+    return _adjacent(link, False, machine)[:, None]
 
 
 def _arriving(after: list[PassEnds], machine: Machine) -> Floats:
     """Seconds (1, K) of the retract axis from home to above each beginning and on down to it."""
-    way = _ways(after, "above_first", "first", "second")
-    k, begin = machine.retract_axis, way[0].copy()
+    link = _links(after, "above_first", "first", "second")
+    k, begin = machine.retract_axis, link[0].copy()
     if k >= 0:
         begin[:, k] = np.where(np.isfinite(begin[:, k]), machine.home[k], np.nan)
-    return _beside([begin, *way], True, machine)[None]
+    return _adjacent([begin, *link], True, machine)[None]
 
 
-def _ways(row: list[PassEnds], *names: str) -> list[Floats]:
+def _links(row: list[PassEnds], *names: str) -> list[Floats]:
     """(K, J) joints of each name."""
     return [np.stack([getattr(each, name) for each in row]) for name in names]
 
 
-def _beside(points: list[Floats], behind: bool, machine: Machine) -> Floats:
-    """Seconds (K,) through points (K, J) beside the rapid of the pass, the last leg (`behind`) or the first, which is
+def _adjacent(points: list[Floats], behind: bool, machine: Machine) -> Floats:
+    """Seconds (K,) through points (K, J) next to the rapid of the pass, the last leg (`behind`) or the first, which is
     counted with the pass."""
     one, other = points[-2:] if behind else points[:2]
     own = _each(one, other, machine)
@@ -194,7 +194,7 @@ def _beside(points: list[Floats], behind: bool, machine: Machine) -> Floats:
 
 
 def _chained(points: list[Floats], machine: Machine) -> Floats:
-    """Seconds (K,) through points (K, J), with a stop where the way does not go straight on."""
+    """Seconds (K,) through points (K, J), with a stop where the path does not go straight on."""
     start, total = points[0], np.zeros(len(points[0]))
     for at, after in zip(points[1:], [*points[2:], None], strict=True):
         stops = np.ones(len(at), dtype=bool) if after is None else ~_straight_on(at - start, after - at)
@@ -204,9 +204,9 @@ def _chained(points: list[Floats], machine: Machine) -> Floats:
 
 
 def _straight_on(one: Floats, other: Floats) -> Bools:
-    """(K,) where way `other` (K, J) has the direction of `one`, or there is no way."""
-    sizes = [np.linalg.norm(way, axis=1, keepdims=True) for way in (one, other)]
-    a, b = (way / np.where(size > 0.0, size, 1.0) for way, size in zip((one, other), sizes, strict=True))
+    """(K,) where path `other` (K, J) has the direction of `one`, or there is no path."""
+    sizes = [np.linalg.norm(link, axis=1, keepdims=True) for link in (one, other)]
+    a, b = (link / np.where(size > 0.0, size, 1.0) for link, size in zip((one, other), sizes, strict=True))
     none = (sizes[0] == 0.0) | (sizes[1] == 0.0)
     return np.asarray((none | (np.abs(a - b).max(axis=1, keepdims=True) <= _STRAIGHT))[:, 0])
 
@@ -225,8 +225,8 @@ def _differ(a: Floats, b: Floats) -> Bools:
 
 def _indexed(q0: Floats, q1: Floats, machine: Machine) -> Floats:
     """As `_moved`, with unclamping and clamping where rotary joints turn."""
-    way = _shortest(q1[None] - q0[:, None], _endless(machine))
-    turns = (np.abs(way[..., np.array(machine.rotary)]) > SAME).any(axis=-1)
+    link = _shortest(q1[None] - q0[:, None], _endless(machine))
+    turns = (np.abs(link[..., np.array(machine.rotary)]) > SAME).any(axis=-1)
     return np.asarray(_moved(q0, q1, machine) + np.where(turns, machine.timing.clamp + machine.timing.unclamp, 0.0))
 
 
@@ -239,10 +239,10 @@ def _moved(q0: Floats, q1: Floats, machine: Machine) -> Floats:
 
 def _each(q0: Floats, q1: Floats, machine: Machine) -> Floats:
     """Seconds (K,) as `_moved`, from each of q0 (K, J) to that of q1 (K, J)."""
-    way = _shortest(q1 - q0, _endless(machine))
-    good, seconds = np.isfinite(way).all(axis=1), np.full(len(way), np.inf)
+    link = _shortest(q1 - q0, _endless(machine))
+    good, seconds = np.isfinite(link).all(axis=1), np.full(len(link), np.inf)
     if good.any():
-        seconds[good] = rest_seconds(np.zeros_like(way[good]), way[good], joint_limits(machine.limits),
+        seconds[good] = rest_seconds(np.zeros_like(link[good]), link[good], joint_limits(machine.limits),
                                      PointToPointMode.STRAIGHT)
     return seconds
 
@@ -252,6 +252,6 @@ def _endless(machine: Machine) -> Bools:
     return np.asarray(np.array(machine.rotary) & ~np.isfinite(machine.limits.upper - machine.limits.lower))
 
 
-def _shortest(way: Floats, endless: Bools) -> Floats:
-    """Ways (..., J), those of endless joints less whole turns."""
-    return np.asarray(np.where(endless, way - 2.0 * np.pi * np.round(way / (2.0 * np.pi)), way))
+def _shortest(link: Floats, endless: Bools) -> Floats:
+    """Paths (..., J), those of endless joints less whole turns."""
+    return np.asarray(np.where(endless, link - 2.0 * np.pi * np.round(link / (2.0 * np.pi)), link))

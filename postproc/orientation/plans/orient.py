@@ -123,11 +123,11 @@ def _fixed(work: PassContext) -> list[Diagnostic]:
 
 
 def _unlinked(work: PassContext, auto: OrientationPlan, runs: bool) -> list[Diagnostic]:
-    """Ways between passes that cannot be run: a warning where a plan without them `runs`, else an error."""
-    bad = np.flatnonzero(~np.isfinite(auto.ways))
+    """Moves between passes that cannot be run: a warning where a plan without them `runs`, else an error."""
+    bad = np.flatnonzero(~np.isfinite(auto.links))
     if not len(bad):
         return []
     lines = list(dict.fromkeys(work.passes[min(k, len(work.passes) - 1)].line for k in bad.tolist()))
-    make, told = (warning, "so that whole plans cannot be compared") if runs else (error, "so that no plan can be run")
-    return [make("orient.ways", f"no height above these passes is inside travel, {told}", file=work.toolpath.file,
+    make, noted = (warning, "so that whole plans cannot be compared") if runs else (error, "so that no plan can be run")
+    return [make("orient.ways", f"no height above these passes is inside travel, {noted}", file=work.toolpath.file,
                  lines=lines[:6], count=len(lines), hint=REACH)]

@@ -1,4 +1,4 @@
-"""Where the seconds of a plan go: cuts, turns of the tool between them, and all other ways."""
+"""Where the seconds of a plan go: cuts, turns of the tool between them, and all other paths."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ class PlanShares:
 
     Attributes:
         cutting: planned cuts
-        turning: all ways on which a rotary joint turns: back, unclamp, index, clamp, approach; from home and back home too
-        other: rapids inside and between passes, other ways from home and back, tool changes
-        turns: how many ways turn
+        turning: all paths on which a rotary joint turns: back, unclamp, index, clamp, approach; from home and back home too
+        other: rapids inside and between passes, other travel from home and back, tool changes
+        turns: how many paths turn
     """
 
     cutting: float
@@ -38,7 +38,7 @@ def shares_of(plan: OrientationPlan) -> PlanShares:
     begins, ends = ([_apart(machine, machine.home, made.q[at]) for made in picked] for at in (0, -1))
     between = [begins[n + 1] or ends[n] if b.one.by_home else turns(a, b) for n, (a, b) in enumerate(pairwise(picked))]
     turned = np.array([begins[0], *between, ends[-1]])
-    turning, cutting = float(plan.ways[turned].sum()), float(plan.cuts.sum())
+    turning, cutting = float(plan.links[turned].sum()), float(plan.cuts.sum())
     return PlanShares(cutting, turning, plan.seconds - cutting - turning, int(turned.sum()))
 
 

@@ -1,4 +1,4 @@
-"""One orientation per pass, out of tables of seconds: shortest way through the passes by dynamic programming."""
+"""One orientation per pass, out of tables of seconds: shortest path through the passes by dynamic programming."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ import numpy as np
 from toolpaths.arrays import Floats
 
 
-def shortest(states: Sequence[Floats], ways: Sequence[Floats]) -> tuple[list[int], float]:
+def shortest(states: Sequence[Floats], links: Sequence[Floats]) -> tuple[list[int], float]:
     """(state of each pass, seconds in all) of least time.
 
     Args:
         states: (K_n,) seconds of each state of pass n
-        ways: seconds between; ways[0] (1, K_0) from home, ways[n] (K_n-1, K_n), the last (K_N-1, 1) back home
+        links: seconds between; paths[0] (1, K_0) from home, paths[n] (K_n-1, K_n), the last (K_N-1, 1) back home
     """
-    best = ways[0][0] + states[0]
+    best = links[0][0] + states[0]
     came = []
-    for cost, way in zip([*states[1:], np.zeros(1)], ways[1:], strict=True):
-        through = best[:, None] + way
+    for cost, link in zip([*states[1:], np.zeros(1)], links[1:], strict=True):
+        through = best[:, None] + link
         came.append(through.argmin(axis=0))
         best = through.min(axis=0) + cost
     at, picked = 0, []
@@ -29,31 +29,31 @@ def shortest(states: Sequence[Floats], ways: Sequence[Floats]) -> tuple[list[int
     return picked[::-1], float(best[0])
 
 
-def seconds(picked: Sequence[int], states: Sequence[Floats], ways: Sequence[Floats]) -> float:
+def seconds(picked: Sequence[int], states: Sequence[Floats], links: Sequence[Floats]) -> float:
     """Seconds in all of given states, added up in the order of `shortest`, so that equal choices give equal numbers."""
-    total = ways[0][0, picked[0]] + states[0][picked[0]]
+    total = links[0][0, picked[0]] + states[0][picked[0]]
     for n in range(1, len(picked)):
-        total = total + ways[n][picked[n - 1], picked[n]] + states[n][picked[n]]
-    return float(total + ways[-1][picked[-1], 0])
+        total = total + links[n][picked[n - 1], picked[n]] + states[n][picked[n]]
+    return float(total + links[-1][picked[-1], 0])
 
 
 def groupwise(picked: Sequence[int], groups: Sequence[tuple[Sequence[int], Sequence[Sequence[int]]]],
-              states: Sequence[Floats], ways: Sequence[Floats]) -> list[int]:
+              states: Sequence[Floats], links: Sequence[Floats]) -> list[int]:
     """`picked` with the states of each group of passes moved together to that of its options which costs least.
 
     Args:
         groups: numbers of passes, and the options: a state for each of them
-        states, ways: seconds as of `shortest`
+        states, links: seconds as of `shortest`
     """
     result = list(picked)
     for members, options in groups:
-        beside = sorted({n for k in members for n in (k, k + 1)})
+        adjacent = sorted({n for k in members for n in (k, k + 1)})
 
-        def local(option: Sequence[int], members: Sequence[int] = members, beside: Sequence[int] = beside) -> float:
+        def local(option: Sequence[int], members: Sequence[int] = members, adjacent: Sequence[int] = adjacent) -> float:
             for k, pick in zip(members, option, strict=True):
                 result[k] = pick
             at = [0, *result, 0]
-            return float(sum(states[k][result[k]] for k in members) + sum(ways[n][at[n], at[n + 1]] for n in beside))
+            return float(sum(states[k][result[k]] for k in members) + sum(links[n][at[n], at[n + 1]] for n in adjacent))
 
         local(min(options, key=local))
     return result

@@ -29,7 +29,7 @@ def ranked(states: list[Candidate]) -> Floats:
 
 
 def pools_of(results: list[PassSearch]) -> list[list[Axis]]:
-    """Axes that every pass of one CL axis may take: the best and the swiftest of its passes, most gain first, and means."""
+    """Axes that every pass of one CL axis may take: the best and the fastest of its passes, most gain first, and means."""
     pools: list[list[Axis]] = [[] for _ in results]
     for group in groups_of([one.own for one in results]):
         here = [results[k] for k in group]
@@ -75,7 +75,7 @@ def groups_of(owns: list[Candidate]) -> list[list[int]]:
 
 
 def states_of(one: PassSearch, allowed: AllowedAxes, pool: list[Axis]) -> list[Candidate]:
-    """Own, best, aimed and swiftest axes of a pass, then those of its pool that are allowed; no axis twice."""
+    """Own, best, aimed and fastest axes of a pass, then those of its pool that are allowed; no axis twice."""
     result: list[Candidate] = []
     for made in (one.own, one.best, one.aimed, one.swift):
         if made is not None and index(result, (made.axis, made.held), -1) < 0:

@@ -8,7 +8,7 @@ from typing import Any
 from postproc.base.options import Orientation
 from postproc.orientation.candidates.candidate_times import Candidate
 from postproc.orientation.candidates.reaches import binding, feed_of, reaches
-from postproc.orientation.candidates.rejections import best_loser, grouped
+from postproc.orientation.candidates.rejections import grouped, runner_up
 from postproc.orientation.candidates.search import PassSearch
 from postproc.orientation.passes.passes import PassContext
 from postproc.orientation.plans.choice import OrientationChoice
@@ -92,7 +92,7 @@ def _pass(tried: PassSearch, made: Candidate, work: PassContext) -> dict[str, An
             "planned": tried.planned, "pruned": tried.pruned, "lost": grouped([tried]),
             "own": _short(tried.own), "best": _short(tried.best), "swift": _short(tried.swift), "paper": _short(tried.aimed),
             "paper_missing": tried.unaimed,
-            "next_best": _short(best_loser(tried)),
+            "next_best": _short(runner_up(tried)),
             "reach": {name: _reach(it) for name, it in (("own", tried.own), ("paper", tried.aimed), ("chosen", made))
                       if it is not None},
             "rejected": [{"orientation_deg": angles(other), "kind": kind, "reason": why}

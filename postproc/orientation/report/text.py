@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from postproc.base.options import Orientation
 from postproc.orientation.candidates.candidate_times import Candidate
 from postproc.orientation.candidates.reaches import binding, feed_of, reaches
-from postproc.orientation.candidates.rejections import KINDS, best_loser, grouped, listed
+from postproc.orientation.candidates.rejections import KINDS, grouped, listed, runner_up
 from postproc.orientation.candidates.search import PassSearch, Rejection, RejectionKind
 from postproc.orientation.plans.choice import OrientationChoice
 from postproc.orientation.plans.plans import OrientationPlan
@@ -20,7 +20,7 @@ from toolpaths.units import DEG
 
 SHOWN = 40
 """passes in the table; where there are more, those that gain most"""
-LOSERS: dict[RejectionKind, int] = {"slower": 8, "bound": 3, "touches": 4, "travel": 3, "reach": 2, "limits": 3}
+REJECTED: dict[RejectionKind, int] = {"slower": 8, "bound": 3, "touches": 4, "travel": 3, "reach": 2, "limits": 3}
 """candidates of a pass in full, by what they lost by"""
 _WHYS = 3
 """reasons of the paper's choice missing"""
@@ -100,22 +100,22 @@ def _row(tried: PassSearch, made: Candidate) -> str:
     kept = f"axis kept: {one.fixed}" if one.fixed else ""
     if not tried.rejected:
         return start + (kept or "no other orientation in reach")
-    after = best_loser(tried)
+    after = runner_up(tried)
     beaten = seconds(None if after is None else after.seconds)
     reasons = "; ".join(filter(None, (listed(grouped([tried])), kept)))
     return f"{start}{seconds(tried.best.seconds):>12} {beaten:>9}  {reasons or '-'}"
 
 
 def _in_full(tried: PassSearch, made: Candidate) -> list[str]:
-    """One pass: what its orientations reach along the mean direction, and each loser with its reason."""
+    """One pass: what its orientations reach along the mean direction, and each rejected candidate with its reason."""
     one = tried.own.one
     lines = [f"pass {one.number}, line {one.line}" + (f", axis kept: {one.fixed}" if one.fixed else "")]
     for name, it in _named(tried, made):
         lines += [f"  {name}: {orientation(it)}, {_state(it)}", *_reached(it)]
     lines += [f"  paper: none, {tried.unaimed}"] if tried.unaimed else []
-    losers = sorted(tried.rejected, key=_rank)
-    for kind, most in LOSERS.items():
-        some = [lost for lost in losers if lost.kind == kind]
+    rejected_starts = sorted(tried.rejected, key=_rank)
+    for kind, most in REJECTED.items():
+        some = [lost for lost in rejected_starts if lost.kind == kind]
         lines += [f"  lost, {kind}: {orientation(lost.made)}{_off(lost.made)} {lost.why}" for lost in some[:most]]
         lines += [f"  lost, {kind}: {len(some) - most} more, all in --json"] if len(some) > most else []
     return lines

@@ -1,9 +1,9 @@
 """How far the tool may stray from its law between the places looked at, where the machine is not the one of the law.
 
 The law of a block (straight tip, straight joints, arc) is that of the machine without errors, as the control holds it. What
-the machine as it is adds to it, E, changes with the joints no faster than `error_rates` says, and by the way that joints
-were moved last. Where E is L-Lipschitz in the time of a piece of length h, it stays within L h / 2 of the straight line
-between its values at both ends. Pieces are looked at in their middle too, so h is half of them.
+the machine as it is adds to it, E, changes with the joints no faster than `error_rates` says, and by the approach direction
+that joints were moved last. Where E is L-Lipschitz in the time of a piece of length h, it stays within L h / 2 of the
+straight line between its values at both ends. Pieces are looked at in their middle too, so h is half of them.
 """
 
 from __future__ import annotations
@@ -48,13 +48,13 @@ def strays(motion: Motion, executed: BlockPoses, rows: Ints, times: tuple[Floats
     away = np.linalg.norm(tips[1] - tips[0], axis=1)
     travel = _travel(motion, executed, rows, times[2] - times[0], kinds, q, away)
     rates = executed.error_rates(motion, rows, q[1], travel.half)
-    way = [executed.way(motion, rows, t) for t in times]
-    turned = np.maximum(np.abs(way[1] - way[0]), np.abs(way[2] - way[1]))
+    approach = [executed.approach(motion, rows, t) for t in times]
+    turned = np.maximum(np.abs(approach[1] - approach[0]), np.abs(approach[2] - approach[1]))
     # A joint that goes back by no more than that is as far from one that does not (the play operator is a contraction).
     turned = np.minimum(2.0, turned + 4.0 * travel.back / executed.gaps(motion, rows, q[1], travel.half))
     with np.errstate(invalid="ignore"):  # infinity times 0: a joint that has no error, known nowhere
-        tip[mine] = 0.5 * (rates.tip * travel.half).sum(axis=1) + (rates.tip_way * turned).sum(axis=1)
-        axis[mine] = 0.5 * (rates.axis * travel.half).sum(axis=1) + (rates.axis_way * turned).sum(axis=1)
+        tip[mine] = 0.5 * (rates.tip * travel.half).sum(axis=1) + (rates.tip_reversal * turned).sum(axis=1)
+        axis[mine] = 0.5 * (rates.axis * travel.half).sum(axis=1) + (rates.axis_reversal * turned).sum(axis=1)
     return np.nan_to_num(tip, nan=np.inf), np.nan_to_num(axis, nan=np.inf)
 
 

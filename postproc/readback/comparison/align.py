@@ -25,7 +25,7 @@ def align(tip: Floats, axis: Floats, sweep: Floats, curves: Curves, link: Bools,
 
     Args:
         tip, axis (E, 3): poses at the ends of the executed blocks
-        sweep (E,): rad, of blocks that are arcs, NaN for others: tells their turns, the tips tell the rest
+        sweep (E,): rad, of blocks that are arcs, NaN for others: says their turns, the tips say the rest
         curves, link (M): the reference motion of each move; linked ones only have to arrive
         tolerance, axis_tolerance: mm, rad: how near to its end a move counts as done
         grain: mm, rad: moves below this may have vanished in the rounding of the words

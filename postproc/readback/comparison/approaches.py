@@ -1,4 +1,4 @@
-"""Which blocks of a linking move belong to the cut that it leads to: those of the way down to it at feed."""
+"""Which blocks of a linking move belong to the cut that it leads to: those of the approach to it at feed."""
 
 from __future__ import annotations
 

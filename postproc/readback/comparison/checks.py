@@ -113,11 +113,11 @@ def check_holes(motion: Motion, job: Job, moves: Moves, tip: Floats, owner: Ints
 
 
 def _turning_points(depth: Floats) -> Bools:
-    """True (N,) where the tool turns back after going deeper, (N,) mm; what is less than _TURNS_BACK goes neither way."""
+    """True (N,) where the tool turns back after going deeper, (N,) mm; what is less than _TURNS_BACK goes neither path."""
     step = np.diff(depth, prepend=-np.inf, append=-np.inf)
     last = np.maximum.accumulate(np.where(np.abs(step) > _TURNS_BACK, np.arange(len(step)), 0))
-    way = np.sign(step[last])
-    return np.asarray((way[:-1] > 0.0) & (way[1:] < 0.0))
+    travel = np.sign(step[last])
+    return np.asarray((travel[:-1] > 0.0) & (travel[1:] < 0.0))
 
 
 def check_travel(motion: Motion, executed: BlockPoses, moves: Moves, owner: Ints, faults: Faults) -> list[Diagnostic]:
@@ -179,7 +179,7 @@ def check_speeds(motion: Motion, moves: Moves, owner: Ints, match: Ints, seconds
 
     Chords within the tolerance e of an arc are shorter than its length r s by up to s e / 3: e = c^2 / (8 r) and the arc
     of a chord c is c (1 + c^2 / (24 r^2)). Where one move ends and the next begins is known to the tolerance only: time that
-    short ones lack may be found beside them, also as feed at the ends of a rapid.
+    short ones lack may be found next to them, also as feed at the ends of a rapid.
     """
     cutting = (owner < len(moves)) & (motion.code > 0)
     total = np.bincount(owner[cutting], weights=seconds[cutting], minlength=len(moves) + 1)[:len(moves)]
@@ -237,14 +237,14 @@ def _seconds(motion: Motion, control: Control, by_radius: bool, rows: Ints, swee
 def check_links(motion: Motion, executed: BlockPoses, moves: Moves, owner: Ints, space: SafeSpace, tolerance: float,
            faults: Faults) -> list[Diagnostic]:
     """Linking blocks, those after the last point too, stay on the line of retract, clear of the path, or on the line of
-    approach; within what corrections of geometric errors change on the way, besides the tolerance."""
+    approach; within what corrections of geometric errors change on the path, besides the tolerance."""
     rows = np.flatnonzero((owner == len(moves)) | ((owner < len(moves)) & moves.link[np.minimum(owner, len(moves) - 1)]))
     rows = rows[rows > 0]
     bad = np.zeros(len(rows), dtype=bool)
     m = owner[rows]
     ends = m >= len(moves)
     to = np.minimum(m, len(moves) - 1)
-    near = tolerance + executed.corrected_on_the_way(motion, rows)
+    near = tolerance + executed.corrected_between(motion, rows)
     for t in executed.times(motion, rows):
         tip, axis = executed.poses(motion, rows, t)
         low = ~space.clear(tip, axis, -tolerance)

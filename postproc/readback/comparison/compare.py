@@ -151,21 +151,21 @@ def _taken_up(job: Job, motion: Motion, tip: Floats) -> Bools:
     decimal by which the level of a hole differs from that of the hole before.
 
     With errors, a rapid that a longer one follows, a feed that a longer feed follows, and a rapid between a longer one and a
-    feed (the last part of the way to the plane of a hole) may move it by as much as a level in the air, to which the tool
+    feed (the last part of the path to the plane of a hole) may move it by as much as a level in the air, to which the tool
     came as part of a hole, may be off by.
     """
-    way = np.linalg.norm(np.diff(tip, axis=0, prepend=np.inf), axis=1)
+    travel = np.linalg.norm(np.diff(tip, axis=0, prepend=np.inf), axis=1)
     if job.errors is None:
-        return np.asarray(way <= 2.0 * job.rounding.tip)
+        return np.asarray(travel <= 2.0 * job.rounding.tip)
     from postproc.correction.compensation import SHARE
     from postproc.correction.cycles import IN_AIR
 
     still, air = (share * SHARE * job.options.tolerance + 2.0 * job.rounding.tip for share in (1.0, IN_AIR))
-    rapid, feed, far = motion.code == TRAVERSE, motion.code == FEED, way > air
+    rapid, feed, far = motion.code == TRAVERSE, motion.code == FEED, travel > air
     rapid_next, feed_next = (np.append((code & far)[1:], False) for code in (rapid, feed))
     ends = rapid & np.append(False, (rapid & far)[:-1]) & feed_next
     begins = (rapid & rapid_next) | (feed & feed_next)
-    return np.asarray((way <= still) | ((begins | ends) & ~far))
+    return np.asarray((travel <= still) | ((begins | ends) & ~far))
 
 
 def _aligned(kept: Ints | slice, tip: Floats, axis: Floats, sweep: Floats, moves: Moves, tolerance: float,
@@ -205,7 +205,7 @@ def _not_reached(motion: Motion, moves: Moves, match: Ints, lost: int, faults: F
 def _bound(motion: Motion, executed: BlockPoses, moves: Moves, owner: Ints, allowed: tuple[float, float],
            corrects: bool) -> DeviationBound:
     """Bounds of every block of the moves that are no links. From hole to hole dog-legs are looked at in height alone; so are
-    all ways where geometric errors are corrected: a control that drills the holes takes up lost motion on its way."""
+    all paths where geometric errors are corrected: a control that drills the holes takes up lost motion on its path."""
     rows = np.flatnonzero((owner < len(moves)) & ~moves.link[np.minimum(owner, len(moves) - 1)])
     begin, share = _place(motion, executed, rows, owner, moves)
     free = executed.bent(motion, rows) | corrects
@@ -278,8 +278,8 @@ def _place(motion: Motion, executed: BlockPoses, rows: Ints, owner: Ints, moves:
         (begin, _), (end, _) = (executed.poses(motion, rows[on], t) for t in (0.0, 1.0))
         arc = moves.curves(owner[rows[on]])
         around = arc_sweeps(motion, executed.control)[rows[on]] * np.linalg.norm(arc.start - arc.center, axis=1)
-        way = np.where(np.isnan(around), np.linalg.norm(end - begin, axis=1), around)
-        length[on] = np.maximum(np.nan_to_num(way), 1e-9)
+        travel = np.where(np.isnan(around), np.linalg.norm(end - begin, axis=1), around)
+        length[on] = np.maximum(np.nan_to_num(travel), 1e-9)
     new = np.diff(owner[rows], prepend=-1) != 0
     start, inverse = np.flatnonzero(new), np.cumsum(new) - 1
     total = np.cumsum(length)

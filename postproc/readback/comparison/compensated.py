@@ -25,13 +25,14 @@ def check_compensated(motion: Motion, job: Job, faults: Faults) -> list[Diagnost
     leads = np.unique(leads[leads < len(motion)])
     leads, ends = leads[arc[leads]], motion.compensation[leads[arc[leads]]] == OFF
     across = np.flatnonzero(arc & (motion.compensation != OFF) & (motion.plane != 17))
-    told = ((leads[~ends & ~np.bool_(rules.begins_on_arc)], "cutter compensation begins on an arc, which this controller "
-             "cannot"),
-            (leads[ends & ~np.bool_(rules.ends_on_arc)], "cutter compensation ends on an arc, which this controller cannot"),
-            (across, "an arc out of the XY plane while cutter compensation is on"))
+    noted = ((leads[~ends & ~np.bool_(rules.begins_on_arc)], "cutter compensation begins on an arc, which this controller "
+              "cannot"),
+             (leads[ends & ~np.bool_(rules.ends_on_arc)],
+              "cutter compensation ends on an arc, which this controller cannot"),
+             (across, "an arc out of the XY plane while cutter compensation is on"))
     return [faults.error("verify.cutcom_arc", said, 0, int(motion.line[rows[0]]), len(rows),
                          hint="a straight move must lead to the contour and away from it" if rows is not across else
-                         "G40 before it") for rows, said in told if len(rows)]
+                         "G40 before it") for rows, said in noted if len(rows)]
 
 
 def _lead(motion: Motion, control: Control, row: int) -> int:

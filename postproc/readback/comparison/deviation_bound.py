@@ -250,14 +250,14 @@ def _compared(curves: Curves, poses: list[tuple[Floats, Floats]], u: list[Floats
     """Deviations and bounds of N pieces from the poses of their curves at `u`, where they begin, in their middle, where they
     end; `even`: the difference of the tips is straight."""
     n = len(even)
-    way = curve_parameter(u[0], np.where(even_parameter, 0.5 * (u[0] + u[2]), u[1]), u[2])
-    on = [curves.at(np.clip(v, 0.0, 1.0)) for v in (u[0], np.asarray(way.value + np.zeros(n)), u[2])]
+    travel = curve_parameter(u[0], np.where(even_parameter, 0.5 * (u[0] + u[2]), u[1]), u[2])
+    on = [curves.at(np.clip(v, 0.0, 1.0)) for v in (u[0], np.asarray(travel.value + np.zeros(n)), u[2])]
     tip_off = np.max([lengths(p[0] - c[0]) for p, c in zip(poses, on, strict=True)], axis=0)
     axis_off = np.max([lengths(p[1] - c[1]) for p, c in zip(poses, on, strict=True)], axis=0)
     turn = angle_between(curves.axis0, curves.axis1)
-    differences = law.tip - tip_reference(curves, way), law.axis - axis_reference(curves, way, turn)
+    differences = law.tip - tip_reference(curves, travel), law.axis - axis_reference(curves, travel, turn)
     bend = [np.where(law.known, _bend(jet) + np.zeros(n), np.inf) for jet in differences]
-    # A straight tip beside a straight line: with both parameters even the difference is straight, so largest at an end.
+    # A straight tip next to a straight line: with both parameters even the difference is straight, so largest at an end.
     bend[0] = np.where(even & law.known, 0.0, bend[0])
     return _Values(_known(tip_off), _angle(_known(axis_off)), _known(tip_off + bend[0] / 32.0 + law.strays[0]),
                    _angle(_known(axis_off + bend[1] / 32.0 + law.strays[1])))

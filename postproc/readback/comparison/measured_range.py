@@ -30,13 +30,13 @@ def check_measured(motion: Motion, executed: ActualBlockPoses, job: Job, faults:
             actual = executed.actual(number)
             beyond[k] += actual.outside(actual.coordinates(q[k], near[k]), CORRECTED)
         low, high = np.fmin(low, q), np.fmax(high, q)
-    told, known = [], measured(executed.model)
+    noted, known = [], measured(executed.model)
     for j in np.flatnonzero(beyond.any(axis=0)).tolist():
         there = np.flatnonzero(beyond[:, j])
         span = " to ".join(f"{x * unit[j]:.7g}" for x in known.get(names[j], ()))
-        told.append(faults.warning(
+        noted.append(faults.warning(
             "compensation.range", f"{names[j]} goes from {low[there, j].min() * unit[j]:.7g} to "
             f"{high[there, j].max() * unit[j]:.7g} where its errors were not measured" + (
                 f": they were from {span}" if span else "") + "; the error at the end of the range was taken for the proof",
             0, int(motion.line[rows[there[0]]]), len(there)))
-    return told
+    return noted

@@ -52,7 +52,7 @@ def _around(k: int, rapid: Bools, tip: Floats, axis: Floats, stops: Floats, angl
             grain: tuple[float, float]) -> tuple[int, int] | None:
     """(first, last) block of the rewind round block k; the pose is that where block first - 1 ends.
 
-    The tool comes back in one run of feed blocks: the next rapid behind them ends the search. On the way it stands in other
+    The tool comes back in one run of feed blocks: the next rapid behind them ends the search. On the path it stands in other
     poses twice too. The innermost that is a position of the CL file counts, for what lies outside it is motion of the CL
     file; without any the outermost.
     """
@@ -90,9 +90,9 @@ def check_rewinds(motion: Motion, executed: BlockPoses, number: Ints, tip: Float
         now, along = executed.poses(motion, rows, t)
         offset = now - pose
         height = np.maximum(np.einsum("ni,ni->n", offset, direction), 0.0)
-        beside = np.linalg.norm(offset - height[:, None] * direction, axis=1) > tolerance
+        adjacent = np.linalg.norm(offset - height[:, None] * direction, axis=1) > tolerance
         turned = np.linalg.norm(along - direction, axis=1) > axis_grain
-        bad |= (beside | turned) & ~space.clear(now, along, -tolerance)
+        bad |= (adjacent | turned) & ~space.clear(now, along, -tolerance)
     if not bad.any():
         return []
     k = int(np.flatnonzero(bad)[0])

@@ -126,7 +126,7 @@ class _Slack:
 
     @classmethod
     def of(cls, job: Job, inch: bool = False) -> _Slack:
-        """Of a job; programs that correct geometric errors take up lost motion on the way."""
+        """Of a job; programs that correct geometric errors take up lost motion on the path."""
         unit = INCH if inch else 1.0
         if job.errors is not None and job.errors.corrected_by == "post":
             return cls(0.25, 0.002, 10.0 * unit * 10.0**-job.controller.format.linear_decimals)
@@ -200,20 +200,20 @@ def _needed(motion: Motion, executed: BlockPoses, moves: Moves, owner: Ints, cut
 def _allowed(owner: Ints, cutting: Bools, needs: Floats, tip: Floats, seconds: Floats, asked: Floats, again: Floats,
              moves: int) -> Floats:
     """(M,) s: each block of a move its part of the time asked for, by the length of the tip's path, or what axes need."""
-    way = np.concatenate([[0.0], lengths(np.diff(tip, axis=0))])
-    whole = _by_move(owner, cutting, way, moves)
+    travel = np.concatenate([[0.0], lengths(np.diff(tip, axis=0))])
+    whole = _by_move(owner, cutting, travel, moves)
     turning = _by_move(owner, cutting, needs, moves)
     here = np.flatnonzero(cutting)
     m = owner[here]
     with np.errstate(divide="ignore", invalid="ignore"):
-        part = np.where(whole[m] > STILL, way[here] / whole[m], np.where(turning[m] > 0.0, needs[here] / turning[m], 1.0))
+        part = np.where(whole[m] > STILL, travel[here] / whole[m], np.where(turning[m] > 0.0, needs[here] / turning[m], 1.0))
     long = np.fmax(part * asked[m] * again[m], needs[here])
     return np.asarray(np.bincount(m, weights=long, minlength=moves + 1)[:moves] / again)
 
 
 def check_fed_rapids(motion: Motion, executed: BlockPoses, job: Job, moves: Moves, owner: Ints, tip: Floats, seconds: Floats,
                      down: Bools, faults: Faults) -> list[Diagnostic]:
-    """Feed moves for rapids, or on the way between operations, that are faster than the axes, or slower than both they
+    """Feed moves for rapids, or on the path between operations, that are faster than the axes, or slower than both they
     and, where they lead `down` (E,) to a cut, its feed."""
     if job.errors is not None and job.errors.corrected_by == "post":
         return []
@@ -223,15 +223,15 @@ def check_fed_rapids(motion: Motion, executed: BlockPoses, job: Job, moves: Move
     if not rows.any():
         return []
     needs = _least(motion, executed, rows)
-    way = np.concatenate([[np.inf], lengths(np.diff(tip, axis=0))])
+    travel = np.concatenate([[np.inf], lengths(np.diff(tip, axis=0))])
     feed = np.where(down & (moves.feed[m] > 0.0), moves.feed[m], np.inf)
     grain = _Slack.of(job, bool(motion.inch.any())).length
     spot = np.where(down & (moves.seconds[m] > 0.0), moves.seconds[m], 0.0)
-    allowed = np.fmax(np.fmax(needs, spot), way / feed)
+    allowed = np.fmax(np.fmax(needs, spot), travel / feed)
     least = executed.control.machine.limits.velocity[executed.control.slides].min(initial=np.inf)
     slack = grain / np.minimum(feed, least) + 1e-4
     bad, fast = (np.flatnonzero(rows & wrong) for wrong in (
-        seconds > 1.003 * allowed + slack, 1.02 * seconds + slack < np.where(np.isfinite(feed), way / feed, needs)))
+        seconds > 1.003 * allowed + slack, 1.02 * seconds + slack < np.where(np.isfinite(feed), travel / feed, needs)))
     if len(fast):
         k = int(fast[0])
         return [faults.error("verify.feed", f"a feed move where the CL file is rapid takes {seconds[k]:.3f} s, the axes "

@@ -1,4 +1,4 @@
-"""Tapped holes: pitch, hand and kind of tapping, which the way of the tool does not show."""
+"""Tapped holes: pitch, hand and kind of tapping, which the path of the tool does not show."""
 
 from __future__ import annotations
 

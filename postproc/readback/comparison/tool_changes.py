@@ -14,7 +14,7 @@ from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic
 
 AWAY = 0.01
-"""mm or degrees beside home that rounding explains"""
+"""mm or degrees next to home that rounding explains"""
 
 
 def check_changes(code: Canonical, motion: Motion, job: Job, home: Floats, faults: Faults) -> list[Diagnostic]:
@@ -45,7 +45,7 @@ def check_changes(code: Canonical, motion: Motion, job: Job, home: Floats, fault
 
 
 def _corrected(job: Job, place: Floats, tool: Ints) -> Floats:
-    """(N, J) mm or degrees beside home that the correction of geometric errors explains.
+    """(N, J) mm or degrees next to home that the correction of geometric errors explains.
 
     A retract as high as home is corrected, home itself is not. It is what the machine with errors needs at the places
     (N, J), its lost motion included.
@@ -55,14 +55,14 @@ def _corrected(job: Job, place: Floats, tool: Ints) -> Floats:
     from machines.geometric_error.actual.correction import correct
 
     control, gauge, names = job.control, job.machine.kinematics, job.machine.axis_names
-    two_way, result = job.errors.axes.two_way(names), np.zeros(place.shape)
+    bidirectional, result = job.errors.axes.bidirectional(names), np.zeros(place.shape)
     for number in np.unique(tool).tolist():
         k = np.flatnonzero((tool == number) & np.isfinite(place).all(axis=1))
         kin, words = job.kinematics_of(number), place[k] - control.work_offset
         q = control.joints(words, gauge, 0.0)
         found = correct(job.errors.on(kin), q, *kin.forward(q), beyond=True).q
         result[k] = np.abs(np.nan_to_num(control.words(found, gauge, 0.0) - words))
-        result[k[:, None], two_way] += job.errors.axes.gaps(names, q, two_way) * control.unit[two_way]
+        result[k[:, None], bidirectional] += job.errors.axes.gaps(names, q, bidirectional) * control.unit[bidirectional]
     return result
 
 
@@ -95,7 +95,7 @@ def lifting(job: Job) -> Ints:
 
 def _distance(job: Job, axes: Ints, away: Floats) -> str:
     k = int(away.argmax())
-    return f": {job.machine.axis_names[axes[k]]} is {away[k]:.3f} beside it"
+    return f": {job.machine.axis_names[axes[k]]} is {away[k]:.3f} next to it"
 
 
 def _on(code: Canonical, numbers: tuple[float, ...], off: float, blocks: Ints) -> Floats:

@@ -46,7 +46,7 @@ class Reader(ABC):
         rises_first: canned cycles as RS274/NGC has them, see `Offsets`
         arc_slack: mm by which the radius may differ between the ends of an arc
         sides, smoothing_hint: what the control calls cutter compensation and its own smoothing
-        units_codes, units_from: what states mm or inches, and what tells them where nothing does
+        units_codes, units_from: what states mm or inches, and what says them where nothing does
         units_stay: that is a setting of the control, which no program changes
         stating: by group, the words that state it; a block that relies on one that nothing states is an error in `verify`
         leaving: by law, the codes that switch it off; modes_named: what the control calls it

@@ -263,14 +263,14 @@ class FanucReader(IsoReader):
                                hint="G53.1 alone, right behind G68.2"))
 
     def reference(self, words: Words, new: New, drop: Bools, line: Ints, file: str, found: list[Diagnostic]) -> None:
-        """G91 G28 Z0.: rapidly to the reference position, which is the machine's home; by way of a point is refused."""
+        """G91 G28 Z0.: rapidly to the reference position, which is the machine's home; through a point is refused."""
         blocks, mode = codes(words, "G", (90, 91))
         motions, motion = codes(words, "G", self.groups["motion"])
         for b in codes(words, "G", (28,))[0].tolist():
             at = int(np.searchsorted(blocks, b, side="right")) - 1
             stated = take(words, drop, b, "".join(self.axes))
             if at < 0 or mode[at] != 91 or any(stated.values()) or self.home is None:
-                found.append(error("gcode.reference", "G28 by way of a point", file=file, lines=[int(line[b])],
+                found.append(error("gcode.reference", "G28 through a point", file=file, lines=[int(line[b])],
                                    hint="G91 G28 Z0."))
                 continue
             new += [(b, "G", 53.0), (b, "G", 0.0)]

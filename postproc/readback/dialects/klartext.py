@@ -110,7 +110,7 @@ class KlartextReader(Reader):
         return []
 
     def check(self, words: Words, file: str) -> list[Diagnostic]:
-        """Codes and words; FMAX stands for G0 beside the G1 of its block."""
+        """Codes and words; FMAX stands for G0 next to the G1 of its block."""
         plain = words.take((words.letter != ord(STATEMENT)) & ((words.letter != ord("G")) | (words.value > 3)))
         letter = np.where(plain.letter >= 97, plain.letter - 32, plain.letter).astype(np.uint8)
         return super().check(Words(letter, plain.value, plain.line, plain.lines), file)

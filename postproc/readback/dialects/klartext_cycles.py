@@ -69,7 +69,7 @@ def _centre(q: Q, speed: float) -> Made:
 
 
 def _ream(q: Q, speed: float) -> Made:
-    """Q208 0: out at the feed of the way in."""
+    """Q208 0: out at the feed of the approach."""
     plane, bottom, out = _levels(q)
     feed = _feed(q.get("Q206", 0.0))
     back = q.get("Q208", 0.0)

@@ -109,7 +109,7 @@ class SiemensRun:
         length = [value for at, value in self.length if at <= b]
         low, high = np.searchsorted(self.words.line, [b, b + 1])
         if length and length[-1] >= 0.0 and ord("Z") in self.words.letter[low:high]:
-            self.fault("gcode.machine_position", b, "SUPA with a tool length in force", "write D0 beside SUPA")
+            self.fault("gcode.machine_position", b, "SUPA with a tool length in force", "write D0 next to SUPA")
 
     def turned_lengths(self) -> None:
         """G18 and G19 turn the length of the tool in force out of Z, and under TRAORI its direction."""

@@ -19,9 +19,9 @@ from toolpaths.arrays import Bools, Floats, Ints
 
 ARC = 2
 LOOKS = 16
-"""parts of a block whose joints do not run straight, for the ways of its axes"""
+"""parts of a block whose joints do not run straight, for the approach directions of its axes"""
 ARC_LOOKS = 0.25, 0.5, 0.75, 1.0
-"""where the way of joints in a block is added up"""
+"""where the approach direction of joints in a block is added up"""
 PLACES = 3
 """whose poses are kept"""
 AT_ONCE = 50_000
@@ -36,23 +36,24 @@ class ActualBlockPoses(BlockPoses):
     motion: Motion = field(kw_only=True)
 
     def poses(self, motion: Motion, rows: Ints, t: float | Floats) -> tuple[Floats, Floats]:
-        """(tip, axis) (K, 3) of the blocks `rows` at fraction t, errors in, by the way that each axis last moved."""
-        near, q, way = self._at(motion, rows, t)
+        """(tip, axis) (K, 3) of the blocks `rows` at fraction t, errors in, by the approach direction that each axis last
+        moved."""
+        near, q, approach = self._at(motion, rows, t)
         tip, axis = np.empty((len(rows), 3)), np.empty((len(rows), 3))
         for number in np.unique(motion.tool[rows]).tolist():
             k = np.flatnonzero(motion.tool[rows] == number)
             actual = self.actual(number)
-            tip[k], axis[k], _ = actual.place(actual.coordinates(q[k], near[k]), way[k])
+            tip[k], axis[k], _ = actual.place(actual.coordinates(q[k], near[k]), approach[k])
         return tip, axis
 
     def _at(self, motion: Motion, rows: Ints, t: float | Floats) -> tuple[Floats, Floats, Floats]:
-        """(nominal pose (K, 6), joints (K, J), their ways (K, J)); those of the places asked for last are kept: bounds ask
-        for the same ones several times."""
+        """(nominal pose (K, 6), joints (K, J), their approach directions (K, J)); those of the places asked for last are
+        kept: bounds ask for the same ones several times."""
         for kept, time, found in self._seen:
             if kept is rows and time is t:
                 return found
         found = (np.concatenate(self.nominal(motion, rows, t), axis=1), super().joints(motion, rows, t),
-                 self._way(motion, rows, t))
+                 self._approach(motion, rows, t))
         if len(rows) <= AT_ONCE:
             self._seen[:] = [*self._seen[1 - PLACES:], (rows, t, found)]
         return found
@@ -86,25 +87,25 @@ class ActualBlockPoses(BlockPoses):
         return joined((k, self.actual(tool).error_rates(q[k], reach[k]) or unknown_rates(len(k), q.shape[1]))
                       for k, (tool,) in alike(motion.tool[rows]))
 
-    def way(self, motion: Motion, rows: Ints, t: float | Floats) -> Floats:
+    def approach(self, motion: Motion, rows: Ints, t: float | Floats) -> Floats:
         """See `BlockPoses`."""
         return self._at(motion, rows, t)[2]
 
     def gaps(self, motion: Motion, rows: Ints, q: Floats, reach: Floats) -> Floats:
         """See `BlockPoses`: at q, less what it may change by within `reach`."""
         result = np.full(q.shape, np.inf)
-        if self._two_way:
-            here = self.model.axes.gaps(self.control.machine.axis_names, q, self._two_way)
-            result[:, self._two_way] = np.maximum(here - STEEPEST_GAP * reach[:, self._two_way], min(GRAIN))
+        if self._bidirectional:
+            here = self.model.axes.gaps(self.control.machine.axis_names, q, self._bidirectional)
+            result[:, self._bidirectional] = np.maximum(here - STEEPEST_GAP * reach[:, self._bidirectional], min(GRAIN))
         return result
 
-    def corrected_on_the_way(self, motion: Motion, rows: Ints) -> Floats:
+    def corrected_between(self, motion: Motion, rows: Ints) -> Floats:
         """(K,) mm: what errors come to at both ends together; axes with rapids of their own take it up one by one."""
         return np.asarray(sum(np.linalg.norm(self.poses(motion, rows, t)[0] - self.nominal(motion, rows, t)[0], axis=1)
                               for t in (0.0, 1.0)))
 
     def looks(self, motion: Motion, rows: Ints) -> Iterator[tuple[Ints, Floats]]:
-        """See `BlockPoses`: errors may change their course on the way."""
+        """See `BlockPoses`: errors may change their course on the approach direction."""
         step, before = np.zeros((len(rows), len(self.control.machine.axis_names))), self.joints(motion, rows, 0.0)
         for t in ARC_LOOKS:
             here = self.joints(motion, rows, t)
@@ -116,12 +117,13 @@ class ActualBlockPoses(BlockPoses):
         return self.model.on(self.kinematics(number))
 
     @cached_property
-    def _two_way(self) -> list[int]:
-        return self.model.axes.two_way(self.control.machine.axis_names)
+    def _bidirectional(self) -> list[int]:
+        return self.model.axes.bidirectional(self.control.machine.axis_names)
 
     @cached_property
     def _curved(self) -> Bools:
-        """(E,) blocks whose joints may turn back on the way: arcs, and those whose words are the tip while an axis turns."""
+        """(E,) blocks whose joints may turn back on the approach direction: arcs, and those whose words are the tip while an
+        axis turns."""
         motion, turning = self.motion, self.control.rotary
         by_tip = np.array([frame.law == "tcp" for frame in motion.frames])[motion.frame] | (self.control.base == "tcp")
         turns = motion.end[:, turning] != begins(motion, np.arange(len(motion)))[:, turning]
@@ -129,20 +131,22 @@ class ActualBlockPoses(BlockPoses):
 
     @cached_property
     def _last(self) -> Floats:
-        """(1 + E, T) the ways of the joints in `_two_way` before the program and at the ends of its blocks."""
+        """(1 + E, T) the approach directions of the joints in `_bidirectional` before the program and at the ends of its
+        blocks."""
         every = self._steps(self.motion, np.arange(len(self.motion)), 1.0)
-        none = np.zeros((1, len(self._two_way)))
+        none = np.zeros((1, len(self._bidirectional)))
         return np.concatenate([none, every.walked().at(none)])
 
-    def _way(self, motion: Motion, rows: Ints, t: float | Floats) -> Floats:
-        """(K, J) by which way each joint is where it is; one that has turned back has taken up what it loses by shares."""
-        way = np.zeros((len(rows), len(self.control.machine.axis_names)))
-        if self._two_way:
-            way[:, self._two_way] = self._steps(motion, rows, t).at(self._last[rows])
-        return way
+    def _approach(self, motion: Motion, rows: Ints, t: float | Floats) -> Floats:
+        """(K, J) from which direction each joint is where it is; one that has turned back has taken up what it loses by
+        shares."""
+        approach = np.zeros((len(rows), len(self.control.machine.axis_names)))
+        if self._bidirectional:
+            approach[:, self._bidirectional] = self._steps(motion, rows, t).at(self._last[rows])
+        return approach
 
     def _steps(self, motion: Motion, rows: Ints, t: float | Floats) -> PlaySteps:
-        """What the motion of blocks up to fraction t does to the ways (K, T)."""
+        """What the motion of blocks up to fraction t does to the approach directions (K, T)."""
         share = np.broadcast_to(np.asarray(t, dtype=np.float64), len(rows))
         result = self._between(motion, rows, np.zeros(len(rows)), share)
         bent = np.flatnonzero(self._curved[rows])
@@ -184,8 +188,8 @@ class ActualBlockPoses(BlockPoses):
         return self._of(self.joints(motion, rows, one), self.joints(motion, rows, two))
 
     def _of(self, before: Floats, q: Floats) -> PlaySteps:
-        step = np.nan_to_num((q - before)[:, self._two_way])
-        return PlaySteps.of(step, self.model.axes.gaps(self.control.machine.axis_names, q, self._two_way))
+        step = np.nan_to_num((q - before)[:, self._bidirectional])
+        return PlaySteps.of(step, self.model.axes.gaps(self.control.machine.axis_names, q, self._bidirectional))
 
 
 def _turning(before: Floats, middle: Floats, after: Floats) -> Floats:

@@ -22,7 +22,7 @@ def centres(start: Floats, end: Floats, plane: Array, ccw: Bools, relative: Floa
             slack: float) -> tuple[Floats, dict[int, str]]:
     """(centres (K, 3), what is wrong with arc k) of arcs between start and end (K, 3).
 
-    A centre is given from the start, in coordinates (K, 3), or by the radius (K,), whose sign tells the arc of more
+    A centre is given from the start, in coordinates (K, 3), or by the radius (K,), whose sign says the arc of more
     than half a turn (-). `slack`: mm by which the radius may differ between the ends.
     """
     center = np.where(np.isfinite(absolute), absolute, start + np.nan_to_num(relative))
@@ -48,7 +48,7 @@ def centres(start: Floats, end: Floats, plane: Array, ccw: Bools, relative: Floa
 
 
 def _by_radius(first: Floats, last: Floats, radius: Floats, ccw: Bools) -> Floats:
-    """Centres (K, 2): on the left of the way for anti-clockwise arcs of up to half a turn."""
+    """Centres (K, 2): on the left of the path for anti-clockwise arcs of up to half a turn."""
     chord = last - first
     length = np.maximum(np.linalg.norm(chord, axis=1), _SMALL)
     height = np.sqrt(np.maximum(radius**2 - 0.25 * length**2, 0.0))

@@ -231,7 +231,7 @@ def _picked(law: WordMeaning, control: Control, kin: Kinematics, q: Floats) -> F
 
 
 def _lead(control: Control) -> int:
-    """The rotary axis whose sign tells the solutions apart: the first that tilts the tool at the zero position."""
+    """The rotary axis whose sign distinguishes the solutions: the first that tilts the tool at the zero position."""
     kin = control.machine.kinematics
     tilts = np.abs(kin.jacobian(np.zeros((1, kin.joints)))[0, 3:6][:, control.rotary]).max(axis=0) > 1e-9
     return int(tilts.argmax())

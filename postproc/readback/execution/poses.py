@@ -23,7 +23,7 @@ SAMPLES = (0.2, 0.4, 0.6, 0.8, 1.0)
 class BlockPoses:
     """Gives the poses of a program's blocks: control, kinematics by tool number, gauge length by register.
 
-    `before` (E, 6) is the gauge point's pose where each block begins, on machines whose joints do not tell it alone.
+    `before` (E, 6) is the gauge point's pose where each block begins, on machines whose joints do not determine it alone.
     """
 
     control: Control
@@ -32,7 +32,7 @@ class BlockPoses:
     before: Floats | None = None
     _asked: list[tuple[Motion, Ints, BlockMotions]] = field(default_factory=list, init=False, repr=False, compare=False)
 
-    def _ways(self, motion: Motion, rows: Ints) -> BlockMotions:
+    def _approaches(self, motion: Motion, rows: Ints) -> BlockMotions:
         """Those of the blocks asked for last are kept: the same ones are asked for at several fractions."""
         if not self._asked or self._asked[0][0] is not motion or self._asked[0][1] is not rows:
             self._asked[:] = [(motion, rows, BlockMotions.of(motion, self.control, rows))]
@@ -40,7 +40,7 @@ class BlockPoses:
 
     def poses(self, motion: Motion, rows: Ints, t: float | Floats) -> tuple[Floats, Floats]:
         """(tip, axis) (K, 3) of the blocks `rows` at fraction t."""
-        return self._placed(motion, rows, motion.end[rows] if _whole(t) else self._ways(motion, rows).at(t))
+        return self._placed(motion, rows, motion.end[rows] if _whole(t) else self._approaches(motion, rows).at(t))
 
     def at_coordinates(self, motion: Motion, rows: Ints, beginning: Floats, xyz: Floats) -> Floats:
         """Tips (K, 3) where X, Y, Z of the frames of blocks stand at `xyz` (K, 3), all else as in `beginning` (K, J)."""
@@ -63,7 +63,7 @@ class BlockPoses:
 
     def joints(self, motion: Motion, rows: Ints, t: float | Floats) -> Floats:
         """Joints (K, J) of the blocks `rows` at fraction t."""
-        position = motion.end[rows] if _whole(t) else self._ways(motion, rows).at(t)
+        position = motion.end[rows] if _whole(t) else self._approaches(motion, rows).at(t)
         if self.control.base != "tcp":
             return np.asarray(position / self.control.unit)
         q = np.empty_like(position)
@@ -101,15 +101,15 @@ class BlockPoses:
             result[k] = standing_arm(self.kinematics(tool), q[k])
         return result
 
-    def way(self, motion: Motion, rows: Ints, t: float | Floats) -> Floats:
-        """(K, J) by which way each joint is where it is: 0 on a machine without lost motion."""
+    def approach(self, motion: Motion, rows: Ints, t: float | Floats) -> Floats:
+        """(K, J) from which direction each joint is where it is: 0 on a machine without lost motion."""
         return np.zeros((len(rows), len(self.control.machine.axis_names)))
 
     def gaps(self, motion: Motion, rows: Ints, q: Floats, reach: Floats) -> Floats:
-        """(K, J) mm or rad of lost motion, at the least; infinite where there is none."""
+        """(K, J) mm or rad of lost motion, at least; infinite where there is none."""
         return np.full(q.shape, np.inf)
 
-    def corrected_on_the_way(self, motion: Motion, rows: Ints) -> Floats:
+    def corrected_between(self, motion: Motion, rows: Ints) -> Floats:
         """(K,) mm that the corrections of the tip may change by in blocks: none on the machine without errors."""
         return np.zeros(len(rows))
 
@@ -156,7 +156,7 @@ class BlockPoses:
 
 
 def poses_before(motion: Motion, control: Control) -> Floats | None:
-    """`BlockPoses.before` of a program; None where the joints alone tell the pose."""
+    """`BlockPoses.before` of a program; None where the joints alone determine the pose."""
     kin = control.machine.kinematics
     if control.base == "tcp" or kin.slides_affine:
         return None

@@ -14,14 +14,14 @@ CycleLeg = tuple[int, Floats, float, float]
 """code, end, feed (NaN: the F word in force), rest at the end (s) of one leg"""
 EPSILON = 1e-9
 MOST = 10_000
-"""pecks of one hole, and holes of one block: more are a slip of the pen"""
+"""pecks of one hole, and holes of one block: more are a typing error"""
 
 
 def legs(drill: Drill, start: Floats, target: Floats, z: int, first: float | None = None) -> list[CycleLeg]:
     """The legs from `start` (J,) over the hole, whose place is that of `target` (J,), to the level where the cycle ends.
 
     `z` is the column of the tool's axis. `first`: the level where the sequence of cycles began, on controls that leave the
-    level of the last hole on the way: where it is below the plane they first go to the plane; from there or lower they
+    level of the last hole on the path: where it is below the plane they first go to the plane; from there or lower they
     travel aslant to where the cycle ends (LinuxCNC 2.9, as its interpreter shows). Others travel at the level where the
     tool stands.
     """

@@ -120,7 +120,7 @@ def read_words(text: bytes, file: str = "") -> tuple[Words, list[Diagnostic]]:
 
 
 def _stretches(text: bytes) -> Iterator[bytes]:
-    """Whole lines, some at a time: what is made of them on the way stays small."""
+    """Whole lines, some at a time: what is made of them on the path stays small."""
     at = 0
     while at < len(text):
         stop = text.find(b"\n", min(at + _STRETCH, len(text) - 1)) + 1

@@ -68,7 +68,7 @@ def test_force_is_dual_to_speed() -> None:
 
 
 def test_h4a_condition_number_stays_below_six() -> None:
-    """V.7: 400 x 400 mm, 45 degrees either way, the turn divided by d = 100 mm."""
+    """V.7: 400 x 400 mm, 45 degrees in either direction, the turn divided by d = 100 mm."""
     kinematics = machines.load("h4a-c-table").kinematics
     assert isinstance(kinematics, H4Linear) and lever(kinematics) == 100.0
     found = worst(partial(condition_number, kinematics), kinematics.workspace, (9, 2, 9, 9))

@@ -1,4 +1,4 @@
-"""Errors of whole machines from poses, ball-bar and laser: the truth back, its doubt, what cannot be told."""
+"""Errors of whole machines from poses, ball-bar and laser: the truth back, its uncertainty, what cannot be reported."""
 
 from __future__ import annotations
 
@@ -55,9 +55,9 @@ def test_location_errors_of_a_table_table_machine_from_a_ball() -> None:
     exact = fit(zeros(), mikron(), Measurements("position", q, read, sigma))
     assert exact.result.converged
     noisy = fit(zeros(), mikron(), Measurements("position", q, read + sigma * rng.normal(size=read.shape), sigma))
-    told = np.isfinite(exact.result.sigma[: len(TRUTH)])
-    assert exact.result.values[: len(TRUTH)][told] == pytest.approx(truth.values[told], abs=1e-9)
-    off = (noisy.result.values[: len(TRUTH)] - truth.values)[told] / noisy.result.sigma[: len(TRUTH)][told]
+    noted = np.isfinite(exact.result.sigma[: len(TRUTH)])
+    assert exact.result.values[: len(TRUTH)][noted] == pytest.approx(truth.values[noted], abs=1e-9)
+    off = (noisy.result.values[: len(TRUTH)] - truth.values)[noted] / noisy.result.sigma[: len(TRUTH)][noted]
     assert np.abs(off).max() < 4.0
     assert noisy.result.cost_after == pytest.approx(180 - exact.result.rank, rel=0.35)
 

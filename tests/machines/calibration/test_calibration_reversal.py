@@ -77,7 +77,7 @@ def test_what_the_data_do_not_support_is_said(m: int, shifts: tuple[int, ...]) -
     assert np.isinf(found.axis_sigma).all() and found.result.not_identifiable
 
 
-def test_stated_doubt_covers_the_truth() -> None:
+def test_stated_uncertainty_covers_the_truth() -> None:
     """1000 trials: 93 to 97 % of the parameters inside their 95 % bounds, and the spread is the stated one."""
     rng = np.random.default_rng(4)
     axis, indexer, inside, errors = closed(rng, 12), closed(rng, 12), [], []
@@ -90,7 +90,7 @@ def test_stated_doubt_covers_the_truth() -> None:
     assert np.std(errors, axis=0) == pytest.approx(found.axis_sigma, rel=0.12)
 
 
-def test_a_plan_weighs_doubt_against_minutes() -> None:
+def test_a_plan_weighs_uncertainty_against_minutes() -> None:
     found = plan(12, 0.1, 0.5, 10.0)
     assert [c.setups for c in found] == list(range(2, 13))
     assert all(a.sigma > b.sigma and a.minutes < b.minutes for a, b in pairwise(found))
@@ -114,7 +114,7 @@ def test_robust_fit_lets_an_outlier_go() -> None:
     assert robust.result.weights.min() < 0.01
 
 
-def test_groups_that_cannot_be_told_apart() -> None:
+def test_groups_that_cannot_be_distinguished() -> None:
     matrix = np.array([[1.0, 1.0, 0.0, 0.0], [2.0, 2.0, 1.0, 0.0], [3.0, 3.0, 5.0, 0.0]])
     found = solve(linear(["a", "b", "c", "d"], matrix, np.array([2.0, 5.0, 11.0]), np.ones(3)))
     assert found.not_identifiable == (("a", "b"), ("d",)) and found.rank == 2
@@ -200,11 +200,11 @@ def test_all_six_errors_from_reversal_with_mounting_and_indexer() -> None:
     sigma = np.array([1e-6, 1e-6, 1e-6, *np.full(3, 1e-3 * ARCSEC)])
     read = simulate(BENCH, series(truth, BENCH.angles), indexer, mounts)
     found = fit_rotary(BENCH, read, sigma, harmonics)
-    told = np.isfinite(found.sigma)
-    assert told[5].all() and told[:, :, 1:].sum() >= 20
+    noted = np.isfinite(found.sigma)
+    assert noted[5].all() and noted[:, :, 1:].sum() >= 20
     assert {name.rsplit(".", 1)[1][-1] for name in found.lost} <= {"1"}  # only first harmonics hide behind the mounting
     off = np.abs(found.amplitudes - truth) / size[:, None, None]
-    assert off[told].max() < 1e-4
+    assert off[noted].max() < 1e-4
     model = error_model(found, "C", "mikron-ucp710")
     assert model.covariance is not None and len(model.names) == 6 * 7
     assert model.axes.frame["C"] == "moving"

@@ -1,4 +1,4 @@
-"""Error model files as people send them: every fault is told with its file and line, what is there, and what to do."""
+"""Error model files as people send them: every fault is reported with its file and line, what is there, and what to do."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ GOOD = {"byte order mark and CRLF": b"\xef\xbb\xbf" + CSV.replace("\n", "\r\n").
         "units in brackets below": b"X,EXX\n[mm],(um)\n-300,0\n0,1\n300,2\n",
         "round brackets": CSV.replace("[", "(").replace("]", ")").encode(),
         "a line for the spreadsheet": b"sep=;\n" + CSV.replace(",", ";").encode(),
-        "targets on the way back": b"X [mm],EXX [um]\n300,2\n0,1\n-300,0\n",
+        "targets on the return": b"X [mm],EXX [um]\n300,2\n0,1\n-300,0\n",
         "titles above the header": b"Laser, XL-80, 2026\nMachine: DMU\nRuns,1\nAxis,X\n\n" + CSV.encode(),
         "titles of a sheet": b"Machine;DMU\r\nTemperature;20,1\r\nX;EXX\r\nmm;\xb5m\r\n-300;0\r\n0;1\r\n300;2\r\n",
         "metres and inches": b"X [m],EXX [in]\n-0.3,0\n0,3.937007874015748e-05\n0.3,7.874015748031496e-05\n"}
@@ -88,12 +88,12 @@ BAD = [
     ("no such axis moved", "[location]\nEC0B = 3\n", b"", "error-model.axis", "e.toml", 2, "no axis 'B'"),
     ("not a number", "[components.EXX]\npolynomial = [nan]\nrange = [0, 1]\n", b"", "file.range", "e.toml", 2, "NaN"),
     ("huge", "[location]\nEX0C = 1e12\n", b"", "error-model.large", "e.toml", 2, "1e+09 mm"),
-    ("sigma beside covariance", COVARIANCE + "[sigma]\nEC0Y = 1\n", b"", "file.value", "e.toml", 1, "not both"),
+    ("sigma next to covariance", COVARIANCE + "[sigma]\nEC0Y = 1\n", b"", "file.value", "e.toml", 1, "not both"),
     ("negative sigma", "[location]\nEC0Y = 1\n[sigma]\nEC0Y = -1\n", b"", "file.range", "e.toml", 4, "-1"),
     ("negative variance", COVARIANCE, b"p,EC0Y\nEC0Y,-1\n", "error-table.covariance", "x.csv", 0, "variance of EC0Y is -1"),
     ("not positive", COVARIANCE, b"p,EC0Y,EB0Z\nEC0Y,1,2\nEB0Z,2,1\n", "error-table.covariance", "x.csv", 0, "eigenvalue"),
     ("not symmetric", COVARIANCE, b"p,EC0Y,EB0Z\nEC0Y,1,0.5\nEB0Z,0.1,1\n", "error-table.covariance", "x.csv", 0,
-     "EC0Y with EB0Z is 0.5, the other way round 0.1"),
+     "EC0Y with EB0Z is 0.5, reversed 0.1"),
     ("covariance of nothing", COVARIANCE, b"p,EC0X\nEC0X,1\n", "error-table.row", "x.csv", 1, "no parameter 'EC0X'"),
     ("covariance twice", COVARIANCE, b"p,EC0Y,EC0Y\nEC0Y,1,1\nEC0Y,1,1\n", "error-table.row", "x.csv", 1, "twice"),
     ("covariance not square", COVARIANCE, b"p,EC0Y,EB0Z\nEC0Y,1,0\n", "error-table.row", "x.csv", 1, "1 rows for 2"),
@@ -112,7 +112,8 @@ BAD = [
 
 
 @pytest.mark.parametrize(("toml", "csv", "code", "file", "line", "word"), [b[1:] for b in BAD], ids=[b[0] for b in BAD])
-def test_what_is_wrong_is_told(tmp_path: Path, toml: str, csv: bytes, code: str, file: str, line: int, word: str) -> None:
+def test_what_is_wrong_is_reported(tmp_path: Path, toml: str, csv: bytes, code: str, file: str, line: int,
+                                   word: str) -> None:
     (tmp_path / "e.toml").write_text(toml)
     (tmp_path / "x.csv").write_bytes(csv)
     found, faults = load_checked(tmp_path / "e.toml", machines.load("mikron-ucp710"))

@@ -9,7 +9,7 @@ import machines
 from machines.geometric_error.actual.actual import Actual
 from machines.geometric_error.actual.actual_kinematics import ActualKinematics
 from machines.geometric_error.actual.correction import POLE, CorrectedCommands, correct
-from machines.geometric_error.actual.model import ErrorModel, doubt
+from machines.geometric_error.actual.model import ErrorModel, uncertainty
 from machines.geometric_error.actual.serial_errors import Component, SerialErrors
 from machines.geometric_error.tables.curves import TableCurve
 from machines.geometric_error.tables.names import parse
@@ -125,8 +125,8 @@ def test_each_way_of_approach_gets_its_own_correction() -> None:
     both = TableCurve(np.array([-500.0, 500.0]), np.array([0.02, 0.02, -0.01, -0.01]), both=True)
     actual = ErrorModel(SerialErrors((Component(parse("EXX"), both),))).on(kin)
     q = np.zeros((3, 3))
-    way = np.array([[1.0, 0, 0], [-1.0, 0, 0], [0.0, 0, 0]])
-    found = correct(actual, q, *kin.forward(q), direction=way)
+    approach = np.array([[1.0, 0, 0], [-1.0, 0, 0], [0.0, 0, 0]])
+    found = correct(actual, q, *kin.forward(q), direction=approach)
     assert found.q[:, 0] == pytest.approx([-0.02, 0.01, -0.005], abs=1e-9)
 
 
@@ -152,22 +152,22 @@ def test_the_machine_with_errors_as_kinematics(name: str) -> None:
     assert real.with_tool(10.0).tool_length == 10.0
 
 
-def test_doubt_against_trials() -> None:
+def test_uncertainty_against_trials() -> None:
     """J Sigma J^T against the spread of exact tips over 400 drawn machines."""
     kin, _, q, _, _ = prepared("mikron-ucp710", 5)
     full, rng = model(kin, 11), np.random.default_rng(5)
     sigma = 0.1 * np.abs(full.values) + 1e-7
     known = ErrorModel(full.axes, covariance=np.diag(sigma**2))
-    predicted = doubt(known, known.on(kin), q)
+    predicted = uncertainty(known, known.on(kin), q)
     draws = np.stack([known.with_values(full.values + rng.normal(size=len(sigma)) * sigma).on(kin).place(q)[0]
                       for _ in range(400)])
     assert draws.std(axis=0, ddof=1) == pytest.approx(predicted.tip, rel=0.15)
     assert (predicted.tip_worst >= predicted.tip.max(axis=1)).all()
     with pytest.raises(ValueError, match="no covariance"):
-        doubt(full, full.on(kin), q)
+        uncertainty(full, full.on(kin), q)
 
 
-def test_all_is_told(recwarn: pytest.WarningsRecorder) -> None:
+def test_all_is_reported(recwarn: pytest.WarningsRecorder) -> None:
     _, actual, q, tip, axis = prepared("mikron-ucp710", 4)
     q = q.copy()
     q[0] = np.nan

@@ -1,4 +1,4 @@
-"""Curves of component errors: known values, linear in their parameters, ranges, both ways of approach."""
+"""Curves of component errors: known values, linear in their parameters, ranges, both approach directions."""
 
 from __future__ import annotations
 
@@ -52,15 +52,15 @@ def test_each_way_has_its_own_values() -> None:
 
 @pytest.mark.parametrize("curve", CURVES, ids=lambda c: type(c).__name__)
 def test_value_is_basis_times_parameters(curve: Curve) -> None:
-    x, way = np.linspace(-150.0, 150.0, 61), np.resize([1.0, -1.0, 0.0], 61)
-    basis = curve.basis(x, way)
+    x, course = np.linspace(-150.0, 150.0, 61), np.resize([1.0, -1.0, 0.0], 61)
+    basis = curve.basis(x, course)
     assert basis.shape == (61, len(curve.labels())) == (61, len(curve.values))
-    assert curve.at(x, way) == pytest.approx(basis @ curve.values, abs=1e-13)
+    assert curve.at(x, course) == pytest.approx(basis @ curve.values, abs=1e-13)
     other = curve.with_values(np.arange(1.0, len(curve.values) + 1.0))
-    assert other.at(x, way) == pytest.approx(basis @ other.values, abs=1e-12)
+    assert other.at(x, course) == pytest.approx(basis @ other.values, abs=1e-12)
 
 
-def test_outside_tells_and_keeps_the_end_value() -> None:
+def test_outside_reports_and_keeps_the_end_value() -> None:
     curve, x = TableCurve(X, V), np.array([-101.0, -100.0, 120.0, 121.0])
     assert curve.outside(x).tolist() == [True, False, False, True]
     assert not curve.outside(x, 2.0).any()
@@ -85,11 +85,11 @@ def test_curves_of_one_basis_are_evaluated_together_as_one_by_one() -> None:
                    Fourier(rng.normal(size=7)), Fourier(rng.normal(size=1)),
                    Fourier(rng.normal(size=7), 0.7, 0.1, (-0.5, 0.5)),
                    Polynomial(rng.normal(size=4), (-0.8, 0.9), 0.2, 0.5), Polynomial(rng.normal(size=1), (-1.0, 1.0))]
-    at, way = rng.uniform(-1.5, 1.5, 200), rng.uniform(-1.0, 1.0, 200)
+    at, course = rng.uniform(-1.5, 1.5, 200), rng.uniform(-1.0, 1.0, 200)
     at[:9] = x
     found = banks(curves)
     assert sorted(k for numbers, _ in found for k in numbers) == list(range(len(curves))) and len(found) < len(curves)
-    for direction in (way, 1.0):
+    for direction in (course, 1.0):
         for numbers, bank in found:
             expected = [curves[k].at(at, direction) for k in numbers]
             np.testing.assert_allclose(bank.at(at, direction), expected, rtol=0.0, atol=1e-13)

@@ -1,4 +1,5 @@
-"""Exchange of error models: any curves as tables with their covariance, LinuxCNC's files both ways, tables of others."""
+"""Exchange of error models: any curves as tables with their covariance, LinuxCNC's files both directions, tables of
+others."""
 
 from __future__ import annotations
 
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 
 import machines
-from machines.geometric_error.actual.model import ErrorModel, doubt
+from machines.geometric_error.actual.model import ErrorModel, uncertainty
 from machines.geometric_error.actual.serial_errors import SerialErrors
 from machines.geometric_error.exchange.bed_frame import bed_side
 from machines.geometric_error.exchange.exports import ini_lines, location_csv, notices, to_screws, to_tables
@@ -30,7 +31,7 @@ SAMPLES = Path(__file__).parents[3] / "samples" / "errors"
 # ---- tables ----------------------------------------------------------------------------------------------------------
 
 @pytest.mark.parametrize("name", ["mikron-ucp710", "nutating-head", "h4a-c-table"])
-def test_curves_become_tables_that_lose_what_is_told_and_keep_the_doubt(name: str) -> None:
+def test_curves_become_tables_that_lose_what_is_reported_and_keep_the_uncertainty(name: str) -> None:
     machine = machines.load(name)
     full = correlated(model(machine.kinematics, 3))
     length, angle = 2e-3, 0.6 * ARCSEC
@@ -48,11 +49,11 @@ def test_curves_become_tables_that_lose_what_is_told_and_keep_the_doubt(name: st
     kin = machine.kinematics.with_tool(60.0)
     one, two = full.on(kin), made.on(kin)
     w = one.coordinates(joints(kin, 300))
-    (tip, axis, side), (other, leaning, beside) = one.place(w), two.place(w)
+    (tip, axis, side), (other, leaning, adjacent) = one.place(w), two.place(w)
     axes = len(made.axes.axes)
     assert np.abs(other - tip).max() < axes * (2.0 * length + 600.0 * angle)
-    assert np.abs([leaning - axis, beside - side]).max() < 2.0 * axes * angle
-    before, after = doubt(full, one, w[:40]), doubt(made, two, w[:40])
+    assert np.abs([leaning - axis, adjacent - side]).max() < 2.0 * axes * angle
+    before, after = uncertainty(full, one, w[:40]), uncertainty(made, two, w[:40])
     assert before.tip.min() > 1e-6
     assert after.tip == pytest.approx(before.tip, rel=0.3) and after.axis == pytest.approx(before.axis, rel=0.3)
     assert np.median(after.tip / before.tip) == pytest.approx(1.0, abs=0.05)
@@ -61,7 +62,7 @@ def test_curves_become_tables_that_lose_what_is_told_and_keep_the_doubt(name: st
 @pytest.mark.parametrize("name", ["mikron-ucp710", "nutating-head", "head-table", "h4a-c-table", "h4a-spindle-axis"])
 @pytest.mark.parametrize("frame", ["fixed", "moving"])
 def test_errors_of_a_rotary_axis_in_any_frame_are_the_same_machine_in_that_of_the_bed(name: str, frame: str) -> None:
-    """Fine tables beside the exact machine: what is left is of second order."""
+    """Fine tables next to the exact machine: what is left is of second order."""
     machine = machines.load(name)
     full = model(machine.kinematics, 3)
     turning = [x for x, turns in zip(machine.axis_names, machine.rotary, strict=True) if turns]
@@ -110,39 +111,39 @@ def test_what_cannot_be_a_table_is_refused() -> None:
 
 # ---- LinuxCNC ----------------------------------------------------------------------------------------------------------
 
-def as_linuxcnc(machine: Machine, texts: dict[str, str], q: Floats, way: float) -> Floats:
+def as_linuxcnc(machine: Machine, texts: dict[str, str], q: Floats, approach: float) -> Floats:
     """Motor positions of commanded joints q, as LinuxCNC makes them: plus nominal less actual, linear between rows."""
     result = q.copy()
     for letter, text in texts.items():
         rows = np.array([[float(x) for x in line.split()] for line in text.splitlines()])
         j = machine.axis_names.index(letter)
         unit = DEG if machine.rotary[j] else 1.0
-        nominal, actual = rows[:, 0] * unit, rows[:, 1 if way > 0 else 2] * unit
+        nominal, actual = rows[:, 0] * unit, rows[:, 1 if approach > 0 else 2] * unit
         result[:, j] += np.interp(q[:, j], nominal, nominal - actual)
     return result
 
 
 @pytest.mark.parametrize("name", ["mikron-ucp710", "linuxcnc-xyzac-trt", "nutating-head", "mill-3axis"])
-@pytest.mark.parametrize("way", [1.0, -1.0])
-def test_linuxcnc_with_the_files_leaves_the_rest(name: str, way: float) -> None:
+@pytest.mark.parametrize("approach", [1.0, -1.0])
+def test_linuxcnc_with_the_files_leaves_the_rest(name: str, approach: float) -> None:
     """Also where joints count against the machine's axes (linuxcnc-xyzac-trt)."""
     machine = machines.load(name)
     kin = machine.kinematics
     assert isinstance(kin, Serial)
     full = model(kin, 3)
-    two_way = TableCurve(np.linspace(-900.0, 900.0, 9), np.linspace(-0.02, 0.03, 18) ** 2 * 30.0, both=True)
+    bidirectional = TableCurve(np.linspace(-900.0, 900.0, 9), np.linspace(-0.02, 0.03, 18) ** 2 * 30.0, both=True)
     rest = tuple(c for c in full.axes.components if str(c.name) != "EXX")
-    full = replace(full, axes=replace(full.axes, components=(*rest, component("EXX", two_way))))
+    full = replace(full, axes=replace(full.axes, components=(*rest, component("EXX", bidirectional))))
     screws = to_screws(full, machine, {}, 1e-4, 0.02 * ARCSEC)
     leaning = {"EBB"} if name == "nutating-head" else set()
     assert set(screws.left) == leaning and set(screws.texts) == set(kin.axis_names) - {x[2] for x in leaning}
     assert all(text.count("\n") <= 256 for text in screws.texts.values())
     assert {str(c.name) for c in screws.rest.axes.components if c.name.positioning and c.curve.values.any()} == leaning
     q = np.clip(joints(kin, 50), machine.limits.lower, machine.limits.upper)
-    ways = np.full(q.shape, way)
-    tip, axis, _ = full.on(kin).place(as_linuxcnc(machine, screws.texts, q, way), ways)
-    wanted = screws.rest.on(kin).place(q, ways)
-    uncorrected = full.on(kin).place(q, ways)
+    approaches = np.full(q.shape, approach)
+    tip, axis, _ = full.on(kin).place(as_linuxcnc(machine, screws.texts, q, approach), approaches)
+    wanted = screws.rest.on(kin).place(q, approaches)
+    uncorrected = full.on(kin).place(q, approaches)
     assert np.abs(tip - wanted[0]).max() < 3e-4 < 0.1 * np.abs(uncorrected[0] - wanted[0]).max()
     assert np.abs(axis - wanted[1]).max() < 2e-7
 
@@ -163,14 +164,14 @@ def test_an_axis_that_goes_round_has_rows_over_as_many_turns_as_there_are_rows(a
     assert screws.rest.on(kin).outside(q)[:, 4].tolist() == [False, True]
 
 
-def test_an_axis_whose_errors_act_about_a_point_beside_it_is_left(tmp_path: Path) -> None:
+def test_an_axis_whose_errors_act_about_a_point_next_to_it_is_left(tmp_path: Path) -> None:
     machine = machines.load("mikron-ucp710")
     full = load(SAMPLES / "mikron-ucp710.toml", machine)
-    for point, left in (([0.0, 0.0, 50.0], set()), ([30.0, 0.0, 50.0], {"ECC"})):  # along the line of C, and beside it
+    for point, left in (([0.0, 0.0, 50.0], set()), ([30.0, 0.0, 50.0], {"ECC"})):  # along the line of C, and next to it
         moved = replace(full, axes=replace(full.axes, reference={"C": np.array(point)}))
         screws = to_screws(moved, machine, {}, 1e-4, 0.1 * ARCSEC)
         assert set(screws.left) == left and ("C" in screws.texts) == (not left)
-        assert all("beside the axis" in why for why in screws.left.values())
+        assert all("next to the axis" in why for why in screws.left.values())
         kin = machine.kinematics.with_tool(50.0)
         q = np.clip(joints(kin, 50), machine.limits.lower, machine.limits.upper)
         tip, _, _ = moved.on(kin).place(as_linuxcnc(machine, screws.texts, q, 1.0), np.ones(q.shape))
@@ -254,7 +255,7 @@ def test_a_lattice_of_others_comes_in_as_they_say(tmp_path: Path) -> None:
     assert found.map.bed == ("C", "A") and found.map.length == 80.0 and found.map.periods == (2 * np.pi,)
 
 
-def test_readings_of_the_same_place_are_averaged_and_scatter_is_the_doubt(tmp_path: Path) -> None:
+def test_readings_of_the_same_place_are_averaged_and_scatter_is_the_uncertainty(tmp_path: Path) -> None:
     """Five runs there and back, as ISO 230-2 has them: means in order, s / sqrt(5) each."""
     rng, x = np.random.default_rng(5), np.linspace(-300.0, 300.0, 13)
     truth = np.stack([0.02 * x, 0.01 * x + 3.0], axis=1)
@@ -262,7 +263,7 @@ def test_readings_of_the_same_place_are_averaged_and_scatter_is_the_doubt(tmp_pa
     rows = [f"{x[k]},{run[k, 0]:.6f},{run[k, 1]:.6f}" for n, run in enumerate(runs) for k in range(13)[:: 1 - 2 * (n % 2)]]
     (tmp_path / "x.csv").write_text("X [mm],EXX+ [um],EXX- [um]\n" + "\n".join(rows))
     machine = machines.load("mikron-ucp710")
-    found, told = read_sources([str(tmp_path / "x.csv")], machine, ImportOptions(average=True))
+    found, noted = read_sources([str(tmp_path / "x.csv")], machine, ImportOptions(average=True))
     assert found is not None and found.covariance is not None
     assert found.values == pytest.approx(np.mean(runs, axis=0).T.ravel() * 1e-3, abs=1e-9)
     sigma = np.sqrt(np.diag(found.covariance)) * 1e3
@@ -270,12 +271,12 @@ def test_readings_of_the_same_place_are_averaged_and_scatter_is_the_doubt(tmp_pa
     assert sigma[13] == pytest.approx(0.8 / np.sqrt(5), rel=0.25)
     pooled = np.sqrt(np.var([r[:, 0] for r in runs], axis=0, ddof=1).mean() / 5)
     assert sigma[0] == pytest.approx(pooled, rel=1e-6)
-    assert [d.code for d in told] == ["error-import.averaged"] and "65 readings at 13 places" in told[0].message
+    assert [d.code for d in noted] == ["error-import.averaged"] and "65 readings at 13 places" in noted[0].message
     plain, faults = read_sources([str(tmp_path / "x.csv")], machine, ImportOptions())
     assert plain is None and faults[0].code == "error-model.order"
 
 
-def test_a_lattice_of_several_readings_that_goes_round_has_a_doubt_by_node(tmp_path: Path) -> None:
+def test_a_lattice_of_several_readings_that_goes_round_has_a_uncertainty_by_node(tmp_path: Path) -> None:
     rng = np.random.default_rng(2)
     nodes = [(z, c) for z in (0.0, 100.0) for c in (0.0, 90.0, 180.0, 270.0, 360.0)]
     value = {(z, c): z / 100.0 + np.cos(np.radians(c)) for z, c in nodes}
@@ -283,7 +284,7 @@ def test_a_lattice_of_several_readings_that_goes_round_has_a_doubt_by_node(tmp_p
     head = "Z [mm],C [deg],dx [um],dy [um],dz [um],rx [arcsec]"
     (tmp_path / "m.csv").write_text("\n".join([head, *rng.permutation(rows)]))
     how = ImportOptions(average=True, periods={"C": 2 * np.pi}, zero={"Z": 100.0, "C": np.pi / 2})
-    found, told = read_sources([str(tmp_path / "m.csv")], machines.load("mikron-ucp710"), how)
+    found, noted = read_sources([str(tmp_path / "m.csv")], machines.load("mikron-ucp710"), how)
     assert found is not None and found.map is not None and found.covariance is not None
     assert found.map.table.shape == (2, 4, 6)
     assert found.map.table[1, :, 0] * 1e3 == pytest.approx([1.0, 0.0, -1.0, 0.0], abs=1e-6)
@@ -298,13 +299,13 @@ def test_a_lattice_of_several_readings_that_goes_round_has_a_doubt_by_node(tmp_p
     assert plain is not None and plain.covariance is not None
     variance = np.diag(plain.covariance).reshape(2, 4, 6) * 1e6
     assert variance[:, :, 1] == pytest.approx(mean)
-    assert variance[:, :, [0, 2, 3]] == pytest.approx(0.0, abs=1e-12) and "30 readings at 8 places" in told[0].message
+    assert variance[:, :, [0, 2, 3]] == pytest.approx(0.0, abs=1e-12) and "30 readings at 8 places" in noted[0].message
     outside, faults = read_sources([str(tmp_path / "m.csv")], machines.load("mikron-ucp710"),
                                    replace(how, zero={"Z": 101.0, "C": 0.0}))
     assert outside is None and faults[0].code == "error-map.zero"
 
 
-def test_what_tables_do_not_say_is_told() -> None:
+def test_what_tables_do_not_say_is_reported() -> None:
     machine = machines.load("mikron-ucp710")
     full = load(SAMPLES / "mikron-ucp710.toml", machine)
     assert notices(to_tables(full, machine, {}, 1.0, 1.0)[0], machine) == []

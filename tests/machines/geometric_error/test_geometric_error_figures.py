@@ -1,4 +1,4 @@
-"""Error models drawn: curves, doubt and sections, on serial machines, on rods, of maps."""
+"""Error models drawn: curves, uncertainty and sections, on serial machines, on rods, of maps."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ def drawn() -> tuple[ErrorModel, bytes]:
 
 def test_every_component_and_its_ways_are_drawn(drawn: tuple[ErrorModel, bytes]) -> None:
     model, svg = drawn
-    told = words(svg)
+    noted = words(svg)
     for component in model.axes.components:
-        assert str(component.name) in told
-    assert "EXX, backwards" in told and "EYX, backwards" not in told and "tip off by, um" in told
+        assert str(component.name) in noted
+    assert "EXX, backwards" in noted and "EYX, backwards" not in noted and "tip off by, um" in noted
 
 
-def test_what_a_model_says_of_its_doubt_is_seen(drawn: tuple[ErrorModel, bytes]) -> None:
+def test_what_a_model_says_of_its_uncertainty_is_seen(drawn: tuple[ErrorModel, bytes]) -> None:
     model, svg = drawn
     bare = model_figure(replace(model, covariance=None), machines.load("mikron-ucp710"), 100.0, ".svg")
     assert svg.count(b"<image") > bare.count(b"<image") == 4  # sections and their scales
@@ -60,7 +60,7 @@ def test_an_arrow_is_drawn_with_its_length_and_no_panel_is_empty(drawn: tuple[Er
 
 
 @pytest.mark.parametrize(("value", "part"), [(9.99, 5.0), (10.0, 10.0), (0.3, 0.2), (0.0, 0.0), (float("nan"), 0.0)])
-def test_arrows_that_are_told_are_round(value: float, part: float) -> None:
+def test_arrows_that_are_reported_are_round(value: float, part: float) -> None:
     assert _round_part(value) == pytest.approx(part)
 
 
@@ -87,8 +87,8 @@ def test_a_map_is_drawn(tmp_path: Path) -> None:
     rows = "\n".join(f"{x},{y},{z},{0.1 * x},0,{5 + y}" for x in (-100, 100) for y in (-80, 80) for z in (-50, 0))
     (tmp_path / "map.csv").write_text("X [mm], Y [mm], Z [mm], dx [um], dy [um], dz [um]\n" + rows + "\n")
     (tmp_path / "m.toml").write_text('machine = "mill-3axis"\n[map]\ntable = "map.csv"\n')
-    told = words(model_figure(load(tmp_path / "m.toml", machine), machine, 50.0, ".svg"))
-    assert "tool of 50 mm" in told
+    noted = words(model_figure(load(tmp_path / "m.toml", machine), machine, 50.0, ".svg"))
+    assert "tool of 50 mm" in noted
 
 
 def test_another_ending_is_refused() -> None:

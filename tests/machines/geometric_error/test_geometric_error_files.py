@@ -12,7 +12,7 @@ import pytest
 
 import machines
 from machines.geometric_error.actual.actual_map import ActualByMap
-from machines.geometric_error.actual.model import ErrorModel, doubt
+from machines.geometric_error.actual.model import ErrorModel, uncertainty
 from machines.geometric_error.actual.serial_errors import Component, SerialErrors
 from machines.geometric_error.exchange.make_map import deviations, map_loss, map_of
 from machines.geometric_error.exchange.tabulate import merged, sampled
@@ -219,7 +219,7 @@ def test_samples_are_what_their_script_writes(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("path", sorted(SAMPLES.glob("*.toml")), ids=lambda p: p.stem)
 def test_samples_are_realistic(path: Path) -> None:
-    """10 to 100 um at the tip, and a doubt far below that."""
+    """10 to 100 um at the tip, and an uncertainty far below that."""
     machine = machines.load(path.stem)
     found = load(path, machine)
     kin = machine.kinematics.with_tool(80.0)
@@ -227,7 +227,7 @@ def test_samples_are_realistic(path: Path) -> None:
     w = actual.coordinates(q)
     moved = np.linalg.norm(deviations(actual, found.zero().on(kin), w)[:, :3], axis=1)
     assert 0.01 < moved.max() < 0.25
-    assert doubt(found, actual, w).tip_worst.max() < 0.2 * moved.max()
+    assert uncertainty(found, actual, w).tip_worst.max() < 0.2 * moved.max()
 
 
 def test_the_schema_knows_the_tables() -> None:
@@ -353,7 +353,7 @@ def test_lattice_csv_round_trip_in_any_order(tmp_path: Path) -> None:
     assert two is not None and np.array_equal(one.table, two.table)
 
 
-def test_a_component_can_be_put_in_and_the_doubt_of_the_others_stays() -> None:
+def test_a_component_can_be_put_in_and_the_uncertainty_of_the_others_stays() -> None:
     name = parse("EXX")
     assert name is not None
     old = Component(name, TableCurve(np.array([0.0, 9.0]), np.ones(2)))

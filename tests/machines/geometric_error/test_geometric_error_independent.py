@@ -12,7 +12,7 @@ import pytest
 import machines
 from machines.geometric_error.actual.actual import Actual
 from machines.geometric_error.actual.correction import POLE, correct
-from machines.geometric_error.actual.model import ErrorModel, doubt
+from machines.geometric_error.actual.model import ErrorModel, uncertainty
 from machines.geometric_error.files.loader import load
 from machines.kinematics.base import Kinematics
 from tests.machines.independent_machine import Curve, Errors, Machine
@@ -45,11 +45,12 @@ class Case:
         """(N, 6) tip and axis."""
         return np.concatenate(self.kin.forward(self.q), axis=1)
 
-    def poses(self, q: Floats, way: Floats | None = None, errors: Errors | None = None) -> tuple[Floats, Floats]:
+    def poses(self, q: Floats, approach: Floats | None = None, errors: Errors | None = None) -> tuple[Floats, Floats]:
         """(tip, axis) by the second implementation."""
         known = Errors(self.file) if errors is None else errors
-        ways = np.zeros(q.shape) if way is None else way
-        found = [self.own.pose(x, TOOL, known, w, near) for x, w, near in zip(q, ways, self.nominal[: len(q)], strict=True)]
+        approaches = np.zeros(q.shape) if approach is None else approach
+        found = [self.own.pose(x, TOOL, known, w, near) for x, w,
+                 near in zip(q, approaches, self.nominal[: len(q)], strict=True)]
         return np.array([tip for tip, _ in found]), np.array([axis for _, axis in found])
 
 
@@ -70,11 +71,11 @@ def drawn(folder: Path, name: str, seed: int, both: bool = False, n: int = 8, si
 @pytest.mark.parametrize("seed", [0, 1])
 @pytest.mark.parametrize("name", NAMES)
 def test_the_machine_with_errors_is_where_the_second_implementation_has_it(name: str, seed: int, tmp_path: Path) -> None:
-    """Serial: 4 x 4 products; on rods: six lengths by least squares. All curves, units, signs, frames, both ways."""
+    """Serial: 4 x 4 products; on rods: six lengths by least squares. All curves, units, signs, frames, both directions."""
     case = drawn(tmp_path, name, seed, both=seed == 1)
-    way = np.random.default_rng(seed).choice([-1.0, 0.0, 1.0], size=case.q.shape)
-    tip, axis = case.actual.aim(case.actual.coordinates(case.q, case.nominal), way)
-    wanted = case.poses(case.q, way)
+    approach = np.random.default_rng(seed).choice([-1.0, 0.0, 1.0], size=case.q.shape)
+    tip, axis = case.actual.aim(case.actual.coordinates(case.q, case.nominal), approach)
+    wanted = case.poses(case.q, approach)
     assert np.abs(tip - case.nominal[:, :3]).max() > 5e-3
     np.testing.assert_allclose(tip, wanted[0], rtol=0.0, atol=1e-9)
     np.testing.assert_allclose(axis, wanted[1], rtol=0.0, atol=1e-12)
@@ -82,7 +83,7 @@ def test_the_machine_with_errors_is_where_the_second_implementation_has_it(name:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_corrected_joints_put_the_tip_of_the_second_implementation_there(name: str, tmp_path: Path) -> None:
-    """0.1 um and 0.01 arcsec before formatting, where a turn is free; what is left of the axis is what is told."""
+    """0.1 um and 0.01 arcsec before formatting, where a turn is free; what is left of the axis is what is reported."""
     case = drawn(tmp_path, name, 7, n=12)
     tip, axis = case.nominal[:, :3], case.nominal[:, 3:]
     found = correct(case.actual, case.q, tip, axis, beyond=True)
@@ -139,10 +140,10 @@ DRAWS = 120
 
 
 @pytest.mark.parametrize("name", ["nutating-head", "uranesx", "h4a-c-table"])
-def test_the_predicted_doubt_is_the_spread_of_machines_drawn_at_random(name: str, tmp_path: Path) -> None:
-    """Every number of the files is drawn anew, by SIGMA um or arcsec; the tips are those of the second implementation."""
+def test_the_predicted_uncertainty_is_the_spread_of_machines_drawn_at_random(name: str, tmp_path: Path) -> None:
+    """Every number of the files is drawn again, by SIGMA um or arcsec; the tips are those of the second implementation."""
     case = drawn(tmp_path, name, 0, n=2, sigma=sigmas(name))
-    predicted = doubt(case.model, case.actual, case.actual.coordinates(case.q, case.nominal))
+    predicted = uncertainty(case.model, case.actual, case.actual.coordinates(case.q, case.nominal))
     rng = np.random.default_rng(3)
     tips = np.stack([case.poses(case.q, errors=Spread(case.file, rng))[0] for _ in range(DRAWS)])
     spread = tips.std(axis=0, ddof=1)

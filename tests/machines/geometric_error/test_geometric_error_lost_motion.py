@@ -13,11 +13,11 @@ from machines.geometric_error.tables.names import parse
 def test_walked_steps_are_the_play_of_a_loop() -> None:
     rng = np.random.default_rng(3)
     step, gap = rng.normal(size=(777, 3)), rng.uniform(0.5, 3.0, (777, 3))
-    way, expected = np.array([1.0, -1.0, 0.3]), []
-    begin = way
+    approach, expected = np.array([1.0, -1.0, 0.3]), []
+    begin = approach
     for d, g in zip(step, gap, strict=True):
-        way = np.clip(way + 2.0 * d / g, -1.0, 1.0)
-        expected.append(way)
+        approach = np.clip(approach + 2.0 * d / g, -1.0, 1.0)
+        expected.append(approach)
     found = PlaySteps.of(step, gap).walked().at(begin)
     np.testing.assert_allclose(found, expected, atol=1e-12)
     assert (np.abs(found) < 1.0).any() and (np.abs(found) == 1.0).any()
@@ -25,8 +25,8 @@ def test_walked_steps_are_the_play_of_a_loop() -> None:
 
 def test_one_after_the_other_is_both_at_once() -> None:
     one, two = PlaySteps.of(np.array([[0.4]]), np.array([[1.0]])), PlaySteps.of(np.array([[-0.3]]), np.array([[1.0]]))
-    for way in (-1.0, -0.2, 0.9):
-        start = np.array([[way]])
+    for approach in (-1.0, -0.2, 0.9):
+        start = np.array([[approach]])
         np.testing.assert_allclose(one.then(two).at(start), two.at(one.at(start)), atol=1e-15)
 
 
@@ -43,7 +43,7 @@ def test_lost_motion_of_axes() -> None:
     curves = {"EYY": both, "EZX": both, "EXX": both, "EZZ": TableCurve(x, np.array([0.0, 1.0]))}
     errors = SerialErrors(tuple(Component(name, c) for text, c in curves.items() if (name := parse(text)) is not None))
     names = ("X", "Y", "Z")
-    assert errors.two_way(names) == [0, 1]
+    assert errors.bidirectional(names) == [0, 1]
     q = np.array([[100.0, -100.0, 0.0], [0.0, 100.0, 0.0]])
     np.testing.assert_allclose(errors.gaps(names, q, [0, 1, 2]), [[0.002, 0.004, GRAIN[0]], [0.003, 0.002, GRAIN[0]]])
 

@@ -10,7 +10,7 @@ import pytest
 
 import machines
 from machines.geometric_error.actual.actual_map import ActualByMap, part_side
-from machines.geometric_error.actual.model import ErrorModel, doubt
+from machines.geometric_error.actual.model import ErrorModel, uncertainty
 from machines.geometric_error.actual.serial_errors import SerialErrors
 from machines.geometric_error.exchange.make_map import map_loss, map_of, nodes_of, refined
 from machines.geometric_error.exchange.volume import middle, samples
@@ -101,13 +101,13 @@ def test_zero_and_sign_of_a_measured_map(tmp_path: Path) -> None:
     assert found.map.table[1, 1] == pytest.approx([0.001, 0, -0.001, 0, 0, 0], abs=1e-15)
 
 
-def test_the_doubt_at_the_stated_zero_is_none_and_elsewhere_that_of_both(tmp_path: Path) -> None:
+def test_the_uncertainty_at_the_stated_zero_is_none_and_elsewhere_that_of_both(tmp_path: Path) -> None:
     table = "X [mm],dx [um],dy [um],dz [um]\n0,1,2,3\n10,2,2,3\n30,1,2,3\n"
     found, _ = loaded(tmp_path, table, "zero = { X = 5.0 }\n[sigma]\nnode = 2.0\n")
     assert found is not None and found.covariance is not None
     kin = machines.load("mikron-ucp710").kinematics
     q = np.array([[5.0, 0, 0, 0, 0], [30.0, 0, 0, 0, 0]])
-    spread = doubt(found, found.on(kin), q).tip
+    spread = uncertainty(found, found.on(kin), q).tip
     assert spread[0] == pytest.approx(np.zeros(3), abs=1e-12)  # the mean of the first two nodes, less itself
     assert spread[1] == pytest.approx(np.full(3, 0.002 * np.sqrt(1.5)))
 
@@ -208,9 +208,9 @@ def test_a_map_is_refined_to_a_stated_loss_and_no_further() -> None:
     base = random_map(("X", "Y", "Z"), (np.array([-150.0, 150.0]),) * 3)
     sizes, probe = [], joints(kin, 3000, 9)
     for loss in (0.01, 0.003, 0.001):
-        made, told = refined(actual, nominal, base, np.zeros(3), loss, 500_000)
+        made, noted = refined(actual, nominal, base, np.zeros(3), loss, 500_000)
         found = map_loss(ErrorModel(map=made).on(kin), actual, probe)
-        assert told.tip_worst <= loss and found.tip_worst < 1.05 * loss
+        assert noted.tip_worst <= loss and found.tip_worst < 1.05 * loss
         half = tuple(np.linspace(x[0], x[-1], max(2, len(x) // 2)) for x in made.nodes)
         coarser = map_of(actual, nominal, random_map(base.letters, half), np.zeros(3))
         assert map_loss(ErrorModel(map=coarser).on(kin), actual, probe).tip_worst > loss
@@ -230,7 +230,7 @@ def test_a_linear_error_needs_two_nodes() -> None:
 
 # ---- rows -----------------------------------------------------------------------------------------------------------
 
-def test_scattered_rows_are_told_before_memory_is_asked_for(tmp_path: Path) -> None:
+def test_scattered_rows_are_reported_before_memory_is_asked_for(tmp_path: Path) -> None:
     rng = np.random.default_rng(3)
     rows = "\n".join(",".join(f"{x:.4f}" for x in row) for row in rng.uniform(-1, 1, (2000, 6)))
     (tmp_path / "m.csv").write_text(f"X [mm],Y [mm],Z [mm],dx [um],dy [um],dz [um]\n{rows}\n")
@@ -252,7 +252,7 @@ def test_the_volume_is_where_machine_and_model_hold(name: str) -> None:
     assert np.isfinite(machine.kinematics.forward(middle(machine)[None])[0]).all()
 
 
-def test_the_doubt_of_more_parameters_than_are_held_is_left_out_and_told(tmp_path: Path,
+def test_the_uncertainty_of_more_parameters_than_are_held_is_left_out_and_reported(tmp_path: Path,
                                                                          monkeypatch: pytest.MonkeyPatch) -> None:
     table = "X [mm],dx [um],dy [um],dz [um]\n-300,1,0,0\n300,3,0,0\n"
     found, faults = loaded(tmp_path, table, "[sigma]\nnode = 0.5\n")

@@ -85,8 +85,8 @@ class Map:
             places = places.copy()
             places[:, 0] = (places[:, 0] + np.pi) % (2.0 * np.pi) - np.pi
         places = np.column_stack([np.clip(column, x[0], x[-1]) for column, x in zip(places.T, grid, strict=True)])
-        told = RegularGridInterpolator(tuple(grid), values)
-        found = told(places) - (0.0 if self.zero is None else told(self.zero[None]))
+        noted = RegularGridInterpolator(tuple(grid), values)
+        found = noted(places) - (0.0 if self.zero is None else noted(self.zero[None]))
         return np.asarray(self.sign * found)
 
     def displaced(self, q: Floats, tip: Floats, axis: Floats) -> tuple[Floats, Floats]:
@@ -94,11 +94,12 @@ class Map:
         point = tip + (TOOL - self.point) * axis
         places = np.column_stack([q[:, self.own.letters.index(n)] if n.isupper() else point[:, "xyz".index(n)]
                                   for n in self.letters])
-        told = self.at(places)
+        noted = self.at(places)
         if self.machine_wide:
-            told = np.array([np.concatenate([r @ v[:3], r @ v[3:]]) for r, v in zip(map(self.table, q), told, strict=True)])
-        turned = Rotation.from_rotvec(told[:, 3:]).apply(axis)
-        return point + told[:, :3] - (TOOL - self.point) * turned, turned
+            noted = np.array([np.concatenate([r @ v[:3], r @ v[3:]]) for r,
+                              v in zip(map(self.table, q), noted, strict=True)])
+        turned = Rotation.from_rotvec(noted[:, 3:]).apply(axis)
+        return point + noted[:, :3] - (TOOL - self.point) * turned, turned
 
     def table(self, q: Floats) -> Floats:
         """Machine to table, (3, 3): all axes that carry the part."""

@@ -25,9 +25,9 @@ REACH = {False: (-900.0, 900.0), True: (-2.5, 2.5)}
 """mm; rad"""
 CURVES: dict[str, Curve] = {
     "linear": TableCurve(np.array([-3.0, -1.0, 0.5, 4.0]), RNG.normal(size=4)),
-    "linear, two ways": TableCurve(np.array([-3.0, -1.0, 0.5, 4.0]), RNG.normal(size=8), both=True),
+    "linear, two approach directions": TableCurve(np.array([-3.0, -1.0, 0.5, 4.0]), RNG.normal(size=8), both=True),
     "spline": TableCurve(np.linspace(-3.0, 4.0, 7), RNG.normal(size=7), rule="spline"),
-    "spline, two ways": TableCurve(np.linspace(-3.0, 4.0, 7), RNG.normal(size=14), rule="spline", both=True),
+    "spline, two approach directions": TableCurve(np.linspace(-3.0, 4.0, 7), RNG.normal(size=14), rule="spline", both=True),
     "periodic": TableCurve(np.linspace(0.0, 5.0, 6), RNG.normal(size=6), period=6.0),
     "periodic spline": TableCurve(np.linspace(0.0, 5.0, 6), RNG.normal(size=6), rule="spline", period=6.0),
     "one row": TableCurve(np.array([1.0]), np.array([0.4])),
@@ -41,22 +41,23 @@ CURVES["turned"] = RotatedCurve((((0, 0), Component(parse("EXC"), CURVES["linear
 @pytest.mark.parametrize("kind", CURVES)
 def test_sizes_and_slopes_of_curves_are_bounds_and_near(kind: str) -> None:
     curve, x = CURVES[kind], np.linspace(-6.0, 9.0, 150_001)
-    for way in (-1.0, 0.3, 1.0):
-        values = curve.at(x, way)
+    for approach in (-1.0, 0.3, 1.0):
+        values = curve.at(x, approach)
         slope = np.abs(np.diff(values) / np.diff(x)).max()
         assert np.abs(values).max() <= curve.most * (1.0 + 1e-12)
         assert slope <= curve.steepest * (1.0 + 1e-6)
     forward, backward = curve.at(x, 1.0), curve.at(x, -1.0)
     assert np.abs(forward - backward).max() <= curve.apart * (1.0 + 1e-12) and (curve.apart > 0.0) == ("ways" in kind)
-    assert curve.steepest <= 3.0 * max(np.abs(np.diff(curve.at(x, way)) / np.diff(x)).max() for way in (-1.0, 1.0)) + 1e-12
+    assert curve.steepest <= 3.0 * max(np.abs(np.diff(curve.at(x, approach)) / np.diff(x)).max()
+                                       for approach in (-1.0, 1.0)) + 1e-12
     if kind == "turned":
         return
     with_more = curve.with_values(2.0 * curve.values)
     assert with_more.most == pytest.approx(2.0 * curve.most) and with_more.steepest == pytest.approx(2.0 * curve.steepest)
 
 
-def with_two_ways(kin: Serial) -> SerialErrors:
-    """Tables of two ways for two components of each axis."""
+def with_two_directions(kin: Serial) -> SerialErrors:
+    """Tables of two approach directions for two components of each axis."""
     found = []
     for j, letter in enumerate(kin.axis_names):
         x = np.linspace(-7.0, 7.0, 9) if kin.rotary[j] else np.linspace(-600.0, 600.0, 9)
@@ -69,20 +70,21 @@ def with_two_ways(kin: Serial) -> SerialErrors:
 
 
 def held(kin: Serial, model: ErrorModel) -> None:
-    """Along straight steps of random length from random poses, with ways that change: no difference above the bound."""
+    """Along straight steps of random length from random poses, with approach directions that change: no difference above the
+    bound."""
     actual, q = model.on(kin), joints(kin, STEPS, 7)
     rng, rotary = np.random.default_rng(9), np.array(kin.rotary)
     for size in (1e-3, 1.0, 30.0):
         step = rng.normal(size=q.shape) * np.where(rotary, 0.01, 1.0) * size
         step *= rng.random(q.shape) < 0.5  # also single axes
-        way, turned = rng.uniform(-1.0, 1.0, q.shape), rng.uniform(-1.0, 1.0, q.shape)
+        approach, turned = rng.uniform(-1.0, 1.0, q.shape), rng.uniform(-1.0, 1.0, q.shape)
         rates = actual.error_rates(q, np.abs(step))
         assert rates is not None
         here, there = ([v - n for v, n in zip(actual.aim(x, w), kin.forward(x), strict=True)] for x, w in (
-            (q, way), (q + step, turned)))
-        for k, (rate, by_way) in enumerate(((rates.tip, rates.tip_way), (rates.axis, rates.axis_way))):
+            (q, approach), (q + step, turned)))
+        for k, (rate, by_approach) in enumerate(((rates.tip, rates.tip_reversal), (rates.axis, rates.axis_reversal))):
             moved = np.linalg.norm(there[k] - here[k], axis=1)
-            allowed = (rate * np.abs(step)).sum(axis=1) + (by_way * np.abs(turned - way)).sum(axis=1)
+            allowed = (rate * np.abs(step)).sum(axis=1) + (by_approach * np.abs(turned - approach)).sum(axis=1)
             assert (moved <= allowed * (1.0 + 1e-9) + 1e-12).all(), (size, float((moved / allowed).max()))
 
 
@@ -90,7 +92,7 @@ def held(kin: Serial, model: ErrorModel) -> None:
 def test_no_error_of_a_serial_machine_changes_faster(name: str) -> None:
     kin = kinematics(name)
     held(kin, ErrorModel(serial_errors(kin, 3)))
-    held(kin, ErrorModel(with_two_ways(kin)))
+    held(kin, ErrorModel(with_two_directions(kin)))
     moving = dict.fromkeys("ABC", "moving")
     held(kin, ErrorModel(replace(serial_errors(kin, 4), frame=moving)))  # type: ignore[arg-type]
 

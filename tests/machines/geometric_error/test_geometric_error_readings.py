@@ -13,9 +13,9 @@ from machines.geometric_error.exchange.imports import ImportOptions, read_source
 from toolpaths.diagnostics import Diagnostic
 
 MILL = machines.load("mill-3axis")
-WAYS = "X [mm],EXX+ [um],EXX- [um]\n"
-ROWS = WAYS + "0,1,5\n0,3,7\n0,2,6\n100,11,14\n100,13,18\n100,12,16\n"
-"""three runs, both ways"""
+DIRECTIONS = "X [mm],EXX+ [um],EXX- [um]\n"
+ROWS = DIRECTIONS + "0,1,5\n0,3,7\n0,2,6\n100,11,14\n100,13,18\n100,12,16\n"
+"""three runs, both directions"""
 SPREAD = [[1.0, 3.0, 2.0], [11.0, 13.0, 12.0], [5.0, 7.0, 6.0], [14.0, 18.0, 16.0]]
 
 
@@ -51,32 +51,33 @@ SAME = {
                                  "0,1,5,3,7,2,6\n100,11,14,13,18,12,16\n"},
     "other names of runs": {"a.csv": "EXX 1+ [um];EXX1- [mm];EXX_2+ [um];EXX2\u2193 [um];EXX 3 \u2191 [um];EXX-03 [um];"
                                      "X [m]\n11;0,014;13;18;12;16;0,1\n1;0,005;3;7;2;6;0\n"},
-    "a run beside those without a number": {"a.csv": WAYS.replace("\n", ",EXX+2 [um],EXX-2 [um],EXX+3 [um],EXX-3 [um]\n")
+    "a run next to those without a number": {"a.csv": DIRECTIONS.replace("\n",
+                                                                         ",EXX+2 [um],EXX-2 [um],EXX+3 [um],EXX-3 [um]\n")
                                             + "0,1,5,3,7,2,6\n100,11,14,13,18,12,16\n"},
-    "in the order of the laser": {"a.csv": WAYS + "0,1,\n100,11,\n100,,14\n0,,5\n0,3,\n100,13,\n100,,18\n0,,7\n0,2,\n"
+    "in the order of the laser": {"a.csv": DIRECTIONS + "0,1,\n100,11,\n100,,14\n0,,5\n0,3,\n100,13,\n100,,18\n0,,7\n0,2,\n"
                                                   "100,12,\n100,,16\n0,,6\n"},
-    "a file for each run": {"a.csv": WAYS + "0,1,5\n100,11,14\n", "b.csv": WAYS + "100,13,18\n0,3,7\n",
-                            "c.csv": WAYS + "0,2,6\n100,12,16\n"},
-    "a file for each way": {"up.csv": "X [mm],EXX+ [um]\n0,1\n100,11\n0,3\n100,13\n0,2\n100,12\n",
+    "a file for each run": {"a.csv": DIRECTIONS + "0,1,5\n100,11,14\n", "b.csv": DIRECTIONS + "100,13,18\n0,3,7\n",
+                            "c.csv": DIRECTIONS + "0,2,6\n100,12,16\n"},
+    "a file for each approach direction": {"up.csv": "X [mm],EXX+ [um]\n0,1\n100,11\n0,3\n100,13\n0,2\n100,12\n",
                             "down.csv": "X [mm],EXX- [um]\n100,14\n0,5\n100,18\n0,7\n100,16\n0,6\n"}}
 
 
 @pytest.mark.parametrize("files", SAME.values(), ids=SAME)
-def test_readings_in_any_layout_are_the_same_means_and_doubt(files: dict[str, str], tmp_path: Path) -> None:
-    model, told = read(tmp_path, files, ImportOptions(average=True))
+def test_readings_in_any_layout_are_the_same_means_and_uncertainty(files: dict[str, str], tmp_path: Path) -> None:
+    model, noted = read(tmp_path, files, ImportOptions(average=True))
     assert means(model) == [2.0, 12.0, 6.0, 16.0]
     up, down = pooled(SPREAD[:2]), pooled(SPREAD[2:])
     assert sigmas(model) == pytest.approx(np.repeat([up, down], 2) / np.sqrt(3.0))
-    assert [d.code for d in told] == ["error-import.averaged"]
+    assert [d.code for d in noted] == ["error-import.averaged"]
 
 
 def test_ways_in_words_are_those_of_the_component(tmp_path: Path) -> None:
-    text = WAYS.replace("+", " up").replace("-", "\u2193") + "0,1,5\n100,11,14\n"
-    model, told = read(tmp_path, {"a.csv": text}, ImportOptions())
-    assert means(model) == [1.0, 11.0, 5.0, 14.0] and not told
+    text = DIRECTIONS.replace("+", " up").replace("-", "\u2193") + "0,1,5\n100,11,14\n"
+    model, noted = read(tmp_path, {"a.csv": text}, ImportOptions())
+    assert means(model) == [1.0, 11.0, 5.0, 14.0] and not noted
 
 
-def test_a_reading_that_is_missing_counts_less_and_its_place_has_more_doubt(tmp_path: Path) -> None:
+def test_a_reading_that_is_missing_counts_less_and_its_place_has_more_uncertainty(tmp_path: Path) -> None:
     model, _ = read(tmp_path, {"a.csv": ROWS.replace("0,2,6\n1", "0,,6\n1").replace("100,12,16", "100,12,")},
                     ImportOptions(average=True))
     assert means(model) == [2.0, 12.0, 6.0, 16.0]
@@ -92,21 +93,21 @@ TARGETS = "target [mm];run 1+ [um];run 1- [um];run 2+ [um];run 2- [um]\n0;1;5;3;
     ("target", "Position"), ("target", "Y"), ("run ", ""), ("run ", "Error "), ("run ", "EYY"),
     ("+", "\u2191"), ("0;1;5;3;7\n100;11;14;13;18\n", "100;11;14;13;18\n0;1;5;3;7\n")])
 def test_targets_and_runs_are_of_the_component_that_is_named(old: str, new: str, tmp_path: Path) -> None:
-    model, told = read(tmp_path, {"laser.csv": TARGETS.replace(old, new)}, ImportOptions(average=True), "EYY=laser.csv")
-    assert means(model) == [2.0, 12.0, 6.0, 16.0], told
+    model, noted = read(tmp_path, {"laser.csv": TARGETS.replace(old, new)}, ImportOptions(average=True), "EYY=laser.csv")
+    assert means(model) == [2.0, 12.0, 6.0, 16.0], noted
     assert model is not None and [str(c.name) for c in model.axes.components] == ["EYY"]
 
 
 def test_one_run_of_a_component_needs_no_average(tmp_path: Path) -> None:
-    model, told = read(tmp_path, {"laser.csv": "target [mm],error [um]\n0,1\n100,2\n"}, ImportOptions(), "EYX=laser.csv")
-    assert means(model) == [1.0, 2.0] and not told
+    model, noted = read(tmp_path, {"laser.csv": "target [mm],error [um]\n0,1\n100,2\n"}, ImportOptions(), "EYX=laser.csv")
+    assert means(model) == [1.0, 2.0] and not noted
     assert model is not None and str(model.axes.components[0].name) == "EYX"
 
 
 def test_two_ways_in_files_of_their_own_are_one_table(tmp_path: Path) -> None:
     files = {"up.csv": "X [mm],EXX+ [um]\n0,1\n100,11\n", "down.csv": "X [mm],EXX- [um]\n100,14\n0,5\n"}
-    model, told = read(tmp_path, files, ImportOptions())
-    assert means(model) == [1.0, 11.0, 5.0, 14.0] and not told
+    model, noted = read(tmp_path, files, ImportOptions())
+    assert means(model) == [1.0, 11.0, 5.0, 14.0] and not noted
     assert model is not None and model.covariance is None
 
 
@@ -153,21 +154,27 @@ FAULTS = [
     ("rows without --average", {"a.csv": ROWS}, ImportOptions(), "error-model.order", "a.csv:3", "import --average"),
     ("files without --average", SAME["a file for each run"], ImportOptions(), "error-import.twice", "b.csv", "--average"),
     ("columns without --average", RUNS, ImportOptions(), "error-import.runs", "a.csv:1", "EXX+1, EXX-1"),
-    ("ways without --average", SAME["a file for each way"], ImportOptions(), "error-import.runs", "up.csv", "--average"),
-    ("blank without --average", {"a.csv": WAYS + "0,1,2\n9,,3\n"}, ImportOptions(), "error-table.row", "a.csv:3",
+    ("approach directions without --average", SAME["a file for each approach direction"], ImportOptions(),
+     "error-import.runs", "up.csv", "--average"),
+    ("blank without --average", {"a.csv": DIRECTIONS + "0,1,2\n9,,3\n"}, ImportOptions(), "error-table.row", "a.csv:3",
      "column EXX+"),
-    ("blank position", {"a.csv": WAYS + "0,1,2\n,1,3\n9,2,2\n"}, ImportOptions(average=True), "error-table.row", "a.csv:3",
+    ("blank position", {"a.csv": DIRECTIONS + "0,1,2\n,1,3\n9,2,2\n"}, ImportOptions(average=True), "error-table.row",
+     "a.csv:3",
      "no number in column X"),
-    ("never read", {"a.csv": WAYS + "0,1,2\n9,,3\n9,,4\n"}, ImportOptions(average=True), "error-import.reading", "a.csv",
+    ("never read", {"a.csv": DIRECTIONS + "0,1,2\n9,,3\n9,,4\n"}, ImportOptions(average=True), "error-import.reading",
+     "a.csv",
      "no reading of EXX+ at X 9"),
-    ("ways at other places", {"u.csv": "X [mm],EXX+ [um]\n0,1\n9,2\n", "d.csv": "X [mm],EXX- [um]\n0,1\n9.001,2\n"},
+    ("approach directions at other places", {"u.csv": "X [mm],EXX+ [um]\n0,1\n9,2\n",
+                                             "d.csv": "X [mm],EXX- [um]\n0,1\n9.001,2\n"},
      ImportOptions(),
      "error-import.reading", "u.csv", "--near"),
-    ("near and near", {"a.csv": WAYS + "0,1,2\n0.01,1,3\n0.02,1,2\n9,1,1\n"}, ImportOptions(average=True, near={"X": 0.015}),
+    ("near and near", {"a.csv": DIRECTIONS + "0,1,2\n0.01,1,3\n0.02,1,2\n9,1,1\n"},
+     ImportOptions(average=True, near={"X": 0.015}),
      "error-import.near", "a.csv", "X from 0 to 0.02"),
     ("near of another axis", {"a.csv": ROWS}, ImportOptions(average=True, near={"Y": 0.1}), "error-import.unused", "",
      "near positions of Y"),
-    ("near of no readings", {"a.csv": WAYS + "0,1,2\n9,1,3\n"}, ImportOptions(near={"X": 0.1}), "error-import.unused", "",
+    ("near of no readings", {"a.csv": DIRECTIONS + "0,1,2\n9,1,3\n"}, ImportOptions(near={"X": 0.1}), "error-import.unused",
+     "",
      "give --average too"),
     ("a laser without a name", {"a.csv": "Position [mm],run 1 [um],run 2 [um]\n0,1,2\n9,1,2\n"}, ImportOptions(average=True),
      "error-import.columns", "a.csv:1", "imported as e.g. EXX=a.csv"),
@@ -208,8 +215,8 @@ def test_what_is_wrong_with_the_columns_of_a_component(source: str, old: str, ne
 @pytest.mark.parametrize(("unit", "large", "severity"), [
     ("mm", False, "ERROR"), ("mm", True, "WARNING"), ("m", True, "ERROR"), ("um", False, ""), ("um", True, "")])
 def test_a_wrong_unit_is_noticed_when_it_comes_in(unit: str, large: bool, severity: str, tmp_path: Path) -> None:
-    model, told = read(tmp_path, {"a.csv": f"X [mm],EXX [{unit}]\n-500,0\n500,2.5\n"}, ImportOptions(large=large))
+    model, noted = read(tmp_path, {"a.csv": f"X [mm],EXX [{unit}]\n-500,0\n500,2.5\n"}, ImportOptions(large=large))
     assert (model is None) == (severity == "ERROR")
-    assert [(d.code, d.severity.name) for d in told] == ([("error-model.large", severity)] if severity else [])
+    assert [(d.code, d.severity.name) for d in noted] == ([("error-model.large", severity)] if severity else [])
     assert model is None or model.large == large
-    assert all("EXX is up to" in d.message and "a.csv" in d.file for d in told)
+    assert all("EXX is up to" in d.message and "a.csv" in d.file for d in noted)

@@ -108,11 +108,11 @@ def test_sensitivity_is_the_derivative_by_every_parameter(name: str) -> None:
     count, rng = len(zero.names), np.random.default_rng(2)
     for start in range(0, count, 8):
         some = np.arange(start, start + 8) * 7919 % count
-        label, way = [zero.names[k] for k in some], np.zeros(count)
-        way[some] = rng.choice([-1.0, 1.0], len(some)) * rng.uniform(0.5, 1.0, len(some))
-        unit = way * step
+        label, approach = [zero.names[k] for k in some], np.zeros(count)
+        approach[some] = rng.choice([-1.0, 1.0], len(some)) * rng.uniform(0.5, 1.0, len(some))
+        unit = approach * step
         up, down = (ActualSerial(kin, zero.with_values(sign * unit)).place(q) for sign in (1.0, -1.0))
-        tip, turned = columns[:, :3] @ way, np.cross(columns[:, 3:] @ way, axis)
+        tip, turned = columns[:, :3] @ approach, np.cross(columns[:, 3:] @ approach, axis)
         assert (np.abs((up[0] - down[0]) / (2 * step) - tip) <= np.maximum(1e-6, 1e-6 * np.abs(tip))).all(), label
         assert (np.abs((up[1] - down[1]) / (2 * step) - turned) <= np.maximum(1e-8, 1e-6 * np.abs(turned))).all(), label
 

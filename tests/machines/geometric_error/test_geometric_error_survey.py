@@ -1,4 +1,4 @@
-"""Error models as maps, and what is told of a model: figures, ranges, what correction leaves."""
+"""Error models as maps, and what is reported of a model: figures, ranges, what correction leaves."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import pytest
 
 import machines
 from machines.geometric_error.actual.correction import correct
-from machines.geometric_error.actual.model import ErrorModel, doubt
+from machines.geometric_error.actual.model import ErrorModel, uncertainty
 from machines.geometric_error.actual.serial_errors import SerialErrors
 from machines.geometric_error.exchange.exports import lattice_for, to_map, worst
 from machines.geometric_error.exchange.imports import ImportOptions, read_sources
@@ -39,19 +39,19 @@ def test_a_map_of_all_coordinates_loses_as_much_everywhere_as_inside(name: str, 
     assert made.model.names and made.model.on(machine.kinematics) is not None
 
 
-def test_a_map_carries_the_doubt_of_its_model_at_its_nodes() -> None:
+def test_a_map_carries_the_uncertainty_of_its_model_at_its_nodes() -> None:
     machine = machines.load("mikron-ucp710")
     full = correlated(load(SAMPLES / "mikron-ucp710.toml", machine))
     steps = {"X": 400.0, "Y": 300.0, "Z": 500.0}
     lattice, fixed = lattice_for(full, machine, "", steps, {"A": 0.4, "C": 1.0}, 0.0, "machine")
     made = to_map(full, machine, lattice, fixed, None)
-    assert made.model.covariance is not None and lattice.table.size == 6 * 3 * 3 * 2 and not made.doubt_lost
+    assert made.model.covariance is not None and lattice.table.size == 6 * 3 * 3 * 2 and not made.uncertainty_lost
     kin = machine.kinematics.with_tool(90.0)
     q = np.column_stack([lattice.places(), np.tile([0.4, 1.0], (18, 1))])
-    before, after = doubt(full, full.on(kin), q), doubt(made.model, made.model.on(kin), q)
+    before, after = uncertainty(full, full.on(kin), q), uncertainty(made.model, made.model.on(kin), q)
     assert after.tip == pytest.approx(before.tip, rel=1e-3) and after.axis == pytest.approx(before.axis, rel=1e-3)
     finer, _ = lattice_for(full, machine, "", {}, {}, 0.0, "machine")
-    assert to_map(full, machine, finer, fixed, None).doubt_lost
+    assert to_map(full, machine, finer, fixed, None).uncertainty_lost
 
 
 def test_a_map_goes_round_where_its_model_does() -> None:
@@ -68,7 +68,7 @@ def test_figures_of_a_model() -> None:
     machine = machines.load("mikron-ucp710")
     full = load(SAMPLES / "mikron-ucp710.toml", machine)
     found = survey(full, machine, 80.0)
-    assert found["components"]["EXX"]["lost_motion"] == pytest.approx(3.0) and found["components"]["EXX"]["both_ways"]
+    assert found["components"]["EXX"]["lost_motion"] == pytest.approx(3.0) and found["components"]["EXX"]["both_directions"]
     assert found["components"]["ECY"]["unit"] == "arcsec"
     peak = max(abs(float(x.split(",")[3])) for x in (SAMPLES / "mikron-ucp710-X.csv").read_text().splitlines()[2:])
     assert abs(found["components"]["EYX"]["largest"]) == pytest.approx(peak)
@@ -88,15 +88,16 @@ def test_figures_of_a_model() -> None:
     assert unmeasured(full, machine, "e") == []
     short = ErrorModel(SerialErrors((component("EXX", TableCurve(np.array([0.0, 10.0]), np.zeros(2))),)))
     turn = ErrorModel(SerialErrors((component("EXC", TableCurve(np.array([0.0, 2 * np.pi]), np.zeros(2))),)))
-    told = unmeasured(turn, machine, "e.toml")
-    assert len(told) == 1 and "C goes round, the model holds from 0 to 360" in told[0].message and "repeats" in told[0].hint
+    noted = unmeasured(turn, machine, "e.toml")
+    assert len(noted) == 1 and "repeats" in noted[0].hint
+    assert "C goes round, the model holds from 0 to 360" in noted[0].message
     assert ranges(turn, machine)[1][4] == pytest.approx(2 * np.pi)
-    told = unmeasured(short, machine, "e.toml")
-    assert len(told) == 1 and "X travels from -355 to 355, the model holds from 0 to 10" in told[0].message
+    noted = unmeasured(short, machine, "e.toml")
+    assert len(noted) == 1 and "X travels from -355 to 355, the model holds from 0 to 10" in noted[0].message
 
 
 @pytest.mark.parametrize(("name", "turns"), [("mikron-ucp710", 2), ("mill-4axis", 1), ("uranesx", 0)])
-def test_what_correction_leaves_is_what_the_commands_leave_where_it_is_told(name: str, turns: int) -> None:
+def test_what_correction_leaves_is_what_the_commands_leave_where_it_is_reported(name: str, turns: int) -> None:
     machine = machines.load(name)
     full = model(machine.kinematics, 3)
     volume = survey(full, machine, 80.0)["volume"]
@@ -113,17 +114,17 @@ def test_what_correction_leaves_is_what_the_commands_leave_where_it_is_told(name
     assert (volume["residual_axis_rms_arcsec"] < 0.1 * volume["axis_rms_arcsec"]) == (turns == 2)
 
 
-@pytest.mark.parametrize(("text", "told"), [
+@pytest.mark.parametrize(("text", "noted"), [
     ("X [mm],EXX [um]\n-300000,0\n300000,5\n", "X was measured from -300000 to 300000, it travels from -355 to 355 mm"),
     ("X [in],EXX [um]\n-355,0\n355,5\n", "X was measured from -9017 to 9017"),
     ("A [rad],EAA [arcsec]\n-30,0\n120,5\n", "A was measured from -1718.87 to 6875.49, it travels from -30 to 120 degrees"),
     ("X [mm],Y [mm],dx [um],dy [um],dz [um]\n0,0,1,1,1\n0,1000,1,1,1\n9,0,1,1,1\n9,1000,1,1,1\n", "Y was measured"),
     ("X [mm],EXX [um]\n-360,0\n360,5\n", ""), ("C [deg],ECC [arcsec]\n-400,0\n400,5\n", "")])
-def test_a_range_far_beyond_travel_is_told(text: str, told: str, tmp_path: Path) -> None:
+def test_a_range_far_beyond_travel_is_reported(text: str, noted: str, tmp_path: Path) -> None:
     machine = machines.load("mikron-ucp710")
     (tmp_path / "x.csv").write_text(text)
     found, _ = read_sources([str(tmp_path / "x.csv")], machine, ImportOptions())
     assert found is not None
     warned = beyond_travel(found, machine, "e.toml")
-    assert [d.code for d in warned] == ["error-model.travel"] * bool(told)
-    assert all(told in d.message and d.severity is Severity.WARNING and "unit" in d.hint for d in warned)
+    assert [d.code for d in warned] == ["error-model.travel"] * bool(noted)
+    assert all(noted in d.message and d.severity is Severity.WARNING and "unit" in d.hint for d in warned)

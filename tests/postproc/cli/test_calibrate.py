@@ -89,7 +89,7 @@ FAULTS = [
     ("unit", "reversal.csv", ("[arcsec]", "[um]"), "calibrate.unit", 5),
     ("step", "reversal.csv", ("0,11,", "0,12,"), "calibrate.row", 14),
     ("endless", "reversal.toml", ("steps = 12", "steps = 100000000"), "file.range", 7),
-    ("no doubt", "reversal.toml", ("= 0.05", "= 1e-320"), "file.range", 8),
+    ("no uncertainty", "reversal.toml", ("= 0.05", "= 1e-320"), "file.range", 8),
     ("gap", "reversal.csv", ("3,0,", "1000000000,0,"), "calibrate.setup", 5),
     ("oblique", "reversal.toml", ('"mikron-ucp710"\n\n[reversal]\ntable = "reversal.csv"\naxis = "C"',
                                   '"nutating-head"\n\n[reversal]\ntable = "reversal.csv"\naxis = "B"'), "calibrate.axis", 6),
@@ -124,7 +124,7 @@ def test_a_direction_of_no_length_is_refused(folder: Path) -> None:
     assert found is None and [d.lines for d in diagnostics] == [(6,)] and "[1, 0, 0]" in str(diagnostics[0])
 
 
-def test_one_reading_is_not_enough_and_more_than_noise_is_told(folder: Path) -> None:
+def test_one_reading_is_not_enough_and_more_than_noise_is_reported(folder: Path) -> None:
     text = (folder / "reversal.csv").read_text()
     (folder / "reversal.csv").write_text("\n".join(text.splitlines()[:3]) + "\n")
     assert run(folder, "reversal.toml", "o.toml", 1)["rank"] == 3

@@ -1,4 +1,4 @@
-"""What `postproc calibrate` tells: the account, the names, the ways, the schema, and what its README says."""
+"""What `postproc calibrate` says: the account, the names, the approach directions, the schema, and what its README says."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 
 import machines
 from machines.calibration.calibrate import calibrate
-from machines.calibration.measurement_file import COLUMNS, JOINT, WAY, MeasurementModel
+from machines.calibration.measurement_file import COLUMNS, DIRECTION, JOINT, MeasurementModel
 from machines.calibration.result_text import text
 from machines.geometric_error.actual.model import ErrorModel
 from machines.geometric_error.actual.rods import RodErrors, rod_frame, rod_names
@@ -38,7 +38,7 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path / "calibration"
 
 
-def told(folder: Path, source: str, code: int = 0) -> tuple[str, str]:
+def noted(folder: Path, source: str, code: int = 0) -> tuple[str, str]:
     done = CliRunner().invoke(app, ["calibrate", str(folder / source), "-o", str(folder / "out.toml")])
     assert done.exit_code == code, done.stderr
     return done.stdout, done.stderr
@@ -59,7 +59,7 @@ def test_the_example_of_the_readme_is_a_good_file(folder: Path) -> None:
     assert example is not None
     (folder / "example.toml").write_text(example[1])
     (folder / "start.toml").write_text((folder / "bar-start.toml").read_text())
-    assert "rank 7 of 7" in told(folder, "example.toml")[0]
+    assert "rank 7 of 7" in noted(folder, "example.toml")[0]
 
 
 def test_readme_and_schema_say_what_every_column_is() -> None:
@@ -76,7 +76,7 @@ def test_readme_and_schema_say_what_every_column_is() -> None:
             assert f"`{column.name}`" in README and f"`[{kind}]`" in README
             if kind in ("ball_bar", "laser", "reversal"):
                 assert column.meaning in README, column
-    assert JOINT in README and WAY in README
+    assert JOINT in README and DIRECTION in README
     assert all(field.description for field in MeasurementModel.model_fields.values())
 
 
@@ -88,7 +88,7 @@ def test_only_what_was_asked_for_is_listed_with_as_many_digits_as_are_known(fold
     (folder / "bar-start.toml").write_text(start)
     source = folder / "ball_bar.toml"
     source.write_text(source.read_text().replace('model =', 'parameters = ["EC0Y", "EB0Z", "EA0Z"]\nmodel ='))
-    lines = told(folder, "ball_bar.toml")[0].splitlines()
+    lines = noted(folder, "ball_bar.toml")[0].splitlines()
     assert lines[1] == "rank 7 of 7, condition number 1.000, 72 readings"
     assert re.fullmatch(r"weighted residual 48\.\d\d before, 5\.4\d\d with nothing found of the machine, 1\.0\d\d after",
                         lines[2])
@@ -125,10 +125,10 @@ def test_what_is_not_known_is_said_to_be_so(folder: Path) -> None:
 
 
 def test_values_of_a_table_say_where_they_are_and_by_which_way(folder: Path) -> None:
-    out, _ = told(folder, "laser.toml")
+    out, _ = noted(folder, "laser.toml")
     assert re.search(r"EXX\[0\]\+ +-7\.\d+ \+- 0\.212 um +at X -300 \+\n", out)
     assert re.search(r"EXX\[12\]- +4\.\d+ \+- 0\.212 um +at X 300 -$", out) and "zero" not in out
-    assert re.search(r"ECC\[1\] .* arcsec at C 30\n", told(folder, "reversal.toml")[0])
+    assert re.search(r"ECC\[1\] .* arcsec at C 30\n", noted(folder, "reversal.toml")[0])
     found = load(folder.parent / "calibration" / "screw-truth.toml", machines.load("mikron-ucp710"))
     fitted, _ = calibrate(folder / "laser.toml")
     assert fitted is not None and fitted.model is not None
@@ -150,24 +150,25 @@ def test_a_wrong_name_is_answered_with_those_near_it(folder: Path) -> None:
                                              + "[location]\nEC0Y = 0.0\nEC0A = 0.0\nEZ0A = 0.0\n")
     source = folder / "laser.toml"
     source.write_text(source.read_text().replace("model =", 'parameters = ["EC0X", "EXX"]\nmodel ='))
-    _, err = told(folder, "laser.toml", 1)
+    _, err = noted(folder, "laser.toml", 1)
     assert ("laser.toml:3: error [calibrate.parameter] screw-start.toml has no parameter 'EC0X'; near it are EC0Y, EC0A"
             in err) and "it has" not in err
     assert "the model has EXX[0]+ .. EXX[12]- (26), EC0Y, EC0A, EZ0A" in err
 
 
-def test_values_that_are_not_told_are_named_once_and_shortly(folder: Path) -> None:
+def test_values_that_are_not_reported_are_named_once_and_shortly(folder: Path) -> None:
     (folder / "laser.csv").write_text((folder / "laser.csv").read_text().replace("X way", "run"))
-    _, err = told(folder, "laser.toml", 1)
+    _, err = noted(folder, "laser.toml", 1)
     assert err.count("[calibrate.rank]") == 1 and "of EXX[1]+, EXX[1]-; of EXX[2]+, EXX[2]-, and of 10 more; say in" in err
     assert "laser.csv: run not used" in err and "info [calibrate.ways]" in err and "add a column X way" in err
     (folder / "bar-start.toml").write_text((folder / "bar-start.toml").read_text() + "EC0A = 0.0\nEZ0A = 0.0\n")
-    _, err = told(folder, "ball_bar.toml", 1)
-    assert err.count("[calibrate.rank]") == 1 and "the readings do not tell EC0A, EZ0A; measure" in err
+    _, err = noted(folder, "ball_bar.toml", 1)
+    assert err.count("[calibrate.rank]") == 1 and "the readings do not determine EC0A, EZ0A; measure" in err
 
 
 def test_readings_from_one_side_are_off_unless_the_table_says_so(folder: Path) -> None:
-    """X always forwards: 3 um of lost motion show as 1.5 um of the place of C, and not where the ways are told."""
+    """X always forwards: 3 um of lost motion show as 1.5 um of the place of C, and not where the approach directions are
+    reported."""
     (folder / "start.toml").write_text('base = "screw-truth.toml"\n[location]\nEX0C = 0.0\nEY0C = 0.0\n')
     (folder / "probe.toml").write_text((folder / "probe.toml").read_text().replace("EC0Y", "EX0C", 1))
     machine = machines.load("mikron-ucp710")
@@ -193,19 +194,19 @@ def test_readings_from_one_side_are_off_unless_the_table_says_so(folder: Path) -
     assert abs(found.figures["parameters"]["EX0C"]["value"]) == pytest.approx(1.5, abs=0.3)
 
 
-def test_as_many_readings_as_unknowns_are_told_to_be_unchecked(folder: Path) -> None:
+def test_as_many_readings_as_unknowns_are_reported_to_be_unchecked(folder: Path) -> None:
     lines = (folder / "laser.csv").read_text().splitlines()
     (folder / "laser.csv").write_text("\n".join(lines[:28]) + "\n")
-    assert "info [calibrate.unchecked] 26 readings for as many unknowns" in told(folder, "laser.toml")[1]
+    assert "info [calibrate.unchecked] 26 readings for as many unknowns" in noted(folder, "laser.toml")[1]
 
 
-def test_places_the_machine_cannot_stand_at_are_told_by_line(folder: Path) -> None:
+def test_places_the_machine_cannot_stand_at_are_reported_by_line(folder: Path) -> None:
     kin = machines.load("uranesx").kinematics
     names = rod_names(rod_frame(kin), kin.axis_names)  # type: ignore[arg-type]
     save(ErrorModel(rods=RodErrors.none(kin.axis_names, names), name="rods"), folder)
     (folder / "d.csv").write_text("X [mm],Y [mm],Z [mm],dx [um],dy [um],dz [um]\n0,0,0,1,2,3\n9000,0,-9000,1,2,3\n")
     (folder / "d.toml").write_text('machine = "uranesx"\nmodel = "rods.toml"\n[poses]\ntable = "d.csv"\nsigma_um = 1\n')
-    _, err = told(folder, "d.toml", 1)
+    _, err = noted(folder, "d.toml", 1)
     assert "d.csv:3: error [calibrate.row] uranesx cannot stand there (1 of 2 rows)" in err
 
 

@@ -1,4 +1,4 @@
-"""Slips of unit, sign and order in measurement files: each is told, and no model is written where it would be wrong."""
+"""Faults of unit, sign and order in measurement files: each is reported, and no model is written where it would be wrong."""
 
 from __future__ import annotations
 
@@ -104,16 +104,16 @@ SLIPS = {
     "laser tenfold": ("laser.csv", scaled(10.0, "reading"), "calibrate.slip", "reading a tenth as large"),
     "laser, a tenth": ("laser.csv", scaled(0.1, "reading"), "calibrate.slip", "reading ten times as large"),
     "laser in inches": ("laser.csv", scaled(1.0 / 25400.0, "reading"), "calibrate.slip", "reading in in (write [in]"),
-    "X of the laser in um": ("laser.csv", text("X [mm]", "X [um]"), "calibrate.rank", "do not tell EXX[0]+ .."),
+    "X of the laser in um": ("laser.csv", text("X [mm]", "X [um]"), "calibrate.rank", "do not determine EXX[0]+ .."),
     "laser absolute": ("laser.csv", rows(lambda r: r.update(reading=r["reading"] + 1e3 * r["X"])), "error-model.large",
                        "actual less nominal"),
     "errors by name": ("laser.csv", text("reading", "EXX"), "calibrate.column", "no column reading; tables of errors by"),
     "two columns": ("laser.csv", text("Y [mm],Z [mm]", "V [mm],W [mm]"), "calibrate.column", "no column Y, Z; it has X"),
     "no bar": ("ball_bar.csv", text("\n150,0,0,", "\n0,0,0,"), "calibrate.row", "stands 0 mm from the centre"),
     "no number": ("laser.csv", text("-7.321", "1e300"), "calibrate.row", "reading is 1e+297 mm"),
-    "way of nothing": ("laser.csv", text("X way", "x way"), "calibrate.column", "write X way"),
-    "way of 2": ("laser.csv", scaled(2.0, "X way"), "calibrate.row", "X way is 2"),
-    "way in mm": ("laser.csv", text("X way", "X way [mm]"), "calibrate.unit", "write X way alone"),
+    "approach direction of nothing": ("laser.csv", text("X way", "x approach direction"), "calibrate.column", "write X way"),
+    "approach direction of 2": ("laser.csv", scaled(2.0, "X way"), "calibrate.row", "X way is 2"),
+    "approach direction in mm": ("laser.csv", text("X way", "X way [mm]"), "calibrate.unit", "write X way alone"),
     "reversal in degrees": ("reversal.csv", text("[arcsec]", "[deg]"), "error-model.large", "ECC is up to 9.982 degrees"),
     "reversal too small": ("reversal.csv", scaled(1e-3, "reading"), "calibrate.silent", "less than any noise"),
     "arcsec under urad": ("reversal.csv", text("[arcsec]", "[urad]"), "calibrate.slip", "reading in arcsec (write [arcsec]"),
@@ -122,7 +122,8 @@ SLIPS = {
     "reversal, a tenth": ("reversal.csv", scaled(0.1, "reading"), "calibrate.slip", "reading ten times as large"),
     "one set-up turned round": ("reversal.csv", rows(lambda r: r.update(reading=r["reading"] * (-1) ** (r["setup"] == 2))),
                                 "calibrate.slip", "set-up 2 turned round"),
-    "indexer the other way": ("reversal.toml", text("steps = 12", "steps = 12\nshifts = [0, 11, 10, 9]"), "calibrate.slip",
+    "indexer in the other direction": ("reversal.toml", text("steps = 12", "steps = 12\nshifts = [0, 11, 10, 9]"),
+                                       "calibrate.slip",
                               "shifts = [0, 1, 2, 3]"),
     "six in mm": ("rotary.csv", text("[um]", "[mm]"), "error-model.large", "EZC is up to 2.039 mm"),
     "ex turned round": ("rotary.csv", scaled(-1.0, "ex"), "calibrate.slip", "with ex turned round"),
@@ -132,14 +133,14 @@ SLIPS = {
     "six, places tenfold": ("rotary.csv", scaled(10.0, "dx", "dy", "dz"), "calibrate.slip", "dx, dy, dz a tenth as large"),
     "six, ez tenfold": ("rotary.csv", scaled(10.0, "ez"), "calibrate.slip", "ez a tenth as large"),
     "steps backwards": ("rotary.csv", rows(lambda r: r.update(step=(12.0 - r["step"]) % 12.0)), "calibrate.slip",
-                        "steps counted the other way"),
+                        "steps counted in the other direction"),
     "set-ups backwards": ("rotary.csv", rows(lambda r: r.update(setup=2.0 - r["setup"])), "calibrate.slip",
                           "set-ups in the other order"),
 }
 
 
 @pytest.mark.parametrize("name", SLIPS)
-def test_a_slip_is_told_and_gives_no_model(name: str, folder: Path) -> None:
+def test_a_fault_is_reported_and_gives_no_model(name: str, folder: Path) -> None:
     file, change, code, words = SLIPS[name]
     (folder / file).write_text((change or along_machine)((folder / file).read_text()))
     source = folder / f"{file.split('.')[0]}.toml"
@@ -193,8 +194,9 @@ def test_more_noise_than_stated_is_refused_and_taken_where_it_is_asked_for(kind:
         assert 6.0 < p["sigma"] / before.figures["parameters"][name]["sigma"] < 16.0
 
 
-def test_doubt_that_is_stated_as_it_is_makes_a_rough_fit_good(folder: Path) -> None:
-    """Too little explained is refused at the stated doubt, and taken at the true one; the doubt found grows by as much."""
+def test_uncertainty_that_is_stated_as_it_is_makes_a_rough_fit_good(folder: Path) -> None:
+    """Too little explained is refused at the stated uncertainty, and taken at the true one; the uncertainty found grows by
+    as much."""
     rng = np.random.default_rng(3)
     noisy = rows(lambda r: r.update({k: r[k] + 200.0 * rng.normal() for k in ("dx", "dy", "dz")}))
     (folder / "probe.csv").write_text(noisy((folder / "probe.csv").read_text()))

@@ -36,10 +36,10 @@ def test_points_of_a_rotary_axis_stay_where_they_are(name: str) -> None:
 
 def test_where_the_rotary_axes_of_a_trunnion_lie() -> None:
     """The numbers of LinuxCNC's own sample: x-rot-point 5, y-rot-point -3, z-rot-point 7, offsets 20 and 10."""
-    told = machine_text(machine("linuxcnc-xyzac-trt"))
-    assert "table frame: carries the part; with all axes at zero it is the machine's, and" in told
-    assert "  A turns about the line through (0, 17, 17) mm along (1, 0, 0)" in told
-    assert "  C turns about the line through (5, -3, 0) mm along (0, 0, 1)" in told
+    noted = machine_text(machine("linuxcnc-xyzac-trt"))
+    assert "table frame: carries the part; with all axes at zero it is the machine's, and" in noted
+    assert "  A turns about the line through (0, 17, 17) mm along (1, 0, 0)" in noted
+    assert "  C turns about the line through (5, -3, 0) mm along (0, 0, 1)" in noted
     assert machine_text(machine("mill-3axis")).endswith("with all axes at zero it is the machine's")
 
 
@@ -49,7 +49,7 @@ def test_inspect_counts_surface_normals(tmp_path: Path) -> None:
                     "GOTO/2,0,0,0,0,1,0,0,1\nFINI\n")
     result = CliRunner().invoke(app, ["inspect", str(file), "--json", str(tmp_path / "i.json")])
     assert result.exit_code == 0 and json.loads((tmp_path / "i.json").read_text())["normals"] == 2
-    told = CliRunner().invoke(app, ["inspect", str(file)]).output
-    assert "  surface normals at 2 points" in told
+    noted = CliRunner().invoke(app, ["inspect", str(file)]).output
+    assert "  surface normals at 2 points" in noted
     file.write_text("UNITS/MM\nFEDRAT/MMPM,500\nGOTO/0,0,0\nGOTO/1,0,0\nFINI\n")
     assert "surface normals" not in CliRunner().invoke(app, ["inspect", str(file)]).output

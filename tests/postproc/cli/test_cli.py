@@ -231,7 +231,7 @@ def test_a_range_without_an_error_model_is_wrong_use(command: list[str]) -> None
     assert run.exit_code == 2 and "--error-model-beyond" in run.output
 
 
-def test_an_output_that_is_full_is_told(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_output_that_is_full_is_reported(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     def full() -> None:
         raise OSError(errno.ENOSPC, "No space left on device")
 
@@ -243,5 +243,5 @@ def test_an_output_that_is_full_is_told(monkeypatch: pytest.MonkeyPatch, capsys:
 
 def test_time_of_a_file_that_is_refused_is_null(tmp_path: Path) -> None:
     got = run("time", cl(tmp_path, "RAPID", "GOTO/0,0,9000"), "-m", "mill-3axis", "--json", "-")
-    told = json.loads(got.stdout)
-    assert got.exit_code == 1 and told["cycle_time_s"] is None and told["operations"] == [] and told["diagnostics"]
+    noted = json.loads(got.stdout)
+    assert got.exit_code == 1 and noted["cycle_time_s"] is None and noted["operations"] == [] and noted["diagnostics"]

@@ -31,7 +31,7 @@ def figures(*arguments: object, code: int = 0) -> dict:
     return json.loads(run(*arguments, "--json", "-", code=code).stdout)
 
 
-def test_check_tells_what_a_model_holds_and_does() -> None:
+def test_check_reports_what_a_model_holds_and_does() -> None:
     done = run("check", MIKRON, "-m", "mikron-ucp710", "--tool-length", 80)
     for word in ("good: errors of mikron-ucp710, 339 parameters", "EXX    linear table       30  -355 to 355", "3.00",
                  "EC0Y 6 arcsec", "spindle: EA0S 5 arcsec", "independent parameters", "tool of 80 mm", "tip  worst"):
@@ -42,9 +42,10 @@ def test_check_tells_what_a_model_holds_and_does() -> None:
 
 
 @pytest.mark.parametrize(("name", "words"), [
-    ("mikron-ucp710", ["places; two ways at their mean:", "left after correction: tip 0.000 um", "(near a pole"]),
+    ("mikron-ucp710", ["places; two approach directions at their mean:", "left after correction: tip 0.000 um",
+                       "(near a pole"]),
     ("uranesx", ["places:", "left after correction: tip 0.000 um", "(no rotary axis turns the tool)"])])
-def test_check_tells_what_correction_leaves(name: str, words: list[str]) -> None:
+def test_check_reports_what_correction_leaves(name: str, words: list[str]) -> None:
     text = run("check", SAMPLES / f"{name}.toml", "-m", name).stdout
     assert all(word in text for word in words) and "cannot be reached" not in text
 
@@ -63,7 +64,7 @@ def test_a_figure_replaces_no_model_and_is_an_image(figure: str, tmp_path: Path)
     assert model.read_text().startswith("[location]") and list(tmp_path.iterdir()) == [model]
 
 
-def test_check_tells_where_a_model_ends(tmp_path: Path) -> None:
+def test_check_reports_where_a_model_ends(tmp_path: Path) -> None:
     (tmp_path / "e.toml").write_text("[location]\nEC0C = 20\nEX0X = 5\n[components.EXX]\npolynomial = [3]\n"
                                      "range = [-100, 100]\n")
     done = run("check", tmp_path / "e.toml", "-m", "mikron-ucp710")
@@ -91,9 +92,9 @@ def test_tables_per_axis_go_out_and_come_back(tmp_path: Path) -> None:
     machine = machines.load("mikron-ucp710")
     made = load(tmp_path / "mikron-ucp710.toml", machine)
     sources = [tmp_path / f"mikron-ucp710-{x}.csv" for x in ("X", "Y", "Z", "A", "C", "location")]
-    told = run("import", *sources, "-m", "mikron-ucp710", "-o", tmp_path / "back.toml", "--repeats", "A=360", "--repeats",
-               "C=360", "--covariance", tmp_path / "mikron-ucp710-covariance.csv").stdout
-    assert f"{len(made.names)} parameters, {len(made.names)} with a doubt" in told
+    noted = run("import", *sources, "-m", "mikron-ucp710", "-o", tmp_path / "back.toml", "--repeats", "A=360", "--repeats",
+                "C=360", "--covariance", tmp_path / "mikron-ucp710-covariance.csv").stdout
+    assert f"{len(made.names)} parameters, {len(made.names)} with an uncertainty" in noted
     back = load(tmp_path / "back.toml", machine)
     assert back.names == made.names and back.values == pytest.approx(made.values, rel=1e-10, abs=1e-14)
     assert back.covariance == pytest.approx(made.covariance, rel=1e-9, abs=1e-22)
@@ -104,8 +105,8 @@ def test_linuxcnc_goes_out_with_the_rest_and_comes_back(tmp_path: Path) -> None:
     assert "the post-processor must not do it again" in done.stderr and "rest.toml" in done.stderr
     assert "lost: the covariance of what these files hold, as they have no place for it" in done.stdout
     volume = figures("check", MIKRON, "-m", "mikron-ucp710")["volume"]
-    assert (f"worst over the work volume, tool of 100 mm, two ways at their mean: tip {volume['tip_worst_um']:.2f} um, "
-            in done.stdout)
+    assert (f"worst over the work volume, tool of 100 mm, mean of both directions: "
+            f"tip {volume['tip_worst_um']:.2f} um, " in done.stdout)
     assert "[JOINT_4]\nCOMP_FILE = mikron-ucp710-C.comp\nCOMP_FILE_TYPE = 0" in done.stdout
     machine = machines.load("mikron-ucp710")
     full, rest = load(MIKRON, machine), load(tmp_path / "rest.toml", machine)
@@ -120,8 +121,8 @@ def test_linuxcnc_goes_out_with_the_rest_and_comes_back(tmp_path: Path) -> None:
     q = np.random.default_rng(0).uniform(-200.0, 200.0, (50, 5)) * [1, 1, 1, 0.002, 0.01]
     for name in ("EXX", "EYY", "EZZ"):
         one, two = (next(c.curve for c in m.axes.components if str(c.name) == name) for m in (full, whole))
-        for way in (1.0, -1.0):
-            assert two.at(q[:, 0], way) == pytest.approx(one.at(q[:, 0], way), abs=2e-9)
+        for travel in (1.0, -1.0):
+            assert two.at(q[:, 0], travel) == pytest.approx(one.at(q[:, 0], travel), abs=2e-9)
 
 
 def test_a_map_goes_out_and_comes_back(tmp_path: Path) -> None:
@@ -129,7 +130,8 @@ def test_a_map_goes_out_and_comes_back(tmp_path: Path) -> None:
                     "--step", "Y=275", "--step", "C=90", "--at", "Z=50", "--at", "A=20", "--tool-length", 100)
     assert found["nodes"] == {"X": 3, "Y": 3, "C": 4}
     assert 0.0 < found["lattice"]["tip_worst_um"] < found["volume"]["tip_worst_um"]
-    assert {"lost: the two ways of EXX, EYY, EZZ; a map holds their mean", "covariance kept"} < set(found["told"])
+    assert {"lost: the two approach directions of EXX, EYY, EZZ; a map holds their mean",
+            "covariance kept"} < set(found["told"])
     machine = machines.load("mikron-ucp710")
     made = load(tmp_path / "m.toml", machine)
     assert made.map is not None and made.map.length == 100.0 and made.map.bed == ("C", "A") and made.covariance is not None
@@ -173,20 +175,21 @@ def test_a_fault_writes_nothing(tmp_path: Path) -> None:
     assert "cannot be written" in done.stderr
 
 
-def test_errors_taken_in_keep_the_doubt_of_the_others_and_tell_whose_is_gone(tmp_path: Path) -> None:
+def test_errors_taken_in_keep_the_uncertainty_of_the_others_and_report_whose_is_gone(tmp_path: Path) -> None:
     (tmp_path / "x.csv").write_text("X [mm],EXX [um],EAX [arcsec]\n-355,1,2\n355,2,3\n")
     done = run("import", tmp_path / "x.csv", "-m", "mikron-ucp710", "-o", tmp_path / "e.toml", "--into", MIKRON)
-    assert "no doubt is known of EAX, EXX any more" in done.stdout
+    assert "no uncertainty is known of EAX, EXX any more" in done.stdout
     found = load(tmp_path / "e.toml", machines.load("mikron-ucp710"))
     assert found.covariance is not None
     sigma = dict(zip(found.names, np.sqrt(np.diag(found.covariance)), strict=True))
     assert sigma["EXX[0]"] == 0.0 and sigma["EYX[0]"] == pytest.approx(0.0005)
 
 
-def test_measured_readings_become_means_with_their_doubt(tmp_path: Path) -> None:
+def test_measured_readings_become_means_with_their_uncertainty(tmp_path: Path) -> None:
     (tmp_path / "x.csv").write_text("X [mm],EXX [um]\n300,5\n-300,1\n300,7\n-300,1\n")
     done = run("import", tmp_path / "x.csv", "-m", "mill-3axis", "-o", tmp_path / "e.toml", "--average")
-    assert "4 readings at 2 places; standard deviation of one: EXX 1" in done.stderr and "2 with a doubt" in done.stdout
+    assert "4 readings at 2 places; standard deviation of one: EXX 1" in done.stderr
+    assert "2 with an uncertainty" in done.stdout
     found = load(tmp_path / "e.toml", machines.load("mill-3axis"))
     assert found.values == pytest.approx([0.001, 0.006]) and found.covariance is not None
     assert np.sqrt(np.diag(found.covariance)) == pytest.approx([0.001 / np.sqrt(2)] * 2)
@@ -223,12 +226,12 @@ def test_a_model_of_another_machine_is_one_fault() -> None:
     assert [d.split("]")[0] for d in done.stderr.split("error [")[1:]] == ["error-model.machine"]
 
 
-def test_import_tells_ranges_that_are_none_of_the_machine(tmp_path: Path) -> None:
-    for text, told in (("X [mm],EXX [um]\n-300000,0\n300000,5\n", "error-model.travel"),
-                       ("X [mm],EXX [um]\n-0.3,0\n0.3,5\n", "the model holds from -0.3 to 0.3")):
+def test_import_reports_ranges_that_are_none_of_the_machine(tmp_path: Path) -> None:
+    for text, noted in (("X [mm],EXX [um]\n-300000,0\n300000,5\n", "error-model.travel"),
+                        ("X [mm],EXX [um]\n-0.3,0\n0.3,5\n", "the model holds from -0.3 to 0.3")):
         (tmp_path / "x.csv").write_text(text)
         for command in (["import", tmp_path / "x.csv", "-o", tmp_path / "e.toml"], ["check", tmp_path / "e.toml"]):
-            assert told in run(*command, "-m", "mill-3axis").stderr
+            assert noted in run(*command, "-m", "mill-3axis").stderr
 
 
 def test_a_covariance_that_is_given_counts_before_the_scatter(tmp_path: Path) -> None:
@@ -236,7 +239,7 @@ def test_a_covariance_that_is_given_counts_before_the_scatter(tmp_path: Path) ->
     (tmp_path / "c.csv").write_text("p,EXX[0],EXX[1]\nEXX[0],9,1\nEXX[1],1,4\n")
     done = run("import", tmp_path / "x.csv", "-m", "mill-3axis", "-o", tmp_path / "e.toml", "--average", "--covariance",
                tmp_path / "c.csv")
-    assert "the doubt is that of c.csv, not of the scatter" in done.stdout
+    assert "the uncertainty is that of c.csv, not of the scatter" in done.stdout
     model = load(tmp_path / "e.toml", machines.load("mill-3axis"))
     assert model.covariance is not None and model.covariance * 1e6 == pytest.approx(np.array([[9.0, 1.0], [1.0, 4.0]]))
 
@@ -287,7 +290,7 @@ def test_a_map_stays_within_what_was_measured(tmp_path: Path) -> None:
     assert again["nodes"] == {"Z": 2, "A": 4} and again["lattice"]["tip_worst_um"] < 1e-6  # the map's own nodes
 
 
-def test_options_that_concern_no_source_are_told(tmp_path: Path) -> None:
+def test_options_that_concern_no_source_are_reported(tmp_path: Path) -> None:
     done = run("import", SAMPLES / "mikron-ucp710-X.csv", "-m", "mikron-ucp710", "-o", tmp_path / "e.toml", "--repeats",
                "C=360", "--tool-length", 10, "--zero", "X=0", "--directions", "machine", code=1)
     for word in ("C repeats", "a map's tool length", "a map's zero", "a map's directions"):

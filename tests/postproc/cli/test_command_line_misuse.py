@@ -102,7 +102,7 @@ def test_setup_faults_name_their_place(tmp_path: Path) -> None:
     assert code == 1 and "s.toml:1" in said
 
 
-def test_tools_that_nothing_uses_are_told(tmp_path: Path) -> None:
+def test_tools_that_nothing_uses_are_reported(tmp_path: Path) -> None:
     code, said = with_setup(tmp_path, "[tools.1]\ngauge_length = 10.0\n[tools.7]\ngauge_length = 10.0\n")
     assert code == 0 and "info [setup.tool_unused] the CL file does not use T7 of the set-up" in said
 

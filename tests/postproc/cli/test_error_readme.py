@@ -22,8 +22,8 @@ COMMANDS = [line.split("#")[0].strip() for block in re.findall(r"```sh\n(.*?)```
             for line in block.splitlines() if line.startswith("postproc")]
 TABLES = dict(re.findall(r"```csv\n# (\S+\.csv)\n(.*?)```", TEXT, re.DOTALL))
 MODELS = re.findall(r"```toml\n(.*?)```", TEXT, re.DOTALL)
-BESIDE = {"x.comp": "-100 -100.002 -100.001\n0 0 0.001\n100 100.003 100.004\n",
-          "y.csv": "Y [mm],EYY [um],EXY [um]\n-200,0,1\n200,4,2\n", "x.csv": "X [mm],EXX [um]\n-300,0\n300,4\n"}
+ADJACENT = {"x.comp": "-100 -100.002 -100.001\n0 0 0.001\n100 100.003 100.004\n",
+            "y.csv": "Y [mm],EYY [um],EXY [um]\n-200,0,1\n200,4,2\n", "x.csv": "X [mm],EXX [um]\n-300,0\n300,4\n"}
 """files that the README names and does not show"""
 
 
@@ -33,7 +33,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         shutil.copy(file, tmp_path)
     shutil.copy(SAMPLES / "mikron-ucp710.toml", tmp_path / "errors.toml")
     shutil.copy(SAMPLES / "map-mikron-ucp710.csv", tmp_path / "map.csv")
-    for name, text in (BESIDE | TABLES).items():
+    for name, text in (ADJACENT | TABLES).items():
         (tmp_path / name).write_text(text)
     monkeypatch.chdir(tmp_path)
     return tmp_path

@@ -15,7 +15,7 @@ from postproc.base.options import Options
 from postproc.cli.app import app
 from postproc.orientation.plans.orient import orient
 from postproc.pipeline.convert import convert
-from postproc.placement.bodies import RESTS, beside
+from postproc.placement.bodies import RESTS, adjacent
 from postproc.placement.figure import margins_at
 from postproc.placement.place import place
 from postproc.placement.space import ANGLES
@@ -170,7 +170,7 @@ def box(low: tuple[float, ...], high: tuple[float, ...], **more: object) -> dict
 
 
 def test_bodies_that_stand_are_kept_clear_of() -> None:
-    """A post stands where the part would: it is named, and the part goes beside it; resting on the table is no touch."""
+    """A post stands where the part would: it is named, and the part goes next to it; resting on the table is no touch."""
     bodies = BodiesModel.model_validate({
         "table": box((-400.0, -300.0, -120.0), (400.0, 300.0, -50.0)),
         "fixtures": [box((0.0, -10.0, -50.0), (80.0, 20.0, -5.0), name="blank", frame="part"),
@@ -181,7 +181,7 @@ def test_bodies_that_stand_are_kept_clear_of() -> None:
     assert choice.found.now.refused == "fixture blank stands in fixture post"
     assert choice.best.place[0] >= 170.0 - RESTS
     assert any("post" in one.refused for one in choice.known)
-    still, found = beside(choice.work, "")
+    still, found = adjacent(choice.work, "")
     assert still is not None, found
     for z, free in ((0.0, True), (-2 * RESTS, False), (5.0, True)):
         assert (not still.against(Placement(np.eye(3), np.array([250.0, 0.0, z])))) == free
@@ -190,7 +190,7 @@ def test_bodies_that_stand_are_kept_clear_of() -> None:
 
 
 def test_tools_keep_clear_of_what_stands() -> None:
-    """A clamp higher than the cut beside the part: the cutter must not come near, although the part itself stands free."""
+    """A clamp higher than the cut next to the part: the cutter must not come near, although the part itself stands free."""
     clamp = box((85.0, -40.0, -50.0), (95.0, 40.0, 30.0), name="clamp")
     bodies = BodiesModel.model_validate({"fixtures": [clamp], "clearance": 2.0})
     tool = setup_of().tools["1"].model_copy(update={"flute_length": 40.0})
@@ -200,7 +200,7 @@ def test_tools_keep_clear_of_what_stands() -> None:
     assert choice.best.place[0] <= 85.0 - 80.0 - 8.0 - 2.0 + 1e-3
 
 
-def test_axes_chosen_anew_at_each_place() -> None:
+def test_axes_chosen_again_at_each_place() -> None:
     """--orient auto: the seconds are those of orient at the chosen place, and no place is worse than where it stands."""
     path, m = passes((1.0, 0.0), 1), machine("mikron-ucp710")
     setup, options = setup_of((0.0, 0.0, 0.0), turns=[0.0, 20.0]), Options(orient="auto", max_tilt=20.0)
@@ -227,7 +227,7 @@ def test_the_sample(tmp_path: Path) -> None:
 
 
 def test_a_place_that_cannot_be_converted_is_passed_over(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The proof has the last word: what it refuses is told and the next place taken."""
+    """The proof has the last word: what it refuses is reported and the next place taken."""
     from postproc.pipeline import convert as pipeline
     from toolpaths.diagnostics import error
 
@@ -246,16 +246,16 @@ def test_a_place_that_cannot_be_converted_is_passed_over(monkeypatch: pytest.Mon
     assert choice.best.place[ANGLES] in (0.0, 30.0 * np.pi / 180.0)
 
 
-def test_a_lift_off_the_table_is_told(tmp_path: Path) -> None:
+def test_a_lift_off_the_table_is_reported(tmp_path: Path) -> None:
     """Where z is free and the part is out of travel below, it stands higher; where z is not, nothing is said."""
     path = passes((1.0, 0.0))
     m = machine("mill-3axis")
-    for z, told in (((-440.0, -200.0), True), (None, False)):
+    for z, noted in (((-440.0, -200.0), True), (None, False)):
         limits: dict[str, object] = {"x": (-50.0, 50.0)} | ({} if z is None else {"z": z})
-        choice, found = place(path, m, setup_of((0.0, 0.0, -440.0 if told else -200.0), **limits), Options())
+        choice, found = place(path, m, setup_of((0.0, 0.0, -440.0 if noted else -200.0), **limits), Options())
         assert choice is not None, [str(d) for d in found]
         lifts = [d for d in found if d.code == "place.lifted"]
-        assert bool(lifts) == told
-        if told:
+        assert bool(lifts) == noted
+        if noted:
             rise = choice.best.place[2] + 440.0
             assert rise > 0.0 and f"stands {rise:.3f} mm higher than [part] has it: it needs a support" in lifts[0].message

@@ -75,7 +75,7 @@ def test_the_setup_goes_before_the_cl_file_and_says_so() -> None:
     (Tool(7, diameter=10.0, corner_radius=0.0), FULL.model_copy(update={"holder": []}), ["the holder is not known"]),
     (Tool(7, diameter=10.0, corner_radius=0.0), FULL.model_copy(update={"gauge_length": 120.0}), ["ends 105 mm", "120 mm"]),
 ])
-def test_what_is_not_known_is_told(tool: Tool | None, setup: ToolSetup | None, words: list[str]) -> None:
+def test_what_is_not_known_is_reported(tool: Tool | None, setup: ToolSetup | None, words: list[str]) -> None:
     _, found = form(tool, setup)
     assert len(found) == 1 and all(word in found[0] for word in words), found
 
@@ -116,7 +116,7 @@ def test_point_and_corner_touch_each_other() -> None:
     Tool(7, diameter=16.0, corner_radius=1.0, cutter=(16.0, 1.0, 3.0, 1.0, 0.0, 0.0, 50.0)),
     Tool(7, diameter=16.0, corner_radius=1.0, taper=np.radians(-60.0)),
 ])
-def test_a_form_that_is_not_known_is_told_and_nothing_in_it_is_smaller(tool: Tool) -> None:
+def test_a_form_that_is_not_known_is_reported_and_nothing_in_it_is_smaller(tool: Tool) -> None:
     made, found = form(tool)
     assert not made.exact and made.of(CUTTER).tolist() == [[8.0, 0.0, 8.0, 20.0, 0.0]]
     assert len(found) == 1 and "does not fit a diameter of 16 mm" in found[0] and "not checked against the part" in found[0]
@@ -139,7 +139,7 @@ def test_a_cutter_has_a_height_where_nobody_states_its_flutes() -> None:
     assert seven.of(CUTTER)[1, 2:4] == pytest.approx([13.0972, 60.0], abs=1e-3)
 
 
-def test_the_point_of_a_mill_counts_as_flat_and_is_told() -> None:
+def test_the_point_of_a_mill_counts_as_flat_and_is_reported() -> None:
     made, found = form(Tool(7, shape="MILL", diameter=10.0, corner_radius=0.0, tip_angle=np.radians(45.0)))
     assert made.of(CUTTER).tolist() == [[5.0, 0.0, 5.0, 20.0, 0.0]] and len(found) == 1 and "counts as flat" in found[0]
 
@@ -149,32 +149,32 @@ def test_a_drill_without_point_angle_is_flat() -> None:
     assert made.of(CUTTER).tolist() == [[5.0, 0.0, 5.0, 20.0, 0.0]]
 
 
-def test_a_gap_below_a_holders_mesh_is_told(tmp_path: Path) -> None:
+def test_a_gap_below_a_holders_mesh_is_reported(tmp_path: Path) -> None:
     trimesh.creation.box(bounds=[(-20, -20, 60), (20, 20, 100)]).export(tmp_path / "h.stl")
     mill = Tool(7, diameter=10.0, corner_radius=0.0)
-    for shank, told in (([], "between 20 mm over the tip and the holder, which begins at 60 mm"),
-                        ([HolderSection(diameter=8.0, length=40.0)], "")):
+    for shank, noted in (([], "between 20 mm over the tip and the holder, which begins at 60 mm"),
+                         ([HolderSection(diameter=8.0, length=40.0)], "")):
         setup = FLAT.model_copy(update={"holder_mesh": "h.stl", "shank": shank})
         _, found = tool_form(7, mill, setup, str(tmp_path / "s.toml"))
-        assert [told in str(d) for d in found] == ([True] if told else [])
+        assert [noted in str(d) for d in found] == ([True] if noted else [])
     _, found = tool_form(7, mill, ToolSetup(gauge_length=100.0, holder_mesh="h.stl"), str(tmp_path / "s.toml"))
     assert [d.code for d in found] == ["collision.unchecked"] and "below the holder at 60 mm" in found[0].message
 
 
-@pytest.mark.parametrize(("change", "code", "told"), [
+@pytest.mark.parametrize(("change", "code", "noted"), [
     ({"gauge_length": 60.0}, "collision.stack", "begins 75 mm over the tip, above the gauge point at 60 mm"),
     ({"gauge_length": 75.0}, "", ""),
     ({"gauge_length": 45.0}, "collision.stack", "begins 75 mm"),
     ({"shank": []}, "collision.shank", "no shank is stated: the holder begins at 20 mm, where the flutes end"),
 ])
-def test_a_stack_that_does_not_fit_its_gauge_length_is_told(tmp_path: Path, change: dict[str, object], code: str,
-                                                            told: str) -> None:
+def test_a_stack_that_does_not_fit_its_gauge_length_is_reported(tmp_path: Path, change: dict[str, object], code: str,
+                                                            noted: str) -> None:
     setup = FULL.model_copy(update={"gauge_length": 75.0} | change)
     _, found = tool_form(7, Tool(7, diameter=10.0, corner_radius=0.0), setup, "s.toml")
-    assert [d.code for d in found] == ([code] if code else []) and all(told in d.message for d in found)
+    assert [d.code for d in found] == ([code] if code else []) and all(noted in d.message for d in found)
 
 
-def test_setup_check_tells_of_a_stack_longer_than_the_gauge_length(tmp_path: Path) -> None:
+def test_setup_check_reports_a_stack_longer_than_the_gauge_length(tmp_path: Path) -> None:
     (tmp_path / "s.toml").write_text("[bodies.table]\n" + BOX + "[tools.1]\ngauge_length = 130.0\nflute_length = 30.0\n"
                                      "shank = [{diameter = 16.0, length = 80.0}]\n"
                                      "holder = [{diameter = 40.0, length = 100.0}, {diameter = 63.0, length = 100.0}]\n")
@@ -209,7 +209,7 @@ def test_a_spun_mesh_with_many_levels_is_held_by_few_pieces() -> None:
 
 
 def test_what_ends_between_two_levels_is_held_too(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A thorn to z = 20 beside a rod to z = 50, in one piece."""
+    """A thorn to z = 20 next to a rod to z = 50, in one piece."""
     monkeypatch.setattr("postproc.collision.holder_hull._MOST", 1)
     thorn = trimesh.convex.convex_hull(np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 2.0, 0.0], [20.0, 0.0, 20.0]]))
     mesh = trimesh.util.concatenate([thorn, trimesh.creation.box(bounds=[(-2, -2, 0), (2, 2, 50)])])
@@ -269,7 +269,7 @@ def test_bodies_that_share_an_edge_are_a_solid_each(tmp_path: Path) -> None:
     assert made is not None and not found and made.volume == pytest.approx(mesh.volume)
 
 
-def test_a_mesh_inside_out_or_in_another_unit_is_told(tmp_path: Path) -> None:
+def test_a_mesh_inside_out_or_in_another_unit_is_reported(tmp_path: Path) -> None:
     box = trimesh.creation.box((0.4, 0.2, 0.1))
     box.invert()
     box.export(tmp_path / "x.stl")

@@ -1,4 +1,4 @@
-"""Whole programs beside part, table and fixtures: what touches stops a conversion, and verify finds it in a text."""
+"""Whole programs next to part, table and fixtures: what touches stops a conversion, and verify finds it in a text."""
 
 from __future__ import annotations
 
@@ -67,8 +67,8 @@ def test_a_gouge_is_found_beyond_its_tolerance(tmp_path: Path, top: float, depth
         assert result.ok and not found
         return
     assert [d.code for d in found] == ["collision.gouge"] and not result.text
-    told = float(found[0].message.split("cuts ")[1].split(" mm")[0])
-    assert told == pytest.approx(depth, abs=0.005) and "cutter of T1" in found[0].message and "the part" in found[0].message
+    noted = float(found[0].message.split("cuts ")[1].split(" mm")[0])
+    assert noted == pytest.approx(depth, abs=0.005) and "cutter of T1" in found[0].message and "the part" in found[0].message
     assert found[0].lines in ((10,), (11,))  # it comes down to the cut's beginning in line 10
 
 
@@ -84,7 +84,7 @@ def fixture(low: tuple[float, float, float], high: tuple[float, float, float], f
     return f'clearance = 0.5\n[[bodies.fixtures]]\nname = "{name}"\nframe = "{frame}"\n{box(low, high)}\n'
 
 
-def test_a_holder_that_comes_too_near_is_told_with_the_gap(tmp_path: Path) -> None:
+def test_a_holder_that_comes_too_near_is_reported_with_the_gap(tmp_path: Path) -> None:
     """The holder begins 50 mm over the tip, with a radius of 20 mm; a wall to z = 60 stands at y = 20.3."""
     result = converted(line(), setup_file(tmp_path, fixture((0, 20.3, -40), (80, 40, 60.0)), TOOL.replace("60.0", "40.0")))
     found = collisions(result.diagnostics)
@@ -163,8 +163,8 @@ def test_a_barrel_is_kept_from_fixtures_and_not_compared_with_the_part(tmp_path:
     assert result.ok and [d.code for d in collisions(result.diagnostics)] == ["collision.corner"]
     clear = next(d.message for d in result.diagnostics if d.code == "collision.clear")
     assert "cutter" not in clear and "shank keeps 1 mm from the part" in clear
-    beside = setup_file(tmp_path, block(tmp_path, 0.0) + fixture((20, 7.5, -5), (30, 20, 10)))
-    assert "collision.touch" in {d.code for d in collisions(converted(path, beside).diagnostics)}
+    adjacent = setup_file(tmp_path, block(tmp_path, 0.0) + fixture((20, 7.5, -5), (30, 20, 10)))
+    assert "collision.touch" in {d.code for d in collisions(converted(path, adjacent).diagnostics)}
 
 
 @pytest.mark.parametrize(("x_axis", "y_axis"), [("[1, 0, 0]", "[0, 1, 0]"), ("[0, 1, 0]", "[-1, 0, 0]"),
@@ -175,21 +175,21 @@ def test_the_part_is_where_it_is_placed_and_turned(tmp_path: Path, x_axis: str, 
     rib.export(tmp_path / "part.stl")
     rest = f"[part]\norigin = [10.0, 20.0, 30.0]\nx_axis = {x_axis}\ny_axis = {y_axis}\n" + TOOL
     found = collisions(converted(line(), setup_file(tmp_path, 'part = "part.stl"\n', rest)).diagnostics)
-    told = float(found[0].message.split("cuts ")[1].split(" mm")[0])
-    assert [d.code for d in found] == ["collision.gouge"] and 0.38 < told < 0.401
+    noted = float(found[0].message.split("cuts ")[1].split(" mm")[0])
+    assert [d.code for d in found] == ["collision.gouge"] and 0.38 < noted < 0.401
     clamp = fixture((60, 15, 20), (70, 25, 40))
     assert converted(line(), setup_file(tmp_path, clamp, rest)).ok == (x_axis != "[1, 0, 0]")
 
 
 def test_the_first_way_from_home_is_looked_at(tmp_path: Path) -> None:
-    """A plate stands over the first point of the file, out of the way of all that follows."""
+    """A plate stands over the first point of the file, out of the path of all that follows."""
     found = collisions(converted(line(), setup_file(tmp_path, fixture((-9, -9, 200), (9, 9, 202)))).diagnostics)
     assert found and found[0].code == "collision.touch" and found[0].lines[0] == 7
-    assert "--orient auto avoids ways that touch" in found[0].hint
+    assert "--orient auto avoids paths that touch" in found[0].hint
 
 
 def test_verify_finds_what_a_program_touches(tmp_path: Path) -> None:
-    """The set-up is told of a clamp only after the program was made."""
+    """The set-up is reported of a clamp only after the program was made."""
     path = line()
     setup = setup_file(tmp_path, block(tmp_path, 0.0))
     result = converted(path, setup)
@@ -208,7 +208,7 @@ def test_verify_finds_what_a_program_touches(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["mikron-ucp710", "head-table", "trunnion-bc", "fork-head-ab"])
 def test_a_turning_axis_is_bounded_between_the_points(tmp_path: Path, name: str) -> None:
-    """The tip stands still while the axis turns by 40 degrees: a wire is met only on the way."""
+    """The tip stands still while the axis turns by 40 degrees: a wire is met only on the path."""
     tilted = (np.sin(np.radians(40.0)), 0.0, np.cos(np.radians(40.0)))
     path = toolpath("MULTAX", "RAPID", "GOTO/0,0,50,0,0,1", "GOTO/0,0,0,0,0,1",
                     f"GOTO/0,0.001,0,{tilted[0]:.9f},0,{tilted[2]:.9f}", head=HEAD)
@@ -228,12 +228,12 @@ def test_a_setup_that_does_not_know_the_holder_says_what_is_not_checked(tmp_path
     assert "flute_length" in found[0].hint and "T1" in found[0].message
 
 
-def test_what_was_compared_is_told(tmp_path: Path) -> None:
+def test_what_was_compared_is_reported(tmp_path: Path) -> None:
     result = converted(line(), setup_file(tmp_path, block(tmp_path, 0.0) + fixture((115, -10, 0), (130, 10, 70))))
-    told = [d.message for d in result.diagnostics if d.code == "collision.clear"]
+    noted = [d.message for d in result.diagnostics if d.code == "collision.clear"]
     both = "keeps 0.5 mm from the part, fixture clamp"
-    assert told == ["T1, everywhere on its way: cutter is at most 0.02 mm in the part; cutter keeps 0.5 mm from fixture "
-                    f"clamp; shank {both}; holder {both}"]
+    assert noted == ["T1, everywhere on its path: cutter is at most 0.02 mm in the part; cutter keeps 0.5 mm from fixture "
+                     f"clamp; shank {both}; holder {both}"]
 
 
 def test_a_bad_mesh_stops_the_conversion(tmp_path: Path) -> None:
@@ -243,7 +243,7 @@ def test_a_bad_mesh_stops_the_conversion(tmp_path: Path) -> None:
 
 
 def test_dog_legs_are_followed(tmp_path: Path) -> None:
-    """A rapid of 100 mm in x and 30 mm in y, all axes at their own speed: y is there first, beside the straight line."""
+    """A rapid of 100 mm in x and 30 mm in y, all axes at their own speed: y is there first, next to the straight line."""
     path = toolpath("RAPID", "GOTO/0,0,50", "RAPID", "GOTO/100,30,50", "GOTO/100,30,49", head=HEAD)
     corner = setup_file(tmp_path, fixture((28, 37, 45), (32, 40, 60)))
     result = converted(path, corner, "mill-3axis", "fanuc-30i")
@@ -255,7 +255,7 @@ def test_dog_legs_are_followed(tmp_path: Path) -> None:
     assert found and found[0].message.startswith("cutter of T1 touches fixture clamp by ")
 
 
-def test_two_cutters_under_one_number_are_told_apart(tmp_path: Path) -> None:
+def test_two_cutters_under_one_number_are_distinguished(tmp_path: Path) -> None:
     """T1 with 16 mm, then T1 with 6 mm; a clamp that only the larger one would meet stands where the smaller one cuts."""
     lines = ["RAPID", "GOTO/0,0,50", "RAPID", "GOTO/0,0,2", "GOTO/0,0,0", "RAPID", "GOTO/0,0,50", "CUTTER/6,3", "LOADTL/1",
              "RAPID", "GOTO/60,0,50", "RAPID", "GOTO/60,0,2", "GOTO/60,0,0", "GOTO/70,0,0", "RAPID", "GOTO/70,0,50"]
@@ -275,11 +275,11 @@ def test_the_worst_of_each_part_of_a_program(tmp_path: Path) -> None:
     assert result.job is not None and result.comparison is not None and result.comparison.executed is not None
     motion, owner = result.comparison.executed[1], result.comparison.owner
     executed = BlockPoses(result.job.control, result.job.kinematics_of, result.job.register_lengths(), None)
-    told = {d.message.split(" touches ")[0]: float(d.message.split(" by ")[1].split(" mm")[0])
-            for d in collisions(result.diagnostics)}
-    worst = max(told, key=lambda name: told[name])
-    assert len(told) == 3 and worst != "holder of T1"
+    noted = {d.message.split(" touches ")[0]: float(d.message.split(" by ")[1].split(" mm")[0])
+             for d in collisions(result.diagnostics)}
+    worst = max(noted, key=lambda name: noted[name])
+    assert len(noted) == 3 and worst != "holder of T1"
     home = owner >= len(result.job.moves)
     parts = touching_parts(motion, executed, result.job, owner, np.where(home, 1, 0))
     assert list(parts) == [0] and str(parts[0]).startswith(f"{worst} touches fixture clamp by ")
-    assert -parts[0].distance == pytest.approx(told[worst], abs=0.005)
+    assert -parts[0].distance == pytest.approx(noted[worst], abs=0.005)

@@ -30,7 +30,7 @@ def block() -> TriangleSolid:
     return solid(trimesh.creation.box((100.0, 100.0, 20.0)), HERE)
 
 
-def way(*tips: tuple[float, float, float], axis: tuple[float, float, float] = UP) -> Swept:
+def travel(*tips: tuple[float, float, float], axis: tuple[float, float, float] = UP) -> Swept:
     points = np.array(tips)
     n = len(points) - 1
     return Swept(np.stack((points[:-1], points[1:]), axis=1), np.tile(np.array(axis), (n, 2, 1)), np.arange(n))
@@ -41,35 +41,35 @@ def way(*tips: tuple[float, float, float], axis: tuple[float, float, float] = UP
 def test_over_a_plane_the_distance_is_the_height(piece: Floats, height: float) -> None:
     """A sunken point of a cone is nearer to the cone's side than to its tip."""
     z = 10.0 + height
-    found = nearest(block(), way((-40.0, -30.0, z), (40.0, -30.0, z), (40.0, 30.0, z)), piece, 1.0)
+    found = nearest(block(), travel((-40.0, -30.0, z), (40.0, -30.0, z), (40.0, 30.0, z)), piece, 1.0)
     expected = height * np.sqrt(0.5) if piece is CONE and height < 0.0 else height
     assert found.distance == pytest.approx(expected, abs=EXACT + PART * (1.0 - height))
     assert found.distance >= expected - 1e-9
 
 
-def test_beside_a_wall_the_distance_is_that_of_the_cylinder() -> None:
-    found = nearest(block(), way((60.0, -30.0, 0.0), (56.4, 30.0, 0.0)), CYLINDER, 1.0)
+def test_next_to_a_wall_the_distance_is_that_of_the_cylinder() -> None:
+    found = nearest(block(), travel((60.0, -30.0, 0.0), (56.4, 30.0, 0.0)), CYLINDER, 1.0)
     assert found.distance == pytest.approx(0.4, abs=0.005) and found.place == 0
     assert found.point[0] == pytest.approx(50.0, abs=0.1) and found.point[1] == pytest.approx(30.0, abs=1.0)
 
 
 def test_over_a_ball_the_distance_is_that_of_the_centres() -> None:
     ball = solid(trimesh.creation.icosphere(5, radius=30.0), HERE)
-    found = nearest(ball, way((-60.0, 5.0, 28.0), (60.0, 5.0, 28.0)), BALL, 1.0)
+    found = nearest(ball, travel((-60.0, 5.0, 28.0), (60.0, 5.0, 28.0)), BALL, 1.0)
     expected = np.hypot(5.0, 36.0) - 38.0
     assert expected - 0.01 < found.distance < expected + 0.03  # the mesh lies inside the sphere by its chords
 
 
 def test_farther_than_the_limit_is_nothing() -> None:
-    assert nearest(block(), way((0.0, 0.0, 11.5), (9.0, 0.0, 11.5)), CYLINDER, 1.0).place == -1
+    assert nearest(block(), travel((0.0, 0.0, 11.5), (9.0, 0.0, 11.5)), CYLINDER, 1.0).place == -1
 
 
 def test_a_thin_rib_between_two_points_of_the_way_is_found() -> None:
     """0.2 mm thick, in the middle of a rapid of 1000 mm whose ends are far from it."""
     rib = solid(trimesh.creation.box((0.2, 50.0, 40.0)), HERE)
-    found = nearest(rib, way((-500.0, 0.0, 19.0), (503.0, 0.0, 19.0)), CYLINDER, 0.5)
+    found = nearest(rib, travel((-500.0, 0.0, 19.0), (503.0, 0.0, 19.0)), CYLINDER, 0.5)
     assert found.distance == pytest.approx(-1.0, abs=0.02)
-    assert nearest(rib, way((-500.0, 0.0, 20.6), (503.0, 0.0, 20.6)), CYLINDER, 0.5).place == -1
+    assert nearest(rib, travel((-500.0, 0.0, 20.6), (503.0, 0.0, 20.6)), CYLINDER, 0.5).place == -1
 
 
 def test_the_normal_is_where_the_body_reaches_farthest() -> None:
@@ -104,7 +104,7 @@ def test_planes_part_triangle_and_turning_tool_wherever_it_stands() -> None:
         true = float((corners[0] @ n).min() - reach.max())
         assert float(cell.apart(n[None], piece)[0]) <= true + 1e-9
         over += reach.max() > max(reach[0], reach[-1]) + 0.1
-    assert over > 10  # in these the tool reaches farthest on the way, not at its ends
+    assert over > 10  # in these the tool reaches farthest on the path, not at its ends
 
 
 def test_random_tools_that_turn_agree_with_dense_points() -> None:
@@ -174,10 +174,10 @@ def dense(mesh: trimesh.Trimesh, parts: int) -> Floats:
 
 
 def test_a_stretch_that_begins_inside_a_body_is_found() -> None:
-    """The first one passes far beside the body, the second one is in it altogether."""
+    """The first one passes far next to the body, the second one is in it altogether."""
     scene = Scene((Body("fixture a", solid(trimesh.creation.box((300.0, 300.0, 300.0)), HERE)),), 1.0, 0.02)
     form = ToolForm(1, CYLINDER, np.array([CUTTER]))
-    outside, inside = way((400.0, 0.0, 0.0), (500.0, 0.0, 0.0)), way((0.0, 0.0, 0.0), (5.0, 0.0, 0.0))
+    outside, inside = travel((400.0, 0.0, 0.0), (500.0, 0.0, 0.0)), travel((0.0, 0.0, 0.0), (5.0, 0.0, 0.0))
     assert not touches(scene, form, outside)
     found = touches(scene, form, joined([outside, Swept(inside.tip, inside.axis, inside.row + 7)]))
     assert [(touch.distance, touch.place) for touch in found] == [(-np.inf, 7)]

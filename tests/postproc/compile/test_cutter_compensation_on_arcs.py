@@ -49,9 +49,9 @@ def test_an_arc_that_begins_compensation_is_refused_but_by_linuxcnc(controller: 
 
 @pytest.mark.parametrize("controller", NAMES)
 def test_an_arc_that_ends_compensation_is_refused(controller: str) -> None:
-    told = errors(made(controller, *ENDS))
-    assert [(d.code, d.lines) for d in told] == [("cutcom.arc", (14,))]
-    assert "ends" in told[0].message and "away from" in told[0].hint
+    noted = errors(made(controller, *ENDS))
+    assert [(d.code, d.lines) for d in noted] == [("cutcom.arc", (14,))]
+    assert "ends" in noted[0].message and "away from" in noted[0].hint
 
 
 @pytest.mark.parametrize("controller", ["linuxcnc", "fanuc-30i"])
@@ -62,8 +62,8 @@ def test_a_plunge_between_is_no_way_in(controller: str) -> None:
 
 
 @pytest.mark.parametrize("controller", ["fanuc-30i", "siemens-840d", "heidenhain-tnc640", "haas-ngc"])
-@pytest.mark.parametrize("way", ["into", "arc", "plunge"])
-def test_it_is_the_same_in_a_tilted_plane(controller: str, way: str) -> None:
+@pytest.mark.parametrize("travel", ["into", "arc", "plunge"])
+def test_it_is_the_same_in_a_tilted_plane(controller: str, travel: str) -> None:
     z = tilted(30.0, 0.0)
     y = np.array([0.0, 1.0, 0.0])
     x = np.cross(y, z)
@@ -72,12 +72,12 @@ def test_it_is_the_same_in_a_tilted_plane(controller: str, way: str) -> None:
         return goto(np.array([a * x + b * y + h * z for a, b, h in places]), np.tile(z, (len(places), 1)))
     arc = ["CIRCLE/0,0,0," + ",".join(f"{v:.9f}" for v in z) + ",20", *at((0, 20, 0), (-20, 20, 0)), "CUTCOM/OFF",
            *at((-50, 20, 0)), "RAPID", *at((-50, 20, 40))]
-    ways = {"into": [*at((20, -20, 40), (20, -20, 0)), "CUTCOM/LEFT", *at((20, 0, 0))],
-            "arc": [*at((20, 0, 40), (20, 0, 0)), "CUTCOM/LEFT"],
-            "plunge": [*at((20, 0, 40)), "CUTCOM/LEFT", *at((20, 0, 0))]}
-    result = convert(toolpath("RAPID", *ways[way], *arc), "trunnion-bc", controller)
-    assert [d.code for d in errors(result)] == ([] if way == "into" else ["cutcom.arc"])
-    if controller == "fanuc-30i" and way == "into":
+    travels = {"into": [*at((20, -20, 40), (20, -20, 0)), "CUTCOM/LEFT", *at((20, 0, 0))],
+               "arc": [*at((20, 0, 40), (20, 0, 0)), "CUTCOM/LEFT"],
+               "plunge": [*at((20, 0, 40)), "CUTCOM/LEFT", *at((20, 0, 0))]}
+    result = convert(toolpath("RAPID", *travels[travel], *arc), "trunnion-bc", controller)
+    assert [d.code for d in errors(result)] == ([] if travel == "into" else ["cutcom.arc"])
+    if controller == "fanuc-30i" and travel == "into":
         rows = result.text.split("\n")
         on = rows.index("G41 D1")
         assert result.job is not None and "G68.2" in result.text
@@ -85,7 +85,7 @@ def test_it_is_the_same_in_a_tilted_plane(controller: str, way: str) -> None:
         assert "verify.cutcom_arc" in codes(read_back(edited.encode(), result.job, "test.apt")[1])
 
 
-def test_a_change_of_side_on_an_arc_is_told_once() -> None:
+def test_a_change_of_side_on_an_arc_is_reported_once() -> None:
     lines = [*DOWN, "CUTCOM/RIGHT", "GOTO/20,0,2", "CUTCOM/LEFT", *INTO[1:], "GOTO/-20,20,2", *OUT]
     assert [(d.code, d.lines) for d in errors(made("fanuc-30i", *lines))] == [("cutcom.arc", (11,))]
 
@@ -118,25 +118,25 @@ def spoilt(controller: str, old: str, new: str, lines: list[str]) -> list[str]:
 
 
 @pytest.mark.parametrize("controller", MODAL)
-def test_verify_tells_compensation_that_was_moved_to_an_arc(controller: str) -> None:
+def test_verify_reports_compensation_that_was_moved_to_an_arc(controller: str) -> None:
     rows = good(made(controller, *ROUND)).text.split("\n")
     on = rows.index("G41 D1")
     assert rows[on + 2].startswith("G3 ")
     edited = "\n".join([*rows[:on], rows[on + 1], "G41 D1", *rows[on + 2:]])
-    told = spoilt(controller, "\n".join(rows), edited, ROUND)
-    assert any(t.startswith("verify.cutcom_arc") and "begins" in t for t in told), told
+    noted = spoilt(controller, "\n".join(rows), edited, ROUND)
+    assert any(t.startswith("verify.cutcom_arc") and "begins" in t for t in noted), noted
 
 
 @pytest.mark.parametrize("controller", MODAL)
-def test_verify_tells_an_arc_behind_the_end(controller: str) -> None:
+def test_verify_reports_an_arc_behind_the_end(controller: str) -> None:
     lines = [*DOWN, "CUTCOM/LEFT", *INTO, "GOTO/-20,20,2", "CIRCLE/-20,40,2,0,0,-1,20", "GOTO/-40,40,2", "CUTCOM/OFF",
              "GOTO/-50,40,2", *OUT]
     text = good(made(controller, *lines)).text
     rows = text.split("\n")
     off = rows.index("G40")
     assert rows[off - 1].startswith("G2 ")
-    told = spoilt(controller, text, "\n".join([*rows[:off - 1], "G40", rows[off - 1], *rows[off + 1:]]), lines)
-    assert any(t.startswith("verify.cutcom_arc") and "ends" in t for t in told), told
+    noted = spoilt(controller, text, "\n".join([*rows[:off - 1], "G40", rows[off - 1], *rows[off + 1:]]), lines)
+    assert any(t.startswith("verify.cutcom_arc") and "ends" in t for t in noted), noted
 
 
 # ---- the register -----------------------------------------------------------------------------------------------------
@@ -146,8 +146,8 @@ def test_verify_tells_an_arc_behind_the_end(controller: str) -> None:
 def test_the_register_of_the_tool_stands_where_d_is_modal(controller: str) -> None:
     result = good(made(controller, *ROUND))
     assert ("G41 D1\n" in result.text) == (controller in MODAL)
-    told = [d for d in result.diagnostics if d.code == "cutcom.register"]
-    assert len(told) == 1 and told[0].severity is Severity.WARNING and ("D1" in told[0].message) == (controller in MODAL)
+    noted = [d for d in result.diagnostics if d.code == "cutcom.register"]
+    assert len(noted) == 1 and noted[0].severity is Severity.WARNING and ("D1" in noted[0].message) == (controller in MODAL)
 
 
 def test_the_register_is_that_of_the_length_where_the_file_names_one() -> None:
@@ -170,8 +170,8 @@ def test_a_register_that_cutcom_names_stays() -> None:
 @pytest.mark.parametrize("controller", MODAL)
 @pytest.mark.parametrize(("new", "found"), [("G41\n", "none"), ("G41 D2\n", "2"), ("G41 D1\nD2\n", "2")])
 def test_verify_knows_the_register_that_holds(controller: str, new: str, found: str) -> None:
-    told = spoilt(controller, "G41 D1\n", new, ROUND)
-    assert len(told) == 1 and f"register of the cutter compensation is {found}, it should be 1" in told[0]
+    noted = spoilt(controller, "G41 D1\n", new, ROUND)
+    assert len(noted) == 1 and f"register of the cutter compensation is {found}, it should be 1" in noted[0]
 
 
 def test_linuxcnc_takes_the_tool_in_the_spindle() -> None:

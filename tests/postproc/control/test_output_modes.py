@@ -252,7 +252,7 @@ def setup_of(folder: Path, text: str) -> SetupFile:
 
 @pytest.mark.parametrize("law", ["tilted", "axes"])
 def test_rotary_axes_are_stated_where_they_stand_already(law: str, tmp_path: Path) -> None:
-    """B begins at the pose that A ended in: nothing turns on the way, A's mode is left and the tip mode entered."""
+    """B begins at the pose that A ended in: nothing turns on the path, A's mode is left and the tip mode entered."""
     piece = turning()
     start = tilted(10, 30)
     flat = ["RAPID", *rows([20 * start], start), "FEDRAT/MMPM,600", *rows([0 * start, [3, 0, 0]], start), "RAPID",
@@ -280,7 +280,7 @@ def test_an_operation_that_is_not_there_is_an_error(tmp_path: Path) -> None:
 
 
 def test_every_operation_can_be_started_at(tmp_path: Path) -> None:
-    """It begins with the way home; tool, length, speed and coolant behind that; the axes all stated."""
+    """It begins with the travel home; tool, length, speed and coolant behind that; the axes all stated."""
     path = operations(indexed()[-8:], indexed()[-8:])
     result = convert(path, "mikron-ucp710", shop(tmp_path), setup_of(tmp_path, "[output]\nrestart = true\n"))
     p = result.program

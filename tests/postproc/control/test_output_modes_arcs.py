@@ -70,7 +70,7 @@ def test_arcs_stay_arcs_in_every_plane_of_a_tilted_frame(name: str, plane: int, 
 
 
 @pytest.mark.parametrize("name", FRAMES)
-def test_an_arc_square_to_the_tool_stays_one_beside_rounded_angles(name: str, tmp_path: Path) -> None:
+def test_an_arc_square_to_the_tool_stays_one_next_to_rounded_angles(name: str, tmp_path: Path) -> None:
     """The printed plane is up to half a last decimal off the tool of the CL file."""
     axis = tilted(30.123456, 50.987654)
     first = np.cross([0.0, 1.0, 0.0], axis) / np.linalg.norm(np.cross([0.0, 1.0, 0.0], axis))
@@ -148,7 +148,7 @@ DOG = '[kinematics]\nrapids = "dog-leg"\n'
 
 
 def test_a_dog_leg_is_each_axis_at_its_own_speed() -> None:
-    """mill-3axis made slow in Y: X 30 at 500 mm/s, Y 30 at 100 mm/s; after 0.03 s X is half way, after 0.06 s there."""
+    """mill-3axis made slow in Y: X 30 at 500 mm/s, Y 30 at 100 mm/s; after 0.03 s X is half path, after 0.06 s there."""
     m = machine("mill-3axis")
     m = replace(m, limits=replace(m.limits, velocity=np.array([500.0, 100.0, 300.0])))
     control = Control(m, "axes", np.zeros(3), rapids="dog-leg")
@@ -185,14 +185,14 @@ def test_holes_at_one_level_are_reached_in_rapid(tmp_path: Path) -> None:
 
 
 def test_a_way_is_looked_at_along_its_dog_leg() -> None:
-    """The straight way passes the sphere at 17.9 mm; with equal speeds X and Y go through its centre."""
+    """The straight path passes the sphere at 17.9 mm; with equal speeds X and Y go through its centre."""
     m = machine("mill-3axis")
     m = replace(m, limits=replace(m.limits, velocity=np.full(3, 300.0)))
     corners = 10.0 * np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, 8).T
     space = SafeSpace(np.zeros(3), 10.0, corners, None, 5.0)
-    way = np.array([[-40.0, -40.0, 0.0], [40.0, 0.0, 0.0]])
+    travel = np.array([[-40.0, -40.0, 0.0], [40.0, 0.0, 0.0]])
     for rapids, clear in (("straight", True), ("dog-leg", False)):
-        assert stays_clear(Control(m, "axes", np.zeros(3), rapids=rapids), m.kinematics, space, way, 1.0) == clear
+        assert stays_clear(Control(m, "axes", np.zeros(3), rapids=rapids), m.kinematics, space, travel, 1.0) == clear
 
 
 def test_linking_moves_are_clear_along_their_dog_legs(tmp_path: Path) -> None:
@@ -299,7 +299,7 @@ def test_slides_make_up_for_coarse_rotary_words(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("point", "code"), [("[-25, 3, -50]", ""), ("[-25, 0, -49.9]", "pivot.mismatch")])
 def test_pivots_of_the_control(point: str, code: str, tmp_path: Path) -> None:
-    """Along the axis itself (Y) a pivot's point is free; 0.1 mm beside it is an error with both places."""
+    """Along the axis itself (Y) a pivot's point is free; 0.1 mm next to it is an error with both places."""
     file = tmp_path / "own.toml"
     file.write_text(f"[control_pivots.B]\npoint = {point}\n[tools.1]\ngauge_length = 120\n")
     own, found = load_setup(file)
@@ -318,8 +318,8 @@ def test_a_pivot_of_no_axis_is_an_error(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("output", ["tilted", "auto"])
-def test_deep_holes_are_native_beside_rounded_angles(output: str, tmp_path: Path) -> None:
-    """20 mm of depth in planes whose printed angles are rounded: the last decimal across the tool may flip on the way."""
+def test_deep_holes_are_native_next_to_rounded_angles(output: str, tmp_path: Path) -> None:
+    """20 mm of depth in planes whose printed angles are rounded: the last decimal across the tool may flip on the path."""
     for angle_of in (23.4567, 41.2345, 57.6543, 12.3456):
         axis = tilted(angle_of, 3 * angle_of)
         lines = [n.replace("DEPTH,5", "DEPTH,60").replace("DRILL", "TAP") for n in holes(axis)]

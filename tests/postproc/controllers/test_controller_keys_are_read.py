@@ -47,7 +47,7 @@ WITH: dict[str, list[str]] = {
     "format.sequence_prefix": ["format.sequence_step = 5"], "program.number": ['program.begin = ["%", "O{number}"]'],
     "codes.rigid_tap": ['program.passive = ["M19"]'], "codes.through_off": ['codes.through = "M88"'],
     "codes.air_off": ['codes.air = "M83"']}
-"""values of other keys beside which a key counts"""
+"""values of other keys besides which a key counts"""
 HEAD = ["UNITS/MM", "LOADTL/1", "SPINDL/RPM,1000,CLW", "FEDRAT/MMPM,600"]
 FLAT = ["PPRINT/NOTE A LONG TEXT FOR PEOPLE", "COOLNT/FLOOD", "RAPID", "GOTO/0,0,50", "GOTO/10,0,5", "CUTCOM/LEFT,1",
         "GOTO/20.125,0,5",
@@ -128,7 +128,7 @@ def test_the_paths_use_everything() -> None:
 
 
 def test_the_read_back_follows_the_controls_pecks(tmp_path: Path) -> None:
-    """Three pecks of 2 mm: the way back down ends 0.254 or 1 mm above the last depth."""
+    """Three pecks of 2 mm: the return down ends 0.254 or 1 mm above the last depth."""
     shop = tmp_path / "shop.toml"
     shop.write_text('base = "linuxcnc"\n[cycles]\npeck_relief = 1.0\n')
     heights = []

@@ -20,7 +20,7 @@ from postproc.pipeline.result import PostResult
 from postproc.readback.comparison.checks import _turning_points
 from postproc.setup.model import SetupFile, load_setup
 from postproc.verification.residual_errors import after_formatting
-from tests.postproc.correction.test_compensation_points import two_ways_of_all
+from tests.postproc.correction.test_compensation_points import both_directions_of_all
 from toolpaths.arrays import Floats
 from toolpaths.toolpath import Kind
 
@@ -31,7 +31,7 @@ GRAIN = 1e-4
 # ---- the walk ---------------------------------------------------------------------------------------------------------
 
 def no_motion(*shape: int) -> Floats:
-    """Shift, low and high that leave the ways as they are."""
+    """Shift, low and high that leave the approach directions as they are."""
     result = np.zeros((3, *shape))
     result[1], result[2] = -np.inf, np.inf
     return result
@@ -43,8 +43,8 @@ def random_ends(rng: np.random.Generator, blocks: int, lossy: int, near: float, 
     gap = np.tile(rng.uniform(1e-3, 6e-3, lossy), (blocks, 1))
     back = rng.normal(size=(blocks, lossy, 3)) * 0.02 * GRAIN
     back[:, i, i] += GRAIN
-    by_way = rng.normal(size=(blocks, 3, lossy)) * 2e-4
-    by_way[:, i, i] += 0.5 * gap
+    by_approach = rng.normal(size=(blocks, 3, lossy)) * 2e-4
+    by_approach[:, i, i] += 0.5 * gap
     bend, later = no_motion(*size), no_motion(*size)
     if not single:
         bend[0], later[0] = rng.normal(size=size) * (rng.random(size) < 0.3), 0.5 * rng.normal(size=size)
@@ -52,7 +52,7 @@ def random_ends(rng: np.random.Generator, blocks: int, lossy: int, near: float, 
     likes = np.where(rng.random(blocks) < 0.25, np.arange(blocks) - 1, -1)
     free = np.where(likes >= 0, 0.0, 1.0)[:, None] * (rng.random((blocks, 3)) < (1.0 if single else 0.95))
     nears = np.where(rng.random(blocks) < (0.0 if single else 0.2), 1.0, near)
-    return BlockEnds(off=rng.normal(size=(blocks, 3)) * 1e-3, by_way=by_way,
+    return BlockEnds(off=rng.normal(size=(blocks, 3)) * 1e-3, by_approach=by_approach,
                      tip_rates=np.eye(3) * GRAIN + rng.normal(size=(blocks, 3, 3)) * 0.05 * GRAIN, back=back, gap=gap,
                      bend=bend,
                      last=2.0 * rng.choice([0.0, 1e-4, -1e-4, 5e-4, -5e-4, 3e-3, -3e-3, 1.0, -1.0], size) / gap, later=later,
@@ -71,13 +71,13 @@ def steps_of(ends: BlockEnds) -> Floats:
 @pytest.mark.parametrize("lossy", [1, 2, 3])
 def test_the_compiled_walk_is_the_plain_one(lossy: int, monkeypatch: pytest.MonkeyPatch) -> None:
     ends = random_ends(np.random.default_rng(lossy), 400, lossy, 8.7e-5)
-    plain, ways = (np.asarray(x) for x in walking._walk(*vars(ends).values()))
+    plain, approaches = (np.asarray(x) for x in walking._walk(*vars(ends).values()))
     monkeypatch.setattr(backlash_steps_loop, "COMPILE_FROM", 400)
     fast = walking.walk(ends)
     assert backlash_steps_loop.wanted(1)
     np.testing.assert_array_equal(fast[0], plain)
-    np.testing.assert_allclose(fast[1], ways, rtol=0.0, atol=1e-12)  # sums of other order
-    assert np.abs(ways).max() == 1.0 and (np.abs(ways) < 1.0).any()
+    np.testing.assert_allclose(fast[1], approaches, rtol=0.0, atol=1e-12)  # sums of other order
+    assert np.abs(approaches).max() == 1.0 and (np.abs(approaches) < 1.0).any()
     assert np.abs(plain).max() > 3.0 and (plain == 0.0).all(axis=1).any()
     likes = np.flatnonzero(ends.like >= 0)
     np.testing.assert_array_equal(plain[likes], plain[ends.like[likes]])
@@ -88,11 +88,12 @@ def test_the_compiled_walk_is_the_plain_one(lossy: int, monkeypatch: pytest.Monk
 def costs(ends: BlockEnds, steps: Floats) -> tuple[Floats, Floats]:
     """(N,) mm that the tip is off by after steps (N, 3) in the block of `ends`, and with what the next begins off by.
 
-    From the play operator: the way 0 takes up a step by 2 / gap of it, held between -1 and 1; ways count by their share.
+    From the play operator: the approach direction 0 takes up a step by 2 / gap of it, held between -1 and 1; approach
+        directions count by their share.
     """
-    way = np.clip(ends.last[0] + 2.0 * steps @ ends.back[0].T / ends.gap[0], -1.0, 1.0)
-    off = np.linalg.norm(ends.off[0] + way @ ends.by_way[0].T + steps @ ends.tip_rates[0].T, axis=1)
-    late = np.where(ends.goes_on[0] != 0.0, ends.goes_on[0] - way, 0.0) @ ends.by_way[0].T
+    approach = np.clip(ends.last[0] + 2.0 * steps @ ends.back[0].T / ends.gap[0], -1.0, 1.0)
+    off = np.linalg.norm(ends.off[0] + approach @ ends.by_approach[0].T + steps @ ends.tip_rates[0].T, axis=1)
+    late = np.where(ends.goes_on[0] != 0.0, ends.goes_on[0] - approach, 0.0) @ ends.by_approach[0].T
     return off, off + ends.weight[0] * np.linalg.norm(late, axis=1)
 
 
@@ -112,7 +113,7 @@ def test_no_steps_around_bring_a_block_nearer() -> None:
 def test_words_stay_where_rounding_leaves_as_much() -> None:
     walk = steps_of
     ends = random_ends(np.random.default_rng(3), 1, 2, 8.7e-5, single=True)
-    still = replace(ends, off=-(ends.by_way @ np.clip(ends.last, -1.0, 1.0)[..., None])[..., 0] + [[6e-5, 0.0, 6e-5]],
+    still = replace(ends, off=-(ends.by_approach @ np.clip(ends.last, -1.0, 1.0)[..., None])[..., 0] + [[6e-5, 0.0, 6e-5]],
                     goes_on=np.zeros((1, 2)))
     assert costs(still, np.zeros((1, 3)))[0][0] == pytest.approx(6e-5 * np.sqrt(2.0))
     assert not walk(still).any()
@@ -140,7 +141,7 @@ def converted(sample: str | Path, machine: str, controller: str, model: str | Pa
     ("tool_axis_tour.apt", "head-table", "siemens-840d", "tcp", "tcp", 6)])
 def test_points_are_inside_the_bound_where_every_slide_loses_motion(sample: str, machine: str, controller: str, output: str,
                                                                     law: str, seed: int, tmp_path: Path) -> None:
-    result = converted(sample, machine, controller, two_ways_of_all(tmp_path, machine, seed), output)
+    result = converted(sample, machine, controller, both_directions_of_all(tmp_path, machine, seed), output)
     found = after_formatting(result)
     assert result.ok and found is not None and result.compensation is not None, [str(d) for d in result.diagnostics]
     assert result.path is not None and law in {frame.control.law for frame in result.path.frames}

@@ -208,7 +208,8 @@ def test_arcs_survive_a_squareness_error_and_not_a_wavy_guide(tmp_path: Path) ->
 
 
 def test_rewinds_are_proved_on_the_machine_with_errors(tmp_path: Path) -> None:
-    """25 rewinds in one cut: on its way out the correction turns the tool by an arc second, no unwinding in the cut."""
+    """25 rewinds in one cut: on its approach direction out the correction turns the tool by an arc second, no unwinding in
+    the cut."""
     machine = str(SAMPLES / "joints" / "limited_c.toml")
     model = written(tmp_path, replace(load(MIKRON, machines.load("mikron-ucp710")), machine=""))
     result = converted("joints/spiral_50.cls", machine, model=model)

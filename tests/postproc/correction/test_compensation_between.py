@@ -83,9 +83,9 @@ TABLE = "X [mm], EXX [um]\n-200, 0\n0, 5\n30, 8\n"
 def test_an_arc_that_leaves_what_was_measured_is_refused(tmp_path: Path) -> None:
     model = "[components.EXX]\ntable = \"t.csv\"\n[components.EYY]\npolynomial = [0.0, 0.1]\nrange = [-70, 20]\n"
     result = converted(tmp_path, CIRCLE, model, TABLE)
-    told = [d for d in result.diagnostics if d.code == "compensation.range" and d.severity == Severity.ERROR]
+    noted = [d for d in result.diagnostics if d.code == "compensation.range" and d.severity == Severity.ERROR]
     assert not result.ok and result.text == ""
-    assert [d.message.split()[0] for d in told] == ["X", "Y"] and told[0].message == (
+    assert [d.message.split()[0] for d in noted] == ["X", "Y"] and noted[0].message == (
         "X goes from 0 to 60 where its errors were not measured: they were from -200 to 30")
     allowed = converted(tmp_path, CIRCLE, model, TABLE, beyond=True)
     assert allowed.ok and sum(d.code == "compensation.range" and d.severity == Severity.WARNING
@@ -96,11 +96,11 @@ def test_home_need_not_be_measured(tmp_path: Path) -> None:
     """Linking moves get the error at the end of the range; home is in the machine's own coordinates."""
     model = "[components.EZZ]\npolynomial = [2.0, 0.1]\nrange = [-20, {}]\n"
     result = converted(tmp_path, LINE, model.format(25))
-    told = [d for d in result.diagnostics if d.code == "compensation.range"]
-    assert result.ok and [d.severity for d in told] == [Severity.INFO] and "Z goes" in told[0].message
+    noted = [d for d in result.diagnostics if d.code == "compensation.range"]
+    assert result.ok and [d.severity for d in noted] == [Severity.INFO] and "Z goes" in noted[0].message
     assert result.path is not None and result.nominal is not None
     links = np.flatnonzero(np.isnan(result.nominal.u) & ~result.nominal.home & (result.nominal.q[:, 2] > 25.0))
-    assert len(links) and "linking moves" in told[0].message
+    assert len(links) and "linking moves" in noted[0].message
     assert not converted(tmp_path, LINE, model.format(15)).ok  # a cut of the CL file from 20 on
     assert converted(tmp_path, LINE.replace("GOTO/-160,0,0", "RAPID\nGOTO/-160,0,0"), model.format(15)).ok
 
@@ -131,13 +131,13 @@ def test_a_tilted_plane_that_was_not_measured_is_refused(tmp_path: Path) -> None
     assert not result.ok and "compensation.range" in {d.code for d in result.diagnostics}
 
 
-def test_a_part_out_of_travel_is_told_before_it_is_corrected(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_part_out_of_travel_is_reported_before_it_is_corrected(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("postproc.correction.compensation.compensate", lambda *args: pytest.fail("corrected"))
     path, found = toolpaths.read("samples/systems/upside_down.cls")
     result = postproc.convert(path, "mikron-ucp710", "fanuc-30i", diagnostics=found, options=Options(
         setup="samples/tools.setup.toml", error_model="samples/errors/mikron-ucp710.toml"))
-    told = [d for d in result.diagnostics if d.code == "travel.exceeded"]
-    assert told and len(told) == len({d.message for d in told}) and "system = " in told[0].hint
+    noted = [d for d in result.diagnostics if d.code == "travel.exceeded"]
+    assert noted and len(noted) == len({d.message for d in noted}) and "system = " in noted[0].hint
 
 
 def test_a_short_rapid_before_a_rapid_takes_up_lost_motion() -> None:
@@ -149,8 +149,8 @@ def test_a_short_rapid_before_a_rapid_takes_up_lost_motion() -> None:
                                                                                                 10]  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize(("feed_beside", "told"), [(0.008, False), (0.001, True)])
-def test_the_end_of_a_cut_may_pass_for_the_beginning_of_a_rapid(feed_beside: float, told: bool) -> None:
+@pytest.mark.parametrize(("feed_adjacent", "noted"), [(0.008, False), (0.001, True)])
+def test_the_end_of_a_cut_may_pass_for_the_beginning_of_a_rapid(feed_adjacent: float, noted: bool) -> None:
     """A cut of 0.176 mm whose last 8 um stand within the tolerance of its end: the rapid that follows has them."""
     feed = 2500.0 / 60.0
     motion = SimpleNamespace(code=np.array([1, 1, 0]), line=np.arange(3))
@@ -158,5 +158,5 @@ def test_the_end_of_a_cut_may_pass_for_the_beginning_of_a_rapid(feed_beside: flo
         kind=np.array([1, 0]), link=np.zeros(2, dtype=bool), seconds=np.full(2, np.nan), line=np.array([7, 8]),
         feed=np.array([feed, np.nan]), lengths=lambda: np.array([0.176, 25.0]), sweeps=lambda: np.zeros(2))
     found = check_speeds(motion, moves, np.array([0, 1, 1]), np.array([0, 2]),  # type: ignore[arg-type]
-                         np.array([0.168 / feed, feed_beside / feed, 0.1]), 0.01, Faults("a.apt"))
-    assert [d.code for d in found] == (["verify.feed"] if told else [])
+                         np.array([0.168 / feed, feed_adjacent / feed, 0.1]), 0.01, Faults("a.apt"))
+    assert [d.code for d in found] == (["verify.feed"] if noted else [])

@@ -35,19 +35,19 @@ def run(arguments: list[str], tmp_path: Path, code: int = 0) -> tuple[str, dict[
     return found.output, json.loads((tmp_path / "o.json").read_text())
 
 
-def told(values: dict[str, Any], code: str) -> list[dict[str, Any]]:
+def noted(values: dict[str, Any], code: str) -> list[dict[str, Any]]:
     return [d for d in values["diagnostics"] if d["code"] == code]
 
 
 def test_a_conversion_says_who_corrects(tmp_path: Path, theirs: str) -> None:
     text, values = run(["convert", CL, *RUN, "--error-model", theirs, "-o", str(tmp_path / "a.ngc")], tmp_path)
     assert values["geometric_errors"] == {"model": "mikron-ucp710", "corrected_by": "control"}
-    found, = told(values, "compensation.control")
+    found, = noted(values, "compensation.control")
     assert found["severity"].lower() == "info" and found["file"] == theirs
     assert "geometric errors mikron-ucp710: left to the control" in text
     text, values = run(["convert", CL, *RUN, "--error-model", OURS, "-o", str(tmp_path / "b.ngc")], tmp_path)
     assert values["geometric_errors"]["corrected_by"] == "post" and values["geometric_errors"]["tip_before_mm"] > 0.02
-    assert "left to the control" not in text and not told(values, "compensation.control")
+    assert "left to the control" not in text and not noted(values, "compensation.control")
 
 
 def test_a_trace_says_who_corrects(tmp_path: Path, theirs: str) -> None:
@@ -67,9 +67,9 @@ def test_verify_says_that_both_would_correct(tmp_path: Path, theirs: str) -> Non
     made = str(tmp_path / "a.ngc")
     run(["convert", CL, *RUN, "--error-model", OURS, "-o", made], tmp_path)
     _, values = run(["verify", made, CL, *RUN, "--error-model", theirs], tmp_path, 1)
-    found, = told(values, "verify.error_model")
+    found, = noted(values, "verify.error_model")
     assert "both would" in found["message"] and "corrected_by" in found["hint"]
-    assert told(values, "compensation.control")
+    assert noted(values, "compensation.control")
     _, values = run(["verify", made, CL, *RUN], tmp_path, 1)
-    found, = told(values, "verify.error_model")
+    found, = noted(values, "verify.error_model")
     assert "none are given here" in found["message"] and "--error-model" in found["hint"]

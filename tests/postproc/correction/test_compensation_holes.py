@@ -1,5 +1,5 @@
-"""Holes corrected as a whole: all at once as one by one, at several heights, in planes, tapped, and what stays a cycle; ways
-of joints in blocks that are nearly straight."""
+"""Holes corrected as a whole: all at once as one by one, at several heights, in planes, tapped, and what stays a cycle;
+approach directions of joints in blocks that are nearly straight."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from postproc.pipeline.result import PostResult
 from postproc.readback.comparison.compare import _taken_up
 from postproc.setup.model import load_setup
 from postproc.verification.residual_errors import after_formatting
-from tests.postproc.correction.test_compensation_points import two_ways_of_all
+from tests.postproc.correction.test_compensation_points import both_directions_of_all
 from toolpaths.arrays import Floats
 
 CONTROLLERS = ["linuxcnc", "fanuc-30i", "siemens-840d", "heidenhain-tnc640", "haas-ngc"]
@@ -52,12 +52,12 @@ def test_blocks_compose_as_one_after_the_other() -> None:
     rng = np.random.default_rng(6)
     bend, last = np.sort(rng.normal(size=(3, 30, 2)), axis=0)[[1, 0, 2]], rng.normal(size=(30, 2))
     first, count = np.array([1, 9, 10, 22]), np.array([7, 0, 11, 1])
-    found, way = _composed(bend, last, first, count), rng.uniform(-1.0, 1.0, 2)
+    found, approach = _composed(bend, last, first, count), rng.uniform(-1.0, 1.0, 2)
     for k in range(4):
-        there = way
+        there = approach
         for block in range(first[k], first[k] + count[k]):
             there = np.clip(np.clip(there + bend[0, block], bend[1, block], bend[2, block]) + last[block], -1.0, 1.0)
-        np.testing.assert_allclose(PlaySteps(*found[:, k]).at(way), there, rtol=0.0, atol=1e-12)
+        np.testing.assert_allclose(PlaySteps(*found[:, k]).at(approach), there, rtol=0.0, atol=1e-12)
     assert not np.isfinite(found[1:, 1]).any() and np.isfinite(found[1:, 2]).all()
 
 
@@ -72,7 +72,7 @@ def drilled(folder: Path, machine: str, controller: str, cycle: str, tilted: boo
     lines = ["UNITS/MM", "LOADTL/1", "SPINDL/1000,CLW", "MULTAX/ON", "RAPID", at[0], f"CYCLE/{cycle}", *at[1:-1],
              "CYCLE/OFF", "RAPID", at[-1], "FINI", ""]
     path, found = toolpaths.read_bytes("\n".join(lines))
-    options = Options(error_model=model or (str(two_ways_of_all(folder, machine, seed)) if seed else ""))
+    options = Options(error_model=model or (str(both_directions_of_all(folder, machine, seed)) if seed else ""))
     return postproc.convert(path, machine, controller, load_setup(None)[0], options, found)
 
 
@@ -132,22 +132,24 @@ def test_holes_in_planes_of_printed_angles_stay_cycles(controller: str, tmp_path
 
 
 def test_what_a_level_is_off_by_is_taken_up_before_a_feed_and_at_its_beginning() -> None:
-    """The last part of the way to a plane, and the first of a cut behind a hole; not in the middle of cuts."""
-    way = [100.0, 10.0, 0.005, 20.0, 0.005, 20.0, 0.005, 0.005, 20.0, 0.02, 20.0, 0.005]
+    """The last part of the approach direction to a plane, and the first of a cut behind a hole; not in the middle of
+    cuts."""
+    approach = [100.0, 10.0, 0.005, 20.0, 0.005, 20.0, 0.005, 0.005, 20.0, 0.02, 20.0, 0.005]
     motion = SimpleNamespace(code=np.array([0, 0, 0, 1, 1, 1, 1, 0, 1, 1, 1, 1]))
     job = SimpleNamespace(errors=True, options=Options(), rounding=SimpleNamespace(tip=1e-4))
-    tip = np.cumsum(way)[:, None] * np.eye(3)[:1]
+    tip = np.cumsum(approach)[:, None] * np.eye(3)[:1]
     assert np.flatnonzero(_taken_up(job, motion, tip)).tolist() == [2, 4]  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("controller", CONTROLLERS)
-@pytest.mark.parametrize("two_ways", [False, True])
-def test_taps_have_planes_of_their_own_and_are_come_to_from_afar(controller: str, two_ways: bool, tmp_path: Path) -> None:
+@pytest.mark.parametrize("two_directions", [False, True])
+def test_taps_have_planes_of_their_own_and_are_come_to_from_afar(controller: str, two_directions: bool,
+                                                                 tmp_path: Path) -> None:
     """A table that sinks by 0.06 um per mm and a Z that leans by 40 arcsec: 11 um across at the level that the tool comes
     from, up to 6 um between the planes; neither is the bottom's to settle."""
     (tmp_path / "z.csv").write_text("Z [mm], EZZ+ [um], EZZ- [um]\n-500, 0, 3\n500, 1, 4\n")
     text = '[location]\nEA0Z = 40\n[components.EZX]\npolynomial = [0, 0.06]\nrange = [-300, 300]\n'
-    (tmp_path / "e.toml").write_text(text + ('[components.EZZ]\ntable = "z.csv"\n' if two_ways else ""))
+    (tmp_path / "e.toml").write_text(text + ('[components.EZZ]\ntable = "z.csv"\n' if two_directions else ""))
     cycle, model = "TAP,DEPTH,8,CLEAR,4,MMPR,1", str(tmp_path / "e.toml")
     result = checked(drilled(tmp_path, "mill-3axis", controller, cycle, model=model))
     assert result.program is not None and len(result.program.holes) == len(HEIGHTS)
@@ -156,7 +158,7 @@ def test_taps_have_planes_of_their_own_and_are_come_to_from_afar(controller: str
     assert 0.004 < np.ptp(off) < 0.012 and np.ptp(off - [-6e-5 * x for x, _ in PLACES]) < 2e-3
 
 
-def test_no_points_mend_what_a_hole_leaves_a_rapid_off_by(tmp_path: Path) -> None:
+def test_no_points_fix_what_a_hole_leaves_a_rapid_off_by(tmp_path: Path) -> None:
     """Behind a hole with a level of the common plane; the rapid away is halved for its own errors alone."""
     result = checked(drilled(tmp_path, "mill-3axis", "linuxcnc", "DRILL,DEPTH,3,CLEAR,2,RETURN,2,MMPM,250", seed=1))
     path, moves = result.path, result.job.moves if result.job is not None else None
@@ -181,7 +183,7 @@ def test_slides_of_other_letters_lose_motion_too(tmp_path: Path) -> None:
 
 def test_blocks_that_are_nearly_straight_need_no_pieces(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The words are those that pieces of all blocks lead to; some blocks are not straight enough to go without."""
-    model, texts, counts = two_ways_of_all(tmp_path, "mikron-ucp710", 3), [], []
+    model, texts, counts = both_directions_of_all(tmp_path, "mikron-ucp710", 3), [], []
     runs = backlash_words._runs
     monkeypatch.setattr(backlash_words, "_runs", lambda pieces: (lambda found: counts.append(len(found[1]))
                                                                  or found)(runs(pieces)))
@@ -194,7 +196,8 @@ def test_blocks_that_are_nearly_straight_need_no_pieces(tmp_path: Path, monkeypa
 
 
 def test_blocks_of_a_hole_are_moved_as_far_as_its_first(monkeypatch: pytest.MonkeyPatch) -> None:
-    """So are their joints: else the ways behind the first block would be those of a hole that was moved back."""
+    """So are their joints: else the approach directions behind the first block would be those of a hole that was moved
+    back."""
     seen: list[BlockEnds] = []
 
     def kept(ends: BlockEnds) -> tuple[Floats, Floats]:

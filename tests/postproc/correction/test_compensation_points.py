@@ -110,8 +110,8 @@ def axis_words(text: str) -> Floats:
     return np.array(rows)
 
 
-def test_the_sign_of_the_last_written_motion_tells_the_error_at_every_point(tmp_path: Path) -> None:
-    """A second reading: words by a pattern, ways by the plain sign of the last change of each word."""
+def test_the_sign_of_the_last_written_motion_reports_the_error_at_every_point(tmp_path: Path) -> None:
+    """A second reading: words by a pattern, approach directions by the plain sign of the last change of each word."""
     (tmp_path / "s.apt").write_text(PLAIN)
     rows = [f"{x}, {0.05 * x}, {0.05 * x + 4}, {0.01 * x * x / 10}" for x in (-60, -20, 0, 30, 60)]
     (tmp_path / "x.csv").write_text("\n".join(["X [mm], EXX+ [um], EXX- [um], EYX [um]", *rows]))
@@ -123,22 +123,22 @@ def test_the_sign_of_the_last_written_motion_tells_the_error_at_every_point(tmp_
                               Options(error_model=str(tmp_path / "e.toml")), found)
     assert result.ok, [str(d) for d in result.diagnostics]
     q = axis_words(result.text)
-    way = np.zeros(3)
+    approach = np.zeros(3)
     tips = []
     x, y = np.array([-60.0, -20.0, 0.0, 30.0, 60.0]), np.array([-60.0, 60.0])
     for before, here in zip(np.concatenate([np.zeros((1, 3)), q[:-1]]), q, strict=True):
-        way = np.where(here != before, np.sign(here - before), way)
-        tips.append(here + 1e-3 * np.array([np.interp(here[0], x, 0.05 * x + (4.0 if way[0] < 0 else 0.0)),
+        approach = np.where(here != before, np.sign(here - before), approach)
+        tips.append(here + 1e-3 * np.array([np.interp(here[0], x, 0.05 * x + (4.0 if approach[0] < 0 else 0.0)),
                                             np.interp(here[0], x, 1e-3 * x * x)
-                                            + np.interp(here[1], y, [0.0, 6.0]) + (3.0 if way[1] < 0 else 0.0),
+                                            + np.interp(here[1], y, [0.0, 6.0]) + (3.0 if approach[1] < 0 else 0.0),
                                             np.interp(here[1], y, [0.0, 12.0])]))
     wanted = np.array([list(map(float, line[5:].split(","))) for line in PLAIN.splitlines() if line.startswith("GOTO")])
     off = np.array([np.linalg.norm(np.array(tips) - point, axis=1).min() for point in wanted[1:]])
     assert off.max() < 1e-4
 
 
-def two_ways_of_all(folder: Path, machine: str, seed: int) -> Path:
-    """Models in which slides lose motion in place and in lean: by the way EXX, EYY, EZZ and EBX, EBY, EBZ."""
+def both_directions_of_all(folder: Path, machine: str, seed: int) -> Path:
+    """Models in which slides lose motion in place and in lean: by the approach direction EXX, EYY, EZZ and EBX, EBY, EBZ."""
     rng = np.random.default_rng(seed)
     text = ""
     for axis in "XYZ":
@@ -155,14 +155,14 @@ def two_ways_of_all(folder: Path, machine: str, seed: int) -> Path:
 
 def turning_back(result: PostResult) -> int:
     """Axis words that turn back by one last decimal; arcs and home apart."""
-    count, way, before = 0, np.zeros(3), np.zeros(3)
+    count, approach, before = 0, np.zeros(3), np.zeros(3)
     for line in result.text.splitlines():
         words = dict(re.findall(r"([XYZ])(-?[\d.]+)", "" if line[:1] in "(%" or "G53" in line else line))
         here = np.array([float(words.get(k, v)) for k, v in zip("XYZ", before, strict=True)])
         step = np.round((here - before) * 1e4)
         if not ({"G2", "G3", "G43"} & set(line.split())):
-            count += int((way * step == -1.0).sum())
-        way, before = np.where(step != 0.0, np.sign(step), way), here
+            count += int((approach * step == -1.0).sum())
+        approach, before = np.where(step != 0.0, np.sign(step), approach), here
     return count
 
 
@@ -171,7 +171,7 @@ def turning_back(result: PostResult) -> int:
     ("indexed_4axis.cls", "mill-4axis", 2)])
 def test_axes_with_lost_motion_never_turn_back_by_a_last_decimal(sample: str, machine: str, seed: int,
                                                                  tmp_path: Path) -> None:
-    model = two_ways_of_all(tmp_path, machine, seed)
+    model = both_directions_of_all(tmp_path, machine, seed)
     path, found = toolpaths.read(SAMPLES / sample)
     options = Options(setup=str(SAMPLES / "tools.setup.toml"), error_model=str(model), output="axes")
     result = postproc.convert(path, machine, "linuxcnc", options=options, diagnostics=found)
@@ -181,7 +181,7 @@ def test_axes_with_lost_motion_never_turn_back_by_a_last_decimal(sample: str, ma
     assert left.tip.max() <= left.tip_bound and left.axis.max() <= left.axis_bound
 
 
-def test_points_beyond_the_bound_are_told() -> None:
+def test_points_beyond_the_bound_are_reported() -> None:
     result = converted("h4a_indexed.cls", "h4a-c-table", "linuxcnc", "h4a")
     found = after_formatting(result)
     assert result.compensation is not None and found is not None and result.job is not None
@@ -189,11 +189,11 @@ def test_points_beyond_the_bound_are_told() -> None:
     assert "geometric_errors.bound" not in {d.code for d in result.diagnostics}
     nearer = 0.5 * found.tip.max()
     less = replace(result.compensation, tip_after=result.compensation.tip_after + float(nearer) - found.tip_bound)
-    [told] = beyond_bound(after_formatting(replace(result, compensation=less)), result.job)
-    assert result.job is not None and told.severity == Severity.WARNING and told.code == "geometric_errors.bound"
-    assert int(result.job.moves.line[found.points[np.argmax(found.tip)]]) in told.lines
-    assert told.count == int((found.tip > nearer).sum())
-    assert f"tip {1e3 * found.tip.max():.2f} um of {1e3 * nearer:.2f} um" in told.message
+    [noted] = beyond_bound(after_formatting(replace(result, compensation=less)), result.job)
+    assert result.job is not None and noted.severity == Severity.WARNING and noted.code == "geometric_errors.bound"
+    assert int(result.job.moves.line[found.points[np.argmax(found.tip)]]) in noted.lines
+    assert noted.count == int((found.tip > nearer).sum())
+    assert f"tip {1e3 * found.tip.max():.2f} um of {1e3 * nearer:.2f} um" in noted.message
 
 
 def test_holes_have_their_own_depth_and_stay_cycles() -> None:
@@ -218,5 +218,5 @@ def test_a_tool_is_changed_at_home_but_for_what_the_model_corrects_there(tmp_pat
     path, found = toolpaths.read(SAMPLES / "five_faces.cls")
     for away, good in ((0.0, True), (0.03, True), (0.3, False)):
         (tmp_path / "a.ngc").write_text(result.text.replace("G53 G0 Z250\n", f"G53 G0 Z{250.0 - away:g}\n"))
-        told = verify(tmp_path / "a.ngc", path, "mikron-ucp710", "linuxcnc", options=result.options, diagnostics=found)
-        assert ("verify.tool_change" not in {d.code for d in told.diagnostics}) == good
+        noted = verify(tmp_path / "a.ngc", path, "mikron-ucp710", "linuxcnc", options=result.options, diagnostics=found)
+        assert ("verify.tool_change" not in {d.code for d in noted.diagnostics}) == good

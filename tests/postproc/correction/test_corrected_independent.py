@@ -56,7 +56,7 @@ CASES: list[Case] = [
     ("indexed_4axis.cls", "mill-4axis", "siemens-840d", "tcp", 11),  # holes from below
     ("pocket.cls", "mikron-ucp710", "heidenhain-tnc640", "tcp", 13),  # helices one after the other
     ("tool_axis_tour.apt", "nutating-head", "fanuc-30i", "axes", 11),  # a rewind
-    ("pocket.cls", "head-table", "fanuc-30i", "auto", 13),  # holes beside a steep error
+    ("pocket.cls", "head-table", "fanuc-30i", "auto", 13),  # holes next to a steep error
     ("pocket.cls", "mill-4axis", "haas-ngc", "auto", 12),  # holes whose levels need unlike corrections
 ]
 
@@ -130,14 +130,14 @@ def converted(case: Case, corrected: bool = True) -> Run:
 def test_the_second_reading_finds_the_points_inside_the_printed_bound(case: Case) -> None:
     """What the product's own read-back finds is what this one finds."""
     run = converted(case)
-    told = after_formatting(run.result)
-    assert told is not None and len(run.tip) == len(told.tip)
-    assert run.tip.max() <= told.tip_bound + SAME and run.tip.max() == pytest.approx(told.tip.max(), abs=SAME)
-    assert run.axis.max() <= told.axis_bound + 0.01 * ARCSEC
+    noted = after_formatting(run.result)
+    assert noted is not None and len(run.tip) == len(noted.tip)
+    assert run.tip.max() <= noted.tip_bound + SAME and run.tip.max() == pytest.approx(noted.tip.max(), abs=SAME)
+    assert run.axis.max() <= noted.axis_bound + 0.01 * ARCSEC
 
 
 @pytest.mark.parametrize("case", [CASES[0], CASES[3], *(case for case in CASES if case[1] == "uranesx")], ids=name)
-def test_without_correction_the_points_are_as_far_off_as_is_told(case: Case) -> None:
+def test_without_correction_the_points_are_as_far_off_as_is_reported(case: Case) -> None:
     found, bare = converted(case).result.compensation, converted(case, corrected=False)
     assert found is not None and 0.01 < bare.tip.max() <= found.tip_before + 1e-3
 

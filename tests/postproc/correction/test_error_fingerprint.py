@@ -1,4 +1,4 @@
-"""`verify` tells that the error model of a program has changed since it was written; every controller's comment holds it."""
+"""`verify` says that the error model of a program has changed since it was written; every controller's comment holds it."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def common(controller: str = "linuxcnc") -> list[str]:
     return ["-m", "mikron-ucp710", "-c", controller, "--setup", "samples/tools.setup.toml"]
 
 
-def told(result: Result, code: str) -> list[str]:
+def noted(result: Result, code: str) -> list[str]:
     return [line for line in result.output.splitlines() if code in line]
 
 
@@ -68,15 +68,15 @@ def test_every_controller_keeps_the_fingerprint(controller: str, model: Path) ->
     stated = re.search(r"fingerprint of the geometric errors ([0-9a-f]{8})\b", program.read_text(), re.IGNORECASE)
     assert stated and f"fingerprint {stated[1].lower()}" in run("errors", "check", model, "-m", "mikron-ucp710").output
     same = verified(program, model, controller)
-    assert same.exit_code == 0 and not told(same, "verify.error_model")
+    assert same.exit_code == 0 and not noted(same, "verify.error_model")
     model.write_text(MODEL.replace("6.0", "6.5"))
     changed = verified(program, model, controller)
     assert changed.exit_code == 0, changed.output  # half an arcsec is far inside the tolerance
-    line, = told(changed, "verify.error_model_changed")
+    line, = noted(changed, "verify.error_model_changed")
     assert " warning " in line and stated[1].lower() in line and "then" in line
 
 
-def test_a_change_beyond_the_tolerance_fails_and_the_change_is_told_first(model: Path) -> None:
+def test_a_change_beyond_the_tolerance_fails_and_the_change_is_reported_first(model: Path) -> None:
     program = written(model)
     model.write_text(MODEL.replace("4.0", "400.0"))
     result = verified(program, model)
@@ -84,13 +84,13 @@ def test_a_change_beyond_the_tolerance_fails_and_the_change_is_told_first(model:
     assert "verify.error_model_changed" in next(line for line in result.output.splitlines() if "verify." in line)
 
 
-def test_a_model_that_only_moved_or_was_written_anew_is_no_other(model: Path) -> None:
+def test_a_model_that_only_moved_or_was_written_again_is_no_other(model: Path) -> None:
     program = written(model)
     other = model.with_name("other.toml")
     other.write_text(MODEL.replace("EC0Y = 6.0\nEX0S = 4.0", "EX0S =  4\n# new\nEC0Y = 6\n[sigma]\nEC0Y = 1.0"))
-    assert not told(verified(program, other), "verify.error_model")
+    assert not noted(verified(program, other), "verify.error_model")
     other.write_text(MODEL.replace("6.0", "6.5"))
-    line, = told(verified(program, other), "verify.error_model")
+    line, = noted(verified(program, other), "verify.error_model")
     assert " warning " in line and "it is verified with other" in line
 
 
@@ -100,7 +100,7 @@ def test_programs_without_a_fingerprint_verify_as_ever(model: Path) -> None:
     for text in (MODEL, MODEL.replace("6.0", "6.5")):
         model.write_text(text)
         result = verified(program, model)
-        assert result.exit_code == 0 and not told(result, "verify.error_model")
+        assert result.exit_code == 0 and not noted(result, "verify.error_model")
 
 
 def test_a_program_that_the_control_corrects_names_no_fingerprint(model: Path) -> None:
@@ -108,7 +108,7 @@ def test_a_program_that_the_control_corrects_names_no_fingerprint(model: Path) -
     program = written(model)
     assert FINGERPRINT not in program.read_text()
     model.write_text(model.read_text().replace("6.0", "6.5"))
-    assert not told(verified(program, model), "verify.error_model")
+    assert not noted(verified(program, model), "verify.error_model")
 
 
 def test_the_sample_with_tables(tmp_path: Path) -> None:
@@ -118,10 +118,10 @@ def test_the_sample_with_tables(tmp_path: Path) -> None:
     program = written(model)
     table = tmp_path / "mikron-ucp710-X.csv"
     head, first, *rows = table.read_text().split("\n")
-    assert not told(verified(program, model), "verify.error_model")
+    assert not noted(verified(program, model), "verify.error_model")
     table.write_text("\n".join([head, first, "# again", *rows]))
-    assert not told(verified(program, model), "verify.error_model")
+    assert not noted(verified(program, model), "verify.error_model")
     cells = rows[1].split(",")
     table.write_text("\n".join([head, first, rows[0], ",".join([cells[0], f"{float(cells[1]) + 0.01:.6f}", *cells[2:]]),
                                 *rows[2:]]))
-    assert told(verified(program, model), "verify.error_model_changed")
+    assert noted(verified(program, model), "verify.error_model_changed")

@@ -44,7 +44,8 @@ def test_first_order_of_turns_about_a_point_off_the_axis(machine: str, letter: s
 
 
 def lost_motion(folder: Path, gap: float, tilt: float = 0.0) -> str:
-    """Tables with two ways for X, Y, Z, their turn about y too, and a wavy straightness that keeps every axis moving."""
+    """Tables with two approach directions for X, Y, Z, their turn about y too, and a wavy straightness that keeps every axis
+    moving."""
     x = np.linspace(-600.0, 600.0, 41)
     text = ""
     for k, letter in enumerate("XYZ"):
@@ -71,7 +72,7 @@ def test_lost_motion_taken_up_after_a_rapid_is_no_cut(tmp_path: Path) -> None:
 
 
 def test_holes_whose_levels_lose_too_much_are_written_out(tmp_path: Path) -> None:
-    """10 um between both ways of Z: a control's cycle would leave the tool that much off where it comes back to."""
+    """10 um between both directions of Z: a control's cycle would leave the tool that much off where it comes back to."""
     result = converted("inch_plate.apt", "mill-3axis", "linuxcnc", lost_motion(tmp_path, 5.0))
     assert result.ok, [str(d) for d in result.diagnostics]
     assert result.program is not None and not result.program.holes

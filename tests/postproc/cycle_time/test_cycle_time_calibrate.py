@@ -128,7 +128,7 @@ GOOD = "".join(f"{n},{n}\n" for n in range(1, 12))
     ("nc_line,time_s\n" + GOOD + "12,1e300\n", "log.time", (2, 13)),
     ("nc_line,time_s\n" + "".join(f"{k},5\n" for k in range(1, 12)), "log.time", (2, 12)),
 ])
-def test_bad_logs_are_told(tmp_path: Path, text: str, code: str, lines: tuple[int, ...]) -> None:
+def test_bad_logs_are_reported(tmp_path: Path, text: str, code: str, lines: tuple[int, ...]) -> None:
     (tmp_path / "log.csv").write_text(text)
     log, found = read_log(tmp_path / "log.csv", ("X", "Y", "Z"))
     assert log is None and [d.code for d in found] == [code]

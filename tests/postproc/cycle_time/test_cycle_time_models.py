@@ -53,11 +53,11 @@ def test_rest_to_rest_is_ruckigs(seed: int) -> None:
     length, target, rate, jerk = (10.0 ** rng.uniform(a, b, 40) for a, b in ((-3, 3), (0, 3), (1, 4), (2, 6)))
     ours = rest_to_rest(length, target, rate, jerk)
     for k in range(40):
-        asked, way = InputParameter(1), Trajectory(1)
+        asked, travel = InputParameter(1), Trajectory(1)
         asked.current_position, asked.target_position = [0.0], [float(length[k])]
         asked.max_velocity, asked.max_acceleration, asked.max_jerk = [target[k]], [rate[k]], [jerk[k]]
-        Ruckig(1).calculate(asked, way)
-        assert ours[k] == pytest.approx(way.duration, rel=1e-9)
+        Ruckig(1).calculate(asked, travel)
+        assert ours[k] == pytest.approx(travel.duration, rel=1e-9)
 
 
 def test_one_line_of_the_ideal_model_is_rest_to_rest() -> None:
@@ -184,7 +184,7 @@ def test_band_holds_the_time_and_grows_with_what_is_assumed() -> None:
     assert assumed.band[0] < assumed.seconds < assumed.band[1]
     assert sure.band[0] < sure.seconds < sure.band[1]
     assert assumed.band[1] - assumed.band[0] > 1.5 * (sure.band[1] - sure.band[0])
-    assert set(sure.doubts) == {"the model itself"}
+    assert set(sure.uncertainties) == {"the model itself"}
 
 
 def test_lengths_of_arcs_and_helices() -> None:
@@ -227,10 +227,10 @@ def test_jerk_of_a_run_over_several_blocks_is_that_of_one() -> None:
     assert times[1] == pytest.approx(times[0], rel=1e-9)
 
 
-def test_doubts_reach_to_both_sides() -> None:
+def test_uncertainties_reach_to_both_sides() -> None:
     b, m = blocks(random_program(4)), machine()
     e = estimate(b, m, model("lookahead"))
-    own = 1.96 * e.doubts["the model itself"]
+    own = 1.96 * e.uncertainties["the model itself"]
     assert e.seconds - e.band[0] > 1.2 * own and e.band[1] - e.seconds > 1.2 * own
 
 

@@ -106,7 +106,7 @@ def test_operations_and_lines_of_a_cl_file() -> None:
 
 
 def test_tip_of_a_controls_own_mode_runs_at_the_feed() -> None:
-    """Under G43.4 the feed is the tip's, whatever way the axes take."""
+    """Under G43.4 the feed is the tip's, whatever path the axes take."""
     fanuc, _ = load_controller("fanuc-30i")
     assert fanuc is not None
     path, found = toolpaths.read(SAMPLES / "tool_axis_tour.apt")
@@ -122,7 +122,7 @@ def test_tip_of_a_controls_own_mode_runs_at_the_feed() -> None:
     assert (lines > 0.0).sum() < tips.sum()
 
 
-def test_programs_and_cl_files_are_told_apart() -> None:
+def test_programs_and_cl_files_are_distinguished() -> None:
     for name in ("pocket.cls", "tool_axis_tour.apt", "inch_plate.apt", "h4a_dome.cls"):
         assert not looks_like_gcode((SAMPLES / name).read_bytes())
     for text in (b"%\nO0001\nG1 X1\n", b"(part)\nN10 G21 G90\n", b"G0 X1\n", b"/N5 M30\n", b"BEGIN PGM A MM\n",
@@ -134,7 +134,7 @@ def test_programs_and_cl_files_are_told_apart() -> None:
         assert not looks_like_gcode(text), text
 
 
-def test_cycles_return_to_r_until_linuxcnc_is_told_otherwise() -> None:
+def test_cycles_return_to_r_until_linuxcnc_is_reported_otherwise() -> None:
     """Measured: a fresh LinuxCNC without G98 or G99; other controls begin with G98."""
     text = f"{HEAD}\nG0 Z300\nF900\n{{}}G81 X5 Y5 Z280 R290\nX10\nG80"
 
@@ -144,7 +144,7 @@ def test_cycles_return_to_r_until_linuxcnc_is_told_otherwise() -> None:
     assert last("G98 ") == last("", "generic-iso") == 300.0
 
 
-def test_faults_of_a_program_are_told() -> None:
+def test_faults_of_a_program_are_reported() -> None:
     spec, _ = load_controller("linuxcnc")
     assert spec is not None
     for text, code in (("G1 X1\nM2\n", "gcode.feed"), ("M2\n", "gcode.no_motion"), ("F100 G1 Q\nM2\n", "gcode.syntax")):

@@ -177,7 +177,7 @@ def test_limits_at_the_tool_hold_by_length() -> None:
 class Screw(PolynomialPath):
     """Tip on a slender helix: its steady jerk is along the binormal, k t sd^3 with curvature k and torsion t.
 
-    One solve limits it beside the jerk in the plane of curvature, strict their sum.
+    One solve limits it next to the jerk in the plane of curvature, strict their sum.
     """
 
     r, c = 0.05, 1.0

@@ -244,7 +244,7 @@ def test_feeds_of_blocks_by_their_edges() -> None:
 
 
 def test_where_tightening_is_in_vain_the_best_is_kept() -> None:
-    """A jerk so high that the motion is one of second order: strict stays beside V/A + S/V."""
+    """A jerk so high that the motion is one of second order: strict stays next to V/A + S/V."""
     made = plan(PolynomialPath([[0.0, 1.0]], 100.0), JointLimits(*np.array([[500.0], [2500.0], [5e8]])), options=STRICT)
     assert made.usage().worst <= 1.0 and made.seconds < 1.06 * 0.4
 

@@ -21,10 +21,10 @@ LIMITS = JointLimits(np.array([100.0, 50.0, 3.0]), np.array([1000.0, 800.0, 20.0
 def moves(count: int, seed: int = 5) -> tuple[np.ndarray, np.ndarray]:  # type: ignore[type-arg]
     """From micrometres to metres; some joints stand still."""
     rng = np.random.default_rng(seed)
-    way = rng.normal(size=(count, 3)) * 10.0 ** rng.uniform(-4.0, 3.0, (count, 1)) * [1.0, 1.0, 0.05]
-    way[rng.random((count, 3)) < 0.2] = 0.0
+    travel = rng.normal(size=(count, 3)) * 10.0 ** rng.uniform(-4.0, 3.0, (count, 1)) * [1.0, 1.0, 0.05]
+    travel[rng.random((count, 3)) < 0.2] = 0.0
     q0 = rng.normal(size=(count, 3))
-    return q0, q0 + way
+    return q0, q0 + travel
 
 
 @pytest.mark.parametrize("law", PointToPointMode)
@@ -39,9 +39,9 @@ def test_closed_form_equals_ruckig(law: PointToPointMode) -> None:
         assert np.all(np.concatenate((made.qd[-1], made.qdd[-1], made.qddd[-1])) == 0.0)
 
 
-def ruckig_seconds(way: float, v: float, a: float, j: float) -> float:
+def ruckig_seconds(travel: float, v: float, a: float, j: float) -> float:
     wanted, found = ruckig.InputParameter(1), ruckig.Trajectory(1)
-    wanted.current_position, wanted.target_position = [0.0], [way]
+    wanted.current_position, wanted.target_position = [0.0], [travel]
     wanted.max_velocity, wanted.max_acceleration, wanted.max_jerk = [v], [a], [j]
     assert ruckig.Ruckig(1).calculate(wanted, found) == ruckig.Result.Working
     return float(found.duration)
@@ -50,9 +50,9 @@ def ruckig_seconds(way: float, v: float, a: float, j: float) -> float:
 @pytest.mark.parametrize("j", [2e3, 1e5, np.inf])
 def test_duration_of_one_joint_is_ruckigs(j: float) -> None:
     limits = JointLimits(np.array([90.0]), np.array([1100.0]), np.array([j]))
-    way = 10.0 ** np.linspace(-5.0, 3.5, 60)
-    found = rest_seconds(np.zeros((60, 1)), -way[:, None], limits, PointToPointMode.DOG_LEG)
-    np.testing.assert_allclose(found, [ruckig_seconds(one, 90.0, 1100.0, j) for one in way], rtol=1e-9)
+    travel = 10.0 ** np.linspace(-5.0, 3.5, 60)
+    found = rest_seconds(np.zeros((60, 1)), -travel[:, None], limits, PointToPointMode.DOG_LEG)
+    np.testing.assert_allclose(found, [ruckig_seconds(one, 90.0, 1100.0, j) for one in travel], rtol=1e-9)
 
 
 def test_laws() -> None:

@@ -60,7 +60,7 @@ def test_compiled_equals_numpy_and_toppra(path: SplinePath) -> None:
     assert least_time(sigma, plain) == pytest.approx(toppra_time(path, sigma), rel=1e-6)
 
 
-def reversing(way: str, small: float, seed: int) -> tuple[Floats, Floats, Floats, Floats]:
+def reversing(travel: str, small: float, seed: int) -> tuple[Floats, Floats, Floats, Floats]:
     """sigma (N,), dq and d2q (N, J) over the limits, cap (N,): one joint whose row hardly depends on x1 in one interval.
 
     Its slope is `small` at the interval's begin, or the sum of curvature and slope/(2h) cancels to `small` at its end.
@@ -69,7 +69,7 @@ def reversing(way: str, small: float, seed: int) -> tuple[Floats, Floats, Floats
     sigma = np.cumsum(rng.uniform(0.1, 0.4, 9))
     dq, d2q = 1e-3 * rng.normal(size=(2, 9, 5))
     joint, k = int(rng.integers(5)), int(rng.integers(2, 7))
-    if way == "slope":
+    if travel == "slope":
         dq[k, joint] = 1e-3 * small
     else:
         dq[k + 1, joint] = -2.0 * (sigma[k + 1] - sigma[k]) * d2q[k + 1, joint] * (1.0 + small)
@@ -77,13 +77,13 @@ def reversing(way: str, small: float, seed: int) -> tuple[Floats, Floats, Floats
 
 
 @pytest.mark.numeric
-@pytest.mark.parametrize("way", ["slope", "sum"])
+@pytest.mark.parametrize("travel", ["slope", "sum"])
 @pytest.mark.parametrize("power", range(-14, -5))
-def test_rows_that_hardly_depend_on_the_next_speed_are_exact(way: str, power: int) -> None:
+def test_rows_that_hardly_depend_on_the_next_speed_are_exact(travel: str, power: int) -> None:
     """Against fractions: x, every limit, and the time of the greedy solution. Compiled to the last bit as numpy."""
     unit = np.ones(5)
     for seed, sign in itertools.product(range(3), (-1.0, 1.0)):
-        sigma, dq, d2q, cap = reversing(way, sign * 10.0**power, seed)
+        sigma, dq, d2q, cap = reversing(travel, sign * 10.0**power, seed)
         fast, plain = (second_order(sigma, dq, d2q, unit, cap, kernel) for kernel in (True, False))
         np.testing.assert_array_equal(fast, plain)
         exact = np.array(exact_second_order(sigma, dq, d2q, cap, FLAT), dtype=np.float64)

@@ -42,7 +42,7 @@ def cone(theta: float, phi: np.ndarray) -> np.ndarray:
 
 
 def over(theta: np.ndarray, miss: float, phi: float = 0.0) -> np.ndarray:
-    """Axes on a straight way past the pole: theta degrees along direction phi, `miss` degrees beside it."""
+    """Axes on a straight path past the pole: theta degrees along direction phi, `miss` degrees next to it."""
     a, b = np.radians(theta), np.radians(miss)
     v = np.stack([np.sin(a) * np.cos(b), np.full(len(a), np.sin(b)), np.cos(a) * np.cos(b)], axis=1)
     c, s = np.cos(np.radians(phi)), np.sin(np.radians(phi))
@@ -66,9 +66,9 @@ def brute(branches: np.ndarray, limits: Limits, start: np.ndarray) -> tuple[floa
             rotary = base + 2 * np.pi * np.array(turns)
             if (rotary < limits.lower[3:] - 1e-9).any() or (rotary > limits.upper[3:] + 1e-9).any():
                 continue
-            way = seconds(np.column_stack([q[:, :3], rotary]), limits, start)
-            if best is None or way < best[0] - 1e-9:
-                best = (way, rotary)
+            course = seconds(np.column_stack([q[:, :3], rotary]), limits, start)
+            if best is None or course < best[0] - 1e-9:
+                best = (course, rotary)
     return best
 
 
@@ -159,7 +159,7 @@ def continued(name: str, axis: np.ndarray, q: np.ndarray, steps: int) -> np.ndar
 
 
 @pytest.mark.parametrize(("name", "miss"), [("mikron-ucp710", 0.5), ("mikron-ucp710", 0.01), ("head-table", -0.5)])
-def test_beside_the_pole_the_branch_is_followed_not_jumped(name: str, miss: float) -> None:
+def test_next_to_the_pole_the_branch_is_followed_not_jumped(name: str, miss: float) -> None:
     """Points 2 degrees apart on both sides, none near the pole: C has to swing half a turn on one branch."""
     axis = over(np.arange(-9.0, 10.0, 2.0), miss, phi=25)
     limits = limits_of(name, **{machine(name).axis_names[3]: (-120, 120)})
@@ -185,11 +185,11 @@ def test_branch_changes_on_the_pole_where_travel_demands_it() -> None:
     assert q[:, 0].min() >= -30 - 1e-9
     assert abs(abs(q[-1, 1] - q[0, 1]) - 180) < 1e-6
     moved = np.flatnonzero(np.abs(np.diff(q[:, 1])) > 1e-6)
-    assert moved.tolist() in ([11], [12]), "only beside the pose on the pole"
+    assert moved.tolist() in ([11], [12]), "only next to the pose on the pole"
 
 
 def test_several_crossings_each_choose_for_their_own_stretch() -> None:
-    """60 through the pole to 20, back to 60, and so on: A inside -30..120 all the way."""
+    """60 through the pole to 20, back to 60, and so on: A inside -30..120 along the whole path."""
     theta = np.concatenate([np.arange(60.0, -21.0, -5.0), np.arange(-15.0, 61.0, 5.0), np.arange(55.0, -61.0, -5.0)])
     q = run("mikron-ucp710", over(theta, 0.0))
     assert q[:, 0].min() >= -30 - 1e-9 and q[:, 0].max() <= 120

@@ -36,7 +36,7 @@ def inside(limits: Limits, q: np.ndarray) -> bool:
 
 
 def seconds(limits: Limits, a: np.ndarray, b: np.ndarray) -> float:
-    """Time between joints; rotaries without limits go the shorter way."""
+    """Time between joints; rotaries without limits go the shorter path."""
     step = b - a
     step[3:] = np.where(np.isfinite(limits.lower[3:]), step[3:], wrap(step[3:]))
     return float((np.abs(step) / limits.velocity).max())
@@ -99,15 +99,15 @@ def brute(runs: list[PoseRun], limits: Limits, start: np.ndarray, side: tuple[in
 
 def onwards(branches: np.ndarray, i: int, every: list[tuple[int, ...]], index: dict[tuple[int, ...], int], limits: Limits,
             cost: np.ndarray) -> np.ndarray:
-    """Costs at the next pose: every rotary axis the shorter way on its own branch."""
+    """Costs at the next pose: every rotary axis the shorter path on its own branch."""
     after = np.full(len(every), 1 << 61, dtype=np.int64)
     for s, c in zip(every, cost.tolist(), strict=True):
-        way = branches[s[0], i + 1] - branches[s[0], i]
-        way[3:] = wrap(way[3:])
-        added = np.rint((branches[s[0], i, 3:] + way[3:] - branches[s[0], i + 1, 3:]) / (2 * np.pi)).astype(int)
+        course = branches[s[0], i + 1] - branches[s[0], i]
+        course[3:] = wrap(course[3:])
+        added = np.rint((branches[s[0], i, 3:] + course[3:] - branches[s[0], i + 1, 3:]) / (2 * np.pi)).astype(int)
         to = (s[0], *(int(k + a) if np.isfinite(w) else 0 for k, a, w in zip(s[1:], added, limits.lower[3:], strict=True)))
         if to in index:
-            after[index[to]] = c + packed(0, 0, 0, 0, (np.abs(way) / limits.velocity).max())
+            after[index[to]] = c + packed(0, 0, 0, 0, (np.abs(course) / limits.velocity).max())
     return after
 
 
@@ -221,7 +221,7 @@ def test_rewinds_of_a_spiral_are_the_fewest_and_stand_where_the_tool_does_not_cu
 
 
 def test_tool_along_the_table_all_the_way_takes_the_table_as_it_stands() -> None:
-    """Between two runs at C 70 and 110 a third along C takes one of them; the linking way is the shorter for it."""
+    """Between two runs at C 70 and 110 a third along C takes one of them; the linking path is the shorter for it."""
     m = machine("mikron-ucp710")
     tip = np.linspace(0, 1, 4)[:, None] * [10.0, 5, 0]
     leaning = [PoseRun(m.kinematics, tip, np.tile(tilted(30, phi), (4, 1))) for phi in (70.0, 110.0)]
@@ -232,10 +232,10 @@ def test_tool_along_the_table_all_the_way_takes_the_table_as_it_stands() -> None
     assert min(ends) - 1e-9 <= middle.q[0, 4] <= max(ends) + 1e-9
 
 
-def test_losers_say_by_how_much() -> None:
+def test_rejected_candidates_say_by_how_much() -> None:
     """A within -30 to 120: the branch with A -40 is outside on every pose, so it is not among those that go through."""
     m = machine("mikron-ucp710")
     run = PoseRun(m.kinematics, np.zeros((6, 3)), tilted(20, np.linspace(10, 60, 6)))
     found = plan_runs([run], m.limits, m.home)[0]
-    assert [round(x.q[3] / DEG) for x in found.losers] == [-round(found.q[0, 3] / DEG)]
-    assert found.losers[0].dearer[4] >= 0.0
+    assert [round(x.q[3] / DEG) for x in found.rejected_starts] == [-round(found.q[0, 3] / DEG)]
+    assert found.rejected_starts[0].extra_cost[4] >= 0.0

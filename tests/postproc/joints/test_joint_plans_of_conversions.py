@@ -1,4 +1,4 @@
-"""Plans of joints on the road: rewinds between far points, several runs, wishes of the set-up, parallel machines."""
+"""Plans of joints on the road: rewinds between far points, several runs, preferences of the set-up, parallel machines."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ def test_rewinds_with_the_feeds_of_a_plan() -> None:
     assert len(result.path.rewinds) == 1
 
 
-def test_choices_are_told() -> None:
+def test_choices_are_reported() -> None:
     """A within -30 to 120: the other side cannot hold 45 degrees."""
     result = run(cone(0.5, 5.0, 45.0), machine("mikron-ucp710"))
     (d,) = [d for d in result.diagnostics if d.code == "joints.chosen"]

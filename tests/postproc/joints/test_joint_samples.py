@@ -60,14 +60,14 @@ def test_script_reproduces_the_files(tmp_path: Path) -> None:
     ("spiral_50", "mikron-ucp710", "tools.setup.toml", 0), ("spiral_50", str(LIMITED), "tools.setup.toml", 25)])
 def test_sample_reads_back_and_the_bound_covers_what_is_read(name: str, machine: str, setup: str, rewinds: int) -> None:
     result = good(converted(name, machine, setup))
-    told = as_dict(result, "")
-    assert told["rewinds"] == rewinds
-    bound = told["linearising_bound"]
+    noted = as_dict(result, "")
+    assert noted["rewinds"] == rewinds
+    bound = noted["linearising_bound"]
     assert bound["tip_mm"] <= result.shares["linearising"] + 1e-9
     led = sum(1 for d in result.diagnostics if d.code == "singular.led")
     if not led:
         slack = result.shares["rounding"] + 1e-6
-        assert told["worst_tip_deviation_mm"] <= bound["tip_mm"] + slack
+        assert noted["worst_tip_deviation_mm"] <= bound["tip_mm"] + slack
 
 
 def test_turned_over_part_lies_on_its_back() -> None:
@@ -114,15 +114,15 @@ def test_a_rewind_leaves_and_returns_along_the_tool_axis_to_the_same_pose() -> N
         first = rows[0] - 1
         assert np.linalg.norm(tip[rows[-1]] - tip[first]) < 1e-7 and np.linalg.norm(axis[rows[-1]] - axis[first]) < 1e-9
         for block in (rows[0], rows[-1] - 1):
-            way = tip[block] - tip[first]
-            assert np.linalg.norm(way - (way @ axis[first]) * axis[first]) < 1e-6 and way @ axis[first] > 10.0
+            travel = tip[block] - tip[first]
+            assert np.linalg.norm(travel - (travel @ axis[first]) * axis[first]) < 1e-6 and travel @ axis[first] > 10.0
         assert np.abs(path.q[rows[-1]] - path.q[first])[4] > np.pi
 
 
 def test_rewinds_stand_where_the_tool_does_not_cut_if_they_can_and_return_at_the_stated_feed() -> None:
     result = rewound()
-    told = [d for d in result.diagnostics if d.code == "rewind.made"]
-    assert sorted(d.severity.name for d in told) == ["INFO", "WARNING"]
+    noted = [d for d in result.diagnostics if d.code == "rewind.made"]
+    assert sorted(d.severity.name for d in noted) == ["INFO", "WARNING"]
     path, kin = result.path, result.job.kinematics(int(result.job.moves.tool[0]))
     cuts = [np.flatnonzero((path.move == m) & np.isnan(path.u) & (path.code == 1)) for m in path.rewinds]
     assert [len(c) > 0 for c in cuts] == [False, True]

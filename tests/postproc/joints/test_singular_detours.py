@@ -18,7 +18,7 @@ TOLERANCE = 0.02 * DEG
 
 
 def past(miss: float, step: float, heading: float = 25.0) -> tuple[Curves, np.ndarray]:
-    """A straight way of the axis past +z at `miss` degrees, points `step` degrees apart, 20 mm/s, 2 mm per degree."""
+    """A straight path of the axis past +z at `miss` degrees, points `step` degrees apart, 20 mm/s, 2 mm per degree."""
     a, b = np.radians(np.arange(-9 + step / 3, 9, step)), np.radians(miss)
     axis = np.stack([np.sin(a) * np.cos(b), np.full(len(a), np.sin(b)), np.cos(a) * np.cos(b)], axis=1)
     c, s = np.cos(heading * DEG), np.sin(heading * DEG)

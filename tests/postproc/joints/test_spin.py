@@ -71,7 +71,7 @@ def test_the_free_joint_takes_the_spin(name: str) -> None:
     ("mikron-ucp710", "haas-ngc", "auto"), ("head-table", "siemens-840d", "auto"), ("h4a-c-table", "linuxcnc", "auto"),
     ("linuxcnc-xyzac-trt", "linuxcnc", "auto")])
 def test_passes_stand_where_they_are_held(name: str, controller: str, mode: OutputMode) -> None:
-    """At 40 degrees, where they like, and at -75: on every way of writing it, proved by the read-back."""
+    """At 40 degrees, where they like, and at -75: on every path of writing it, proved by the read-back."""
     path = held(np.radians(40.0), np.nan, np.radians(-75.0))
     result = postproc.convert(path, machine(name), controller, setup_of(name), Options(output=mode))
     assert result.ok and result.comparison is not None, [str(d) for d in result.diagnostics]
@@ -114,8 +114,8 @@ def test_the_read_back_sees_another_angle(tmp_path: Path) -> None:
     other = postproc.pipeline.convert.verify(file, replace(path, spin=spin + np.radians(5.0)), machine("mikron-ucp710"),
                                              "linuxcnc",
                                      TOOLS)
-    told = [d for d in other.diagnostics if d.code == "verify.spin"]
-    assert len(told) == 1 and "5.0000 degrees turned about its axis" in told[0].message
+    noted = [d for d in other.diagnostics if d.code == "verify.spin"]
+    assert len(noted) == 1 and "5.0000 degrees turned about its axis" in noted[0].message
 
 
 def test_what_no_axis_can_hold_is_refused() -> None:

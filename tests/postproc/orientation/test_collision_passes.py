@@ -1,4 +1,4 @@
-"""Bodies beside the choice of orientations: what the holder would touch decides, wherever the part stands."""
+"""Bodies next to the choice of orientations: what the holder would touch decides, wherever the part stands."""
 
 from __future__ import annotations
 
@@ -90,16 +90,16 @@ def test_a_wall_where_the_holder_would_be_decides(tmp_path: Path) -> None:
     assert choice.plans["auto"].seconds >= free.plans["auto"].seconds - 1e-9
 
 
-def test_an_own_axis_that_touches_is_told_and_left(tmp_path: Path) -> None:
+def test_an_own_axis_that_touches_is_reported_and_left(tmp_path: Path) -> None:
     over = np.array([40.0, 0.0, 100.0])
     choice, found = chosen(passes(1), setup_file(tmp_path, wall(over - 3.0, over + 3.0)))
-    told = [d for d in found if d.code == "orient.own_touches"]
-    assert len(told) == 1 and "holder of T1 touches fixture wall" in told[0].message and "(at line " in told[0].message
+    noted = [d for d in found if d.code == "orient.own_touches"]
+    assert len(noted) == 1 and "holder of T1 touches fixture wall" in noted[0].message and "(at line " in noted[0].message
     assert all(not made.touching for made in choice.plans["auto"].picked)
 
 
 def test_a_rib_between_two_points_of_a_pass_is_found(tmp_path: Path) -> None:
-    """0.1 mm thick, half way along 80 mm of cut that has no point there."""
+    """0.1 mm thick, half path along 80 mm of cut that has no point there."""
     rib = setup_file(tmp_path, wall(np.array([40.0, 15.0, 45.0]), np.array([40.1, 30.0, 60.0])))
     bodies = bodies_of(passes(1), rib)
     assert "holder of T1 touches fixture wall by" in bodies.touching(bodies.work.passes[0], leaning(0.0, 0.0))
@@ -108,7 +108,7 @@ def test_a_rib_between_two_points_of_a_pass_is_found(tmp_path: Path) -> None:
 
 
 def test_a_ball_that_is_turned_cuts_no_deeper(tmp_path: Path) -> None:
-    """Its centre stays; what changes is the side above it, which a wall beside the cut meets."""
+    """Its centre stays; what changes is the side above it, which a wall next to the cut meets."""
     mesh = trimesh.util.concatenate([trimesh.creation.box(bounds=[(-20, -20, -30), (100, 60, 0)]),
                                      trimesh.creation.box(bounds=[(-20, 8.0, -10), (100, 60, 40)])])
     mesh.export(tmp_path / "part.ply")
@@ -179,7 +179,7 @@ def test_the_samples_are_what_their_script_writes(tmp_path: Path) -> None:
 
 
 def test_a_drill_may_be_in_the_hole_that_it_makes(tmp_path: Path) -> None:
-    """Its pass is fixed; the part's mesh has no hole. A clamp beside the hole is met all the same."""
+    """Its pass is fixed; the part's mesh has no hole. A clamp next to the hole is met all the same."""
     trimesh.creation.box(bounds=[(-20, -20, -40), (60, 20, 0)]).export(tmp_path / "part.stl")
     path = toolpath("RAPID", "GOTO/0,0,50", "CYCLE/DRILL,DEPTH,15,MMPM,100,CLEAR,3", "GOTO/0,0,0", "GOTO/40,0,0",
                     "CYCLE/OFF", "RAPID", "GOTO/40,0,60", head=["UNITS/MM", "CUTTER/6,0", *HEAD[2:]])
@@ -193,7 +193,7 @@ def test_a_drill_may_be_in_the_hole_that_it_makes(tmp_path: Path) -> None:
 
 
 def test_a_pass_whose_axis_turns_is_bounded_on_the_way(tmp_path: Path) -> None:
-    """The tip stands, the axis leans from -30 to 30 degrees: a wire over it is met by the holder half way."""
+    """The tip stands, the axis leans from -30 to 30 degrees: a wire over it is met by the holder half path."""
     a, b = leaning(30.0, 180.0), leaning(30.0, 0.0)
     lines = ["MULTAX", "RAPID", f"GOTO/0,0,0,{a[0]:.9f},0,{a[2]:.9f}", f"GOTO/0,0.001,0,{b[0]:.9f},0,{b[2]:.9f}"]
     wire = setup_file(tmp_path, wall(np.array([-0.2, -60.0, 119.5]), np.array([0.2, 60.0, 119.9])))

@@ -36,12 +36,12 @@ def sphere() -> Surface:
 def test_normals_from_the_part() -> None:
     """On a ball they point from its centre, (0, 5, 100) where the part stands, to that of the cutter."""
     centre = np.array([0.0, 5.0, 100.0])
-    way = np.random.default_rng(5).normal(size=(40, 3)) * [1.0, 1.0, 0.3] + [0.0, 0.0, 1.0]
-    way /= np.linalg.norm(way, axis=1, keepdims=True)
-    tip = centre + 48.0 * way - 8.0 * Z
+    link = np.random.default_rng(5).normal(size=(40, 3)) * [1.0, 1.0, 0.3] + [0.0, 0.0, 1.0]
+    link /= np.linalg.norm(link, axis=1, keepdims=True)
+    tip = centre + 48.0 * link - 8.0 * Z
     at = sphere().contact(lines_of(tip[:-1], tip[:-1] + 1e-3 * X), np.arange(39), 8.0)
     assert len(at) == 78 and at.unknown == 0
-    assert np.einsum("ni,ni->n", at.normal[::2], way[:-1]).min() > np.cos(1.0 * DEG)
+    assert np.einsum("ni,ni->n", at.normal[::2], link[:-1]).min() > np.cos(1.0 * DEG)
 
 
 @pytest.mark.parametrize(("off", "touches"), [(0.0, True), (0.045, True), (-0.03, True), (0.08, False), (-0.08, False)])
@@ -64,7 +64,7 @@ def test_long_moves_and_arcs_are_looked_at_between_their_ends() -> None:
     middle = np.array([[0.0, 5.0, start[0, 2]]])
     arc = Curves(start, start, Z[None], Z[None], np.array([True]), middle, Z[None], np.array([2.0 * np.pi]))
     at = sphere().contact(arc, np.array([1]), 8.0)
-    assert len(at) == 144 and np.ptp(np.arctan2(at.way[:, 1], at.way[:, 0])) > 6.0
+    assert len(at) == 144 and np.ptp(np.arctan2(at.link[:, 1], at.link[:, 0])) > 6.0
     assert np.abs(at.normal[:, 2] - 0.8).max() < 0.01
     plate = Surface(trimesh.creation.box(extents=(100.0, 100.0, 10.0)), Placement(np.eye(3), np.zeros(3)), 0.01)
     at = plate.contact(lines_of(np.array([[-20.0, 0.0, 5.0]]), np.array([[20.0, 0.0, 5.0]])), np.array([1]), 8.0)

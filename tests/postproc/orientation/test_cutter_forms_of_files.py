@@ -46,7 +46,7 @@ def test_corner_centre_says_what_a_ball_is(cutter: str, radius: float) -> None:
     assert ball_radius(path.tools[0]) == radius
 
 
-def test_meshes_are_beside_the_file_that_names_them(tmp_path: Path) -> None:
+def test_meshes_are_next_to_the_file_that_names_them(tmp_path: Path) -> None:
     for folder in ("shop", "job", "placed"):
         (tmp_path / folder).mkdir()
     (tmp_path / "shop/base.toml").write_text(_BASE)
@@ -77,14 +77,14 @@ def test_tapered_balls_are_as_wide_as_they_are(cutter: str) -> None:
 
 
 @pytest.mark.parametrize("cutter", ["CUTTER/16,85,-77,85,0,0,50", "CUTTER/16,9"])
-def test_a_corner_that_does_not_fit_is_told_and_nothing_is_cut_off(cutter: str) -> None:
+def test_a_corner_that_does_not_fit_is_reported_and_nothing_is_cut_off(cutter: str) -> None:
     path, _ = toolpaths.read_bytes(_LINES.format(cutter=cutter).encode(), file="part.apt")
     form, found = tool_form(1, path.tools[0], ToolSetup(gauge_length=150.0, flute_length=60.0), "setup.toml")
     assert form.of(CUTTER) == pytest.approx(np.array([[8.0, 0.0, 8.0, 60.0, 0.0]]))
     assert ["does not fit a diameter of 16 mm" in d.message for d in found if d.code == "collision.corner"] == [True]
 
 
-def test_why_a_pass_without_length_is_kept_is_told() -> None:
+def test_why_a_pass_without_length_is_kept_is_reported() -> None:
     lines = _LINES.format(cutter="CUTTER/16,8").replace("GOTO/9,0,9,0,0,1", "GOTO/0,0,9,0,0,1")
     path, _ = toolpaths.read_bytes(lines.encode(), file="part.apt")
     choice, _ = orient(path, machines.load("mikron-ucp710"), SetupFile())

@@ -1,4 +1,4 @@
-"""Passes and plans that cannot be run: told once for those alike, with what the other axes lost by."""
+"""Passes and plans that cannot be run: reported once for those alike, with what the other axes lost by."""
 
 from __future__ import annotations
 
@@ -48,15 +48,15 @@ def test_passes_that_always_touch_are_one_error() -> None:
     lost = [each for one in results for each in one.rejected if each.made is not one.own]
     touching = sum(each.kind == "touches" for each in lost)
     least = min(each.made.axis[2] for each in results[0].rejected if each.kind == "touches")
-    told = found[0].message
-    assert told.startswith("pass 2 and 2 more with the axis of the CL file: holder of T1 touches fixture vise by 4.00 mm")
-    assert f"none of {len(lost)} other axes tried can be taken" in told
+    noted = found[0].message
+    assert noted.startswith("pass 2 and 2 more with the axis of the CL file: holder of T1 touches fixture vise by 4.00 mm")
+    assert f"none of {len(lost)} other axes tried can be taken" in noted
     assert f"{touching} touches part, fixture or table (the least: holder of T1 touches fixture vise by {1 + least:.2f}" \
-        in told
+        in noted
 
 
 def test_no_plan_is_an_error_that_counts_a_pass_once() -> None:
-    """Z ends 10 mm above the only cut: it can be run, and no way to it nor back from it."""
+    """Z ends 10 mm above the only cut: it can be run, and no path to it nor back from it."""
     m = machine("mikron-ucp710")
     upper = m.limits.upper.copy()
     upper[m.axis_names.index("Z")] = 10.0
@@ -78,15 +78,15 @@ def at(x: float, y: float = 0.0, z: float = 0.0) -> SetupFile:
     return SetupFile(part=PartPlacement(origin=(x, y, z)))
 
 
-def test_a_part_out_of_travel_is_told_before_any_search(monkeypatch: pytest.MonkeyPatch) -> None:
-    """X ends at 355 mm and the table leans by 30 degrees one way and 120 the other: at 700 mm nothing helps."""
+def test_a_part_out_of_travel_is_reported_before_any_search(monkeypatch: pytest.MonkeyPatch) -> None:
+    """X ends at 355 mm and the table leans by 30 degrees one direction and 120 the other: at 700 mm nothing helps."""
     monkeypatch.setattr("postproc.orientation.plans.orient.each_pass", None)
     choice, found = orient(ball_passes(0.0, 1.0, 2.0), machine("mikron-ucp710"), at(700.0))
     assert choice is None and [(d.code, d.count, d.lines) for d in found] == [("orient.travel", 3, (11, 18, 25))]
-    told = found[0].message
-    assert told.startswith("pass 0 with the axis of the CL file: travel: axis X at 780.000 mm, allowed -355.000 to 355.000")
-    assert "425.000 too high; no other axis is inside travel, the nearest to it has axis " in told
-    assert told.endswith("; the CL's axis is outside alike in 2 more passes")
+    noted = found[0].message
+    assert noted.startswith("pass 0 with the axis of the CL file: travel: axis X at 780.000 mm, allowed -355.000 to 355.000")
+    assert "425.000 too high; no other axis is inside travel, the nearest to it has axis " in noted
+    assert noted.endswith("; the CL's axis is outside alike in 2 more passes")
 
 
 def test_holes_out_of_travel_have_no_other_axis(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -122,13 +122,13 @@ def test_a_joint_that_the_tool_leaves_free_may_bring_it_inside() -> None:
         assert (nearest_inside(work.passes[0], m, AllowedAxes(60.0 * DEG)).size == 0.0) == inside
 
 
-def test_travel_that_ends_alike_is_told_once() -> None:
+def test_travel_that_ends_alike_is_reported_once() -> None:
     """Other passes of the same file are out by other amounts: the farthest stands for all."""
     choice, found = orient(ball_passes(0.0, 3.0, 6.0), machine("mikron-ucp710"), at(300.0))
     assert choice is not None
-    told = [d for d in found if d.code == "orient.own_reach"]
-    assert [(d.count, d.severity) for d in told] == [(3, Severity.WARNING)]
-    assert "380.000 mm, allowed -355.000 to 355.000: 25.000 too high" in told[0].message
+    noted = [d for d in found if d.code == "orient.own_reach"]
+    assert [(d.count, d.severity) for d in noted] == [(3, Severity.WARNING)]
+    assert "380.000 mm, allowed -355.000 to 355.000: 25.000 too high" in noted[0].message
 
 
 def test_what_helps_is_said_by_what_is_against_it() -> None:
@@ -145,7 +145,7 @@ def test_what_helps_is_said_by_what_is_against_it() -> None:
     assert found[0].hint.startswith("move or turn the part")
 
 
-def test_a_pass_out_of_reach_is_not_told_to_touch_too() -> None:
+def test_a_pass_out_of_reach_is_not_reported_to_touch_too() -> None:
     path, m = toolpath(*LINES, head=BALL), machine("mikron-ucp710")
     work, _ = work_of(path, m, at(300.0), Options())
     assert work is not None

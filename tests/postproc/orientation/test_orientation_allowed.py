@@ -85,7 +85,7 @@ def test_feed_has_its_direction_at_both_ends_of_an_arc() -> None:
     start, end, up = 10.0 * X[None], 10.0 * np.eye(3)[1:2], Z[None]
     arc = Curves(start, end, up, up, np.array([True]), np.zeros((1, 3)), up, np.array([np.pi / 2]))
     at = contact_of(arc, np.array([[Z, Z]]), np.array([[6, 7]]))
-    np.testing.assert_allclose(at.way, [[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]], atol=1e-12)
+    np.testing.assert_allclose(at.link, [[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]], atol=1e-12)
     assert at.line.tolist() == [6, 7]
 
 
@@ -94,10 +94,10 @@ def test_the_feed_of_a_slope_lies_in_its_tangent_plane() -> None:
     none, both = np.zeros(1), np.array([[Z, Z]])
     line = Curves(np.zeros((1, 3)), np.array([[1.0, 0.0, 0.2]]), Z[None], Z[None], none.astype(bool), np.zeros((1, 3)),
                   np.zeros((1, 3)), none)
-    np.testing.assert_allclose(contact_of(line, both, np.array([[1, 2]])).way, np.tile(X, (2, 1)), atol=1e-12)
+    np.testing.assert_allclose(contact_of(line, both, np.array([[1, 2]])).link, np.tile(X, (2, 1)), atol=1e-12)
     down = Curves(np.zeros((1, 3)), -Z[None], Z[None], Z[None], none.astype(bool), np.zeros((1, 3)), np.zeros((1, 3)), none)
     at = contact_of(down, both, np.array([[1, 2]]))
-    assert len(at) == 2 and np.isnan(at.way).all()
+    assert len(at) == 2 and np.isnan(at.link).all()
     limits = OrientationLimits(lead=(5.0, 10.0), off_centre=10.0)
     allowed = AllowedAxes(60.0 * DEG, None, limits)
     assert allowed.mask(only_pass(along_x()), leaning(7.0, 30.0)[None])[0]
@@ -110,7 +110,7 @@ def test_points_without_normal_do_not_count() -> None:
     assert len(contact_of(line, nan, np.array([[1, 2], [2, 3]]))) == 0
 
 
-@pytest.mark.parametrize(("keys", "axis", "told"), [
+@pytest.mark.parametrize(("keys", "axis", "noted"), [
     ({"lead": (5.0, 10.0)}, leaning(20.0, 0.0), "lead 20.000 degrees at line 10, allowed 5.000 to 10.000"),
     ({"lead": (5.0, 10.0)}, leaning(-3.0, 0.0), "lead -3.000 degrees at line 10, allowed 5.000 to 10.000"),
     ({"tilt": (-15.0, 0.0)}, leaning(0.0, 4.0), "tilt sideways 4.000 degrees at line 10, allowed -15.000 to 0.000"),
@@ -119,10 +119,10 @@ def test_points_without_normal_do_not_count() -> None:
     ({"contact_radius": 4.0}, leaning(29.0, 0.0),
      "tilt 29.000 degrees from the surface normal at line 10, allowed 30.000 to 60.000"),
     ({}, leaning(0.0, 70.0), "tilt 70.000 degrees from the surface normal at line 10, allowed 60.000")])
-def test_a_refusal_says_where_what_and_what_is_allowed(keys: dict[str, object], axis: Floats, told: str) -> None:
+def test_a_refusal_says_where_what_and_what_is_allowed(keys: dict[str, object], axis: Floats, noted: str) -> None:
     setup = limited(**keys)
     one = only_pass(along_x(), setup)
-    assert AllowedAxes(60.0 * DEG, None, setup.orientation).refused(one, axis) == told
+    assert AllowedAxes(60.0 * DEG, None, setup.orientation).refused(one, axis) == noted
 
 
 def test_the_worst_point_decides() -> None:
@@ -176,15 +176,15 @@ def test_contact_radius_as_an_angle() -> None:
     assert off_centre(OrientationLimits(), 8.0) == 0.0
 
 
-def test_chosen_axes_are_inside_and_the_own_one_is_told() -> None:
+def test_chosen_axes_are_inside_and_the_own_one_is_reported() -> None:
     """The own axis stands on the dead centre: it is named; what is chosen fulfils the set-up, and gains less than free."""
     setup = limited(lead=(5.0, 50.0), tilt=(-50.0, -5.0), off_centre=10.0)
     path = along_x(passes=2)
     choice, found = oriented(path, setup)
     assert choice is not None
-    told = [d for d in found if d.code == "orient.own_limits"]
-    assert len(told) == 1 and told[0].count == 2 and "tilt 0.000 degrees from the surface normal at line 10, " \
-        "allowed at least 10.000" in told[0].message
+    noted = [d for d in found if d.code == "orient.own_limits"]
+    assert len(noted) == 1 and noted[0].count == 2 and "tilt 0.000 degrees from the surface normal at line 10, " \
+        "allowed at least 10.000" in noted[0].message
     for made in choice.plans["per-pass"].picked:
         at = made.one.contact
         assert 5.0 <= at.lead(made.axis[None]).min() / DEG <= 50.0
@@ -217,10 +217,10 @@ def test_limits_of_very_many_points() -> None:
     rng = np.random.default_rng(8)
     normal = rng.normal(size=(10_000, 3)) * 0.15 + Z
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    way = np.cross(normal, rng.normal(size=normal.shape))
-    way /= np.linalg.norm(way, axis=1, keepdims=True)
-    way[::50] = np.nan
-    one = replace(only_pass(along_x()), contact=Contact(normal, way, np.arange(10_000)))
+    link = np.cross(normal, rng.normal(size=normal.shape))
+    link /= np.linalg.norm(link, axis=1, keepdims=True)
+    link[::50] = np.nan
+    one = replace(only_pass(along_x()), contact=Contact(normal, link, np.arange(10_000)))
     allowed = AllowedAxes(50.0 * DEG, None, OrientationLimits(lead=(-48.0, 45.0), tilt=(-90.0, 46.0), off_centre=0.01))
     axes = rng.normal(size=(300, 3)) * 0.3 + Z
     axes /= np.linalg.norm(axes, axis=1, keepdims=True)
@@ -259,15 +259,15 @@ def test_limits_that_cannot_be_held(keys: dict[str, object], normals: bool, code
     assert (choice is None) == bool(code)
 
 
-@pytest.mark.parametrize(("text", "line", "told"), [
+@pytest.mark.parametrize(("text", "line", "noted"), [
     ("lead = [10, 5]", 2, "write [least, greatest]"), ("lead = [0, 95]", 2, "allowed: 90 or less"),
     ("off_centre = 5\ncontact_radius = 1", 1, "give one of them"), ("led = [0, 5]", 2, "unknown key"),
     ("off_centre = -1", 2, "allowed: 0 or more")])
-def test_set_up_files_that_are_wrong(tmp_path: Path, text: str, line: int, told: str) -> None:
+def test_set_up_files_that_are_wrong(tmp_path: Path, text: str, line: int, noted: str) -> None:
     file = tmp_path / "s.toml"
     file.write_text(f"[orientation]\n{text}\n")
     setup, found = load_setup(file)
-    assert setup is None and found[0].lines == (line,) and told in found[0].message
+    assert setup is None and found[0].lines == (line,) and noted in found[0].message
 
 
 def test_set_up_file_that_is_right(tmp_path: Path) -> None:
@@ -276,8 +276,8 @@ def test_set_up_file_that_is_right(tmp_path: Path) -> None:
     setup, found = load_setup(file)
     assert setup is not None and not found and setup.orientation.lead == (2.0, 30.0) and setup.orientation.need_normals
     choice, found = oriented(along_x(), setup.model_copy(), setup=str(file))
-    told = next(d for d in found if d.code == "orient.operation")
-    assert choice is None and told.lines == (5,) and told.file == str(file)
+    noted = next(d for d in found if d.code == "orient.operation")
+    assert choice is None and noted.lines == (5,) and noted.file == str(file)
 
 
 def test_a_part_mesh_instead_of_normals(tmp_path: Path) -> None:
@@ -294,8 +294,8 @@ def test_a_part_mesh_instead_of_normals(tmp_path: Path) -> None:
     choice, found = oriented(path, setup, setup=str(file))
     assert choice is not None and "orient.own_limits" in codes(found), found
     assert len(choice.tried[0].own.one.contact) == 21
-    told = next(d.message for d in found if d.code == "orient.no_contact")
-    assert told.startswith("at 1 of 22 places on cutting moves the ball does not touch the part mesh within 0.02 mm")
+    noted = next(d.message for d in found if d.code == "orient.no_contact")
+    assert noted.startswith("at 1 of 22 places on cutting moves the ball does not touch the part mesh within 0.02 mm")
     same, _ = oriented(along_x(), limited(lead=(5.0, 50.0), tilt=(-50.0, -5.0)))
     assert same is not None
     np.testing.assert_allclose(choice.tried[0].best.axis, same.tried[0].best.axis, atol=5e-3)
@@ -310,30 +310,30 @@ def test_a_part_mesh_instead_of_normals(tmp_path: Path) -> None:
     assert choice is None and "mesh.open" in codes(found)
 
 
-@pytest.mark.parametrize(("keys", "told"), [
+@pytest.mark.parametrize(("keys", "noted"), [
     ({"off_centre": 50.0}, "off_centre = 50 degrees is more than --max-tilt 45"),
     ({"contact_radius": 6.0}, "contact_radius = 6 mm is an angle of 48.590 degrees to the normal, more than --max-tilt 45")])
-def test_a_least_angle_above_the_largest_is_an_error(keys: dict[str, object], told: str) -> None:
+def test_a_least_angle_above_the_largest_is_an_error(keys: dict[str, object], noted: str) -> None:
     """No axis fulfils both: said once for both passes, and nothing of their own axes besides."""
     choice, found = oriented(along_x(passes=2), limited(**keys), max_tilt=45.0)
-    assert choice is None and [(d.code, d.count) for d in found] == [("orient.max_tilt", 2)] and told in found[0].message
+    assert choice is None and [(d.code, d.count) for d in found] == [("orient.max_tilt", 2)] and noted in found[0].message
     assert "orient.max_tilt" not in codes(oriented(along_x(), limited(**keys), max_tilt=60.0)[1])
 
 
-def test_own_axes_beyond_the_largest_tilt_are_told_once() -> None:
-    """They lean 30 degrees: kept where nothing better is found, and told with the least --max-tilt that allows them."""
+def test_own_axes_beyond_the_largest_tilt_are_reported_once() -> None:
+    """They lean 30 degrees: kept where nothing better is found, and reported with the least --max-tilt that allows them."""
     lines = ["MULTAX", *(line for k in range(2) for line in (
         "RAPID", f"GOTO/0,{k},30,0.5,0,0.8660254037844386", "RAPID", f"GOTO/0,{k},0,0.5,0,0.8660254037844386,0,0,1",
         f"GOTO/80,{k},0,0.5,0,0.8660254037844386,0,0,1", "RAPID", f"GOTO/80,{k},30,0.5,0,0.8660254037844386"))]
     path = toolpath(*lines, head=BALL)
     _, found = oriented(path, SetupFile(), max_tilt=20.0)
-    told = [d for d in found if d.code == "orient.own_tilt"]
-    assert len(told) == 1 and told[0].count == 2 and "30.000 degrees from the surface normal" in told[0].message
-    assert "--max-tilt 30 allows" in told[0].hint
+    noted = [d for d in found if d.code == "orient.own_tilt"]
+    assert len(noted) == 1 and noted[0].count == 2 and "30.000 degrees from the surface normal" in noted[0].message
+    assert "--max-tilt 30 allows" in noted[0].hint
     assert "orient.own_tilt" not in codes(oriented(path, SetupFile(), max_tilt=30.0)[1])
 
 
-def test_a_contact_beyond_the_ball_is_told_alone() -> None:
+def test_a_contact_beyond_the_ball_is_reported_alone() -> None:
     choice, found = oriented(along_x(), limited(contact_radius=9.0))
     assert choice is None and codes(found) == {"orient.contact_radius"}
 

@@ -61,7 +61,7 @@ def standing(result: PostResult, letter: str) -> set[float]:
 
 
 def near(angle: float, found: set[float]) -> bool:
-    """One angle, the one expected within two degrees, either way round."""
+    """One angle, the one expected within two degrees, in either direction round."""
     return len(found) == 1 and abs(abs(next(iter(found))) - angle) < 2.0
 
 
@@ -74,8 +74,8 @@ def test_travel_decides() -> None:
     assert free.best.rotary()["A"] == pytest.approx(45.0, abs=1.0)
     assert 20.0 < abs(narrow.best.rotary()["A"]) <= 30.0 + 1e-6 and narrow.aimed is None
     assert free.best.seconds < 0.999 * narrow.best.seconds < 0.95 * narrow.own.seconds
-    told = [lost.why for lost in narrow.rejected if lost.kind == "travel"]
-    assert any(why.startswith("travel: axis A at 45.000 degrees, allowed -30.000 to 30.000") for why in told)
+    noted = [lost.why for lost in narrow.rejected if lost.kind == "travel"]
+    assert any(why.startswith("travel: axis A at 45.000 degrees, allowed -30.000 to 30.000") for why in noted)
 
 
 def test_indexing_time_decides() -> None:
@@ -111,8 +111,8 @@ def test_the_holder_decides() -> None:
     assert first.axis[1] > 0.3 and first.rotary()["A"] == pytest.approx(45.0, abs=1.0)
     other = behind(right)
     assert other.best.axis[1] < -0.3 and other.best.seconds == pytest.approx(first.seconds, rel=1e-3)
-    told = [lost.why for lost in other.rejected if lost.kind == "touches"]
-    assert any(why.startswith("holder of T1 touches fixture wall at 60 by ") for why in told)
+    noted = [lost.why for lost in other.rejected if lost.kind == "touches"]
+    assert any(why.startswith("holder of T1 touches fixture wall at 60 by ") for why in noted)
     thin = behind(right, holder=14.0)
     assert not any(lost.kind == "touches" for lost in thin.rejected)
     assert thin.best.seconds == pytest.approx(first.seconds, rel=1e-3)
@@ -248,7 +248,7 @@ def test_a_turned_part_is_held_as_a_straight_one() -> None:
 
 
 @pytest.mark.parametrize(("direction", "cap"), [(25.0, 4.0), (0.0, 2.5)])
-def test_search_beside_a_full_grid(direction: float, cap: float) -> None:
+def test_search_next_to_a_full_grid(direction: float, cap: float) -> None:
     """Every axis of a coarse grid within the cap planned in full: none is better by more than half a percent."""
     m = machine("mikron-ucp710")
     work, _ = work_of(strips([direction]), m, setup_of(""), Options())
@@ -257,7 +257,7 @@ def test_search_beside_a_full_grid(direction: float, cap: float) -> None:
     assert -0.02 < compared("strip", one, m, AllowedAxes(cap * DEG), one.axis, cap * DEG, cap / 5.0 * DEG) < 0.005
 
 
-def test_auto_beside_all_sequences() -> None:
+def test_auto_next_to_all_sequences() -> None:
     """Strips in two directions, every sequence of axes of a grid: `auto` is within half a percent of the best."""
     free = replace(machine("mikron-ucp710"), timing=Timing(0.0, 0.0, 0.0))
     keep, auto, least = whole(free, strips([0.0, 0.0, 70.0, 70.0], length=160.0), 4.0 * DEG, 1.3 * DEG)

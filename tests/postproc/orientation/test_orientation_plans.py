@@ -28,7 +28,7 @@ BALL = ["UNITS/MM", "CUTTER/16,8", "LOADTL/1", "SPINDL/RPM,1000,CLW", "FEDRAT/MM
 
 
 def passes(count: int, head: list[str] | None = None, axis: str = "0,0,1", pitch: float = 1.0) -> Toolpath:
-    """Level passes of 80 mm along x beside each other, rapids between."""
+    """Level passes of 80 mm along x next to each other, rapids between."""
     lines = ["MULTAX"]
     for k in range(count):
         y = pitch * k
@@ -70,10 +70,10 @@ def test_shortest_is_that_of_all_choices() -> None:
     for _ in range(20):
         sizes = rng.integers(1, 4, 5)
         states = [rng.uniform(0, 1, k) for k in sizes]
-        ways = [rng.uniform(0, 1, (a, b)) for a, b in itertools.pairwise([1, *sizes, 1])]
-        picked, total = shortest(states, ways)
-        every = [seconds(choice, states, ways) for choice in itertools.product(*(range(k) for k in sizes))]
-        assert total == min(every) == seconds(picked, states, ways)
+        links = [rng.uniform(0, 1, (a, b)) for a, b in itertools.pairwise([1, *sizes, 1])]
+        picked, total = shortest(states, links)
+        every = [seconds(choice, states, links) for choice in itertools.product(*(range(k) for k in sizes))]
+        assert total == min(every) == seconds(picked, states, links)
 
 
 def test_auto_is_never_worse() -> None:

@@ -1,4 +1,4 @@
-"""Seconds of whole plans beside those of the programs that are written for them, under the ideal control."""
+"""Seconds of whole plans compared with those of the programs that are written for them, under the ideal control."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def strips() -> Toolpath:
 
 @pytest.mark.parametrize("name", ["mikron-ucp710", "head-table"])
 def test_a_plan_takes_as_long_as_its_program(name: str) -> None:
-    """From home to home with the tool change: `keep` winds C up, which the way home undoes. The program rounds
+    """From home to home with the tool change: `keep` winds C up, which the travel home undoes. The program rounds
     corners between rapids, the count stops there, so that it is above by some percent at most."""
     m, (setup, _) = machine(name), load_setup(SAMPLES / "tools.setup.toml")
     assert setup is not None

@@ -1,4 +1,4 @@
-"""Plans beside their programs: where a program is refused the plan avoids what it was refused for, and tells it."""
+"""Plans next to their programs: where a program is refused the plan avoids what it was refused for, and says it."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.toolpath import Toolpath
 
 COUNT, POSTED = 8, 12
-"""strips: as many as gain by leaning; where a post stands beside them"""
+"""strips: as many as gain by leaning; where a post stands next to them"""
 Box = tuple[list[float], list[float]]
 POSTS: tuple[Box, ...] = (([-37.0, -127.0, -30.0], [-2.0, -51.0, 292.0]),)
-"""beside the part: where the table leans, the tool would pass through it on its way from home"""
+"""next to the part: where the table leans, the tool would pass through it on its path from home"""
 
 
 def quick() -> Machine:
@@ -41,7 +41,7 @@ def quick() -> Machine:
     return replace(machine("mikron-ucp710"), timing=Timing(0.0, 0.05, 0.05))
 
 
-def beside(*posts: Box) -> SetupFile:
+def adjacent(*posts: Box) -> SetupFile:
     fixtures = [{"name": f"post {k}", "box": {"low": low, "high": high}} for k, (low, high) in enumerate(posts)]
     tool = {"gauge_length": 140.0, "flute_length": 30.0, "shank": [{"diameter": 14.0, "length": 40.0}],
             "holder": [{"diameter": 50.0, "length": 70.0}]}
@@ -55,8 +55,8 @@ def converted(path: Toolpath, setup: SetupFile, plan: Orientation = "auto") -> P
 
 @cache
 def refused() -> tuple[OrientationChoice, PostResult, list[Diagnostic]]:
-    """The choice without a proof beside a post, the conversion with one, and what that says of orientations."""
-    path, setup = strips([0.0] * POSTED), beside(*POSTS)
+    """The choice without a proof next to a post, the conversion with one, and what that says of orientations."""
+    path, setup = strips([0.0] * POSTED), adjacent(*POSTS)
     choice, _ = orient(path, quick(), setup)
     assert choice is not None
     result = converted(path, setup)
@@ -64,15 +64,15 @@ def refused() -> tuple[OrientationChoice, PostResult, list[Diagnostic]]:
 
 
 def test_a_way_that_touches_is_not_taken() -> None:
-    unproved, result, told = refused()
-    program = postproc.convert(unproved.toolpath("auto"), quick(), "linuxcnc", beside(*POSTS))
+    unproved, result, noted = refused()
+    program = postproc.convert(unproved.toolpath("auto"), quick(), "linuxcnc", adjacent(*POSTS))
     assert {d.code for d in program.diagnostics if d.severity > 1} == {"collision.touch"}
     assert result.ok and result.choice is not None
     auto, before = result.choice.plans["auto"], unproved.plans["auto"]
     assert before.seconds < auto.seconds < result.choice.plans["keep"].seconds
-    assert [d.code for d in told] == ["orient.passed_over"]
-    assert f"{before.seconds:.3f} s, holder of T1 touches fixture post 0 by " in told[0].message
-    assert "on the way to pass 0 (line 10)" in told[0].message
+    assert [d.code for d in noted] == ["orient.passed_over"]
+    assert f"{before.seconds:.3f} s, holder of T1 touches fixture post 0 by " in noted[0].message
+    assert "on the path to pass 0 (line 10)" in noted[0].message
 
 
 def test_what_is_barred_is_the_way_and_not_the_axis() -> None:
@@ -82,20 +82,20 @@ def test_what_is_barred_is_the_way_and_not_the_axis() -> None:
     table, first = result.choice.table, unproved.plans["auto"]
     assert not any(bar.any() for bar in table.barred[1:-1]) and table.barred[0][0, first.states[0]]
     assert not table.barred[0].all()
-    assert shortest(table.costs(), table.ways)[1] < shortest(table.costs(), table.open_ways())[1] < np.inf
+    assert shortest(table.costs(), table.links)[1] < shortest(table.costs(), table.open_links())[1] < np.inf
 
 
 def test_verify_chooses_the_same(tmp_path: Path) -> None:
     _, result, _ = refused()
     file = tmp_path / "p.ngc"
     file.write_text(result.text)
-    verified = pipeline.verify(file, strips([0.0] * POSTED), quick(), "linuxcnc", beside(*POSTS), Options(orient="auto"))
+    verified = pipeline.verify(file, strips([0.0] * POSTED), quick(), "linuxcnc", adjacent(*POSTS), Options(orient="auto"))
     assert verified.ok, [str(d) for d in verified.diagnostics]
 
 
 @pytest.mark.parametrize(("plan", "count"), [("per-pass", 2), ("whole-part", POSTED)])
 def test_other_plans_avoid_it_too(plan: Orientation, count: int) -> None:
-    result = converted(strips([0.0] * count), beside(*POSTS), plan)
+    result = converted(strips([0.0] * count), adjacent(*POSTS), plan)
     assert result.ok and result.choice is not None and not result.choice.plans[plan].barred
     assert "orient.passed_over" in {d.code for d in result.diagnostics}
 
@@ -109,7 +109,7 @@ def test_the_program_that_proved_is_not_made_again(monkeypatch: pytest.MonkeyPat
         return stages(start, progress)
 
     monkeypatch.setattr(pipeline, "_stages", counted)
-    path, setup = strips([0.0] * 2), beside()
+    path, setup = strips([0.0] * 2), adjacent()
     result = converted(path, setup)
     assert result.ok and len(made) == 1 and "planned" in result.text
     planned = postproc.convert(path, quick(), "linuxcnc", setup, Options(orient="auto", feed="planned", smooth=True))
@@ -119,14 +119,14 @@ def test_the_program_that_proved_is_not_made_again(monkeypatch: pytest.MonkeyPat
 @cache
 def some() -> OrientationChoice:
     """Strips that gain by leaning."""
-    choice, _ = orient(strips([0.0] * COUNT), quick(), beside())
+    choice, _ = orient(strips([0.0] * COUNT), quick(), adjacent())
     assert choice is not None and choice.plans["auto"].states != choice.plans["keep"].states
     return choice
 
 
 @cache
 def good() -> PostResult:
-    return converted(strips([0.0] * 2), beside())
+    return converted(strips([0.0] * 2), adjacent())
 
 
 class Control:
@@ -158,7 +158,7 @@ def test_the_axes_of_the_file_are_what_is_left() -> None:
     assert [d.code for d in found] == ["orient.passed_over"] and "refused" in found[0].message
 
 
-def test_what_the_file_is_refused_for_is_no_reason_to_choose_anew() -> None:
+def test_what_the_file_is_refused_for_is_no_reason_to_choose_again() -> None:
     line = int(some().work.moves.line[5])
     control = Control("auto", always=fault("feed.missing", line))
     made, found = proved(some(), "auto", control)
@@ -176,7 +176,7 @@ def test_only_auto_becomes_another_plan() -> None:
 
 @pytest.mark.parametrize(("offset", "whole"), [(0, False), (2, True)])
 def test_lines_of_errors_say_what_is_barred(offset: int, whole: bool) -> None:
-    """The first rapid of a pass is the way to it: that is barred from where it came. Its cut is the pass: however it is
+    """The first rapid of a pass is the path to it: that is barred from where it came. Its cut is the pass: however it is
     come to, it is."""
     one, first = some().work.passes[5], some().plans["auto"]
     line = int(some().work.moves.line[one.rows[0] + offset])
@@ -205,7 +205,7 @@ def test_the_command_proves_for_a_control(tmp_path: Path) -> None:
 
 
 def test_axes_chosen_without_a_program_are_not_proved() -> None:
-    """What stands against a program whatever its axes: the plan is told, and that it is not proved."""
+    """What stands against a program whatever its axes: the plan is reported, and that it is not proved."""
     path = strips([0.0] * 2)
     result = choose_axes(path, quick(), "linuxcnc", Options(orient="auto"), [fault()])
     assert result.choice is None and not result.ok

@@ -1,4 +1,5 @@
-"""What is told of a choice of orientations: reaches, losers, shares, JSON, text, pictures, the command line."""
+"""What is reported of a choice of orientations: reaches, rejected candidates, shares, JSON, text, pictures, the command
+line."""
 
 from __future__ import annotations
 
@@ -36,7 +37,7 @@ BALL = ["UNITS/MM", "CUTTER/16,8", "LOADTL/1", "SPINDL/RPM,1000,CLW", "FEDRAT/MM
 
 
 def written(passes: int, cutter: str = "CUTTER/16,8") -> str:
-    """Level passes of 80 mm along x beside each other, rapids between."""
+    """Level passes of 80 mm along x next to each other, rapids between."""
     lines = [cutter if line.startswith("CUTTER") else line for line in BALL]
     for y in range(passes):
         lines += ["RAPID", f"GOTO/0,{y},5,0,0,1", "RAPID", f"GOTO/0,{y},0,0,0,1", f"GOTO/80,{y},0,0,0,1", "RAPID",
@@ -58,10 +59,10 @@ def part() -> OrientationChoice:
 
 
 def repeated(plan: OrientationPlan) -> OrientationPlan:
-    ways = np.append(np.tile(plan.ways[:-1], 16), plan.ways[-1])
+    links = np.append(np.tile(plan.links[:-1], 16), plan.links[-1])
     cuts, rapids = np.tile(plan.cuts, 16), np.tile(plan.rapids, 16)
-    return replace(plan, picked=16 * plan.picked, cuts=cuts, rapids=rapids, ways=ways,
-                   seconds=float(cuts.sum() + rapids.sum() + ways.sum()))
+    return replace(plan, picked=16 * plan.picked, cuts=cuts, rapids=rapids, links=links,
+                   seconds=float(cuts.sum() + rapids.sum() + links.sum()))
 
 
 def many() -> OrientationChoice:
@@ -125,21 +126,22 @@ def test_reach_of_an_axis_is_that_of_its_pass() -> None:
     assert reaches.least_under(own, axes) == pytest.approx([one.seconds for one in slowest if one is not None], rel=1e-9)
 
 
-def test_every_loser_is_counted_once() -> None:
+def test_every_rejected_candidate_is_counted_once() -> None:
     for choice in (part(), of_text(written(2))):
         for tried in choice.tried:
-            told = rejections.grouped([tried])
-            assert sum(told.values()) == len([lost for lost in tried.rejected if lost.made is not tried.own])
-            assert told.get("bound", 0) == tried.pruned
-            after = rejections.best_loser(tried)
+            noted = rejections.grouped([tried])
+            assert sum(noted.values()) == len([lost for lost in tried.rejected if lost.made is not tried.own])
+            assert noted.get("bound", 0) == tried.pruned
+            after = rejections.runner_up(tried)
             assert after is not None and after.seconds >= tried.best.seconds
             assert after.seconds == min(lost.made.seconds for lost in tried.rejected if np.isfinite(lost.made.seconds))
         assert sum(rejections.grouped(choice.tried).values()) == sum(sum(rejections.grouped([one]).values())
                                                                      for one in choice.tried)
 
 
-def test_no_loser_is_told_as_faster_than_the_best_or_where_it_stands() -> None:
-    """Candidates are ranked on knots that all share, the best is planned on its own: both times are told on one scale."""
+def test_no_rejected_candidate_is_reported_as_faster_than_the_best_or_where_it_stands() -> None:
+    """Candidates are ranked on knots that all share, the best is planned on its own: both times are reported on one
+    scale."""
     for tried in (*part().tried, *of_text(written(2)).tried, *of_text(written(2, "CUTTER/16,0")).tried):
         for lost in tried.rejected:
             if lost.kind == "slower":
@@ -170,7 +172,7 @@ def test_a_tool_change_turns_home_and_back() -> None:
     plan = of_text(both).plans["keep"]
     parts = shares.shares_of(plan)
     assert len(plan.picked) == 2 and parts.turns == 3
-    assert parts.turning == pytest.approx(plan.ways.sum()) and parts.other == pytest.approx(plan.rapids.sum())
+    assert parts.turning == pytest.approx(plan.links.sum()) and parts.other == pytest.approx(plan.rapids.sum())
 
 
 def test_json_has_the_keys_that_others_read() -> None:
@@ -190,34 +192,34 @@ def test_json_has_the_keys_that_others_read() -> None:
 
 
 def test_text_says_why_others_lost() -> None:
-    told = text.as_text(part(), "per-pass", [4])
-    table = told.splitlines()
+    noted = text.as_text(part(), "per-pass", [4])
+    table = noted.splitlines()
     assert len([line for line in table if line.split()[:1] and line.split()[0].isdigit()]) == 8  # 7 passes, "N orientations"
-    assert "limits" in told and "slower" in told and "bound" in told
-    assert "slowest alone: jerk" in told and "feed 1000 mm/s" in told
-    assert "lost, slower: A45.000 C" in told and "takes about 0.61" in told
+    assert "limits" in noted and "slower" in noted and "bound" in noted
+    assert "slowest alone: jerk" in noted and "feed 1000 mm/s" in noted
+    assert "lost, slower: A45.000 C" in noted and "takes about 0.61" in noted
     assert any(line.startswith("paper per pass") for line in table)
 
 
 def test_text_of_many_passes_is_short_and_shows_those_that_gain() -> None:
-    told = text.as_text(many(), "per-pass")
-    assert f"and {16 * 7 - text.SHOWN} passes that gain less" in told and len(told.splitlines()) < text.SHOWN + 15
+    noted = text.as_text(many(), "per-pass")
+    assert f"and {16 * 7 - text.SHOWN} passes that gain less" in noted and len(noted.splitlines()) < text.SHOWN + 15
     saved = [one.own.seconds - one.best.seconds for one in part().tried]
-    assert told.count(f"\n{int(np.argmax(saved)):>5} ") == 16 and told.count(f"\n{int(np.argmin(saved)):>5} ") == 0
+    assert noted.count(f"\n{int(np.argmax(saved)):>5} ") == 16 and noted.count(f"\n{int(np.argmin(saved)):>5} ") == 0
 
 
 def test_fixed_passes_say_why() -> None:
     turning = ["RAPID", "GOTO/0,0,9,0,0,1", "GOTO/0,0,0,0,0,1", "GOTO/80,0,0,0,0.6,0.8", "RAPID", "GOTO/80,0,9,0,0.6,0.8"]
     choice = of_text("\n".join([*BALL, *turning, "FINI"]))
-    told = text.as_text(choice, "auto", [0])
-    assert told.count("axis kept: the tool axis turns within the pass") == 2
+    noted = text.as_text(choice, "auto", [0])
+    assert noted.count("axis kept: the tool axis turns within the pass") == 2
     assert report.as_dict(choice)["passes"][0]["paper"] is None
     assert sheet.most_gaining(choice) == []
     assert any("axis kept, the tool axis turns" in one for one in texts(choice, "auto", [0]))
 
 
 @pytest.mark.usefixtures("as_laid_out")
-def test_held_angles_are_told_and_drawn() -> None:
+def test_held_angles_are_reported_and_drawn() -> None:
     """A flat cutter keeps its axis; the table turns under it."""
     choice = of_text(written(2, "CUTTER/16,0"))
     tried = choice.tried[0]
@@ -225,8 +227,8 @@ def test_held_angles_are_told_and_drawn() -> None:
     ball = part().tried[0]
     assert free_rotary.is_held(tried) and not free_rotary.is_held(ball)
     assert free_rotary.is_held(replace(ball, best=replace(ball.best, held=0.3)))
-    told = text.as_text(choice, "per-pass", [0])
-    assert told.count("axis kept: the cutter is no ball") == 3 and "bound; axis kept" in told
+    noted = text.as_text(choice, "per-pass", [0])
+    assert noted.count("axis kept: the cutter is no ball") == 3 and "bound; axis kept" in noted
     one = report.as_dict(choice, "per-pass")["passes"][0]
     assert abs(abs(one["held_deg"]) % 90.0 - 45.0) < 0.5 and one["turned_deg"] == 0.0
     angle = np.array([0.3, tried.best.held])
@@ -237,7 +239,7 @@ def test_held_angles_are_told_and_drawn() -> None:
     assert b"angles at which C is held" in sheet.draw(choice, "per-pass", [0], ".svg")
 
 
-def test_axes_that_cannot_be_run_are_told() -> None:
+def test_axes_that_cannot_be_run_are_reported() -> None:
     """The CL's axis needs A at 127 degrees, travel ends at 120: no seconds before, none saved, and no figure fails."""
     lean = written(2).replace(",0,0,1", ",0,0.79863551,-0.601815023")
     choice = of_text(lean)
@@ -246,8 +248,8 @@ def test_axes_that_cannot_be_run_are_told() -> None:
     json.dumps(values, allow_nan=False)
     assert values["passes"][0]["reference_time_s"] is None and values["passes"][0]["gain_percent"] is None
     assert values["plans"]["keep"]["time_s"] is None and values["plans"]["auto"]["time_s"] > 0.0
-    told = text.as_text(choice, "auto", [1])
-    assert "travel: axis A at 127.000 degrees" in told and "keep                      -" in told
+    noted = text.as_text(choice, "auto", [1])
+    assert "travel: axis A at 127.000 degrees" in noted and "keep                      -" in noted
     drawn = texts(choice, "auto", [1])
     assert "cannot be run" in drawn and any("the CL file's own cannot be run" in one for one in drawn)
     assert report.slower(choice, "auto") == [] and text.header(choice, "auto")[1].endswith("of the CL file - s")
@@ -297,22 +299,22 @@ def test_command_refuses_what_it_cannot_show(tmp_path: Path) -> None:
 
 
 def test_converted_program_says_which_axes_were_chosen(tmp_path: Path) -> None:
-    """Head and JSON: each pass with its orientation and seconds; what takes longer is told."""
+    """Head and JSON: each pass with its orientation and seconds; what takes longer is reported."""
     file, out, figures = tmp_path / "p.apt", tmp_path / "p.ngc", tmp_path / "p.json"
     file.write_text(written(3))
     result = run(file, "-c", "linuxcnc", "-o", out, "--orient", "per-pass", "--json", figures, command="convert")
-    told = json.loads(figures.read_text())["orientation"]
-    assert told["plan"] == "per-pass" and told["turned"] == 3
-    assert [one["pass"] for one in told["passes"]] == [0, 1, 2]
-    assert all(one["time_s"] < one["reference_time_s"] for one in told["passes"])
-    angles = told["passes"][0]["orientation_deg"]
+    noted = json.loads(figures.read_text())["orientation"]
+    assert noted["plan"] == "per-pass" and noted["turned"] == 3
+    assert [one["pass"] for one in noted["passes"]] == [0, 1, 2]
+    assert all(one["time_s"] < one["reference_time_s"] for one in noted["passes"])
+    angles = noted["passes"][0]["orientation_deg"]
     head = [line for line in out.read_text().splitlines() if line.startswith("(pass ")]
     assert head[0].startswith(f"(pass 0 to 2: A{angles['A']:.3f} C{angles['C']:.3f}, cuts ")
     assert "3 of 3 passes turned" in result.output
-    assert ("orient.slower" in result.output) == (told["time_s"] > told["reference_time_s"])
+    assert ("orient.slower" in result.output) == (noted["time_s"] > noted["reference_time_s"])
 
 
-def test_what_takes_longer_is_told() -> None:
+def test_what_takes_longer_is_reported() -> None:
     slow, quick = report.slower(part(), "per-pass"), report.slower(part(), "auto")
     assert [d.code for d in slow] == ["orient.slower"] and not quick
     assert f"{part().plans['per-pass'].seconds:.3f} s" in slow[0].message
@@ -366,14 +368,14 @@ def narrow(path: str, degrees: float = 30.0) -> OrientationChoice:
     return choice
 
 
-def test_why_the_paper_chooses_nothing_is_told() -> None:
+def test_why_the_paper_chooses_nothing_is_reported() -> None:
     choice = narrow(written(2))
     assert all(one.aimed is None for one in choice.tried)
     assert {one.unaimed for one in choice.tried} == {
         "of the axes that aim a vertex 4 are outside the allowed angles, 4 are outside travel"}
-    told = text.as_text(choice, "auto", [1])
-    assert "\n  paper: none, of the axes that aim a vertex 4 are" in told
-    assert "\npaper per pass keeps the CL axis in 2 of 2 passes: of the axes that aim a vertex 4 are outside" in told
+    noted = text.as_text(choice, "auto", [1])
+    assert "\n  paper: none, of the axes that aim a vertex 4 are" in noted
+    assert "\npaper per pass keeps the CL axis in 2 of 2 passes: of the axes that aim a vertex 4 are outside" in noted
     assert report.as_dict(choice)["passes"][0]["paper_missing"].endswith("4 are outside travel")
     assert {one["paper_missing"] for one in report.as_dict(part())["passes"]} == {""}
     assert "paper per pass keeps" not in text.as_text(part())

@@ -36,11 +36,11 @@ from toolpaths.units import DEG
 HEAD = ["UNITS/MM", "CUTTER/10,5", "LOADTL/1", "SPINDL/RPM,1000,CLW", "FEDRAT/MMPM,15000", "MULTAX"]
 
 
-def strips(ways: Sequence[float], length: float = 60.0, axis: str = "0,0,1") -> Toolpath:
+def strips(links: Sequence[float], length: float = 60.0, axis: str = "0,0,1") -> Toolpath:
     """Level strips from the origin at angles (degrees), a rapid to each."""
     lines = list(HEAD)
-    for way in ways:
-        x, y = length * np.cos(way * DEG), length * np.sin(way * DEG)
+    for link in links:
+        x, y = length * np.cos(link * DEG), length * np.sin(link * DEG)
         lines += ["RAPID", f"GOTO/0,0,5,{axis}", f"GOTO/0,0,0,{axis}", f"GOTO/{x:.6f},{y:.6f},0,{axis}"]
     path, found = toolpaths.read_bytes("\n".join([*lines, "FINI"]).encode(), file="strips.apt")
     assert not toolpaths.diagnostics.has_errors(found), found
@@ -118,9 +118,9 @@ def test_neighbours_of_an_axis() -> None:
     centre = np.array([0.0, 0.0, 1.0])
     np.testing.assert_allclose(angle_between(around(centre, centre, 0.1), centre), np.full(8, 0.1), atol=1e-12)
     start = np.array([np.sin(0.5), 0.0, np.cos(0.5)])
-    beside = around(start, centre, 0.1)
-    np.testing.assert_allclose(angle_between(beside, centre), [0.4, 0.6, 0.5, 0.5], atol=1e-12)
-    np.testing.assert_allclose(angle_between(beside, start), 0.1, rtol=2e-2)
+    adjacent = around(start, centre, 0.1)
+    np.testing.assert_allclose(angle_between(adjacent, centre), [0.4, 0.6, 0.5, 0.5], atol=1e-12)
+    np.testing.assert_allclose(angle_between(adjacent, start), 0.1, rtol=2e-2)
 
 
 def test_groups_are_moved_together() -> None:
@@ -128,11 +128,11 @@ def test_groups_are_moved_together() -> None:
     rng = np.random.default_rng(4)
     for _ in range(20):
         states = [rng.uniform(0, 1, 3) for _ in range(6)]
-        ways = [rng.uniform(0, 1, (a, b)) for a, b in itertools.pairwise([1, *[3] * 6, 1])]
+        links = [rng.uniform(0, 1, (a, b)) for a, b in itertools.pairwise([1, *[3] * 6, 1])]
         groups = [([0, 2, 4], [[k] * 3 for k in range(3)]), ([1, 3, 5], [[k] * 3 for k in range(3)])]
-        picked = groupwise([0] * 6, groups, states, ways)
-        first = min(([a, 0] * 3 for a in range(3)), key=lambda p: seconds(p, states, ways))
-        best = min(([first[0], b] * 3 for b in range(3)), key=lambda p: seconds(p, states, ways))
+        picked = groupwise([0] * 6, groups, states, links)
+        first = min(([a, 0] * 3 for a in range(3)), key=lambda p: seconds(p, states, links))
+        best = min(([first[0], b] * 3 for b in range(3)), key=lambda p: seconds(p, states, links))
         assert picked == best
 
 
@@ -152,7 +152,7 @@ def test_the_choice_does_not_depend_on_the_cores(monkeypatch: pytest.MonkeyPatch
 @pytest.mark.parametrize("workers", [1, 2])
 def test_faults_name_the_line_of_their_pass(workers: int) -> None:
     made = work(strips([0.0] * 5 * CHUNK), machine("mikron-ucp710"))
-    told: list[tuple[str, int, int]] = []
+    noted: list[tuple[str, int, int]] = []
 
     def failing(number: int, before: int | None) -> int:
         assert before == (None if number % CHUNK == 0 else number - 1)
@@ -161,9 +161,9 @@ def test_faults_name_the_line_of_their_pass(workers: int) -> None:
         return number
 
     with pytest.raises(PassFault, match="no") as fault:
-        each_pass(failing, made, AllowedAxes(1.0), "trying", lambda *args: told.append(args), workers)
+        each_pass(failing, made, AllowedAxes(1.0), "trying", lambda *args: noted.append(args), workers)
     assert fault.value.line == made.passes[4 * CHUNK + 3].line
-    assert told[-1][0] == "trying" and told[-1][2] == 5 * CHUNK and 3 * CHUNK <= told[-1][1] < 5 * CHUNK
+    assert noted[-1][0] == "trying" and noted[-1][2] == 5 * CHUNK and 3 * CHUNK <= noted[-1][1] < 5 * CHUNK
 
 
 def test_the_pass_before_lends_its_axis() -> None:
@@ -178,7 +178,7 @@ def test_the_pass_before_lends_its_axis() -> None:
 
 
 def test_rapids_count_in_whole_plans() -> None:
-    """The swiftest axis minds the rapids of its pass, the best only its cuts."""
+    """The fastest axis minds the rapids of its pass, the best only its cuts."""
     choice = chosen(toolpaths.read(SAMPLES / "test_part.cls")[0], machine("mikron-ucp710"))
     found, plans = choice.tried, choice.plans
     assert plans["auto"].seconds == min(plan.seconds for plan in plans.values())
@@ -202,7 +202,7 @@ def test_auto_is_the_least_of_all_on_every_machine(name: str, walls: bool) -> No
     assert np.isfinite(least) and choice.plans["auto"].seconds == least
     assert choice.plans["whole-part"].seconds <= choice.plans["keep"].seconds
     for plan in choice.plans.values():
-        assert plan.seconds == pytest.approx(plan.cuts.sum() + plan.rapids.sum() + plan.ways.sum(), rel=1e-12)
+        assert plan.seconds == pytest.approx(plan.cuts.sum() + plan.rapids.sum() + plan.links.sum(), rel=1e-12)
 
 
 def test_axes_that_the_machine_does_not_have_are_refused() -> None:
@@ -219,7 +219,7 @@ def test_axes_that_the_machine_does_not_have_are_refused() -> None:
 
 
 def test_an_axis_outside_travel_is_replaced_with_a_warning() -> None:
-    """A ends at 20 degrees: passes that lean by 30 get another axis, `keep` is told as impossible."""
+    """A ends at 20 degrees: passes that lean by 30 get another axis, `keep` is reported as impossible."""
     m = machine("mikron-ucp710")
     lower, upper = m.limits.lower.copy(), m.limits.upper.copy()
     lower[m.axis_names.index("A")], upper[m.axis_names.index("A")] = -20.0 * DEG, 20.0 * DEG

@@ -1,4 +1,4 @@
-"""The proved bound of linearising beside dense truth: never below it, on every machine and under every law."""
+"""The proved bound of linearising compared with dense truth: never below it, on every machine and under every law."""
 
 from __future__ import annotations
 

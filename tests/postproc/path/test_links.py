@@ -76,7 +76,7 @@ def check(result: PostResult) -> int:
 
 
 def _between_cl_points(tip: np.ndarray, cl: np.ndarray) -> np.ndarray:
-    """True (N,) on a straight way between two successive CL points."""
+    """True (N,) on a straight path between two successive CL points."""
     result = np.zeros(len(tip), dtype=bool)
     for p, q in pairwise(cl):
         d = q - p

@@ -119,7 +119,7 @@ ALONG = np.array([np.sqrt(0.75), 0.5, 0.0])
 
 
 @pytest.fixture
-def post_in_the_way(tmp_path: Path) -> Machine:
+def post_in_the_path(tmp_path: Path) -> Machine:
     """UraneSX whose slide X stands where rod Y1 passes when the platform is 150 mm along, and well off at 20 and 280."""
     kinematics = machine("uranesx").kinematics
     assert isinstance(kinematics, LinearDelta)
@@ -143,26 +143,26 @@ def passing(machine_: Machine, along: list[float], outwards: float = 0.0, tolera
                             options=postproc.Options(tolerance=tolerance))
 
 
-def test_a_rod_that_would_hit_a_slide_is_refused_at_a_point(post_in_the_way: Machine) -> None:
-    result = passing(post_in_the_way, [20.0, 150.0, 280.0])
+def test_a_rod_that_would_hit_a_slide_is_refused_at_a_point(post_in_the_path: Machine) -> None:
+    result = passing(post_in_the_path, [20.0, 150.0, 280.0])
     (d,) = [d for d in result.diagnostics if d.code == "reach.clearance"]
     assert "rod Y1 - slide X: passed by" in d.message and "mm" in d.message and d.lines
     assert not result.text
 
 
-def test_and_between_two_points_when_the_points_are_clear(post_in_the_way: Machine) -> None:
+def test_and_between_two_points_when_the_points_are_clear(post_in_the_path: Machine) -> None:
     """One block from a place on one side of the rail to one on the other; both ends keep their distance."""
-    result = passing(post_in_the_way, [20.0, 280.0], tolerance=200.0)
+    result = passing(post_in_the_path, [20.0, 280.0], tolerance=200.0)
     (block,) = np.flatnonzero(result.path.code == 1)
-    margins = machines.reach.reach(post_in_the_way.kinematics, result.path.q[block - 1:block + 1])
+    margins = machines.reach.reach(post_in_the_path.kinematics, result.path.q[block - 1:block + 1])
     assert margins.values[:, margins.names.index("rod Y1 - slide X")].min() > 5.0
     (d,) = [d for d in result.diagnostics if d.code == "reach.clearance"]
     assert "rod Y1 - slide X: passed by" in d.message and not result.text
     assert "part.origin" in d.hint
 
 
-def test_the_same_pass_elsewhere_is_allowed(post_in_the_way: Machine) -> None:
-    result = passing(post_in_the_way, [20.0, 150.0, 280.0], outwards=100.0)
+def test_the_same_pass_elsewhere_is_allowed(post_in_the_path: Machine) -> None:
+    result = passing(post_in_the_path, [20.0, 150.0, 280.0], outwards=100.0)
     assert all("linking move" in d.message for d in result.diagnostics if d.code == "reach.clearance")
     assert passing(machine("uranesx"), [20.0, 150.0, 280.0]).ok
 
@@ -361,7 +361,7 @@ def test_a_block_that_moves_u_alone_is_measured_by_u() -> None:
 
 
 def test_joint_program_of_the_same_machine_without_the_controls_kinematics(tmp_path: Path) -> None:
-    """`module = "trivkins"` takes the kinematics from the control: words are joints, and the tip goes the same way."""
+    """`module = "trivkins"` takes the kinematics from the control: words are joints, and the tip goes the same path."""
     path, _ = toolpaths.read(SAMPLES / "pocket.cls")
     own = with_file(tmp_path, 'base = "linuxcnc-lineardelta"\n[control]\nmodule = "trivkins"\n')
     assert own.control_kinematics is None

@@ -1,4 +1,4 @@
-"""Moves of a few hundredths past a singular direction: where one ends is known to the tolerance, its time beside it too."""
+"""Moves of a few hundredths past a singular direction: where one ends is known to the tolerance, its time next to it too."""
 
 from __future__ import annotations
 

@@ -53,8 +53,8 @@ def test_a_stated_distance_is_kept_or_refused_with_lines() -> None:
     setup, _ = load_setup(SAMPLES / "h4a.setup.toml")
     assert setup is not None
     kept = postproc.convert(path, machine("h4a-c-table"), setup=setup)
-    (told,) = [d for d in kept.diagnostics if d.code == "singular.distance"]
-    assert kept.ok and "stated: at least 0.05" in told.message
+    (noted,) = [d for d in kept.diagnostics if d.code == "singular.distance"]
+    assert kept.ok and "stated: at least 0.05" in noted.message
     strict = setup.model_copy(update={"joints": setup.joints.model_copy(update={"singular_distance": 0.9})})
     refused = postproc.convert(path, machine("h4a-c-table"), setup=strict)
     found = [d for d in refused.diagnostics if d.code == "singular.distance"]

@@ -33,8 +33,9 @@ def test_a_mode_without_compensation_or_cycles_is_named(controller: str) -> None
     tap = toolpath(*OVER, "CYCLE/TAP,DEPTH,5,MMPR,1,CLEAR,3", "GOTO/9,0,0", "CYCLE/OFF")
     result = convert(cut, "mikron-ucp710", controller, output="tcp")
     assert "cutcom.mode" in codes(result.diagnostics) and "cutcom.tilted" not in codes(result.diagnostics)
-    [told] = [d for d in convert(tap, "mikron-ucp710", controller, output="tcp").diagnostics if d.code == "cycle.not_native"]
-    assert "in output mode tcp" in told.message and "--output-mode" in told.hint
+    [noted] = [d for d in convert(tap, "mikron-ucp710", controller, output="tcp").diagnostics
+               if d.code == "cycle.not_native"]
+    assert "in output mode tcp" in noted.message and "--output-mode" in noted.hint
 
 
 @pytest.mark.parametrize("controller", ["linuxcnc", "fanuc-30i", "siemens-840d", "heidenhain-tnc640"])
@@ -59,7 +60,7 @@ def made(*lines: str, controller: str = "linuxcnc") -> PostResult:
 
 @pytest.mark.parametrize("controller", ["linuxcnc", "fanuc-30i", "siemens-840d", "heidenhain-tnc640"])
 def test_a_short_arc_of_a_large_radius_asks_for_no_more_room(controller: str) -> None:
-    """Its whole circle would reach 10 m away from the part: no way to link would be inside travel."""
+    """Its whole circle would reach 10 m away from the part: no path to link would be inside travel."""
     result = made("GOTO/0,0,20,0,0,1", "FEDRAT/MMPM,600", "GOTO/0,0,0", "CIRCLE/-5000,0,0,0,0,-1,5000,0.03,0.5,10,0",
                   "GOTO/-0.009,9.487,0", "RAPID", "GOTO/0,10,40", controller=controller)
     assert result.ok and result.job is not None

@@ -33,7 +33,7 @@ def made(name: str, controller: str) -> PostResult:
 
 
 def all_of(result: PostResult) -> dict[str, object]:
-    """The text, what is told, and the bytes of every array of the comparison and its motion."""
+    """The text, what is reported, and the bytes of every array of the comparison and its motion."""
     assert result.comparison is not None and result.comparison.executed is not None
     parts: dict[str, object] = {"text": result.text, "told": [str(d) for d in result.diagnostics], "extents": result.extents}
     for owner in (result.comparison, result.comparison.executed[1]):

@@ -29,14 +29,14 @@ from toolpaths.units import DEG
 HEAD = ["UNITS/MM", "CUTTER/16,8", "LOADTL/1", "SPINDL/RPM,1000,CLW"]
 
 
-def passes(way: tuple[float, float], count: int = 3, length: float = 80.0, feed: int = 60000) -> Toolpath:
-    """Level passes along `way`, 1 mm from each other, 3-axis; `feed` in mm/min."""
-    along, up = np.array([*way, 0.0]) * length, np.array([0.0, 0.0, 5.0])
+def passes(link: tuple[float, float], count: int = 3, length: float = 80.0, feed: int = 60000) -> Toolpath:
+    """Level passes along `link`, 1 mm from each other, 3-axis; `feed` in mm/min."""
+    along, up = np.array([*link, 0.0]) * length, np.array([0.0, 0.0, 5.0])
     lines = []
     for k in range(count):
-        beside = k * np.array([-way[1], way[0], 0.0])
-        for word, tip in (("RAPID", beside + up), ("RAPID", beside), ("", along + beside),
-                          ("RAPID", along + beside + up)):
+        adjacent = k * np.array([-link[1], link[0], 0.0])
+        for word, tip in (("RAPID", adjacent + up), ("RAPID", adjacent), ("", along + adjacent),
+                          ("RAPID", along + adjacent + up)):
             lines += [word] * bool(word) + ["GOTO/{:.6f},{:.6f},{:.6f}".format(*tip)]
     path, found = toolpaths.read_bytes("\n".join([*HEAD, f"FEDRAT/MMPM,{feed}", *lines, "FINI"]).encode(), file="passes.apt")
     assert not has_errors(found), found
@@ -71,7 +71,7 @@ def refused(path: Toolpath, m: Machine, setup: SetupFile) -> Diagnostic:
 
 
 def test_turning_aims_a_vertex_of_the_box_along_the_passes() -> None:
-    """Under jerk alone, J on each slide, a straight way D takes (32 D/J)^(1/3) along an axis; along the diagonal of X and
+    """Under jerk alone, J on each slide, a straight path D takes (32 D/J)^(1/3) along an axis; along the diagonal of X and
     Y each goes D/sqrt(2): 2^(-1/6) of it."""
     m = jerk_only(machine("mill-3axis"))
     choice = placed(passes((1.0, 0.0), 1, feed=STEADY), m, setup_of(turn=(0.0, 90.0)))
@@ -137,7 +137,7 @@ def test_limits_and_table_hold() -> None:
     assert (corners >= np.array(table.low) - 1e-6).all() and (corners <= np.array(table.high) + 1e-6).all()
 
 
-def test_a_part_beyond_its_table_is_told() -> None:
+def test_a_part_beyond_its_table_is_reported() -> None:
     """It is within travel where it stands now, and still refused; the limits alone would let it stay."""
     table = PlaceBox(low=(-100.0, -60.0, -50.0), high=(100.0, 60.0, 50.0))
     choice = placed(passes((1.0, 0.0)), machine("mill-3axis"), setup_of((60.0, 0.0, 0.0), x=(-90.0, 90.0), table=table))
@@ -206,8 +206,8 @@ def test_surfaces_are_moved_with_the_part() -> None:
     base, _ = work_of(passes((0.6, 0.8)), machine("mikron-ucp710"), setup_of(), Options())
     assert base is not None
     rng = np.random.default_rng(8)
-    normal, way = (v / np.linalg.norm(v, axis=1, keepdims=True) for v in rng.normal(size=(2, 5, 3)))
-    known = replace(base, passes=tuple(replace(one, contact=Contact(normal, way, np.arange(5))) for one in base.passes))
+    normal, link = (v / np.linalg.norm(v, axis=1, keepdims=True) for v in rng.normal(size=(2, 5, 3)))
+    known = replace(base, passes=tuple(replace(one, contact=Contact(normal, link, np.arange(5))) for one in base.passes))
     there = Placement(matrix(np.array([0.7, 0.2, -0.4])), np.array([1.0, 2.0, 3.0]))
     axes = rng.normal(size=(4, 3))
     for a, b in zip(known.passes, moved(known, there).passes, strict=True):

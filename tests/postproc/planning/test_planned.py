@@ -167,14 +167,14 @@ def test_plan_keeps_limits_and_feed_and_rests_at_both_ends() -> None:
     tip = one.smooth.at(run.s)[0]
     assert (np.linalg.norm(np.diff(tip, axis=0), axis=1) / 1e-3).max() <= 25.0 * 1.001
     assert not run.qd[0].any() and not run.qd[-1].any()
-    way = np.linalg.norm(np.diff(tip, axis=0), axis=1).sum()
-    assert made.seconds > way / 25.0
+    travel = np.linalg.norm(np.diff(tip, axis=0), axis=1).sum()
+    assert made.seconds > travel / 25.0
 
 
 def test_motion_stops_at_a_dwell_and_not_at_a_comment() -> None:
-    ways = ["GOTO/20,0,50", "GOTO/40,0,50", "GOTO/60,0,50"]
-    for record, stops in (("DELAY/1.0", True), ("PPRINT/half way", False)):
-        lines = ["RAPID", "GOTO/0,0,50", "FEDRAT/MMPM,1200", ways[0], record, *ways[1:]]
+    travels = ["GOTO/20,0,50", "GOTO/40,0,50", "GOTO/60,0,50"]
+    for record, stops in (("DELAY/1.0", True), ("PPRINT/half path", False)):
+        lines = ["RAPID", "GOTO/0,0,50", "FEDRAT/MMPM,1200", travels[0], record, *travels[1:]]
         result = good(convert(toolpath(*lines), "mill-3axis"))
         made = motion(result)
         assert (len(made.passes) == 2) is stops
@@ -227,7 +227,7 @@ def test_direction_of_a_rotary_axis_is_passed_without_a_swing(off: float) -> Non
     assert made.seconds < 3.0
 
 
-def test_a_real_swing_beside_the_direction_of_a_rotary_axis_stays_a_swing() -> None:
+def test_a_real_swing_next_to_the_direction_of_a_rotary_axis_stays_a_swing() -> None:
     lines = pole(0.5)
     result = good(convert(toolpath("RAPID", lines[0], "FEDRAT/MMPM,1500", *lines[1:]), "mikron-ucp710"))
     made = motion(result)
@@ -251,8 +251,8 @@ def test_feed_changes_are_known_to_the_planner_and_kept() -> None:
 
 
 def test_a_stated_time_is_the_least_time_of_a_move() -> None:
-    ways = ["RAPID", "GOTO/0,0,50", "FEDRAT/INVERS,30", "GOTO/10,0,50", "GOTO/30,0,50"]
-    result = good(convert(toolpath(*ways), "mill-3axis"))
+    travels = ["RAPID", "GOTO/0,0,50", "FEDRAT/INVERS,30", "GOTO/10,0,50", "GOTO/30,0,50"]
+    result = good(convert(toolpath(*travels), "mill-3axis"))
     made = motion(result)
     assert made.seconds > 4.0
     speed = made.plans[0].speed(np.array([5.0, 20.0]))

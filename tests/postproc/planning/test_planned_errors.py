@@ -54,7 +54,7 @@ def test_feeds_keep_the_jerk_of_what_corrects_a_screw(tmp_path: Path) -> None:
                                                           ("h4a_dome.cls", "h4a-c-table", "h4a"),
                                                           ("pocket.cls", "uranesx", "delta")])
 def test_planned_joints_put_the_tool_where_it_belongs(sample: str, machine: str, setup: str) -> None:
-    """On the machine with errors, mean of both ways; rotary axes stand where those that are written do."""
+    """On the machine with errors, mean of both directions; rotary axes stand where those that are written do."""
     model = f"samples/errors/{machine}.toml"
     lines = Path(f"samples/{sample}").read_text().splitlines()[:MOST]
     result = planned("\n".join([*lines, *["FINI"] * (len(lines) == MOST)]), machine, "linuxcnc", error_model=model,

@@ -49,8 +49,8 @@ def cuts(result: PostResult) -> list[Step]:
 def seconds(steps: list[Step], before: Floats) -> Floats:
     """What LinuxCNC takes for each step: 1/F min, or the length of X, Y, Z, where they move, by F."""
     ends = np.array([before, *(step.end for step in steps)])
-    way = np.diff(ends, axis=0)
-    xyz, abc = np.linalg.norm(way[:, :3], axis=1), np.linalg.norm(way[:, 3:], axis=1)
+    travel = np.diff(ends, axis=0)
+    xyz, abc = np.linalg.norm(travel[:, :3], axis=1), np.linalg.norm(travel[:, 3:], axis=1)
     length = np.where(xyz > 0.0, xyz, abc)
     return np.array([60.0 / step.feed if step.inverse else 60.0 * part / step.feed
                      for step, part in zip(steps, length, strict=True)])
@@ -135,8 +135,8 @@ def test_smooth_moves_points_inside_the_tolerance_and_calms_the_words() -> None:
     noise = []
     for result in (rough, calm):
         ends = np.array([step.end for step in cuts(result)])
-        way = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(ends, axis=0), axis=1))))
-        bend = make_interp_spline(way, ends, k=3).derivative(2)(way[10:-10])
+        travel = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(ends, axis=0), axis=1))))
+        bend = make_interp_spline(travel, ends, k=3).derivative(2)(travel[10:-10])
         noise.append(np.abs(np.diff(bend, axis=0)).max())
     assert noise[1] < 0.3 * noise[0]
 

@@ -27,11 +27,11 @@ def dense(seed: int) -> tuple[Floats, Floats]:
     """Points from 0.3 um to 3 mm apart, some twice, none quite on the curve; the axis goes through 90 degrees of tilt."""
     rng = np.random.default_rng(seed)
     count = int(rng.integers(20, 120))
-    way = np.cumsum(10.0 ** rng.uniform(-3.5, -0.5, count) * rng.choice([1, 1, 1, 0, 10], count))
-    tilt = np.radians(rng.uniform(60, 95) + rng.uniform(-20, 20) * way / way[-1])
-    turn = rng.uniform(0, 6) + rng.uniform(-1, 1) * way / way[-1]
+    travel = np.cumsum(10.0 ** rng.uniform(-3.5, -0.5, count) * rng.choice([1, 1, 1, 0, 10], count))
+    tilt = np.radians(rng.uniform(60, 95) + rng.uniform(-20, 20) * travel / travel[-1])
+    turn = rng.uniform(0, 6) + rng.uniform(-1, 1) * travel / travel[-1]
     axis = np.stack([np.sin(tilt) * np.cos(turn), np.sin(tilt) * np.sin(turn), np.cos(tilt)], axis=1)
-    tip = np.stack([way, 2.0 * np.sin(way / 8.0), np.cos(way / 5.0)], axis=1)
+    tip = np.stack([travel, 2.0 * np.sin(travel / 8.0), np.cos(travel / 5.0)], axis=1)
     tip += rng.normal(size=tip.shape) * 10.0 ** rng.uniform(-4.5, -2.6)
     twice = np.flatnonzero(rng.random(count) < 0.1)
     tip[twice] = tip[np.maximum(twice - 1, 0)]

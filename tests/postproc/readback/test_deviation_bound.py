@@ -82,7 +82,7 @@ def test_no_place_of_a_block_is_farther_off_than_the_bound_and_the_bound_is_near
 
 @pytest.mark.parametrize("which", ERRORS, ids="-".join)
 def test_the_machine_with_its_errors_is_bounded(which):
-    """Tables, lost motion and all; where an axis turns back the worst lies within some hundredths of a mm of its way."""
+    """Tables, lost motion and all; where an axis turns back the worst lies within some hundredths of a mm of its path."""
     result = good(corrected(*which))
     comparison = result.comparison
     tip, axis = dense(result, tuple(NEAR))

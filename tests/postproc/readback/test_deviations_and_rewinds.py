@@ -73,7 +73,7 @@ def test_positions_of_another_assembly_are_out_of_reach(rows: list[str]) -> None
     assert fault.code == "reach.position" and "(0.0000, 0.0000, 0.0000)" in fault.message
 
 
-def test_where_travel_is_short_a_jump_is_told_as_that() -> None:
+def test_where_travel_is_short_a_jump_is_reported_as_that() -> None:
     heading = np.radians(np.linspace(0.0, 330.0, 34))
     axis = np.stack([0.0 * heading, np.sin(heading), np.cos(heading)], axis=1)
     rows = goto(np.zeros((len(axis), 3)) + np.linspace(0.0, 60.0, len(axis))[:, None] * [1.0, 0.0, 0.0], axis)

@@ -45,7 +45,7 @@ CASES = [("fork-head-ab", "fanuc-30i", "", CHANGE), ("fork-head-ab", "haas-ngc",
          ("nutating-head", "siemens-840d", BORED, CHANGE), ("nutating-head", "heidenhain-tnc640", "", STOPPED),
          ("head-table", "generic-iso", "", CHANGE)]
 FED = ("fork-head-ab", "haas-ngc", "", CHANGE)
-"""has a retract and a way down to the cut at feed"""
+"""has a retract and a path down to the cut at feed"""
 
 
 def converted(name: str, control: str, between: str, change: str) -> PostResult:
@@ -91,7 +91,7 @@ def test_the_retract_is_fed_and_the_way_down_is_that_of_the_cut(fed: PostResult)
 
 @pytest.mark.parametrize("state", ["tool", "spindle", "rpm", "coolant", "register", "offset"])
 def test_the_way_down_to_a_cut_has_the_states_of_that_cut(fed: PostResult, state: str) -> None:
-    """Both are fed, only the way down is compared: a wrong state there is an error, on the retract it is that of before."""
+    """Both are fed, only the approach is compared: a wrong state there is an error, on the retract it is that of before."""
     motion, _, led, down = parts(fed)
     values = getattr(motion, state)
     for rows, expected in ((down, {"verify.state"}), (led & ~down, set[str]())):

@@ -1,6 +1,6 @@
 """Programs spoilt in one place: the read-back must refuse every one of them.
 
-What may be changed without harm is left out on purpose: the way above the safe planes, pecks on the way to a bottom,
+What may be changed without harm is left out on purpose: the path above the safe planes, pecks on the path to a bottom,
 feeds that an axis limit had reduced below the programmed one, and blocks that linearising put in with room to spare.
 """
 
@@ -198,8 +198,8 @@ def test_rapid_into_uncut_metal() -> None:
 @pytest.mark.parametrize(("old", "new", "code"), [
     (r"\nZ([\d.]+)\nG53", r"\nZ-\1\nG53", "verify.link"), ("G64 P0.002 Q0.001\n", "", "verify.smoothing"),
     ("G64 P0.002", "G64 P2", "verify.smoothing"), ("G53 G0 Z400", "G0 Z400", "verify.travel"), ("M2\n", "", "gcode.no_end")])
-def test_spoilt_beside_the_path(old: str, new: str, code: str) -> None:
-    """The way out at the end, the control's smoothing, travel, the end itself."""
+def test_spoilt_next_to_the_path(old: str, new: str, code: str) -> None:
+    """The retract at the end, the control's smoothing, travel, the end itself."""
     result = sample(*FLAT[0])
     spoilt, count = re.subn(old, new, result.text)
     assert count and code in found(result, spoilt.splitlines())
@@ -259,7 +259,7 @@ HARMLESS = {
 
 @cache
 def off_axes(source: Path, controller: str, mode: str) -> tuple[PostResult, Effect]:
-    """A program for a machine whose pivots are beside its origin, and what it does."""
+    """A program for a machine whose pivots are next to its origin, and what it does."""
     path, _ = toolpaths.read(source)
     result = good(convert(path, "trunnion-bc", controller, setup_of(OFF_AXES), output=mode))
     assert result.job is not None

@@ -101,7 +101,7 @@ def test_rises_to_the_plane_before_it_travels() -> None:
     assert motion.end[1].tolist() == [10, 20, 33] and motion.end[2].tolist() == [11, 22, 33]
 
 
-@pytest.mark.parametrize(("text", "way"), [
+@pytest.mark.parametrize(("text", "travel"), [
     ("G99 G81 X50 Z-2 R3 F100\nG80\nG98 X10 G81 Z-5 R3\n", [(10, 3), (10, -5), (10, 3)]),
     ("G99 G81 X50 Z-2 R3 F100\nG98 X10 Z-5\n", [(10, 50), (10, 3), (10, -5), (10, 50)]),
     ("G99 G81 X50 Z-2 R3 F100\nG98 G82 X10 Z-5 R3 P1\n", [(10, 50), (10, 3), (10, -5), (10, 50)]),
@@ -111,12 +111,12 @@ def test_rises_to_the_plane_before_it_travels() -> None:
      [(50, 60), (10, 60), (10, -2), (10, 60), (20, 60), (20, -2), (20, 60)]),
     ("G0 Z1\nG98 G81 X50 Z-2 R3 F100\nX10 R20\nX20 R3\n",
      [(50, 20), (10, 20), (10, -2), (10, 20), (10, 3), (20, 3), (20, -2), (20, 3)])])
-def test_the_level_on_the_way_to_the_next_hole(text: str, way: list[tuple[float, float]]) -> None:
+def test_the_level_on_the_way_to_the_next_hole(text: str, travel: list[tuple[float, float]]) -> None:
     """As LinuxCNC's interpreter goes (rs274 of 2.9): aslant to where the cycle ends unless the tool stands above the plane,
-    to the plane first where the sequence began below it; G80 begins a sequence anew."""
+    to the plane first where the sequence began below it; G80 begins a sequence again."""
     motion, _ = read("G0 X0 Y0 Z50\n" + text)
     found = [(round(float(e[0]) - 10, 3), round(float(e[2]) - 30, 3)) for e in motion.end]
-    assert found[found.index((50, -2)) + 2:] == way
+    assert found[found.index((50, -2)) + 2:] == travel
 
 
 def test_pecking_and_boring() -> None:
@@ -309,7 +309,7 @@ def test_blocks_that_come_nearer_to_the_end_are_the_moves_own() -> None:
 
 
 def test_a_move_is_not_done_before_its_axis_is_there() -> None:
-    """At the end of the way, but 1.5 tolerances short of the direction: the next block ends the move."""
+    """At the end of the path, but 1.5 tolerances short of the direction: the next block ends the move."""
     def at(degrees: float) -> np.ndarray:
         return np.array([np.sin(np.radians(degrees)), 0, np.cos(np.radians(degrees))])
     tip, axis = np.array([[10.0, 0, 0], [10.005, 0, 0]]), np.array([at(4.925), at(5.0)])

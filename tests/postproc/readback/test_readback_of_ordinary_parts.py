@@ -16,7 +16,7 @@ from toolpaths.toolpath import Toolpath
 
 
 def ring() -> Toolpath:
-    """A vertical way in, holes on a cone all round, a vertical way out at the place of the way in: C has gone round."""
+    """A vertical path in, holes on a cone all round, a vertical path out at the place of the approach: C has gone round."""
     lines = ["TOOL PATH/D,TOOL,DR", "TLDATA/DRILL,5,0,75,118,50", "LOAD/TOOL,1", "SPINDL/RPM,1000,CLW", "RAPID",
              "GOTO/0,0,80,0,0,1", "CYCLE/DRILL,RAPTO,2,FEDTO,-8,RTRCTO,20,MANUAL,MMPM,100"]
     for phi in np.arange(8) * np.pi / 4.0:
@@ -41,7 +41,7 @@ def read(lines: list[str]) -> Toolpath:
 
 @pytest.mark.parametrize("controller", ["linuxcnc", "haas-ngc", "fanuc-30i", "heidenhain-tnc640"])
 def test_a_ring_of_tilted_holes_is_no_rewind(controller: str) -> None:
-    """Home and the way out are the same pose with C half a turn on, the whole program between them."""
+    """Home and the retract are the same pose with C half a turn on, the whole program between them."""
     result = good(convert(ring(), "mikron-ucp710", controller))
     assert result.comparison is not None
 
@@ -52,7 +52,7 @@ def test_an_arc_without_a_block_takes_no_other(controller: str) -> None:
     assert result.comparison is not None and result.comparison.worst_tip < 0.01
 
 
-def test_lines_that_nobody_knows_are_not_told() -> None:
+def test_lines_that_nobody_knows_are_not_reported() -> None:
     assert str(Diagnostic(Severity.WARNING, "a.b", "seven", count=7)) == "warning [a.b] seven (7 times)"
     assert str(warning("a.b", "none", file="part.cls", lines=[0])) == "part.cls: warning [a.b] none"
 

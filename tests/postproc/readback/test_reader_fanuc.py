@@ -41,7 +41,7 @@ def test_a_change_of_length_does_not_move_what_g91_leaves_alone() -> None:
     ("G2 X10. Y0. R5.", (5, 0)), ("G2 X6. Y0. R5.", (3, -4)), ("G2 X6. Y0. R-5.", (3, 4)),
     ("G3 X6. Y0. R5.", (3, 4)), ("G3 X6. Y0. R-5.", (3, -4)), ("G2 X10. Y0. I5. J0.", (5, 0))])
 def test_radius_is_the_short_way_and_minus_the_long_one(arc: str, centre: tuple[float, float]) -> None:
-    """A chord of 6 with radius 5 has its middle 4 beside the centre: clockwise short arcs have it on the right."""
+    """A chord of 6 with radius 5 has its middle 4 next to the centre: clockwise short arcs have it on the right."""
     motion = good(FANUC, program(f"G0 X0. Y0. Z0.\n{arc} F100\n"))
     assert (motion.center[1, :2] - [10, 20]).round(9).tolist() == list(centre)
 
@@ -149,12 +149,12 @@ def test_a_fault_in_another_file_points_there() -> None:
     assert [(d.code, d.file, list(d.lines)) for d in found] == [("gcode.unknown_code", "O78.nc", [3])]
 
 
-def test_files_beside_a_program(tmp_path: Path) -> None:
+def test_files_next_to_a_program(tmp_path: Path) -> None:
     for name in ("MAIN.nc", "o0077.NC"):
         (tmp_path / name).write_bytes(b"%\nO0077\nX3.\nM99\n%\n")
-    beside = NeighbourFiles(tmp_path / "MAIN.nc")
-    assert list(beside) == ["o0077.NC"] and len(beside) == 1 and "MAIN.nc" not in beside
-    motion = good(FANUC, program("G0 X0. Y0. Z0.\nM98 P77\n"), others=beside)
+    adjacent = NeighbourFiles(tmp_path / "MAIN.nc")
+    assert list(adjacent) == ["o0077.NC"] and len(adjacent) == 1 and "MAIN.nc" not in adjacent
+    motion = good(FANUC, program("G0 X0. Y0. Z0.\nM98 P77\n"), others=adjacent)
     assert words(motion)[-1] == [3, 0, 0]
 
 
@@ -196,7 +196,7 @@ def test_smoothing_of_both() -> None:
     assert np.isnan(motion.blend[0]) and motion.blend[1:].tolist() == [0.005, np.inf]
 
 
-def test_work_offsets_are_told_apart() -> None:
+def test_work_offsets_are_distinguished() -> None:
     assert good(FANUC, program("G0 X0.\nG54.1 P2\nX1.\nG57\nX2.\n")).offset.tolist() == [54, 1002, 57]
     assert good(HAAS, program("G0 X0.\nG154 P2\nX1.\n")).offset.tolist() == [54, 1002]
 

@@ -154,7 +154,7 @@ def test_points_of_a_plane_are_where_its_frame_has_them(dialect: str, name: str,
 
 
 @pytest.mark.parametrize("dialect", [FANUC, SIEMENS])
-def test_zero_of_a_plane_beside_that_of_the_work_offset(dialect: str) -> None:
+def test_zero_of_a_plane_next_to_that_of_the_work_offset(dialect: str) -> None:
     """G68.2 X Y Z, _X0 _Y0 _Z0 count in the work offset, _X1 _Y1 _Z1 in the plane."""
     name, rotary = "mikron-ucp710", {"A": -30.0, "C": 40.0}
     r, text = matrix_of(name, rotary), in_plane(dialect, name, rotary)
@@ -191,7 +191,7 @@ def test_tip_words_are_the_tip_whatever_the_rotary_axes_do(dialect: str, name: s
 @pytest.mark.parametrize("dialect", [FANUC, HAAS, SIEMENS, TNC])
 @pytest.mark.parametrize(("name", "rotary"), TABLES)
 def test_three_laws_agree_between_the_ends_too(dialect: str, name: str, rotary: dict[str, float]) -> None:
-    """At standing rotary axes the way between two points is the same by every law."""
+    """At standing rotary axes the path between two points is the same by every law."""
     held = control(name)
     plane = good(dialect, in_plane(dialect, name, rotary), name)
     n = len(PLANE_POINTS)
@@ -199,9 +199,9 @@ def test_three_laws_agree_between_the_ends_too(dialect: str, name: str, rotary: 
     by_tips = good(dialect, by_tip(dialect, tips, [rotary] * n), name)
     axes = good(dialect, by_axes(dialect, name, plane.end[-n:].copy(), held.work_offset), name)
     for t in (0.3, 0.7, 1.0):
-        ways = [look(m, held).poses(m, np.arange(len(m) - n + 1, len(m)), t) for m in (plane, by_tips, axes)]
-        for tip, axis in ways[1:]:
-            assert np.abs(tip - ways[0][0]).max() < 2e-5 and angle(axis, ways[0][1]).max() < 1e-7
+        travels = [look(m, held).poses(m, np.arange(len(m) - n + 1, len(m)), t) for m in (plane, by_tips, axes)]
+        for tip, axis in travels[1:]:
+            assert np.abs(tip - travels[0][0]).max() < 2e-5 and angle(axis, travels[0][1]).max() < 1e-7
 
 
 @pytest.mark.parametrize("dialect", [FANUC, HAAS, SIEMENS, TNC])
@@ -221,14 +221,14 @@ def test_between_two_turned_poses_the_tip_runs_straight_by_tip_and_not_by_axes(d
 
 @pytest.mark.parametrize("dialect", [FANUC, SIEMENS, TNC])
 @pytest.mark.parametrize(("name", "rotary"), TABLES)
-def test_a_plane_beside_the_rotary_position_is_an_error(dialect: str, name: str, rotary: dict[str, float]) -> None:
+def test_a_plane_next_to_the_rotary_position_is_an_error(dialect: str, name: str, rotary: dict[str, float]) -> None:
     assert set(faults(dialect, in_plane(dialect, name, rotary, off=0.2), name)) == {"gcode.plane_pose"}
     assert faults(dialect, in_plane(dialect, name, rotary, off=1e-3), name) == {}
 
 
 @pytest.mark.parametrize("dialect", [FANUC, SIEMENS, TNC])
 def test_a_plane_with_the_tool_along_z_still_says_how_its_table_stands(dialect: str) -> None:
-    """With the tool along C the plane tells C: a plane that is not turned as the table is another one."""
+    """With the tool along C the plane says C: a plane that is not turned as the table is another one."""
     assert faults(dialect, in_plane(dialect, "mikron-ucp710", {"A": 0.0, "C": 40.0}), "mikron-ucp710") == {}
     spoilt = in_plane(dialect, "mikron-ucp710", {"A": 0.0, "C": 40.0}).replace(" C40", " C41").replace(" C+40", " C+41")
     assert set(faults(dialect, spoilt, "mikron-ucp710")) == {"gcode.plane_pose"}
@@ -267,7 +267,7 @@ def test_arcs_and_cycles_run_in_the_plane() -> None:
     r = matrix_of(name, rotary)
     held = control(name)
     middle, _ = look(motion, held).poses(motion, np.array([3]), 0.5)
-    assert np.abs((middle[0] - np.array(ORIGIN)) @ r - [-5, 0, 5]).max() < 1e-5, "half way round from -Z': Z towards X"
+    assert np.abs((middle[0] - np.array(ORIGIN)) @ r - [-5, 0, 5]).max() < 1e-5, "half path round from -Z': Z towards X"
     tip, _ = tips_of(motion, name)
     assert (tip[4:] @ r).round(4).tolist() == [[3, 4, 10], [3, 4, 2], [3, 4, -6], [3, 4, 10]]
     assert motion.hole.tolist() == [False] * 4 + [True] * 4
@@ -296,7 +296,7 @@ def shifted(kin: Kinematics) -> Kinematics:
 
 
 def test_dog_legs_bend_in_joints_but_not_under_the_tip_law() -> None:
-    """Each axis runs at its own speed until it is there; half the time of the longest is half its way only."""
+    """Each axis runs at its own speed until it is there; half the time of the longest is half its path only."""
     name = "mikron-ucp710"
     held = control(name, rapids="dog-leg")
     speed = held.machine.limits.velocity

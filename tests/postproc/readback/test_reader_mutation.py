@@ -25,7 +25,7 @@ COUNT = 6
 
 @cache
 def result_of(file: str, controller: str) -> PostResult:
-    """The pivots of the machine are beside its origin, so that words mean other positions under every law."""
+    """The pivots of the machine are next to its origin, so that words mean other positions under every law."""
     return sample(file, "trunnion-bc", controller)
 
 
@@ -61,7 +61,7 @@ def changed(lines: list[str], i: int, block: str | None) -> tuple[str, list[str]
 
 @pytest.mark.parametrize(("file", "controller"), CASES)
 def test_every_number_of_a_cut_counts(file: str, controller: str) -> None:
-    """0.05 mm or 0.5 degrees beside it, in any word of any cutting block; but not C where the tool stands along it."""
+    """0.05 mm or 0.5 degrees next to it, in any word of any cutting block; but not C where the tool stands along it."""
     result = result_of(file, controller)
     motion, lines = motion_of(result), result.text.splitlines()
     upright = np.abs(motion.end[:, 3]) < 12.0
@@ -100,7 +100,7 @@ def test_every_code_of_a_mode_counts(file: str, controller: str) -> None:
 
 @pytest.mark.parametrize("controller", [FANUC, HAAS, SIEMENS, TNC])
 def test_every_word_of_a_cycle_counts(controller: str) -> None:
-    """Levels, pecks and places of holes 0.05 mm beside them."""
+    """Levels, pecks and places of holes 0.05 mm next to them."""
     result = result_of("five_faces.cls", controller)
     motion, lines = motion_of(result), result.text.splitlines()
     rows = (np.unique(motion.line[motion.hole]) - 1).tolist()

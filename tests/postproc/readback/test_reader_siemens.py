@@ -109,7 +109,7 @@ def test_inches_of_g700() -> None:
     assert words(good(SIEMENS, program("G700 G0 X1\nG710 X1\n")))[0][0] == 25.4
 
 
-def test_work_offsets_are_told_apart() -> None:
+def test_work_offsets_are_distinguished() -> None:
     assert good(SIEMENS, program("G0 X0\nG505\nX1\nG57 X2\n")).offset.tolist() == [54, 505, 57]
 
 

@@ -13,7 +13,7 @@ LISTED = (ROOM / "readback" / "SHARED.md").read_text("utf-8")
 WRITERS = ("compile", "word_rows", "rounding", "feed", "commands", "canned", "cycle_refusals", "sections", "block_delete",
            "coolant",
            "modes", "planes", "zero_entry", "word_arcs", "program", "program_header", "blocks", "split_operations")
-"""stages that a program goes through on its way to the text, next to controllers/ and writing/"""
+"""stages that a program goes through on its path to the text, next to controllers/ and writing/"""
 OTHERS = ("text", "execution", "comparison", "dialects", "cycle_time", "witness", "orientation", "joints", "feedrate",
           "collision",
           "correction", "placement", "proof")

@@ -33,7 +33,7 @@ def verified(result: PostResult, text: str) -> list[str]:
 
 
 def test_haas_has_codes_of_its_own() -> None:
-    """M88, M89 through the tool, M83, M84 air; M7 is the shower, so mist becomes flood and is told."""
+    """M88, M89 through the tool, M83, M84 air; M7 is the shower, so mist becomes flood and is reported."""
     lines = [w for k, one in enumerate(("THRU", "FLOOD", "AIR", "MIST")) for w in (f"COOLNT/{one}", AT[k % 3])]
     result = good(cut("haas-ngc", *lines, "COOLNT/OFF"))
     assert switches(result.text) == ["M88", "M89", "M8", "M9", "M83", "M84", "M8", "M9"]

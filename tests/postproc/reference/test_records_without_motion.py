@@ -102,7 +102,7 @@ def test_a_retract_that_is_not_carried_out_is_no_reason_to_cut_across(record: st
 
 @pytest.mark.parametrize("after", [["RETRCT/OFF", "GOTO/9,9,0"], ["RETRCT"], ["RETRCT", "GOHOME"],
                                    ["RETRCT", "LOADTL/2", "RAPID", "GOTO/9,9,50"]])
-def test_a_retract_that_nothing_is_cut_after_is_told(after: list[str]) -> None:
+def test_a_retract_that_nothing_is_cut_after_is_reported(after: list[str]) -> None:
     result = good(made("SPINDL/RPM,500,CLW", *CUT, *after))
     assert "event.not_carried_out" in codes(result.diagnostics)
 
@@ -169,7 +169,7 @@ def test_a_speed_alone_does_not_start_the_spindle() -> None:
 
 @pytest.mark.parametrize(("word", "code"), [("THRU", "coolant.through"), ("AIR", "coolant.air"), ("TAP", "coolant.word"),
                                             ("STEAM", "coolant.word")])
-def test_coolant_that_the_controller_lacks_is_told(word: str, code: str) -> None:
+def test_coolant_that_the_controller_lacks_is_reported(word: str, code: str) -> None:
     result = good(made("SPINDL/RPM,500,CLW", f"COOLNT/{word}", *CUT))
     assert code in codes(result.diagnostics) and ("M7" if word == "AIR" else "M8") in body(result.text)
 

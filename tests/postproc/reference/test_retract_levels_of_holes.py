@@ -84,7 +84,7 @@ def test_the_cut_begins_where_the_hole_was_left_to(kind: str, out: str, between:
 @pytest.mark.parametrize(("kind", "out", "control"), [
     ("DRILL", "RTRCTO,10,", "fanuc-30i"), ("BORE", "RTRCTO,10,", "haas-ngc"), ("BORE", "RTRCTO,AUTO,", "linuxcnc")])
 def test_a_cut_along_the_axis_of_the_hole_is_no_way_out_of_it(kind: str, out: str, control: str, cut: str) -> None:
-    """Up, down and back into the hole: the rapid of the way out counts with the hole, the rest is a cut at its own feed."""
+    """Up, down and back into the hole: the rapid of the retract counts with the hole, the rest is a cut at its own feed."""
     result = converted(cl(kind, out, STATES, cut + CUT), control)
     assert result.ok, [str(d) for d in result.diagnostics]
 

@@ -42,7 +42,7 @@ def said(result: postproc.PostResult, code: str) -> Diagnostic:
 
 
 def blocks_of(result: postproc.PostResult) -> list[str]:
-    """The program without the line of its header that tells one set-up from another."""
+    """The program without the line of its header that says one set-up from another."""
     return [row for row in result.text.splitlines() if "fingerprint of the set-up" not in row]
 
 
@@ -144,7 +144,7 @@ def test_a_tool_that_is_never_loaded_is_not_numbered() -> None:
     assert "EM6 (T2)" in found.message
 
 
-def test_names_that_the_file_does_not_have_are_told() -> None:
+def test_names_that_the_file_does_not_have_are_reported() -> None:
     found = said(converted(TWO, of=setup(tool_numbers={**NAMES, "BALL8": 3})), "setup.tool_name_unused")
     assert "BALL8" in found.message and "EM12, EM6" in found.hint
 
@@ -158,7 +158,7 @@ def test_a_selected_tool_is_that_which_is_loaded_next() -> None:
 @pytest.mark.parametrize(("controller", "register", "code", "severity"), [
     ("siemens-840d", 1, "D1", Severity.INFO), ("siemens-840d", 20, "D1", Severity.WARNING),
     ("heidenhain-tnc640", 1, "TOOL CALL 10", Severity.WARNING), ("heidenhain-tnc640", 3, "TOOL CALL 10", Severity.WARNING)])
-def test_a_register_that_the_controller_does_not_have_is_told(controller: str, register: int, code: str,
+def test_a_register_that_the_controller_does_not_have_is_reported(controller: str, register: int, code: str,
                                                               severity: Severity, tmp_path: Path) -> None:
     of = setup(tools={"10": {"gauge_length": 70.0}})
     text = HEAD.replace("LOADTL/1", f"LOADTL/10,ADJUST,{register}") + CUT
@@ -186,7 +186,7 @@ def test_two_registers_of_one_tool_are_refused_where_it_has_one_length(controlle
 
 
 @pytest.mark.parametrize("controller", ["siemens-840d", "heidenhain-tnc640"])
-def test_the_tools_own_number_as_register_is_nothing_to_tell(controller: str) -> None:
+def test_the_tools_own_number_as_register_is_nothing_to_report(controller: str) -> None:
     result = converted(HEAD.replace("LOADTL/1", "LOADTL/1,ADJUST,1") + CUT, controller=controller)
     assert not errors(result) and "tool.register" not in {d.code for d in result.diagnostics}
 
@@ -233,7 +233,7 @@ def test_a_cycle_that_cannot_be_written_names_the_reason(text: str, controller: 
     assert [w for w in reasons if w in found.message] == [w for w in reasons if w in reason]
 
 
-def test_a_length_beside_the_tool_is_no_register() -> None:
+def test_a_length_next_to_the_tool_is_no_register() -> None:
     result = converted(HEAD.replace("LOADTL/1", "LOADTL/1,LENGTH,120") + CUT)
     assert not errors(result) and "G43 H1" in result.text.splitlines()
     assert "gauge length of tool 1 in the set-up" in said(result, "cl.tool-length").hint

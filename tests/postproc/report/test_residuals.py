@@ -38,13 +38,13 @@ def field(sample: str, machine: str, setup: SetupFile, **options: object) -> tup
     result = postproc.convert(path, machine, "linuxcnc", setup=setup, diagnostics=found,
                               options=Options(error_model=f"samples/errors/{machine}.toml",
                                               **options))  # type: ignore[arg-type]
-    told = residuals(result)
-    assert result.ok and told is not None, [str(d) for d in result.diagnostics]
-    return result, told
+    noted = residuals(result)
+    assert result.ok and noted is not None, [str(d) for d in result.diagnostics]
+    return result, noted
 
 
 def deviation(result: PostResult, q: Floats, machine: str, length: float) -> Floats:
-    """(N, 6) of the machine with errors at joints from the nominal one, by mean ways, in the frame of the part."""
+    """(N, 6) of the machine with errors at joints from the nominal one, by mean paths, in the frame of the part."""
     kinematics = result.machine.kinematics.with_tool(length)
     actual, wanted = load(f"samples/errors/{machine}.toml", result.machine).on(kinematics), np.hstack(kinematics.forward(q))
     off = np.hstack(actual.aim(actual.coordinates(q, wanted), np.zeros(q.shape))) - wanted
@@ -52,38 +52,38 @@ def deviation(result: PostResult, q: Floats, machine: str, length: float) -> Flo
 
 
 def test_the_field_is_that_of_the_machine_in_the_frame_of_the_part() -> None:
-    result, told = field("pocket.cls", "uranesx", turned("delta"))
+    result, noted = field("pocket.cls", "uranesx", turned("delta"))
     lengths = {tool.gauge_length for tool in result.setup.tools.values()}
-    off = np.min([np.abs(deviation(result, told.q, "uranesx", float(x or 0.0)) - told.before).max(axis=1)
+    off = np.min([np.abs(deviation(result, noted.q, "uranesx", float(x or 0.0)) - noted.before).max(axis=1)
                   for x in lengths], axis=0)
     assert off.max() < 1e-9
-    assert np.abs(told.before[:, :2]).min(axis=0).max() > 2e-3  # along both: a turn left out would show
-    left = told.before[:, 3:] - told.after[:, 3:]
-    assert np.linalg.norm(told.after[:, 3:], axis=1).min() > 15.0 * ARCSEC > 20.0 * np.abs(left).max()
+    assert np.abs(noted.before[:, :2]).min(axis=0).max() > 2e-3  # along both: a turn left out would show
+    left = noted.before[:, 3:] - noted.after[:, 3:]
+    assert np.linalg.norm(noted.after[:, 3:], axis=1).min() > 15.0 * ARCSEC > 20.0 * np.abs(left).max()
     assert result.toolpath is not None
-    assert np.allclose(told.tip[:, :2], result.toolpath.tip[np.searchsorted(result.toolpath.line, told.line), :2])
+    assert np.allclose(noted.tip[:, :2], result.toolpath.tip[np.searchsorted(result.toolpath.line, noted.line), :2])
 
 
 def test_the_worst_are_those_of_the_summary() -> None:
     setup, _ = load_setup("samples/tools.setup.toml")
     assert setup is not None
-    result, told = field("blade.cls", "mikron-ucp710", setup)
+    result, noted = field("blade.cls", "mikron-ucp710", setup)
     proof = after_formatting(result)
-    assert proof is not None and result.compensation is not None and len(told.line) == len(proof.points)
-    assert np.allclose(np.linalg.norm(told.after[:, :3], axis=1), proof.tip, atol=1e-12)
-    assert np.allclose(np.linalg.norm(told.after[:, 3:], axis=1), proof.axis, rtol=1e-3, atol=1e-8)
-    assert np.linalg.norm(told.before[:, :3], axis=1).max() == pytest.approx(result.compensation.tip_before, rel=0.02)
+    assert proof is not None and result.compensation is not None and len(noted.line) == len(proof.points)
+    assert np.allclose(np.linalg.norm(noted.after[:, :3], axis=1), proof.tip, atol=1e-12)
+    assert np.allclose(np.linalg.norm(noted.after[:, 3:], axis=1), proof.axis, rtol=1e-3, atol=1e-8)
+    assert np.linalg.norm(noted.before[:, :3], axis=1).max() == pytest.approx(result.compensation.tip_before, rel=0.02)
 
 
 def test_smoothed_points_are_the_wanted_ones() -> None:
     setup, _ = load_setup("samples/tools.setup.toml")
     assert setup is not None
-    result, told = field("bicubic.cls", "mikron-ucp710", setup, smooth=True)
-    assert np.linalg.norm(told.after[:, :3], axis=1).max() <= told.tip_bound < 6e-4
+    result, noted = field("bicubic.cls", "mikron-ucp710", setup, smooth=True)
+    assert np.linalg.norm(noted.after[:, :3], axis=1).max() <= noted.tip_bound < 6e-4
     assert "geometric_errors.bound" not in {d.code for d in result.diagnostics}
 
 
-def test_table_and_drawing_are_written_beside_the_program(tmp_path: Path) -> None:
+def test_table_and_drawing_are_written_next_to_the_program(tmp_path: Path) -> None:
     names = [tmp_path / "r.csv", tmp_path / "r.svg", tmp_path / "r.png"]
     run = CliRunner().invoke(app, ["convert", "samples/tool_axis_tour.apt", "-m", "mikron-ucp710", "-c", "fanuc-30i", "-o",
                                    str(tmp_path / "a.nc"), "--error-model", "samples/errors/mikron-ucp710.toml",
@@ -108,12 +108,12 @@ def test_without_a_field_nothing_is_written(tmp_path: Path) -> None:
     assert not (tmp_path / "a.ngc").exists() and not (tmp_path / "r.csv").exists()
 
 
-@pytest.mark.parametrize(("more", "told"), [
+@pytest.mark.parametrize(("more", "noted"), [
     (["--residuals", "r.csv"], "without --error-model"),
     (["--error-model", "samples/errors/uranesx.toml", "--residuals", "r.csv", "--residuals", "r.txt"], "neither")])
-def test_wrong_use(more: list[str], told: str) -> None:
+def test_wrong_use(more: list[str], noted: str) -> None:
     run = CliRunner().invoke(app, ["convert", "samples/pocket.cls", "-m", "uranesx", "-c", "linuxcnc", "-o", "a.ngc", *more])
-    assert run.exit_code == 2 and told in " ".join(run.output.split())
+    assert run.exit_code == 2 and noted in " ".join(run.output.split())
 
 
 def test_a_residual_file_replaces_no_other(tmp_path: Path) -> None:
@@ -126,7 +126,7 @@ def test_a_residual_file_replaces_no_other(tmp_path: Path) -> None:
 def test_an_ending_that_is_none() -> None:
     setup, _ = load_setup("samples/delta.setup.toml")
     assert setup is not None
-    result, told = field("pocket.cls", "uranesx", setup)
+    result, noted = field("pocket.cls", "uranesx", setup)
     with pytest.raises(ValueError, match="figure format"):
         contents(result, [".pdf"])
-    assert UM < told.tip_bound * 10.0 < 10.0 * UM and told.axis_bound > DEG / 3600.0
+    assert UM < noted.tip_bound * 10.0 < 10.0 * UM and noted.axis_bound > DEG / 3600.0

@@ -53,7 +53,7 @@ def cuts(result: PostResult) -> np.ndarray:
 @pytest.mark.parametrize("name", ["mikron-ucp710", "head-table"])
 @pytest.mark.parametrize("turn", [20.0, -35.0])
 def test_turning_the_part_about_c_changes_only_c(name: str, turn: float) -> None:
-    """The table's C line is the z axis of the table frame: C goes the other way by the same angle."""
+    """The table's C line is the z axis of the table frame: C goes in the other direction by the same angle."""
     a = np.radians(turn)
     turned = setup(part={"x_axis": [np.cos(a), np.sin(a), 0], "y_axis": [-np.sin(a), np.cos(a), 0]})
     straight, moved = (cuts(good(convert(toolpath(*spiral()), name, setup=s))) for s in (setup(), turned))

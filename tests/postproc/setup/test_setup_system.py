@@ -56,9 +56,9 @@ def test_the_words_are_those_of_the_system_alone(controller: str, system: bool |
 
 def test_without_it_the_hints_of_travel_errors_name_it() -> None:
     result = convert(path(LINES), "mikron-ucp710", "linuxcnc", setup())
-    told = [d for d in result.diagnostics if d.severity is Severity.ERROR]
-    assert told and all(d.code.startswith(("travel.", "reach.")) for d in told)
-    assert all('MSYS 1 leans by 180 degrees' in d.hint and '[part] system = "MSYS 1"' in d.hint for d in told)
+    noted = [d for d in result.diagnostics if d.severity is Severity.ERROR]
+    assert noted and all(d.code.startswith(("travel.", "reach.")) for d in noted)
+    assert all('MSYS 1 leans by 180 degrees' in d.hint and '[part] system = "MSYS 1"' in d.hint for d in noted)
 
 
 @pytest.mark.parametrize(("part", "named"), [
@@ -67,8 +67,8 @@ def test_without_it_the_hints_of_travel_errors_name_it() -> None:
 def test_a_system_far_away_is_named_where_part_does_nothing_about_it(part: dict[str, object], named: bool) -> None:
     lines = [line.replace(MSYS, "MSYS/1500,0,0,1,0,0,0,1,0") for line in LINES]
     result = convert(path(lines), "mikron-ucp710", "linuxcnc", setup(**part))
-    told = [d for d in result.diagnostics if d.severity is Severity.ERROR]
-    assert told and all(("lies 15" in d.hint and 'system = "MSYS 1"' in d.hint) == named for d in told)
+    noted = [d for d in result.diagnostics if d.severity is Severity.ERROR]
+    assert noted and all(("lies 15" in d.hint and 'system = "MSYS 1"' in d.hint) == named for d in noted)
 
 
 def test_files_without_a_system_of_their_own_are_left_alone() -> None:
@@ -103,9 +103,9 @@ def test_a_system_that_the_file_has_not_is_refused(tmp_path: Path) -> None:
     file = tmp_path / "s.toml"
     file.write_text('[part]\norigin = [1, 2, 3]\nsystem = "MSYS 7"\n')
     result = postproc.convert(path(LINES), machine("mikron-ucp710"), setup=str(file))
-    told = [d for d in result.diagnostics if d.severity is Severity.ERROR]
-    assert [(d.code, d.file, d.lines) for d in told] == [("setup.system", str(file), (3,))]
-    assert "MSYS 7" in told[0].message and "MSYS 1" in told[0].hint
+    noted = [d for d in result.diagnostics if d.severity is Severity.ERROR]
+    assert [(d.code, d.file, d.lines) for d in noted] == [("setup.system", str(file), (3,))]
+    assert "MSYS 7" in noted[0].message and "MSYS 1" in noted[0].hint
     for bad in ('""', "3", "[1]"):
         file.write_text(f"[part]\nsystem = {bad}\n")
         assert load_setup(file)[0] is None
@@ -137,7 +137,7 @@ def test_the_sample_is_converted_verified_and_timed(tmp_path: Path) -> None:
     assert plain.exit_code == 1 and 'system = "MSYS 1"' in plain.stderr
 
 
-def test_inspect_tells_the_systems() -> None:
+def test_inspect_reports_the_systems() -> None:
     text = CliRunner().invoke(app, ["inspect", str(FOLDER / "upside_down.cls")]).stdout
     assert "system MSYS 1: origin (393, -297, 3) mm, turned by 180.00 degrees, its z by 180.00" in text
     text = CliRunner().invoke(app, ["inspect", str(SAMPLES / "pocket.cls")]).stdout

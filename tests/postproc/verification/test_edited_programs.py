@@ -18,7 +18,7 @@ PART = ["RAPID", "GOTO/0,0,50", "RAPID", "GOTO/0,0,2", "FEDRAT/MMPM,200", "GOTO/
         "CYCLE/DEEP,DEPTH,9,MMPM,100,CLEAR,3,STEP,4", "GOTO/5,5,0", "GOTO/15,5,0", "CYCLE/OFF",
         "CYCLE/TAP,DEPTH,8,MMPR,1,CLEAR,3", "GOTO/25,5,0", "CYCLE/OFF", "RAPID", "GOTO/0,0,50"]
 MOST_TIMED, MOST_VERIFIED = 2, 1
-"""blocks of each program that are changed here, each in eight ways"""
+"""blocks of each program that are changed here, each in eight paths"""
 
 
 @pytest.fixture(scope="module")

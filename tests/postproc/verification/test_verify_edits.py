@@ -74,7 +74,7 @@ def codes(diagnostics: list[Diagnostic], severity: Severity = Severity.ERROR) ->
 
 
 @pytest.mark.parametrize("controller", NAMES)
-def test_a_program_of_our_own_has_nothing_to_be_told(controller: str) -> None:
+def test_a_program_of_our_own_has_nothing_to_be_reported(controller: str) -> None:
     result = part(controller)
     assert result.job is not None
     assert [d for d in read_back(result.text.encode(), result.job, "part.apt")[1] if d.severity is not Severity.INFO] == []
@@ -107,8 +107,8 @@ CHANGES = {"linuxcnc": ("G53 G0 Z400\n", "M5\n", "M9\n"), "fanuc-30i": ("G53 G0 
 def test_tools_change_at_home_with_spindle_and_coolant_off(controller: str) -> None:
     home, stop, dry = CHANGES[controller]
     for old, at, what in ((home, 1, "away from home"), (stop, 0, "spindle turns"), (dry, 0, "coolant flows")):
-        told = [d for d in found(part(controller), old, "\n", at) if d.severity is Severity.ERROR]
-        assert told and told[0].code == "verify.tool_change" and what in told[0].message
+        noted = [d for d in found(part(controller), old, "\n", at) if d.severity is Severity.ERROR]
+        assert noted and noted[0].code == "verify.tool_change" and what in noted[0].message
 
 
 @pytest.mark.parametrize("controller", ["fanuc-30i", "siemens-840d", "heidenhain-tnc640", "haas-ngc"])
@@ -126,8 +126,8 @@ def test_tools_change_at_home_in_tilted_programs_too(controller: str) -> None:
 
 @pytest.mark.parametrize("controller", ["linuxcnc", "fanuc-30i", "haas-ngc"])
 def test_the_register_of_cutter_compensation_is_that_of_cutcom(controller: str) -> None:
-    told = [d for d in found(part(controller), "G41 D1", "G41 D2") if d.severity is Severity.ERROR]
-    assert [d.code for d in told] == ["verify.state"] and "is 2, it should be 1" in told[0].message
+    noted = [d for d in found(part(controller), "G41 D1", "G41 D2") if d.severity is Severity.ERROR]
+    assert [d.code for d in noted] == ["verify.state"] and "is 2, it should be 1" in noted[0].message
 
 
 @pytest.mark.parametrize(("controller", "old", "new"), [
@@ -146,14 +146,14 @@ def test_a_rest_added_to_pecks_is_found() -> None:
 @pytest.mark.parametrize(("controller", "old", "new"), [
     ("linuxcnc", "Y30\n", "Y30\nM0\n"), ("fanuc-30i", "Y30.\n", "Y30.\nM0\n"), ("haas-ngc", "Y30.\n", "Y30.\nM1\n"),
     ("siemens-840d", "Y30\n", "Y30\nM0\n"), ("heidenhain-tnc640", "L Y+30\n", "L Y+30\nSTOP\n")])
-def test_stops_that_are_added_are_told(controller: str, old: str, new: str) -> None:
+def test_stops_that_are_added_are_reported(controller: str, old: str, new: str) -> None:
     assert "verify.stop" in codes(found(part(controller), old, new), Severity.WARNING)
 
 
 @pytest.mark.parametrize("controller", NAMES)
-def test_feeds_cut_to_a_quarter_are_told_once(controller: str) -> None:
-    told = [d for d in found(part(controller), "F800", "F200") if d.code == "verify.slow"]
-    assert len(told) == 1 and told[0].severity is Severity.ERROR and told[0].count == 3 and "0.25" in told[0].message
+def test_feeds_cut_to_a_quarter_are_reported_once(controller: str) -> None:
+    noted = [d for d in found(part(controller), "F800", "F200") if d.code == "verify.slow"]
+    assert len(noted) == 1 and noted[0].severity is Severity.ERROR and noted[0].count == 3 and "0.25" in noted[0].message
 
 
 def test_the_first_line_names_the_cause() -> None:
@@ -172,19 +172,20 @@ def test_messages_speak_the_words_of_the_control() -> None:
 
 
 def test_corrections_of_the_header_are_asked_for_first() -> None:
-    told = found(part("linuxcnc"), "(feed mode auto)", "(geometric errors E: corrected in this program; not by the control)",
-                 gcode="p.ngc")
-    assert told[0].code == "verify.error_model" and codes(told) == ["verify.error_model"]
+    noted = found(part("linuxcnc"), "(feed mode auto)",
+                  "(geometric errors E: corrected in this program; not by the control)",
+                  gcode="p.ngc")
+    assert noted[0].code == "verify.error_model" and codes(noted) == ["verify.error_model"]
 
 
 def test_unknown_codes_name_file_line_and_way_out() -> None:
-    told = [d for d in found(part("fanuc-30i"), "M29 S400", "M88\nM29 S400") if d.code == "gcode.unknown_code"]
-    assert told[0].file == "test.apt" and "of the program" in told[0].message and "program.passive" in told[0].hint
+    noted = [d for d in found(part("fanuc-30i"), "M29 S400", "M88\nM29 S400") if d.code == "gcode.unknown_code"]
+    assert noted[0].file == "test.apt" and "of the program" in noted[0].message and "program.passive" in noted[0].hint
 
 
 def test_a_program_that_is_not_proved_has_no_deviation_to_show() -> None:
     result = part("fanuc-30i")
     assert result.job is not None
-    comparison, told = read_back(result.text.replace("F800.", "F1600.").encode(), result.job, "part.apt")
-    text = verify_text(VerifyResult("p.nc", comparison, tuple(told)))
+    comparison, noted = read_back(result.text.replace("F800.", "F1600.").encode(), result.job, "part.apt")
+    text = verify_text(VerifyResult("p.nc", comparison, tuple(noted)))
     assert text.startswith("NOT proved") and "tip" not in text

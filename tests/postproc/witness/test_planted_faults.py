@@ -184,7 +184,7 @@ def events(change: Callable[[str, tuple[Any, ...]], tuple[str, tuple[Any, ...]] 
 
 
 def moved(rows: dict[int, int | tuple[int, int]]) -> Callable[[Toolpath], Toolpath]:
-    """Rows put where other rows are, or half way between two."""
+    """Rows put where other rows are, or half path between two."""
     def change(path: Toolpath) -> Toolpath:
         tip = path.tip.copy()
         for row, at in rows.items():
@@ -227,7 +227,7 @@ def turned_back(j: Any) -> Any:
     return replace(j, direction=-j.direction) if j.rotary and j.name == "C" else j
 
 
-def beside(j: Any) -> Any:
+def adjacent(j: Any) -> Any:
     return replace(j, point=j.point + np.array([0.1, 0.0, 0.0])) if j.rotary else j
 
 
@@ -270,7 +270,7 @@ def cycle(**change: Callable[[Any], Any]) -> Plant:
     return wrapped(toolpaths.cl.cycles, "_made", spoilt)
 
 
-def other_way(word: str, values: tuple[Any, ...]) -> tuple[str, tuple[Any, ...]]:
+def other_direction(word: str, values: tuple[Any, ...]) -> tuple[str, tuple[Any, ...]]:
     return word, tuple({"CLW": "CCLW"}.get(v, v) for v in values) if word == "SPINDL" else values
 
 
@@ -300,9 +300,9 @@ FAULTS: dict[str, tuple[str, str, str, str, Plant]] = {
     "CSYS ignored": (CREO, "mikron-ucp710", "fanuc-30i", "turned", frame(lambda m: EYE)),
     "CSYS transposed": (CREO, "mikron-ucp710", "fanuc-30i", "turned", frame(lambda m: m.T)),
     "subroutine skipped": (CREO, "mikron-ucp710", "fanuc-30i", "turned", subroutine_skipped),
-    "arcs the other way": (NX, "mill-3axis", "linuxcnc", "plain",
+    "arcs in the other direction": (NX, "mill-3axis", "linuxcnc", "plain",
                            arcs(normal=lambda n: -n, sweep=lambda s: 2.0 * np.pi - s)),
-    "arcs the other way, as lines": (MILLED, "uranesx", "linuxcnc", "delta",
+    "arcs in the other direction, as lines": (MILLED, "uranesx", "linuxcnc", "delta",
                                      arcs(normal=lambda n: -n, sweep=lambda s: 2.0 * np.pi - s)),
     "centre of arcs shifted": (NX, "mill-3axis", "linuxcnc", "plain",
                                 arcs(center=lambda c: c + np.array([-0.05, 0.05, 0.0]))),
@@ -329,14 +329,14 @@ FAULTS: dict[str, tuple[str, str, str, str, Plant]] = {
     "gauge length x 1.001, rods": (MILLED, "h4a-c-table", "linuxcnc", "h4a",
                                    wrapped(Job, "length_of", lambda old, self, n: 1.001 * old(self, n))),
     "rods x 1.0002": (MILLED, "uranesx", "linuxcnc", "delta", wrapped(SliderModel, "build_legs", rods)),
-    "lines of the rotary axes off by 0.1 mm": (FIVE, "mikron-ucp710", "linuxcnc", "turned", joint(beside)),
-    "lines of the rotary axes off, tip modes": (FIVE, "mikron-ucp710", "siemens-840d", "turned", joint(beside)),
-    "C the other way": (FIVE, "mikron-ucp710", "linuxcnc", "turned", joint(turned_back)),
+    "lines of the rotary axes off by 0.1 mm": (FIVE, "mikron-ucp710", "linuxcnc", "turned", joint(adjacent)),
+    "lines of the rotary axes off, tip modes": (FIVE, "mikron-ucp710", "siemens-840d", "turned", joint(adjacent)),
+    "C in the other direction": (FIVE, "mikron-ucp710", "linuxcnc", "turned", joint(turned_back)),
     "part placement transposed": (NX, "mill-3axis", "linuxcnc", "turned",
                                   wrapped(postproc.job.job, "part_placement", transposed)),
     "wrong tool number": (NX, "mill-3axis", "linuxcnc", "turned",
                           path_changed(next_tools)),
-    "spindle the other way": (NX, "mill-3axis", "linuxcnc", "plain", events(other_way)),
+    "spindle in the other direction": (NX, "mill-3axis", "linuxcnc", "plain", events(other_direction)),
     "spindle speed": (NX, "mill-3axis", "linuxcnc", "plain",
                       of_word("SPINDL", lambda v: tuple(2000.0 if x == 3000.0 else x for x in v))),
     "coolant dropped": (NX, "mill-3axis", "linuxcnc", "plain", of_word("COOLNT", lambda v: None)),
@@ -348,7 +348,7 @@ FAULTS: dict[str, tuple[str, str, str, str, Plant]] = {
                                path_changed(lambda p: replace(p, tip=p.tip + np.array([0.0, 0.02, 0.0])))),
     "cut as rapid": (NX, "mill-3axis", "linuxcnc", "plain", path_changed(kinds(6, Kind.RAPID))),
     "rapid as cut": (NX, "mill-3axis", "linuxcnc", "plain", path_changed(kinds(7, Kind.FEED))),
-    "GODLTA the other way": (NX, "mill-3axis", "linuxcnc", "plain",
+    "GODLTA in the other direction": (NX, "mill-3axis", "linuxcnc", "plain",
                              wrapped(toolpaths.cl.assemble, "_add_deltas", delta_turned)),
     "tool axis of all points as the first": (FIVE, "mikron-ucp710", "linuxcnc", "turned", path_changed(
         lambda p: replace(p, axis=np.tile([0.0, 0.0, 1.0], (len(p), 1))))),

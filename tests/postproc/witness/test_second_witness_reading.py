@@ -1,4 +1,4 @@
-"""The witness's reading and kinematics beside the project's own: two ways to one result."""
+"""The witness's reading and kinematics next to the project's own: two paths to one result."""
 
 from __future__ import annotations
 

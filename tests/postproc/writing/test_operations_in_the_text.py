@@ -30,7 +30,7 @@ def two_operations() -> Program:
     ("haas-ngc", ["(FINISH  2 )", "N200 G17 G40 G80 G90 G94"], "G1 X2. F100."),
     ("siemens-840d", ["; finish (2)", "G17 G40 G90 G94"], "G1 X2 F100"),
     ("heidenhain-tnc640", ["* - finish (2)"], "L X+2 R0 F100")])
-def test_modal_codes_are_stated_anew_at_each_operation(controller: str, start: list[str], then: str) -> None:
+def test_modal_codes_are_stated_again_at_each_operation(controller: str, start: list[str], then: str) -> None:
     text = [b for b in blocks(controller, two_operations()) if b != "\0"]
     assert text[-len(start) - 1:] == [*start, then]
 
@@ -126,7 +126,7 @@ def test_klartext_operations_in_files_of_their_own_read_back(tmp_path: Path) -> 
     assert all(text.startswith("0 BEGIN PGM THREE_LAWS_100") for text in result.files.values())
 
 
-def test_the_command_writes_the_files_beside_the_program(tmp_path: Path) -> None:
+def test_the_command_writes_the_files_next_to_the_program(tmp_path: Path) -> None:
     setup, out = tmp_path / "s.toml", tmp_path / "part.mpf"
     setup.write_text((SAMPLES / "tools.setup.toml").read_text() + "\n[output]\nsubprograms = true\n")
     done = CliRunner().invoke(app, ["convert", str(GOLDEN / "three_laws.cls"), "-m", "mikron-ucp710", "-c", "siemens-840d",

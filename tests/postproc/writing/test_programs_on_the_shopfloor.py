@@ -64,7 +64,7 @@ def test_files_bear_the_name_of_the_output(tmp_path: Path, controller: str, file
     assert {file.format(name=name) for name in ("LEFT", "RIGHT")} <= {p.name for p in out.iterdir()}
     figures = json.loads((tmp_path / "s.json").read_text())
     assert figures["files"][0] == str(out / file.format(name="RIGHT")) and len(figures["files"]) == 3
-    assert f"subprograms beside it: {file.format(name='RIGHT')}, " in done.output
+    assert f"subprograms next to it: {file.format(name='RIGHT')}, " in done.output
 
 
 def test_files_of_another_program_are_not_replaced_in_silence(tmp_path: Path) -> None:

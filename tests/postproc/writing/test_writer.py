@@ -62,7 +62,7 @@ def test_shop_file_numbers_blocks_and_sets_decimals(tmp_path: Path) -> None:
     assert not [n for n in numbered if "G53 G0" not in n and re.search(r"[XYZ][\d.-]+ ", n)]
 
 
-def test_too_few_decimals_for_the_tolerance_are_told(tmp_path: Path) -> None:
+def test_too_few_decimals_for_the_tolerance_are_reported(tmp_path: Path) -> None:
     shop = shop_file(tmp_path, "[format]\nlinear_decimals = 1\n")
     result = convert(toolpath("RAPID", "GOTO/0,0,5", "GOTO/1.26,0,5"), "mill-3axis", shop)
     assert "tolerance.rounding" in codes(result.diagnostics) and not result.ok
@@ -72,7 +72,7 @@ def test_too_few_decimals_for_the_tolerance_are_told(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["mikron-ucp710", "head-table", "linuxcnc-xyzac-trt"])
-def test_no_tiny_residue_beside_a_rotary_move(name: str) -> None:
+def test_no_tiny_residue_next_to_a_rotary_move(name: str) -> None:
     """What LinuxCNC would take for the length of an inverse-time block: X, Y, Z steps of a few last decimals."""
     spin = [tilted(30, p) for p in range(0, 60, 3)]
     tips = np.random.default_rng(6).normal(0, 7e-5, (len(spin), 3))

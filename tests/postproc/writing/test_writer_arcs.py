@@ -82,7 +82,7 @@ def test_upright_arcs_use_the_other_planes(normal: list[float], code: str) -> No
         assert np.abs(arc[0] @ n).max() < 1e-3
         assert np.allclose(arc[0][-1], last, atol=1e-3)
         swept = angle(arc[0][:1] / 10, arc[0][-1:] / 10)[0]
-        assert swept < np.pi / 2 + 0.01, "the short way round"
+        assert swept < np.pi / 2 + 0.01, "the short path round"
 
 
 def test_arc_in_a_slanting_plane_becomes_lines() -> None:

@@ -44,9 +44,9 @@ def test_feeds_by_arrays_are_those_of_the_records(form: str, together: int, monk
     for seed in range(25):
         text = text_of(form, np.random.default_rng(seed), () if seed < 3 else ODD[::2] if seed % 2 else ODD)
         path, found = read(text, 1, monkeypatch)
-        wanted, told = read(text, 10**9, monkeypatch)
+        wanted, noted = read(text, 10**9, monkeypatch)
         assert path.equals(wanted) and (path.line == wanted.line).all()
-        assert [str(d) for d in found] == [str(d) for d in told]
+        assert [str(d) for d in found] == [str(d) for d in noted]
         used += seed < 3 and len({*path.feed[np.isfinite(path.feed)].tolist()}) > 20
     assert used == 3
 

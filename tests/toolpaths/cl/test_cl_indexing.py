@@ -37,8 +37,8 @@ def truth() -> np.ndarray:
     return np.array(found)
 
 
-def path_of(manner: m.Manner, *changes: tuple[str, str]) -> ReadResult:
-    text = m.text_of(manner)
+def path_of(run_options: m.Manner, *changes: tuple[str, str]) -> ReadResult:
+    text = m.text_of(run_options)
     for old, new in changes:
         assert old in text
         text = text.replace(old, new, 1)

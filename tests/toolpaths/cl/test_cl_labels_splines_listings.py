@@ -68,11 +68,11 @@ def test_motions_of_other_processors_are_refused_wherever_they_stand(word: str, 
     assert errors(found) == [("cl.unsupported-motion", (4 + at,))] and codes(found) == ["cl.unsupported-motion"]
 
 
-@pytest.mark.parametrize(("record", "told"), [("INDEX/1,NOMORE", []), ("TRACUT/NOMORE", []),
-                                              ("COPY/1,SAME,NOMORE", ["COPY"]), ("INDEX/1", ["INDEX"])])
-def test_the_end_of_a_copy_alone_copies_nothing(record: str, told: list[str]) -> None:
+@pytest.mark.parametrize(("record", "noted"), [("INDEX/1,NOMORE", []), ("TRACUT/NOMORE", []),
+                                               ("COPY/1,SAME,NOMORE", ["COPY"]), ("INDEX/1", ["INDEX"])])
+def test_the_end_of_a_copy_alone_copies_nothing(record: str, noted: list[str]) -> None:
     found = read_bytes(f"{ISO}GOTO/0,0,0\n{record}\nGOTO/1,0,0\n")
-    assert [d.message.split()[0] for d in found.diagnostics if d.severity is Severity.ERROR] == told
+    assert [d.message.split()[0] for d in found.diagnostics if d.severity is Severity.ERROR] == noted
 
 
 @pytest.mark.parametrize("knots", ["KNOT/0.25,0.5,0.75,\n  1.0", "KNOT/0.25\n0.5,0.75\n$$ end\n1.0",
@@ -94,16 +94,16 @@ def test_three_numbers_after_six_are_along_the_local_z_in_creo() -> None:
     np.testing.assert_allclose(found.toolpath.tip[:2], [[5, 0, 0], [5, -8, 6]], atol=1e-12)
 
 
-@pytest.mark.parametrize(("head", "after", "axis", "told"), [
+@pytest.mark.parametrize(("head", "after", "axis", "noted"), [
     (ISO, "GOTO/1,0,0", (0, 0.6, 0.8), ["cl.multax-off"]),
     (ISO, "GOTO/1,0,0,0,0,1", (0, 0, 1), []),
     (ISO, "TLAXIS/0,0,1\nGOTO/1,0,0", (0, 0, 1), []),
     ("$$ CATIA APT\nUNITS/MM\nFEDRAT/600\n", "GOTO/1,0,0", (0, 0.6, 0.8), []),
 ])
-def test_the_axis_after_multax_off_is_told_where_no_document_says_it(head: str, after: str, axis: tuple[float, ...],
-                                                                     told: list[str]) -> None:
+def test_the_axis_after_multax_off_is_reported_where_no_document_says_it(head: str, after: str, axis: tuple[float, ...],
+                                                                     noted: list[str]) -> None:
     found = read_bytes(f"{head}MULTAX/ON\nGOTO/0,0,0,0,.6,.8\nMULTAX/OFF\n{after}\n")
-    assert codes(found) == told
+    assert codes(found) == noted
     assert found.toolpath.axis[-1].tolist() == list(axis)
 
 
@@ -126,13 +126,13 @@ def test_what_is_no_length_register_is_refused(record: str) -> None:
     assert errors(read_bytes(f"{ISO}{record}\nGOTO/0,0,0\n")) == [("cl.length-register", (3,))]
 
 
-@pytest.mark.parametrize(("tail", "told"), [
+@pytest.mark.parametrize(("tail", "noted"), [
     ("END-OF-PATH\nTool Path Listing has 5 lines.", []), ("END-OF-PATH\r\n\r\nTool Path Listing has 5 lines.", []),
     ("END-OF-PATH\nTOOL PAT", ["cl.cut-off"]), ("GOTO/1,0,0\nGOTO/1 2 3.", ["cl.cut-off"]),
     ("FINI\nPart of GOTO/1,2,3 here", ["cl.cut-off"]),
 ])
-def test_the_text_of_a_listing_behind_its_end_needs_no_line_end(tail: str, told: list[str], tmp_path: Path) -> None:
+def test_the_text_of_a_listing_behind_its_end_needs_no_line_end(tail: str, noted: list[str], tmp_path: Path) -> None:
     file = tmp_path / "part.cls"
     file.write_bytes(f"{NX}GOTO/0,0,0\n{tail}".encode())
     _, diagnostics = toolpaths.read(file)
-    assert [d.code for d in diagnostics if d.code == "cl.cut-off"] == told
+    assert [d.code for d in diagnostics if d.code == "cl.cut-off"] == noted

@@ -171,7 +171,7 @@ def test_wrong_use_raises() -> None:
     ("GOTO / 7, 8, 9, $$ half a note $\n", 1), ("$$-> NOTE / 1, $\n 2, 3\n", 0), ("GOTO / 7, $\n8, $\n9\n", 1),
 ])
 def test_continued_points_are_read_at_once_or_one_by_one_with_the_same_result(spoilt: str, rows: int) -> None:
-    """One line that is no plain continuation sends its block to the slow way: rows and lines must not change."""
+    """One line that is no plain continuation sends its block to the slow path: rows and lines must not change."""
     lines = "".join(f"GOTO / {k}, 2, 3, $\n 0, 0, 1\nGOTO / {k}.5, 2, 3, 0, 0, 1  \nGOTO / {k}, $  \n{k}, 3\n"
                     for k in range(5))
     result = read(HEAD + lines + spoilt + lines)

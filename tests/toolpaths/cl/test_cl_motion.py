@@ -22,7 +22,7 @@ def read(text: str, dialect: str | None = None) -> Toolpath:
     return result.toolpath
 
 
-def test_modal_axis_of_nx_starts_anew_with_each_operation() -> None:
+def test_modal_axis_of_nx_starts_again_with_each_operation() -> None:
     p = read(NX + "GOTO/0,0,0,1,0,0\nGOTO/1,0,0\nGOTO/2,0,0,0,1,0\nGOTO/3,0,0\nEND-OF-PATH\n" + NX + "GOTO/4,0,0\n")
     assert p.axis.tolist() == [[1, 0, 0], [1, 0, 0], [0, 1, 0], [0, 1, 0], [0, 0, 1]]
     assert p.operation.tolist() == [0, 0, 0, 0, 1]
@@ -314,7 +314,7 @@ def test_where_units_come_from() -> None:
     assert units("UNITS/MM\nGOTO/1,2,3\n", units="inch") == ("inch", [("cl.units", "WARNING")])
 
 
-def test_axis_starts_anew_even_without_a_system() -> None:
+def test_axis_starts_again_even_without_a_system() -> None:
     p = read("TOOL PATH/A,TOOL,T\nFEDRAT/MMPM,1\nGOTO/0,0,0,1,0,0\nEND-OF-PATH\nTOOL PATH/B,TOOL,T\nGOTO/1,0,0\n")
     assert p.axis.tolist() == [[1, 0, 0], [0, 0, 1]]
 

@@ -69,12 +69,12 @@ def cycle_diagnostics(words: str) -> list[str]:
     return [d.message for d in read_bytes(text).diagnostics if d.code == "cl.cycle-option"]
 
 
-def test_what_a_cycle_says_and_nothing_does_is_told() -> None:
+def test_what_a_cycle_says_and_nothing_does_is_reported() -> None:
     words = "DRILL,DEPTH,9,MMPM,60,CLEAR,3,RETURN,5"
     assert cycle_diagnostics(words) == []
     for word in ("REPEAT,3", "OFFSET,1,2", "ORIENT,90", "PLUNGE,4", "PARAMS,1,2,3"):
-        told, = cycle_diagnostics(f"{words},{word}")
-        assert told.startswith(f"CYCLE/DRILL: {word.split(',')[0]} ")
+        noted, = cycle_diagnostics(f"{words},{word}")
+        assert noted.startswith(f"CYCLE/DRILL: {word.split(',')[0]} ")
     assert cycle_diagnostics("DRILL,9,60,MMPM,3,20,0") == []
     assert cycle_diagnostics("DEEP,9,60,MMPM,3,20,4") == ["CYCLE/DEEP: 4 is not used"]
 
@@ -104,11 +104,11 @@ def test_taps_pecks_and_dwells() -> None:
     ("CYCLE/DRILL,BRKCHP,RAPTO,3,FEDTO,-5,STEP,2,MMPM,60", None),
     ("CYCLE/FACE,RAPTO,3,FEDTO,-5,MMPM,60,DWELL,REV,4", None),
 ])
-def test_variants_of_cycles_are_carried_out_told_or_refused(record: str, severity: Severity | None) -> None:
+def test_variants_of_cycles_are_carried_out_reported_or_refused(record: str, severity: Severity | None) -> None:
     found = read_bytes(NX + f"RAPID\nGOTO/0,0,9\n{record}\nGOTO/0,0,0\nCYCLE/OFF\nEND-OF-PATH\n")
-    told = [(d.severity, d.code) for d in found.diagnostics if d.severity is not Severity.INFO]
+    noted = [(d.severity, d.code) for d in found.diagnostics if d.severity is not Severity.INFO]
     code = "cl.cycle" if severity is Severity.ERROR else "cl.cycle-option"
-    assert told == ([(severity, code)] if severity else [])
+    assert noted == ([(severity, code)] if severity else [])
     assert (found.toolpath.cycles[0].depth, found.toolpath.cycles[0].clearance) == (5, 3)
 
 
@@ -179,17 +179,17 @@ def test_events_keep_their_words() -> None:
                                   "UNITS/MM\nSPINDL/ 500.0,SFM,CCLW\nGOTO/1,2,3\n",
                                   "TOOLNO/1,TURN,,,80.,$\n5.,ON,0.0,NOTE\nGOTO/1,2,3\n",
                                   "LOADTL/3,ADJUST,9,TURN\nGOTO/1,2,3\n"])
-def test_turning_is_told(text: str) -> None:
+def test_turning_is_reported(text: str) -> None:
     assert [op.turning for op in read(text).operations] == [True]
 
 
 @pytest.mark.parametrize("text", ["SPINDL/ 500.0,SMM,CCLW\nTRNTYP/WORLD,0,0,0\nGOTO/1,2,3\n",
                                   "$$*CATIA0\nSPINDL/ 500.0,SMM,CCLW\n$$ OPERATION NAME : Face.1\nGOTO/1,2,3\n"])
-def test_turning_told_before_its_operation_begins_is_of_that_operation(text: str) -> None:
+def test_turning_reported_before_its_operation_begins_is_of_that_operation(text: str) -> None:
     assert [op.turning for op in read(text).operations] == [True]
 
 
-def test_turning_told_after_the_last_point_is_of_the_last_operation() -> None:
+def test_turning_reported_after_the_last_point_is_of_the_last_operation() -> None:
     p = read("TRNTYP/WORLD,0,0,0\nGOTO/1,2,3\nTRNTYP/WORLD,0,0,0\nGOTO/1,2,3\nSPINDL/ 500.0,SMM,CCLW\nFINI\n")
     assert [op.turning for op in p.operations] == [False, True]
 
@@ -252,7 +252,7 @@ def test_write_to_a_file_and_refusals(tmp_path: Path) -> None:
     assert toolpaths.read(tmp_path / "a.apt")[0].equals(p)
 
 
-def test_progress_is_told() -> None:
+def test_progress_is_reported() -> None:
     seen: list[tuple[int, int]] = []
     read_bytes("GOTO/1,2,3\n" * 10, progress=lambda done, total: seen.append((done, total)))
     assert seen == [(110, 110)]

@@ -23,9 +23,9 @@ ISO = "UNITS/MM\nFEDRAT/600\n"
 def result(text: str, *codes: str) -> ReadResult:
     """The text read without an error; `codes` are the warnings that must come, and no other."""
     found = read_bytes(text, units=None if "UNIT" in text else "mm")
-    told = [d for d in found.diagnostics if d.severity is not Severity.INFO]
-    assert not [str(d) for d in told if d.severity is Severity.ERROR]
-    assert sorted({d.code for d in told}) == sorted(codes), [str(d) for d in told]
+    noted = [d for d in found.diagnostics if d.severity is not Severity.INFO]
+    assert not [str(d) for d in noted if d.severity is Severity.ERROR]
+    assert sorted({d.code for d in noted}) == sorted(codes), [str(d) for d in noted]
     return found
 
 
@@ -137,7 +137,7 @@ def test_nx_pecking_repeated_with_other_depths() -> None:
         ("DEEP", d, 3, None, (20,)) for d in (72, 74.5, 72)]
 
 
-def test_wire_and_programs_of_the_machine_are_told() -> None:
+def test_wire_and_programs_of_the_machine_are_reported() -> None:
     wire = NX.replace("MILL,10,0,50,0,0", "WEDM,0.2,25,0") + "SET/UPPER,25.0,LOWER,0.0\nLOAD/WIRE\nGOTO/1,2,3,0,0,1\n"
     assert len(read(wire, "cl.wire")) == 1
     assert len(read(CREO + "CALSUB/START_PROG\nGOTO / 1,2,3\n", "cl.subprogram")) == 1
@@ -202,7 +202,7 @@ def test_a_tiny_arc_in_the_plane_stays_tiny() -> None:
     assert p.arcs.sweep.tolist() == pytest.approx([3e-5])
 
 
-def test_few_arcs_that_all_sweep_more_than_half_a_turn_are_told() -> None:
+def test_few_arcs_that_all_sweep_more_than_half_a_turn_are_reported() -> None:
     arcs = "".join(f"CIRCLE/0,0,0,0,0,-1,10\nGOTO/{end}\n" for end in ("0,10,0", "-10,0,0", "-6,-8,0"))
     found = result(ISO + "GOTO/10,0,0\n" + arcs.replace("-10,0,0", "-6,8,0"), "cl.arc-sense")
     assert inspect(found)["arcs_over_180_deg"] == 3

@@ -74,10 +74,10 @@ def test_noise_of_the_third_derivative_goes() -> None:
     path = smooth(curves, TOLERANCE)
     assert path is not None
     exact, axis = wave(np.arange(0.0, 80.0, 0.05))
-    way = np.concatenate(([0.0], np.cumsum(np.hypot(np.linalg.norm(np.diff(exact, axis=0), axis=1),
-                                                    TOLERANCE.scale * angle_between(axis[:-1], axis[1:])))))
+    travel = np.concatenate(([0.0], np.cumsum(np.hypot(np.linalg.norm(np.diff(exact, axis=0), axis=1),
+                                                       TOLERANCE.scale * angle_between(axis[:-1], axis[1:])))))
     inner = path.s[200:-200]
-    true = make_interp_spline(way, exact, k=7).derivative(3)(inner)
+    true = make_interp_spline(travel, exact, k=7).derivative(3)(inner)
     noisy = make_interp_spline(path.s, np.concatenate((curves.start[:1], curves.end)), k=7).derivative(3)(inner)
     scale = np.linalg.norm(true, axis=1).max()
     assert np.linalg.norm(third(path, inner, 0.02) - true, axis=1).max() < 0.1 * scale
@@ -133,13 +133,13 @@ def test_arc_stays_an_arc_and_meets_its_line_smoothly() -> None:
     assert 0.0 < off(path, curves, 3001)[0] <= TOLERANCE.tip
 
 
-def test_motion_stops_where_it_turns_back_and_where_it_is_told_to() -> None:
+def test_motion_stops_where_it_turns_back_and_where_it_is_reported_to() -> None:
     back = smooth(chain(np.array([[0.0, 0, 0], [10, 0, 0], [0, 0.5, 0]])), TOLERANCE)
     assert back is not None and back.stops.tolist() == [10.0]
     square = chain(np.array([[0.0, 0, 0], [10, 0, 0], [10, 10, 0]]))
-    told = smooth(square, TOLERANCE, sharpest=0.2)
-    assert told is not None and told.stops.tolist() == [10.0]
-    assert off(told, square, 101)[0] < 1e-13
+    noted = smooth(square, TOLERANCE, sharpest=0.2)
+    assert noted is not None and noted.stops.tolist() == [10.0]
+    assert off(noted, square, 101)[0] < 1e-13
 
 
 def test_points_too_far_apart_for_a_curve_become_lines_inside_the_tolerance() -> None:

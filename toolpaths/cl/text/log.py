@@ -27,7 +27,7 @@ class DiagnosticLog:
         self._entries: dict[tuple[Severity, str, str], _Entry] = {}
 
     def add(self, severity: Severity, code: str, message: str, line: int = 0, hint: str = "", key: str = "") -> None:
-        """Note one problem; `key` tells apart problems of one code that are to be listed apart."""
+        """Note one problem; `key` distinguishes problems of one code that are to be listed apart."""
         entry = self._entries.get((severity, code, key))
         if entry is None:
             entry = self._entries[severity, code, key] = _Entry(severity, code, _short(message), hint)

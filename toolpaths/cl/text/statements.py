@@ -75,7 +75,7 @@ class Statement:
 class StatementList:
     """The slow part of a file in order: statement, its first line, and how many plain points stand before it.
 
-    `first` tells for each different statement (points apart) the line where it stands first. `feeds` holds, by the index of
+    `first` says for each different statement (points apart) the line where it stands first. `feeds` holds, by the index of
     the first of them, the numbers of neighbouring FEDRAT statements that differ in nothing else: for all of them stands the
     first of the file.
     """
@@ -114,7 +114,7 @@ def _word(text: str) -> Word:
 
 
 def major_of(head: str) -> str:
-    """A major word in its one spelling: upper case, single blanks, none beside hyphens and commas."""
+    """A major word in its one spelling: upper case, single blanks, none next to hyphens and commas."""
     head = " ".join(head.upper().split())
     return head.replace(" -", "-").replace("- ", "-").replace(" ,", ",").replace(", ", ",")
 
