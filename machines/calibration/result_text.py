@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from toolpaths.table_text import table_text
+
 FIGURES = 4
 """of a number without an uncertainty of its own"""
 MOST = 9
@@ -59,15 +61,14 @@ def _errors(figures: dict[str, Any]) -> list[str]:
     """Each parameter that was found; how many others stay."""
     noted = {name: p for name, p in figures["parameters"].items() if p["sigma"] is not None}
     untold, kept = [name for name in figures["parameters"] if name not in noted], figures["kept"]
-    wide = max((len(name) for name in noted), default=0)
     lines = ["found, with one standard deviation:"] if noted else []
-    lines += [f"  {name:{wide}} {_value(p['value'], p['sigma'])} {p['unit']:6} {p['at'] and 'at '}{p['at']}".rstrip()
-              for name, p in noted.items()]
+    lines += table_text([(name, f"{_value(p['value'], p['sigma'])} {p['unit']}", f"{p['at'] and 'at '}{p['at']}")
+                         for name, p in noted.items()], indent=2) if noted else []
     lines += [f"not known, 0 in the model: {', '.join(untold)}"] if untold else []
     return lines + ([f"other parameters, which stay as they were: {kept}"] if kept else [])
 
 
 def _value(value: float, sigma: float) -> str:
-    """Both to the decimal that the uncertainty has its Uncertainties figures at."""
+    """Both to the decimal at which the uncertainty has UNCERTAINTY_DIGITS digits."""
     decimals = min(max(UNCERTAINTY_DIGITS - 1 - math.floor(math.log10(sigma)), 0), MOST)
     return f"{value:10.{decimals}f} +- {sigma:.{decimals}f}"

@@ -86,14 +86,18 @@ def options_of_all(version: Annotated[bool, typer.Option("--version", is_eager=T
 @app.command(epilog="Example: postproc convert part.cls -m mikron-ucp710 -c linuxcnc -o part.ngc")
 def convert(file: ClFile, machine: MachineName, controller: ControllerName,
             output: Annotated[Path, typer.Option("-o", "--output", metavar="OUT", help="G-code file to write")],
-            feed_mode: Annotated[str, typer.Option("--feed-mode", help="auto, per-minute or inverse-time")] = "auto",
-            output_mode: Annotated[str, typer.Option("--output-mode", help="auto, axes (axis positions), tcp (the control "
-                                                     "runs the kinematics) or tilted (turned plane)")] = "auto",
+            feed_mode: Annotated[str, typer.Option("--feed-mode", metavar="{auto,per-minute,inverse-time}",
+                                                   help="unit of F words")] = "auto",
+            output_mode: Annotated[str, typer.Option("--output-mode", metavar="{auto,axes,tcp,tilted}", help="axes: machine "
+                                                     "coordinates, no RTCP; tcp: tool-centre-point control (G43.4, TRAORI, "
+                                                     "TCPM, G234); tilted: tilted work plane, 3+2 (G68.2, CYCLE800, PLANE "
+                                                     "SPATIAL, G254)")] = "auto",
             orient: Orient = "keep", max_tilt: MaxTilt = 60.0,
-            feed: Annotated[str, typer.Option("--feed", help="programmed: the feeds of the CL file; planned: reduced where "
-                                                     "an axis would exceed velocity, acceleration or jerk")] = "programmed",
-            merge_feeds: Annotated[float, typer.Option("--merge-feeds", metavar="PERCENT", min=0.0, max=50.0, help="planned "
-                                                       "feeds may be so much lower that neighbours share one")] = 0.0,
+            feed: Annotated[str, typer.Option("--feed", metavar="{programmed,planned}",
+                                              help="programmed: the feeds of the CL file; planned: reduced where an axis "
+                                              "would exceed velocity, acceleration or jerk")] = "programmed",
+            merge_feeds: Annotated[float, typer.Option("--merge-feeds", metavar="PERCENT", min=0.0, max=50.0, help="merge "
+                                                       "neighbouring F words within this part")] = 0.0,
             smooth: Annotated[bool, typer.Option("--smooth", help="move points onto smooth curves inside the "
                                                  "tolerance")] = False,
             setup: Setup = "", tolerance: ToleranceOption = 0.01, axis_tolerance: AxisToleranceOption = 0.05,

@@ -13,6 +13,7 @@ from machines.machine import Machine
 from machines.user_file import read_toml
 from postproc.controllers.model import builtin_files, load_controller
 from toolpaths.diagnostics import DiagnosticError, require
+from toolpaths.table_text import table_text
 from toolpaths.units import DEG
 
 _COLUMNS = ("lower", "upper", "velocity", "acceleration", "jerk")
@@ -60,12 +61,13 @@ def rotary_lines(machine: Machine) -> list[dict[str, Any]]:
 def machine_text(machine: Machine) -> str:
     """The same for people."""
     d = machine_dict(machine)
-    lines = [f"{d['name']}: {d['description']}", f"structure {d['structure']}", "",
-             "axis  travel                        velocity  acceleration       jerk  home"]
+    lines = [f"{d['name']}: {d['description']}", f"structure {d['structure']}", ""]
+    axes = []
     for row in d["axes"]:
         travel = "unlimited" if row["lower"] is None else f"{row['lower']:g} to {row['upper']:g} {row['unit']}"
-        lines.append(f"{row['letter']:4}  {travel:28} {row['velocity']:9g} {row['acceleration']:13g} {row['jerk']:10g} "
-                     f"{row['home']:5g}" + (f"  (assumed: {', '.join(row['assumed'])})" if row["assumed"] else ""))
+        axes.append((row["letter"], travel, *(f"{row[key]:g}" for key in ("velocity", "acceleration", "jerk", "home")),
+                     f"(assumed: {', '.join(row['assumed'])})" if row["assumed"] else ""))
+    lines += table_text(axes, ("axis", "travel", "velocity", "acceleration", "jerk", "home", ""), "llrrrrl")
     lines.append("velocity per s, acceleration per s2, jerk per s3, in mm or degrees")
     zero = "all" if machine.kinematics.slides_affine else "all rotary"
     lines.append(f"table frame: carries the part; with {zero} axes at zero it is the machine's" + (
@@ -109,19 +111,22 @@ def _flat(values: dict[str, Any], above: tuple[str, ...]) -> Iterator[tuple[tupl
 
 def controller_text(values: dict[str, Any], origins: dict[str, str]) -> str:
     """The same for people: a value a line, where it comes from in a column of its own."""
-    width = max(map(len, origins.values()))
-    return "\n".join(f"{origins[key]:{width}}  {key} = {json.dumps(value)}" for key, value in values.items())
+    return "\n".join(table_text([(origins[key], f"{key} = {json.dumps(value)}") for key, value in values.items()]))
 
 
 def analysis_text(figures: dict[str, Any], indent: str = "") -> str:
     """Figures of an analysis, one a line; the keys carry the units."""
-    lines = []
+    return "\n".join(table_text(list(_indented(figures, indent))))
+
+
+def _indented(figures: dict[str, Any], indent: str) -> Iterator[tuple[str, str]]:
+    """(key, value) line by line, tables inside moved in."""
     for key, value in figures.items():
         if isinstance(value, dict):
-            lines += [f"{indent}{key}", analysis_text(value, indent + "  ")]
+            yield indent + key, ""
+            yield from _indented(value, indent + "  ")
         else:
-            lines.append(f"{indent}{key:40} {_plain(value)}")
-    return "\n".join(lines)
+            yield indent + key, _plain(value)
 
 
 def _plain(value: Any) -> str:

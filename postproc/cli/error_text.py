@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
+from toolpaths.table_text import table_text
+
 
 def check_text(file: str, found: dict[str, Any]) -> str:
     """What `machines.geometric_error.exchange.survey` gives."""
     who = {"post": "corrected by the post-processor", "control": "corrected by the control"}[found["corrected_by"]]
-    lines = [f"{file}: good: errors of {found['machine']}, {found['parameters']} parameters, {who}; fingerprint "
+    lines = [f"{file}: OK: errors of {found['machine']}, {found['parameters']} parameters, {who}; fingerprint "
              f"{found['fingerprint']}", *_components(found)]
     for kind in ("line", "zero position", "spindle"):
         mine = [f"{n} {v['value']:.3g} {v['unit']}" for n, v in found["location"].items() if v["kind"] == kind]
@@ -19,14 +21,13 @@ def check_text(file: str, found: dict[str, Any]) -> str:
 
 
 def _components(found: dict[str, Any]) -> list[str]:
-    lines = []
-    if found["components"]:
-        lines.append("error  kind           values  range                  largest          at   lost motion")
+    rows = []
     for name, c in found["components"].items():
         span = "everywhere" if c["range"][0] is None else f"{c['range'][0]:g} to {c['range'][1]:g}"
-        lost = f"{c['lost_motion']:8.2f}" if c["both_directions"] else "        "
-        lines.append(f"{name:5}  {c['kind']:13} {c['values']:7}  {span:20} {c['largest']:9.2f} {c['unit']:6} {c['at']:9.2f} "
-                     f"{lost}".rstrip())
+        lost = f"{c['lost_motion']:.2f}" if c["both_directions"] else ""
+        rows.append((name, c["kind"], c["values"], span, f"{c['largest']:.2f}", c["unit"], f"{c['at']:.2f}", lost))
+    heads = ("error", "kind", "values", "range", "largest", "", "at", "lost motion")
+    lines = table_text(rows, heads, "llrlrlrr") if rows else []
     return lines + ([f"not given, so 0: {', '.join(found['absent'])}"] if found["absent"] else [])
 
 
@@ -42,7 +43,7 @@ def _map(found: dict[str, Any]) -> list[str]:
 
 def _covariance(found: dict[str, Any] | None) -> list[str]:
     if found is None:
-        return ["covariance: none, so the uncertainty is unknown"]
+        return ["no covariance: uncertainty unknown"]
     kind = "correlated parameters" if found["correlated"] else "independent parameters"
     without = f"; {len(found['without'])} parameters have none" if found["without"] else ""
     return [f"covariance: {kind}, largest standard deviation {found['largest_um']:.3g} um, {found['largest_arcsec']:.3g} "

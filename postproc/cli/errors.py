@@ -28,7 +28,7 @@ ToolLength = Annotated[float, typer.Option("--tool-length", metavar="MM", min=0.
 Step = Annotated[list[str] | None, typer.Option("--step", metavar="AXIS=STEP", help="mm or degrees between rows or nodes, "
                                                 "e.g. X=50; may be repeated")]
 Loss = Annotated[float, typer.Option("--loss", metavar="UM", min=1e-4, max=1e4,
-                                     help="what a table may lose between its rows, um")]
+                                     help="allowed interpolation error between rows, um")]
 AngleLoss = Annotated[float, typer.Option("--angle-loss", metavar="ARCSEC", min=1e-4, max=1e5,
                                           help="the same of angles, arcsec")]
 Rest = Annotated[Path | None, typer.Option("--rest", metavar="REST.toml",

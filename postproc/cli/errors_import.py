@@ -22,7 +22,7 @@ Into = Annotated[Path | None, typer.Option("--into", metavar="MODEL.toml", help=
                                            "covariance")]
 Covariance = Annotated[Path | None, typer.Option("--covariance", metavar="C.csv", help="square table of what is imported, "
                                                  "um and arcsec")]
-Interpolation = Annotated[str, typer.Option("--interpolation", help="between rows: linear or spline")]
+Interpolation = Annotated[str, typer.Option("--interpolation", metavar="{linear,spline}", help="between rows: linear or spline")]
 Repeats = Annotated[list[str] | None, typer.Option("--repeats", metavar="AXIS=PERIOD", help="degrees or mm after which a "
                                                    "table or map repeats, e.g. C=360")]
 Sign = Annotated[int, typer.Option("--sign", help="-1 where the numbers say how the part moves relative to the tool")]
@@ -37,7 +37,7 @@ Average = Annotated[bool, typer.Option("--average", help="rows at the same place
 NearOption = Annotated[list[str] | None, typer.Option("--near", metavar="AXIS=AMOUNT",
                                                       help="with --average: readings no farther "
                                                       "apart are of one place, given to that amount, mm or degrees")]
-Large = Annotated[bool, typer.Option("--large", help="errors above 1 mm or 0.5 degrees are so, and no unit is wrong")]
+Large = Annotated[bool, typer.Option("--large", help="accept errors above 1 mm or 0.5 degrees")]
 DirectionsOption = Annotated[str, typer.Option("--directions", help="of a map's values: machine or table")]
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import sys
 from functools import cache
+from shutil import get_terminal_size
 from typing import Annotated, Any
 
 import typer
@@ -13,11 +15,21 @@ MaxFileSize = Annotated[float | None, typer.Option("--max-file-size", metavar="M
                                                    help="largest input file that is read (default 1000 MB)")]
 
 
+PIPE = 120
+"""columns of help where it goes to no terminal: stable, and not broken at 80"""
+
+
+def width() -> int:
+    """Columns of the help: those of the terminal."""
+    return get_terminal_size((PIPE, 24)).columns if sys.stdout.isatty() else PIPE
+
+
 class Group(TyperGroup):
-    """Commands with the option, each of them."""
+    """Commands with the option, each of them; help in the width of the terminal."""
 
     def __init__(self, **attributes: Any) -> None:
         super().__init__(**attributes)
+        self.context_settings = {**self.context_settings, "terminal_width": width()}
         for command in self.commands.values():
             if not isinstance(command, TyperGroup):
                 command.params.append(_option())

@@ -17,6 +17,7 @@ from postproc.cli.console import (
     shown_errors,
 )
 from postproc.cli.group import Group
+from toolpaths.table_text import table_text
 
 machine_app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None,
                           help="Machines: list, show, check, analyse, schema.")
@@ -32,9 +33,8 @@ def machine_list(json: Json = "") -> None:
     found = [machines.load(name) for name in machines.names()]
     rows = [{"name": m.name, "structure": m.structure, "axes": list(m.axis_names), "description": m.description}
             for m in found]
-    width = max(len(m.name) for m in found)
     report((), json, {"machines": rows},
-            "\n".join(f"{m.name:{width}}  {' '.join(m.axis_names):10}  {m.description}" for m in found))
+           "\n".join(table_text([(m.name, " ".join(m.axis_names), m.description) for m in found])))
 
 
 @machine_app.command("show")
@@ -53,7 +53,7 @@ def machine_check(file: Annotated[str, typer.Argument(help="TOML file or name")]
     import machines
 
     m, found = machines.load_checked(file)
-    good = f"{file}: good: {m.name}, {m.structure}, axes {' '.join(m.axis_names)}" if m else ""
+    good = f"{file}: OK: {m.name}, {m.structure}, axes {' '.join(m.axis_names)}" if m else ""
     report(tuple(found), json, {"name": m.name if m else None, "diagnostics": [d.as_dict() for d in found]}, good)
 
 
@@ -95,7 +95,7 @@ def setup_check(file: Annotated[str, typer.Argument(help="TOML file")], json: Js
             found.append(info("setup.system", "the part stands by a system of the CL file: bodies are shown as if that were "
                               "the file's absolute frame", file=file))
     count = len(spec.tools) if spec else 0
-    good = "" if has_errors(found) else f"{file}: good: {count} tool{'s' * (count != 1)}{bodies}"
+    good = "" if has_errors(found) else f"{file}: OK: {count} tool{'s' * (count != 1)}{bodies}"
     report(tuple(found), json, {"diagnostics": [d.as_dict() for d in found]}, good)
 
 
@@ -115,8 +115,7 @@ def controller_list(json: Json = "") -> None:
 
     found = {name: controller_file(name) for name in builtin_files()}
     rows = [{"name": name, "description": spec.description} for name, spec in found.items()]
-    width = max(map(len, found))
-    report((), json, {"controllers": rows}, "\n".join(f"{r['name']:{width}}  {r['description']}" for r in rows))
+    report((), json, {"controllers": rows}, "\n".join(table_text([(r["name"], r["description"]) for r in rows])))
 
 
 @controller_app.command("show")

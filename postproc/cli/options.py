@@ -13,11 +13,10 @@ ToleranceOption = Annotated[float, typer.Option("--tolerance", metavar="MM", min
                                                 help="tolerance of the tip")]
 AxisToleranceOption = Annotated[float, typer.Option("--axis-tolerance", metavar="DEG", min=1e-6, max=10.0,
                                                help="tolerance of the axis")]
-UnitsOption = Annotated[str, typer.Option("--units", help="units of a CL file that states none: mm or inch")]
+UnitsOption = Annotated[str, typer.Option("--units", metavar="{mm,inch}", help="units of a CL file that states none")]
 DialectOption = Annotated[str, typer.Option("--dialect",
                                             help="read the CL file as this dialect instead of the recognised one")]
-Beyond = Annotated[bool, typer.Option("--error-model-beyond", help="outside the range that was measured, take the error at "
-                                      "its end")]
+Beyond = Annotated[bool, typer.Option("--error-model-beyond", help="hold the end value outside the measured range")]
 RequireProof = Annotated[bool, typer.Option("--require-proof", help="refuse a program where some block has no bound of its "
                                             "deviation and is only checked at places")]
 ProofOption = Annotated[bool, typer.Option("--proof",

@@ -35,9 +35,10 @@ if TYPE_CHECKING:
     from toolpaths.diagnostics import Diagnostic
 
 ORIENTATIONS = ("keep", "per-pass", "whole-part", "auto")
-MaxTilt = Annotated[float, typer.Option("--max-tilt", metavar="DEG", min=0.0, max=120.0, help="largest tilt of a chosen "
-                                        "axis from the file's surface normals, or from its own axis")]
-Orient = Annotated[str, typer.Option("--orient", help="keep: the tool axes of the CL file; per-pass, whole-part, auto: "
+MaxTilt = Annotated[float, typer.Option("--max-tilt", metavar="DEG", min=0.0, max=120.0, help="largest angle of "
+                                        "a chosen axis to the surface normal, else to the programmed axis")]
+Orient = Annotated[str, typer.Option("--orient", metavar="{keep,per-pass,whole-part,auto}",
+                                     help="keep: the tool axes of the CL file; per-pass, whole-part, auto: "
                                      "turned for the least planned time (3+2 passes of ball cutters)")]
 EXAMPLES = """Examples:
 

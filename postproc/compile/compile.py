@@ -110,6 +110,6 @@ def _slowed(feeds: Feeds, moves: Moves, path: JointPath, planned: bool, file: st
         return []
     share = path.seconds[rows] / feeds.seconds[rows]
     excess = "exceed its velocity, acceleration or jerk" if planned else "be faster than its limit"
-    return [info("feed.reduced", f"feed reduced to {100.0 * share.min():.1f} % at least, where an axis would "
+    return [info("feed.reduced", f"feed reduced, down to {100.0 * share.min():.1f} %, where an axis would "
                  f"{excess}", file=file, lines=np.unique(moves.line[path.move[rows]])[:6].tolist(),
                  count=len(rows))]

@@ -84,7 +84,7 @@ class ErrorCorrection:
         arcsec = DEG / 3600.0
         return [f"geometric errors corrected: tip {1e3 * self.tip_before:.1f} um, axis {self.axis_before / arcsec:.1f} "
                 f"arcsec before, {1e3 * self.tip_after:.2f} um and {self.axis_after / arcsec:.2f} arcsec left",
-                f"{self.added} points added, {self.resolved} arcs resolved, {self.partial} blocks near a pole",
+                f"{self.added} points added, {self.resolved} arcs split into lines, {self.partial} near a singularity",
                 *([] if self.uncertainty_tip is None or self.uncertainty_axis is None else
                   [f"uncertainty of the correction (one standard deviation): tip {1e3 * self.uncertainty_tip:.2f} um, axis "
                    f"{self.uncertainty_axis / arcsec:.2f} arcsec"])]

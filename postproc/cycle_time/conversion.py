@@ -42,4 +42,4 @@ def figures(e: Estimate | None) -> dict[str, Any]:
 def text(e: Estimate) -> str:
     """One line for people."""
     band = f", 95 % between {clock(e.band[0])} and {clock(e.band[1])}" if e.uncertainties else ""
-    return f"time: {clock(e.seconds)}{band} (model {e.model.kind}; no control is below {clock(e.lower_bound)})"
+    return f"time: {clock(e.seconds)}{band} (model {e.model.kind}; lower bound {clock(e.lower_bound)})"

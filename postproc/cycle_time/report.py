@@ -6,6 +6,7 @@ from typing import Any
 
 from postproc.cycle_time.estimate import Estimate
 from postproc.cycle_time.shares import TimeShares, most_expensive, operations, shares
+from toolpaths.table_text import table_text
 
 COVERS = ("95 % of runs on a machine as the files describe it: the model's own deviation, and parameters of the control and "
           "limits of the machine that no document states")
@@ -45,17 +46,18 @@ def as_text(e: Estimate, name: str) -> str:
     """The same for people."""
     d, s = as_dict(e), shares(e)
     lines = [f"{name}: {clock(e.seconds)} ({e.seconds:.2f} s), 95 % between {clock(e.band[0])} and {clock(e.band[1])}; "
-             f"no control is below {clock(e.lower_bound)}",
+             f"lower bound {clock(e.lower_bound)}",
              f"model {e.model.kind}: {e.model.description}"]
     if e.model.assumed:
         lines.append(f"assumed, not documented: {', '.join(e.model.assumed)}")
-    lines.append("goes to: " + ", ".join(f"{key.removesuffix('_s').replace('_', ' ')} {value:.2f} s"
+    lines.append("time by activity: " + ", ".join(f"{key.removesuffix('_s').replace('_', ' ')} {value:.2f} s"
                                          for key, value in d["causes"].items() if value >= 0.005))
     lines += _limits(s, d["feed_s"])
     if len(d["operations"]) > 1:
-        lines += [f"  {op['operation'] or 'without a name':40} {clock(op['time_s']):>12}" for op in d["operations"]]
+        lines += table_text([(op["operation"] or "without a name", clock(op["time_s"])) for op in d["operations"]],
+                            align="lr", indent=2)
     if d["most_expensive"]:
-        lines.append("most expensive beyond the feed:")
+        lines.append("largest losses against the programmed feed:")
         for place in d["most_expensive"]:
             cl = f", CL line {place['cl_line']}" if place["cl_line"] is not None else ""
             lines.append(f"  NC line {place['nc_line']}{cl}: {place['lost_s']:.3f} s, {place['cause'].replace('_', ' ')}")
@@ -65,7 +67,7 @@ def as_text(e: Estimate, name: str) -> str:
 def _limits(s: TimeShares, feed: float) -> list[str]:
     rows = [f"  {letter}: velocity {v:.2f} s, acceleration {a:.2f} s, jerk {j:.2f} s"
             for letter, (v, a, j) in s.limiting.items() if v + a + j >= 0.005]
-    return [f"held by the feed {feed:.2f} s, by axes:", *rows] if rows else []
+    return [f"limited by programmed feed {feed:.2f} s, by axes:", *rows] if rows else []
 
 
 def clock(seconds: float) -> str:

@@ -59,7 +59,7 @@ def _choices(plan: RunPlan, moves: Moves, file: str) -> list[Diagnostic]:
     for start, solution in zip(starts, plan.solutions, strict=True):
         if solution.rejected_starts and _reason(solution.rejected_starts):
             lines.setdefault(_reason(solution.rejected_starts), []).append(int(moves.line[start]))
-    return [info("joints.chosen", f"the other branches and windings {reason}", file=file, lines=found[:6], count=len(found))
+    return [info("joints.chosen", f"the other rotary solutions {reason}", file=file, lines=found[:6], count=len(found))
             for reason, found in sorted(lines.items())]
 
 

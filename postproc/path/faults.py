@@ -123,6 +123,6 @@ def rapid_as_feed(code: Array, move: Ints, seconds: Floats, moves: Moves, file: 
     if not len(rows):
         return []
     lines = np.unique(moves.line[move[rows]])
-    return [info("feed.rapid_as_feed", "rapids that move several axes are written as feed moves at the speed of the slowest "
+    return [info("feed.rapid_as_feed", "G0 of several axes output as G1 (dog-leg rapids), at the speed of the slowest "
                  "axis: the control's rapids would leave the straight line", file=file, lines=lines[:6].tolist(),
                  count=len(lines))]

@@ -103,5 +103,6 @@ def _corrections(made: CompiledStage) -> list[str]:
 
 def _meanings(program: Program) -> str:
     """What the words of a program mean, in order of first use."""
-    names = {"axes": "axis positions", "tcp": "tip in the work offset", "tilted": "tip in tilted planes"}
+    names = {"axes": "machine coordinates without RTCP", "tcp": "tool-centre-point control",
+             "tilted": "tilted work planes"}
     return ", ".join(dict.fromkeys(names[section.law] for section in program.sections))

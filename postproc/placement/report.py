@@ -11,6 +11,7 @@ from postproc.placement.place import PlacementChoice
 from postproc.placement.place_times import TimedPlace
 from postproc.placement.space import ANGLES, NAMES
 from toolpaths.arrays import Floats
+from toolpaths.table_text import table_text
 from toolpaths.units import DEG
 
 _SHOWN = 5
@@ -55,13 +56,13 @@ def _gain(choice: PlacementChoice) -> float:
 def as_text(choice: PlacementChoice) -> str:
     """Before and after, margins, what was tried."""
     free = [NAMES[k] for k in choice.space.free]
-    lines = [f"{'':8} {'x mm':>10} {'y mm':>10} {'z mm':>10} {'turn deg':>10} {'seconds':>10} {'cuts':>10} {'linking':>10}"]
+    rows = []
     for name, one in (("[part]", choice.found.now), ("placed", choice.best)):
         x, y, z, turn = one.place[:4]
-        figures = (f"{one.seconds:>10.3f} {one.cutting:>10.3f} {one.linking:>10.3f}" if math.isfinite(one.seconds)
-                   else f"  {one.refused}")
-        row = " ".join(f"{round(value, 3) + 0.0:>10.3f}" for value in (x, y, z, turn / DEG))
-        lines.append(f"{name:8} {row} {figures}")
+        figures = ((f"{one.seconds:.3f}", f"{one.cutting:.3f}", f"{one.linking:.3f}", "") if math.isfinite(one.seconds)
+                   else ("-", "-", "-", one.refused))
+        rows.append((name, *(f"{round(value, 3) + 0.0:.3f}" for value in (x, y, z, turn / DEG)), *figures))
+    lines = table_text(rows, ("", "x mm", "y mm", "z mm", "turn deg", "seconds", "cuts", "linking", ""), "lrrrrrrrl")
     gain = _gain(choice)
     if math.isfinite(gain):
         lines.append(f"planned time saved: {100.0 * gain:.2f} %")

@@ -77,7 +77,7 @@ def zigzag(folder: Path, controller: str | Path, machine: str | Path = DELTA) ->
 def test_lineardeltakins_at_the_points_of_a_posted_program(standstill) -> None:
     """Cartesian words of pocket.cls: LinuxCNC's joints at rest there are ours, within 1e-6 mm."""
     result = converted("pocket.cls", DELTA, "tools")
-    assert result.job is not None and "tip in the work offset" in result.text
+    assert result.job is not None and "tool-centre-point control" in result.text
     machine, motion = result.machine, outputs.read(result)[1]
     gauge = np.unique(motion.end[(motion.register >= 0) & (motion.code > 0)], axis=0)
     assert len(gauge) > 30
@@ -91,7 +91,7 @@ def test_joint_program_equals_the_joints_that_lineardeltakins_commands(standstil
     own = tmp_path / "joints.toml"
     own.write_text(f'base = "{DELTA}"\n[control]\nmodule = "trivkins"\n')
     joints, tips = zigzag(tmp_path, "linuxcnc", own), zigzag(tmp_path, "linuxcnc")
-    assert joints.job is not None and "(words: axis positions)" in joints.text
+    assert joints.job is not None and "(words: machine coordinates without RTCP)" in joints.text
     words = outputs.read(joints)[1].end
     motion = outputs.read(tips)[1]
     gauge = motion.end[motion.code > 0]

@@ -156,7 +156,7 @@ def summary(result: ReadResult) -> str:
     if found["normals"]:
         lines.append(f"  surface normals at {found['normals']} points")
     if len(p.arcs):
-        lines.append(f"  sense of the arcs: {found['arcs_over_180_deg']} of {len(p.arcs)} sweep more than 180 degrees")
+        lines.append(f"  arc direction: {found['arcs_over_180_deg']} of {len(p.arcs)} arcs sweep more than 180 degrees")
     lines += [f"  {name} {low:.3f} to {high:.3f} mm" for name, (low, high) in extents(p).items()]
     lines += [f"  system {f.name}: {stands(f)}" for f in p.frames]
     lines += [f"  operation {op.name or i + 1}{' (turning)' if op.turning else ''}: "
@@ -175,7 +175,7 @@ def stands(frame: Frame) -> str:
     turned = math.degrees(math.acos(min(max((np.trace(frame.rotation) - 1.0) / 2.0, -1.0), 1.0)))
     lean = math.degrees(math.acos(min(max(frame.rotation[2][2], -1.0), 1.0)))
     place = ", ".join(f"{round(v, 4) + 0.0:g}" for v in frame.origin)
-    how = f", turned by {turned:.2f} degrees, its z by {lean:.2f}" if turned > TURNED else ""
+    how = f", rotation {turned:.2f} degrees, Z tilted {lean:.2f} degrees" if turned > TURNED else ""
     return f"origin ({place}) mm{how}"
 
 

@@ -16,6 +16,7 @@ from postproc.orientation.plans.plans import OrientationPlan
 from postproc.orientation.plans.shares import shares_of, turns
 from postproc.orientation.report.figures_of_choice import NAMES, UNITS, gain
 from toolpaths.rotations import angle_between
+from toolpaths.table_text import table_text
 from toolpaths.units import DEG
 
 SHOWN = 40
@@ -26,6 +27,8 @@ _WHYS = 3
 """reasons of the paper's choice missing"""
 RUNS = 20
 """lines of the head of a program"""
+_HEADS = ("pass", "line", "orientation", "time s", "CL axis s", "gain %", "limited by", "fastest s", "runner-up s",
+          "rejected")
 
 
 def as_text(choice: OrientationChoice, plan: Orientation = "auto", passes: Sequence[int] = ()) -> str:
@@ -33,10 +36,7 @@ def as_text(choice: OrientationChoice, plan: Orientation = "auto", passes: Seque
     picked = choice.plans[plan].picked
     rows = list(zip(choice.tried, picked, strict=True))
     shown = sorted(sorted(rows, key=lambda row: _saved(*row))[:SHOWN], key=lambda row: row[0].own.one.number)
-    lines = [f"passes as {plan} has them",
-             f"{'pass':>5} {'line':>7}  {'orientation':<24} {'time s':>9} {'CL axis s':>9} {'gain %':>7}  "
-             f"{'limited by':<15} {'best alone s':>12} {'next s':>9}  others lost by"]
-    lines += [_row(tried, made) for tried, made in shown]
+    lines = [f"passes as {plan} has them", *table_text([_row(tried, made) for tried, made in shown], _HEADS, "rrlrrrlrrl")]
     if len(rows) > len(shown):
         lines.append(f"      and {len(rows) - len(shown)} passes that gain less; all are in --json")
     for number in passes:
@@ -88,22 +88,21 @@ def percent(value: float | None) -> str:
     return "-" if value is None else f"{value + 0.0:.2f}"
 
 
-def _row(tried: PassSearch, made: Candidate) -> str:
+def _row(tried: PassSearch, made: Candidate) -> tuple[object, ...]:
     one, before = tried.own.one, tried.own.seconds
-    limit = " ".join(made.limiting).strip() or "-"
     if not one.stretches:
         taken = (seconds(value if value > 0.0 else None) for value in (made.seconds, before))
-        return f"{one.number:>5} {one.line:>7}  {orientation(made):<24} {next(taken):>9} {next(taken):>9} {'-':>7}  " + (
-            f"axis kept: {one.fixed or 'its cuts have no length'}")
-    start = (f"{one.number:>5} {one.line:>7}  {orientation(made):<24} {seconds(made.seconds):>9} {seconds(before):>9} "
-             f"{percent(gain(made.seconds, before)):>7}  {limit:<15} ")
+        return (one.number, one.line, orientation(made), *taken, "-", "", "", "",
+                f"axis kept: {one.fixed or 'its cuts have no length'}")
+    start = (one.number, one.line, orientation(made), seconds(made.seconds), seconds(before),
+             percent(gain(made.seconds, before)), " ".join(made.limiting).strip() or "-")
     kept = f"axis kept: {one.fixed}" if one.fixed else ""
     if not tried.rejected:
-        return start + (kept or "no other orientation in reach")
+        return (*start, "", "", kept or "no other orientation in reach")
     after = runner_up(tried)
     beaten = seconds(None if after is None else after.seconds)
     reasons = "; ".join(filter(None, (listed(grouped([tried])), kept)))
-    return f"{start}{seconds(tried.best.seconds):>12} {beaten:>9}  {reasons or '-'}"
+    return (*start, seconds(tried.best.seconds), beaten, reasons or "-")
 
 
 def _in_full(tried: PassSearch, made: Candidate) -> list[str]:
@@ -132,7 +131,7 @@ def _named(tried: PassSearch, made: Candidate) -> list[tuple[str, Candidate]]:
     """The orientations of a pass that have names, each once."""
     names: list[list[str]] = []
     kept: list[Candidate] = []
-    for name, it in (("CL axis", tried.own), ("paper", tried.aimed), ("best alone", tried.best),
+    for name, it in (("CL axis", tried.own), ("paper", tried.aimed), ("fastest for this pass", tried.best),
                      ("best with its rapids", tried.swift), ("chosen", made)):
         if it is None:
             continue
@@ -176,15 +175,16 @@ def _totals(choice: OrientationChoice) -> str:
 
 
 def _plans(choice: OrientationChoice) -> list[str]:
-    lines = [f"{'plan':<16} {'time s':>10} {'gain %':>7} {'cutting s':>10} {'turning s':>10} {'other s':>10} {'turns':>6}"]
-    every: dict[str, OrientationPlan] = {**{name: choice.plans[name] for name in NAMES}, "paper per pass": choice.paper}
+    every: dict[str, OrientationPlan] = {**{name: choice.plans[name] for name in NAMES},
+                                         "vertex-aligned per pass": choice.paper}
+    rows = []
     for name, plan in every.items():
         parts = shares_of(plan)
-        figures = (f"{value:.3f}" if math.isfinite(value) else "-" for value in
-                   (plan.seconds, parts.cutting, parts.turning, parts.other))
-        whole, cutting, turning, other = figures
-        lines.append(f"{name:<16} {whole:>10} {percent(gain(plan.seconds, choice.plans['keep'].seconds)):>7} {cutting:>10} "
-                     f"{turning:>10} {other:>10} {parts.turns:>6}" + ("  takes what is refused" if plan.touches else ""))
+        whole, *others = (f"{value:.3f}" if math.isfinite(value) else "-" for value in
+                          (plan.seconds, parts.cutting, parts.turning, parts.other))
+        rows.append((name, whole, percent(gain(plan.seconds, choice.plans["keep"].seconds)), *others, parts.turns,
+                     "takes what is refused" if plan.touches else ""))
+    lines = table_text(rows, ("plan", "time s", "gain %", "cutting s", "turning s", "other s", "turns", ""), "lrrrrrrl")
     return lines + _proof(choice) + _unaimed(choice)
 
 
@@ -199,5 +199,5 @@ def _proof(choice: OrientationChoice) -> list[str]:
 def _unaimed(choice: OrientationChoice) -> list[str]:
     """Passes in which the paper chooses nothing, by why."""
     count = Counter(one.unaimed for one in choice.tried if one.unaimed)
-    return [f"paper per pass keeps the CL axis in {number} of {len(choice.tried)} passes: {why}"
+    return [f"vertex-aligned per pass keeps the CL axis in {number} of {len(choice.tried)} passes: {why}"
             for why, number in count.most_common(_WHYS)]

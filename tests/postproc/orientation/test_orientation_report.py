@@ -198,7 +198,7 @@ def test_text_says_why_others_lost() -> None:
     assert "limits" in noted and "slower" in noted and "bound" in noted
     assert "slowest alone: jerk" in noted and "feed 1000 mm/s" in noted
     assert "lost, slower: A45.000 C" in noted and "takes about 0.61" in noted
-    assert any(line.startswith("paper per pass") for line in table)
+    assert any(line.startswith("vertex-aligned per pass") for line in table)
 
 
 def test_text_of_many_passes_is_short_and_shows_those_that_gain() -> None:
@@ -375,10 +375,11 @@ def test_why_the_paper_chooses_nothing_is_reported() -> None:
         "of the axes that aim a vertex 4 are outside the allowed angles, 4 are outside travel"}
     noted = text.as_text(choice, "auto", [1])
     assert "\n  paper: none, of the axes that aim a vertex 4 are" in noted
-    assert "\npaper per pass keeps the CL axis in 2 of 2 passes: of the axes that aim a vertex 4 are outside" in noted
+    assert ("\nvertex-aligned per pass keeps the CL axis in 2 of 2 passes: "
+            "of the axes that aim a vertex 4 are outside") in noted
     assert report.as_dict(choice)["passes"][0]["paper_missing"].endswith("4 are outside travel")
     assert {one["paper_missing"] for one in report.as_dict(part())["passes"]} == {""}
-    assert "paper per pass keeps" not in text.as_text(part())
+    assert "vertex-aligned per pass keeps" not in text.as_text(part())
 
 
 def test_a_steep_way_has_no_vertex() -> None:

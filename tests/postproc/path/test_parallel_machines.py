@@ -66,7 +66,7 @@ def test_five_axes_on_both_h4a(name: str, file: str, moves: int) -> None:
 
 def test_words_are_the_letters_of_the_machine() -> None:
     text = sample("h4a_dome.cls", "h4a-c-table", "h4a").text
-    assert "(words: axis positions)" in text
+    assert "(words: machine coordinates without RTCP)" in text
     assert "Z" in text and "U" in text and "C" in text and "G43" not in text
     assert "U" not in sample("pocket.cls", "uranesx", "delta").text.split("G54\n")[1]
 
@@ -367,7 +367,7 @@ def test_joint_program_of_the_same_machine_without_the_controls_kinematics(tmp_p
     assert own.control_kinematics is None
     tip_words = good(postproc.convert(path, machine("linuxcnc-lineardelta"), setup=setup("tools")))
     joint_words = good(postproc.convert(path, own, setup=setup("tools")))
-    assert "tip in the work offset" in tip_words.text and "axis positions" in joint_words.text
+    assert "tool-centre-point control" in tip_words.text and "machine coordinates without RTCP" in joint_words.text
     tip, _, compared = deviations(joint_words)
     assert compared >= 80 and tip < TOLERANCE
     commanded = np.flatnonzero(joint_words.path.u == 1.0)
