@@ -67,6 +67,10 @@ ControllerName = Annotated[str, typer.Option("-c", "--controller", help="control
 Setup = Annotated[str, typer.Option("--setup", metavar="S.toml", help="set-up file: placement, tools, safe distances")]
 Errors = Annotated[str, typer.Option("--error-model", metavar="E.toml", help="file of the machine's geometric errors: "
                                      "corrected, and proved on the machine with them")]
+OutputModeOption = Annotated[str, typer.Option("--output-mode", metavar="{auto,axes,tcp,tilted}",
+                                               help="axes: machine coordinates, "
+                                         "no RTCP; tcp: tool-centre-point control (G43.4, TRAORI, TCPM, G234); tilted: tilted "
+                                         "work plane, 3+2 (G68.2, CYCLE800, PLANE SPATIAL, G254)")]
 
 
 def _version(wanted: bool) -> None:
@@ -88,10 +92,7 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
             output: Annotated[Path, typer.Option("-o", "--output", metavar="OUT", help="G-code file to write")],
             feed_mode: Annotated[str, typer.Option("--feed-mode", metavar="{auto,per-minute,inverse-time}",
                                                    help="unit of F words")] = "auto",
-            output_mode: Annotated[str, typer.Option("--output-mode", metavar="{auto,axes,tcp,tilted}", help="axes: machine "
-                                                     "coordinates, no RTCP; tcp: tool-centre-point control (G43.4, TRAORI, "
-                                                     "TCPM, G234); tilted: tilted work plane, 3+2 (G68.2, CYCLE800, PLANE "
-                                                     "SPATIAL, G254)")] = "auto",
+            output_mode: OutputModeOption = "auto",
             orient: Orient = "keep", max_tilt: MaxTilt = 60.0,
             feed: Annotated[str, typer.Option("--feed", metavar="{programmed,planned}",
                                               help="programmed: the feeds of the CL file; planned: reduced where an axis "

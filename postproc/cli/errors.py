@@ -36,7 +36,7 @@ Rest = Annotated[Path | None, typer.Option("--rest", metavar="REST.toml",
 MapFile = Annotated[Path, typer.Option("-o", "--output", metavar="MAP.toml",
                                        help="model to write; its lattice is put next to it")]
 Over = Annotated[str, typer.Option("--over", metavar="LETTERS", help="coordinates: axes, e.g. XYZ or XYZAC, or x y z of the "
-                                   "point in the table frame; default the slides, xyz of machines on rods")]
+                                   "point in the table frame; default the slides, xyz of parallel-kinematic machines")]
 MapLossOption = Annotated[float | None, typer.Option("--loss", metavar="UM", min=1e-3, max=1e4,
                                                      help="divide cells until the map "
                                                      "loses no more inside its lattice, um")]

@@ -22,7 +22,8 @@ Into = Annotated[Path | None, typer.Option("--into", metavar="MODEL.toml", help=
                                            "covariance")]
 Covariance = Annotated[Path | None, typer.Option("--covariance", metavar="C.csv", help="square table of what is imported, "
                                                  "um and arcsec")]
-Interpolation = Annotated[str, typer.Option("--interpolation", metavar="{linear,spline}", help="between rows: linear or spline")]
+Interpolation = Annotated[str, typer.Option("--interpolation", metavar="{linear,spline}",
+                                            help="between rows: linear or spline")]
 Repeats = Annotated[list[str] | None, typer.Option("--repeats", metavar="AXIS=PERIOD", help="degrees or mm after which a "
                                                    "table or map repeats, e.g. C=360")]
 Sign = Annotated[int, typer.Option("--sign", help="-1 where the numbers say how the part moves relative to the tool")]

@@ -2,9 +2,9 @@
 
 Every block end gets the joints at which the machine with errors has its tool where the nominal one would have it. What the
 nominal control makes of those joints (axis positions, tip, tilted plane) is written. Blocks at one orientation (3+2, arcs,
-cycles, lines at standing rotary axes) keep one, corrected as a whole. Points are added, and arcs resolved, only where the
-motion between corrected ends would leave the nominal motion by more than the share of the tolerance that it gets. Home
-positions are the machine's own and stay.
+cycles, lines at standing rotary axes) keep one, corrected as a whole. Points are added, and arcs split into lines, only
+where the motion between corrected ends would leave the nominal motion by more than the share of the tolerance that it gets.
+Home positions are the machine's own and stay.
 """
 
 from __future__ import annotations

@@ -13,8 +13,8 @@ from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic, info, warning
 from toolpaths.units import DEG
 
-_REASONS = ((BAD, "leave travel"), (REWINDS, "need more rewinds"), (CUTS, "need more rewinds in the cut"),
-            (WRONG, "stand on the side that the set-up does not prefer"), (SECONDS, "take longer"))
+_REASONS = ((BAD, "exceed axis travel"), (REWINDS, "need more rewinds"), (CUTS, "need more rewinds in the cut"),
+            (WRONG, "stand on the side that the set-up does not prefer"), (SECONDS, "are slower"))
 
 
 def planned(plan: RunPlan, machine: Machine, moves: Moves, file: str) -> list[Diagnostic]:

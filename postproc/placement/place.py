@@ -43,7 +43,7 @@ class PlacementChoice:
     Attributes:
         work: the file with its part frame on the table frame
         best: the place that is taken
-        planned, looked, pruned, refused: cuts that were planned; places that were looked at, that lost by their bound
+        planned, looked, pruned, refused: cuts that were planned; places that were looked at, rejected by their bound
             alone, and where the part cannot stand
     """
 

@@ -87,7 +87,7 @@ class Timer:
 
     Attributes:
         most: places that may be looked at, fewer of long files
-        looked, refused, pruned: places that were, where the part cannot stand, and that lost by their bound alone
+        looked, refused, pruned: places that were, where the part cannot stand, and rejected by their bound alone
         planned: cuts
         unsolved: lines of passes with a plan that was not solved, whose time is longer than need be
     """

@@ -158,7 +158,7 @@ class PlaceSearch:
     def _starts(self, count: int, apart: float) -> list[TimedPlace]:
         """The best place of each of the best attitudes that are more than `apart` rad from each other.
 
-        A place that lost by its bound counts with that: attitudes are likely by the least time they can take.
+        A place rejected by its bound counts with that: attitudes are likely by the least time they can take.
         """
         good = sorted((one for one in self.timer.known() if not one.refused and self.space.holds(one.place)),
                       key=lambda one: one.seconds if np.isfinite(one.seconds) else one.bound)

@@ -73,7 +73,7 @@ class OutputSettings(UserModel):
     """What the words of the program mean, and how it is divided."""
 
     default: Asked = "auto"
-    """axes: axis positions; tcp: the tip, the control runs the kinematics; tilted: the tip in a turned plane, rotary axes
+    """axes: machine coordinates; tcp: tool-centre-point control; tilted: the tip in a tilted work plane, rotary axes
     standing still; auto: the best that controller and machine can. --output-mode goes before it"""
     operations: dict[str, Asked] = Field(default_factory=dict)
     """by name of the operation"""

@@ -1,5 +1,5 @@
 0 BEGIN PGM EVERY_CYCLE MM
-1 ; postproc 0.1.0
+1 ; postproc 0.2.0
 2 ; source every_cycle.cls
 3 ; machine mikron-ucp710
 4 ; controller heidenhain-tnc640
@@ -7,7 +7,7 @@
 6 ; tolerance 0.01 mm, axis tolerance 0.05 degrees
 7 ; feed mode auto
 8 ; setup without a file, fingerprint of the set-up 2477345d
-9 ; words: axis positions, tip in tilted planes
+9 ; words: machine coordinates without RTCP, tilted work planes
 10 ; work offset datum number 1 in machine coordinates: X0.0000 Y-40.0000 Z-10.0000 A0.0000 C0.0000
 11 ; tool T1 DR6, diameter 6 mm, gauge length 120.0000 mm
 12 ; tool T2 M6, diameter 6 mm, gauge length 95.5000 mm

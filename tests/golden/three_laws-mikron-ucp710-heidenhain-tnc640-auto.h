@@ -1,5 +1,5 @@
 0 BEGIN PGM THREE_LAWS MM
-1 ; postproc 0.1.0
+1 ; postproc 0.2.0
 2 ; source three_laws.cls
 3 ; machine mikron-ucp710
 4 ; controller heidenhain-tnc640
@@ -7,7 +7,7 @@
 6 ; tolerance 0.01 mm, axis tolerance 0.05 degrees
 7 ; feed mode auto
 8 ; setup without a file, fingerprint of the set-up 2477345d
-9 ; words: axis positions, tip in tilted planes, tip in the work offset
+9 ; words: machine coordinates without RTCP, tilted work planes, tool-centre-point control
 10 ; work offset datum number 1 in machine coordinates: X0.0000 Y0.0000 Z0.0000 A0.0000 C0.0000
 11 ; tool T1 EM10, diameter 10 mm, gauge length 120.0000 mm
 12 ; tool T2 BM6, diameter 6 mm, gauge length 95.5000 mm

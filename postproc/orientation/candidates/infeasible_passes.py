@@ -107,7 +107,7 @@ def _noted(work: PassContext, bad: list[PassSearch], codes: tuple[str, str],
 
 
 def _others(some: list[PassSearch]) -> str:
-    """What all other axes of passes lost by."""
+    """What all other axes of passes were rejected for."""
     lost = [each for one in some for each in one.rejected if each.made is not one.own]
     count = Counter(each.kind for each in lost)
     parts = [f"{count[kind]} {text}" + (_nearest(lost) if kind == "touches" else "")

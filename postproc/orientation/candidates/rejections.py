@@ -15,7 +15,7 @@ KINDS: dict[RejectionKind, str] = {
 
 
 def grouped(every: Iterable[PassSearch]) -> dict[str, int]:
-    """How many candidates of passes lost by each kind of reason, the CL's own axis not counted."""
+    """How many candidates of passes were rejected, by kind of reason, the CL's own axis not counted."""
     count = Counter(lost.kind for tried in every for lost in tried.rejected if lost.made is not tried.own)
     return {kind: count[kind] for kind in KINDS if count[kind]}
 

@@ -40,7 +40,7 @@ class PassSearch:
         own, best, swift: the CL's axis, that of the least cuts, that of the least cuts and rapids together
         aimed: the paper's choice for the mean direction, None without a vertex in travel
         gains: seconds as ranked that `best` and `swift` gain over `own`
-        rejected: candidates with what they lost by, but those that stand where the best does; ranked times are reported next
+        rejected: candidates with their reasons, but those that stand where the best does; ranked times are reported next
             to the planned one of the best
         unaimed: why there is no `aimed`, "" where there is one and where none is looked for
         pruned, planned: how many were discarded by the bound alone, how many timed
@@ -102,7 +102,7 @@ class CandidateSearch:
         return not (why or made.refused)
 
     def lose(self, made: Candidate, why: str, kind: RejectionKind) -> None:
-        """Note what a candidate lost by; times are reported at the end."""
+        """Note why a candidate is rejected; times are reported at the end."""
         noted = made if made is self.own else made.slim(self._times.get(id(made), np.nan))
         self.lost[id(made)] = Rejection(noted, why, kind)
 
@@ -172,7 +172,7 @@ class CandidateSearch:
         return made is not self.own and self.lost[id(made)].kind == "slower" and made.same(best.axis, best.held, APART)
 
     def _noted(self, made: Candidate, winner: Candidate) -> Rejection:
-        """What a candidate lost by; a time as ranked by as much longer as the winner is when planned in full, and no gain
+        """Why a candidate is rejected; a time as ranked by as much longer as the winner is when planned in full, and no gain
         that is not worth to be taken."""
         lost = self.lost[id(made)]
         if lost.kind != "slower":

@@ -22,7 +22,7 @@ from toolpaths.units import DEG
 SHOWN = 40
 """passes in the table; where there are more, those that gain most"""
 REJECTED: dict[RejectionKind, int] = {"slower": 8, "bound": 3, "touches": 4, "travel": 3, "reach": 2, "limits": 3}
-"""candidates of a pass in full, by what they lost by"""
+"""candidates of a pass in full, by reason"""
 _WHYS = 3
 """reasons of the paper's choice missing"""
 RUNS = 20
@@ -171,7 +171,7 @@ def _totals(choice: OrientationChoice) -> str:
     """What was tried, over all passes."""
     planned, lost = sum(one.planned for one in choice.tried), grouped(choice.tried)
     reasons = ", ".join(f"{text} {lost[kind]}" for kind, text in KINDS.items() if kind in lost)
-    return f"{planned} orientations planned; lost by: {reasons or '-'}"
+    return f"{planned} orientations planned; rejected: {reasons or '-'}"
 
 
 def _plans(choice: OrientationChoice) -> list[str]:
