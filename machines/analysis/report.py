@@ -9,6 +9,7 @@ import numpy as np
 
 from machines.analysis.box import Box, reachable_box
 from machines.analysis.directions import tilts
+from machines.analysis.singularity import grid_step_that_proves
 from machines.analysis.transmission import (
     Measure,
     WorstValue,
@@ -23,11 +24,20 @@ from machines.kinematics.h4_linear import H4Linear
 from machines.kinematics.linear_delta import LinearDelta
 from machines.machine import Machine
 from toolpaths.arrays import Floats
+from toolpaths.diagnostics import DiagnosticError, error
 from toolpaths.units import DEG
 
 
-def analyse(machine: Machine) -> dict[str, Any]:
-    """Figures of a machine; a serial one, whose slides pass their speed on as it is, has no transmission."""
+def analyse(machine: Machine, singular_above: float | None = None) -> dict[str, Any]:
+    """Figures of a machine; a serial one, whose slides pass their speed on as it is, has no transmission.
+
+    Args:
+        singular_above: mm; of a Delta with slides along z also the step of a grid that proves all singular values of a slice
+            to be above it
+
+    Raises:
+        DiagnosticError: where that proof is asked for and the machine is of another kind.
+    """
     found: dict[str, Any] = {"machine": machine.name, "structure": machine.structure, "axes": list(machine.axis_names)}
     kinematics = machine.kinematics
     if isinstance(kinematics, LinearDelta | H4Linear):
@@ -39,7 +49,20 @@ def analyse(machine: Machine) -> dict[str, Any]:
     found["tilt_in_every_direction_deg"] = every if np.isfinite(every) else None
     found["largest_tilt_deg"] = largest
     found["reachable_box_mm"] = _box(machine)
+    if singular_above is not None:
+        found["singular_values_above_mm"] = singular_above
+        found["proved_by_grid_step_mm"] = _proof_step(machine, singular_above)
     return found
+
+
+def _proof_step(machine: Machine, floor: float) -> float | None:
+    """mm; None where no grid down to the finest proves it."""
+    kinematics = machine.kinematics
+    if not isinstance(kinematics, LinearDelta) or not np.allclose(np.abs(kinematics.legs.directions[:, 2]), 1.0):
+        raise DiagnosticError([error("analysis.singular", "the proof by a grid is for a linear Delta with slides along z, "
+                                     f"not for {machine.name}", hint="leave --singular-above out: convert keeps the distance "
+                                     "from singular positions that the machine file states")])
+    return grid_step_that_proves(kinematics, floor)
 
 
 def _transmission(kinematics: LinearDelta | H4Linear) -> dict[str, Any]:

@@ -67,10 +67,9 @@ ControllerName = Annotated[str, typer.Option("-c", "--controller", help="control
 Setup = Annotated[str, typer.Option("--setup", metavar="S.toml", help="set-up file: placement, tools, safe distances")]
 Errors = Annotated[str, typer.Option("--error-model", metavar="E.toml", help="file of the machine's geometric errors: "
                                      "corrected, and proved on the machine with them")]
-OutputModeOption = Annotated[str, typer.Option("--output-mode", metavar="{auto,axes,tcp,tilted}",
-                                               help="axes: machine coordinates, "
-                                         "no RTCP; tcp: tool-centre-point control (G43.4, TRAORI, TCPM, G234); tilted: tilted "
-                                         "work plane, 3+2 (G68.2, CYCLE800, PLANE SPATIAL, G254)")]
+OutputModeOption = Annotated[str, typer.Option("--output-mode", metavar="{auto,axes,tcp,tilted}", help=(
+    "axes: machine coordinates, no RTCP; tcp: tool-centre-point control (G43.4, TRAORI, TCPM, G234); tilted: tilted work "
+    "plane, 3+2 (G68.2, CYCLE800, PLANE SPATIAL, G254)"))]
 
 
 def _version(wanted: bool) -> None:

@@ -58,13 +58,16 @@ def machine_check(file: Annotated[str, typer.Argument(help="TOML file or name")]
 
 
 @machine_app.command("analyse", epilog="Example: postproc machine analyse uranesx --json -")
-def machine_analyse(name: Annotated[str, typer.Argument(help="name or TOML file")], json: Json = "") -> None:
+def machine_analyse(name: Annotated[str, typer.Argument(help="name or TOML file")],
+                    singular_above: Annotated[float | None, typer.Option("--singular-above", metavar="MM", min=0.0,
+                                              help="prove by a grid that the singular values of a linear Delta with slides "
+                                              "along z stay above this")] = None, json: Json = "") -> None:
     """Condition number, speed and force transmission, reachable box of a parallel machine, over its workspace."""
     from machines.analysis.report import analyse
     from postproc.cli.catalogue import analysis_text
 
     with shown_errors(json):
-        found = analyse(machine_of(name))
+        found = analyse(machine_of(name), singular_above)
     report((), json, found, analysis_text(found))
 
 

@@ -15,7 +15,6 @@ from postproc.controllers.model import ControllerFile, Mode
 from postproc.setup.model import SetupFile
 from toolpaths.arrays import Array, Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
-from toolpaths.rotations import angle_between
 from toolpaths.toolpath import Toolpath
 
 ASKED = ("auto", "axes", "tcp", "tilted")
@@ -175,11 +174,6 @@ def _unknown_operations(setup: SetupFile, options: Options, toolpath: Toolpath) 
     return [error("setup.operation", f"[output.operations] names {name!r}, which is no operation of the CL file",
                   file=options.setup, hint=f"it has: {known}")
             for name in setup.output.operations if name not in names]
-
-
-def stands_still(axis: Floats, axis_tolerance: float) -> bool:
-    """True where tool axes (N, 3) are one within a share of the tolerance (rad)."""
-    return bool((angle_between(axis, np.broadcast_to(axis[:1], axis.shape)) <= CONSTANT * axis_tolerance).all())
 
 
 def turning_run(lines: list[int], file: str) -> Diagnostic:

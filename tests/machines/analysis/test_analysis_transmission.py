@@ -1,9 +1,11 @@
 """What the analysis gives: transmission, singularity, reachable box, tilt; printed figures are in tests/laws."""
 
+import json
 from functools import partial
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner, Result
 
 import machines
 from machines.analysis.box import reachable_box, reached
@@ -20,6 +22,7 @@ from machines.analysis.transmission import (
 )
 from machines.kinematics.h4_linear import H4Linear
 from machines.kinematics.linear_delta import LinearDelta
+from postproc.cli.app import app
 
 
 def delta(name: str) -> LinearDelta:
@@ -87,6 +90,18 @@ def test_the_workspace_of_uranesx_is_proved_free_of_singular_points() -> None:
     step = grid_step_that_proves(kinematics, floor=100.0)
     assert step is not None and 1.0 < step <= 100.0
     assert grid_step_that_proves(kinematics, floor=1000.0) is None
+
+
+def test_the_command_proves_it_and_says_for_which_machines() -> None:
+    def run(*words: str) -> Result:
+        return CliRunner().invoke(app, ["machine", "analyse", *words, "--json", "-"])
+    found = json.loads(run("uranesx", "--singular-above", "100").stdout)
+    assert found["singular_values_above_mm"] == 100.0 and 1.0 < found["proved_by_grid_step_mm"] <= 100.0
+    assert json.loads(run("uranesx", "--singular-above", "1000").stdout)["proved_by_grid_step_mm"] is None
+    refused = run("mill-3axis", "--singular-above", "100")
+    assert refused.exit_code == 1
+    assert "analysis.singular" in refused.stderr and "leave --singular-above out" in refused.stderr
+    assert run("mill-3axis").exit_code == 0
 
 
 def test_reachable_box_is_the_largest_in_travel() -> None:

@@ -1,4 +1,4 @@
-"""Reversal, set-up errors and their filter, the simulator, all six errors of a rotary axis: from known truths."""
+"""Reversal, set-up errors, the simulator, all six errors of a rotary axis: from known truths."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from scipy.spatial.transform import Rotation
 from machines.calibration.problem import linear, solve
 from machines.calibration.reversal import conditioning, cost_without, identify, plan, reversal_matrix, statistics
 from machines.calibration.rotary_fit import error_model, fit_rotary
-from machines.calibration.setup_filter import setup_filter
 from machines.calibration.simulator import Bench, mount_jacobian, simulate
 from toolpaths.arrays import Floats
 from toolpaths.units import DEG
@@ -137,32 +136,6 @@ def test_mounting_jacobian_is_the_derivative_of_the_exact_chain() -> None:
         mounts[0, k], mounts[1, k] = step, -step
         up, down = simulate(BENCH, zero, zero, mounts.reshape(2, 3, 6), order=np.zeros(2))
         assert (up - down) / (2 * step) == pytest.approx(jacobian[:, :, k], abs=1e-7)
-
-
-def test_of_the_angular_reading_one_combination_of_eighteen_is_seen() -> None:
-    found = setup_filter(BENCH, "ez")
-    assert found.result.rank == 1
-    assert ("C0.ez", "RX0.ez", "RL.ez") in found.result.not_identifiable
-    assert found.removed == pytest.approx([1.0, 0, 0, 0, 0, 0, 0], abs=1e-12)
-
-
-@pytest.mark.parametrize("reading", ["ex", "ey"])
-def test_tilts_hide_constant_cosine_and_sine(reading: str) -> None:
-    found = setup_filter(BENCH, reading)
-    assert found.span.shape[1] == 3
-    assert found.removed == pytest.approx([1, 1, 0, 0, 0, 0, 0], abs=1e-12)
-
-
-def test_the_filter_takes_the_mounting_out_and_leaves_the_rest() -> None:
-    rng = np.random.default_rng(7)
-    mounts = rng.normal(size=(3, 3, 6)) * 1e-6
-    zero = np.zeros((12, 6))
-    read = simulate(BENCH, zero, zero, mounts)[:, :, 4]
-    assert np.abs(setup_filter(BENCH, "ey")(read)).max() < 1e-9 * 1e-3 + 1e-10
-    wave = np.cos(3 * BENCH.angles)[None]
-    assert setup_filter(BENCH, "ey")(wave) == pytest.approx(wave, abs=1e-12)
-    with pytest.raises(ValueError, match="known"):
-        setup_filter(BENCH, "azimuth")
 
 
 def test_set_up_tilts_enter_the_angle_at_second_order() -> None:
