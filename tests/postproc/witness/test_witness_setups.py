@@ -83,8 +83,8 @@ def test_coolant_of_the_setup_for_a_tool_behind_one_with_its_own(stated: dict[st
     text = LOADED.replace(b"SPINDL", b"COOLNT/FLOOD\nSPINDL", 1).replace(b"FINI", between + SECOND + b"FINI")
     result = converted(text, stated)
     assert result.ok and result.witness is not None, [str(d) for d in result.diagnostics]
-    old = Builder.event
-    monkeypatch.setattr(Builder, "event",
+    old = ToolpathBuilder.event
+    monkeypatch.setattr(ToolpathBuilder, "event",
                         lambda self, word, values: old(self, word, ("AIR",) if word == "COOLNT" else values))
     assert "witness.coolant" in {d.code for d in converted(text, stated).diagnostics}
 
