@@ -59,9 +59,9 @@ def _proof_step(machine: Machine, floor: float) -> float | None:
     """mm; None where no grid down to the finest proves it."""
     kinematics = machine.kinematics
     if not isinstance(kinematics, LinearDelta) or not np.allclose(np.abs(kinematics.legs.directions[:, 2]), 1.0):
-        raise DiagnosticError([error("analysis.singular", "the proof by a grid is for a linear Delta with slides along z, "
-                                     f"not for {machine.name}", hint="leave --singular-above out: convert keeps the distance "
-                                     "from singular positions that the machine file states")])
+        raise DiagnosticError([error(
+            "analysis.singular", f"the proof by a grid is for a linear Delta with slides along z, not for {machine.name}",
+            hint="leave --singular-above out: convert keeps the distances from singular positions of the machine file")])
     return grid_step_that_proves(kinematics, floor)
 
 
