@@ -251,6 +251,7 @@ TURNED = PartPlacement(origin=(30.0, -20.0, 40.0), x_axis=(np.cos(np.pi / 6), 0.
                        y_axis=(-0.5, np.cos(np.pi / 6), 0.0))
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("machine", ["mikron-ucp710", "linuxcnc-xyzac-trt", "trunnion-bc", "fork-head-ab", "head-table"])
 @pytest.mark.parametrize("system", [0, 1])
 def test_machine_coordinates_are_our_joints(interpret, machine: str, system: int) -> None:

@@ -47,6 +47,7 @@ def tilted_arcs(seed: int) -> Toolpath:
     return path
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("seed", range(6))
 @pytest.mark.parametrize(("controller", "machine"), PAIRS)
 def test_arcs_stay_arcs(controller: str, machine: str, seed: int) -> None:

@@ -52,6 +52,7 @@ def blocks(result: PostResult) -> list[str]:
     return [line for line in result.text.splitlines() if line and line[0] not in "(;"]
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize(("sample", "machine", "controller", "setup"), CASES)
 def test_corrected_programs_are_proved_on_the_machine_with_errors(sample: str, machine: str, controller: str,
                                                                   setup: str) -> None:

@@ -43,6 +43,7 @@ def converted(sample: str, machine: str, controller: str, setup: str) -> PostRes
     return postproc.convert(path, machine, controller, options=options, diagnostics=found)
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize(("sample", "machine", "controller", "setup"), CASES)
 def test_points_are_inside_the_rounding_of_their_words(sample: str, machine: str, controller: str, setup: str) -> None:
     result = converted(sample, machine, controller, setup)

@@ -83,6 +83,7 @@ def test_joints_of_a_pass_follow_from_four_poses(name: str) -> None:
         assert np.abs(found_tip - tip).max() < 1e-9 and angle_between(found_axis, axis).max() < 1e-9
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("name", ["mikron-ucp710", "h4a-c-table"])
 @pytest.mark.parametrize("jerk", [True, False])
 def test_times_on_shared_knots_are_those_of_plans(name: str, jerk: bool) -> None:

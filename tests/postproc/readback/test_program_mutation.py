@@ -119,6 +119,7 @@ def test_swapped_blocks(case: tuple[str, str, str]) -> None:
                                    [*lines[:i], lines[i + 1], lines[i], *lines[i + 2:]]) for i in some(pairs)))
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("case", [*FLAT[:3], FIVE[0]])
 @pytest.mark.parametrize(("code", "other"), [("G1", "G0"), ("G2", "G3"), ("G3", "G2"), ("G93", "G94")])
 def test_wrong_motion_code(case: tuple[str, str, str], code: str, other: str) -> None:
@@ -151,6 +152,7 @@ def test_feed_doubled_all_over_a_five_axis_move() -> None:
     assert "verify.feed" in found(result, [re.sub(r"F([\d.]+)$", lambda m: f"F{2 * float(m[1]):.4f}", n) for n in lines])
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("case", FLAT)
 @pytest.mark.parametrize(("pattern", "code"), [
     (r"T1 M6", ""), (r"T2 M6", ""), (r"S\d+ M3", "verify.state"), (r"M8", "verify.state"), (r"G43 H1", ""), (r"G43 H2", "")])
@@ -163,6 +165,7 @@ def test_missing_change_of_state(case: tuple[str, str, str], pattern: str, code:
     assert got and (not code or code in got)
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("case", FLAT)
 @pytest.mark.parametrize(("pattern", "text"), [(r"T1 M6", "T2 M6"), (r"G43 H1", "G43 H2"), (r"G43 H2", "G43 H1"),
                                                (r"S\d+ M3", "S1 M3"), (r"G43 H1", "G43 H9")])
@@ -279,6 +282,7 @@ def judged(source: Path, controller: str, mode: str, count: int | None, start: i
     return [f"{one}: {said}" for one, said in verdicts if said.split()[0] not in ("caught", *HARMLESS)]
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize(("source", "controller", "mode"), CHANGED, ids=lambda v: getattr(v, "stem", v))
 def test_no_change_is_silent_and_harmful(source: Path, controller: str, mode: str) -> None:
     assert judged(source, controller, mode, EACH, SIX.index(controller)) == []
