@@ -25,6 +25,8 @@ FLAT = [("pocket.cls", "mill-3axis", "linuxcnc"), ("inch_plate.apt", "mill-3axis
         ("five_faces.cls", "mikron-ucp710", "linuxcnc"), ("indexed_4axis.cls", "mill-4axis", "linuxcnc")]
 FIVE = [("tool_axis_tour.apt", "mikron-ucp710", "linuxcnc"), ("tool_axis_tour.apt", "linuxcnc-xyzac-trt", "linuxcnc")]
 MOST = 4
+BLOCKS = pytest.mark.parametrize("most", [2, pytest.param(6, marks=pytest.mark.slow)])
+"""how many blocks of a program have all their numbers changed"""
 
 
 def found(result: PostResult, lines: list[str]) -> set[str]:
@@ -76,31 +78,34 @@ def test_unspoilt_programs_pass(case: tuple[str, str, str]) -> None:
     assert not found(result, result.text.splitlines())
 
 
+@BLOCKS
 @pytest.mark.parametrize("case", FLAT)
-def test_wrong_number(case: tuple[str, str, str]) -> None:
+def test_wrong_number(case: tuple[str, str, str], most: int) -> None:
     """0.02 mm off, and far off, in every word of every kind of cutting block."""
     result = sample(*case)
-    rows = some(cutting(case))
+    rows = some(cutting(case), most)
     assert not survivors(result, numbers(result, "XYZ", (0.021, -0.3, 7.0), rows))
     if case == FLAT[0]:
         arcs = [i for i in cutting(case) if re.search(r"\b[IJ]", result.text.splitlines()[i])]
         assert not survivors(result, numbers(result, "IJ", (-0.3, 7.0), some(arcs, 2)))
 
 
+@BLOCKS
 @pytest.mark.parametrize("case", FIVE)
-def test_wrong_number_in_five_axes(case: tuple[str, str, str]) -> None:
+def test_wrong_number_in_five_axes(case: tuple[str, str, str], most: int) -> None:
     result = sample(*case)
-    assert not survivors(result, numbers(result, "XYZ", (0.05, -7.0), some(cutting(case), 3)))
-    assert not survivors(result, numbers(result, "ABC", (10.0, -25.0), some(cutting(case), 3)))
+    assert not survivors(result, numbers(result, "XYZ", (0.05, -7.0), some(cutting(case), most)))
+    assert not survivors(result, numbers(result, "ABC", (10.0, -25.0), some(cutting(case), most)))
 
 
+@BLOCKS
 @pytest.mark.parametrize("case", FLAT[:2])
-def test_wrong_number_in_a_canned_cycle(case: tuple[str, str, str]) -> None:
+def test_wrong_number_in_a_canned_cycle(case: tuple[str, str, str], most: int) -> None:
     result = sample(*case)
     lines = result.text.splitlines()
     rows = [i for i, n in enumerate(lines) if re.search(r"G8[1-9]|G73", n)]
     rows += [i + 1 for i in rows if re.fullmatch(r"X\S+ Y\S+", lines[i + 1])]
-    assert not survivors(result, numbers(result, "XYZR", (0.021, -0.3, 7.0), some(rows, 3)))
+    assert not survivors(result, numbers(result, "XYZR", (0.021, -0.3, 7.0), some(rows, most)))
 
 
 @pytest.mark.parametrize("case", FLAT[:3])
