@@ -28,6 +28,7 @@ from postproc.orientation.plans.orient import orient
 from postproc.orientation.plans.plans import plans_of, table_of
 from postproc.setup.model import SetupFile, load_setup
 from tests.postproc.kit import SAMPLES, machine
+from tests.postproc.orientation.part_choice import part
 from toolpaths.arrays import Floats
 from toolpaths.rotations import angle_between
 from toolpaths.toolpath import Toolpath
@@ -180,7 +181,7 @@ def test_the_pass_before_lends_its_axis() -> None:
 
 def test_rapids_count_in_whole_plans() -> None:
     """The swiftest axis minds the rapids of its pass, the best only its cuts."""
-    choice = chosen(toolpaths.read(SAMPLES / "test_part.cls")[0], machine("mikron-ucp710"))
+    choice = part()
     found, plans = choice.tried, choice.plans
     assert plans["auto"].seconds == min(plan.seconds for plan in plans.values())
     assert plans["whole-part"].seconds <= plans["keep"].seconds
@@ -188,6 +189,7 @@ def test_rapids_count_in_whole_plans() -> None:
     assert any(one.swift.rapids < 0.999 * one.best.rapids for one in found)
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize(("name", "walls"), [("mikron-ucp710", True), ("mikron-ucp710", False), ("trunnion-bc", True),
                                              ("head-table", False), ("mill-4axis", True), ("nutating-head", True),
                                              ("uranesx", False)])
