@@ -7,6 +7,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Hashable, Sequence
 from itertools import combinations
 
@@ -31,15 +32,17 @@ def mark_slow(items: Sequence[pytest.Item]) -> None:
 
 
 def chosen(cases: Sequence[Case], together: int = 1, count: int = 0) -> set[int]:
-    """Numbers of the cases to run: `count` evenly, or the greedy choice that shows each combination of `together` values."""
+    """Numbers of the cases to run: `count` evenly, or the greedy choice that shows each combination of `together` values;
+    of cases that show as much the one whose values have been shown least."""
     if count:
         return {round(k * (len(cases) - 1) / max(count - 1, 1)) for k in range(count)}
     shown = [{tuple((name, case[name]) for name in names) for names in combinations(case, min(together, len(case)))}
              for case in cases]
-    left, kept = set().union(*shown), set[int]()
+    left, kept, seen = set().union(*shown), set[int](), Counter[tuple[str, Hashable]]()
     while left:
-        best = max(range(len(cases)), key=lambda n: (len(shown[n] & left), -n))
+        best = max(range(len(cases)), key=lambda n: (len(shown[n] & left), -sum(seen[one] for one in cases[n].items()), -n))
         kept.add(best)
+        seen.update(cases[best].items())
         left -= shown[best]
     return kept
 
