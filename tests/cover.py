@@ -2,6 +2,7 @@
 
     @pytest.mark.covering               # each value of each parameter at least once
     @pytest.mark.covering(together=2)   # each pair of values of two parameters that occurs
+    @pytest.mark.covering(of=("machine", "control"))   # each value of these; the others are as they come
     @pytest.mark.covering(count=3)      # three of the cases, evenly, where one parameter holds samples of one kind
 """
 
@@ -31,11 +32,12 @@ def mark_slow(items: Sequence[pytest.Item]) -> None:
                 item.add_marker(pytest.mark.slow)
 
 
-def chosen(cases: Sequence[Case], together: int = 1, count: int = 0) -> set[int]:
+def chosen(cases: Sequence[Case], together: int = 1, count: int = 0, of: Sequence[str] = ()) -> set[int]:
     """Numbers of the cases to run: `count` evenly, or the greedy choice that shows each combination of `together` values;
     of cases that show as much the one whose values have been shown least."""
     if count:
         return {round(k * (len(cases) - 1) / max(count - 1, 1)) for k in range(count)}
+    cases = [{name: case[name] for name in of or case} for case in cases]
     shown = [{tuple((name, case[name]) for name in names) for names in combinations(case, min(together, len(case)))}
              for case in cases]
     left, kept, seen = set().union(*shown), set[int](), Counter[tuple[str, Hashable]]()

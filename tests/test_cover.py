@@ -29,6 +29,11 @@ def test_values_are_shown_as_often_as_each_other() -> None:
     assert sorted(CASES[n]["mode"] for n in kept).count("tcp") == len(kept) // 2
 
 
+def test_parameters_that_do_not_count_ask_for_no_case() -> None:
+    kept = chosen(CASES, of=("control", "mode"))
+    assert len(kept) == 6 and {CASES[n]["control"] for n in kept} == set(range(6))
+
+
 def test_a_number_of_cases_is_spread_evenly() -> None:
     assert chosen(CASES, count=3) == {0, 42, 83} and chosen(CASES[:2], count=5) == {0, 1} and chosen(CASES, count=1) == {0}
 

@@ -128,7 +128,7 @@ def converted(sample: str | Path, machine: str, controller: str, model: str | Pa
     return postproc.convert(path, machine, controller, setup, options, found)
 
 
-@pytest.mark.covering
+@pytest.mark.covering(of=("controller", "output", "law"))
 @pytest.mark.parametrize(("sample", "machine", "controller", "output", "law", "seed"), [
     ("five_faces.cls", "mikron-ucp710", "linuxcnc", "axes", "axes", 3),
     ("five_faces.cls", "mikron-ucp710", "fanuc-30i", "auto", "tilted", 4),
