@@ -195,7 +195,8 @@ def check_text(o: Output) -> None:
 
 
 @pytest.mark.parametrize(("sample", "names"), [
-    *MADE.items(), *(pytest.param(*pair, marks=pytest.mark.slow) for pair in MORE.items())], ids=str)
+    *MADE.items(), *(pytest.param(*pair, marks=pytest.mark.slow) for pair in MORE.items())],
+    ids=lambda v: v if isinstance(v, str) else f"{len(v)} machines")
 def test_linuxcnc_reads_what_we_meant(interpret, sample: str, names: tuple[str, ...]) -> None:
     for o in all_outputs(interpret, sample, names):
         try:
