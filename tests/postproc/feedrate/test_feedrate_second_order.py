@@ -76,6 +76,7 @@ def reversing(way: str, small: float, seed: int) -> tuple[Floats, Floats, Floats
     return sigma, dq, d2q, 0.05 / np.abs(dq).max(axis=1) ** 2
 
 
+@pytest.mark.covering
 @pytest.mark.numeric
 @pytest.mark.parametrize("way", ["slope", "sum"])
 @pytest.mark.parametrize("power", range(-14, -5))
