@@ -116,7 +116,8 @@ def _halve(cells: Any, i: Any, reach: Any) -> Any:
             longest, edge = k, length
     if max(edge, step + reach * chord) <= 1e-5:
         return False
-    other[:] = cell
+    for k in range(21):  # numba compiles slices for seconds
+        other[k] = cell[k]
     if edge >= step + reach * chord:
         a, b = 3 * longest, 3 * ((longest + 1) % 3)
         for k in range(3):
@@ -202,7 +203,10 @@ def search(piece: Any, high: Any, size: Any, body: Any, corners: Any, normals: A
         if bound >= enough(out, limit, rule):
             continue
         if k >= body_first and m >= path_first:
-            cells[0, :9], cells[0, 9:] = corners[k - body_first], pieces[m - path_first]
+            for n in range(9):
+                cells[0, n] = corners[k - body_first, n]
+            for n in range(12):
+                cells[0, 9 + n] = pieces[m - path_first, n]
             leaf(piece, size, cells, inner, normals[k - body_first], m - path_first, limit, rule, out)
             continue
         spread = travel[m, 3] + travel[m, 4] + travel[m, 5] + size[0] * travel[m, 9]

@@ -215,7 +215,8 @@ def _add_link(out: PathBuilder, moves: Moves, row: int, link: Link, legs: _Legs)
         _leg(out, legs.after, legs.kin_after, begin, link.approach, row)
         return
     n = len(link.approach)
-    travels = np.linalg.norm(np.diff(np.concatenate([begin[None], link.approach]), axis=0), axis=1)
+    tips, _ = legs.kin_after.forward(np.concatenate([begin[None], link.approach]))
+    travels = np.linalg.norm(np.diff(tips, axis=0), axis=1)
     seconds = travels / moves.feed[row] if moves.feed[row] > 0.0 else np.full(n, moves.seconds[row] / n)
     out.link(legs.after, link.approach, row, code=np.full(n, FEED, dtype=np.int8), seconds=seconds)
 

@@ -1,5 +1,4 @@
-"""Blocks against the path that the CL file commands: deviation, rapid or feed, arcs, clearance of what the post has
-added."""
+"""Blocks against the path that the CL file commands: deviation, rapid or feed, arcs, clearance of blocks that were added."""
 
 from __future__ import annotations
 

@@ -59,6 +59,7 @@ def test_curves_become_tables_that_lose_what_is_reported_and_keep_the_uncertaint
     assert np.median(after.tip / before.tip) == pytest.approx(1.0, abs=0.05)
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("name", ["mikron-ucp710", "nutating-head", "head-table", "h4a-c-table", "h4a-spindle-axis"])
 @pytest.mark.parametrize("frame", ["fixed", "moving"])
 def test_errors_of_a_rotary_axis_in_any_frame_are_the_same_machine_in_that_of_the_bed(name: str, frame: str) -> None:
@@ -123,6 +124,7 @@ def as_linuxcnc(machine: Machine, texts: dict[str, str], q: Floats, approach: fl
     return result
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("name", ["mikron-ucp710", "linuxcnc-xyzac-trt", "nutating-head", "mill-3axis"])
 @pytest.mark.parametrize("approach", [1.0, -1.0])
 def test_linuxcnc_with_the_files_leaves_the_rest(name: str, approach: float) -> None:

@@ -130,6 +130,7 @@ def converted(sample: str | Path, machine: str, controller: str, model: str | Pa
     return postproc.convert(path, machine, controller, setup, options, found)
 
 
+@pytest.mark.covering(of=("controller", "output", "law"))
 @pytest.mark.parametrize(("sample", "machine", "controller", "output", "law", "seed"), [
     ("five_faces.cls", "mikron-ucp710", "linuxcnc", "axes", "axes", 3),
     ("five_faces.cls", "mikron-ucp710", "fanuc-30i", "auto", "tilted", 4),
@@ -174,6 +175,7 @@ def back_and_forth(slanting: bool) -> str:
     return "\n".join([*lines, "FINI\n"])
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("controller", ["fanuc-30i", "linuxcnc"])
 @pytest.mark.parametrize("slanting", [True, False])
 def test_rapids_that_begin_by_turning_back_get_one_point(controller: str, slanting: bool, tmp_path: Path) -> None:

@@ -47,6 +47,7 @@ def test_stop_in_every_corner_adds_up() -> None:
     assert timed(b, model("linuxcnc")).end[-1] == pytest.approx(alone.sum() + SETTLED, abs=1e-9)
 
 
+@pytest.mark.covering(count=3)
 @pytest.mark.parametrize("seed", range(5))
 def test_rest_to_rest_is_ruckigs(seed: int) -> None:
     rng = np.random.default_rng(seed)

@@ -64,6 +64,7 @@ def test_compiled_equals_numpy(first: int, last: int) -> None:
     np.testing.assert_allclose(fast.c, plain.c, rtol=1e-9)
 
 
+@pytest.mark.covering(count=5)
 @pytest.mark.parametrize("seed", range(12))
 def test_time_is_the_optimum(seed: int) -> None:
     """At most 1e-4 above a converged sequence of convex problems (Clarabel) on the same knots, within 40 iterations."""

@@ -76,6 +76,7 @@ def reversing(travel: str, small: float, seed: int) -> tuple[Floats, Floats, Flo
     return sigma, dq, d2q, 0.05 / np.abs(dq).max(axis=1) ** 2
 
 
+@pytest.mark.covering
 @pytest.mark.numeric
 @pytest.mark.parametrize("travel", ["slope", "sum"])
 @pytest.mark.parametrize("power", range(-14, -5))

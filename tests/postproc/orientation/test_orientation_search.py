@@ -28,6 +28,7 @@ from postproc.orientation.plans.plans import plans_of, table_of
 from postproc.orientation.plans.shortest_sequence import groupwise, seconds
 from postproc.setup.model import SetupFile, load_setup
 from tests.postproc.kit import SAMPLES, machine
+from tests.postproc.orientation.part_choice import part
 from toolpaths.arrays import Floats
 from toolpaths.rotations import angle_between
 from toolpaths.toolpath import Toolpath
@@ -83,6 +84,7 @@ def test_joints_of_a_pass_follow_from_four_poses(name: str) -> None:
         assert np.abs(found_tip - tip).max() < 1e-9 and angle_between(found_axis, axis).max() < 1e-9
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("name", ["mikron-ucp710", "h4a-c-table"])
 @pytest.mark.parametrize("jerk", [True, False])
 def test_times_on_shared_knots_are_those_of_plans(name: str, jerk: bool) -> None:
@@ -179,7 +181,7 @@ def test_the_pass_before_lends_its_axis() -> None:
 
 def test_rapids_count_in_whole_plans() -> None:
     """The fastest axis minds the rapids of its pass, the best only its cuts."""
-    choice = chosen(toolpaths.read(SAMPLES / "test_part.cls")[0], machine("mikron-ucp710"))
+    choice = part()
     found, plans = choice.tried, choice.plans
     assert plans["auto"].seconds == min(plan.seconds for plan in plans.values())
     assert plans["whole-part"].seconds <= plans["keep"].seconds
@@ -187,6 +189,7 @@ def test_rapids_count_in_whole_plans() -> None:
     assert any(one.swift.rapids < 0.999 * one.best.rapids for one in found)
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize(("name", "walls"), [("mikron-ucp710", True), ("mikron-ucp710", False), ("trunnion-bc", True),
                                              ("head-table", False), ("mill-4axis", True), ("nutating-head", True),
                                              ("uranesx", False)])

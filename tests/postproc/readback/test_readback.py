@@ -176,6 +176,7 @@ def random_program(rng: np.random.Generator) -> str:
     return "\n".join(lines) + "\n"
 
 
+@pytest.mark.covering(count=6)
 @pytest.mark.parametrize("seed", range(12))
 def test_random_programs_as_the_own_executor_runs_them(seed: int) -> None:
     text = random_program(np.random.default_rng(seed))
@@ -285,6 +286,7 @@ def test_compiled_walk_is_the_plain_walk(monkeypatch: pytest.MonkeyPatch) -> Non
         assert np.array_equal(m0, m1) and np.array_equal(o0, o1)
 
 
+@pytest.mark.covering(count=3)
 @pytest.mark.parametrize("seed", range(6))
 def test_walk_gives_each_move_its_own_blocks(seed: int) -> None:
     (_, end, *_), tips, _, _ = data = random_walk(np.random.default_rng(100 + seed), 80)
