@@ -10,7 +10,8 @@ from typing import Literal
 import numpy as np
 from pydantic import Field, field_validator
 
-from machines.kinematics.serial import Joint, Serial
+from machines.kinematics.chain import Joint
+from machines.kinematics.serial import Serial
 from machines.machine import ControlKinematics
 from machines.models import KinematicsModel, Problem, Vector
 from machines.user_file import UserModel

@@ -138,7 +138,7 @@ def _modes(path: Path, control: Control, step: Floats, passes: Ints, native: Boo
         chosen = cutting
     else:
         turned = (step[:, control.rotary] != 0.0).any(axis=1) if len(control.rotary) else np.zeros(len(path), dtype=bool)
-        turning = cutting & axes & (turned | (not control.machine.kinematics.slides_affine))
+        turning = cutting & axes & (turned | (not control.machine.kinematics.straight_slides))
         of_pass = np.zeros(int(passes.max(initial=0)) + 1, dtype=bool)
         of_pass[passes[turning]] = True
         chosen = cutting & axes & of_pass[passes]

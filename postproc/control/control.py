@@ -83,7 +83,7 @@ class Control:
     @cached_property
     def tips_straight(self) -> bool:
         """True where a block at standing rotary axes takes the tip along a straight line."""
-        return self.law != "axes" or self.machine.kinematics.slides_affine
+        return self.law != "axes" or self.machine.kinematics.straight_slides
 
     @cached_property
     def kinematics(self) -> Kinematics:
@@ -98,9 +98,11 @@ class Control:
         work offset serves every law.
         """
         kin = self.machine.kinematics
-        if not kin.slides_affine or not any(kin.rotary) or (self.xyz < 0).any() or len(self.slides) != 3:
+        if not kin.straight_slides or not any(kin.rotary) or (self.xyz < 0).any() or len(self.slides) != 3:
             return False
         zero = np.zeros((1, kin.joints))
+        if not np.isfinite(kin.pose(zero)[2]).all():  # no frame of a plane without the tool's own x direction
+            return False
         moved = kin.jacobian(zero)[0, :3][:, self.xyz]
         return bool(np.allclose(moved, np.eye(3), atol=1e-9)) and bool(
             np.allclose(kin.forward(zero)[1], [[0.0, 0.0, 1.0]], atol=1e-9))
@@ -164,7 +166,7 @@ class Control:
         kin, z = self.machine.kinematics, self.xyz[2]
         if self.base == "tcp":
             return True
-        if z < 0 or not kin.slides_affine:
+        if z < 0 or not kin.straight_slides:
             return False
         zero = np.zeros((1, kin.joints))
         step = zero.copy()
@@ -180,20 +182,11 @@ class Control:
             offset = np.zeros(kin.joints)
             offset[self.xyz] = self.origin
             return offset
-        if not kin.slides_affine:
+        if not kin.straight_slides:
             return np.zeros(kin.joints)
-        result: Floats = self.slides_for(kin, self.origin[None, :], np.zeros((1, kin.joints)))[0] * self.unit
+        result: Floats = kin.at_tip(self.origin[None, :], np.zeros((1, kin.joints)), self.slides)[0] * self.unit
         if self.measured:
             result[self.xyz[2]] += self.measured
-        return result
-
-    def slides_for(self, kin: Kinematics, tip: Floats, q: Floats) -> Floats:
-        """q with the linear joints that bring the tip (N, 3) there at the rotary joints of q (N, J)."""
-        result = q.copy()
-        result[:, self.slides] = 0.0
-        at_zero, _ = kin.forward(result)
-        columns = kin.jacobian(result)[:, :3, :][:, :, self.slides]
-        result[:, self.slides] = np.linalg.solve(columns, (tip - at_zero)[..., None])[..., 0]
         return result
 
     def words(self, q: Floats, kin: Kinematics, length: float) -> Floats:
@@ -221,10 +214,8 @@ class Control:
         q = words / self.unit
         xyz = words[:, self.xyz]
         tip = xyz + self.origin if self.plane is None else self.plane.to_table(xyz)
-        if kin.slides_affine:
-            return self.slides_for(kin, tip, q)
-        axis = np.tile(kin.nearest_axis(np.array([[0.0, 0.0, 1.0]])), (len(q), 1))
-        return np.asarray(kin.inverse(tip, axis)[0])
+        q[:, self.xyz] = self.machine.home[self.xyz]
+        return kin.at_tip(tip, q, self.xyz)
 
     def tip_to_words(self, kin: Kinematics, q: Floats) -> Floats:
         """(N, 3, 3): change of the words X, Y, Z per change of the tip at joints q (N, J), rotary joints fixed."""
@@ -246,20 +237,14 @@ class Control:
         tip0, _ = kin.forward(q0)
         tip1, _ = kin.forward(q1)
         tip = tip0 + t[:, None] * (tip1 - tip0)
-        if kin.slides_affine:
-            q = self.slides_for(kin, tip, q)
-            return tip, kin.forward(q)[1], q
-        axis = kin.forward(q0)[1]
-        return tip, axis, kin.inverse(tip, axis)[0]
+        q = kin.at_tip(tip, q, self.xyz)
+        return tip, kin.forward(q)[1], q
 
     def bent(self, q0: Floats, q1: Floats, places: Floats, kin: Kinematics) -> Iterator[Floats]:
         """Joints (N, J) at each of the fractions `places` of the way from q0 to q1 (N, J), under the law "tcp"."""
         tip0, tip1 = kin.forward(q0)[0], kin.forward(q1)[0]
         for t in places.tolist():
-            if kin.slides_affine:
-                yield self.slides_for(kin, tip0 + t * (tip1 - tip0), q0 + t * (q1 - q0))
-            else:
-                yield self.between(q0, q1, np.full(len(q0), t), kin)[2]
+            yield kin.at_tip(tip0 + t * (tip1 - tip0), q0 + t * (q1 - q0), self.xyz)
 
     def _toward(self, q0: Floats, q1: Floats, t: Floats, rapid: Bools | None) -> Floats:
         """Joints at fraction t (N,) of the time: all at once, or each axis at its own rapid speed until it is there."""

@@ -320,7 +320,8 @@ def bent_blocks(path: Path, rotary: Bools) -> Bools:
     by_tip = np.array([frame.control.law == "tcp" for frame in path.frames])[path.frame]
     turns = np.concatenate([[False], (path.q[1:, rotary] != path.q[:-1, rotary]).any(axis=1)])
     first = np.arange(len(path)) == 0
-    result: Bools = ((path.code == ARC) | (by_tip & (turns | (not rotary.any())))) & ~first
+    straight = path.frames[0].control.machine.kinematics.straight_slides
+    result: Bools = ((path.code == ARC) | (by_tip & (turns | (not straight)))) & ~first
     return result
 
 

@@ -3,7 +3,7 @@
 With e(t) the difference of the block's pose and the reference's pose, both run through in the same t, and |e''| <= M, e
 stays within M d^2 / 8 of the straight lines between its values at places d apart (interpolation error), and a straight
 line is nowhere longer than at its ends. So max |e| <= max |e(t_k)| + M d^2 / 8. M comes from the derivatives in the middle
-of the block and a bound of the third derivative over all of it (`machines.straight_blocks`). The reference may be run
+of the block and a bound of the third derivative over all of it (`Kinematics.jets`). The reference may be run
 through in any way: here its parameter is the parabola through its values at the block's ends and middle.
 """
 
@@ -15,8 +15,8 @@ import numpy as np
 
 from machines.kinematics import columns
 from machines.kinematics.base import Kinematics
+from machines.kinematics.columns import blocks as in_blocks
 from machines.kinematics.jets import ZERO, Angle, Jet
-from machines.straight_blocks import in_blocks, pose_jets, tip_rule_jets
 from postproc.control.control import Control
 from toolpaths.arrays import Bools, Floats
 from toolpaths.rotations import angle_between, cross, lengths
@@ -160,8 +160,8 @@ class _Offset:
 def _law_jets(control: Control, kin: Kinematics, s: Stretch) -> tuple[Jet, Jet]:
     """Tip and axis along the blocks under the control's law; with standing rotaries a plane's law is that of the axes."""
     if control.tip_law:
-        return tip_rule_jets(kin, s.q0, s.q1, s.start[0], s.end[0])
-    return pose_jets(kin, s.q0, s.q1)
+        return kin.tip_jets(s.q0, s.q1, s.start[0], s.end[0], control.xyz)
+    return kin.jets(s.q0, s.q1)
 
 
 def _way(s: Stretch, middle: Floats) -> Angle:

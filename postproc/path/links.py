@@ -191,7 +191,7 @@ def _above(kin: Kinematics, space: SafeSpace, pose: Pose, turning: bool, share: 
     lift = space.plane(pose.axis, turning, share) + rise - float(pose.axis @ (pose.tip - space.centre))
     tip = pose.tip + max(lift, 0.0) * pose.axis
     if pose.law is not None and pose.law.law == "tilted":
-        q = pose.law.slides_for(kin, tip[None, :], pose.q[None, :])[0]
+        q = kin.at_tip(tip[None, :], pose.q[None, :], pose.law.slides)[0]
     else:
         q = nearest_solution(kin, tip[None, :], pose.axis[None, :], pose.q[None, :])[0]
     return Pose(tip, pose.axis, q, pose.law)

@@ -50,7 +50,7 @@ def solved_runs(plan: RunPlan, modes: OutputModes, kinematics: Callable[[int], K
     lasts, firsts = [*starts[1:].tolist(), len(moves)], starts.tolist()
     still = _still(moves.axis, starts, axis_tolerance)
     asked, left, tool = modes.asked[operation[np.array(lasts) - 1]].tolist(), plan.left[starts].tolist(), moves.tool[starts]
-    good = machine.kinematics.slides_affine and bool(np.isfinite(plan.q).all()) and not bool((plan.moved > 1e-6).any()) \
+    good = machine.kinematics.straight_slides and bool(np.isfinite(plan.q).all()) and not bool((plan.moved > 1e-6).any()) \
         and not bool(np.isfinite(moves.spin).any())
     laws = {(a, s): modes.law(a, s) for a, s in set(zip(asked, still.tolist(), strict=True))}
     tools = {k: kinematics(k) for k in np.unique(tool).tolist()}
@@ -70,7 +70,7 @@ def solved_runs(plan: RunPlan, modes: OutputModes, kinematics: Callable[[int], K
             if axis is moves.axis:
                 axis, q = np.array(axis), q.copy()
             frame, at = modes.plane(kin, q[first])
-            q[first:last] = frame.control.slides_for(kin, moves.tip[first:last], np.tile(at, (last - first, 1)))
+            q[first:last] = kin.at_tip(moves.tip[first:last], np.tile(at, (last - first, 1)), frame.control.slides)
             axis[first:last] = kin.forward(q[first:first + 1])[1]
         each.append(Run(first, last, frame, kin, left[k]))
     return Runs(tuple(each), axis, q), found

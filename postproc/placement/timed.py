@@ -9,8 +9,6 @@ from hashlib import blake2b
 import numpy as np
 
 from machines.machine import Machine
-from machines.singular_distance import NAMES as SINGULAR
-from machines.singular_distance import has_singular_distance, singular_distance
 from postproc.orientation.candidates.ranking import prepare
 from postproc.orientation.candidates.timed import Turned, turned
 from postproc.orientation.passes.passes import Work
@@ -161,12 +159,13 @@ class Timer:
 
     def _singular(self, made: Sequence[Turned]) -> tuple[float, str]:
         """Least distance from singular positions over all poses of a parallel machine, and what stands against it."""
-        if not has_singular_distance(self.machine.kinematics):
+        kin = self.machine.kinematics
+        if not kin.singular_names:
             return np.inf, ""
-        found = np.concatenate([singular_distance(self.machine.kinematics, q) for one in made for q in (one.q, *one.sites)])
+        found = np.concatenate([kin.singular_distance(q) for one in made for q in (one.q, *one.sites)])
         row, which = np.unravel_index(int(np.nanargmin(found)), found.shape)
         value = float(found[row, which])
-        why = f"{SINGULAR[int(which)]} comes to {value:.4f} of a singular position, allowed at least {self.least:g}"
+        why = f"{kin.singular_names[int(which)]} comes to {value:.4f} of a singular position, allowed at least {self.least:g}"
         return value, why if value < self.least else ""
 
     def _cutting(self, made: Sequence[Turned], best: float) -> tuple[list[tuple[float, str]], float, bool]:

@@ -28,9 +28,9 @@ def joints(m: Machine, n: int, seed: int = 1) -> np.ndarray:
 def poses(m: Machine, n: int, seed: int = 1, calm: bool = True) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """(q, tip, axis) of n random joint positions; for a parallel machine, whose legs seldom meet at those, of up to n
     random poses around the ones that do, `calm` without those next to a singular one."""
-    q = joints(m, n if m.kinematics.slides_affine else 1000, seed)
+    q = joints(m, n if m.kinematics.straight_slides else 1000, seed)
     tip, axis = m.kinematics.forward(q)
-    if m.kinematics.slides_affine:
+    if m.kinematics.straight_slides:
         return q, tip, axis
     met = np.isfinite(tip).all(axis=1)
     rng = np.random.default_rng(seed)

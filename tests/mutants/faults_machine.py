@@ -91,7 +91,7 @@ FAULTS = (
     Fault("travel not looked at", "travel", "check_travel", "if bad.any():\n            diagnostics",
           "if False:\n            diagnostics", ("far", "far tip")),
     Fault("travel of arcs by their ends", "travel", "extremes",
-          "if len(arcs) and law.machine.kinematics.slides_affine:", "if False:", ("far arc",)),
+          "if len(arcs) and law.machine.kinematics.straight_slides:", "if False:", ("far arc",)),
     Fault("travel by the upper end alone", "travel", "check_travel",
           "np.maximum(limits.lower[j] - low[:, j], high[:, j] - limits.upper[j])", "high[:, j] - limits.upper[j]",
           ("far", "far arc", "far tip")),

@@ -19,11 +19,10 @@ from machines.geometric_error.actual.serial_errors import SerialErrors
 from machines.geometric_error.actual.transforms import carried
 from machines.geometric_error.tables.names import SPINDLE, parse
 from machines.kinematics import columns
+from machines.kinematics.chain import Joint
 from machines.kinematics.columns import Columns
-from machines.kinematics.h4_axes import H4SpindleAxis
 from machines.kinematics.h4_linear import H4Linear
 from machines.kinematics.linear_delta import LinearDelta
-from machines.kinematics.serial import Joint
 from toolpaths.arrays import Bools, Floats
 from toolpaths.rotations import rotation
 
@@ -131,15 +130,13 @@ class ActualH4(ActualRods):
     @cached_property
     def line(self) -> Line:
         """The rotary axis, as its errors leave it; its reference point is on the nominal line."""
-        name, sense = self.kinematics.axis_names[4], self.kinematics.sense
-        at_spindle = isinstance(self.kinematics, H4SpindleAxis)
-        joint = Joint(name, True, np.array([0.0, sense, 0.0]) if at_spindle else np.array([0.0, 0.0, sense]), self.pivot)
-        return actual_line(joint, 4, self.chain)
+        name = self.kinematics.axis_names[4]
+        return actual_line(Joint(name, True, *self.kinematics.axis_line(name)), 4, self.chain)
 
     @property
     def pivot(self) -> Floats:
         """(3,) point of the rotary axis: in the platform, or the machine origin."""
-        return self.kinematics.pivot if isinstance(self.kinematics, H4SpindleAxis) else np.zeros(3)
+        return self.kinematics.axis_line(self.kinematics.axis_names[4])[1]
 
     def coordinates(self, q: Floats, near: Floats | None = None) -> Floats:
         """See the base class."""
@@ -154,7 +151,7 @@ class ActualH4(ActualRods):
         turned, tip, axis = self._part(w), *self.kinematics.place(w[:, :4], w[:, 4])[:2]
         place = np.einsum("nij,nj->ni", turned, w[:, :3])
         tilt = turned[:, :, 0]
-        at_spindle = isinstance(self.kinematics, H4SpindleAxis)
+        at_spindle = self._at_spindle
         tilted = platform_turn(w[:, 3])
         line = tilted @ self.line.joint.direction if at_spindle else np.broadcast_to(self.line.joint.direction, tip.shape)
         point = place + tilted @ self.pivot if at_spindle else np.zeros(3)
@@ -166,7 +163,7 @@ class ActualH4(ActualRods):
 
     def _part(self, w: Floats) -> Floats:
         """Machine frame to table frame (N, 3, 3)."""
-        if isinstance(self.kinematics, H4SpindleAxis):
+        if self._at_spindle:
             return np.tile(np.eye(3), (len(w), 1, 1))
         return rotation(self.line.joint.direction, w[:, 4])
 
@@ -194,7 +191,7 @@ class ActualH4(ActualRods):
 
     @property
     def _at_spindle(self) -> bool:
-        return isinstance(self.kinematics, H4SpindleAxis)
+        return self.kinematics.at_spindle
 
     def sensitivity(self, w: Floats, direction: Floats | None = None) -> Floats:
         """See the base class: the platform's, the rotary axis's, the spindle's, all at the tip in the table frame."""

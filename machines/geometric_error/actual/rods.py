@@ -19,8 +19,7 @@ import numpy as np
 
 from machines.geometric_error.actual.rods_loop import compiled, wanted
 from machines.geometric_error.actual.transforms import turns
-from machines.kinematics.h4_linear import H4Linear
-from machines.kinematics.linear_delta import LinearDelta
+from machines.kinematics.rod_platform import RodPlatform
 from toolpaths.arrays import Floats, Ints, frozen
 
 RODS = 6
@@ -203,12 +202,12 @@ def inverted(matrices: Floats) -> Floats:
         return result
 
 
-def gives_rods(kinematics: LinearDelta | H4Linear) -> bool:
+def gives_rods(kinematics: RodPlatform) -> bool:
     """Whether the machine file says where the rods are; one that does not gives the middle lines of pairs."""
     return kinematics.clearance is not None and len(kinematics.clearance.leg) == RODS
 
 
-def rod_frame(kinematics: LinearDelta | H4Linear, pairs: tuple[float, ...] = ()) -> RodFrame:
+def rod_frame(kinematics: RodPlatform, pairs: tuple[float, ...] = ()) -> RodFrame:
     """The rods of a machine; `pairs` as in `RodErrors`.
 
     The joints of a pair whose place the file does not give lie square to its slide and, in the middle of the workspace, to
@@ -217,7 +216,7 @@ def rod_frame(kinematics: LinearDelta | H4Linear, pairs: tuple[float, ...] = ())
     Raises:
         ValueError: where neither its file nor `pairs` give six rods.
     """
-    platform = kinematics.platform if isinstance(kinematics, LinearDelta) else kinematics.platform.joints
+    platform = kinematics.platform_joints
     legs, rods = kinematics.legs, kinematics.clearance
     offset = np.zeros_like(legs.points) if rods is None or rods.rail_offset is None else rods.rail_offset
     if rods is not None and gives_rods(kinematics):
@@ -233,7 +232,7 @@ def rod_frame(kinematics: LinearDelta | H4Linear, pairs: tuple[float, ...] = ())
     return RodFrame(leg, rail, legs.directions, shift - offset[leg], platform[leg] + shift, legs.lengths[leg], guide)
 
 
-def _pairs(kinematics: LinearDelta | H4Linear, platform: Floats, pairs: tuple[float, ...]) -> Floats:
+def _pairs(kinematics: RodPlatform, platform: Floats, pairs: tuple[float, ...]) -> Floats:
     """(6, 3) from the middle line of each leg to its two rods."""
     legs, ends = kinematics.legs, kinematics.workspace.middle + platform
     rods = ends - legs.carriages(legs.inverse(ends[None]))[0]

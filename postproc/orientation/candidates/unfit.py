@@ -72,7 +72,7 @@ def unfit(work: Work, results: list[Tried]) -> list[Diagnostic]:
 
 def _off(own: Turned) -> str:
     """By how much a serial machine misses an axis that it cannot take at all."""
-    if own.refused != OUT_OF_REACH or not own.one.kin.slides_affine:
+    if own.refused != OUT_OF_REACH or not own.one.kin.straight_slides:
         return ""
     off = angle_between(own.one.kin.nearest_axis(own.one.axes), own.one.axes)
     return f": the rotary axes bring the tool no nearer to it than {off.max() / DEG:.3f} degrees" if off.max() > 0.0 else ""

@@ -51,7 +51,7 @@ def vertex_angles(kin: Kinematics, q: Floats, direction: Floats, limit: Floats) 
     """
     rotary = np.flatnonzero(kin.rotary)
     linear = np.flatnonzero(~np.array(kin.rotary))
-    if len(rotary) != 2 or len(linear) != 3 or not kin.slides_affine:
+    if len(rotary) != 2 or len(linear) != 3 or not kin.straight_slides:
         return np.zeros((0, 2))
     table = table_of(kin, q)
     if table is not None:

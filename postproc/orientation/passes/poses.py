@@ -33,7 +33,7 @@ def held_poses(one: Pass, machine: Machine, axes: Floats, held: float = np.nan) 
     tips = np.concatenate([one.tip, *(stretch.tip for stretch in one.stretches)])
     moves = np.stack([one.shift(axis) for axis in axes])
     near = _near(machine, held)
-    if not one.kin.slides_affine:
+    if not one.kin.straight_slides:
         return [poses(one, machine, tips + move, np.tile(axis, (len(tips), 1)), held)
                 for move, axis in zip(moves, axes, strict=True)]
     corners = _corners(tips)

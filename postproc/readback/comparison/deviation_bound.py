@@ -2,7 +2,7 @@
 
 Between two places of a block the difference e of the executed pose and a pose of its curve bends by at most M, so that it
 stays within M / 32 of the largest value at the begin, middle and end (interpolation error, see `postproc.path.bound`). M
-comes from the law of the block by Taylor's theorem (`machines.straight_blocks`); the values themselves are poses of the
+comes from the law of the block by Taylor's theorem (`Kinematics.jets`); the values themselves are poses of the
 reader. Blocks whose bound is above the worst that was seen anywhere are halved until bound and worst meet.
 """
 
@@ -16,7 +16,6 @@ from machines.kinematics import columns
 from machines.kinematics.base import Kinematics
 from machines.kinematics.columns import Columns
 from machines.kinematics.jets import Angle, Jet, straight
-from machines.straight_blocks import pose_jets
 from postproc.base.group_rows import groups
 from postproc.control.word_arcs import PLANE_AXIS, PLANE_COLUMNS
 from postproc.path.bound import SHORT, axis_reference, curve_parameter, tip_reference
@@ -335,8 +334,10 @@ def _kinds(motion: Motion, executed: Executed, rows: Ints) -> Ints:
     by_tip = np.array([law == "tcp" for law in laws])[motion.frame[rows]] | (control.base == "tcp")
     in_plane = np.array([law == "tilted" for law in laws])[motion.frame[rows]]
     before = np.where((rows == 0)[:, None], motion.start, motion.end[np.maximum(rows - 1, 0)])
-    stands = (before[:, control.rotary] == motion.end[rows][:, control.rotary]).all(axis=1)
-    straight_slides = control.machine.kinematics.slides_affine
+    kin = control.machine.kinematics
+    holding = np.array(kin.rotary) | np.array(kin.turns_tool)
+    stands = (before[:, holding] == motion.end[rows][:, holding]).all(axis=1)
+    straight_slides = kin.straight_slides
     kind = np.where(by_tip, TIP, JOINTS)
     kind = np.where(in_plane | (stands & (straight_slides | (by_tip & (control.base != "tcp")))), LINE, kind)
     return np.where(motion.code[rows] == ARC, CIRCLE, kind)
@@ -349,13 +350,12 @@ def _jets(kind: int, motion: Motion, executed: Executed, rows: Ints, pieces: _Pi
     if kind == CIRCLE:
         return _circle_jets(motion, executed, rows, pieces, tip0, axis0)
     line = straight(list(tip0.T), list(tip1.T))
-    if kind == LINE or (kind == TIP and not any(kin.rotary)):
+    if kind == LINE or (kind == TIP and not any(kin.turns_tool)):
         return line, Jet(list(axis0.T))
-    try:
-        tip, axis = pose_jets(kin, q0, q1)
-    except TypeError:
+    xyz = executed.control.xyz
+    if not (kin.tip_jets_proved(xyz) if kind == TIP else kin.jets_proved):
         return None
-    return (line, axis) if kind == TIP else (tip, axis)
+    return (line, kin.jets(q0, q1)[1]) if kind == TIP else kin.jets(q0, q1)
 
 
 def _circle_jets(motion: Motion, executed: Executed, rows: Ints, pieces: _Pieces, tip0: Floats,

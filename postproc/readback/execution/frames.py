@@ -144,7 +144,7 @@ def frame_of(law: Law, control: Control | None, length: float, position: Floats,
     if law.name == "axes":
         return AXES
     kin = control.kinematics if control is not None else None
-    if control is None or kin is None or not kin.slides_affine or (control.xyz < 0).any():
+    if control is None or kin is None or not kin.straight_slides or (control.xyz < 0).any():
         found.append(error("gcode.mode", f"{law.code}: the control does not own the kinematics of this machine", file=file,
                            lines=[line], hint="axis positions are all that it can run"))
         return AXES

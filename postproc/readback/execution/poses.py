@@ -158,7 +158,7 @@ class Executed:
 def poses_before(motion: Motion, control: Control) -> Floats | None:
     """`Executed.before` of a program; None where the joints alone tell the pose."""
     kin = control.machine.kinematics
-    if control.base == "tcp" or kin.slides_affine:
+    if control.base == "tcp" or kin.straight_slides:
         return None
     home = motion.start / control.unit
     ends = assembly.ends(kin, motion.end / control.unit, home)

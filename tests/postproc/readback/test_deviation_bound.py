@@ -141,10 +141,7 @@ def test_blocks_that_may_be_off_between_the_places_looked_at_are_an_error(monkey
 @pytest.mark.parametrize(("file", "name", "kind"), [("short_five_axis.apt", "mikron-ucp710", Serial),
                                                     ("pocket.cls", "delta-star", LinearDelta)])
 def test_a_kinematics_without_bounds_is_checked_not_proved(monkeypatch, file, name, kind):
-    def none(kin, q0, q1):
-        raise TypeError(f"{kind.__name__} has no bound")
-
-    monkeypatch.setattr(bound_module, "pose_jets", none)
+    monkeypatch.setattr(kind, "jets_proved", False)
     result = good(convert(path_of(file), name, "linuxcnc" if kind is Serial else "generic-iso"))
     assert result.comparison.unbounded > 10
     refused = convert(path_of(file), name, "linuxcnc" if kind is Serial else "generic-iso", require_proof=True)
@@ -153,8 +150,8 @@ def test_a_kinematics_without_bounds_is_checked_not_proved(monkeypatch, file, na
 
 def test_another_assembly_mode_than_that_of_the_bound_is_not_called_bounded(monkeypatch):
     """The law's middle and the reader's pose must be one: else the bend is of another motion."""
-    given = bound_module.pose_jets
-    monkeypatch.setattr(bound_module, "pose_jets", lambda kin, q0, q1: tuple(
+    given = LinearDelta.jets
+    monkeypatch.setattr(LinearDelta, "jets", lambda kin, q0, q1: tuple(
         replace(jet, value=[x + 1e-4 for x in jet.value]) for jet in given(kin, q0, q1)))
     assert good(convert(path_of("pocket.cls"), "delta-star", "generic-iso")).comparison.unbounded > 10
 
