@@ -1,4 +1,4 @@
-"""`[kinematics] family = "serial"`: an ISO 10791-6 code plus direction, point and sense of each axis."""
+"""`[kinematics] kind = "serial"`: an ISO 10791-6 code plus direction, point and sense of each axis."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class SerialAxisModel(UserModel):
 class SerialModel(KinematicsModel):
     """Three linear axes and up to two rotary ones."""
 
-    family: Literal["serial"]
+    kind: Literal["serial"]
     structure: str
     """ISO 10791-6 code, e.g. "w C' A' b X Y Z (C1) t"; primed axes carry the part, the spindle is in brackets"""
     axes: dict[str, SerialAxisModel] = Field(default_factory=dict)

@@ -23,6 +23,8 @@ from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.units import DEG
 
 XYZ = ("X", "Y", "Z")
+PLACES = 200
+"""of a machine's travel at which it is looked at"""
 Law = Literal["axes", "tcp", "tilted"]
 Rapids = Literal["straight", "dog-leg"]
 FeedLength = Literal["xyz-first", "all", "geometry"]
@@ -162,17 +164,18 @@ class Control:
 
     @cached_property
     def length_on_z(self) -> bool:
-        """True where a tool length offset on Z moves the controlled point from gauge point to tip at q = 0."""
+        """True where a tool length offset on Z moves the controlled point from gauge point to tip: at q = 0, and where slides
+        do not move the tip straight, wherever the machine is looked at."""
         kin, z = self.machine.kinematics, self.xyz[2]
         if self.base == "tcp":
             return True
-        if z < 0 or not kin.straight_slides:
+        if z < 0:
             return False
-        zero = np.zeros((1, kin.joints))
-        step = zero.copy()
-        step[0, z] = 1.0
-        moved = kin.forward(step)[0] - kin.forward(zero)[0]
-        return bool(np.allclose(moved, kin.forward(zero)[1], atol=1e-9))
+        at = np.zeros((1, kin.joints)) if kin.straight_slides else _places(self.machine)
+        tip, axis = kin.forward(at)
+        moved = kin.forward(at + np.eye(kin.joints)[z])[0] - tip
+        good = np.isfinite(moved).all(axis=1)
+        return bool(good.any() and np.allclose(moved[good], axis[good], atol=1e-9))
 
     @cached_property
     def work_offset(self) -> Floats:
@@ -257,6 +260,13 @@ class Control:
             share = np.where(rapid[:, None] & (own > 0.0), faster, share)
         result: Floats = q0 + share * step
         return result
+
+
+def _places(machine: Machine) -> Floats:
+    """Joints (N, J) all over the travel, a turn of axes that go round, and home."""
+    low, high = (np.where(np.isfinite(v), v, side * np.pi) for v, side in ((machine.limits.lower, -1), (machine.limits.upper, 1)))
+    spread = np.random.default_rng(0).random((PLACES, len(low)))
+    return np.concatenate([machine.home[None], low + spread * (high - low)])
 
 
 def tool_frames(kin: Kinematics, q: Floats) -> Floats:
