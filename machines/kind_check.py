@@ -5,15 +5,15 @@ Not a proof: what it gives near home must fit together before anything is comput
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import numpy as np
 
 from machines.kinematics import by_samples
 from machines.kinematics.base import Kinematics
 from machines.machine import Limits
-from machines.models import Problem
-from toolpaths.arrays import Floats
+from machines.models import KeyProblem
+from toolpaths.arrays import Bools, Floats
 
 NEAR, TOOL = 1e-6, 50.0
 """mm or rad that poses and joints may differ by; mm of the tool that is tried"""
@@ -24,7 +24,7 @@ SHARES = (0.0, 0.02, -0.02, 0.05)
 _PATH = ("kind",)
 
 
-def contract_faults(kinematics: Kinematics, limits: Limits, home: Floats) -> Iterator[Problem]:
+def contract_faults(kinematics: Kinematics, limits: Limits, home: Floats) -> Iterator[KeyProblem]:
     """What a kind breaks of `Kinematics`, as faults of its machine file; whatever its code raises is one."""
     found = list(_letters(kinematics))
     yield from found
@@ -36,11 +36,11 @@ def contract_faults(kinematics: Kinematics, limits: Limits, home: Floats) -> Ite
         yield _problem(f"its code fails near home: {type(fault).__name__}: {fault}")
 
 
-def _problem(what: str) -> Problem:
-    return Problem("machine.contract", _PATH, what, "correct the kind: machines/kinematics/base.py says what it promises")
+def _problem(what: str) -> KeyProblem:
+    return KeyProblem("machine.contract", _PATH, what, "correct the kind: machines/kinematics/base.py says what it promises")
 
 
-def _letters(kin: Kinematics) -> Iterator[Problem]:
+def _letters(kin: Kinematics) -> Iterator[KeyProblem]:
     if len(kin.axis_names) != len(kin.rotary) or len(set(kin.axis_names)) != len(kin.axis_names) or not kin.axis_names:
         yield _problem(f"axis_names {kin.axis_names} and rotary {kin.rotary} do not go together, one letter a joint")
         return
@@ -61,7 +61,7 @@ def _places(kin: Kinematics, limits: Limits, home: Floats) -> Floats:
     return np.asarray(q[np.isfinite(np.hstack([tip, axis])).all(axis=1) | (np.arange(len(q)) == 0)])
 
 
-def _poses(kin: Kinematics, q: Floats) -> Iterator[Problem]:
+def _poses(kin: Kinematics, q: Floats) -> Iterator[KeyProblem]:
     n = len(q)
     tip, axis = kin.forward(q)
     if tip.shape != (n, 3) or axis.shape != (n, 3):
@@ -78,7 +78,7 @@ def _poses(kin: Kinematics, q: Floats) -> Iterator[Problem]:
     yield from _rates(kin, q, axis)
 
 
-def _round_trip(kin: Kinematics, q: Floats, pose: tuple[Floats, Floats], what: str) -> Iterator[Problem]:
+def _round_trip(kin: Kinematics, q: Floats, pose: tuple[Floats, Floats], what: str) -> Iterator[KeyProblem]:
     tip, axis = kin.forward(q)
     if max(np.abs(tip - pose[0]).max(), np.abs(axis - pose[1]).max()) > NEAR:
         yield _problem("with_tool does not move the tip along the tool axis: forward has to use tool_length")
@@ -87,7 +87,7 @@ def _round_trip(kin: Kinematics, q: Floats, pose: tuple[Floats, Floats], what: s
     if found.shape != (kin.branches, len(q), kin.joints):
         yield _problem(f"{what} gives {found.shape}, expected (branches, N, J) = {(kin.branches, len(q), kin.joints)}")
         return
-    good = np.isfinite(found).all(axis=2)
+    good: Bools = np.asarray(np.isfinite(found).all(axis=2))
     if not good.any(axis=0).all():
         yield _problem(f"{what} finds no joints for a pose that forward gives near home")
         return
@@ -99,7 +99,7 @@ def _round_trip(kin: Kinematics, q: Floats, pose: tuple[Floats, Floats], what: s
             return
 
 
-def _rates(kin: Kinematics, q: Floats, axis: Floats) -> Iterator[Problem]:
+def _rates(kin: Kinematics, q: Floats, axis: Floats) -> Iterator[KeyProblem]:
     rates, pose = kin.jacobian(q), np.hstack(kin.forward(q))
     expected = by_samples.rates(lambda some: kin.forward(some), q, kin.rotary)
     good = np.isfinite(expected).all(axis=(1, 2))
@@ -115,20 +115,19 @@ def _rates(kin: Kinematics, q: Floats, axis: Floats) -> Iterator[Problem]:
         if linear.sum() != 3 or slid > RATE * size or np.abs(expected[good][:, 3:, linear]).max(initial=0.0) > RATE:
             yield _problem("straight_slides is True, and there are not three linear joints that move the tip straight")
     if kin.jets_proved:
-        yield from _bounds(kin.jets, kin.forward, q, pose)
+        yield from _bounds(kin, q, pose)
 
 
-def _same_turns(q: Floats, linear: Floats) -> Floats:
+def _same_turns(q: Floats, linear: Bools) -> Bools:
     """(N - 1,) True where two places in turn differ in linear joints alone."""
     return np.asarray((np.diff(q[:, ~linear], axis=0) == 0.0).all(axis=1))
 
 
-def _bounds(jets: Callable[..., object], forward: by_samples.Forward, q: Floats, pose: Floats) -> Iterator[Problem]:
+def _bounds(kin: Kinematics, q: Floats, pose: Floats) -> Iterator[KeyProblem]:
     """Poses between that leave the Taylor bound of a move's jets."""
-    found: tuple[by_samples.Jet, by_samples.Jet] = jets(q[:-1], q[1:])  # type: ignore[assignment]
-    size, n = max(1.0, float(np.abs(pose).max())), len(q) - 1
+    found, size, n = kin.jets(q[:-1], q[1:]), max(1.0, float(np.abs(pose).max())), len(q) - 1
     for t in (0.0, 0.2, 0.8, 1.0):
-        h, there = t - 0.5, forward(q[:-1] + t * (q[1:] - q[:-1]))
+        h, there = t - 0.5, kin.forward(q[:-1] + t * (q[1:] - q[:-1]))
         for jet, seen in zip(found, there, strict=True):
             value, first, second = (np.stack([np.broadcast_to(c, n) for c in v], axis=1) for v in (
                 jet.value, jet.first, jet.second))

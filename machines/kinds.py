@@ -5,8 +5,8 @@ A package registers a kind in its metadata, in the group `postproc.kinematics`, 
     [project.entry-points."postproc.kinematics"]
     scissors = "my_machine:ScissorsModel"
 
-Without a package: `POSTPROC_KINDS=my_machine.py` names files (several as in PATH) whose models are registered. Such a file is a
-program that is run, so only files named there are, never one that merely lies next to a machine file.
+Without a package: `POSTPROC_KINDS=my_machine.py` names files (several as in PATH) whose models are registered. Such a
+file is a program that is run, so only files named there are, never one that merely lies next to a machine file.
 """
 
 from __future__ import annotations
@@ -137,6 +137,6 @@ def _run(file: Path) -> ModuleType:
 
 
 def _words(model: object, module: str) -> Iterator[str]:
-    """The words that name a model in machine files, where it is one that its module defines; built-in ones stay as they are."""
+    """The words that name a model in machine files, of one that its module defines; built-in ones stay as they are."""
     if isinstance(model, type) and issubclass(model, KinematicsModel) and model.__module__ == module:
         yield from (word for word in get_args(model.model_fields["kind"].annotation) if word not in BUILT_IN)

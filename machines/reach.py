@@ -1,4 +1,4 @@
-"""Reach of a machine that is declared to work somewhere, parallel ones mostly: signed margins to its workspace, joint stops and collisions, at joints and between them.
+"""Reach of a machine with a declared workspace: signed margins to it, joint stops and collisions, at joints and between.
 
 Rods, rails and spindle are round bars (segments with a radius); two bars clear each other by the distance of their
 middle lines less both radii. Source: Company 2000, II.4.2.1 (rods and slides), II.4.2.2 (rods), II.4.2.3 (rods and
@@ -14,7 +14,7 @@ from functools import cached_property, partial
 import numpy as np
 
 from machines.kinematics.base import Kinematics
-from machines.kinematics.rig import Rig
+from machines.kinematics.clearance_geometry import ClearanceGeometry
 from toolpaths.arrays import Bools, Floats
 from toolpaths.rotations import angle_between
 
@@ -24,7 +24,7 @@ TOUCH = 1e-6
 """mm: rods whose ends are nearer share a joint"""
 
 
-Column = tuple[str, bool, Callable[[Rig], Floats]]
+MarginColumn = tuple[str, bool, Callable[[ClearanceGeometry], Floats]]
 """name, True for rad, margin (N,) of a rig"""
 
 
@@ -104,7 +104,7 @@ class _Checks:
     def __init__(self, kinematics: Kinematics) -> None:
         assert kinematics.workspace is not None  # see `is_checked`
         self.space, self.letters = kinematics.workspace, kinematics.axis_names
-        self.columns: list[Column] = list(self._workspace())
+        self.columns: list[MarginColumn] = list(self._workspace())
         platform = kinematics.on_rods
         if platform is not None and platform.clearance is not None:
             self.middle, self.legs, self.clearance = platform.middle_rig(), platform.legs, platform.clearance
@@ -112,31 +112,31 @@ class _Checks:
         self.names = tuple(name for name, _, _ in self.columns)
         self.angular = np.array([angular for _, angular, _ in self.columns], dtype=np.bool_)
 
-    def values(self, rig: Rig) -> Floats:
+    def values(self, rig: ClearanceGeometry) -> Floats:
         """(N, M)"""
         return np.stack([column(rig) for _, _, column in self.columns], axis=1)
 
-    def _workspace(self) -> Iterator[Column]:
+    def _workspace(self) -> Iterator[MarginColumn]:
         for i, letter in enumerate("xyz"):
             yield f"workspace {letter}", False, partial(self._face, i)
         if self.space.tilt[0] < self.space.tilt[1]:
             yield "tilt", True, self._tilt
 
-    def _face(self, i: int, rig: Rig) -> Floats:
+    def _face(self, i: int, rig: ClearanceGeometry) -> Floats:
         return self.space.margins(rig.place)[:, i]
 
-    def _tilt(self, rig: Rig) -> Floats:
+    def _tilt(self, rig: ClearanceGeometry) -> Floats:
         low, high = self.space.tilt
         return np.minimum(rig.tilt - low, high - rig.tilt)
 
-    def _stops(self) -> Iterator[Column]:
+    def _stops(self) -> Iterator[MarginColumn]:
         stops = (("slide", self.clearance.carriage_angle), ("platform", self.clearance.platform_angle))
         for k, letter in enumerate(self.letters[: len(self.legs.lengths)]):
             for where, most in stops:
                 if most is not None:
                     yield f"joint {letter} at {where}", True, partial(self._swing, k, most, where == "platform")
 
-    def _swing(self, k: int, most: float, carried: bool, rig: Rig) -> Floats:
+    def _swing(self, k: int, most: float, carried: bool, rig: ClearanceGeometry) -> Floats:
         """The stop `most` less the rod's angle from its direction in the middle; `carried` by the tilting platform."""
         rod = _unit(rig.ends[:, k] - rig.carriages[:, k])
         middle = _unit(self.middle.ends[:, k] - self.middle.carriages[:, k])
@@ -144,7 +144,7 @@ class _Checks:
             rod, middle = _level(rod, rig.tilt), _level(middle, self.middle.tilt)
         return np.asarray(most - angle_between(rod, middle), dtype=np.float64)
 
-    def _bars(self) -> Iterator[Column]:
+    def _bars(self) -> Iterator[MarginColumn]:
         given = self.clearance
         if given.rod_radius is None:
             return
@@ -161,7 +161,8 @@ class _Checks:
                     yield (f"{name} - slide {letter}", False,
                            partial(self._gap, a, partial(self.rail, k), given.rod_radius + given.rail_radius))
 
-    def _gap(self, a: int, other: Callable[[Rig], tuple[Floats, Floats]], thick: float, rig: Rig) -> Floats:
+    def _gap(self, a: int, other: Callable[[ClearanceGeometry], tuple[Floats, Floats]], thick: float,
+             rig: ClearanceGeometry) -> Floats:
         return np.asarray(segment_distance(*self.rod(a, rig), *other(rig)) - thick, dtype=np.float64)
 
     @cached_property
@@ -174,17 +175,17 @@ class _Checks:
         ends = [self.rod(i, self.middle)[1] for i in (a, b)]
         return bool(np.linalg.norm(ends[0] - ends[1]) < TOUCH)
 
-    def rod(self, i: int, rig: Rig) -> tuple[Floats, Floats]:
+    def rod(self, i: int, rig: ClearanceGeometry) -> tuple[Floats, Floats]:
         """Both ends (N, 3) of rod i."""
         k, shift = int(self.clearance.leg[i]), self.clearance.shift[i]
         return rig.carriages[:, k] + shift, rig.ends[:, k] + shift
 
-    def spindle(self, rig: Rig) -> tuple[Floats, Floats]:
+    def spindle(self, rig: ClearanceGeometry) -> tuple[Floats, Floats]:
         """Both ends (N, 3) of the spindle."""
         low, high = self.clearance.spindle
         return rig.gauge + low * rig.axis, rig.gauge + high * rig.axis
 
-    def rail(self, k: int, rig: Rig) -> tuple[Floats, Floats]:
+    def rail(self, k: int, rig: ClearanceGeometry) -> tuple[Floats, Floats]:
         """Both ends (1, 3) of the rail of slide k."""
         given = self.clearance
         assert given.rail_offset is not None and given.rail_ends is not None

@@ -1,6 +1,7 @@
-"""A kind of machine of your own: a mill whose spindle hangs on two arms, scissors over a rail along x, lifted by a slide along z.
+"""A kind of machine of your own: a mill whose spindle hangs on two arms, scissors on a rail along x, with a slide along z.
 
-    POSTPROC_KINDS=samples/my_machine.py postproc convert samples/pocket.cls -m samples/my_machine.toml -c linuxcnc -o out/pocket.ngc
+    export POSTPROC_KINDS=samples/my_machine.py
+    postproc convert samples/pocket.cls -m samples/my_machine.toml --setup samples/tools.setup.toml -c linuxcnc -o out/p.ngc
 """
 
 from dataclasses import dataclass
@@ -27,7 +28,7 @@ class Scissors(Kinematics):
     def forward(self, q, near=None):
         reach = self.arm**2 - 0.25 * (q[:, 1] - q[:, 0]) ** 2
         y = self.rail - np.sqrt(np.where((reach > 0.0) & (q[:, 1] > q[:, 0]), reach, np.nan))
-        return np.stack([0.5 * (q[:, 0] + q[:, 1]), y, q[:, 2] - self.tool_length], axis=1), np.tile([0.0, 0.0, 1.0], (len(q), 1))
+        return np.stack([0.5 * (q[:, 0] + q[:, 1]), y, q[:, 2] - self.tool_length], axis=1), np.eye(3)[np.full(len(q), 2)]
 
 
 class ScissorsModel(KinematicsModel):

@@ -23,7 +23,7 @@ ROUNDS = 14
 
 
 @dataclass(frozen=True)
-class Worst:
+class WorstValue:
     """The largest value over a box, the place (mm) and tilt (rad) where it is, and the least seen on the grid."""
 
     value: float
@@ -82,7 +82,7 @@ def speed_acceleration(kinematics: RodPlatform, place: Floats, tilt: Floats) -> 
     return result
 
 
-def worst(measure: Measure, space: Workspace, counts: tuple[int, int, int, int] = (11, 11, 11, 7)) -> Worst:
+def worst(measure: Measure, space: Workspace, counts: tuple[int, int, int, int] = (11, 11, 11, 7)) -> WorstValue:
     """The largest value of `measure` over the closed workspace: an even grid, then a finer one around its largest."""
     place, tilt = space.grid(counts)
     value = measure(place, tilt)
@@ -98,7 +98,7 @@ def worst(measure: Measure, space: Workspace, counts: tuple[int, int, int, int] 
             best, point = float(value.max()), around[int(np.argmax(value))]
         else:
             step = 0.5 * step
-    return Worst(best, (float(point[0]), float(point[1]), float(point[2])), float(point[3]), least)
+    return WorstValue(best, (float(point[0]), float(point[1]), float(point[2])), float(point[3]), least)
 
 
 def _inverse(kinematics: RodPlatform, place: Floats, tilt: Floats) -> Floats:

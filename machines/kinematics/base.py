@@ -3,9 +3,9 @@
 Kinematics work in the table frame (the frame that carries the part, at the machine origin when q = 0), at the gauge
 point of the spindle unless `with_tool(length)` was asked for. The tool axis points from the tip to the spindle.
 
-A kind of machine gives `inverse` and `forward`; everything else has a default that is safe: rates by differences, blocks
-looked at in places instead of bounded (`jets_proved` is False: programs are checked, not proved), no clearances, no geometric
-errors. A kind that knows more overrides more.
+A kind of machine gives `inverse` and `forward`; everything else has a default that is safe: rates by differences,
+blocks looked at in places instead of bounded (`jets_proved` is False: programs are checked, not proved), no clearances, no
+geometric errors. A kind that knows more overrides more.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ import numpy as np
 
 from machines.kinematics import by_samples
 from machines.kinematics.chain import Joint
-from machines.kinematics.jets import Jet, straight
-from machines.kinematics.rig import Rig
+from machines.kinematics.clearance_geometry import ClearanceGeometry
 from machines.kinematics.rod_platform import RodPlatform
+from machines.kinematics.taylor import TaylorVector, straight
 from machines.kinematics.workspace import Workspace
 from toolpaths.arrays import Bools, Floats, Ints, frozen
 
@@ -115,8 +115,8 @@ class Kinematics(ABC):
         return as_points(axis, 3, "axis")
 
     def singular(self, q: Floats) -> Bools:
-        """True (N,) where joints may turn while the tool stands, so that the inverse is a family: where the tool lies along a
-        rotary axis, mostly."""
+        """True (N,) where joints may turn while the tool stands, so that the inverse is a family: mostly where the tool lies
+        along a rotary axis."""
         return by_samples.free(self.jacobian(q), self.rotary)
 
     def carried(self, pose: Floats, q0: Floats, q1: Floats) -> Floats:
@@ -155,11 +155,13 @@ class Kinematics(ABC):
         return by_samples.rates(lambda some: self.forward(some, near), q, self.rotary)
 
     def twist_jacobian(self, q: Floats, near: Floats | None = None) -> Floats:
-        """(v, omega) of the tool relative to the part per joint rate, (N, 6, J), v at the tip, in the table frame; turns about
-        the tool axis count only where the kind knows them."""
+        """(v, omega) of the tool relative to the part per joint rate, (N, 6, J), v at the tip, in the table frame.
+
+        Turns about the tool axis count only where the kind knows them.
+        """
         return by_samples.twists(self.jacobian(q, near), self.forward(q, near)[1])
 
-    def jets(self, q0: Floats, q1: Floats) -> tuple[Jet, Jet]:
+    def jets(self, q0: Floats, q1: Floats) -> tuple[TaylorVector, TaylorVector]:
         """(tip in mm, tool axis) in the table frame along the straight moves q0 -> q1 (N, J).
 
         Machines of several assembly modes are taken in their home mode. Where `jets_proved` the third derivative is a bound
@@ -167,14 +169,15 @@ class Kinematics(ABC):
         """
         return by_samples.jets(self.forward, q0, q1)
 
-    def tip_jets(self, q0: Floats, q1: Floats, tip0: Floats, tip1: Floats, solved: Ints) -> tuple[Jet, Jet]:
+    def tip_jets(self, q0: Floats, q1: Floats, tip0: Floats, tip1: Floats,
+                 solved: Ints) -> tuple[TaylorVector, TaylorVector]:
         """(tip, tool axis) where the control runs the kinematics: tips straight from `tip0` to `tip1` (N, 3), the joints
         but those it solves for (`solved`) even from q0 to q1 (N, J). A bound where `tip_jets_proved`."""
         tip = straight(list(tip0.T), list(tip1.T))
         turning = np.array(self.turns_tool)
         if not turning.any():
             _, axis = self.forward(q0)
-            return tip, Jet(list(axis.T))
+            return tip, TaylorVector(list(axis.T))
         if not turning[solved].any():
             return tip, self.jets(q0, q1)[1]
         return tip, by_samples.axis_jet(self._followed, q0, q1, tip0, tip1, solved)
@@ -198,16 +201,16 @@ class Kinematics(ABC):
         return np.zeros((max(len(q) - 1, 0), 0))
 
     def places_apart(self) -> Floats | None:
-        """(2, J) joints in reach, rotary ones apart, from which the axis is found that turns the tool about the same direction
+        """(2, J) joints in reach, rotary ones apart, by which the axis is found that turns the tool about one direction
         everywhere (`postproc/joints/poles.py`); None of a kind that knows of none."""
         return None
 
-    def rig(self, q: Floats, near: Floats | None = None) -> Rig:
+    def rig(self, q: Floats, near: Floats | None = None) -> ClearanceGeometry:
         """Where the parts are at joints q (N, J) that `machines.reach` looks at; without a platform the gauge point."""
         tip, axis = self.forward(q, near)
         gauge = tip + self.tool_length * axis
         none = np.zeros((len(q), 0, 3))
-        return Rig(gauge, np.zeros(len(q)), none, none, gauge, axis)
+        return ClearanceGeometry(gauge, np.zeros(len(q)), none, none, gauge, axis)
 
     # ---- geometric errors, pivots --------------------------------------------------------------------------------------
 

@@ -10,7 +10,7 @@ from collections.abc import Callable
 import numpy as np
 
 from machines.kinematics.columns import blocks
-from machines.kinematics.jets import Jet
+from machines.kinematics.taylor import TaylorVector
 from toolpaths.arrays import Bools, Floats, Ints
 
 Forward = Callable[[Floats], tuple[Floats, Floats]]
@@ -55,7 +55,7 @@ def free(rate: Floats, rotary: tuple[bool, ...]) -> Bools:
     return np.asarray(values[:, -1] < ALONG_ITSELF * values[:, 0])
 
 
-def jets(forward: Forward, q0: Floats, q1: Floats) -> tuple[Jet, Jet]:
+def jets(forward: Forward, q0: Floats, q1: Floats) -> tuple[TaylorVector, TaylorVector]:
     """(tip, axis) along the straight moves q0 -> q1 (N, J).
 
     Value and derivatives in the middle by differences of fourth order; the third over the whole move is SAFETY times the
@@ -65,7 +65,7 @@ def jets(forward: Forward, q0: Floats, q1: Floats) -> tuple[Jet, Jet]:
     value, first, second, third = np.empty((n, 6)), np.empty((n, 6)), np.empty((n, 6)), np.empty((n, 2))
     for part in blocks(n):
         value[part], first[part], second[part], third[part] = _derivatives(forward, q0[part], q1[part])
-    tip, axis = (Jet(list(value[:, k].T), list(first[:, k].T), list(second[:, k].T), third[:, i])
+    tip, axis = (TaylorVector(list(value[:, k].T), list(first[:, k].T), list(second[:, k].T), third[:, i])
                  for i, k in enumerate((slice(0, 3), slice(3, 6))))
     return tip, axis
 
@@ -118,10 +118,12 @@ Followed = Callable[[Floats, Floats, Ints], Floats]
 """tool axis (N, 3) at tips (N, 3), from joints (N, J) of which those named are solved for"""
 
 
-def axis_jet(followed: Followed, q0: Floats, q1: Floats, tip0: Floats, tip1: Floats, solved: Ints) -> Jet:
-    """The tool axis along moves of straight tips tip0 -> tip1 (N, 3), joints that are not `solved` even from q0 to q1; the third
-    derivative as in `jets`."""
+def axis_jet(followed: Followed, q0: Floats, q1: Floats, tip0: Floats, tip1: Floats, solved: Ints) -> TaylorVector:
+    """The tool axis along moves of straight tips tip0 -> tip1 (N, 3), joints that are not `solved` even from q0 to q1.
+
+    The third derivative is what was seen, as in `jets`.
+    """
     shares = np.linspace(0.0, 1.0, INTERVALS + 1)
     seen = np.stack([followed(tip0 + t * (tip1 - tip0), q0 + t * (q1 - q0), solved) for t in shares])
     value, first, second, third = differences(np.concatenate([seen, seen], axis=2))
-    return Jet(list(value[:, 3:].T), list(first[:, 3:].T), list(second[:, 3:].T), third[:, 1])
+    return TaylorVector(list(value[:, 3:].T), list(first[:, 3:].T), list(second[:, 3:].T), third[:, 1])

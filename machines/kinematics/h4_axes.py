@@ -12,7 +12,7 @@ import numpy as np
 from machines.kinematics.base import as_points
 from machines.kinematics.columns import of_one
 from machines.kinematics.h4_linear import ROUND_OFF, H4Linear, Pair, tilted, unit, wrap
-from machines.kinematics.jets import ZERO, Angle, Jet
+from machines.kinematics.taylor import ZERO, TaylorAngle, TaylorVector
 from toolpaths.arrays import Bools, Floats, frozen
 
 X, UP = (1.0, 0.0, 0.0), [0.0, 0.0, 1.0]
@@ -39,10 +39,10 @@ class H4TableAxis(H4Linear):
             return super().axis_line(letter)
         return np.array([0.0, 0.0, self.sense]), np.zeros(3)
 
-    def _tool_jets(self, place: Jet, tilt: Angle, turn: Angle) -> tuple[Jet, Jet]:
+    def _tool_jets(self, place: TaylorVector, tilt: TaylorAngle, turn: TaylorAngle) -> tuple[TaylorVector, TaylorVector]:
         about, down = (0.0, 0.0, self.sense), -(self.gauge + self.tool_length)
-        tip = (Jet((0.0, 0.0, down)).turned(X, ZERO, tilt) + place).turned(about, ZERO, turn)
-        return tip, Jet(list(UP)).turned(X, ZERO, tilt).turned(about, ZERO, turn)
+        tip = (TaylorVector((0.0, 0.0, down)).turned(X, ZERO, tilt) + place).turned(about, ZERO, turn)
+        return tip, TaylorVector(list(UP)).turned(X, ZERO, tilt).turned(about, ZERO, turn)
 
     def _pairs(self, axis: Floats, free: Floats) -> tuple[Pair, Pair]:
         flat = np.hypot(axis[:, 0], axis[:, 1])
@@ -106,10 +106,10 @@ class H4SpindleAxis(H4Linear):
             return super().axis_line(letter)
         return np.array([0.0, self.sense, 0.0]), self.pivot
 
-    def _tool_jets(self, place: Jet, tilt: Angle, turn: Angle) -> tuple[Jet, Jet]:
+    def _tool_jets(self, place: TaylorVector, tilt: TaylorAngle, turn: TaylorAngle) -> tuple[TaylorVector, TaylorVector]:
         about, down = (0.0, self.sense, 0.0), -(self.gauge + self.tool_length)
-        reach = Jet((0.0, 0.0, down)).turned(about, ZERO, turn) + Jet(of_one(self.pivot))
-        axis = Jet(list(UP)).turned(about, ZERO, turn)
+        reach = TaylorVector((0.0, 0.0, down)).turned(about, ZERO, turn) + TaylorVector(of_one(self.pivot))
+        axis = TaylorVector(list(UP)).turned(about, ZERO, turn)
         return reach.turned(X, ZERO, tilt) + place, axis.turned(X, ZERO, tilt)
 
     def _pairs(self, axis: Floats, free: Floats) -> tuple[Pair]:

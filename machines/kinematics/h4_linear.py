@@ -15,14 +15,14 @@ from typing import ClassVar, Self
 import numpy as np
 
 from machines.kinematics.base import ErrorForms, Made, as_points
+from machines.kinematics.clearance_geometry import ClearanceGeometry, ClearanceSizes
 from machines.kinematics.columns import blocks
 from machines.kinematics.frames import spin_about
 from machines.kinematics.h4_platform import H4Platform
-from machines.kinematics.jets import Angle, Jet
 from machines.kinematics.on_slides import OnSlides
-from machines.kinematics.rig import Clearance, Rig
 from machines.kinematics.rod_loops import RodLoop
 from machines.kinematics.sliders import Legs
+from machines.kinematics.taylor import TaylorAngle, TaylorVector
 from machines.kinematics.workspace import Workspace
 from toolpaths.arrays import Floats
 
@@ -49,7 +49,7 @@ class H4Linear(OnSlides):
     axis_names: tuple[str, ...] = ("X", "Y", "Z", "U", "C")
     tool_length: float = 0.0
     all_roots: bool = False
-    clearance: Clearance | None = None
+    clearance: ClearanceSizes | None = None
     rotary: tuple[bool, ...] = (False, False, False, False, True)
 
     pairs: ClassVar[int]
@@ -97,7 +97,7 @@ class H4Linear(OnSlides):
         """(direction, point), each (N, 3), of the axis that the tool turns about, seen from the part."""
 
     @abstractmethod
-    def _tool_jets(self, place: Jet, tilt: Angle, turn: Angle) -> tuple[Jet, Jet]:
+    def _tool_jets(self, place: TaylorVector, tilt: TaylorAngle, turn: TaylorAngle) -> tuple[TaylorVector, TaylorVector]:
         """(tip, axis) of a platform that moves, in the table frame."""
 
     # ---- inverse and forward ---------------------------------------------------------------------------------------
@@ -173,19 +173,20 @@ class H4Linear(OnSlides):
         placed = [self.place(p, q[:, 4]) for p in self.platform.modes(q[:, :4])]
         return np.stack([tip for tip, _, _ in placed]), np.stack([axis for _, axis, _ in placed])
 
-    def rig(self, q: Floats, near: Floats | None = None) -> Rig:
+    def rig(self, q: Floats, near: Floats | None = None) -> ClearanceGeometry:
         """Where the parts are at joints q (N, 5), for the clearances."""
         p = self.solve_platform(q, near)
         reach, axis, _ = (tilted(v, p[:, 3]) for v in self._tool(q[:, 4]))
         gauge = p[:, :3] + reach + self.tool_length * axis
-        return Rig(p[:, :3], p[:, 3], self.platform.legs.carriages(q[:, :4]), self.platform.ends(p), gauge, axis)
+        return ClearanceGeometry(p[:, :3], p[:, 3], self.platform.legs.carriages(q[:, :4]), self.platform.ends(p), gauge,
+                                 axis)
 
     def random_slides(self, rng: np.random.Generator, n: int) -> Floats:
         """Slides (n, 4) of random places and tilts of the workspace."""
         place, tilt = self.workspace.random(rng, n)
         return self.platform.inverse(np.column_stack([place, tilt]))
 
-    def middle_rig(self) -> Rig:
+    def middle_rig(self) -> ClearanceGeometry:
         """The same in the middle of the workspace, rotary axis at 0."""
         return self.rig(np.column_stack([self.platform.inverse(self.platform.home[None]), [0.0]]))
 
@@ -209,14 +210,14 @@ class H4Linear(OnSlides):
         """See `OnSlides`."""
         return self.platform.jx(self.solve_platform(q), q[:, :4])
 
-    def platform_jets(self, q0: Floats, q1: Floats) -> tuple[Jet, Jet]:
+    def platform_jets(self, q0: Floats, q1: Floats) -> tuple[TaylorVector, TaylorVector]:
         """See `OnSlides`."""
         middle, step = 0.5 * (q0 + q1), q1 - q0
         p = self.solve_platform(middle)
         arms = self.platform.ends(p) - p[:, None, :3]
         rods = p[:, None, :3] + arms - self.legs.carriages(middle[:, :4])
         place, tilt = RodLoop(rods, arms, self.legs, step[:, :4], True).jets(p[:, :3], p[:, 3])
-        return self._tool_jets(place, tilt, Angle(middle[:, 4], step[:, 4]))
+        return self._tool_jets(place, tilt, TaylorAngle(middle[:, 4], step[:, 4]))
 
     def places_apart(self) -> Floats:
         """See the base class: in the middle of the workspace."""

@@ -12,12 +12,12 @@ from typing import Self
 import numpy as np
 
 from machines.kinematics.base import ErrorForms, Made, as_points
+from machines.kinematics.clearance_geometry import ClearanceGeometry, ClearanceSizes
 from machines.kinematics.columns import blocks, of_one
-from machines.kinematics.jets import Jet
 from machines.kinematics.on_slides import OnSlides
-from machines.kinematics.rig import Clearance, Rig
 from machines.kinematics.rod_loops import RodLoop
 from machines.kinematics.sliders import Legs, determinant, three_spheres
+from machines.kinematics.taylor import TaylorVector
 from machines.kinematics.workspace import Workspace
 from toolpaths.arrays import Bools, Floats, Ints, frozen
 
@@ -43,7 +43,7 @@ class LinearDelta(OnSlides):
     axis_names: tuple[str, ...] = ("X", "Y", "Z")
     tool_length: float = 0.0
     all_roots: bool = False
-    clearance: Clearance | None = None
+    clearance: ClearanceSizes | None = None
     rotary: tuple[bool, ...] = (False, False, False)
     side: float = field(init=False)
     """sign of det Jx in the home assembly mode"""
@@ -145,30 +145,31 @@ class LinearDelta(OnSlides):
         """See `OnSlides`."""
         return self.rods(q, self.pose(q)[0])
 
-    def platform_jets(self, q0: Floats, q1: Floats) -> tuple[Jet, Jet]:
+    def platform_jets(self, q0: Floats, q1: Floats) -> tuple[TaylorVector, TaylorVector]:
         """See `OnSlides`."""
         middle, step = 0.5 * (q0 + q1), q1 - q0
         tip, _, _ = self.pose(middle)
         rods = self.rods(middle, tip)
         place, _ = RodLoop(rods, np.zeros_like(rods), self.legs, step, False).jets(
             tip + self.tool_length * UP, np.zeros(len(tip)))
-        return place - Jet(of_one(self.tool_length * UP)), Jet(of_one(UP))
+        return place - TaylorVector(of_one(self.tool_length * UP)), TaylorVector(of_one(UP))
 
     def rods(self, q: Floats, tip: Floats) -> Floats:
         """AB (N, 3, 3) mm, which is Jx (III-3)."""
         return self._joints(tip) - self.legs.carriages(q)
 
-    def rig(self, q: Floats, near: Floats | None = None) -> Rig:
+    def rig(self, q: Floats, near: Floats | None = None) -> ClearanceGeometry:
         """Where the parts are at slides q (N, 3), for the clearances."""
         tip, axis, _ = self.pose(q, near)
         place = tip + self.tool_length * UP
-        return Rig(place, np.zeros(len(q)), self.legs.carriages(q), place[:, None, :] + self.platform, place, axis)
+        return ClearanceGeometry(place, np.zeros(len(q)), self.legs.carriages(q), place[:, None, :] + self.platform, place,
+                                 axis)
 
     def random_slides(self, rng: np.random.Generator, n: int) -> Floats:
         """Slides (n, 3) of random places of the workspace."""
         return self.legs.inverse(self.workspace.random(rng, n)[0][:, None, :] + self.platform)
 
-    def middle_rig(self) -> Rig:
+    def middle_rig(self) -> ClearanceGeometry:
         """The same in the middle of the workspace."""
         tip = (self.workspace.middle + self._gauge_to_tip())[None]
         return self.rig(self.legs.inverse(self._joints(tip)))

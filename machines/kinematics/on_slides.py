@@ -5,11 +5,11 @@ from __future__ import annotations
 from abc import abstractmethod
 
 from machines.kinematics.base import Kinematics
-from machines.kinematics.jets import Jet
-from machines.kinematics.rig import Clearance, Rig
+from machines.kinematics.clearance_geometry import ClearanceGeometry, ClearanceSizes
 from machines.kinematics.rod_loops import by_parts
 from machines.kinematics.singular_distance import NAMES, distance, distance_between, unit_free
 from machines.kinematics.sliders import Legs
+from machines.kinematics.taylor import TaylorVector
 from machines.kinematics.workspace import Workspace
 from toolpaths.arrays import Floats
 
@@ -21,7 +21,7 @@ class OnSlides(Kinematics):
     singular_names = NAMES
     legs: Legs
     workspace: Workspace
-    clearance: Clearance | None
+    clearance: ClearanceSizes | None
     platform_turns: bool
     gauge_below: float
 
@@ -36,11 +36,11 @@ class OnSlides(Kinematics):
         """See `RodPlatform`."""
 
     @abstractmethod
-    def rig(self, q: Floats, near: Floats | None = None) -> Rig:
+    def rig(self, q: Floats, near: Floats | None = None) -> ClearanceGeometry:
         """See `RodPlatform`."""
 
     @abstractmethod
-    def middle_rig(self) -> Rig:
+    def middle_rig(self) -> ClearanceGeometry:
         """See `RodPlatform`."""
 
     @abstractmethod
@@ -56,10 +56,10 @@ class OnSlides(Kinematics):
         """The same at joints q (N, J), home mode; NaN without a pose."""
 
     @abstractmethod
-    def platform_jets(self, q0: Floats, q1: Floats) -> tuple[Jet, Jet]:
+    def platform_jets(self, q0: Floats, q1: Floats) -> tuple[TaylorVector, TaylorVector]:
         """`jets` of whole moves, `UNBOUNDED` where they are too long."""
 
-    def jets(self, q0: Floats, q1: Floats) -> tuple[Jet, Jet]:
+    def jets(self, q0: Floats, q1: Floats) -> tuple[TaylorVector, TaylorVector]:
         """See the base class."""
         return by_parts(self.platform_jets, q0, q1)
 

@@ -1,7 +1,7 @@
 """A platform on rods along straight slide moves, with a bound of its third derivative over the whole move.
 
-The platform follows from the rods' fixed lengths, differentiated three times; that Jx stays regular all along the move is proved
-on the way, and where it cannot be, there is no bound.
+The platform follows from the rods' fixed lengths, differentiated three times; that Jx stays regular all along the move is
+proved with it, and where it cannot be, there is no bound.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ from functools import cached_property
 
 import numpy as np
 
-from machines.kinematics.jets import Angle, Jet
 from machines.kinematics.sliders import Legs, solved
+from machines.kinematics.taylor import TaylorAngle, TaylorVector
 from toolpaths.arrays import Floats
 
 _ROUNDS = 6
@@ -21,12 +21,12 @@ _GROWTH = 1.02
 _PARTS = 4
 UNBOUNDED = 1e30
 """a third derivative for which no bound was found"""
-Jets = tuple[Jet, Jet]
+Jets = tuple[TaylorVector, TaylorVector]
 
 
 def by_parts(jets: Callable[[Floats, Floats], Jets], q0: Floats, q1: Floats) -> Jets:
-    """`jets` of the moves q0 -> q1 (N, J); where a whole move is too long for a bound, the largest of the bounds of its parts,
-    each over a shorter time."""
+    """`jets` of the moves q0 -> q1 (N, J); where a whole move is too long for a bound, the largest of the bounds of its
+    parts, each over a shorter time."""
     whole = jets(q0, q1)
     third = [np.array(np.broadcast_to(jet.third, len(q0)), dtype=np.float64) for jet in whole]
     rows = np.flatnonzero(np.maximum(*third) >= UNBOUNDED)
@@ -68,15 +68,15 @@ class RodLoop:
     step: Floats
     tilts: bool
 
-    def jets(self, place: Floats, tilt: Floats) -> tuple[Jet, Angle]:
+    def jets(self, place: Floats, tilt: Floats) -> tuple[TaylorVector, TaylorAngle]:
         """(C, tilt) along the move from their values (N, 3), (N,) in the middle."""
         first, rate, rod_rates = self._first()
         second = self._solved(-np.einsum("nki,nki->nk", rod_rates, rod_rates)
                               + rate[:, None] ** 2 * np.einsum("nki,nki->nk", self.rods, self._across))
         third = self._third(first, rate, rod_rates)
         c2, t2 = second[:, :3], second[:, 3] / self._lever if self.tilts else np.zeros(len(tilt))
-        return (Jet(_columns(place), _columns(first), _columns(c2), third),
-                Angle(tilt, rate, t2, third / self._lever if self.tilts else 0.0))
+        return (TaylorVector(_columns(place), _columns(first), _columns(c2), third),
+                TaylorAngle(tilt, rate, t2, third / self._lever if self.tilts else 0.0))
 
     @cached_property
     def _across(self) -> Floats:

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from machines.kinematics.rig import Clearance, Rig
+from machines.kinematics.clearance_geometry import ClearanceGeometry, ClearanceSizes
 from machines.kinematics.sliders import Legs
 from machines.kinematics.workspace import Workspace
 from toolpaths.arrays import Floats
 
 
 class RodPlatform(Protocol):
-    """A platform on K legs whose carriages run on straight slides; where it is, is its reference point (mm) and tilt (rad)."""
+    """A platform on K legs whose carriages run on straight slides; its place is its reference point, mm, and a tilt."""
 
     @property
     def axis_names(self) -> tuple[str, ...]:
@@ -26,7 +26,7 @@ class RodPlatform(Protocol):
         """Of the reference point and the tilt."""
 
     @property
-    def clearance(self) -> Clearance | None:
+    def clearance(self) -> ClearanceSizes | None:
         """Sizes of the parts that must not touch."""
 
     @property
@@ -41,10 +41,10 @@ class RodPlatform(Protocol):
     def gauge_below(self) -> float:
         """mm from the reference point of the level platform down to the gauge point, rotary axes at 0."""
 
-    def rig(self, q: Floats, near: Floats | None = None) -> Rig:
+    def rig(self, q: Floats, near: Floats | None = None) -> ClearanceGeometry:
         """Where the parts are at joints q (N, J)."""
 
-    def middle_rig(self) -> Rig:
+    def middle_rig(self) -> ClearanceGeometry:
         """The same in the middle of the workspace, N = 1."""
 
     def joints_at(self, platform: Floats, turn: Floats) -> Floats:

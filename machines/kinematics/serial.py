@@ -25,8 +25,8 @@ from machines.kinematics.base import ErrorForms, Kinematics, Made, as_points
 from machines.kinematics.chain import Joint, unit_vector
 from machines.kinematics.columns import Columns
 from machines.kinematics.frames import reference_x, spin_about
-from machines.kinematics.jets import ZERO, Angle, Jet
 from machines.kinematics.spherical import angle, azimuth, basis, meet, perpendicular, wrap
+from machines.kinematics.taylor import ZERO, TaylorAngle, TaylorVector
 from toolpaths.arrays import Bools, Floats
 from toolpaths.rotations import angle_between
 
@@ -189,12 +189,12 @@ class Serial(Kinematics):
             done.append(index)
         return np.ascontiguousarray(rates.transpose(3, 2, 0, 1)).reshape(n, 6, self.joints)
 
-    def jets(self, q0: Floats, q1: Floats) -> tuple[Jet, Jet]:
+    def jets(self, q0: Floats, q1: Floats) -> tuple[TaylorVector, TaylorVector]:
         """(tip, axis) along straight moves: the product of exponentials, axis by axis from the tool to the part."""
-        tip, axis = Jet(columns.of_one(-self.tool_length * self.tool_axis)), Jet(columns.of_one(self.tool_axis))
+        tip, axis = (TaylorVector(columns.of_one(v)) for v in (-self.tool_length * self.tool_axis, self.tool_axis))
         for joint in reversed(self.chain):
             j = self.axis_names.index(joint.name)
-            by, direction = Angle(0.5 * (q0[:, j] + q1[:, j]), q1[:, j] - q0[:, j]), columns.of_one(joint.direction)
+            by, direction = TaylorAngle(0.5 * (q0[:, j] + q1[:, j]), q1[:, j] - q0[:, j]), columns.of_one(joint.direction)
             if joint.rotary:
                 tip, axis = tip.turned(direction, columns.of_one(joint.point), by), axis.turned(direction, ZERO, by)
             else:

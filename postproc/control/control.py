@@ -25,7 +25,7 @@ from toolpaths.units import DEG
 XYZ = ("X", "Y", "Z")
 PLACES = 200
 """of a machine's travel at which it is looked at"""
-Law = Literal["axes", "tcp", "tilted"]
+InterpolationMode = Literal["axes", "tcp", "tilted"]
 Rapids = Literal["straight", "dog-leg"]
 FeedLength = Literal["xyz-first", "all", "geometry"]
 
@@ -51,10 +51,10 @@ class Control:
     """
 
     machine: Machine
-    law: Law
+    law: InterpolationMode
     origin: Floats
     arc_limit: float = math.inf
-    base: Law = "axes"
+    base: InterpolationMode = "axes"
     plane: Plane | None = None
     rapids: Rapids = "straight"
     feed_rule: FeedLength = "xyz-first"
@@ -68,7 +68,7 @@ class Control:
     def _others(self) -> dict[tuple[object, ...], Control]:
         return {(self.law, self.plane.key if self.plane else ()): self}
 
-    def under(self, law: Law, plane: Plane | None = None) -> Control:
+    def under(self, law: InterpolationMode, plane: Plane | None = None) -> Control:
         """The same control under another law; equal questions get the same object."""
         key = law, plane.key if plane else ()
         if key not in self._others:
@@ -164,8 +164,8 @@ class Control:
 
     @cached_property
     def length_on_z(self) -> bool:
-        """True where a tool length offset on Z moves the controlled point from gauge point to tip: at q = 0, and where slides
-        do not move the tip straight, wherever the machine is looked at."""
+        """True where a tool length offset on Z moves the controlled point from gauge point to tip: at q = 0, and where the
+        slides do not move the tip straight, wherever the machine is looked at."""
         kin, z = self.machine.kinematics, self.xyz[2]
         if self.base == "tcp":
             return True
@@ -264,7 +264,8 @@ class Control:
 
 def _places(machine: Machine) -> Floats:
     """Joints (N, J) all over the travel, a turn of axes that go round, and home."""
-    low, high = (np.where(np.isfinite(v), v, side * np.pi) for v, side in ((machine.limits.lower, -1), (machine.limits.upper, 1)))
+    limits = machine.limits
+    low, high = (np.where(np.isfinite(v), v, way * np.pi) for v, way in ((limits.lower, -1.0), (limits.upper, 1.0)))
     spread = np.random.default_rng(0).random((PLACES, len(low)))
     return np.concatenate([machine.home[None], low + spread * (high - low)])
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from postproc.control.control import Control
-from postproc.path.model import Path
+from postproc.path.model import JointPath
 from postproc.reference.moves import Moves
 from toolpaths.diagnostics import Diagnostic, error, info
 
 
-def check_singular(path: Path, moves: Moves, control: Control, least: float, file: str = "") -> list[Diagnostic]:
-    """How near the blocks come to singular positions: told, and an error below `least`; nothing where the machine measures none."""
+def check_singular(path: JointPath, moves: Moves, control: Control, least: float, file: str = "") -> list[Diagnostic]:
+    """How near the blocks come to singular positions: an error below `least`; nothing where the machine measures none."""
     kinematics = control.machine.kinematics
     names = kinematics.singular_names
     if not names or not len(path):

@@ -6,7 +6,7 @@ import numpy as np
 
 import postproc.witness.arcs as arcs
 from postproc.witness.commanded import ARC, HOLE, LINE, RAPID, START, Commanded, unit
-from postproc.witness.execution import Execution, Track, Z
+from postproc.witness.execution import Execution, HeldValues, Z
 from postproc.witness.text import Array
 
 _CHUNK = 100_000
@@ -58,8 +58,8 @@ def assembled(e: Execution) -> Commanded:
     return Commanded(tip, axis, kind, line, known, gap, feed[:, 0], feed[:, 1] > 0, feed[:, 2] > 0, arc, centre, normal,
                      sweep, cycle, tuple(e.cycles), e.tool.column(n, np.int64), e.register.column(n, np.int64),
                      e.name.column(n, np.int64), tuple(e.names),
-                     spindle[:, 0].astype(np.int64), spindle[:, 1], turned, e.coolant.column(n, np.int64), e.systems,
-                     _first_system(e, place), e.unread)
+                     spindle[:, 0].astype(np.int64), spindle[:, 1], turned, e.coolant.column(n, np.int64),
+                     np.array(e.coolant.rows, np.int64)[_index(e.coolant, n)], e.systems, _first_system(e, place), e.unread)
 
 
 def _first_system(e: Execution, place: Array) -> str | None:
@@ -69,7 +69,7 @@ def _first_system(e: Execution, place: Array) -> str | None:
     return list(e.systems)[int(place[0]) - 1] if len(place) and place[0] else ""
 
 
-def _index(track: Track, n: int) -> Array:
+def _index(track: HeldValues, n: int) -> Array:
     starts = np.minimum(np.append(track.rows, n), n)
     return np.repeat(np.arange(len(track.rows)), np.diff(starts))
 

@@ -22,7 +22,7 @@ from machines.kinematics.rod_platform import RodPlatform
 from machines.kinematics.serial import Serial
 from toolpaths.arrays import Floats, frozen
 
-Place = Literal["post", "control"]
+CorrectedBy = Literal["post", "control"]
 BLOCK = 2048
 """points at a time where a matrix per point and parameter is needed"""
 
@@ -45,7 +45,7 @@ class ErrorModel:
     rods: RodErrors | None = None
     map: ErrorMap | None = None
     covariance: Floats | None = None
-    corrected_by: Place = "post"
+    corrected_by: CorrectedBy = "post"
     name: str = ""
     machine: str = ""
     large: bool = False
@@ -133,7 +133,8 @@ class Forms:
 
     def _rods_of(self, platform: RodPlatform) -> RodErrors:
         rods, slides = self.rods, platform.axis_names[: len(platform.legs.points)]
-        pairs = () if gives_rods(platform) else (1.0,) * len(slides) if rods is None else rods.pairs  # no errors: any will do
+        none = (1.0,) * len(slides)  # no errors: any will do
+        pairs = () if gives_rods(platform) else none if rods is None else rods.pairs
         own = rod_names(rod_frame(platform, pairs), slides)
         rods = RodErrors.none(slides, own, pairs) if rods is None else rods
         if rods.legs != slides or rods.rods != own:
@@ -150,7 +151,7 @@ def _check_axes(kinematics: Kinematics, axes: SerialErrors) -> None:
 
 
 @dataclass(frozen=True)
-class Doubt:
+class Uncertainty:
     """Standard deviations that the covariance of a model gives at places of a path.
 
     Attributes:
@@ -164,7 +165,7 @@ class Doubt:
     axis: Floats
 
 
-def doubt(model: ErrorModel, actual: Actual, w: Floats, direction: Floats | None = None) -> Doubt:
+def doubt(model: ErrorModel, actual: Actual, w: Floats, direction: Floats | None = None) -> Uncertainty:
     """Predicted doubt (one standard deviation) of tip and axis at w (N, 3 + R): J Sigma J^T, first order.
 
     Raises:
@@ -183,4 +184,4 @@ def doubt(model: ErrorModel, actual: Actual, w: Floats, direction: Floats | None
         _, along, _ = actual.place(w[part])
         across = np.eye(3) - along[:, :, None] * along[:, None, :]
         axis[part] = np.sqrt(np.maximum(np.linalg.eigvalsh(across @ spread[:, 3:, 3:] @ across)[:, -1], 0.0))
-    return Doubt(tip, worst, axis)
+    return Uncertainty(tip, worst, axis)
