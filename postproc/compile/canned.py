@@ -37,7 +37,9 @@ def holes_of(toolpath: Toolpath, moves: Moves, path: JointPath, words: WordRows,
     native = np.zeros(len(path), dtype=bool)
     holes: list[Hole] = []
     z = int(control.xyz[2])
-    if not controller.cycles.enabled or 17 not in controller.cycles.planes or z < 0 or not (moves.hole >= 0).any():
+    if not controller.cycles.enabled or 17 not in controller.cycles.planes or not (moves.hole >= 0).any():
+        return native, holes
+    if (control.xyz < 0).any():  # a cycle goes from hole to hole by the words X, Y
         return native, holes
     allowed = np.array([may_cycle(f.control, controller) for f in path.frames])[path.frame] & ~skip
     hole = np.where(np.isnan(path.u), -1, moves.hole[path.move])

@@ -225,6 +225,11 @@ class ControllerFile(UserModel):
     kinematics: InterpolationRules = InterpolationRules()
     modes: Modes = Modes()
 
+    @property
+    def adds_length_always(self) -> bool:
+        """True where a tool change puts the tool's length in force and nothing takes it back."""
+        return self.tools.length_automatic and not self.codes.length_cancel
+
     def divided(self, files: bool) -> ControllerFile:
         """The controller that writes operations into files of their own, where that is asked for."""
         return self.model_copy(update={"subprograms": self.subprogram_files}) if files else self

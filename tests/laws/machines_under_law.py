@@ -1,4 +1,4 @@
-"""What the laws run on: every machine of the catalogue, poses drawn from its travel, the tolerance of the laws."""
+"""What the laws run on: machines of the catalogue and of kinds of others, poses from their travel, tolerance of the laws."""
 
 from functools import cache
 
@@ -6,6 +6,7 @@ import numpy as np
 
 import machines
 from machines.machine import Machine
+from tests.machines.own_kinds import OWN, own_machine
 
 SCALE = 100.0
 """mm per rad: weighs angles against lengths in condition numbers"""
@@ -15,7 +16,7 @@ CALM = 30.0
 
 @cache
 def machine(name: str) -> Machine:
-    return machines.load(name)
+    return own_machine(name) if name in OWN else machines.load(name)
 
 
 def joints(m: Machine, n: int, seed: int = 1) -> np.ndarray:
@@ -33,6 +34,10 @@ def poses(m: Machine, n: int, seed: int = 1, calm: bool = True) -> tuple[np.ndar
     if m.kinematics.straight_slides:
         return q, tip, axis
     met = np.isfinite(tip).all(axis=1)
+    if m.kinematics.on_rods is None:  # nothing but its travel says where it works
+        q, tip, axis = q[met][:n], tip[met][:n], axis[met][:n]
+        keep = condition(m, q, tip, axis) < CALM if calm else slice(None)
+        return q[keep], tip[keep], axis[keep]
     rng = np.random.default_rng(seed)
     tip = rng.uniform(tip[met].min(axis=0), tip[met].max(axis=0), (4 * n, 3))
     axis = m.kinematics.nearest_axis(unit(rng.normal(size=(4 * n, 3))))

@@ -1,4 +1,4 @@
-"""One law, all machines: what every kinematics promises, over every file of the catalogue."""
+"""One law, all machines: what every kinematics promises, over every file of the catalogue and kinds of others."""
 
 import machines_under_law as law
 import numpy as np
@@ -6,8 +6,9 @@ import pytest
 
 import machines
 from machines.kinematics.serial import Serial
+from tests.machines.own_kinds import OWN
 
-pytestmark = pytest.mark.parametrize("name", machines.names())
+pytestmark = pytest.mark.parametrize("name", [*machines.names(), *OWN])
 MANY = 5_000
 
 

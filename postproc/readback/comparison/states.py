@@ -150,8 +150,9 @@ def check_lengths(motion: Motion, job: Job, faults: Faults) -> list[Diagnostic]:
 
 def _registers_of(motion: Motion, job: Job, rows: Ints, named: Ints) -> Ints:
     """(K,) length register that should be in force in the blocks `rows`: that which the CL file names (K,); none where axis
-    positions hold the length of the tool already, and where the program calls none."""
-    if job.control.length_on_z:
+    positions hold the length of the tool already, and where the program calls none. A control that always adds that of
+    its tool table (0 then: `tool.length_twice`) is left with it."""
+    if job.control.length_on_z or job.controller.adds_length_always:
         return named
     joints = np.array([frame.law == "axes" for frame in motion.frames])[motion.frame[rows]]
     return np.where(joints, -1, named)
