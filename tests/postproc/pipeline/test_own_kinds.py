@@ -19,7 +19,7 @@ from tests.postproc.kit import HEAD, codes, good, goto, setup_of, tool_setup, to
 
 CONTROLS = ["fanuc-30i", "siemens-840d", "heidenhain-tnc640", "haas-ngc", "linuxcnc", "generic-iso"]
 OFF = "[part]\norigin = [150.0, 20.0, 0.0]\n[tools.1]\ngauge_length = 100.0\n"
-"""beside the table's centre, where the polar mill is singular"""
+"""away from the table's centre, where the polar mill is singular"""
 TILTS = np.radians([0.0, 10.0, 25.0, 40.0, -20.0, 0.0])
 TIPS = np.array([[-40, -30, 0], [-20, -10, 5], [10, 0, 0], [30, 20, -5], [40, 10, 0], [0, 0, 0.0]])
 AXES = np.stack([0.0 * TILTS, -np.sin(TILTS), np.cos(TILTS)], axis=1)
