@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from pydantic import create_model
 
-from machines import kinds
+import machines.kinds as kinds
 from machines.kind_check import contract_faults
 from machines.kinematics.base import Kinematics
 from machines.machine import Limits, Machine, Timing
