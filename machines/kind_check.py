@@ -12,7 +12,7 @@ import numpy as np
 from machines.kinematics import by_samples
 from machines.kinematics.base import Kinematics
 from machines.machine import Limits
-from machines.models import KeyProblem
+from machines.models import KeyProblem, KinematicsModel
 from toolpaths.arrays import Bools, Floats
 
 NEAR, TOOL = 1e-6, 50.0
@@ -24,12 +24,20 @@ SHARES = (0.0, 0.02, -0.02, 0.05)
 _PATH = ("kind",)
 
 
+def build_faults(model: KinematicsModel) -> Iterator[KeyProblem]:
+    """What keeps the model of a kind from giving a kinematics with letters, whatever its code raises."""
+    try:
+        made = model.build()
+        if isinstance(made, Kinematics):
+            yield from _letters(made)
+        else:
+            yield _problem(f"build gives a {type(made).__name__}, expected a Kinematics (machines/kinematics/base.py)")
+    except Exception as fault:  # code of others: whatever it raises
+        yield _problem(f"its model builds no kinematics: {type(fault).__name__}: {fault}")
+
+
 def contract_faults(kinematics: Kinematics, limits: Limits, home: Floats) -> Iterator[KeyProblem]:
     """What a kind breaks of `Kinematics`, as faults of its machine file; whatever its code raises is one."""
-    found = list(_letters(kinematics))
-    yield from found
-    if found:
-        return
     try:
         yield from _poses(kinematics, _places(kinematics, limits, home))
     except Exception as fault:  # code of others: whatever it raises

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -11,12 +12,12 @@ import numpy as np
 from pydantic import create_model
 
 import machines.kinds as kinds
-from machines.kind_check import contract_faults
+from machines.kind_check import build_faults, contract_faults
 from machines.kinematics.base import Kinematics
 from machines.machine import Limits, Machine, Timing
-from machines.models import KinematicsModel, MachineModel
+from machines.models import KeyProblem, KinematicsModel, MachineModel
 from machines.user_file import UserFile, nearest, read_toml, schema, validate
-from toolpaths.diagnostics import Diagnostic, DiagnosticError, has_errors
+from toolpaths.diagnostics import Diagnostic, DiagnosticError, error, has_errors
 from toolpaths.units import DEG
 
 DATA = Path(__file__).parent / "data"
@@ -51,9 +52,8 @@ def load_checked(source: str | Path) -> tuple[Machine | None, list[Diagnostic]]:
     if model is None or has_errors(diagnostics):
         return None, diagnostics
     machine = assemble(file, model)
-    if model.kinematics.kind not in kinds.BUILT_IN:
-        faults = contract_faults(machine.kinematics, machine.limits, machine.home)
-        diagnostics += [file.problem(p.code, KIND, f"kind {model.kinematics.kind!r}: {p.message}", p.hint) for p in faults]
+    if not _is_built_in(model):
+        diagnostics += _of_kind(file, model, contract_faults(machine.kinematics, machine.limits, machine.home))
     return (None if has_errors(diagnostics) else machine), diagnostics
 
 
@@ -69,7 +69,17 @@ def check(file: UserFile) -> tuple[MachineModel | None, list[Diagnostic]]:
     model, diagnostics = validate(file, machine_model(kinematics))
     if model is None:
         return None, diagnostics
-    return model, [file.problem(p.code, p.path, p.message, p.hint) for p in model.problems()]
+    faults = [] if _is_built_in(model) else _of_kind(file, model, build_faults(model.kinematics))
+    return model, faults or [file.problem(p.code, p.path, p.message, p.hint) for p in model.problems()]
+
+
+def _is_built_in(model: MachineModel) -> bool:
+    return model.kinematics.kind in kinds.BUILT_IN
+
+
+def _of_kind(file: UserFile, model: MachineModel, faults: Iterable[KeyProblem]) -> list[Diagnostic]:
+    """Faults of the code of a kind, at the line that names it."""
+    return [file.problem(p.code, KIND, f"kind {model.kinematics.kind!r}: {p.message}", p.hint) for p in faults]
 
 
 def _with_kind(file: UserFile) -> UserFile:
@@ -115,9 +125,17 @@ def machine_model(kinematics: type[KinematicsModel]) -> type[MachineModel]:
 
 
 def machine_schema() -> dict[str, Any]:
-    """The JSON schema of a machine file: of any registered kind that can be imported."""
+    """The JSON schema of a machine file: of any registered kind that can be imported.
+
+    Raises:
+        DiagnosticError: where a file that `POSTPROC_KINDS` names cannot be run.
+    """
     found = list[type[MachineModel]]()
-    for kind in kinds.known():
+    try:
+        words = kinds.known()
+    except kinds.KindFault as fault:
+        raise DiagnosticError([error("machine.kind", str(fault), hint=fault.hint)]) from fault
+    for kind in words:
         try:
             model = kinds.model_of(kind)
         except kinds.KindFault:

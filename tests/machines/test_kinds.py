@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +14,7 @@ from machines.kind_check import contract_faults
 from machines.kinematics.taylor import TaylorVector
 from samples.my_machine import Scissors
 from tests.machines.own_kinds import OWN, SAMPLE, Polar, Tilting, own_machine
+from toolpaths.diagnostics import DiagnosticError
 
 GOOD = OWN["scissors"]
 
@@ -150,16 +148,11 @@ class Raises(Scissors):
         raise KeyError("arm")
 
 
-class Letters(Scissors):
-    axis_names = ("X", "A", "Z")
-
-
 @pytest.mark.parametrize(("kind", "words"), [
     (ForgetsTool, "forward has to use tool_length"), (WrongInverse, "off the pose that was asked for"),
     (WrongShape, "expected (branches, N, J)"), (StandsStill, "turns_tool is False of a joint that turns the tool axis"),
     (SaysProved, "poses leave the bound"), (SaysStraight, "straight_slides is True"),
-    (WrongRates, "jacobian is not what forward changes by"), (Raises, "its code fails near home: KeyError: 'arm'"),
-    (Letters, "'A' is no letter of a linear axis")])
+    (WrongRates, "jacobian is not what forward changes by"), (Raises, "its code fails near home: KeyError: 'arm'")])
 def test_a_kind_that_breaks_the_contract_is_refused(kind: type, words: str) -> None:
     machine = own_machine("tilting" if issubclass(kind, Tilting) else "scissors")
     broken = kind(200.0, 60.0) if issubclass(kind, Tilting) else kind(500.0, 400.0)
@@ -182,13 +175,30 @@ def test_the_contract_is_held_against_a_file_that_is_loaded(tmp_path, monkeypatc
     assert "base.py says what it promises" in fault.hint
 
 
-def test_starting_stays_light() -> None:
-    """The names of kinds cost no look at installed packages while a built-in one is asked for."""
-    code = ("import sys, machines; machines.load('mill-3axis'); from machines import kinds;"
-            "assert not kinds._of_file.cache_info().currsize; print('done')")
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False,
-                          env={**os.environ, kinds.FILES: str(SAMPLE)})
-    assert done.stdout == "done\n", done.stderr
+@pytest.mark.parametrize(("old", "new", "words"), [
+    ("return Scissors(self.arm, self.rail)", "return 7", "build gives a int, expected a Kinematics"),
+    ("return Scissors(self.arm, self.rail)", "raise OSError('no')", "builds no kinematics: OSError: no"),
+    ("def forward(", "def forwards(", "builds no kinematics: TypeError: Can't instantiate abstract class"),
+    ('axis_names = ("X", "Y", "Z")', 'axis_names = ("X", "Y", "C")', "'C' is no letter of a linear axis"),
+    ('    axis_names = ("X", "Y", "Z")', "    names = ()", "has no attribute 'axis_names'")])
+def test_a_model_that_gives_no_kinematics_is_refused(tmp_path, monkeypatch, old: str, new: str, words: str) -> None:
+    wrong = tmp_path / "wrong.py"
+    assert old in SAMPLE.read_text()
+    wrong.write_text(SAMPLE.read_text().replace(old, new))
+    monkeypatch.setenv(kinds.FILES, str(wrong))
+    fault = only(tmp_path)
+    assert fault.code == "machine.contract" and words in fault.message, fault.message
+
+
+def test_a_schema_of_a_file_that_is_not_run_says_so(tmp_path, monkeypatch) -> None:
+    wrong = tmp_path / "wrong.py"
+    wrong.write_text("import no_such_module")
+    monkeypatch.setenv(kinds.FILES, str(wrong))
+    with pytest.raises(DiagnosticError, match="No module named"):
+        machines.schema()
+    wrong.unlink()  # what the hint says
+    monkeypatch.delenv(kinds.FILES)
+    assert machines.schema()
 
 
 def test_a_polar_mill_has_no_place_where_the_table_is_free_but_its_middle() -> None:
