@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 import postproc
 from machines.kinds import FILES
 from postproc.cli.app import app
+from postproc.control.control import Control
 from postproc.pipeline.result import PostResult
 from postproc.verification.proof_text import statement
 from tests.machines.own_kinds import SAMPLE, own_machine
@@ -90,6 +91,21 @@ def test_under_tip_control_a_screw_that_tilts_the_tool_is_followed() -> None:
     turned = np.flatnonzero(np.abs(u1 - u0) > 1.0)
     middle = comparison.poses.poses(motion, cut[turned], 0.5)[1]
     assert (np.linalg.norm(middle - ends[turned], axis=1) > 1e-3).all()
+
+
+def test_words_of_tip_control_and_back_where_a_linear_joint_turns_the_tool() -> None:
+    """What words mean at the ends of blocks and between: the axis is that of the joints there, never that of the start."""
+    machine = own_machine("tilting-by-control")
+    control, kin = Control(machine, "tcp", np.array([10.0, 20.0, 5.0]), base="tcp"), machine.kinematics.with_tool(80.0)
+    q = np.array([[0.0, 5, 200, -60], [40, 30, 180, 90], [-20, 10, 220, 0]])
+    np.testing.assert_allclose(control.joints(control.words(q, kin, 80.0), kin, 80.0), q, atol=1e-7)
+    tip, axis, there = control.between(q[:2], q[1:], np.array([0.3, 0.7]), kin)
+    np.testing.assert_allclose(there[:, 3], [-15.0, 27.0], atol=1e-12)
+    for found, expected in zip((tip, axis), kin.forward(there), strict=True):
+        np.testing.assert_allclose(found, expected, atol=1e-7)
+    assert (np.linalg.norm(axis - kin.forward(q[:2])[1], axis=1) > 0.2).all()
+    (bent,) = control.bent(q[:2], q[1:], np.array([0.5]), kin)
+    np.testing.assert_allclose(bent[:, 3], [15.0, 45.0], atol=1e-12)
 
 
 def run(*words: str, code: int = 0) -> str:
