@@ -147,8 +147,7 @@ def rods(table: dict[str, Any]) -> Rods:
 
 def kinematics_of(table: dict[str, Any]) -> Chain | Rods | None:
     """The machine of a file; None of a kind that this witness does not know."""
-    kinematics = table.get("kinematics", {})
-    kind = kinematics.get("kind", kinematics.get("family"))
+    kind = table.get("kinematics", {}).get("kind", table.get("kinematics", {}).get("family"))
     if kind == "serial":
         return chain(table)
     return rods(table) if kind in ("linear-delta", "h4-linear") else None
