@@ -14,11 +14,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from postproc.base.compiled import compiled, wanted
 from postproc.collision.revolution import around, bend, lever, middle, raised, support
 from postproc.collision.solid import Solid
 from postproc.collision.swept import TURN, Swept
 from toolpaths.arrays import Floats, Ints
+from toolpaths.compiled import compiled, wanted
 
 EXACT = 1e-3
 """mm"""

@@ -15,11 +15,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from postproc.base.compiled import wanted
 from postproc.feedrate.interior import NumpySteps, Solution, Steps, solve
 from postproc.feedrate.problem import Knots, Problem
 from postproc.feedrate.shares import weigh
 from toolpaths.arrays import Floats
+from toolpaths.compiled import wanted
 
 WINDOW, OVERLAP = 8192, 1024
 """Knots of a window, and on each side beyond it."""

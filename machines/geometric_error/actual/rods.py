@@ -17,11 +17,12 @@ from typing import Self
 
 import numpy as np
 
-from machines.geometric_error.actual.rods_loop import compiled, wanted
+from machines.geometric_error.actual.rods_loop import COMPILE_FROM, close_all
 from machines.geometric_error.actual.transforms import turns
 from machines.kinematics.h4_linear import H4Linear
 from machines.kinematics.linear_delta import LinearDelta
 from toolpaths.arrays import Floats, Ints, frozen
+from toolpaths.compiled import compiled, wanted
 
 RODS = 6
 STEPS = 12
@@ -129,10 +130,11 @@ class RodFrame:
 
         Chord iteration from the nominal platform `place` (N, 3), `turned` (N, 3, 3); NaN where it does not close.
         """
-        if wanted(len(q)):
+        if wanted(len(q), COMPILE_FROM, close_all):
             place, turned = np.array(place), np.array(turned)
-            worst = compiled()(np.ascontiguousarray(q), self.leg, *self._carriages(errors), self.joint + errors.platform,
-                               (self.length + errors.length) ** 2, place, turned, STEPS, CLOSED, LEAST_GAIN)
+            lengths = (self.length + errors.length) ** 2
+            worst = compiled(close_all)(np.ascontiguousarray(q), self.leg, *self._carriages(errors),
+                                        self.joint + errors.platform, lengths, place, turned, STEPS, CLOSED, LEAST_GAIN)
             return _where_closed(place, turned, worst)
         with np.errstate(over="ignore", invalid="ignore"):  # what does not close grows out of bounds
             return self._by_chords(q, place, turned, errors)

@@ -13,7 +13,6 @@ import numpy as np
 from scipy.interpolate import BSpline, make_interp_spline
 from scipy.sparse import csr_matrix, diags, identity, vstack
 
-from postproc.base.compiled import compiled, wanted
 from postproc.feedrate.feed import Allowed
 from postproc.feedrate.kernels.interior import pentadiagonal
 from postproc.feedrate.limits import JointLimits, squared_speed, steady_cap
@@ -28,6 +27,7 @@ from postproc.orientation.candidates.timed import Turned
 from postproc.orientation.passes.passes import Pass
 from postproc.planning.geometry import DEGREE, MachinePath
 from toolpaths.arrays import Floats
+from toolpaths.compiled import compiled, wanted
 
 _MOVES = 1e-9
 """mm or rad: joints that move less along a stretch stand still"""
@@ -40,7 +40,7 @@ LONG = 50_000
 def prepare(passes: Sequence[Pass]) -> None:
     """Load the compiler where so many passes are worth it; then all of them are planned by compiled loops, else none."""
     if wanted(_KNOTS * sum(len(stretch.s) for one in passes for stretch in one.stretches), KERNEL_FROM):
-        compiled(pentadiagonal, fused=True)
+        compiled(pentadiagonal)
 
 
 class Ranking:
