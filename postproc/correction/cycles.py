@@ -16,6 +16,7 @@ from postproc.correction.runs import Runs
 from postproc.path.model import FEED, Path
 from postproc.reference.moves import Moves
 from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.shapes import arrays
 from toolpaths.toolpath import Kind
 
 SAME = 0.5 * GRAIN[0]
@@ -90,6 +91,7 @@ def _lifted(path: Path, q: Floats, work: Work, block: Ints) -> Floats:
 
 
 @dataclass(frozen=True)
+@arrays(owner="H", wanted="M 3", found="M 3", feeds="M", plane="H", apart="H")
 class _Holes:
     """H holes of M blocks in words X, Y, Z.
 

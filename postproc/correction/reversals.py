@@ -12,6 +12,7 @@ from postproc.control.word_arcs import PLANE_COLUMNS
 from postproc.correction.error_context import ALONE, EDGES, Work
 from postproc.path.model import ARC, FEED, TRAVERSE, Path
 from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.shapes import arrays
 
 BISECTIONS = 14
 """halvings to find where between two looks an axis turns back"""
@@ -44,6 +45,7 @@ def arcs_cut(path: Path, work: Work) -> Divided:
 
 
 @dataclass(frozen=True)
+@arrays(q="K J", way="K J", block="N")
 class Starts:
     """Joints (K, J) and ways (K, J) where blocks begin when corrected; those of `block` (N,) after taking up what an axis
     has lost."""
@@ -111,6 +113,7 @@ def _bisected(work: Work, block: Ints, edges: tuple[float, ...]) -> tuple[Ints, 
 
 
 @dataclass(frozen=True)
+@arrays(owner="K", part="K")
 class Divided:
     """A path made of another's blocks: `owner` (K,) which of them each block is of, `part` (K,) of its time."""
 

@@ -18,6 +18,7 @@ import numpy as np
 from postproc.correction.walk_loop import walk_all
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.compiled import chosen
+from toolpaths.shapes import arrays
 
 COMPILE_FROM = 10_000
 """blocks from which compiling pays"""
@@ -32,6 +33,8 @@ REACH = 32.0, 8.0, 2.0, 1.0
 
 
 @dataclass(frozen=True)
+@arrays(off="K 3", by_way="K 3 T", tip_rates="K 3 3", back="K T 3", gap="K T", bend="3 K T", last="K T", later="3 K T",
+        goes_on="K T", weight="K", plain="K", near="K", enough="K", free="K 3", like="K")
 class Ends:
     """The ends of K blocks at their planned words, and what T joints that lose motion do there; mm and rad.
 

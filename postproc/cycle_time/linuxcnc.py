@@ -22,6 +22,7 @@ from postproc.cycle_time.phases import Ramps, Timed, ramps, summed
 from postproc.cycle_time.shape import NOTHING, shape
 from toolpaths.arrays import Array, Bools, Floats, Ints
 from toolpaths.compiled import chosen
+from toolpaths.shapes import arrays
 from toolpaths.units import DEG
 
 STOP, TANGENT, OVERLAP = 0, 2, 3
@@ -61,6 +62,8 @@ class Settings:
 
 
 @dataclass(frozen=True)
+@arrays(owner="M", length="M", asked="M", most="M", rate="M", ends="M", kink="M", fresh="M", traverse="M",
+        overlap_speed="M")
 class Row:
     """M segments and blend arcs in the order of motion; fields as in `Segments`."""
 

@@ -15,6 +15,7 @@ from postproc.cycle_time.linuxcnc_kernels import chain_ends
 from postproc.cycle_time.shape import Shape, axis_limit, shape
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.compiled import chosen
+from toolpaths.shapes import arrays
 
 NORMAL_SHARE = np.sqrt(3.0) / 2.0
 """of the acceleration on a circle may point to its centre (`BLEND_ACC_RATIO_NORMAL`)"""
@@ -23,6 +24,7 @@ KERNEL_FROM = 20_000
 
 
 @dataclass(frozen=True)
+@arrays(block="N", fresh="N", length="N", asked="N", most="N", acceleration="N")
 class Segments:
     """N segments of the planner, in mm or rad of `length`, and s.
 

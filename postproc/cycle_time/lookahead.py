@@ -21,12 +21,14 @@ from postproc.cycle_time.phases import Ramps, Timed, ramps, summed
 from postproc.cycle_time.shape import Shape, axis_limit, shape
 from toolpaths.arrays import Bools, Floats
 from toolpaths.compiled import chosen
+from toolpaths.shapes import arrays
 
 TANGENT = 1e-3
 """|du| up to which an exact path goes on without a stop"""
 
 
 @dataclass(frozen=True)
+@arrays(first="E A", last="E A")
 class Directions:
     """(E, A) derivatives of the axes by path length at begin and end of each block."""
 

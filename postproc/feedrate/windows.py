@@ -20,6 +20,7 @@ from postproc.feedrate.problem import Knots, Problem
 from postproc.feedrate.shares import weigh
 from toolpaths.arrays import Floats
 from toolpaths.compiled import wanted
+from toolpaths.shapes import arrays
 
 WINDOW, OVERLAP = 8192, 1024
 """Knots of a window, and on each side beyond it."""
@@ -59,6 +60,7 @@ class Method:
 
 
 @dataclass(frozen=True)
+@arrays(c="C", weights="3 R")
 class Solved:
     """Coefficients (K + 2,); most iterations of a window; worst stitch (relative difference); whether all were solved;
     seconds of each row (3, R + 1), see `shares.weigh`."""

@@ -20,6 +20,7 @@ from postproc.placement.bodies import Beside
 from postproc.placement.moved import moved
 from postproc.placement.space import Space
 from toolpaths.arrays import Floats
+from toolpaths.shapes import arrays
 
 _WORTH = 1e-4
 """least part of the time that a place must gain to be planned"""
@@ -30,6 +31,7 @@ _DIGITS = 7
 
 
 @dataclass(frozen=True)
+@arrays(place="6", low="J", high="J")
 class Tried:
     """A place that was looked at.
 

@@ -23,6 +23,7 @@ from machines.kinematics.h4_linear import H4Linear
 from machines.kinematics.linear_delta import LinearDelta
 from toolpaths.arrays import Floats, Ints, frozen
 from toolpaths.compiled import compiled, wanted
+from toolpaths.shapes import arrays
 
 RODS = 6
 STEPS = 12
@@ -34,6 +35,7 @@ LEAST_GAIN = 0.5
 
 
 @dataclass(frozen=True, eq=False)
+@arrays(rail="K 3", guide="K 3", carriage="6 3", platform="6 3", length="6")
 class RodErrors:
     """Errors of K legs and six rods, mm and rad; the order of the parameters is that of E-14.
 
@@ -91,6 +93,7 @@ class RodErrors:
 
 
 @dataclass(frozen=True, eq=False)
+@arrays(leg="6", rail="K 3", direction="K 3", arm="6 3", joint="6 3", length="6", guide="K 3 3")
 class RodFrame:
     """Nominal geometry of six rods, mm, machine frame.
 

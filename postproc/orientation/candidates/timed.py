@@ -21,6 +21,7 @@ from postproc.orientation.passes.poses import held_poses, poses
 from postproc.planning.geometry import MachinePath
 from postproc.planning.planned import ORDERS, joint_limits
 from toolpaths.arrays import Floats
+from toolpaths.shapes import arrays
 from toolpaths.units import DEG
 
 _ROUND = 1.002
@@ -33,6 +34,7 @@ def no_bodies(one: Pass, axis: Floats) -> str:
 
 
 @dataclass(frozen=True)
+@arrays(axis="3", q="n J", sites="* _ _")
 class Turned:
     """A pass turned to `axis` (3,) (the CL's own where it is fixed): joints of its rows `q` (n, J) and of the sites of
     each stretch; `refused` says why the machine cannot run it, else ""; `held` is the angle, rad, asked for of the rotary

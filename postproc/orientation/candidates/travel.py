@@ -15,6 +15,7 @@ from postproc.orientation.passes.passes import Pass
 from postproc.orientation.passes.poses import Solved, held_poses
 from toolpaths.arrays import Floats
 from toolpaths.rotations import angle_between
+from toolpaths.shapes import arrays
 from toolpaths.units import DEG
 
 _APART = 10.0 * DEG
@@ -30,6 +31,7 @@ _SOME = 24
 
 
 @dataclass(frozen=True)
+@arrays(axis="3")
 class Lack:
     """What lacks least: mm, in words, under a tool axis (3,)."""
 

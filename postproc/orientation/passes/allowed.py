@@ -11,6 +11,7 @@ from postproc.orientation.passes.passes import Pass
 from postproc.setup.orientation import OrientationLimits
 from toolpaths.arrays import Bools, Floats
 from toolpaths.rotations import angle_between
+from toolpaths.shapes import arrays
 from toolpaths.units import DEG
 
 SAME = 1e-4
@@ -28,6 +29,7 @@ class Bodies(Protocol):
 
 
 @dataclass(frozen=True)
+@arrays(values="...")
 class _Bound:
     """An angle that must be inside [low, high], rad, at every point of a pass."""
 

@@ -16,6 +16,7 @@ from postproc.orientation.plans.choose import groupwise, shortest
 from postproc.orientation.plans.states import CLUSTER, groups_of, index, pools_of, ranked, states_of
 from postproc.orientation.plans.turns import Ends, all_ends, unwinding, ways_between
 from toolpaths.arrays import Bools, Floats
+from toolpaths.shapes import arrays
 
 _EQUAL = 2e-4
 """part of the time of a cut by which its best orientations may differ; turns decide among them"""
@@ -24,6 +25,7 @@ _Row = tuple[list[Turned], Floats, list[Ends]]
 
 
 @dataclass(frozen=True)
+@arrays(cuts="N", rapids="N", ways="N+1")
 class OrientationPlan:
     """One axis per pass.
 
