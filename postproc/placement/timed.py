@@ -11,7 +11,6 @@ import numpy as np
 from machines.machine import Machine
 from machines.singular_distance import NAMES as SINGULAR
 from machines.singular_distance import has_singular_distance, singular_distance
-from postproc.orientation.candidates.ranking import prepare
 from postproc.orientation.candidates.timed import Turned, turned
 from postproc.orientation.passes.passes import Work
 from postproc.orientation.plans.choose import seconds
@@ -100,7 +99,6 @@ class Timer:
         self.unsolved: set[int] = set()
         self._cuts: dict[tuple[int, bytes], _Cut] = {}
         self._known: dict[bytes, Tried] = {}
-        prepare(work.passes)
         sites = sum(len(each.s) for one in work.passes for each in one.stretches)
         self.most = min(_MOST, max(_LEAST, _SITES // max(1, sites)))
 
