@@ -8,6 +8,7 @@ from typing import Protocol
 import numpy as np
 
 from postproc.orientation.passes.passes import Pass
+from postproc.orientation.passes.reasons import Touching
 from postproc.setup.orientation import OrientationLimits
 from toolpaths.arrays import Bools, Floats
 from toolpaths.rotations import angle_between
@@ -24,8 +25,8 @@ NO_LIMITS = OrientationLimits()
 class Bodies(Protocol):
     """Part, fixtures and table beside cutter, shank and holder."""
 
-    def touching(self, one: Pass, axis: Floats) -> str:
-        """Which pair touches where a pass is run with its tool along `axis` (3,), and by how much; "" where none does."""
+    def touching(self, one: Pass, axis: Floats) -> Touching | None:
+        """Which pair touches where a pass is run with its tool along `axis` (3,), and by how much; None where none does."""
 
 
 @dataclass(frozen=True)
@@ -92,9 +93,9 @@ class Allowed:
         axes = lattice(apart)
         return axes[self.mask(one, axes)]
 
-    def touching(self, one: Pass, axis: Floats) -> str:
+    def touching(self, one: Pass, axis: Floats) -> Touching | None:
         """As `Bodies.touching`; the own axis of a pass can touch as well."""
-        return "" if self.bodies is None else self.bodies.touching(one, axis)
+        return None if self.bodies is None else self.bodies.touching(one, axis)
 
     def _planes(self, one: Pass) -> list[tuple[Floats, float]]:
         """The limits as half-spaces: axes a with a . w <= offset for every row w (K, 3), NaN rows bound nothing.

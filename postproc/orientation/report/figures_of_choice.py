@@ -102,7 +102,7 @@ def _pass(tried: Tried, made: Turned, work: Work) -> dict[str, Any]:
 def _short(made: Turned | None) -> dict[str, Any] | None:
     """An orientation and its planned time."""
     return None if made is None else {"orientation_deg": angles(made), "held_deg": held(made),
-                                      "time_s": finite(made.seconds), "touches": made.touching}
+                                      "time_s": finite(made.seconds), "touches": str(made.touching or "")}
 
 
 def _reach(made: Turned) -> dict[str, Any]:
