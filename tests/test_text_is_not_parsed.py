@@ -13,14 +13,16 @@ READERS = {
     "postproc.witness": "CL files and machine files, by itself"}
 """rooms that read text files, and what they read"""
 FILES = {
-    "toolpaths.leftovers": "names of temporary files", "toolpaths.shapes": "tables of shapes",
+    "toolpaths.interrupted_runs": "names of temporary files", "toolpaths.shapes": "tables of shapes",
     "machines.toml_lines": "lines of TOML files", "machines.value_words": "values in TOML files",
-    "machines.serial_models": "structures of machines (ISO 10791-6)", "machines.calibration.folded": "names of parameters",
+    "machines.serial_models": "structures of machines (ISO 10791-6)",
+    "machines.calibration.folded_names": "names of parameters",
     "machines.geometric_error.exchange.imports": "tables of others",
     "postproc.reference.records": "blocks of INSERT records",
     "postproc.base.header_words": "heads of programs: written and read in one place",
     "postproc.cycle_time.source": "whether a file is a CL file or a program",
-    "postproc.readback.comparison.slow": "F words of programs", "postproc.readback.comparison.stated": "codes of programs",
+    "postproc.readback.comparison.slow_moves": "F words of programs",
+    "postproc.readback.comparison.unstated_codes": "codes of programs",
     "postproc.writing.linuxcnc": "comments that LinuxCNC obeys", "postproc.writing.state": "decimals of words",
     "postproc.writing.writer": "labels of blocks"}
 """single files besides"""

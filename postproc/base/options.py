@@ -8,7 +8,7 @@ from typing import Literal
 
 from postproc.base.header_words import chosen_axes, feed_line, setup_line
 
-FeedMode = Literal["auto", "per-minute", "inverse-time"]
+FeedModeChoice = Literal["auto", "per-minute", "inverse-time"]
 OutputMode = Literal["auto", "axes", "tcp", "tilted"]
 FeedSource = Literal["programmed", "planned"]
 Orientation = Literal["keep", "per-pass", "whole-part", "auto"]
@@ -20,7 +20,7 @@ class Options:
 
     tolerance: float = 0.01
     axis_tolerance: float = 0.05
-    feed_mode: FeedMode = "auto"
+    feed_mode: FeedModeChoice = "auto"
     setup: str = ""
     """file of the set-up"""
     units: str = ""

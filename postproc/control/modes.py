@@ -9,7 +9,7 @@ import numpy as np
 
 from machines.kinematics.base import Kinematics
 from postproc.base.options import Options
-from postproc.control.control import Control, Law, tool_frames
+from postproc.control.control import Control, InterpolationMode, tool_frames
 from postproc.control.planes import Plane, stated
 from postproc.controllers.model import ControllerFile, Mode
 from postproc.setup.model import SetupFile
@@ -52,7 +52,7 @@ class OutputModes:
     tool_call: bool = True
 
     @cached_property
-    def lacking(self) -> dict[Law, str]:
+    def lacking(self) -> dict[InterpolationMode, str]:
         """Why a law cannot be had, "" where it can."""
         control, modes, name = self.control, self.controller.modes, self.control.machine.name
         if control.base == "tcp":
@@ -97,14 +97,14 @@ class OutputModes:
         """The frame that programs begin in, and that home and indexing moves are made in."""
         return WordFrame(self.control)
 
-    def law(self, asked: int, constant: bool) -> Law:
+    def law(self, asked: int, constant: bool) -> InterpolationMode:
         """The law of a run, `constant` where its tool axis stands still."""
         if ASKED[asked] != "auto":
             return ASKED[asked]  # type: ignore[return-value]
-        wanted: tuple[Law, ...] = ("tilted", "axes", "tcp") if constant else ("tcp", "axes")
+        wanted: tuple[InterpolationMode, ...] = ("tilted", "axes", "tcp") if constant else ("tcp", "axes")
         return next(law for law in wanted if not self.lacking[law])
 
-    def cutting_laws(self) -> set[Law]:
+    def cutting_laws(self) -> set[InterpolationMode]:
         """The laws that runs may come to have."""
         return {self.law(int(asked), constant) for asked in np.unique(self.asked) for constant in (True, False)}
 

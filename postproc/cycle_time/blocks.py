@@ -13,7 +13,7 @@ from toolpaths.arrays import Array, Bools, Floats, Ints, as_slice, frozen, share
 from toolpaths.shapes import arrays
 
 
-class Path(IntEnum):
+class CornerMode(IntEnum):
     """What a control does where two blocks meet."""
 
     STOP = 0
@@ -106,7 +106,7 @@ _COLUMNS: dict[str, tuple[type, tuple[int, ...]]] = {
 @dataclass(frozen=True)
 @arrays(start="E A", end="E A", line="E", rapid="E", arc="E", center="E 3", normal="E 3", sweep="E", speed="E", path="E",
         tolerance="E", chain="E", operation="E", cl_line="E", move="E", given="E", pieces="E")
-class Blocks:
+class MotionBlocks:
     """E blocks that move, in mm, rad and s.
 
     Attributes:
@@ -159,7 +159,7 @@ class Blocks:
     def __len__(self) -> int:
         return len(self.line)
 
-    def take(self, rows: Ints | Bools) -> Blocks:
+    def take(self, rows: Ints | Bools) -> MotionBlocks:
         """Some of the blocks; the pauses stay with the last block that is left before them."""
         rows = np.arange(len(self))[rows]
         moved = replace(self.pauses, block=np.searchsorted(rows, self.pauses.block, side="right") - 1)

@@ -53,7 +53,7 @@ def ramps(length: Floats, first: Floats, last: Floats, target: Floats, rate: Flo
 
 @dataclass(frozen=True)
 @arrays(begin="E", end="E", ramp="E", steady="E", jerk="E", peak="E", lost_stop="E", lost_corner="E", pause="P")
-class Timed:
+class BlockTimes:
     """What a model says of E blocks.
 
     Attributes:

@@ -18,7 +18,7 @@ from toolpaths.shapes import arrays
 
 @dataclass(frozen=True)
 @arrays(dq="J K", d2q="J K", d3q="J K", cap="K", capped="K", weight="K", tight="2 K")
-class Problem:
+class SpeedProblem:
     """Minimise sum w x^-1/2 over coefficients of x, K knots, J joints.
 
     rows `dq`, `d2q`, `d3q` (J, K) by sigma; `cap` (K,) bound on x and the row it comes from, `capped` (K,);
@@ -77,7 +77,7 @@ class Problem:
 
 @dataclass(frozen=True)
 @arrays(sigma="K", tight="3 K")
-class Knots:
+class MotionKnots:
     """One motion from rest to rest on its knots; problems are made for stretches of it, so that memory stays small.
 
     `eased` path, `sigma` (K,) knots, `limits`; `feed` gives the largest ds/dt at s; `tight` (3, K) factors >= 1 on
@@ -94,7 +94,7 @@ class Knots:
         """Largest sigma_dot (N,) that the feed allows."""
         return self.eased.speed_limit(sigma, self.feed)
 
-    def problem(self, first: int = 0, last: int | None = None) -> Problem:
+    def problem(self, first: int = 0, last: int | None = None) -> SpeedProblem:
         """On knots [first, last), free at ends inside the motion."""
         last = len(self.sigma) if last is None else last
         sigma = self.sigma[first:last]
@@ -104,4 +104,4 @@ class Knots:
         weight = 0.5 * (np.append(h, 0.0) + np.insert(h, 0, 0.0))
         dq, d2q, d3q = (np.ascontiguousarray(order.T) for order in at[:3])
         basis = rest_basis(self.sigma, self.eased.ease, first, last)
-        return Problem(basis, dq, d2q, d3q, at.limits, at.cap / tight[0] ** 2, at.capped, weight, tight[1:])
+        return SpeedProblem(basis, dq, d2q, d3q, at.limits, at.cap / tight[0] ** 2, at.capped, weight, tight[1:])

@@ -17,7 +17,7 @@ from postproc.pipeline.stages import Progress, staged
 from postproc.setup.fingerprint import fingerprint
 from postproc.setup.model import SetupFile, load_setup
 from postproc.setup.system import standing
-from postproc.verification.files_beside import Beside, unfinished
+from postproc.verification.neighbour_files import NeighbourFiles, unfinished
 from postproc.verification.read_back import other_axes, other_setup, read_back
 from postproc.verification.second_witness import second_witness
 from toolpaths.diagnostics import Diagnostic, DiagnosticError, has_errors, require
@@ -134,7 +134,7 @@ def verify(gcode: str | FilePath, path: Toolpath, machine: Machine | str | FileP
     found += more
     if job is None or has_errors(found):
         return replace(begun, diagnostics=tuple(found))
-    comparison, more = read_back(data, job, path.file, progress, str(gcode), Beside(gcode))
+    comparison, more = read_back(data, job, path.file, progress, str(gcode), NeighbourFiles(gcode))
     found = [*other_setup(data, options, has_errors(more), str(gcode)), *found, *more]
     said = None
     if comparison is not None and not has_errors(found):

@@ -19,7 +19,7 @@ ROOT = Path(__file__).parents[2]
 FILES = {path.relative_to(ROOT).as_posix(): ast.parse(path.read_text("utf-8"))
          for top in ("toolpaths", "machines", "postproc") for path in sorted((ROOT / top).rglob("*.py"))}
 JIT = "toolpaths/compiled.py"
-WITNESS = "postproc/witness/walk.py"
+WITNESS = "postproc/witness/assign_blocks.py"
 """shares no code with the rest, not even this"""
 AT_ONCE = {
     "machines/geometric_error/actual/rods.py", "postproc/collision/search.py", "postproc/feedrate/interior_packed.py",
@@ -108,7 +108,7 @@ def test_compiling_waits_until_it_pays(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_marking_loops_does_not_load_the_compiler() -> None:
-    code = ("import sys, postproc.collision.kernel, postproc.feedrate.kernels.interior, postproc.correction.walk_loop\n"
+    code = ("import sys, postproc.collision.kernel, postproc.feedrate.kernels.interior, postproc.correction.backlash_steps_loop\n"
             "import toolpaths.compiled as c; assert not c.loaded() and 'numba' not in sys.modules")
     subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True)
     assert isinstance(loaded(), bool)

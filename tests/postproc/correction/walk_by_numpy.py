@@ -1,4 +1,4 @@
-"""The walk of `postproc.correction.walk_loop` with numpy: small arrays where the loop has numbers, sums in another order."""
+"""The walk of `postproc.correction.backlash_steps_loop` with numpy: small arrays where the loop has numbers, sums in another order."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from postproc.correction.walk import BETWEEN, NEARER, PLAIN, REACH, RESTS, Ends
+from postproc.correction.backlash_steps import BETWEEN, NEARER, PLAIN, REACH, RESTS, BlockEnds
 from toolpaths.arrays import Floats
 
 AROUND = np.array(list(product((-1.0, 0.0, 1.0), repeat=3)))
@@ -19,8 +19,8 @@ WAYS = np.array(list(product((0.0, 1.0, -1.0), repeat=MOST)))[:, ::-1].copy()
 STAYS = 1.0 - np.abs(WAYS)
 
 
-def walk(ends: Ends) -> tuple[Floats, Floats]:
-    """As `postproc.correction.walk.walk`."""
+def walk(ends: BlockEnds) -> tuple[Floats, Floats]:
+    """As `postproc.correction.backlash_steps.walk`."""
     steps, ways = _walk(*vars(ends).values())
     return steps, ways
 
