@@ -6,7 +6,7 @@ follows from the ways of its axes, and these from the words before and the words
 else those are taken that bring it nearest: by the ways that the words themselves make, by other ways, by last decimals
 beside. Ways by which the next block does not begin count a little: it would first take up what they are off by. So do, where
 words are axis positions, steps back by less than an axis loses: who takes the way of an axis for the sign of its last step
-sees another machine there. The walk itself is the loop of `walk_loop`.
+sees another machine there. The walk itself is the loop of `backlash_steps_loop`.
 """
 
 from __future__ import annotations

@@ -108,7 +108,8 @@ def test_compiling_waits_until_it_pays(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_marking_loops_does_not_load_the_compiler() -> None:
-    code = ("import sys, postproc.collision.kernel, postproc.feedrate.kernels.interior, postproc.correction.backlash_steps_loop\n"
+    code = ("import sys, postproc.collision.kernel, postproc.feedrate.kernels.interior\n"
+            "import postproc.correction.backlash_steps_loop\n"
             "import toolpaths.compiled as c; assert not c.loaded() and 'numba' not in sys.modules")
     subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True)
     assert isinstance(loaded(), bool)

@@ -130,4 +130,5 @@ def _thinned(one: Pass) -> Pass:
     ways = np.array([way for way in np.ndindex(3, 3, 3) if way != (1, 1, 1)], dtype=np.float64) - 1.0
     rows = np.unique([*(tips @ ways.T).argmax(axis=0).tolist(),
                       *np.linspace(0, len(tips) - 1, min(len(tips), _SOME)).astype(int).tolist()])
-    return replace(one, tip=tips[rows], axes=np.tile(one.axis, (len(rows), 1)), stretches=())
+    return replace(one, tip=tips[rows], axes=np.tile(one.axis, (len(rows), 1)), rapid=np.zeros(len(rows), dtype=bool),
+                   stretches=())

@@ -1,4 +1,4 @@
-"""The walk of `postproc.correction.backlash_steps_loop` with numpy: small arrays where the loop has numbers, sums in another order."""
+"""The walk of `postproc.correction.backlash_steps_loop` with numpy: sums in another order."""
 
 from __future__ import annotations
 
