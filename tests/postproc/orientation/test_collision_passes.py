@@ -86,7 +86,7 @@ def test_a_wall_where_the_holder_would_be_decides(tmp_path: Path) -> None:
     one = choice.tried[0]
     assert not one.best.touching and abs(float(one.best.axis @ best.axis)) < 1.0 - 1e-6
     lost = [lost.why for lost in one.rejected if lost.kind == "touches"]
-    assert lost and all("of T1 " in why and "fixture wall" in why and "(at line " in why for why in lost)
+    assert lost and all("of T1 " in str(why) and "fixture wall" in str(why) and "(at line " in str(why) for why in lost)
     assert choice.plans["auto"].seconds >= free.plans["auto"].seconds - 1e-9
 
 
