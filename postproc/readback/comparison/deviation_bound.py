@@ -28,9 +28,9 @@ from postproc.reference.moves import Moves
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.rotations import angle_between, cross, lengths
 from toolpaths.shape import Curves
+from toolpaths.shapes import arrays
 
-TIGHT = 1.01
-"""bound over worst pose that is near enough"""
+TIGHT = 1.01  # bound over worst pose that is near enough
 HALVINGS = 26
 """at most, of one block"""
 GRAIN = 1e-7, 1e-9
@@ -46,6 +46,7 @@ _REACH = 0.9
 
 
 @dataclass(frozen=True)
+@arrays(unbounded_rows="U")
 class DeviationBound:
     """Upper bounds over all blocks: tip (mm), axis (rad), each with the block (row) that has it, -1 where there are none;
     how many blocks have no bound, because kinematics or law give none (they are only checked at places), and which."""
@@ -59,6 +60,7 @@ class DeviationBound:
 
 
 @dataclass(frozen=True)
+@arrays(rows="K", owner="K", begin="K", share="K")
 class _Ends:
     """What bounds need of blocks `rows`: where each begins and ends on its curve, by count (a guess for helices)."""
 
@@ -69,6 +71,7 @@ class _Ends:
 
 
 @dataclass(frozen=True)
+@arrays(k="N", a="N", b="N")
 class _Pieces:
     """Parts [a, b] of blocks: `k` (N,) numbers of `_Ends.rows`."""
 
@@ -91,6 +94,7 @@ class _Pieces:
 
 
 @dataclass(frozen=True)
+@arrays(seen_tip="N", seen_axis="N", tip="N", axis="N")
 class _Values:
     """Of N pieces: worst deviation at places, and bound, of tip (mm) and axis (rad); inf where there is no bound."""
 
@@ -282,6 +286,7 @@ def _angle(chord: Floats) -> Floats:
 
 
 @dataclass(frozen=True)
+@arrays(known="N", straight_tip="N", strays="2 N")
 class _PieceMotion:
     """Jets of N pieces by the law of their blocks: tip, axis; `known` where there are any; `straight_tip` where the tip is
     straight and even by the law itself; `strays` (2, N): what the machine may add to it, mm and rad."""
