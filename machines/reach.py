@@ -17,6 +17,7 @@ from machines.kinematics.base import Kinematics
 from machines.kinematics.clearance_geometry import ClearanceGeometry
 from toolpaths.arrays import Bools, Floats
 from toolpaths.rotations import angle_between
+from toolpaths.shapes import arrays
 
 BLOCK = 4096
 """points at a time"""
@@ -29,6 +30,7 @@ MarginColumn = tuple[str, bool, Callable[[ClearanceGeometry], Floats]]
 
 
 @dataclass(frozen=True, eq=False)
+@arrays(angular="M", values="N M")
 class Margins:
     """Signed margins: negative where a bound is passed, NaN where the joints have no pose.
 

@@ -7,9 +7,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from toolpaths.arrays import Floats, frozen
+from toolpaths.shapes import arrays
 
 
 @dataclass(frozen=True, eq=False)
+@arrays(direction="3", point="3")
 class Joint:
     """One axis: letter, kind, unit direction (3,), for a rotary one a point (3,) of its line in mm; all at q = 0."""
 

@@ -14,6 +14,7 @@ from machines.kinematics.columns import of_one
 from machines.kinematics.h4_linear import ROUND_OFF, H4Linear, Pair, tilted, unit, wrap
 from machines.kinematics.taylor import ZERO, TaylorAngle, TaylorVector
 from toolpaths.arrays import Bools, Floats, frozen
+from toolpaths.shapes import arrays
 
 X, UP = (1.0, 0.0, 0.0), [0.0, 0.0, 1.0]
 
@@ -85,6 +86,7 @@ class H4TableAxis(H4Linear):
 
 
 @dataclass(frozen=True, eq=False)
+@arrays(pivot="3")
 class H4SpindleAxis(H4Linear):
     """The spindle on a B axis that the platform carries: about the platform's y through C + pivot.
 

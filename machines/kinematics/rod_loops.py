@@ -15,6 +15,7 @@ import numpy as np
 from machines.kinematics.sliders import Legs, solved
 from machines.kinematics.taylor import TaylorAngle, TaylorVector
 from toolpaths.arrays import Floats
+from toolpaths.shapes import arrays
 
 _ROUNDS = 6
 _GROWTH = 1.02
@@ -41,6 +42,7 @@ def by_parts(jets: Callable[[Floats, Floats], Jets], q0: Floats, q1: Floats) -> 
 
 
 @dataclass(frozen=True)
+@arrays(rods="N K 3", arms="N K 3", step="N K")
 class RodLoop:
     """The closed loops of a platform along straight slide moves.
 

@@ -29,6 +29,7 @@ from machines.kinematics.spherical import angle, azimuth, basis, meet, perpendic
 from machines.kinematics.taylor import ZERO, TaylorAngle, TaylorVector
 from toolpaths.arrays import Bools, Floats
 from toolpaths.rotations import angle_between
+from toolpaths.shapes import arrays
 
 ROUND_OFF = 1e-12
 """rad: directions nearer than this are the same (reach, singular direction)"""
@@ -41,6 +42,7 @@ Turning = dict[str, tuple[Floats, Floats]]
 
 
 @dataclass(frozen=True, eq=False)
+@arrays(tool_axis="3")
 class Serial(Kinematics):
     """Three linear axes and up to two rotary ones.
 

@@ -226,8 +226,8 @@ class ControllerFile(UserModel):
     modes: Modes = Modes()
 
     @property
-    def adds_length_always(self) -> bool:
-        """True where a tool change puts the tool's length in force and nothing takes it back."""
+    def keeps_length(self) -> bool:
+        """True where a tool change puts the length of the tool in force for good: no code takes it back."""
         return self.tools.length_automatic and not self.codes.length_cancel
 
     def divided(self, files: bool) -> ControllerFile:

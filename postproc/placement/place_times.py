@@ -10,7 +10,6 @@ import numpy as np
 
 from machines.machine import Machine
 from postproc.orientation.candidates.candidate_times import Candidate, turned
-from postproc.orientation.candidates.ranking import prepare
 from postproc.orientation.passes.passes import PassContext
 from postproc.orientation.plans.index_time import PassEnds, ends, ways_between
 from postproc.orientation.plans.shortest_sequence import seconds
@@ -18,6 +17,7 @@ from postproc.placement.bodies import StationaryBodies
 from postproc.placement.rigid_move import moved
 from postproc.placement.space import Space
 from toolpaths.arrays import Floats
+from toolpaths.shapes import arrays
 
 _WORTH = 1e-4
 """least part of the time that a place must gain to be planned"""
@@ -28,6 +28,7 @@ _DIGITS = 7
 
 
 @dataclass(frozen=True)
+@arrays(place="6", low="J", high="J")
 class TimedPlace:
     """A place that was looked at.
 
@@ -96,7 +97,6 @@ class Timer:
         self.unsolved: set[int] = set()
         self._cuts: dict[tuple[int, bytes], _Cut] = {}
         self._known: dict[bytes, TimedPlace] = {}
-        prepare(work.passes)
         sites = sum(len(each.s) for one in work.passes for each in one.stretches)
         self.most = min(_MOST, max(_LEAST, _SITES // max(1, sites)))
 
