@@ -331,8 +331,7 @@ class _PieceMotion:
             return [np.broadcast_to(x, self.known.shape)[k] for x in part]
 
         jets = [TaylorVector(some(jet.value), some(jet.first), some(jet.second),
-                             np.broadcast_to(jet.third, self.known.shape)[k])
-                for jet in (self.tip, self.axis)]
+                             np.broadcast_to(jet.third, self.known.shape)[k]) for jet in (self.tip, self.axis)]
         return _PieceMotion(jets[0], jets[1], self.known[k], self.straight_tip[k], self.strays[:, k])
 
 
@@ -346,9 +345,8 @@ def _kinds(motion: Motion, executed: BlockPoses, rows: Ints) -> Ints:
     kin = control.machine.kinematics
     holding = np.array(kin.rotary) | np.array(kin.turns_tool)
     stands = (before[:, holding] == motion.end[rows][:, holding]).all(axis=1)
-    straight_slides = kin.straight_slides
     kind = np.where(by_tip, TIP, JOINTS)
-    kind = np.where(in_plane | (stands & (straight_slides | (by_tip & (control.base != "tcp")))), LINE, kind)
+    kind = np.where(in_plane | (stands & (kin.straight_slides | (by_tip & (control.base != "tcp")))), LINE, kind)
     return np.where(motion.code[rows] == ARC, CIRCLE, kind)
 
 
@@ -361,8 +359,7 @@ def _jets(kind: int, motion: Motion, executed: BlockPoses, rows: Ints, pieces: _
     line = straight(list(tip0.T), list(tip1.T))
     if kind == LINE or (kind == TIP and not any(kin.turns_tool)):
         return line, TaylorVector(list(axis0.T))
-    xyz = executed.control.xyz
-    if not (kin.tip_jets_proved(xyz) if kind == TIP else kin.jets_proved):
+    if not (kin.tip_jets_proved(executed.control.xyz) if kind == TIP else kin.jets_proved):
         return None
     return (line, kin.jets(q0, q1)[1]) if kind == TIP else kin.jets(q0, q1)
 
