@@ -14,6 +14,14 @@ import numpy as np
 
 from machines.geometric_error.actual.actual import EDGE, Actual, ToolPlace
 from machines.geometric_error.actual.axis_motion import Line, actual_line, actual_tool, along, driven
+from machines.geometric_error.actual.error_rates import LARGEST_TURN, ErrorRates, gap_slopes_fit, sizes_of
+from machines.geometric_error.actual.rod_rates import (
+    PlatformMotion,
+    ToolMotion,
+    platform_motion,
+    tool_motion,
+    with_rotary,
+)
 from machines.geometric_error.actual.rods import RodErrors, RodFrame, platform_turn, rod_frame
 from machines.geometric_error.actual.serial_errors import SerialErrors
 from machines.geometric_error.actual.transforms import carried
@@ -64,6 +72,23 @@ class ActualRods(Actual):
         result: list[Columns] = [[columns.dot(row, v) for row in rows] for v in point]
         return [columns.plus(result[0], columns.of_rows(place)), *result[1:]]
 
+    def _motions(self, w: Floats, reach: Floats) -> tuple[PlatformMotion, PlatformMotion]:
+        """The platform's motion with errors and without, while slides go by up to `reach` (N, K)."""
+        place, turned, slides = self._platform(w)
+        none = RodErrors.none(self.rods.legs, self.rods.rods, self.rods.pairs)
+        found = self.frame.solve(slides, place, turned, self.rods)
+        return (platform_motion(self.frame, self.rods, slides, found, reach),
+                platform_motion(self.frame, none, slides, (place, turned), reach))
+
+    def _tool_motion(self, w: Floats, reach: Floats, tools: tuple[list[Columns], list[Columns]],
+                     arm_reach: Floats) -> ToolMotion:
+        """Of points and axes of the platform, with errors and without."""
+        actual, nominal = self._motions(w, reach)
+        nominal = nominal if self.turns else nominal.translating()
+        arms, axes = zip(*([np.einsum("nij,nj->ni", motion.turned, columns.to_rows(v, len(w))) for v in tool[:2]]
+                           for motion, tool in ((actual, tools[0]), (nominal, tools[1]))), strict=True)
+        return tool_motion(actual, nominal, arms, axes, reach, arm_reach)
+
     def _twist(self, w: Floats) -> tuple[Floats, Floats]:
         """(platform's place (N, 3), its motion per rod parameter (N, 6, P)), machine frame."""
         place, turned, slides = self._platform(w)
@@ -108,6 +133,15 @@ class ActualDelta(ActualRods):
         tool: list[Columns] = [columns.of_one(v) for v in actual_tool(UP, self.kinematics.tool_length, self.chain)]
         tip, axis, side = (columns.to_rows(v, len(w)) for v in self._carried(w, tool))
         return tip, axis, side
+
+    def error_rates(self, q: Floats, reach: Floats) -> ErrorRates | None:
+        """See the base class."""
+        length = self.kinematics.tool_length
+        tools: list[list[Columns]] = [[columns.of_one(v) for v in actual_tool(UP, length, chain)]
+                                      for chain in (self.chain, SerialErrors())]
+        tool = self._tool_motion(self.coordinates(q), reach, (tools[0], tools[1]), np.zeros(len(q)))
+        none = np.zeros(q.shape)
+        return ErrorRates(tool.tip, tool.axis, none, none)
 
     def sensitivity(self, w: Floats, direction: Floats | None = None) -> Floats:
         """See the base class: T^-1 S (E-15), carried to the tip, then the spindle's."""
@@ -179,11 +213,7 @@ class ActualH4(ActualRods):
         if not self.any:
             return self.kinematics.place(w[:, :4], w[:, 4])
         way = 0.0 if direction is None else direction[:, 4]
-        tool: list[Columns] = [columns.of_one(v) for v in actual_tool(UP, self.kinematics.tool_length, self.chain)]
-        tool[0] = columns.plus(tool[0], columns.of_one(self.pivot * self._at_spindle - self.kinematics.gauge * UP))
-        if self._at_spindle:
-            tool = driven(self.line, w[:, 4], way, self.chain, tool)
-        tool = self._carried(w, tool)
+        tool = self._carried(w, self._tool(w, way, self.line, self.chain))
         if not self._at_spindle:
             tool = driven(self.line, w[:, 4], way, self.chain, tool)
         tip, axis, side = (columns.to_rows(v, len(w)) for v in tool)
@@ -192,6 +222,35 @@ class ActualH4(ActualRods):
     @property
     def _at_spindle(self) -> bool:
         return self.kinematics.at_spindle
+
+    def _tool(self, w: Floats, way: Floats | float, line: Line, chain: SerialErrors) -> list[Columns]:
+        """Tip and directions in the platform, turned by the rotary axis where that is there."""
+        tool: list[Columns] = [columns.of_one(v) for v in actual_tool(UP, self.kinematics.tool_length, chain)]
+        tool[0] = columns.plus(tool[0], columns.of_one(self.pivot * self._at_spindle - self.kinematics.gauge * UP))
+        return driven(line, w[:, 4], way, chain, tool) if self._at_spindle else tool
+
+    def error_rates(self, q: Floats, reach: Floats) -> ErrorRates | None:
+        """See the base class."""
+        if not gap_slopes_fit(self.chain):
+            return None
+        w, turn, none = self.coordinates(q), reach[:, 4], SerialErrors()
+        size, spindle = sizes_of(self.chain, self.line.joint.name), sizes_of(self.chain, SPINDLE)
+        line = actual_line(self.line.joint, 4, none)
+        tools = self._tool(w, 0.0, self.line, self.chain), self._tool(w, 0.0, line, none)
+        arm = self._arm(w, tools[1])
+        at_spindle = self._at_spindle
+        apart = size.shift_apart + size.turn_apart * arm
+        wide = (1.0 + 2.0 * LARGEST_TURN + size.turn_slope) * (arm + size.line_shift) + size.shift_slope
+        tool = self._tool_motion(w, reach[:, :4], tools, (wide * turn + apart) * at_spindle)
+        arm = arm * (1.0 + turn) + (0.0 if at_spindle else (tool.nominal_tip * reach[:, :4]).sum(axis=1))
+        return with_rotary(tool, size, spindle, arm, self.kinematics.tool_length, at_spindle)
+
+    def _arm(self, w: Floats, tool: list[Columns]) -> Floats:
+        """(N,) largest distance of the nominal tip from the rotary axis's point and reference point."""
+        tip = columns.to_rows(tool[0], len(w))
+        if not self._at_spindle:
+            tip = w[:, :3] + np.einsum("nij,nj->ni", platform_turn(w[:, 3]), tip)
+        return np.asarray(np.linalg.norm(tip - self.pivot, axis=1) + np.linalg.norm(self.line.reference - self.pivot))
 
     def sensitivity(self, w: Floats, direction: Floats | None = None) -> Floats:
         """See the base class: the platform's, the rotary axis's, the spindle's, all at the tip in the table frame."""

@@ -115,10 +115,10 @@ class RodFrame:
 
     def carriage_joints(self, q: Floats, errors: RodErrors | None = None) -> Floats:
         """A (N, 6, 3) of slides q (N, K)."""
-        base, along = self._carriages(errors)
+        base, along = self.carriage_lines(errors)
         return np.asarray(base + q[:, self.leg, None] * along)
 
-    def _carriages(self, errors: RodErrors | None) -> tuple[Floats, Floats]:
+    def carriage_lines(self, errors: RodErrors | None) -> tuple[Floats, Floats]:
         """(6, 3) each: the joints on the carriages at q = 0, and how they move with their slides."""
         if errors is None:
             return self.rail[self.leg] + self.arm, self.direction[self.leg]
@@ -135,7 +135,7 @@ class RodFrame:
         if wanted(len(q), COMPILE_FROM, close_all):
             place, turned = np.array(place), np.array(turned)
             lengths = (self.length + errors.length) ** 2
-            worst = compiled(close_all)(np.ascontiguousarray(q), self.leg, *self._carriages(errors),
+            worst = compiled(close_all)(np.ascontiguousarray(q), self.leg, *self.carriage_lines(errors),
                                         self.joint + errors.platform, lengths, place, turned, STEPS, CLOSED, LEAST_GAIN)
             return _where_closed(place, turned, worst)
         with np.errstate(over="ignore", invalid="ignore"):  # what does not close grows out of bounds

@@ -39,6 +39,8 @@ SAME = 1e-5
 CHUNK = 20_000
 _FEW, _AT_ONCE = 250, 8
 """few pieces cost what one does: so many parts of each instead of halves"""
+_NO_BOUND, _PATIENCE = 1e20, 10
+"""mm: above it nothing is known; after so many halvings a block without a bound is given up"""
 _STANDS = 1e-12
 _REACH = 0.9
 """of the tolerance: how far from the nearest point the axis may be compared"""
@@ -128,7 +130,9 @@ def deviation_bound(motion: Motion, executed: BlockPoses, moves: Moves, rows: In
     for at in range(0, len(rows), CHUNK):
         for pieces in _whole(motion, executed, ends, np.arange(at, min(at + CHUNK, len(rows)))):
             worst.add(pieces, _values(motion, executed, moves, ends, pieces, allowed))
-    for _ in range(HALVINGS):
+    for divided in range(HALVINGS):
+        if divided >= _PATIENCE:
+            worst.give_up()
         pieces = worst.taken()
         if not len(pieces):
             break
@@ -182,6 +186,14 @@ class _Worst:
             if len(bound) and bound.max() > self.closed[i]:
                 self.closed[i], self.k[i] = bound.max(), int(pieces.k[bound.argmax()])
 
+    def give_up(self) -> None:
+        """Open pieces of which nothing is known have no bound."""
+        parts, self.open = self.open, []
+        for pieces, values in parts:
+            known = np.maximum(values.tip, values.axis) < _NO_BOUND
+            self.unbounded.update(np.unique(pieces.k[~known]).tolist())
+            self.open.append((pieces.take(known), values.take(known)))
+
     def taken(self) -> _Pieces:
         """The pieces that are open, which are so no more."""
         self._sort_out()
@@ -192,6 +204,7 @@ class _Worst:
 
     def result(self, rows: Ints) -> DeviationBound:
         """What is known in the end."""
+        self.give_up()
         for pieces, values in self.open:
             self._close(pieces, values)
         tip, axis = np.maximum(self.closed, self.seen).tolist()
