@@ -1,29 +1,28 @@
-"""From a machine file to a Machine: read, choose the family's model, check, convert to mm, rad, s."""
+"""From a machine file to a Machine: read, choose the model of its kind, check, convert to mm, rad, s."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from dataclasses import replace
 from functools import cache
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from pydantic import create_model
 
+import machines.kinds as kinds
+from machines.kind_check import build_faults, contract_faults
 from machines.kinematics.base import Kinematics
 from machines.machine import Limits, Machine, Timing
-from machines.models import KinematicsModel, MachineModel
+from machines.models import KeyProblem, KinematicsModel, MachineModel
 from machines.user_file import UserFile, nearest, read_toml, schema, validate
-from toolpaths.diagnostics import Diagnostic, DiagnosticError, has_errors
+from toolpaths.diagnostics import Diagnostic, DiagnosticError, error, has_errors
 from toolpaths.units import DEG
 
 DATA = Path(__file__).parent / "data"
-FAMILIES: dict[str, str] = {
-    "serial": "machines.serial_models:SerialModel",
-    "linear-delta": "machines.parallel_models:LinearDeltaModel",
-    "h4-linear": "machines.parallel_models:H4LinearModel",
-}
-"""`[kinematics] family` -> module:model of that table; imported when a file asks for it"""
+KIND, OLDER = ("kinematics", "kind"), ("kinematics", "family")
+"""the key that names the kind of machine, and the older word for it, which files may still have"""
 
 
 def builtin() -> dict[str, Path]:
@@ -52,44 +51,97 @@ def load_checked(source: str | Path) -> tuple[Machine | None, list[Diagnostic]]:
     diagnostics += found
     if model is None or has_errors(diagnostics):
         return None, diagnostics
-    return assemble(file, model), diagnostics
+    machine = assemble(file, model)
+    if not _is_built_in(model):
+        diagnostics += _of_kind(file, model, contract_faults(machine.kinematics, machine.limits, machine.home))
+    return (None if has_errors(diagnostics) else machine), diagnostics
 
 
 def check(file: UserFile) -> tuple[MachineModel | None, list[Diagnostic]]:
     """The model of a machine file that has been read, or None and what is wrong with it."""
-    family, diagnostics = _family(file)
-    if family is None:
+    file = _with_kind(file)
+    try:
+        kinematics, diagnostics = _kinematics_model(file)
+    except kinds.KindFault as fault:
+        return None, [file.problem("machine.kind", KIND, str(fault), fault.hint)]
+    if kinematics is None:
         return None, diagnostics
-    model, diagnostics = validate(file, machine_model(family))
+    model, diagnostics = validate(file, machine_model(kinematics))
     if model is None:
         return None, diagnostics
-    return model, [file.problem(p.code, p.path, p.message, p.hint) for p in model.problems()]
+    faults = [] if _is_built_in(model) else _of_kind(file, model, build_faults(model.kinematics))
+    return model, faults or [file.problem(p.code, p.path, p.message, p.hint) for p in model.problems()]
 
 
-def _family(file: UserFile) -> tuple[str | None, list[Diagnostic]]:
+def _is_built_in(model: MachineModel) -> bool:
+    return model.kinematics.kind in kinds.BUILT_IN
+
+
+def _of_kind(file: UserFile, model: MachineModel, faults: Iterable[KeyProblem]) -> list[Diagnostic]:
+    """Faults of the code of a kind, at the line that names it."""
+    return [file.problem(p.code, KIND, f"kind {model.kinematics.kind!r}: {p.message}", p.hint) for p in faults]
+
+
+def _with_kind(file: UserFile) -> UserFile:
+    """The same file with `kind` where it has the older word."""
     table = file.values.get("kinematics")
-    if not isinstance(table, dict) or "family" not in table:
-        return None, [file.problem("file.missing-key", ("kinematics", "family"), "key 'kinematics.family' is missing",
-                                   "add [kinematics] family = one of " + ", ".join(FAMILIES))]
-    family = table["family"]
-    if not isinstance(family, str) or family not in FAMILIES:
-        return None, [file.problem("machine.family", ("kinematics", "family"),
-                                   f"no kinematics family is called {family!r}", nearest(str(family), list(FAMILIES)))]
-    return family, []
+    if not isinstance(table, dict) or "family" not in table or table.get("kind", table["family"]) != table["family"]:
+        return file
+    table = {"kind": table["family"]} | {key: value for key, value in table.items() if key != "family"}
+    origins = {path: origin for path, origin in file.origins.items() if path != OLDER}
+    if OLDER in file.origins:
+        origins.setdefault(KIND, file.origins[OLDER])
+    return replace(file, values=file.values | {"kinematics": table}, origins=origins)
+
+
+def _kinematics_model(file: UserFile) -> tuple[type[KinematicsModel] | None, list[Diagnostic]]:
+    """The model of the table; None and why there is none."""
+    table = file.values.get("kinematics")
+    if not isinstance(table, dict) or "kind" not in table:
+        return None, [file.problem("file.missing-key", KIND, "key 'kinematics.kind' is missing",
+                                   "add [kinematics] kind = one of " + ", ".join(kinds.known()))]
+    kind = table["kind"]
+    if "family" in table:
+        return None, [file.problem("machine.kind", OLDER, f"kind = {kind!r} and family = {table['family']!r}",
+                                   "family is the older word for kind: keep one of them")]
+    found = kinds.model_of(kind) if isinstance(kind, str) else None
+    if found is None:
+        return None, [file.problem("machine.kind", KIND, f"no kind of machine is called {kind!r}, registered are "
+                                   f"{', '.join(kinds.known())}", _hint(str(kind)))]
+    return found, []
+
+
+def _hint(kind: str) -> str:
+    meant = nearest(kind, kinds.known())
+    return f"{meant} {kinds.HOW}" if meant.endswith("?") else kinds.HOW
 
 
 @cache
-def machine_model(family: str) -> type[MachineModel]:
-    """The model of a machine file of that family."""
-    module, _, name = FAMILIES[family].partition(":")
-    kinematics: type[KinematicsModel] = getattr(import_module(module), name)
-    return create_model(f"Machine_{name}", __base__=MachineModel, __doc__=f"A machine file of family {family}.",
+def machine_model(kinematics: type[KinematicsModel]) -> type[MachineModel]:
+    """The model of a machine file whose `[kinematics]` table is of that model."""
+    name = kinematics.__name__
+    return create_model(f"Machine_{name}", __base__=MachineModel, __doc__=f"A machine file with {name}.",
                         kinematics=(kinematics, ...))
 
 
 def machine_schema() -> dict[str, Any]:
-    """The JSON schema of a machine file: any of the families."""
-    return schema(*(machine_model(family) for family in FAMILIES))
+    """The JSON schema of a machine file: of any registered kind that can be imported.
+
+    Raises:
+        DiagnosticError: where a file that `POSTPROC_KINDS` names cannot be run.
+    """
+    found = list[type[MachineModel]]()
+    try:
+        words = kinds.known()
+    except kinds.KindFault as fault:
+        raise DiagnosticError([error("machine.kind", str(fault), hint=fault.hint)]) from fault
+    for kind in words:
+        try:
+            model = kinds.model_of(kind)
+        except kinds.KindFault:
+            continue
+        found += [] if model is None else [machine_model(model)]
+    return schema(*found)
 
 
 def assemble(file: UserFile, model: MachineModel) -> Machine:

@@ -41,23 +41,18 @@ class KeyProblem:
 
 
 class KinematicsModel(UserModel):
-    """Base of the `[kinematics]` table of every family."""
+    """Base of the `[kinematics]` table of every kind of machine (`kinds.py`)."""
 
-    family: str
-    """kind of kinematics; decides which other keys there are"""
+    kind: str
+    """kind of machine; decides which other keys there are"""
 
     @abstractmethod
     def build(self) -> Kinematics:
         """The kinematics at the gauge point; called only where `problems` has none."""
 
-    @abstractmethod
     def describe(self) -> str:
-        """The structure in one line: ISO 10791-6 code or the parallel family."""
-
-    @property
-    @abstractmethod
-    def axis_names(self) -> tuple[str, ...]:
-        """Axis letters, the order of q."""
+        """The structure in one line: ISO 10791-6 code, or what the kind is called."""
+        return self.kind
 
     def problems(self) -> Iterator[KeyProblem]:
         """What makes the geometry unusable; paths within this table."""
@@ -69,7 +64,7 @@ class KinematicsModel(UserModel):
         Raises:
             ValueError: where the module cannot describe this machine, saying why.
         """
-        raise ValueError(f"no module of a control is known for family {self.family!r}")
+        raise ValueError(f"no module of a control is known for kind {self.kind!r}")
 
 
 class AxisModel(UserModel):

@@ -1,4 +1,4 @@
-"""`[kinematics] family = "linear-delta"` and `"h4-linear"`: the two families and what makes them unusable."""
+"""`[kinematics] kind = "linear-delta"` and `"h4-linear"`: the two kinds and what makes them unusable."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from toolpaths.units import DEG
 class LinearDeltaModel(SliderModel):
     """Three slides, a platform that only translates; the gauge point is the platform's reference point."""
 
-    family: Literal["linear-delta"]
+    kind: Literal["linear-delta"]
 
     @property
     def leg_count(self) -> int:
@@ -36,7 +36,7 @@ class LinearDeltaModel(SliderModel):
         return tuple(self.legs)
 
     def describe(self) -> str:
-        """The family."""
+        """The kind."""
         return "linear Delta"
 
     def build(self) -> LinearDelta:
@@ -89,7 +89,7 @@ class RotaryModel(UserModel):
 class H4LinearModel(SliderModel):
     """Asymmetric H4 on four slides with a rotary axis: tilt about x, two legs with pairs of rods, two with one rod."""
 
-    family: Literal["h4-linear"]
+    kind: Literal["h4-linear"]
     gauge: NotNegative
     """mm from the platform's reference point (spindle: from the pivot) down to the gauge point"""
     rotary: RotaryModel = Field(...)
@@ -105,7 +105,7 @@ class H4LinearModel(SliderModel):
         return (*self.legs, self.rotary.letter)
 
     def describe(self) -> str:
-        """The family and where the fifth axis is."""
+        """The kind and where the fifth axis is."""
         where = "table under the part" if self.rotary.carries == "part" else "axis between platform and spindle"
         return f"H4a, {self.rotary.letter} {where}"
 

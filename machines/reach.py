@@ -1,4 +1,4 @@
-"""Reach of a parallel machine: signed margins to its workspace, joint stops and collisions, at joints and between them.
+"""Reach of a machine with a declared workspace: signed margins to it, joint stops and collisions, at joints and between.
 
 Rods, rails and spindle are round bars (segments with a radius); two bars clear each other by the distance of their
 middle lines less both radii. Source: Company 2000, II.4.2.1 (rods and slides), II.4.2.2 (rods), II.4.2.3 (rods and
@@ -10,15 +10,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import Protocol
 
 import numpy as np
 
-from machines.kinematics.clearance_geometry import ClearanceGeometry, ClearanceSizes
-from machines.kinematics.sliders import Legs
-from machines.kinematics.workspace import Workspace
+from machines.kinematics.base import Kinematics
+from machines.kinematics.clearance_geometry import ClearanceGeometry
 from toolpaths.arrays import Bools, Floats
 from toolpaths.rotations import angle_between
+from toolpaths.shapes import arrays
 
 BLOCK = 4096
 """points at a time"""
@@ -30,22 +29,8 @@ MarginColumn = tuple[str, bool, Callable[[ClearanceGeometry], Floats]]
 """name, True for rad, margin (N,) of a rig"""
 
 
-class SliderMachine(Protocol):
-    """What the clearances need of a kinematics."""
-
-    @property
-    def workspace(self) -> Workspace: ...
-    @property
-    def clearance(self) -> ClearanceSizes | None: ...
-    @property
-    def legs(self) -> Legs: ...
-    @property
-    def axis_names(self) -> tuple[str, ...]: ...
-    def rig(self, q: Floats, near: Floats | None = None) -> ClearanceGeometry: ...
-    def middle_rig(self) -> ClearanceGeometry: ...
-
-
 @dataclass(frozen=True, eq=False)
+@arrays(angular="M", values="N M")
 class Margins:
     """Signed margins: negative where a bound is passed, NaN where the joints have no pose.
 
@@ -70,12 +55,12 @@ class Margins:
         return sorted(found, key=lambda f: (f[1], f[4]))
 
 
-def is_checked(kinematics: object) -> bool:
-    """True for a kinematics that `reach` knows how to look at."""
-    return hasattr(kinematics, "rig") and hasattr(kinematics, "workspace")
+def is_checked(kinematics: Kinematics) -> bool:
+    """True for a machine that is declared to work somewhere: `reach` has margins of it."""
+    return kinematics.workspace is not None
 
 
-def reach(kinematics: SliderMachine, q: Floats, near: Floats | None = None) -> Margins:
+def reach(kinematics: Kinematics, q: Floats, near: Floats | None = None) -> Margins:
     """Margins at joints q (N, J); `near` as for `Kinematics.pose`."""
     checks = _Checks(kinematics)
     blocks = []
@@ -87,7 +72,7 @@ def reach(kinematics: SliderMachine, q: Floats, near: Floats | None = None) -> M
     return Margins(checks.names, checks.angular, values)
 
 
-def reach_between(kinematics: SliderMachine, q: Floats, depth: int = 6) -> Margins:
+def reach_between(kinematics: Kinematics, q: Floats, depth: int = 6) -> Margins:
     """Least margins (N-1, M) on the straight joint moves between consecutive q (N, J), their ends included.
 
     A move is halved until it cannot hide a negative margin, `depth` times at most. The test for that: a margin
@@ -101,7 +86,7 @@ def reach_between(kinematics: SliderMachine, q: Floats, depth: int = 6) -> Margi
     return Margins(checks.names, checks.angular, least)
 
 
-def _halve(kinematics: SliderMachine, checks: _Checks, q0: Floats, q1: Floats, m0: Floats, m1: Floats, least: Floats,
+def _halve(kinematics: Kinematics, checks: _Checks, q0: Floats, q1: Floats, m0: Floats, m1: Floats, least: Floats,
            move: np.ndarray[tuple[int], np.dtype[np.int64]], depth: int) -> None:
     if not len(move) or depth == 0:
         return
@@ -118,14 +103,13 @@ def _halve(kinematics: SliderMachine, checks: _Checks, q0: Floats, q1: Floats, m
 class _Checks:
     """The columns of one machine, built once: name, unit and a function of the rig."""
 
-    def __init__(self, kinematics: SliderMachine) -> None:
-        self.space = kinematics.workspace
-        self.letters = kinematics.axis_names
-        self.middle = kinematics.middle_rig()
-        self.legs = kinematics.legs
+    def __init__(self, kinematics: Kinematics) -> None:
+        assert kinematics.workspace is not None  # see `is_checked`
+        self.space, self.letters = kinematics.workspace, kinematics.axis_names
         self.columns: list[MarginColumn] = list(self._workspace())
-        if kinematics.clearance is not None:
-            self.clearance = kinematics.clearance
+        platform = kinematics.on_rods
+        if platform is not None and platform.clearance is not None:
+            self.middle, self.legs, self.clearance = platform.middle_rig(), platform.legs, platform.clearance
             self.columns += [*self._stops(), *self._bars()]
         self.names = tuple(name for name, _, _ in self.columns)
         self.angular = np.array([angular for _, angular, _ in self.columns], dtype=np.bool_)

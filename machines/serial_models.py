@@ -1,4 +1,4 @@
-"""`[kinematics] family = "serial"`: an ISO 10791-6 code plus direction, point and sense of each axis."""
+"""`[kinematics] kind = "serial"`: an ISO 10791-6 code plus direction, point and sense of each axis."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ from typing import Literal
 import numpy as np
 from pydantic import Field, field_validator
 
-from machines.kinematics.serial import Joint, Serial
+from machines.kinematics.chain import Joint
+from machines.kinematics.serial import Serial
 from machines.machine import ControlKinematics
 from machines.models import KeyProblem, KinematicsModel, Vector
 from machines.user_file import UserModel
@@ -42,7 +43,7 @@ class SerialAxisModel(UserModel):
 class SerialModel(KinematicsModel):
     """Three linear axes and up to two rotary ones."""
 
-    family: Literal["serial"]
+    kind: Literal["serial"]
     structure: str
     """ISO 10791-6 code, e.g. "w C' A' b X Y Z (C1) t"; primed axes carry the part, the spindle is in brackets"""
     axes: dict[str, SerialAxisModel] = Field(default_factory=dict)

@@ -84,7 +84,7 @@ class ClearanceModel(UserModel):
 
 
 class SliderModel(KinematicsModel):
-    """What the families share."""
+    """What these kinds share."""
 
     legs: dict[str, LegModel]
     """by axis letter"""
@@ -118,10 +118,10 @@ class SliderModel(KinematicsModel):
     @property
     @abstractmethod
     def leg_count(self) -> int:
-        """Legs that this family has."""
+        """Legs that this kind has."""
 
     def problems(self) -> Iterator[KeyProblem]:
-        """Vectors that are no directions, a workspace out of reach, a platform that moves otherwise than the family."""
+        """Vectors that are no directions, a workspace out of reach, a platform that moves otherwise than the kind."""
         found = list(self._leg_problems())
         yield from found
         if not found:
@@ -130,8 +130,8 @@ class SliderModel(KinematicsModel):
     def _leg_problems(self) -> Iterator[KeyProblem]:
         if len(self.legs) != self.leg_count:
             yield KeyProblem("machine.geometry", ("legs",),
-                             f"{len(self.legs)} legs; family {self.family!r} has {self.leg_count}",
-                             "write one [kinematics.legs.LETTER] table per leg")
+                          f"{len(self.legs)} legs; kind {self.kind!r} has {self.leg_count}",
+                          "write one [kinematics.legs.LETTER] table per leg")
         for name, leg in self.legs.items():
             length = float(np.linalg.norm(leg.direction))
             if abs(length - 1.0) > UNIT:

@@ -59,7 +59,7 @@ def reached(machine: Machine, tip: Floats, axis: Floats) -> Bools:
 
 
 def _clear(machine: Machine, q: Floats) -> Bools:
-    margins = reach(machine.kinematics, q)  # type: ignore[arg-type]
+    margins = reach(machine.kinematics, q)
     bounds = [not name.startswith("workspace") for name in margins.names]
     result: Bools = np.all(margins.values[:, bounds] >= 0.0, axis=1)
     return result

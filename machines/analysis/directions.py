@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from machines.kinematics.h4_linear import H4Linear
-from machines.kinematics.linear_delta import LinearDelta
 from machines.machine import Machine
 from toolpaths.arrays import Bools, Floats
 from toolpaths.units import DEG
@@ -35,11 +33,11 @@ def tilts(machine: Machine) -> tuple[float, float]:
 def taken(machine: Machine, axis: Floats) -> Bools:
     """True (N,) where the directions `axis` (N, 3) need no more than the travel of the rotary axes."""
     kinematics, tip = machine.kinematics, np.zeros(3)
-    if isinstance(kinematics, H4Linear):  # a tool that ends where the tilt turns it
-        kinematics = kinematics.with_tool(-kinematics.gauge)
-        tip = kinematics.workspace.middle
-    elif isinstance(kinematics, LinearDelta):
-        tip = kinematics.workspace.middle
+    if kinematics.on_rods is not None:  # a tool that ends where the tilt turns it
+        tip = kinematics.on_rods.workspace.middle
+        kinematics = kinematics.with_tool(-kinematics.on_rods.gauge_below)
+    elif not kinematics.straight_slides:  # slides have not travel enough everywhere
+        tip = kinematics.forward(machine.home[None])[0][0]
     inside = np.all(np.abs(kinematics.nearest_axis(axis) - axis) < SLACK, axis=1)
     rotary, limits = np.array(machine.rotary), machine.limits
     found = np.zeros(len(axis), dtype=np.bool_)

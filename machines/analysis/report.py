@@ -20,8 +20,7 @@ from machines.analysis.transmission import (
     speed_transmission,
     worst,
 )
-from machines.kinematics.h4_linear import H4Linear
-from machines.kinematics.linear_delta import LinearDelta
+from machines.kinematics.rod_platform import RodPlatform
 from machines.machine import Machine
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import DiagnosticError, error
@@ -40,11 +39,11 @@ def analyse(machine: Machine, singular_above: float | None = None) -> dict[str, 
     """
     found: dict[str, Any] = {"machine": machine.name, "structure": machine.structure, "axes": list(machine.axis_names)}
     kinematics = machine.kinematics
-    if isinstance(kinematics, LinearDelta | H4Linear):
-        space = kinematics.workspace
+    if (space := kinematics.workspace) is not None:
         found["workspace_mm"] = _span(space.lower, space.upper)
         found["tilt_range_deg"] = [t / DEG for t in space.tilt]
-        found |= _transmission(kinematics)
+    if kinematics.on_rods is not None:
+        found |= _transmission(kinematics.on_rods)
     every, largest = tilts(machine)
     found["tilt_in_every_direction_deg"] = every if np.isfinite(every) else None
     found["largest_tilt_deg"] = largest
@@ -57,15 +56,15 @@ def analyse(machine: Machine, singular_above: float | None = None) -> dict[str, 
 
 def _proof_step(machine: Machine, floor: float) -> float | None:
     """mm; None where no grid down to the finest proves it."""
-    kinematics = machine.kinematics
-    if not isinstance(kinematics, LinearDelta) or not np.allclose(np.abs(kinematics.legs.directions[:, 2]), 1.0):
+    rods = machine.kinematics.on_rods
+    if rods is None or rods.platform_turns or not np.allclose(np.abs(rods.legs.directions[:, 2]), 1.0):
         raise DiagnosticError([error(
             "analysis.singular", f"the proof by a grid is for a linear Delta with slides along z, not for {machine.name}",
             hint="leave --singular-above out: convert keeps the distances from singular positions of the machine file")])
-    return grid_step_that_proves(kinematics, floor)
+    return grid_step_that_proves(rods, floor)
 
 
-def _transmission(kinematics: LinearDelta | H4Linear) -> dict[str, Any]:
+def _transmission(kinematics: RodPlatform) -> dict[str, Any]:
     def largest(measure: Any) -> dict[str, Any]:
         bound: Measure = partial(measure, kinematics)
         return _point(worst(bound, kinematics.workspace))
@@ -73,10 +72,10 @@ def _transmission(kinematics: LinearDelta | H4Linear) -> dict[str, Any]:
     found: dict[str, Any] = {
         "condition_number": largest(condition_number), "speed_transmission": largest(speed_transmission),
         "force_transmission": largest(force_transmission)}
-    if isinstance(kinematics, LinearDelta):
-        found["acceleration_per_speed_squared_per_mm"] = largest(speed_acceleration)
-    else:
+    if kinematics.platform_turns:
         found["turn_lever_mm"] = lever(kinematics)
+    else:
+        found["acceleration_per_speed_squared_per_mm"] = largest(speed_acceleration)
     return found
 
 
@@ -86,19 +85,20 @@ def _point(value: WorstValue) -> dict[str, Any]:
 
 
 def _box(machine: Machine) -> dict[str, list[float]] | None:
-    """In the proportions of the workspace, of a serial machine those of its linear travel, around their middle."""
+    """In the proportions of the workspace, of straight slides those of their travel, around their middle; else a cube."""
     kinematics = machine.kinematics
-    if isinstance(kinematics, LinearDelta | H4Linear):
-        space = kinematics.workspace
-        tip = space.middle - (0.0 if isinstance(kinematics, LinearDelta) else kinematics.gauge) * np.array([0, 0, 1.0])
+    if kinematics.on_rods is not None:
+        space = kinematics.on_rods.workspace
+        tip = space.middle - kinematics.on_rods.gauge_below * np.array([0, 0, 1.0])
         box = reachable_box(machine, tip, space.upper - space.lower)
     else:
         linear = ~np.array(machine.rotary)
         lower, upper = machine.limits.lower[linear], machine.limits.upper[linear]
         q = machine.home.copy()
         q[linear] = 0.5 * (lower + upper)
-        tip, axis = kinematics.forward(q[None])
-        box = reachable_box(machine, tip[0], upper - lower, axis[0])
+        tip, axis = kinematics.forward(np.stack([q, machine.home]))
+        k = 0 if np.isfinite(tip[0]).all() else 1
+        box = reachable_box(machine, tip[k], upper - lower if kinematics.straight_slides else np.ones(3), axis[k])
     return _sides(box)
 
 

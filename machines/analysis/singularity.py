@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from machines.kinematics.linear_delta import LinearDelta
+from machines.kinematics.rod_platform import RodPlatform
 from machines.kinematics.sliders import smallest_singular_value
 
 FINEST = 1.0
@@ -32,14 +32,14 @@ def safe_radius(spread: float, length: float, alpha: float) -> float:
     return 1.0 / (math.sqrt(3.0) * (2.0 * growth(spread, length, alpha) + 1.0))
 
 
-def grid_step_that_proves(kinematics: LinearDelta, floor: float, alpha: float = 100.0) -> float | None:
+def grid_step_that_proves(kinematics: RodPlatform, floor: float, alpha: float = 100.0) -> float | None:
     """Step (mm) of a square grid over the workspace that proves singular values above `floor` (mm), None without one.
 
     III.7.3: around a grid point whose value is s the values stay above `floor` within safe_radius x (s - floor). The
     step is halved until half of its diagonal is inside that at every point; half a step also stays below `alpha`.
     """
     legs, space = kinematics.legs, kinematics.workspace
-    feet = (legs.points - kinematics.platform)[:, :2]
+    feet = (legs.points - kinematics.platform_joints)[:, :2]
     corners = np.stack(np.meshgrid(*zip(space.lower[:2], space.upper[:2], strict=True)), axis=-1).reshape(-1, 2)
     spread = float(np.linalg.norm(corners[:, None] - feet, axis=2).max())
     factor = safe_radius(spread, float(legs.lengths.min()), alpha)
@@ -51,12 +51,12 @@ def grid_step_that_proves(kinematics: LinearDelta, floor: float, alpha: float = 
     return None
 
 
-def _least(kinematics: LinearDelta, step: float) -> float:
+def _least(kinematics: RodPlatform, step: float) -> float:
     """Smallest singular value of Jx and Jq (mm) over the grid of a slice."""
     space, legs = kinematics.workspace, kinematics.legs
     counts = np.ceil((space.upper - space.lower)[:2] / step).astype(int) + 1
     sides = [np.linspace(lo, hi, n) for lo, hi, n in zip(space.lower[:2], space.upper[:2], counts, strict=True)]
     x, y = (m.ravel() for m in np.meshgrid(*sides))
-    ends = np.column_stack([x, y, np.full(len(x), space.middle[2])])[:, None, :] + kinematics.platform
+    ends = np.column_stack([x, y, np.full(len(x), space.middle[2])])[:, None, :] + kinematics.platform_joints
     rods = ends - legs.carriages(legs.inverse(ends))
     return float(min(smallest_singular_value(rods).min(), np.abs(legs.along(rods)).min()))

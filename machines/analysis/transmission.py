@@ -11,13 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from machines.kinematics.h4_linear import H4Linear
-from machines.kinematics.linear_delta import LinearDelta
-from machines.kinematics.sliders import Legs, platform_rates
+from machines.kinematics.rod_platform import RodPlatform
+from machines.kinematics.sliders import platform_rates
 from machines.kinematics.workspace import Workspace
 from toolpaths.arrays import Floats
 
-SliderKinematics = LinearDelta | H4Linear
 Measure = Callable[[Floats, Floats], Floats]
 """(N,) of places (N, 3) and tilts (N,) of the workspace"""
 ROUNDS = 14
@@ -34,19 +32,19 @@ class WorstValue:
     least: float
 
 
-def rates(kinematics: SliderKinematics, place: Floats, tilt: Floats) -> Floats:
+def rates(kinematics: RodPlatform, place: Floats, tilt: Floats) -> Floats:
     """J (N, K, K) at places (N, 3) and tilts (N,) of the workspace: platform (mm, lever x turn) per slide (mm)."""
     jx, along = _jx(kinematics, place, tilt)
     return platform_rates(jx, along)
 
 
-def lever(kinematics: SliderKinematics) -> float:
+def lever(kinematics: RodPlatform) -> float:
     """mm by which the platform's turn counts: half the largest distance of two platform joints (d in the thesis)."""
-    joints = kinematics.platform.joints if isinstance(kinematics, H4Linear) else kinematics.platform
+    joints = kinematics.platform_joints
     return 0.5 * float(np.linalg.norm(joints[:, None] - joints[None], axis=2).max())
 
 
-def condition_number(kinematics: SliderKinematics, place: Floats, tilt: Floats) -> Floats:
+def condition_number(kinematics: RodPlatform, place: Floats, tilt: Floats) -> Floats:
     """cond_2 J (N,), II-24; inf where the platform is singular."""
     jacobian = rates(kinematics, place, tilt)
     bad = ~np.isfinite(np.sum(jacobian, axis=(1, 2)))
@@ -55,7 +53,7 @@ def condition_number(kinematics: SliderKinematics, place: Floats, tilt: Floats) 
     return np.nan_to_num(values[:, 0] / least, nan=np.inf)
 
 
-def speed_transmission(kinematics: SliderKinematics, place: Floats, tilt: Floats) -> Floats:
+def speed_transmission(kinematics: RodPlatform, place: Floats, tilt: Floats) -> Floats:
     """eta_v (N,): fastest slide per unit speed of the platform in any direction: largest row norm of J^-1 (III.6.2).
 
     It is eta_a as well, the slide acceleration per acceleration of the platform.
@@ -64,13 +62,13 @@ def speed_transmission(kinematics: SliderKinematics, place: Floats, tilt: Floats
     return np.asarray(np.linalg.norm(inverse, axis=2).max(axis=1), dtype=np.float64)
 
 
-def force_transmission(kinematics: SliderKinematics, place: Floats, tilt: Floats) -> Floats:
+def force_transmission(kinematics: RodPlatform, place: Floats, tilt: Floats) -> Floats:
     """eta_f (N,): largest slide force per unit force on the platform in any direction, the largest column norm of J."""
     jacobian = rates(kinematics, place, tilt)
     return np.asarray(np.linalg.norm(jacobian, axis=1).max(axis=1), dtype=np.float64)
 
 
-def speed_acceleration(kinematics: LinearDelta, place: Floats, tilt: Floats) -> Floats:
+def speed_acceleration(kinematics: RodPlatform, place: Floats, tilt: Floats) -> Floats:
     """eta_av (N,) 1/mm: slide acceleration at unit speed of a Delta's platform in the worst direction (III.6.5).
 
     With j a row of J^-1 the rod's equation, differentiated twice, gives (AB.u) qdd = AB.a + |v - u (j.v)|^2; over unit
@@ -103,21 +101,16 @@ def worst(measure: Measure, space: Workspace, counts: tuple[int, int, int, int] 
     return WorstValue(best, (float(point[0]), float(point[1]), float(point[2])), float(point[3]), least)
 
 
-def _inverse(kinematics: SliderKinematics, place: Floats, tilt: Floats) -> Floats:
+def _inverse(kinematics: RodPlatform, place: Floats, tilt: Floats) -> Floats:
     """J^-1 = Jq^-1 Jx (N, K, K)."""
     jx, along = _jx(kinematics, place, tilt)
     result: Floats = jx / along[:, :, None]
     return result
 
 
-def _jx(kinematics: SliderKinematics, place: Floats, tilt: Floats) -> tuple[Floats, Floats]:
+def _jx(kinematics: RodPlatform, place: Floats, tilt: Floats) -> tuple[Floats, Floats]:
     """(Jx (N, K, K) with the turn's column divided by the lever, diagonal of Jq (N, K))."""
-    if isinstance(kinematics, H4Linear):
-        p = np.column_stack([place, tilt])
-        jx = kinematics.platform.jx(p, kinematics.platform.inverse(p))
+    jx = kinematics.loop_matrices(place, tilt)
+    if kinematics.platform_turns:
         jx[:, :, 3] /= lever(kinematics)
-        return jx, kinematics.legs.along(jx[:, :, :3])
-    legs: Legs = kinematics.legs
-    ends = place[:, None, :] + kinematics.platform
-    rods = ends - legs.carriages(legs.inverse(ends))
-    return rods, legs.along(rods)
+    return jx, kinematics.legs.along(jx[:, :, :3])

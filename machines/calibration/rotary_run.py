@@ -21,8 +21,6 @@ from machines.geometric_error.actual.serial_errors import Component, SerialError
 from machines.geometric_error.tables.csv_table import UNITS, CsvTable
 from machines.geometric_error.tables.curves import TableCurve
 from machines.geometric_error.tables.names import DIRECTIONS, ErrorName
-from machines.kinematics.h4_axes import H4TableAxis
-from machines.kinematics.serial import Serial
 from toolpaths.arrays import Floats
 
 ARCSEC = UNITS["arcsec"]
@@ -121,9 +119,7 @@ def _sense(run: CalibrationRun, letter: str) -> int:
         run.problem("calibrate.axis", f"{machine.name} has no axis {letter}", "it has " + ", ".join(machine.axis_names),
                     "axis")
         return 0
-    if not isinstance(kinematics, Serial):
-        return -1 if isinstance(kinematics, H4TableAxis) and kinematics.sense < 0 else 1
-    along = next(j.direction for j in kinematics.chain if j.name == letter)["ABC".index(letter)]
+    along = kinematics.axis_line(letter)[0]["ABC".index(letter)]
     if abs(along) < 1.0 - ALONG:
         run.problem("calibrate.axis", f"{letter} of {machine.name} is inclined: E{letter}{letter} is not its "
                     "positioning error", "measure poses, and name its parameters", "axis")
@@ -132,7 +128,7 @@ def _sense(run: CalibrationRun, letter: str) -> int:
 
 
 def _carries_part(run: CalibrationRun, letter: str) -> bool:
-    return f"{letter}'" in run.machine.structure or isinstance(run.machine.kinematics, H4TableAxis)
+    return f"{letter}'" in run.machine.structure or run.machine.kinematics.carries_part(letter)
 
 
 def _planned(steps: int, most: int, readings: int) -> int:

@@ -2,16 +2,45 @@
 
 Kinematics work in the table frame (the frame that carries the part, at the machine origin when q = 0), at the gauge
 point of the spindle unless `with_tool(length)` was asked for. The tool axis points from the tip to the spindle.
+
+A kind of machine gives `inverse` and `forward`; everything else has a default that is safe: rates by differences,
+blocks looked at in places instead of bounded (`jets_proved` is False: programs are checked, not proved), no clearances, no
+geometric errors. A kind that knows more overrides more.
 """
 
 from __future__ import annotations
 
+import copy
 from abc import ABC, abstractmethod
-from typing import Self
+from collections.abc import Mapping
+from functools import cached_property
+from typing import Any, Protocol, Self, TypeVar
 
 import numpy as np
 
-from toolpaths.arrays import Bools, Floats
+from machines.kinematics import by_samples
+from machines.kinematics.chain import Joint
+from machines.kinematics.clearance_geometry import ClearanceGeometry
+from machines.kinematics.rod_platform import RodPlatform
+from machines.kinematics.taylor import TaylorVector, straight
+from machines.kinematics.workspace import Workspace
+from toolpaths.arrays import Bools, Floats, Ints, frozen
+
+Made = TypeVar("Made", covariant=True)
+UP = frozen(np.array([0.0, 0.0, 1.0]), np.float64, (3,), "UP")
+
+
+class ErrorForms(Protocol[Made]):
+    """The paths to give a machine its geometric errors; `Kinematics.with_errors` takes the one that is the machine's."""
+
+    def chain(self, kinematics: Any) -> Made:
+        """Of a chain of axes (`Kinematics.chain`)."""
+
+    def translating_rods(self, kinematics: Any) -> Made:
+        """Of a platform on rods that only translates."""
+
+    def tilting_rods(self, kinematics: Any) -> Made:
+        """Of one that tilts about x, with a rotary axis."""
 
 
 class Kinematics(ABC):
@@ -23,11 +52,28 @@ class Kinematics(ABC):
     """True for joints in rad"""
     tool_length: float = 0.0
     """mm from the gauge point to the tip, along the tool axis"""
-    branches: int
+    branches: int = 1
     """B of `inverse`"""
-    slides_affine: bool = False
+    tool_axis: Floats = UP
+    """(3,) from the tip to the spindle when all joints are 0"""
+    straight_slides: bool = False
+    """True where, at fixed rotary joints, the tip is an affine function of the linear joints, which turn no tool: slides
+    move it along straight lines, evenly, whatever the others do"""
     slides_square: bool = False
-    """True where, at fixed rotary joints, the tip is an affine function of the linear joints (serial machines)"""
+    """True where the slides besides are square to each other and no turning axis lies between them"""
+    jets_proved: bool = False
+    """True where `jets` bounds the third derivative, False where it only looks at places: then no block has a bound"""
+    chain: tuple[Joint, ...] = ()
+    """the axes from the workpiece to the tool of a machine whose poses are their motions one after the other (product of
+    exponentials, see `Serial`); () of any other"""
+    on_rods: RodPlatform | None = None
+    """the platform and its rods, where rods carry the tool"""
+    workspace: Workspace | None = None
+    """where the machine is declared to work: of the platform's reference point, of the gauge point without a platform"""
+    singular_names: tuple[str, ...] = ()
+    """what `singular_distance` measures; () where it measures nothing"""
+
+    # ---- what a kind gives ---------------------------------------------------------------------------------------------
 
     @abstractmethod
     def inverse(self, tip: Floats, axis: Floats, spin: float | Floats = 0.0,
@@ -40,38 +86,38 @@ class Kinematics(ABC):
         """
 
     @abstractmethod
+    def forward(self, q: Floats, near: Floats | None = None) -> tuple[Floats, Floats]:
+        """(tip (N, 3), axis (N, 3)) of joints q (N, J); see `pose` for `near`."""
+
+    # ---- poses ---------------------------------------------------------------------------------------------------------
+
     def pose(self, q: Floats, near: Floats | None = None) -> tuple[Floats, Floats, Floats]:
         """(tip (N, 3), axis (N, 3), spin (N,)) of joints q (N, J).
 
         Spin is the angle about the axis from the reference (the x direction carried by the least rotation that
-        takes z to the axis) to the tool's own x direction. Parallel machines take the assembly mode nearest
-        `near`, a pose (N, 6) or (6,) as (tip, axis); without it the home mode.
+        takes z to the axis) to the tool's own x direction; NaN of a kind that does not say it. Parallel machines take the
+        assembly mode nearest `near`, a pose (N, 6) or (6,) as (tip, axis); without it the home mode.
         """
+        tip, axis = self.forward(q, near)
+        return tip, axis, np.full(len(tip), np.nan)
 
-    @abstractmethod
-    def jacobian(self, q: Floats, near: Floats | None = None) -> Floats:
-        """d(tip, axis)/dq as (N, 6, J), analytic."""
-
-    @abstractmethod
-    def twist_jacobian(self, q: Floats, near: Floats | None = None) -> Floats:
-        """(v, omega) of the tool relative to the part per joint rate, (N, 6, J), v at the tip, in the table frame."""
-
-    @abstractmethod
-    def singular(self, q: Floats) -> Bools:
-        """True (N,) where the tool direction lies along a rotary axis, so that the inverse is a family."""
-
-    @abstractmethod
     def with_tool(self, length: float) -> Self:
-        """The same kinematics at the tip of a tool of that length (mm)."""
+        """The same kinematics at the tip of a tool of that length (mm): tip = gauge point - length * axis."""
+        made = copy.copy(self)
+        for name in [name for name in vars(made) if isinstance(getattr(type(made), name, None), cached_property)]:
+            del made.__dict__[name]
+        object.__setattr__(made, "tool_length", float(length))
+        return made
 
-    @abstractmethod
     def nearest_axis(self, axis: Floats) -> Floats:
-        """The tool directions (N, 3) that the machine can take nearest to `axis` (N, 3); the same where reachable."""
+        """The tool directions (N, 3) that the machine can take nearest to `axis` (N, 3); the same where reachable, and where
+        the kind does not know: `inverse` then says what it cannot take."""
+        return as_points(axis, 3, "axis")
 
-    def forward(self, q: Floats, near: Floats | None = None) -> tuple[Floats, Floats]:
-        """(tip (N, 3), axis (N, 3)) of joints q (N, J); see `pose` for `near`."""
-        tip, axis, _ = self.pose(q, near)
-        return tip, axis
+    def singular(self, q: Floats) -> Bools:
+        """True (N,) where joints may turn while the tool stands, so that the inverse is a family: mostly where the tool lies
+        along a rotary axis."""
+        return by_samples.free(self.jacobian(q), self.rotary)
 
     def carried(self, pose: Floats, q0: Floats, q1: Floats) -> Floats:
         """The pose (N, 6) at joints q0 (N, J) as the rotary joints outside the closed loops turn it on the path to q1 (N,
@@ -80,6 +126,128 @@ class Kinematics(ABC):
         On parallel machines it is what `forward` at q1 takes as `near`: what is left between the two is the slides' part.
         """
         return pose
+
+    def at_tip(self, tip: Floats, q: Floats, solved: Ints) -> Floats:
+        """q (N, J) with the joints `solved` (3,) as they bring the tip (N, 3) there, the others as they are: what a control
+        does that runs the kinematics. NaN where there are none near q."""
+        if not self.straight_slides:
+            return by_samples.at_tip(self.forward, self.jacobian, tip, q, solved)
+        result = q.copy()
+        result[:, solved] = 0.0
+        at_zero, _ = self.forward(result)
+        columns = self.jacobian(result)[:, :3, :][:, :, solved]
+        result[:, solved] = np.linalg.solve(columns, (tip - at_zero)[..., None])[..., 0]
+        return result
+
+    # ---- rates, motion along straight joint moves ------------------------------------------------------------------------
+
+    @property
+    def turns_tool(self) -> tuple[bool, ...]:
+        """(J,) True for joints, linear ones too, that may change the direction of the tool axis seen from the part."""
+        return (True,) * self.joints
+
+    @property
+    def slides_turn_tool(self) -> bool:
+        """True where a linear joint may turn the tool (`turns_tool`): standing rotary joints then do not hold its axis."""
+        return any(turns and not rotary for turns, rotary in zip(self.turns_tool, self.rotary, strict=True))
+
+    def jacobian(self, q: Floats, near: Floats | None = None) -> Floats:
+        """d(tip, axis)/dq as (N, 6, J)."""
+        return by_samples.rates(lambda some: self.forward(some, near), q, self.rotary)
+
+    def twist_jacobian(self, q: Floats, near: Floats | None = None) -> Floats:
+        """(v, omega) of the tool relative to the part per joint rate, (N, 6, J), v at the tip, in the table frame.
+
+        Turns about the tool axis count only where the kind knows them.
+        """
+        return by_samples.twists(self.jacobian(q, near), self.forward(q, near)[1])
+
+    def jets(self, q0: Floats, q1: Floats) -> tuple[TaylorVector, TaylorVector]:
+        """(tip in mm, tool axis) in the table frame along the straight moves q0 -> q1 (N, J).
+
+        Machines of several assembly modes are taken in their home mode. Where `jets_proved` the third derivative is a bound
+        over the whole move (`rod_loops.UNBOUNDED` where none was found), else what was seen of it.
+        """
+        return by_samples.jets(self.forward, q0, q1)
+
+    def tip_jets(self, q0: Floats, q1: Floats, tip0: Floats, tip1: Floats,
+                 solved: Ints) -> tuple[TaylorVector, TaylorVector]:
+        """(tip, tool axis) where the control runs the kinematics: tips straight from `tip0` to `tip1` (N, 3), the joints
+        but those it solves for (`solved`) even from q0 to q1 (N, J). A bound where `tip_jets_proved`."""
+        tip = straight(list(tip0.T), list(tip1.T))
+        turning = np.array(self.turns_tool)
+        if not turning.any():
+            _, axis = self.forward(q0)
+            return tip, TaylorVector(list(axis.T))
+        if not turning[solved].any():
+            return tip, self.jets(q0, q1)[1]
+        return tip, by_samples.axis_jet(self._followed, q0, q1, tip0, tip1, solved)
+
+    def _followed(self, tip: Floats, q: Floats, solved: Ints) -> Floats:
+        return self.forward(self.at_tip(tip, q, solved))[1]
+
+    def tip_jets_proved(self, solved: Ints) -> bool:
+        """Whether `tip_jets` bounds the third derivative: not where the joints that the control solves for turn the tool."""
+        return self.jets_proved and not np.array(self.turns_tool)[solved].any()
+
+    # ---- singular positions, clearances ------------------------------------------------------------------------------
+
+    def singular_distance(self, q: Floats) -> Floats:
+        """(N, S) how far joints q (N, J) stand from the singular positions of `singular_names`, between 0 and 1, home mode;
+        NaN without a pose."""
+        return np.zeros((len(q), 0))
+
+    def singular_distance_between(self, q: Floats) -> Floats:
+        """(N - 1, S) the same at least on the straight joint moves between consecutive q (N, J)."""
+        return np.zeros((max(len(q) - 1, 0), 0))
+
+    def places_apart(self) -> Floats | None:
+        """(2, J) joints in reach, rotary ones apart, by which the axis is found that turns the tool about one direction
+        everywhere (`postproc/joints/poles.py`); None of a kind that knows of none."""
+        return None
+
+    def rig(self, q: Floats, near: Floats | None = None) -> ClearanceGeometry:
+        """Where the parts are at joints q (N, J) that `machines.reach` looks at; without a platform the gauge point."""
+        tip, axis = self.forward(q, near)
+        gauge = tip + self.tool_length * axis
+        none = np.zeros((len(q), 0, 3))
+        return ClearanceGeometry(gauge, np.zeros(len(q)), none, none, gauge, axis)
+
+    # ---- geometric errors, pivots --------------------------------------------------------------------------------------
+
+    @property
+    def axes_with_errors(self) -> tuple[str, ...]:
+        """Letters whose own motion may have geometric errors; those of carriages are errors of rods."""
+        return ()
+
+    def with_errors(self, forms: ErrorForms[Made]) -> Made:
+        """The machine with geometric errors, by the form that is its own.
+
+        Raises:
+            ValueError: where the kind has none.
+        """
+        raise ValueError(f"errors of {type(self).__name__} machines cannot be modelled")
+
+    def axis_line(self, letter: str) -> tuple[Floats, Floats]:
+        """(direction (3,), point (3,) in mm) of the line of an axis when all joints are 0, in the frame that carries it; the
+        point of a slide is 0.
+
+        Raises:
+            ValueError: where the kind does not know it.
+        """
+        raise ValueError(f"the line of axis {letter} is not known")
+
+    def carries_part(self, letter: str) -> bool:
+        """True for a rotary axis that stands between the part and the bed, where no structure code says so."""
+        return False
+
+    def with_pivots(self, points: Mapping[str, Floats]) -> Self:
+        """The same machine with other points (3,) of the lines of rotary axes, by letter.
+
+        Raises:
+            ValueError: where the kind cannot move them.
+        """
+        raise ValueError(f"{type(self).__name__} machines have no pivots that could be moved")
 
     @property
     def joints(self) -> int:

@@ -10,8 +10,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from machines.kinematics.base import as_points
+from machines.kinematics.columns import of_one
 from machines.kinematics.h4_linear import ROUND_OFF, H4Linear, Pair, tilted, unit, wrap
+from machines.kinematics.taylor import ZERO, TaylorAngle, TaylorVector
 from toolpaths.arrays import Bools, Floats, frozen
+from toolpaths.shapes import arrays
+
+X, UP = (1.0, 0.0, 0.0), [0.0, 0.0, 1.0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,6 +28,22 @@ class H4TableAxis(H4Linear):
     """
 
     pairs = 2
+    at_spindle = False
+
+    def carries_part(self, letter: str) -> bool:
+        """See the base class."""
+        return letter == self.axis_names[4]
+
+    def axis_line(self, letter: str) -> tuple[Floats, Floats]:
+        """See the base class; of the table."""
+        if letter != self.axis_names[4]:
+            return super().axis_line(letter)
+        return np.array([0.0, 0.0, self.sense]), np.zeros(3)
+
+    def _tool_jets(self, place: TaylorVector, tilt: TaylorAngle, turn: TaylorAngle) -> tuple[TaylorVector, TaylorVector]:
+        about, down = (0.0, 0.0, self.sense), -(self.gauge + self.tool_length)
+        tip = (TaylorVector((0.0, 0.0, down)).turned(X, ZERO, tilt) + place).turned(about, ZERO, turn)
+        return tip, TaylorVector(list(UP)).turned(X, ZERO, tilt).turned(about, ZERO, turn)
 
     def _pairs(self, axis: Floats, free: Floats) -> tuple[Pair, Pair]:
         flat = np.hypot(axis[:, 0], axis[:, 1])
@@ -65,6 +86,7 @@ class H4TableAxis(H4Linear):
 
 
 @dataclass(frozen=True, eq=False)
+@arrays(pivot="3")
 class H4SpindleAxis(H4Linear):
     """The spindle on a B axis that the platform carries: about the platform's y through C + pivot.
 
@@ -73,11 +95,24 @@ class H4SpindleAxis(H4Linear):
     """
 
     pairs = 1
+    at_spindle = True
     pivot: Floats = field(default_factory=lambda: np.zeros(3))
     """(3,) mm in the platform; the gauge point is `gauge` below it"""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "pivot", frozen(self.pivot, np.float64, (3,), "H4SpindleAxis.pivot"))
+
+    def axis_line(self, letter: str) -> tuple[Floats, Floats]:
+        """See the base class; in the level platform."""
+        if letter != self.axis_names[4]:
+            return super().axis_line(letter)
+        return np.array([0.0, self.sense, 0.0]), self.pivot
+
+    def _tool_jets(self, place: TaylorVector, tilt: TaylorAngle, turn: TaylorAngle) -> tuple[TaylorVector, TaylorVector]:
+        about, down = (0.0, self.sense, 0.0), -(self.gauge + self.tool_length)
+        reach = TaylorVector((0.0, 0.0, down)).turned(about, ZERO, turn) + TaylorVector(of_one(self.pivot))
+        axis = TaylorVector(list(UP)).turned(about, ZERO, turn)
+        return reach.turned(X, ZERO, tilt) + place, axis.turned(X, ZERO, tilt)
 
     def _pairs(self, axis: Floats, free: Floats) -> tuple[Pair]:
         turn = np.arctan2(axis[:, 0], np.hypot(axis[:, 1], axis[:, 2]))

@@ -14,12 +14,15 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from machines.kinematics.base import Kinematics, as_points
+from machines.kinematics.base import ErrorForms, Made, as_points
 from machines.kinematics.clearance_geometry import ClearanceGeometry, ClearanceSizes
 from machines.kinematics.columns import blocks
 from machines.kinematics.frames import spin_about
 from machines.kinematics.h4_platform import H4Platform
+from machines.kinematics.on_slides import OnSlides
+from machines.kinematics.rod_loops import RodLoop
 from machines.kinematics.sliders import Legs
+from machines.kinematics.taylor import TaylorAngle, TaylorVector
 from machines.kinematics.workspace import Workspace
 from toolpaths.arrays import Floats
 
@@ -30,7 +33,7 @@ Pair = tuple[Floats, Floats]
 
 
 @dataclass(frozen=True, eq=False)
-class H4Linear(Kinematics):
+class H4Linear(OnSlides):
     """What both machines share. Joints: four slides, then the rotary axis.
 
     `inverse` gives the machine's own leg roots for each pair of tilt and rotary axis (`pairs`). With `all_roots` it
@@ -51,6 +54,9 @@ class H4Linear(Kinematics):
 
     pairs: ClassVar[int]
     """how many tilts take the tool to a direction"""
+    at_spindle: ClassVar[bool]
+    """True where the rotary axis stands between platform and spindle, False for a table under the part"""
+    platform_turns = True
 
     @property
     def branches(self) -> int:  # type: ignore[override]
@@ -58,12 +64,17 @@ class H4Linear(Kinematics):
         return self.pairs * (16 if self.all_roots else 1)
 
     @property
-    def workspace(self) -> Workspace:
+    def gauge_below(self) -> float:  # type: ignore[override]
+        """`gauge`"""
+        return self.gauge
+
+    @property
+    def workspace(self) -> Workspace:  # type: ignore[override]
         """of C and the tilt, in the machine frame"""
         return self.platform.workspace
 
     @property
-    def legs(self) -> Legs:
+    def legs(self) -> Legs:  # type: ignore[override]
         """of the platform"""
         return self.platform.legs
 
@@ -84,6 +95,10 @@ class H4Linear(Kinematics):
     @abstractmethod
     def _line(self, p: Floats) -> tuple[Floats, Floats]:
         """(direction, point), each (N, 3), of the axis that the tool turns about, seen from the part."""
+
+    @abstractmethod
+    def _tool_jets(self, place: TaylorVector, tilt: TaylorAngle, turn: TaylorAngle) -> tuple[TaylorVector, TaylorVector]:
+        """(tip, axis) of a platform that moves, in the table frame."""
 
     # ---- inverse and forward ---------------------------------------------------------------------------------------
 
@@ -174,6 +189,51 @@ class H4Linear(Kinematics):
     def middle_rig(self) -> ClearanceGeometry:
         """The same in the middle of the workspace, rotary axis at 0."""
         return self.rig(np.column_stack([self.platform.inverse(self.platform.home[None]), [0.0]]))
+
+    # ---- platform ------------------------------------------------------------------------------------------------
+
+    @property
+    def platform_joints(self) -> Floats:
+        """See `RodPlatform`."""
+        return self.platform.joints
+
+    def joints_at(self, platform: Floats, turn: Floats) -> Floats:
+        """See `RodPlatform`."""
+        return np.column_stack([self.platform.inverse(platform), turn])
+
+    def loop_matrices(self, place: Floats, tilt: Floats) -> Floats:
+        """See `RodPlatform`."""
+        p = np.column_stack([place, tilt])
+        return self.platform.jx(p, self.platform.inverse(p))
+
+    def loop_matrix_at(self, q: Floats) -> Floats:
+        """See `OnSlides`."""
+        return self.platform.jx(self.solve_platform(q), q[:, :4])
+
+    def platform_jets(self, q0: Floats, q1: Floats) -> tuple[TaylorVector, TaylorVector]:
+        """See `OnSlides`."""
+        middle, step = 0.5 * (q0 + q1), q1 - q0
+        p = self.solve_platform(middle)
+        arms = self.platform.ends(p) - p[:, None, :3]
+        rods = p[:, None, :3] + arms - self.legs.carriages(middle[:, :4])
+        place, tilt = RodLoop(rods, arms, self.legs, step[:, :4], True).jets(p[:, :3], p[:, 3])
+        return self._tool_jets(place, tilt, TaylorAngle(middle[:, 4], step[:, 4]))
+
+    def places_apart(self) -> Floats:
+        """See the base class: in the middle of the workspace."""
+        slides = self.platform.inverse(self.platform.home[None])
+        return np.column_stack([np.repeat(slides, 2, axis=0), [0.0, 0.7]])
+
+    # ---- errors --------------------------------------------------------------------------------------------------
+
+    @property
+    def axes_with_errors(self) -> tuple[str, ...]:
+        """The rotary axis."""
+        return self.axis_names[4:]
+
+    def with_errors(self, forms: ErrorForms[Made]) -> Made:
+        """See the base class."""
+        return forms.tilting_rods(self)
 
     # ---- rates -----------------------------------------------------------------------------------------------------
 

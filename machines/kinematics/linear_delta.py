@@ -11,12 +11,16 @@ from typing import Self
 
 import numpy as np
 
-from machines.kinematics.base import Kinematics, as_points
+from machines.kinematics.base import ErrorForms, Made, as_points
 from machines.kinematics.clearance_geometry import ClearanceGeometry, ClearanceSizes
-from machines.kinematics.columns import blocks
+from machines.kinematics.columns import blocks, of_one
+from machines.kinematics.on_slides import OnSlides
+from machines.kinematics.rod_loops import RodLoop
 from machines.kinematics.sliders import Legs, determinant, three_spheres
+from machines.kinematics.taylor import TaylorVector
 from machines.kinematics.workspace import Workspace
-from toolpaths.arrays import Bools, Floats, frozen
+from toolpaths.arrays import Bools, Floats, Ints, frozen
+from toolpaths.shapes import arrays
 
 UP = np.array([0.0, 0.0, 1.0])
 ROUND_OFF = 1e-12
@@ -24,7 +28,8 @@ ROUND_OFF = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
-class LinearDelta(Kinematics):
+@arrays(platform="3 3")
+class LinearDelta(OnSlides):
     """Three legs whose platform joints are E + platform[k].
 
     `inverse` gives the machine's own roots (branches = 1): a leg cannot change its root without passing the position
@@ -35,7 +40,7 @@ class LinearDelta(Kinematics):
     legs: Legs
     platform: Floats
     """(3, 3) mm: platform joints relative to E"""
-    workspace: Workspace
+    workspace: Workspace = field()
     """of E; its middle is where the home assembly mode is defined"""
     axis_names: tuple[str, ...] = ("X", "Y", "Z")
     tool_length: float = 0.0
@@ -44,6 +49,8 @@ class LinearDelta(Kinematics):
     rotary: tuple[bool, ...] = (False, False, False)
     side: float = field(init=False)
     """sign of det Jx in the home assembly mode"""
+    platform_turns = False
+    gauge_below = 0.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "platform", frozen(self.platform, np.float64, (3, 3), "LinearDelta.platform"))
@@ -80,6 +87,11 @@ class LinearDelta(Kinematics):
         tip = np.stack([foot + self.side * out, foot - self.side * out]) - self.tool_length * UP
         return tip, np.broadcast_to(UP, tip.shape) + 0.0 * tip
 
+    def forward(self, q: Floats, near: Floats | None = None) -> tuple[Floats, Floats]:
+        """(tip, axis) of slides q (N, 3), see the base class."""
+        tip, axis, _ = self.pose(q, near)
+        return tip, axis
+
     def pose(self, q: Floats, near: Floats | None = None) -> tuple[Floats, Floats, Floats]:
         """(tip, axis, spin = 0) of slides q (N, 3), see the base class."""
         tips, axes = self.assembly_modes(q)
@@ -101,6 +113,48 @@ class LinearDelta(Kinematics):
     def twist_jacobian(self, q: Floats, near: Floats | None = None) -> Floats:
         """(v, omega = 0) per slide rate (N, 6, 3)."""
         return self.jacobian(q, near)
+
+    @property
+    def turns_tool(self) -> tuple[bool, ...]:
+        """None: the platform only translates."""
+        return (False, False, False)
+
+    def at_tip(self, tip: Floats, q: Floats, solved: Ints) -> Floats:
+        """See the base class: the inverse."""
+        return np.asarray(self.inverse(tip, np.broadcast_to(UP, tip.shape))[0])
+
+    def with_errors(self, forms: ErrorForms[Made]) -> Made:
+        """See the base class."""
+        return forms.translating_rods(self)
+
+    # ---- platform ------------------------------------------------------------------------------------------------
+
+    @property
+    def platform_joints(self) -> Floats:
+        """See `RodPlatform`."""
+        return self.platform
+
+    def joints_at(self, platform: Floats, turn: Floats) -> Floats:
+        """See `RodPlatform`."""
+        return self.legs.inverse(platform[:, None, :3] + self.platform)
+
+    def loop_matrices(self, place: Floats, tilt: Floats) -> Floats:
+        """See `RodPlatform`: the rods."""
+        ends = place[:, None, :] + self.platform
+        return np.asarray(ends - self.legs.carriages(self.legs.inverse(ends)))
+
+    def loop_matrix_at(self, q: Floats) -> Floats:
+        """See `OnSlides`."""
+        return self.rods(q, self.pose(q)[0])
+
+    def platform_jets(self, q0: Floats, q1: Floats) -> tuple[TaylorVector, TaylorVector]:
+        """See `OnSlides`."""
+        middle, step = 0.5 * (q0 + q1), q1 - q0
+        tip, _, _ = self.pose(middle)
+        rods = self.rods(middle, tip)
+        place, _ = RodLoop(rods, np.zeros_like(rods), self.legs, step, False).jets(
+            tip + self.tool_length * UP, np.zeros(len(tip)))
+        return place - TaylorVector(of_one(self.tool_length * UP)), TaylorVector(of_one(UP))
 
     def rods(self, q: Floats, tip: Floats) -> Floats:
         """AB (N, 3, 3) mm, which is Jx (III-3)."""

@@ -13,7 +13,7 @@ the product of exponentials (Brockett 1984; Murray, Li, Sastry, A Mathematical I
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Self
@@ -21,12 +21,15 @@ from typing import Self
 import numpy as np
 
 from machines.kinematics import columns
-from machines.kinematics.base import Kinematics, as_points
+from machines.kinematics.base import ErrorForms, Kinematics, Made, as_points
+from machines.kinematics.chain import Joint, unit_vector
 from machines.kinematics.columns import Columns
 from machines.kinematics.frames import reference_x, spin_about
 from machines.kinematics.spherical import angle, azimuth, basis, meet, perpendicular, wrap
-from toolpaths.arrays import Bools, Floats, frozen
+from machines.kinematics.taylor import ZERO, TaylorAngle, TaylorVector
+from toolpaths.arrays import Bools, Floats
 from toolpaths.rotations import angle_between
+from toolpaths.shapes import arrays
 
 ROUND_OFF = 1e-12
 """rad: directions nearer than this are the same (reach, singular direction)"""
@@ -39,20 +42,7 @@ Turning = dict[str, tuple[Floats, Floats]]
 
 
 @dataclass(frozen=True, eq=False)
-class Joint:
-    """One axis: letter, kind, unit direction (3,), for a rotary one a point (3,) of its line in mm; all at q = 0."""
-
-    name: str
-    rotary: bool
-    direction: Floats
-    point: Floats = field(default_factory=lambda: np.zeros(3))
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "direction", _unit_vector(self.direction, "direction"))
-        object.__setattr__(self, "point", frozen(self.point, np.float64, (3,), "point"))
-
-
-@dataclass(frozen=True, eq=False)
+@arrays(tool_axis="3")
 class Serial(Kinematics):
     """Three linear axes and up to two rotary ones.
 
@@ -66,16 +56,17 @@ class Serial(Kinematics):
     for fewer: a single angle takes the tool to a given direction, and the slides follow by a linear system.
     """
 
-    chain: tuple[Joint, ...]
+    chain: tuple[Joint, ...] = field()
     axis_names: tuple[str, ...]
     tool_axis: Floats = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
     tool_length: float = 0.0
     rotary: tuple[bool, ...] = field(init=False)
     branches: int = field(init=False)
-    slides_affine = True
+    straight_slides = True
+    jets_proved = True
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "tool_axis", _unit_vector(self.tool_axis, "tool_axis"))
+        object.__setattr__(self, "tool_axis", unit_vector(self.tool_axis, "tool_axis"))
         kind = {joint.name: joint.rotary for joint in self.chain}
         object.__setattr__(self, "rotary", tuple(kind[name] for name in self.axis_names))
         object.__setattr__(self, "branches", 2 if len(self._turns) == 2 else 1)
@@ -85,8 +76,13 @@ class Serial(Kinematics):
         return [joint for joint in self.chain if joint.rotary]
 
     @property
+    def turns_tool(self) -> tuple[bool, ...]:
+        """Rotary joints."""
+        return self.rotary
+
+    @property
     def slides_square(self) -> bool:  # type: ignore[override]
-        """True where the slides are square to each other and no turning axis lies between them."""
+        """See the base class."""
         kinds = [joint.rotary for joint in self.chain]
         first = kinds.index(False) if False in kinds else 0
         together = not any(kinds[first:first + len(self._slides)])
@@ -194,6 +190,43 @@ class Serial(Kinematics):
                 tip = columns.plus(tip, place)
             done.append(index)
         return np.ascontiguousarray(rates.transpose(3, 2, 0, 1)).reshape(n, 6, self.joints)
+
+    def jets(self, q0: Floats, q1: Floats) -> tuple[TaylorVector, TaylorVector]:
+        """(tip, axis) along straight moves: the product of exponentials, axis by axis from the tool to the part."""
+        tip, axis = (TaylorVector(columns.of_one(v)) for v in (-self.tool_length * self.tool_axis, self.tool_axis))
+        for joint in reversed(self.chain):
+            j = self.axis_names.index(joint.name)
+            by, direction = TaylorAngle(0.5 * (q0[:, j] + q1[:, j]), q1[:, j] - q0[:, j]), columns.of_one(joint.direction)
+            if joint.rotary:
+                tip, axis = tip.turned(direction, columns.of_one(joint.point), by), axis.turned(direction, ZERO, by)
+            else:
+                tip = tip.slid(direction, by)
+        return tip, axis
+
+    # ---- errors, pivots ------------------------------------------------------------------------------------------
+
+    @property
+    def axes_with_errors(self) -> tuple[str, ...]:
+        """All axes."""
+        return self.axis_names
+
+    def with_errors(self, forms: ErrorForms[Made]) -> Made:
+        """See the base class."""
+        return forms.chain(self)
+
+    def axis_line(self, letter: str) -> tuple[Floats, Floats]:
+        """See the base class."""
+        joint = next(joint for joint in self.chain if joint.name == letter)
+        return joint.direction, joint.point
+
+    def with_pivots(self, points: Mapping[str, Floats]) -> Self:
+        """See the base class."""
+        return replace(self, chain=tuple(replace(j, point=points[j.name]) if j.name in points else j for j in self.chain))
+
+    def places_apart(self) -> Floats:
+        """See the base class."""
+        axis = self.nearest_axis(np.array([[0.1, 0.2, 1.0], [-0.3, 0.15, 1.0]]))
+        return np.asarray(self.inverse(np.zeros((2, 3)), axis)[0])
 
     # ---- inverse -------------------------------------------------------------------------------------------------
 
@@ -342,11 +375,6 @@ def _along(direction: Floats, v: Floats) -> Bools:
     """True (N,) where v (N, 3) lies along +-direction."""
     result: Bools = np.linalg.norm(np.cross(v, direction), axis=1) < ROUND_OFF
     return result
-
-
-def _unit_vector(v: Floats, name: str) -> Floats:
-    vector = np.asarray(v, dtype=np.float64)
-    return frozen(vector / np.linalg.norm(vector), np.float64, (3,), name)
 
 
 def _unit(v: Floats) -> Floats:

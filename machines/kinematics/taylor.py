@@ -82,6 +82,10 @@ class TaylorVector:
         return ((by.third + 3.0 * rate * change + rate**3) * s + 3.0 * (change + rate**2) * v + 3.0 * rate * a
                 + self.third)
 
+    def speed(self) -> Number:
+        """Bound (N,) of |first| over the block."""
+        return _norm(self.first) + 0.5 * _norm(self.second) + 0.125 * self.third
+
     def bend(self) -> Number:
         """Bound (N,) of |second| over the block."""
         return _norm(self.second) + 0.5 * self.third

@@ -45,10 +45,10 @@ def rotary_lines(machine: Machine) -> list[dict[str, Any]]:
     """Where the rotary axes lie with all rotary joints at zero (a serial machine's slides too): `point` (mm) and `direction`
     of each in the table frame, which then is the machine's; the point is that of the line nearest to the origin."""
     kin = machine.kinematics
-    q = np.where(np.array(machine.rotary) | kin.slides_affine, 0.0, machine.home)[None]
+    q = np.where(np.array(machine.rotary) | kin.straight_slides, 0.0, machine.home)[None]
     (tip,), rates = kin.forward(q)[0], kin.twist_jacobian(q)[0]
     lines = []
-    for j in np.flatnonzero(machine.rotary).tolist():
+    for j in np.flatnonzero(np.array(machine.rotary) & (np.linalg.norm(rates[3:], axis=0) > 0.0)).tolist():
         turn = rates[3:, j] / np.linalg.norm(rates[3:, j])
         turn = turn * np.sign(turn[np.abs(turn).argmax()])
         at = tip + np.cross(rates[3:, j], rates[:3, j]) / float(rates[3:, j] @ rates[3:, j])
@@ -69,7 +69,7 @@ def machine_text(machine: Machine) -> str:
                      f"(assumed: {', '.join(row['assumed'])})" if row["assumed"] else ""))
     lines += table_text(axes, ("axis", "travel", "velocity", "acceleration", "jerk", "home", ""), "llrrrrl")
     lines.append("velocity per s, acceleration per s2, jerk per s3, in mm or degrees")
-    zero = "all" if machine.kinematics.slides_affine else "all rotary"
+    zero = "all" if machine.kinematics.straight_slides else "all rotary"
     lines.append(f"table frame: carries the part; with {zero} axes at zero it is the machine's" + (
         ", and" if d["rotary_axes"] else ""))
     for row in d["rotary_axes"]:

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from machines.kinematics.base import Kinematics
-from machines.straight_blocks import in_blocks, pose_jets
+from machines.kinematics.columns import blocks as in_blocks
 from postproc.collision.swept import OFF, Swept
 from postproc.control.word_arcs import PLANE_COLUMNS
 from postproc.readback.execution.assembly import ends, steps
@@ -102,10 +102,13 @@ def _bends(motion: Motion, executed: BlockPoses, kin: Kinematics, parts: Parts, 
     """
     row = parts[0]
     q0, q1 = executed.joints(motion, row, parts[1]), executed.joints(motion, row, parts[2])
-    tip, axis = (np.broadcast_to(jet.bend(), len(row)) for jet in pose_jets(kin, q0, q1))
+    jets = kin.jets(q0, q1)
+    tip, axis = (np.broadcast_to(jet.bend(), len(row)) for jet in jets)
     tips_straight = np.array([frame.law == "tcp" for frame in motion.frames])[motion.frame[row]]
     tip = np.where(tips_straight | (executed.control.base == "tcp"), 0.0, tip)
     turn = np.abs(q1 - q0)[:, executed.control.rotary].sum(axis=1)
+    if kin.slides_turn_tool:
+        turn = np.maximum(turn, jets[1].speed())
     return np.asarray(tip + reach * (axis + turn**2))
 
 

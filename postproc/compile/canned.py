@@ -37,7 +37,9 @@ def holes_of(toolpath: Toolpath, moves: Moves, path: JointPath, words: WordRows,
     native = np.zeros(len(path), dtype=bool)
     holes: list[Hole] = []
     z = int(control.xyz[2])
-    if not controller.cycles.enabled or 17 not in controller.cycles.planes or z < 0 or not (moves.hole >= 0).any():
+    if not controller.cycles.enabled or 17 not in controller.cycles.planes or not (moves.hole >= 0).any():
+        return native, holes
+    if (control.xyz < 0).any():  # a cycle goes from hole to hole by the words X, Y
         return native, holes
     allowed = np.array([may_cycle(f.control, controller) for f in path.frames])[path.frame] & ~skip
     hole = np.where(np.isnan(path.u), -1, moves.hole[path.move])
@@ -51,6 +53,7 @@ def holes_of(toolpath: Toolpath, moves: Moves, path: JointPath, words: WordRows,
         first += _rises_first(words, z, int(first), int(last), _slack(path, controller, first))
         first, last = _without_feeding_rapids(moves, path, int(first), int(last))
         first += _before_own_level(moves, path, words, z, first, last)
+        first += _points_between(moves, path, first, last)
         placed = _placed_before(moves, path, allowed, first, last)
         first += placed
         level = float(words.start[first, z]) if first > 0 else np.inf
@@ -98,6 +101,15 @@ def _before_own_level(moves: Moves, path: JointPath, words: WordRows, z: int, fi
     level = np.abs(words.end[first:last + 1, z] - words.end[last, z]) < 1e-9
     lowered = words.end[first:last + 1, z] < words.start[first:last + 1, z]
     found = np.flatnonzero(placing & level & lowered)
+    return int(found[-1]) + 1 if len(found) else 0
+
+
+def _points_between(moves: Moves, path: JointPath, first: int, last: int) -> int:
+    """How many blocks keep the tip straight over to a hole where the slides do not: they stay blocks of their own, for
+    a cycle goes there in one block."""
+    straight = np.array([f.control.tips_straight for f in path.frames])[path.frame[first:last + 1]]
+    placing = moves.phase[path.move[first:last + 1]] <= Phase.APPROACH
+    found = np.flatnonzero(placing & ~straight & (path.u[first:last + 1] < 1.0))
     return int(found[-1]) + 1 if len(found) else 0
 
 

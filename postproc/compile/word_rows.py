@@ -14,12 +14,14 @@ from postproc.control.word_arcs import PLANE_AXIS
 from postproc.path.model import ARC, FEED, JointPath
 from postproc.reference.moves import Moves
 from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.shapes import arrays
 
 SNAP = 2.5
 """X, Y, Z residues next to a rotary move, in units of the last decimal, that are not written"""
 
 
 @dataclass(frozen=True)
+@arrays(end="K J", start="K J", write="K J")
 class WordRows:
     """Words (K, J) at the end and, in the same meaning, at the start of each block, rounded; `write` those it states."""
 
@@ -90,7 +92,7 @@ def with_turns(q: Floats, turns: Floats, path: JointPath, rows: Ints, tool: Ints
     for k in groups(path.frame[rows], tool[rows]):
         law, kin = path.frames[int(path.frame[rows[k[0]]])].control, kinematics(int(tool[rows[k[0]]]))
         if law.law != "axes" or made_up:
-            result[k] = law.slides_for(kin, kin.forward(q[k])[0], result[k]) if kin.slides_affine else q[k]
+            result[k] = kin.at_tip(kin.forward(q[k])[0], result[k], law.slides) if kin.straight_slides else q[k]
     return result
 
 
@@ -99,7 +101,7 @@ def _made_up(q: Floats, law: Control, kin: Kinematics, places: Ints) -> Floats:
     turned, rotary = q.copy(), law.rotary
     turned[:, rotary] = _rounded(q * law.unit, places)[:, rotary] / law.unit[rotary]
     moved = np.flatnonzero((turned != q).any(axis=1))
-    turned[moved] = law.slides_for(kin, kin.forward(q[moved])[0], turned[moved])
+    turned[moved] = kin.at_tip(kin.forward(q[moved])[0], turned[moved], law.slides)
     return turned
 
 

@@ -20,15 +20,19 @@ from machines.kinematics.frames import reference_x
 from machines.machine import Machine
 from postproc.control.planes import Plane
 from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.shapes import arrays
 from toolpaths.units import DEG
 
 XYZ = ("X", "Y", "Z")
+PLACES = 200
+"""of a machine's travel at which it is looked at"""
 InterpolationMode = Literal["axes", "tcp", "tilted"]
 Rapids = Literal["straight", "dog-leg"]
 FeedLength = Literal["xyz-first", "all", "geometry"]
 
 
 @dataclass(frozen=True, eq=False)
+@arrays(origin="3")
 class Control:
     """The control of a machine as programs see it, under one law; `under` gives it under another.
 
@@ -83,7 +87,7 @@ class Control:
     @cached_property
     def tips_straight(self) -> bool:
         """True where a block at standing rotary axes takes the tip along a straight line."""
-        return self.law != "axes" or self.machine.kinematics.slides_affine
+        return self.law != "axes" or self.machine.kinematics.straight_slides
 
     @cached_property
     def kinematics(self) -> Kinematics:
@@ -98,9 +102,11 @@ class Control:
         work offset serves every law.
         """
         kin = self.machine.kinematics
-        if not kin.slides_affine or not any(kin.rotary) or (self.xyz < 0).any() or len(self.slides) != 3:
+        if not kin.straight_slides or not any(kin.rotary) or (self.xyz < 0).any() or len(self.slides) != 3:
             return False
         zero = np.zeros((1, kin.joints))
+        if not np.isfinite(kin.pose(zero)[2]).all():  # no frame of a plane without the tool's own x direction
+            return False
         moved = kin.jacobian(zero)[0, :3][:, self.xyz]
         return bool(np.allclose(moved, np.eye(3), atol=1e-9)) and bool(
             np.allclose(kin.forward(zero)[1], [[0.0, 0.0, 1.0]], atol=1e-9))
@@ -160,17 +166,18 @@ class Control:
 
     @cached_property
     def length_on_z(self) -> bool:
-        """True where a tool length offset on Z moves the controlled point from gauge point to tip at q = 0."""
+        """True where a tool length offset on Z moves the controlled point from gauge point to tip: at q = 0, and where the
+        slides do not move the tip straight, wherever the machine is looked at."""
         kin, z = self.machine.kinematics, self.xyz[2]
         if self.base == "tcp":
             return True
-        if z < 0 or not kin.slides_affine:
+        if z < 0:
             return False
-        zero = np.zeros((1, kin.joints))
-        step = zero.copy()
-        step[0, z] = 1.0
-        moved = kin.forward(step)[0] - kin.forward(zero)[0]
-        return bool(np.allclose(moved, kin.forward(zero)[1], atol=1e-9))
+        at = np.zeros((1, kin.joints)) if kin.straight_slides else _places(self.machine)
+        tip, axis = kin.forward(at)
+        moved = kin.forward(at + np.eye(kin.joints)[z])[0] - tip
+        good = np.isfinite(moved).all(axis=1)
+        return bool(good.any() and np.allclose(moved[good], axis[good], atol=1e-9))
 
     @cached_property
     def work_offset(self) -> Floats:
@@ -180,20 +187,11 @@ class Control:
             offset = np.zeros(kin.joints)
             offset[self.xyz] = self.origin
             return offset
-        if not kin.slides_affine:
+        if not kin.straight_slides:
             return np.zeros(kin.joints)
-        result: Floats = self.slides_for(kin, self.origin[None, :], np.zeros((1, kin.joints)))[0] * self.unit
+        result: Floats = kin.at_tip(self.origin[None, :], np.zeros((1, kin.joints)), self.slides)[0] * self.unit
         if self.measured:
             result[self.xyz[2]] += self.measured
-        return result
-
-    def slides_for(self, kin: Kinematics, tip: Floats, q: Floats) -> Floats:
-        """q with the linear joints that bring the tip (N, 3) there at the rotary joints of q (N, J)."""
-        result = q.copy()
-        result[:, self.slides] = 0.0
-        at_zero, _ = kin.forward(result)
-        columns = kin.jacobian(result)[:, :3, :][:, :, self.slides]
-        result[:, self.slides] = np.linalg.solve(columns, (tip - at_zero)[..., None])[..., 0]
         return result
 
     def words(self, q: Floats, kin: Kinematics, length: float) -> Floats:
@@ -221,10 +219,8 @@ class Control:
         q = words / self.unit
         xyz = words[:, self.xyz]
         tip = xyz + self.origin if self.plane is None else self.plane.to_table(xyz)
-        if kin.slides_affine:
-            return self.slides_for(kin, tip, q)
-        axis = np.tile(kin.nearest_axis(np.array([[0.0, 0.0, 1.0]])), (len(q), 1))
-        return np.asarray(kin.inverse(tip, axis)[0])
+        q[:, self.xyz] = self.machine.home[self.xyz]
+        return kin.at_tip(tip, q, self.xyz)
 
     def tip_to_words(self, kin: Kinematics, q: Floats) -> Floats:
         """(N, 3, 3): change of the words X, Y, Z per change of the tip at joints q (N, J), rotary joints fixed."""
@@ -246,20 +242,14 @@ class Control:
         tip0, _ = kin.forward(q0)
         tip1, _ = kin.forward(q1)
         tip = tip0 + t[:, None] * (tip1 - tip0)
-        if kin.slides_affine:
-            q = self.slides_for(kin, tip, q)
-            return tip, kin.forward(q)[1], q
-        axis = kin.forward(q0)[1]
-        return tip, axis, kin.inverse(tip, axis)[0]
+        q = kin.at_tip(tip, q, self.xyz)
+        return tip, kin.forward(q)[1], q
 
     def bent(self, q0: Floats, q1: Floats, places: Floats, kin: Kinematics) -> Iterator[Floats]:
         """Joints (N, J) at each of the fractions `places` of the path from q0 to q1 (N, J), under the law "tcp"."""
         tip0, tip1 = kin.forward(q0)[0], kin.forward(q1)[0]
         for t in places.tolist():
-            if kin.slides_affine:
-                yield self.slides_for(kin, tip0 + t * (tip1 - tip0), q0 + t * (q1 - q0))
-            else:
-                yield self.between(q0, q1, np.full(len(q0), t), kin)[2]
+            yield kin.at_tip(tip0 + t * (tip1 - tip0), q0 + t * (q1 - q0), self.xyz)
 
     def _toward(self, q0: Floats, q1: Floats, t: Floats, rapid: Bools | None) -> Floats:
         """Joints at fraction t (N,) of the time: all at once, or each axis at its own rapid speed until it is there."""
@@ -272,6 +262,14 @@ class Control:
             share = np.where(rapid[:, None] & (own > 0.0), faster, share)
         result: Floats = q0 + share * step
         return result
+
+
+def _places(machine: Machine) -> Floats:
+    """Joints (N, J) all over the travel, a turn of axes that go round, and home."""
+    limits = machine.limits
+    low, high = (np.where(np.isfinite(v), v, travel * np.pi) for v, travel in ((limits.lower, -1.0), (limits.upper, 1.0)))
+    spread = np.random.default_rng(0).random((PLACES, len(low)))
+    return np.concatenate([machine.home[None], low + spread * (high - low)])
 
 
 def tool_frames(kin: Kinematics, q: Floats) -> Floats:

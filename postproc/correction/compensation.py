@@ -31,6 +31,7 @@ from postproc.path.model import JointPath
 from postproc.reference.moves import Moves
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.diagnostics import Diagnostic, Severity, error, has_errors
+from toolpaths.shapes import arrays
 from toolpaths.units import DEG
 
 UNCERTAINTY_DIGITS = 500
@@ -46,6 +47,7 @@ back"""
 
 
 @dataclass(frozen=True)
+@arrays(residual_tip="K 3", residual_axis="K 3", moved="J", owner="L", part="L", apart="A")
 class ErrorCorrection:
     """What the correction did to the blocks that it corrects, mm and rad.
 
@@ -161,7 +163,9 @@ def _written_out(corrected: JointPath, path: JointPath, work: ErrorContext, writ
         again -= 1
         if not (again and len(far)):
             return whole, written, resolved, axis_left
-        corrected.q[far] = written.q[ends[far]]
+        q = corrected.q.copy()
+        q[far] = written.q[ends[far]]
+        corrected = replace(corrected, q=q)
         work.approach[far[:, None], work.bidirectional] = approaches[ends[far]]
         del starts, fitted, whole, written, approaches  # not to be held next to the next
 

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from machines.kinematics.base import Kinematics
-from machines.kinematics.serial import Serial
 from machines.machine import Machine
 from postproc.base.options import Options
 from postproc.setup.model import SetupFile
@@ -26,17 +23,16 @@ def control_kinematics(machine: Machine, setup: SetupFile, options: Options) -> 
     if not setup.control_pivots:
         return None, []
     kin = machine.kinematics
-    letters = [j.name for j in kin.chain if j.rotary] if isinstance(kin, Serial) else []
+    letters = [j.name for j in kin.chain if j.rotary]
     unknown = [k for k in setup.control_pivots if k not in letters]
-    if not isinstance(kin, Serial) or unknown:
+    if not letters or unknown:
         return None, [error("setup.pivot", f"[control_pivots.{k}]: {machine.name} has no such rotary axis",
                             file=options.setup, hint=f"its rotary axes are {', '.join(letters) or 'none'}")
                       for k in unknown or setup.control_pivots]
-    points = {k: np.array(v.point) for k, v in setup.control_pivots.items()}
-    chain = tuple(replace(j, point=points[j.name]) if j.name in points else j for j in kin.chain)
+    made = kin.with_pivots({k: np.array(v.point) for k, v in setup.control_pivots.items()})
     result = []
     allowed = ALLOWED * options.tolerance
-    for joint, own in zip(kin.chain, chain, strict=True):
+    for joint, own in zip(kin.chain, made.chain, strict=True):
         offset = own.point - joint.point
         off = float(np.linalg.norm(offset - (offset @ joint.direction) * joint.direction))
         if off > allowed:
@@ -44,4 +40,4 @@ def control_kinematics(machine: Machine, setup: SetupFile, options: Options) -> 
             result.append(error("pivot.mismatch", f"the control holds the pivot of {joint.name} at ({held}), the machine "
                                 f"file at ({true}): {off:.4f} mm apart, allowed {allowed:.4f} mm", file=options.setup,
                                 hint="correct the control's parameters, the machine file, or the set-up's [control_pivots]"))
-    return replace(kin, chain=chain), result
+    return made, result

@@ -58,7 +58,7 @@ def rounding_bound(control: Control, kin: Kinematics, moves: Moves, places: Ints
     slides, rotary = control.slides, control.rotary
     linear = _farthest(jacobian[:, :3][:, :, slides] * step[slides])
     lever = np.linalg.norm(jacobian[:, :3][:, :, rotary], axis=1) @ step[rotary]
-    if kin.slides_affine and lever.max() > LEVER * tolerance:
+    if kin.straight_slides and lever.max() > LEVER * tolerance:
         return Rounding(float(linear.max()), float(axis.max()), True)
     return Rounding(float((linear + lever).max()), float(axis.max()))
 

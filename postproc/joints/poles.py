@@ -11,9 +11,11 @@ from machines.kinematics.base import Kinematics
 from toolpaths.arrays import Bools, Floats
 from toolpaths.rotations import angle_between, cross, lengths
 from toolpaths.shape import Curves
+from toolpaths.shapes import arrays
 
 
 @dataclass(frozen=True)
+@arrays(frame="3 3")
 class Pole:
     """A singular direction (3,) with a frame (3, 3) whose third row it is, and the joint that turns about it."""
 
@@ -45,12 +47,9 @@ def _poles(kin: Kinematics) -> tuple[Pole, ...]:
     rotary = np.flatnonzero(np.array(kin.rotary))
     if len(rotary) == 0 or kin.branches < 2:
         return ()
-    q = np.zeros((2, kin.joints))
-    tip, axis = np.zeros((2, 3)), kin.nearest_axis(np.array([[0.1, 0.2, 1.0], [-0.3, 0.15, 1.0]]))
-    found = kin.inverse(tip, axis)[0] if kin.slides_affine else q
-    if not kin.slides_affine:
-        found[:, rotary] = [[0.0], [0.7]]
-        found = _within(kin, found)
+    found = kin.places_apart()
+    if found is None:
+        return ()
     turn = kin.twist_jacobian(found)[:, 3:, :]
     result = []
     for j in rotary:
@@ -61,13 +60,6 @@ def _poles(kin: Kinematics) -> tuple[Pole, ...]:
                 if angle_between(kin.nearest_axis(unit[None]), unit[None])[0] < 1e-9:
                     result.append(Pole(_frame(unit), int(j)))
     return tuple(result)
-
-
-def _within(kin: Kinematics, q: Floats) -> Floats:
-    """Joints (N, J) of a parallel machine in the middle of its workspace, its rotary joints as in q."""
-    q = q.copy()
-    q[:, :4] = kin.platform.inverse(kin.platform.home[None])  # type: ignore[attr-defined]
-    return q
 
 
 def _frame(unit: Floats) -> Floats:

@@ -3,7 +3,7 @@
 With e(t) the difference of the block's pose and the reference's pose, both run through in the same t, and |e''| <= M, e
 stays within M d^2 / 8 of the straight lines between its values at places d apart (interpolation error), and a straight
 line is nowhere longer than at its ends. So max |e| <= max |e(t_k)| + M d^2 / 8. M comes from the derivatives in the middle
-of the block and a bound of the third derivative over all of it (`machines.straight_blocks`). The reference may be run
+of the block and a bound of the third derivative over all of it (`Kinematics.jets`). The reference may be run
 through at all: here its parameter is the parabola through its values at the block's ends and middle.
 """
 
@@ -15,12 +15,13 @@ import numpy as np
 
 from machines.kinematics import columns
 from machines.kinematics.base import Kinematics
+from machines.kinematics.columns import blocks as in_blocks
 from machines.kinematics.taylor import ZERO, TaylorAngle, TaylorVector
-from machines.straight_blocks import in_blocks, pose_jets, tip_rule_jets
 from postproc.control.control import Control
 from toolpaths.arrays import Bools, Floats
 from toolpaths.rotations import angle_between, cross, lengths
 from toolpaths.shape import Curves
+from toolpaths.shapes import arrays
 
 SHORT = 0.1
 """mm: on shorter curves the axis is compared where the curve's own parameter stands, not at the nearest tip"""
@@ -28,6 +29,7 @@ _MOST_SKEW = 0.25
 
 
 @dataclass(frozen=True)
+@arrays(u0="N", u1="N", q0="N J", q1="N J", start="* _ 3", end="* _ 3")
 class CurveBlocks:
     """N blocks and what they follow: joints q0 -> q1 (N, J), curves[u0..u1], poses at both ends (tip, axis), (N, 3)."""
 
@@ -73,6 +75,7 @@ def _bounds(control: Control, kin: Kinematics, s: CurveBlocks, tolerance: float,
 
 
 @dataclass(frozen=True)
+@arrays(tip="N", axis="N", along="N")
 class _Seen:
     """Largest |e| (N,) at the places looked at: of the tip, of the axis, of the tip's part along the curve's chord."""
 
@@ -94,6 +97,7 @@ class _Seen:
 
 
 @dataclass(frozen=True)
+@arrays(turn="N")
 class _Offset:
     """e(t) of N blocks: what was seen of it, bounds of |e''| (same meanings), and the reference's parameter.
 
@@ -161,8 +165,8 @@ class _Offset:
 def _law_jets(control: Control, kin: Kinematics, s: CurveBlocks) -> tuple[TaylorVector, TaylorVector]:
     """Tip and axis along the blocks under the control's law; with standing rotaries a plane's law is that of the axes."""
     if control.tip_law:
-        return tip_rule_jets(kin, s.q0, s.q1, s.start[0], s.end[0])
-    return pose_jets(kin, s.q0, s.q1)
+        return kin.tip_jets(s.q0, s.q1, s.start[0], s.end[0], control.xyz)
+    return kin.jets(s.q0, s.q1)
 
 
 def _travel(s: CurveBlocks, middle: Floats) -> TaylorAngle:

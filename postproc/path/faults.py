@@ -55,7 +55,7 @@ def unreachable(control: Control, kin: Kinematics, moves: Moves, rows: Ints, axi
     if off[worst] > 1e-9:
         i, j, k = axis[bad][worst]
         hint = "turn the part in the set-up (part.x_axis, part.y_axis)" + (
-            "" if any(kin.rotary) else f"; {name} has no rotary axis, so every operation needs its own set-up")
+            "" if any(kin.turns_tool) else f"; {name} has no rotary axis, so every operation needs its own set-up")
         return [error("reach.axis", f"{name} cannot take the tool axis ({i:.6f}, {j:.6f}, {k:.6f}): its nearest "
                       f"direction is {off[worst] / DEG:.4f} degrees away", file=file,
                       lines=[int(lines[worst]), *lines[:5].tolist()], count=len(bad), hint=hint)]
@@ -79,7 +79,7 @@ def spun(kin: Kinematics, moves: Moves, rows: Ints, axis: Floats, q: Floats, tol
 
 def _elsewhere(kin: Kinematics, tip: Floats, q: Floats) -> Bools:
     """(N,) True where a parallel machine is assembled so that its joints bring the tool to another place than the tip."""
-    if kin.slides_affine:
+    if kin.straight_slides:
         return np.zeros(len(tip), dtype=np.bool_)
     there, _ = kin.forward(q)
     return np.asarray(~(np.linalg.norm(there - tip, axis=1) <= _ELSEWHERE))

@@ -17,6 +17,7 @@ from postproc.path.bound import CurveBlocks, bounds
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.rotations import angle_between
 from toolpaths.shape import Curves
+from toolpaths.shapes import arrays
 
 _SMALLEST = 1e-9
 """of a curve: a block that short and still outside is a jump"""
@@ -31,6 +32,7 @@ _NARROW = 1.05
 
 
 @dataclass(frozen=True)
+@arrays(curve="K", u="K", q="K J", broken="B")
 class CurvePieces:
     """Blocks that follow curves: piece k ends at `q` (K, J), at `u` (K,) of curve `curve` (K,).
 
@@ -66,10 +68,10 @@ def linearise(control: Control, kin: Kinematics, curves: Curves, q0: Floats, q1:
 
 
 def _straight_already(control: Control, kin: Kinematics, curves: Curves, q0: Floats, q1: Floats) -> Bools:
-    """Lines at fixed rotary joints on machines where the tip then follows the slides."""
-    rotary = np.array(kin.rotary)
-    fixed = (q0[:, rotary] == q1[:, rotary]).all(axis=1) & ~curves.is_arc
-    if control.tip_law or kin.slides_affine:
+    """Lines on which the tool axis stands still and the tip follows the slides, or the words."""
+    holding = np.array(kin.rotary) | np.array(kin.turns_tool)
+    fixed = (q0[:, holding] == q1[:, holding]).all(axis=1) & ~curves.is_arc
+    if control.tip_law or kin.straight_slides:
         straight: Bools = fixed & (angle_between(curves.axis0, curves.axis1) < 1e-6)
         return straight
     return np.zeros(len(curves), dtype=bool)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -26,13 +26,12 @@ is_checked = clearances.is_checked
 
 def inside(kinematics: Kinematics, q: Floats) -> bool:
     """True where joints (N, J) of a parallel machine keep every bound."""
-    machine: Any = kinematics
-    return bool((clearances.reach(machine, q).values >= -_SLACK).all())
+    return bool((clearances.reach(kinematics, q).values >= -_SLACK).all())
 
 
 def check_reach(path: JointPath, moves: Moves, control: Control, file: str = "") -> list[Diagnostic]:
     """Workspace, joint and clearance bounds that the blocks pass, as errors; nothing for serial machines."""
-    kinematics: Any = control.machine.kinematics
+    kinematics = control.machine.kinematics
     if not is_checked(kinematics):
         return []
     start = np.concatenate([control.machine.home[None, :], path.q])
@@ -49,7 +48,7 @@ def check_reach(path: JointPath, moves: Moves, control: Control, file: str = "")
 
 def _at_samples(path: JointPath, control: Control, start: Floats) -> clearances.Margins:
     """Least margins of each block over samples of the motion that the control's own kinematics makes."""
-    kinematics: Any = control.machine.kinematics
+    kinematics = control.machine.kinematics
     margins = clearances.reach(kinematics, path.q)
     values = margins.values.copy()
     for t in _SAMPLES:

@@ -1,10 +1,9 @@
-"""The stated distance that a parallel machine keeps from its singular positions, at points and between them."""
+"""The stated distance that a machine keeps from its singular positions, at points and between them."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from machines.singular_distance import NAMES, has_singular_distance, singular_distance_between
 from postproc.control.control import Control
 from postproc.path.model import JointPath
 from postproc.reference.moves import Moves
@@ -12,13 +11,14 @@ from toolpaths.diagnostics import Diagnostic, error, info
 
 
 def check_singular(path: JointPath, moves: Moves, control: Control, least: float, file: str = "") -> list[Diagnostic]:
-    """How near the blocks come to singular positions: reported, and an error below `least`; nothing for serial machines."""
+    """How near the blocks come to singular positions: an error below `least`; nothing where the machine measures none."""
     kinematics = control.machine.kinematics
-    if not has_singular_distance(kinematics) or not len(path):
+    names = kinematics.singular_names
+    if not names or not len(path):
         return []
-    found = singular_distance_between(kinematics, np.concatenate([control.machine.home[None, :], path.q]))
+    found = kinematics.singular_distance_between(np.concatenate([control.machine.home[None, :], path.q]))
     result = []
-    for name, values in zip(NAMES, found.T, strict=True):
+    for name, values in zip(names, found.T, strict=True):
         worst = int(np.nanargmin(values))
         line = int(moves.line[path.move[worst]])
         bad = np.unique(moves.line[path.move[np.flatnonzero(values < least)]])
@@ -28,7 +28,7 @@ def check_singular(path: JointPath, moves: Moves, control: Control, least: float
                                 f"at least {least:g}", file=file, lines=lines, count=len(bad),
                                 hint="move or turn the part in the set-up, or state another joints.singular_distance"))
     if not result:
-        noted = ", ".join(f"{name} {np.nanmin(values):.3f}" for name, values in zip(NAMES, found.T, strict=True))
+        noted = ", ".join(f"{name} {np.nanmin(values):.3f}" for name, values in zip(names, found.T, strict=True))
         result.append(info("singular.distance", f"distance from singular positions: {noted} (stated: at least {least:g})",
                            file=file))
     return result

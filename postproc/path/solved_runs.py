@@ -14,6 +14,7 @@ from postproc.joints.run_plan import RunPlan
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.diagnostics import Diagnostic, has_errors
 from toolpaths.rotations import angle_between
+from toolpaths.shapes import arrays
 
 
 @dataclass(frozen=True)
@@ -29,6 +30,7 @@ class SolvedRun:
 
 
 @dataclass(frozen=True)
+@arrays(axis="R 3", q="R J")
 class SolvedRuns:
     """All runs, and the axes (R, 3) and joints (R, J) of their rows."""
 
@@ -50,7 +52,7 @@ def solved_runs(plan: RunPlan, modes: OutputModes, kinematics: Callable[[int], K
     lasts, firsts = [*starts[1:].tolist(), len(moves)], starts.tolist()
     still = _still(moves.axis, starts, axis_tolerance)
     asked, left, tool = modes.asked[operation[np.array(lasts) - 1]].tolist(), plan.left[starts].tolist(), moves.tool[starts]
-    good = machine.kinematics.slides_affine and bool(np.isfinite(plan.q).all()) and not bool((plan.moved > 1e-6).any()) \
+    good = machine.kinematics.straight_slides and bool(np.isfinite(plan.q).all()) and not bool((plan.moved > 1e-6).any()) \
         and not bool(np.isfinite(moves.spin).any())
     laws = {(a, s): modes.law(a, s) for a, s in set(zip(asked, still.tolist(), strict=True))}
     tools = {k: kinematics(k) for k in np.unique(tool).tolist()}
@@ -70,7 +72,7 @@ def solved_runs(plan: RunPlan, modes: OutputModes, kinematics: Callable[[int], K
             if axis is moves.axis:
                 axis, q = np.array(axis), q.copy()
             frame, at = modes.plane(kin, q[first])
-            q[first:last] = frame.control.slides_for(kin, moves.tip[first:last], np.tile(at, (last - first, 1)))
+            q[first:last] = kin.at_tip(moves.tip[first:last], np.tile(at, (last - first, 1)), frame.control.slides)
             axis[first:last] = kin.forward(q[first:first + 1])[1]
         each.append(SolvedRun(first, last, frame, kin, left[k]))
     return SolvedRuns(tuple(each), axis, q), found

@@ -93,7 +93,7 @@ def extremes(path: JointPath, moves: Moves, control: Control, kinematics: Callab
     for k in groups(frame):
         law = path.frames[int(frame[k[0]])].control
         arcs = k[path.code[rows[k]] == ARC]
-        if len(arcs) and law.machine.kinematics.slides_affine:
+        if len(arcs) and law.machine.kinematics.straight_slides:
             low_arc, high_arc = low[arcs], high[arcs]
             _arc_extremes(path, law, rows[arcs], before[arcs], low_arc, high_arc)
             low[arcs], high[arcs] = low_arc, high_arc

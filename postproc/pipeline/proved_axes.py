@@ -48,7 +48,8 @@ class Proved:
     def of(cls, choice: OrientationChoice, plan: Orientation, convert: Convert) -> Proved:
         """The choice with its program as `convert` makes it."""
         program = convert(choice)
-        return cls(replace(choice, proof=PlanProof(plan, program.controller_name, program.ok)), program)
+        bounded = program.comparison is None or not program.comparison.unbounded
+        return cls(replace(choice, proof=PlanProof(plan, program.controller_name, program.ok, bounded)), program)
 
 
 def proved(choice: OrientationChoice, plan: Orientation, convert: Convert) -> tuple[Proved, list[Diagnostic]]:

@@ -9,10 +9,7 @@ from hashlib import blake2b
 import numpy as np
 
 from machines.machine import Machine
-from machines.singular_distance import NAMES as SINGULAR
-from machines.singular_distance import has_singular_distance, singular_distance
 from postproc.orientation.candidates.candidate_times import Candidate, turned
-from postproc.orientation.candidates.ranking import prepare
 from postproc.orientation.passes.passes import PassContext
 from postproc.orientation.plans.index_time import PassEnds, ends, links_between
 from postproc.orientation.plans.shortest_sequence import seconds
@@ -20,6 +17,7 @@ from postproc.placement.bodies import StationaryBodies
 from postproc.placement.rigid_move import moved
 from postproc.placement.space import Space
 from toolpaths.arrays import Floats
+from toolpaths.shapes import arrays
 
 _WORTH = 1e-4
 """least part of the time that a place must gain to be planned"""
@@ -30,6 +28,7 @@ _DIGITS = 7
 
 
 @dataclass(frozen=True)
+@arrays(place="6", low="J", high="J")
 class TimedPlace:
     """A place that was looked at.
 
@@ -98,7 +97,6 @@ class Timer:
         self.unsolved: set[int] = set()
         self._cuts: dict[tuple[int, bytes], _Cut] = {}
         self._known: dict[bytes, TimedPlace] = {}
-        prepare(work.passes)
         sites = sum(len(each.s) for one in work.passes for each in one.stretches)
         self.most = min(_MOST, max(_LEAST, _SITES // max(1, sites)))
 
@@ -162,12 +160,14 @@ class Timer:
 
     def _singular(self, made: Sequence[Candidate]) -> tuple[float, str]:
         """Least distance from singular positions over all poses of a parallel machine, and what stands against it."""
-        if not has_singular_distance(self.machine.kinematics):
+        kin = self.machine.kinematics
+        if not kin.singular_names:
             return np.inf, ""
-        found = np.concatenate([singular_distance(self.machine.kinematics, q) for one in made for q in (one.q, *one.sites)])
+        found = np.concatenate([kin.singular_distance(q) for one in made for q in (one.q, *one.sites)])
         row, which = np.unravel_index(int(np.nanargmin(found)), found.shape)
         value = float(found[row, which])
-        why = f"{SINGULAR[int(which)]} comes to {value:.4f} of a singular position, allowed at least {self.least:g}"
+        name = kin.singular_names[int(which)]
+        why = f"{name} comes to {value:.4f} of a singular position, allowed at least {self.least:g}"
         return value, why if value < self.least else ""
 
     def _cutting(self, made: Sequence[Candidate], best: float) -> tuple[list[tuple[float, str]], float, bool]:

@@ -16,8 +16,6 @@ from scipy.optimize import linprog
 from machines import reach as clearances
 from machines.kinematics.base import Kinematics
 from machines.machine import Machine
-from machines.singular_distance import NAMES as SINGULAR
-from machines.singular_distance import has_singular_distance, singular_distance
 from postproc.orientation.candidates.candidate_times import Candidate, turned
 from postproc.orientation.passes.passes import PassContext
 from postproc.orientation.plans.index_time import ends
@@ -25,6 +23,7 @@ from postproc.path.reach import is_checked
 from postproc.placement.rigid_move import moved
 from postproc.placement.space import ANGLES, Space
 from toolpaths.arrays import Floats, Ints
+from toolpaths.shapes import arrays
 from toolpaths.units import DEG
 
 _MARGIN = 0.1
@@ -58,6 +57,7 @@ class Region(Protocol):
 
 
 @dataclass(frozen=True)
+@arrays(g="K 3", c="K", joint="K")
 class Slabs:
     """A serial machine: each row is how far one end of travel of joint `joint` is from a pose, g . p + c, of p (3,).
 
@@ -118,7 +118,7 @@ def region_of(work: PassContext, space: Space, angles: Floats, least: float) -> 
         work: with the part frame on the table frame
         least: distance that a parallel machine keeps from its singular positions
     """
-    if not work.machine.kinematics.slides_affine:
+    if not work.machine.kinematics.straight_slides:
         return sampled(moved(work, space.placement(np.append(np.zeros(ANGLES), angles))), least), ""
     places = np.vstack([np.zeros((1, ANGLES)), _STEP * np.eye(ANGLES)])
     joints = []
@@ -215,10 +215,10 @@ class Sampled:
         good = np.isfinite(q).all(axis=1)
         result[~good] = _NONE
         if is_checked(kin) and good.any():
-            found = clearances.reach(kin, q[good])  # type: ignore[arg-type]
+            found = clearances.reach(kin, q[good])
             result[good] = np.minimum(result[good], (found.values * np.where(found.angular, _PER_RAD, 1.0)).min(axis=1))
-        if has_singular_distance(kin) and good.any():
-            result[good] = np.minimum(result[good], _PER_SHARE * (singular_distance(kin, q[good]).min(axis=1) - self.least))
+        if kin.singular_names and good.any():
+            result[good] = np.minimum(result[good], _PER_SHARE * (kin.singular_distance(q[good]).min(axis=1) - self.least))
         return np.where(np.isnan(result), _NONE, result)
 
     def deepest(self, low: Floats, high: Floats) -> tuple[Floats, float, str]:
@@ -257,13 +257,14 @@ class Sampled:
         result = [(float(column.min()), f"axis {name}", *(rad if rotary else mm)) for name, rotary, column in
                   zip(self.machine.axis_names, self.machine.rotary, travel.T, strict=True)]
         if is_checked(kin):
-            found = clearances.reach(kin, q)  # type: ignore[arg-type]
+            found = clearances.reach(kin, q)
             values = np.nanmin(found.values * np.where(found.angular, _PER_RAD, 1.0), axis=0)
             result += [(value, name, *(rad if angular else mm)) for value, name, angular in
                        zip(values.tolist(), found.names, found.angular.tolist(), strict=True)]
-        if has_singular_distance(kin):
-            away = np.nanmin(singular_distance(kin, q), axis=0) - self.least
-            result += [(value, name, *share) for value, name in zip((_PER_SHARE * away).tolist(), SINGULAR, strict=True)]
+        if kin.singular_names:
+            away = np.nanmin(kin.singular_distance(q), axis=0) - self.least
+            result += [(value, name, *share)
+                       for value, name in zip((_PER_SHARE * away).tolist(), kin.singular_names, strict=True)]
         return result
 
 

@@ -33,14 +33,14 @@ def past_poles(s: Floats, q: Floats, tip: Floats, axis: Floats, near: Bools, kin
     inside = near.copy()
     inside[[0, -1]] = False
     led = np.zeros(len(s), dtype=bool)
-    if not kin.slides_affine or not inside.any() or (~inside).sum() <= DEGREE:
+    if not kin.straight_slides or not inside.any() or (~inside).sum() <= DEGREE:
         return q, led
     rotary = np.array(kin.rotary)
     changed = q.copy()
     through = make_interp_spline(s[~inside], q[~inside][:, rotary], k=DEGREE)
     where = np.flatnonzero(inside)
     changed[np.ix_(where, rotary)] = through(s[where])
-    changed[where] = slides_for(kin, tip[where], changed[where])
+    changed[where] = kin.at_tip(tip[where], changed[where], np.flatnonzero(~rotary))
     off = np.zeros(len(s))
     off[where] = angle_between(kin.forward(changed[where])[1], axis[where])
     zone = np.cumsum(np.diff(inside.astype(np.int64), prepend=0) == 1)
@@ -59,15 +59,4 @@ def near_poles(q: Floats, kin: Kinematics) -> Bools:
     for k in range(0, len(q), CHUNK):
         turned = np.linalg.norm(kin.jacobian(q[k:k + CHUNK])[:, 3:][:, :, rotary], axis=1)
         result[k:k + CHUNK] = (turned < ZONE).any(axis=1)
-    return result
-
-
-def slides_for(kin: Kinematics, tip: Floats, q: Floats) -> Floats:
-    """q (N, J) with the linear joints that bring the tip (N, 3) there; of machines whose tip is affine in them."""
-    linear = np.flatnonzero(~np.array(kin.rotary))
-    result = q.copy()
-    result[:, linear] = 0.0
-    at_zero, _ = kin.forward(result)
-    columns = kin.jacobian(result)[:, :3][:, :, linear]
-    result[:, linear] = np.linalg.solve(columns, (tip - at_zero)[..., None])[..., 0]
     return result

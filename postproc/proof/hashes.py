@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from machines.kinds import code_file
 from machines.loader import builtin
 from machines.user_file import UserFile, base_chain, read_toml
 from postproc.base.options import Options
@@ -41,7 +42,7 @@ def input_hashes(machine: str, controller: str, options: Options) -> dict[str, H
         OSError: where a file cannot be read any more.
     """
     return {"setup": _with_files(options.setup, {}, _meshes) if options.setup else (),
-            "machine": _with_files(machine, builtin(), _none),
+            "machine": _with_files(machine, builtin(), _kind),
             "controller": _with_files(controller, builtin_files(), _none),
             "error_model": _with_files(options.error_model, {}, _tables) if options.error_model else ()}
 
@@ -61,6 +62,13 @@ def _meshes(file: UserFile) -> list[Path]:
     """Mesh files of a set-up, as it sees them."""
     seen = seen_from_here(file)
     return [Path(seen.file).parent / str(value_at(seen.values, key)) for key in file_keys(seen.values)]
+
+
+def _kind(file: UserFile) -> list[Path]:
+    """The code of a kind of machine that is not built in."""
+    table = file.values.get("kinematics", {})
+    code = code_file(str(table.get("kind", table.get("family", ""))))
+    return [] if code is None else [code]
 
 
 def _tables(file: UserFile) -> list[Path]:

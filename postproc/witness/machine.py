@@ -81,7 +81,7 @@ def apply(turns: Array, v: Array) -> Array:
 
 
 def chain(table: dict[str, Any]) -> Chain:
-    """The chain of a machine file of family "serial"."""
+    """The chain of a machine file of kind "serial"."""
     kinematics = table["kinematics"]
     names = re.findall(r"(?<![(\w])([XYZUVWABC])'?(?=\s)", kinematics["structure"])
     axes = kinematics.get("axes", {})
@@ -133,7 +133,7 @@ class Rods:
 
 
 def rods(table: dict[str, Any]) -> Rods:
-    """The rods of a machine file of family "linear-delta" or "h4-linear"."""
+    """The rods of a machine file of kind "linear-delta" or "h4-linear"."""
     kinematics = table["kinematics"]
     legs, rotary = kinematics["legs"], kinematics.get("rotary", {})
 
@@ -146,11 +146,11 @@ def rods(table: dict[str, Any]) -> Rods:
 
 
 def kinematics_of(table: dict[str, Any]) -> Chain | Rods | None:
-    """The machine of a file; None of a family that this witness does not know."""
-    family = table.get("kinematics", {}).get("family")
-    if family == "serial":
+    """The machine of a file; None of a kind that this witness does not know."""
+    kind = table.get("kinematics", {}).get("kind", table.get("kinematics", {}).get("family"))
+    if kind == "serial":
         return chain(table)
-    return rods(table) if family in ("linear-delta", "h4-linear") else None
+    return rods(table) if kind in ("linear-delta", "h4-linear") else None
 
 
 def limits_of(table: dict[str, Any], letters: tuple[str, ...]) -> tuple[Array, Array]:

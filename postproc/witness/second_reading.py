@@ -46,7 +46,7 @@ def testify(case: Case, executed: ExecutedBlocks) -> Testimony:
     machine = kinematics_of(table) if not case.errors else None
     if machine is None:
         missing.append("kinematics (machine with geometric errors: poses of the read-back)" if case.errors
-                       else "kinematics (no machine file of a known family: poses of the read-back)")
+                       else "kinematics (no machine file of a known kind: poses of the read-back)")
     poses = Poses(case, executed, machine, machine is not None, [], max(int(tools_of(c, case.setup).max(initial=0)), 0))
     with np.errstate(all="ignore"):
         found, worst, counts, silent = _compare(case, executed, c, place, poses, table)

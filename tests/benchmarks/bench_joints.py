@@ -92,7 +92,7 @@ def moves(name: str, rng: np.random.Generator, count: int) -> tuple[Curves, np.n
     kin = m.kinematics
     start = rng.uniform(-60, 60, (count, 3))
     end = start + rng.normal(0, 15, (count, 3))
-    if not kin.slides_affine:
+    if not kin.straight_slides:
         start, _ = kin.workspace.random(rng, count)  # type: ignore[attr-defined]
         space = kin.workspace  # type: ignore[attr-defined]
         end = np.clip(start + rng.normal(0, 15, (count, 3)), space.lower, space.upper)

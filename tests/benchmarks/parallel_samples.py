@@ -38,7 +38,7 @@ def line(file: str, name: str, setup_name: str) -> str:
 def main() -> None:
     """Print all of them."""
     for name in machines.names():
-        if machines.load(name).kinematics.slides_affine:
+        if machines.load(name).kinematics.straight_slides:
             continue
         tilting = any(machines.load(name).rotary)
         setup_name = "h4a" if tilting else "tools" if name == "linuxcnc-lineardelta" else "delta"

@@ -1,4 +1,4 @@
-"""What the laws run on: every machine of the catalogue, poses drawn from its travel, the tolerance of the laws."""
+"""What the laws run on: machines of the catalogue and of kinds of others, poses from their travel, tolerance of the laws."""
 
 from functools import cache
 
@@ -6,6 +6,7 @@ import numpy as np
 
 import machines
 from machines.machine import Machine
+from tests.machines.own_kinds import OWN, own_machine
 
 SCALE = 100.0
 """mm per rad: weighs angles against lengths in condition numbers"""
@@ -15,7 +16,7 @@ CALM = 30.0
 
 @cache
 def machine(name: str) -> Machine:
-    return machines.load(name)
+    return own_machine(name) if name in OWN else machines.load(name)
 
 
 def joints(m: Machine, n: int, seed: int = 1) -> np.ndarray:
@@ -28,9 +29,16 @@ def joints(m: Machine, n: int, seed: int = 1) -> np.ndarray:
 def poses(m: Machine, n: int, seed: int = 1, calm: bool = True) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """(q, tip, axis) of n random joint positions; for a parallel machine, whose legs seldom meet at those, of up to n
     random poses around the ones that do, `calm` without those next to a singular one."""
-    if m.kinematics.slides_affine:
+    if m.kinematics.straight_slides:
         q = joints(m, n, seed)
         return q, *m.kinematics.forward(q)
+    if m.kinematics.on_rods is None:  # nothing but its travel says where it works
+        q = joints(m, 1000, seed)
+        tip, axis = m.kinematics.forward(q)
+        met = np.isfinite(tip).all(axis=1)
+        q, tip, axis = q[met][:n], tip[met][:n], axis[met][:n]
+        keep = condition(m, q, tip, axis) < CALM if calm else slice(None)
+        return q[keep], tip[keep], axis[keep]
     rng = np.random.default_rng(seed)
     tip = rng.uniform(*box(m.name), (4 * n, 3))
     axis = m.kinematics.nearest_axis(unit(rng.normal(size=(4 * n, 3))))

@@ -1,4 +1,4 @@
-"""One law, all machines: what every kinematics promises, over every file of the catalogue."""
+"""One law, all machines: what every kinematics promises, over every file of the catalogue and kinds of others."""
 
 import machines_under_law as law
 import numpy as np
@@ -6,8 +6,9 @@ import pytest
 
 import machines
 from machines.kinematics.serial import Serial
+from tests.machines.own_kinds import OWN
 
-pytestmark = pytest.mark.parametrize("name", machines.names())
+pytestmark = pytest.mark.parametrize("name", [*machines.names(), *OWN])
 MANY = 5_000
 
 
@@ -157,7 +158,7 @@ def test_nearest_axis_is_reachable_idempotent_and_keeps_what_is_in_reach(name):
     np.testing.assert_array_equal(k.nearest_axis(axis), axis)
     best = (near @ axis.T).max(axis=1)  # near must not be beaten by any direction the machine is known to take
     assert ((wild * near).sum(axis=1) >= (wild @ axis.T).max(axis=1) - 1e-9).all(), best.min()
-    if k.slides_affine:
+    if k.straight_slides:
         assert np.isfinite(k.inverse(np.broadcast_to(tip[0], near.shape), near)).all()
         kept = (near == wild).all(axis=1)
         assert np.isnan(k.inverse(np.broadcast_to(tip[0], near.shape), wild)[:, ~kept]).all()

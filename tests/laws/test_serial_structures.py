@@ -5,8 +5,9 @@ from itertools import permutations
 import numpy as np
 import pytest
 
+from machines.kinematics.chain import Joint
 from machines.kinematics.frames import reference_x
-from machines.kinematics.serial import Joint, Serial
+from machines.kinematics.serial import Serial
 from toolpaths.rotations import angle_between, rotation
 
 X, Y, Z = np.eye(3)

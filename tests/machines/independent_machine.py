@@ -163,7 +163,7 @@ class Machine:
 
     @cached_property
     def letters(self) -> list[str]:
-        if self.kinematics["family"] == "serial":
+        if self.kinematics["kind"] == "serial":
             return sorted(axis.letter for axis in self.chain if not axis.rotary) + sorted(
                 axis.letter for axis in self.chain if axis.rotary)
         turning = self.kinematics.get("rotary", {}).get("letter", "")
@@ -175,7 +175,7 @@ class Machine:
         approaches = np.zeros(len(q)) if approach is None else approach
         now = dict(zip(self.letters, zip(q, approaches, strict=True), strict=True))
         frame = np.eye(4)
-        if self.kinematics["family"] == "serial":
+        if self.kinematics["kind"] == "serial":
             for axis in self.chain:
                 frame = frame @ moved(axis, *now[axis.letter], errors)
             gauge = 0.0

@@ -33,7 +33,7 @@ class Draw:
         self.text = [f'length_unit = "{self.unit["length"]}"', f'angle_unit = "{self.unit["angle"]}"']
 
     def write(self, name: str = "errors.toml") -> Path:
-        if self.machine.kinematics["family"] == "serial":
+        if self.machine.kinematics["kind"] == "serial":
             axes = self.machine.chain
         else:
             axes = [] if self.machine.rotary_axis is None else [self.machine.rotary_axis]

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import machines
-from machines.loader import FAMILIES
+from machines.kinds import BUILT_IN
 from toolpaths.diagnostics import DiagnosticError
 
 GOOD = (Path(machines.__file__).parent / "data" / "mikron-ucp710.toml").read_text()
@@ -77,8 +77,8 @@ def test_home_and_travel_are_in_radians(tmp_path):
 
 @pytest.mark.parametrize(("old", "new", "code", "words"), [
     ("velocity = 500 ", "velocty = 500 ", "file.unknown-key", "did you mean 'velocity'?"),
-    ('family = "serial"', 'family = "seriall"', "machine.family", "did you mean 'serial'?"),
-    ('family = "serial"', 'family = ["serial"]', "machine.family", "did you mean 'serial'?"),
+    ('kind = "serial"', 'kind = "seriall"', "machine.kind", "did you mean 'serial'?"),
+    ('kind = "serial"', 'kind = ["serial"]', "machine.kind", "did you mean 'serial'?"),
     ("w C' A' b X Y Z (C1) t", "w C' A b X Y Z (C1) t", "file.value", "primed"),
     ("w C' A' b X Y Z (C1) t", "w C' A' b X Y (C1) t", "file.value", "three linear"),
     ("w C' A' b X Y Z (C1) t", "w C' A' B' b X Y Z t", "file.value", "up to two rotary"),
@@ -133,7 +133,7 @@ def test_square_brackets_and_bare_spindle_of_the_code(tmp_path):
     assert machines.load(path).axis_names == ("X", "Y", "Z", "A", "C")
 
 
-def test_schema_is_json_and_names_every_family():
+def test_schema_is_json_and_names_every_kind():
     text = json.dumps(machines.schema())
-    for family in FAMILIES:
-        assert f'"{family}"' in text
+    for kind in BUILT_IN:
+        assert f'"{kind}"' in text

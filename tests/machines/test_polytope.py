@@ -22,7 +22,7 @@ def _poses(machine: Machine, count: int = 12) -> Floats:
     span = np.where(machine.rotary, 0.4, 20.0)
     q = machine.home + RNG.uniform(-1.0, 1.0, (count, len(span))) * span
     tip, axis = machine.kinematics.forward(machine.home[None, :])
-    if machine.kinematics.slides_affine:
+    if machine.kinematics.straight_slides:
         return q
     tips = tip + RNG.uniform(-20.0, 20.0, (count, 3))
     solved = machine.kinematics.inverse(tips, np.tile(axis, (count, 1)))[0]

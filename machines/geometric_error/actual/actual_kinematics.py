@@ -47,6 +47,11 @@ class ActualKinematics(Kinematics):
         return self.nominal.branches
 
     @property
+    def turns_tool(self) -> tuple[bool, ...]:
+        """Of the nominal machine."""
+        return self.nominal.turns_tool
+
+    @property
     def actual(self) -> Actual:
         """The machine with errors."""
         return self.model.on(self.nominal)
@@ -56,6 +61,11 @@ class ActualKinematics(Kinematics):
         actual = self.actual
         unit = axis / np.linalg.norm(axis, axis=1, keepdims=True)
         return np.stack([correct(actual, q, tip, unit).q for q in self.nominal.inverse(tip, axis, spin, near)])
+
+    def forward(self, q: Floats, near: Floats | None = None) -> tuple[Floats, Floats]:
+        """(tip, axis) of the machine with errors."""
+        tip, axis, _ = self.pose(q, near)
+        return tip, axis
 
     def pose(self, q: Floats, near: Floats | None = None) -> tuple[Floats, Floats, Floats]:
         """(tip, axis, spin) of the machine with errors."""

@@ -11,8 +11,6 @@ from machines.geometric_error.actual.error_rates import ErrorRates, arms_of
 from machines.geometric_error.actual.serial_errors import SerialErrors
 from machines.geometric_error.tables.lattice import POINT, ErrorMap
 from machines.kinematics.base import Kinematics
-from machines.kinematics.h4_axes import H4TableAxis
-from machines.kinematics.serial import Serial
 from toolpaths.arrays import Bools, Floats
 from toolpaths.rotations import rotation
 
@@ -58,7 +56,7 @@ class ActualByMap(Actual):
         """(N, 3, 3) that take the map's directions into those of the table at joints q (N, J)."""
         turned, names = np.broadcast_to(np.eye(3), (len(q), 3, 3)), self.kinematics.axis_names
         for letter in self.map.bed:
-            turned = turned @ rotation(_direction(self.kinematics, letter), q[:, names.index(letter)])
+            turned = turned @ rotation(self.kinematics.axis_line(letter)[0], q[:, names.index(letter)])
         return turned
 
     def lattice_places(self, w: Floats) -> Floats:
@@ -82,7 +80,7 @@ class ActualByMap(Actual):
     def error_rates(self, q: Floats, reach: Floats) -> ErrorRates | None:
         """See the base class: by the slopes of the map, along its coordinates, times how fast a joint moves those."""
         kin = self.kinematics
-        if not isinstance(kin, Serial):
+        if not kin.chain:
             return None
         arms = arms_of(kin, SerialErrors(), q, reach)
         (shift, turn), arm = self.map.most, abs(self.arm)
@@ -128,24 +126,16 @@ class ActualByMap(Actual):
     def _moving(self, w: Floats, coordinate: int) -> Bools:
         """(N, slides) True for slides that move a coordinate of the point; all of a machine whose w are not its joints."""
         slides = int(np.sum(~np.array(self.kinematics.rotary)))
-        if not isinstance(self.kinematics, Serial):
+        if not self.kinematics.chain:
             return np.ones((len(w), slides), dtype=np.bool_)
         return np.asarray(np.abs(self.rates(w)[:, coordinate, :slides]) > STILL)
 
 
 def part_side(kinematics: Kinematics, structure: str) -> tuple[str, ...]:
     """Rotary axes between the part and the bed, from the part on; `structure` as in the machine file."""
-    if isinstance(kinematics, Serial):
-        return tuple(joint.name for joint in kinematics.chain if joint.rotary and f"{joint.name}'" in structure)
-    return kinematics.axis_names[4:] if isinstance(kinematics, H4TableAxis) else ()
-
-
-def _direction(kinematics: Kinematics, letter: str) -> Floats:
-    """(3,) that a rotary axis of `part_side` turns about."""
-    if isinstance(kinematics, Serial):
-        return next(joint.direction for joint in kinematics.chain if joint.name == letter)
-    assert isinstance(kinematics, H4TableAxis)
-    return np.array([0.0, 0.0, kinematics.sense])
+    rotary = dict(zip(kinematics.axis_names, kinematics.rotary, strict=True))
+    order = [joint.name for joint in kinematics.chain] or kinematics.axis_names
+    return tuple(name for name in order if rotary[name] and (f"{name}'" in structure or kinematics.carries_part(name)))
 
 
 def spun(v: Floats, by: Floats) -> Floats:

@@ -14,16 +14,23 @@ import numpy as np
 
 from machines.geometric_error.actual.actual import EDGE, Actual, ToolPlace
 from machines.geometric_error.actual.axis_motion import Line, actual_line, actual_tool, along, driven
+from machines.geometric_error.actual.error_rates import LARGEST_TURN, ErrorRates, gap_slopes_fit, sizes_of
+from machines.geometric_error.actual.rod_rates import (
+    PlatformMotion,
+    ToolMotion,
+    platform_motion,
+    tool_motion,
+    with_rotary,
+)
 from machines.geometric_error.actual.rods import RodErrors, RodFrame, platform_turn, rod_frame
 from machines.geometric_error.actual.serial_errors import SerialErrors
 from machines.geometric_error.actual.transforms import carried
 from machines.geometric_error.tables.names import SPINDLE, parse
 from machines.kinematics import columns
+from machines.kinematics.chain import Joint
 from machines.kinematics.columns import Columns
-from machines.kinematics.h4_axes import H4SpindleAxis
 from machines.kinematics.h4_linear import H4Linear
 from machines.kinematics.linear_delta import LinearDelta
-from machines.kinematics.serial import Joint
 from toolpaths.arrays import Bools, Floats
 from toolpaths.rotations import rotation
 
@@ -64,6 +71,23 @@ class ActualRods(Actual):
         rows = np.moveaxis(turned, 0, 2)
         result: list[Columns] = [[columns.dot(row, v) for row in rows] for v in point]
         return [columns.plus(result[0], columns.of_rows(place)), *result[1:]]
+
+    def _motions(self, w: Floats, reach: Floats) -> tuple[PlatformMotion, PlatformMotion]:
+        """The platform's motion with errors and without, while slides go by up to `reach` (N, K)."""
+        place, turned, slides = self._platform(w)
+        none = RodErrors.none(self.rods.legs, self.rods.rods, self.rods.pairs)
+        found = self.frame.solve(slides, place, turned, self.rods)
+        return (platform_motion(self.frame, self.rods, slides, found, reach),
+                platform_motion(self.frame, none, slides, (place, turned), reach))
+
+    def _tool_motion(self, w: Floats, reach: Floats, tools: tuple[list[Columns], list[Columns]],
+                     arm_reach: Floats) -> ToolMotion:
+        """Of points and axes of the platform, with errors and without."""
+        actual, nominal = self._motions(w, reach)
+        nominal = nominal if self.turns else nominal.translating()
+        arms, axes = zip(*([np.einsum("nij,nj->ni", motion.turned, columns.to_rows(v, len(w))) for v in tool[:2]]
+                           for motion, tool in ((actual, tools[0]), (nominal, tools[1]))), strict=True)
+        return tool_motion(actual, nominal, arms, axes, reach, arm_reach)
 
     def _twist(self, w: Floats) -> tuple[Floats, Floats]:
         """(platform's place (N, 3), its motion per rod parameter (N, 6, P)), machine frame."""
@@ -110,6 +134,15 @@ class ActualDelta(ActualRods):
         tip, axis, side = (columns.to_rows(v, len(w)) for v in self._carried(w, tool))
         return tip, axis, side
 
+    def error_rates(self, q: Floats, reach: Floats) -> ErrorRates | None:
+        """See the base class."""
+        length = self.kinematics.tool_length
+        tools: list[list[Columns]] = [[columns.of_one(v) for v in actual_tool(UP, length, chain)]
+                                      for chain in (self.chain, SerialErrors())]
+        tool = self._tool_motion(self.coordinates(q), reach, (tools[0], tools[1]), np.zeros(len(q)))
+        none = np.zeros(q.shape)
+        return ErrorRates(tool.tip, tool.axis, none, none)
+
     def sensitivity(self, w: Floats, direction: Floats | None = None) -> Floats:
         """See the base class: T^-1 S (E-15), carried to the tip, then the spindle's."""
         place, twist = self._twist(w)
@@ -131,15 +164,13 @@ class ActualH4(ActualRods):
     @cached_property
     def line(self) -> Line:
         """The rotary axis, as its errors leave it; its reference point is on the nominal line."""
-        name, sense = self.kinematics.axis_names[4], self.kinematics.sense
-        at_spindle = isinstance(self.kinematics, H4SpindleAxis)
-        joint = Joint(name, True, np.array([0.0, sense, 0.0]) if at_spindle else np.array([0.0, 0.0, sense]), self.pivot)
-        return actual_line(joint, 4, self.chain)
+        name = self.kinematics.axis_names[4]
+        return actual_line(Joint(name, True, *self.kinematics.axis_line(name)), 4, self.chain)
 
     @property
     def pivot(self) -> Floats:
         """(3,) point of the rotary axis: in the platform, or the machine origin."""
-        return self.kinematics.pivot if isinstance(self.kinematics, H4SpindleAxis) else np.zeros(3)
+        return self.kinematics.axis_line(self.kinematics.axis_names[4])[1]
 
     def coordinates(self, q: Floats, near: Floats | None = None) -> Floats:
         """See the base class."""
@@ -154,7 +185,7 @@ class ActualH4(ActualRods):
         turned, tip, axis = self._part(w), *self.kinematics.place(w[:, :4], w[:, 4])[:2]
         place = np.einsum("nij,nj->ni", turned, w[:, :3])
         tilt = turned[:, :, 0]
-        at_spindle = isinstance(self.kinematics, H4SpindleAxis)
+        at_spindle = self._at_spindle
         tilted = platform_turn(w[:, 3])
         line = tilted @ self.line.joint.direction if at_spindle else np.broadcast_to(self.line.joint.direction, tip.shape)
         point = place + tilted @ self.pivot if at_spindle else np.zeros(3)
@@ -166,7 +197,7 @@ class ActualH4(ActualRods):
 
     def _part(self, w: Floats) -> Floats:
         """Machine frame to table frame (N, 3, 3)."""
-        if isinstance(self.kinematics, H4SpindleAxis):
+        if self._at_spindle:
             return np.tile(np.eye(3), (len(w), 1, 1))
         return rotation(self.line.joint.direction, w[:, 4])
 
@@ -182,11 +213,7 @@ class ActualH4(ActualRods):
         if not self.any:
             return self.kinematics.place(w[:, :4], w[:, 4])
         approach = 0.0 if direction is None else direction[:, 4]
-        tool: list[Columns] = [columns.of_one(v) for v in actual_tool(UP, self.kinematics.tool_length, self.chain)]
-        tool[0] = columns.plus(tool[0], columns.of_one(self.pivot * self._at_spindle - self.kinematics.gauge * UP))
-        if self._at_spindle:
-            tool = driven(self.line, w[:, 4], approach, self.chain, tool)
-        tool = self._carried(w, tool)
+        tool = self._carried(w, self._tool(w, approach, self.line, self.chain))
         if not self._at_spindle:
             tool = driven(self.line, w[:, 4], approach, self.chain, tool)
         tip, axis, side = (columns.to_rows(v, len(w)) for v in tool)
@@ -194,7 +221,36 @@ class ActualH4(ActualRods):
 
     @property
     def _at_spindle(self) -> bool:
-        return isinstance(self.kinematics, H4SpindleAxis)
+        return self.kinematics.at_spindle
+
+    def _tool(self, w: Floats, approach: Floats | float, line: Line, chain: SerialErrors) -> list[Columns]:
+        """Tip and directions in the platform, turned by the rotary axis where that is there."""
+        tool: list[Columns] = [columns.of_one(v) for v in actual_tool(UP, self.kinematics.tool_length, chain)]
+        tool[0] = columns.plus(tool[0], columns.of_one(self.pivot * self._at_spindle - self.kinematics.gauge * UP))
+        return driven(line, w[:, 4], approach, chain, tool) if self._at_spindle else tool
+
+    def error_rates(self, q: Floats, reach: Floats) -> ErrorRates | None:
+        """See the base class."""
+        if not gap_slopes_fit(self.chain):
+            return None
+        w, turn, none = self.coordinates(q), reach[:, 4], SerialErrors()
+        size, spindle = sizes_of(self.chain, self.line.joint.name), sizes_of(self.chain, SPINDLE)
+        line = actual_line(self.line.joint, 4, none)
+        tools = self._tool(w, 0.0, self.line, self.chain), self._tool(w, 0.0, line, none)
+        arm = self._arm(w, tools[1])
+        at_spindle = self._at_spindle
+        apart = size.shift_apart + size.turn_apart * arm
+        wide = (1.0 + 2.0 * LARGEST_TURN + size.turn_slope) * (arm + size.line_shift) + size.shift_slope
+        tool = self._tool_motion(w, reach[:, :4], tools, (wide * turn + apart) * at_spindle)
+        arm = arm * (1.0 + turn) + (0.0 if at_spindle else (tool.nominal_tip * reach[:, :4]).sum(axis=1))
+        return with_rotary(tool, size, spindle, arm, self.kinematics.tool_length, at_spindle)
+
+    def _arm(self, w: Floats, tool: list[Columns]) -> Floats:
+        """(N,) largest distance of the nominal tip from the rotary axis's point and reference point."""
+        tip = columns.to_rows(tool[0], len(w))
+        if not self._at_spindle:
+            tip = w[:, :3] + np.einsum("nij,nj->ni", platform_turn(w[:, 3]), tip)
+        return np.asarray(np.linalg.norm(tip - self.pivot, axis=1) + np.linalg.norm(self.line.reference - self.pivot))
 
     def sensitivity(self, w: Floats, direction: Floats | None = None) -> Floats:
         """See the base class: the platform's, the rotary axis's, the spindle's, all at the tip in the table frame."""

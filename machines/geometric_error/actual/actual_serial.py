@@ -19,8 +19,9 @@ from machines.geometric_error.actual.serial_errors import SerialErrors
 from machines.geometric_error.actual.transforms import carried
 from machines.geometric_error.tables.names import SPINDLE, parse
 from machines.kinematics import columns
+from machines.kinematics.chain import Joint
 from machines.kinematics.columns import Columns
-from machines.kinematics.serial import Joint, Serial
+from machines.kinematics.serial import Serial
 from toolpaths.arrays import Bools, Floats
 from toolpaths.rotations import rotation
 

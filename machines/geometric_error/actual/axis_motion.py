@@ -12,10 +12,11 @@ from machines.geometric_error.actual.transforms import homogeneous
 from machines.geometric_error.tables.names import DIRECTIONS, OWN, SPINDLE, ErrorName
 from machines.kinematics import columns
 from machines.kinematics.base import Kinematics
+from machines.kinematics.chain import Joint
 from machines.kinematics.columns import Columns
 from machines.kinematics.frames import reference_x
-from machines.kinematics.serial import Joint, Serial
 from toolpaths.arrays import Floats
+from toolpaths.shapes import arrays
 
 X, Y, Z = np.eye(3)
 SERIES = 1e-5
@@ -25,6 +26,7 @@ ALONG = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
+@arrays(direction="3", point="3", reference="3")
 class Line:
     """An axis as its location errors leave it: direction (3,), a point of its line (3,), reference point (3,), and by how
     much it stands farther than it counts."""
@@ -112,17 +114,13 @@ def _small(angle: Floats) -> tuple[Floats, Floats]:
 def effect(name: ErrorName, kinematics: Kinematics) -> bool:
     """False where a location error moves nothing: shift of a slide, shift along or turn about an axis's own line.
 
-    Its zero position, along or about its line, does.
+    Its zero position, along or about its line, does. Of axes that the machine has not nothing is known here.
     """
-    if name.zero_position:
+    if name.zero_position or name.axis not in (SPINDLE, *kinematics.axes_with_errors):
         return True
     unit = np.eye(3)[name.part % 3]
     if name.axis == SPINDLE:
-        along = kinematics.tool_axis if isinstance(kinematics, Serial) else np.array([0.0, 0.0, 1.0])
-        return not name.angular or float(np.linalg.norm(np.cross(unit, along))) > ALONG
-    if isinstance(kinematics, Serial):
-        joint = next(joint for joint in kinematics.chain if joint.name == name.axis)
-        direction, rotary = joint.direction, joint.rotary
-    else:
-        direction, rotary = np.eye(3)["ABC".index(name.axis)], True
+        return not name.angular or float(np.linalg.norm(np.cross(unit, kinematics.tool_axis))) > ALONG
+    direction, _ = kinematics.axis_line(name.axis)
+    rotary = kinematics.rotary[kinematics.axis_names.index(name.axis)]
     return (rotary or name.angular) and float(np.linalg.norm(np.cross(unit, direction))) > ALONG

@@ -23,9 +23,10 @@ import numpy as np
 from machines.geometric_error.actual.serial_errors import SerialErrors
 from machines.geometric_error.tables.names import SPINDLE
 from machines.kinematics.base import Kinematics
-from machines.kinematics.serial import Joint, Serial
+from machines.kinematics.chain import Joint
 from toolpaths.arrays import Floats, Ints
 from toolpaths.rotations import rotation
+from toolpaths.shapes import arrays
 
 LARGEST_TURN = 0.1
 """rad: errors that turn the tool by more have no bound here"""
@@ -34,6 +35,7 @@ STEEPEST_GAP = 0.1
 
 
 @dataclass(frozen=True)
+@arrays(tip="N J", axis="N J", tip_reversal="N J", axis_reversal="N J")
 class ErrorRates:
     """Bounds for N poses and J joints.
 
@@ -85,7 +87,7 @@ def pivot_rates(kin: Kinematics, held: Kinematics | None, q: Floats) -> ErrorRat
     The tip is linear in the points: E = sum of R (I - R_k) (offset of axis k), which a radian of any axis changes by no more
     than twice the offsets, square to their axes, together.
     """
-    if not isinstance(kin, Serial) or not isinstance(held, Serial):
+    if held is None or not kin.chain or not held.chain:
         return unknown_rates(*q.shape)
     off = abs(kin.tool_length - held.tool_length)
     for one, other in zip(kin.chain, held.chain, strict=True):
@@ -118,7 +120,7 @@ def gap_slopes_fit(errors: SerialErrors) -> bool:
     return all(2.0 * curve.steepest < STEEPEST_GAP for curve in curves)
 
 
-def serial_rates(kin: Serial, errors: SerialErrors, q: Floats, reach: Floats) -> ErrorRates | None:
+def serial_rates(kin: Kinematics, errors: SerialErrors, q: Floats, reach: Floats) -> ErrorRates | None:
     """Rates near poses q (N, J) while each joint moves by up to `reach` (N, J); None where errors are too large for it."""
     n, chain = len(q), kin.chain
     index = [kin.axis_names.index(joint.name) for joint in chain]
@@ -156,7 +158,7 @@ def standing_arm(kin: Kinematics, q: Floats) -> Floats:
     Where all slides are together the turning axes on either side of them keep their distances from each other, from the
     part or from the tool; infinite elsewhere.
     """
-    if not isinstance(kin, Serial) or not kin.slides_square:
+    if not kin.chain or not kin.slides_square:
         return np.full(len(q), np.inf)
     turning = [joint for joint in kin.chain if joint.rotary]
     if not turning:
@@ -166,7 +168,7 @@ def standing_arm(kin: Kinematics, q: Floats) -> Floats:
     return np.asarray(np.max([arm for arm, joint in zip(arms, kin.chain, strict=True) if joint.rotary], axis=0) + apart)
 
 
-def arms_of(kin: Serial, errors: SerialErrors, q: Floats, reach: Floats) -> list[Floats]:
+def arms_of(kin: Kinematics, errors: SerialErrors, q: Floats, reach: Floats) -> list[Floats]:
     """By axis of the chain the largest distance (N,) of the tip from its point and its reference point, with what it may
     grow by while the joints move by `reach` (N, J)."""
     point = np.broadcast_to(-kin.tool_length * kin.tool_axis, (len(q), 3))

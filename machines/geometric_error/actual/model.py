@@ -18,8 +18,10 @@ from machines.geometric_error.tables.lattice import ErrorMap
 from machines.kinematics.base import Kinematics
 from machines.kinematics.h4_linear import H4Linear
 from machines.kinematics.linear_delta import LinearDelta
+from machines.kinematics.rod_platform import RodPlatform
 from machines.kinematics.serial import Serial
 from toolpaths.arrays import Floats, frozen
+from toolpaths.shapes import arrays
 
 CorrectedBy = Literal["post", "control"]
 BLOCK = 2048
@@ -27,6 +29,7 @@ BLOCK = 2048
 
 
 @dataclass(frozen=True, eq=False)
+@arrays(covariance="P P")
 class ErrorModel:
     """Errors of one machine. Zero parameters give exactly the nominal machine.
 
@@ -98,7 +101,8 @@ class ErrorModel:
         Raises:
             ValueError: where the model is not one for this kind of machine; the message says why.
         """
-        nominal = _actual(kinematics, self.axes, self.rods)
+        _check_axes(kinematics, self.axes)
+        nominal = kinematics.with_errors(Forms(self.axes, self.rods))
         if self.map is None:
             return nominal
         unknown = [x for x in self.map.letters if x not in (*kinematics.axis_names, "x", "y", "z")]
@@ -108,36 +112,48 @@ class ErrorModel:
         return ActualByMap(nominal, self.map)
 
 
-def _actual(kinematics: Kinematics, axes: SerialErrors, rods: RodErrors | None) -> Actual:
-    _check_axes(kinematics, axes)
-    if isinstance(kinematics, Serial):
-        if rods is not None:
+@dataclass(frozen=True)
+class Forms:
+    """The forms of `ErrorForms` with the errors of a model."""
+
+    axes: SerialErrors
+    rods: RodErrors | None
+
+    def chain(self, kinematics: Serial) -> Actual:
+        """See `ErrorForms`."""
+        if self.rods is not None:
             raise ValueError("the model has dimensions of legs, this machine has none")
-        return ActualSerial(kinematics, axes)
-    if not isinstance(kinematics, LinearDelta | H4Linear):
-        raise ValueError(f"errors of {type(kinematics).__name__} machines cannot be modelled")
-    slides = kinematics.axis_names[: len(kinematics.legs.points)]
-    pairs = () if gives_rods(kinematics) else (1.0,) * len(slides) if rods is None else rods.pairs  # no errors: any will do
-    own = rod_names(rod_frame(kinematics, pairs), slides)
-    rods = RodErrors.none(slides, own, pairs) if rods is None else rods
-    if rods.legs != slides or rods.rods != own:
-        raise ValueError(f"the model's legs are {', '.join(rods.legs)}, those of this machine {', '.join(slides)}")
-    if isinstance(kinematics, LinearDelta):
-        return ActualDelta(rods, axes, kinematics=kinematics)
-    return ActualH4(rods, axes, kinematics=kinematics)
+        return ActualSerial(kinematics, self.axes)
+
+    def translating_rods(self, kinematics: LinearDelta) -> Actual:
+        """See `ErrorForms`."""
+        return ActualDelta(self._rods_of(kinematics), self.axes, kinematics=kinematics)
+
+    def tilting_rods(self, kinematics: H4Linear) -> Actual:
+        """See `ErrorForms`."""
+        return ActualH4(self._rods_of(kinematics), self.axes, kinematics=kinematics)
+
+    def _rods_of(self, platform: RodPlatform) -> RodErrors:
+        rods, slides = self.rods, platform.axis_names[: len(platform.legs.points)]
+        none = (1.0,) * len(slides)  # no errors: any will do
+        pairs = () if gives_rods(platform) else none if rods is None else rods.pairs
+        own = rod_names(rod_frame(platform, pairs), slides)
+        rods = RodErrors.none(slides, own, pairs) if rods is None else rods
+        if rods.legs != slides or rods.rods != own:
+            raise ValueError(f"the model's legs are {', '.join(rods.legs)}, those of this machine {', '.join(slides)}")
+        return rods
 
 
 def _check_axes(kinematics: Kinematics, axes: SerialErrors) -> None:
-    serial = isinstance(kinematics, Serial)
-    turning = [name for name, rotary in zip(kinematics.axis_names, kinematics.rotary, strict=True) if rotary]
-    known = list(kinematics.axis_names) if serial else turning
+    known = kinematics.axes_with_errors
     for letter in sorted(axes.axes - {*known, "S"}):
-        kind = "axis" if serial else "rotary axis"
+        kind = "axis" if known == kinematics.axis_names else "rotary axis"
         raise ValueError(f"the model has errors of {letter}, which is no {kind} of this machine; "
                          f"it has {', '.join(known) or 'none'}")
 
 
 @dataclass(frozen=True)
+@arrays(tip="N 3", tip_worst="N", axis="N")
 class Uncertainty:
     """Standard deviations that the covariance of a model gives at places of a path.
 

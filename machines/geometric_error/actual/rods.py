@@ -17,11 +17,12 @@ from typing import Self
 
 import numpy as np
 
-from machines.geometric_error.actual.rods_loop import compiled, wanted
+from machines.geometric_error.actual.rods_loop import COMPILE_FROM, close_all
 from machines.geometric_error.actual.transforms import turns
-from machines.kinematics.h4_linear import H4Linear
-from machines.kinematics.linear_delta import LinearDelta
+from machines.kinematics.rod_platform import RodPlatform
 from toolpaths.arrays import Floats, Ints, frozen
+from toolpaths.compiled import compiled, wanted
+from toolpaths.shapes import arrays
 
 RODS = 6
 STEPS = 12
@@ -33,6 +34,7 @@ LEAST_GAIN = 0.5
 
 
 @dataclass(frozen=True, eq=False)
+@arrays(rail="K 3", guide="K 3", carriage="6 3", platform="6 3", length="6")
 class RodErrors:
     """Errors of K legs and six rods, mm and rad; the order of the parameters is that of E-14.
 
@@ -90,6 +92,7 @@ class RodErrors:
 
 
 @dataclass(frozen=True, eq=False)
+@arrays(leg="6", rail="K 3", direction="K 3", arm="6 3", joint="6 3", length="6", guide="K 3 3")
 class RodFrame:
     """Nominal geometry of six rods, mm, machine frame.
 
@@ -112,10 +115,10 @@ class RodFrame:
 
     def carriage_joints(self, q: Floats, errors: RodErrors | None = None) -> Floats:
         """A (N, 6, 3) of slides q (N, K)."""
-        base, along = self._carriages(errors)
+        base, along = self.carriage_lines(errors)
         return np.asarray(base + q[:, self.leg, None] * along)
 
-    def _carriages(self, errors: RodErrors | None) -> tuple[Floats, Floats]:
+    def carriage_lines(self, errors: RodErrors | None) -> tuple[Floats, Floats]:
         """(6, 3) each: the joints on the carriages at q = 0, and how they move with their slides."""
         if errors is None:
             return self.rail[self.leg] + self.arm, self.direction[self.leg]
@@ -129,10 +132,11 @@ class RodFrame:
 
         Chord iteration from the nominal platform `place` (N, 3), `turned` (N, 3, 3); NaN where it does not close.
         """
-        if wanted(len(q)):
+        if wanted(len(q), COMPILE_FROM, close_all):
             place, turned = np.array(place), np.array(turned)
-            worst = compiled()(np.ascontiguousarray(q), self.leg, *self._carriages(errors), self.joint + errors.platform,
-                               (self.length + errors.length) ** 2, place, turned, STEPS, CLOSED, LEAST_GAIN)
+            lengths = (self.length + errors.length) ** 2
+            worst = compiled(close_all)(np.ascontiguousarray(q), self.leg, *self.carriage_lines(errors),
+                                        self.joint + errors.platform, lengths, place, turned, STEPS, CLOSED, LEAST_GAIN)
             return _where_closed(place, turned, worst)
         with np.errstate(over="ignore", invalid="ignore"):  # what does not close grows out of bounds
             return self._by_chords(q, place, turned, errors)
@@ -203,12 +207,12 @@ def inverted(matrices: Floats) -> Floats:
         return result
 
 
-def gives_rods(kinematics: LinearDelta | H4Linear) -> bool:
+def gives_rods(kinematics: RodPlatform) -> bool:
     """Whether the machine file says where the rods are; one that does not gives the middle lines of pairs."""
     return kinematics.clearance is not None and len(kinematics.clearance.leg) == RODS
 
 
-def rod_frame(kinematics: LinearDelta | H4Linear, pairs: tuple[float, ...] = ()) -> RodFrame:
+def rod_frame(kinematics: RodPlatform, pairs: tuple[float, ...] = ()) -> RodFrame:
     """The rods of a machine; `pairs` as in `RodErrors`.
 
     The joints of a pair whose place the file does not give lie square to its slide and, in the middle of the workspace, to
@@ -217,7 +221,7 @@ def rod_frame(kinematics: LinearDelta | H4Linear, pairs: tuple[float, ...] = ())
     Raises:
         ValueError: where neither its file nor `pairs` give six rods.
     """
-    platform = kinematics.platform if isinstance(kinematics, LinearDelta) else kinematics.platform.joints
+    platform = kinematics.platform_joints
     legs, rods = kinematics.legs, kinematics.clearance
     offset = np.zeros_like(legs.points) if rods is None or rods.rail_offset is None else rods.rail_offset
     if rods is not None and gives_rods(kinematics):
@@ -233,7 +237,7 @@ def rod_frame(kinematics: LinearDelta | H4Linear, pairs: tuple[float, ...] = ())
     return RodFrame(leg, rail, legs.directions, shift - offset[leg], platform[leg] + shift, legs.lengths[leg], guide)
 
 
-def _pairs(kinematics: LinearDelta | H4Linear, platform: Floats, pairs: tuple[float, ...]) -> Floats:
+def _pairs(kinematics: RodPlatform, platform: Floats, pairs: tuple[float, ...]) -> Floats:
     """(6, 3) from the middle line of each leg to its two rods."""
     legs, ends = kinematics.legs, kinematics.workspace.middle + platform
     rods = ends - legs.carriages(legs.inverse(ends[None]))[0]

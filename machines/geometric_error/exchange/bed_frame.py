@@ -17,12 +17,10 @@ from machines.geometric_error.actual.model import ErrorModel
 from machines.geometric_error.actual.serial_errors import Component, ErrorFrame
 from machines.geometric_error.tables.curves import EVERYWHERE, Curve, Fourier, TableCurve
 from machines.geometric_error.tables.names import DIRECTIONS, ErrorName
-from machines.kinematics.h4_axes import H4SpindleAxis
-from machines.kinematics.h4_linear import H4Linear
-from machines.kinematics.serial import Serial
 from machines.machine import Machine
 from toolpaths.arrays import Floats
 from toolpaths.rotations import rotation
+from toolpaths.shapes import arrays
 
 NONE = 1e-12
 """an entry of a turn below this everywhere is 0"""
@@ -31,6 +29,7 @@ ON_LINE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
+@arrays(direction="3")
 class RotatedCurve(Curve):
     """Sum of curves of one axis, each times an entry of the axis's turn.
 
@@ -120,7 +119,7 @@ def in_bed_frame(model: ErrorModel, machine: Machine) -> tuple[list[Component], 
         if letter not in "ABC" or frame.get(letter, "fixed") == side or not on_line(model, machine, letter):
             components += mine.values()
             continue
-        components += _turned(letter, mine, _line(machine, letter)[0], back=side == "moving")
+        components += _turned(letter, mine, machine.kinematics.axis_line(letter)[0], back=side == "moving")
         frame[letter] = side
     return components, frame
 
@@ -144,17 +143,5 @@ def on_line(model: ErrorModel, machine: Machine, letter: str) -> bool:
     reference = model.axes.reference.get(letter)
     if reference is None:
         return True
-    direction, point = _line(machine, letter)
+    direction, point = machine.kinematics.axis_line(letter)
     return float(np.linalg.norm(np.cross(reference - point, direction))) <= ON_LINE
-
-
-def _line(machine: Machine, letter: str) -> tuple[Floats, Floats]:
-    """(direction (3,), point (3,)) of a rotary axis."""
-    kinematics = machine.kinematics
-    if isinstance(kinematics, Serial):
-        joint = next(joint for joint in kinematics.chain if joint.name == letter)
-        return joint.direction, joint.point
-    assert isinstance(kinematics, H4Linear)
-    if isinstance(kinematics, H4SpindleAxis):
-        return np.array([0.0, kinematics.sense, 0.0]), kinematics.pivot
-    return np.array([0.0, 0.0, kinematics.sense]), np.zeros(3)

@@ -26,7 +26,7 @@ from machines.geometric_error.tables.curves import Polynomial, TableCurve
 from machines.geometric_error.tables.lattice import POINT, ROTARY, ErrorMap
 from machines.geometric_error.tables.names import DIRECTIONS, OWN
 from machines.geometric_error.tables.screw_tables import LINUXCNC_ROWS, to_linuxcnc
-from machines.kinematics.serial import Serial
+from machines.kinematics.chain import Joint
 from machines.machine import Machine
 from toolpaths.arrays import Floats
 from toolpaths.units import DEG
@@ -151,17 +151,14 @@ def _not_of_joint(model: ErrorModel, machine: Machine, component: Component) -> 
 
 def leans(machine: Machine, letter: str) -> bool:
     """True for an axis that is not along the machine axis of its letter: its EBB is not about itself."""
-    if not isinstance(machine.kinematics, Serial):
-        return False
-    joint = next(joint for joint in machine.kinematics.chain if joint.name == letter)
-    return bool(abs(joint.direction[DIRECTIONS.index(OWN[letter]) % 3]) < 1.0 - ALONG)
+    direction, _ = machine.kinematics.axis_line(letter)
+    return bool(abs(direction[DIRECTIONS.index(OWN[letter]) % 3]) < 1.0 - ALONG)
 
 
 def joint_sense(machine: Machine, letter: str) -> float:
     """-1.0 where the joint counts against the machine axis of its letter."""
-    if isinstance(machine.kinematics, Serial):
-        return sense(next(joint for joint in machine.kinematics.chain if joint.name == letter))
-    return float(getattr(machine.kinematics, "sense", 1.0))
+    rotary = machine.rotary[machine.axis_names.index(letter)]
+    return sense(Joint(letter, rotary, *machine.kinematics.axis_line(letter)))
 
 
 def ini_lines(machine: Machine, names: Mapping[str, str]) -> list[str]:
@@ -213,7 +210,7 @@ def lattice_for(model: ErrorModel, machine: Machine, letters: str, step: GridSte
         ValueError: a step for what is no coordinate, or a place to stand for what is one or outside travel.
     """
     letters = letters or ("".join(x for x, turns in zip(machine.axis_names, machine.rotary, strict=True) if not turns)
-                          if isinstance(machine.kinematics, Serial) else POINT)
+                          if machine.kinematics.chain else POINT)
     fixed = middle(machine)
     for letter, value in at.items():
         j = machine.axis_names.index(letter)

@@ -34,7 +34,6 @@ from machines.geometric_error.tables.readings import (
 )
 from machines.geometric_error.tables.screw_tables import from_linuxcnc
 from machines.geometric_error.tables.table_curves import Fault, table_curve
-from machines.kinematics.serial import Serial
 from machines.machine import Machine
 from machines.user_file import nearest
 from toolpaths.diagnostics import Diagnostic, error, has_errors, warning
@@ -342,9 +341,8 @@ def _location(table: CsvTable, how: ImportOptions) -> tuple[ErrorModel | None, l
 # ---- LinuxCNC ----------------------------------------------------------------------------------------------------------
 
 def _screw(letter: str, path: Path, machine: Machine, how: ImportOptions) -> tuple[ErrorModel | None, list[Diagnostic]]:
-    rotary = dict(zip(machine.axis_names, machine.rotary, strict=True))
-    if letter not in rotary or (not isinstance(machine.kinematics, Serial) and not rotary[letter]):
-        mine = [x for x in machine.axis_names if isinstance(machine.kinematics, Serial) or rotary[x]]
+    mine = machine.kinematics.axes_with_errors
+    if letter not in mine:
         return None, [error("error-model.axis", f"{machine.name} has no axis {letter!r} with a positioning error",
                             file=str(path), hint="it has " + (", ".join(mine) or "none"))]
     if leans(machine, letter):
@@ -359,5 +357,6 @@ def _screw(letter: str, path: Path, machine: Machine, how: ImportOptions) -> tup
     table, found = from_linuxcnc(text, name, how.sign * joint_sense(machine, letter), how.kind, str(path))
     if table is None:
         return None, found
-    frame: dict[str, ErrorFrame] = {letter: bed_side(machine, letter)} if rotary[letter] else {}
+    turns = machine.rotary[machine.axis_names.index(letter)]
+    frame: dict[str, ErrorFrame] = {letter: bed_side(machine, letter)} if turns else {}
     return ErrorModel(SerialErrors((Component(name, table),), frame=frame)), []

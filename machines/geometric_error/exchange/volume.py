@@ -8,8 +8,6 @@ import numpy as np
 
 from machines.geometric_error.actual.actual import Actual
 from machines.geometric_error.actual.model import ErrorModel
-from machines.kinematics.h4_linear import H4Linear
-from machines.kinematics.linear_delta import LinearDelta
 from machines.machine import Machine
 from toolpaths.arrays import Floats
 
@@ -59,22 +57,22 @@ def samples(model: ErrorModel, machine: Machine, actual: Actual, count: int, see
 
 def middle(machine: Machine) -> Floats:
     """(J,) joints in the middle of the workspace of a machine on rods, at 0 within travel of a serial one."""
-    kinematics = machine.kinematics
-    zero = np.clip(np.zeros(len(machine.axis_names)), machine.limits.lower, machine.limits.upper)
-    if not isinstance(kinematics, LinearDelta | H4Linear):
+    zero, platform = np.clip(np.zeros(len(machine.axis_names)), machine.limits.lower, machine.limits.upper), \
+        machine.kinematics.on_rods
+    if platform is None:
         return zero
-    box = kinematics.workspace
+    box = platform.workspace
     at = np.append(box.middle, np.clip(0.0, *box.tilt))[None]
-    return np.asarray(_of_platform(kinematics, at, zero[None, 4:])[0])
+    return np.asarray(platform.joints_at(at, zero[None, 4:])[0])
 
 
 def corners(machine: Machine, lower: Floats, upper: Floats, fixed: Floats) -> Floats:
     """Joints (M, J) with the slides at their ends, or the platform at the corners of its box; the rest as `fixed` (J,)."""
-    kinematics = machine.kinematics
-    if isinstance(kinematics, LinearDelta | H4Linear):
-        ends = np.array(list(product(*zip(kinematics.workspace.lower, kinematics.workspace.upper, strict=True))))
-        tilt = np.full((len(ends), 1), np.clip(0.0, *kinematics.workspace.tilt))
-        return _of_platform(kinematics, np.hstack([ends, tilt]), np.tile(fixed[4:], (len(ends), 1)))
+    platform = machine.kinematics.on_rods
+    if platform is not None:
+        ends = np.array(list(product(*zip(platform.workspace.lower, platform.workspace.upper, strict=True))))
+        tilt = np.full((len(ends), 1), np.clip(0.0, *platform.workspace.tilt))
+        return platform.joints_at(np.hstack([ends, tilt]), np.tile(fixed[4:], (len(ends), 1)))
     rotary = np.array(machine.rotary)
     ends = np.array(list(product(*zip(np.where(rotary, fixed, lower), np.where(rotary, fixed, upper), strict=True))))
     return np.unique(ends, axis=0)
@@ -84,33 +82,26 @@ def section(machine: Machine, lower: Floats, upper: Floats, across: int, up: int
             count: int) -> tuple[Floats, Floats, Floats]:
     """Joints (count^2, J) over two slides, or two directions of the platform (0, 1, 2 for x, y, z), the rest in the middle;
     and the positions (count,) of both, mm."""
-    kinematics, rest = machine.kinematics, middle(machine)
-    box = kinematics.workspace if isinstance(kinematics, LinearDelta | H4Linear) else None
+    platform, rest = machine.kinematics.on_rods, middle(machine)
+    box = platform.workspace if platform is not None else None
     j = [across, up] if box else [machine.axis_names.index("XYZ"[k]) for k in (across, up)]
     ends = (box.lower, box.upper) if box else (lower, upper)
     one, two = (np.linspace(ends[0][k], ends[1][k], count) for k in j)
     grid = np.stack(np.meshgrid(one, two), axis=-1).reshape(-1, 2)
     at = np.tile(np.append(box.middle, np.clip(0.0, *box.tilt)) if box else rest, (len(grid), 1))
     at[:, j] = grid
-    if isinstance(kinematics, LinearDelta | H4Linear):
-        at = _of_platform(kinematics, at, np.tile(rest[4:], (len(grid), 1)))
+    if platform is not None:
+        at = platform.joints_at(at, np.tile(rest[4:], (len(grid), 1)))
     return at, one, two
 
 
 def _joints(machine: Machine, lower: Floats, upper: Floats, rng: np.random.Generator, count: int) -> Floats:
-    kinematics = machine.kinematics
-    if not isinstance(kinematics, LinearDelta | H4Linear):
+    platform = machine.kinematics.on_rods
+    if platform is None:
         return _spread(lower, upper, rng, count)
-    box = kinematics.workspace
+    box = platform.workspace
     low, high = (np.append(ends, tilt) for ends, tilt in zip((box.lower, box.upper), box.tilt, strict=True))
-    return _of_platform(kinematics, _spread(low, high, rng, count), _spread(lower[4:], upper[4:], rng, count))
-
-
-def _of_platform(kinematics: LinearDelta | H4Linear, platform: Floats, turn: Floats) -> Floats:
-    """Joints (N, J) of places and tilts of the platform (N, 4) and rotary axes (N, J - 4)."""
-    if isinstance(kinematics, LinearDelta):
-        return kinematics.legs.inverse(platform[:, None, :3] + kinematics.platform)
-    return np.column_stack([kinematics.platform.inverse(platform), turn])
+    return platform.joints_at(_spread(low, high, rng, count), _spread(lower[4:], upper[4:], rng, count))
 
 
 def _spread(lower: Floats, upper: Floats, rng: np.random.Generator, count: int) -> Floats:

@@ -21,10 +21,6 @@ from machines.geometric_error.tables.lattice import ErrorMap
 from machines.geometric_error.tables.lattice_file import map_from_csv, zeroed, zeroed_covariance
 from machines.geometric_error.tables.names import SPINDLE, ErrorName, parse
 from machines.geometric_error.tables.table_curves import ROTARY, Fault, table_curve
-from machines.kinematics.h4_axes import H4TableAxis
-from machines.kinematics.h4_linear import H4Linear
-from machines.kinematics.linear_delta import LinearDelta
-from machines.kinematics.serial import Serial
 from machines.machine import Machine
 from machines.user_file import UserFile, nearest, read_toml, schema, validate
 from toolpaths.arrays import Floats, Ints
@@ -106,14 +102,14 @@ class _Loader:
 
     def _check_letters(self) -> None:
         """Errors of axes that the machine has not, or whose errors are those of its legs."""
-        serial = isinstance(self.machine.kinematics, Serial)
-        known = [x for x, turns in zip(self.machine.axis_names, self.machine.rotary, strict=True) if serial or turns]
+        known = self.machine.kinematics.axes_with_errors
+        whole = known == self.machine.axis_names
         for table, names in (("components", self.checked.components), ("location", self.checked.location)):
             for text in names:
                 if (name := parse(text)) and name.axis not in (*known, SPINDLE):
-                    kind = "axis" if serial else "rotary axis"
+                    kind = "axis" if whole else "rotary axis"
                     self._problem("error-model.axis", (table, text), f"{self.machine.name} has no {kind} {name.axis!r}",
-                                  f"it has {', '.join(known) or 'none'}" + ("" if serial else "; slides are in [legs]"))
+                                  f"it has {', '.join(known) or 'none'}" + ("" if whole else "; slides are in [legs]"))
 
     def _check_sizes(self, model: ErrorModel) -> None:
         """Errors too large to be any: a wrong unit, most likely; none at all."""
@@ -148,7 +144,7 @@ class _Loader:
         given = self.checked.reference.get(letter)
         if given is not None and given.frame != "bed":
             return given.frame
-        part = f"{letter}'" in self.machine.structure or isinstance(self.machine.kinematics, H4TableAxis)
+        part = f"{letter}'" in self.machine.structure or self.machine.kinematics.carries_part(letter)
         return "moving" if part else "fixed"
 
     def _unit(self, name: ErrorName | None) -> float:
@@ -207,8 +203,8 @@ class _Loader:
     # ---- parallel machines, maps -----------------------------------------------------------------------------------
 
     def _rods(self) -> RodErrors | None:
-        kinematics = self.machine.kinematics
-        if isinstance(kinematics, Serial) or not isinstance(kinematics, LinearDelta | H4Linear):
+        kinematics = self.machine.kinematics.on_rods
+        if kinematics is None:
             for letter in self.checked.legs:
                 self._problem("error-model.legs", ("legs", letter), f"{self.machine.name} has no legs", "take [legs] out")
             return None

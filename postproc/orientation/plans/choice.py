@@ -14,11 +14,12 @@ from toolpaths.toolpath import Toolpath
 
 @dataclass(frozen=True)
 class PlanProof:
-    """That the program of a plan was made for a controller: written (`ok`) or refused."""
+    """That the program of a plan was made for a controller: written (`ok`) or refused; `bounded`: every block of it."""
 
     plan: Orientation
     controller: str
     ok: bool
+    bounded: bool = True
 
 
 @dataclass(frozen=True)

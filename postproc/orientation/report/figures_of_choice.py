@@ -27,7 +27,7 @@ def as_dict(choice: OrientationChoice, plan: Orientation = "auto") -> dict[str, 
     plans = {name.replace("-", "_"): _plan(choice.plans[name], keep) for name in NAMES}
     proof = choice.proof
     return {"machine": choice.work.machine.name, "plan": plan, "controller": proof.controller if proof else None,
-            "proved": proof.ok if proof else None,
+            "proved": proof.ok and proof.bounded if proof else None,
             "passes": [_pass(tried, made, choice.work) for tried, made in zip(choice.tried, picked, strict=True)],
             "plans": plans | {"paper_per_pass": _plan(choice.paper, keep)}}
 
@@ -102,7 +102,7 @@ def _pass(tried: PassSearch, made: Candidate, work: PassContext) -> dict[str, An
 def _short(made: Candidate | None) -> dict[str, Any] | None:
     """An orientation and its planned time."""
     return None if made is None else {"orientation_deg": angles(made), "held_deg": held(made),
-                                      "time_s": finite(made.seconds), "touches": made.touching}
+                                      "time_s": finite(made.seconds), "touches": str(made.touching or "")}
 
 
 def _reach(made: Candidate) -> dict[str, Any]:

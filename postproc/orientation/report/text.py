@@ -193,7 +193,8 @@ def _proof(choice: OrientationChoice) -> list[str]:
     proof = choice.proof
     if proof is None:
         return []
-    return [f"the program of {proof.plan} for {proof.controller} is {'proved' if proof.ok else 'refused'}"]
+    said = "refused" if not proof.ok else "proved" if proof.bounded else "checked, not proved"
+    return [f"the program of {proof.plan} for {proof.controller} is {said}"]
 
 
 def _unaimed(choice: OrientationChoice) -> list[str]:

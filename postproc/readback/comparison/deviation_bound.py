@@ -2,8 +2,8 @@
 
 Between two places of a block the difference e of the executed pose and a pose of its curve bends by at most M, so that it
 stays within M / 32 of the largest value at the begin, middle and end (interpolation error, see `postproc.path.bound`). M
-comes from the law of the block by Taylor's theorem (`machines.straight_blocks`); the values themselves are poses of the
-reader. Blocks whose bound is above the worst that was seen anywhere are halved until bound and worst meet.
+comes from the law of the block by Taylor's theorem (`Kinematics.jets`); the values themselves are poses of the
+reader. Blocks whose bound is above the worst that was seen anywhere are divided until bound and worst meet.
 """
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ from machines.kinematics import columns
 from machines.kinematics.base import Kinematics
 from machines.kinematics.columns import Columns
 from machines.kinematics.taylor import TaylorAngle, TaylorVector, straight
-from machines.straight_blocks import pose_jets
 from postproc.base.group_rows import groups
 from postproc.control.word_arcs import PLANE_AXIS, PLANE_COLUMNS
 from postproc.path.bound import SHORT, axis_reference, curve_parameter, tip_reference
@@ -28,9 +27,9 @@ from postproc.reference.moves import Moves
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.rotations import angle_between, cross, lengths
 from toolpaths.shape import Curves
+from toolpaths.shapes import arrays
 
-TIGHT = 1.01
-"""bound over worst pose that is near enough"""
+TIGHT = 1.01  # bound over worst pose that is near enough
 HALVINGS = 26
 """at most, of one block"""
 GRAIN = 1e-7, 1e-9
@@ -38,12 +37,17 @@ GRAIN = 1e-7, 1e-9
 SAME = 1e-5
 """mm: what the law of a block and the reader may differ by in its middle"""
 CHUNK = 20_000
+_FEW, _AT_ONCE = 250, 8
+"""few pieces cost what one does: so many parts of each instead of halves"""
+_NO_BOUND, _PATIENCE = 1e20, 10
+"""mm: above it nothing is known; after so many halvings a block without a bound is given up"""
 _STANDS = 1e-12
 _REACH = 0.9
 """of the tolerance: how far from the nearest point the axis may be compared"""
 
 
 @dataclass(frozen=True)
+@arrays(unbounded_rows="U")
 class DeviationBound:
     """Upper bounds over all blocks: tip (mm), axis (rad), each with the block (row) that has it, -1 where there are none;
     how many blocks have no bound, because kinematics or law give none (they are only checked at places), and which."""
@@ -57,6 +61,7 @@ class DeviationBound:
 
 
 @dataclass(frozen=True)
+@arrays(rows="K", owner="K", begin="K", share="K")
 class _Ends:
     """What bounds need of blocks `rows`: where each begins and ends on its curve, by count (a guess for helices)."""
 
@@ -67,6 +72,7 @@ class _Ends:
 
 
 @dataclass(frozen=True)
+@arrays(k="N", a="N", b="N")
 class _Pieces:
     """Parts [a, b] of blocks: `k` (N,) numbers of `_Ends.rows`."""
 
@@ -77,11 +83,11 @@ class _Pieces:
     def __len__(self) -> int:
         return len(self.k)
 
-    def halves(self) -> _Pieces:
-        """Twice as many, half as long."""
-        middle = 0.5 * (self.a + self.b)
-        return _Pieces(np.repeat(self.k, 2), np.stack([self.a, middle], axis=1).ravel(),
-                       np.stack([middle, self.b], axis=1).ravel())
+    def divided(self, parts: int) -> _Pieces:
+        """Each in so many equal parts."""
+        cuts = self.a[:, None] + np.linspace(0.0, 1.0, parts + 1) * (self.b - self.a)[:, None]
+        cuts[:, -1] = self.b
+        return _Pieces(np.repeat(self.k, parts), cuts[:, :-1].ravel(), cuts[:, 1:].ravel())
 
     def take(self, index: Ints | Bools | slice) -> _Pieces:
         """Some of them."""
@@ -89,6 +95,7 @@ class _Pieces:
 
 
 @dataclass(frozen=True)
+@arrays(seen_tip="N", seen_axis="N", tip="N", axis="N")
 class _Values:
     """Of N pieces: worst deviation at places, and bound, of tip (mm) and axis (rad); inf where there is no bound."""
 
@@ -123,12 +130,15 @@ def deviation_bound(motion: Motion, executed: BlockPoses, moves: Moves, rows: In
     for at in range(0, len(rows), CHUNK):
         for pieces in _whole(motion, executed, ends, np.arange(at, min(at + CHUNK, len(rows)))):
             worst.add(pieces, _values(motion, executed, moves, ends, pieces, allowed))
-    for _ in range(HALVINGS):
-        halves = worst.taken().halves()
-        if not len(halves):
+    for divided in range(HALVINGS):
+        if divided >= _PATIENCE:
+            worst.give_up()
+        pieces = worst.taken()
+        if not len(pieces):
             break
-        for at in range(0, len(halves), CHUNK):
-            part = halves.take(slice(at, at + CHUNK))
+        pieces = pieces.divided(_AT_ONCE if len(pieces) < _FEW else 2)
+        for at in range(0, len(pieces), CHUNK):
+            part = pieces.take(slice(at, at + CHUNK))
             worst.add(part, _values(motion, executed, moves, ends, part, allowed))
     return worst.result(rows)
 
@@ -176,6 +186,14 @@ class _Worst:
             if len(bound) and bound.max() > self.closed[i]:
                 self.closed[i], self.k[i] = bound.max(), int(pieces.k[bound.argmax()])
 
+    def give_up(self) -> None:
+        """Open pieces of which nothing is known have no bound."""
+        parts, self.open = self.open, []
+        for pieces, values in parts:
+            known = np.maximum(values.tip, values.axis) < _NO_BOUND
+            self.unbounded.update(np.unique(pieces.k[~known]).tolist())
+            self.open.append((pieces.take(known), values.take(known)))
+
     def taken(self) -> _Pieces:
         """The pieces that are open, which are so no more."""
         self._sort_out()
@@ -186,6 +204,7 @@ class _Worst:
 
     def result(self, rows: Ints) -> DeviationBound:
         """What is known in the end."""
+        self.give_up()
         for pieces, values in self.open:
             self._close(pieces, values)
         tip, axis = np.maximum(self.closed, self.seen).tolist()
@@ -279,6 +298,7 @@ def _angle(chord: Floats) -> Floats:
 
 
 @dataclass(frozen=True)
+@arrays(known="N", straight_tip="N", strays="2 N")
 class _PieceMotion:
     """Jets of N pieces by the law of their blocks: tip, axis; `known` where there are any; `straight_tip` where the tip is
     straight and even by the law itself; `strays` (2, N): what the machine may add to it, mm and rad."""
@@ -324,8 +344,7 @@ class _PieceMotion:
             return [np.broadcast_to(x, self.known.shape)[k] for x in part]
 
         jets = [TaylorVector(some(jet.value), some(jet.first), some(jet.second),
-                             np.broadcast_to(jet.third, self.known.shape)[k])
-                for jet in (self.tip, self.axis)]
+                             np.broadcast_to(jet.third, self.known.shape)[k]) for jet in (self.tip, self.axis)]
         return _PieceMotion(jets[0], jets[1], self.known[k], self.straight_tip[k], self.strays[:, k])
 
 
@@ -336,10 +355,11 @@ def _kinds(motion: Motion, executed: BlockPoses, rows: Ints) -> Ints:
     by_tip = np.array([law == "tcp" for law in laws])[motion.frame[rows]] | (control.base == "tcp")
     in_plane = np.array([law == "tilted" for law in laws])[motion.frame[rows]]
     before = np.where((rows == 0)[:, None], motion.start, motion.end[np.maximum(rows - 1, 0)])
-    stands = (before[:, control.rotary] == motion.end[rows][:, control.rotary]).all(axis=1)
-    straight_slides = control.machine.kinematics.slides_affine
+    kin = control.machine.kinematics
+    holding = np.array(kin.rotary) | np.array(kin.turns_tool)
+    stands = (before[:, holding] == motion.end[rows][:, holding]).all(axis=1)
     kind = np.where(by_tip, TIP, JOINTS)
-    kind = np.where(in_plane | (stands & (straight_slides | (by_tip & (control.base != "tcp")))), LINE, kind)
+    kind = np.where(in_plane | (stands & (kin.straight_slides | (by_tip & (control.base != "tcp")))), LINE, kind)
     return np.where(motion.code[rows] == ARC, CIRCLE, kind)
 
 
@@ -350,13 +370,11 @@ def _jets(kind: int, motion: Motion, executed: BlockPoses, rows: Ints, pieces: _
     if kind == CIRCLE:
         return _circle_jets(motion, executed, rows, pieces, tip0, axis0)
     line = straight(list(tip0.T), list(tip1.T))
-    if kind == LINE or (kind == TIP and not any(kin.rotary)):
+    if kind == LINE or (kind == TIP and not any(kin.turns_tool)):
         return line, TaylorVector(list(axis0.T))
-    try:
-        tip, axis = pose_jets(kin, q0, q1)
-    except TypeError:
+    if not (kin.tip_jets_proved(executed.control.xyz) if kind == TIP else kin.jets_proved):
         return None
-    return (line, axis) if kind == TIP else (tip, axis)
+    return (line, kin.jets(q0, q1)[1]) if kind == TIP else kin.jets(q0, q1)
 
 
 def _circle_jets(motion: Motion, executed: BlockPoses, rows: Ints, pieces: _Pieces, tip0: Floats,

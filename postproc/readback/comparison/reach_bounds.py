@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from machines import reach
@@ -19,7 +17,7 @@ from toolpaths.units import DEG
 
 def check_reach_bounds(motion: Motion, executed: BlockPoses, moves: Moves, owner: Ints, faults: Faults) -> list[Diagnostic]:
     """Blocks that end where a rod, a joint or the platform cannot be; nothing for serial machines."""
-    kinematics: Any = executed.control.machine.kinematics
+    kinematics = executed.control.machine.kinematics
     if not reach.is_checked(kinematics):
         return []
     worst: dict[str, tuple[float, int, bool]] = {}

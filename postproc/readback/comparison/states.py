@@ -29,12 +29,14 @@ from postproc.reference.events import (
 from postproc.reference.moves import Moves
 from toolpaths.arrays import Array, Bools, Floats, Ints, shared
 from toolpaths.diagnostics import Diagnostic
+from toolpaths.shapes import arrays
 from toolpaths.toolpath import Kind
 
 _SPINDLE = {-1: "anti-clockwise (M4)", 0: "stopped (M5)", 1: "clockwise (M3)"}
 
 
 @dataclass(frozen=True)
+@arrays(tool="N", register="N", direction="N", rpm="N", coolant="N", side="N", radius="N")
 class _Asked:
     """What the CL file asks for while it cuts: by row of the Toolpath, the work offset of the set-up."""
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -72,8 +72,13 @@ class ActualBlockPoses(BlockPoses):
         return super().poses(motion, rows, t)
 
     def lawful(self, motion: Motion, rows: Ints, t: float | Floats) -> tuple[Floats, Floats]:
-        """See `BlockPoses`: the law is that of the machine without errors."""
-        pose = self._at(motion, rows, t)[0]
+        """See `BlockPoses`: the law is that of the machine without errors, as the control holds it."""
+        pose, q, _ = self._at(motion, rows, t)
+        for k, (number,) in alike(motion.frame[rows]) if self.control.own_kinematics is not None else ():
+            held = motion.frames[number].kinematics
+            if held is not None:
+                pose = np.array(pose)
+                pose[k] = np.concatenate(held.forward(q[k]), axis=1)
         return pose[:, :3], pose[:, 3:]
 
     def off_law(self, motion: Motion, rows: Ints) -> Bools:
@@ -81,11 +86,15 @@ class ActualBlockPoses(BlockPoses):
         return np.ones(len(rows), dtype=bool)
 
     def error_rates(self, motion: Motion, rows: Ints, q: Floats, reach: Floats) -> ErrorRates:
-        """See `BlockPoses`: of the errors; none are known where the control's pivots differ from the machine's besides."""
-        if self.control.own_kinematics is not None:
-            return unknown_rates(*q.shape)
-        return joined((k, self.actual(tool).error_rates(q[k], reach[k]) or unknown_rates(len(k), q.shape[1]))
-                      for k, (tool,) in alike(motion.tool[rows]))
+        """See `BlockPoses`: of the errors, and of other pivots of the control where it has some."""
+        found = joined((k, self.actual(tool).error_rates(q[k], reach[k]) or unknown_rates(len(k), q.shape[1]))
+                       for k, (tool,) in alike(motion.tool[rows]))
+        held = np.flatnonzero(super().off_law(motion, rows))
+        if not len(held):
+            return found
+        tip = np.array(found.tip)
+        tip[held] += super().error_rates(motion, rows[held], q[held], reach[held]).tip
+        return replace(found, tip=tip)
 
     def approach(self, motion: Motion, rows: Ints, t: float | Floats) -> Floats:
         """See `BlockPoses`."""
@@ -148,7 +157,8 @@ class ActualBlockPoses(BlockPoses):
     def _steps(self, motion: Motion, rows: Ints, t: float | Floats) -> PlaySteps:
         """What the motion of blocks up to fraction t does to the approach directions (K, T)."""
         share = np.broadcast_to(np.asarray(t, dtype=np.float64), len(rows))
-        result = self._between(motion, rows, np.zeros(len(rows)), share)
+        even = self._between(motion, rows, np.zeros(len(rows)), share)
+        result = {name: getattr(even, name).copy() for name in ("shift", "low", "high")}
         bent = np.flatnonzero(self._curved[rows])
         for at in range(0, len(bent), AT_ONCE):
             k = bent[at:at + AT_ONCE]
@@ -159,9 +169,9 @@ class ActualBlockPoses(BlockPoses):
                 last / LOOKS, 0.5 * (last / LOOKS + share[k]), share[k]))
             turn = _turning(before, middle, q)
             whole = gone.then(self._of(before, turn)).then(self._of(turn, q))
-            for name in ("shift", "low", "high"):
-                getattr(result, name)[k] = getattr(whole, name)
-        return result
+            for name, values in result.items():
+                values[k] = getattr(whole, name)
+        return PlaySteps(**result)
 
     def _looked_at(self, motion: Motion, rows: Ints) -> tuple[Floats, Floats, Floats]:
         """Shift, low and high, each (LOOKS, K, T), from the beginning of blocks to each look; kept for the next time."""

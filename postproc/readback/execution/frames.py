@@ -18,6 +18,7 @@ from postproc.readback.text.canonical import InterpolationModeName, WordMeaning
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.rotations import angle_between
+from toolpaths.shapes import arrays
 from toolpaths.units import DEG
 
 ANGLE_SLACK = 0.01
@@ -29,6 +30,7 @@ _TURN = 360.0
 
 
 @dataclass(frozen=True, eq=False)
+@arrays(rotation="3 3", origin="3")
 class ExecutionFrame:
     """One law in force: its plane, and the kinematics at the tip of the tool that the control reckons with."""
 
@@ -48,6 +50,7 @@ class ExecutionFrame:
 
 
 @dataclass(frozen=True, eq=False)
+@arrays(owner="F", rotation="F 3 3", origin="F 3")
 class FrameTable:
     """F frames side by side: the blocks of all that share control and tool length are placed at once."""
 
@@ -144,7 +147,7 @@ def frame_of(law: WordMeaning, control: Control | None, length: float, position:
     if law.name == "axes":
         return AXES
     kin = control.kinematics if control is not None else None
-    if control is None or kin is None or not kin.slides_affine or (control.xyz < 0).any():
+    if control is None or kin is None or not kin.straight_slides or (control.xyz < 0).any():
         found.append(error("gcode.mode", f"{law.code}: the control does not own the kinematics of this machine", file=file,
                            lines=[line], hint="axis positions are all that it can run"))
         return AXES

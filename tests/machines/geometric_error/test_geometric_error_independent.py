@@ -59,7 +59,7 @@ def drawn(folder: Path, name: str, seed: int, both: bool = False, n: int = 8, si
     file = Draw(folder, own, seed, both=both).write()
     file.write_text(f"{file.read_text()}{sigma}")
     kin, rng = machine.kinematics.with_tool(TOOL), np.random.default_rng(seed)
-    if own.kinematics["family"] == "serial":
+    if own.kinematics["kind"] == "serial":
         low, high = np.nan_to_num(machine.limits.lower, neginf=-7.0), np.nan_to_num(machine.limits.upper, posinf=7.0)
         q = rng.uniform(low, high, (n, len(low)))
     else:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+import machines
 from machines.geometric_error.actual.error_rates import pivot_rates, standing_arm
 from machines.geometric_error.actual.model import ErrorModel
 from machines.geometric_error.actual.serial_errors import Component, SerialErrors
@@ -14,8 +16,9 @@ from machines.geometric_error.exchange.bed_frame import RotatedCurve
 from machines.geometric_error.tables.curves import Curve, Fourier, Polynomial, TableCurve
 from machines.geometric_error.tables.lattice import ErrorMap
 from machines.geometric_error.tables.names import parse
+from machines.kinematics.base import Kinematics
 from machines.kinematics.serial import Serial
-from tests.machines.error_models import joints, serial_errors
+from tests.machines.error_models import joints, model, rod_errors, serial_errors
 from tests.machines.geometric_error.test_geometric_error_serial import NAMES, kinematics
 from toolpaths.arrays import Floats
 
@@ -56,10 +59,12 @@ def test_sizes_and_slopes_of_curves_are_bounds_and_near(kind: str) -> None:
     assert with_more.most == pytest.approx(2.0 * curve.most) and with_more.steepest == pytest.approx(2.0 * curve.steepest)
 
 
-def with_two_directions(kin: Serial) -> SerialErrors:
-    """Tables of two approach directions for two components of each axis."""
+def with_two_directions(kin: Kinematics, letters: Sequence[str] = ()) -> SerialErrors:
+    """Tables of two approach directions for two components of each axis, or of some."""
     found = []
     for j, letter in enumerate(kin.axis_names):
+        if letters and letter not in letters:
+            continue
         x = np.linspace(-7.0, 7.0, 9) if kin.rotary[j] else np.linspace(-600.0, 600.0, 9)
         for text in (f"E{letter}{letter}", f"E{'B' if letter != 'B' else 'C'}{letter}"):
             name = parse(text)
@@ -69,19 +74,20 @@ def with_two_directions(kin: Serial) -> SerialErrors:
     return SerialErrors(tuple(found))
 
 
-def held(kin: Serial, model: ErrorModel) -> None:
+def held(kin: Kinematics, model: ErrorModel, sizes: Sequence[float] = (1e-3, 1.0, 30.0)) -> None:
     """Along straight steps of random length from random poses, with approach directions that change: no difference above the
     bound."""
     actual, q = model.on(kin), joints(kin, STEPS, 7)
     rng, rotary = np.random.default_rng(9), np.array(kin.rotary)
-    for size in (1e-3, 1.0, 30.0):
+    for size in sizes:
         step = rng.normal(size=q.shape) * np.where(rotary, 0.01, 1.0) * size
         step *= rng.random(q.shape) < 0.5  # also single axes
         approach, turned = rng.uniform(-1.0, 1.0, q.shape), rng.uniform(-1.0, 1.0, q.shape)
         rates = actual.error_rates(q, np.abs(step))
         assert rates is not None
-        here, there = ([v - n for v, n in zip(actual.aim(x, w), kin.forward(x), strict=True)] for x, w in (
-            (q, approach), (q + step, turned)))
+        assert (rates.tip < 1e3).all()
+        here, there = ([v - n for v, n in zip(actual.aim(actual.coordinates(x), w), kin.forward(x), strict=True)]
+                       for x, w in ((q, approach), (q + step, turned)))
         for k, (rate, by_approach) in enumerate(((rates.tip, rates.tip_reversal), (rates.axis, rates.axis_reversal))):
             moved = np.linalg.norm(there[k] - here[k], axis=1)
             allowed = (rate * np.abs(step)).sum(axis=1) + (by_approach * np.abs(turned - approach)).sum(axis=1)
@@ -95,6 +101,34 @@ def test_no_error_of_a_serial_machine_changes_faster(name: str) -> None:
     held(kin, ErrorModel(with_two_directions(kin)))
     moving = dict.fromkeys("ABC", "moving")
     held(kin, ErrorModel(replace(serial_errors(kin, 4), frame=moving)))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("name", ["uranesx", "h4a-c-table", "h4a-spindle-axis"])
+def test_no_error_of_a_machine_on_rods_changes_faster(name: str) -> None:
+    """Every dimension wrong, the rotary axis and the spindle too; two approach directions in the rotary axis's tables."""
+    kin = machines.load(name).kinematics.with_tool(87.0)
+    both = model(kin, 3)
+    held(kin, both, (1e-3, 0.1, 0.7))
+    held(kin, replace(both, axes=SerialErrors()), (1e-3, 0.7))
+    if any(kin.rotary):
+        held(kin, replace(both, axes=with_two_directions(kin, kin.axis_names[4:])), (1e-3, 0.3))
+        held(kin, replace(both, axes=replace(both.axes, frame=dict.fromkeys("ABC", "moving"))),
+             (0.3,))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("name", ["uranesx", "h4a-c-table", "h4a-spindle-axis"])
+def test_a_machine_on_rods_reaches_its_bound(name: str) -> None:
+    """For short approach directions the bound is the rate itself."""
+    kin = machines.load(name).kinematics
+    actual, q = ErrorModel(rods=rod_errors(kin, 5)).on(kin), joints(kin, 60, 3)
+    step = np.where(np.array(kin.rotary), 0.0, 1e-4) * np.random.default_rng(1).normal(size=q.shape)
+    rates = actual.error_rates(q, np.abs(step))
+    assert rates is not None
+    near = kin.forward(q)[0]
+    off = [actual.aim(actual.coordinates(x))[0] - kin.forward(x)[0] for x in (q, q + step)]
+    assert np.abs(near).max() < 1e4
+    reached = np.linalg.norm(off[1] - off[0], axis=1) / (rates.tip * np.abs(step)).sum(axis=1)
+    assert 0.3 < reached.max() <= 1.0 + 1e-6
 
 
 @pytest.mark.parametrize("name", ["mikron-ucp710", "head-table", "nutating-head", "mill-3axis"])

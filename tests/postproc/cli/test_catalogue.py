@@ -21,7 +21,7 @@ NAMES = [name for name in machines.names() if any(machine(name).rotary)]
 def test_points_of_a_rotary_axis_stay_where_they_are(name: str) -> None:
     """With the slides standing, a joint that turns moves the tool round its line: as far from it, and as high along it."""
     m = machine(name)
-    q = np.where(np.array(m.rotary) | m.kinematics.slides_affine, 0.0, m.home)
+    q = np.where(np.array(m.rotary) | m.kinematics.straight_slides, 0.0, m.home)
     for row in rotary_lines(m):
         point, along = np.array(row["point"]), np.array(row["direction"])
         assert np.linalg.norm(along) == pytest.approx(1.0) and abs(point @ along) < 1e-5

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from ruckig import InputParameter, Ruckig, Trajectory
 
-from postproc.base.compiled import compiled
 from postproc.cycle_time.blocks import MotionBlocks
 from postproc.cycle_time.bound import lower_bound
 from postproc.cycle_time.estimate import estimate, timed, total
@@ -21,6 +20,7 @@ from postproc.cycle_time.shape import shape
 from postproc.cycle_time.shares import most_expensive, operations, shares
 from tests.linuxcnc import time_programs
 from tests.postproc.time_kit import HEAD, blocks, machine, model, random_program
+from toolpaths.compiled import compiled
 
 KINDS = ("linuxcnc", "lookahead", "ideal")
 CASES = [("mill-3axis", "", 300.0), ("mikron-ucp710", "AC", 150.0), ("mill-4axis", "A", 400.0)]

@@ -22,6 +22,7 @@ from postproc.orientation.passes.allowed import AllowedAxes
 from postproc.orientation.passes.parallel_map import CHUNK, PassFault, each_pass
 from postproc.orientation.passes.passes import Pass, PassContext, work_of
 from postproc.orientation.passes.poses import held_poses
+from postproc.orientation.passes.reasons import Touching
 from postproc.orientation.plans.choice import OrientationChoice
 from postproc.orientation.plans.orient import orient
 from postproc.orientation.plans.plans import plans_of, table_of
@@ -80,7 +81,7 @@ def test_joints_of_a_pass_follow_from_four_poses(name: str) -> None:
     for axis, (q, refused) in zip(axes, held_poses(one, m, axes), strict=True):
         tip = np.concatenate([one.tip, *(s.tip for s in one.stretches)]) + one.shift(axis)
         found_tip, found_axis = one.kin.forward(q)
-        assert not refused or refused.startswith("travel")
+        assert refused is None or refused.kind == "travel"
         assert np.abs(found_tip - tip).max() < 1e-9 and angle_between(found_axis, axis).max() < 1e-9
 
 
@@ -237,8 +238,8 @@ def test_an_axis_outside_travel_is_replaced_with_a_warning() -> None:
 def test_states_that_touch_are_in_no_plan_but_keep() -> None:
     """Bodies that the upright tool touches: every other plan leans."""
     class Ceiling:
-        def touching(self, one: Pass, axis: Floats) -> str:
-            return "holder touches ceiling" if axis[2] > 0.97 else ""
+        def touching(self, one: Pass, axis: Floats) -> Touching | None:
+            return Touching(1, 2, "ceiling", 1.0, "holder touches ceiling") if axis[2] > 0.97 else None
 
     made, allowed = work(strips([0.0, 30.0, 60.0]), machine("mikron-ucp710")), AllowedAxes(60.0 * DEG, Ceiling())
     results = [tried(one, made.machine, allowed) for one in made.passes]

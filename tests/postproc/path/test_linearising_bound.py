@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import machines
+from machines.kinematics.rod_loops import UNBOUNDED
 from machines.kinematics.serial import Serial
-from machines.straight_blocks import UNBOUNDED, pose_jets
 from postproc.control.control import Control
 from postproc.joints.joint_path import nearest_solution
 from postproc.path.bound import CurveBlocks, bounds
@@ -42,7 +42,7 @@ def test_derivatives_of_straight_moves_and_the_bound_of_the_third(name: str) -> 
     """Against finite differences of the forward kinematics at 41 places."""
     q0, q1 = moves(name, 60, 5)
     n, h = len(q0), 1.0 / 40
-    found = pose_jets(machine(name).kinematics.with_tool(80.0), q0, q1)
+    found = machine(name).kinematics.with_tool(80.0).jets(q0, q1)
     for jet, x in zip(found, dense(name, q0, q1, 41), strict=True):
         value, first, second = (np.stack([np.broadcast_to(c, n) for c in v], axis=1) for v in (
             jet.value, jet.first, jet.second))
@@ -94,7 +94,7 @@ def truth(name: str, control: Control, curves: Curves, qa: np.ndarray, qb: np.nd
 
 
 LAWS = [(name, law) for name in NAMES for law in ("axes", "tcp") if law == "axes" or (
-    machine(name).kinematics.slides_affine and any(machine(name).rotary))]
+    machine(name).kinematics.straight_slides and any(machine(name).rotary))]
 
 
 @pytest.mark.covering
@@ -191,7 +191,3 @@ def test_short_moves_need_no_point_and_cost_little() -> None:
                     np.zeros(len(curves), dtype=bool), TIP, AXIS)
     assert len(got.q) == len(curves) and got.worst_tip < 2e-5
 
-
-def test_machines_without_a_bound_are_named() -> None:
-    with pytest.raises(TypeError, match="object has no bound"):
-        pose_jets(object(), np.zeros((1, 5)), np.ones((1, 5)))  # type: ignore[arg-type]

@@ -10,12 +10,11 @@ import pytest
 import machines
 import postproc
 import toolpaths
-from machines.singular_distance import has_singular_distance, singular_distance, singular_distance_between
 from postproc.setup.model import load_setup
 from tests.postproc.joint_kit import machine
 
 SAMPLES = Path(__file__).parents[3] / "samples"
-PARALLEL = [name for name in machines.names() if has_singular_distance(machine(name).kinematics)]
+PARALLEL = [name for name in machines.names() if machine(name).kinematics.singular_names]
 
 
 def places(name: str, count: int) -> np.ndarray:
@@ -28,7 +27,7 @@ def places(name: str, count: int) -> np.ndarray:
 def test_distances_against_the_rates_of_the_machine(name: str) -> None:
     """No slide rate moves the tip further than the inverse of the distance allows; near 0 they would be without bound."""
     kin, q = machine(name).kinematics, places(name, 200)
-    found = singular_distance(kin, q)
+    found = kin.singular_distance(q)
     assert (found > 0.05).all() and (found <= 2.0).all()
     rates = kin.jacobian(q)[:, :3, :kin.legs.lengths.size]  # type: ignore[attr-defined]
     fastest = np.linalg.svd(rates, compute_uv=False)[:, 0]
@@ -39,9 +38,9 @@ def test_distances_against_the_rates_of_the_machine(name: str) -> None:
 @pytest.mark.parametrize("name", ["delta-parallel-z", "h4a-c-table", "uranesx"])
 def test_between_points_it_is_never_above_dense_truth(name: str) -> None:
     kin, q = machine(name).kinematics, places(name, 30)
-    found = singular_distance_between(kin, q)
+    found = kin.singular_distance_between(q)
     t = np.linspace(0, 1, 101)[:, None, None]
-    dense = singular_distance(kin, (q[:-1] + t * (q[1:] - q[:-1])).reshape(-1, q.shape[1])).reshape(101, len(q) - 1, 2)
+    dense = kin.singular_distance((q[:-1] + t * (q[1:] - q[:-1])).reshape(-1, q.shape[1])).reshape(101, len(q) - 1, 2)
     good = np.isfinite(found).all(axis=1)
     assert good.sum() > 20
     assert (found <= np.nanmin(dense, axis=0) + 1e-9)[good].all()
@@ -62,6 +61,6 @@ def test_a_stated_distance_is_kept_or_refused_with_lines() -> None:
 
 
 def test_serial_machines_have_none() -> None:
-    assert not has_singular_distance(machine("mikron-ucp710").kinematics)
-    with pytest.raises(TypeError, match="no singular distance"):
-        singular_distance(machine("mikron-ucp710").kinematics, np.zeros((1, 5)))
+    kin = machine("mikron-ucp710").kinematics
+    assert kin.singular_names == () and kin.singular_distance(np.zeros((3, 5))).shape == (3, 0)
+    assert kin.singular_distance_between(np.zeros((3, 5))).shape == (2, 0)

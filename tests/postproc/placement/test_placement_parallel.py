@@ -10,7 +10,6 @@ import pytest
 
 import toolpaths
 from machines.machine import Machine
-from machines.singular_distance import singular_distance
 from postproc.base.options import Options
 from postproc.orientation.passes.passes import work_of
 from postproc.placement.place import place
@@ -149,7 +148,7 @@ def test_poses_that_stand_for_all_keep_their_distance() -> None:
     kin = choice.work.passes[0].kin
     tips = choice.space.placement(choice.best.place).points(np.concatenate([one.tip for one in choice.work.passes]))
     q = kin.inverse(tips, np.tile([0.0, 0.0, 1.0], (len(tips), 1)), near=machine(DELTA).home)[0]
-    assert made.singular <= singular_distance(kin, q).min() + 1e-9
+    assert made.singular <= kin.singular_distance(q).min() + 1e-9
     assert made.singular == pytest.approx(choice.best.singular)
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from machines.geometric_error.actual.actual_rods import ActualDelta
 from machines.kinematics.linear_delta import LinearDelta
 from machines.kinematics.serial import Serial
 from postproc.readback.comparison import compare as compare_module
@@ -104,8 +105,32 @@ def test_other_pivots_of_the_control_are_bounded(controller):
     assert axis <= result.comparison.axis_bound and result.comparison.tip_bound > 1.05 * plain.comparison.tip_bound
 
 
-def test_errors_that_no_bound_is_known_for_are_checked_not_proved():
-    """Rods of other lengths: the machine's own poses are looked at, and the text says so."""
+def test_other_pivots_of_the_control_and_errors_are_bounded_together():
+    text = (SAMPLES / "tools.setup.toml").read_text() + "\n[control_pivots.A]\npoint = [0.0, 0.0007, -0.0006]\n"
+    given = {"setup": setup_of(text), "error_model": str(SAMPLES / "errors/mikron-ucp710.toml"), "output": "tcp"}
+    result = good(convert(path_of("short_five_axis.apt"), "mikron-ucp710", "siemens-840d", **given))
+    tip, axis = dense(result)
+    assert result.comparison.unbounded == 0 and tip <= result.comparison.tip_bound <= 1.12 * tip
+    assert axis <= result.comparison.axis_bound
+
+
+@pytest.mark.parametrize(("file", "machine", "setup"), [("pocket.cls", "uranesx", "delta"),
+                                                        ("h4a_indexed.cls", "h4a-c-table", "h4a")])
+def test_rods_with_errors_are_bounded(file, machine, setup):
+    """Dimensions of rods, joints, slides, and tables of the rotary axis."""
+    given = setup_of((SAMPLES / f"{setup}.setup.toml").read_text())
+    model = str(SAMPLES / f"errors/{machine}.toml")
+    result = good(convert(path_of(file), machine, "linuxcnc", setup=given, error_model=model))
+    tip, axis = dense(result, tuple(NEAR))
+    comparison = result.comparison
+    assert comparison.unbounded == 0 and comparison.bounded_cuts == comparison.cuts
+    assert tip <= comparison.tip_bound <= 1.12 * tip and axis <= comparison.axis_bound <= max(1.12 * axis, 1e-7)
+    assert "checked, not proved" not in statement(comparison, result.witness)
+
+
+def test_errors_that_no_bound_is_known_for_are_checked_not_proved(monkeypatch):
+    """The machine's own poses are looked at, and the text says so."""
+    monkeypatch.setattr(ActualDelta, "error_rates", lambda self, q, reach: None)
     setup = setup_of((SAMPLES / "delta.setup.toml").read_text())
     model = str(SAMPLES / "errors/uranesx.toml")
     result = good(convert(path_of("pocket.cls"), "uranesx", "linuxcnc", setup=setup, error_model=model))
@@ -141,10 +166,7 @@ def test_blocks_that_may_be_off_between_the_places_looked_at_are_an_error(monkey
 @pytest.mark.parametrize(("file", "name", "kind"), [("short_five_axis.apt", "mikron-ucp710", Serial),
                                                     ("pocket.cls", "delta-star", LinearDelta)])
 def test_a_kinematics_without_bounds_is_checked_not_proved(monkeypatch, file, name, kind):
-    def none(kin, q0, q1):
-        raise TypeError(f"{kind.__name__} has no bound")
-
-    monkeypatch.setattr(bound_module, "pose_jets", none)
+    monkeypatch.setattr(kind, "jets_proved", False)
     result = good(convert(path_of(file), name, "linuxcnc" if kind is Serial else "generic-iso"))
     assert result.comparison.unbounded > 10
     refused = convert(path_of(file), name, "linuxcnc" if kind is Serial else "generic-iso", require_proof=True)
@@ -153,8 +175,8 @@ def test_a_kinematics_without_bounds_is_checked_not_proved(monkeypatch, file, na
 
 def test_another_assembly_mode_than_that_of_the_bound_is_not_called_bounded(monkeypatch):
     """The law's middle and the reader's pose must be one: else the bend is of another motion."""
-    given = bound_module.pose_jets
-    monkeypatch.setattr(bound_module, "pose_jets", lambda kin, q0, q1: tuple(
+    given = LinearDelta.jets
+    monkeypatch.setattr(LinearDelta, "jets", lambda kin, q0, q1: tuple(
         replace(jet, value=[x + 1e-4 for x in jet.value]) for jet in given(kin, q0, q1)))
     assert good(convert(path_of("pocket.cls"), "delta-star", "generic-iso")).comparison.unbounded > 10
 

@@ -7,71 +7,56 @@ vectors, moments about the platform's reference point by the largest arm. Source
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
-from machines.kinematics.base import Kinematics
-from machines.kinematics.h4_linear import H4Linear
-from machines.kinematics.linear_delta import LinearDelta
 from machines.kinematics.sliders import Legs
 from toolpaths.arrays import Floats
 
 _MUCH, _PARTS = 0.02, 32
 NAMES = ("rod to slide (inverse)", "platform (direct)")
+Matrices = Callable[[Floats], tuple[Floats, Floats]]
+"""joints (N, J) to (Jx (N, K, K) made free of units, the rods (N, K, 3) in mm), home mode; NaN without a pose"""
 
 
-def has_singular_distance(kinematics: Kinematics) -> bool:
-    """True for the machines that stand on slides."""
-    return isinstance(kinematics, LinearDelta | H4Linear)
-
-
-def singular_distance(kinematics: Kinematics, q: Floats) -> Floats:
-    """(N, 2) distances of joints q (N, J) from the inverse and the direct singularities, home mode; NaN without a pose.
-
-    Raises:
-        TypeError: for machines without slides.
-    """
-    rows, legs, rods = _matrix(kinematics, q)
+def distance(matrices: Matrices, legs: Legs, q: Floats) -> Floats:
+    """(N, 2) distances of joints q (N, J) from the inverse and the direct singularities; NaN without a pose."""
+    rows, rods = matrices(q)
     across = np.abs(legs.transmission(rods)).min(axis=1)
     good = np.asarray(np.isfinite(rows).all(axis=(1, 2)))
     least = np.linalg.svd(np.where(good[:, None, None], rows, 0.0), compute_uv=False)[:, -1]
     return np.column_stack([across, np.where(good, np.asarray(least), np.nan)])
 
 
-def singular_distance_between(kinematics: Kinematics, q: Floats) -> Floats:
+def distance_between(matrices: Matrices, legs: Legs, q: Floats) -> Floats:
     """(N - 1, 2) the same at least on the straight joint moves between consecutive q (N, J).
 
     A least singular value changes by no more than the matrix does (Weyl), a cosine by no more than its rod's direction:
     what either does in a quarter of a move, taken as three quarters of its change over a half, is taken off the values
     at the ends and in the middle. Moves over which that is much are cut into parts.
     """
-    result, change = _between(kinematics, q[:-1], q[1:])
+    result, change = _between(matrices, legs, q[:-1], q[1:])
     rows = np.flatnonzero(change > _MUCH)
     if len(rows):
         cuts = [q[rows] + k / _PARTS * (q[rows + 1] - q[rows]) for k in range(_PARTS + 1)]
-        parts, _ = _between(kinematics, np.concatenate(cuts[:-1]), np.concatenate(cuts[1:]))
+        parts, _ = _between(matrices, legs, np.concatenate(cuts[:-1]), np.concatenate(cuts[1:]))
         result[rows] = parts.reshape(_PARTS, len(rows), 2).min(axis=0)
     return result
 
 
-def _between(kinematics: Kinematics, q0: Floats, q1: Floats) -> tuple[Floats, Floats]:
+def _between(matrices: Matrices, legs: Legs, q0: Floats, q1: Floats) -> tuple[Floats, Floats]:
     """(distances (N, 2), what was taken off (N,)) of the moves q0 -> q1 (N, J)."""
     places = (q0, 0.5 * (q0 + q1), q1)
-    first, middle, last = (_matrix(kinematics, x)[0] for x in places)
+    first, middle, last = (matrices(x)[0] for x in places)
     change = 0.75 * np.maximum(np.linalg.norm(middle - first, axis=(1, 2)), np.linalg.norm(last - middle, axis=(1, 2)))
-    least = np.stack([singular_distance(kinematics, x) for x in places]).min(axis=0)
+    least = np.stack([distance(matrices, legs, x) for x in places]).min(axis=0)
     return np.asarray(least - change[:, None]), np.asarray(change)
 
 
-def _matrix(kinematics: Kinematics, q: Floats) -> tuple[Floats, Legs, Floats]:
-    """(Jx (N, K, K) made free of units, the legs, the rods (N, K, 3) in mm)."""
-    if isinstance(kinematics, LinearDelta):
-        tip, _ = kinematics.forward(q)
-        rods = kinematics.rods(q, tip)
-        return rods / kinematics.legs.lengths[:, None], kinematics.legs, rods
-    if not isinstance(kinematics, H4Linear):
-        raise TypeError(f"{type(kinematics).__name__} has no singular distance")
-    p = kinematics.solve_platform(q)
-    jx = kinematics.platform.jx(p, q[:, :4])
-    arm = max(float(np.linalg.norm(kinematics.platform.joints[:, 1:], axis=1).max()), 1.0)
-    scaled = jx / np.array([1.0, 1.0, 1.0, arm]) / kinematics.legs.lengths[:, None]
-    return scaled, kinematics.legs, jx[:, :, :3]
+def unit_free(jx: Floats, legs: Legs, joints: Floats) -> tuple[Floats, Floats]:
+    """(Jx (N, K, K) free of units, its rods (N, K, 3) in mm) of `RodPlatform.loop_matrices` and platform joints (K, 3)."""
+    if jx.shape[2] == 3:
+        return jx / legs.lengths[:, None], jx
+    arm = max(float(np.linalg.norm(joints[:, 1:], axis=1).max()), 1.0)
+    return jx / np.array([1.0, 1.0, 1.0, arm]) / legs.lengths[:, None], jx[:, :, :3]

@@ -1,60 +1,39 @@
-"""Tip and tool axis along straight joint moves, with a bound of their third derivative over the whole move.
+"""A platform on rods along straight slide moves, with a bound of its third derivative over the whole move.
 
-Each family of machines goes the path from joints to the tool once with jets instead of numbers (`kinematics/taylor.py`).
-Serial: the chain of axes. Parallel: the platform follows from the rods' fixed lengths, differentiated three times; that
-Jx stays regular all along the move is proved on the path, and where it cannot be, there is no bound.
+The platform follows from the rods' fixed lengths, differentiated three times; that Jx stays regular all along the move is
+proved with it, and where it cannot be, there is no bound.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
-from machines.kinematics import columns
-from machines.kinematics.base import Kinematics
-from machines.kinematics.h4_axes import H4SpindleAxis, H4TableAxis
-from machines.kinematics.h4_linear import H4Linear
-from machines.kinematics.linear_delta import LinearDelta
-from machines.kinematics.serial import Serial
 from machines.kinematics.sliders import Legs, solved
-from machines.kinematics.taylor import ZERO, TaylorAngle, TaylorVector, straight
+from machines.kinematics.taylor import TaylorAngle, TaylorVector
 from toolpaths.arrays import Floats
+from toolpaths.shapes import arrays
 
-_Z = (0.0, 0.0, 1.0)
 _ROUNDS = 6
 _GROWTH = 1.02
 _PARTS = 4
 UNBOUNDED = 1e30
 """a third derivative for which no bound was found"""
+Jets = tuple[TaylorVector, TaylorVector]
 
 
-def pose_jets(kin: Kinematics, q0: Floats, q1: Floats) -> tuple[TaylorVector, TaylorVector]:
-    """(tip in mm, tool axis) in the table frame along the straight moves q0 -> q1 (N, J).
-
-    Parallel machines are taken in their home mode. The third derivative is UNBOUNDED where the platform cannot
-    be proved regular all along.
-
-    Raises:
-        TypeError: for a family of kinematics without such a bound.
-    """
-    if isinstance(kin, Serial):
-        return _serial(kin, q0, q1)
-    if isinstance(kin, LinearDelta | H4Linear):
-        return _by_parts(kin, q0, q1)
-    raise TypeError(f"{type(kin).__name__} has no bound for straight joint moves")
-
-
-def _by_parts(kin: LinearDelta | H4Linear, q0: Floats, q1: Floats) -> tuple[TaylorVector, TaylorVector]:
-    """Where a whole move is too long for a bound, the largest of the bounds of its parts, each over a shorter time."""
-    whole = _platform(kin, q0, q1)
+def by_parts(jets: Callable[[Floats, Floats], Jets], q0: Floats, q1: Floats) -> Jets:
+    """`jets` of the moves q0 -> q1 (N, J); where a whole move is too long for a bound, the largest of the bounds of its
+    parts, each over a shorter time."""
+    whole = jets(q0, q1)
     third = [np.array(np.broadcast_to(jet.third, len(q0)), dtype=np.float64) for jet in whole]
     rows = np.flatnonzero(np.maximum(*third) >= UNBOUNDED)
     if len(rows):
         cuts = [q0[rows] + k / _PARTS * (q1[rows] - q0[rows]) for k in range(_PARTS + 1)]
-        parts = _platform(kin, np.concatenate(cuts[:-1]), np.concatenate(cuts[1:]))
+        parts = jets(np.concatenate(cuts[:-1]), np.concatenate(cuts[1:]))
         for column, jet in zip(third, parts, strict=True):
             most = np.broadcast_to(jet.third, len(rows) * _PARTS).reshape(_PARTS, -1).max(axis=0)
             column[rows] = np.minimum(most * _PARTS**3, UNBOUNDED)
@@ -62,53 +41,9 @@ def _by_parts(kin: LinearDelta | H4Linear, q0: Floats, q1: Floats) -> tuple[Tayl
     return tip, axis
 
 
-def _platform(kin: LinearDelta | H4Linear, q0: Floats, q1: Floats) -> tuple[TaylorVector, TaylorVector]:
-    return _delta(kin, q0, q1) if isinstance(kin, LinearDelta) else _h4(kin, q0, q1)
-
-
-def _serial(kin: Serial, q0: Floats, q1: Floats) -> tuple[TaylorVector, TaylorVector]:
-    """The product of exponentials (see `Serial`), axis by axis from the tool to the part."""
-    tip, axis = TaylorVector(columns.of_one(-kin.tool_length * kin.tool_axis)), TaylorVector(columns.of_one(kin.tool_axis))
-    for joint in reversed(kin.chain):
-        j = kin.axis_names.index(joint.name)
-        by, direction = TaylorAngle(0.5 * (q0[:, j] + q1[:, j]), q1[:, j] - q0[:, j]), columns.of_one(joint.direction)
-        if joint.rotary:
-            tip, axis = tip.turned(direction, columns.of_one(joint.point), by), axis.turned(direction, ZERO, by)
-        else:
-            tip = tip.slid(direction, by)
-    return tip, axis
-
-
-def _delta(kin: LinearDelta, q0: Floats, q1: Floats) -> tuple[TaylorVector, TaylorVector]:
-    middle, step = 0.5 * (q0 + q1), q1 - q0
-    tip, _ = kin.forward(middle)
-    rods = kin.rods(middle, tip)
-    place, _ = _Loop(rods, np.zeros_like(rods), kin.legs, step, False).jets(
-        tip + kin.tool_length * np.array(_Z), np.zeros(len(tip)))
-    return place - TaylorVector(columns.of_one(kin.tool_length * np.array(_Z))), TaylorVector(list(_Z))
-
-
-def _h4(kin: H4Linear, q0: Floats, q1: Floats) -> tuple[TaylorVector, TaylorVector]:
-    middle, step = 0.5 * (q0 + q1), q1 - q0
-    p = kin.solve_platform(middle)
-    arms = kin.platform.ends(p) - p[:, None, :3]
-    rods = p[:, None, :3] + arms - kin.legs.carriages(middle[:, :4])
-    place, tilt = _Loop(rods, arms, kin.legs, step[:, :4], True).jets(p[:, :3], p[:, 3])
-    turn, down = TaylorAngle(middle[:, 4], step[:, 4]), -(kin.gauge + kin.tool_length)
-    if isinstance(kin, H4TableAxis):
-        about = (0.0, 0.0, kin.sense)
-        tip = (TaylorVector((0.0, 0.0, down)).turned((1.0, 0.0, 0.0), ZERO, tilt) + place).turned(about, ZERO, turn)
-        return tip, TaylorVector(list(_Z)).turned((1.0, 0.0, 0.0), ZERO, tilt).turned(about, ZERO, turn)
-    if not isinstance(kin, H4SpindleAxis):
-        raise TypeError(f"{type(kin).__name__} has no bound for straight joint moves")
-    axis = TaylorVector(list(_Z)).turned((0.0, kin.sense, 0.0), ZERO, turn)
-    reach = TaylorVector((0.0, 0.0, down)).turned((0.0, kin.sense, 0.0), ZERO,
-                                                  turn) + TaylorVector(columns.of_one(kin.pivot))
-    return (reach.turned((1.0, 0.0, 0.0), ZERO, tilt) + place, axis.turned((1.0, 0.0, 0.0), ZERO, tilt))
-
-
 @dataclass(frozen=True)
-class _Loop:
+@arrays(rods="N K 3", arms="N K 3", step="N K")
+class RodLoop:
     """The closed loops of a platform along straight slide moves.
 
     With r_k the rods (from carriage to platform joint), b_k the arms (from the reference point C to the joint, turned),
@@ -226,20 +161,3 @@ class _Loop:
 
 def _columns(rows: Floats) -> list[Floats | float]:
     return list(rows.T)
-
-
-def tip_rule_jets(kin: Kinematics, q0: Floats, q1: Floats, tip0: Floats, tip1: Floats) -> tuple[TaylorVector, TaylorVector]:
-    """(tip, tool axis) where the control runs the kinematics: tips straight, rotary joints even.
-
-    The slides then follow from the tip; of the joints only the rotary ones count.
-    """
-    tip = straight(_columns(tip0), _columns(tip1))
-    if not any(kin.rotary):
-        _, axis = kin.forward(q0)
-        return tip, TaylorVector(_columns(axis))
-    return tip, pose_jets(kin, q0, q1)[1]
-
-
-def in_blocks(n: int) -> Iterator[slice]:
-    """Slices that keep the columns in the processor's cache."""
-    return columns.blocks(n)

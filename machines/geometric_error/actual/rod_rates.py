@@ -1,0 +1,184 @@
+"""How fast the errors of a machine on six rods change as its slides move: bounds that hold wherever the slides may be.
+
+A platform is held by W (dX, lever turn) = D dq, the rods' fixed lengths differentiated (II-15 of Company 2000, E-15):
+the rows of W are (r, b x r / lever) with the rods r and the arms b from the platform's point X to their joints, D holds
+r along the slides. The columns J of W^-1 D say how each slide moves a platform. From q to q' on a straight line
+
+    W' (J' - J) = (D' - D) - (W' - W) J,     |W'^-1| <= 1 / (least singular value of W - |W' - W|),
+
+where row k of the right side is (r_k' - r_k) . (u - v - w x b_k) - r_k' . (w x (b_k' - b_k)) with the slide's direction
+u, the platform's v and w. What r and b change by follows from J along the line: a bound of J' - J that comes out smaller
+than it was assumed holds all along the line, by continuity. The rate of the errors is the difference of J with errors
+and without, exact at q, and what both may change by.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from machines.geometric_error.actual.error_rates import LARGEST_TURN, AxisSizes, ErrorRates
+from machines.geometric_error.actual.rods import RodErrors, RodFrame, inverted
+from toolpaths.arrays import Floats
+
+_ROUNDS = 8
+_GROWTH = 1.05
+UNBOUNDED = 1e30
+"""a rate where no bound was found: shorter pieces may have one"""
+
+
+@dataclass(frozen=True, eq=False)
+class PlatformMotion:
+    """N platforms and how K slides move them.
+
+    Attributes:
+        place: (N, 3) X; turned: (N, 3, 3)
+        shift, turn: (N, 3, K) mm and rad of the platform per mm of each slide
+        shift_change, turn_change: (N, K) by which those may change while the slides go as far as they may
+        swing: (N,) rad that the platform may turn by
+    """
+
+    place: Floats
+    turned: Floats
+    shift: Floats
+    turn: Floats
+    shift_change: Floats
+    turn_change: Floats
+    swing: Floats
+
+    def of_point(self, arm: Floats) -> tuple[Floats, Floats]:
+        """(mm per mm (N, 3, K), its largest change (N, K)) of the point at `arm` (N, 3) from X, machine frame."""
+        size = np.linalg.norm(arm, axis=1)[:, None]
+        turn = np.linalg.norm(self.turn, axis=1)
+        return (self.shift + np.cross(self.turn, arm[:, :, None], axis=1),
+                self.shift_change + size * self.turn_change + (turn + self.turn_change) * size * self.swing[:, None])
+
+    def of_direction(self, unit: Floats) -> tuple[Floats, Floats]:
+        """The same of a direction (N, 3) of the platform, rad per mm."""
+        turn = np.linalg.norm(self.turn, axis=1)
+        return (np.cross(self.turn, unit[:, :, None], axis=1),
+                self.turn_change + (turn + self.turn_change) * self.swing[:, None])
+
+    def translating(self) -> PlatformMotion:
+        """Of a platform that does not turn, whatever six rods could do."""
+        none = np.zeros(self.turn_change.shape)
+        return PlatformMotion(self.place, self.turned, self.shift, np.zeros(self.turn.shape), self.shift_change, none,
+                              np.zeros(len(none)))
+
+
+def platform_motion(frame: RodFrame, errors: RodErrors, q: Floats, pose: tuple[Floats, Floats],
+                    reach: Floats) -> PlatformMotion:
+    """The motion of platforms at `pose` (X (N, 3), R (N, 3, 3)) by slides q (N, K) that go by up to `reach` (N, K)."""
+    place, turned = pose
+    base, along = frame.carriage_lines(errors)
+    joints = frame.joint + errors.platform
+    ends = joints @ np.swapaxes(turned, 1, 2)
+    rods = place[:, None] + ends - base - q[:, frame.leg, None] * along
+    lever = max(float(np.linalg.norm(joints, axis=1).max()), 1.0)
+    rows = np.concatenate([rods, np.cross(ends, rods) / lever], axis=2)
+    own = frame.leg[:, None] == np.arange(q.shape[1])
+    columns = inverted(rows) @ (np.einsum("nri,ri->nr", rods, along)[:, :, None] * own)
+    shift, turn = columns[:, :3], columns[:, 3:] / lever
+    rates = shift[:, None] + np.cross(turn[:, None], ends[:, :, :, None], axis=2) - (along[:, :, None] * own[:, None])
+    loops = _Loops(np.linalg.svd(np.nan_to_num(rows), compute_uv=False)[:, -1], np.linalg.norm(rates, axis=2),
+                   np.linalg.norm(turn, axis=1), np.linalg.norm(joints, axis=1), frame.length + errors.length, lever, reach)
+    change, swing = loops.held()
+    return PlatformMotion(place, turned, shift, turn, change, change / lever, swing)
+
+
+@dataclass(frozen=True, eq=False)
+class _Loops:
+    """What bounds need of N platforms: least singular value of W (N,), mm that each rod's vector changes by per mm of each
+    slide (N, 6, K), rad of the platform (N, K), arms and lengths (6,), the lever, how far the slides go (N, K)."""
+
+    least: Floats
+    rates: Floats
+    turn: Floats
+    arm: Floats
+    length: Floats
+    lever: float
+    reach: Floats
+
+    def held(self) -> tuple[Floats, Floats]:
+        """(by how much columns of J change at most (N, K), turns times the lever; rad that the platform turns (N,));
+        UNBOUNDED where W might become singular."""
+        change, swing = np.full(self.reach.shape, UNBOUNDED), np.full(len(self.reach), UNBOUNDED)
+        open_, guess = np.ones(len(swing), dtype=np.bool_), np.zeros(self.reach.shape)
+        for _ in range(_ROUNDS):
+            found, turned = self._change(guess)
+            good = open_ & (found <= guess).all(axis=1)
+            change[good], swing[good] = guess[good], turned[good]
+            open_ &= ~good
+            if not open_.any():
+                break
+            guess = found * _GROWTH + 1e-15
+        return change, swing
+
+    def _change(self, assumed: Floats) -> tuple[Floats, Floats]:
+        """The same while columns of J change by up to `assumed`; NaN where there is no bound."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            swing = ((self.turn + assumed / self.lever) * self.reach).sum(axis=1)
+            drift = (assumed * self.reach).sum(axis=1)[:, None] * np.hypot(1.0, self.arm / self.lever)
+            away = (self.turn * self.reach).sum(axis=1)[:, None] * self.arm * swing[:, None]
+            rod = (self.rates * self.reach[:, None]).sum(axis=2) + drift + away
+            arm = self.arm * swing[:, None]
+            off = np.linalg.norm(np.hypot(rod, (self.arm * rod + arm * self.length) / self.lever), axis=1)
+            grip = 1.0 / np.where(off < self.least, self.least - off, np.nan)
+            wrong = rod[:, :, None] * self.rates + (self.length * arm)[:, :, None] * self.turn[:, None]
+            return grip[:, None] * np.linalg.norm(wrong, axis=1), swing
+
+
+@dataclass(frozen=True, eq=False)
+class ToolMotion:
+    """N tools on the platform: mm (or rad, of the axis) per mm of each slide with errors less without, and how large it is
+    without them at most (N, K) each; how far apart the tips and how many rad the platforms are, at most (N,)."""
+
+    tip: Floats
+    axis: Floats
+    nominal_tip: Floats
+    nominal_axis: Floats
+    apart: Floats
+    turned: Floats
+
+
+def tool_motion(actual: PlatformMotion, nominal: PlatformMotion, arms: tuple[Floats, Floats], axes: tuple[Floats, Floats],
+                reach: Floats, arm_reach: Floats) -> ToolMotion:
+    """Tools at `arms` (N, 3) from X with `axes` (N, 3), machine frame, with errors and without, while slides go by `reach`
+    (N, K) and the arms' ends move on the platform by up to `arm_reach` (N,) mm."""
+    rates, sizes = [], []
+    for one, other in ((actual.of_point(arms[0]), nominal.of_point(arms[1])),
+                       (actual.of_direction(axes[0]), nominal.of_direction(axes[1]))):
+        rates.append(np.linalg.norm(one[0] - other[0], axis=1) + one[1] + other[1])
+        sizes.append(np.linalg.norm(other[0], axis=1) + other[1])
+    spins = [np.linalg.norm(m.turn, axis=1) + m.turn_change for m in (actual, nominal)]
+    rates[0] = rates[0] + (spins[0] + spins[1]) * arm_reach[:, None]
+    sizes[0] = sizes[0] + spins[1] * arm_reach[:, None]
+    turn_rate = np.linalg.norm(actual.turn - nominal.turn, axis=1) + actual.turn_change + nominal.turn_change
+    tips = actual.place + arms[0] - nominal.place - arms[1]
+    angle = np.linalg.norm(np.einsum("nji,njk->nik", nominal.turned, actual.turned) - np.eye(3), axis=(1, 2))
+    return ToolMotion(rates[0], rates[1], sizes[0], sizes[1], np.linalg.norm(tips, axis=1) + (rates[0] * reach).sum(axis=1),
+                      angle + (turn_rate * reach).sum(axis=1))
+
+
+def with_rotary(tool: ToolMotion, size: AxisSizes, spindle: AxisSizes, arm: Floats, length: float,
+                at_spindle: bool) -> ErrorRates | None:
+    """Rates of K slides and the rotary axis that stands under the part or carries the spindle (the formulas of `error_rates`
+    for one turning axis). `arm` (N,): the tip's largest distance from the axis; None where errors are too large."""
+    own = size.turn + 2.0 * size.line_turn + size.zero
+    if own + spindle.line_turn > LARGEST_TURN:
+        return None
+    before = np.where(at_spindle, tool.turned, 0.0)
+    whole = own + spindle.line_turn + tool.turned
+    moved = spindle.line_shift + spindle.line_turn * length if at_spindle else tool.apart
+    moved = (moved + size.shift + own * arm + 2.0 * size.line_shift) / (1.0 - np.minimum(whole, 0.5))
+    far = arm + moved
+    turning = ((before + size.turn) * (far + size.line_shift) + size.line_turn * arm + moved + size.line_shift
+               + size.shift_slope + size.turn_slope * far)
+    around = before + size.turn + size.line_turn + whole + size.turn_slope
+    turned_by = 0.0 if at_spindle else own
+    tip = np.column_stack([tool.tip + turned_by * tool.nominal_tip, turning])
+    axis = np.column_stack([tool.axis + turned_by * tool.nominal_axis, around])
+    none = np.zeros(tool.tip.shape)
+    return ErrorRates(tip, axis, np.column_stack([none, 0.5 * (size.shift_apart + size.turn_apart * far)]),
+                      np.column_stack([none, np.full(len(far), 0.5 * size.turn_apart)]))

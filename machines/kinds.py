@@ -1,0 +1,142 @@
+"""Kinds of machines: the built-in ones, those of installed packages, and those of files that the user names.
+
+A package registers a kind in its metadata, in the group `postproc.kinematics`, by the word that machine files write:
+
+    [project.entry-points."postproc.kinematics"]
+    scissors = "my_machine:ScissorsModel"
+
+Without a package: `POSTPROC_KINDS=my_machine.py` names files (several as in PATH) whose models are registered. Such a
+file is a program that is run, so only files named there are, never one that merely lies next to a machine file.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator
+from functools import cache
+from importlib import import_module
+from importlib.metadata import EntryPoint, entry_points
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+from types import ModuleType
+from typing import get_args
+
+from machines.models import KinematicsModel
+
+GROUP, FILES = "postproc.kinematics", "POSTPROC_KINDS"
+BUILT_IN = {
+    "serial": "machines.serial_models:SerialModel",
+    "linear-delta": "machines.parallel_models:LinearDeltaModel",
+    "h4-linear": "machines.parallel_models:H4LinearModel",
+}
+"""`[kinematics] kind` -> module:model of that table; imported when a file asks for it"""
+HOW = f'a package registers a kind in the entry point group "{GROUP}"; a file of yours is named in {FILES}=FILE.py'
+
+
+class KindFault(ValueError):
+    """A registered kind that cannot be used; the message says why, `hint` what to do."""
+
+    def __init__(self, message: str, hint: str) -> None:
+        super().__init__(message)
+        self.hint = hint
+
+
+def known() -> list[str]:
+    """All registered kinds, the built-in ones first.
+
+    Raises:
+        KindFault: where a file of `POSTPROC_KINDS` cannot be run or registers nothing.
+    """
+    return list(dict.fromkeys([*BUILT_IN, *sorted(_registered()), *sorted(_in_files())]))
+
+
+def model_of(kind: str) -> type[KinematicsModel] | None:
+    """The model of the `[kinematics]` table of a kind; None where nothing of that name is registered.
+
+    Raises:
+        KindFault: where its code cannot be imported or is no model of a kind.
+    """
+    if kind in BUILT_IN:
+        module, _, name = BUILT_IN[kind].partition(":")
+        found: type[KinematicsModel] = getattr(import_module(module), name)
+        return found
+    if kind in (made := _in_files()):
+        return made[kind]
+    points = _registered().get(kind, [])
+    if len({point.value for point in points}) > 1:
+        raise KindFault(f"kind {kind!r} is registered several times: {', '.join(point.value for point in points)}",
+                        "uninstall all but one of these packages")
+    return _loaded(points[0]) if points else None
+
+
+def code_file(kind: str) -> Path | None:
+    """The file with the model of a kind that is not built in, so that a proof can name its bytes; None of any other."""
+    try:
+        model = None if kind in BUILT_IN else model_of(kind)
+    except KindFault:
+        return None
+    file = getattr(sys.modules.get(model.__module__), "__file__", None) if model is not None else None
+    return Path(file) if file else None
+
+
+def _registered() -> dict[str, list[EntryPoint]]:
+    """Entry points of installed packages by kind."""
+    result: dict[str, list[EntryPoint]] = {}
+    for point in entry_points(group=GROUP):
+        if point.name not in BUILT_IN:
+            result.setdefault(point.name, []).append(point)
+    return result
+
+
+def _loaded(point: EntryPoint) -> type[KinematicsModel]:
+    try:
+        model = point.load()
+    except Exception as fault:  # code of others: whatever it raises
+        raise KindFault(f"kind {point.name!r} ({point.value}) is not imported: {type(fault).__name__}: {fault}",
+                        "correct or reinstall the package that registers it") from fault
+    if not (isinstance(model, type) and issubclass(model, KinematicsModel)):
+        raise KindFault(f"kind {point.name!r} ({point.value}) is no KinematicsModel (machines/models.py)",
+                        "register the model of the [kinematics] table")
+    return model
+
+
+def _in_files() -> dict[str, type[KinematicsModel]]:
+    """Models of the files of `POSTPROC_KINDS` by kind."""
+    named = [part for part in os.environ.get(FILES, "").split(os.pathsep) if part]
+    return {kind: model for part in named for kind, model in _of_file(str(Path(part).resolve())).items()}
+
+
+@cache
+def _of_file(file: str) -> dict[str, type[KinematicsModel]]:
+    hint = f"correct the file, or take it out of {FILES}"
+    try:
+        module = _run(Path(file))
+    except Exception as fault:  # code of others: whatever it raises
+        raise KindFault(f"{file}, named in {FILES}, is not run: {type(fault).__name__}: {fault}", hint) from fault
+    found = {kind: model for model in vars(module).values() for kind in _words(model, module.__name__)}
+    if not found:
+        raise KindFault(f"{file}, named in {FILES}, holds no kind of machine",
+                        'derive a model from KinematicsModel with `kind: Literal["..."]` (machines/README.md)')
+    return found
+
+
+def _run(file: Path) -> ModuleType:
+    name = f"postproc_kinds_{file.stem}"
+    spec = spec_from_file_location(name, file)
+    if spec is None or spec.loader is None:
+        raise ImportError("not a Python file")
+    module = module_from_spec(spec)
+    sys.modules[name] = module
+    try:
+        spec.loader.exec_module(module)
+    except BaseException:
+        del sys.modules[name]
+        raise
+    return module
+
+
+def _words(model: object, module: str) -> Iterator[str]:
+    """The words that name a model in machine files, of one that its module defines; built-in ones stay as they are."""
+    if isinstance(model, type) and issubclass(model, KinematicsModel) and model.__module__ == module:
+        yield from (word for word in get_args(model.model_fields["kind"].annotation) if word not in BUILT_IN)

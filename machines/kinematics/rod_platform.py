@@ -1,0 +1,55 @@
+"""What the rods of a machine on slides say to who asks for them: clearances, errors of rods, transmission."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from machines.kinematics.clearance_geometry import ClearanceGeometry, ClearanceSizes
+from machines.kinematics.sliders import Legs
+from machines.kinematics.workspace import Workspace
+from toolpaths.arrays import Floats
+
+
+class RodPlatform(Protocol):
+    """A platform on K legs whose carriages run on straight slides; its place is its reference point, mm, and a tilt."""
+
+    @property
+    def axis_names(self) -> tuple[str, ...]:
+        """Letters of the slides in the order of the legs, then those of rotary axes."""
+
+    @property
+    def legs(self) -> Legs:
+        """K legs."""
+
+    @property
+    def workspace(self) -> Workspace:
+        """Of the reference point and the tilt."""
+
+    @property
+    def clearance(self) -> ClearanceSizes | None:
+        """Sizes of the parts that must not touch."""
+
+    @property
+    def platform_joints(self) -> Floats:
+        """(K, 3) mm from the reference point to the joints of the legs, platform level."""
+
+    @property
+    def platform_turns(self) -> bool:
+        """False for a platform that only translates."""
+
+    @property
+    def gauge_below(self) -> float:
+        """mm from the reference point of the level platform down to the gauge point, rotary axes at 0."""
+
+    def rig(self, q: Floats, near: Floats | None = None) -> ClearanceGeometry:
+        """Where the parts are at joints q (N, J)."""
+
+    def middle_rig(self) -> ClearanceGeometry:
+        """The same in the middle of the workspace, N = 1."""
+
+    def joints_at(self, platform: Floats, turn: Floats) -> Floats:
+        """Joints (N, J) of places and tilts of the platform (N, 4) and rotary axes (N, R)."""
+
+    def loop_matrices(self, place: Floats, tilt: Floats) -> Floats:
+        """Jx (N, K, K) at places (N, 3) and tilts (N,): rods in mm and, of a platform that tilts, their moments about its
+        reference point in mm^2."""

@@ -1,0 +1,88 @@
+"""One contract for machines: no code outside a kind's own files asks which concrete kind a machine has."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from machines.kinds import BUILT_IN
+from tests.test_imports import ROAD, ROOT
+
+OWN_FILES = "machines/kinematics/"
+"""where the kinds are; their models in machine files are chosen by `machines/kinds.py`"""
+WITNESS = "postproc/witness/"
+"""shares no code: it reads the kinds of machine files itself, and has no kinematics of the project"""
+
+
+@cache
+def trees() -> list[tuple[str, ast.Module]]:
+    return [(path.relative_to(ROOT).as_posix(), ast.parse(path.read_text()))
+            for top in ROAD for path in sorted((ROOT / top).rglob("*.py"))]
+
+
+def concrete_kinds() -> set[str]:
+    """Names of all classes that derive from Kinematics, however far."""
+    bases = {node.name: {ast.unparse(base).rpartition(".")[2] for base in node.bases}
+             for _, tree in trees() for node in ast.walk(tree) if isinstance(node, ast.ClassDef)}
+    kinds, before = {"Kinematics"}, 0
+    while len(kinds) > before:
+        before = len(kinds)
+        kinds |= {name for name, above in bases.items() if above & kinds}
+    return kinds - {"Kinematics"}
+
+
+KINDS = concrete_kinds()
+
+
+def names_in(nodes: list[ast.expr]) -> set[str]:
+    return {leaf.id if isinstance(leaf, ast.Name) else leaf.attr for node in nodes for leaf in ast.walk(node)
+            if isinstance(leaf, ast.Name | ast.Attribute)}
+
+
+def of_kinematics(call: ast.Call) -> bool:
+    """True where the first argument of a call is called after a kinematics."""
+    return any("kin" in name.lower() for name in names_in(call.args[:1]))
+
+
+def asks(tree: ast.AST) -> Iterator[str]:
+    """Places that ask for a concrete kind: by its class, by what attributes it has, by the word of its machine file."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+            if node.func.id in ("isinstance", "issubclass") and names_in(node.args[1:]) & KINDS:
+                yield ast.unparse(node)
+            if node.func.id in ("hasattr", "getattr") and of_kinematics(node):
+                yield ast.unparse(node)
+        elif isinstance(node, ast.MatchClass) and names_in([node.cls]) & KINDS:
+            yield ast.unparse(node)
+        elif isinstance(node, ast.Compare):
+            sides = (node.left, *node.comparators)
+            words = {side.value for side in sides if isinstance(side, ast.Constant)}
+            types = [side for side in sides if isinstance(side, ast.Call) and names_in([side.func]) == {"type"}]
+            if words & set(BUILT_IN) or any(of_kinematics(side) for side in types):
+                yield ast.unparse(node)
+        elif isinstance(node, ast.Attribute) and node.attr == "slides_affine":
+            yield ast.unparse(node)
+
+
+def test_nothing_asks_for_a_concrete_kind() -> None:
+    assert [f"{file}: {text}" for file, tree in trees() if not file.startswith((OWN_FILES, WITNESS))
+            for text in asks(tree)] == []
+
+
+def test_the_kinds_are_known() -> None:
+    assert {"Serial", "LinearDelta", "H4Linear", "H4TableAxis", "H4SpindleAxis", "OnSlides", "ActualKinematics"} == KINDS
+
+
+@pytest.mark.parametrize("text", [
+    "isinstance(kin, Serial)", "isinstance(machine.kinematics, LinearDelta | h4.H4Linear)", "hasattr(kinematics, 'rig')",
+    "type(machine.kinematics) is Serial", "getattr(kin, 'sense', 1.0)", "model.kind == 'serial'", "kin.slides_affine"])
+def test_an_asking_is_noticed(text: str) -> None:
+    assert list(asks(ast.parse(text)))
+
+
+def test_the_sample_has_no_more_lines_than_it_is_said_to_have() -> None:
+    assert len(Path(ROOT / "samples/my_machine.py").read_text().splitlines()) <= 40
