@@ -12,7 +12,7 @@ from machines.kinematics.base import Kinematics
 from machines.machine import Machine
 from postproc.base.options import Options
 from postproc.control.control import Control, Law
-from postproc.control.modes import OutputModes, output_modes
+from postproc.control.modes import OutputModes, Refused, output_modes
 from postproc.controllers.model import ControllerFile
 from postproc.job.pivots import control_kinematics
 from postproc.job.rounding import Rounding, decimals, helix_bound, rounding_bound
@@ -152,8 +152,9 @@ class Job:
 
 
 def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, setup: SetupFile,
-            options: Options) -> tuple[Job | None, list[Diagnostic]]:
-    """The job (its path has plain records, see `plain_records`), or None and why there is none."""
+            options: Options, refused: Refused = frozenset()) -> tuple[Job | None, list[Diagnostic]]:
+    """The job (its path has plain records, see `plain_records`), or None and why there is none; `refused`: output modes
+    that "auto" passes over."""
     toolpath, diagnostics = numbered(toolpath, setup, options.setup)
     toolpath, found = plain_records(toolpath, controller)
     diagnostics += found
@@ -195,7 +196,7 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
                       helix_planes=controller.arcs.helix_planes,
                       measured=0.0 if setup.output.tool_call else measured_length(toolpath, setup))
     diagnostics += _measured(control, controller, moves.axis, setup, options)
-    modes, found = output_modes(control, controller, setup, options, toolpath, decimals(control, controller))
+    modes, found = output_modes(control, controller, setup, options, toolpath, decimals(control, controller), refused)
     diagnostics += found
     job = Job(toolpath, machine, controller, setup, options, placement, control, moves, safe_space(moves, setup, placement),
               modes, errors, tuple(stated))

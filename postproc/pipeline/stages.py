@@ -22,6 +22,7 @@ from postproc.path.rewinds import drawing_of
 from postproc.path.singular import check_singular
 from postproc.path.travel import check_travel
 from postproc.pipeline.program_header import header_lines
+from postproc.pipeline.program_lines import with_cl_lines
 from postproc.pipeline.result import PostResult, shared_fields
 from postproc.pipeline.smoothed_stages import Left, written_moves
 from postproc.pipeline.stage_values import (
@@ -95,7 +96,7 @@ def _recorded(result: PostResult, made: Begun, found: Found) -> PostResult:
 def prepared(begun: Begun, progress: Progress | None) -> tuple[Begun | Prepared, Found]:
     """Records, tools, cycles, output modes and linking moves of the path, as the machine and the control take them."""
     options = begun.options
-    job, found = prepare(begun.toolpath, begun.machine, begun.controller, begun.setup, options)
+    job, found = prepare(begun.toolpath, begun.machine, begun.controller, begun.setup, options, begun.refused)
     found = [*found, *_bad_meshes(begun.setup, options.setup)]
     if job is None:
         return begun, found
@@ -225,6 +226,8 @@ def verified(made: Written, progress: Progress | None) -> tuple[Verified, Found]
     job, witness = made.job, None
     comparison, found = read_back(made.text, job, made.toolpath.file, progress,
                                   others={name: text.encode() for name, text in made.files.items()})
+    if not made.files:
+        found = with_cl_lines(found, made.text, made.program, made.controller)
     if comparison is not None and not has_errors(found):
         witness, more = second_witness(made.source, made.asked or made.setup, made.options, job, comparison)
         found = [*found, *more]
