@@ -16,7 +16,7 @@ import numpy as np
 from machines.kinematics.h4_platform import H4Platform
 from machines.kinematics.sliders import Legs, determinant
 from machines.kinematics.workspace import Workspace
-from machines.models import Problem, Vector
+from machines.models import KeyProblem, Vector
 from toolpaths.arrays import Floats
 from toolpaths.units import DEG
 
@@ -29,7 +29,7 @@ ALONG = 1e-9
 X = np.array([1.0, 0.0, 0.0])
 
 
-def reach_faults(legs: Legs, joints: Floats, space: Workspace, names: Sequence[str]) -> Iterator[Problem]:
+def reach_faults(legs: Legs, joints: Floats, space: Workspace, names: Sequence[str]) -> Iterator[KeyProblem]:
     """Corners out of reach, and a singular platform, of a machine that only translates."""
     place, _ = space.grid((*GRID[:3], 1))
     ends = place[:, None, :] + joints
@@ -43,7 +43,7 @@ def reach_faults(legs: Legs, joints: Floats, space: Workspace, names: Sequence[s
                                "smaller")
 
 
-def delta_faults(legs: Legs, joints: Floats, space: Workspace, across: Floats) -> Iterator[Problem]:
+def delta_faults(legs: Legs, joints: Floats, space: Workspace, across: Floats) -> Iterator[KeyProblem]:
     """Pairs of rods, their joints along `across` (3, 3), that leave the platform of a Delta a turn."""
     place, _ = space.grid((*GRID[:3], 1))
     ends = place[:, None, :] + joints
@@ -56,7 +56,7 @@ def delta_faults(legs: Legs, joints: Floats, space: Workspace, across: Floats) -
 
 
 def h4_faults(legs: Legs, joints: Floats, space: Workspace, rods: Sequence[Sequence[Vector]],
-              names: Sequence[str]) -> Iterator[Problem]:
+              names: Sequence[str]) -> Iterator[KeyProblem]:
     """Condition V-4 (V.4.2 for the H4a) and det Jx over the workspace."""
     direction = list(_direction_faults(rods, names))
     yield from direction
@@ -88,40 +88,40 @@ def v4(rods: Floats, legs: Legs, pairs: Sequence[int]) -> Floats:
     return result
 
 
-def _direction_faults(rods: Sequence[Sequence[Vector]], names: Sequence[str]) -> Iterator[Problem]:
+def _direction_faults(rods: Sequence[Sequence[Vector]], names: Sequence[str]) -> Iterator[KeyProblem]:
     for name, leg in zip(names, rods, strict=True):
         path = ("legs", name, "rods")
         if len(leg) == 2:
             b = np.subtract(leg[0], leg[1])
             if float(np.linalg.norm(np.cross(b, X))) > ALONG * max(float(np.linalg.norm(b)), 1e-300):
-                yield Problem("machine.mobility", path, f"the joints of pair {name} lie along {b.tolist()}, not along "
-                              "x: the platform's turn would not keep its direction (V.4.2)",
-                              "write rods = [[s, 0, 0], [-s, 0, 0]]")
+                yield KeyProblem("machine.mobility", path, f"the joints of pair {name} lie along {b.tolist()}, not along "
+                                 "x: the platform's turn would not keep its direction (V.4.2)",
+                                 "write rods = [[s, 0, 0], [-s, 0, 0]]")
             elif not b.any():
-                yield Problem("machine.mobility", path, f"both rods of pair {name} are in one place",
-                              "write rods = [[s, 0, 0], [-s, 0, 0]]")
+                yield KeyProblem("machine.mobility", path, f"both rods of pair {name} are in one place",
+                                 "write rods = [[s, 0, 0], [-s, 0, 0]]")
         elif leg and np.any(np.asarray(leg[0])[1:] != 0.0):
-            yield Problem("machine.geometry", path, f"{list(leg[0])}: the platform turns a shift off x, the carriage "
-                          "does not", "shift single rods along x only")
+            yield KeyProblem("machine.geometry", path, f"{list(leg[0])}: the platform turns a shift off x, the carriage "
+                             "does not", "shift single rods along x only")
 
 
-def _out_of_reach(legs: Legs, ends: Floats, place: Floats, tilt: Floats, names: Sequence[str]) -> Iterator[Problem]:
+def _out_of_reach(legs: Legs, ends: Floats, place: Floats, tilt: Floats, names: Sequence[str]) -> Iterator[KeyProblem]:
     _, half = legs.solve(ends)
     for k, name in enumerate(names[: len(legs.lengths)]):
         bad = np.flatnonzero(~(half[:, k] > 0.0))
         if len(bad):
-            yield Problem("machine.workspace", ("workspace",), f"rod {name} ({legs.lengths[k]:g} mm) does not reach "
-                          f"{_at(place, tilt, int(bad[0]))} and {len(bad) - 1} of {len(place)} other places examined",
-                          "make the workspace smaller or the rod longer")
+            yield KeyProblem("machine.workspace", ("workspace",), f"rod {name} ({legs.lengths[k]:g} mm) does not reach "
+                             f"{_at(place, tilt, int(bad[0]))} and {len(bad) - 1} of {len(place)} other places examined",
+                             "make the workspace smaller or the rod longer")
 
 
-def _sign_fault(code: str, what: str, value: Floats, place: Floats, tilt: Floats, hint: str) -> Iterator[Problem]:
+def _sign_fault(code: str, what: str, value: Floats, place: Floats, tilt: Floats, hint: str) -> Iterator[KeyProblem]:
     mostly = value if np.median(value) > 0.0 else -value
     worst, best = int(np.argmin(mostly)), int(np.argmax(mostly))
     if mostly[worst] < LEAST:
-        yield Problem(code, ("workspace",), f"{what} is {value[worst]:.3g} at {_at(place, tilt, worst)} and "
-                      f"{value[best]:.3g} at {_at(place, tilt, best)}; it must keep its sign, at least {LEAST:g} off 0",
-                      hint)
+        yield KeyProblem(code, ("workspace",), f"{what} is {value[worst]:.3g} at {_at(place, tilt, worst)} and "
+                         f"{value[best]:.3g} at {_at(place, tilt, best)}; it must keep its sign, at least {LEAST:g} off 0",
+                         hint)
 
 
 def _at(place: Floats, tilt: Floats, k: int) -> str:

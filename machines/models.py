@@ -31,7 +31,7 @@ Travel = Annotated[tuple[float, float] | Literal["unlimited"], AfterValidator(_u
 
 
 @dataclass(frozen=True)
-class Problem:
+class KeyProblem:
     """A fault that only several keys together show: stable code, path of the key at fault, message, hint."""
 
     code: str
@@ -59,7 +59,7 @@ class KinematicsModel(UserModel):
     def axis_names(self) -> tuple[str, ...]:
         """Axis letters, the order of q."""
 
-    def problems(self) -> Iterator[Problem]:
+    def problems(self) -> Iterator[KeyProblem]:
         """What makes the geometry unusable; paths within this table."""
         yield from ()
 
@@ -131,9 +131,9 @@ class MachineModel(UserModel):
     timing: TimingModel
     control: ControlModel | None = None
 
-    def problems(self) -> Iterator[Problem]:
+    def problems(self) -> Iterator[KeyProblem]:
         """Faults between tables; the geometry's first, for without it the rest means nothing."""
-        geometry = [Problem(p.code, ("kinematics", *p.path), p.message, p.hint) for p in self.kinematics.problems()]
+        geometry = [KeyProblem(p.code, ("kinematics", *p.path), p.message, p.hint) for p in self.kinematics.problems()]
         yield from geometry
         if geometry:
             return
@@ -142,14 +142,14 @@ class MachineModel(UserModel):
         yield from self._axis_problems(rotary)
         if self.retract_axis is not None and rotary.get(self.retract_axis, True):
             linear = ", ".join(name for name, turns in rotary.items() if not turns)
-            yield Problem("machine.retract-axis", ("retract_axis",),
-                          f"retract_axis = {self.retract_axis!r} is no linear axis of this machine",
-                          f"choose from {linear}")
+            yield KeyProblem("machine.retract-axis", ("retract_axis",),
+                             f"retract_axis = {self.retract_axis!r} is no linear axis of this machine",
+                             f"choose from {linear}")
         if self.control is not None:
             try:
                 self.control_kinematics()
             except ValueError as fault:
-                yield Problem("machine.control", ("control", "module"), str(fault))
+                yield KeyProblem("machine.control", ("control", "module"), str(fault))
 
     def control_kinematics(self) -> ControlKinematics | None:
         """What the control runs; None where joints are the program's axes.
@@ -161,17 +161,17 @@ class MachineModel(UserModel):
             return None
         return self.kinematics.control(self.control.module)
 
-    def _axis_problems(self, rotary: dict[str, bool]) -> Iterator[Problem]:
+    def _axis_problems(self, rotary: dict[str, bool]) -> Iterator[KeyProblem]:
         for name in rotary.keys() - self.axes.keys():
-            yield Problem("machine.axis-missing", ("axes",), f"axis {name} of the kinematics has no table",
-                          f"add [axes.{name}] with travel, velocity, acceleration, jerk, home")
+            yield KeyProblem("machine.axis-missing", ("axes",), f"axis {name} of the kinematics has no table",
+                             f"add [axes.{name}] with travel, velocity, acceleration, jerk, home")
         for name, axis in self.axes.items():
             if name not in rotary:
-                yield Problem("machine.axis-unknown", ("axes", name),
-                              f"[axes.{name}]: the kinematics has no axis {name}", f"its axes are {', '.join(rotary)}")
+                yield KeyProblem("machine.axis-unknown", ("axes", name),
+                                 f"[axes.{name}]: the kinematics has no axis {name}", f"its axes are {', '.join(rotary)}")
             elif axis.travel == "unlimited" and not rotary[name]:
-                yield Problem("machine.travel", ("axes", name, "travel"),
-                              f"linear axis {name} cannot have unlimited travel", "write travel = [lower, upper] in mm")
+                yield KeyProblem("machine.travel", ("axes", name, "travel"),
+                                 f"linear axis {name} cannot have unlimited travel", "write travel = [lower, upper] in mm")
             elif not axis.range[0] <= axis.home <= axis.range[1]:
-                yield Problem("machine.home", ("axes", name, "home"),
-                              f"home {axis.home:g} of {name} lies outside its travel {list(axis.range)}")
+                yield KeyProblem("machine.home", ("axes", name, "home"),
+                                 f"home {axis.home:g} of {name} lies outside its travel {list(axis.range)}")

@@ -14,7 +14,7 @@ from machines.kinematics.h4_platform import H4Platform
 from machines.kinematics.linear_delta import LinearDelta
 from machines.machine import ControlKinematics
 from machines.mobility import delta_faults, h4_faults, reach_faults
-from machines.models import NotNegative, Problem, Vector
+from machines.models import KeyProblem, NotNegative, Vector
 from machines.slider_models import SliderModel
 from machines.user_file import UserModel
 from toolpaths.units import DEG
@@ -44,7 +44,7 @@ class LinearDeltaModel(SliderModel):
         return LinearDelta(self.build_legs(), self.platform_joints(), self.workspace.build(), self.axis_names,
                            clearance=self.build_clearance())
 
-    def mobility_problems(self) -> Iterator[Problem]:
+    def mobility_problems(self) -> Iterator[KeyProblem]:
         """Workspace out of reach or singular; pairs of rods that leave the platform a turn."""
         yield from reach_faults(self.build_legs(), self.platform_joints(), self.workspace.build(), self.axis_names)
         pairs = [leg.rods for leg in self.legs.values()]
@@ -117,21 +117,21 @@ class H4LinearModel(SliderModel):
             return H4TableAxis(platform, self.gauge, sense, names, clearance=clearance)
         return H4SpindleAxis(platform, self.gauge, sense, names, clearance=clearance, pivot=np.array(self.rotary.pivot))
 
-    def _leg_problems(self) -> Iterator[Problem]:
+    def _leg_problems(self) -> Iterator[KeyProblem]:
         yield from super()._leg_problems()
         if sorted(len(leg.rods) for leg in self.legs.values()) != [1, 1, 2, 2]:
             count = ", ".join(f"{name} {len(leg.rods)}" for name, leg in self.legs.items())
-            yield Problem("machine.geometry", ("legs",), f"rods per leg: {count}; an H4a has two pairs and two single "
-                          "rods", "write rods = [[x, 0, 0], [-x, 0, 0]] for a pair, [[x, 0, 0]] for a single rod")
+            yield KeyProblem("machine.geometry", ("legs",), f"rods per leg: {count}; an H4a has two pairs and two single "
+                             "rods", "write rods = [[x, 0, 0], [-x, 0, 0]] for a pair, [[x, 0, 0]] for a single rod")
         low, high = self.workspace.tilt
         if not -90.0 < low <= 0.0 <= high < 90.0:
-            yield Problem("machine.geometry", ("workspace", "tilt"), f"{[low, high]} does not hold 0 or reaches "
-                          "90 degrees", "write tilt = [lower, upper] about the level platform, degrees")
+            yield KeyProblem("machine.geometry", ("workspace", "tilt"), f"{[low, high]} does not hold 0 or reaches "
+                             "90 degrees", "write tilt = [lower, upper] about the level platform, degrees")
         if self.rotary.carries == "part" and self.rotary.pivot != (0.0, 0.0, 0.0):
-            yield Problem("machine.geometry", ("rotary", "pivot"), "a table turns about z through the machine origin",
-                          "take pivot out and give the slides relative to the table's axis")
+            yield KeyProblem("machine.geometry", ("rotary", "pivot"), "a table turns about z through the machine origin",
+                             "take pivot out and give the slides relative to the table's axis")
 
-    def mobility_problems(self) -> Iterator[Problem]:
+    def mobility_problems(self) -> Iterator[KeyProblem]:
         """Workspace out of reach or singular; condition V-4."""
         legs, space = self.build_legs(), self.workspace.build()
         rods = [leg.rods for leg in self.legs.values()]

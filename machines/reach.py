@@ -14,7 +14,7 @@ from typing import Protocol
 
 import numpy as np
 
-from machines.kinematics.rig import Clearance, Rig
+from machines.kinematics.clearance_geometry import ClearanceGeometry, ClearanceSizes
 from machines.kinematics.sliders import Legs
 from machines.kinematics.workspace import Workspace
 from toolpaths.arrays import Bools, Floats
@@ -26,7 +26,7 @@ TOUCH = 1e-6
 """mm: rods whose ends are nearer share a joint"""
 
 
-Column = tuple[str, bool, Callable[[Rig], Floats]]
+MarginColumn = tuple[str, bool, Callable[[ClearanceGeometry], Floats]]
 """name, True for rad, margin (N,) of a rig"""
 
 
@@ -36,13 +36,13 @@ class SliderMachine(Protocol):
     @property
     def workspace(self) -> Workspace: ...
     @property
-    def clearance(self) -> Clearance | None: ...
+    def clearance(self) -> ClearanceSizes | None: ...
     @property
     def legs(self) -> Legs: ...
     @property
     def axis_names(self) -> tuple[str, ...]: ...
-    def rig(self, q: Floats, near: Floats | None = None) -> Rig: ...
-    def middle_rig(self) -> Rig: ...
+    def rig(self, q: Floats, near: Floats | None = None) -> ClearanceGeometry: ...
+    def middle_rig(self) -> ClearanceGeometry: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,38 +123,38 @@ class _Checks:
         self.letters = kinematics.axis_names
         self.middle = kinematics.middle_rig()
         self.legs = kinematics.legs
-        self.columns: list[Column] = list(self._workspace())
+        self.columns: list[MarginColumn] = list(self._workspace())
         if kinematics.clearance is not None:
             self.clearance = kinematics.clearance
             self.columns += [*self._stops(), *self._bars()]
         self.names = tuple(name for name, _, _ in self.columns)
         self.angular = np.array([angular for _, angular, _ in self.columns], dtype=np.bool_)
 
-    def values(self, rig: Rig) -> Floats:
+    def values(self, rig: ClearanceGeometry) -> Floats:
         """(N, M)"""
         return np.stack([column(rig) for _, _, column in self.columns], axis=1)
 
-    def _workspace(self) -> Iterator[Column]:
+    def _workspace(self) -> Iterator[MarginColumn]:
         for i, letter in enumerate("xyz"):
             yield f"workspace {letter}", False, partial(self._face, i)
         if self.space.tilt[0] < self.space.tilt[1]:
             yield "tilt", True, self._tilt
 
-    def _face(self, i: int, rig: Rig) -> Floats:
+    def _face(self, i: int, rig: ClearanceGeometry) -> Floats:
         return self.space.margins(rig.place)[:, i]
 
-    def _tilt(self, rig: Rig) -> Floats:
+    def _tilt(self, rig: ClearanceGeometry) -> Floats:
         low, high = self.space.tilt
         return np.minimum(rig.tilt - low, high - rig.tilt)
 
-    def _stops(self) -> Iterator[Column]:
+    def _stops(self) -> Iterator[MarginColumn]:
         stops = (("slide", self.clearance.carriage_angle), ("platform", self.clearance.platform_angle))
         for k, letter in enumerate(self.letters[: len(self.legs.lengths)]):
             for where, most in stops:
                 if most is not None:
                     yield f"joint {letter} at {where}", True, partial(self._swing, k, most, where == "platform")
 
-    def _swing(self, k: int, most: float, carried: bool, rig: Rig) -> Floats:
+    def _swing(self, k: int, most: float, carried: bool, rig: ClearanceGeometry) -> Floats:
         """The stop `most` less the rod's angle from its direction in the middle; `carried` by the tilting platform."""
         rod = _unit(rig.ends[:, k] - rig.carriages[:, k])
         middle = _unit(self.middle.ends[:, k] - self.middle.carriages[:, k])
@@ -162,7 +162,7 @@ class _Checks:
             rod, middle = _level(rod, rig.tilt), _level(middle, self.middle.tilt)
         return np.asarray(most - angle_between(rod, middle), dtype=np.float64)
 
-    def _bars(self) -> Iterator[Column]:
+    def _bars(self) -> Iterator[MarginColumn]:
         given = self.clearance
         if given.rod_radius is None:
             return
@@ -179,7 +179,8 @@ class _Checks:
                     yield (f"{name} - slide {letter}", False,
                            partial(self._gap, a, partial(self.rail, k), given.rod_radius + given.rail_radius))
 
-    def _gap(self, a: int, other: Callable[[Rig], tuple[Floats, Floats]], thick: float, rig: Rig) -> Floats:
+    def _gap(self, a: int, other: Callable[[ClearanceGeometry], tuple[Floats, Floats]], thick: float,
+             rig: ClearanceGeometry) -> Floats:
         return np.asarray(segment_distance(*self.rod(a, rig), *other(rig)) - thick, dtype=np.float64)
 
     @cached_property
@@ -192,17 +193,17 @@ class _Checks:
         ends = [self.rod(i, self.middle)[1] for i in (a, b)]
         return bool(np.linalg.norm(ends[0] - ends[1]) < TOUCH)
 
-    def rod(self, i: int, rig: Rig) -> tuple[Floats, Floats]:
+    def rod(self, i: int, rig: ClearanceGeometry) -> tuple[Floats, Floats]:
         """Both ends (N, 3) of rod i."""
         k, shift = int(self.clearance.leg[i]), self.clearance.shift[i]
         return rig.carriages[:, k] + shift, rig.ends[:, k] + shift
 
-    def spindle(self, rig: Rig) -> tuple[Floats, Floats]:
+    def spindle(self, rig: ClearanceGeometry) -> tuple[Floats, Floats]:
         """Both ends (N, 3) of the spindle."""
         low, high = self.clearance.spindle
         return rig.gauge + low * rig.axis, rig.gauge + high * rig.axis
 
-    def rail(self, k: int, rig: Rig) -> tuple[Floats, Floats]:
+    def rail(self, k: int, rig: ClearanceGeometry) -> tuple[Floats, Floats]:
         """Both ends (1, 3) of the rail of slide k."""
         given = self.clearance
         assert given.rail_offset is not None and given.rail_ends is not None

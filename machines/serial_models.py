@@ -12,7 +12,7 @@ from pydantic import Field, field_validator
 
 from machines.kinematics.serial import Joint, Serial
 from machines.machine import ControlKinematics
-from machines.models import KinematicsModel, Problem, Vector
+from machines.models import KeyProblem, KinematicsModel, Vector
 from machines.user_file import UserModel
 from toolpaths.arrays import Floats
 
@@ -79,49 +79,49 @@ class SerialModel(KinematicsModel):
         direction = np.array(axis.direction or _ISO_841[name], dtype=np.float64) * axis.positive
         return Joint(name, name in "ABC", direction, np.array(axis.point or (0.0, 0.0, 0.0)))
 
-    def problems(self) -> Iterator[Problem]:
+    def problems(self) -> Iterator[KeyProblem]:
         """Tables that do not fit the code, vectors that are not of length 1, axes that depend on each other."""
         tables = list(self._table_problems())
         yield from tables
         if not tables:
             yield from self._geometry_problems()
 
-    def _table_problems(self) -> Iterator[Problem]:
+    def _table_problems(self) -> Iterator[KeyProblem]:
         for name, axis in self.axes.items():
             path = ("axes", name)
             if name not in self.letters:
-                yield Problem("machine.axis-unknown", path, f"structure {self.structure!r} has no axis {name!r}",
-                              f"its axes are {', '.join(self.axis_names)}")
+                yield KeyProblem("machine.axis-unknown", path, f"structure {self.structure!r} has no axis {name!r}",
+                                 f"its axes are {', '.join(self.axis_names)}")
             elif name not in "ABC" and axis.point is not None:
-                yield Problem("machine.geometry", (*path, "point"), f"linear axis {name} has no point", "take it out")
+                yield KeyProblem("machine.geometry", (*path, "point"), f"linear axis {name} has no point", "take it out")
             if axis.direction is not None:
                 yield from _unit_problems((*path, "direction"), axis.direction)
         for name in self.letters:
             if name in "ABC" and (name not in self.axes or self.axes[name].point is None):
-                yield Problem("machine.geometry", ("axes", name), f"rotary axis {name} has no point",
-                              f"add [kinematics.axes.{name}] point = [x, y, z], a point of its line in mm")
+                yield KeyProblem("machine.geometry", ("axes", name), f"rotary axis {name} has no point",
+                                 f"add [kinematics.axes.{name}] point = [x, y, z], a point of its line in mm")
         yield from _unit_problems(("tool_axis",), self.tool_axis)
 
-    def _geometry_problems(self) -> Iterator[Problem]:
+    def _geometry_problems(self) -> Iterator[KeyProblem]:
         joints = {name: self._joint(name) for name in self.letters}
         linear = [j.direction for j in joints.values() if not j.rotary]
         turns = [j for j in joints.values() if j.rotary]
         volume = abs(float(np.linalg.det(np.array(linear))))
         if volume < INDEPENDENT:
-            yield Problem("machine.geometry", ("axes",), f"the linear axes span no space: volume of their directions "
-                          f"{volume:.2g}, at least {INDEPENDENT:g}", "check their directions")
+            yield KeyProblem("machine.geometry", ("axes",), f"the linear axes span no space: volume of their directions "
+                             f"{volume:.2g}, at least {INDEPENDENT:g}", "check their directions")
         if len(turns) == 2:
             yield from self._turn_problems(turns[0], turns[1])
 
-    def _turn_problems(self, first: Joint, second: Joint) -> Iterator[Problem]:
+    def _turn_problems(self, first: Joint, second: Joint) -> Iterator[KeyProblem]:
         path = ("axes", second.name)
         if _sine(first.direction, second.direction) < INDEPENDENT:
-            yield Problem("machine.geometry", path, f"rotary axes {first.name} and {second.name} are parallel",
-                          "check their directions")
+            yield KeyProblem("machine.geometry", path, f"rotary axes {first.name} and {second.name} are parallel",
+                             "check their directions")
         elif _sine(second.direction, np.array(self.tool_axis)) < INDEPENDENT:
-            yield Problem("machine.geometry", path,
-                          f"rotary axis {second.name} is parallel to the tool and only turns it about itself",
-                          "check the structure: it lists the axes from the workpiece to the tool")
+            yield KeyProblem("machine.geometry", path,
+                             f"rotary axis {second.name} is parallel to the tool and only turns it about itself",
+                             "check the structure: it lists the axes from the workpiece to the tool")
 
     def control(self, module: str) -> ControlKinematics:
         """Pins of LinuxCNC's table-table modules (xyzac-trt-kins, xyzbc-trt-kins) from the lines of both rotary axes.
@@ -179,12 +179,12 @@ def _letter(token: str, on_part_side: bool, code: str) -> str:
     return found[1]
 
 
-def _unit_problems(path: tuple[str, ...], vector: Vector) -> Iterator[Problem]:
+def _unit_problems(path: tuple[str, ...], vector: Vector) -> Iterator[KeyProblem]:
     length = float(np.linalg.norm(vector))
     if abs(length - 1.0) > UNIT:
         near = ", ".join(f"{v / length:.9g}" for v in vector) if length > 0 else ""
-        yield Problem("machine.geometry", path, f"{list(vector)} has length {length:.6g}, not 1",
-                      f"write [{near}]" if near else "write the direction as a unit vector")
+        yield KeyProblem("machine.geometry", path, f"{list(vector)} has length {length:.6g}, not 1",
+                         f"write [{near}]" if near else "write the direction as a unit vector")
 
 
 def _sine(a: Floats, b: Floats) -> float:

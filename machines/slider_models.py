@@ -9,10 +9,10 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import AfterValidator
 
-from machines.kinematics.rig import Clearance
+from machines.kinematics.clearance_geometry import ClearanceSizes
 from machines.kinematics.sliders import Legs
 from machines.kinematics.workspace import Workspace
-from machines.models import KinematicsModel, NotNegative, Positive, Problem, Vector
+from machines.models import KeyProblem, KinematicsModel, NotNegative, Positive, Vector
 from machines.user_file import UserModel
 from toolpaths.arrays import Floats
 from toolpaths.units import DEG
@@ -27,7 +27,7 @@ def _upward(span: tuple[float, float]) -> tuple[float, float]:
     return span
 
 
-Span = Annotated[tuple[float, float], AfterValidator(_upward)]
+Interval = Annotated[tuple[float, float], AfterValidator(_upward)]
 
 
 class LegModel(UserModel):
@@ -47,16 +47,16 @@ class LegModel(UserModel):
     """each rod's place beside the leg's line, the same at both ends: two for a pair of parallel rods"""
     rail_offset: Vector = (0.0, 0.0, 0.0)
     """from the line of the carriage joint to the middle of the rail"""
-    rail_ends: Span | None = None
+    rail_ends: Interval | None = None
     """q of the rail's ends; without it the rail is left out of the clearances"""
 
 
 class WorkspaceModel(UserModel):
     """`[kinematics.workspace]`: box of the platform's reference point in the machine frame, mm; tilt in degrees."""
 
-    x: Span
-    y: Span
-    z: Span
+    x: Interval
+    y: Interval
+    z: Interval
     tilt: tuple[float, float] = (0.0, 0.0)
     """range of the platform's tilt about x"""
 
@@ -71,7 +71,7 @@ class ClearanceModel(UserModel):
 
     rod_radius: Positive | None = None
     spindle_radius: Positive | None = None
-    spindle: Span = (0.0, 1.0)
+    spindle: Interval = (0.0, 1.0)
     """lower and upper end of the spindle above the gauge point along the tool axis"""
     rail_radius: NotNegative | None = None
     carriage_angle: Positive | None = None
@@ -101,12 +101,12 @@ class SliderModel(KinematicsModel):
         """(K, 3) mm"""
         return np.array([leg.joint for leg in self.legs.values()])
 
-    def build_clearance(self) -> Clearance:
+    def build_clearance(self) -> ClearanceSizes:
         """In mm and rad."""
         legs, given = list(self.legs.values()), self.clearance
         shifts = [(k, shift) for k, leg in enumerate(legs) for shift in leg.rods or ((0.0, 0.0, 0.0),)]
         rails = all(leg.rail_ends is not None for leg in legs) and given.rail_radius is not None
-        return Clearance(
+        return ClearanceSizes(
             leg=np.array([k for k, _ in shifts]), shift=np.array([s for _, s in shifts]),
             rod_radius=given.rod_radius,
             spindle_radius=given.spindle_radius, spindle=given.spindle,
@@ -120,31 +120,31 @@ class SliderModel(KinematicsModel):
     def leg_count(self) -> int:
         """Legs that this family has."""
 
-    def problems(self) -> Iterator[Problem]:
+    def problems(self) -> Iterator[KeyProblem]:
         """Vectors that are no directions, a workspace out of reach, a platform that moves otherwise than the family."""
         found = list(self._leg_problems())
         yield from found
         if not found:
             yield from self.mobility_problems()
 
-    def _leg_problems(self) -> Iterator[Problem]:
+    def _leg_problems(self) -> Iterator[KeyProblem]:
         if len(self.legs) != self.leg_count:
-            yield Problem("machine.geometry", ("legs",),
-                          f"{len(self.legs)} legs; family {self.family!r} has {self.leg_count}",
-                          "write one [kinematics.legs.LETTER] table per leg")
+            yield KeyProblem("machine.geometry", ("legs",),
+                             f"{len(self.legs)} legs; family {self.family!r} has {self.leg_count}",
+                             "write one [kinematics.legs.LETTER] table per leg")
         for name, leg in self.legs.items():
             length = float(np.linalg.norm(leg.direction))
             if abs(length - 1.0) > UNIT:
-                yield Problem("machine.geometry", ("legs", name, "direction"),
-                              f"{list(leg.direction)} has length {length:.6g}, not 1", "write a unit vector")
+                yield KeyProblem("machine.geometry", ("legs", name, "direction"),
+                                 f"{list(leg.direction)} has length {length:.6g}, not 1", "write a unit vector")
             if len(name) != 1 or name not in "XYZUVWPQR":
-                yield Problem("machine.axis-letter", ("legs", name), f"{name!r} is no letter of a linear axis",
-                              "choose from X Y Z U V W P Q R")
+                yield KeyProblem("machine.axis-letter", ("legs", name), f"{name!r} is no letter of a linear axis",
+                                 "choose from X Y Z U V W P Q R")
             if len(leg.rods) > 2:
-                yield Problem("machine.geometry", ("legs", name, "rods"), f"{len(leg.rods)} rods; a leg has one or two")
+                yield KeyProblem("machine.geometry", ("legs", name, "rods"), f"{len(leg.rods)} rods; a leg has one or two")
 
     @abstractmethod
-    def mobility_problems(self) -> Iterator[Problem]:
+    def mobility_problems(self) -> Iterator[KeyProblem]:
         """Faults that show over the workspace."""
 
 

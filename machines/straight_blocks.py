@@ -1,6 +1,6 @@
 """Tip and tool axis along straight joint moves, with a bound of their third derivative over the whole move.
 
-Each family of machines goes the way from joints to the tool once with jets instead of numbers (`kinematics/jets.py`).
+Each family of machines goes the way from joints to the tool once with jets instead of numbers (`kinematics/taylor.py`).
 Serial: the chain of axes. Parallel: the platform follows from the rods' fixed lengths, differentiated three times; that
 Jx stays regular all along the move is proved on the way, and where it cannot be, there is no bound.
 """
@@ -17,10 +17,10 @@ from machines.kinematics import columns
 from machines.kinematics.base import Kinematics
 from machines.kinematics.h4_axes import H4SpindleAxis, H4TableAxis
 from machines.kinematics.h4_linear import H4Linear
-from machines.kinematics.jets import ZERO, Angle, Jet, straight
 from machines.kinematics.linear_delta import LinearDelta
 from machines.kinematics.serial import Serial
 from machines.kinematics.sliders import Legs, solved
+from machines.kinematics.taylor import ZERO, TaylorAngle, TaylorVector, straight
 from toolpaths.arrays import Floats
 
 _Z = (0.0, 0.0, 1.0)
@@ -31,7 +31,7 @@ UNBOUNDED = 1e30
 """a third derivative for which no bound was found"""
 
 
-def pose_jets(kin: Kinematics, q0: Floats, q1: Floats) -> tuple[Jet, Jet]:
+def pose_jets(kin: Kinematics, q0: Floats, q1: Floats) -> tuple[TaylorVector, TaylorVector]:
     """(tip in mm, tool axis) in the table frame along the straight moves q0 -> q1 (N, J).
 
     Parallel machines are taken in their home mode. The third derivative is UNBOUNDED where the platform cannot
@@ -47,7 +47,7 @@ def pose_jets(kin: Kinematics, q0: Floats, q1: Floats) -> tuple[Jet, Jet]:
     raise TypeError(f"{type(kin).__name__} has no bound for straight joint moves")
 
 
-def _by_parts(kin: LinearDelta | H4Linear, q0: Floats, q1: Floats) -> tuple[Jet, Jet]:
+def _by_parts(kin: LinearDelta | H4Linear, q0: Floats, q1: Floats) -> tuple[TaylorVector, TaylorVector]:
     """Where a whole move is too long for a bound, the largest of the bounds of its parts, each over a shorter time."""
     whole = _platform(kin, q0, q1)
     third = [np.array(np.broadcast_to(jet.third, len(q0)), dtype=np.float64) for jet in whole]
@@ -62,16 +62,16 @@ def _by_parts(kin: LinearDelta | H4Linear, q0: Floats, q1: Floats) -> tuple[Jet,
     return tip, axis
 
 
-def _platform(kin: LinearDelta | H4Linear, q0: Floats, q1: Floats) -> tuple[Jet, Jet]:
+def _platform(kin: LinearDelta | H4Linear, q0: Floats, q1: Floats) -> tuple[TaylorVector, TaylorVector]:
     return _delta(kin, q0, q1) if isinstance(kin, LinearDelta) else _h4(kin, q0, q1)
 
 
-def _serial(kin: Serial, q0: Floats, q1: Floats) -> tuple[Jet, Jet]:
+def _serial(kin: Serial, q0: Floats, q1: Floats) -> tuple[TaylorVector, TaylorVector]:
     """The product of exponentials (see `Serial`), axis by axis from the tool to the part."""
-    tip, axis = Jet(columns.of_one(-kin.tool_length * kin.tool_axis)), Jet(columns.of_one(kin.tool_axis))
+    tip, axis = TaylorVector(columns.of_one(-kin.tool_length * kin.tool_axis)), TaylorVector(columns.of_one(kin.tool_axis))
     for joint in reversed(kin.chain):
         j = kin.axis_names.index(joint.name)
-        by, direction = Angle(0.5 * (q0[:, j] + q1[:, j]), q1[:, j] - q0[:, j]), columns.of_one(joint.direction)
+        by, direction = TaylorAngle(0.5 * (q0[:, j] + q1[:, j]), q1[:, j] - q0[:, j]), columns.of_one(joint.direction)
         if joint.rotary:
             tip, axis = tip.turned(direction, columns.of_one(joint.point), by), axis.turned(direction, ZERO, by)
         else:
@@ -79,30 +79,31 @@ def _serial(kin: Serial, q0: Floats, q1: Floats) -> tuple[Jet, Jet]:
     return tip, axis
 
 
-def _delta(kin: LinearDelta, q0: Floats, q1: Floats) -> tuple[Jet, Jet]:
+def _delta(kin: LinearDelta, q0: Floats, q1: Floats) -> tuple[TaylorVector, TaylorVector]:
     middle, step = 0.5 * (q0 + q1), q1 - q0
     tip, _ = kin.forward(middle)
     rods = kin.rods(middle, tip)
     place, _ = _Loop(rods, np.zeros_like(rods), kin.legs, step, False).jets(
         tip + kin.tool_length * np.array(_Z), np.zeros(len(tip)))
-    return place - Jet(columns.of_one(kin.tool_length * np.array(_Z))), Jet(list(_Z))
+    return place - TaylorVector(columns.of_one(kin.tool_length * np.array(_Z))), TaylorVector(list(_Z))
 
 
-def _h4(kin: H4Linear, q0: Floats, q1: Floats) -> tuple[Jet, Jet]:
+def _h4(kin: H4Linear, q0: Floats, q1: Floats) -> tuple[TaylorVector, TaylorVector]:
     middle, step = 0.5 * (q0 + q1), q1 - q0
     p = kin.solve_platform(middle)
     arms = kin.platform.ends(p) - p[:, None, :3]
     rods = p[:, None, :3] + arms - kin.legs.carriages(middle[:, :4])
     place, tilt = _Loop(rods, arms, kin.legs, step[:, :4], True).jets(p[:, :3], p[:, 3])
-    turn, down = Angle(middle[:, 4], step[:, 4]), -(kin.gauge + kin.tool_length)
+    turn, down = TaylorAngle(middle[:, 4], step[:, 4]), -(kin.gauge + kin.tool_length)
     if isinstance(kin, H4TableAxis):
         about = (0.0, 0.0, kin.sense)
-        tip = (Jet((0.0, 0.0, down)).turned((1.0, 0.0, 0.0), ZERO, tilt) + place).turned(about, ZERO, turn)
-        return tip, Jet(list(_Z)).turned((1.0, 0.0, 0.0), ZERO, tilt).turned(about, ZERO, turn)
+        tip = (TaylorVector((0.0, 0.0, down)).turned((1.0, 0.0, 0.0), ZERO, tilt) + place).turned(about, ZERO, turn)
+        return tip, TaylorVector(list(_Z)).turned((1.0, 0.0, 0.0), ZERO, tilt).turned(about, ZERO, turn)
     if not isinstance(kin, H4SpindleAxis):
         raise TypeError(f"{type(kin).__name__} has no bound for straight joint moves")
-    axis = Jet(list(_Z)).turned((0.0, kin.sense, 0.0), ZERO, turn)
-    reach = Jet((0.0, 0.0, down)).turned((0.0, kin.sense, 0.0), ZERO, turn) + Jet(columns.of_one(kin.pivot))
+    axis = TaylorVector(list(_Z)).turned((0.0, kin.sense, 0.0), ZERO, turn)
+    reach = TaylorVector((0.0, 0.0, down)).turned((0.0, kin.sense, 0.0), ZERO,
+                                                  turn) + TaylorVector(columns.of_one(kin.pivot))
     return (reach.turned((1.0, 0.0, 0.0), ZERO, tilt) + place, axis.turned((1.0, 0.0, 0.0), ZERO, tilt))
 
 
@@ -134,15 +135,15 @@ class _Loop:
     step: Floats
     tilts: bool
 
-    def jets(self, place: Floats, tilt: Floats) -> tuple[Jet, Angle]:
+    def jets(self, place: Floats, tilt: Floats) -> tuple[TaylorVector, TaylorAngle]:
         """(C, tilt) along the move from their values (N, 3), (N,) in the middle."""
         first, rate, rod_rates = self._first()
         second = self._solved(-np.einsum("nki,nki->nk", rod_rates, rod_rates)
                               + rate[:, None] ** 2 * np.einsum("nki,nki->nk", self.rods, self._across))
         third = self._third(first, rate, rod_rates)
         c2, t2 = second[:, :3], second[:, 3] / self._lever if self.tilts else np.zeros(len(tilt))
-        return (Jet(_columns(place), _columns(first), _columns(c2), third),
-                Angle(tilt, rate, t2, third / self._lever if self.tilts else 0.0))
+        return (TaylorVector(_columns(place), _columns(first), _columns(c2), third),
+                TaylorAngle(tilt, rate, t2, third / self._lever if self.tilts else 0.0))
 
     @cached_property
     def _across(self) -> Floats:
@@ -227,7 +228,7 @@ def _columns(rows: Floats) -> list[Floats | float]:
     return list(rows.T)
 
 
-def tip_rule_jets(kin: Kinematics, q0: Floats, q1: Floats, tip0: Floats, tip1: Floats) -> tuple[Jet, Jet]:
+def tip_rule_jets(kin: Kinematics, q0: Floats, q1: Floats, tip0: Floats, tip1: Floats) -> tuple[TaylorVector, TaylorVector]:
     """(tip, tool axis) where the control runs the kinematics: tips straight, rotary joints even.
 
     The slides then follow from the tip; of the joints only the rotary ones count.
@@ -235,7 +236,7 @@ def tip_rule_jets(kin: Kinematics, q0: Floats, q1: Floats, tip0: Floats, tip1: F
     tip = straight(_columns(tip0), _columns(tip1))
     if not any(kin.rotary):
         _, axis = kin.forward(q0)
-        return tip, Jet(_columns(axis))
+        return tip, TaylorVector(_columns(axis))
     return tip, pose_jets(kin, q0, q1)[1]
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 
-Path = tuple[str | int, ...]
+KeyPath = tuple[str | int, ...]
 """keys and array indices from the root, as pydantic's error locations"""
 
 _BLANK = re.compile(r"(?:[ \t\r\n]|#[^\n]*)*")
@@ -16,7 +16,7 @@ _STRING = re.compile(r'"{3}(?:[^\\]|\\.)*?"{3,5}|\'{3}.*?\'{3,5}|"(?:[^"\\]|\\.)
 _SCALAR = re.compile(r"[^,\]}\n#]+")
 
 
-def key_lines(text: str) -> dict[Path, int]:
+def key_lines(text: str) -> dict[KeyPath, int]:
     """1-based line of every table, key and array element of a valid TOML text."""
     return _Scanner(text).scan()
 
@@ -25,13 +25,13 @@ class _Scanner:
     def __init__(self, text: str):
         self.text = text
         self.at = 0
-        self.lines: dict[Path, int] = {}
-        self.elements: dict[Path, int] = {}
+        self.lines: dict[KeyPath, int] = {}
+        self.elements: dict[KeyPath, int] = {}
         self._line = 1
         self._counted = 0
 
-    def scan(self) -> dict[Path, int]:
-        table: Path = ()
+    def scan(self) -> dict[KeyPath, int]:
+        table: KeyPath = ()
         self._blank()
         while self.at < len(self.text):
             if self.text[self.at] == "[":
@@ -46,7 +46,7 @@ class _Scanner:
         self._counted = self.at
         return self._line
 
-    def _mark(self, path: Path) -> None:
+    def _mark(self, path: KeyPath) -> None:
         line = self._line_here()
         for n in range(1, len(path) + 1):
             self.lines.setdefault(path[:n], line)
@@ -66,13 +66,13 @@ class _Scanner:
             self.at += 1
         return tuple(parts)
 
-    def _header(self) -> Path:
+    def _header(self) -> KeyPath:
         """`[a.b]` or `[[a.b]]`: the path of the table that follows; arrays of tables get the index in."""
         double = self.text.startswith("[[", self.at)
         self.at += 2 if double else 1
         keys = self._key()
         self.at += 2 if double else 1
-        path: Path = ()
+        path: KeyPath = ()
         for key in keys[:-1]:
             path = self._into_last((*path, key))
         path = (*path, keys[-1])
@@ -82,10 +82,10 @@ class _Scanner:
         self._mark(path)
         return path
 
-    def _into_last(self, path: Path) -> Path:
+    def _into_last(self, path: KeyPath) -> KeyPath:
         return (*path, self.elements[path]) if path in self.elements else path
 
-    def _pair(self, table: Path) -> None:
+    def _pair(self, table: KeyPath) -> None:
         start = self.at
         path = (*table, *self._key())
         end, self.at = self.at, start
@@ -93,7 +93,7 @@ class _Scanner:
         self.at = end + 1  # the equals sign
         self._value(path)
 
-    def _value(self, path: Path) -> None:
+    def _value(self, path: KeyPath) -> None:
         self._blank()
         if self.text[self.at] == "[":
             self._items(path, "]")
@@ -104,7 +104,7 @@ class _Scanner:
             assert found
             self.at = found.end()
 
-    def _items(self, path: Path, close: str) -> None:
+    def _items(self, path: KeyPath, close: str) -> None:
         """An array or inline table, from its opening bracket to behind its closing one."""
         self.at += 1
         index = 0

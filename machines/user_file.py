@@ -17,7 +17,7 @@ from typing import Any, TypeVar, Union, get_args, get_origin
 from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 from pydantic_core import ErrorDetails
 
-from machines.toml_lines import Path, key_lines
+from machines.toml_lines import KeyPath, key_lines
 from machines.value_words import POINT, advice, allowed, decimal_comma
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.input_files import advice as remedy
@@ -38,7 +38,7 @@ _HOW = "write key = value, text in quotes, each [table] and each key on a line o
 
 
 @dataclass(frozen=True)
-class Origin:
+class ValueSource:
     """The file and 1-based line that a value was written in."""
 
     file: str
@@ -53,16 +53,16 @@ class UserFile:
     """built-in name or file stem"""
     file: str
     values: Values
-    origins: Mapping[Path, Origin]
+    origins: Mapping[KeyPath, ValueSource]
     """by path of keys, e.g. ("axes", "X", "travel")"""
 
-    def origin(self, path: Sequence[str | int]) -> Origin:
+    def origin(self, path: Sequence[str | int]) -> ValueSource:
         """Where the value at `path` was written, or the nearest table around it."""
         for n in range(len(path), 0, -1):
             found = self.origins.get(tuple(path[:n]))
             if found:
                 return found
-        return Origin(self.file, 1)
+        return ValueSource(self.file, 1)
 
     def problem(self, code: str, path: Sequence[str | int], message: str, hint: str = "") -> Diagnostic:
         """An ERROR at the line where `path` was written."""
@@ -166,7 +166,7 @@ def _read(source: str, builtin: Mapping[str, FilePath], kind: str, wanted_by: Us
         why = "its lists or tables are nested too deeply" if isinstance(fault, RecursionError) else str(fault).split(";")[0]
         return None, [error("file.syntax", f"not valid TOML: {why}", file=str(path),
                             hint=_HOW)]
-    origins = {p: Origin(str(path), line) for p, line in key_lines(text).items()}
+    origins = {p: ValueSource(str(path), line) for p, line in key_lines(text).items()}
     return _with_base(UserFile(name, str(path), values, origins), builtin, kind, (*above, key))
 
 
@@ -219,8 +219,8 @@ def _with_base(file: UserFile, builtin: Mapping[str, FilePath], kind: str,
     return UserFile(file.name, file.file, values, origins), diagnostics
 
 
-def _merge(under: Values, over: Values, under_at: Mapping[Path, Origin], over_at: Mapping[Path, Origin],
-           prefix: Path) -> tuple[Values, dict[Path, Origin]]:
+def _merge(under: Values, over: Values, under_at: Mapping[KeyPath, ValueSource], over_at: Mapping[KeyPath, ValueSource],
+           prefix: KeyPath) -> tuple[Values, dict[KeyPath, ValueSource]]:
     """Tables merged key by key, all else replaced, with the origins of what is kept."""
     values = dict(under)
     origins = dict(under_at)
@@ -246,7 +246,7 @@ _RANGE = ("greater_than", "less_than", "too_short", "too_long", "multiple_of", "
 
 @dataclass(frozen=True)
 class _Fault:
-    path: Path
+    path: KeyPath
     """as it stands in the file"""
     kind: str
     """pydantic's name"""
@@ -258,7 +258,7 @@ class _Fault:
 
 def _faults(values: Values, model: type[BaseModel], found: ValidationError) -> list[_Fault]:
     """One fault per key: the words of a union's members are joined, a missing key that is only misspelt left out."""
-    by_key: dict[Path, _Fault] = {}
+    by_key: dict[KeyPath, _Fault] = {}
     for detail in found.errors(include_url=False):
         path, kind = _in_file(values, detail), detail["type"]
         context = detail.get("ctx", {})
@@ -275,7 +275,7 @@ def _faults(values: Values, model: type[BaseModel], found: ValidationError) -> l
     return [f for f in by_key.values() if f.path not in around and not (f.kind == "missing" and f.path in misspelt)]
 
 
-def _in_file(values: Values, detail: ErrorDetails) -> Path:
+def _in_file(values: Values, detail: ErrorDetails) -> KeyPath:
     """The location of a fault without the union members that pydantic names in it."""
     path: list[str | int] = []
     at: Any = values
@@ -287,7 +287,7 @@ def _in_file(values: Values, detail: ErrorDetails) -> Path:
     return (*path, detail["loc"][-1]) if detail["type"] == "missing" else tuple(path)
 
 
-def _nearest_key(path: Path, model: type[BaseModel]) -> str | None:
+def _nearest_key(path: KeyPath, model: type[BaseModel]) -> str | None:
     return _nearest(str(path[-1]), _known_keys(model, path[:-1]))
 
 

@@ -14,7 +14,7 @@ QUICK = (
     "tests/machines/kinematics/test_delta_linear.py",
     "tests/machines/geometric_error/test_geometric_error_curves.py",
     "tests/machines/geometric_error/test_geometric_error_frames.py",
-    "tests/machines/geometric_error/test_geometric_error_hostile.py",
+    "tests/machines/geometric_error/test_geometric_error_bad_files.py",
     "tests/machines/geometric_error/test_geometric_error_lost_motion.py",
     "tests/machines/geometric_error/test_geometric_error_maps_independent.py",
     "tests/machines/geometric_error/test_geometric_error_readings.py",

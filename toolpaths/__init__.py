@@ -11,11 +11,11 @@ if TYPE_CHECKING:
     from toolpaths.toolpath import Toolpath
 
 __all__ = ["read", "read_bytes", "write"]
-Progress = Callable[[int, int], None]
+ReadProgress = Callable[[int, int], None]
 
 
 def read(path: str | Path, *, units: str | None = None, dialect: str | None = None, allow_unknown: Iterable[str] = (),
-         progress: Progress | None = None) -> tuple[Toolpath, list[Diagnostic]]:
+         progress: ReadProgress | None = None) -> tuple[Toolpath, list[Diagnostic]]:
     """The toolpath of a CL file, and what reading it showed; see `toolpaths.cl.read.read_bytes` for the options."""
     from toolpaths.cl.read import read_file
     result = read_file(path, units=units, dialect=dialect, allow_unknown=allow_unknown, progress=progress)

@@ -46,7 +46,7 @@ class FeedMode(IntEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Records:
+class RecordCounts:
     """Records of a CL file: all, executed, neutral (nothing for the machine), dropped (then the file has an error)."""
 
     total: int = 0
@@ -240,7 +240,7 @@ class Toolpath:
     faults: tuple[Diagnostic, ...] = ()
     """errors that reading met: what they stand for is missing, so that nothing may be written from the path"""
     spin: Floats | None = None
-    records: Records = field(default_factory=Records)
+    records: RecordCounts = field(default_factory=RecordCounts)
     """what became of the records of the file"""
     source: ClSource | None = field(default=None, init=False, repr=False, compare=False)
     """where the path is exactly what reading a file gave: a path that is made otherwise, or changed, has none"""

@@ -19,7 +19,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import toolpaths.leftovers as leftovers
+import toolpaths.interrupted_runs as leftovers
 from toolpaths.diagnostics import Diagnostic, DiagnosticError, error
 
 READ_ONLY = "it is read-only"

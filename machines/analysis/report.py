@@ -11,7 +11,7 @@ from machines.analysis.box import Box, reachable_box
 from machines.analysis.directions import tilts
 from machines.analysis.transmission import (
     Measure,
-    Worst,
+    WorstValue,
     condition_number,
     force_transmission,
     lever,
@@ -57,7 +57,7 @@ def _transmission(kinematics: LinearDelta | H4Linear) -> dict[str, Any]:
     return found
 
 
-def _point(value: Worst) -> dict[str, Any]:
+def _point(value: WorstValue) -> dict[str, Any]:
     return {"worst": value.value, "least_on_grid": value.least, "at_mm": list(value.place),
             "at_tilt_deg": value.tilt / DEG}
 

@@ -17,7 +17,7 @@ from machines.kinematics.sliders import Legs, platform_rates
 from machines.kinematics.workspace import Workspace
 from toolpaths.arrays import Floats
 
-SliderMachine = LinearDelta | H4Linear
+SliderKinematics = LinearDelta | H4Linear
 Measure = Callable[[Floats, Floats], Floats]
 """(N,) of places (N, 3) and tilts (N,) of the workspace"""
 ROUNDS = 14
@@ -25,7 +25,7 @@ ROUNDS = 14
 
 
 @dataclass(frozen=True)
-class Worst:
+class WorstValue:
     """The largest value over a box, the place (mm) and tilt (rad) where it is, and the least seen on the grid."""
 
     value: float
@@ -34,19 +34,19 @@ class Worst:
     least: float
 
 
-def rates(kinematics: SliderMachine, place: Floats, tilt: Floats) -> Floats:
+def rates(kinematics: SliderKinematics, place: Floats, tilt: Floats) -> Floats:
     """J (N, K, K) at places (N, 3) and tilts (N,) of the workspace: platform (mm, lever x turn) per slide (mm)."""
     jx, along = _jx(kinematics, place, tilt)
     return platform_rates(jx, along)
 
 
-def lever(kinematics: SliderMachine) -> float:
+def lever(kinematics: SliderKinematics) -> float:
     """mm by which the platform's turn counts: half the largest distance of two platform joints (d in the thesis)."""
     joints = kinematics.platform.joints if isinstance(kinematics, H4Linear) else kinematics.platform
     return 0.5 * float(np.linalg.norm(joints[:, None] - joints[None], axis=2).max())
 
 
-def condition_number(kinematics: SliderMachine, place: Floats, tilt: Floats) -> Floats:
+def condition_number(kinematics: SliderKinematics, place: Floats, tilt: Floats) -> Floats:
     """cond_2 J (N,), II-24; inf where the platform is singular."""
     jacobian = rates(kinematics, place, tilt)
     bad = ~np.isfinite(np.sum(jacobian, axis=(1, 2)))
@@ -55,7 +55,7 @@ def condition_number(kinematics: SliderMachine, place: Floats, tilt: Floats) -> 
     return np.nan_to_num(values[:, 0] / least, nan=np.inf)
 
 
-def speed_transmission(kinematics: SliderMachine, place: Floats, tilt: Floats) -> Floats:
+def speed_transmission(kinematics: SliderKinematics, place: Floats, tilt: Floats) -> Floats:
     """eta_v (N,): fastest slide per unit speed of the platform in any direction: largest row norm of J^-1 (III.6.2).
 
     It is eta_a as well, the slide acceleration per acceleration of the platform.
@@ -64,7 +64,7 @@ def speed_transmission(kinematics: SliderMachine, place: Floats, tilt: Floats) -
     return np.asarray(np.linalg.norm(inverse, axis=2).max(axis=1), dtype=np.float64)
 
 
-def force_transmission(kinematics: SliderMachine, place: Floats, tilt: Floats) -> Floats:
+def force_transmission(kinematics: SliderKinematics, place: Floats, tilt: Floats) -> Floats:
     """eta_f (N,): largest slide force per unit force on the platform in any direction, the largest column norm of J."""
     jacobian = rates(kinematics, place, tilt)
     return np.asarray(np.linalg.norm(jacobian, axis=1).max(axis=1), dtype=np.float64)
@@ -84,7 +84,7 @@ def speed_acceleration(kinematics: LinearDelta, place: Floats, tilt: Floats) -> 
     return result
 
 
-def worst(measure: Measure, space: Workspace, counts: tuple[int, int, int, int] = (11, 11, 11, 7)) -> Worst:
+def worst(measure: Measure, space: Workspace, counts: tuple[int, int, int, int] = (11, 11, 11, 7)) -> WorstValue:
     """The largest value of `measure` over the closed workspace: an even grid, then a finer one around its largest."""
     place, tilt = space.grid(counts)
     value = measure(place, tilt)
@@ -100,17 +100,17 @@ def worst(measure: Measure, space: Workspace, counts: tuple[int, int, int, int] 
             best, point = float(value.max()), around[int(np.argmax(value))]
         else:
             step = 0.5 * step
-    return Worst(best, (float(point[0]), float(point[1]), float(point[2])), float(point[3]), least)
+    return WorstValue(best, (float(point[0]), float(point[1]), float(point[2])), float(point[3]), least)
 
 
-def _inverse(kinematics: SliderMachine, place: Floats, tilt: Floats) -> Floats:
+def _inverse(kinematics: SliderKinematics, place: Floats, tilt: Floats) -> Floats:
     """J^-1 = Jq^-1 Jx (N, K, K)."""
     jx, along = _jx(kinematics, place, tilt)
     result: Floats = jx / along[:, :, None]
     return result
 
 
-def _jx(kinematics: SliderMachine, place: Floats, tilt: Floats) -> tuple[Floats, Floats]:
+def _jx(kinematics: SliderKinematics, place: Floats, tilt: Floats) -> tuple[Floats, Floats]:
     """(Jx (N, K, K) with the turn's column divided by the lever, diagonal of Jq (N, K))."""
     if isinstance(kinematics, H4Linear):
         p = np.column_stack([place, tilt])

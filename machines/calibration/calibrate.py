@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 from machines.calibration.machine_run import machine_errors
-from machines.calibration.measurement_file import COLUMNS, MeasurementModel, ReversalModel, RotaryModel
-from machines.calibration.outcome import Calibration
+from machines.calibration.measurement_file import COLUMNS, MeasurementModel, ReversalModel, RotaryMeasurementModel
+from machines.calibration.outcome import CalibrationOutcome
 from machines.calibration.rotary_run import reversal, rotary
-from machines.calibration.run import Run
+from machines.calibration.run import CalibrationRun
 from machines.geometric_error.tables.csv_table import CsvTable, read_csv
 from machines.loader import load_checked as load_machine
 from machines.user_file import read_toml, validate
@@ -16,7 +16,7 @@ from toolpaths.diagnostics import Diagnostic, has_errors
 from toolpaths.input_files import there_is
 
 
-def calibrate(source: str | Path, accept_residual: bool = False) -> tuple[Calibration | None, list[Diagnostic]]:
+def calibrate(source: str | Path, accept_residual: bool = False) -> tuple[CalibrationOutcome | None, list[Diagnostic]]:
     """Identify what a measurement file asks for; None and what is wrong where it cannot be read. Where the data do not
     support a model, or only one that cannot be, the figures come without it.
 
@@ -40,22 +40,22 @@ def calibrate(source: str | Path, accept_residual: bool = False) -> tuple[Calibr
     machine, found = load_machine(beside if beside.suffix == ".toml" and there_is(beside) else checked.machine)
     if machine is None:
         return None, found
-    return _worked(Run(file, checked, machine, given[0]))
+    return _worked(CalibrationRun(file, checked, machine, given[0]))
 
 
-def _worked(run: Run) -> tuple[Calibration | None, list[Diagnostic]]:
+def _worked(run: CalibrationRun) -> tuple[CalibrationOutcome | None, list[Diagnostic]]:
     given = getattr(run.checked, run.kind)
     origin = run.file.origin((run.kind, "table"))
     table, found = read_csv(Path(origin.file).parent / given.table, (origin.file, origin.line))
     run.found += found
     done = None if table is None else _identified(run, table)
     if done is not None and has_errors(run.found):
-        done = Calibration(None, done.figures)
+        done = CalibrationOutcome(None, done.figures)
     return done, run.found
 
 
-def _identified(run: Run, table: CsvTable) -> Calibration | None:
+def _identified(run: CalibrationRun, table: CsvTable) -> CalibrationOutcome | None:
     given = getattr(run.checked, run.kind)
     if isinstance(given, ReversalModel):
         return reversal(run, given, table)
-    return rotary(run, given, table) if isinstance(given, RotaryModel) else machine_errors(run, given, table)
+    return rotary(run, given, table) if isinstance(given, RotaryMeasurementModel) else machine_errors(run, given, table)

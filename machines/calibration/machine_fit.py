@@ -13,14 +13,14 @@ from typing import Literal
 
 import numpy as np
 
-from machines.calibration.folded import near
+from machines.calibration.folded_names import near
 from machines.calibration.problem import CalibrationProblem, CalibrationResult, solve
 from machines.geometric_error.actual.actual import Actual
 from machines.geometric_error.actual.model import ErrorModel
 from machines.kinematics.base import Kinematics
 from toolpaths.arrays import Floats
 
-Kind = Literal["position", "distance", "along"]
+MeasuredQuantity = Literal["position", "distance", "along"]
 BALL = ("ball.x", "ball.y", "ball.z")
 SETUP = {"position": BALL, "distance": (*BALL, "bar.length"), "along": ("zero",)}
 
@@ -41,7 +41,7 @@ class Measurements:
         zeroed: True where the place of the ball (zero of the laser) is not known and is identified along
     """
 
-    kind: Kind
+    kind: MeasuredQuantity
     q: Floats
     read: Floats
     sigma: float | Floats

@@ -7,17 +7,17 @@ from pathlib import Path
 
 import numpy as np
 
-from machines.calibration.account import account, weighted
-from machines.calibration.folded import folded, near
-from machines.calibration.machine_fit import SETUP, Kind, MachineFit, Measurements, fit
-from machines.calibration.measurement_file import COLUMNS, BarModel, Column, LaserModel, PosesModel
-from machines.calibration.outcome import MEANT, Calibration, done, doubtful
-from machines.calibration.run import Run, way_column
-from machines.calibration.slips import machine_slip
+from machines.calibration.folded_names import folded, near
+from machines.calibration.machine_fit import SETUP, MachineFit, MeasuredQuantity, Measurements, fit
+from machines.calibration.measurement_file import COLUMNS, BarModel, LaserModel, PosesModel, TableColumn
+from machines.calibration.outcome import MEANT, CalibrationOutcome, done, doubtful
+from machines.calibration.result_figures import account, weighted
+from machines.calibration.run import CalibrationRun, way_column
+from machines.calibration.unit_and_sign_checks import machine_slip
 from machines.geometric_error.actual.model import ErrorModel
 from machines.geometric_error.files.loader import load_checked as load_errors
 from machines.geometric_error.tables.csv_table import LENGTHS, CsvTable
-from machines.geometric_error.tables.curves import Table
+from machines.geometric_error.tables.curves import TableCurve
 from machines.kinematics.base import Kinematics
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import has_errors
@@ -34,10 +34,11 @@ SEEN = 1e-6
 """mm or rad that an error differs by its way, to be told"""
 
 
-def machine_errors(run: Run, given: PosesModel | BarModel | LaserModel, table: CsvTable) -> Calibration | None:
+def machine_errors(run: CalibrationRun, given: PosesModel | BarModel | LaserModel,
+                   table: CsvTable) -> CalibrationOutcome | None:
     """The parameters that are asked for; None where the file is at fault."""
     names = run.machine.axis_names
-    joints = [Column(n, "angle" if r else "length") for n, r in zip(names, run.machine.rotary, strict=True)]
+    joints = [TableColumn(n, "angle" if r else "length") for n, r in zip(names, run.machine.rotary, strict=True)]
     if not run.columns(table, [*joints, *COLUMNS[run.kind]], [way_column(n) for n in names]):
         return None
     q, ways, start = run.joints(table), run.ways(table), _start(run)
@@ -65,7 +66,7 @@ def _measured(given: PosesModel | BarModel | LaserModel, q: Floats, read: Floats
     return Measurements("along", q, read[:, 0], sigma, toward=toward, zeroed=given.zeroed, ways=ways)
 
 
-def _start(run: Run) -> ErrorModel | None:
+def _start(run: CalibrationRun) -> ErrorModel | None:
     if not run.checked.model:
         run.found.append(run.file.problem("calibrate.model", ("model",), "no error model to start from",
                                           "write model = \"start.toml\", with the parameters that are wanted, all 0"))
@@ -78,7 +79,7 @@ def _start(run: Run) -> ErrorModel | None:
 
 # ---- before the fit ------------------------------------------------------------------------------------------------------
 
-def _known(run: Run, start: ErrorModel) -> bool:
+def _known(run: CalibrationRun, start: ErrorModel) -> bool:
     """False where a parameter is asked for that the start model has not."""
     unknown = [word for word in run.checked.parameters if not any(name.startswith(word) for name in start.names)]
     for word in unknown:
@@ -87,7 +88,7 @@ def _known(run: Run, start: ErrorModel) -> bool:
     return not unknown
 
 
-def _reached(run: Run, table: CsvTable, kinematics: Kinematics, q: Floats) -> bool:
+def _reached(run: CalibrationRun, table: CsvTable, kinematics: Kinematics, q: Floats) -> bool:
     """False where the machine cannot stand at a row."""
     lost = ~np.isfinite(kinematics.forward(q)[0]).all(axis=1)
     if lost.any():
@@ -96,7 +97,7 @@ def _reached(run: Run, table: CsvTable, kinematics: Kinematics, q: Floats) -> bo
     return not lost.any()
 
 
-def _distances(run: Run, table: CsvTable, kinematics: Kinematics, measured: Measurements) -> bool:
+def _distances(run: CalibrationRun, table: CsvTable, kinematics: Kinematics, measured: Measurements) -> bool:
     """False where a bar's readings are of another size than the commanded distances."""
     if measured.centre is None:
         return True
@@ -116,7 +117,7 @@ def _distances(run: Run, table: CsvTable, kinematics: Kinematics, measured: Meas
     return False
 
 
-def _lost_motion(run: Run, start: ErrorModel, ways: Floats) -> None:
+def _lost_motion(run: CalibrationRun, start: ErrorModel, ways: Floats) -> None:
     """Axes that come to another place by either way, where the table does not say by which they came."""
     names = run.machine.axis_names
     silent = [names[j] for j in start.axes.two_way(names) if not ways[:, j].any()]
@@ -130,14 +131,14 @@ def _lost_motion(run: Run, start: ErrorModel, ways: Floats) -> None:
 def _gap(start: ErrorModel, axis: str) -> float:
     """mm, the most that a displacement of an axis differs by its way."""
     both = [c.curve for c in start.axes.components
-            if c.name.axis == axis and not c.name.angular and isinstance(c.curve, Table) and c.curve.both]
+            if c.name.axis == axis and not c.name.angular and isinstance(c.curve, TableCurve) and c.curve.both]
     return max((float(np.abs(np.diff(curve.values.reshape(2, -1), axis=0)).max()) for curve in both), default=0.0)
 
 
 # ---- after the fit -------------------------------------------------------------------------------------------------------
 
-def _judged(run: Run, given: PosesModel | BarModel | LaserModel, start: ErrorModel, kinematics: Kinematics,
-            measured: Measurements, fitted: MachineFit, table: CsvTable) -> Calibration:
+def _judged(run: CalibrationRun, given: PosesModel | BarModel | LaserModel, start: ErrorModel, kinematics: Kinematics,
+            measured: Measurements, fitted: MachineFit, table: CsvTable) -> CalibrationOutcome:
     result = fitted.result
     rows = result.residuals.reshape(len(measured.q), -1).T
     wanted = run.checked.parameters
@@ -151,7 +152,7 @@ def _judged(run: Run, given: PosesModel | BarModel | LaserModel, start: ErrorMod
         run.problem("calibrate.converged", "the fit does not come to an end", "check units and signs of the table")
     _untold(run, result.not_identifiable)
     if has_errors(run.found):
-        return Calibration(None, figures)
+        return CalibrationOutcome(None, figures)
     _far(run, given, measured.kind, fitted.setup)
     travel = run.machine.limits.lower, run.machine.limits.upper
     columns = [c.name for c in COLUMNS[run.kind]]
@@ -160,7 +161,7 @@ def _judged(run: Run, given: PosesModel | BarModel | LaserModel, start: ErrorMod
                 lambda: machine_slip(start, kinematics, measured, wanted, travel, units, joints, columns), start, wanted)
 
 
-def _untold(run: Run, groups: Sequence[tuple[str, ...]]) -> None:
+def _untold(run: CalibrationRun, groups: Sequence[tuple[str, ...]]) -> None:
     """Parameters that the readings do not tell, alone or from each other."""
     alone, together = [g[0] for g in groups if len(g) == 1], [folded(g) for g in groups if len(g) > 1]
     ways = any({name[-1] for name in g} == {"+", "-"} for g in groups)
@@ -173,7 +174,8 @@ def _untold(run: Run, groups: Sequence[tuple[str, ...]]) -> None:
                     f"say in columns such as X way by which way each axis came; or {hint}" if ways else hint)
 
 
-def _far(run: Run, given: PosesModel | BarModel | LaserModel, kind: Kind, setup: dict[str, float]) -> None:
+def _far(run: CalibrationRun, given: PosesModel | BarModel | LaserModel, kind: MeasuredQuantity,
+         setup: dict[str, float]) -> None:
     """Ball, bar or zero where they cannot be."""
     off = np.array([setup[name] for name in SETUP[kind]])
     away = float(np.linalg.norm(off[:3]))

@@ -13,11 +13,11 @@ from machines.models import NotNegative, Positive, Vector
 from machines.user_file import UserModel, schema
 
 Sigma = Annotated[float, Field(ge=1e-6, le=1e6)]
-Steps = Annotated[int, Field(ge=3, le=360)]
-Place = Annotated[float, Field(ge=-1e6, le=1e6)]
+StepCount = Annotated[int, Field(ge=3, le=360)]
+Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]
 
 
-class Column(NamedTuple):
+class TableColumn(NamedTuple):
     """A column of a table: its name, the kind of its unit ("length", "angle", "" none), what it says."""
 
     name: str
@@ -25,17 +25,17 @@ class Column(NamedTuple):
     meaning: str = ""
 
 
-_PLACES = (Column("setup", "", "number of the set-up: 0, 1, ..."),
-           Column("step", "", "0 .. steps - 1: where the axis stands, counted in steps of 360 / steps degrees from its 0"))
-_SIX = (*(Column(f"d{x}", "length", f"displacement along {x} of what the axis moves, + along {x}") for x in "xyz"),
-        *(Column(f"e{x}", "angle", f"turn about {x} of what the axis moves, + as a right-hand screw") for x in "xyz"))
-COLUMNS: dict[str, tuple[Column, ...]] = {
-    "reversal": (*_PLACES, Column("reading", "angle", "actual less commanded angle, + the way the axis counts")),
+_PLACES = (TableColumn("setup", "", "number of the set-up: 0, 1, ..."),
+           TableColumn("step", "", "0 .. steps - 1: where the axis stands, in steps of 360 / steps degrees from its 0"))
+_SIX = (*(TableColumn(f"d{x}", "length", f"displacement along {x} of what the axis moves, + along {x}") for x in "xyz"),
+        *(TableColumn(f"e{x}", "angle", f"turn about {x} of what the axis moves, + as a right-hand screw") for x in "xyz"))
+COLUMNS: dict[str, tuple[TableColumn, ...]] = {
+    "reversal": (*_PLACES, TableColumn("reading", "angle", "actual less commanded angle, + the way the axis counts")),
     "rotary": (*_PLACES, *_SIX),
-    "poses": tuple(Column(f"d{x}", "length", f"actual less nominal place of the tip along {x} of the table frame")
+    "poses": tuple(TableColumn(f"d{x}", "length", f"actual less nominal place of the tip along {x} of the table frame")
                    for x in "xyz"),
-    "ball_bar": (Column("distance", "length", "whole length from the ball on the table to the ball in the spindle"),),
-    "laser": (Column("reading", "length", "actual less nominal displacement of the tip, + along `toward`"),),
+    "ball_bar": (TableColumn("distance", "length", "whole length from the ball on the table to the ball in the spindle"),),
+    "laser": (TableColumn("reading", "length", "actual less nominal displacement of the tip, + along `toward`"),),
 }
 """what was read, by kind of measurement; poses, ball_bar and laser have a column for each axis of the machine beside"""
 JOINT = "commanded position of each axis of the machine, slides in a length, rotary axes in an angle"
@@ -49,7 +49,7 @@ class ReversalModel(UserModel):
     """CSV file beside this one"""
     axis: Literal["A", "B", "C"]
     """rotary axis that was measured"""
-    steps: Steps
+    steps: StepCount
     """n, steps of a turn"""
     sigma_arcsec: Sigma
     """standard deviation of a reading"""
@@ -60,7 +60,7 @@ class ReversalModel(UserModel):
     """the instrument was zeroed anew at each set-up"""
 
 
-class RotaryModel(UserModel):
+class RotaryMeasurementModel(UserModel):
     """`[rotary]`: all six errors by reversal."""
 
     table: str
@@ -68,7 +68,7 @@ class RotaryModel(UserModel):
     axis: Literal["A", "B", "C"]
     """rotary axis that was measured. Readings are of what it moves, tool or part: z where that turns to at positive
     commands, x along the machine's X (axis C), Y (A) or Z (B)"""
-    steps: Steps
+    steps: StepCount
     """n, steps of a turn"""
     harmonics: Annotated[int, Field(ge=1)]
     """of the series that are fitted"""
@@ -80,7 +80,7 @@ class RotaryModel(UserModel):
     """mm along the axis from its reference point to the indexer"""
     indexer_to_reflector: NotNegative = 120.0
     """mm from there to the reflector"""
-    shift: tuple[Place, Place, Place] = (0.0, 0.0, 0.0)
+    shift: tuple[Coordinate, Coordinate, Coordinate] = (0.0, 0.0, 0.0)
     """mm, where the reflector stands from the indexer's axis"""
 
 
@@ -104,7 +104,7 @@ class BarModel(UserModel):
     """CSV file beside this one"""
     sigma_um: Sigma
     """standard deviation of a distance"""
-    centre: tuple[Place, Place, Place]
+    centre: tuple[Coordinate, Coordinate, Coordinate]
     """mm, where the ball on the table is thought to be, in the table frame; where it really is, and how much the readings
     are too short, are found along"""
     tool_length: NotNegative = 0.0
@@ -158,7 +158,7 @@ class MeasurementModel(UserModel):
     """machine time to turn the indexer and align"""
     reversal: ReversalModel | None = None
     """axis and indexer told apart"""
-    rotary: RotaryModel | None = None
+    rotary: RotaryMeasurementModel | None = None
     """all six errors of a rotary axis"""
     poses: PosesModel | None = None
     """probe on ball, R-test, tracker"""

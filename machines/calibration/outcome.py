@@ -6,12 +6,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from machines.calibration.account import parameters
 from machines.calibration.noise import CHANCE, Noise
-from machines.calibration.run import Run
-from machines.calibration.slips import Slip
+from machines.calibration.result_figures import parameters
+from machines.calibration.run import CalibrationRun
+from machines.calibration.unit_and_sign_checks import TableFault
 from machines.geometric_error.actual.model import ErrorModel
-from machines.geometric_error.files.sizes import too_large
+from machines.geometric_error.files.implausible_errors import too_large
 
 UNFIT = 5.0
 """the same, where the errors found do not help: no model"""
@@ -30,7 +30,7 @@ FEW = 8
 
 
 @dataclass(frozen=True)
-class Calibration:
+class CalibrationOutcome:
     """What was found: the model (None where the data do not support it) and the figures of `calibrate --json`."""
 
     model: ErrorModel | None
@@ -45,8 +45,9 @@ class Calibration:
                 f"readings, {self.figures['spare']} degrees of freedom")
 
 
-def done(run: Run, model: ErrorModel, figures: dict[str, Any], noise: Noise | None, sigma: str,
-         slip: Callable[[], Slip | None], start: ErrorModel | None = None, wanted: Sequence[str] = ()) -> Calibration:
+def done(run: CalibrationRun, model: ErrorModel, figures: dict[str, Any], noise: Noise | None, sigma: str,
+         slip: Callable[[], TableFault | None], start: ErrorModel | None = None,
+         wanted: Sequence[str] = ()) -> CalibrationOutcome:
     """The calibration, its parameters in the figures.
 
     Args:
@@ -60,10 +61,10 @@ def done(run: Run, model: ErrorModel, figures: dict[str, Any], noise: Noise | No
     _residual(run, figures, noise, sigma, slip)
     found = parameters(model, wanted)
     figures |= {"parameters": found, "kept": len(model.names) - len(found)}
-    return Calibration(model, figures)
+    return CalibrationOutcome(model, figures)
 
 
-def _large(run: Run, model: ErrorModel, start: ErrorModel | None) -> None:
+def _large(run: CalibrationRun, model: ErrorModel, start: ErrorModel | None) -> None:
     """Found errors beyond what machines have; those of the start model are its own matter."""
     before = {one.path: one.size for one in too_large(start)} if start is not None else {}
     large = run.checked.large or (start is not None and start.large)
@@ -76,7 +77,7 @@ def _large(run: Run, model: ErrorModel, start: ErrorModel | None) -> None:
             run.warn("error-model.large", message, hint)
 
 
-def doubtful(run: Run, code: str, message: str, hint: str, key: str = "table") -> None:
+def doubtful(run: CalibrationRun, code: str, message: str, hint: str, key: str = "table") -> None:
     """An error, a warning where the file says `large = true`."""
     if run.checked.large:
         run.warn(code, message)
@@ -84,7 +85,8 @@ def doubtful(run: Run, code: str, message: str, hint: str, key: str = "table") -
         run.problem(code, message, hint, key)
 
 
-def _residual(run: Run, figures: dict[str, Any], noise: Noise | None, sigma: str, slip: Callable[[], Slip | None]) -> None:
+def _residual(run: CalibrationRun, figures: dict[str, Any], noise: Noise | None, sigma: str,
+              slip: Callable[[], TableFault | None]) -> None:
     """What is left of the readings against what the file says of their noise."""
     if noise is None:
         run.tell("calibrate.unchecked", f"{figures['readings']} readings for as many unknowns: nothing is left over that "
@@ -103,7 +105,7 @@ def _residual(run: Run, figures: dict[str, Any], noise: Noise | None, sigma: str
                  "is left of them", "measure more than is asked for")
 
 
-def _silent(run: Run, noise: Noise, message: str, found: Slip | None, stated: str) -> None:
+def _silent(run: CalibrationRun, noise: Noise, message: str, found: TableFault | None, stated: str) -> None:
     """Less is left than the stated noise leaves."""
     if found is not None:
         run.problem("calibrate.slip", f"{message}, less than such noise leaves", f"{found.words}; {stated}")
@@ -114,7 +116,8 @@ def _silent(run: Run, noise: Noise, message: str, found: Slip | None, stated: st
         run.warn("calibrate.silent", f"{message}: it is stated too large", stated)
 
 
-def _loud(run: Run, figures: dict[str, Any], noise: Noise, message: str, found: Slip | None, stated: str) -> None:
+def _loud(run: CalibrationRun, figures: dict[str, Any], noise: Noise, message: str, found: TableFault | None,
+          stated: str) -> None:
     """More is left than the stated noise leaves: refused, unless it is asked for."""
     accepted = run.checked.accept_residual
     if found is not None and not (found.size and accepted):

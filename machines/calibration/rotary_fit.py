@@ -15,7 +15,7 @@ import numpy as np
 from machines.calibration.problem import CalibrationResult, linear, solve
 from machines.calibration.simulator import MOUNTS, PARTS, Bench, motion_jacobian, mount_jacobian
 from machines.geometric_error.actual.model import ErrorModel
-from machines.geometric_error.actual.serial_errors import Component, Frame, SerialErrors
+from machines.geometric_error.actual.serial_errors import Component, ErrorFrame, SerialErrors
 from machines.geometric_error.tables.curves import Fourier
 from machines.geometric_error.tables.names import DIRECTIONS, ErrorName
 from toolpaths.arrays import Bools, Floats
@@ -165,7 +165,7 @@ def error_model(fitted: RotaryFit, axis: str, machine: str = "", name: str = "",
     amplitudes = np.einsum("pr,rch->pch", turn, fitted.amplitudes)
     components = [Component(ErrorName(part, False, axis), Fourier(np.concatenate([[0.0], *amplitudes[part]])))
                   for part in range(len(DIRECTIONS))]
-    frame: Frame = "fixed" if carries_part else "moving"
+    frame: ErrorFrame = "fixed" if carries_part else "moving"
     model = ErrorModel(SerialErrors(tuple(components), frame={axis: frame}), name=name or axis, machine=machine)
     at = np.concatenate([1 + part * (1 + 2 * harmonics) + np.arange(2 * harmonics) for part in range(len(DIRECTIONS))])
     covariance, spread = np.zeros((len(model.names), len(model.names))), np.kron(turn, np.eye(2 * harmonics))

@@ -6,20 +6,20 @@ from typing import Any
 
 import numpy as np
 
-from machines.calibration.account import account, finite, listed, series_signatures, signature, weighted
-from machines.calibration.folded import folded
-from machines.calibration.measurement_file import COLUMNS, ReversalModel, RotaryModel
-from machines.calibration.outcome import Calibration, done
+from machines.calibration.folded_names import folded
+from machines.calibration.measurement_file import COLUMNS, ReversalModel, RotaryMeasurementModel
+from machines.calibration.outcome import CalibrationOutcome, done
+from machines.calibration.result_figures import account, finite, listed, series_signatures, signature, weighted
 from machines.calibration.reversal import Reversal, cost_without, identify, plan, statistics
 from machines.calibration.rotary_fit import RotaryFit, error_model, fit_rotary, hidden, told_apart
-from machines.calibration.run import Run
+from machines.calibration.run import CalibrationRun
 from machines.calibration.simulator import PARTS, Bench
-from machines.calibration.slips import reversal_slip, rotary_slip
+from machines.calibration.unit_and_sign_checks import reversal_slip, rotary_slip
 from machines.geometric_error.actual.axis_motion import ALONG
 from machines.geometric_error.actual.model import ErrorModel
 from machines.geometric_error.actual.serial_errors import Component, SerialErrors
 from machines.geometric_error.tables.csv_table import UNITS, CsvTable
-from machines.geometric_error.tables.curves import Table
+from machines.geometric_error.tables.curves import TableCurve
 from machines.geometric_error.tables.names import DIRECTIONS, ErrorName
 from machines.kinematics.h4_axes import H4TableAxis
 from machines.kinematics.serial import Serial
@@ -30,7 +30,7 @@ SETUPS = 6
 """up to which the condition number of a rotary axis's readings is told"""
 
 
-def reversal(run: Run, given: ReversalModel, table: CsvTable) -> Calibration | None:
+def reversal(run: CalibrationRun, given: ReversalModel, table: CsvTable) -> CalibrationOutcome | None:
     """The signature of an axis; None where the file is at fault."""
     sense = _sense(run, given.axis)
     if not sense or not run.columns(table, COLUMNS["reversal"]) or (places := run.places(table, given.steps)) is None:
@@ -46,16 +46,17 @@ def reversal(run: Run, given: ReversalModel, table: CsvTable) -> Calibration | N
     figures = _reversal_figures(run, given, fitted, readings, sigma)
     if fitted.lacking:
         run.problem("calibrate.rank", f"the readings do not tell axis and indexer apart: {fitted.lacking}")
-        return Calibration(None, figures)
+        return CalibrationOutcome(None, figures)
     name = ErrorName(DIRECTIONS.index(given.axis), False, given.axis)
     x = 2.0 * np.pi * np.arange(given.steps) / given.steps
-    model = ErrorModel(SerialErrors((Component(name, Table(x, sense * fitted.axis, "spline", period=2.0 * np.pi)),)),
+    model = ErrorModel(SerialErrors((Component(name, TableCurve(x, sense * fitted.axis, "spline", period=2.0 * np.pi)),)),
                        covariance=fitted.covariance[: given.steps, : given.steps])
     return done(run, model, figures, fitted.result.noise, f"sigma_arcsec = {given.sigma_arcsec:g}",
                 lambda: reversal_slip(readings, sigma, given, table.unit["reading"]))
 
 
-def _reversal_figures(run: Run, given: ReversalModel, fitted: Reversal, readings: Floats, sigma: float) -> dict[str, Any]:
+def _reversal_figures(run: CalibrationRun, given: ReversalModel, fitted: Reversal, readings: Floats,
+                      sigma: float) -> dict[str, Any]:
     degrees = np.asarray(np.arange(given.steps) * (360.0 / given.steps), dtype=np.float64)
     curves = {"axis": (fitted.axis, fitted.axis_sigma), "indexer": (fitted.indexer, fitted.indexer_sigma)}
     known, planned = fitted.conditioning, _planned(given.steps, 12, 864)
@@ -74,7 +75,7 @@ def _reversal_figures(run: Run, given: ReversalModel, fitted: Reversal, readings
                                given.zeroed)]}
 
 
-def rotary(run: Run, given: RotaryModel, table: CsvTable) -> Calibration | None:
+def rotary(run: CalibrationRun, given: RotaryMeasurementModel, table: CsvTable) -> CalibrationOutcome | None:
     """The six series of an axis; None where the file is at fault."""
     sense = _sense(run, given.axis)
     if not sense or not run.columns(table, COLUMNS["rotary"]) or (places := run.places(table, given.steps)) is None:
@@ -95,7 +96,7 @@ def rotary(run: Run, given: RotaryModel, table: CsvTable) -> Calibration | None:
     if untold:
         run.problem("calibrate.rank", f"the readings do not tell {folded(untold)}",
                     "measure one more set-up, the indexer turned by one increment more")
-        return Calibration(None, figures)
+        return CalibrationOutcome(None, figures)
     if fitted.lost:
         run.tell("calibrate.hidden", f"the mounting can pretend {', '.join(fitted.lost)} as well; they are 0 in the model")
     model = error_model(fitted, given.axis, sense=sense, carries_part=_carries_part(run, given.axis))
@@ -104,7 +105,7 @@ def rotary(run: Run, given: RotaryModel, table: CsvTable) -> Calibration | None:
                 lambda: rotary_slip(bench, readings, sigma, given.harmonics, [table.unit[p] for p in PARTS]))
 
 
-def _rotary_figures(given: RotaryModel, bench: Bench, fitted: RotaryFit, sigma: Floats) -> dict[str, Any]:
+def _rotary_figures(given: RotaryMeasurementModel, bench: Bench, fitted: RotaryFit, sigma: Floats) -> dict[str, Any]:
     planned = _planned(given.steps, SETUPS, 216)
     return account(fitted.result, fitted.told, fitted.condition_number, fitted.amplitudes.size, fitted.cost_instrument) | {
         "not_identifiable": [[name] for name in fitted.lost], "signatures": series_signatures(fitted),
@@ -113,7 +114,7 @@ def _rotary_figures(given: RotaryModel, bench: Bench, fitted: RotaryFit, sigma: 
                  for k in range(1, planned + 1)]}
 
 
-def _sense(run: Run, letter: str) -> int:
+def _sense(run: CalibrationRun, letter: str) -> int:
     """1 or -1: how the axis turns about x, y or z of the machine at positive commands; 0: not, a problem."""
     machine, kinematics = run.machine, run.machine.kinematics
     if letter not in machine.axis_names:
@@ -130,7 +131,7 @@ def _sense(run: Run, letter: str) -> int:
     return 1 if along > 0.0 else -1
 
 
-def _carries_part(run: Run, letter: str) -> bool:
+def _carries_part(run: CalibrationRun, letter: str) -> bool:
     return f"{letter}'" in run.machine.structure or isinstance(run.machine.kinematics, H4TableAxis)
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from machines.calibration.measurement_file import Column, MeasurementModel
+from machines.calibration.measurement_file import MeasurementModel, TableColumn
 from machines.geometric_error.tables.csv_table import ANGLES, LENGTHS, CsvTable
 from machines.geometric_error.tables.names import parse
 from machines.machine import Machine
@@ -22,7 +22,7 @@ EDGE = 1e-6
 UNIT = {"length": LENGTHS, "angle": ANGLES, "": {"": 1.0}}
 
 
-class Run:
+class CalibrationRun:
     """A checked file with its machine; `found` collects what is wrong."""
 
     def __init__(self, file: UserFile, checked: MeasurementModel, machine: Machine, kind: str) -> None:
@@ -41,7 +41,7 @@ class Run:
         """An info of the whole file."""
         self.found.append(info(code, message, file=self.file.file, hint=hint))
 
-    def columns(self, table: CsvTable, wanted: Sequence[Column], optional: Sequence[str] = ()) -> bool:
+    def columns(self, table: CsvTable, wanted: Sequence[TableColumn], optional: Sequence[str] = ()) -> bool:
         """True where all columns are there with the right kind of unit; those that are not used are told."""
         self._missing(table, [column.name for column in wanted if column.name not in table.columns])
         for name, kind, _ in wanted:

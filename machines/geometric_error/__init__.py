@@ -8,15 +8,16 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from machines.geometric_error.actual.actual import Actual, approach
     from machines.geometric_error.actual.actual_kinematics import ActualKinematics
-    from machines.geometric_error.actual.correction import Corrected, correct
-    from machines.geometric_error.actual.model import Doubt, ErrorModel, doubt
+    from machines.geometric_error.actual.correction import CorrectedCommands, correct
+    from machines.geometric_error.actual.model import ErrorModel, Uncertainty, doubt
     from machines.geometric_error.files.loader import error_model_schema, load, load_checked
 
 _HOME = {"Actual": "actual.actual", "approach": "actual.actual",
-         "ActualKinematics": "actual.actual_kinematics", "Corrected": "actual.correction", "correct": "actual.correction",
+         "ActualKinematics": "actual.actual_kinematics", "CorrectedCommands": "actual.correction",
+         "correct": "actual.correction",
          "error_model_schema": "files.loader", "load": "files.loader", "load_checked": "files.loader",
-         "Doubt": "actual.model", "ErrorModel": "actual.model", "doubt": "actual.model"}
-__all__ = ["Actual", "ActualKinematics", "Corrected", "Doubt", "ErrorModel", "approach", "correct", "doubt",
+         "Uncertainty": "actual.model", "ErrorModel": "actual.model", "doubt": "actual.model"}
+__all__ = ["Actual", "ActualKinematics", "CorrectedCommands", "ErrorModel", "Uncertainty", "approach", "correct", "doubt",
            "error_model_schema", "load", "load_checked"]
 
 

@@ -15,10 +15,10 @@ from typing import ClassVar, Self
 import numpy as np
 
 from machines.kinematics.base import Kinematics, as_points
+from machines.kinematics.clearance_geometry import ClearanceGeometry, ClearanceSizes
 from machines.kinematics.columns import blocks
 from machines.kinematics.frames import spin_about
 from machines.kinematics.h4_platform import H4Platform
-from machines.kinematics.rig import Clearance, Rig
 from machines.kinematics.sliders import Legs
 from machines.kinematics.workspace import Workspace
 from toolpaths.arrays import Floats
@@ -46,7 +46,7 @@ class H4Linear(Kinematics):
     axis_names: tuple[str, ...] = ("X", "Y", "Z", "U", "C")
     tool_length: float = 0.0
     all_roots: bool = False
-    clearance: Clearance | None = None
+    clearance: ClearanceSizes | None = None
     rotary: tuple[bool, ...] = (False, False, False, False, True)
 
     pairs: ClassVar[int]
@@ -158,19 +158,20 @@ class H4Linear(Kinematics):
         placed = [self.place(p, q[:, 4]) for p in self.platform.modes(q[:, :4])]
         return np.stack([tip for tip, _, _ in placed]), np.stack([axis for _, axis, _ in placed])
 
-    def rig(self, q: Floats, near: Floats | None = None) -> Rig:
+    def rig(self, q: Floats, near: Floats | None = None) -> ClearanceGeometry:
         """Where the parts are at joints q (N, 5), for the clearances."""
         p = self.solve_platform(q, near)
         reach, axis, _ = (tilted(v, p[:, 3]) for v in self._tool(q[:, 4]))
         gauge = p[:, :3] + reach + self.tool_length * axis
-        return Rig(p[:, :3], p[:, 3], self.platform.legs.carriages(q[:, :4]), self.platform.ends(p), gauge, axis)
+        return ClearanceGeometry(p[:, :3], p[:, 3], self.platform.legs.carriages(q[:, :4]), self.platform.ends(p), gauge,
+                                 axis)
 
     def random_slides(self, rng: np.random.Generator, n: int) -> Floats:
         """Slides (n, 4) of random places and tilts of the workspace."""
         place, tilt = self.workspace.random(rng, n)
         return self.platform.inverse(np.column_stack([place, tilt]))
 
-    def middle_rig(self) -> Rig:
+    def middle_rig(self) -> ClearanceGeometry:
         """The same in the middle of the workspace, rotary axis at 0."""
         return self.rig(np.column_stack([self.platform.inverse(self.platform.home[None]), [0.0]]))
 

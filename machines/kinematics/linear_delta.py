@@ -12,8 +12,8 @@ from typing import Self
 import numpy as np
 
 from machines.kinematics.base import Kinematics, as_points
+from machines.kinematics.clearance_geometry import ClearanceGeometry, ClearanceSizes
 from machines.kinematics.columns import blocks
-from machines.kinematics.rig import Clearance, Rig
 from machines.kinematics.sliders import Legs, determinant, three_spheres
 from machines.kinematics.workspace import Workspace
 from toolpaths.arrays import Bools, Floats, frozen
@@ -40,7 +40,7 @@ class LinearDelta(Kinematics):
     axis_names: tuple[str, ...] = ("X", "Y", "Z")
     tool_length: float = 0.0
     all_roots: bool = False
-    clearance: Clearance | None = None
+    clearance: ClearanceSizes | None = None
     rotary: tuple[bool, ...] = (False, False, False)
     side: float = field(init=False)
     """sign of det Jx in the home assembly mode"""
@@ -106,17 +106,18 @@ class LinearDelta(Kinematics):
         """AB (N, 3, 3) mm, which is Jx (III-3)."""
         return self._joints(tip) - self.legs.carriages(q)
 
-    def rig(self, q: Floats, near: Floats | None = None) -> Rig:
+    def rig(self, q: Floats, near: Floats | None = None) -> ClearanceGeometry:
         """Where the parts are at slides q (N, 3), for the clearances."""
         tip, axis, _ = self.pose(q, near)
         place = tip + self.tool_length * UP
-        return Rig(place, np.zeros(len(q)), self.legs.carriages(q), place[:, None, :] + self.platform, place, axis)
+        return ClearanceGeometry(place, np.zeros(len(q)), self.legs.carriages(q), place[:, None, :] + self.platform, place,
+                                 axis)
 
     def random_slides(self, rng: np.random.Generator, n: int) -> Floats:
         """Slides (n, 3) of random places of the workspace."""
         return self.legs.inverse(self.workspace.random(rng, n)[0][:, None, :] + self.platform)
 
-    def middle_rig(self) -> Rig:
+    def middle_rig(self) -> ClearanceGeometry:
         """The same in the middle of the workspace."""
         tip = (self.workspace.middle + self._gauge_to_tip())[None]
         return self.rig(self.legs.inverse(self._joints(tip)))

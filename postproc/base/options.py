@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-FeedMode = Literal["auto", "per-minute", "inverse-time"]
+FeedModeChoice = Literal["auto", "per-minute", "inverse-time"]
 OutputMode = Literal["auto", "axes", "tcp", "tilted"]
 FeedSource = Literal["programmed", "planned"]
 Orientation = Literal["keep", "per-pass", "whole-part", "auto"]
@@ -22,7 +22,7 @@ class Options:
 
     tolerance: float = 0.01
     axis_tolerance: float = 0.05
-    feed_mode: FeedMode = "auto"
+    feed_mode: FeedModeChoice = "auto"
     setup: str = ""
     """file of the set-up"""
     units: str = ""

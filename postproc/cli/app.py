@@ -27,16 +27,16 @@ from postproc.cli.guard import guarded
 from postproc.cli.machines_controllers import controller_app, machine_app, setup_app
 from postproc.cli.options import (
     Allow,
-    AxisTolerance,
+    AxisToleranceOption,
     Beyond,
     ClFile,
-    Dialect,
+    DialectOption,
     MachineName,
-    Proof,
     ProofOf,
+    ProofOption,
     RequireProof,
-    Tolerance,
-    Units,
+    ToleranceOption,
+    UnitsOption,
     only_with_errors,
 )
 from postproc.cli.orient import EXAMPLES, ORIENTATIONS, MaxTilt, Orient
@@ -96,18 +96,20 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
                                                        "feeds may be so much lower that neighbours share one")] = 0.0,
             smooth: Annotated[bool, typer.Option("--smooth", help="move points onto smooth curves inside the "
                                                  "tolerance")] = False,
-            setup: Setup = "", tolerance: Tolerance = 0.01, axis_tolerance: AxisTolerance = 0.05, units: Units = "",
-            dialect: Dialect = "", allow_unknown: Allow = None, error_model: Errors = "", beyond: Beyond = False,
+            setup: Setup = "", tolerance: ToleranceOption = 0.01, axis_tolerance: AxisToleranceOption = 0.05,
+            units: UnitsOption = "",
+            dialect: DialectOption = "", allow_unknown: Allow = None, error_model: Errors = "", beyond: Beyond = False,
             residuals: Annotated[list[Path] | None, typer.Option("--residuals", metavar="FILE", help="what errors do at "
                                  "each CL point, before and after correction: .csv, or drawn: .png, .svg; again for "
                                  "more")] = None,
-            require_proof: RequireProof = False, proof: Proof = False, json: Json = "") -> None:
+            require_proof: RequireProof = False, proof: ProofOption = False, json: Json = "") -> None:
     """Convert a CL file to G-code, read it back and prove it; nothing is written where a proof fails."""
     _choice("--orient", orient, ORIENTATIONS)
     _choice("--feed", feed, ("programmed", "planned"))
     _choice("--output-mode", output_mode, ("auto", "axes", "tcp", "tilted"))
     options = replace(_options(tolerance, axis_tolerance, feed_mode, setup, units, dialect, allow_unknown),
-                      output=output_mode, feed=feed, merge_feeds=merge_feeds / 100.0, smooth=smooth,  # type: ignore[arg-type]
+                      output=output_mode, feed=feed,  # type: ignore[arg-type]
+                      merge_feeds=merge_feeds / 100.0, smooth=smooth,
                       error_model=error_model, error_beyond=beyond, orient=orient,  # type: ignore[arg-type]
                       max_tilt=max_tilt, name=output.stem, require_proof=require_proof)
     only_with_errors(beyond, error_model)
@@ -145,8 +147,9 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
 
 @app.command(epilog="Example: postproc verify part.ngc part.cls -m mikron-ucp710 -c linuxcnc")
 def verify(gcode: Annotated[Path, typer.Argument(metavar="GCODE", help="G-code file")], file: ClFile,
-           machine: MachineName, controller: ControllerName, setup: Setup = "", tolerance: Tolerance = 0.01,
-           axis_tolerance: AxisTolerance = 0.05, units: Units = "", dialect: Dialect = "", allow_unknown: Allow = None,
+           machine: MachineName, controller: ControllerName, setup: Setup = "", tolerance: ToleranceOption = 0.01,
+           axis_tolerance: AxisToleranceOption = 0.05, units: UnitsOption = "", dialect: DialectOption = "",
+           allow_unknown: Allow = None,
            error_model: Errors = "", orient: Orient = "keep", max_tilt: MaxTilt = 60.0,
            require_proof: RequireProof = False, proof: ProofOf = "", json: Json = "") -> None:
     """Read a G-code file back and compare its motion with a CL file."""
@@ -174,8 +177,9 @@ def verify(gcode: Annotated[Path, typer.Argument(metavar="GCODE", help="G-code f
 
 @app.command(epilog="Example: postproc trace part.cls --line 120 -m mikron-ucp710 -c linuxcnc")
 def trace(file: ClFile, line: Annotated[int, typer.Option("--line", metavar="L", min=1, help="line of the CL file")],
-          machine: MachineName, controller: ControllerName, setup: Setup = "", tolerance: Tolerance = 0.01,
-          axis_tolerance: AxisTolerance = 0.05, units: Units = "", dialect: Dialect = "", allow_unknown: Allow = None,
+          machine: MachineName, controller: ControllerName, setup: Setup = "", tolerance: ToleranceOption = 0.01,
+          axis_tolerance: AxisToleranceOption = 0.05, units: UnitsOption = "", dialect: DialectOption = "",
+          allow_unknown: Allow = None,
           error_model: Errors = "", beyond: Beyond = False, orient: Orient = "keep", max_tilt: MaxTilt = 60.0,
           json: Json = "") -> None:
     """Show one point of a CL file through every stage, from its record to its blocks and back."""
@@ -198,7 +202,8 @@ def trace(file: ClFile, line: Annotated[int, typer.Option("--line", metavar="L",
 
 
 @app.command(epilog="Example: postproc inspect part.cls --json -")
-def inspect(file: ClFile, units: Units = "", dialect: Dialect = "", allow_unknown: Allow = None, json: Json = "") -> None:
+def inspect(file: ClFile, units: UnitsOption = "", dialect: DialectOption = "", allow_unknown: Allow = None,
+            json: Json = "") -> None:
     """Show what a CL file holds: operations, tools, points, extents, unknown words."""
     options = _options(0.01, 0.05, "auto", "", units, dialect, allow_unknown)
     refuse_overwriting({"--json": json}, {"the CL file": str(file)})

@@ -36,8 +36,8 @@ def calibrate(file: Annotated[Path, typer.Argument(metavar="MEASUREMENTS.toml", 
     from dataclasses import replace
 
     from machines.calibration.calibrate import calibrate as run
-    from machines.calibration.text import text
-    from machines.geometric_error.exchange.exchange import write_model
+    from machines.calibration.result_text import text
+    from machines.geometric_error.exchange.write_model import write_model
 
     outputs: dict[Path, str | bytes] = {}
     with shown_errors(json):

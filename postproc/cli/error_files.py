@@ -95,7 +95,7 @@ def writable(model: ErrorModel, made: ErrorModel) -> tuple[ErrorModel, list[str]
 
 def model_files(model: ErrorModel, stem: str, description: str, name: str = "") -> dict[str, str]:
     """File name -> text, the tables first, the model, called `name`, last."""
-    from machines.geometric_error.exchange.exchange import write_model
+    from machines.geometric_error.exchange.write_model import write_model
 
     files = write_model(replace(model, name=stem), description)
     text = files.pop(f"{stem}.toml")

@@ -20,8 +20,9 @@ errors_app.command("import", epilog=EXAMPLE)(import_)
 
 ModelFile = Annotated[Path, typer.Argument(metavar="MODEL.toml", help="error model")]
 Folder = Annotated[Path, typer.Option("-o", "--output", metavar="FOLDER", help="folder to write into")]
-Figure = Annotated[Path | None, typer.Option("--figure", metavar="FILE", help="drawing of the errors, and of the tip over "
-                                             "the work volume, .png or .svg")]
+FigureOption = Annotated[Path | None, typer.Option("--figure", metavar="FILE",
+                                                   help="drawing of the errors, and of the tip over "
+                                                   "the work volume, .png or .svg")]
 ToolLength = Annotated[float, typer.Option("--tool-length", metavar="MM", min=0.0, max=10_000.0,
                                            help="gauge length of the tool that is looked at")]
 Step = Annotated[list[str] | None, typer.Option("--step", metavar="AXIS=STEP", help="mm or degrees between rows or nodes, "
@@ -36,18 +37,21 @@ MapFile = Annotated[Path, typer.Option("-o", "--output", metavar="MAP.toml",
                                        help="model to write; its lattice is put beside it")]
 Over = Annotated[str, typer.Option("--over", metavar="LETTERS", help="coordinates: axes, e.g. XYZ or XYZAC, or x y z of the "
                                    "point in the table frame; default the slides, xyz of machines on rods")]
-MapLoss = Annotated[float | None, typer.Option("--loss", metavar="UM", min=1e-3, max=1e4, help="divide cells until the map "
-                                               "loses no more inside its lattice, um")]
+MapLossOption = Annotated[float | None, typer.Option("--loss", metavar="UM", min=1e-3, max=1e4,
+                                                     help="divide cells until the map "
+                                                     "loses no more inside its lattice, um")]
 At = Annotated[list[str] | None, typer.Option("--at", metavar="AXIS=POSITION", help="where an axis stands that is no "
                                               "coordinate, mm or degrees")]
-MapTool = Annotated[float, typer.Option("--tool-length", metavar="MM", min=0.0, max=10_000.0, help="displacements are those "
-                                        "of the tip of this tool; 0: of the gauge point")]
-Directions = Annotated[str, typer.Option("--directions", help="of the map's values: machine, or table (turns with the "
-                                         "rotary axes under the part)")]
+MapToolLengthOption = Annotated[float, typer.Option("--tool-length", metavar="MM", min=0.0, max=10_000.0,
+                                                    help="displacements are those "
+                                                    "of the tip of this tool; 0: of the gauge point")]
+MapDirectionsOption = Annotated[str, typer.Option("--directions",
+                                                  help="of the map's values: machine, or table (turns with the "
+                                                  "rotary axes under the part)")]
 
 
 @errors_app.command("check", epilog="Example: postproc errors check errors.toml -m mikron-ucp710 --tool-length 120")
-def check(file: ModelFile, machine: MachineName, tool_length: ToolLength = 100.0, figure: Figure = None,
+def check(file: ModelFile, machine: MachineName, tool_length: ToolLength = 100.0, figure: FigureOption = None,
           json: Json = "") -> None:
     """Check an error model: what it holds, how far it reaches, worst tip and axis over the work volume, doubt."""
     refuse_overwriting({"--figure": str(figure or ""), "--json": json}, {"the error model": str(file), **own_files(machine)})
@@ -117,8 +121,10 @@ def to_linuxcnc(file: ModelFile, machine: MachineName, output: Folder, rest: Res
 
 
 @errors_app.command("to-map", epilog="Example: postproc errors to-map e.toml -m mikron-ucp710 -o map.toml --loss 2")
-def to_map(file: ModelFile, machine: MachineName, output: MapFile, over: Over = "", step: Step = None, loss: MapLoss = None,
-           at: At = None, tool_length: MapTool = 0.0, directions: Directions = "machine", json: Json = "") -> None:
+def to_map(file: ModelFile, machine: MachineName, output: MapFile, over: Over = "", step: Step = None,
+           loss: MapLossOption = None,
+           at: At = None, tool_length: MapToolLengthOption = 0.0, directions: MapDirectionsOption = "machine",
+           json: Json = "") -> None:
     """Write an error map of a model, as controls hold it, and say what it loses."""
     refuse_overwriting({"-o": str(output), "--json": json}, {"the error model": str(file), **own_files(machine)})
     if directions not in ("machine", "table"):

@@ -15,8 +15,9 @@ EXAMPLE = "Example: postproc errors import X=x.comp y.csv -m mill-3axis -o error
 Sources = Annotated[list[str], typer.Argument(metavar="SOURCE...", help="tables per axis or of location errors (x.csv), of "
                                               "targets and runs of one error (EXX=laser.csv), a lattice (map.csv), "
                                               "LinuxCNC's files (X=x.comp)")]
-Output = Annotated[Path, typer.Option("-o", "--output", metavar="MODEL.toml", help="model to write; its tables are put "
-                                      "beside it")]
+OutputOption = Annotated[Path, typer.Option("-o", "--output", metavar="MODEL.toml",
+                                            help="model to write; its tables are put "
+                                            "beside it")]
 Into = Annotated[Path | None, typer.Option("--into", metavar="MODEL.toml", help="model whose other errors stay, with their "
                                            "covariance")]
 Covariance = Annotated[Path | None, typer.Option("--covariance", metavar="C.csv", help="square table of what is imported, "
@@ -25,23 +26,26 @@ Interpolation = Annotated[str, typer.Option("--interpolation", help="between row
 Repeats = Annotated[list[str] | None, typer.Option("--repeats", metavar="AXIS=PERIOD", help="degrees or mm after which a "
                                                    "table or map repeats, e.g. C=360")]
 Sign = Annotated[int, typer.Option("--sign", help="-1 where the numbers say how the part moves relative to the tool")]
-Kind = Annotated[int, typer.Option("--type", min=0, max=1, help="COMP_FILE_TYPE of LinuxCNC's files")]
-MapTool = Annotated[float, typer.Option("--tool-length", metavar="MM", min=0.0, max=10_000.0, help="of the tool whose tip a "
-                                        "map displaces; 0: the gauge point")]
+ScrewFileTypeOption = Annotated[int, typer.Option("--type", min=0, max=1, help="COMP_FILE_TYPE of LinuxCNC's files")]
+ToolLengthOption = Annotated[float, typer.Option("--tool-length", metavar="MM", min=0.0, max=10_000.0,
+                                                 help="of the tool whose tip a "
+                                                 "map displaces; 0: the gauge point")]
 Zero = Annotated[list[str] | None, typer.Option("--zero", metavar="AXIS=POSITION", help="place at which a map is to be 0, "
                                                 "all its coordinates, mm or degrees")]
 Average = Annotated[bool, typer.Option("--average", help="rows at the same place, columns of runs (EXX+1, EXX-1, EXX+2 ...) "
                                        "and files of runs are readings: their mean counts, their scatter is the doubt")]
-Near = Annotated[list[str] | None, typer.Option("--near", metavar="AXIS=AMOUNT", help="with --average: readings no farther "
-                                                "apart are of one place, given to that amount, mm or degrees")]
+NearOption = Annotated[list[str] | None, typer.Option("--near", metavar="AXIS=AMOUNT",
+                                                      help="with --average: readings no farther "
+                                                      "apart are of one place, given to that amount, mm or degrees")]
 Large = Annotated[bool, typer.Option("--large", help="errors above 1 mm or 0.5 degrees are so, and no unit slipped")]
-Directions = Annotated[str, typer.Option("--directions", help="of a map's values: machine or table")]
+DirectionsOption = Annotated[str, typer.Option("--directions", help="of a map's values: machine or table")]
 
 
-def import_(sources: Sources, machine: MachineName, output: Output, into: Into = None, covariance: Covariance = None,
-            interpolation: Interpolation = "linear", repeats: Repeats = None, sign: Sign = 1, kind: Kind = 0,
-            tool_length: MapTool = 0.0, directions: Directions = "table", zero: Zero = None, average: Average = False,
-            near: Near = None, large: Large = False, json: Json = "") -> None:
+def import_(sources: Sources, machine: MachineName, output: OutputOption, into: Into = None, covariance: Covariance = None,
+            interpolation: Interpolation = "linear", repeats: Repeats = None, sign: Sign = 1, kind: ScrewFileTypeOption = 0,
+            tool_length: ToolLengthOption = 0.0, directions: DirectionsOption = "table", zero: Zero = None,
+            average: Average = False,
+            near: NearOption = None, large: Large = False, json: Json = "") -> None:
     """Make an error model of tables that others wrote."""
     for option, value, allowed in (("--interpolation", interpolation, ("linear", "spline")),
                                    ("--sign", str(sign), ("1", "-1")), ("--directions", directions, ("machine", "table"))):
@@ -53,7 +57,7 @@ def import_(sources: Sources, machine: MachineName, output: Output, into: Into =
     refuse_overwriting({"--json": json}, {"the model of --into": str(into or ""),
                                          "the table of --covariance": str(covariance or "")})
     from machines.geometric_error.exchange.exports import in_units
-    from machines.geometric_error.exchange.imports import How, read_sources, with_covariance
+    from machines.geometric_error.exchange.imports import ImportOptions, read_sources, with_covariance
     from machines.geometric_error.exchange.survey import beyond_travel, unmeasured
 
     with shown_errors(json):
@@ -61,8 +65,8 @@ def import_(sources: Sources, machine: MachineName, output: Output, into: Into =
         known = (*m.axis_names, *"xyz")
         periods, at = in_units(pairs("--repeats", repeats, known)), in_units(pairs("--zero", zero, known))
         apart = in_units(pairs("--near", near, known))
-        how = How(interpolation, periods, float(sign), kind, tool_length, directions, at, average,  # type: ignore[arg-type]
-                  apart, large)
+        how = ImportOptions(interpolation, periods, float(sign), kind, tool_length, directions,  # type: ignore[arg-type]
+                            at, average, apart, large)
         read, found = read_sources(sources, m, how)
         model, told = required(read, found), [f"read: {', '.join(files_of)}"]
         found += [*beyond_travel(model, m, str(output)), *unmeasured(model, m, str(output))]

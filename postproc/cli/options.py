@@ -9,17 +9,20 @@ import typer
 
 ClFile = Annotated[Path, typer.Argument(metavar="FILE", help="CL file (APT text)")]
 MachineName = Annotated[str, typer.Option("-m", "--machine", help="machine: a name from the list, or a TOML file")]
-Tolerance = Annotated[float, typer.Option("--tolerance", metavar="MM", min=1e-6, max=10.0, help="tolerance of the tip")]
-AxisTolerance = Annotated[float, typer.Option("--axis-tolerance", metavar="DEG", min=1e-6, max=10.0,
+ToleranceOption = Annotated[float, typer.Option("--tolerance", metavar="MM", min=1e-6, max=10.0,
+                                                help="tolerance of the tip")]
+AxisToleranceOption = Annotated[float, typer.Option("--axis-tolerance", metavar="DEG", min=1e-6, max=10.0,
                                                help="tolerance of the axis")]
-Units = Annotated[str, typer.Option("--units", help="units of a CL file that states none: mm or inch")]
-Dialect = Annotated[str, typer.Option("--dialect", help="read the CL file as this dialect instead of the recognised one")]
+UnitsOption = Annotated[str, typer.Option("--units", help="units of a CL file that states none: mm or inch")]
+DialectOption = Annotated[str, typer.Option("--dialect",
+                                            help="read the CL file as this dialect instead of the recognised one")]
 Beyond = Annotated[bool, typer.Option("--error-model-beyond", help="outside the range that was measured, take the error at "
                                       "its end")]
 RequireProof = Annotated[bool, typer.Option("--require-proof", help="refuse a program where some block has no bound of its "
                                             "deviation and is only checked at places")]
-Proof = Annotated[bool, typer.Option("--proof", help="write what was proved, and the hashes of all files that it rests on, "
-                                     "next to the program: OUT.proof.json")]
+ProofOption = Annotated[bool, typer.Option("--proof",
+                                           help="write what was proved, and the hashes of all files that it rests on, "
+                                           "next to the program: OUT.proof.json")]
 ProofOf = Annotated[str, typer.Option("--proof", metavar="FILE", help="name what has changed since this proof was written; "
                                       "default: GCODE.proof.json, where it is there")]
 Allow = Annotated[list[str] | None, typer.Option("--allow-unknown", metavar="WORD",

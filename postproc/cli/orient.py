@@ -17,7 +17,16 @@ from postproc.cli.console import (
     report,
     shown_errors,
 )
-from postproc.cli.options import Allow, AxisTolerance, ClFile, Dialect, MachineName, Tolerance, Units, figure_ending
+from postproc.cli.options import (
+    Allow,
+    AxisToleranceOption,
+    ClFile,
+    DialectOption,
+    MachineName,
+    ToleranceOption,
+    UnitsOption,
+    figure_ending,
+)
 
 if TYPE_CHECKING:
     from machines.machine import Machine
@@ -52,12 +61,12 @@ def orient(file: ClFile,
            figure: Annotated[Path | None, typer.Option("--figure", metavar="FILE", help="drawing of plans, passes and, of "
                                                        "--pass, polytopes, reach, candidates; .png or .svg")] = None,
            setup: Annotated[str, typer.Option("--setup", metavar="S.toml", help="set-up file: placement, tools")] = "",
-           tolerance: Tolerance = 0.01,
-           axis_tolerance: AxisTolerance = 0.05,
+           tolerance: ToleranceOption = 0.01,
+           axis_tolerance: AxisToleranceOption = 0.05,
            error_model: Annotated[str, typer.Option("--error-model", metavar="E.toml", help="file of the machine's "
                                                     "geometric errors: checked; it changes no choice")] = "",
-           units: Units = "",
-           dialect: Dialect = "",
+           units: UnitsOption = "",
+           dialect: DialectOption = "",
            allow_unknown: Allow = None,
            json: Json = "") -> None:
     """Choose the tool orientation of 3+2 passes for the least planned time, and say why."""

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from postproc.cli.console import Json, machine_of, own_files, progress_bar, refuse_overwriting, report, shown_errors
-from postproc.cli.options import AxisTolerance, Beyond, MachineName, Tolerance, Units, only_with_errors
+from postproc.cli.options import AxisToleranceOption, Beyond, MachineName, ToleranceOption, UnitsOption, only_with_errors
 
 if TYPE_CHECKING:
     from machines.machine import Machine
     from postproc.base.options import Options
-    from postproc.cycle_time.blocks import Blocks
+    from postproc.cycle_time.blocks import MotionBlocks
     from postproc.cycle_time.model import CycleTimeModel
-    from postproc.cycle_time.phases import Timed
+    from postproc.cycle_time.phases import BlockTimes
     from toolpaths.diagnostics import Diagnostic
 
 
@@ -33,9 +33,9 @@ def time(file: Annotated[Path, typer.Argument(metavar="FILE", help="CL file, or 
                                                 "FILE: columns nc_line, time_s")] = "",
          output: Annotated[str, typer.Option("-o", "--output", metavar="MODEL.toml", help="write the fitted model")] = "",
          setup: Annotated[str, typer.Option("--setup", metavar="S.toml", help="set-up file: placement, tools")] = "",
-         tolerance: Tolerance = 0.01,
-         axis_tolerance: AxisTolerance = 0.05,
-         units: Units = "",
+         tolerance: ToleranceOption = 0.01,
+         axis_tolerance: AxisToleranceOption = 0.05,
+         units: UnitsOption = "",
          dialect: Annotated[str, typer.Option("--dialect", help="read the CL file as this dialect")] = "",
          error_model: Annotated[str, typer.Option("--error-model", metavar="E.toml", help="a CL file is timed as it is "
                                                   "written with these geometric errors corrected")] = "",
@@ -86,13 +86,13 @@ def _check(output: str, calibrate: str, units: str, dialect: str) -> None:
 
 
 def _blocks(file: Path, machine: Machine, controller: str, model: str, options: Options,
-            progress: Any) -> tuple[Blocks | None, CycleTimeModel | None, Timed | None, list[Diagnostic]]:
+            progress: Any) -> tuple[MotionBlocks | None, CycleTimeModel | None, BlockTimes | None, list[Diagnostic]]:
     """The blocks of a CL file (converted first) or of a program, the model of the control, and times that are planned."""
     from postproc.controllers.model import load_controller
     from postproc.cycle_time.model import load_model, model_name
     from postproc.cycle_time.source import from_conversion, from_gcode, looks_like_gcode, read_file
     from postproc.setup.model import load_setup
-    from postproc.verification.files_beside import Beside
+    from postproc.verification.neighbour_files import NeighbourFiles
     from toolpaths.diagnostics import require
 
     spec, found = load_controller(controller)
@@ -105,7 +105,7 @@ def _blocks(file: Path, machine: Machine, controller: str, model: str, options: 
         setup, found = load_setup(options.setup or None)
         require(found)
         assert setup is not None
-        blocks, found = from_gcode(data, machine, spec, setup, str(file), Beside(file))
+        blocks, found = from_gcode(data, machine, spec, setup, str(file), NeighbourFiles(file))
         return blocks, planner, None, found
     import toolpaths
     from postproc.pipeline.convert import convert
@@ -123,7 +123,7 @@ def _blocks(file: Path, machine: Machine, controller: str, model: str, options: 
     return blocks, planner, times, [*result.diagnostics, *found]
 
 
-def _calibrated(blocks: Blocks, machine: Machine, planner: CycleTimeModel | None,
+def _calibrated(blocks: MotionBlocks, machine: Machine, planner: CycleTimeModel | None,
                 log: str) -> tuple[CycleTimeModel | None, dict[str, Any], list[Diagnostic]]:
     """The model fitted to a log (None where it cannot be), and its figures."""
     from postproc.cycle_time.calibrate import as_dict, calibrate

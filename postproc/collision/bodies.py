@@ -8,13 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
-from postproc.collision.form import CUTTER, HOLDER, PARTS, SHANK, Form, stacked
+from postproc.collision.form import CUTTER, HOLDER, PARTS, SHANK, ToolForm, stacked
 from postproc.collision.mesh import load_mesh
 from postproc.collision.search import nearest
-from postproc.collision.solid import Solid, solid
+from postproc.collision.solid import TriangleSolid, solid
 from postproc.collision.swept import Swept
-from postproc.setup.bodies import Bodies, Units
-from postproc.setup.bodies import Solid as Given
+from postproc.setup.bodies import BodiesModel, MeshUnits
+from postproc.setup.bodies import SolidModel as Given
 from postproc.setup.model import Placement, SetupFile
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic, error, has_errors
@@ -30,7 +30,7 @@ class Body:
     """A solid in the table frame, `name` as messages call it."""
 
     name: str
-    solid: Solid
+    solid: TriangleSolid
 
     @property
     def is_part(self) -> bool:
@@ -47,7 +47,7 @@ class Scene:
     clearance: float
     gouge: float
 
-    def pairs(self, form: Form) -> Iterator[tuple[int, Body, float]]:
+    def pairs(self, form: ToolForm) -> Iterator[tuple[int, Body, float]]:
         """(CUTTER, SHANK or HOLDER, body, least distance in mm) of all pairs that are checked."""
         for part in (CUTTER, SHANK, HOLDER):
             if len(form.of(part)):
@@ -132,7 +132,7 @@ def _holders(setup: SetupFile, file: str) -> list[Diagnostic]:
             for d in load_mesh(Path(file).parent / tool.holder_mesh, tool.holder_units, f"tools.{number}.holder_mesh")[1]]
 
 
-def _others(given: Bodies) -> list[tuple[str, Given]]:
+def _others(given: BodiesModel) -> list[tuple[str, Given]]:
     """Table and fixtures with the keys that name them."""
     table = [] if given.table is None else [("bodies.table", given.table)]
     return [*table, *((f"bodies.fixtures[{k}]", one) for k, one in enumerate(given.fixtures))]
@@ -145,8 +145,8 @@ def _where(body: Body) -> str:
     return f"{body.name}: {len(body.solid)} triangles, {spans} mm of the table frame"
 
 
-def _solid(given: Given, where: Placement, folder: Path, units: Units,
-           key: str) -> tuple[Solid | None, list[Diagnostic]]:
+def _solid(given: Given, where: Placement, folder: Path, units: MeshUnits,
+           key: str) -> tuple[TriangleSolid | None, list[Diagnostic]]:
     """A mesh or box in the table frame."""
     if given.file is not None:
         mesh, found = load_mesh(folder / given.file, given.units or units, key)
@@ -157,7 +157,7 @@ def _solid(given: Given, where: Placement, folder: Path, units: Units,
     return solid(trimesh.creation.box(bounds=[given.box.low, given.box.high]), where), []
 
 
-def touches(all_bodies: Scene, form: Form, way: Swept, cutting: Swept | None = None) -> list[Touch]:
+def touches(all_bodies: Scene, form: ToolForm, way: Swept, cutting: Swept | None = None) -> list[Touch]:
     """What of a tool comes too near to what on a way; a pair once, at its worst.
 
     Args:

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from postproc.collision.cutter_form import Cutter, cutter_pieces, stated_cutter
+from postproc.collision.holder_hull import spun
 from postproc.collision.mesh import load_mesh
-from postproc.collision.spun import spun
-from postproc.setup.bodies import Section
+from postproc.setup.bodies import HolderSection
 from postproc.setup.model import ToolSetup
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, info, warning
@@ -25,7 +25,7 @@ _ANY = ToolSetup(gauge_length=1.0)
 
 
 @dataclass(frozen=True)
-class Form:
+class ToolForm:
     """A tool's pieces (P, 5), see `revolution`, and which of PARTS each belongs to (P,).
 
     `exact` is False where the cutter's pieces are only round it: they tell nothing of how far it cuts into the part.
@@ -41,7 +41,7 @@ class Form:
         return np.asarray(self.pieces[self.part == part])
 
 
-def tool_form(number: int, tool: Tool | None, setup: ToolSetup | None, file: str) -> tuple[Form, list[Diagnostic]]:
+def tool_form(number: int, tool: Tool | None, setup: ToolSetup | None, file: str) -> tuple[ToolForm, list[Diagnostic]]:
     """What is known of a tool's form; what is not is told, for it is not checked.
 
     Args:
@@ -67,10 +67,10 @@ def tool_form(number: int, tool: Tool | None, setup: ToolSetup | None, file: str
     found = [replace(d, file=d.file or file) for d in found]
     rows = np.concatenate(list(pieces.values()))
     part = np.repeat(list(pieces), [len(rows) for rows in pieces.values()])
-    return Form(number, rows, part, cutter.centre is not None), found
+    return ToolForm(number, rows, part, cutter.centre is not None), found
 
 
-def _sections(sections: list[Section], at: float) -> tuple[Floats, float]:
+def _sections(sections: list[HolderSection], at: float) -> tuple[Floats, float]:
     """Pieces (P, 5) of cylinders and cones from height `at` upwards, and the height where they end."""
     rows = []
     for one in sections:
@@ -149,7 +149,7 @@ def stacked(number: int | str, given: ToolSetup, flutes: float | None) -> list[D
     return found
 
 
-def lever_of(form: Form) -> float:
+def lever_of(form: ToolForm) -> float:
     """mm from the tip to the farthest point of the tool."""
     r0, z0, r1, z1, c = form.pieces.T
     return float((np.maximum(np.hypot(r0, z0), np.hypot(r1, z1)) + c).max())

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from postproc.collision.bodies import Scene, Touch, scene, touches
-from postproc.collision.executed_way import way_of
-from postproc.collision.form import PARTS, Form, lever_of, tool_form
+from postproc.collision.executed_path import way_of
+from postproc.collision.form import PARTS, ToolForm, lever_of, tool_form
 from postproc.collision.swept import Swept
 from postproc.readback.comparison.faults import Faults
 from postproc.readback.execution.execute import Motion
-from postproc.readback.execution.poses import Executed, begins
+from postproc.readback.execution.poses import BlockPoses, begins
 from postproc.reference.moves import Moves, Phase
 from toolpaths.arrays import Bools, Ints
 from toolpaths.diagnostics import Diagnostic, has_errors, info
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from postproc.job.job import Job
 
 
-def check_bodies(motion: Motion, executed: Executed, job: Job, owner: Ints, faults: Faults) -> list[Diagnostic]:
+def check_bodies(motion: Motion, executed: BlockPoses, job: Job, owner: Ints, faults: Faults) -> list[Diagnostic]:
     """Errors where a tool comes nearer to part, table or fixture than the set-up allows; nothing without [bodies].
 
     Args:
@@ -36,7 +36,7 @@ def check_bodies(motion: Motion, executed: Executed, job: Job, owner: Ints, faul
     return found
 
 
-def touching_parts(motion: Motion, executed: Executed, job: Job, owner: Ints, part: Ints) -> dict[int, Touch]:
+def touching_parts(motion: Motion, executed: BlockPoses, job: Job, owner: Ints, part: Ints) -> dict[int, Touch]:
     """What tools come nearest to being through in each part of a program; parts where they keep clear are not in it.
 
     Args:
@@ -64,7 +64,7 @@ class _Way:
     """
 
     bodies: Scene
-    form: Form
+    form: ToolForm
     way: Swept
     moves: Moves
     drilling: Bools
@@ -76,7 +76,7 @@ class _Way:
         return touches(self.bodies, self.form, way, way.take(np.flatnonzero(~drilling)) if drilling.any() else None)
 
 
-def _ways(motion: Motion, executed: Executed, job: Job, owner: Ints) -> tuple[list[_Way], list[Diagnostic]]:
+def _ways(motion: Motion, executed: BlockPoses, job: Job, owner: Ints) -> tuple[list[_Way], list[Diagnostic]]:
     """The way of each tool whose form is known; none without [bodies]."""
     if job.setup.bodies is None:
         return [], []
@@ -143,7 +143,7 @@ def _told(one: _Way, motion: Motion, owner: Ints, faults: Faults) -> list[Diagno
     return result
 
 
-def _clear(bodies: Scene, form: Form, faults: Faults) -> Diagnostic:
+def _clear(bodies: Scene, form: ToolForm, faults: Faults) -> Diagnostic:
     """What was compared with what."""
     said: dict[str, list[str]] = {}
     for part, body, limit in bodies.pairs(form):

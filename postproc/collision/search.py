@@ -16,7 +16,7 @@ import numpy as np
 
 from postproc.base.compiled import compiled, wanted
 from postproc.collision.revolution import around, bend, lever, middle, raised, support
-from postproc.collision.solid import Solid
+from postproc.collision.solid import TriangleSolid
 from postproc.collision.swept import TURN, Swept
 from toolpaths.arrays import Floats, Ints
 
@@ -47,7 +47,7 @@ class Nearest:
     point: tuple[float, float, float] = (np.nan, np.nan, np.nan)
 
 
-def nearest(body: Solid, way: Swept, pieces: Floats, limit: float) -> Nearest:
+def nearest(body: TriangleSolid, way: Swept, pieces: Floats, limit: float) -> Nearest:
     """What of a tool's `pieces` (P, 5) comes nearest to a body, where that is less than `limit` mm."""
     if wanted(len(way), _LONG):
         return _compiled(body, way, pieces, limit)
@@ -61,7 +61,7 @@ def nearest(body: Solid, way: Swept, pieces: Floats, limit: float) -> Nearest:
     return best
 
 
-def _compiled(body: Solid, way: Swept, pieces: Floats, limit: float) -> Nearest:
+def _compiled(body: TriangleSolid, way: Swept, pieces: Floats, limit: float) -> Nearest:
     """The same by the loops of `kernel`."""
     from postproc.collision import kernel
 
@@ -86,7 +86,7 @@ def _compiled(body: Solid, way: Swept, pieces: Floats, limit: float) -> Nearest:
 class _Search:
     """One piece of the tool; `best` is what was found so far."""
 
-    def __init__(self, body: Solid, way: Swept, piece: Floats, number: int, best: Nearest, limit: float,
+    def __init__(self, body: TriangleSolid, way: Swept, piece: Floats, number: int, best: Nearest, limit: float,
                  each: int) -> None:
         self.body, self.way, self.piece, self.number, self.best, self.limit = body, way, piece, number, best, limit
         self.high, self.nodes = raised(piece, middle(piece)), way.tree_at(middle(piece))
@@ -194,7 +194,7 @@ class _Cells:
     place: Ints
 
     @classmethod
-    def of(cls, body: Solid, way: Swept, pairs: Ints) -> _Cells:
+    def of(cls, body: TriangleSolid, way: Swept, pairs: Ints) -> _Cells:
         k, m = pairs.T
         return cls(body.corners[k], body.normal[k], way.tip[m], way.axis[m], m)
 

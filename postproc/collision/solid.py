@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Solid:
+class TriangleSolid:
     """Closed surface of T triangles.
 
     Attributes:
@@ -75,11 +75,11 @@ class Solid:
         return bool(abs(2.0 * np.arctan2(volume, below).sum()) > 2.0 * np.pi)
 
 
-def solid(mesh: Trimesh, placement: Placement) -> Solid:
+def solid(mesh: Trimesh, placement: Placement) -> TriangleSolid:
     """A closed mesh where `placement` puts it."""
     corners = placement.points(np.asarray(mesh.vertices, dtype=np.float64))[np.asarray(mesh.faces)]
     corners = corners[z_order(corners.mean(axis=1))]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     size = np.linalg.norm(normal, axis=1)
     corners, normal = corners[size > 0.0], normal[size > 0.0] / size[size > 0.0, None]
-    return Solid(corners, normal, tree(corners.min(axis=1), corners.max(axis=1)))
+    return TriangleSolid(corners, normal, tree(corners.min(axis=1), corners.max(axis=1)))

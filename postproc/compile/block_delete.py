@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from postproc.compile.program import Command, Commands
-from postproc.path.model import Path
+from postproc.path.model import JointPath
 from postproc.reference.events import words
 from postproc.reference.moves import Moves
 from toolpaths.arrays import Bools, Ints
@@ -23,7 +23,7 @@ _KEPT = frozenset({"ENTER_SECTION", "LEAVE_SECTION", "CHANGE_TOOL", "USE_TOOL_LE
 """commands that must not depend on a switch"""
 
 
-def skipped(toolpath: Toolpath, moves: Moves, path: Path) -> Bools:
+def skipped(toolpath: Toolpath, moves: Moves, path: JointPath) -> Bools:
     """(K,) blocks between OPSKIP/ON and OPSKIP/OFF, or the end."""
     change = np.zeros(len(path) + 1, dtype=np.int8)
     on = False

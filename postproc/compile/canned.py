@@ -8,7 +8,7 @@ from postproc.compile.program import Hole
 from postproc.compile.word_rows import WordRows
 from postproc.control.control import Control
 from postproc.controllers.model import ControllerFile
-from postproc.path.model import FEED, TRAVERSE, Path
+from postproc.path.model import FEED, TRAVERSE, JointPath
 from postproc.reference.events import spindle_states
 from postproc.reference.moves import Moves, Phase
 from toolpaths.arrays import Bools, Ints
@@ -25,7 +25,7 @@ _BACK_TO_THE_FIRST = ("linuxcnc", "iso")
 plane of the hole to that level on the way there (see `readback.cycles.legs`)"""
 
 
-def holes_of(toolpath: Toolpath, moves: Moves, path: Path, words: WordRows, control: Control,
+def holes_of(toolpath: Toolpath, moves: Moves, path: JointPath, words: WordRows, control: Control,
              controller: ControllerFile, skip: Bools) -> tuple[Bools, list[Hole]]:
     """Blocks of holes that the controller can drill by itself, and the holes; not among blocks that a switch may `skip`.
 
@@ -92,7 +92,7 @@ def _rises_first(words: WordRows, z: int, first: int, last: int, slack: float) -
     return 0 < first < last and bool(step[z] > slack) and not (np.abs(np.delete(step, z)) > slack).any()
 
 
-def _before_own_level(moves: Moves, path: Path, words: WordRows, z: int, first: int, last: int) -> int:
+def _before_own_level(moves: Moves, path: JointPath, words: WordRows, z: int, first: int, last: int) -> int:
     """How many blocks of a hole come down to the level that it retracts to: they stay blocks of their own."""
     placing = moves.phase[path.move[first:last + 1]] == Phase.POSITION
     level = np.abs(words.end[first:last + 1, z] - words.end[last, z]) < 1e-9
@@ -101,13 +101,13 @@ def _before_own_level(moves: Moves, path: Path, words: WordRows, z: int, first: 
     return int(found[-1]) + 1 if len(found) else 0
 
 
-def _placed_before(moves: Moves, path: Path, allowed: Bools, first: int, last: int) -> int:
+def _placed_before(moves: Moves, path: JointPath, allowed: Bools, first: int, last: int) -> int:
     """How many blocks bring the tool over a hole that are not `allowed` (K,) in its cycle: they stay blocks of their own."""
     inside = np.flatnonzero(allowed[first:last + 1] | (moves.phase[path.move[first:last + 1]] > Phase.APPROACH))
     return int(inside[0]) if len(inside) else 0
 
 
-def _rises_beyond(moves: Moves, path: Path, words: WordRows, z: int, first: int, last: int, initial: float) -> bool:
+def _rises_beyond(moves: Moves, path: JointPath, words: WordRows, z: int, first: int, last: int, initial: float) -> bool:
     """True where block `last` goes on in rapid, from the plane that the cycle feeds out to, to above its initial level.
 
     No code of a cycle goes there: it stays a block of its own behind the cycle.
@@ -122,13 +122,13 @@ def _states_retract(controller: ControllerFile, key: str) -> bool:
     return any(name in spec.code for spec in specs for name in STATES_RETRACT)
 
 
-def _slack(path: Path, controller: ControllerFile, block: int) -> float:
+def _slack(path: JointPath, controller: ControllerFile, block: int) -> float:
     """mm by which words of one level may differ."""
     tilted = path.frames[int(path.frame[block])].control.law == "tilted"
     return ROUNDED * 10.0 ** -controller.format.linear_decimals if tilted else 1e-9
 
 
-def _without_feeding_rapids(moves: Moves, path: Path, first: int, last: int) -> tuple[int, int]:
+def _without_feeding_rapids(moves: Moves, path: JointPath, first: int, last: int) -> tuple[int, int]:
     """The blocks of a hole without rapids at its ends that are written at feed (`rapid_codes`).
 
     They stay blocks of their own: the cycle begins over the hole, or at its clearance plane, and ends there.
@@ -138,12 +138,12 @@ def _without_feeding_rapids(moves: Moves, path: Path, first: int, last: int) -> 
     return first + max(int(inner[0]), int(over[-1]) + 1 if len(over) else 0), first + int(inner[-1])
 
 
-def feeding_rapid(moves: Moves, path: Path, blocks: Ints) -> Bools:
+def feeding_rapid(moves: Moves, path: JointPath, blocks: Ints) -> Bools:
     """(N,) blocks that are rapids of the CL file written at feed."""
     return np.asarray((path.code[blocks] == FEED) & (moves.kind[path.move[blocks]] == Kind.RAPID))
 
 
-def _hole(toolpath: Toolpath, moves: Moves, path: Path, rows: WordRows, control: Control, controller: ControllerFile,
+def _hole(toolpath: Toolpath, moves: Moves, path: JointPath, rows: WordRows, control: Control, controller: ControllerFile,
           first: int, last: int, initial: float, key: str, placed: bool) -> Hole | None:
     """The hole of blocks `first` to `last`; the tool goes to the very place at the plane where blocks of their own have
     `placed` it there."""

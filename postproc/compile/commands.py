@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from postproc.compile.cutter_compensation import Compensation
+from postproc.compile.cutter_compensation import RadiusCompensation
 from postproc.compile.program import Command, Commands
-from postproc.compile.spindle_coolant_state import Switched
+from postproc.compile.spindle_coolant_state import SpindleCoolantState
 from postproc.controllers.model import ControllerFile
-from postproc.path.model import Path
+from postproc.path.model import JointPath
 from postproc.reference.coolant import written
 from postproc.reference.events import (
     Spindle,
@@ -35,7 +35,7 @@ QUIET = frozenset({"GOHOME", "END", "OPSKIP", "SEQNO", "MODE", "ROTATE", "ROTABL
 _STOPS = frozenset({"STOP", "OPSTOP"})
 
 
-def commands_of(toolpath: Toolpath, moves: Moves, path: Path, controller: ControllerFile, native: Bools,
+def commands_of(toolpath: Toolpath, moves: Moves, path: JointPath, controller: ControllerFile, native: Bools,
                 restart: bool = False, tool_call: bool = True) -> tuple[Commands, list[Diagnostic]]:
     """Commands by block, and what could not be carried out; with `restart` every operation restates its tool; without
     `tool_call` no length register may be left in force by what ran before."""
@@ -62,7 +62,7 @@ def operation_starts(toolpath: Toolpath, moves: Moves) -> list[tuple[int, int]]:
 class _Writing:
     """Goes through the records of a path and puts commands at their blocks."""
 
-    def __init__(self, toolpath: Toolpath, moves: Moves, path: Path, controller: ControllerFile, restart: bool) -> None:
+    def __init__(self, toolpath: Toolpath, moves: Moves, path: JointPath, controller: ControllerFile, restart: bool) -> None:
         self.toolpath, self.moves, self.path, self.controller, self.restart = toolpath, moves, path, controller, restart
         self.result: dict[int, list[Command]] = {}
         self.first_move = np.searchsorted(moves.row, np.arange(len(toolpath) + 1))
@@ -71,8 +71,8 @@ class _Writing:
         self.to_come = [c.number for c in self.changes.values()]
         self.selects = controller.tools.preload and not any(e.word == "SELECT" for e in toolpath.events)
         self.loaded: ToolChange | None = None
-        self.spindle, self.state = Spindle(), Switched()
-        self.compensation = Compensation(moves, path, self.result, controller, loaded_registers(toolpath))
+        self.spindle, self.state = Spindle(), SpindleCoolantState()
+        self.compensation = RadiusCompensation(moves, path, self.result, controller, loaded_registers(toolpath))
         self.starts = operation_starts(toolpath, moves)
         self.lost: dict[str, list[int]] = {}
         self.skipping = False
@@ -209,7 +209,7 @@ def _gone(events: tuple[Event, ...], at: int) -> bool:
     return any(e.index == events[at].index and e.word in ("LOADTL", "GOHOME") for e in events[max(at - 20, 0):at])
 
 
-def _behind(path: Path, move: int) -> int:
+def _behind(path: JointPath, move: int) -> int:
     """The block behind the last of the move before `move`: a dwell belongs there, not behind the retract."""
     last = np.flatnonzero((path.move == move - 1) & np.isfinite(path.u))
     return int(last[-1]) + 1 if len(last) else int(path.begin[min(move, len(path.begin) - 1)])
@@ -239,7 +239,7 @@ def _simple(event: Event, spindle: Spindle) -> Command | None:
     return None
 
 
-def _dwells(toolpath: Toolpath, moves: Moves, path: Path, native: Bools) -> list[tuple[int, Command]]:
+def _dwells(toolpath: Toolpath, moves: Moves, path: JointPath, native: Bools) -> list[tuple[int, Command]]:
     """Dwell at the bottom of holes that are written as single moves."""
     result = []
     for m in np.flatnonzero(moves.phase == Phase.DRILL):

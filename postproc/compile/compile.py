@@ -10,23 +10,23 @@ from postproc.compile.block_delete import after, skipped, with_skips
 from postproc.compile.canned import holes_of
 from postproc.compile.commands import commands_of
 from postproc.compile.cycle_refusals import not_native
-from postproc.compile.feed import Feeds, Planned, plan_feeds
+from postproc.compile.feed import Feeds, PlannedTimes, plan_feeds
 from postproc.compile.program import Command, Commands, Hole, Program
 from postproc.compile.sections import sections_of, with_sections
 from postproc.compile.word_rows import WordRows, block_tools, joints_of, with_turns, word_rows
 from postproc.job.job import Job
 from postproc.job.rounding import decimals
-from postproc.path.model import ARC, Path
+from postproc.path.model import ARC, JointPath
 from postproc.reference.moves import Moves
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.diagnostics import Diagnostic, info
 
 if TYPE_CHECKING:
-    from postproc.correction.settled import Writing
+    from postproc.correction.backlash_words import Writing
 
 
-def compile_program(job: Job, moves: Moves, path: Path,
-                    planned: Planned | None = None,
+def compile_program(job: Job, moves: Moves, path: JointPath,
+                    planned: PlannedTimes | None = None,
                     apart: Bools | None = None) -> tuple[Program, Feeds, list[Diagnostic]]:
     """The canonical program of a path along `moves`; `planned` are the feeds that the plan allows, blocks that are `apart`
     (K,) no part of canned cycles."""
@@ -58,7 +58,7 @@ def compile_program(job: Job, moves: Moves, path: Path,
                             *not_native(toolpath, moves, path, native, controller, skip)]
 
 
-def words_of(job: Job, moves: Moves, path: Path, anew: Ints | None = None) -> WordRows:
+def words_of(job: Job, moves: Moves, path: JointPath, anew: Ints | None = None) -> WordRows:
     """The words of a path's blocks; the blocks `anew` state every axis."""
     return word_rows(path, moves, job.control, job.kinematics, job.offset_length, decimals(job.control, job.controller),
                      np.zeros(0, dtype=np.int64) if anew is None else anew, job.rounding.made_up, job.two_way, job.corrects)
@@ -66,12 +66,12 @@ def words_of(job: Job, moves: Moves, path: Path, anew: Ints | None = None) -> Wo
 
 def writing_of(job: Job, moves: Moves) -> Writing:
     """How paths along `moves` are written, for the correction of geometric errors."""
-    from postproc.correction.settled import Writing
+    from postproc.correction.backlash_words import Writing
 
-    def joints(path: Path, words: Floats, rows: Ints) -> Floats:
+    def joints(path: JointPath, words: Floats, rows: Ints) -> Floats:
         return joints_of(path, words, rows, block_tools(path, moves), job.kinematics, job.offset_length)
 
-    def turned(path: Path, q: Floats, rows: Ints) -> Floats:
+    def turned(path: JointPath, q: Floats, rows: Ints) -> Floats:
         return with_turns(q, path.q[rows], path, rows, block_tools(path, moves), job.kinematics, job.rounding.made_up)
 
     grain = np.asarray(10.0 ** -decimals(job.control, job.controller).astype(np.float64))
@@ -86,7 +86,7 @@ def _moved(commands: Commands, new: Ints) -> Commands:
     return moved
 
 
-def _mapped(feeds: Feeds, moves: Moves, path: Path, job: Job) -> list[Diagnostic]:
+def _mapped(feeds: Feeds, moves: Moves, path: JointPath, job: Job) -> list[Diagnostic]:
     """Cuts that turn rotary axes under axis positions, per minute as the controller has no inverse time."""
     if job.controller.feed.inverse_time or job.options.feed_mode != "auto" or not len(job.control.rotary):
         return []
@@ -103,7 +103,7 @@ def _mapped(feeds: Feeds, moves: Moves, path: Path, job: Job) -> list[Diagnostic
                  lines=np.unique(moves.line[path.move[rows]])[:6].tolist(), count=len(rows))]
 
 
-def _slowed(feeds: Feeds, moves: Moves, path: Path, planned: bool, file: str) -> list[Diagnostic]:
+def _slowed(feeds: Feeds, moves: Moves, path: JointPath, planned: bool, file: str) -> list[Diagnostic]:
     rows = np.flatnonzero(feeds.slowed)
     if not len(rows):
         return []

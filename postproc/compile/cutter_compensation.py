@@ -6,7 +6,7 @@ import numpy as np
 
 from postproc.compile.program import Command
 from postproc.controllers.model import ControllerFile
-from postproc.path.model import TRAVERSE, Path
+from postproc.path.model import TRAVERSE, JointPath
 from postproc.reference.events import compensation_side, numbers
 from postproc.reference.moves import Moves
 from toolpaths.arrays import Bools, Ints
@@ -20,7 +20,7 @@ STILL = 1e-9
 STARTS = ("CUTTER_COMPENSATION_LEFT", "CUTTER_COMPENSATION_RIGHT")
 
 
-class Compensation:
+class RadiusCompensation:
     """CUTCOM as the control's cutter compensation: stated when it changes, off before linking moves, holes, tool changes.
 
     The points are written as the file has them; what the control adds depends on its register. It adds it in the plane of
@@ -29,7 +29,7 @@ class Compensation:
     names none, that of the tool's length register is written: `registers` (N,) by row of the Toolpath, -1 for none.
     """
 
-    def __init__(self, moves: Moves, path: Path, commands: dict[int, list[Command]], controller: ControllerFile,
+    def __init__(self, moves: Moves, path: JointPath, commands: dict[int, list[Command]], controller: ControllerFile,
                  registers: Ints) -> None:
         self.moves, self.path, self.out = moves, path, commands
         self.modal, self.registers = controller.cutter_compensation.modal_register, registers

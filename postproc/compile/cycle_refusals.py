@@ -6,7 +6,7 @@ import numpy as np
 
 from postproc.compile.canned import cycle_key, may_cycle
 from postproc.controllers.model import ControllerFile
-from postproc.path.model import Path
+from postproc.path.model import JointPath
 from postproc.reference.events import spindle_states
 from postproc.reference.moves import Moves, Phase
 from toolpaths.arrays import Bools, Ints
@@ -20,7 +20,7 @@ _OTHER = ("the tool does not stand along Z of the words, or the way out ends at 
           "an output mode in which it does (--output-mode tilted), or RTRCTO at the start plane or where the tool came from")
 
 
-def not_native(toolpath: Toolpath, moves: Moves, path: Path, native: Bools, controller: ControllerFile,
+def not_native(toolpath: Toolpath, moves: Moves, path: JointPath, native: Bools, controller: ControllerFile,
                skip: Bools) -> list[Diagnostic]:
     """Cycles that single moves do not replace and that could not be written as canned cycles, each with its reason;
     `native` and `skip` (K,) as in `holes_of`."""
@@ -44,7 +44,7 @@ def only_canned(toolpath: Toolpath, controller: ControllerFile) -> Bools:
                     dtype=bool)
 
 
-def _rows(toolpath: Toolpath, moves: Moves, path: Path, native: Bools, controller: ControllerFile) -> Ints:
+def _rows(toolpath: Toolpath, moves: Moves, path: JointPath, native: Bools, controller: ControllerFile) -> Ints:
     """The moves down such holes."""
     only = only_canned(toolpath, controller)
     rows = np.flatnonzero((moves.phase == Phase.DRILL) & (moves.cycle >= 0))
@@ -71,7 +71,7 @@ def _lacking(cycle: Cycle, key: str, controller: ControllerFile) -> tuple[str, s
     return None
 
 
-def _at_its_place(path: Path, block: int, controller: ControllerFile, skipped: bool) -> tuple[str, str]:
+def _at_its_place(path: JointPath, block: int, controller: ControllerFile, skipped: bool) -> tuple[str, str]:
     """(reason, what to do) where the controller has the cycle, but not there."""
     law = path.frames[int(path.frame[block])].control
     if not may_cycle(law, controller):

@@ -10,8 +10,8 @@ from postproc.compile.merged_feeds import merged
 from postproc.compile.program import INVERSE, PER_MINUTE
 from postproc.control.control import Control
 from postproc.control.word_arcs import PLANE_COLUMNS
-from postproc.controllers.model import Feed as FeedRules
-from postproc.path.model import ARC, Path
+from postproc.controllers.model import FeedRules
+from postproc.path.model import ARC, JointPath
 from toolpaths.arrays import Array, Bools, Floats, Ints
 
 
@@ -26,15 +26,15 @@ class Feeds:
 
 
 @dataclass(frozen=True)
-class Planned:
+class PlannedTimes:
     """Least seconds (K,) of each block that keep the limits of the axes, and the part by which feeds may be merged."""
 
     needed: Floats
     merge: float = 0.0
 
 
-def plan_feeds(path: Path, control: Control, step: Floats, asked: Floats, passes: Ints, native: Bools,
-               feed_mode: str, rules: FeedRules, planned: Planned | None = None) -> Feeds:
+def plan_feeds(path: JointPath, control: Control, step: Floats, asked: Floats, passes: Ints, native: Bools,
+               feed_mode: str, rules: FeedRules, planned: PlannedTimes | None = None) -> Feeds:
     """Feed words for the blocks of a path.
 
     Args:
@@ -56,7 +56,7 @@ def plan_feeds(path: Path, control: Control, step: Floats, asked: Floats, passes
     return replace(feeds, feed=feed, seconds=feeds.seconds * factor, slowed=feeds.slowed | (factor > 1.0 + 1e-9))
 
 
-def least_seconds(path: Path, control: Control, asked: Floats, step: Floats) -> Floats:
+def least_seconds(path: JointPath, control: Control, asked: Floats, step: Floats) -> Floats:
     """(K,) s that the velocities of the axes ask of each block, by its joints and by its rounded words, step (K, J)."""
     joints = np.concatenate([control.machine.home[None, :], path.q[:-1]])
     velocity = control.machine.limits.velocity
@@ -70,13 +70,13 @@ def least_seconds(path: Path, control: Control, asked: Floats, step: Floats) -> 
     return np.asarray(needed)
 
 
-def _control_bends(path: Path) -> Bools:
+def _control_bends(path: JointPath) -> Bools:
     """(K,) blocks whose joints bend between their ends, so that their speed is not known from the tip's."""
     tip_law = np.array([f.control.tip_law for f in path.frames])
     return np.asarray(tip_law[path.frame])
 
 
-def feed_words(path: Path, control: Control, step: Floats, asked: Floats, needed: Floats, mode: Array,
+def feed_words(path: JointPath, control: Control, step: Floats, asked: Floats, needed: Floats, mode: Array,
                rules: FeedRules) -> Feeds:
     """The words of blocks that take the time asked for, or the time (K,) s needed where that is longer, in the feed mode
     (K,) and under the law of each. Blocks without a time of their own, retracts in feed motion, have no feed asked for."""
@@ -109,7 +109,7 @@ def feed_words(path: Path, control: Control, step: Floats, asked: Floats, needed
     return Feeds(feed, mode.astype(np.int8), np.where(cutting, seconds, np.nan), slowed)
 
 
-def _radius(path: Path) -> Floats:
+def _radius(path: JointPath) -> Floats:
     """(K,) radius of the arc blocks, mm, 1 for others."""
     result = np.ones(len(path))
     for plane, columns in PLANE_COLUMNS.items():
@@ -127,7 +127,7 @@ def _moves_tip(step: Floats, control: Control) -> Bools:
     return np.asarray((step[:, control.xyz] != 0.0).any(axis=1))
 
 
-def _modes(path: Path, control: Control, step: Floats, passes: Ints, native: Bools, feed_mode: str,
+def _modes(path: JointPath, control: Control, step: Floats, passes: Ints, native: Bools, feed_mode: str,
            rules: FeedRules) -> Array:
     """(K,) inverse time for passes that move rotary axes while cutting, where X, Y, Z words are joints."""
     cutting = path.code != 0

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from postproc.control.control import Law
+from postproc.control.control import InterpolationMode
 from postproc.control.planes import Plane
 from toolpaths.arrays import Array, Bools, Floats, Ints
 
@@ -46,7 +46,7 @@ class Section:
     """
 
     first: int
-    law: Law
+    law: InterpolationMode
     plane: Plane | None = None
     angles: tuple[float, ...] = ()
     rotary: tuple[tuple[str, float], ...] = ()

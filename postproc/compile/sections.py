@@ -7,14 +7,14 @@ from itertools import pairwise
 import numpy as np
 
 from postproc.compile.program import Command, Commands, Section
-from postproc.path.model import Path
+from postproc.path.model import JointPath
 from toolpaths.arrays import Ints
 
 _BELONG_BEFORE = frozenset({"CUTTER_COMPENSATION_OFF", "DWELL"})
 """commands that stand before a mode is left"""
 
 
-def sections_of(path: Path, new: Ints) -> tuple[Section, ...]:
+def sections_of(path: JointPath, new: Ints) -> tuple[Section, ...]:
     """The sections of a path, `new` (K + 1,) giving the number of each block among those that are written."""
     first = np.concatenate([[0], np.flatnonzero(np.diff(path.frame)) + 1])
     at = new[first]

@@ -10,7 +10,7 @@ from postproc.reference.events import ToolChange
 _STOPPED, _DRY = "STOP_SPINDLE_TURNING", "COOLANT_OFF"
 
 
-class Switched:
+class SpindleCoolantState:
     """Spindle and coolant as the commands so far leave them: stated only where they change."""
 
     def __init__(self) -> None:

@@ -11,7 +11,7 @@ from machines.kinematics.base import Kinematics
 from postproc.base.group_rows import groups
 from postproc.control.control import Control
 from postproc.control.word_arcs import PLANE_AXIS
-from postproc.path.model import ARC, FEED, Path
+from postproc.path.model import ARC, FEED, JointPath
 from postproc.reference.moves import Moves
 from toolpaths.arrays import Bools, Floats, Ints
 
@@ -28,7 +28,7 @@ class WordRows:
     write: Bools
 
 
-def word_rows(path: Path, moves: Moves, control: Control, kinematics: Callable[[int], Kinematics],
+def word_rows(path: JointPath, moves: Moves, control: Control, kinematics: Callable[[int], Kinematics],
               lengths: Callable[[int], float], places: Ints, anew: Ints, made_up: bool = False,
               two_way: Sequence[int] = (), exact: bool = False) -> WordRows:
     """The words of all blocks; `lengths` gives the gauge length of the tool of an index, `places` (J,) the decimals,
@@ -50,14 +50,14 @@ def _rounded(words: Floats, places: Ints) -> Floats:
     return np.asarray(np.round(np.round(words / grain) * grain, int(places.max())))
 
 
-def block_tools(path: Path, moves: Moves) -> Ints:
+def block_tools(path: JointPath, moves: Moves) -> Ints:
     """(K,) tool of each block; blocks before a tool change still carry the tool that leaves, none before the first."""
     leaving = np.arange(len(path)) < path.begin[path.move]
     before = np.where(path.move > 0, moves.tool[np.maximum(path.move - 1, 0)], -1)
     return np.asarray(np.where(leaving, before, moves.tool[path.move]))
 
 
-def _words(path: Path, q: Floats, rows: Ints, tool: Ints, kinematics: Callable[[int], Kinematics],
+def _words(path: JointPath, q: Floats, rows: Ints, tool: Ints, kinematics: Callable[[int], Kinematics],
            lengths: Callable[[int], float], rounds: Ints | None) -> Floats:
     """Unrounded words of joints q (K, J) under the law and with the tool of the blocks `rows` (K,).
 
@@ -73,7 +73,7 @@ def _words(path: Path, q: Floats, rows: Ints, tool: Ints, kinematics: Callable[[
     return words
 
 
-def joints_of(path: Path, words: Floats, rows: Ints, tool: Ints, kinematics: Callable[[int], Kinematics],
+def joints_of(path: JointPath, words: Floats, rows: Ints, tool: Ints, kinematics: Callable[[int], Kinematics],
               lengths: Callable[[int], float]) -> Floats:
     """Joints (N, J) that words (N, J) under the law and with the tool of the blocks `rows` (N,) mean; tool (K,)."""
     q = np.empty_like(words)
@@ -83,7 +83,7 @@ def joints_of(path: Path, words: Floats, rows: Ints, tool: Ints, kinematics: Cal
     return q
 
 
-def with_turns(q: Floats, turns: Floats, path: Path, rows: Ints, tool: Ints, kinematics: Callable[[int], Kinematics],
+def with_turns(q: Floats, turns: Floats, path: JointPath, rows: Ints, tool: Ints, kinematics: Callable[[int], Kinematics],
                made_up: bool) -> Floats:
     """Joints (N, J) with the rotary joints of `turns` (N, J) that are written as q (N, J) is, by blocks `rows` (N,)."""
     result = np.where(path.frames[0].control.machine.rotary, turns, q)
@@ -103,7 +103,7 @@ def _made_up(q: Floats, law: Control, kin: Kinematics, places: Ints) -> Floats:
     return turned
 
 
-def _snapped(words: Floats, path: Path, control: Control, places: Ints, exact: bool) -> Floats:
+def _snapped(words: Floats, path: JointPath, control: Control, places: Ints, exact: bool) -> Floats:
     """Words (rounded) without tiny X, Y, Z residues beside a rotary move.
 
     Under inverse time LinuxCNC takes the length of X, Y, Z alone where any of them moves, so that a residue of
@@ -132,11 +132,12 @@ def _snapped(words: Floats, path: Path, control: Control, places: Ints, exact: b
     return words
 
 
-def _held(words: Floats, path: Path, control: Control, tool: Ints, places: Ints, joints: Sequence[int]) -> Floats:
+def _held(words: Floats, path: JointPath, control: Control, tool: Ints, places: Ints, joints: Sequence[int]) -> Floats:
     """Words (rounded) in which rotary axes among `joints` never turn back by one last decimal: the word before stays.
 
     An axis that loses motion would have another error there, more than the decimal is worth. What is left out never adds
-    up: each block is compared with the last written position. Slides have their words from `postproc.correction.settled`.
+    up: each block is compared with the last written position. Slides have their words from
+    `postproc.correction.backlash_words`.
     """
     turning = [j for j in joints if j in control.rotary]
     if not turning:
@@ -169,7 +170,7 @@ def _walked(counts: Floats, same: Bools, along: Floats) -> list[float]:
     return result
 
 
-def _flat(words: Floats, path: Path, control: Control) -> Floats:
+def _flat(words: Floats, path: JointPath, control: Control) -> Floats:
     """Words whose arcs do not rise in planes in which the control has no helix: rounding may part their ends."""
     goes_on = np.append(False, np.diff(path.frame) == 0)
     for law, k in path.by_control():
@@ -179,7 +180,7 @@ def _flat(words: Floats, path: Path, control: Control) -> Floats:
     return words
 
 
-def _written(end: Floats, start: Floats, anew: Ints, path: Path, control: Control) -> Bools:
+def _written(end: Floats, start: Floats, anew: Ints, path: JointPath, control: Control) -> Bools:
     """Words (K, J) that a block states: those it names, else those that change; both plane words of an arc.
 
     The blocks `anew` state all, the first under another law among them; in a tilted plane rotary axes have no words.

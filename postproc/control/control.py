@@ -23,7 +23,7 @@ from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.units import DEG
 
 XYZ = ("X", "Y", "Z")
-Law = Literal["axes", "tcp", "tilted"]
+InterpolationMode = Literal["axes", "tcp", "tilted"]
 Rapids = Literal["straight", "dog-leg"]
 FeedLength = Literal["xyz-first", "all", "geometry"]
 
@@ -49,10 +49,10 @@ class Control:
     """
 
     machine: Machine
-    law: Law
+    law: InterpolationMode
     origin: Floats
     arc_limit: float = math.inf
-    base: Law = "axes"
+    base: InterpolationMode = "axes"
     plane: Plane | None = None
     rapids: Rapids = "straight"
     feed_rule: FeedLength = "xyz-first"
@@ -66,7 +66,7 @@ class Control:
     def _others(self) -> dict[tuple[object, ...], Control]:
         return {(self.law, self.plane.key if self.plane else ()): self}
 
-    def under(self, law: Law, plane: Plane | None = None) -> Control:
+    def under(self, law: InterpolationMode, plane: Plane | None = None) -> Control:
         """The same control under another law; equal questions get the same object."""
         key = law, plane.key if plane else ()
         if key not in self._others:

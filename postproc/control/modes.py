@@ -9,7 +9,7 @@ import numpy as np
 
 from machines.kinematics.base import Kinematics
 from postproc.base.options import Options
-from postproc.control.control import Control, Law, tool_frames
+from postproc.control.control import Control, InterpolationMode, tool_frames
 from postproc.control.planes import Plane, stated
 from postproc.controllers.model import ControllerFile, Mode
 from postproc.setup.model import SetupFile
@@ -19,9 +19,9 @@ from toolpaths.rotations import angle_between
 from toolpaths.toolpath import Toolpath
 
 ASKED = ("auto", "axes", "tcp", "tilted")
-PREFERRED: dict[bool, tuple[Law, ...]] = {True: ("tilted", "axes", "tcp"), False: ("tcp", "axes")}
+PREFERRED: dict[bool, tuple[InterpolationMode, ...]] = {True: ("tilted", "axes", "tcp"), False: ("tcp", "axes")}
 """modes that "auto" takes, the first that can be had: where the tool axis of a run stands still, and where it turns"""
-Refused = frozenset[tuple[int, Law]]
+Refused = frozenset[tuple[int, InterpolationMode]]
 """(operation, mode) that "auto" passes over, because that mode could not be written or proved for it"""
 CONSTANT = 0.1
 """share of the axis tolerance within which the tool axis of a run counts as standing still"""
@@ -56,7 +56,7 @@ class OutputModes:
     refused: Refused = frozenset()
 
     @cached_property
-    def lacking(self) -> dict[Law, str]:
+    def lacking(self) -> dict[InterpolationMode, str]:
         """Why a law cannot be had, "" where it can."""
         control, modes, name = self.control, self.controller.modes, self.control.machine.name
         if control.base == "tcp":
@@ -101,17 +101,17 @@ class OutputModes:
         """The frame that programs begin in, and that home and indexing moves are made in."""
         return WordFrame(self.control)
 
-    def law(self, operation: int, constant: bool) -> Law:
+    def law(self, operation: int, constant: bool) -> InterpolationMode:
         """The law of a run of that operation, `constant` where its tool axis stands still."""
         asked = ASKED[int(self.asked[operation])]
         return self.possible(operation, constant)[0] if asked == "auto" else asked  # type: ignore[return-value]
 
-    def possible(self, operation: int, constant: bool) -> list[Law]:
+    def possible(self, operation: int, constant: bool) -> list[InterpolationMode]:
         """The laws that "auto" may take for such a run, in order: those that are refused only where there is no other."""
         had = [law for law in PREFERRED[constant] if not self.lacking[law]]
         return [law for law in had if (operation, law) not in self.refused] or had[-1:]
 
-    def cutting_laws(self) -> set[Law]:
+    def cutting_laws(self) -> set[InterpolationMode]:
         """The laws that runs may come to have."""
         apart = {operation for operation, _ in self.refused}
         alike = {int(asked): k for k, asked in enumerate(self.asked) if k not in apart}

@@ -10,12 +10,12 @@ from pydantic import Field
 
 from machines.stop import Stop
 from machines.user_file import UserModel, load_toml
-from postproc.controllers.spelling import Codes, Comment, Format, Frame, Subprograms, Tools
+from postproc.controllers.spelling import Codes, Comment, Format, ProgramBlocks, SubprogramFormat, Tools
 from postproc.controllers.texts import CYCLE_VALUES, placeholders
 from toolpaths.diagnostics import Diagnostic
 
 
-class Arcs(UserModel):
+class ArcRules(UserModel):
     """Which arcs the controller takes."""
 
     enabled: bool = True
@@ -68,7 +68,7 @@ class Cycles(UserModel):
     """mm before the last depth to which the tool returns rapidly"""
 
 
-class Feed(UserModel):
+class FeedRules(UserModel):
     """Rules of the feed word."""
 
     inverse_time: bool = True
@@ -98,7 +98,7 @@ class CutterCompensation(UserModel):
     register is written"""
 
 
-class Kinematics(UserModel):
+class InterpolationRules(UserModel):
     """Which motion lies between two blocks."""
 
     linear: Literal["joints"] = "joints"
@@ -210,19 +210,19 @@ class ControllerFile(UserModel):
     """documents that the rules come from"""
     format: Format = Format()
     comment: Comment = Comment()
-    program: Frame = Frame()
+    program: ProgramBlocks = ProgramBlocks()
     start: Start = Start()
     codes: Codes = Codes()
     tools: Tools = Tools()
     stops: Stops = Stops()
-    subprograms: Subprograms = Subprograms()
-    subprogram_files: Subprograms = Subprograms(place="files")
+    subprograms: SubprogramFormat = SubprogramFormat()
+    subprogram_files: SubprogramFormat = SubprogramFormat(place="files")
     """the same in files of their own, which the set-up may ask for"""
-    arcs: Arcs = Arcs()
+    arcs: ArcRules = ArcRules()
     cycles: Cycles = Cycles()
-    feed: Feed = Feed()
+    feed: FeedRules = FeedRules()
     cutter_compensation: CutterCompensation = CutterCompensation()
-    kinematics: Kinematics = Kinematics()
+    kinematics: InterpolationRules = InterpolationRules()
     modes: Modes = Modes()
 
     def divided(self, files: bool) -> ControllerFile:

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from machines.user_file import UserModel
-from postproc.controllers.texts import Named, Numbered, Registered, Timed, WorkOffsets, placeholders
+from postproc.controllers.texts import DwellText, Named, Numbered, Registered, WorkOffsets, placeholders
 
 
 class Format(UserModel):
@@ -49,7 +49,7 @@ class Comment(UserModel):
     """characters that a comment must not hold"""
 
 
-class Frame(UserModel):
+class ProgramBlocks(UserModel):
     """Blocks that stand around every program."""
 
     begin: tuple[Named, ...] = ("%",)
@@ -137,7 +137,7 @@ class Codes(UserModel):
     """length register in force; empty: the controller has none"""
     length_cancel: str = "G49"
     """length register off"""
-    dwell: Timed = "G4 P{seconds}"
+    dwell: DwellText = "G4 P{seconds}"
     """a dwell, a block a line"""
     rigid_tap: Annotated[str, placeholders("speed")] = ""
     """block before a tapping cycle that couples feed and spindle"""
@@ -162,7 +162,7 @@ class Tools(UserModel):
     """blocks in machine coordinates switch the length register off"""
 
 
-class Subprograms(UserModel):
+class SubprogramFormat(UserModel):
     """Operations as subprograms; their numbers are 1001, 1002, ..., {name} is the program's."""
 
     call: Named = ""

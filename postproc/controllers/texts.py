@@ -41,7 +41,7 @@ WorkOffsets = Annotated[dict[str, str], AfterValidator(_all_offsets)]
 Named = Annotated[str, placeholders("name", "number")]
 Numbered = Annotated[str, placeholders("number")]
 Registered = Annotated[str, placeholders("register")]
-Timed = Annotated[str, placeholders("seconds", "milliseconds")]
+DwellText = Annotated[str, placeholders("seconds", "milliseconds")]
 
 
 def blocks_of(text: str) -> list[str]:

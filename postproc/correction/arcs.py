@@ -9,17 +9,18 @@ import numpy as np
 
 from postproc.base.group_rows import groups
 from postproc.control.word_arcs import PLANE_AXIS, PLANE_COLUMNS
-from postproc.correction.error_context import Work, on_arc
+from postproc.correction.error_context import ErrorContext, on_arc
 from postproc.correction.error_sampling import changes, looks_between
 from postproc.correction.reversals import LOOSE
-from postproc.path.model import ARC, FEED, Path
+from postproc.path.model import ARC, FEED, JointPath
 from toolpaths.arrays import Bools, Floats, Ints
 
 LOOKS = (0.25, 0.5, 0.75)
 """where the motion between two corrected points is looked at"""
 
 
-def fitted_arcs(path: Path, nominal: Path, work: Work, start: Floats, allowed: float, grain: float) -> tuple[Path, Bools]:
+def fitted_arcs(path: JointPath, nominal: JointPath, work: ErrorContext, start: Floats, allowed: float,
+                grain: float) -> tuple[JointPath, Bools]:
     """The path with arcs through their corrected ends, and which of them become lines: those that leave the nominal arc by
     more than `allowed` mm, or rise by more than half a `grain` across a plane in which the control has no helix."""
     resolved, center = np.zeros(len(path), dtype=bool), path.center.copy()
@@ -45,13 +46,13 @@ def fitted_arcs(path: Path, nominal: Path, work: Work, start: Floats, allowed: f
     return replace(path, center=center, code=np.where(resolved, FEED, path.code).astype(path.code.dtype)), resolved
 
 
-def _changes(work: Work, k: Ints) -> Ints:
+def _changes(work: ErrorContext, k: Ints) -> Ints:
     """(N,) stretches of arcs k (N,) in which errors run one way."""
     places = [work.nominal(k, np.full(len(k), t)) for t in (0.0, *LOOKS, 1.0)]
     return changes(sum((np.abs(two - one) for one, two in pairwise(places)), np.zeros_like(places[0])), work.detail)
 
 
-def new_centers(path: Path, k: Ints, n0: Floats, n1: Floats, c0: Floats, c1: Floats) -> Floats:
+def new_centers(path: JointPath, k: Ints, n0: Floats, n1: Floats, c0: Floats, c1: Floats) -> Floats:
     """Centres (N, 3), relative to the start, of arcs k (N,) whose ends go from words n0, n1 to c0, c1 (N, 3).
 
     They go as the ends have gone, then to the same distance from both.

@@ -21,13 +21,13 @@ from postproc.base.group_rows import groups
 from postproc.control.control import Control
 from postproc.control.modes import OutputModes
 from postproc.correction.arcs import fitted_arcs
+from postproc.correction.backlash_words import Writing, settled
 from postproc.correction.cycles import whole_holes
-from postproc.correction.error_context import CorrectedEnds, Work
+from postproc.correction.error_context import CorrectedEnds, ErrorContext
 from postproc.correction.error_sampling import looks_between
 from postproc.correction.points import between, divided
 from postproc.correction.reversals import Divided, arcs_cut, inserted, starts_of
-from postproc.correction.settled import Writing, settled
-from postproc.path.model import Path
+from postproc.path.model import JointPath
 from postproc.reference.moves import Moves
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.diagnostics import Diagnostic, Severity, error, has_errors
@@ -44,7 +44,7 @@ SETTLED = 5
 
 
 @dataclass(frozen=True)
-class Compensation:
+class ErrorCorrection:
     """What the correction did to the blocks that it corrects, mm and rad.
 
     Attributes:
@@ -87,9 +87,9 @@ class Compensation:
                    f"{self.doubt_axis / arcsec:.2f} arcsec"])]
 
 
-def compensate(path: Path, moves: Moves, tools: Ints, kinematics: Callable[[int], Kinematics], model: ErrorModel,
+def compensate(path: JointPath, moves: Moves, tools: Ints, kinematics: Callable[[int], Kinematics], model: ErrorModel,
                modes: OutputModes, tolerance: float, axis_tolerance: float, writing: Writing, always: Bools,
-               beyond: bool = False, file: str = "") -> tuple[Path | None, Compensation | None, list[Diagnostic]]:
+               beyond: bool = False, file: str = "") -> tuple[JointPath | None, ErrorCorrection | None, list[Diagnostic]]:
     """The path with corrected joints, points added where they are needed; None where the model does not reach.
 
     Args:
@@ -102,8 +102,8 @@ def compensate(path: Path, moves: Moves, tools: Ints, kinematics: Callable[[int]
     """
     allowed, before_cut = SHARE * tolerance, len(path)
 
-    def work_on(path: Path, owner: Ints, mean: bool = False) -> Work:
-        return Work(path, tools[owner], kinematics, model, axis_tolerance, beyond, SHARE, mean)
+    def work_on(path: JointPath, owner: Ints, mean: bool = False) -> ErrorContext:
+        return ErrorContext(path, tools[owner], kinematics, model, axis_tolerance, beyond, SHARE, mean)
 
     work = work_on(path, np.arange(len(path)))
     cut = arcs_cut(path, work)
@@ -135,7 +135,7 @@ def compensate(path: Path, moves: Moves, tools: Ints, kinematics: Callable[[int]
     tip_before, axis_before = np.maximum(before, _before_inside(path, work, done)).tolist()
     tip_after, axis_after = after.tolist()
     doubt_tip, doubt_axis = _doubt(path, live, work, model)
-    report = Compensation(
+    report = ErrorCorrection(
         tip_before, axis_before, tip_after, max(axis_after, axis_left), residual_tip=found.residual[:, :3],
         residual_axis=found.residual[:, 3:], added=len(corrected) - before_cut, resolved=int(resolved.sum()),
         partial=int(found.partial[live].sum()), moved=np.abs(found.q - path.q).max(axis=0, initial=0.0),
@@ -143,8 +143,8 @@ def compensate(path: Path, moves: Moves, tools: Ints, kinematics: Callable[[int]
     return corrected, report, diagnostics
 
 
-def _written_out(corrected: Path, path: Path, work: Work, writing: Writing,
-                 allowed: float) -> tuple[Divided, Path, Bools, float]:
+def _written_out(corrected: JointPath, path: JointPath, work: ErrorContext, writing: Writing,
+                 allowed: float) -> tuple[Divided, JointPath, Bools, float]:
     """The blocks with points between them, their path in words that stand where they should, arcs that became lines, and rad
     left of the axis; anew where words take ends farther."""
     again = MOVED
@@ -163,7 +163,7 @@ def _written_out(corrected: Path, path: Path, work: Work, writing: Writing,
         del starts, fitted, whole, written, ways  # not to be held beside the next
 
 
-def _before_inside(path: Path, work: Work, where: Bools) -> Floats:
+def _before_inside(path: JointPath, work: ErrorContext, where: Bools) -> Floats:
     """(2,) worst deviations, mm and rad, of nominal joints inside the long blocks that are `where` (K,)."""
     block, worst = np.flatnonzero(where & (np.arange(len(path)) > 0)), np.zeros(2)
     for k, t in looks_between(work.changes(path.q[block - 1], path.q[block])):
@@ -174,7 +174,8 @@ def _before_inside(path: Path, work: Work, where: Bools) -> Floats:
     return worst
 
 
-def _points_by_mean(cut: Divided, moves: Moves, modes: OutputModes, work: Work, allowed: float, always: Bools) -> Divided:
+def _points_by_mean(cut: Divided, moves: Moves, modes: OutputModes, work: ErrorContext, allowed: float,
+                    always: Bools) -> Divided:
     """The nominal path with the points that the correction by mean ways needs, so that the ways are those of all points."""
     corrected, _ = _at_ends(cut.path, moves, modes, work, allowed, always)
     starts = starts_of(corrected, cut.path, work, allowed)
@@ -182,8 +183,8 @@ def _points_by_mean(cut: Divided, moves: Moves, modes: OutputModes, work: Work, 
     return inserted(cut.path, block, share, work.nominal(block, share)).of(cut)
 
 
-def _at_ends(path: Path, moves: Moves, modes: OutputModes, work: Work, allowed: float,
-             always: Bools) -> tuple[Path, CorrectedEnds]:
+def _at_ends(path: JointPath, moves: Moves, modes: OutputModes, work: ErrorContext, allowed: float,
+             always: Bools) -> tuple[JointPath, CorrectedEnds]:
     """The path with its block ends corrected by the ways of `work`, holes as a whole; and what the correction said."""
     found = _turned_in_travel(work.ends(), path, modes.control, work)
     corrected = framed(replace(path, q=found.q), path, modes, work)
@@ -192,7 +193,7 @@ def _at_ends(path: Path, moves: Moves, modes: OutputModes, work: Work, allowed: 
     return corrected, found
 
 
-def _turned_in_travel(found: CorrectedEnds, path: Path, control: Control, work: Work) -> CorrectedEnds:
+def _turned_in_travel(found: CorrectedEnds, path: JointPath, control: Control, work: ErrorContext) -> CorrectedEnds:
     """The ends with no rotary joint beyond travel that the nominal one keeps: it stands at the end of travel, and what the
     axis is then off by is residual."""
     limits = control.machine.limits
@@ -208,7 +209,7 @@ def _turned_in_travel(found: CorrectedEnds, path: Path, control: Control, work: 
     return replace(found, q=q, after=after, residual=residual)
 
 
-def kept_in_travel(q: Floats, path: Path, control: Control) -> Floats:
+def kept_in_travel(q: Floats, path: JointPath, control: Control) -> Floats:
     """The joints (K, J), those of linking moves nominal where the nominal one is inside travel and the corrected one not.
 
     A linking move at the end of travel cuts nothing; a corrected cutting move beyond it is an error of `check_travel`.
@@ -220,7 +221,7 @@ def kept_in_travel(q: Floats, path: Path, control: Control) -> Floats:
     return result
 
 
-def unstated(q: Floats, path: Path) -> Floats:
+def unstated(q: Floats, path: JointPath) -> Floats:
     """The joints (K, J), those that a block does not state being those of the block before.
 
     Blocks that name their axes (after tool changes and home) write no others: the correction of an axis that the block
@@ -238,7 +239,7 @@ def unstated(q: Floats, path: Path) -> Floats:
     return result
 
 
-def framed(path: Path, nominal: Path, modes: OutputModes, work: Work) -> Path:
+def framed(path: JointPath, nominal: JointPath, modes: OutputModes, work: ErrorContext) -> JointPath:
     """The path with the tilted planes that belong to its corrected rotary axes."""
     frames, frame, q = list(path.frames), path.frame.copy(), path.q.copy()
     tilted = np.array([f.control.law == "tilted" for f in frames])[path.frame]
@@ -255,7 +256,7 @@ def framed(path: Path, nominal: Path, modes: OutputModes, work: Work) -> Path:
     return replace(path, q=q, frame=frame, frames=tuple(frames))
 
 
-def _doubt(path: Path, live: Bools, work: Work, model: ErrorModel) -> tuple[float | None, float | None]:
+def _doubt(path: JointPath, live: Bools, work: ErrorContext, model: ErrorModel) -> tuple[float | None, float | None]:
     """Largest standard deviations at up to DOUBTS blocks spread over the path."""
     if model.covariance is None or not live.any():
         return None, None
@@ -273,7 +274,7 @@ def _doubt(path: Path, live: Bools, work: Work, model: ErrorModel) -> tuple[floa
 
 # ---- what cannot be done ----------------------------------------------------------------------------------------------
 
-def _unmeasured(path: Path, moves: Moves, control: Control, where: Bools, reached: tuple[Floats, Floats],
+def _unmeasured(path: JointPath, moves: Moves, control: Control, where: Bools, reached: tuple[Floats, Floats],
                 known: dict[str, tuple[float, float]], severity: Severity, file: str) -> list[Diagnostic]:
     """One of each axis that goes where its errors were not measured, `where` (K, J), from and to `reached` (K, J); `known`:
     what was measured of it. Those that are no errors get the error at the end of the range: linking moves are INFO."""
@@ -295,7 +296,7 @@ def _unmeasured(path: Path, moves: Moves, control: Control, where: Bools, reache
     return told
 
 
-def _lost(path: Path, moves: Moves, lost: Bools, file: str) -> Diagnostic:
+def _lost(path: JointPath, moves: Moves, lost: Bools, file: str) -> Diagnostic:
     lines = np.unique(moves.line[path.move[lost]])
     return error("compensation.reach", "the machine cannot go where the correction puts it", file=file,
                  lines=lines[:6].tolist(), count=int(lost.sum()), hint="move the part in the set-up (part.origin)")

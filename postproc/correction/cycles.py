@@ -10,10 +10,10 @@ import numpy as np
 from machines.geometric_error.actual.lost_motion import GRAIN
 from postproc.base.group_rows import groups
 from postproc.correction.arcs import LOOKS
-from postproc.correction.error_context import ALONE, LIFTS, Work
+from postproc.correction.error_context import ALONE, LIFTS, ErrorContext
 from postproc.correction.reversals import LOOSE
-from postproc.correction.runs import Runs
-from postproc.path.model import FEED, Path
+from postproc.correction.runs import RowRuns
+from postproc.path.model import FEED, JointPath
 from postproc.reference.moves import Moves
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.toolpath import Kind
@@ -25,7 +25,8 @@ IN_AIR = 8.0
 """times the share of the correction: what lost motion may leave at the levels of a hole that the tool comes back to"""
 
 
-def whole_holes(path: Path, nominal: Path, moves: Moves, work: Work, allowed: float, always: Bools) -> tuple[Path, Ints]:
+def whole_holes(path: JointPath, nominal: JointPath, moves: Moves, work: ErrorContext, allowed: float,
+                always: Bools) -> tuple[JointPath, Ints]:
     """The path with holes corrected as a whole, and for each block (K,) its hole or ALONE or LIFTS; sets `work.level`.
 
     Every block of a hole is corrected as its bottom is, but along the tool: the planes that drilling begins at get the
@@ -59,10 +60,11 @@ def whole_holes(path: Path, nominal: Path, moves: Moves, work: Work, allowed: fl
     return replace(path, q=q), whole
 
 
-def _sequences(path: Path, nominal: Path, hole: Ints, feeds: Bools, work: Work) -> tuple[Runs, Ints, Ints]:
+def _sequences(path: JointPath, nominal: JointPath, hole: Ints, feeds: Bools,
+               work: ErrorContext) -> tuple[RowRuns, Ints, Ints]:
     """Holes at one orientation with one tool in one frame, as runs of blocks; for each (H,) the first block of all that
     follow each other so; and blocks that lift the tool to the plane of the next, none of this but of the one before."""
-    runs, turns = Runs.of(hole), path.q[:, work.rotary]
+    runs, turns = RowRuns.of(hole), path.q[:, work.rotary]
     same = np.append(False, (np.diff(path.frame) == 0) & (np.diff(work.tools) == 0) & (turns[1:] == turns[:-1]).all(axis=1))
     drills = np.logical_or.reduceat(feeds, runs.begin)
     fine = (hole[runs.begin] >= 0) & (runs.begin > 0) & drills & runs.throughout(same | (np.diff(hole, prepend=-2) != 0))
@@ -73,17 +75,17 @@ def _sequences(path: Path, nominal: Path, hole: Ints, feeds: Bools, work: Work) 
     begin[lifts] += 1
     end[lifts - 1] += joined[lifts]
     first = np.maximum.accumulate(np.where(joined, 0, begin))
-    return Runs(begin, end - begin).some(fine), first[fine], runs.begin[lifts]
+    return RowRuns(begin, end - begin).some(fine), first[fine], runs.begin[lifts]
 
 
-def _lifting(path: Path, work: Work, block: Ints) -> Bools:
+def _lifting(path: JointPath, work: ErrorContext, block: Ints) -> Bools:
     """(N,) blocks (N,) that go up along Z of the words and nowhere else."""
     step = np.subtract(*(_words(path, work, block, path.q[k]) for k in (block, block - 1)))
     across = np.abs(step[:, :2]).max(axis=1, initial=0.0)
     return np.asarray((step[:, 2] > SAME) & (across <= SAME) & ~path.home[block - 1])
 
 
-def _lifted(path: Path, q: Floats, work: Work, block: Ints) -> Floats:
+def _lifted(path: JointPath, q: Floats, work: ErrorContext, block: Ints) -> Floats:
     """Joints (N, J) of blocks (N,) that go up from where the block before ends at joints (K, J), along Z of the words."""
     xyz = np.append(_words(path, work, block, q[block - 1])[:, :2], _words(path, work, block, q[block])[:, 2:], axis=1)
     return _joints(path, work, block, q[block], xyz)
@@ -98,7 +100,7 @@ class _Holes:
     plane: (H,) levels where drilling begins, nominal; apart: (H,) those with planes of their own
     """
 
-    runs: Runs
+    runs: RowRuns
     owner: Ints
     wanted: Floats
     found: Floats
@@ -152,9 +154,9 @@ class _Holes:
         return np.asarray(self.found[self.bottom] - self.wanted[self.bottom])
 
     @cached_property
-    def sequences(self) -> Runs:
+    def sequences(self) -> RowRuns:
         """Those that follow each other, as runs of holes."""
-        return Runs.of(self.owner)
+        return RowRuns.of(self.owner)
 
     @cached_property
     def least(self) -> Floats:
@@ -184,7 +186,7 @@ class _Holes:
         """All without the first `count` (H,) blocks."""
         keep = np.arange(len(self.rows)) >= (self.first + count)[self.hole]
         owner = self.owner + count[self.sequences.begin][self.sequences.of_rows]
-        return _Holes(Runs(self.runs.begin + count, self.runs.size - count), owner, self.wanted[keep], self.found[keep],
+        return _Holes(RowRuns(self.runs.begin + count, self.runs.size - count), owner, self.wanted[keep], self.found[keep],
                       self.feeds[keep], self.plane, self.apart)
 
     def corrected(self, above: Floats) -> Floats:
@@ -202,7 +204,7 @@ class _Holes:
                       self.plane[keep], self.apart[keep])
 
 
-def _along_tool(path: Path, nominal: Path, work: Work, runs: Runs, owner: Ints, feeds: Bools) -> _Holes:
+def _along_tool(path: JointPath, nominal: JointPath, work: ErrorContext, runs: RowRuns, owner: Ints, feeds: Bools) -> _Holes:
     """The holes of some runs that are drilled along Z of the words."""
     rows, frames = runs.rows, np.repeat(owner, runs.size)
     wanted, found = (_words(p, work, frames, p.q[rows]) for p in (nominal, path))
@@ -210,7 +212,7 @@ def _along_tool(path: Path, nominal: Path, work: Work, runs: Runs, owner: Ints, 
     return replace(holes, plane=wanted[holes.start, 2]).some(holes.along_z) if len(runs) else holes
 
 
-def _words(path: Path, work: Work, owner: Ints, q: Floats) -> Floats:
+def _words(path: JointPath, work: ErrorContext, owner: Ints, q: Floats) -> Floats:
     """(N, 3) words X, Y, Z of joints (N, J) by the law of blocks (N,)."""
     result = np.empty((len(q), 3))
     for k in groups(path.frame[owner], work.tools[owner]):
@@ -219,7 +221,7 @@ def _words(path: Path, work: Work, owner: Ints, q: Floats) -> Floats:
     return result
 
 
-def _joints(path: Path, work: Work, owner: Ints, q: Floats, xyz: Floats) -> Floats:
+def _joints(path: JointPath, work: ErrorContext, owner: Ints, q: Floats, xyz: Floats) -> Floats:
     """Joints (N, J) that are q (N, J) but at other words X, Y, Z (N, 3), by the law of blocks (N,)."""
     result = np.empty_like(q)
     for k in groups(path.frame[owner], work.tools[owner]):
@@ -230,7 +232,7 @@ def _joints(path: Path, work: Work, owner: Ints, q: Floats, xyz: Floats) -> Floa
     return result
 
 
-def _leads(path: Path, nominal: Path, work: Work, holes: _Holes) -> tuple[Ints, Floats, Floats]:
+def _leads(path: JointPath, nominal: JointPath, work: ErrorContext, holes: _Holes) -> tuple[Ints, Floats, Floats]:
     """Blocks (N,) before holes that come to planes of these, their joints (N, J) at the correction of planes, and what the
     blocks before holes are corrected by along the tool (S,)."""
     first = holes.sequences.begin
@@ -243,7 +245,7 @@ def _leads(path: Path, nominal: Path, work: Work, holes: _Holes) -> tuple[Ints, 
     return lead[level], _joints(path, work, owner[level], path.q[lead[level]], came[level]), (came - before)[:, 2]
 
 
-def _near(nominal: Path, work: Work, holes: _Holes, joints: Floats, share: Floats) -> Bools:
+def _near(nominal: JointPath, work: ErrorContext, holes: _Holes, joints: Floats, share: Floats) -> Bools:
     """(H,) holes that joints (M, J) leave within LOOSE times `share` (M,) mm of where they belong by the ways at their
     bottoms, and within IN_AIR times that by the ways of their blocks."""
     rows = holes.rows
@@ -252,7 +254,8 @@ def _near(nominal: Path, work: Work, holes: _Holes, joints: Floats, share: Float
     return holes.runs.throughout(fine & (work.off(nominal.q[rows], joints, rows, work.way[rows]) <= IN_AIR * share))
 
 
-def _approached(path: Path, work: Work, holes: _Holes, joints: Floats, share: Floats, near: Bools, lead: Ints) -> Bools:
+def _approached(path: JointPath, work: ErrorContext, holes: _Holes, joints: Floats, share: Floats, near: Bools,
+                lead: Ints) -> Bools:
     """(H,) those of the holes that are `near` (H,) whose approach is near enough: from the hole before at its joints
     (M, J) where that stays whole, else from where `path` is; blocks `lead` (N,) stand."""
     row, limit = holes.runs.begin, IN_AIR * share[holes.first]
@@ -267,7 +270,7 @@ def _approached(path: Path, work: Work, holes: _Holes, joints: Floats, share: Fl
     return result
 
 
-def _approach_off(path: Path, work: Work, q0: Floats, q1: Floats, row: Ints, share: Floats) -> Floats:
+def _approach_off(path: JointPath, work: ErrorContext, q0: Floats, q1: Floats, row: Ints, share: Floats) -> Floats:
     """(N,) mm, largest distance from the nominal motion on the way from q0 to q1 (N, J), to holes (blocks `row`), which get
     no points; 0 where the correction changes by no more than `share` (N,) mm over one stretch of the errors."""
     change = q1 - q0 - (work.path.q[row] - work.path.q[row - 1])

@@ -10,13 +10,13 @@ import numpy as np
 
 from machines.geometric_error.actual.actual import Actual, moving_sign
 from machines.geometric_error.actual.correction import correct
-from machines.geometric_error.actual.lost_motion import GRAIN, Steps, turning_sign
+from machines.geometric_error.actual.lost_motion import GRAIN, PlaySteps, turning_sign
 from machines.geometric_error.actual.model import ErrorModel
 from machines.kinematics.base import Kinematics
 from postproc.base.group_rows import groups
 from postproc.control.word_arcs import PLANE_COLUMNS
 from postproc.correction.error_sampling import changes
-from postproc.path.model import ARC, TRAVERSE, Path
+from postproc.path.model import ARC, TRAVERSE, JointPath
 from toolpaths.arrays import Bools, Floats, Ints
 
 MOMENT = 1e-3
@@ -44,7 +44,7 @@ class CorrectedEnds:
     unmeasured: Bools
 
 
-class Work:
+class ErrorContext:
     """What is needed throughout: the machine with errors by tool, groups of one orientation.
 
     `whole`: (K,) the hole that a block is of where it is corrected as a whole, else ALONE or LIFTS; `level`: (K,) blocks
@@ -53,7 +53,7 @@ class Work:
     blocks that may end, or run, where errors were not measured.
     """
 
-    def __init__(self, path: Path, tools: Ints, kinematics: Callable[[int], Kinematics], model: ErrorModel,
+    def __init__(self, path: JointPath, tools: Ints, kinematics: Callable[[int], Kinematics], model: ErrorModel,
                  axis_tolerance: float, beyond: bool, share: float, mean: bool = False) -> None:
         self.path, self.tools, self.kinematics = path, tools, kinematics
         self.axis_tolerance, self.model = axis_tolerance, model
@@ -84,7 +84,7 @@ class Work:
         """Letters of the joints."""
         return self.kinematics(int(self.tools[0])).axis_names
 
-    def take_ways(self, path: Path, words: Floats, drift: bool = True) -> None:
+    def take_ways(self, path: JointPath, words: Floats, drift: bool = True) -> None:
         """Find `way` from the corrected `path` and its words (K, J) at block ends, and `drift` where that is by mean ways.
 
         Where words are axis positions their last change tells.
@@ -114,9 +114,9 @@ class Work:
             return
         before = np.setdiff1d(inside - 1, inside)
         rows, two = np.union1d(before, inside), self.two_way
-        way, steps = self.way[rows][:, two], Steps.of(np.nan_to_num(q[rows] - q[rows - 1])[:, two], self.gaps(q[rows]))
+        way, steps = self.way[rows][:, two], PlaySteps.of(np.nan_to_num(q[rows] - q[rows - 1])[:, two], self.gaps(q[rows]))
         begins = np.isin(rows, before)[:, None]
-        steps = Steps(*(np.where(begins, x, y) for x, y in ((0.0, steps.shift), (way, steps.low), (way, steps.high))))
+        steps = PlaySteps(*(np.where(begins, x, y) for x, y in ((0.0, steps.shift), (way, steps.low), (way, steps.high))))
         self.way[rows[:, None], two] = steps.walked().at(way)
 
     @cached_property
@@ -170,7 +170,7 @@ class Work:
         result = np.array(way)
         if self.two_way:
             j = self.two_way
-            result[:, j] = Steps.of(np.nan_to_num((q - q0)[:, j]), self.gaps(q)).at(way[:, j])
+            result[:, j] = PlaySteps.of(np.nan_to_num((q - q0)[:, j]), self.gaps(q)).at(way[:, j])
         return result
 
     def gaps(self, q: Floats) -> Floats:
@@ -192,7 +192,7 @@ class Work:
                 result[k] = control.joints(words, kin, 0.0)
         return result
 
-    def straight(self, path: Path, q0: Floats, q1: Floats, block: Ints, t: Floats, owner: Ints | None = None) -> Floats:
+    def straight(self, path: JointPath, q0: Floats, q1: Floats, block: Ints, t: Floats, owner: Ints | None = None) -> Floats:
         """Joints (N, J) at fraction t (N,) of straight blocks from q0 to q1 (N, J), under the law of each in `path`.
 
         Rapids are dog-legs where the control makes them that: what the correction adds to one axis comes at once. In a
@@ -280,7 +280,7 @@ class Work:
                                 axis_tolerance=self.axis_tolerance, beyond=self.beyond_inside[blocks[k]]).q
         return result
 
-    def corrected(self, there: Floats, block: Ints, way: Floats, path: Path) -> Floats:
+    def corrected(self, there: Floats, block: Ints, way: Floats, path: JointPath) -> Floats:
         """Corrected joints (N, J) of nominal ones inside blocks (N,) of the corrected `path`.
 
         Blocks at one orientation keep it.
@@ -315,7 +315,7 @@ class Work:
         return result
 
 
-def bent_blocks(path: Path, rotary: Bools) -> Bools:
+def bent_blocks(path: JointPath, rotary: Bools) -> Bools:
     """(K,) blocks in which joints do not run straight: arcs, and those by the tip that turn an axis."""
     by_tip = np.array([frame.control.law == "tcp" for frame in path.frames])[path.frame]
     turns = np.concatenate([[False], (path.q[1:, rotary] != path.q[:-1, rotary]).any(axis=1)])
@@ -324,7 +324,7 @@ def bent_blocks(path: Path, rotary: Bools) -> Bools:
     return result
 
 
-def axis_positions(path: Path, tools: Ints) -> Bools:
+def axis_positions(path: JointPath, tools: Ints) -> Bools:
     """(K,) blocks whose words, and those of the block before, are axis positions with the same tool; home is left out."""
     same = np.append(False, (np.diff(path.frame) == 0) & (np.diff(tools) == 0))
     law = np.array([frame.control.law == "axes" for frame in path.frames])[path.frame]

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from postproc.correction.arcs import LOOKS as ARC_LOOKS
-from postproc.correction.error_context import ALONE, MOMENT, Work
+from postproc.correction.error_context import ALONE, MOMENT, ErrorContext
 from postproc.correction.error_sampling import looks_between
 from postproc.correction.reversals import LOOSE, SHORTEST, Divided, Starts, inserted, reversals, stretches
-from postproc.path.model import ARC, FEED, TRAVERSE, Path
+from postproc.path.model import ARC, FEED, TRAVERSE, JointPath
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.units import DEG
 
@@ -22,12 +22,12 @@ LEAST = 0.2
 """of what is allowed, where the axis turns fast"""
 
 
-def divided(path: Path, work: Work, starts: Starts, allowed: float) -> Divided:
+def divided(path: JointPath, work: ErrorContext, starts: Starts, allowed: float) -> Divided:
     """The path with its blocks halved until their motion is near enough to the nominal one (`allowed` mm, see `_bound`)."""
     return inserted(path, *between(path, work, starts, allowed))
 
 
-def between(path: Path, work: Work, starts: Starts, allowed: float) -> tuple[Ints, Floats, Floats]:
+def between(path: JointPath, work: ErrorContext, starts: Starts, allowed: float) -> tuple[Ints, Floats, Floats]:
     """(block (M,), fraction (M,), joints (M, J)) of the points that `divided` inserts."""
     block = np.flatnonzero(stretches(path))
     block = block[~path.home[block - 1] & (work.whole[block] == ALONE)]
@@ -47,7 +47,7 @@ def between(path: Path, work: Work, starts: Starts, allowed: float) -> tuple[Int
 
 
 @dataclass(frozen=True)
-class Pieces:
+class BlockPieces:
     """Parts t0..t1 (N,) of blocks (N,) with the corrected joints (N, J) at their ends, and the ways (N, J) at t0; mm (N,)
     that the tip is off at t0 of rapids behind holes that are corrected as a whole: no point between mends that."""
 
@@ -59,20 +59,20 @@ class Pieces:
     way: Floats
     behind: Floats
 
-    def rows(self, keep: Bools | Ints) -> Pieces:
+    def rows(self, keep: Bools | Ints) -> BlockPieces:
         """Some of them."""
-        return Pieces(self.block[keep], self.t0[keep], self.t1[keep], self.q0[keep], self.q1[keep], self.way[keep],
-                      self.behind[keep])
+        return BlockPieces(self.block[keep], self.t0[keep], self.t1[keep], self.q0[keep], self.q1[keep], self.way[keep],
+                           self.behind[keep])
 
-    def halved(self, middle: Floats, q: Floats, way: Floats) -> Pieces:
+    def halved(self, middle: Floats, q: Floats, way: Floats) -> BlockPieces:
         """Both halves of each, joints and ways in the middle being q and way."""
-        return Pieces(np.tile(self.block, 2), np.concatenate([self.t0, middle]), np.concatenate([middle, self.t1]),
+        return BlockPieces(np.tile(self.block, 2), np.concatenate([self.t0, middle]), np.concatenate([middle, self.t1]),
                        np.concatenate([self.q0, q]), np.concatenate([q, self.q1]), np.concatenate([self.way, way]),
-                      np.concatenate([self.behind, np.zeros(len(q))]))
+                           np.concatenate([self.behind, np.zeros(len(q))]))
 
 
-def _taken_up(path: Path, work: Work, starts: Starts, block: Ints,
-              allowed: float) -> tuple[Pieces, list[tuple[Ints, Floats, Floats]]]:
+def _taken_up(path: JointPath, work: ErrorContext, starts: Starts, block: Ints,
+              allowed: float) -> tuple[BlockPieces, list[tuple[Ints, Floats, Floats]]]:
     """The blocks as pieces, cut where an axis turns back, and the points that take up what it loses by that.
 
     At a block's start that is one point, inside a block two at one place: corrected by the old way and by the new one.
@@ -87,14 +87,14 @@ def _taken_up(path: Path, work: Work, starts: Starts, block: Ints,
     owner = np.concatenate([block, turning])
     t0, t1 = np.concatenate([zero, at]), np.concatenate([zero + 1.0, at])
     begins, ends = np.lexsort((t0, owner)), np.lexsort((t1, owner))
-    pieces = Pieces(owner[begins], t0[begins], t1[ends], np.concatenate([starts.q[block], new])[begins],
-                    np.concatenate([path.q[block], old])[ends], np.concatenate([starts.way[block], after])[begins],
-                    np.concatenate([_behind(path, work, starts, block), 0.0 * at])[begins])
+    pieces = BlockPieces(owner[begins], t0[begins], t1[ends], np.concatenate([starts.q[block], new])[begins],
+                         np.concatenate([path.q[block], old])[ends], np.concatenate([starts.way[block], after])[begins],
+                         np.concatenate([_behind(path, work, starts, block), 0.0 * at])[begins])
     back = starts.block
     return pieces, [(back, np.zeros(len(back)), starts.q[back]), (turning, at, old), (turning, at, new)]
 
 
-def _behind(path: Path, work: Work, starts: Starts, block: Ints) -> Floats:
+def _behind(path: JointPath, work: ErrorContext, starts: Starts, block: Ints) -> Floats:
     """`behind` (N,) of blocks (N,) as a whole."""
     result, k = np.zeros(len(block)), np.flatnonzero((path.code[block] == TRAVERSE) & (work.whole[block - 1] != ALONE))
     rows = block[k]
@@ -102,7 +102,7 @@ def _behind(path: Path, work: Work, starts: Starts, block: Ints) -> Floats:
     return result
 
 
-def _off(pieces: Pieces, path: Path, work: Work) -> Floats:
+def _off(pieces: BlockPieces, path: JointPath, work: ErrorContext) -> Floats:
     """(N,) mm, largest distance from the nominal motion at LOOKS, and at more where errors change their course between."""
     worst, count = np.zeros(len(pieces.block)), work.changes(pieces.q0, pieces.q1)
     for look in LOOKS:
@@ -112,7 +112,7 @@ def _off(pieces: Pieces, path: Path, work: Work) -> Floats:
     return worst
 
 
-def _off_at(pieces: Pieces, t: Floats, path: Path, work: Work) -> Floats:
+def _off_at(pieces: BlockPieces, t: Floats, path: JointPath, work: ErrorContext) -> Floats:
     """(N,) mm from the nominal motion at t (N,) of pieces, beyond what is left of what their beginning is off by."""
     at = pieces.t0 + t * (pieces.t1 - pieces.t0)
     got = work.straight(path, pieces.q0, pieces.q1, pieces.block, t)
@@ -120,7 +120,7 @@ def _off_at(pieces: Pieces, t: Floats, path: Path, work: Work) -> Floats:
     return np.asarray(work.off(work.nominal(pieces.block, at), got, pieces.block, way) - (1.0 - t) * pieces.behind)
 
 
-def _bound(pieces: Pieces, path: Path, work: Work, allowed: float) -> Floats:
+def _bound(pieces: BlockPieces, path: JointPath, work: ErrorContext, allowed: float) -> Floats:
     """(N,) mm: less where the axis turns so fast that the tip's being late would cost more than its share of the axis
     tolerance; LOOSE times as much for rapids and arcs."""
     ends = [np.concatenate(work.poses(work.nominal(pieces.block, t), pieces.block), axis=1) for t in (pieces.t0, pieces.t1)]
@@ -132,7 +132,7 @@ def _bound(pieces: Pieces, path: Path, work: Work, allowed: float) -> Floats:
     return result
 
 
-def _long(pieces: Pieces, work: Work) -> Bools:
+def _long(pieces: BlockPieces, work: ErrorContext) -> Bools:
     """True (N,) for pieces that are worth halving."""
     step = np.abs(work.nominal(pieces.block, pieces.t1) - work.nominal(pieces.block, pieces.t0))
     result: Bools = (step / np.where(work.rotary, DEG, 1.0)).max(axis=1) > SHORTEST

@@ -9,8 +9,8 @@ import numpy as np
 
 from machines.geometric_error.actual.lost_motion import carried_on
 from postproc.control.word_arcs import PLANE_COLUMNS
-from postproc.correction.error_context import ALONE, EDGES, Work
-from postproc.path.model import ARC, FEED, TRAVERSE, Path
+from postproc.correction.error_context import ALONE, EDGES, ErrorContext
+from postproc.path.model import ARC, FEED, TRAVERSE, JointPath
 from toolpaths.arrays import Bools, Floats, Ints
 
 BISECTIONS = 14
@@ -22,7 +22,7 @@ SHORTEST = 0.05
 """mm of tip way or degrees of a rotary axis: a block that short is not divided"""
 
 
-def arcs_cut(path: Path, work: Work) -> Divided:
+def arcs_cut(path: JointPath, work: ErrorContext) -> Divided:
     """The path with arcs cut where an axis that loses motion turns back."""
     arcs = np.flatnonzero((path.code == ARC) & (np.arange(len(path)) > 0))
     block, t = reversals(work, arcs)
@@ -53,7 +53,7 @@ class Starts:
     block: Ints
 
 
-def starts_of(path: Path, nominal: Path, work: Work, allowed: float) -> Starts:
+def starts_of(path: JointPath, nominal: JointPath, work: ErrorContext, allowed: float) -> Starts:
     """Corrected joints where blocks begin; those in which an axis turns back begin by the new way, where that moves one by
     more than `allowed` mm, rapids LOOSE times as much."""
     start, begun = (np.concatenate([x[:1], x[:-1]]) for x in (path.q, work.way))
@@ -69,13 +69,13 @@ def starts_of(path: Path, nominal: Path, work: Work, allowed: float) -> Starts:
     return Starts(start, begun, back[jump])
 
 
-def stretches(path: Path) -> Bools:
+def stretches(path: JointPath) -> Bools:
     """(K,) feed moves and rapids of the CL file, straight ones: their way counts, not their ends alone."""
     straight = (path.code == FEED) | (path.code == TRAVERSE)
     return np.asarray(straight & np.isfinite(path.u) & ~path.home & (np.arange(len(path)) > 0))
 
 
-def reversals(work: Work, block: Ints) -> tuple[Ints, Floats]:
+def reversals(work: ErrorContext, block: Ints) -> tuple[Ints, Floats]:
     """(block, fraction), by block, of the places inside blocks where a joint that loses motion turns back.
 
     On arcs a joint may do so twice; on straight blocks once, and only where the words are the tip.
@@ -88,7 +88,7 @@ def reversals(work: Work, block: Ints) -> tuple[Ints, Floats]:
     return where[order], at[order]
 
 
-def _bisected(work: Work, block: Ints, edges: tuple[float, ...]) -> tuple[Ints, Floats]:
+def _bisected(work: ErrorContext, block: Ints, edges: tuple[float, ...]) -> tuple[Ints, Floats]:
     """(block, fraction) of the places where the direction of a joint changes between two of the edges."""
     where, at = [np.zeros(0, dtype=np.int64)], [np.zeros(0)]
     if not len(block) or not work.two_way:
@@ -114,7 +114,7 @@ def _bisected(work: Work, block: Ints, edges: tuple[float, ...]) -> tuple[Ints, 
 class Divided:
     """A path made of another's blocks: `owner` (K,) which of them each block is of, `part` (K,) of its time."""
 
-    path: Path
+    path: JointPath
     owner: Ints
     part: Floats
 
@@ -132,7 +132,7 @@ class Divided:
         return Divided(self.path, before.owner[self.owner], before.part[self.owner] * self.part)
 
 
-def inserted(path: Path, block: Ints, t: Floats, q: Floats) -> Divided:
+def inserted(path: JointPath, block: Ints, t: Floats, q: Floats) -> Divided:
     """The path with points (M, J) at fractions t (M,) of blocks (M,): columns, times and beginnings carried along."""
     n = len(path)
     owner = np.concatenate([block, np.arange(n)])

@@ -10,7 +10,7 @@ from toolpaths.arrays import Bools, Floats, Ints
 
 
 @dataclass(frozen=True)
-class Runs:
+class RowRuns:
     """H runs of rows that follow each other, N rows in all: `begin` (H,) row of each run's first, `size` (H,) rows."""
 
     begin: Ints
@@ -20,7 +20,7 @@ class Runs:
         return len(self.begin)
 
     @classmethod
-    def of(cls, number: Ints) -> Runs:
+    def of(cls, number: Ints) -> RowRuns:
         """The runs of equal numbers (N,)."""
         begin = np.flatnonzero(np.diff(number, prepend=number[:1] - 1))
         return cls(begin, np.diff(begin, append=len(number)))
@@ -40,13 +40,13 @@ class Runs:
         """(M,) number of the run that each of `rows` is of."""
         return np.repeat(np.arange(len(self)), self.size)
 
-    def some(self, keep: Bools | Ints) -> Runs:
+    def some(self, keep: Bools | Ints) -> RowRuns:
         """Some of the runs."""
-        return Runs(self.begin[keep], self.size[keep])
+        return RowRuns(self.begin[keep], self.size[keep])
 
-    def packed(self) -> Runs:
+    def packed(self) -> RowRuns:
         """The same runs of rows that are `rows` alone."""
-        return Runs(np.cumsum(self.size) - self.size, self.size)
+        return RowRuns(np.cumsum(self.size) - self.size, self.size)
 
     def throughout(self, true: Bools) -> Bools:
         """(H,) runs with nothing but True; (M,) by `rows`."""

@@ -12,7 +12,7 @@ from machines.machine import Machine
 from toolpaths.arrays import Array, Bools, Floats, Ints, as_slice, frozen, shared, taken
 
 
-class Path(IntEnum):
+class CornerMode(IntEnum):
     """What a control does where two blocks meet."""
 
     STOP = 0
@@ -101,7 +101,7 @@ _COLUMNS: dict[str, tuple[type, tuple[int, ...]]] = {
 
 
 @dataclass(frozen=True)
-class Blocks:
+class MotionBlocks:
     """E blocks that move, in mm, rad and s.
 
     Attributes:
@@ -154,7 +154,7 @@ class Blocks:
     def __len__(self) -> int:
         return len(self.line)
 
-    def take(self, rows: Ints | Bools) -> Blocks:
+    def take(self, rows: Ints | Bools) -> MotionBlocks:
         """Some of the blocks; the pauses stay with the last block that is left before them."""
         rows = np.arange(len(self))[rows]
         moved = replace(self.pauses, block=np.searchsorted(rows, self.pauses.block, side="right") - 1)

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from postproc.base.compiled import compiled
-from postproc.cycle_time.blocks import Blocks, Path
+from postproc.cycle_time.blocks import CornerMode, MotionBlocks
 from postproc.cycle_time.linuxcnc_kernels import speeds
 from postproc.cycle_time.linuxcnc_segments import KERNEL_FROM, merge
 from postproc.cycle_time.model import CycleTimeModel
@@ -20,7 +20,7 @@ from postproc.cycle_time.shape import Shape, axis_limit, shape
 from toolpaths.arrays import Floats
 
 
-def lower_bound(blocks: Blocks, model: CycleTimeModel) -> float:
+def lower_bound(blocks: MotionBlocks, model: CycleTimeModel) -> float:
     """s below which no control can be on this path with these limits, dwells and tool changes included."""
     merged = merge(blocks)[0] if model.kind == "linuxcnc" else blocks
     form, axes = shape(merged), merged.axes
@@ -41,18 +41,19 @@ def lower_bound(blocks: Blocks, model: CycleTimeModel) -> float:
     return float(np.maximum(seconds, 0.0).sum() + blocks.pauses.seconds.sum())
 
 
-def shared_feed(blocks: Blocks, form: Shape, target: Floats, model: CycleTimeModel) -> Floats:
+def shared_feed(blocks: MotionBlocks, form: Shape, target: Floats, model: CycleTimeModel) -> Floats:
     """(E,) largest speed anywhere in each block: LinuxCNC runs through a blend arc at the faster of both feeds
     (blendmath.c, `blendParamKinematics`)."""
     if model.kind != "linuxcnc" or not len(blocks):
         return target
-    arc = (blocks.path[:-1] == Path.BLEND) & ~blocks.forced[:-1] & (blocks.rapid[1:] == blocks.rapid[:-1])
+    arc = (blocks.path[:-1] == CornerMode.BLEND) & ~blocks.forced[:-1] & (blocks.rapid[1:] == blocks.rapid[:-1])
     arc &= ~form.turns[:-1] & ~form.turns[1:]
     both = np.where(arc, np.maximum(target[:-1], target[1:]), 0.0)
     return np.asarray(np.maximum(target, np.maximum(np.append(both, 0.0), np.concatenate([[0.0], both]))))
 
 
-def at_feed(blocks: Blocks, form: Shape, length: Floats, target: Floats, lent: Floats, model: CycleTimeModel) -> Floats:
+def at_feed(blocks: MotionBlocks, form: Shape, length: Floats, target: Floats, lent: Floats,
+            model: CycleTimeModel) -> Floats:
     """(E,) s of each block at its own feed, but of what blends may take at its ends; none where it goes on straight."""
     reach, cosine = reaches(blocks, form, model)
     reach = np.where(cosine < 1.0 - 1e-12, reach, 0.0)
@@ -60,17 +61,17 @@ def at_feed(blocks: Blocks, form: Shape, length: Floats, target: Floats, lent: F
     return np.asarray((length - taken) / target + taken / lent)
 
 
-def early(blocks: Blocks, form: Shape, model: CycleTimeModel) -> Floats:
+def early(blocks: MotionBlocks, form: Shape, model: CycleTimeModel) -> Floats:
     """(E,) s by which the next block may begin before the feeds allow it: LinuxCNC's overlapping ramps begin with a servo
     cycle, so that up to one is gained at each (`linuxcnc._overlapping`)."""
     result = np.zeros(len(blocks))
     if model.kind == "linuxcnc":
-        overlaps = (blocks.path[:-1] == Path.BLEND) & ~blocks.forced[:-1] & (form.turns[:-1] | form.turns[1:])
+        overlaps = (blocks.path[:-1] == CornerMode.BLEND) & ~blocks.forced[:-1] & (form.turns[:-1] | form.turns[1:])
         result[:-1] = np.where(overlaps, model.servo_cycle, 0.0)
     return result
 
 
-def cut_off(blocks: Blocks, form: Shape, model: CycleTimeModel) -> Floats:
+def cut_off(blocks: MotionBlocks, form: Shape, model: CycleTimeModel) -> Floats:
     """(E,) mm by which blends can make each block shorter.
 
     The chord that takes d off both sides of a corner of turning angle phi lies d sin(phi/2) from it and is 2 d
@@ -82,7 +83,7 @@ def cut_off(blocks: Blocks, form: Shape, model: CycleTimeModel) -> Floats:
     return np.asarray(np.append(spared, 0.0) + np.concatenate([[0.0], spared]))
 
 
-def reaches(blocks: Blocks, form: Shape, model: CycleTimeModel) -> tuple[Floats, Floats]:
+def reaches(blocks: MotionBlocks, form: Shape, model: CycleTimeModel) -> tuple[Floats, Floats]:
     """(E - 1,) mm that a blend may take of either side of each corner, and cos(phi/2) of the corner."""
     dot = np.clip((form.last[:-1] * form.first[1:]).sum(axis=1), -1.0, 1.0)
     sine, cosine = np.sqrt((1.0 - dot) / 2.0), np.sqrt((1.0 + dot) / 2.0)
@@ -93,4 +94,4 @@ def reaches(blocks: Blocks, form: Shape, model: CycleTimeModel) -> tuple[Floats,
         tolerance = np.maximum(tolerance, model.corner_tolerance)
     with np.errstate(divide="ignore"):
         reach = np.minimum(np.minimum(form.length[:-1], form.length[1:]) / 2.0, tolerance / sine)
-    return np.where((blocks.path[:-1] == Path.BLEND) & ~blocks.forced[:-1], reach, 0.0), cosine
+    return np.where((blocks.path[:-1] == CornerMode.BLEND) & ~blocks.forced[:-1], reach, 0.0), cosine

@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from postproc.cycle_time.blocks import Blocks
+from postproc.cycle_time.blocks import MotionBlocks
 from postproc.cycle_time.estimate import timed
-from postproc.cycle_time.log import Log, matched
-from postproc.cycle_time.model import PARAMETERS, Calibration, CycleTimeModel
+from postproc.cycle_time.log import RunLog, matched
+from postproc.cycle_time.model import PARAMETERS, CalibrationRecord, CycleTimeModel
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, warning
 
@@ -46,7 +46,7 @@ SEEN = 0.5
 
 
 @dataclass(frozen=True)
-class Fit:
+class CalibratedModel:
     """A calibrated model and how well it fits.
 
     Attributes:
@@ -59,8 +59,8 @@ class Fit:
     values: dict[str, tuple[float, float]]
 
 
-def calibrate(blocks: Blocks, log: Log, model: CycleTimeModel, file: str = "",
-              machine: Machine | None = None) -> tuple[Fit | None, list[Diagnostic]]:
+def calibrate(blocks: MotionBlocks, log: RunLog, model: CycleTimeModel, file: str = "",
+              machine: Machine | None = None) -> tuple[CalibratedModel | None, list[Diagnostic]]:
     """The model fitted to a log; None and why where the log does not fit the program.
 
     A model with jerk is also tried without, and left so where that is clearly better.
@@ -79,8 +79,8 @@ def calibrate(blocks: Blocks, log: Log, model: CycleTimeModel, file: str = "",
     return fit, _warnings(fit, file)
 
 
-def _fitted(blocks: Blocks, rows: Ints, measured: Floats, before: Floats, model: CycleTimeModel, file: str,
-            machine: Machine | None) -> Fit:
+def _fitted(blocks: MotionBlocks, rows: Ints, measured: Floats, before: Floats, model: CycleTimeModel, file: str,
+            machine: Machine | None) -> CalibratedModel:
     """The fit of the parameters that the kind of model has."""
     from scipy.optimize import least_squares
 
@@ -149,11 +149,11 @@ def _covariance(weighted: Floats, free: list[int], prior: Floats) -> Floats:
 
 
 def _fit(model: CycleTimeModel, fitted: CycleTimeModel, covariance: Floats, free: list[int], prior: Floats,
-         measured: Floats, before: Floats, after: Floats, file: str, machine: Machine | None) -> Fit:
+         measured: Floats, before: Floats, after: Floats, file: str, machine: Machine | None) -> CalibratedModel:
     sigma = np.sqrt(np.diag(covariance))
     hidden = tuple(PARAMETERS[k] for k in free if sigma[k] > SEEN * prior[k])
     relative = _relative(measured, after)
-    calibration = Calibration(
+    calibration = CalibrationRecord(
         log=file, samples=len(measured), machine=machine.name if machine is not None else "",
         rms_before=_rms(before - measured), rms_after=_rms(after - measured), relative=relative,
         covariance=tuple(tuple(float(v) for v in row) for row in covariance), not_identifiable=hidden)
@@ -161,7 +161,7 @@ def _fit(model: CycleTimeModel, fitted: CycleTimeModel, covariance: Floats, free
     result = fitted.model_copy(update={"calibration": calibration, "assumed": (*hidden, *others),
                                        "description": f"{model.description}, calibrated"})
     values = {PARAMETERS[k]: (float(getattr(result, PARAMETERS[k])), float(sigma[k])) for k in free}
-    return Fit(result, measured, after, values)
+    return CalibratedModel(result, measured, after, values)
 
 
 def _rms(values: Floats) -> float:
@@ -180,7 +180,7 @@ def _relative(measured: Floats, modelled: Floats) -> float:
     return float(np.hypot(0.005, np.sqrt(np.average(errors**2, weights=np.maximum(weight, CLOCK)))))
 
 
-def _warnings(fit: Fit, file: str) -> list[Diagnostic]:
+def _warnings(fit: CalibratedModel, file: str) -> list[Diagnostic]:
     calibration = fit.model.calibration
     assert calibration is not None
     if calibration.relative <= 0.1:
@@ -210,7 +210,7 @@ def _toml(value: object) -> str:
     return repr(value)
 
 
-def as_dict(fit: Fit) -> dict[str, object]:
+def as_dict(fit: CalibratedModel) -> dict[str, object]:
     """The figures of a calibration."""
     c = fit.model.calibration
     assert c is not None

@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from machines.machine import Machine
-from postproc.cycle_time.blocks import Axes, Blocks, Cause
+from postproc.cycle_time.blocks import Axes, Cause, MotionBlocks
 from postproc.cycle_time.bound import lower_bound
 from postproc.cycle_time.linuxcnc import Settings, linuxcnc
 from postproc.cycle_time.lookahead import lookahead
 from postproc.cycle_time.model import ASSUMED, PARAMETERS, CycleTimeModel
-from postproc.cycle_time.phases import Timed
+from postproc.cycle_time.phases import BlockTimes
 from toolpaths.arrays import Floats
 
 COVERAGE = 1.96
@@ -30,16 +30,16 @@ class Estimate:
         doubts: standard deviation of the time by what it comes from, s
     """
 
-    blocks: Blocks
+    blocks: MotionBlocks
     model: CycleTimeModel
-    timed: Timed
+    timed: BlockTimes
     seconds: float
     lower_bound: float
     band: tuple[float, float]
     doubts: dict[str, float]
 
 
-def timed(blocks: Blocks, model: CycleTimeModel) -> Timed:
+def timed(blocks: MotionBlocks, model: CycleTimeModel) -> BlockTimes:
     """The blocks under a model."""
     if model.spindle_time > 0.0:
         p = blocks.pauses
@@ -50,15 +50,15 @@ def timed(blocks: Blocks, model: CycleTimeModel) -> Timed:
     return lookahead(blocks, model)
 
 
-def total(blocks: Blocks, times: Timed) -> float:
+def total(blocks: MotionBlocks, times: BlockTimes) -> float:
     """s of the whole program, pauses before the first and behind the last block included."""
     outside = (blocks.pauses.block < 0) | (blocks.pauses.block == len(blocks) - 1)
     moving = float(times.end.max() - times.begin.min()) if len(blocks) else 0.0
     return moving + float(times.pause[outside].sum())
 
 
-def estimate(blocks: Blocks, machine: Machine, model: CycleTimeModel, with_band: bool = True,
-             times: Timed | None = None) -> Estimate:
+def estimate(blocks: MotionBlocks, machine: Machine, model: CycleTimeModel, with_band: bool = True,
+             times: BlockTimes | None = None) -> Estimate:
     """Time, bound and band of a program.
 
     Args:
@@ -75,7 +75,7 @@ def estimate(blocks: Blocks, machine: Machine, model: CycleTimeModel, with_band:
     return Estimate(blocks, model, times, seconds, bound, (max(low, 0.0), seconds + up), doubts)
 
 
-def _doubts(blocks: Blocks, machine: Machine, model: CycleTimeModel,
+def _doubts(blocks: MotionBlocks, machine: Machine, model: CycleTimeModel,
             seconds: float) -> tuple[float, float, dict[str, float]]:
     """(s below, s above, standard deviation by origin): every doubtful value is moved by one standard deviation."""
     own = model.calibration.relative if model.calibration else model.own_share
@@ -90,10 +90,10 @@ def _doubts(blocks: Blocks, machine: Machine, model: CycleTimeModel,
     return float(np.sqrt(low)), float(np.sqrt(high)), doubts
 
 
-Change = tuple[Blocks, CycleTimeModel]
+Change = tuple[MotionBlocks, CycleTimeModel]
 
 
-def _changes(blocks: Blocks, machine: Machine, model: CycleTimeModel) -> list[tuple[str, list[Change]]]:
+def _changes(blocks: MotionBlocks, machine: Machine, model: CycleTimeModel) -> list[tuple[str, list[Change]]]:
     """What may be otherwise: name, and the program and model with it lower and higher by one standard deviation."""
     result: list[tuple[str, list[Change]]] = []
     for limit in _LIMITS:
@@ -110,7 +110,7 @@ def _changes(blocks: Blocks, machine: Machine, model: CycleTimeModel) -> list[tu
     return result + _parameter_changes(blocks, model)
 
 
-def _parameter_changes(blocks: Blocks, model: CycleTimeModel) -> list[tuple[str, list[Change]]]:
+def _parameter_changes(blocks: MotionBlocks, model: CycleTimeModel) -> list[tuple[str, list[Change]]]:
     """The model's own parameters: assumed ones alone, fitted ones along the principal axes of their covariance."""
     alone = [name for name in model.assumed if model.calibration is None or name not in PARAMETERS]
     result = [(f"assumed {name}", [(blocks, with_values(model, {name: sign * ASSUMED[name]})) for sign in (-1, 1)])
@@ -131,7 +131,7 @@ def with_values(model: CycleTimeModel, logarithms: dict[str, float]) -> CycleTim
     return moved.model_copy(update=others)
 
 
-def _scaled(blocks: Blocks, limit: str, which: Floats, sign: int) -> Blocks:
+def _scaled(blocks: MotionBlocks, limit: str, which: Floats, sign: int) -> MotionBlocks:
     axes = blocks.axes
     factor = np.where(which, np.exp(sign * ASSUMED[limit]), 1.0)
     scaled = {name: getattr(axes, name) for name in _LIMITS} | {limit: getattr(axes, limit) * factor}
@@ -139,6 +139,6 @@ def _scaled(blocks: Blocks, limit: str, which: Floats, sign: int) -> Blocks:
                                      scaled["jerk"], axes.xyz))
 
 
-def _longer(blocks: Blocks, which: Floats, seconds: float) -> Blocks:
+def _longer(blocks: MotionBlocks, which: Floats, seconds: float) -> MotionBlocks:
     p = blocks.pauses
     return replace(blocks, pauses=replace(p, seconds=np.maximum(p.seconds + np.where(which, seconds, 0.0), 0.0)))

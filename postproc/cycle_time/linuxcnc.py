@@ -15,11 +15,11 @@ import numpy as np
 
 from postproc.base.compiled import compiled
 from postproc.base.memory import give_back
-from postproc.cycle_time.blocks import Blocks, Cause, Path
-from postproc.cycle_time.linuxcnc_corners import KINK, Blends, Corners, blends, corners
+from postproc.cycle_time.blocks import Cause, CornerMode, MotionBlocks
+from postproc.cycle_time.linuxcnc_corners import KINK, BlendArcs, Corners, blends, corners
 from postproc.cycle_time.linuxcnc_kernels import speeds, timeline
-from postproc.cycle_time.linuxcnc_segments import KERNEL_FROM, NORMAL_SHARE, Segments, clamped, segments
-from postproc.cycle_time.phases import Ramps, Timed, ramps, summed
+from postproc.cycle_time.linuxcnc_segments import KERNEL_FROM, NORMAL_SHARE, PlannerSegments, clamped, segments
+from postproc.cycle_time.phases import BlockTimes, Ramps, ramps, summed
 from postproc.cycle_time.shape import NOTHING, shape
 from toolpaths.arrays import Array, Bools, Floats, Ints
 from toolpaths.units import DEG
@@ -62,7 +62,7 @@ class Settings:
 
 @dataclass(frozen=True)
 class Row:
-    """M segments and blend arcs in the order of motion; fields as in `Segments`."""
+    """M segments and blend arcs in the order of motion; fields as in `PlannerSegments`."""
 
     owner: Ints
     length: Floats
@@ -76,7 +76,7 @@ class Row:
     overlap_speed: Floats
 
 
-def linuxcnc(blocks: Blocks, settings: Settings | None = None) -> Timed:
+def linuxcnc(blocks: MotionBlocks, settings: Settings | None = None) -> BlockTimes:
     """How long LinuxCNC takes over each block."""
     settings = settings or Settings()
     s = segments(blocks, settings.override, settings.rapid)
@@ -85,14 +85,14 @@ def linuxcnc(blocks: Blocks, settings: Settings | None = None) -> Timed:
     return _timed(blocks, s, row, settings)
 
 
-def in_a_row(s: Segments, cycle: float) -> Row:
+def in_a_row(s: PlannerSegments, cycle: float) -> Row:
     """Every corner decided, blend arcs put in, lengths trimmed, accelerations shared out."""
     count = len(s)
-    ends = np.where(s.blocks.path == Path.BLEND, OVERLAP, STOP)
+    ends = np.where(s.blocks.path == CornerMode.BLEND, OVERLAP, STOP)
     joined = ~s.fresh[1:]
     change = joined & (s.blocks.rapid[1:] != s.blocks.rapid[:-1])
     ends[:-1][change] = STOP
-    free = joined & ~change & (s.blocks.path[:-1] != Path.STOP)
+    free = joined & ~change & (s.blocks.path[:-1] != CornerMode.STOP)
     c = corners(s, free, cycle)
     ends[:-1][c.back] = STOP
     ends[:-1][c.tangent] = TANGENT
@@ -103,7 +103,7 @@ def in_a_row(s: Segments, cycle: float) -> Row:
     return _put_together(s, c, ends, at, arcs, blended, tangent, joined, count, cycle)
 
 
-def _choice(s: Segments, c: Corners, at: Ints, arcs: Blends, cycle: float) -> tuple[Bools, Bools]:
+def _choice(s: PlannerSegments, c: Corners, at: Ints, arcs: BlendArcs, cycle: float) -> tuple[Bools, Bools]:
     """(K,) where the blend arc, where passing as tangent wins; else two ramps overlap (`tpChooseBestBlend`).
 
     The decision falls while both segments may still lose half of their length to the next blends.
@@ -122,7 +122,7 @@ def _choice(s: Segments, c: Corners, at: Ints, arcs: Blends, cycle: float) -> tu
     return better, ~better & (c.speed[at] > net)
 
 
-def _overlap(s: Segments, one: Ints, length: tuple[Floats, Floats], part: tuple[Floats | float, Floats | float],
+def _overlap(s: PlannerSegments, one: Ints, length: tuple[Floats, Floats], part: tuple[Floats | float, Floats | float],
              target: Floats, rate: Floats, share: Floats) -> tuple[Floats, Floats]:
     """(speed below which the next begins, speed along the blend) (K,) of overlapping ramps (`tpComputeBlendVelocity`).
 
@@ -145,7 +145,7 @@ def _overlap(s: Segments, one: Ints, length: tuple[Floats, Floats], part: tuple[
     return speed, np.sin(theta) * (speed + following) / 2.0
 
 
-def _pull(s: Segments, rows: Ints, share: Floats) -> Floats:
+def _pull(s: PlannerSegments, rows: Ints, share: Floats) -> Floats:
     """(K, 3) unit direction of the acceleration at the begin of segments: that of the tangent, on arcs with half the
     asked speed's centripetal part (`tcCircleStartAccelUnitVector`)."""
     tangent = _flat(s, s.shape.first, rows)
@@ -157,7 +157,7 @@ def _pull(s: Segments, rows: Ints, share: Floats) -> Floats:
     return np.asarray(pull / np.maximum(np.linalg.norm(pull, axis=1, keepdims=True), 1e-300))
 
 
-def _flat(s: Segments, tangent: Floats, rows: Ints) -> Floats:
+def _flat(s: PlannerSegments, tangent: Floats, rows: Ints) -> Floats:
     """(K, 3) tangents of segments; those of helices in the plane; along X where X, Y, Z stand still, as LinuxCNC has it
     for a line without length."""
     own, normal = tangent[rows], s.blocks.normal[rows]
@@ -166,7 +166,7 @@ def _flat(s: Segments, tangent: Floats, rows: Ints) -> Floats:
     return np.where(size > 0.0, own / np.maximum(size, 1e-300), np.array([1.0, 0.0, 0.0]))
 
 
-def _put_together(s: Segments, c: Corners, ends: Array, at: Ints, arcs: Blends, blended: Bools, tangent: Bools,
+def _put_together(s: PlannerSegments, c: Corners, ends: Array, at: Ints, arcs: BlendArcs, blended: Bools, tangent: Bools,
                   joined: Bools, count: int, cycle: float) -> Row:
     """Segments and blend arcs as one row."""
     arc_at, arc = at[blended], np.flatnonzero(blended)
@@ -221,7 +221,7 @@ def _mask(rows: Ints, count: int) -> Bools:
     return result
 
 
-def _along_arcs(s: Segments, rate: Floats, most: Floats, finished: Bools) -> tuple[Floats, Floats]:
+def _along_arcs(s: PlannerSegments, rate: Floats, most: Floats, finished: Bools) -> tuple[Floats, Floats]:
     """Rate along arcs and their largest speed: what centripetal acceleration leaves (`pmCircleActualMaxVel`)."""
     arc = s.blocks.arc
     if not arc.any():
@@ -237,7 +237,7 @@ def _along_arcs(s: Segments, rate: Floats, most: Floats, finished: Bools) -> tup
     return np.where(arc, rate * part, rate), slower
 
 
-def _timed(blocks: Blocks, s: Segments, row: Row, settings: Settings) -> Timed:
+def _timed(blocks: MotionBlocks, s: PlannerSegments, row: Row, settings: Settings) -> BlockTimes:
     """Speeds by look-ahead, ramps, and everything put on the clock."""
     big = len(row.length) >= KERNEL_FROM
     through = (row.ends == TANGENT) & ~np.append(row.fresh[1:], True)
@@ -281,7 +281,7 @@ def _ahead(row: Row, depth: int) -> Floats:
     return np.asarray(np.sqrt(np.maximum(window, 0.0)))
 
 
-def _pauses(blocks: Blocks, s: Segments, row: Row) -> tuple[Floats, Floats]:
+def _pauses(blocks: MotionBlocks, s: PlannerSegments, row: Row) -> tuple[Floats, Floats]:
     """(P,) s of each pause, and (M,) s of rest behind each segment of the row."""
     p = blocks.pauses
     seconds = p.seconds + np.array([COMMAND[Cause(k)] for k in range(len(Cause))])[p.cause]
@@ -291,8 +291,8 @@ def _pauses(blocks: Blocks, s: Segments, row: Row) -> tuple[Floats, Floats]:
     return seconds, summed(seconds[inside], position[inside], len(row.length))
 
 
-def _by_block(blocks: Blocks, s: Segments, row: Row, ramp: Floats, steady: Floats, begin: Floats, end: Floats,
-              pause: Floats, stops: Bools, first: Floats, last: Floats, peak: Floats) -> Timed:
+def _by_block(blocks: MotionBlocks, s: PlannerSegments, row: Row, ramp: Floats, steady: Floats, begin: Floats, end: Floats,
+              pause: Floats, stops: Bools, first: Floats, last: Floats, peak: Floats) -> BlockTimes:
     """Segments' times shared out to the blocks that they stand for, by length."""
     count = len(blocks)
     begin, end, ramp, steady = _apart(begin, end, ramp, steady)
@@ -319,8 +319,8 @@ def _by_block(blocks: Blocks, s: Segments, row: Row, ramp: Floats, steady: Float
 
     def shared(values: Floats) -> Floats:
         return summed(values, row.owner, len(s))[owner] * part
-    return Timed(start, finish, shared(ramp), shared(steady), np.zeros(count), _peak(row, peak, len(s))[owner],
-                 shared(lost_stop), shared(lost_corner), pause)
+    return BlockTimes(start, finish, shared(ramp), shared(steady), np.zeros(count), _peak(row, peak, len(s))[owner],
+                      shared(lost_stop), shared(lost_corner), pause)
 
 
 def _apart(begin: Floats, end: Floats, ramp: Floats, steady: Floats) -> tuple[Floats, Floats, Floats, Floats]:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from postproc.cycle_time.linuxcnc_segments import NORMAL_SHARE, Segments, clamped, plane_limit
+from postproc.cycle_time.linuxcnc_segments import NORMAL_SHARE, PlannerSegments, clamped, plane_limit
 from toolpaths.arrays import Bools, Floats, Ints
 
 KINK = 0.1
@@ -42,7 +42,7 @@ class Corners:
     kinked: Bools
 
 
-def corners(s: Segments, free: Bools, cycle: float) -> Corners:
+def corners(s: PlannerSegments, free: Bools, cycle: float) -> Corners:
     """How tangent each place is; `free` (N-1,) is False where the segment before has to stop in any case."""
     last, first = s.shape.last[:-1], s.shape.first[1:]
     straight = free & ~s.shape.turns[:-1] & ~s.shape.turns[1:]
@@ -62,7 +62,7 @@ def corners(s: Segments, free: Bools, cycle: float) -> Corners:
 
 
 @dataclass(frozen=True)
-class Blends:
+class BlendArcs:
     """Blend arcs at K corners: `trim` (K, 2) mm taken from both sides, `length`, `asked` and `most` speed,
     `acceleration`; `good` where there is an arc at all."""
 
@@ -89,7 +89,7 @@ class _Side:
     most: Floats
 
 
-def blends(s: Segments, at: Ints, cycle: float) -> Blends:
+def blends(s: PlannerSegments, at: Ints, cycle: float) -> BlendArcs:
     """The blend arc of each corner `at` (K,) by line or arc on either side."""
     u1, u2 = s.shape.last[at], s.shape.first[at + 1]
     half = np.arccos(np.clip(-(u1 * u2).sum(axis=1), -1.0, 1.0)) / 2.0
@@ -110,14 +110,14 @@ def blends(s: Segments, at: Ints, cycle: float) -> Blends:
     curved = np.flatnonzero(one.arc | two.arc)
     if len(curved):
         _fit(curved, u1, u2, binormal, point, one, two, radius, tolerance, trim, length, good)
-    return Blends(good, trim, length, asked, planned, acceleration)
+    return BlendArcs(good, trim, length, asked, planned, acceleration)
 
 
 def _unit(v: Floats) -> Floats:
     return np.asarray(v / np.maximum(np.linalg.norm(v, axis=1, keepdims=True), 1e-300))
 
 
-def _side(s: Segments, rows: Ints, half: Floats, point: Floats, u1: Floats, u2: Floats, before: bool) -> _Side:
+def _side(s: PlannerSegments, rows: Ints, half: Floats, point: Floats, u1: Floats, u2: Floats, before: bool) -> _Side:
     """The segments `rows` (K,) as the side before or behind the corner."""
     arc, center = s.blocks.arc[rows], s.blocks.center[rows]
     spoke = point - center
@@ -133,7 +133,7 @@ def _side(s: Segments, rows: Ints, half: Floats, point: Floats, u1: Floats, u2: 
     return _Side(arc, arm, lean, np.where(convex, most / 4.0, 0.0), center, radius, convex, most)
 
 
-def _sizes(s: Segments, at: Ints, one: _Side, two: _Side, theta: Floats, binormal: Floats,
+def _sizes(s: PlannerSegments, at: Ints, one: _Side, two: _Side, theta: Floats, binormal: Floats,
            cycle: float) -> tuple[Floats, ...]:
     """(radius, planned speed, asked speed, acceleration, tolerance) of the blends, all (K,)."""
     axes = s.blocks.axes

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from postproc.base.compiled import compiled
-from postproc.cycle_time.blocks import Axes, Blocks, Path
+from postproc.cycle_time.blocks import Axes, CornerMode, MotionBlocks
 from postproc.cycle_time.linuxcnc_kernels import chain_ends
 from postproc.cycle_time.shape import Shape, axis_limit, shape
 from toolpaths.arrays import Bools, Floats, Ints
@@ -23,7 +23,7 @@ KERNEL_FROM = 20_000
 
 
 @dataclass(frozen=True)
-class Segments:
+class PlannerSegments:
     """N segments of the planner, in mm or rad of `length`, and s.
 
     Attributes:
@@ -39,13 +39,13 @@ class Segments:
     most: Floats
     acceleration: Floats
     shape: Shape
-    blocks: Blocks
+    blocks: MotionBlocks
 
     def __len__(self) -> int:
         return len(self.length)
 
 
-def segments(blocks: Blocks, override: float = 1.0, rapid: float = 1.0) -> Segments:
+def segments(blocks: MotionBlocks, override: float = 1.0, rapid: float = 1.0) -> PlannerSegments:
     """The segments that the planner is given; feeds and rapids times their overrides."""
     merged, block = merge(blocks)
     form, axes = shape(merged), merged.axes
@@ -54,10 +54,10 @@ def segments(blocks: Blocks, override: float = 1.0, rapid: float = 1.0) -> Segme
         _arc_limits(merged, form, most, acceleration)
     fresh = np.concatenate([[True], merged.forced[:-1]])
     asked = np.where(merged.rapid, most * rapid, merged.speed * override)
-    return Segments(block, fresh, form.length, np.minimum(asked, most), most, acceleration, form, merged)
+    return PlannerSegments(block, fresh, form.length, np.minimum(asked, most), most, acceleration, form, merged)
 
 
-def _arc_limits(blocks: Blocks, form: Shape, most: Floats, acceleration: Floats) -> None:
+def _arc_limits(blocks: MotionBlocks, form: Shape, most: Floats, acceleration: Floats) -> None:
     """Speed and acceleration of arcs: the plane's slower axis, centripetal acceleration, and the straight way's axes."""
     at, axes = np.flatnonzero(blocks.arc), blocks.axes
     in_plane = np.abs(blocks.normal[at]) < 0.5
@@ -70,13 +70,13 @@ def _arc_limits(blocks: Blocks, form: Shape, most: Floats, acceleration: Floats)
         values[at] = form.length[at] / np.maximum((straight / limit).max(axis=1), around / around_limit)
 
 
-def merge(blocks: Blocks) -> tuple[Blocks, Ints]:
+def merge(blocks: MotionBlocks) -> tuple[MotionBlocks, Ints]:
     """(blocks with short lines merged, row of the last block behind each): G64 Q, "naive CAM" detection."""
     rows = np.arange(len(blocks))
     if not (blocks.chain > 0.0).any():
         return blocks, rows
     blocks, rows = _flat_arcs(blocks, rows)
-    line = ~blocks.rapid & ~blocks.arc & (blocks.path == Path.BLEND) & (blocks.chain > 0.0)
+    line = ~blocks.rapid & ~blocks.arc & (blocks.path == CornerMode.BLEND) & (blocks.chain > 0.0)
     turns = np.delete(blocks.end - blocks.start, blocks.axes.xyz[blocks.axes.xyz >= 0], axis=1).any(axis=1)
     same = np.ones(len(blocks), dtype=bool)
     for column in (blocks.speed, blocks.path, blocks.tolerance, blocks.chain):
@@ -90,12 +90,12 @@ def merge(blocks: Blocks) -> tuple[Blocks, Ints]:
     return replace(blocks.take(keep), start=start), rows[keep]
 
 
-def _flat_arcs(blocks: Blocks, rows: Ints) -> tuple[Blocks, Ints]:
+def _flat_arcs(blocks: MotionBlocks, rows: Ints) -> tuple[MotionBlocks, Ints]:
     """Arcs in XY that rise over their chord by less than the chain tolerance, as two lines through their middle."""
     if not blocks.arc.any():
         return blocks, rows
     form = shape(blocks)
-    flat = blocks.arc & (blocks.path == Path.BLEND) & (np.abs(blocks.normal[:, 2]) > 0.5)
+    flat = blocks.arc & (blocks.path == CornerMode.BLEND) & (np.abs(blocks.normal[:, 2]) > 0.5)
     flat &= form.radius * (1.0 - np.cos(blocks.sweep / 2.0)) < blocks.chain
     if not flat.any():
         return blocks, rows
@@ -113,7 +113,7 @@ def _flat_arcs(blocks: Blocks, rows: Ints) -> tuple[Blocks, Ints]:
     return replace(wide, start=start, end=end, arc=wide.arc & ~flat[double], pauses=moved), rows[double]
 
 
-def _turned(blocks: Blocks, at: Ints) -> Floats:
+def _turned(blocks: MotionBlocks, at: Ints) -> Floats:
     """(K, 3) the middle of arcs."""
     center, normal, half = blocks.center[at], blocks.normal[at], blocks.sweep[at, None] / 2.0
     spoke = blocks.start[at][:, blocks.axes.xyz] - center

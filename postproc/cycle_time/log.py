@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from postproc.cycle_time.blocks import Blocks
+from postproc.cycle_time.blocks import MotionBlocks
 from postproc.cycle_time.source import read_file
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
@@ -21,7 +21,7 @@ MOST_LINES, MOST_SECONDS = 1e9, 1e7
 
 
 @dataclass(frozen=True)
-class Log:
+class RunLog:
     """S samples in the order of the run.
 
     Attributes:
@@ -35,7 +35,7 @@ class Log:
     row: Ints
 
 
-def read_log(file: str | Path, letters: tuple[str, ...]) -> tuple[Log | None, list[Diagnostic]]:
+def read_log(file: str | Path, letters: tuple[str, ...]) -> tuple[RunLog | None, list[Diagnostic]]:
     """A CSV file with the columns nc_line and time_s, and axis letters where it has positions.
 
     Raises:
@@ -61,7 +61,7 @@ def read_log(file: str | Path, letters: tuple[str, ...]) -> tuple[Log | None, li
     number = np.array([k for k, row in enumerate(rows[1:], 2) if row], dtype=np.int64)
     if found := _faults(column["nc_line"], column["time_s"], number, str(file)):
         return None, found
-    return Log(column["nc_line"].astype(np.int64), column["time_s"], position, number), []
+    return RunLog(column["nc_line"].astype(np.int64), column["time_s"], position, number), []
 
 
 def _numbers(rows: list[list[str]], columns: int, file: str) -> tuple[Floats, list[Diagnostic]]:
@@ -103,7 +103,7 @@ def _faults(line: Floats, time: Floats, row: Ints, file: str) -> list[Diagnostic
     return []
 
 
-def matched(log: Log, blocks: Blocks, file: str) -> tuple[Ints, Ints, list[Diagnostic]]:
+def matched(log: RunLog, blocks: MotionBlocks, file: str) -> tuple[Ints, Ints, list[Diagnostic]]:
     """(samples, blocks) (M,) that belong together: the first sample at a line, the first block of it, both rising."""
     line, first = np.unique(blocks.line, return_index=True)
     at = np.searchsorted(line, log.line)

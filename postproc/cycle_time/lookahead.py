@@ -14,11 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from postproc.base.compiled import compiled
-from postproc.cycle_time.blocks import Blocks, Path
+from postproc.cycle_time.blocks import CornerMode, MotionBlocks
 from postproc.cycle_time.linuxcnc_kernels import speeds
 from postproc.cycle_time.linuxcnc_segments import KERNEL_FROM, NORMAL_SHARE
 from postproc.cycle_time.model import CycleTimeModel
-from postproc.cycle_time.phases import Ramps, Timed, ramps, summed
+from postproc.cycle_time.phases import BlockTimes, Ramps, ramps, summed
 from postproc.cycle_time.shape import Shape, axis_limit, shape
 from toolpaths.arrays import Bools, Floats
 
@@ -27,14 +27,14 @@ TANGENT = 1e-3
 
 
 @dataclass(frozen=True)
-class Directions:
+class PathDerivatives:
     """(E, A) derivatives of the axes by path length at begin and end of each block."""
 
     first: Floats
     last: Floats
 
 
-def directions(blocks: Blocks, form: Shape) -> Directions:
+def directions(blocks: MotionBlocks, form: Shape) -> PathDerivatives:
     """Signed derivatives at both ends; arcs by their tangents."""
     step = (blocks.end - blocks.start) / np.where(form.length > 0.0, form.length, 1.0)[:, None]
     first, last = step, step
@@ -43,10 +43,10 @@ def directions(blocks: Blocks, form: Shape) -> Directions:
         columns = blocks.axes.xyz
         for way, tangent in ((first, form.first), (last, form.last)):
             way[np.ix_(blocks.arc, columns)] = tangent[blocks.arc]
-    return Directions(first, last)
+    return PathDerivatives(first, last)
 
 
-def lookahead(blocks: Blocks, model: CycleTimeModel) -> Timed:
+def lookahead(blocks: MotionBlocks, model: CycleTimeModel) -> BlockTimes:
     """How long a control with look-ahead takes over each block."""
     form = shape(blocks)
     target, rate, jerk = limits(blocks, form, model)
@@ -61,7 +61,7 @@ def lookahead(blocks: Blocks, model: CycleTimeModel) -> Timed:
     return on_the_clock(blocks, r, extra, first, last, rate, ~through, model.stop_time)
 
 
-def limits(blocks: Blocks, form: Shape, model: CycleTimeModel) -> tuple[Floats, Floats, Floats]:
+def limits(blocks: MotionBlocks, form: Shape, model: CycleTimeModel) -> tuple[Floats, Floats, Floats]:
     """(E,) largest speed, acceleration and jerk along each block."""
     axes = blocks.axes
     velocity, rate, jerk = (axis_limit(form.share, limit) for limit in (axes.velocity, axes.acceleration, axes.jerk))
@@ -76,7 +76,7 @@ def limits(blocks: Blocks, form: Shape, model: CycleTimeModel) -> tuple[Floats, 
     return target, rate, jerk
 
 
-def corner_speed(blocks: Blocks, form: Shape, model: CycleTimeModel) -> Floats:
+def corner_speed(blocks: MotionBlocks, form: Shape, model: CycleTimeModel) -> Floats:
     """(E-1,) speed at which each corner is passed; 0 where the control stops."""
     ways = directions(blocks, form)
     change = np.abs(ways.first[1:] - ways.last[:-1])
@@ -87,8 +87,8 @@ def corner_speed(blocks: Blocks, form: Shape, model: CycleTimeModel) -> Floats:
     with np.errstate(divide="ignore"):
         reach = np.minimum(4.0 * tolerance / bend, half)
         speed = np.sqrt(2.0 * reach * (blocks.axes.acceleration / change).min(axis=1))
-    exact = (blocks.path[:-1] == Path.EXACT) & (change.max(axis=1, initial=0.0) > TANGENT)
-    stop = blocks.forced[:-1] | (blocks.path[:-1] == Path.STOP) | exact | (blocks.rapid[1:] != blocks.rapid[:-1])
+    exact = (blocks.path[:-1] == CornerMode.EXACT) & (change.max(axis=1, initial=0.0) > TANGENT)
+    stop = blocks.forced[:-1] | (blocks.path[:-1] == CornerMode.STOP) | exact | (blocks.rapid[1:] != blocks.rapid[:-1])
     return np.where(stop, 0.0, speed)
 
 
@@ -142,8 +142,8 @@ def _run_share(begin: Floats, end: Floats, seconds: Floats, rate: Floats, jerk: 
     return np.asarray(lost[run] * seconds / np.maximum(total[run], 1e-300))
 
 
-def on_the_clock(blocks: Blocks, r: Ramps, extra: Floats, first: Floats, last: Floats, rate: Floats, stops: Bools,
-                 stop_time: float) -> Timed:
+def on_the_clock(blocks: MotionBlocks, r: Ramps, extra: Floats, first: Floats, last: Floats, rate: Floats, stops: Bools,
+                 stop_time: float) -> BlockTimes:
     """Blocks one after the other, with their rests."""
     p = blocks.pauses
     inside = p.block >= 0
@@ -155,4 +155,4 @@ def on_the_clock(blocks: Blocks, r: Ramps, extra: Floats, first: Floats, last: F
     lost_stop = np.where(before, loss[0], 0.0) + np.where(stops, loss[1] + stop_time, 0.0)
     lost_corner = np.where(before, 0.0, loss[0]) + np.where(stops, 0.0, loss[1])
     end = begin + seconds + np.where(stops, stop_time, 0.0)
-    return Timed(begin, end, r.up + r.down, r.steady, extra, r.peak, lost_stop, lost_corner, p.seconds.copy())
+    return BlockTimes(begin, end, r.up + r.down, r.steady, extra, r.peak, lost_stop, lost_corner, p.seconds.copy())

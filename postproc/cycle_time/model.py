@@ -14,14 +14,14 @@ from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic
 
 PARAMETERS = ("corner_tolerance", "block_time", "rapid", "override", "stop_time")
-"""what a log can tell, in the order of `Calibration.covariance`"""
+"""what a log can tell, in the order of `CalibrationRecord.covariance`"""
 ASSUMED = {"corner_tolerance": 0.7, "block_time": 0.7, "rapid": 0.05, "override": 0.02, "stop_time": 0.7,
            "spindle_time": 0.7, "velocity": 0.15, "acceleration": 0.3, "jerk": 0.5, "tool_change": 0.3, "clamp": 0.3,
            "unclamp": 0.3}
 """standard deviation of the logarithm of a value that no document states"""
 
 
-class Calibration(UserModel):
+class CalibrationRecord(UserModel):
     """Where the parameters of a calibrated model come from."""
 
     log: str
@@ -71,7 +71,7 @@ class CycleTimeModel(UserModel):
     """standard deviation of the time over the model's own, as a share, where every parameter is known"""
     assumed: tuple[str, ...] = ()
     """parameters that no document states and no run has shown"""
-    calibration: Calibration | None = None
+    calibration: CalibrationRecord | None = None
 
     def values(self) -> Floats:
         """(5,) logarithms of PARAMETERS."""

@@ -50,7 +50,7 @@ def ramps(length: Floats, first: Floats, last: Floats, target: Floats, rate: Flo
 
 
 @dataclass(frozen=True)
-class Timed:
+class BlockTimes:
     """What a model says of E blocks.
 
     Attributes:

@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from postproc.cycle_time.blocks import Blocks
+from postproc.cycle_time.blocks import MotionBlocks
 from postproc.cycle_time.lookahead import lookahead
 from postproc.cycle_time.model import CycleTimeModel
-from postproc.cycle_time.phases import Timed
+from postproc.cycle_time.phases import BlockTimes
 from postproc.pipeline.result import PostResult
 from postproc.planning.pass_geometry import stops_of
 from postproc.planning.planned import PlannedMotion, Source
@@ -20,7 +20,7 @@ from toolpaths.diagnostics import Diagnostic, DiagnosticError, warning
 from toolpaths.smoothing.smooth import Tolerance
 
 
-def planned_times(result: PostResult, blocks: Blocks, model: CycleTimeModel) -> tuple[Timed, list[Diagnostic]]:
+def planned_times(result: PostResult, blocks: MotionBlocks, model: CycleTimeModel) -> tuple[BlockTimes, list[Diagnostic]]:
     """Times of a conversion's blocks; a warning where no pass could be planned, so that all times are the model's."""
     times = lookahead(blocks, model)
     job, path = result.job, result.path
@@ -49,7 +49,7 @@ def _unsolved(motion: PlannedMotion, moves: Moves, file: str) -> list[Diagnostic
                     "within all limits", file=file, lines=lines[:6], count=len(lines), hint="--model lookahead")]
 
 
-def _of_passes(blocks: Blocks, times: Timed, spans: list[tuple[int, int, float]]) -> Floats:
+def _of_passes(blocks: MotionBlocks, times: BlockTimes, spans: list[tuple[int, int, float]]) -> Floats:
     """(E,) s of each block: in passes the plan's time, shared out as the model has it."""
     assert blocks.move is not None
     seconds = times.seconds.copy()
@@ -62,7 +62,7 @@ def _of_passes(blocks: Blocks, times: Timed, spans: list[tuple[int, int, float]]
     return seconds
 
 
-def with_seconds(times: Timed, seconds: Floats) -> Timed:
+def with_seconds(times: BlockTimes, seconds: Floats) -> BlockTimes:
     """The same order of blocks and rests, with other times of the blocks; their phases shrink and grow alike."""
     rest = np.append(np.diff(times.begin) - times.seconds[:-1], 0.0) if len(seconds) else seconds
     begin = np.concatenate([[0.0], np.cumsum(seconds + rest)[:-1]])

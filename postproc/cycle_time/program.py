@@ -8,7 +8,7 @@ import numpy as np
 
 from machines.machine import Machine
 from postproc.control.control import Control
-from postproc.cycle_time.blocks import Axes, Blocks, Cause, Path, Pauses
+from postproc.cycle_time.blocks import Axes, Cause, CornerMode, MotionBlocks, Pauses
 from postproc.cycle_time.shape import NOTHING, shape
 from postproc.readback.execution.execute import Motion
 from postproc.readback.execution.poses import arc_sweeps, coordinates, positions
@@ -30,7 +30,7 @@ INCH = 25.4
 
 
 @dataclass(frozen=True)
-class Origin:
+class BlockOrigin:
     """Where motion blocks come from: operation (E,) of `names`; CL line and row of the job's moves (E,) or None."""
 
     operation: Ints
@@ -39,16 +39,16 @@ class Origin:
     move: Ints | None = None
 
     @staticmethod
-    def by_tool(motion: Motion) -> Origin:
+    def by_tool(motion: Motion) -> BlockOrigin:
         """One operation from tool change to tool change."""
         change = np.concatenate([[False], np.diff(motion.tool) != 0])[:len(motion)]
         number = np.cumsum(change)
         first = np.unique(number, return_index=True)[1]
-        return Origin(number, tuple(f"T{t}" if t >= 0 else "" for t in motion.tool[first].tolist()) or ("",))
+        return BlockOrigin(number, tuple(f"T{t}" if t >= 0 else "" for t in motion.tool[first].tolist()) or ("",))
 
 
-def blocks_of(code: Canonical, motion: Motion, machine: Machine, control: Control, origin: Origin | None = None,
-              own_path: bool = True, by_radius: bool = False) -> Blocks:
+def blocks_of(code: Canonical, motion: Motion, machine: Machine, control: Control, origin: BlockOrigin | None = None,
+              own_path: bool = True, by_radius: bool = False) -> MotionBlocks:
     """The blocks that move, with their pauses.
 
     Args:
@@ -58,7 +58,7 @@ def blocks_of(code: Canonical, motion: Motion, machine: Machine, control: Contro
             it was stated (LinuxCNC), else both are the control's
         by_radius: inverse time of arcs counts radians
     """
-    origin = origin or Origin.by_tool(motion)
+    origin = origin or BlockOrigin.by_tool(motion)
     block = _block_of(code, motion)
     words, unit = code.words, np.where(machine.rotary, DEG, 1.0)
     points = np.concatenate([motion.start[None], motion.end]) * unit
@@ -66,11 +66,12 @@ def blocks_of(code: Canonical, motion: Motion, machine: Machine, control: Contro
     arc = motion.code == 2
     normal, sweep, center = _arcs(motion, control, arc, start)
     path, tolerance, chain = _path_modes(words, own_path)
-    path = np.where(motion.hole, Path.EXACT, path[block])
+    path = np.where(motion.hole, CornerMode.EXACT, path[block])
     pauses = _pauses(words, block, code.line, motion, machine)
-    blocks = Blocks(Axes.of(machine), start, end, motion.line, motion.code == 0, arc, center, normal, sweep,
-                    np.full(len(end), np.inf), path, tolerance[block], chain[block], origin.operation, origin.names, pauses,
-                    origin.cl_line, origin.move, _tip_lengths(motion, control))
+    blocks = MotionBlocks(Axes.of(machine), start, end, motion.line, motion.code == 0, arc, center, normal, sweep,
+                          np.full(len(end), np.inf), path, tolerance[block], chain[block], origin.operation, origin.names,
+                          pauses,
+                          origin.cl_line, origin.move, _tip_lengths(motion, control))
     inch = _feed_inch(words, block, own_path)
     blocks = replace(blocks, speed=_speeds(inch, motion, blocks, by_radius))
     moving = (np.abs(end - start) > NOTHING).any(axis=1) | arc
@@ -120,7 +121,7 @@ def _tip_lengths(motion: Motion, control: Control) -> Floats:
     return result
 
 
-def _unrolled(blocks: Blocks, motion: Motion, control: Control, unit: Floats) -> Blocks:
+def _unrolled(blocks: MotionBlocks, motion: Motion, control: Control, unit: Floats) -> MotionBlocks:
     """Blocks that the control bends through its kinematics as straight pieces; what does not move is left out."""
     bent = blocks.arc & (motion.frame > 0)
     count = np.where(bent, np.ceil(blocks.sweep / CHORD).astype(np.int64), _pieces(blocks, motion, control, unit))
@@ -138,7 +139,7 @@ def _unrolled(blocks: Blocks, motion: Motion, control: Control, unit: Floats) ->
     return wide.take((np.abs(end - start) > NOTHING).any(axis=1) | wide.arc)
 
 
-def _pieces(blocks: Blocks, motion: Motion, control: Control, unit: Floats) -> Ints:
+def _pieces(blocks: MotionBlocks, motion: Motion, control: Control, unit: Floats) -> Ints:
     """(E,) pieces of blocks whose axes leave the straight line while the tip stays on it: 1 elsewhere."""
     count = np.ones(len(blocks), dtype=np.int64)
     rows = np.flatnonzero((motion.frame > 0) & ~blocks.arc)
@@ -159,14 +160,14 @@ def _path_modes(words: Words, own_path: bool) -> tuple[Array, Floats, Floats]:
     scale = np.where(modal_state(words).inch, INCH, 1.0)[at]
     p, q = (columns(words, letter)[at, 0] * scale for letter in "PQ")
     blend = codes == 64.0
-    path = np.where(blend, Path.BLEND, np.where(codes == 61.0, Path.EXACT, Path.STOP))
+    path = np.where(blend, CornerMode.BLEND, np.where(codes == 61.0, CornerMode.EXACT, CornerMode.STOP))
     tolerance = np.where(p > 0.0, p, np.inf)
     chain = np.where(blend, np.where(np.isfinite(q), q, np.where(np.isfinite(p), p, 0.0)), 0.0)
     smooth = fill_values(*words.pick(SMOOTH), words.lines)
     stated = np.where(smooth == 0.0, np.nan, smooth) if not own_path else np.full(words.lines + 1, np.inf)
     stated[at[0] if len(at) else words.lines + 1:] = np.nan
     own = _carried(at, tolerance, words.lines)
-    return (np.nan_to_num(_carried(at, path.astype(np.float64), words.lines), nan=float(Path.BLEND)).astype(np.int8),
+    return (np.nan_to_num(_carried(at, path.astype(np.float64), words.lines), nan=float(CornerMode.BLEND)).astype(np.int8),
             np.where(np.isnan(own), stated, own), np.nan_to_num(_carried(at, chain, words.lines)))
 
 
@@ -188,7 +189,7 @@ def _feed_inch(words: Words, block: Ints, kept: bool) -> Bools:
     return np.asarray(fill_values(at, inch[at - 1].astype(np.float64), words.lines)[block] == 1.0)
 
 
-def _speeds(inch: Bools, motion: Motion, blocks: Blocks, by_radius: bool) -> Floats:
+def _speeds(inch: Bools, motion: Motion, blocks: MotionBlocks, by_radius: bool) -> Floats:
     """(E,) mm/s or rad/s that the feed word asks for; `inch` (E,): it counts inches."""
     form = shape(blocks)
     linear = (form.first != 0.0).any(axis=1) | blocks.arc
@@ -219,7 +220,7 @@ def _pauses(words: Words, block: Ints, line: Ints, motion: Motion, machine: Mach
     return Pauses(row[order], cause[order], seconds[order], line[where[order]])
 
 
-def _with_indexing(blocks: Blocks, machine: Machine) -> Pauses:
+def _with_indexing(blocks: MotionBlocks, machine: Machine) -> Pauses:
     """The pauses with clamp and unclamp: where a run of rapids turns axes that the cut behind it leaves at rest."""
     timing, pauses = machine.timing, blocks.pauses
     seconds = timing.clamp + timing.unclamp

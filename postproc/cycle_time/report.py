@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from postproc.cycle_time.estimate import Estimate
-from postproc.cycle_time.shares import Shares, most_expensive, operations, shares
+from postproc.cycle_time.shares import TimeShares, most_expensive, operations, shares
 
 COVERS = ("95 % of runs on a machine as the files describe it: the model's own deviation, and parameters of the control and "
           "limits of the machine that no document states")
@@ -62,7 +62,7 @@ def as_text(e: Estimate, name: str) -> str:
     return "\n".join(lines)
 
 
-def _limits(s: Shares, feed: float) -> list[str]:
+def _limits(s: TimeShares, feed: float) -> list[str]:
     rows = [f"  {letter}: velocity {v:.2f} s, acceleration {a:.2f} s, jerk {j:.2f} s"
             for letter, (v, a, j) in s.limiting.items() if v + a + j >= 0.005]
     return [f"held by the feed {feed:.2f} s, by axes:", *rows] if rows else []

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from postproc.cycle_time.blocks import Axes, Blocks
+from postproc.cycle_time.blocks import Axes, MotionBlocks
 from toolpaths.arrays import Bools, Floats, repeated
 from toolpaths.rotations import lengths
 
@@ -50,7 +50,7 @@ def feed_length(step: Floats, axes: Axes) -> Floats:
     return result
 
 
-def shape(blocks: Blocks) -> Shape:
+def shape(blocks: MotionBlocks) -> Shape:
     """The geometry of every block."""
     axes, step = blocks.axes, blocks.end - blocks.start
     step = np.where(np.abs(step) > NOTHING, step, 0.0)
@@ -69,7 +69,8 @@ def shape(blocks: Blocks) -> Shape:
     return Shape(length, turns, radius, climb, first, last, share / np.where(length > 0.0, length, 1.0)[:, None])
 
 
-def _arcs(blocks: Blocks, length: Floats, radius: Floats, climb: Floats, first: Floats, last: Floats, share: Floats) -> None:
+def _arcs(blocks: MotionBlocks, length: Floats, radius: Floats, climb: Floats, first: Floats, last: Floats,
+          share: Floats) -> None:
     """Fill the rows of arcs: circle of the start's radius, helix along the normal."""
     at, axes = np.flatnonzero(blocks.arc), blocks.axes
     normal, sweep = blocks.normal[at], blocks.sweep[at]

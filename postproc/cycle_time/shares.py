@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from postproc.cycle_time.blocks import Blocks, Cause
+from postproc.cycle_time.blocks import Cause, MotionBlocks
 from postproc.cycle_time.estimate import Estimate
-from postproc.cycle_time.phases import Timed, summed
+from postproc.cycle_time.phases import BlockTimes, summed
 from postproc.cycle_time.shape import shape
 from toolpaths.arrays import Floats, Ints
 
@@ -18,7 +18,7 @@ FELT = 1e-9
 
 
 @dataclass(frozen=True)
-class Shares:
+class TimeShares:
     """s of E blocks.
 
     Attributes:
@@ -32,7 +32,7 @@ class Shares:
     feed: float
 
 
-def shares(e: Estimate) -> Shares:
+def shares(e: Estimate) -> TimeShares:
     """The time of an estimate by what it goes to."""
     blocks, times = e.blocks, e.timed
     form = shape(blocks)
@@ -56,10 +56,10 @@ def shares(e: Estimate) -> Shares:
     sums = {name: summed(spent[name], axis[name], len(blocks.axes.letters)) for name in axis}
     limiting = {letter: (float(sums["velocity"][j]), float(sums["acceleration"][j]), float(sums["jerk"][j]))
                 for j, letter in enumerate(blocks.axes.letters)}
-    return Shares(causes, limiting, float(np.where(at_feed, times.steady, 0.0).sum()))
+    return TimeShares(causes, limiting, float(np.where(at_feed, times.steady, 0.0).sum()))
 
 
-def _split(over: Floats, times: Timed) -> tuple[Floats, Floats]:
+def _split(over: Floats, times: BlockTimes) -> tuple[Floats, Floats]:
     """What a block takes beyond its feed, as far as ramps explain it: (corners, stops)."""
     lost = times.lost_corner + times.lost_stop + times.jerk
     scale = np.minimum(1.0, over / np.maximum(lost, 1e-300))
@@ -68,7 +68,7 @@ def _split(over: Floats, times: Timed) -> tuple[Floats, Floats]:
     return lost * scale * (1.0 - stop), lost * scale * stop
 
 
-def _pauses(blocks: Blocks, times: Timed) -> dict[str, Floats]:
+def _pauses(blocks: MotionBlocks, times: BlockTimes) -> dict[str, Floats]:
     p = blocks.pauses
     names = {Cause.DWELL: "dwell", Cause.TOOL_CHANGE: "tool_change", Cause.SPINDLE: "spindle", Cause.INDEXING: "indexing",
              Cause.OTHER: "commands"}
@@ -76,7 +76,7 @@ def _pauses(blocks: Blocks, times: Timed) -> dict[str, Floats]:
             for cause, name in names.items()}
 
 
-def operations(e: Estimate, s: Shares) -> list[dict[str, object]]:
+def operations(e: Estimate, s: TimeShares) -> list[dict[str, object]]:
     """Time of each operation, by cause."""
     count = len(e.blocks.operations)
     sums = {name: summed(values, e.blocks.operation, count) for name, values in s.by_cause.items()}
@@ -85,7 +85,7 @@ def operations(e: Estimate, s: Shares) -> list[dict[str, object]]:
             for k, name in enumerate(e.blocks.operations)]
 
 
-def most_expensive(e: Estimate, s: Shares, count: int = 10) -> list[dict[str, object]]:
+def most_expensive(e: Estimate, s: TimeShares, count: int = 10) -> list[dict[str, object]]:
     """The places where most time goes beyond the feed of the program: lines, seconds lost, why."""
     lost = sum((values for name, values in s.by_cause.items() if name != "feed"), np.zeros(len(e.blocks)))
     order: Ints = np.argsort(-np.asarray(lost), kind="stable")[:count]

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from machines.machine import Machine
-from postproc.control.control import Control, Law
+from postproc.control.control import Control, InterpolationMode
 from postproc.controllers.model import ControllerFile
-from postproc.cycle_time.blocks import Blocks
-from postproc.cycle_time.program import Origin, blocks_of
+from postproc.cycle_time.blocks import MotionBlocks
+from postproc.cycle_time.program import BlockOrigin, blocks_of
 from postproc.pipeline.result import PostResult
 from postproc.readback.dialects.readers import reader_for
 from postproc.readback.execution.execute import Motion, run
@@ -24,7 +24,7 @@ from toolpaths.diagnostics import Diagnostic, DiagnosticError, error, has_errors
 from toolpaths.input_files import read_input, unreadable
 
 
-def from_conversion(result: PostResult) -> Blocks:
+def from_conversion(result: PostResult) -> MotionBlocks:
     """The blocks of a conversion that has succeeded, with operations and lines of its CL file."""
     assert result.job is not None and result.comparison is not None and result.comparison.executed is not None and result.ok
     job = result.job
@@ -34,13 +34,13 @@ def from_conversion(result: PostResult) -> Blocks:
     names = tuple(op.name or f"operation {k + 1}" for k, op in enumerate(path.operations))
     inside = (result.comparison.owner >= 0) & (result.comparison.owner < len(moves))
     kept = np.flatnonzero(job.moves.phase != Phase.PECK)
-    origin = Origin(path.operation[moves.row[owner]].astype(np.int64), names,
-                    np.where(inside, moves.line[owner], -1).astype(np.int64), np.where(inside, kept[owner], -1))
+    origin = BlockOrigin(path.operation[moves.row[owner]].astype(np.int64), names,
+                         np.where(inside, moves.line[owner], -1).astype(np.int64), np.where(inside, kept[owner], -1))
     return _blocks(code, motion, result.machine, job.control, result.controller, origin)
 
 
 def from_gcode(data: bytes, machine: Machine, controller: ControllerFile, setup: SetupFile, file: str = "",
-               others: Mapping[str, bytes] | None = None) -> tuple[Blocks | None, list[Diagnostic]]:
+               others: Mapping[str, bytes] | None = None) -> tuple[MotionBlocks | None, list[Diagnostic]]:
     """The blocks of a program, from the machine's home; None and why where it cannot be executed.
 
     Tool lengths come from the set-up, by length register as by tool number; the work offset stands where the set-up puts
@@ -50,7 +50,7 @@ def from_gcode(data: bytes, machine: Machine, controller: ControllerFile, setup:
     if placement is None:
         return None, found
     tip_law = machine.control_kinematics is not None and controller.kinematics.modules
-    law: Law = "tcp" if tip_law else "axes"
+    law: InterpolationMode = "tcp" if tip_law else "axes"
     control = Control(machine, law, placement.points(np.zeros((1, 3)))[0], base=law, rapids=controller.kinematics.rapids,
                       feed_rule=controller.feed.length)
     lengths = {int(number): tool.length for number, tool in setup.tools.items()}
@@ -86,7 +86,7 @@ def _executed(data: bytes, controller: ControllerFile, control: Control, lengths
 
 
 def _blocks(code: Canonical, motion: Motion, machine: Machine, control: Control, controller: ControllerFile,
-            origin: Origin | None) -> Blocks:
+            origin: BlockOrigin | None) -> MotionBlocks:
     return blocks_of(code, motion, machine, control, origin, own_path=controller.writer == "linuxcnc",
                      by_radius=controller.feed.arc_inverse == "radius")
 

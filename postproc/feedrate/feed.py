@@ -36,7 +36,7 @@ class StepFeed:
         return np.asarray(self.values[np.clip(np.searchsorted(self.edges, s, side="right") - 1, 0, len(self.values) - 1)])
 
 
-Feed = float | Callable[[Floats], Floats]
+FeedLimit = float | Callable[[Floats], Floats]
 """Largest ds/dt: one number, or a function of s (N,) that returns (N,): the tip's feed, if s is the length of its path.
 
 A function that changes suddenly has the places in an attribute `breaks` (M,), as `StepFeed`: knots are put there, and
@@ -47,10 +47,10 @@ TOUCH = 1e-9
 
 
 @dataclass(frozen=True)
-class Allowed:
+class AllowedFeed:
     """A feed under an override; at its breaks the lesser of both sides."""
 
-    feed: Feed
+    feed: FeedLimit
     override: float = 1.0
 
     def __post_init__(self) -> None:

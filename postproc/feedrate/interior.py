@@ -1,6 +1,6 @@
 """Interior point on the squared speed: one Newton step per linearisation, every iterate respects the limits.
 
-Each row g(c) of `Problem` is convex in c (x^-1/2 less a linear form), so its tangent lies below it: where the
+Each row g(c) of `SpeedProblem` is convex in c (x^-1/2 less a linear form), so its tangent lies below it: where the
 linearised slack stays positive, so does the true one. Slacks are therefore computed from c, never stored. Newton's
 equations per step are
     (H + sum (z/g) grad g grad g') dc = -grad f + sum (mu/g) grad g,    dz = mu/g - z - (z/g) grad g' dc,
@@ -17,7 +17,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from scipy.linalg import solveh_banded
 
-from postproc.feedrate.problem import Problem
+from postproc.feedrate.problem import SpeedProblem
 from toolpaths.arrays import Floats
 
 TAU = 0.99
@@ -28,7 +28,7 @@ MOST = 120
 
 
 @dataclass(frozen=True)
-class Solution:
+class InteriorSolution:
     """Coefficients (K + 2,), iterations used, last gap over time, whether the tolerance was reached, multipliers."""
 
     c: Floats
@@ -46,7 +46,7 @@ class Multipliers(NamedTuple):
     jerk: Floats
 
 
-class Steps(Protocol):
+class NewtonSteps(Protocol):
     """One linearisation; numpy here, compiled loops in `interior_packed.py`."""
 
     @property
@@ -67,7 +67,7 @@ class Steps(Protocol):
         ...
 
 
-def solve(steps: Steps, rows: int, gap: float, tolerance: float = TOLERANCE, most: int = MOST) -> Solution:
+def solve(steps: NewtonSteps, rows: int, gap: float, tolerance: float = TOLERANCE, most: int = MOST) -> InteriorSolution:
     """Drive `steps` from a first `gap` until it is below tolerance x time.
 
     Any iterate respects the limits, so that a solution that is not `solved` is slow, not wrong.
@@ -77,20 +77,20 @@ def solve(steps: Steps, rows: int, gap: float, tolerance: float = TOLERANCE, mos
     for iteration in range(most):
         gap, time = steps.assemble(mu, primal, dual)
         if gap < tolerance * time:
-            return Solution(steps.c, iteration, gap / time, True, steps.multipliers())
+            return InteriorSolution(steps.c, iteration, gap / time, True, steps.multipliers())
         primal, dual = (min(1.0, TAU * step) for step in steps.direction(mu))
         if not primal > 0.0:
             break
         shortest = min(primal, dual)
         expected = gap * (1.0 - shortest) + shortest * rows * mu
         mu = min(max((1.0 - shortest) ** 1.4 + 0.3, 0.3), 0.5) * expected / rows
-    return Solution(steps.c, most, gap / time, False, steps.multipliers())
+    return InteriorSolution(steps.c, most, gap / time, False, steps.multipliers())
 
 
 class NumpySteps:
     """The reference in numpy."""
 
-    def __init__(self, problem: Problem, c: Floats) -> None:
+    def __init__(self, problem: SpeedProblem, c: Floats) -> None:
         self.problem, self.c = problem, c.copy()
         self._a, self._j = problem.acceleration_rows(), problem.jerk_rows()
         self._z: list[Floats] = []
@@ -98,7 +98,7 @@ class NumpySteps:
         self._dc = np.zeros_like(c)
 
     def assemble(self, mu: float, primal: float, dual: float) -> tuple[float, float]:
-        """See `Steps`."""
+        """See `NewtonSteps`."""
         self.c += primal * self._dc
         self._x = self.problem.basis.values(self.c)
         slack = self.slacks()
@@ -138,7 +138,7 @@ class NumpySteps:
         self._force = _gather(np.einsum("iak,ik->ak", s, gradient)) + pull[5]
 
     def direction(self, mu: float) -> tuple[float, float]:
-        """See `Steps`."""
+        """See `NewtonSteps`."""
         self._dc = solve_tied(self._band, self._force, self.problem.basis.tied)
         if not np.any(self._dc):
             return 0.0, 0.0
@@ -151,7 +151,7 @@ class NumpySteps:
 
 
     def multipliers(self) -> Multipliers:
-        """See `Steps`."""
+        """See `NewtonSteps`."""
         z = self._z
         return Multipliers(z[0], z[1] - z[2], z[3] - z[4])
 

@@ -8,14 +8,14 @@ from postproc.base.compiled import compiled
 from postproc.feedrate.interior import Multipliers, NumpySteps
 from postproc.feedrate.kernels.coefficients import advance, begin, relative, tie_ends
 from postproc.feedrate.kernels.interior import COMMON, LANES, PER_JOINT, assemble, band, direction, pentadiagonal
-from postproc.feedrate.problem import Problem
+from postproc.feedrate.problem import SpeedProblem
 from toolpaths.arrays import Floats
 
 
 class PackedSteps:
     """As `NumpySteps`, which makes the first z; see `interior.Steps`."""
 
-    def __init__(self, problem: Problem, c: Floats) -> None:
+    def __init__(self, problem: SpeedProblem, c: Floats) -> None:
         self.problem = problem
         knots, joints = problem.basis.knots, len(problem.dq)
         blocks = -(-knots // LANES)

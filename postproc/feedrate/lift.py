@@ -8,11 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from postproc.feedrate.feed import Feed
+from postproc.feedrate.feed import FeedLimit
 from postproc.feedrate.limits import JointLimits, ToolLimits
 from postproc.feedrate.motion import Plan
-from postproc.feedrate.paths import Path
-from postproc.feedrate.plan import Options, plan
+from postproc.feedrate.paths import ParametricPath
+from postproc.feedrate.plan import PlannerOptions, plan
 from postproc.feedrate.trajectory import ORDERS
 
 HIGHER = 1e3
@@ -27,7 +27,8 @@ class Gain(NamedTuple):
     seconds: float
 
 
-def gains(path: Path, limits: JointLimits, feed: Feed, stops: Sequence[float], made: Plan, options: Options | None = None,
+def gains(path: ParametricPath, limits: JointLimits, feed: FeedLimit, stops: Sequence[float], made: Plan,
+          options: PlannerOptions | None = None,
           least: float = 1e-3) -> list[Gain]:
     """Gains, largest first, of the limits whose share of `made` is `least` of its time or more; one plan each.
 
@@ -37,7 +38,7 @@ def gains(path: Path, limits: JointLimits, feed: Feed, stops: Sequence[float], m
     Raises:
         ArithmeticError: where one of the plans is not solved: its time says nothing of a gain.
     """
-    def time(limits: JointLimits, feed: Feed) -> float:
+    def time(limits: JointLimits, feed: FeedLimit) -> float:
         return _solved(plan(path, limits, feed, stops, options))
 
     before, enough, found = _solved(made), least * made.seconds, []

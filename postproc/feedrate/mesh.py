@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from postproc.feedrate.limits import JointLimits, squared_speed, steady_cap
-from postproc.feedrate.paths import Path
+from postproc.feedrate.paths import ParametricPath
 from toolpaths.arrays import Floats
 
 CHUNK = 16384
@@ -40,7 +40,7 @@ class Marks(NamedTuple):
     speed: Floats
 
 
-def mesh(path: Path, limits: JointLimits, top: Callable[[Floats], Floats], spacing: Spacing,
+def mesh(path: ParametricPath, limits: JointLimits, top: Callable[[Floats], Floats], spacing: Spacing,
          ramp: float = np.inf, marks: Marks | None = None) -> Floats:
     """Knots (K,) from path.start to path.end.
 
@@ -96,7 +96,7 @@ def ramp_time(dq: Floats, limits: JointLimits, feed: Floats) -> float:
     return float(np.min(np.where(times > 0.0, times, np.inf)))
 
 
-def _probed(path: Path, limits: JointLimits, top: Callable[[Floats], Floats], at: Floats) -> tuple[Floats, Floats]:
+def _probed(path: ParametricPath, limits: JointLimits, top: Callable[[Floats], Floats], at: Floats) -> tuple[Floats, Floats]:
     """Speed (N,) along sigma that all limits would allow if it were constant; jerk over its limits (N, J) at that speed."""
     found = path.derivatives(at)
     cap = np.minimum(squared_speed(found.dq, limits.velocity), steady_cap(found.d2q, found.d3q, limits))
@@ -112,7 +112,7 @@ def _bend(at: Floats, jerk: Floats) -> Floats:
     return np.asarray(np.abs(2.0 * np.diff(slope, axis=0) / (step[1:] + step[:-1])).max(axis=1))
 
 
-def _probes(path: Path, spacing: Spacing, marks: Marks | None) -> Floats:
+def _probes(path: ParametricPath, spacing: Spacing, marks: Marks | None) -> Floats:
     """Ends, breaks, marks, and equal parts between them, two or more."""
     length = path.end - path.start
     breaks = np.asarray(path.breaks, dtype=np.float64)

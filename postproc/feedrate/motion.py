@@ -10,12 +10,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from postproc.feedrate.feed import Allowed
+from postproc.feedrate.feed import AllowedFeed
 from postproc.feedrate.limits import JointLimits
 from postproc.feedrate.paths import Eased
 from postproc.feedrate.profile import Places, Profile
 from postproc.feedrate.rows import tool
-from postproc.feedrate.shares import Shares
+from postproc.feedrate.shares import LimitShares
 from postproc.feedrate.trajectory import REST_PAD, JointTrajectory, Usage
 from toolpaths.arrays import Floats, Ints
 
@@ -26,25 +26,25 @@ CHUNK = 65536
 
 
 @dataclass(frozen=True)
-class Piece:
+class MotionPiece:
     """Motion between two stops; `shares` of its seconds, None at second order."""
 
     eased: Eased
     profile: Profile
-    shares: Shares | None = None
+    shares: LimitShares | None = None
 
     @property
     def seconds(self) -> float:
         """Time from stop to stop."""
         return float(self.profile.times[-1])
 
-    def slower(self, factor: float) -> Piece:
+    def slower(self, factor: float) -> MotionPiece:
         """The same motion, `factor` times as long."""
         shares = self.shares and self.shares.scaled(factor * self.shares.seconds)
-        return Piece(self.eased, self.profile.slower(factor), shares)
+        return MotionPiece(self.eased, self.profile.slower(factor), shares)
 
 
-class Blocks(NamedTuple):
+class StretchSpeeds(NamedTuple):
     """Of stretches of the path, each (M,): time in s; mean, lowest and highest ds/dt."""
 
     seconds: Floats
@@ -62,9 +62,9 @@ class Plan:
     limits but is not the fastest.
     """
 
-    pieces: tuple[Piece, ...]
+    pieces: tuple[MotionPiece, ...]
     limits: JointLimits
-    feed: Allowed
+    feed: AllowedFeed
     step: float = SAMPLE
     iterations: int = 0
     mismatch: float = 0.0
@@ -81,7 +81,7 @@ class Plan:
         return np.cumsum([piece.seconds for piece in self.pieces])
 
     @property
-    def shares(self) -> Shares:
+    def shares(self) -> LimitShares:
         """What each limit costs, seconds that add up to `seconds`; see `shares`.
 
         Raises:
@@ -93,11 +93,11 @@ class Plan:
         return reduce(add, found)
 
     @property
-    def lost(self) -> Shares:
+    def lost(self) -> LimitShares:
         """The time at the feed alone, and the time lost against it shared out over the other limits."""
         return self.shares.lost(sum(self._at_feed(piece) for piece in self.pieces))
 
-    def _at_feed(self, piece: Piece) -> float:
+    def _at_feed(self, piece: MotionPiece) -> float:
         """Seconds at the feed, which is read in the middle of the intervals."""
         sigma = piece.profile.sigma
         way = np.diff(piece.eased.parameter(sigma)[0])
@@ -111,7 +111,7 @@ class Plan:
         """Time (N,) at which s (N,) is reached."""
         return self._by_place(s)[0]
 
-    def blocks(self, cuts: Floats) -> Blocks:
+    def blocks(self, cuts: Floats) -> StretchSpeeds:
         """Of the stretches between rising `cuts` (M + 1,) of s."""
         time, speed = self._by_place(cuts)
         knots = np.concatenate([piece.eased.parameter(piece.profile.sigma)[0] for piece in self.pieces])
@@ -120,7 +120,7 @@ class Plan:
         speeds = self.speed(every)
         lowest, highest = (np.minimum.reduceat(speeds, at[:-1]), np.maximum.reduceat(speeds, at[:-1]))
         seconds = np.diff(time)
-        return Blocks(seconds, np.diff(cuts) / seconds, np.minimum(lowest, speed[1:]), np.maximum(highest, speed[1:]))
+        return StretchSpeeds(seconds, np.diff(cuts) / seconds, np.minimum(lowest, speed[1:]), np.maximum(highest, speed[1:]))
 
     def _by_place(self, s: Floats) -> tuple[Floats, Floats]:
         """Time and ds/dt (N,) at s (N,)."""

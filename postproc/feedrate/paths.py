@@ -33,7 +33,7 @@ class Derivatives(NamedTuple):
     d3q: Floats
 
 
-class Path(Protocol):
+class ParametricPath(Protocol):
     """What the planner asks of a path: three times continuously differentiable between `breaks`."""
 
     @property
@@ -52,7 +52,7 @@ class Path(Protocol):
         ...
 
 
-class ToolPath(Path, Protocol):
+class ParametricToolPath(ParametricPath, Protocol):
     """A path that also knows the tool, as limits at the tool need it."""
 
     def tip(self, s: Floats) -> Derivatives:
@@ -78,7 +78,7 @@ class SplinePath:
         self.breaks: Floats = np.unique(knots[degree:len(knots) - degree])
 
     def derivatives(self, s: Floats) -> Derivatives:
-        """See `Path`."""
+        """See `ParametricPath`."""
         if wanted(len(s), KERNEL_FROM):
             first = self._orders[0]
             out = np.empty((4, len(s), self._coefficients[0].shape[1]))
@@ -92,13 +92,13 @@ class SplinePath:
 class Eased:
     """A stretch of a path in the parameter sigma in [0, end] that is at rest with finite sigma_dot at both ends."""
 
-    path: Path
+    path: ParametricPath
     first: float
     last: float
     ease: float
 
     @staticmethod
-    def between(path: Path, first: float, last: float, ease: float) -> Eased:
+    def between(path: ParametricPath, first: float, last: float, ease: float) -> Eased:
         """The stretch [first, last] of `path`, d the lesser of `ease` and 0.8 of its length."""
         return Eased(path, first, last, min(ease, ROOM * (last - first)))
 
@@ -147,7 +147,7 @@ class Eased:
         return np.where(s[1] > 0.0, allowed / np.where(s[1] > 0.0, s[1], 1.0), np.inf)
 
     def derivatives(self, sigma: Floats) -> Derivatives:
-        """Chain rule to third order, exact; see `Path`."""
+        """Chain rule to third order, exact; see `ParametricPath`."""
         s = self.parameter(sigma)
         return self.chained(sigma, s, self.path.derivatives(self.inside(s[0])))
 

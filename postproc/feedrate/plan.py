@@ -9,20 +9,20 @@ from itertools import pairwise
 
 import numpy as np
 
-from postproc.feedrate.feed import Allowed, Feed
+from postproc.feedrate.feed import AllowedFeed, FeedLimit
 from postproc.feedrate.limits import JointLimits, squared_speed
 from postproc.feedrate.mesh import FEWEST, Marks, Spacing, mesh, ramp_time
-from postproc.feedrate.motion import CHUNK, SAMPLE, Piece, Plan
-from postproc.feedrate.paths import Eased, Path
-from postproc.feedrate.problem import Knots
+from postproc.feedrate.motion import CHUNK, SAMPLE, MotionPiece, Plan
+from postproc.feedrate.paths import Eased, ParametricPath
+from postproc.feedrate.problem import MotionKnots
 from postproc.feedrate.profile import Profile, linear_profile, spline_profile
-from postproc.feedrate.retried import solved_again
 from postproc.feedrate.rows import steady_tool_speed
 from postproc.feedrate.second_order import second_order
 from postproc.feedrate.shares import shares
+from postproc.feedrate.solve_again import solved_again
 from postproc.feedrate.spline import rest_basis
 from postproc.feedrate.tightening import SPLIT, tightened
-from postproc.feedrate.windows import Method, Solved
+from postproc.feedrate.windows import Method, SolvedWindows
 from toolpaths.arrays import Floats
 
 ROUNDS = 12
@@ -32,7 +32,7 @@ TRIES = 3
 
 
 @dataclass(frozen=True)
-class Options:
+class PlannerOptions:
     """`ease`: length of path at each stop over which the parameter is changed; `spacing` of knots; `method` of solving;
     `strict`: nothing exceeded in the delivered samples; `step` of these; `passes` of tightening in strict mode;
     `override`: factor on the feed, as the operator's switch; limits of the machine stay."""
@@ -51,7 +51,8 @@ class Options:
         return self.spacing or Spacing(dt=2e-3 if self.strict else 2.5e-3)
 
 
-def plan(path: Path, limits: JointLimits, feed: Feed = np.inf, stops: Sequence[float] = (), options: Options | None = None,
+def plan(path: ParametricPath, limits: JointLimits, feed: FeedLimit = np.inf, stops: Sequence[float] = (),
+         options: PlannerOptions | None = None,
          knots: Floats | None = None) -> Plan:
     """Least time under velocity, acceleration, jerk and feed, from rest at the start to rest at the end.
 
@@ -60,7 +61,7 @@ def plan(path: Path, limits: JointLimits, feed: Feed = np.inf, stops: Sequence[f
         limits: per joint of the path, jerk finite
         feed: largest ds/dt
         stops: s of exact stops inside the path; corners must be among them
-        options: see `Options`
+        options: see `PlannerOptions`
         knots: sigma of the knots, instead of the mesh; only without stops
 
     What is not solved at once is solved again on finer knots (`retried`). A motion that is not `solved` even then is slowed
@@ -69,10 +70,10 @@ def plan(path: Path, limits: JointLimits, feed: Feed = np.inf, stops: Sequence[f
     Raises:
         ValueError: stops outside the path or not rising; knots with stops; an infinite jerk limit everywhere.
     """
-    options = options or Options()
+    options = options or PlannerOptions()
     if not np.all(np.isfinite(limits.jerk)):
         raise ValueError("a joint without a jerk limit: plan_second_order is for machines that state none")
-    allowed = Allowed(feed, options.override)
+    allowed = AllowedFeed(feed, options.override)
     if knots is not None and len(stops):
         raise ValueError("knots are for a motion without stops")
     pieces, reports, guess = [], [], []
@@ -81,8 +82,8 @@ def plan(path: Path, limits: JointLimits, feed: Feed = np.inf, stops: Sequence[f
     options = replace(options, method=options.method.settled(int(knots_about)))
     for eased in stretches:
         sigma = knots if knots is not None else _mesh(eased, limits, allowed, options.knots)
-        profile, report, slower = _solve(Knots(eased, sigma, limits, allowed), options)
-        pieces.append(Piece(eased, profile, shares(report.weights, len(limits.velocity), float(profile.times[-1]))))
+        profile, report, slower = _solve(MotionKnots(eased, sigma, limits, allowed), options)
+        pieces.append(MotionPiece(eased, profile, shares(report.weights, len(limits.velocity), float(profile.times[-1]))))
         reports.append(report)
         guess.append(slower)
     made = Plan(tuple(pieces), limits, allowed, options.step, max(r.iterations for r in reports),
@@ -90,22 +91,22 @@ def plan(path: Path, limits: JointLimits, feed: Feed = np.inf, stops: Sequence[f
     return _within(made, np.array(guess)) if options.strict or not made.solved else made
 
 
-def plan_second_order(path: Path, limits: JointLimits, feed: Feed = np.inf, stops: Sequence[float] = (),
-                      options: Options | None = None, knots: Floats | None = None) -> Plan:
+def plan_second_order(path: ParametricPath, limits: JointLimits, feed: FeedLimit = np.inf, stops: Sequence[float] = (),
+                      options: PlannerOptions | None = None, knots: Floats | None = None) -> Plan:
     """Least time under velocity, acceleration and feed only: a bound, and the plan of machines that state no jerk."""
-    options = options or Options()
-    allowed = Allowed(feed, options.override)
+    options = options or PlannerOptions()
+    allowed = AllowedFeed(feed, options.override)
     pieces = []
     for eased in _stretches(path, stops, 0.0):
         sigma = knots if knots is not None else _mesh(eased, limits, allowed, options.knots)
         at = eased.derivatives(sigma)
         cap = np.minimum(squared_speed(at.dq, limits.velocity), allowed(eased.parameter(sigma)[0]) ** 2)
         x = second_order(sigma, at.dq, at.d2q, limits.acceleration, cap, options.method.kernel)
-        pieces.append(Piece(eased, linear_profile(sigma, x)))
+        pieces.append(MotionPiece(eased, linear_profile(sigma, x)))
     return Plan(tuple(pieces), limits, allowed, options.step)
 
 
-def _mesh(eased: Eased, limits: JointLimits, feed: Allowed, spacing: Spacing) -> Floats:
+def _mesh(eased: Eased, limits: JointLimits, feed: AllowedFeed, spacing: Spacing) -> Floats:
     """Knots between two stops, fine enough beside them and where the feed changes."""
     ends = np.array([eased.first, np.nextafter(eased.last, eased.first)])
     ramp = ramp_time(eased.path.derivatives(ends).dq, limits, feed(ends))
@@ -116,13 +117,13 @@ def _mesh(eased: Eased, limits: JointLimits, feed: Allowed, spacing: Spacing) ->
     return mesh(eased, limits, partial(_top, eased, limits, None if marks else feed), spacing, ramp, marks)
 
 
-def _top(eased: Eased, limits: JointLimits, feed: Allowed | None, sigma: Floats) -> Floats:
+def _top(eased: Eased, limits: JointLimits, feed: AllowedFeed | None, sigma: Floats) -> Floats:
     """Largest constant sigma_dot (N,) under the feed, unless it has marks of its own, and the limits at the tool."""
     allowed = np.full(len(sigma), np.inf) if feed is None else eased.speed_limit(sigma, feed)
     return allowed if limits.tool is None else np.minimum(allowed, steady_tool_speed(eased, sigma, limits.tool))
 
 
-def _stretches(path: Path, stops: Sequence[float], ease: float) -> list[Eased]:
+def _stretches(path: ParametricPath, stops: Sequence[float], ease: float) -> list[Eased]:
     """One eased stretch between each two stops."""
     ends = np.concatenate(([path.start], np.asarray(stops, dtype=np.float64), [path.end]))
     if np.any(np.diff(ends) <= 0.0):
@@ -130,7 +131,7 @@ def _stretches(path: Path, stops: Sequence[float], ease: float) -> list[Eased]:
     return [Eased.between(path, first, last, ease) for first, last in pairwise(ends)]
 
 
-def _solve(grid: Knots, options: Options) -> tuple[Profile, Solved, float]:
+def _solve(grid: MotionKnots, options: PlannerOptions) -> tuple[Profile, SolvedWindows, float]:
     """One solve; in strict mode again with tightened limits where they are exceeded between the knots.
 
     The fastest of them with the factor on time that it still needs there; 1 in fast mode.
@@ -152,7 +153,7 @@ def _solve(grid: Knots, options: Options) -> tuple[Profile, Solved, float]:
     return profile if last is report else _profile(grid, last.c), last, slower
 
 
-def _profile(grid: Knots, c: Floats) -> Profile:
+def _profile(grid: MotionKnots, c: Floats) -> Profile:
     """Piecewise cubic, made in chunks."""
     count = len(grid.sigma)
     cuts = np.linspace(0, count, max(1, count // CHUNK) + 1).astype(int)

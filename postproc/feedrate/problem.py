@@ -16,7 +16,7 @@ from toolpaths.arrays import Floats, Ints
 
 
 @dataclass(frozen=True)
-class Problem:
+class SpeedProblem:
     """Minimise sum w x^-1/2 over coefficients of x, K knots, J joints.
 
     rows `dq`, `d2q`, `d3q` (J, K) by sigma; `cap` (K,) bound on x and the row it comes from, `capped` (K,);
@@ -74,7 +74,7 @@ class Problem:
 
 
 @dataclass(frozen=True)
-class Knots:
+class MotionKnots:
     """One motion from rest to rest on its knots; problems are made for stretches of it, so that memory stays small.
 
     `eased` path, `sigma` (K,) knots, `limits`; `feed` gives the largest ds/dt at s; `tight` (3, K) factors >= 1 on
@@ -91,7 +91,7 @@ class Knots:
         """Largest sigma_dot (N,) that the feed allows."""
         return self.eased.speed_limit(sigma, self.feed)
 
-    def problem(self, first: int = 0, last: int | None = None) -> Problem:
+    def problem(self, first: int = 0, last: int | None = None) -> SpeedProblem:
         """On knots [first, last), free at ends inside the motion."""
         last = len(self.sigma) if last is None else last
         sigma = self.sigma[first:last]
@@ -101,4 +101,4 @@ class Knots:
         weight = 0.5 * (np.append(h, 0.0) + np.insert(h, 0, 0.0))
         dq, d2q, d3q = (np.ascontiguousarray(order.T) for order in at[:3])
         basis = rest_basis(self.sigma, self.eased.ease, first, last)
-        return Problem(basis, dq, d2q, d3q, at.limits, at.cap / tight[0] ** 2, at.capped, weight, tight[1:])
+        return SpeedProblem(basis, dq, d2q, d3q, at.limits, at.cap / tight[0] ** 2, at.capped, weight, tight[1:])

@@ -16,7 +16,7 @@ from postproc.feedrate.trajectory import JointTrajectory
 from toolpaths.arrays import Floats
 
 
-class Law(StrEnum):
+class PointToPointMode(StrEnum):
     """How a control moves the joints of a move without a path.
 
     STRAIGHT: on a straight line in the joints, as fast as the joint that allows least; DOG_LEG: each joint as fast as it
@@ -28,7 +28,7 @@ class Law(StrEnum):
     SYNCHRONISED = "synchronised"
 
 
-def rest_seconds(q0: Floats, q1: Floats, limits: JointLimits, law: Law | str) -> Floats:
+def rest_seconds(q0: Floats, q1: Floats, limits: JointLimits, law: PointToPointMode | str) -> Floats:
     """Least times (N,) of many moves from rest at q0 (N, J) to rest at q1 (N, J), in closed form.
 
     Under velocity V, acceleration A and jerk J, of which A' = min(A, sqrt(V J)) is reached at most, a way D takes
@@ -41,12 +41,13 @@ def rest_seconds(q0: Floats, q1: Floats, limits: JointLimits, law: Law | str) ->
         ValueError: positions that are not finite; a joint that moves without any limit on acceleration and jerk.
     """
     way = _way(q0, q1)
-    if Law(law) is Law.STRAIGHT:
+    if PointToPointMode(law) is PointToPointMode.STRAIGHT:
         return np.asarray(_seconds(np.where(way.max(axis=1) > 0.0, 1.0, 0.0), *_along(way, limits)))
     return np.asarray(_seconds(way, limits.velocity, limits.acceleration, limits.jerk).max(axis=1))
 
 
-def rest_to_rest(q0: Floats, q1: Floats, limits: JointLimits, law: Law | str, step: float = 1e-3) -> JointTrajectory:
+def rest_to_rest(q0: Floats, q1: Floats, limits: JointLimits, law: PointToPointMode | str,
+                 step: float = 1e-3) -> JointTrajectory:
     """One move from rest at q0 (J,) to rest at q1 (J,), samples each `step`; s is the share of the time.
 
     Raises:
@@ -54,8 +55,8 @@ def rest_to_rest(q0: Floats, q1: Floats, limits: JointLimits, law: Law | str, st
         ArithmeticError: ruckig found no motion.
     """
     way = _way(q0[None], q1[None])
-    law = Law(law)
-    if law is Law.STRAIGHT and np.any(way > 0.0):
+    law = PointToPointMode(law)
+    if law is PointToPointMode.STRAIGHT and np.any(way > 0.0):
         rates = _along(way, limits)
         unit = _states(np.zeros(1), np.ones(1), rates, law, step)
         q, *rest = (values * (q1 - q0) for values in unit)
@@ -93,7 +94,8 @@ def _seconds(way: Floats, velocity: Floats, acceleration: Floats, jerk: Floats) 
         return np.where(way >= 2.0 * peak * rise**2, way / top + top / peak + rise, np.cbrt(32.0 * way / j))
 
 
-def _states(q0: Floats, q1: Floats, limits: tuple[Floats, Floats, Floats], law: Law, step: float) -> list[Floats]:
+def _states(q0: Floats, q1: Floats, limits: tuple[Floats, Floats, Floats], law: PointToPointMode,
+            step: float) -> list[Floats]:
     """Positions, velocities, accelerations and jerks (N, J) each `step`, the last at rest."""
     import ruckig
 
@@ -101,7 +103,7 @@ def _states(q0: Floats, q1: Floats, limits: tuple[Floats, Floats, Floats], law: 
     wanted, found = ruckig.InputParameter(joints), ruckig.Trajectory(joints)
     wanted.current_position, wanted.target_position = q0.tolist(), q1.tolist()
     wanted.max_velocity, wanted.max_acceleration, wanted.max_jerk = (np.ravel(limit).tolist() for limit in limits)
-    wanted.synchronization = ruckig.Synchronization.No if law is Law.DOG_LEG else ruckig.Synchronization.Time
+    wanted.synchronization = ruckig.Synchronization.No if law is PointToPointMode.DOG_LEG else ruckig.Synchronization.Time
     result = ruckig.Ruckig(joints).calculate(wanted, found)
     if result != ruckig.Result.Working:
         raise ArithmeticError(f"no motion from {q0} to {q1}: ruckig answers {result.name}")

@@ -14,7 +14,7 @@ from typing import NamedTuple, cast
 import numpy as np
 
 from postproc.feedrate.limits import JointLimits, ToolLimits, steady_cap
-from postproc.feedrate.paths import Derivatives, Eased, ToolPath
+from postproc.feedrate.paths import Derivatives, Eased, ParametricToolPath
 from toolpaths.arrays import Floats, Ints
 
 UNBOUND = 1e4
@@ -23,7 +23,7 @@ OCTAGON = np.pi / 8.0 * np.array([1.0, 3.0, 5.0, 7.0])
 """Directions of its sides from the tangent; the opposite ones come with each row."""
 
 
-class Rows(NamedTuple):
+class LimitRows(NamedTuple):
     """Derivatives by sigma (N, R), limits (R,) of acceleration and jerk, largest x = sigma_dot^2 (N,) and what caps it.
 
     Rows are the joints, behind them those of the tool; `capped` (N,) is the joint, J for the tool, R for the feed.
@@ -37,7 +37,7 @@ class Rows(NamedTuple):
     capped: Ints
 
 
-class Tool(NamedTuple):
+class ToolMotion(NamedTuple):
     """At places of a path: tip by sigma, unit tangent, normal and binormal (N, 3), |d axis/d sigma| (N,)."""
 
     tip: Derivatives
@@ -45,7 +45,7 @@ class Tool(NamedTuple):
     tilt: Floats
 
 
-def rows(eased: Eased, sigma: Floats, limits: JointLimits, feed: Callable[[Floats], Floats]) -> Rows:
+def rows(eased: Eased, sigma: Floats, limits: JointLimits, feed: Callable[[Floats], Floats]) -> LimitRows:
     """All rows at sigma (N,); `feed` gives the largest ds/dt at s."""
     s = eased.parameter(sigma)
     at = eased.chained(sigma, s, eased.path.derivatives(eased.inside(s[0])))
@@ -66,9 +66,9 @@ def rows(eased: Eased, sigma: Floats, limits: JointLimits, feed: Callable[[Float
     return _capped(both, wide, speeds, tilted, allowed)
 
 
-def tool(eased: Eased, sigma: Floats, s: Floats) -> Tool:
+def tool(eased: Eased, sigma: Floats, s: Floats) -> ToolMotion:
     """The tool at sigma (N,), s (4, N) as of `Eased.parameter`."""
-    path, inside = cast(ToolPath, eased.path), eased.inside(s[0])
+    path, inside = cast(ParametricToolPath, eased.path), eased.inside(s[0])
     inner = path.tip(inside)
     tangent = _unit(inner.dq)
     normal = _across(inner.d2q, tangent)
@@ -76,7 +76,7 @@ def tool(eased: Eased, sigma: Floats, s: Floats) -> Tool:
     normal[flat] = _across(inner.d3q, tangent)[flat]
     normal = _unit(normal)
     tilt = np.linalg.norm(path.axis(inside).dq, axis=1) * s[1]
-    return Tool(eased.chained(sigma, s, inner), (tangent, normal, np.cross(tangent, normal)), tilt)
+    return ToolMotion(eased.chained(sigma, s, inner), (tangent, normal, np.cross(tangent, normal)), tilt)
 
 
 def steady_tool_speed(eased: Eased, sigma: Floats, limits: ToolLimits) -> Floats:
@@ -89,7 +89,7 @@ def steady_tool_speed(eased: Eased, sigma: Floats, limits: ToolLimits) -> Floats
         return np.asarray(np.minimum(limits.tilt_rate / found.tilt, steady))
 
 
-def _octagon(found: Tool, limits: ToolLimits) -> tuple[list[Floats], tuple[float, float]]:
+def _octagon(found: ToolMotion, limits: ToolLimits) -> tuple[list[Floats], tuple[float, float]]:
     """Derivatives of the tip along the normals of the octagon's sides, (N, 4) each; limits of acceleration and jerk."""
     tangent, normal = (np.stack([np.einsum("ij,ij->i", axis, order) for order in found.tip[1:]]) for axis in found.frame[:2])
     sides = tangent[:, :, None] * np.cos(OCTAGON) + normal[:, :, None] * np.sin(OCTAGON)
@@ -97,7 +97,7 @@ def _octagon(found: Tool, limits: ToolLimits) -> tuple[list[Floats], tuple[float
     return list(sides), (inscribed * limits.acceleration, inscribed * limits.jerk)
 
 
-def _capped(at: Derivatives, limits: JointLimits, joints: Floats, tool: Floats, feed: Floats) -> Rows:
+def _capped(at: Derivatives, limits: JointLimits, joints: Floats, tool: Floats, feed: Floats) -> LimitRows:
     """With the cap from velocities, feed and tool as speeds along sigma; joints (N, J), the others (N,)."""
     count, named = at.dq.shape[1], joints.shape[1]
     speeds = np.column_stack((joints, tool, feed))
@@ -108,7 +108,7 @@ def _capped(at: Derivatives, limits: JointLimits, joints: Floats, tool: Floats, 
         cap[free] = UNBOUND * steady_cap(at.d2q[free], at.d3q[free], limits)
     if not np.all(np.isfinite(cap)):
         raise ValueError("the path stands still somewhere between its ends: no limit bounds the speed there")
-    return Rows(at.dq, at.d2q, at.d3q, limits, cap, np.where(which > named, count, which))
+    return LimitRows(at.dq, at.d2q, at.d3q, limits, cap, np.where(which > named, count, which))
 
 
 def _unit(vectors: Floats) -> Floats:

@@ -12,12 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from postproc.feedrate.interior import Multipliers
-from postproc.feedrate.problem import Problem
+from postproc.feedrate.problem import SpeedProblem
 from toolpaths.arrays import Floats, frozen
 
 
 @dataclass(frozen=True)
-class Shares:
+class LimitShares:
     """Seconds of each limit: `feed`, and `limits` (3, J + 1) for velocity, acceleration, jerk of the joints.
 
     The last column is the tool: rate of its axis, acceleration and jerk of the tip.
@@ -34,24 +34,24 @@ class Shares:
         """Sum of all."""
         return self.feed + float(self.limits.sum())
 
-    def lost(self, alone: float) -> Shares:
+    def lost(self, alone: float) -> LimitShares:
         """The time lost against a motion that takes `alone` at the feed: over the limits in the proportion of their shares.
 
         `feed` is then `alone`, and the sum stays.
         """
         spent, lost = float(self.limits.sum()), self.seconds - alone
-        return Shares(alone, self.limits * (lost / spent)) if spent > 0.0 else self
+        return LimitShares(alone, self.limits * (lost / spent)) if spent > 0.0 else self
 
-    def scaled(self, seconds: float) -> Shares:
+    def scaled(self, seconds: float) -> LimitShares:
         """With this sum."""
         factor = seconds / self.seconds
-        return Shares(self.feed * factor, self.limits * factor)
+        return LimitShares(self.feed * factor, self.limits * factor)
 
-    def __add__(self, other: Shares) -> Shares:
-        return Shares(self.feed + other.feed, self.limits + other.limits)
+    def __add__(self, other: LimitShares) -> LimitShares:
+        return LimitShares(self.feed + other.feed, self.limits + other.limits)
 
 
-def weigh(problem: Problem, c: Floats, z: Multipliers, first: int, last: int) -> Floats:
+def weigh(problem: SpeedProblem, c: Floats, z: Multipliers, first: int, last: int) -> Floats:
     """Seconds (3, R + 1) of each row of knots [first, last); the last column is the feed's."""
     x = problem.basis.values(c)[:, first:last]
     here = slice(first, last)
@@ -65,8 +65,8 @@ def weigh(problem: Problem, c: Floats, z: Multipliers, first: int, last: int) ->
     return found
 
 
-def shares(weights: Floats, joints: int, seconds: float) -> Shares:
+def shares(weights: Floats, joints: int, seconds: float) -> LimitShares:
     """From sums of `weigh`, the tool's rows together; the last bit, the gap of the solver, in proportion."""
     positive = np.maximum(weights, 0.0)
     tool = positive[:, joints:-1].sum(axis=1, keepdims=True)
-    return Shares(float(positive[0, -1]), np.concatenate((positive[:, :joints], tool), axis=1)).scaled(seconds)
+    return LimitShares(float(positive[0, -1]), np.concatenate((positive[:, :joints], tool), axis=1)).scaled(seconds)

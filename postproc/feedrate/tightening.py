@@ -10,7 +10,7 @@ from postproc.base.compiled import compiled
 from postproc.feedrate.kernels.tightening import worst
 from postproc.feedrate.limits import JointLimits
 from postproc.feedrate.paths import Derivatives
-from postproc.feedrate.problem import Knots
+from postproc.feedrate.problem import MotionKnots
 from postproc.feedrate.profile import Profile
 from postproc.feedrate.rows import tool
 from toolpaths.arrays import Bools, Floats, Ints
@@ -25,7 +25,8 @@ SPLIT = (1.5, 1.5, 1.02, 1.02)
 CHUNK = 16384
 
 
-def tightened(grid: Knots, profile: Profile, split_from: float, kernel: bool = False) -> tuple[float, Knots | None]:
+def tightened(grid: MotionKnots, profile: Profile, split_from: float,
+              kernel: bool = False) -> tuple[float, MotionKnots | None]:
     """Factor on time that brings what is seen between the knots to 1; a better grid, None where nothing is exceeded.
 
     The better grid has tighter rows, and more knots where the ratio is above `split_from`: where tightening was in vain,
@@ -49,7 +50,7 @@ def tightened(grid: Knots, profile: Profile, split_from: float, kernel: bool = F
     return slower, _split(replace(grid, tight=tight), split) if split.any() else replace(grid, tight=tight)
 
 
-def _split(grid: Knots, split: Bools) -> Knots:
+def _split(grid: MotionKnots, split: Bools) -> MotionKnots:
     """Intervals `split` (K - 1,) and their neighbours halved; no tightening at the new knots."""
     wide = np.convolve(split, np.ones(3), mode="same") > 0.0
     where = np.flatnonzero(wide)
@@ -59,7 +60,7 @@ def _split(grid: Knots, split: Bools) -> Knots:
     return replace(grid, sigma=sigma, tight=tight)
 
 
-def _ratios(grid: Knots, profile: Profile, k: Ints, kernel: bool) -> Floats:
+def _ratios(grid: MotionKnots, profile: Profile, k: Ints, kernel: bool) -> Floats:
     """Velocity (feed included), acceleration and jerk over their limits, (3, N), the worst BETWEEN ends of intervals k."""
     way = ((grid.sigma[k + 1] - grid.sigma[k])[:, None] * BETWEEN).ravel()
     k = np.repeat(k, len(BETWEEN))

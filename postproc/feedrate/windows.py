@@ -16,8 +16,8 @@ from typing import NamedTuple
 import numpy as np
 
 from postproc.base.compiled import wanted
-from postproc.feedrate.interior import NumpySteps, Solution, Steps, solve
-from postproc.feedrate.problem import Knots, Problem
+from postproc.feedrate.interior import InteriorSolution, NewtonSteps, NumpySteps, solve
+from postproc.feedrate.problem import MotionKnots, SpeedProblem
 from postproc.feedrate.shares import weigh
 from toolpaths.arrays import Floats
 
@@ -49,7 +49,7 @@ class Method:
         return self if self.kernel is not None else replace(self, kernel=wanted(knots, KERNEL_FROM))
 
     @property
-    def steps(self) -> Callable[[Problem, Floats], Steps]:
+    def steps(self) -> Callable[[SpeedProblem, Floats], NewtonSteps]:
         """What makes one linearisation; numpy unless `kernel` is true."""
         if self.kernel:
             from postproc.feedrate.interior_packed import PackedSteps
@@ -59,7 +59,7 @@ class Method:
 
 
 @dataclass(frozen=True)
-class Solved:
+class SolvedWindows:
     """Coefficients (K + 2,); most iterations of a window; worst stitch (relative difference); whether all were solved;
     seconds of each row (3, R + 1), see `shares.weigh`."""
 
@@ -70,7 +70,7 @@ class Solved:
     weights: Floats
 
 
-class Found(NamedTuple):
+class WindowSolution(NamedTuple):
     """A window's first knot, coefficients, iterations, success, and the seconds of the rows in its own part."""
 
     first: int
@@ -80,14 +80,14 @@ class Found(NamedTuple):
     weights: Floats
 
 
-def solved(knots: Knots, method: Method, near: Floats | None = None) -> Solved:
+def solved(knots: MotionKnots, method: Method, near: Floats | None = None) -> SolvedWindows:
     """Least time on the knots; `near`: coefficients (K + 2,) of a similar motion to start from."""
     count = len(knots.sigma)
     make = method.settled(count).steps
     inner = np.linspace(0, count, max(1, round(count / method.window)) + 1).astype(int).tolist()
     windows = list(pairwise(inner))
     wide = [method.overlap] * len(windows)
-    found = [Found(0, np.empty(0), 0, False, np.empty(0))] * len(windows)
+    found = [WindowSolution(0, np.empty(0), 0, False, np.empty(0))] * len(windows)
     again = list(range(len(windows)))
     while again:
         _solve_some(knots, windows, wide, again, found, make, method.threads, near)
@@ -95,11 +95,11 @@ def solved(knots: Knots, method: Method, near: Floats | None = None) -> Solved:
         again = sorted({i for j in bad for i in (j, j + 1) if wide[i] < min(count, WIDEST * method.overlap)})
         for i in again:
             wide[i] *= 2
-    return Solved(_held(knots, c, inner) if bad else c, max(one.iterations for one in found), worst,
-                  not bad and all(one.solved for one in found), np.sum([one.weights for one in found], axis=0))
+    return SolvedWindows(_held(knots, c, inner) if bad else c, max(one.iterations for one in found), worst,
+                         not bad and all(one.solved for one in found), np.sum([one.weights for one in found], axis=0))
 
 
-def _held(knots: Knots, c: Floats, inner: Sequence[int]) -> Floats:
+def _held(knots: MotionKnots, c: Floats, inner: Sequence[int]) -> Floats:
     """Where windows do not agree however wide: all slowed until the stitches, too, respect the limits."""
     share = 1.0
     for middle in inner[1:-1]:
@@ -109,8 +109,9 @@ def _held(knots: Knots, c: Floats, inner: Sequence[int]) -> Floats:
     return c * share
 
 
-def _solve_some(knots: Knots, windows: Sequence[tuple[int, int]], wide: Sequence[int], which: Sequence[int],
-                found: list[Found], make: Callable[[Problem, Floats], Steps], threads: int, near: Floats | None) -> None:
+def _solve_some(knots: MotionKnots, windows: Sequence[tuple[int, int]], wide: Sequence[int], which: Sequence[int],
+                found: list[WindowSolution], make: Callable[[SpeedProblem, Floats], NewtonSteps], threads: int,
+                near: Floats | None) -> None:
     def one(i: int) -> None:
         first, last = max(windows[i][0] - wide[i], 0), min(windows[i][1] + wide[i], len(knots.sigma))
         # A tied end needs its knots in one window.
@@ -118,7 +119,7 @@ def _solve_some(knots: Knots, windows: Sequence[tuple[int, int]], wide: Sequence
         problem = knots.problem(first, last)
         one = solve_problem(problem, make, None if near is None else near[first:last + 2])
         weights = weigh(problem, one.c, one.multipliers, windows[i][0] - first, windows[i][1] - first)
-        found[i] = Found(first, one.c, one.iterations, one.solved, weights)
+        found[i] = WindowSolution(first, one.c, one.iterations, one.solved, weights)
 
     if threads > 1 and len(which) > 1:
         with ThreadPoolExecutor(threads) as pool:
@@ -128,15 +129,16 @@ def _solve_some(knots: Knots, windows: Sequence[tuple[int, int]], wide: Sequence
             one(i)
 
 
-def solve_problem(problem: Problem, make: Callable[[Problem, Floats], Steps], near: Floats | None = None) -> Solution:
+def solve_problem(problem: SpeedProblem, make: Callable[[SpeedProblem, Floats], NewtonSteps],
+                  near: Floats | None = None) -> InteriorSolution:
     """One problem from its slow start, or from coefficients `near` slowed until they respect its limits."""
     start = problem.start() if near is None else problem.slowed(near)
     seconds = float(np.sum(problem.weight * problem.basis.values(start)[0] ** -0.5))
     return solve(make(problem, start), problem.rows, (COLD if near is None else WARM) * seconds)
 
 
-def _stitched(knots: Knots, inner: Sequence[int], wide: Sequence[int],
-              found: Sequence[Found]) -> tuple[Floats, list[int], float]:
+def _stitched(knots: MotionKnots, inner: Sequence[int], wide: Sequence[int],
+              found: Sequence[WindowSolution]) -> tuple[Floats, list[int], float]:
     """All coefficients, the stitches that must be widened, the worst relative difference."""
     c = np.empty(len(knots.sigma) + 2)
     for i, one in enumerate(found):

@@ -11,7 +11,7 @@ import numpy as np
 from machines.kinematics.base import Kinematics
 from machines.machine import Machine
 from postproc.base.options import Options
-from postproc.control.control import Control, Law
+from postproc.control.control import Control, InterpolationMode
 from postproc.control.modes import OutputModes, Refused, output_modes
 from postproc.controllers.model import ControllerFile
 from postproc.job.pivots import control_kinematics
@@ -184,7 +184,7 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
     tip_law = machine.control_kinematics is not None and controller.kinematics.modules
     origin = placement.points(np.array([frame.origin]))[0]
     largest = controller.arcs.largest_radius if controller.arcs.enabled else 0.0
-    law: Law = "tcp" if tip_law else "axes"
+    law: InterpolationMode = "tcp" if tip_law else "axes"
     own, found = control_kinematics(machine, setup, options)
     diagnostics += found
     errors, found = _error_model(machine, options)

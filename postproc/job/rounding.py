@@ -9,7 +9,7 @@ from itertools import product
 import numpy as np
 
 from machines.kinematics.base import Kinematics
-from postproc.control.control import Control, Law
+from postproc.control.control import Control, InterpolationMode
 from postproc.controllers.model import ControllerFile
 from postproc.reference.moves import Moves
 from toolpaths.arrays import Floats, Ints
@@ -40,7 +40,7 @@ def decimals(control: Control, controller: ControllerFile) -> Ints:
 
 
 def rounding_bound(control: Control, kin: Kinematics, moves: Moves, places: Ints,
-                   laws: Collection[Law], tolerance: float) -> Rounding:
+                   laws: Collection[InterpolationMode], tolerance: float) -> Rounding:
     """Worst case of half a last decimal in every word, to first order (Jacobian), at up to 500 of the poses.
 
     `laws` are those that the words may have. Where X, Y, Z are the tip, rotary words turn the tool about it.

@@ -8,12 +8,12 @@ import numpy as np
 
 from machines.kinematics.base import Kinematics
 from machines.machine import Limits
-from postproc.joints.lattice import Run
+from postproc.joints.lattice import PoseRun
 from postproc.joints.tracks import TRAVEL_SLACK
 from toolpaths.arrays import Floats
 
 
-def direct(runs: Sequence[Run], limits: Limits) -> list[Floats] | None:
+def direct(runs: Sequence[PoseRun], limits: Limits) -> list[Floats] | None:
     """Joints (N, J) of every run, all runs of one tool solved together; None where there is a choice, or a pose outside."""
     if any(any(run.kin.rotary) or run.kin.branches != 1 for run in runs):
         return None
@@ -31,7 +31,7 @@ def direct(runs: Sequence[Run], limits: Limits) -> list[Floats] | None:
     return result
 
 
-def _joints(kin: Kinematics, runs: Sequence[Run], limits: Limits) -> Floats | None:
+def _joints(kin: Kinematics, runs: Sequence[PoseRun], limits: Limits) -> Floats | None:
     """Joints (N, J) of runs one behind the other; None where one is outside, or where a direction is singular."""
     poses = [np.concatenate(x) if len(x) > 1 else x[0] for x in ([run.tip for run in runs], [run.axis for run in runs])]
     q: Floats = kin.inverse(*poses)[0]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from machines.machine import Machine
-from postproc.joints.plan import Loser, Rewind
+from postproc.joints.plan import RejectedStart, Rewind
 from postproc.joints.run_plan import RunPlan
 from postproc.joints.states import BAD, CUTS, REWINDS, SECONDS, WRONG
 from postproc.reference.moves import Moves
@@ -63,7 +63,7 @@ def _choices(plan: RunPlan, moves: Moves, file: str) -> list[Diagnostic]:
             for reason, found in sorted(lines.items())]
 
 
-def _reason(losers: tuple[Loser, ...]) -> str:
+def _reason(losers: tuple[RejectedStart, ...]) -> str:
     """What decides against the loser that comes nearest; "" where it is as good."""
     best: Floats = min((x.dearer for x in losers), key=lambda cost: tuple(cost.tolist()))
     for column, text in _REASONS:

@@ -6,13 +6,13 @@ import numpy as np
 
 from machines.kinematics.base import Kinematics
 from machines.machine import Limits
-from postproc.joints.lattice import Run
-from postproc.joints.plan import Solution, plan_runs
+from postproc.joints.lattice import PoseRun
+from postproc.joints.plan import RunSolution, plan_runs
 from postproc.joints.tracks import TRAVEL_SLACK, distance, wrap
 from toolpaths.arrays import Floats, Ints, repeated
 from toolpaths.rotations import angle_between
 
-__all__ = ["TRAVEL_SLACK", "Solution", "branch_of", "nearest_solution", "reachable_axes", "solve", "wrap"]
+__all__ = ["TRAVEL_SLACK", "RunSolution", "branch_of", "nearest_solution", "reachable_axes", "solve", "wrap"]
 
 
 def reachable_axes(kin: Kinematics, axis: Floats, tolerance: float) -> tuple[Floats, Floats]:
@@ -30,9 +30,9 @@ def reachable_axes(kin: Kinematics, axis: Floats, tolerance: float) -> tuple[Flo
 
 
 def solve(kin: Kinematics, tip: Floats, axis: Floats, limits: Limits, start: Floats,
-          may_rewind: bool = False) -> Solution:
+          may_rewind: bool = False) -> RunSolution:
     """The joints of a run of poses (N, 3), (N, 3) that begins after a stop at joints `start` (J,): see `plan_runs`."""
-    return plan_runs([Run(kin, tip, axis)], limits, start, None, may_rewind)[0]
+    return plan_runs([PoseRun(kin, tip, axis)], limits, start, None, may_rewind)[0]
 
 
 def nearest_solution(kin: Kinematics, tip: Floats, axis: Floats, near: Floats, branch: Ints | None = None) -> Floats:

@@ -21,7 +21,7 @@ _MANY = 1 << 30
 
 
 @dataclass(frozen=True)
-class Run:
+class PoseRun:
     """Poses that the tool goes through without retracting.
 
     Attributes:
@@ -111,7 +111,7 @@ class Lattice:
         return np.asarray(np.nan_to_num((np.abs(way) / self.limits.velocity).max(axis=-1)))
 
 
-def lattice_of(run: Run, limits: Limits, near: Floats) -> Lattice:
+def lattice_of(run: PoseRun, limits: Limits, near: Floats) -> Lattice:
     """The states of a run; where the tool lies along a rotary axis all the way, that axis stands as in `near` (F, J).
 
     Such a run has a branch for each row of `near`.

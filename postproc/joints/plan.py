@@ -14,8 +14,8 @@ import numpy as np
 from machines.machine import Limits
 from postproc.joints.direct import direct
 from postproc.joints.greedy import greedy
-from postproc.joints.lattice import Lattice, Run, lattice_of
-from postproc.joints.search import Choice, Piece, cheapest, pieces, wrong_side
+from postproc.joints.lattice import Lattice, PoseRun, lattice_of
+from postproc.joints.search import RunPiece, SegmentChoice, cheapest, pieces, wrong_side
 from postproc.joints.states import BAD, NEVER, SECONDS, Segment, least_of, rough_segments, tidy_segments
 from postproc.joints.tracks import TRAVEL_SLACK, TWO_PI, wrap
 from toolpaths.arrays import Bools, Floats
@@ -33,7 +33,7 @@ class Rewind:
 
 
 @dataclass(frozen=True)
-class Loser:
+class RejectedStart:
     """A state that a run could have begun in: joints (J,), and by how much (5,) the best end from there is dearer.
 
     Infinitely where no winding of its branch goes through the run.
@@ -44,7 +44,7 @@ class Loser:
 
 
 @dataclass(frozen=True)
-class Solution:
+class RunSolution:
     """Joints (N, J) of a run, rotaries unwound; NaN rows where the machine cannot take the pose."""
 
     q: Floats
@@ -53,13 +53,13 @@ class Solution:
     rewinds: tuple[Rewind, ...] = ()
     outside: int = 0
     """poses outside travel or without solution, and steps between poses that no state makes inside travel"""
-    losers: tuple[Loser, ...] = ()
+    losers: tuple[RejectedStart, ...] = ()
     greedy: int = 0
     """rewinds if every pose took the nearest joints"""
 
 
 @dataclass(frozen=True)
-class Wishes:
+class JointPreferences:
     """What the set-up prefers: `side` (joint: +1 or -1) of an axis, `start` (joint: rad) where the program begins."""
 
     side: Mapping[int, int] = field(default_factory=dict)
@@ -76,11 +76,12 @@ class _Stage:
     tidy: bool
     """some state goes through without leaving travel"""
     value: Floats = field(default_factory=lambda: np.zeros((0, 5)))
-    choices: list[Choice] = field(default_factory=list)
+    choices: list[SegmentChoice] = field(default_factory=list)
 
 
-def plan_runs(runs: list[Run], limits: Limits, start: Floats, wishes: Wishes | None = None, may_rewind: bool = True,
-              progress: Callable[[int], None] | None = None) -> list[Solution]:
+def plan_runs(runs: list[PoseRun], limits: Limits, start: Floats, wishes: JointPreferences | None = None,
+              may_rewind: bool = True,
+              progress: Callable[[int], None] | None = None) -> list[RunSolution]:
     """The joints of runs, in order, from a machine that stands at `start` (J,).
 
     Between two runs the tool is drawn back, so that any state may follow any other at the price of the way there.
@@ -90,8 +91,8 @@ def plan_runs(runs: list[Run], limits: Limits, start: Floats, wishes: Wishes | N
         progress: called with the number of runs looked at
     """
     if (only := direct(runs, limits)) is not None:
-        return [Solution(q, np.zeros(len(q), dtype=np.bool_)) for q in only]
-    wishes = wishes or Wishes()
+        return [RunSolution(q, np.zeros(len(q), dtype=np.bool_)) for q in only]
+    wishes = wishes or JointPreferences()
     start = start.copy()
     for joint, angle in wishes.start.items():
         start[joint] = angle
@@ -138,7 +139,7 @@ def _link(lattice: Lattice, q: Floats, to: Floats) -> Floats:
     return result
 
 
-def _stages(runs: list[Run], limits: Limits, start: Floats, may_rewind: bool,
+def _stages(runs: list[PoseRun], limits: Limits, start: Floats, may_rewind: bool,
             progress: Callable[[int], None] | None) -> list[_Stage]:
     """Every run with its states.
 
@@ -182,7 +183,7 @@ def _stage(lattice: Lattice, may_rewind: bool) -> _Stage:
     return _Stage(lattice, rough_segments(lattice, may_rewind), may_rewind, False)
 
 
-def _solution(stage: _Stage, at: Floats) -> Solution:
+def _solution(stage: _Stage, at: Floats) -> RunSolution:
     """The run from where the machine stands."""
     lattice = stage.lattice
     q0 = _joints(stage, 0, 0)
@@ -197,27 +198,27 @@ def _solution(stage: _Stage, at: Floats) -> Solution:
     low, high = lattice.limits.lower - TRAVEL_SLACK, lattice.limits.upper + TRAVEL_SLACK
     stood = np.concatenate([q, *(r.after[None] for r in rewinds)])
     outside = int((~((stood >= low) & (stood <= high)).all(axis=1)).sum()) + _jumps(lattice, taken, q)
-    return Solution(q, family, rewinds, outside, _losers(lattice, stage.segments[0], q0, every, best),
-                    greedy(lattice, at).rewinds)
+    return RunSolution(q, family, rewinds, outside, _losers(lattice, stage.segments[0], q0, every, best),
+                       greedy(lattice, at).rewinds)
 
 
-def _jumps(lattice: Lattice, taken: list[Piece], q: Floats) -> int:
+def _jumps(lattice: Lattice, taken: list[RunPiece], q: Floats) -> int:
     """Steps to another winding that are neither rewinds nor turns on the spot: travel ends between two poses."""
     ends = np.array([p.last for p in taken[:-1] if not p.rewind and not lattice.free[p.last]], dtype=np.int64)
     step = np.abs(q[ends + 1] - q[ends])[:, lattice.rotary]
     return int((step > np.pi + 1e-6).any(axis=1).sum())
 
 
-def _losers(lattice: Lattice, first: Segment, q0: Floats, every: Floats, best: int) -> tuple[Loser, ...]:
+def _losers(lattice: Lattice, first: Segment, q0: Floats, every: Floats, best: int) -> tuple[RejectedStart, ...]:
     """The other states of the first pose, and the branches that it has but the run has not."""
     shut = set(range(len(lattice.values))) - {branch for branch, _ in first.states}
     with np.errstate(invalid="ignore"):
         dearer = np.where(every == np.inf, np.inf, every - every[best])
-    return (*(Loser(q0[k], dearer[k]) for k in range(len(every)) if k != best),
-            *(Loser(lattice.values[b, 0], NEVER) for b in sorted(shut) if np.isfinite(lattice.values[b, 0]).all()))
+    return (*(RejectedStart(q0[k], dearer[k]) for k in range(len(every)) if k != best),
+            *(RejectedStart(lattice.values[b, 0], NEVER) for b in sorted(shut) if np.isfinite(lattice.values[b, 0]).all()))
 
 
-def _rows(lattice: Lattice, piece: Piece, first: int) -> Floats:
+def _rows(lattice: Lattice, piece: RunPiece, first: int) -> Floats:
     """Joints (K, J) of a piece from pose `first` on."""
     branch, turns = piece.state
     q: Floats = lattice.values[branch, first:piece.last + 1].copy()
@@ -225,11 +226,11 @@ def _rows(lattice: Lattice, piece: Piece, first: int) -> Floats:
     return q
 
 
-def _offsets(lattice: Lattice, taken: list[Piece], at: Floats) -> list[Floats]:
+def _offsets(lattice: Lattice, taken: list[RunPiece], at: Floats) -> list[Floats]:
     """What each piece's axes without limits are to be turned by (J,), so that they go on the shorter way."""
     result, before = [], at
     for piece in taken:
-        begin = _rows(lattice, Piece(piece.first, piece.first, piece.state, False), piece.first)[0]
+        begin = _rows(lattice, RunPiece(piece.first, piece.first, piece.state, False), piece.first)[0]
         turned = np.where(lattice.endless, np.rint(np.nan_to_num(before - begin) / TWO_PI) * TWO_PI, 0.0)
         result.append(turned)
         before = _rows(lattice, piece, piece.last)[0] + turned

@@ -11,10 +11,10 @@ from machines.kinematics.base import Kinematics
 from machines.machine import Machine
 from postproc.base.group_rows import groups
 from postproc.joints.joint_path import reachable_axes
-from postproc.joints.lattice import Run
-from postproc.joints.lead import Event, Led, lead_past, whole
-from postproc.joints.plan import Solution, Wishes, plan_runs
+from postproc.joints.lattice import PoseRun
+from postproc.joints.plan import JointPreferences, RunSolution, plan_runs
 from postproc.joints.refined_moves import Refined, cut, with_rewinds
+from postproc.joints.singular_detours import Led, SingularPassage, lead_past, whole
 from postproc.joints.spin import held_joints
 from postproc.reference.moves import Moves
 from toolpaths.arrays import Bools, Floats, Ints, shared
@@ -31,7 +31,7 @@ _COARSE = 10.0 * DEG
 
 
 @dataclass(frozen=True)
-class Manner:
+class RunOptions:
     """How runs are planned.
 
     Attributes:
@@ -42,7 +42,7 @@ class Manner:
         tolerance: rad, of the axis
     """
 
-    wishes: Wishes
+    wishes: JointPreferences
     may_rewind: bool
     feed: float | None
     away: Callable[[Floats, Floats], Floats]
@@ -64,8 +64,8 @@ class RunPlan:
     singular: Bools
     moved: Floats
     left: Floats
-    events: tuple[tuple[int, int, Event], ...]
-    solutions: tuple[Solution, ...]
+    events: tuple[tuple[int, int, SingularPassage], ...]
+    solutions: tuple[RunSolution, ...]
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,7 @@ class _Part:
     """(N, 3) as given"""
 
 
-def plan_moves(machine: Machine, kinematics: Callable[[int], Kinematics], moves: Moves, manner: Manner,
+def plan_moves(machine: Machine, kinematics: Callable[[int], Kinematics], moves: Moves, manner: RunOptions,
                progress: Callable[[int], None] | None = None) -> RunPlan:
     """The joints of all moves (in the table frame), run by run as `moves.link` divides them."""
     starts, parts = np.flatnonzero(moves.link), []
@@ -125,7 +125,7 @@ def _reached(tools: dict[int, Kinematics], moves: Moves, starts: Ints, tolerance
 
 
 def _part(machine: Machine, kin: Kinematics, moves: Moves, first: int, last: int, given: tuple[Floats, Floats],
-          manner: Manner) -> _Part:
+          manner: RunOptions) -> _Part:
     """A run with the axes `given` (R, 3), which are moved by as much (R,)."""
     rows, curves = np.arange(first, last), moves.run(first, last)
     axis, moved = given[0][first:last], given[1][first:last]
@@ -144,17 +144,17 @@ def _seconds(moves: Moves, rows: Ints, curves: Curves) -> Floats:
     return np.where((moves.kind[rows] == Kind.RAPID) | ~(time > 0.0), np.nan, time)
 
 
-def _run(part: _Part, moves: Moves, manner: Manner, home: Floats) -> Run:
+def _run(part: _Part, moves: Moves, manner: RunOptions, home: Floats) -> PoseRun:
     tip, axis = part.poses()
     owner = np.concatenate([part.rows[:1], part.rows[1:][part.led.parent]])
     rapid = moves.kind[owner] == Kind.RAPID
     rest = rapid | np.append(rapid[1:], True)
     spin = float(moves.spin[part.rows[0]])
     held = held_joints(part.kin, tip[0], axis[0], spin, home) if np.isfinite(spin) else None
-    return Run(part.kin, tip, axis, rest, manner.away(tip, axis), held)
+    return PoseRun(part.kin, tip, axis, rest, manner.away(tip, axis), held)
 
 
-def _finer(part: _Part, solution: Solution) -> _Part:
+def _finer(part: _Part, solution: RunSolution) -> _Part:
     """The run with moves that turn a rotary axis far cut into parts, so that a rewind may stand between their ends."""
     step = np.abs(np.diff(solution.q[:, np.array(part.kin.rotary)], axis=0)).max(axis=1, initial=0.0)
     count = np.maximum(np.ceil(np.nan_to_num(step) / _COARSE), 1).astype(np.int64)
@@ -172,7 +172,7 @@ def _finer(part: _Part, solution: Solution) -> _Part:
     return _Part(part.kin, part.rows, part.axis, part.moved, finer, part._tip)
 
 
-def _together(moves: Moves, parts: list[_Part], found: list[Solution], manner: Manner) -> RunPlan:
+def _together(moves: Moves, parts: list[_Part], found: list[RunSolution], manner: RunOptions) -> RunPlan:
     """All runs one after the other, cut where there are rewinds."""
     owner = [np.append(0, 1 + p.led.parent) for p in parts]
     refined = cut(moves, np.concatenate([p.rows[k] for p, k in zip(parts, owner, strict=True)]),
@@ -202,7 +202,7 @@ def _joined(moves: Moves, parts: list[_Part]) -> tuple[Floats, Floats]:
     return tip, moves.axis if same else shared(np.concatenate([axis for _, axis in poses]))
 
 
-def _left(part: _Part, manner: Manner) -> float:
+def _left(part: _Part, manner: RunOptions) -> float:
     """What moving and leading the axis leave of the tolerance."""
     led = max((e.deviation for e in part.led.events), default=0.0)
     return manner.tolerance - float(part.moved.max()) - led

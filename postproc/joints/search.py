@@ -18,8 +18,8 @@ from postproc.joints.states import (
     REWINDS,
     SECONDS,
     WRONG,
+    BranchState,
     Segment,
-    State,
     leading,
     least_of,
     staying,
@@ -28,7 +28,7 @@ from toolpaths.arrays import Bools, Floats, Ints
 
 
 @dataclass(frozen=True)
-class Choice:
+class SegmentChoice:
     """What is done in a segment from each state: a rewind to state `to` (S,) at pose `at` (S,), -1 for none; then the state
     `next` (S,) of the segment after."""
 
@@ -38,17 +38,17 @@ class Choice:
 
 
 @dataclass(frozen=True)
-class Piece:
+class RunPiece:
     """Poses first..last of a run in one state; a rewind to the next piece's state follows where `rewind`."""
 
     first: int
     last: int
-    state: State
+    state: BranchState
     rewind: bool
 
 
 def cheapest(lattice: Lattice, segments: list[Segment], end: Floats, rewinds: bool,
-             wrong: Floats) -> tuple[Floats, list[Choice]]:
+             wrong: Floats) -> tuple[Floats, list[SegmentChoice]]:
     """(cost (S, 5) to the end from each state of the first segment, what is done in each segment).
 
     Args:
@@ -56,7 +56,7 @@ def cheapest(lattice: Lattice, segments: list[Segment], end: Floats, rewinds: bo
         rewinds: False where the tool may not draw back
         wrong: (B, N + 1) poses on the wrong side up to each pose
     """
-    choices: list[Choice] = []
+    choices: list[SegmentChoice] = []
     value, after = end, None
     for segment in reversed(segments):
         out, following = (value, np.zeros(len(segment), dtype=np.int64)) if after is None else _onwards(
@@ -71,7 +71,7 @@ def cheapest(lattice: Lattice, segments: list[Segment], end: Floats, rewinds: bo
             better = least_of(np.stack([value, cost], axis=1)) == 1
             value = np.where(better[:, None], cost, value)
             to, at = np.where(better, best, -1), np.where(better, places[np.arange(len(segment)), best], -1)
-        choices.append(Choice(to, at, following))
+        choices.append(SegmentChoice(to, at, following))
         after = segment
     return value, choices[::-1]
 
@@ -118,25 +118,25 @@ def _rewind(lattice: Lattice, segment: Segment, s: int, t: int, wrong: Floats) -
     return cost[best], int(rows[best])
 
 
-def pieces(segments: list[Segment], choices: list[Choice], start: int) -> list[Piece]:
+def pieces(segments: list[Segment], choices: list[SegmentChoice], start: int) -> list[RunPiece]:
     """The states taken from state `start` of the first segment on, neighbours of the same state joined."""
-    result: list[Piece] = []
+    result: list[RunPiece] = []
     state = start
     for segment, choice in zip(segments, choices, strict=True):
         first = segment.first
         if choice.to[state] >= 0:
             at = int(choice.at[state])
-            _append(result, Piece(first, at, segment.states[state], True))
+            _append(result, RunPiece(first, at, segment.states[state], True))
             state, first = int(choice.to[state]), at + 1
         if first <= segment.last:
-            _append(result, Piece(first, segment.last, segment.states[state], False))
+            _append(result, RunPiece(first, segment.last, segment.states[state], False))
         state = int(choice.next[state])
     return result
 
 
-def _append(result: list[Piece], piece: Piece) -> None:
+def _append(result: list[RunPiece], piece: RunPiece) -> None:
     if result and not result[-1].rewind and result[-1].state == piece.state:
-        piece = Piece(result.pop().first, piece.last, piece.state, piece.rewind)
+        piece = RunPiece(result.pop().first, piece.last, piece.state, piece.rewind)
     result.append(piece)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from postproc.joints.lattice import Lattice
 from toolpaths.arrays import Array, Bools, Floats, Ints
 
-State = tuple[int, tuple[int, ...]]
+BranchState = tuple[int, tuple[int, ...]]
 """branch, turns of each wound joint"""
 BAD, REWINDS, CUTS, WRONG, SECONDS = range(5)
 """columns of a cost, compared in this order: poses outside travel or without solution, rewinds, those of them in the cut,
@@ -24,9 +24,9 @@ class Segment:
 
     first: int
     last: int
-    states: list[State]
+    states: list[BranchState]
     bad: Ints
-    index: dict[State, int]
+    index: dict[BranchState, int]
 
     def __len__(self) -> int:
         return len(self.states)
@@ -59,8 +59,8 @@ def rough_segments(lattice: Lattice, rewinds: bool) -> list[Segment]:
     result = []
     for g, (i, j) in enumerate(zip(first, last, strict=True)):
         near = slice(max(g - 1, 0), g + 2) if rewinds else slice(None)
-        good: list[State] = []
-        every: list[State] = []
+        good: list[BranchState] = []
+        every: list[BranchState] = []
         for b in range(len(least)):
             if inside[b, g]:
                 good += _windings(b, least[b, g], most[b, g])
@@ -76,11 +76,11 @@ def _structure(lattice: Lattice) -> Bools:
     return np.asarray((lattice.leads != own).any(axis=0) | lattice.free)
 
 
-def _windings(branch: int, least: Array, most: Array) -> list[State]:
+def _windings(branch: int, least: Array, most: Array) -> list[BranchState]:
     return [(branch, turns) for turns in product(*(range(int(a), int(b) + 1) for a, b in zip(least, most, strict=True)))]
 
 
-def _segment(first: int, last: int, good: list[State], outside: list[State]) -> Segment:
+def _segment(first: int, last: int, good: list[BranchState], outside: list[BranchState]) -> Segment:
     states = good + outside
     bad = np.array([0] * len(good) + [last - first + 1] * len(outside), dtype=np.int64)
     return Segment(first, last, states, bad, {s: k for k, s in enumerate(states)})
@@ -119,7 +119,7 @@ def leading(lattice: Lattice, segment: Segment, after: Segment) -> list[list[tup
     return result
 
 
-def lattice_target(lattice: Lattice, branch: int, pose: int, turns: tuple[int, ...]) -> State:
+def lattice_target(lattice: Lattice, branch: int, pose: int, turns: tuple[int, ...]) -> BranchState:
     """Where a state leads to by itself."""
     target = int(lattice.leads[branch, pose])
     return target, lattice.on(branch, pose, turns, target)[0]

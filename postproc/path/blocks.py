@@ -26,7 +26,7 @@ PARTS, LINK, RUN = 8, 0, 7
 COLUMNS = ("q", "move", "u", "code", "home", "seconds", "plane", "ccw", "center", "state", "frame")
 
 
-class Builder:
+class PathBuilder:
     """Collects the columns of a Path run by run; `frames` are the word frames used so far."""
 
     def __init__(self, moves: Moves, joints: int) -> None:
@@ -120,7 +120,7 @@ def _off(tip: Floats, begin: Floats, end: Floats) -> Floats:
     return np.asarray(np.linalg.norm(tip - begin - along[:, None] * way, axis=1))
 
 
-def add_run(out: Builder, frame: WordFrame, kin: Kinematics, moves: Moves, rows: Ints, curves: Curves, q0: Floats,
+def add_run(out: PathBuilder, frame: WordFrame, kin: Kinematics, moves: Moves, rows: Ints, curves: Curves, q0: Floats,
             q1: Floats, tolerance: float, axis_tolerance: float) -> tuple[Floats, Ints, Ints]:
     """The blocks of moves `rows` (N,), of one or many runs, along curves (N) from joints q0 to q1 (N, J): (worst deviations
     (2,), rows with turns on the spot, broken rows)."""
@@ -153,7 +153,7 @@ def _on_the_spot(curves: Curves, where: Ints) -> Curves:
     return Curves(c.start, c.start, c.axis0, c.axis0, np.zeros(len(where), dtype=bool), c.center, c.normal, c.sweep)
 
 
-def _emit(out: Builder, frame: WordFrame, moves: Moves, rows: Ints, kin: Kinematics, curves: Curves, arcs: WordArcs,
+def _emit(out: PathBuilder, frame: WordFrame, moves: Moves, rows: Ints, kin: Kinematics, curves: Curves, arcs: WordArcs,
           curve: Ints, u: Floats, q: Floats, q0: Floats, tolerance: float, axis_tolerance: float) -> None:
     """Blocks in order, kept arcs cut into whole turns, with code and seconds; curves begin at joints q0 (N, J)."""
     if ((arcs.parts > 1) & arcs.keep)[curve].any():

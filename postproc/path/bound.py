@@ -15,7 +15,7 @@ import numpy as np
 
 from machines.kinematics import columns
 from machines.kinematics.base import Kinematics
-from machines.kinematics.jets import ZERO, Angle, Jet
+from machines.kinematics.taylor import ZERO, TaylorAngle, TaylorVector
 from machines.straight_blocks import in_blocks, pose_jets, tip_rule_jets
 from postproc.control.control import Control
 from toolpaths.arrays import Bools, Floats
@@ -28,7 +28,7 @@ _MOST_SKEW = 0.25
 
 
 @dataclass(frozen=True)
-class Stretch:
+class CurveBlocks:
     """N blocks and what they follow: joints q0 -> q1 (N, J), curves[u0..u1], poses at both ends (tip, axis), (N, 3)."""
 
     curves: Curves
@@ -42,13 +42,13 @@ class Stretch:
     def __len__(self) -> int:
         return len(self.u0)
 
-    def take(self, rows: slice | Bools) -> Stretch:
+    def take(self, rows: slice | Bools) -> CurveBlocks:
         """Some of the blocks."""
-        return Stretch(self.curves.take(rows), self.u0[rows], self.u1[rows], self.q0[rows], self.q1[rows],
-                       (self.start[0][rows], self.start[1][rows]), (self.end[0][rows], self.end[1][rows]))
+        return CurveBlocks(self.curves.take(rows), self.u0[rows], self.u1[rows], self.q0[rows], self.q1[rows],
+                           (self.start[0][rows], self.start[1][rows]), (self.end[0][rows], self.end[1][rows]))
 
 
-def bounds(control: Control, kin: Kinematics, stretch: Stretch, tolerance: float,
+def bounds(control: Control, kin: Kinematics, stretch: CurveBlocks, tolerance: float,
            axis_tolerance: float) -> tuple[Floats, Floats]:
     """Bounds (tip (N,) mm, axis (N,) rad) of the deviation of blocks from their curves under the control's law.
 
@@ -61,7 +61,7 @@ def bounds(control: Control, kin: Kinematics, stretch: Stretch, tolerance: float
     return tip, axis
 
 
-def _bounds(control: Control, kin: Kinematics, s: Stretch, tolerance: float,
+def _bounds(control: Control, kin: Kinematics, s: CurveBlocks, tolerance: float,
             axis_tolerance: float) -> tuple[Floats, Floats]:
     off = _Offset.of(control, kin, s)
     tip, axis = off.bound(s.curves, 0.5)
@@ -103,10 +103,10 @@ class _Offset:
     seen: _Seen
     bend: _Seen
     turn: Floats
-    way: Angle
+    way: TaylorAngle
 
     @classmethod
-    def of(cls, control: Control, kin: Kinematics, s: Stretch) -> _Offset:
+    def of(cls, control: Control, kin: Kinematics, s: CurveBlocks) -> _Offset:
         """Looked at where the blocks begin and end and in their middle."""
         n, chord = len(s), _chord(s.curves)
         tip, axis = _law_jets(control, kin, s)
@@ -123,7 +123,7 @@ class _Offset:
         """Some of the blocks."""
         value, first, second = (np.broadcast_to(x, rows.shape)[rows] for x in (
             self.way.value, self.way.first, self.way.second))
-        return _Offset(self.seen.take(rows), self.bend.take(rows), self.turn[rows], Angle(value, first, second))
+        return _Offset(self.seen.take(rows), self.bend.take(rows), self.turn[rows], TaylorAngle(value, first, second))
 
     def bound(self, curves: Curves, apart: float) -> tuple[Floats, Floats]:
         """(mm, rad), e having been seen at places `apart` of the block from each other."""
@@ -146,7 +146,7 @@ class _Offset:
             extent[arc] = np.where(np.isfinite(extent[arc]), radius * curves.sweep[arc], np.inf)
         return np.asarray(along / extent, dtype=np.float64)
 
-    def looked_at(self, control: Control, kin: Kinematics, s: Stretch) -> tuple[Floats, Floats]:
+    def looked_at(self, control: Control, kin: Kinematics, s: CurveBlocks) -> tuple[Floats, Floats]:
         """The bounds with the quarters looked at too."""
         seen, chord = self.seen, _chord(s.curves)
         for t in (0.25, 0.75):
@@ -157,14 +157,14 @@ class _Offset:
         return _Offset(seen, self.bend, self.turn, self.way).bound(s.curves, 0.25)
 
 
-def _law_jets(control: Control, kin: Kinematics, s: Stretch) -> tuple[Jet, Jet]:
+def _law_jets(control: Control, kin: Kinematics, s: CurveBlocks) -> tuple[TaylorVector, TaylorVector]:
     """Tip and axis along the blocks under the control's law; with standing rotaries a plane's law is that of the axes."""
     if control.tip_law:
         return tip_rule_jets(kin, s.q0, s.q1, s.start[0], s.end[0])
     return pose_jets(kin, s.q0, s.q1)
 
 
-def _way(s: Stretch, middle: Floats) -> Angle:
+def _way(s: CurveBlocks, middle: Floats) -> TaylorAngle:
     """The curve's parameter through both ends and the point nearest to the block's middle."""
     even = 0.5 * (s.u0 + s.u1)
     length = s.curves.length()
@@ -172,14 +172,14 @@ def _way(s: Stretch, middle: Floats) -> Angle:
     return curve_parameter(s.u0, found, s.u1)
 
 
-def curve_parameter(u0: Floats, middle: Floats, u1: Floats) -> Angle:
+def curve_parameter(u0: Floats, middle: Floats, u1: Floats) -> TaylorAngle:
     """The parabola (N,) of the curve's parameter through `u0`, `middle` and `u1`, monotone."""
     even, reach = 0.5 * (u0 + u1), _MOST_SKEW * np.abs(u1 - u0)
     value = np.clip(middle, even - reach, even + reach)
-    return Angle(value, u1 - u0, 4.0 * (u0 - 2.0 * value + u1))
+    return TaylorAngle(value, u1 - u0, 4.0 * (u0 - 2.0 * value + u1))
 
 
-def tip_reference(curves: Curves, way: Angle) -> Jet:
+def tip_reference(curves: Curves, way: TaylorAngle) -> TaylorVector:
     """The curve's tip: straight, or on arcs the radius vector, blended between the ends, turned about the centre."""
     span, start = curves.end - curves.start, curves.start
     arc = curves.is_arc
@@ -189,7 +189,7 @@ def tip_reference(curves: Curves, way: Angle) -> Jet:
     last = _turned_back(curves)
     jet = _run(np.where(arc[:, None], curves.center + first, start), np.where(arc[:, None], last - first, span), way)
     sweep = np.where(arc, curves.sweep, 0.0)
-    turn = Angle(sweep * way.value, sweep * way.first, sweep * way.second)
+    turn = TaylorAngle(sweep * way.value, sweep * way.first, sweep * way.second)
     normal = np.where(arc[:, None], curves.normal, [0.0, 0.0, 1.0])
     return jet.turned(list(normal.T), list(np.where(arc[:, None], curves.center, 0.0).T), turn)
 
@@ -205,20 +205,20 @@ def _turned_back(curves: Curves) -> Floats:
     return result
 
 
-def _run(start: Floats, span: Floats, way: Angle) -> Jet:
+def _run(start: Floats, span: Floats, way: TaylorAngle) -> TaylorVector:
     d = list(span.T)
-    return Jet(columns.plus(list(start.T), columns.times(way.value, d)), columns.times(way.first, d),
-               columns.times(way.second, d))
+    return TaylorVector(columns.plus(list(start.T), columns.times(way.value, d)), columns.times(way.first, d),
+                        columns.times(way.second, d))
 
 
-def axis_reference(curves: Curves, way: Angle, turn: Floats) -> Jet:
+def axis_reference(curves: Curves, way: TaylorAngle, turn: Floats) -> TaylorVector:
     """The tool axis on the great circle."""
     normal = cross(curves.axis0, curves.axis1)
     size = np.linalg.norm(normal, axis=1, keepdims=True)
     normal = np.where(size > 0.0, normal / np.where(size > 0.0, size, 1.0), [0.0, 0.0, 1.0])
     whole = np.where(size[:, 0] > 0.0, turn, 0.0)
-    angle = Angle(whole * way.value, whole * way.first, whole * way.second)
-    return Jet(list(curves.axis0.T)).turned(list(normal.T), ZERO, angle)
+    angle = TaylorAngle(whole * way.value, whole * way.first, whole * way.second)
+    return TaylorVector(list(curves.axis0.T)).turned(list(normal.T), ZERO, angle)
 
 
 def _chord(curves: Curves) -> Floats:

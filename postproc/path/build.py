@@ -14,13 +14,13 @@ from machines.machine import Machine
 from postproc.base.memory import give_back
 from postproc.control.modes import OutputModes, WordFrame
 from postproc.joints.run_plan import RunPlan, plan_moves
-from postproc.path.blocks import LEG, Builder, add_run, rapid_codes
+from postproc.path.blocks import LEG, PathBuilder, add_run, rapid_codes
 from postproc.path.home_links import add_home_links
 from postproc.path.linearise import approached
 from postproc.path.links import Link, Pose, SafeSpace, plan_link
-from postproc.path.model import FEED, TRAVERSE, Path
-from postproc.path.rewinds import Drawing
-from postproc.path.solved_runs import Run, Runs, solved_runs
+from postproc.path.model import FEED, TRAVERSE, JointPath
+from postproc.path.rewinds import RetractPlan
+from postproc.path.solved_runs import SolvedRun, SolvedRuns, solved_runs
 from postproc.path.zero_entry import ZeroEntry, cost, needed, zero_entry
 from postproc.reference.moves import Moves
 from toolpaths.arrays import Array, Floats, Ints, as_slice, taken
@@ -39,7 +39,7 @@ class _Road:
     modes: OutputModes
     operation: Ints
     space: SafeSpace
-    drawing: Drawing
+    drawing: RetractPlan
     home_rows: frozenset[int]
     file: str
 
@@ -55,7 +55,8 @@ class _Stand:
 
 def build_path(modes: OutputModes, kinematics: Callable[[int], Kinematics], moves: Moves, space: SafeSpace,
                home_rows: frozenset[int], operation: Ints, tolerance: float, axis_tolerance: float, file: str = "",
-               progress: Progress | None = None, drawing: Drawing | None = None) -> tuple[Path | None, list[Diagnostic]]:
+               progress: Progress | None = None, drawing: RetractPlan | None = None) -> tuple[JointPath | None,
+                                                                                              list[Diagnostic]]:
     """Blocks for all moves (in the table frame).
 
     Args:
@@ -65,12 +66,12 @@ def build_path(modes: OutputModes, kinematics: Callable[[int], Kinematics], move
         tolerance, axis_tolerance: mm and rad that linearising may use
         drawing: what the set-up says about rewinds and preferred joints; default: its defaults
     """
-    machine, given, drawing = modes.control.machine, moves, drawing or Drawing.default(space)
+    machine, given, drawing = modes.control.machine, moves, drawing or RetractPlan.default(space)
     plan = plan_moves(machine, kinematics, moves, drawing.manner(machine, axis_tolerance),
                       None if progress is None else lambda run: progress("joints", run, int(given.link.sum())))
     moves = plan.refined.moves
     road = _Road(plan, modes, operation[plan.refined.origin], space, drawing, plan.refined.among(home_rows), file)
-    out = Builder(moves, len(machine.axis_names))
+    out = PathBuilder(moves, len(machine.axis_names))
     out.frame(modes.base)
     runs, diagnostics = solved_runs(plan, modes, kinematics, road.operation, axis_tolerance, file)
     if has_errors(diagnostics):
@@ -92,24 +93,26 @@ def build_path(modes: OutputModes, kinematics: Callable[[int], Kinematics], move
     return path, faults.merged(diagnostics) + faults.rapid_as_feed(path.code, path.move, path.seconds, given, file)
 
 
-def _of_given(columns: dict[str, Array], out: Builder, plan: RunPlan, count: int, turns: Ints, worst: Floats) -> Path:
+def _of_given(columns: dict[str, Array], out: PathBuilder, plan: RunPlan, count: int, turns: Ints,
+              worst: Floats) -> JointPath:
     """The path of the parts of moves as that of the `count` moves themselves."""
     parts = plan.refined
     singular = np.zeros(count, dtype=bool)
     singular[parts.origin] = plan.singular
     columns = columns | {"move": parts.origin[columns["move"]], "u": parts.at(columns["move"], columns["u"])}
-    return Path(**columns, begin=parts.begins(out.begin, count), singular=singular, turns=np.unique(parts.origin[turns]),
-                worst_tip=float(worst[0]), worst_axis=float(worst[1]), frames=tuple(out.frames),
-                rewinds=parts.origin[parts.rewind], events=plan.events)
+    return JointPath(**columns, begin=parts.begins(out.begin, count), singular=singular,
+                     turns=np.unique(parts.origin[turns]),
+                     worst_tip=float(worst[0]), worst_axis=float(worst[1]), frames=tuple(out.frames),
+                     rewinds=parts.origin[parts.rewind], events=plan.events)
 
 
-def _add_runs(out: Builder, road: _Road, runs: Runs, tolerance: float,
-              machine: Machine) -> tuple[Runs, Floats, list[Ints], list[Diagnostic]]:
+def _add_runs(out: PathBuilder, road: _Road, runs: SolvedRuns, tolerance: float,
+              machine: Machine) -> tuple[SolvedRuns, Floats, list[Ints], list[Diagnostic]]:
     """The blocks of all runs, those of one frame and tool together: (runs as their ends are approached, worst deviations
     (2,), rows with turns, faults)."""
     worst, turns, found = np.zeros(2), [np.zeros(0, dtype=np.int64)], list[Diagnostic]()
     moves = road.plan.refined.moves
-    together: dict[tuple[int, int, float], list[Run]] = {}
+    together: dict[tuple[int, int, float], list[SolvedRun]] = {}
     for run in runs.each:
         out.frame(run.frame)
         if run.last - run.first > 1:
@@ -131,7 +134,7 @@ def _add_runs(out: Builder, road: _Road, runs: Runs, tolerance: float,
     return runs, worst, turns, found
 
 
-def _add_links(out: Builder, road: _Road, runs: Runs, stand: _Stand,
+def _add_links(out: PathBuilder, road: _Road, runs: SolvedRuns, stand: _Stand,
                progress: Progress | None) -> tuple[_Stand, list[float], list[Diagnostic]]:
     """The linking moves to all runs in order: (where the tool stands at the end, s that entries at zero cost, faults)."""
     modes, space, refined = road.modes, road.space, road.plan.refined
@@ -187,7 +190,7 @@ class _Legs:
     """where the mode that it goes to is entered with the tables at zero"""
 
 
-def _add_link(out: Builder, moves: Moves, row: int, link: Link, legs: _Legs) -> None:
+def _add_link(out: PathBuilder, moves: Moves, row: int, link: Link, legs: _Legs) -> None:
     """Retract, home, then the records without motion, then index and the approach to the pose itself.
 
     A cutting move that is linked to (no RAPID before it) is approached at its feed. Before a mode is entered the rotary
@@ -217,13 +220,13 @@ def _add_link(out: Builder, moves: Moves, row: int, link: Link, legs: _Legs) -> 
     out.link(legs.after, link.approach, row, code=np.full(n, FEED, dtype=np.int8), seconds=seconds)
 
 
-def _leg(out: Builder, frame: WordFrame, kin: Kinematics, begin: Floats, q: Floats, row: int) -> None:
+def _leg(out: PathBuilder, frame: WordFrame, kin: Kinematics, begin: Floats, q: Floats, row: int) -> None:
     """Blocks (K, J) along the tool axis in rapid, at feed where rapids would leave the line."""
     code = rapid_codes(frame.control, kin, np.concatenate([begin[None], q[:-1]]) if len(q) else q, q, *LEG)
     out.link(frame, q, row, code=code, seconds=np.where(code == TRAVERSE, np.nan, 0.0))
 
 
-def _add_end(out: Builder, modes: OutputModes, stand: _Stand, space: SafeSpace, row: int) -> None:
+def _add_end(out: PathBuilder, modes: OutputModes, stand: _Stand, space: SafeSpace, row: int) -> None:
     """The way home behind the last run."""
     if stand.pose is None:
         return

@@ -17,11 +17,11 @@ from postproc.base.group_rows import groups
 from postproc.control.control import Control
 from postproc.control.modes import WordFrame
 from postproc.joints.joint_path import TRAVEL_SLACK, nearest_solution
-from postproc.path.blocks import LEG, PARTS, Builder, rapid_codes
+from postproc.path.blocks import LEG, PARTS, PathBuilder, rapid_codes
 from postproc.path.linearise import linearise
 from postproc.path.links import LEG_TOLERANCE, RISE, SAMPLES, SafeSpace, has_retract_axis
 from postproc.path.model import TRAVERSE
-from postproc.path.solved_runs import Run, Runs
+from postproc.path.solved_runs import SolvedRun, SolvedRuns
 from postproc.reference.moves import Moves
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.rotations import angle_between
@@ -51,7 +51,7 @@ class _Poses:
         return replace(self, tip=self.tip[rows], axis=self.axis[rows], q=self.q[rows], tool=self.tool[rows])
 
 
-def add_home_links(out: Builder, base: WordFrame, space: SafeSpace, runs: Runs, moves: Moves,
+def add_home_links(out: PathBuilder, base: WordFrame, space: SafeSpace, runs: SolvedRuns, moves: Moves,
                    linked: Bools) -> Bools:
     """Add the links by home before those of the runs `linked` (runs,) that a first try brings home and back, clear and
     inside travel; (runs,) True where that is done."""
@@ -86,7 +86,8 @@ def add_home_links(out: Builder, base: WordFrame, space: SafeSpace, runs: Runs, 
     return done
 
 
-def _poses(some: Sequence[Run], rows: Sequence[int], tools: Sequence[Kinematics], runs: Runs, moves: Moves) -> _Poses:
+def _poses(some: Sequence[SolvedRun], rows: Sequence[int], tools: Sequence[Kinematics], runs: SolvedRuns,
+           moves: Moves) -> _Poses:
     at, number = np.array(rows, dtype=np.int64), {id(kin): k for k, kin in enumerate(tools)}
     tool = np.array([number[id(run.kin)] for run in some], dtype=np.int64)
     return _Poses(moves.tip[at], runs.axis[at], runs.q[at], tool, tools)
@@ -145,7 +146,7 @@ def _clear(control: Control, space: SafeSpace, poses: _Poses, ways: Sequence[Flo
     return result
 
 
-def _add_legs(out: Builder, frame: WordFrame, start: _Poses, end: _Poses, rows: Ints, part: int) -> None:
+def _add_legs(out: PathBuilder, frame: WordFrame, start: _Poses, end: _Poses, rows: Ints, part: int) -> None:
     """Blocks along the tool axis in rapid, at feed where rapids would leave the line; none where nothing moves."""
     moved = (start.q != end.q).any(axis=1)
     for kin, every in start.each_tool() if len(rows) else ():
@@ -155,7 +156,7 @@ def _add_legs(out: Builder, frame: WordFrame, start: _Poses, end: _Poses, rows: 
                 place=PARTS * rows[k] + part)
 
 
-def _add_rapids(out: Builder, frame: WordFrame, q: Floats, rows: Ints, part: int, state: Bools, home: bool) -> None:
+def _add_rapids(out: PathBuilder, frame: WordFrame, q: Floats, rows: Ints, part: int, state: Bools, home: bool) -> None:
     n = len(q)
     out.add(frame, q, rows, np.full(n, np.nan), np.full(n, TRAVERSE, dtype=np.int8), np.full(n, np.nan), home,
             state=np.tile(state, (n, 1)), place=PARTS * rows + part)

@@ -13,7 +13,7 @@ import numpy as np
 from machines.kinematics.base import Kinematics
 from postproc.control.control import Control
 from postproc.joints.joint_path import branch_of, nearest_solution, wrap
-from postproc.path.bound import Stretch, bounds
+from postproc.path.bound import CurveBlocks, bounds
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.rotations import angle_between
 from toolpaths.shape import Curves
@@ -31,7 +31,7 @@ _NARROW = 1.05
 
 
 @dataclass(frozen=True)
-class Pieces:
+class CurvePieces:
     """Blocks that follow curves: piece k ends at `q` (K, J), at `u` (K,) of curve `curve` (K,).
 
     `broken` names curves that no number of points brings inside the tolerance (a jump of the joints).
@@ -47,14 +47,14 @@ class Pieces:
 
 
 def linearise(control: Control, kin: Kinematics, curves: Curves, q0: Floats, q1: Floats, keep: Bools,
-              tolerance: float, axis_tolerance: float) -> Pieces:
+              tolerance: float, axis_tolerance: float) -> CurvePieces:
     """Split the blocks q0 -> q1 (N, J) that follow `curves` (N) until the deviation is inside mm and rad tolerances.
 
     `keep` (N,) marks curves whose block follows them by itself (kept arcs).
     """
     exact = keep | _straight_already(control, kin, curves, q0, q1)
     if exact.all():
-        return Pieces(np.arange(len(exact)), np.ones(len(exact)), q1, np.zeros(0, dtype=np.int64), 0.0, 0.0)
+        return CurvePieces(np.arange(len(exact)), np.ones(len(exact)), q1, np.zeros(0, dtype=np.int64), 0.0, 0.0)
     front = _Front(control, kin, curves, q0, q1, np.flatnonzero(~exact), tolerance, axis_tolerance)
     while len(front.index):
         front.advance()
@@ -62,7 +62,7 @@ def linearise(control: Control, kin: Kinematics, curves: Curves, q0: Floats, q1:
     u, q = np.concatenate([np.ones(int(exact.sum())), *front.u]), np.concatenate([q1[exact], *front.q])
     order = np.lexsort((u, curve))
     broken = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *front.broken]))
-    return Pieces(curve[order], u[order], q[order], broken, float(front.worst[0]), float(front.worst[1]))
+    return CurvePieces(curve[order], u[order], q[order], broken, float(front.worst[0]), float(front.worst[1]))
 
 
 def _straight_already(control: Control, kin: Kinematics, curves: Curves, q0: Floats, q1: Floats) -> Bools:
@@ -107,7 +107,7 @@ class _Front:
     def advance(self) -> None:
         """Try the steps, take those that are long enough, forget finished and broken curves."""
         u1, q1, pose = self._tried()
-        stretch = Stretch(self.curves.take(self.index), self.at, u1, self.joints, q1, self.pose, pose)
+        stretch = CurveBlocks(self.curves.take(self.index), self.at, u1, self.joints, q1, self.pose, pose)
         tip, axis = bounds(self.control, self.kin, stretch, self.tolerance, self.axis_tolerance)
         ratio = np.maximum(tip / self.tolerance, axis / self.axis_tolerance)
         good = ratio <= 1.0

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from postproc.base.group_rows import groups
 from postproc.control.control import Control
 from postproc.control.modes import WordFrame
-from postproc.joints.lead import Event
+from postproc.joints.singular_detours import SingularPassage
 from toolpaths.arrays import Array, Bools, Floats, Ints
 
 TRAVERSE, FEED, ARC = 0, 1, 2
@@ -15,7 +15,7 @@ TRAVERSE, FEED, ARC = 0, 1, 2
 
 
 @dataclass(frozen=True)
-class Path:
+class JointPath:
     """Blocks in joints, K of them, and where the rows of Moves begin among them.
 
     Attributes:
@@ -53,7 +53,7 @@ class Path:
     worst_axis: float
     frames: tuple[WordFrame, ...]
     rewinds: Ints
-    events: tuple[tuple[int, int, Event], ...]
+    events: tuple[tuple[int, int, SingularPassage], ...]
 
     def __len__(self) -> int:
         return len(self.q)

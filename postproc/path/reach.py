@@ -15,7 +15,7 @@ from toolpaths.units import DEG
 
 if TYPE_CHECKING:
     from postproc.control.control import Control
-    from postproc.path.model import Path
+    from postproc.path.model import JointPath
     from postproc.reference.moves import Moves
 
 _SAMPLES = (0.25, 0.5, 0.75)
@@ -30,7 +30,7 @@ def inside(kinematics: Kinematics, q: Floats) -> bool:
     return bool((clearances.reach(machine, q).values >= -_SLACK).all())
 
 
-def check_reach(path: Path, moves: Moves, control: Control, file: str = "") -> list[Diagnostic]:
+def check_reach(path: JointPath, moves: Moves, control: Control, file: str = "") -> list[Diagnostic]:
     """Workspace, joint and clearance bounds that the blocks pass, as errors; nothing for serial machines."""
     kinematics: Any = control.machine.kinematics
     if not is_checked(kinematics):
@@ -47,7 +47,7 @@ def check_reach(path: Path, moves: Moves, control: Control, file: str = "") -> l
     return result
 
 
-def _at_samples(path: Path, control: Control, start: Floats) -> clearances.Margins:
+def _at_samples(path: JointPath, control: Control, start: Floats) -> clearances.Margins:
     """Least margins of each block over samples of the motion that the control's own kinematics makes."""
     kinematics: Any = control.machine.kinematics
     margins = clearances.reach(kinematics, path.q)

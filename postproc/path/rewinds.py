@@ -14,34 +14,34 @@ import numpy as np
 from machines.kinematics.base import Kinematics
 from machines.machine import Machine
 from postproc.control.control import Control
-from postproc.joints.plan import Wishes
-from postproc.joints.run_plan import Manner
+from postproc.joints.plan import JointPreferences
+from postproc.joints.run_plan import RunOptions
 from postproc.path.links import Link, Pose, SafeSpace, plan_link
-from postproc.setup.model import Placement, Rewind, SetupFile
+from postproc.setup.model import Placement, RewindSettings, SetupFile
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.units import DEG
 
 
 @dataclass(frozen=True)
-class Drawing:
+class RetractPlan:
     """Drawing back on one machine: `space` is kept free of the tool while axes turn."""
 
     space: SafeSpace
-    rewind: Rewind = field(default_factory=Rewind)
-    wishes: Wishes = field(default_factory=Wishes)
+    rewind: RewindSettings = field(default_factory=RewindSettings)
+    wishes: JointPreferences = field(default_factory=JointPreferences)
 
     @classmethod
-    def default(cls, space: SafeSpace) -> Drawing:
+    def default(cls, space: SafeSpace) -> RetractPlan:
         """That of a set-up which says nothing."""
         return cls(space)
 
-    def manner(self, machine: Machine, axis_tolerance: float) -> Manner:
+    def manner(self, machine: Machine, axis_tolerance: float) -> RunOptions:
         """How the runs of a program are planned on a machine."""
         feed = None if self.rewind.feed is None else self.rewind.feed / 60.0
         slow = machine.limits.velocity[~np.array(machine.rotary)]
         speed = float(slow.min()) if len(slow) else np.inf
-        return Manner(self.wishes, self.rewind.allowed, feed, partial(self._away, speed, feed or speed), axis_tolerance)
+        return RunOptions(self.wishes, self.rewind.allowed, feed, partial(self._away, speed, feed or speed), axis_tolerance)
 
     def _away(self, rapid: float, feed: float, tip: Floats, axis: Floats) -> Floats:
         """Time (N,) s to draw back from poses (N, 3) to the sphere about what is cut, and to come down again."""
@@ -55,7 +55,7 @@ class Drawing:
 
 
 def drawing_of(setup: SetupFile, placement: Placement, space: SafeSpace, machine: Machine,
-               file: str = "") -> tuple[Drawing, list[Diagnostic]]:
+               file: str = "") -> tuple[RetractPlan, list[Diagnostic]]:
     """What a set-up says, for a machine; faults point into `file`, that of the set-up."""
     rewind, joints = setup.rewind, setup.joints
     diagnostics = [error("setup.joints", f"joints.{table}.{letter}: {machine.name} has no rotary axis {letter}", file=file,
@@ -65,13 +65,13 @@ def drawing_of(setup: SetupFile, placement: Placement, space: SafeSpace, machine
         diagnostics.append(error("setup.stock", f"rewind.stock: low {rewind.stock.low} must be below high "
                                  f"{rewind.stock.high} in x, y and z", file=file))
     if diagnostics:
-        return Drawing(space), diagnostics
+        return RetractPlan(space), diagnostics
     index = machine.axis_names.index
-    wishes = Wishes({index(k): 1 if v == "positive" else -1 for k, v in joints.side.items()},
-                    {index(k): v * DEG for k, v in joints.start.items()})
+    wishes = JointPreferences({index(k): 1 if v == "positive" else -1 for k, v in joints.side.items()},
+                              {index(k): v * DEG for k, v in joints.start.items()})
     if rewind.stock is not None:
         space = _with_stock(space, placement.points(_box(np.array(rewind.stock.low), np.array(rewind.stock.high))))
-    return Drawing(space, rewind, wishes), []
+    return RetractPlan(space, rewind, wishes), []
 
 
 def _rotaries(machine: Machine) -> list[str]:

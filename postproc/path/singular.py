@@ -6,12 +6,12 @@ import numpy as np
 
 from machines.singular_distance import NAMES, has_singular_distance, singular_distance_between
 from postproc.control.control import Control
-from postproc.path.model import Path
+from postproc.path.model import JointPath
 from postproc.reference.moves import Moves
 from toolpaths.diagnostics import Diagnostic, error, info
 
 
-def check_singular(path: Path, moves: Moves, control: Control, least: float, file: str = "") -> list[Diagnostic]:
+def check_singular(path: JointPath, moves: Moves, control: Control, least: float, file: str = "") -> list[Diagnostic]:
     """How near the blocks come to singular positions: told, and an error below `least`; nothing for serial machines."""
     kinematics = control.machine.kinematics
     if not has_singular_distance(kinematics) or not len(path):

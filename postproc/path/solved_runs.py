@@ -17,7 +17,7 @@ from toolpaths.rotations import angle_between
 
 
 @dataclass(frozen=True)
-class Run:
+class SolvedRun:
     """Rows `first` to before `last` of Moves, with the frame of their words and the tool's kinematics."""
 
     first: int
@@ -29,16 +29,16 @@ class Run:
 
 
 @dataclass(frozen=True)
-class Runs:
+class SolvedRuns:
     """All runs, and the axes (R, 3) and joints (R, J) of their rows."""
 
-    each: tuple[Run, ...]
+    each: tuple[SolvedRun, ...]
     axis: Floats
     q: Floats
 
 
 def solved_runs(plan: RunPlan, modes: OutputModes, kinematics: Callable[[int], Kinematics], operation: Ints,
-                axis_tolerance: float, file: str) -> tuple[Runs, list[Diagnostic]]:
+                axis_tolerance: float, file: str) -> tuple[SolvedRuns, list[Diagnostic]]:
     """The runs of a plan in the output modes that are theirs; those that cannot be solved are left out, with errors.
 
     Args:
@@ -54,7 +54,7 @@ def solved_runs(plan: RunPlan, modes: OutputModes, kinematics: Callable[[int], K
         and not bool(np.isfinite(moves.spin).any())
     laws = {(op, s): modes.law(op, s) for op, s in set(zip(owner, still.tolist(), strict=True))}
     tools = {k: kinematics(k) for k in np.unique(tool).tolist()}
-    q, axis, found, each = plan.q, moves.axis, list[Diagnostic](), list[Run]()
+    q, axis, found, each = plan.q, moves.axis, list[Diagnostic](), list[SolvedRun]()
     for k, (first, last) in enumerate(zip(firsts, lasts, strict=True)):
         kin, law = tools[int(tool[k])], laws[owner[k], bool(still[k])]
         if not good:
@@ -72,8 +72,8 @@ def solved_runs(plan: RunPlan, modes: OutputModes, kinematics: Callable[[int], K
             frame, at = modes.plane(kin, q[first])
             q[first:last] = frame.control.slides_for(kin, moves.tip[first:last], np.tile(at, (last - first, 1)))
             axis[first:last] = kin.forward(q[first:first + 1])[1]
-        each.append(Run(first, last, frame, kin, left[k]))
-    return Runs(tuple(each), axis, q), found
+        each.append(SolvedRun(first, last, frame, kin, left[k]))
+    return SolvedRuns(tuple(each), axis, q), found
 
 
 def _still(axis: Floats, starts: Ints, axis_tolerance: float) -> Bools:

@@ -11,7 +11,7 @@ from postproc.base.group_rows import groups
 from postproc.control.control import Control
 from postproc.control.word_arcs import PLANE_COLUMNS
 from postproc.joints.joint_path import TRAVEL_SLACK
-from postproc.path.model import ARC, Path
+from postproc.path.model import ARC, JointPath
 from postproc.reference.moves import Moves
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
@@ -21,7 +21,7 @@ PART = 50_000
 """blocks that are looked at together"""
 
 
-def _arc_extremes(path: Path, law: Control, k: Ints, at_start: Floats, low: Floats, high: Floats) -> None:
+def _arc_extremes(path: JointPath, law: Control, k: Ints, at_start: Floats, low: Floats, high: Floats) -> None:
     """Widen the joints `low`, `high` (K, J) of the arc blocks k (K,) to where they are extreme between the ends; they begin
     at joints `at_start` (K, J).
 
@@ -54,7 +54,7 @@ def _arc_extremes(path: Path, law: Control, k: Ints, at_start: Floats, low: Floa
             high[at] = np.where(passed, np.maximum(high[at], value + np.maximum(rise, 0.0)), high[at])
 
 
-def check_travel(path: Path, moves: Moves, control: Control, kinematics: Callable[[int], Kinematics],
+def check_travel(path: JointPath, moves: Moves, control: Control, kinematics: Callable[[int], Kinematics],
                  file: str = "") -> tuple[list[Diagnostic], dict[str, tuple[float, float]]]:
     """(excesses as errors, extents of each axis in mm or degrees)."""
     machine, limits = control.machine, control.machine.limits
@@ -78,7 +78,7 @@ def check_travel(path: Path, moves: Moves, control: Control, kinematics: Callabl
     return diagnostics, extents
 
 
-def extremes(path: Path, moves: Moves, control: Control, kinematics: Callable[[int], Kinematics],
+def extremes(path: JointPath, moves: Moves, control: Control, kinematics: Callable[[int], Kinematics],
              rows: Ints | None = None) -> tuple[Floats, Floats]:
     """(lowest, highest) joints (K, J) of each block, or of each of `rows` (K,).
 
@@ -104,7 +104,7 @@ def extremes(path: Path, moves: Moves, control: Control, kinematics: Callable[[i
     return low, high
 
 
-def _excess(path: Path, moves: Moves, control: Control, j: int, bad: Ints, low: Floats, high: Floats, over: Floats,
+def _excess(path: JointPath, moves: Moves, control: Control, j: int, bad: Ints, low: Floats, high: Floats, over: Floats,
             file: str) -> Diagnostic:
     """Axis j goes beyond its travel in the blocks `bad` (K,), to `low`, `high`, by `over` (K,)."""
     machine = control.machine

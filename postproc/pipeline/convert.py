@@ -13,12 +13,12 @@ from postproc.controllers.model import ControllerFile, load_controller
 from postproc.job.job import prepare
 from postproc.pipeline.next_modes import with_next_modes
 from postproc.pipeline.result import PostResult, VerifyResult
-from postproc.pipeline.smoothed_stages import Left, with_passes_taken_back
+from postproc.pipeline.smoothed_stages import ExcludedPasses, with_passes_taken_back
 from postproc.pipeline.stages import Progress, staged
 from postproc.setup.fingerprint import fingerprint
 from postproc.setup.model import SetupFile, load_setup
 from postproc.setup.system import standing
-from postproc.verification.files_beside import Beside, unfinished
+from postproc.verification.neighbour_files import NeighbourFiles, unfinished
 from postproc.verification.read_back import other_axes, other_setup, read_back
 from postproc.verification.second_witness import second_witness
 from toolpaths.diagnostics import Diagnostic, DiagnosticError, has_errors, require
@@ -105,7 +105,7 @@ def _reading(path: Toolpath, diagnostics: list[Diagnostic] | None) -> tuple[Diag
 def _stages(result: PostResult, progress: Progress | None) -> PostResult:
     """All stages; with --smooth passes that cannot be smoothed are taken back; "auto" takes the next output mode where one
     cannot be written or proved."""
-    def one(begun: PostResult, left: Left = frozenset()) -> PostResult:
+    def one(begun: PostResult, left: ExcludedPasses = frozenset()) -> PostResult:
         return with_next_modes(begun, lambda again: staged(again, progress, left))
     return with_passes_taken_back(result, one) if result.options.smooth else one(result)
 
@@ -136,7 +136,7 @@ def verify(gcode: str | FilePath, path: Toolpath, machine: Machine | str | FileP
     found += more
     if job is None or has_errors(found):
         return replace(begun, diagnostics=tuple(found))
-    comparison, more = read_back(data, job, path.file, progress, str(gcode), Beside(gcode))
+    comparison, more = read_back(data, job, path.file, progress, str(gcode), NeighbourFiles(gcode))
     found = [*other_setup(data, options, has_errors(more), str(gcode)), *found, *more]
     said = None
     if comparison is not None and not has_errors(found):

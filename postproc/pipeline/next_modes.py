@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from postproc.control.control import Law
+from postproc.control.control import InterpolationMode
 from postproc.control.modes import ASKED, OutputModes, Refused
 from postproc.job.job import Job
 from postproc.pipeline.result import PostResult
@@ -20,11 +20,12 @@ TURNS = 3
 """conversions in which only the operations that errors name take the next mode; then all of that mode do"""
 SAME_IN_ALL = frozenset({"reach.axis", "reach.position", "axis.spin"})
 """errors that no output mode changes"""
-NAMES: dict[Law, str] = {"axes": "axis positions", "tcp": "the tool-centre-point mode", "tilted": "a tilted plane"}
+NAMES: dict[InterpolationMode, str] = {"axes": "axis positions", "tcp": "the tool-centre-point mode",
+                                       "tilted": "a tilted plane"}
 ASK_AUTO = "--output-mode auto takes the next mode where one cannot be proved"
 NONE_DOES = "no output mode of this control and machine is proved for it: "
 COARSER = "a coarser --tolerance may do; else report CL file, machine and controller file as a fault of postproc"
-_LAWS: tuple[Law, ...] = ("tilted", "tcp", "axes")
+_LAWS: tuple[InterpolationMode, ...] = ("tilted", "tcp", "axes")
 _SHOWN = 6
 
 
@@ -34,7 +35,7 @@ def with_next_modes(result: PostResult, staged: Staged) -> PostResult:
     first = made = staged(result)
     if made.ok or not _depends(made):
         return with_way_out(made)
-    refused, why, tried = Refused(), dict[tuple[int, Law], Diagnostic](), {_assigned(made)}
+    refused, why, tried = Refused(), dict[tuple[int, InterpolationMode], Diagnostic](), {_assigned(made)}
     for turn in range(TURNS + len(_LAWS)):
         more = _refusals(made, turn)
         if not more or not _depends(made):
@@ -69,14 +70,14 @@ def _auto(modes: OutputModes) -> list[int]:
     return np.flatnonzero(modes.asked == ASKED.index("auto")).tolist()
 
 
-def _assigned(made: PostResult, refused: Refused | None = None) -> tuple[tuple[Law, ...], ...]:
+def _assigned(made: PostResult, refused: Refused | None = None) -> tuple[tuple[InterpolationMode, ...], ...]:
     """The mode of each operation where the tool axis stands still, and where it turns."""
     assert made.job is not None
     modes = made.job.modes if refused is None else replace(made.job.modes, refused=refused)
     return tuple(tuple(modes.law(k, constant) for k in range(len(modes.asked))) for constant in (True, False))
 
 
-def _refusals(made: PostResult, turn: int) -> frozenset[tuple[int, Law]]:
+def _refusals(made: PostResult, turn: int) -> frozenset[tuple[int, InterpolationMode]]:
     """The modes that are to be passed over next: those that the errors name, else the first of all that are in use."""
     assert made.job is not None
     modes = made.job.modes
@@ -90,7 +91,7 @@ def _refusals(made: PostResult, turn: int) -> frozenset[tuple[int, Law]]:
     return frozenset((k, law) for k, law in free if law == worst)
 
 
-def _named(made: PostResult, job: Job) -> Iterator[tuple[int, Law]]:
+def _named(made: PostResult, job: Job) -> Iterator[tuple[int, InterpolationMode]]:
     """(operation, mode) of the blocks that errors name, by line of the CL file."""
     errors = [d for d in made.diagnostics if d.severity is Severity.ERROR]
     lines = np.array(sorted({line for d in errors for line in d.lines}), dtype=np.int64)
@@ -118,10 +119,10 @@ def _each_alone(made: PostResult) -> Iterator[Refused]:
             yield frozenset((k, other) for k in _auto(modes) for other in _LAWS if other != law)
 
 
-def _said(first: PostResult, made: PostResult, why: dict[tuple[int, Law], Diagnostic]) -> PostResult:
+def _said(first: PostResult, made: PostResult, why: dict[tuple[int, InterpolationMode], Diagnostic]) -> PostResult:
     """With a warning for each mode that another was taken for: operations, both modes, the reason."""
     assert first.job is not None and made.job is not None
-    path, groups = made.toolpath, dict[tuple[Law, Law], list[int]]()
+    path, groups = made.toolpath, dict[tuple[InterpolationMode, InterpolationMode], list[int]]()
     pairs = zip(_assigned(first), _assigned(made), strict=True)
     for before, after in pairs:
         for k, (old, new) in enumerate(zip(before, after, strict=True)):
@@ -143,7 +144,7 @@ def _said(first: PostResult, made: PostResult, why: dict[tuple[int, Law], Diagno
     return made.with_found(found)
 
 
-def _in_use(made: PostResult) -> set[tuple[int, Law]]:
+def _in_use(made: PostResult) -> set[tuple[int, InterpolationMode]]:
     """(operation, mode) of all blocks that are on the path."""
     assert made.path is not None and made.job is not None
     path = made.path

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from postproc.base.options import Options
-from postproc.orientation.passes.rounds import Progress
+from postproc.orientation.passes.parallel_map import Progress
 from postproc.orientation.plans.choice import OrientationChoice
 from postproc.orientation.plans.orient import bettered, planned_choice, unsolved
 from postproc.pipeline.proved_axes import proved

@@ -11,10 +11,10 @@ from postproc.base.version import VERSION
 from postproc.compile.program import Program
 from postproc.control.modes import table_axes
 from postproc.job.job import Job
-from postproc.pipeline.stage_values import Compiled
+from postproc.pipeline.stage_values import CompiledStage
 
 
-def header_lines(made: Compiled) -> list[str]:
+def header_lines(made: CompiledStage) -> list[str]:
     """The head of the program of a conversion that is compiled."""
     job, machine = made.job, made.machine
     letters = zip(machine.axis_names, job.control.work_offset, strict=True)
@@ -39,7 +39,7 @@ def header_lines(made: Compiled) -> list[str]:
     return header
 
 
-def _tip_frame(made: Compiled) -> list[str]:
+def _tip_frame(made: CompiledStage) -> list[str]:
     """What is relied on where the frame of the tip's mode is not known for turned tables."""
     mode, control = made.controller.modes.tcp, made.job.control
     if mode is None or mode.frame == "table" or all(s.law != "tcp" for s in made.program.sections):
@@ -78,7 +78,7 @@ def _tools(job: Job) -> list[str]:
     return list(found.values())
 
 
-def _orientations(made: Compiled) -> list[str]:
+def _orientations(made: CompiledStage) -> list[str]:
     """Header lines that say which tool axes were chosen."""
     if made.choice is None:
         return []
@@ -87,7 +87,7 @@ def _orientations(made: Compiled) -> list[str]:
     return header(made.choice, made.options.orient)
 
 
-def _corrections(made: Compiled) -> list[str]:
+def _corrections(made: CompiledStage) -> list[str]:
     """Header lines that say who corrects geometric errors."""
     if made.job.errors is None:
         return []

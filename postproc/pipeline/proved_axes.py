@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from postproc.base.options import Orientation
-from postproc.orientation.passes.passes import Work
-from postproc.orientation.plans.choice import OrientationChoice, Proof
+from postproc.orientation.passes.passes import PassContext
+from postproc.orientation.plans.choice import OrientationChoice, PlanProof
 from postproc.orientation.plans.plans import OrientationPlan, plans_of
 from postproc.pipeline.result import PostResult
 from toolpaths.arrays import Ints
@@ -48,7 +48,7 @@ class Proved:
     def of(cls, choice: OrientationChoice, plan: Orientation, convert: Convert) -> Proved:
         """The choice with its program as `convert` makes it."""
         program = convert(choice)
-        return cls(replace(choice, proof=Proof(plan, program.controller_name, program.ok)), program)
+        return cls(replace(choice, proof=PlanProof(plan, program.controller_name, program.ok)), program)
 
 
 def proved(choice: OrientationChoice, plan: Orientation, convert: Convert) -> tuple[Proved, list[Diagnostic]]:
@@ -107,15 +107,15 @@ def _blame(choice: OrientationChoice, program: PostResult) -> _Blame:
     return _Blame(ways, passes, errors[0].message + (f" (line {errors[0].lines[0]})" if errors[0].lines else ""), False)
 
 
-def _touched(work: Work, program: PostResult) -> _Blame:
+def _touched(work: PassContext, program: PostResult) -> _Blame:
     """Every way and pass on which a tool touches something."""
     from postproc.collision.program import touching_parts
-    from postproc.readback.execution.poses import Executed, poses_before
+    from postproc.readback.execution.poses import BlockPoses, poses_before
 
     job, comparison = program.job, program.comparison
     assert job is not None and comparison is not None and comparison.executed is not None
     motion, moves = comparison.executed[1], job.moves.without_pecks()
-    executed = Executed(job.control, job.kinematics_of, job.register_lengths(), poses_before(motion, job.control))
+    executed = BlockPoses(job.control, job.kinematics_of, job.register_lengths(), poses_before(motion, job.control))
     serves = np.minimum(comparison.owner, len(moves) - 1)
     first = np.append(True, np.diff(moves.row) != 0)[serves]
     part = np.where(comparison.owner < len(moves), _parts(work, moves.row[serves], first), len(work.passes))
@@ -125,7 +125,7 @@ def _touched(work: Work, program: PostResult) -> _Blame:
     return _Blame(ways, passes, f"{touched[worst]} {_where(work, worst)}", True)
 
 
-def _parts(work: Work, rows: Ints, first: Ints | bool = True) -> Ints:
+def _parts(work: PassContext, rows: Ints, first: Ints | bool = True) -> Ints:
     """Parts (K,) of a program by rows of the CL path: n >= 0 for the way to pass n, which serves its first row (`first`: the
     first move of a row), -1 - n inside it."""
     begins = work.moves.row[[one.rows[0] for one in work.passes]]
@@ -138,7 +138,7 @@ def _split(parts: Ints) -> tuple[frozenset[int], frozenset[int]]:
     return frozenset(parts[parts >= 0].tolist()), frozenset((-1 - parts[parts < 0]).tolist())
 
 
-def _where(work: Work, part: int) -> str:
+def _where(work: PassContext, part: int) -> str:
     """Part of a program in words."""
     if part == len(work.passes):
         return "on the way home"

@@ -12,7 +12,7 @@ from postproc.compile.program import Program
 from postproc.control.modes import Refused
 from postproc.controllers.model import ControllerFile
 from postproc.job.job import Job
-from postproc.path.model import Path
+from postproc.path.model import JointPath
 from postproc.planning.planned import PlannedMotion
 from postproc.readback.comparison.compare import Comparison
 from postproc.reference.moves import Moves
@@ -21,8 +21,8 @@ from toolpaths.diagnostics import Diagnostic, has_errors
 from toolpaths.toolpath import ClSource, Toolpath
 
 if TYPE_CHECKING:
-    from postproc.correction.compensation import Compensation
-    from postproc.correction.formatted import AfterFormatting
+    from postproc.correction.compensation import ErrorCorrection
+    from postproc.correction.written_deviation import AfterFormatting
     from postproc.orientation.plans.choice import OrientationChoice
     from postproc.witness.evidence import Testimony
 
@@ -43,10 +43,10 @@ class PostResult:
     job: Job | None = None
     moves: Moves | None = None
     """that are written: those of `job`, with --smooth moved"""
-    path: Path | None = None
-    nominal: Path | None = None
+    path: JointPath | None = None
+    nominal: JointPath | None = None
     """the path before geometric errors are corrected, where they are"""
-    compensation: Compensation | None = None
+    compensation: ErrorCorrection | None = None
     program: Program | None = None
     feeds: Feeds | None = None
     motion: PlannedMotion | None = None

@@ -17,9 +17,9 @@ from toolpaths.diagnostics import Diagnostic, Severity, info, warning
 from toolpaths.smoothing.smooth import Tolerance
 from toolpaths.units import DEG
 
-Left = frozenset[tuple[int, int]]
+ExcludedPasses = frozenset[tuple[int, int]]
 """passes that are not smoothed, as `Smoothed.ranges`"""
-Staged = Callable[[PostResult, Left], PostResult]
+Staged = Callable[[PostResult, ExcludedPasses], PostResult]
 """A conversion without smoothing of some passes"""
 GRAIN = 2e-3, 2e-5
 """mm, rad: least of what a written point must be nearer to its own CL point than to its neighbours"""
@@ -28,7 +28,7 @@ TURNS = 2
 _SHOWN = 6
 
 
-def written_moves(job: Job, shares: dict[str, float], left: Left = frozenset()) -> tuple[Moves, list[Diagnostic]]:
+def written_moves(job: Job, shares: dict[str, float], left: ExcludedPasses = frozenset()) -> tuple[Moves, list[Diagnostic]]:
     """The moves that are written: those of the CL file, with --smooth moved within their share of the tolerance."""
     if not job.options.smooth:
         return job.moves, []
@@ -36,7 +36,7 @@ def written_moves(job: Job, shares: dict[str, float], left: Left = frozenset()) 
     return made.moves, _staying(job, made)
 
 
-def _smoothed(job: Job, shares: dict[str, float], left: Left) -> Smoothed:
+def _smoothed(job: Job, shares: dict[str, float], left: ExcludedPasses) -> Smoothed:
     bound = job.rounding
     return smoothed_moves(job.moves, Tolerance(shares["points"], shares["axis_points"] * DEG),
                           stops_of(job.toolpath, job.moves),
@@ -57,7 +57,7 @@ def _staying(job: Job, made: Smoothed) -> list[Diagnostic]:
 def with_passes_taken_back(result: PostResult, staged: Staged) -> PostResult:
     """A conversion with --smooth: where an error stands against it, again without smoothing the passes that it names, and
     then without any, so that what can be converted without --smooth can be with it."""
-    left: Left = frozenset()
+    left: ExcludedPasses = frozenset()
     for turn in range(TURNS + 1):
         made = staged(result, left)
         job, shares = made.job, made.shares
@@ -73,7 +73,7 @@ def with_passes_taken_back(result: PostResult, staged: Staged) -> PostResult:
     raise AssertionError("the last turn returns")
 
 
-def _plain(result: PostResult, staged: Staged, failed: PostResult, passes: Left) -> PostResult:
+def _plain(result: PostResult, staged: Staged, failed: PostResult, passes: ExcludedPasses) -> PostResult:
     """Without --smooth; the failure of the smoothed program where that fails no less."""
     job = failed.job
     if job is None or not passes:

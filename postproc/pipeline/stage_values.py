@@ -15,9 +15,9 @@ from postproc.compile.program import Program
 from postproc.control.modes import Refused
 from postproc.controllers.model import ControllerFile
 from postproc.job.job import Job
-from postproc.path.model import Path
-from postproc.path.rewinds import Drawing
-from postproc.pipeline.smoothed_stages import Left
+from postproc.path.model import JointPath
+from postproc.path.rewinds import RetractPlan
+from postproc.pipeline.smoothed_stages import ExcludedPasses
 from postproc.planning.planned import PlannedMotion
 from postproc.readback.comparison.compare import Comparison
 from postproc.reference.moves import Moves
@@ -26,14 +26,14 @@ from toolpaths.diagnostics import Diagnostic
 from toolpaths.toolpath import ClSource, Toolpath
 
 if TYPE_CHECKING:
-    from postproc.correction.compensation import Compensation
-    from postproc.correction.formatted import AfterFormatting
+    from postproc.correction.compensation import ErrorCorrection
+    from postproc.correction.written_deviation import AfterFormatting
     from postproc.orientation.plans.choice import OrientationChoice
     from postproc.witness.evidence import Testimony
 
 
 @dataclass(frozen=True)
-class Begun:
+class BegunStage:
     """A conversion before its first stage; `left`: passes that --smooth leaves; `refused`: output
     modes that "auto" passes over; `diagnostics`: of all stages so far."""
 
@@ -47,63 +47,63 @@ class Begun:
     choice: OrientationChoice | None
     source: ClSource | None
     asked: SetupFile | None
-    left: Left
+    left: ExcludedPasses
     refused: Refused
 
 
 @dataclass(frozen=True)
-class Prepared(Begun):
+class PreparedStage(BegunStage):
     """Records spelt out, output modes known: the moves that everything is compared with."""
 
     job: Job
 
 
 @dataclass(frozen=True)
-class Shared(Prepared):
+class SharedStage(PreparedStage):
     """The tolerance shared out: mm, `axis_` in degrees."""
 
     shares: dict[str, float]
 
 
 @dataclass(frozen=True)
-class Placed(Shared):
+class PlacedStage(SharedStage):
     """The moves that are written, and how the tool is drawn back for rewinds."""
 
     moves: Moves
-    drawing: Drawing
+    drawing: RetractPlan
 
 
 @dataclass(frozen=True)
-class Solved(Placed):
+class SolvedStage(PlacedStage):
     """Joints, linking moves, points between: the path in blocks."""
 
-    path: Path
+    path: JointPath
 
 
 @dataclass(frozen=True)
-class Corrected(Solved):
+class CorrectedStage(SolvedStage):
     """`path` on the machine with its geometric errors; `nominal` as it was, both None where none are corrected."""
 
-    nominal: Path | None
-    compensation: Compensation | None
+    nominal: JointPath | None
+    compensation: ErrorCorrection | None
 
 
 @dataclass(frozen=True)
-class Checked(Corrected):
+class CheckedStage(CorrectedStage):
     """Least and greatest position by axis letter."""
 
     extents: dict[str, tuple[float, float]]
 
 
 @dataclass(frozen=True)
-class Planned(Checked):
+class PlannedStage(CheckedStage):
     """Motion within the limits of the axes; None without --feed planned."""
 
     motion: PlannedMotion | None
 
 
 @dataclass(frozen=True)
-class Compiled(Planned):
+class CompiledStage(PlannedStage):
     """Canonical words and feeds."""
 
     program: Program
@@ -111,7 +111,7 @@ class Compiled(Planned):
 
 
 @dataclass(frozen=True)
-class Written(Compiled):
+class WrittenStage(CompiledStage):
     """The text of the program, and of its subprograms in files of their own by file name."""
 
     text: str
@@ -119,7 +119,7 @@ class Written(Compiled):
 
 
 @dataclass(frozen=True)
-class Verified(Written):
+class VerifiedStage(WrittenStage):
     """What the program does as it was read back; None where it could not be executed."""
 
     comparison: Comparison | None
@@ -127,9 +127,9 @@ class Verified(Written):
     after_formatting: AfterFormatting | None
 
 
-_Value = TypeVar("_Value", bound=Begun)
+_Value = TypeVar("_Value", bound=BegunStage)
 
 
-def handed_on(kind: type[_Value], made: Begun, **more: object) -> _Value:
+def handed_on(kind: type[_Value], made: BegunStage, **more: object) -> _Value:
     """A stage's value: that of the stage before with more fields, or other ones."""
     return kind(**(vars(made) | more))

@@ -12,11 +12,11 @@ from typing import Any
 
 from postproc.compile.compile import compile_program, writing_of
 from postproc.compile.cycle_refusals import only_canned
-from postproc.compile.feed import Planned as PlannedFeeds
+from postproc.compile.feed import PlannedTimes as PlannedFeeds
 from postproc.compile.word_rows import block_tools
 from postproc.job.job import Job, prepare
 from postproc.path.build import build_path
-from postproc.path.model import Path
+from postproc.path.model import JointPath
 from postproc.path.reach import check_reach
 from postproc.path.rewinds import drawing_of
 from postproc.path.singular import check_singular
@@ -24,26 +24,26 @@ from postproc.path.travel import check_travel
 from postproc.pipeline.program_header import header_lines
 from postproc.pipeline.program_lines import with_cl_lines
 from postproc.pipeline.result import PostResult, shared_fields
-from postproc.pipeline.smoothed_stages import Left, written_moves
+from postproc.pipeline.smoothed_stages import ExcludedPasses, written_moves
 from postproc.pipeline.stage_values import (
-    Begun,
-    Checked,
-    Compiled,
-    Corrected,
-    Placed,
-    Planned,
-    Prepared,
-    Shared,
-    Solved,
-    Verified,
-    Written,
+    BegunStage,
+    CheckedStage,
+    CompiledStage,
+    CorrectedStage,
+    PlacedStage,
+    PlannedStage,
+    PreparedStage,
+    SharedStage,
+    SolvedStage,
+    VerifiedStage,
+    WrittenStage,
     handed_on,
 )
 from postproc.pipeline.tolerance_shares import tolerance_shares
 from postproc.planning.pass_geometry import stops_of
 from postproc.planning.planned import PlannedMotion, Source, planned_motion
 from postproc.planning.planned_errors import PlannedCorrection, on_written, planned_correction
-from postproc.readback.comparison.slow import with_fingerprint
+from postproc.readback.comparison.slow_moves import with_fingerprint
 from postproc.reference.moves import Moves
 from postproc.setup.model import SetupFile
 from postproc.setup.system import with_system
@@ -57,7 +57,7 @@ from toolpaths.smoothing.smooth import Tolerance
 from toolpaths.units import DEG
 
 Progress = Callable[[str, int, int], None]
-Found = list[Diagnostic]
+DiagnosticList = list[Diagnostic]
 _STRETCH = 1_000_000
 """characters of a program that are looked at together"""
 
@@ -72,12 +72,12 @@ class Stage:
 
     name: str
     does: str
-    run: Callable[[Any, Progress | None], tuple[Begun, Found]]
+    run: Callable[[Any, Progress | None], tuple[BegunStage, DiagnosticList]]
 
 
-def staged(result: PostResult, progress: Progress | None = None, left: Left = frozenset()) -> PostResult:
+def staged(result: PostResult, progress: Progress | None = None, left: ExcludedPasses = frozenset()) -> PostResult:
     """A conversion through all stages, up to the first that finds an error; `left`: passes that --smooth leaves."""
-    made: Any = Begun(**shared_fields(Begun, result), left=left)
+    made: Any = BegunStage(**shared_fields(BegunStage, result), left=left)
     for stage in STAGES:
         made, found = stage.run(made, progress)
         result = replace(_recorded(result, made, found), reached=stage.name)
@@ -87,23 +87,23 @@ def staged(result: PostResult, progress: Progress | None = None, left: Left = fr
     return replace(result, text=made.text, files=made.files)
 
 
-def _recorded(result: PostResult, made: Begun, found: Found) -> PostResult:
+def _recorded(result: PostResult, made: BegunStage, found: DiagnosticList) -> PostResult:
     """With what a stage has handed on; the text only stands in it at the end."""
     known = shared_fields(PostResult, made)
     return result.with_found(found, **{name: known[name] for name in known.keys() - {"text", "files", "diagnostics"}})
 
 
-def prepared(begun: Begun, progress: Progress | None) -> tuple[Begun | Prepared, Found]:
+def prepared(begun: BegunStage, progress: Progress | None) -> tuple[BegunStage | PreparedStage, DiagnosticList]:
     """Records, tools, cycles, output modes and linking moves of the path, as the machine and the control take them."""
     options = begun.options
     job, found = prepare(begun.toolpath, begun.machine, begun.controller, begun.setup, options, begun.refused)
     found = [*found, *_bad_meshes(begun.setup, options.setup)]
     if job is None:
         return begun, found
-    return handed_on(Prepared, begun, job=job, toolpath=begun.toolpath if has_errors(found) else job.toolpath), found
+    return handed_on(PreparedStage, begun, job=job, toolpath=begun.toolpath if has_errors(found) else job.toolpath), found
 
 
-def _bad_meshes(setup: SetupFile, file: str) -> Found:
+def _bad_meshes(setup: SetupFile, file: str) -> DiagnosticList:
     """Errors in the meshes of a set-up, told before anything is planned."""
     if setup.bodies is None:
         return []
@@ -112,35 +112,35 @@ def _bad_meshes(setup: SetupFile, file: str) -> Found:
     return mesh_errors(setup, file)
 
 
-def shared(made: Prepared, progress: Progress | None) -> tuple[Shared, Found]:
+def shared(made: PreparedStage, progress: Progress | None) -> tuple[SharedStage, DiagnosticList]:
     """The tolerance shared out."""
     shares, found = tolerance_shares(made.job)
-    return handed_on(Shared, made, shares=shares), found
+    return handed_on(SharedStage, made, shares=shares), found
 
 
-def placed(made: Shared, progress: Progress | None) -> tuple[Placed, Found]:
+def placed(made: SharedStage, progress: Progress | None) -> tuple[PlacedStage, DiagnosticList]:
     """The moves that are written, with --smooth moved; how the tool is drawn back."""
     job = made.job
     moves, found = written_moves(job, made.shares, made.left)
     drawing, more = drawing_of(job.setup, job.placement, job.space, job.machine, made.options.setup or made.toolpath.file)
-    return handed_on(Placed, made, moves=moves, drawing=drawing), [*found, *more]
+    return handed_on(PlacedStage, made, moves=moves, drawing=drawing), [*found, *more]
 
 
-def solved(made: Placed, progress: Progress | None) -> tuple[Placed | Solved, Found]:
+def solved(made: PlacedStage, progress: Progress | None) -> tuple[PlacedStage | SolvedStage, DiagnosticList]:
     """Joints of every run, linking moves between them, points between."""
     job, shares = made.job, made.shares
     path, found = build_path(job.modes, job.kinematics, made.moves, job.space, job.home_rows(), job.operation,
                              shares["linearising"], shares["axis_linearising"] * DEG, made.toolpath.file, progress,
                              made.drawing)
     found = with_system(found, job.work_system, job.placement)
-    return (made if path is None else handed_on(Solved, made, path=path)), found
+    return (made if path is None else handed_on(SolvedStage, made, path=path)), found
 
 
-def corrected(made: Solved, progress: Progress | None) -> tuple[Solved | Corrected, Found]:
+def corrected(made: SolvedStage, progress: Progress | None) -> tuple[SolvedStage | CorrectedStage, DiagnosticList]:
     """The path on the machine with its geometric errors, where it is inside travel without."""
     job, path = made.job, made.path
     if job.errors is None or job.errors.corrected_by != "post":
-        return handed_on(Corrected, made, nominal=None, compensation=None), []
+        return handed_on(CorrectedStage, made, nominal=None, compensation=None), []
     from postproc.correction.compensation import compensate
 
     options, file, moves = made.options, made.toolpath.file, made.moves
@@ -153,27 +153,27 @@ def corrected(made: Solved, progress: Progress | None) -> tuple[Solved | Correct
                                        only_canned(job.toolpath, job.controller), options.error_beyond, file)
     if better is None:
         return made, found
-    return handed_on(Corrected, made, path=better, nominal=path, compensation=report), found
+    return handed_on(CorrectedStage, made, path=better, nominal=path, compensation=report), found
 
 
-def checked(made: Corrected, progress: Progress | None) -> tuple[Checked, Found]:
+def checked(made: CorrectedStage, progress: Progress | None) -> tuple[CheckedStage, DiagnosticList]:
     """Travel, reach, distance from singular positions."""
     job, path, file = made.job, made.path, made.toolpath.file
     found, extents = check_travel(path, job.moves, job.control, job.kinematics, file)
     found += check_reach(path, job.moves, job.control, file)
     found += check_singular(path, job.moves, job.control, job.setup.joints.singular_distance, file)
-    return handed_on(Checked, made, extents=extents), with_system(found, job.work_system, job.placement)
+    return handed_on(CheckedStage, made, extents=extents), with_system(found, job.work_system, job.placement)
 
 
-def planned(made: Checked, progress: Progress | None) -> tuple[Planned, Found]:
+def planned(made: CheckedStage, progress: Progress | None) -> tuple[PlannedStage, DiagnosticList]:
     """What the passes allow under the limits of the axes, with --feed planned."""
     correction = planned_correction(made.job, made.compensation, made.path)
     motion, found = plan_motion(made.job, made.moves, made.nominal or made.path, correction)
-    return handed_on(Planned, made, motion=motion), found
+    return handed_on(PlannedStage, made, motion=motion), found
 
 
-def plan_motion(job: Job, moves: Moves, path: Path,
-                correction: PlannedCorrection | None = None) -> tuple[PlannedMotion | None, Found]:
+def plan_motion(job: Job, moves: Moves, path: JointPath,
+                correction: PlannedCorrection | None = None) -> tuple[PlannedMotion | None, DiagnosticList]:
     """The motion of a path within the limits of the axes; None without --feed planned."""
     if job.options.feed != "planned":
         return None, []
@@ -182,7 +182,7 @@ def plan_motion(job: Job, moves: Moves, path: Path,
                                  job.toolpath.file, correction))
 
 
-def compiled(made: Planned, progress: Progress | None) -> tuple[Compiled, Found]:
+def compiled(made: PlannedStage, progress: Progress | None) -> tuple[CompiledStage, DiagnosticList]:
     """Canonical words, rounded, with feeds, commands, cycles and sections; what the control cannot write is refused."""
     job, motion, compensation = made.job, made.motion, made.compensation
     feeds_planned = None if motion is None else PlannedFeeds(on_written(compensation, motion.needed),
@@ -190,10 +190,10 @@ def compiled(made: Planned, progress: Progress | None) -> tuple[Compiled, Found]
     program, feeds, found = compile_program(job, made.moves, made.path, feeds_planned,
                                             None if compensation is None else compensation.apart)
     found += unwritable(made.controller, program, made.toolpath.cycles, made.toolpath.file, job.control.length_on_z)
-    return handed_on(Compiled, made, program=program, feeds=feeds), found
+    return handed_on(CompiledStage, made, program=program, feeds=feeds), found
 
 
-def written(made: Compiled, progress: Progress | None) -> tuple[Written, Found]:
+def written(made: CompiledStage, progress: Progress | None) -> tuple[WrittenStage, DiagnosticList]:
     """The text of the program, header with what made it, and of its subprograms in files of their own."""
     file, setup, shares = made.toolpath.file, made.setup, made.shares
     writer = writer_for(made.controller, made.program, made.toolpath.cycles, made.job.control.length_on_z,
@@ -202,11 +202,11 @@ def written(made: Compiled, progress: Progress | None) -> tuple[Written, Found]:
     text = writer.text(header_lines(made))
     files = {name: "\n".join(blocks) + "\n" for name, blocks in writer.files.items()}
     text, most = with_fingerprint(text, files), made.controller.format.line_length
-    return handed_on(Written, made, text=text, files=files), [
+    return handed_on(WrittenStage, made, text=text, files=files), [
         d for one in (text, *files.values()) for d in long_blocks(one, most, file)]
 
 
-def long_blocks(text: str, most: int, file: str) -> Found:
+def long_blocks(text: str, most: int, file: str) -> DiagnosticList:
     """Blocks with more characters than the controller reads."""
     long, at, before = list[tuple[int, str]](), 0, 0
     while at < len(text):
@@ -221,7 +221,7 @@ def long_blocks(text: str, most: int, file: str) -> Found:
                   f"{most}: {line[:60]}", file=file, count=len(long), hint="format.line_length of the controller file")]
 
 
-def verified(made: Written, progress: Progress | None) -> tuple[Verified, Found]:
+def verified(made: WrittenStage, progress: Progress | None) -> tuple[VerifiedStage, DiagnosticList]:
     """The text executed as the control would, held against the CL file; then by the second witness."""
     job, witness = made.job, None
     comparison, found = read_back(made.text, job, made.toolpath.file, progress,
@@ -231,16 +231,16 @@ def verified(made: Written, progress: Progress | None) -> tuple[Verified, Found]
     if comparison is not None and not has_errors(found):
         witness, more = second_witness(made.source, made.asked or made.setup, made.options, job, comparison)
         found = [*found, *more]
-    value = handed_on(Verified, made, comparison=comparison, witness=witness, after_formatting=None)
+    value = handed_on(VerifiedStage, made, comparison=comparison, witness=witness, after_formatting=None)
     if made.compensation is None:
         return value, found
-    from postproc.verification.errors_left import after_formatting, beyond_bound
+    from postproc.verification.residual_errors import after_formatting, beyond_bound
 
     left = after_formatting(value)
     return replace(value, after_formatting=left), [*found, *beyond_bound(left, job)]
 
 
-def stated(made: Verified, progress: Progress | None) -> tuple[Verified, Found]:
+def stated(made: VerifiedStage, progress: Progress | None) -> tuple[VerifiedStage, DiagnosticList]:
     """What is proved, in the head of the program: another comment in the place of the one that was read back."""
     if made.comparison is None:
         return made, []

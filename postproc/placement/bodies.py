@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from postproc.collision.bodies import Scene, scene
-from postproc.collision.form import Form
+from postproc.collision.form import ToolForm
 from postproc.collision.mesh import load_mesh
-from postproc.collision.solid import Solid, solid
+from postproc.collision.solid import TriangleSolid, solid
 from postproc.orientation.passes.pass_bodies import PassBodies, forms_of
-from postproc.orientation.passes.passes import Work
-from postproc.setup.bodies import Bodies
-from postproc.setup.bodies import Solid as Given
+from postproc.orientation.passes.passes import PassContext
+from postproc.setup.bodies import BodiesModel
+from postproc.setup.bodies import SolidModel as Given
 from postproc.setup.model import Placement, SetupFile
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic, has_errors
@@ -36,7 +36,7 @@ _HERE = Placement(np.eye(3), np.zeros(3))
 
 
 @dataclass(frozen=True)
-class Beside:
+class StationaryBodies:
     """Bodies that do not move, beside the part and the tools.
 
     Attributes:
@@ -46,8 +46,8 @@ class Beside:
     """
 
     standing: Scene
-    part: dict[str, tuple[Trimesh, Solid]]
-    forms: dict[int, Form]
+    part: dict[str, tuple[Trimesh, TriangleSolid]]
+    forms: dict[int, ToolForm]
 
     def against(self, placement: Placement) -> str:
         """Which body the part stands in, "" where it stands free."""
@@ -66,7 +66,7 @@ class Beside:
                     return f"{name} stands in {body.name}"
         return ""
 
-    def tool(self, work: Work) -> str:
+    def tool(self, work: PassContext) -> str:
         """What the tools would touch on the passes of `work` with the axes of the file."""
         beside = PassBodies(work, self.standing, self.forms)
         return next((why for one in work.passes if (why := beside.touching(one, one.axis))), "")
@@ -90,7 +90,7 @@ def _manager(meshes: dict[str, Trimesh]) -> Any:
     return manager
 
 
-def beside(work: Work, file: str) -> tuple[Beside | None, list[Diagnostic]]:
+def beside(work: PassContext, file: str) -> tuple[StationaryBodies | None, list[Diagnostic]]:
     """The bodies of the set-up `file` that do not move with the part; None where there are none, or a mesh is no good."""
     given = work.setup.bodies
     if given is None:
@@ -106,14 +106,14 @@ def beside(work: Work, file: str) -> tuple[Beside | None, list[Diagnostic]]:
     if has_errors(faults):
         return None, faults
     part = {name: (_drawn_in(mesh), solid(mesh, _HERE)) for name, mesh in moving.items()}
-    return Beside(standing, part, forms), []
+    return StationaryBodies(standing, part, forms), []
 
 
-def _with(setup: SetupFile, bodies: Bodies) -> SetupFile:
+def _with(setup: SetupFile, bodies: BodiesModel) -> SetupFile:
     return setup.model_copy(update={"bodies": bodies})
 
 
-def _moving(given: Bodies, folder: Path) -> tuple[dict[str, Trimesh], list[Diagnostic]]:
+def _moving(given: BodiesModel, folder: Path) -> tuple[dict[str, Trimesh], list[Diagnostic]]:
     """Meshes in the part frame by name: the part, and the fixtures that stand with it."""
     import trimesh
 

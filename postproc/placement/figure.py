@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from postproc.placement.place import PlacementChoice
+from postproc.placement.place_times import TimedPlace
 from postproc.placement.region import region_of
 from postproc.placement.space import ANGLES, NAMES
-from postproc.placement.timed import Tried
 from toolpaths.arrays import Floats
 from toolpaths.drawing import BESIDE, image
 from toolpaths.units import DEG
@@ -105,7 +105,7 @@ def _spread(choice: PlacementChoice, k: int) -> float:
     return (dim.high - dim.low) * (200.0 / (2.0 * np.pi) if k >= ANGLES else 1.0)
 
 
-def _points(place: Any, tried: list[Tried], across: int, up: int | None, **how: Any) -> Any:
+def _points(place: Any, tried: list[TimedPlace], across: int, up: int | None, **how: Any) -> Any:
     at = np.array([one.place for one in tried]).reshape(-1, len(NAMES))
     if not len(at):
         return None

@@ -12,13 +12,13 @@ from machines.machine import Machine
 from postproc.base.options import Options
 from postproc.controllers.model import load_controller
 from postproc.job.job import prepare
-from postproc.orientation.passes.passes import Work, work_of
+from postproc.orientation.passes.passes import PassContext, work_of
 from postproc.path.links import safe_space
 from postproc.placement.bodies import beside
-from postproc.placement.oriented import OrientedTimer
-from postproc.placement.search import Found, Progress, Search
+from postproc.placement.oriented_times import OrientedTimer
+from postproc.placement.place_times import TimedPlace, Timer
+from postproc.placement.search import FoundPlaces, PlaceSearch, Progress
 from postproc.placement.space import ANGLES, Space, space_of
-from postproc.placement.timed import Timer, Tried
 from postproc.setup.model import PartPlacement, SetupFile, part_placement
 from postproc.setup.system import standing
 from toolpaths.diagnostics import Diagnostic, error, has_errors, info, require, warning
@@ -47,15 +47,15 @@ class PlacementChoice:
             alone, and where the part cannot stand
     """
 
-    work: Work
+    work: PassContext
     space: Space
-    found: Found
-    best: Tried
+    found: FoundPlaces
+    best: TimedPlace
     planned: int
     looked: int
     pruned: int
     refused: int
-    known: tuple[Tried, ...]
+    known: tuple[TimedPlace, ...]
     program: tuple[float, float]
     """seconds of the program at [part] and at the best place; NaN where it cannot be written"""
 
@@ -87,11 +87,11 @@ def place(toolpath: Toolpath, machine: Machine, setup: SetupFile, options: Optio
         return None, found
     timer: Timer = Timer(work, space, setup.joints.singular_distance, bodies)
     try:
-        search = Search(timer, space, progress)
+        search = PlaceSearch(timer, space, progress)
         result = search.run()
         if options.orient != "keep":
             timer = OrientedTimer(work, space, setup, options, bodies)
-            result = replace(Search(timer, space, progress).among(_likely(search)), lacks=result.lacks,
+            result = replace(PlaceSearch(timer, space, progress).among(_likely(search)), lacks=result.lacks,
                              attitudes=result.attitudes, screened=result.screened)
     except (ValueError, ArithmeticError) as fault:
         return None, [*found, error("place.plan", f"no motion could be planned: {fault}", file=toolpath.file)]
@@ -118,7 +118,7 @@ def place(toolpath: Toolpath, machine: Machine, setup: SetupFile, options: Optio
                            tuple(timer.known()), program), [*found, *more]
 
 
-def _lifted(space: Space, best: Tried, file: str) -> list[Diagnostic]:
+def _lifted(space: Space, best: TimedPlace, file: str) -> list[Diagnostic]:
     """What must go under a part that is placed higher than it stands, or come away where it is lower."""
     here, there = (space.placement(place).points(space.corners)[:, 2].min() for place in (space.now, best.place))
     lift = float(there - here)
@@ -131,7 +131,7 @@ def _lifted(space: Space, best: Tried, file: str) -> list[Diagnostic]:
 
 
 def _begun(toolpath: Toolpath, machine: Machine, setup: SetupFile, options: Options,
-           controller: str | Path) -> tuple[Work | None, Space | None, list[Diagnostic]]:
+           controller: str | Path) -> tuple[PassContext | None, Space | None, list[Diagnostic]]:
     """The passes with the part frame on the table frame, and the places that are allowed."""
     spec, found = load_controller(controller)
     require(found)
@@ -154,7 +154,7 @@ def _begun(toolpath: Toolpath, machine: Machine, setup: SetupFile, options: Opti
     return work, space, found
 
 
-def _likely(search: Search) -> list[Tried]:
+def _likely(search: PlaceSearch) -> list[TimedPlace]:
     """Places to choose tool axes at: the best of each attitude with the axes of the file; where these cannot be run, the
     middle of what is allowed."""
     space = search.space
@@ -168,7 +168,7 @@ def _likely(search: Search) -> list[Tried]:
     return found
 
 
-def _nowhere(result: Found, timer: Timer, options: Options) -> Diagnostic:
+def _nowhere(result: FoundPlaces, timer: Timer, options: Options) -> Diagnostic:
     """Why the part can stand nowhere: the attitude that lacks least."""
     known = [lack for lack in result.lacks if np.isfinite(lack[1])]
     if known:
@@ -190,7 +190,7 @@ class _Proof:
         self.controller, self.space, self.progress = controller, space, progress
         self.done: dict[int, tuple[float, Diagnostic | None]] = {}
 
-    def of(self, one: Tried) -> tuple[float, Diagnostic | None]:
+    def of(self, one: TimedPlace) -> tuple[float, Diagnostic | None]:
         """Seconds of the program there (NaN where none is written), and the worst that stands against it."""
         from postproc.pipeline.convert import convert
         from postproc.placement.program import program_seconds
@@ -202,18 +202,18 @@ class _Proof:
             self.done[id(one)] = program_seconds(result), why
         return self.done[id(one)]
 
-    def seconds(self, one: Tried) -> float:
+    def seconds(self, one: TimedPlace) -> float:
         """Of the program there; NaN where the part cannot stand there."""
         return np.nan if one.refused else self.of(one)[0]
 
 
-def _proved(proof: _Proof, timer: Timer, best: Tried, now: Tried) -> tuple[Tried | None, list[Diagnostic]]:
+def _proved(proof: _Proof, timer: Timer, best: TimedPlace, now: TimedPlace) -> tuple[TimedPlace | None, list[Diagnostic]]:
     """The best place whose conversion is proved; what stood against better ones is told.
 
     After a failure come in turn the place farthest from all that failed and the fastest that is left: what stands against
     one place (a link that leaves the workspace) stands against its neighbours too. At last the part may stay where it is.
     """
-    failed: list[tuple[Tried, Diagnostic]] = []
+    failed: list[tuple[TimedPlace, Diagnostic]] = []
     left = _candidates(timer, best)
     while left and len(failed) < _PROOFS:
         one = min(left, key=lambda one: -_off(one, failed)) if len(failed) % 2 else left[0]
@@ -228,18 +228,18 @@ def _proved(proof: _Proof, timer: Timer, best: Tried, now: Tried) -> tuple[Tried
                         file=failed[0][1].file, lines=failed[0][1].lines, hint=failed[0][1].hint)]
 
 
-def _candidates(timer: Timer, best: Tried) -> list[Tried]:
+def _candidates(timer: Timer, best: TimedPlace) -> list[TimedPlace]:
     """The best, then all others that are timed, in order."""
     good = [one for one in timer.known() if np.isfinite(one.seconds) and timer.space.holds(one.place) and one is not best]
     return [best, *sorted(good, key=lambda one: one.seconds)]
 
 
-def _off(one: Tried, failed: list[tuple[Tried, Diagnostic]]) -> float:
+def _off(one: TimedPlace, failed: list[tuple[TimedPlace, Diagnostic]]) -> float:
     """Least distance from places that failed, 1 where they count as another place."""
     scale = np.repeat(_APART, ANGLES)
     return min((float((np.abs(one.place - other.place) / scale).max()) for other, _ in failed), default=np.inf)
 
 
-def _passed_over(one: Tried, why: Diagnostic, options: Options) -> Diagnostic:
+def _passed_over(one: TimedPlace, why: Diagnostic, options: Options) -> Diagnostic:
     return info("place.passed_over", f"a place of {one.seconds:.3f} s was passed over, its conversion fails: {why.message}",
                 file=options.setup)

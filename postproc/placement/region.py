@@ -18,11 +18,11 @@ from machines.kinematics.base import Kinematics
 from machines.machine import Machine
 from machines.singular_distance import NAMES as SINGULAR
 from machines.singular_distance import has_singular_distance, singular_distance
-from postproc.orientation.candidates.timed import Turned, turned
-from postproc.orientation.passes.passes import Work
-from postproc.orientation.plans.turns import ends
+from postproc.orientation.candidates.candidate_times import Candidate, turned
+from postproc.orientation.passes.passes import PassContext
+from postproc.orientation.plans.index_time import ends
 from postproc.path.reach import is_checked
-from postproc.placement.moved import moved
+from postproc.placement.rigid_move import moved
 from postproc.placement.space import ANGLES, Space
 from toolpaths.arrays import Floats, Ints
 from toolpaths.units import DEG
@@ -111,7 +111,7 @@ class Slabs:
         return [int(k[values[k].argmin()]) for one in np.unique(key) if len(k := np.flatnonzero(key == one))]
 
 
-def region_of(work: Work, space: Space, angles: Floats, least: float) -> tuple[Region | None, str]:
+def region_of(work: PassContext, space: Space, angles: Floats, least: float) -> tuple[Region | None, str]:
     """The region of a part turned by `angles` (3,), or why there is none.
 
     Args:
@@ -132,7 +132,7 @@ def region_of(work: Work, space: Space, angles: Floats, least: float) -> tuple[R
     return _slabs(joints, work.machine, space.room(angles)), ""
 
 
-def _unbounded(work: Work) -> Work:
+def _unbounded(work: PassContext) -> PassContext:
     """The same work on a machine whose slides never end, with the least safe planes."""
     limits, slides = work.machine.limits, ~np.array(work.machine.rotary)
     free = replace(limits, lower=np.where(slides, -np.inf, limits.lower), upper=np.where(slides, np.inf, limits.upper))
@@ -140,7 +140,7 @@ def _unbounded(work: Work) -> Work:
                    space=replace(work.space, margin=_MARGIN * work.space.margin))
 
 
-def _poses(made: Turned, work: Work) -> Floats:
+def _poses(made: Candidate, work: PassContext) -> Floats:
     """Joints (N, J) of all rows and sites of a pass, and above its ends."""
     end = ends(made, work)
     return np.concatenate([made.q, *made.sites, end.above_first[None], end.above_last[None]])
@@ -267,7 +267,7 @@ class Sampled:
         return result
 
 
-def sampled(work: Work, least: float) -> Sampled:
+def sampled(work: PassContext, least: float) -> Sampled:
     """The region of a parallel machine from the poses of `work`, its point at the table's origin."""
     groups: dict[tuple[float, bytes], list[tuple[Floats, Floats]]] = {}
     kins = {one.kin.tool_length: one.kin for one in work.passes}

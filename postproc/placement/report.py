@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from postproc.placement.place import PlacementChoice
+from postproc.placement.place_times import TimedPlace
 from postproc.placement.space import ANGLES, NAMES
-from postproc.placement.timed import Tried
 from toolpaths.arrays import Floats
 from toolpaths.units import DEG
 
@@ -33,7 +33,7 @@ def as_dict(choice: PlacementChoice) -> dict[str, Any]:
                               for angles, margin, why in choice.found.lacks]}
 
 
-def _place(choice: PlacementChoice, one: Tried) -> dict[str, Any]:
+def _place(choice: PlacementChoice, one: TimedPlace) -> dict[str, Any]:
     machine = choice.work.machine
     units = np.where(machine.rotary, 1.0 / DEG, 1.0)
     margins = dict(zip(machine.axis_names, map(_finite, (one.margins(machine) * units).tolist()), strict=True))
@@ -82,7 +82,7 @@ def as_text(choice: PlacementChoice) -> str:
     return "\n".join(lines)
 
 
-def _turned(choice: PlacementChoice) -> list[Tried]:
+def _turned(choice: PlacementChoice) -> list[TimedPlace]:
     """The best place of each way to turn the part, those within a few degrees as one; the best first."""
     good = [one for one in choice.known if math.isfinite(one.seconds) and choice.space.holds(one.place)]
     kept = [choice.best]

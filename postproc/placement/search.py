@@ -10,9 +10,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from postproc.placement.place_times import TimedPlace, Timer
 from postproc.placement.region import Region, region_of
 from postproc.placement.space import ANGLES, FINE, Space
-from postproc.placement.timed import Timer, Tried
 from toolpaths.arrays import Floats
 from toolpaths.units import DEG
 
@@ -34,7 +34,7 @@ _SLACK = 1e-6
 
 
 @dataclass
-class Found:
+class FoundPlaces:
     """What a search found.
 
     Attributes:
@@ -43,27 +43,27 @@ class Found:
             anywhere), and why, of attitudes without a place
     """
 
-    now: Tried
-    best: Tried | None = None
+    now: TimedPlace
+    best: TimedPlace | None = None
     lacks: list[tuple[Floats, float, str]] = field(default_factory=list)
     attitudes: int = 0
     screened: int = 0
 
 
-class Search:
+class PlaceSearch:
     """See the module; places are looked at in an order that depends on nothing but the file and the limits."""
 
     def __init__(self, timer: Timer, space: Space, progress: Progress | None = None) -> None:
         self.timer, self.space, self.progress = timer, space, progress
         now = timer.tried(space.now)
-        self.found = Found(now, now if not now.refused and space.holds(space.now) else None)
+        self.found = FoundPlaces(now, now if not now.refused and space.holds(space.now) else None)
 
     @property
     def spent(self) -> bool:
         """True where no more places may be looked at."""
         return self.timer.looked >= self.timer.most
 
-    def run(self) -> Found:
+    def run(self) -> FoundPlaces:
         """All of it."""
         attitudes = self.space.attitudes()
         self.found.attitudes = len(attitudes)
@@ -81,7 +81,7 @@ class Search:
             self.found.best = self._roomiest(_POLISH)
         return self.found
 
-    def among(self, likely: list[Tried]) -> Found:
+    def among(self, likely: list[TimedPlace]) -> FoundPlaces:
         """The best of places that another search found likely, and compass steps from it; few, where each costs much."""
         for one in likely:
             if self.timer.looked < self.timer.most // 2:
@@ -91,7 +91,7 @@ class Search:
             self.found.best = self._roomiest(0)
         return self.found
 
-    def _look(self, place: Floats) -> Tried | None:
+    def _look(self, place: Floats) -> TimedPlace | None:
         """Time a place; it becomes the best where it is."""
         if self.spent:
             return None
@@ -151,24 +151,24 @@ class Search:
         bounds = [self.timer.tried(place, 0.0).bound for place in places if not self.spent]
         return [places[k] for k in np.argsort(bounds, kind="stable").tolist()]
 
-    def likely(self) -> list[Tried]:
+    def likely(self) -> list[TimedPlace]:
         """The best place of each attitude, the best first."""
         return self._starts(len(self.space.attitudes()), 0.0)
 
-    def _starts(self, count: int, apart: float) -> list[Tried]:
+    def _starts(self, count: int, apart: float) -> list[TimedPlace]:
         """The best place of each of the best attitudes that are more than `apart` rad from each other.
 
         A place that lost by its bound counts with that: attitudes are likely by the least time they can take.
         """
         good = sorted((one for one in self.timer.known() if not one.refused and self.space.holds(one.place)),
                       key=lambda one: one.seconds if np.isfinite(one.seconds) else one.bound)
-        taken: list[Tried] = []
+        taken: list[TimedPlace] = []
         for one in good:
             if len(taken) < count and all(np.abs(one.place - other.place)[ANGLES:].max() > apart for other in taken):
                 taken.append(one)
         return taken
 
-    def _compass(self, start: Tried) -> None:
+    def _compass(self, start: TimedPlace) -> None:
         """Steps along each coordinate, halved where none gains."""
         steps = self._first_steps()
         at = start
@@ -180,7 +180,7 @@ class Search:
             if at is before:
                 steps = 0.5 * steps
 
-    def _nearer(self, place: Floats, at: Tried) -> Tried | None:
+    def _nearer(self, place: Floats, at: TimedPlace) -> TimedPlace | None:
         """The place where it is better than `at`."""
         if self.spent:
             return None
@@ -202,7 +202,7 @@ class Search:
         finest = np.array([_FINEST[0]] * ANGLES + [_FINEST[1]] * ANGLES)
         return any(steps[k] >= finest[k] for k in self.space.free)
 
-    def _roomiest(self, left: int) -> Tried:
+    def _roomiest(self, left: int) -> TimedPlace:
         """Of the places that take as long as the best, that with most travel margin; so many more are looked at."""
         best = self.found.best
         assert best is not None

@@ -29,7 +29,7 @@ SHARE = 0.05
 ROUNDS = 6
 MANY = 50_000
 """sites that are solved together"""
-Near = Callable[[Floats], Floats]
+JointsNearby = Callable[[Floats], Floats]
 """Joints (N, J) at s (N,) that the solution must be nearest to: its branch and winding."""
 
 
@@ -99,28 +99,28 @@ class MachinePath:
 
 
 @dataclass(frozen=True)
-class Stretch:
+class PathStretch:
     """A smoothed path between two stops, s = first to last, and the joints to stay near to."""
 
     path: Smooth
     first: float
     last: float
-    near: Near
+    near: JointsNearby
 
 
-def machine_path(path: Smooth, first: float, last: float, kin: Kinematics, near: Near) -> MachinePath:
+def machine_path(path: Smooth, first: float, last: float, kin: Kinematics, near: JointsNearby) -> MachinePath:
     """The joints' spline along `path` from s = first to last, without a stop between.
 
     Raises:
         ArithmeticError: where the machine has no solution, with the s of the first such place.
     """
-    found, = machine_paths([Stretch(path, first, last, near)], kin)
+    found, = machine_paths([PathStretch(path, first, last, near)], kin)
     if isinstance(found, str):
         raise ArithmeticError(found)
     return found
 
 
-def machine_paths(stretches: list[Stretch], kin: Kinematics) -> list[MachinePath | str]:
+def machine_paths(stretches: list[PathStretch], kin: Kinematics) -> list[MachinePath | str]:
     """`machine_path` of each; what is wrong where the machine has no solution. Many short ones are solved together."""
     result: list[MachinePath | str] = [""] * len(stretches)
     at = {i: sites(one.path, one.first, one.last) for i, one in enumerate(stretches)}
@@ -167,7 +167,7 @@ def _split(values: Array, parts: list[Floats]) -> list[Array]:
     return np.split(values, np.cumsum([len(part) for part in parts])[:-1])
 
 
-def _interpolated(stretches: list[Stretch], at: list[Floats], kin: Kinematics) -> list[MachinePath | str]:
+def _interpolated(stretches: list[PathStretch], at: list[Floats], kin: Kinematics) -> list[MachinePath | str]:
     """Splines through the exact joints at sites."""
     poses = [one.path.at(s) for one, s in zip(stretches, at, strict=True)]
     tip, axis = np.concatenate([pose[0] for pose in poses]), kin.nearest_axis(np.concatenate([pose[1] for pose in poses]))

@@ -13,8 +13,8 @@ from itertools import groupby, islice, pairwise
 import numpy as np
 
 from machines.kinematics.base import Kinematics
-from postproc.path.model import TRAVERSE, Path
-from postproc.planning.geometry import MachinePath, Stretch, machine_paths
+from postproc.path.model import TRAVERSE, JointPath
+from postproc.planning.geometry import MachinePath, PathStretch, machine_paths
 from postproc.planning.planned_errors import PlannedCorrection
 from postproc.reference.moves import Moves
 from toolpaths.arrays import Floats, Ints
@@ -68,7 +68,7 @@ def chains(moves: Moves, stops: Ints) -> list[tuple[int, int]]:
     return list(zip(first.tolist(), ends.tolist(), strict=True))
 
 
-def pass_geometry(path: Path, moves: Moves, kinematics: Callable[[int], Kinematics], tolerance: Tolerance, stops: Ints,
+def pass_geometry(path: JointPath, moves: Moves, kinematics: Callable[[int], Kinematics], tolerance: Tolerance, stops: Ints,
                   sharpest: float = SHARPEST, file: str = "",
                   correction: PlannedCorrection | None = None) -> tuple[list[PassGeometry], list[Diagnostic]]:
     """All passes of a path, smoothed within `tolerance` of the moves.
@@ -108,7 +108,7 @@ def _joined(written: list[_Written]) -> Curves:
                     for name in Curves.__dataclass_fields__))
 
 
-def _blocks(path: Path, first: int, last: int) -> Ints:
+def _blocks(path: JointPath, first: int, last: int) -> Ints:
     """Cutting blocks of these moves, turns on the spot left out."""
     low, high = np.searchsorted(path.move, [first, last])
     here = np.arange(low, high)
@@ -127,7 +127,7 @@ class _Written:
     u: Floats
 
 
-def _written(path: Path, block: Ints, reference: Curves, kin: Kinematics) -> _Written:
+def _written(path: JointPath, block: Ints, reference: Curves, kin: Kinematics) -> _Written:
     """The moves' curves with the tool axes that are written; moves whose axis is led aside, block by block.
 
     Axes differ from those of the moves where these are out of reach, or near a singular direction.
@@ -161,12 +161,12 @@ class _Placed:
     smooth: Smooth
     begin: Floats
     ends: Floats
-    stretches: tuple[Stretch, ...]
+    stretches: tuple[PathStretch, ...]
     first: tuple[int, ...]
     """block of the Path that each stretch begins in"""
 
 
-def _placed(path: Path, written: _Written, found: Smooth) -> _Placed:
+def _placed(path: JointPath, written: _Written, found: Smooth) -> _Placed:
     """Where the blocks of a chain are along s, and where it stops."""
     block = written.block
     ends = found.s[written.curve] + written.u * np.diff(found.s)[written.curve]
@@ -177,7 +177,7 @@ def _placed(path: Path, written: _Written, found: Smooth) -> _Placed:
     for low, high in pairwise(cuts.tolist()):
         own = np.flatnonzero((ends > low) & (begin < high))
         near = _Near(np.append(begin[own[:1]], ends[own]), path.q[np.append(block[own[:1]] - 1, block[own])])
-        stretches.append(Stretch(found, low, high, near))
+        stretches.append(PathStretch(found, low, high, near))
         first.append(int(block[own[0]]))
     return _Placed(written, found, begin, ends, tuple(stretches), tuple(first))
 

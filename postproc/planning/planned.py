@@ -13,10 +13,10 @@ from machines.kinematics.base import Kinematics
 from machines.machine import Limits, Machine
 from postproc.feedrate.limits import JointLimits
 from postproc.feedrate.motion import Plan
-from postproc.feedrate.plan import Options, plan, plan_second_order
-from postproc.feedrate.shares import Shares
+from postproc.feedrate.plan import PlannerOptions, plan, plan_second_order
+from postproc.feedrate.shares import LimitShares
 from postproc.feedrate.trajectory import JointTrajectory
-from postproc.path.model import Path
+from postproc.path.model import JointPath
 from postproc.planning.pass_geometry import PassGeometry, pass_geometry
 from postproc.planning.planned_errors import PlannedCorrection
 from postproc.planning.steady_feed import CORNER, steady_seconds
@@ -125,7 +125,7 @@ class PlannedMotion:
         return tuple(made.trajectory() for made in self.plans)
 
     @property
-    def shares(self) -> Shares | None:
+    def shares(self) -> LimitShares | None:
         """What each limit costs, over all passes; None where nothing cuts, or the machine states no jerk."""
         known = bool(self.passes) and bool(np.isfinite(self.source.bounds.jerk).all())
         return reduce(add, (made.shares for made in self.plans)) if known else None
@@ -144,7 +144,7 @@ class Source:
     """What passes are made from: blocks, moves, machine, kinematics by tool, tolerance, rows before which it stops, and how
     geometric errors are corrected, where they are."""
 
-    path: Path
+    path: JointPath
     moves: Moves
     machine: Machine
     kinematics: Callable[[int], Kinematics]
@@ -175,7 +175,7 @@ def planned_motion(source: Source) -> tuple[PlannedMotion | None, list[Diagnosti
     return PlannedMotion(source, steady_seconds(stopping, source.bounds, len(source.path))), []
 
 
-def plan_pass(one: PassGeometry, moves: Moves, limits: JointLimits, options: Options | None = None) -> Plan:
+def plan_pass(one: PassGeometry, moves: Moves, limits: JointLimits, options: PlannerOptions | None = None) -> Plan:
     """The motion of least time along a pass, from rest to rest, stopping where its geometry does.
 
     Of second order where the machine states no jerk for some axis.

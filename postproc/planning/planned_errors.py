@@ -11,12 +11,12 @@ from machines.geometric_error.actual.correction import correct
 from machines.geometric_error.actual.model import ErrorModel
 from machines.kinematics.base import Kinematics
 from postproc.correction.error_sampling import changes
-from postproc.path.model import Path
+from postproc.path.model import JointPath
 from postproc.planning.geometry import MachinePath
 from toolpaths.arrays import Floats, Ints
 
 if TYPE_CHECKING:
-    from postproc.correction.compensation import Compensation
+    from postproc.correction.compensation import ErrorCorrection
     from postproc.job.job import Job
 
 SEEN = 3.0
@@ -37,7 +37,7 @@ class PlannedCorrection:
     """
 
     errors: ErrorModel
-    corrected: Path
+    corrected: JointPath
     owner: Ints
     axis_tolerance: float
 
@@ -78,13 +78,13 @@ class PlannedCorrection:
         return np.append(first + share * np.repeat(np.diff(one.s), count), one.s[-1])
 
 
-def planned_correction(job: Job, found: Compensation | None, path: Path) -> PlannedCorrection | None:
+def planned_correction(job: Job, found: ErrorCorrection | None, path: JointPath) -> PlannedCorrection | None:
     """How the joints of a conversion's passes are corrected, `path` being the corrected one; None where they are not."""
     if job.errors is None or found is None:
         return None
     return PlannedCorrection(job.errors, path, found.owner, job.axis_tolerance)
 
 
-def on_written(found: Compensation | None, seconds: Floats) -> Floats:
+def on_written(found: ErrorCorrection | None, seconds: Floats) -> Floats:
     """Seconds of the planned blocks on the blocks that are written; those of corrected ones are parts of nominal ones."""
     return seconds if found is None else np.asarray(seconds[found.owner] * found.part)

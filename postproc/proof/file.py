@@ -25,7 +25,7 @@ OWN = "of_this_file"
 """key of the SHA-256 of all else that the file says"""
 AGAIN = "convert again with --proof"
 Digest = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
-Figure = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
+NotNegativeFigure = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
 
 
 class _Model(BaseModel):
@@ -49,24 +49,24 @@ class Inputs(_Model):
     error_model: list[HashedFile]
 
 
-class Options(_Model):
+class ProofOptions(_Model):
     """Options that the proof depends on."""
 
-    tolerance_mm: Figure
-    axis_tolerance_deg: Figure
+    tolerance_mm: NotNegativeFigure
+    axis_tolerance_deg: NotNegativeFigure
     units: str
     dialect: str
     allow_unknown: list[str]
     orient: str
-    max_tilt_deg: Figure
+    max_tilt_deg: NotNegativeFigure
     error_model_beyond: bool
 
 
 class Deviation(_Model):
     """Of tip (mm) and axis (degrees)."""
 
-    tip_mm: Figure
-    axis_deg: Figure
+    tip_mm: NotNegativeFigure
+    axis_deg: NotNegativeFigure
 
 
 class ReadBack(_Model):
@@ -110,7 +110,7 @@ class ProofFile(_Model):
     inputs: Inputs
     program: list[HashedFile]
     """the program, then the files of its subprograms"""
-    options: Options
+    options: ProofOptions
     records: ReadRecords
     read_back: ReadBack
     second_reading: SecondReading

@@ -25,12 +25,12 @@ class Phase(IntEnum):
     RETRACT = 5
 
 
-Leg = tuple[Floats, Phase, Kind]
+HoleLeg = tuple[Floats, Phase, Kind]
 
 
-def hole_legs(toolpath: Toolpath, link: Bools, holes: Ints) -> list[list[Leg]]:
+def hole_legs(toolpath: Toolpath, link: Bools, holes: Ints) -> list[list[HoleLeg]]:
     """The legs of each hole. The level is the height along the tool axis the tool comes from."""
-    result: list[list[Leg]] = []
+    result: list[list[HoleLeg]] = []
     before: Floats | None = None
     initial = 0.0
     for k, row in enumerate(holes):
@@ -46,7 +46,7 @@ def hole_legs(toolpath: Toolpath, link: Bools, holes: Ints) -> list[list[Leg]]:
     return result
 
 
-def _legs(top: Floats, axis: Floats, cycle: Cycle, before: Floats | None, initial: float) -> list[Leg]:
+def _legs(top: Floats, axis: Floats, cycle: Cycle, before: Floats | None, initial: float) -> list[HoleLeg]:
     """Above the hole at the level the tool is at (never below the clearance plane), down, drill, out.
 
     Without a known level (`before` None: a linking move leads here) the tool comes straight to the clearance plane
@@ -55,7 +55,7 @@ def _legs(top: Floats, axis: Floats, cycle: Cycle, before: Floats | None, initia
     """
     height = float(axis @ top)
     plane = height + cycle.clearance
-    legs: list[Leg] = []
+    legs: list[HoleLeg] = []
     level = plane
     if before is not None:
         level = max(float(axis @ before), plane)
@@ -80,11 +80,11 @@ def _legs(top: Floats, axis: Floats, cycle: Cycle, before: Floats | None, initia
     return legs
 
 
-def _pecks(top: Floats, axis: Floats, cycle: Cycle) -> list[Leg]:
+def _pecks(top: Floats, axis: Floats, cycle: Cycle) -> list[HoleLeg]:
     """Depths between of DEEP (out to the clearance plane each time) and BRKCHP (a little up each time)."""
     if cycle.kind not in PECKING or not cycle.steps or not cycle.steps[-1] > 0.0:
         return []
-    legs: list[Leg] = []
+    legs: list[HoleLeg] = []
     total = cycle.depth + cycle.clearance
     done, k = cycle.steps[0], 1
     while done < total - 1e-9:

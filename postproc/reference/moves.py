@@ -12,7 +12,7 @@ import numpy as np
 
 from machines.kinematics.frames import spin_about, tool_x
 from postproc.reference.events import tool_changes
-from postproc.reference.holes import Leg, hole_legs
+from postproc.reference.holes import HoleLeg, hole_legs
 from postproc.reference.holes import Phase as Phase
 from postproc.reference.stated_feeds import feeds_of
 from postproc.setup.model import Placement, SetupFile
@@ -227,7 +227,7 @@ def build_moves(toolpath: Toolpath, setup: SetupFile, axis_tolerance: float) -> 
         toolpath, moves) + _arcs_behind_holes(toolpath, moves)
 
 
-def _left_to(toolpath: Toolpath, holes: Ints, legs: list[list[Leg]]) -> Floats:
+def _left_to(toolpath: Toolpath, holes: Ints, legs: list[list[HoleLeg]]) -> Floats:
     """(N, 3) where the tool stands behind each row: at the end of its way out of a hole, else at the tip."""
     if not len(holes):
         return toolpath.tip

@@ -10,7 +10,7 @@ from itertools import count
 import numpy as np
 
 from postproc.reference.events import TOOL_WORDS, cutting, loaded_tools, numbers
-from postproc.reference.tools_alike import differ
+from postproc.reference.same_tool import differ
 from postproc.reference.unnumbered_tools import measured, named_by, with_loads, with_tools, without_number
 from postproc.setup.model import SetupFile
 from toolpaths.arrays import Ints

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from postproc.reference.events import TOOL_WORDS, cutting, numbers
-from postproc.reference.tools_alike import differ, differ_in_length
+from postproc.reference.same_tool import differ, differ_in_length
 from postproc.setup.model import SetupFile
 from toolpaths.arrays import Array, Bools
 from toolpaths.diagnostics import Diagnostic, error, info

@@ -11,7 +11,7 @@ from machines.geometric_error.actual.actual import approach
 from postproc.base.group_rows import groups
 from postproc.pipeline.result import PostResult
 from postproc.reference.holes import Phase
-from postproc.verification.errors_left import last_blocks, planned_moves
+from postproc.verification.residual_errors import last_blocks, planned_moves
 from toolpaths.arrays import Floats, Ints
 from toolpaths.units import DEG
 

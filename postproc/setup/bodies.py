@@ -9,27 +9,27 @@ from pydantic import Field, model_validator
 from machines.user_file import UserModel
 from postproc.setup.place import PlaceBox
 
-Units = Literal["mm", "inch"]
+MeshUnits = Literal["mm", "inch"]
 
 
-class Solid(UserModel):
+class SolidModel(UserModel):
     """A solid: a mesh file (STL, PLY, OBJ, OFF; paths are relative to the set-up file) or a box."""
 
     file: str | None = None
     """closed triangle mesh"""
     box: PlaceBox | None = None
     """instead of a file: a box along the axes of its frame, mm"""
-    units: Units | None = None
+    units: MeshUnits | None = None
     """of the numbers in the file; default: that of [bodies]"""
 
     @model_validator(mode="after")
-    def _one(self) -> Solid:
+    def _one(self) -> SolidModel:
         if (self.file is None) == (self.box is None):
             raise ValueError("give either file or box")
         return self
 
 
-class Fixture(Solid):
+class Fixture(SolidModel):
     """A clamp, a vise, a fixture: what stands beside the part and is not cut."""
 
     name: str = Field(min_length=1)
@@ -38,16 +38,16 @@ class Fixture(Solid):
     """whose coordinates the file or the box has: "part" for what moves with the part's place"""
 
 
-class Bodies(UserModel):
+class BodiesModel(UserModel):
     """What the tool must not touch. Cutters may touch the part where they cut, nothing else."""
 
     part: str | None = None
     """mesh file of the finished part, in the part frame"""
-    table: Solid | None = None
+    table: SolidModel | None = None
     """the machine's table, in the table frame"""
     fixtures: list[Fixture] = Field(default_factory=list)
     """[[bodies.fixtures]], one each"""
-    units: Units = "mm"
+    units: MeshUnits = "mm"
     """of the numbers in the files"""
     clearance: float = Field(default=1.0, ge=0.0)
     """that the cutter keeps from table and fixtures, shank and holder from everything, mm"""
@@ -55,14 +55,14 @@ class Bodies(UserModel):
     """that the cutter may reach into the part's mesh, mm: the tolerances of the tool path and of the mesh together"""
 
     @model_validator(mode="after")
-    def _names(self) -> Bodies:
+    def _names(self) -> BodiesModel:
         names = [one.name for one in self.fixtures]
         if len({*names, "part", "table"}) < len(names) + 2:
             raise ValueError("every fixture needs a name of its own, other than part and table")
         return self
 
 
-class Section(UserModel):
+class HolderSection(UserModel):
     """A stretch of a shank or holder: a cylinder, or a cone between two diameters."""
 
     diameter: float | None = Field(default=None, gt=0.0)
@@ -75,7 +75,7 @@ class Section(UserModel):
     """along the tool axis, mm"""
 
     @model_validator(mode="after")
-    def _sizes(self) -> Section:
+    def _sizes(self) -> HolderSection:
         if (self.diameter is None) == (self.lower is None) or (self.lower is None) != (self.upper is None):
             raise ValueError("give either diameter, or lower and upper")
         return self
@@ -103,13 +103,13 @@ class ToolBody(UserModel):
     """enclosed by a drill's lips, degrees; default: that of the CL file"""
     flute_length: float | None = Field(default=None, gt=0.0)
     """from the tip: what may touch the part, mm; default: that of the CL file"""
-    shank: list[Section] = Field(default_factory=list)
+    shank: list[HolderSection] = Field(default_factory=list)
     """above the flutes, from there upwards, e.g. shank = [{diameter = 12, length = 40}]"""
-    holder: list[Section] = Field(default_factory=list)
+    holder: list[HolderSection] = Field(default_factory=list)
     """above the shank, to the gauge point and beyond, e.g. holder = [{lower = 40, upper = 50, length = 60}]"""
     holder_mesh: str | None = None
     """instead: mesh file of the holder in the frame of the tool, tip at 0, +z to the spindle; spun about z"""
-    holder_units: Units = "mm"
+    holder_units: MeshUnits = "mm"
     """of the numbers in that file"""
 
     @model_validator(mode="after")

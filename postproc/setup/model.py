@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field
 
 from machines.user_file import UserModel, read_toml, validate
-from postproc.setup.bodies import Bodies, ToolBody
+from postproc.setup.bodies import BodiesModel, ToolBody
 from postproc.setup.files import seen_from_here
 from postproc.setup.orientation import OrientationLimits
 from postproc.setup.place import PlacementLimits
@@ -19,7 +19,7 @@ from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.toolpath import Frame, Toolpath
 
-Vector = Annotated[tuple[float, float, float], Field(description="x, y, z")]
+SetupVector = Annotated[tuple[float, float, float], Field(description="x, y, z")]
 
 
 class PartPlacement(UserModel):
@@ -29,18 +29,18 @@ class PartPlacement(UserModel):
     system: bool | Annotated[str, Field(min_length=1)] = False
     """true: origin, x_axis and y_axis are those of the system that is the work offset; a name: of that system of the CL file
     (see inspect); false: of the file's absolute frame"""
-    origin: Vector = (0.0, 0.0, 0.0)
+    origin: SetupVector = (0.0, 0.0, 0.0)
     """its origin in the table frame, mm"""
-    x_axis: Vector = (1.0, 0.0, 0.0)
+    x_axis: SetupVector = (1.0, 0.0, 0.0)
     """its x direction in the table frame"""
-    y_axis: Vector = (0.0, 1.0, 0.0)
+    y_axis: SetupVector = (0.0, 1.0, 0.0)
     """its y direction in the table frame"""
 
 
-class Clearance(UserModel):
+class LinkClearance(UserModel):
     """How linking moves keep away from the part."""
 
-    centre: Vector | None = None
+    centre: SetupVector | None = None
     """centre of the safe planes in the part frame, mm; default: middle of the path's extents"""
     distance: float | None = Field(default=None, gt=0.0)
     """from the centre to every safe plane (each stands square to the tool axis), mm; default: outside the path"""
@@ -69,7 +69,7 @@ class ToolSetup(ToolBody):
 Asked = Literal["auto", "axes", "tcp", "tilted"]
 
 
-class Output(UserModel):
+class OutputSettings(UserModel):
     """What the words of the program mean, and how it is divided."""
 
     default: Asked = "auto"
@@ -110,20 +110,20 @@ class Output(UserModel):
 class Pivot(UserModel):
     """A rotary axis as the control's kinematics holds it."""
 
-    point: Vector
+    point: SetupVector
     """a point of its line when all axes stand at 0, in machine coordinates, mm"""
 
 
 class Stock(UserModel):
     """A box in the part frame, mm."""
 
-    low: Vector
+    low: SetupVector
     """its least x, y, z"""
-    high: Vector
+    high: SetupVector
     """its greatest x, y, z"""
 
 
-class Rewind(UserModel):
+class RewindSettings(UserModel):
     """Unwinding an axis in the middle of a run, where its travel ends."""
 
     allowed: bool = True
@@ -155,19 +155,19 @@ class SetupFile(UserModel):
     """register of the control that holds it: G54 to G59, or G59.1 to G59.3 where the control has them"""
     part: PartPlacement = PartPlacement()
     placement: PlacementLimits = PlacementLimits()
-    clearance: Clearance = Clearance()
+    clearance: LinkClearance = LinkClearance()
     tools: dict[Annotated[str, Field(pattern=r"^(0|[1-9][0-9]*)$")], ToolSetup] = Field(default_factory=dict)
     """by tool number without leading zeros, e.g. [tools.1]"""
     tool_numbers: dict[Annotated[str, Field(min_length=1)], Annotated[int, Field(ge=1, lt=10**9)]] = Field(
         default_factory=dict)
     """by name of the tool in the CL file (see inspect), e.g. [tool_numbers] "EM12" = 2: its number, whatever the file loads
     it by, and where it loads none; lengths in [tools.2] are then its. "unnamed" is a tool without name and number"""
-    output: Output = Output()
+    output: OutputSettings = OutputSettings()
     control_pivots: dict[Annotated[str, Field(pattern="^[ABC]$")], Pivot] = Field(default_factory=dict)
     """by rotary axis, e.g. [control_pivots.A]: what the control's parameters say; default: as the machine file"""
-    rewind: Rewind = Rewind()
+    rewind: RewindSettings = RewindSettings()
     joints: Joints = Joints()
-    bodies: Bodies | None = None
+    bodies: BodiesModel | None = None
     """part, table and fixtures that the tools must not touch"""
     orientation: OrientationLimits = OrientationLimits()
 

@@ -9,7 +9,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 from machines.user_file import UserModel
 from postproc.setup.ranges import pair
 
-Angle = Annotated[float, Field(ge=-90.0, le=90.0)]
+LimitAngle = Annotated[float, Field(ge=-90.0, le=90.0)]
 
 
 def _ordered(values: tuple[float, float]) -> tuple[float, float]:
@@ -18,7 +18,7 @@ def _ordered(values: tuple[float, float]) -> tuple[float, float]:
     return values
 
 
-Range = Annotated[tuple[Angle, Angle], BeforeValidator(pair), AfterValidator(_ordered)]
+AngleRange = Annotated[tuple[LimitAngle, LimitAngle], BeforeValidator(pair), AfterValidator(_ordered)]
 
 
 class OrientationLimits(UserModel):
@@ -29,9 +29,9 @@ class OrientationLimits(UserModel):
     those of the CL file, or of the part mesh ([bodies] part).
     """
 
-    lead: Range | None = None
+    lead: AngleRange | None = None
     """[least, greatest] degrees in the plane of feed and surface normal, positive where the axis leans towards the feed"""
-    tilt: Range | None = None
+    tilt: AngleRange | None = None
     """[least, greatest] degrees in the plane square to the feed, positive where the axis leans to the right, seen along
     the feed with the surface normal upwards"""
     off_centre: float | None = Field(default=None, ge=0.0, lt=90.0)

@@ -9,16 +9,16 @@ from pydantic import BeforeValidator, Field, model_validator
 from machines.user_file import UserModel
 from postproc.setup.ranges import pair
 
-Place = Annotated[tuple[float, float, float], Field(description="x, y, z")]
-Range = Annotated[tuple[float, float], BeforeValidator(pair), Field(description="least, greatest")]
+PlacePoint = Annotated[tuple[float, float, float], Field(description="x, y, z")]
+PlaceRange = Annotated[tuple[float, float], BeforeValidator(pair), Field(description="least, greatest")]
 
 
 class PlaceBox(UserModel):
     """A box along its frame's axes, mm."""
 
-    low: Place
+    low: PlacePoint
     """its least x, y, z"""
-    high: Place
+    high: PlacePoint
     """its greatest x, y, z"""
 
     @model_validator(mode="after")
@@ -35,23 +35,23 @@ class PlacementLimits(UserModel):
     frame is parallel to it.
     """
 
-    point: Place = (0.0, 0.0, 0.0)
+    point: PlacePoint = (0.0, 0.0, 0.0)
     """the point of the part frame that x, y and z place and that turning leaves where it is, mm"""
-    x: Range | None = None
+    x: PlaceRange | None = None
     """of that point in the table frame, mm, e.g. x = [-100, 100]"""
-    y: Range | None = None
+    y: PlaceRange | None = None
     """the same, mm"""
-    z: Range | None = None
+    z: PlaceRange | None = None
     """the same, mm"""
     step: float | None = Field(default=None, gt=0.0)
     """x and y stand this far apart from their least values (bores of a plate, slots), mm; default: anywhere"""
-    turn: Range | None = None
+    turn: PlaceRange | None = None
     """about the table's z, degrees, e.g. turn = [0, 360]"""
     turns: list[float] = Field(default_factory=list)
     """the only turns, degrees, e.g. turns = [0, 90, 180, 270]; instead of `turn`"""
-    tilt_y: Range | None = None
+    tilt_y: PlaceRange | None = None
     """about the table's y, degrees, before the turn"""
-    tilt_x: Range | None = None
+    tilt_x: PlaceRange | None = None
     """about the table's x, degrees, before the other two"""
     table: PlaceBox | None = None
     """box of the table frame that `part` must not leave; default: anywhere within travel"""

@@ -13,19 +13,19 @@ from postproc.base.header_words import FINGERPRINT, HEADER, head_of
 from postproc.base.memory import give_back
 from postproc.base.options import NO_FILE, SETUP_MARK, Options
 from postproc.job.job import Job
-from postproc.readback.comparison.changes import check_changes
 from postproc.readback.comparison.compare import Comparison, compare
 from postproc.readback.comparison.faults import Faults
-from postproc.readback.comparison.slow import planned_feeds
+from postproc.readback.comparison.slow_moves import planned_feeds
 from postproc.readback.comparison.starts import check_end, check_start
-from postproc.readback.comparison.stated import check_stated
 from postproc.readback.comparison.states import check_lengths
-from postproc.readback.comparison.stops import check_stops
+from postproc.readback.comparison.stops_and_dwells import check_stops
+from postproc.readback.comparison.tool_changes import check_changes
+from postproc.readback.comparison.unstated_codes import check_stated
 from postproc.readback.dialects.base import UNITS_UNSTATED, as_bytes
 from postproc.readback.dialects.readers import reader_for
 from postproc.readback.execution.execute import Motion, run
 from postproc.readback.execution.offsets import Offsets
-from postproc.readback.execution.poses import Executed, poses_before
+from postproc.readback.execution.poses import BlockPoses, poses_before
 from postproc.readback.text.canonical import placed
 from toolpaths.diagnostics import Diagnostic, Severity, error, has_errors, warning
 from toolpaths.rotations import angle_between
@@ -125,11 +125,11 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Callable[[str, i
     return replace(comparison, executed=(code, motion), poses=executed, planned=planned), [*diagnostics, *told]
 
 
-def _unmeasured(motion: Motion, executed: Executed, job: Job, faults: Faults) -> list[Diagnostic]:
-    from postproc.readback.comparison.measured import check_measured
-    from postproc.readback.execution.actual import ActualExecuted
+def _unmeasured(motion: Motion, executed: BlockPoses, job: Job, faults: Faults) -> list[Diagnostic]:
+    from postproc.readback.comparison.measured_range import check_measured
+    from postproc.readback.execution.actual import ActualBlockPoses
 
-    return check_measured(motion, executed, job, faults) if isinstance(executed, ActualExecuted) else []
+    return check_measured(motion, executed, job, faults) if isinstance(executed, ActualBlockPoses) else []
 
 
 def _by_post(job: Job) -> bool:
@@ -147,7 +147,7 @@ def _twice(job: Job, gcode: str) -> Diagnostic:
                  "into it and take its errors out of the control")
 
 
-def _uncorrected(head: bytes, job: Job, motion: Motion, executed: Executed, comparison: Comparison,
+def _uncorrected(head: bytes, job: Job, motion: Motion, executed: BlockPoses, comparison: Comparison,
                  gcode: str) -> list[Diagnostic]:
     """Why a program is off on the machine with errors: its header names none that it corrects.
 
@@ -190,10 +190,10 @@ def _as_in_comments(name: str) -> str:
     return re.sub(r"[^a-z0-9]+", " ", name.lower())
 
 
-def _amounts(job: Job, motion: Motion, executed: Executed, comparison: Comparison) -> str:
+def _amounts(job: Job, motion: Motion, executed: BlockPoses, comparison: Comparison) -> str:
     """How far errors take the tool from where the nominal machine has it at ends of feed blocks; "" where not known."""
     rows = np.flatnonzero(motion.code > 0)
-    nominal = Executed(job.control, job.kinematics_of, executed.lengths, executed.before)
+    nominal = BlockPoses(job.control, job.kinematics_of, executed.lengths, executed.before)
     tip, axis = nominal.poses(motion, rows, 1.0)
     off = np.linalg.norm(comparison.tip[rows] - tip, axis=1)
     tilt = angle_between(comparison.axis[rows], axis) / DEG
@@ -203,7 +203,7 @@ def _amounts(job: Job, motion: Motion, executed: Executed, comparison: Compariso
             f"{tilt.max():.6f} degrees, allowed {job.options.axis_tolerance:g} degrees")
 
 
-def _bodies(motion: Motion, executed: Executed, job: Job, comparison: Comparison, faults: Faults) -> list[Diagnostic]:
+def _bodies(motion: Motion, executed: BlockPoses, job: Job, comparison: Comparison, faults: Faults) -> list[Diagnostic]:
     """What the tools touch, where the set-up names bodies."""
     if job.setup.bodies is None:
         return []
@@ -224,11 +224,11 @@ def _located(d: Diagnostic, file: str) -> Diagnostic:
     return replace(d, file=file, lines=(), message=f"{d.message} (line {d.lines[0]} of the program)")
 
 
-def _executed(job: Job, motion: Motion, lengths: dict[int, float]) -> Executed:
+def _executed(job: Job, motion: Motion, lengths: dict[int, float]) -> BlockPoses:
     """Poses of the machine as it is: with its errors where the program corrects them."""
     before = poses_before(motion, job.control)
     if job.errors is None or not _by_post(job):
-        return Executed(job.control, job.kinematics_of, lengths, before)
-    from postproc.readback.execution.actual import ActualExecuted
+        return BlockPoses(job.control, job.kinematics_of, lengths, before)
+    from postproc.readback.execution.actual import ActualBlockPoses
 
-    return ActualExecuted(job.control, job.kinematics_of, lengths, before, model=job.errors, motion=motion)
+    return ActualBlockPoses(job.control, job.kinematics_of, lengths, before, model=job.errors, motion=motion)

@@ -16,12 +16,12 @@ from postproc.base.options import Options
 from postproc.control.control import Control
 from postproc.job.job import Job
 from postproc.readback.comparison.compare import Comparison
-from postproc.readback.execution.poses import Executed as Poses
+from postproc.readback.execution.poses import BlockPoses as Poses
 from postproc.readback.execution.poses import arc_sweeps, begins, coordinates
 from postproc.reference.coolant import COMMANDS, switching
 from postproc.setup.model import SetupFile
-from postproc.witness.evidence import Case, Executed, Testimony
-from postproc.witness.testify import testify
+from postproc.witness.evidence import Case, ExecutedBlocks, Testimony
+from postproc.witness.second_reading import testify
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.input_files import read_input
@@ -48,7 +48,7 @@ def _limits_table(machine: Machine) -> dict[str, dict[str, Any]]:
                                                   limits.velocity.tolist(), strict=True)}
 
 
-def executed_of(comparison: Comparison, poses: Poses, job: Job) -> Executed:
+def executed_of(comparison: Comparison, poses: Poses, job: Job) -> ExecutedBlocks:
     """The motion of a program, read back, as plain arrays."""
     assert comparison.executed is not None
     motion, control = comparison.executed[1], job.control
@@ -76,10 +76,11 @@ def executed_of(comparison: Comparison, poses: Poses, job: Job) -> Executed:
     by_tip = np.asarray(motion.frame > 0) | (control.base == "tcp")
     lengthless = np.array([f.law == "axes" for f in motion.frames])[motion.frame] & (not control.length_on_z)
     start = motion.start / degrees if control.base != "tcp" else job.machine.home
-    return Executed(job.machine.axis_names, joints, start, motion.line, motion.code, np.asarray(straight),
-                    arc_sweeps(motion, control), motion.feed, motion.inverse, motion.inch, by_tip, control.feed_rule,
-                    job.controller.feed.arc_inverse == "radius", motion.tool, motion.spindle, motion.rpm, motion.coolant,
-                    motion.dwell, motion.pitch, motion.hole, motion.register, lengthless, steps, joints_at, poses_at)
+    return ExecutedBlocks(job.machine.axis_names, joints, start, motion.line, motion.code, np.asarray(straight),
+                          arc_sweeps(motion, control), motion.feed, motion.inverse, motion.inch, by_tip, control.feed_rule,
+                          job.controller.feed.arc_inverse == "radius", motion.tool, motion.spindle, motion.rpm,
+                          motion.coolant,
+                          motion.dwell, motion.pitch, motion.hole, motion.register, lengthless, steps, joints_at, poses_at)
 
 
 def offset_joints(control: Control) -> Floats | None:

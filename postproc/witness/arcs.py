@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from postproc.witness.commanded import unit
-from postproc.witness.dialect import Dialect
+from postproc.witness.dialect import WitnessDialect
 from postproc.witness.text import Array, Record, words_of
 
 _TURN = 2.0 * math.pi
@@ -30,7 +30,7 @@ class Given:
     toward: tuple[float, ...] | None = None
 
 
-def circle(r: Record, dialect: Dialect) -> Given | None:
+def circle(r: Record, dialect: WitnessDialect) -> Given | None:
     """CIRCLE of NX and Makino (11 numbers), Creo (7), SolidWorks (6; 7 and a word), others (4, 6, 7)."""
     n = r.numbers
     turns = r.after("TIMES") or 0.0
@@ -72,7 +72,7 @@ def tlon(r: Record, toward: tuple[float, ...] | None) -> tuple[Given, tuple[floa
 
 
 def resolved(given: dict[int, Given], tip: Array, place: Array, common: Array, frames: list[tuple[Array, Array]],
-             scale: float, dialect: Dialect) -> tuple[Array, Array, Array, Array, list[int]]:
+             scale: float, dialect: WitnessDialect) -> tuple[Array, Array, Array, Array, list[int]]:
     """(arc (N,), centre, normal (K, 3), sweep (K,), rows of arcs that this reader is not sure of) in the absolute frame."""
     arc = np.full(len(tip), -1)
     row = np.array([r for r in given if 0 < r < len(tip)], np.int64)
@@ -102,7 +102,7 @@ def stacked(frames: list[tuple[Array, Array]]) -> tuple[Array, Array]:
     return np.stack([m for m, _ in frames]), np.stack([o for _, o in frames])
 
 
-def _sweeps(u: Array, v: Array, normal: Array, own: list[Given], dialect: Dialect) -> tuple[Array, Array]:
+def _sweeps(u: Array, v: Array, normal: Array, own: list[Given], dialect: WitnessDialect) -> tuple[Array, Array]:
     """(angle (K,) from u to v about the normal with whole turns, True (K,) where nothing about it hangs on rounding)."""
     u = u - np.einsum("ni,ni->n", u, normal)[:, None] * normal
     v = v - np.einsum("ni,ni->n", v, normal)[:, None] * normal

@@ -24,7 +24,7 @@ OWN = 0
 
 
 @dataclass(frozen=True)
-class Cycle:
+class WitnessCycle:
     """A drilling cycle, mm from the hole's top along the tool axis; `feed` mm/min or (per turn) mm; NaN: not stated."""
 
     kind: str
@@ -70,7 +70,7 @@ class Commanded:
     normal: Array
     sweep: Array
     cycle: Array
-    cycles: tuple[Cycle, ...]
+    cycles: tuple[WitnessCycle, ...]
     tool: Array
     register: Array
     name: Array

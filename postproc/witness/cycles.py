@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from postproc.witness.commanded import Cycle
-from postproc.witness.dialect import INCH, Dialect
+from postproc.witness.commanded import WitnessCycle
+from postproc.witness.dialect import INCH, WitnessDialect
 from postproc.witness.text import Record
 
 _PECKED = {"DEEP": "DEEP", "DEEP2": "DEEP", "PECK": "DEEP", "BRKCHP": "BRKCHP", "BREAKCHP": "BRKCHP"}
@@ -19,22 +19,22 @@ _LABELS = {*_STEPS, "FEDTO", "DEPTH", "RAPTO", "CLEAR", "RTRCTO", "RETURN", "AUT
            "DIAMET", "TLANGL", "TIMES", "BACK", "REV", *_PER_MINUTE, *_PER_TURN}
 
 
-def cycle(r: Record, dialect: Dialect, scale: float, feed: tuple[float, bool, bool], line: int) -> Cycle:
+def cycle(r: Record, dialect: WitnessDialect, scale: float, feed: tuple[float, bool, bool], line: int) -> WitnessCycle:
     """A CYCLE record; depth NaN where numbers without words would have to be guessed."""
     words = [w for w in r.words if isinstance(w, str) and w not in _LABELS]
     plain = next((w for w in words if w in _KINDS and w != "DRILL"), "DRILL")
     kind = next((_PECKED[w] for w in words if w in _PECKED), plain)
     kind = {"RIGID": "TAP", "SPOT": "DRILL"}.get(kind, kind)
-    bare = Cycle(kind, math.nan, math.nan, feed[0], feed[1], line=line)
+    bare = WitnessCycle(kind, math.nan, math.nan, feed[0], feed[1], line=line)
     return _stated(bare, r, dialect, scale, line)
 
 
-def changed(before: Cycle, r: Record, dialect: Dialect, scale: float, line: int) -> Cycle:
+def changed(before: WitnessCycle, r: Record, dialect: WitnessDialect, scale: float, line: int) -> WitnessCycle:
     """CYCLE/ON with parameters: the last cycle with those."""
     return _stated(before, r, dialect, scale, line)
 
 
-def _stated(made: Cycle, r: Record, dialect: Dialect, scale: float, line: int) -> Cycle:
+def _stated(made: WitnessCycle, r: Record, dialect: WitnessDialect, scale: float, line: int) -> WitnessCycle:
     known = set(r.words) <= {*_LABELS, *_PECKED, *_KINDS, "ON", "NEXT", "SEC"} | {w for w in r.words if isinstance(w, float)}
     first = next((w for w in r.words if isinstance(w, float) or w in _LABELS), "")
     if isinstance(first, float) or not known:
@@ -62,7 +62,7 @@ def _steps(r: Record) -> list[float]:
     return found
 
 
-def _fed(made: Cycle, r: Record, scale: float) -> Cycle:
+def _fed(made: WitnessCycle, r: Record, scale: float) -> WitnessCycle:
     threads, pitch = r.after("TPI"), r.after("PITCH")
     if threads:
         return replace(made, feed=INCH / threads, per_turn=True)

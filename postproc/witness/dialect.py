@@ -10,7 +10,7 @@ INCH = 25.4
 
 
 @dataclass(frozen=True)
-class Dialect:
+class WitnessDialect:
     """`sense` of the vector of CIRCLE: 1 right-hand, -1 left-hand, 0 by a word; `depth`: -1 where depths are negative;
     `local_three`: points of three numbers are in the local system along its z, of six in the common one."""
 
@@ -23,12 +23,12 @@ class Dialect:
     unread: bool = False
 
 
-GENERIC = Dialect("generic")
+GENERIC = WitnessDialect("generic")
 ALL = {d.name: d for d in (
-    GENERIC, Dialect("nx", -1, -1, whole=False, axis_back=True), Dialect("makino", -1, whole=False),
-    Dialect("creo", local_three=True), Dialect("solidworks", local_three=True),
-    Dialect("solidworks-clt", 0, local_three=True), Dialect("catia"), Dialect("ncl"),
-    *(Dialect(name, unread=True) for name in ("camplete", "mfgsuite", "autodesk-iso", "hsmworks", "own")))}
+    GENERIC, WitnessDialect("nx", -1, -1, whole=False, axis_back=True), WitnessDialect("makino", -1, whole=False),
+    WitnessDialect("creo", local_three=True), WitnessDialect("solidworks", local_three=True),
+    WitnessDialect("solidworks-clt", 0, local_three=True), WitnessDialect("catia"), WitnessDialect("ncl"),
+    *(WitnessDialect(name, unread=True) for name in ("camplete", "mfgsuite", "autodesk-iso", "hsmworks", "own")))}
 _WORDS = {
     "own": ("$$->TOOLPATH",), "camplete": ("MCS",), "mfgsuite": ("MCSYS",),
     "solidworks-clt": ("MOVE_ATTRIB", "OPFEATSTART", "BOX"),
@@ -40,7 +40,7 @@ _SCALE = {"MM": 1.0, "MILLIMETER": 1.0, "MILLIMETERS": 1.0, "METRIC": 1.0, "INCH
           "ENGLISH": INCH}
 
 
-def dialect_of(records: list[Record], data: bytes) -> Dialect:
+def dialect_of(records: list[Record], data: bytes) -> WitnessDialect:
     """By the words that only one system writes, then by its name in a text."""
     majors = {r.major for r in records}
     texts = " ".join(r.body.upper() for r in records if r.major in ("PARTNO", "MACHIN", "PPRINT", "REMARK"))

@@ -39,7 +39,7 @@ class Case:
 
 
 @dataclass(frozen=True)
-class Executed:
+class ExecutedBlocks:
     """E blocks of a program as its reader has executed them.
 
     Attributes:

@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 
 import postproc.witness.arcs as arcs
-from postproc.witness.commanded import OWN, UNKNOWN, Cycle
-from postproc.witness.dialect import Dialect
-from postproc.witness.text import Array, Text
+from postproc.witness.commanded import OWN, UNKNOWN, WitnessCycle
+from postproc.witness.dialect import WitnessDialect
+from postproc.witness.text import Array, ClText
 
 Z = (0.0, 0.0, 1.0)
 
 
-class Track:
+class HeldValues:
     """Values that hold from a row on; of several for one row the last counts."""
 
     def __init__(self, first: Any) -> None:
@@ -43,7 +43,7 @@ class Track:
 class Execution:
     """The state of a reading; `row` counts all positions."""
 
-    def __init__(self, text: Text, dialect: Dialect, scale: float) -> None:
+    def __init__(self, text: ClText, dialect: WitnessDialect, scale: float) -> None:
         self.text, self.dialect, self.scale = text, dialect, scale
         self.row = 0
         self.extra: list[tuple[int, Any, Any, int]] = []
@@ -53,18 +53,18 @@ class Execution:
         self.unread: dict[str, int] = {}
         self.axes: dict[int, tuple[float, ...]] = {}
         self.systems: dict[str, tuple[Array, Array]] = {}
-        self.frame, self.frames, self._seen = Track(0), [(np.eye(3), np.zeros(3))], dict[bytes, int]()
-        self.known, self.gap = Track(True), set[int]()
-        self.feed: Track = Track((math.nan, False, False))
-        self.tool, self.name, self.names = Track(UNKNOWN), Track(-1), list[str]()
-        self.register = Track(OWN)
-        self.spindle: Track = Track((UNKNOWN, math.nan))
+        self.frame, self.frames, self._seen = HeldValues(0), [(np.eye(3), np.zeros(3))], dict[bytes, int]()
+        self.known, self.gap = HeldValues(True), set[int]()
+        self.feed: HeldValues = HeldValues((math.nan, False, False))
+        self.tool, self.name, self.names = HeldValues(UNKNOWN), HeldValues(-1), list[str]()
+        self.register = HeldValues(OWN)
+        self.spindle: HeldValues = HeldValues((UNKNOWN, math.nan))
         self.last_direction = 1
-        self.coolant, self.cycle, self.cycles = Track(UNKNOWN), Track(-1), list[Cycle]()
+        self.coolant, self.cycle, self.cycles = HeldValues(UNKNOWN), HeldValues(-1), list[WitnessCycle]()
         self.armed = -1
         self.arcs: dict[int, arcs.Given] = {}
         self.toward: tuple[float, ...] | None = None
-        self.inside = Track(0)
+        self.inside = HeldValues(0)
         self.shifted = False
         self.height: float | None = None
         self.turn = np.eye(3)

@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 
+from postproc.witness.block_times import seconds_of
 from postproc.witness.commanded import RAPID
 from postproc.witness.evidence import Finding
 from postproc.witness.machine import Chain, limits_of
-from postproc.witness.pace import seconds_of
 from postproc.witness.place import Cut, Poses
 from postproc.witness.stretches import BOTTOM, ENTER, Targets, is_cut, is_rapid, off
 from postproc.witness.text import Array

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from postproc.witness.commanded import ARC, HOLE, LINE, Commanded, unit
-from postproc.witness.evidence import Case, Executed
+from postproc.witness.evidence import Case, ExecutedBlocks
 from postproc.witness.machine import Chain, Rods
 from postproc.witness.text import Array
 
@@ -61,7 +61,7 @@ class Poses:
     """
 
     case: Case
-    executed: Executed
+    executed: ExecutedBlocks
     machine: Chain | Rods | None
     own: bool
     misfits: list[tuple[float, int]]

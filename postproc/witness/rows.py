@@ -6,7 +6,7 @@ import numpy as np
 
 import postproc.witness.arcs as arcs
 from postproc.witness.commanded import ARC, HOLE, LINE, RAPID, START, Commanded, unit
-from postproc.witness.execution import Execution, Track, Z
+from postproc.witness.execution import Execution, HeldValues, Z
 from postproc.witness.text import Array
 
 _CHUNK = 100_000
@@ -69,7 +69,7 @@ def _first_system(e: Execution, place: Array) -> str | None:
     return list(e.systems)[int(place[0]) - 1] if len(place) and place[0] else ""
 
 
-def _index(track: Track, n: int) -> Array:
+def _index(track: HeldValues, n: int) -> Array:
     starts = np.minimum(np.append(track.rows, n), n)
     return np.repeat(np.arange(len(track.rows)), np.diff(starts))
 

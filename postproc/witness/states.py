@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from postproc.witness.commanded import ARC, BITS, LINE, OWN, UNFOLLOWED, UNKNOWN, Commanded, Cycle
+from postproc.witness.commanded import ARC, BITS, LINE, OWN, UNFOLLOWED, UNKNOWN, Commanded, WitnessCycle
 from postproc.witness.evidence import Case, Finding
 from postproc.witness.machine import limits_of
 from postproc.witness.motion import CHUNK, Walked
@@ -272,7 +272,7 @@ def check_holes(w: Walked, c: Commanded, case: Case, match: Array) -> tuple[list
             for what, at in bad.items()], len(holes)
 
 
-def _hole_faults(w: Walked, i: int, blocks: Array, cycle: Cycle, rpm: float, tolerance: float) -> list[str]:
+def _hole_faults(w: Walked, i: int, blocks: Array, cycle: WitnessCycle, rpm: float, tolerance: float) -> list[str]:
     t, e = w.targets, w.poses.executed
     depth = (t.tip[i] - w.tip[blocks]) @ t.axis[i]
     total, found = cycle.depth + cycle.clearance, []
@@ -319,7 +319,7 @@ def _risen(w: Walked, i: int, last: int, depth: float, tolerance: float) -> floa
     return float(rise[:leaves[0] if len(leaves) else None].max()) - depth
 
 
-def _feed_fault(w: Walked, blocks: Array, cycle: Cycle, rpm: float) -> list[str]:
+def _feed_fault(w: Walked, blocks: Array, cycle: WitnessCycle, rpm: float) -> list[str]:
     """That a block which goes deeper than those before it is faster than the feed of the cycle, or slower and no axis is at
     its velocity."""
     feed = cycle.feed * rpm if cycle.per_turn else cycle.feed

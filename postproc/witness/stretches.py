@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from postproc.witness.assign_blocks import walk
 from postproc.witness.commanded import ARC, HOLE, LINE, RAPID, START, Commanded
 from postproc.witness.place import Poses
 from postproc.witness.text import Array
-from postproc.witness.walk import walk
 
 ENTER, BOTTOM = 5, 6
 """kinds of targets: the start plane of a hole, its bottom"""

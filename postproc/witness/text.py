@@ -61,7 +61,7 @@ class Record:
 
 
 @dataclass(frozen=True)
-class Text:
+class ClText:
     """Plain points: numbers (N, 6), NaN where a line has three, line (N,); records with `before`, points before each."""
 
     points: Array
@@ -72,7 +72,7 @@ class Text:
     subroutines: bool
 
 
-def read(data: bytes) -> Text:
+def read(data: bytes) -> ClText:
     """Records and points of a CL file in the order in which they are executed."""
     text = _plain(data)
     text, line_of = _written_out(text)
@@ -92,8 +92,8 @@ def read(data: bytes) -> Text:
     found = [_record(text[first:last]) for first, last in spans]
     used = [k for k, r in enumerate(found) if r.major or r.body]
     lines = line_of[starts] if spans else starts
-    return Text(rows, _lines_of_points(text, spans, ends, line_of), [found[k] for k in used],
-                [int(before[k]) for k in used], [int(lines[k]) for k in used], b"CALSUB" in text or b"SUB-BEGIN" in text)
+    return ClText(rows, _lines_of_points(text, spans, ends, line_of), [found[k] for k in used],
+                  [int(before[k]) for k in used], [int(lines[k]) for k in used], b"CALSUB" in text or b"SUB-BEGIN" in text)
 
 
 def _lines_of_points(text: bytes, spans: list[tuple[int, int]], ends: Array, line_of: Array) -> Array:

@@ -17,9 +17,9 @@ import machines
 from machines.calibration.simulator import PARTS, Bench, simulate
 from machines.geometric_error.actual.model import ErrorModel
 from machines.geometric_error.actual.serial_errors import Component, SerialErrors
-from machines.geometric_error.exchange.exchange import save
+from machines.geometric_error.exchange.write_model import save
 from machines.geometric_error.tables.csv_table import write_csv
-from machines.geometric_error.tables.curves import Fourier, Table
+from machines.geometric_error.tables.curves import Fourier, TableCurve
 from machines.geometric_error.tables.names import parse
 from toolpaths.units import DEG
 
@@ -94,7 +94,7 @@ def screw() -> ErrorModel:
     forward = np.round(8e-3 * SCREW / 300.0 + 2e-3 * np.sin(SCREW / 50.0), 4)
     name = parse("EXX")
     assert name is not None
-    table = Table(SCREW, np.concatenate([forward, forward - 3e-3]), both=True)
+    table = TableCurve(SCREW, np.concatenate([forward, forward - 3e-3]), both=True)
     return ErrorModel(SerialErrors((Component(name, table),)), name="screw-truth", machine="mikron-ucp710")
 
 

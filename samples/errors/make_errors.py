@@ -11,11 +11,11 @@ import numpy as np
 import machines
 from machines.geometric_error.actual.model import ErrorModel
 from machines.geometric_error.actual.rods import RodErrors, rod_frame, rod_names
-from machines.geometric_error.actual.serial_errors import Component, Frame, SerialErrors
-from machines.geometric_error.exchange.exchange import save
+from machines.geometric_error.actual.serial_errors import Component, ErrorFrame, SerialErrors
+from machines.geometric_error.exchange.write_model import save
 from machines.geometric_error.files.covariance import angular
 from machines.geometric_error.tables.csv_table import write_csv
-from machines.geometric_error.tables.curves import Curve, Fourier, Table
+from machines.geometric_error.tables.curves import Curve, Fourier, TableCurve
 from machines.geometric_error.tables.names import DIRECTIONS, parse
 from toolpaths.units import DEG
 
@@ -30,7 +30,7 @@ def slide(rng: np.random.Generator, travel: tuple[float, float], part: int, both
     t = (x - travel[0]) / (travel[1] - travel[0])
     shape = rng.normal() * t + 0.6 * rng.normal() * np.sin(np.pi * t) + 0.3 * rng.normal() * np.sin(3.0 * np.pi * t)
     values = np.round(10.0 * shape, 2) * (0.4 * ARCSEC if part >= 3 else 1e-3)
-    return Table(x, np.concatenate([values, values + 0.003]), both=True) if both else Table(x, values)
+    return TableCurve(x, np.concatenate([values, values + 0.003]), both=True) if both else TableCurve(x, values)
 
 
 def serial(name: str, seed: int) -> ErrorModel:
@@ -51,7 +51,7 @@ def serial(name: str, seed: int) -> ErrorModel:
     constants = {"EC0Y": 6 * ARCSEC, "EB0Z": -4 * ARCSEC, "EA0Z": 5 * ARCSEC, "EY0A": 0.012, "EZ0A": -0.018,
                  "EB0A": 4 * ARCSEC, "EC0A": -5 * ARCSEC, "EX0C": 0.015, "EY0C": -0.010, "EA0C": 6 * ARCSEC,
                  "EB0C": -3 * ARCSEC, "EA0S": 5 * ARCSEC, "EB0S": -6 * ARCSEC}
-    bed: dict[str, Frame] = {"A": "moving", "C": "moving"}  # both carry the part
+    bed: dict[str, ErrorFrame] = {"A": "moving", "C": "moving"}  # both carry the part
     return with_doubt(ErrorModel(SerialErrors(tuple(components), constants, frame=bed), name=name, machine=name))
 
 

@@ -21,7 +21,7 @@ from machines.calibration.calibrate import calibrate
 from machines.calibration.reversal import conditioning, identify
 from machines.calibration.simulator import Bench, simulate
 from machines.geometric_error.actual.correction import correct
-from machines.geometric_error.exchange.exchange import save
+from machines.geometric_error.exchange.write_model import save
 from machines.geometric_error.files.loader import load
 from toolpaths.arrays import Floats
 from toolpaths.units import DEG

@@ -25,7 +25,7 @@ import postproc
 import toolpaths
 from machines.geometric_error.actual.correction import correct
 from postproc.base.options import Options
-from postproc.verification.errors_left import after_formatting
+from postproc.verification.residual_errors import after_formatting
 from tests.machines.error_models import joints, model
 from toolpaths.units import DEG
 

@@ -33,7 +33,7 @@ from postproc.feedrate.limits import JointLimits, squared_speed
 from postproc.feedrate.mesh import Spacing
 from postproc.feedrate.motion import Plan
 from postproc.feedrate.paths import Eased, SplinePath
-from postproc.feedrate.plan import Options, plan, plan_second_order
+from postproc.feedrate.plan import PlannerOptions, plan, plan_second_order
 from postproc.feedrate.second_order import least_time, second_order
 from postproc.feedrate.windows import Method, solve_problem
 from postproc.planning.geometry import MachinePath
@@ -63,7 +63,7 @@ Run = Callable[[], tuple[float, int]]
 
 def jerk(path: SplinePath, knots: Floats | None, strict: bool = False, threads: int = 1, kernel: bool = True) -> Run:
     def run() -> tuple[float, int]:
-        options = Options(method=Method(kernel=kernel, threads=threads), strict=strict)
+        options = PlannerOptions(method=Method(kernel=kernel, threads=threads), strict=strict)
         made = plan(path, MIKRON, options=options, knots=knots)
         return made.seconds, len(made.pieces[0].profile.sigma)
     return run
@@ -107,11 +107,11 @@ def cl() -> None:
     """Smoothed CL points on the Mikron UCP 710; toppra on as many equal steps as the mesh has knots."""
     for points in (5000, 50_000):
         path, most = cl_path(points)
-        count = len(plan(path, most, options=Options(method=Method(kernel=True))).pieces[0].profile.sigma)
+        count = len(plan(path, most, options=PlannerOptions(method=Method(kernel=True))).pieces[0].profile.sigma)
         plain = np.linspace(path.start, path.end, count)
 
         def own(strict: bool, path: MachinePath = path, most: JointLimits = most) -> Plan:
-            return plan(path, most, options=Options(method=Method(kernel=True), strict=strict))
+            return plan(path, most, options=PlannerOptions(method=Method(kernel=True), strict=strict))
 
         rates: dict[str, list[float]] = {"toppra": [], "fast": [], "strict": []}
         for _ in range(3):
@@ -157,8 +157,8 @@ def corners() -> None:
     for seed in range(6):
         for size in (0.004, 0.015, 0.06):
             path = blended(seed, size)
-            dense = plan(path, MIKRON, options=Options(spacing=Spacing(dt=8e-4))).seconds
-            strict = plan(path, MIKRON, options=Options(strict=True))
+            dense = plan(path, MIKRON, options=PlannerOptions(spacing=Spacing(dt=8e-4))).seconds
+            strict = plan(path, MIKRON, options=PlannerOptions(strict=True))
             assert strict.usage().worst <= 1.0
             worst.append((strict.seconds / dense - 1.0, size))
     print(f"18 polylines with blended corners: strict above the dense optimum median "
@@ -170,7 +170,7 @@ def stops() -> None:
     path, places = zigzag(1000.0), np.linspace(0.0, 1000.0, 501)[1:-1].tolist()
     for strict in (False, True):
         start = time.perf_counter()
-        made = plan(path, MIKRON, stops=places, options=Options(strict=strict, method=Method(kernel=True)))
+        made = plan(path, MIKRON, stops=places, options=PlannerOptions(strict=strict, method=Method(kernel=True)))
         print(f"a stop each 2 mm, {'strict' if strict else 'fast'}: {(time.perf_counter() - start) / 0.5:.1f} ms per stop, "
               f"{made.seconds:.1f} s of motion")
 
@@ -188,11 +188,11 @@ def memory() -> None:
         return
     path, small = zigzag(100_000.0), zigzag(3000.0)
     method = Method(kernel=True)
-    plan(small, MIKRON, options=Options(method=method), knots=uniform(small, 30_000).sigma)
+    plan(small, MIKRON, options=PlannerOptions(method=method), knots=uniform(small, 30_000).sigma)
     sigma = uniform(path, 1_000_000).sigma
     Path("/proc/self/clear_refs").write_text("5")  # forgets the peak so far
     before = peak()
-    made = plan(path, MIKRON, options=Options(method=method), knots=sigma)
+    made = plan(path, MIKRON, options=PlannerOptions(method=method), knots=sigma)
     grown = peak() - before
     print(f"10^6 knots: {grown:.0f} MB more, stitches {made.mismatch:.1e}, {made.iterations} iterations, "
           f"{made.seconds:.1f} s of motion")
@@ -229,7 +229,7 @@ def limits() -> None:
     price, bound = [], []
     for seed in range(50):
         path = random_path(seed, bend=(0.3, 1.0, 3.0)[seed % 3])
-        made = {strict: plan(path, MIKRON, options=Options(strict=strict)) for strict in (False, True)}
+        made = {strict: plan(path, MIKRON, options=PlannerOptions(strict=strict)) for strict in (False, True)}
         for strict, one in made.items():
             worst[strict].append(one.usage().worst)
         price.append(made[True].seconds / made[False].seconds - 1.0)

@@ -19,9 +19,9 @@ from machines.machine import Limits, Machine
 from postproc.control.control import Control
 from postproc.joints.greedy import greedy
 from postproc.joints.joint_path import solve
-from postproc.joints.lattice import Run, lattice_of
-from postproc.joints.lead import lead_past
+from postproc.joints.lattice import PoseRun, lattice_of
 from postproc.joints.plan import plan_runs
+from postproc.joints.singular_detours import lead_past
 from postproc.path.linearise import linearise
 from toolpaths.shape import Curves
 from toolpaths.units import DEG
@@ -65,7 +65,7 @@ def against_greedy() -> None:
         m = machines.load(name)
         limits = limited(m)
         for label, tip, axis, rest in paths(np.random.default_rng(1)):
-            run = Run(m.kinematics, tip, axis, rest)
+            run = PoseRun(m.kinematics, tip, axis, rest)
             found = plan_runs([run], limits, m.home)[0]
             other = greedy(lattice_of(run, limits, m.home[None]), m.home)
             stops = [m.home[None], *np.split(found.q, [r.row + 1 for r in found.rewinds])]
@@ -153,7 +153,7 @@ def speed(n: int) -> None:
         base = clocked("inverse kinematics, all branches", n, 0.0, lambda: m.kinematics.inverse(tip, axis))  # noqa: B023
         found: list[np.ndarray] = []
         clocked("plan", n, base, lambda: found.append(plan_runs(  # noqa: B023
-            [Run(m.kinematics, tip, axis)], limits, m.home)[0].q))  # noqa: B023
+            [PoseRun(m.kinematics, tip, axis)], limits, m.home)[0].q))  # noqa: B023
         zero = np.zeros((n - 1, 3))
         curves = Curves(tip[:-1], tip[1:], axis[:-1], axis[1:], np.zeros(n - 1, dtype=bool), zero, zero, np.zeros(n - 1))
         clocked("leading past singular directions", n, base, lambda: lead_past(

@@ -19,10 +19,10 @@ import machines
 import toolpaths
 from machines.machine import Machine
 from postproc.base.options import Options
+from postproc.orientation.candidates.candidate_times import turned, turned_all
 from postproc.orientation.candidates.candidates import tried
 from postproc.orientation.candidates.ranking import Ranking, prepare
-from postproc.orientation.candidates.timed import turned, turned_all
-from postproc.orientation.passes.allowed import Allowed
+from postproc.orientation.passes.allowed import AllowedAxes
 from postproc.orientation.passes.passes import Pass, work_of
 from postproc.orientation.plans.choice import OrientationChoice
 from postproc.orientation.plans.orient import orient
@@ -100,7 +100,7 @@ def full() -> None:
         timed(f"{name} on {machine}", toolpaths.read(SAMPLES / name)[0], machines.load(machine), setup)
 
 
-def _grid_best(one: Pass, m: Machine, limit: Allowed) -> float:
+def _grid_best(one: Pass, m: Machine, limit: AllowedAxes) -> float:
     """Least time over orientations A, C on a grid, then on a finer one round the best."""
     best, centre, span, step = np.inf, (0.0, 0.0), (60.0, 180.0), GRID
     for _ in range(3):
@@ -126,7 +126,7 @@ def brute() -> None:
     work, _ = work_of(toolpaths.read(SAMPLES / "test_part.cls")[0], m, settings, Options())
     assert work is not None
     for k in (0, 2, 4):
-        one, limit = work.passes[k], Allowed(60.0 * DEG)
+        one, limit = work.passes[k], AllowedAxes(60.0 * DEG)
         best, grid = tried(one, m, limit).best.seconds, _grid_best(one, m, limit)
         print(f"Xp = {one.tip[1, 0]:4.0f}: search {best:.4f} s, grid {grid:.4f} s, {100.0 * (best / grid - 1.0):+.2f} %")
 

@@ -18,15 +18,15 @@ import machines
 import toolpaths
 from machines.machine import Machine, Timing
 from postproc.base.options import Options
+from postproc.orientation.candidates.candidate_times import Candidate, turned_all
 from postproc.orientation.candidates.candidates import tried
-from postproc.orientation.candidates.seeds import across
-from postproc.orientation.candidates.timed import Turned, turned_all
-from postproc.orientation.passes.allowed import Allowed
-from postproc.orientation.passes.passes import Pass, Work, work_of
+from postproc.orientation.candidates.initial_axes import across
+from postproc.orientation.passes.allowed import AllowedAxes
+from postproc.orientation.passes.passes import Pass, PassContext, work_of
 from postproc.orientation.plans.choice import OrientationChoice
-from postproc.orientation.plans.choose import shortest
+from postproc.orientation.plans.index_time import all_ends, ways_between
 from postproc.orientation.plans.orient import orient
-from postproc.orientation.plans.turns import all_ends, ways_between
+from postproc.orientation.plans.shortest_sequence import shortest
 from postproc.setup.model import SetupFile, load_setup
 from toolpaths.arrays import Floats
 from toolpaths.toolpath import Toolpath
@@ -57,7 +57,7 @@ def disc(axis: Floats, cap: float, step: float) -> Floats:
     return np.asarray(np.cos(size)[:, None] * axis + flat[:, None] * (u[:, None] * x + v[:, None] * y))
 
 
-def grid_of(one: Pass, m: Machine, allowed: Allowed, centre: Floats, cap: float, step: float) -> list[Turned]:
+def grid_of(one: Pass, m: Machine, allowed: AllowedAxes, centre: Floats, cap: float, step: float) -> list[Candidate]:
     """The pass along every allowed axis of a disc that the machine can run it along."""
     axes = disc(centre, cap, step)
     axes = axes[allowed.mask(one, axes)]
@@ -65,7 +65,8 @@ def grid_of(one: Pass, m: Machine, allowed: Allowed, centre: Floats, cap: float,
     return [each for each in made if not each.refused]
 
 
-def compared(name: str, one: Pass, m: Machine, allowed: Allowed, centre: Floats | None, cap: float, step: float) -> float:
+def compared(name: str, one: Pass, m: Machine, allowed: AllowedAxes, centre: Floats | None, cap: float,
+             step: float) -> float:
     """Seconds of the search over the least of the grid, both planned in full, less 1."""
     begin = time.perf_counter()
     found = tried(one, m, allowed).best
@@ -78,7 +79,7 @@ def compared(name: str, one: Pass, m: Machine, allowed: Allowed, centre: Floats 
     return loss
 
 
-def test_part(m: Machine) -> Work:
+def test_part(m: Machine) -> PassContext:
     """The paper's part on a machine."""
     work, found = work_of(toolpaths.read(SAMPLES / "test_part.cls")[0], m, setup_of("tools.setup.toml"), Options())
     assert work is not None, found
@@ -91,8 +92,8 @@ def brute() -> None:
     for k in (0, 2, 4):
         one = test_part(m).passes[k]
         name = f"Xp = {one.tip[1, 0]:.0f}"
-        compared(f"{name}, within 15 degrees of the CL's axis", one, m, Allowed(CAP), one.axis, CAP, GRID)
-        compared(f"{name}, round the best of 60 degrees", one, m, Allowed(60.0 * DEG), None, CAP, GRID)
+        compared(f"{name}, within 15 degrees of the CL's axis", one, m, AllowedAxes(CAP), one.axis, CAP, GRID)
+        compared(f"{name}, round the best of 60 degrees", one, m, AllowedAxes(60.0 * DEG), None, CAP, GRID)
 
 
 def strips(directions: list[float], cutter: str = "16,8", length: float = 80.0, pitch: float = 1.0) -> Toolpath:
@@ -118,7 +119,7 @@ def chosen(path: Toolpath, m: Machine, setup: SetupFile, max_tilt: float = 60.0)
 def whole(m: Machine, path: Toolpath, cap: float, step: float) -> tuple[float, float, float]:
     """(seconds of `keep`, of `auto`, least seconds of all sequences of axes of the grid), within `cap` of the CL's axes."""
     choice = chosen(path, m, setup_of("tools.setup.toml"), cap / DEG)
-    work, allowed = choice.work, Allowed(cap)
+    work, allowed = choice.work, AllowedAxes(cap)
     states = [grid_of(one, m, allowed, one.axis, cap, step) for one in work.passes]
     edges = [all_ends(row, work) for row in states]
     cost = [np.array([made.seconds for made in row]) + np.array([e.rapids for e in edge])

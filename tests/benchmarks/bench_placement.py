@@ -26,7 +26,7 @@ from postproc.cycle_time.model import load_model
 from postproc.cycle_time.planned import planned_times
 from postproc.pipeline.convert import convert
 from postproc.placement.place import PlacementChoice, place
-from postproc.placement.timed import Timer
+from postproc.placement.place_times import Timer
 from postproc.setup.model import PartPlacement, SetupFile, load_setup
 from postproc.setup.place import PlacementLimits
 from toolpaths.toolpath import Toolpath

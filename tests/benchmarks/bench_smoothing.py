@@ -32,7 +32,7 @@ import toolpaths
 from machines.machine import Machine
 from postproc.feedrate.limits import JointLimits
 from postproc.feedrate.paths import SplinePath
-from postproc.feedrate.plan import Options, plan
+from postproc.feedrate.plan import PlannerOptions, plan
 from postproc.pipeline.result import PostResult
 from postproc.pipeline.stages import plan_motion
 from postproc.planning.geometry import MachinePath
@@ -203,13 +203,14 @@ def parallel() -> None:
         weight = np.array([1.0, 1.0, 1.0, 1.0 / 300.0])[:p.shape[1]]
         inner = with_c(box(made, p, weight), made)
         one = first_pass(file, name, setup)
-        own = sum(plan(path, joint_limits(made.limits), FAST, options=Options(strict=True)).seconds for path in one.paths)
+        own = sum(plan(path, joint_limits(made.limits), FAST, options=PlannerOptions(strict=True)).seconds
+                  for path in one.paths)
         other, worst = 0.0, 0.0
         for path in one.paths:
             gauge = path.values[:, :path.joints]
             coordinates = np.hstack((platform(made, gauge), gauge[:, 4:]))
             virtual = MachinePath.through(path.s, np.hstack((coordinates, path.values[:, path.joints:])), path.led)
-            boxed = plan(virtual, inner, FAST, options=Options(strict=True))
+            boxed = plan(virtual, inner, FAST, options=PlannerOptions(strict=True))
             other += boxed.seconds
             run = boxed.trajectory()
             q = slides(made, run.q[:, :p.shape[1]])

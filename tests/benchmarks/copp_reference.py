@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from postproc.feedrate.limits import JointLimits
-from postproc.feedrate.paths import Path
+from postproc.feedrate.paths import ParametricPath
 from toolpaths.arrays import Floats
 
 
-def copp_times(path: Path, s: Floats, limits: JointLimits, passes: int, unit: float = 10.0) -> Iterator[float]:
+def copp_times(path: ParametricPath, s: Floats, limits: JointLimits, passes: int, unit: float = 10.0) -> Iterator[float]:
     """Time of motion after each linear program on the grid s (N,); the parameter in units of `unit`, which suits it.
 
     The first one is linearised about the second-order optimum, each further one about the last motion.

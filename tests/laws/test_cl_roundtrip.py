@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from toolpaths import write
 from toolpaths.cl.read import read_bytes
-from toolpaths.cl.text.log import Log
+from toolpaths.cl.text.log import DiagnosticLog
 from toolpaths.cl.text.scan import scan
 from toolpaths.cl.text.source import normalise
 from toolpaths.diagnostics import has_errors
@@ -111,7 +111,7 @@ def test_fast_and_slow_paths_agree(rows: list[tuple[str, list[str], str, str]]) 
     fast = read_bytes("\n".join(["UNITS/MM", *lines]))
     labelled = ["UNITS/MM", *(f"L{k}){line}" for k, line in enumerate(lines))]
     slow = read_bytes("\n".join(labelled))
-    assert not len(scan(normalise("\n".join(labelled).encode(), Log())).points.line)
+    assert not len(scan(normalise("\n".join(labelled).encode(), DiagnosticLog())).points.line)
     assert fast.toolpath.equals(slow.toolpath)
     assert np.array_equal(fast.toolpath.line, slow.toolpath.line)
     assert [(d.code, d.lines) for d in fast.diagnostics] == [(d.code, d.lines) for d in slow.diagnostics]
@@ -119,7 +119,7 @@ def test_fast_and_slow_paths_agree(rows: list[tuple[str, list[str], str, str]]) 
 
 def test_plain_lines_take_the_fast_path() -> None:
     text = b"RAPID\nGOTO/1,2,3\nGOTO  /  1., .5,-3 , 0,0,1 \ngoto/1,2,3\nGOTO/1,2\nGOTO/1,2,3 $$ c\nGOTO/1 2 3\n"
-    found = scan(normalise(text, Log()))
+    found = scan(normalise(text, DiagnosticLog()))
     assert found.points.line.tolist() == [2, 3, 4, 6]
     assert found.line == [1, 5, 7]
     assert found.before == [0, 3, 4]

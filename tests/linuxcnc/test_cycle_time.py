@@ -10,10 +10,10 @@ import pytest
 
 from machines.machine import Machine
 from postproc.controllers.model import load_controller
-from postproc.cycle_time.blocks import Blocks
+from postproc.cycle_time.blocks import MotionBlocks
 from postproc.cycle_time.calibrate import calibrate
 from postproc.cycle_time.estimate import Estimate, estimate
-from postproc.cycle_time.log import Log
+from postproc.cycle_time.log import RunLog
 from postproc.cycle_time.model import load_model
 from postproc.cycle_time.source import from_gcode
 from postproc.setup.model import SetupFile
@@ -31,7 +31,7 @@ SIMULATED = ("zigzag, G61.1", "zigzag, G64", "circle of lines, G64 P0.01", "rand
 tests/postproc/cycle_time/test_cycle_time_models.py"""
 
 
-def blocks(text: str, on: Machine) -> Blocks:
+def blocks(text: str, on: Machine) -> MotionBlocks:
     spec, _ = load_controller("linuxcnc")
     assert spec is not None
     made, found = from_gcode(text.encode(), on, spec, SetupFile())
@@ -102,7 +102,7 @@ def test_a_generic_model_learns_linuxcnc_from_its_log(recorded, tmp_path: Path) 
     taught = runs[0]
     rows = np.concatenate([[0], np.flatnonzero(np.diff(taught.line) != 0) + 1])
     rows = rows[taught.line[rows] > 0]
-    log = Log(taught.line[rows], taught.t[rows], np.full((len(rows), 3), np.nan), rows)
+    log = RunLog(taught.line[rows], taught.t[rows], np.full((len(rows), 3), np.nan), rows)
     model, _ = load_model("lookahead")
     assert model is not None
     fit, found = calibrate(blocks(texts[0], on), log, model, "log.csv", on)

@@ -12,15 +12,15 @@ import machines
 from machines.geometric_error.actual.model import ErrorModel
 from machines.geometric_error.actual.serial_errors import Component, SerialErrors
 from machines.geometric_error.exchange.exports import to_screws
-from machines.geometric_error.tables.curves import Table
+from machines.geometric_error.tables.curves import TableCurve
 from machines.geometric_error.tables.names import parse
 from tests.linuxcnc import config
 from toolpaths.arrays import Floats
 
 STOPS = (-60.0, -13.0, 40.0, 71.0, 5.0, -40.0, -58.5)
 """mm, X: forwards four times, then backwards"""
-TABLE = Table(np.array([-80.0, -50.0, 0.0, 30.0, 80.0]),
-              np.array([0.010, -0.020, 0.005, 0.030, 0.015, 0.014, -0.012, 0.011, 0.041, 0.022]), both=True)
+TABLE = TableCurve(np.array([-80.0, -50.0, 0.0, 30.0, 80.0]),
+                   np.array([0.010, -0.020, 0.005, 0.030, 0.015, 0.014, -0.012, 0.011, 0.041, 0.022]), both=True)
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ from machines.geometric_error.actual.axis_motion import effect
 from machines.geometric_error.actual.model import ErrorModel
 from machines.geometric_error.actual.rods import RodErrors, rod_frame, rod_names
 from machines.geometric_error.actual.serial_errors import Component, SerialErrors
-from machines.geometric_error.tables.curves import Fourier, Polynomial, Table
+from machines.geometric_error.tables.curves import Fourier, Polynomial, TableCurve
 from machines.geometric_error.tables.names import DIRECTIONS, parse
 from machines.kinematics.base import Kinematics
 from machines.kinematics.serial import Serial
@@ -39,13 +39,13 @@ def serial_errors(kinematics: Kinematics, seed: int = 0, length: float = 0.01, a
     return SerialErrors(tuple(components), constants, reference, {moving: "moving"})
 
 
-def _curve(rng: np.random.Generator, rotary: bool, k: int, size: float) -> Table | Fourier | Polynomial:
+def _curve(rng: np.random.Generator, rotary: bool, k: int, size: float) -> TableCurve | Fourier | Polynomial:
     if rotary:
         return Fourier(rng.normal(size=7) * size / 2.0)
     if k == 1:
         return Polynomial(rng.normal(size=4) * size / 2.0, (-REACH, REACH), 20.0, REACH)
     x = np.linspace(-REACH, REACH, 13)
-    return Table(x, rng.normal(size=13) * size, "spline" if k == 2 else "linear")
+    return TableCurve(x, rng.normal(size=13) * size, "spline" if k == 2 else "linear")
 
 
 def rod_errors(kinematics: Kinematics, seed: int = 0, length: float = 0.01, angle: float = 3.0 * ARCSEC) -> RodErrors:
@@ -88,7 +88,7 @@ def correlated(full: ErrorModel, seed: int = 0) -> ErrorModel:
     return replace(full, covariance=root @ root.T + np.diag(np.full(len(full.names), 1e-14)))
 
 
-def component(text: str, curve: Table | Fourier | Polynomial) -> Component:
+def component(text: str, curve: TableCurve | Fourier | Polynomial) -> Component:
     """A component error by its name."""
     name = parse(text)
     assert name is not None

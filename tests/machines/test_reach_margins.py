@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import machines
+from machines.kinematics.clearance_geometry import ClearanceSizes
 from machines.kinematics.h4_linear import H4Linear
 from machines.kinematics.linear_delta import LinearDelta
-from machines.kinematics.rig import Clearance
 from machines.reach import Margins, is_checked, reach, reach_between, segment_distance
 
 NAMES = ("uranesx", "h4a-c-table", "h4a-spindle-axis")
@@ -78,8 +78,8 @@ def test_tilt_and_joint_margins_count_from_their_stops() -> None:
 def test_rods_side_by_side_keep_their_spacing() -> None:
     """Parallel slides, parallel rods: the gap is the spacing of the lines less two radii."""
     kinematics = parallel("delta-parallel-z")
-    clearance = Clearance(leg=np.array([0, 0, 1, 2]), shift=np.array([[0, 40.0, 0], [0, -40, 0], [0, 0, 0], [0, 0, 0]]),
-                          rod_radius=10.0)
+    clearance = ClearanceSizes(leg=np.array([0, 0, 1, 2]), shift=np.array([[0, 40.0, 0], [0, -40, 0], [0, 0, 0], [0, 0, 0]]),
+                               rod_radius=10.0)
     names = reach(replace(kinematics, clearance=clearance), joints(kinematics, 5)).names
     assert "rod X1 - rod X2" not in names, "rods of one leg stay parallel"
     assert "rod X1 - rod Y1" in names

@@ -7,7 +7,7 @@ import pytest
 from pydantic import Field
 
 from machines.toml_lines import key_lines
-from machines.user_file import Origin, UserModel, load_toml, read_toml, schema
+from machines.user_file import UserModel, ValueSource, load_toml, read_toml, schema
 
 
 class Axis(UserModel):
@@ -147,8 +147,8 @@ def test_origin_of_each_value_through_a_base(tmp_path):
     own = write(tmp_path, 'base = "small"\n[axes.X]\ntravel = [0, 1]\n')
     file, _ = read_toml(own, {"small": base})
     assert file is not None
-    assert file.origin(("axes", "X", "travel")) == Origin(str(own), 3)
-    assert file.origin(("axes", "X", "velocity")) == Origin(str(base), 5)
+    assert file.origin(("axes", "X", "travel")) == ValueSource(str(own), 3)
+    assert file.origin(("axes", "X", "velocity")) == ValueSource(str(base), 5)
 
 
 def test_a_fault_in_the_base_names_the_base_file(tmp_path):

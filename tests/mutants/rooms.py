@@ -28,7 +28,8 @@ BATTERY: dict[str, tuple[str, ...]] = {
     "proof": ("flat linuxcnc", "five linuxcnc", "laws siemens"),
 }
 TESTS: dict[str, tuple[str, ...]] = {
-    "reader": ("toolpaths/cl/test_cl_motion.py", "toolpaths/cl/test_cl_records.py", "toolpaths/cl/test_cl_habits.py",
+    "reader": ("toolpaths/cl/test_cl_motion.py", "toolpaths/cl/test_cl_records.py",
+               "toolpaths/cl/test_cl_records_by_system.py",
                "test_samples.py"),
     "frames": ("toolpaths/cl/test_cl_motion.py", "toolpaths/cl/test_cl_records.py", "postproc/setup/test_setup_frames.py",
                "test_samples.py"),
@@ -61,7 +62,7 @@ TESTS: dict[str, tuple[str, ...]] = {
     "writer": ("postproc/writing/test_golden_programs.py", "postproc/writing/test_writer.py",
                "postproc/writing/test_writer_cycles.py",
                "postproc/writing/test_writer_{}.py"),
-    "reader of": ("postproc/readback/test_reader_{}.py", "postproc/writing/test_rules_of_text_and_reader.py",
+    "reader of": ("postproc/readback/test_reader_{}.py", "postproc/writing/test_controller_rules.py",
                   "postproc/verification/test_verify_edits.py", "postproc/readback/test_reader_laws.py",
                       "postproc/readback/test_readback.py",
                   "postproc/readback/test_program_mutation.py"),

@@ -10,7 +10,7 @@ from scipy.interpolate import make_interp_spline
 
 from postproc.feedrate.limits import JointLimits
 from postproc.feedrate.paths import Derivatives, Eased, SplinePath
-from postproc.feedrate.problem import Knots
+from postproc.feedrate.problem import MotionKnots
 from toolpaths.arrays import Floats
 
 TURN = 2.0 * np.pi
@@ -70,7 +70,7 @@ def unlimited(s: Floats) -> Floats:
 
 
 def uniform(path: SplinePath, intervals: int, limits: JointLimits = MIKRON, ease: float = 25.0,
-            feed: Callable[[Floats], Floats] = unlimited) -> Knots:
+            feed: Callable[[Floats], Floats] = unlimited) -> MotionKnots:
     """The whole path on equal intervals."""
     eased = Eased.between(path, path.start, path.end, ease)
-    return Knots(eased, np.linspace(0.0, eased.end, intervals + 1), limits, feed)
+    return MotionKnots(eased, np.linspace(0.0, eased.end, intervals + 1), limits, feed)

@@ -9,11 +9,11 @@ import numpy as np
 from scipy import sparse
 from scipy.optimize import linprog
 
-from postproc.feedrate.problem import Problem
+from postproc.feedrate.problem import SpeedProblem
 from toolpaths.arrays import Floats
 
 
-def least_jerk_time(problem: Problem, c: Floats, rounds: int = 60, close: float = 1e-6) -> float:
+def least_jerk_time(problem: SpeedProblem, c: Floats, rounds: int = 60, close: float = 1e-6) -> float:
     """Sequence of convex problems from the feasible c (K + 2,): x^-1/2 of the jerk rows by its tangent, the objective exact.
 
     Each is min sum w t with t >= x^-1/2, a power cone per knot. Unknowns are relative to the last solution.
@@ -31,7 +31,7 @@ def least_jerk_time(problem: Problem, c: Floats, rounds: int = 60, close: float 
     raise ArithmeticError("the reference did not converge")
 
 
-def _convex(problem: Problem, c: Floats) -> tuple[Floats | None, float]:
+def _convex(problem: SpeedProblem, c: Floats) -> tuple[Floats | None, float]:
     basis, knots = problem.basis, problem.basis.knots
     order = [_operator(basis.stencil[i]) @ sparse.diags(c) @ _tie(knots + 2, basis.tied) for i in range(3)]
     x = basis.values(c)[0]

@@ -19,7 +19,7 @@ import postproc
 import toolpaths
 from postproc.pipeline.result import PostResult
 from postproc.setup.model import SetupFile, load_setup
-from tests.postproc.peer import Peer, Step
+from tests.postproc.plain_executor import Peer, Step
 from toolpaths.diagnostics import has_errors
 from toolpaths.toolpath import Toolpath
 

@@ -13,7 +13,7 @@ from postproc.controllers.model import ControllerFile, load_controller
 from postproc.readback.dialects.readers import reader_for
 from postproc.readback.execution.execute import Motion, run
 from postproc.readback.execution.offsets import Offsets
-from postproc.readback.execution.poses import Executed
+from postproc.readback.execution.poses import BlockPoses
 from tests.postproc.kit import machine
 from toolpaths.diagnostics import Diagnostic, has_errors
 
@@ -61,10 +61,10 @@ def words(motion: Motion) -> list[list[float]]:
     return (motion.end[:, :3] - np.array(ORIGIN)).round(4).tolist()
 
 
-def look(motion: Motion, held: Control) -> Executed:
+def look(motion: Motion, held: Control) -> BlockPoses:
     """Poses of the motion on the machine itself."""
     kin = held.machine.kinematics
-    return Executed(held, lambda number: kin.with_tool(LENGTHS.get(number, 0.0)), LENGTHS)
+    return BlockPoses(held, lambda number: kin.with_tool(LENGTHS.get(number, 0.0)), LENGTHS)
 
 
 def faults(dialect: str, text: str, on: str = "mill-3axis") -> dict[str, list[int]]:

@@ -11,7 +11,7 @@ import numpy as np
 import machines
 from machines.machine import Machine, Timing
 from postproc.controllers.model import load_controller
-from postproc.cycle_time.blocks import Blocks
+from postproc.cycle_time.blocks import MotionBlocks
 from postproc.cycle_time.model import CycleTimeModel, load_model
 from postproc.cycle_time.source import from_gcode
 from postproc.setup.model import SetupFile
@@ -32,7 +32,7 @@ def model(name: str) -> CycleTimeModel:
     return loaded
 
 
-def blocks(text: str, on: Machine | None = None, controller: str = "linuxcnc") -> Blocks:
+def blocks(text: str, on: Machine | None = None, controller: str = "linuxcnc") -> MotionBlocks:
     spec, _ = load_controller(controller)
     assert spec is not None
     made, found = from_gcode(f"{text}\nM2\n".encode(), on or machine(), spec, SetupFile())

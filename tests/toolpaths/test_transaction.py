@@ -16,7 +16,7 @@ from typing import Any
 
 import pytest
 
-from toolpaths import leftovers, transaction
+from toolpaths import interrupted_runs, transaction
 from toolpaths.diagnostics import DiagnosticError
 from toolpaths.transaction import write_together
 
@@ -94,8 +94,8 @@ def test_a_fault_at_any_step_leaves_everything_as_it_was(shop: tuple[Path, dict[
         if calls[0] < number:
             break
         with monkeypatch.context() as patch:  # a fault that costs nothing: the next one again, as another process
-            patch.setattr(leftovers, "_alive", lambda path, name: False)
-            assert not any(leftovers.clean(place) for place in (folder, folder / "subs", folder / "made" / "deep"))
+            patch.setattr(interrupted_runs, "_alive", lambda path, name: False)
+            assert not any(interrupted_runs.clean(place) for place in (folder, folder / "subs", folder / "made" / "deep"))
         (folder / "O2").unlink()
         shutil.rmtree(folder / "made")
         (folder / "subs" / "O1").write_text("old O1")
@@ -126,10 +126,10 @@ def test_what_cannot_be_put_back_is_put_back_by_the_next_run(shop: tuple[Path, d
         with pytest.raises(DiagnosticError, match=r"file\.mixed.*the next run that writes here"):
             write_together(outputs)
     assert (folder / "subs" / "O1").read_text() == "new O1"
-    monkeypatch.setattr(leftovers, "_alive", lambda path, name: False)
-    told = leftovers.clean(folder)
+    monkeypatch.setattr(interrupted_runs, "_alive", lambda path, name: False)
+    told = interrupted_runs.clean(folder)
     assert [d.code for d in told] == ["file.recovered"]
-    leftovers.clean(folder / "subs")
+    interrupted_runs.clean(folder / "subs")
     assert {k: v for k, v in state(folder).items() if not k.startswith("made")} == before
 
 
@@ -279,7 +279,7 @@ def dead() -> Iterator[int]:
 
 
 def test_only_temporary_files_of_dead_runs_are_swept(tmp_path: Path, dead: int) -> None:
-    mine, here = leftovers.run_name(), leftovers._where()
+    mine, here = interrupted_runs.run_name(), interrupted_runs._where()
     names = {"dead": f".a.nc.postproc-{here}-{dead}-1-00000000.new", "live": f".a.nc.{mine}.new",
              "reused": f".a.nc.postproc-{here}-{os.getpid()}-1-00000000.old",
              "far": f".a.nc.postproc-00000000-{dead}-1-00000000.new",
@@ -288,30 +288,30 @@ def test_only_temporary_files_of_dead_runs_are_swept(tmp_path: Path, dead: int) 
     for name in names.values():
         (tmp_path / name).write_text("")
     made = time.time
-    leftovers.time.time = lambda: made() + 86000.0
+    interrupted_runs.time.time = lambda: made() + 86000.0
     try:
         write_together({tmp_path / "a.nc": "A"})
         assert {k for k, name in names.items() if not (tmp_path / name).exists()} == {"dead", "reused"}
-        leftovers.time.time = lambda: made() + 90000.0
+        interrupted_runs.time.time = lambda: made() + 90000.0
         write_together({tmp_path / "a.nc": "A"})
         assert {k for k, name in names.items() if not (tmp_path / name).exists()} == {"dead", "reused", "far", "far old"}
     finally:
-        leftovers.time.time = made
+        interrupted_runs.time.time = made
 
 
 def test_what_was_changed_since_a_kill_stays(tmp_path: Path, dead: int) -> None:
-    run = f"postproc-{leftovers._where()}-{dead}-1-00000000"
+    run = f"postproc-{interrupted_runs._where()}-{dead}-1-00000000"
     entries = []
     for name in ("a.nc", "b.nc", "c.nc"):
         (tmp_path / name).write_text(f"new {name}")
-        backup = leftovers.temporary(tmp_path / name, run, leftovers.OLD)
+        backup = interrupted_runs.temporary(tmp_path / name, run, interrupted_runs.OLD)
         backup.write_text(f"old {name}")
-        entries.append(leftovers.Entry(name, "gone", backup.name, leftovers.mark_of(tmp_path / name)))
-    journal = leftovers.temporary(tmp_path / "c.nc", run, leftovers.JOURNAL)
-    journal.write_text(leftovers.journal_text(entries))
+        entries.append(interrupted_runs.Entry(name, "gone", backup.name, interrupted_runs.mark_of(tmp_path / name)))
+    journal = interrupted_runs.temporary(tmp_path / "c.nc", run, interrupted_runs.JOURNAL)
+    journal.write_text(interrupted_runs.journal_text(entries))
     (tmp_path / "b.nc").write_text("by hand, in place")
-    assert leftovers.interrupted(tmp_path) == journal
+    assert interrupted_runs.interrupted(tmp_path) == journal
     told = write_together({tmp_path / "d.nc": "D"})
-    assert ["replaced 2 of 3 files" in str(d) for d in told] == [True] and leftovers.interrupted(tmp_path) is None
+    assert ["replaced 2 of 3 files" in str(d) for d in told] == [True] and interrupted_runs.interrupted(tmp_path) is None
     assert {p.name: p.read_text() for p in tmp_path.iterdir()} == {"a.nc": "old a.nc", "b.nc": "by hand, in place",
                                                                    "c.nc": "old c.nc", "d.nc": "D"}

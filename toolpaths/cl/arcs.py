@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from toolpaths.arrays import Bools, Floats, Ints
-from toolpaths.cl.text.log import Log
+from toolpaths.cl.text.log import DiagnosticLog
 from toolpaths.toolpath import Arcs
 
 UNIT_EXACT = 1e-14
@@ -55,7 +55,7 @@ class ArcTable:
 
 
 @dataclass(frozen=True)
-class Records:
+class CircleRecords:
     """The same as arrays in mm and the part frame, one per arc (K rows); start and end are tips (K, 3)."""
 
     start: Floats
@@ -80,7 +80,7 @@ def unit(vectors: Floats) -> Floats:
     return result
 
 
-def arcs_of(r: Records, full_circles: bool, log: Log) -> Arcs:
+def arcs_of(r: CircleRecords, full_circles: bool, log: DiagnosticLog) -> Arcs:
     """Arcs of the records; a fault is logged with its line. `full_circles`: start = end is a whole turn."""
     normal = _normals(r, log)
     height = np.einsum("ki,ki->k", r.start - r.center, normal)
@@ -97,14 +97,15 @@ def arcs_of(r: Records, full_circles: bool, log: Log) -> Arcs:
     return Arcs(center, normal, radius, sweep)
 
 
-def _normals(r: Records, log: Log) -> Floats:
+def _normals(r: CircleRecords, log: DiagnosticLog) -> Floats:
     norm = np.linalg.norm(r.normal, axis=1)
     for k in np.flatnonzero(np.abs(norm - 1.0) > UNIT_ROUNDING):
         log.error("cl.arc-axis", f"the axis of the circle has length {norm[k]:.4g}, it must be 1", int(r.line[k]))
     return np.where((norm > 0.0)[:, None], unit(r.normal), [0.0, 0.0, 1.0])
 
 
-def _sweep(u: Floats, v: Floats, normal: Floats, r: Records, full_circles: bool, log: Log) -> tuple[Floats, Bools]:
+def _sweep(u: Floats, v: Floats, normal: Floats, r: CircleRecords, full_circles: bool,
+           log: DiagnosticLog) -> tuple[Floats, Bools]:
     """Angle from u to v about the normal in (0, 2 pi], whole turns added; a written sweep is checked and kept.
 
     Second: arcs that end behind their start by rounding, where no whole circles are written; they go back that way.
@@ -140,14 +141,14 @@ def _sweep(u: Floats, v: Floats, normal: Floats, r: Records, full_circles: bool,
     return angle, back
 
 
-def _check_written(angle: float, sweep: float, radius: float, line: int, log: Log) -> None:
+def _check_written(angle: float, sweep: float, radius: float, line: int, log: DiagnosticLog) -> None:
     miss = abs(math.remainder(angle - sweep, _TURN)) * radius
     if not sweep > 0.0 or miss > RADIUS_ERROR:
         log.error("cl.arc-sweep", f"a sweep of {math.degrees(sweep):.6g} degrees misses the end of the arc by "
                   f"{miss:.3g} mm", line)
 
 
-def _check_radius(start: Floats, end: Floats, r: Records, log: Log) -> None:
+def _check_radius(start: Floats, end: Floats, r: CircleRecords, log: DiagnosticLog) -> None:
     for k in np.flatnonzero(start == 0.0):
         log.error("cl.arc-radius", "the arc starts at its centre", int(r.line[k]))
     miss = np.maximum(np.abs(start - end), np.nan_to_num(np.abs(start - r.radius)))
@@ -159,7 +160,7 @@ def _check_radius(start: Floats, end: Floats, r: Records, log: Log) -> None:
             f"{RADIUS_ERROR if bad else RADIUS_WARNING} mm of difference is allowed", int(r.line[k]))
 
 
-def _check_sense(sweep: Floats, line: Ints, log: Log) -> None:
+def _check_sense(sweep: Floats, line: Ints, log: DiagnosticLog) -> None:
     long = sweep % _TURN > math.pi + 1e-3
     if (len(sweep) >= _SENSE_LEAST and long.sum() > 0.5 * len(sweep)) or (len(sweep) >= _SENSE_ALL and long.all()):
         log.warning("cl.arc-sense", f"{int(long.sum())} of {len(sweep)} arcs sweep more than 180 degrees: the sense "

@@ -1,4 +1,4 @@
-"""From the state of `Builder` to a `Toolpath`: everything that is done to all rows at once."""
+"""From the state of `ToolpathBuilder` to a `Toolpath`: everything that is done to all rows at once."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import numpy as np
 
 from toolpaths.arrays import Array, Bools, Floats, Ints
 from toolpaths.cl import indexing
-from toolpaths.cl.arcs import UNIT_ROUNDING, Records, arcs_of, unit
-from toolpaths.cl.build import Builder, Track
+from toolpaths.cl.arcs import UNIT_ROUNDING, CircleRecords, arcs_of, unit
+from toolpaths.cl.build import ModalValue, ToolpathBuilder
 from toolpaths.cl.heights import height_of, place
 from toolpaths.cl.unnumbered import loaded, named
 from toolpaths.diagnostics import Severity
@@ -22,7 +22,7 @@ T = TypeVar("T")
 
 
 @dataclass
-class Rows:
+class PointRows:
     """The N rows while they are worked on, mm; `given` (N,): the record carries an axis of its own, `index` (N,): which map
     of the builder it takes."""
 
@@ -38,7 +38,7 @@ class Rows:
         return len(self.line)
 
 
-def assemble(b: Builder) -> Toolpath:
+def assemble(b: ToolpathBuilder) -> Toolpath:
     """The toolpath; consumes the builder's arrays."""
     rows = _rows(b)
     n = len(rows)
@@ -73,27 +73,27 @@ def assemble(b: Builder) -> Toolpath:
                     b.declared.units if b.declared else b.units, b.name, b.log.file)
 
 
-def spread(track: Track[T], n: int, dtype: type) -> Array:
+def spread(track: ModalValue[T], n: int, dtype: type) -> Array:
     """The value of each of n rows."""
     starts = np.minimum(np.array([*track.starts, n]), n)
     return np.repeat(np.array(track.values, dtype), np.diff(starts))
 
 
-def _rows(b: Builder) -> Rows:
+def _rows(b: ToolpathBuilder) -> PointRows:
     """Plain points and the others in the order of the program."""
     points, extras = b.points, b.extras
     axis, third = points.axis, points.third
     if b.pieces == [(0, len(points))] or (not b.pieces and not len(points)):
         given = np.zeros(len(points), bool) if axis is None else ~np.isnan(axis[:, 0])
-        return Rows(points.xyz, axis if axis is not None else np.full((len(points), 3), np.nan), third, points.line,
-                    given)
+        return PointRows(points.xyz, axis if axis is not None else np.full((len(points), 3), np.nan), third, points.line,
+                         given)
     source = _source(b)
     tip = _merged(points.xyz, extras.xyz, len(points))[source]
     axis = _merged(axis, extras.axis, len(points))[source]
     has_third = third is not None or any(t[0] == t[0] for t in extras.third)
     third = _merged(third, extras.third, len(points))[source] if has_third else None
     line = np.concatenate([points.line, np.array(extras.line, np.int64)])[source]
-    return Rows(tip, axis, third, line, ~np.isnan(axis[:, 0]))
+    return PointRows(tip, axis, third, line, ~np.isnan(axis[:, 0]))
 
 
 def _merged(plain: Floats | None, extra: list[tuple[float, float, float]], n: int) -> Floats:
@@ -101,7 +101,7 @@ def _merged(plain: Floats | None, extra: list[tuple[float, float, float]], n: in
     return np.concatenate([first, np.array(extra, np.float64).reshape(-1, 3)])
 
 
-def _source(b: Builder) -> Ints:
+def _source(b: ToolpathBuilder) -> Ints:
     """Index into plain points followed by extras, per row."""
     pieces = np.array(b.pieces, np.int64).reshape(-1, 2)
     single = pieces[:, 0] < 0
@@ -112,7 +112,7 @@ def _source(b: Builder) -> Ints:
     return source
 
 
-def _fill_axis(b: Builder, rows: Rows) -> None:
+def _fill_axis(b: ToolpathBuilder, rows: PointRows) -> None:
     """Modal axis: the last one given or set, (0, 0, 1) before any."""
     n = len(rows)
     if rows.given.all():
@@ -132,7 +132,7 @@ def _fill_axis(b: Builder, rows: Rows) -> None:
     _check_multax_off(b, rows, marks)
 
 
-def _check_multax_off(b: Builder, rows: Rows, marks: dict[int, tuple[float, float, float]]) -> None:
+def _check_multax_off(b: ToolpathBuilder, rows: PointRows, marks: dict[int, tuple[float, float, float]]) -> None:
     """Systems differ in what points of three numbers after MULTAX/OFF mean; CATIA documents the locked axis."""
     for row, line in b.multax_off:
         if row < len(rows) and not rows.given[row] and row not in marks and abs(rows.axis[row, 2] - 1.0) > UNIT_ROUNDING:
@@ -141,7 +141,7 @@ def _check_multax_off(b: Builder, rows: Rows, marks: dict[int, tuple[float, floa
                           f"{k:.6g}) of the point before", line, "state TLAXIS/0,0,1 where it is to be z")
 
 
-def _check_world_axes(b: Builder, rows: Rows) -> None:
+def _check_world_axes(b: ToolpathBuilder, rows: PointRows) -> None:
     """`.clt`: the tool axis of the first point after TLAXIS and ROTABL must be what TLAXIS says."""
     ends = [*(row for row, _, _ in b.world_axes[1:]), len(rows)]
     for (row, stated, line), end in zip(b.world_axes, ends, strict=False):
@@ -152,7 +152,7 @@ def _check_world_axes(b: Builder, rows: Rows) -> None:
                         "write the file anew in the CAM system")
 
 
-def _checked_axis(b: Builder, rows: Rows) -> Floats:
+def _checked_axis(b: ToolpathBuilder, rows: PointRows) -> Floats:
     norm = np.linalg.norm(rows.axis, axis=1)
     bad = ~(np.abs(norm - 1.0) <= UNIT_ROUNDING)
     if bad.any():
@@ -161,7 +161,7 @@ def _checked_axis(b: Builder, rows: Rows) -> Floats:
     return unit(rows.axis)
 
 
-def _normals(b: Builder, rows: Rows) -> tuple[Floats | None, Floats | None]:
+def _normals(b: ToolpathBuilder, rows: PointRows) -> tuple[Floats | None, Floats | None]:
     """Numbers 7 to 9 as (unit normal, contact point), NaN where a row has none."""
     if rows.third is None:
         return None, None
@@ -178,7 +178,7 @@ def _normals(b: Builder, rows: Rows) -> tuple[Floats | None, Floats | None]:
     return normal, np.where(is_contact[:, None], rows.third * b.scale, np.nan)
 
 
-def _place_frames(b: Builder, rows: Rows) -> None:
+def _place_frames(b: ToolpathBuilder, rows: PointRows) -> None:
     """Which map each row takes, and which rows of six numbers are in the common frame."""
     if not b.dialect.six_common:
         return
@@ -194,7 +194,7 @@ def _place_frames(b: Builder, rows: Rows) -> None:
     indexing.check_cuts(b, ~rapid, rows.index, rows.line)
 
 
-def _to_part_frame(b: Builder, rows: Rows, normal: Floats | None, contact: Floats | None) -> None:
+def _to_part_frame(b: ToolpathBuilder, rows: PointRows, normal: Floats | None, contact: Floats | None) -> None:
     for start, end in _runs(rows.index):
         found = b.maps[rows.index[start]]
         if found is None:
@@ -218,7 +218,7 @@ def _runs(index: Ints) -> list[tuple[int, int]]:
     return list(zip([0, *cut], [*cut, len(index)], strict=True))
 
 
-def _add_deltas(b: Builder, rows: Rows) -> None:
+def _add_deltas(b: ToolpathBuilder, rows: PointRows) -> None:
     """GODLTA: each from the row before it, in order."""
     if not b.deltas:
         return
@@ -234,7 +234,7 @@ def _add_deltas(b: Builder, rows: Rows) -> None:
         rows.tip[row] = rows.tip[row - 1] + move
 
 
-def _kinds(b: Builder, n: int) -> tuple[Array, Array, Array]:
+def _kinds(b: ToolpathBuilder, n: int) -> tuple[Array, Array, Array]:
     """(role, kind, arc index) by what the records say; cycles come later."""
     role = np.full(n, Role.POINT, np.int8)
     rows = np.array(list(b.roles), np.int64)
@@ -250,7 +250,7 @@ def _kinds(b: Builder, n: int) -> tuple[Array, Array, Array]:
     return role, kind, arc
 
 
-def _arcs(b: Builder, rows: Rows, kind: Array, arc: Array) -> Arcs:
+def _arcs(b: ToolpathBuilder, rows: PointRows, kind: Array, arc: Array) -> Arcs:
     """Arcs of the circle records; marks their rows."""
     t = b.arcs
     keep = [k for k, row in enumerate(t.row) if _has_start(b, rows, kind, k, row)]
@@ -265,12 +265,12 @@ def _arcs(b: Builder, rows: Rows, kind: Array, arc: Array) -> Arcs:
     normal[against] *= -1.0
     arc[row] = np.arange(len(row))
     kind[row] = Kind.ARC
-    records = Records(rows.tip[row - 1], rows.tip[row], center, normal, np.array(t.radius)[keep] * b.scale,
-                      np.array(t.times)[keep], np.array(t.sweep)[keep], np.array(t.line, np.int64)[keep])
+    records = CircleRecords(rows.tip[row - 1], rows.tip[row], center, normal, np.array(t.radius)[keep] * b.scale,
+                            np.array(t.times)[keep], np.array(t.sweep)[keep], np.array(t.line, np.int64)[keep])
     return arcs_of(records, b.dialect.full_circles, b.log)
 
 
-def _has_start(b: Builder, rows: Rows, kind: Array, k: int, row: int) -> bool:
+def _has_start(b: ToolpathBuilder, rows: PointRows, kind: Array, k: int, row: int) -> bool:
     if row >= len(rows):
         return False
     if row == 0:
@@ -282,7 +282,7 @@ def _has_start(b: Builder, rows: Rows, kind: Array, k: int, row: int) -> bool:
     return b.arcs.row[k + 1:k + 2] != [row]
 
 
-def _map_arcs(b: Builder, rows: Rows, row: Ints, center: Floats, normal: Floats, toward: Floats) -> None:
+def _map_arcs(b: ToolpathBuilder, rows: PointRows, row: Ints, center: Floats, normal: Floats, toward: Floats) -> None:
     index = rows.index[row]
     if rows.common is not None:
         index = np.where(rows.common[row], 0, index)
@@ -295,7 +295,7 @@ def _map_arcs(b: Builder, rows: Rows, row: Ints, center: Floats, normal: Floats,
             toward[where] = toward[where] @ found[0].T
 
 
-def _used_cycles(b: Builder, cycle: Array) -> tuple[Array, tuple[Cycle, ...]]:
+def _used_cycles(b: ToolpathBuilder, cycle: Array) -> tuple[Array, tuple[Cycle, ...]]:
     """(index per row, cycles) without the cycles that drill no hole."""
     used = np.unique(cycle[cycle >= 0])
     for i in np.setdiff1d(np.arange(len(b.cycles)), used):
@@ -305,7 +305,7 @@ def _used_cycles(b: Builder, cycle: Array) -> tuple[Array, tuple[Cycle, ...]]:
     return index[cycle], tuple(b.cycles[i] for i in used)
 
 
-def _fed_cycles(b: Builder, cycle: Array, cycles: tuple[Cycle, ...]) -> tuple[Cycle, ...]:
+def _fed_cycles(b: ToolpathBuilder, cycle: Array, cycles: tuple[Cycle, ...]) -> tuple[Cycle, ...]:
     """The cycles; those that state no feed, where none held yet, have that which holds at their first hole."""
     result = list(cycles)
     for k in [k for k, c in enumerate(cycles) if np.isnan(c.feed)]:
@@ -315,7 +315,7 @@ def _fed_cycles(b: Builder, cycle: Array, cycles: tuple[Cycle, ...]) -> tuple[Cy
     return tuple(result)
 
 
-def _feeds(b: Builder, rows: Rows, kind: Array) -> tuple[Floats, Array]:
+def _feeds(b: ToolpathBuilder, rows: PointRows, kind: Array) -> tuple[Floats, Array]:
     """Modal feed per row; NaN on rapids. A cutting move must have one, and it must be positive."""
     n = len(rows)
     starts = np.minimum(np.array([*b.feed.starts, n]), n)
@@ -329,7 +329,7 @@ def _feeds(b: Builder, rows: Rows, kind: Array) -> tuple[Floats, Array]:
     return feed, mode
 
 
-def _operations(b: Builder, n: int) -> tuple[Array, tuple[Operation, ...], tuple[Frame, ...]]:
+def _operations(b: ToolpathBuilder, n: int) -> tuple[Array, tuple[Operation, ...], tuple[Frame, ...]]:
     """(operation per row, operations with their frames, frames)."""
     column = spread(b.operation, n, np.int32)
     if b.declared is not None and b.declared.operations:
@@ -353,11 +353,11 @@ def _operations(b: Builder, n: int) -> tuple[Array, tuple[Operation, ...], tuple
     return column, tuple(replace(op, frame=frame_of.get(i, 0)) for i, op in enumerate(operations)), tuple(frames)
 
 
-def _tools(b: Builder, n: int) -> tuple[Array, tuple[Tool, ...]]:
+def _tools(b: ToolpathBuilder, n: int) -> tuple[Array, tuple[Tool, ...]]:
     if b.declared is not None:
         return spread(b.declared.tool, n, np.int32), tuple(b.declared.tools)
     order: dict[Tool, int] = {}
-    index: Track[int] = Track(-1)
+    index: ModalValue[int] = ModalValue(-1)
     for start, tool in zip(b.tool.starts, b.tool.values, strict=True):
         index.set(start, -1 if tool is None else order.setdefault(tool, len(order)))
     return spread(index, n, np.int32), named(tuple(order))

@@ -1,6 +1,6 @@
 """The state of reading: where we are in the file, what holds from here on, what was found so far.
 
-Plain points are never touched one by one: a record that changes something notes the row from which it holds (`Track`),
+Plain points are never touched one by one: a record that changes something notes the row from which it holds (`ModalValue`),
 and `assemble` spreads these over the rows at the end.
 """
 
@@ -15,9 +15,9 @@ import numpy as np
 from toolpaths.arrays import Floats
 from toolpaths.cl.arcs import ArcTable
 from toolpaths.cl.text.dialects import SCALE, Dialect
-from toolpaths.cl.text.log import Log
+from toolpaths.cl.text.log import DiagnosticLog
 from toolpaths.cl.text.scan import Points
-from toolpaths.cl.text.statements import COMMENT, Program, Statement
+from toolpaths.cl.text.statements import COMMENT, Statement, StatementList
 from toolpaths.cl.text.subprograms import Called, Subprograms
 from toolpaths.toolpath import Cycle, Event, FeedMode, Frame, Operation, Role, Tool
 
@@ -31,7 +31,7 @@ BETWEEN = frozenset({"FEDRAT", "PPRINT", "REMARK", "LPRINT", "COOLNT", "SPINDL",
 V = TypeVar("V")
 
 
-class Track(Generic[V]):
+class ModalValue(Generic[V]):
     """A value that holds from a row on until the next change."""
 
     __slots__ = ("starts", "values")
@@ -61,7 +61,7 @@ class Declared:
     frames: list[Frame] = field(default_factory=list)
     tools: list[Tool] = field(default_factory=list)
     operations: list[Operation] = field(default_factory=list)
-    tool: Track[int] = field(default_factory=lambda: Track(-1))
+    tool: ModalValue[int] = field(default_factory=lambda: ModalValue(-1))
 
 
 @dataclass(frozen=True)
@@ -86,10 +86,10 @@ class Extras:
         self.line: list[int] = []
 
 
-class Builder:
+class ToolpathBuilder:
     """Reads one program. Handlers get it with the statement and use what they need."""
 
-    def __init__(self, program: Program, points: Points, dialect: Dialect, units: str, log: Log,
+    def __init__(self, program: StatementList, points: Points, dialect: Dialect, units: str, log: DiagnosticLog,
                  allow_unknown: Iterable[str] = ()):
         self.program, self.points, self.dialect, self.log = program, points, dialect, log
         self.units, self.scale = units, SCALE[units]
@@ -102,16 +102,16 @@ class Builder:
         self._start_lists()
 
     def _start_tracks(self) -> None:
-        self.feed: Track[tuple[float, FeedMode]] = Track((float("nan"), FeedMode.PER_TIME))
-        self.tool: Track[Tool | None] = Track(None)
-        self.operation = Track(-1)
-        self.cycle = Track(-1)
-        self.system = Track(-1)
-        self.map = Track(0)
-        self.in_subprogram = Track(False)
-        self.frame_faults: Track[object] = Track("")
+        self.feed: ModalValue[tuple[float, FeedMode]] = ModalValue((float("nan"), FeedMode.PER_TIME))
+        self.tool: ModalValue[Tool | None] = ModalValue(None)
+        self.operation = ModalValue(-1)
+        self.cycle = ModalValue(-1)
+        self.system = ModalValue(-1)
+        self.map = ModalValue(0)
+        self.in_subprogram = ModalValue(False)
+        self.frame_faults: ModalValue[object] = ModalValue("")
         """what the file contradicts about the frame of its points (`indexing`)"""
-        self.dropped_at: Track[object] = Track(False)
+        self.dropped_at: ModalValue[object] = ModalValue(False)
         """where the translation of a CSYS remark is not added"""
 
     def _start_lists(self) -> None:

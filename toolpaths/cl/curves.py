@@ -8,7 +8,7 @@ import re
 import numpy as np
 
 from toolpaths.arrays import Floats
-from toolpaths.cl.build import Builder, Triple
+from toolpaths.cl.build import ToolpathBuilder, Triple
 from toolpaths.cl.text.statements import COMMENT, TEXT, Statement, Word, words_of
 from toolpaths.toolpath import Role
 
@@ -20,7 +20,7 @@ _GEOMETRY = re.compile(r"\b(CIRCLE|LINE|CYLNDR|POINT|PLANE)\s*/([^()]*)", re.IGN
 _TANGENT = re.compile(r"\)\s*,\s*TANTO\b", re.IGNORECASE)
 
 
-def indirv(b: Builder, s: Statement) -> None:
+def indirv(b: ToolpathBuilder, s: Statement) -> None:
     """INDIRV/i, j, k: the direction in which the next curve begins."""
     if len(s.numbers) != 3:
         b.log.error("cl.indirv", f"INDIRV/{s.body}: it takes three numbers", b.line)
@@ -28,7 +28,7 @@ def indirv(b: Builder, s: Statement) -> None:
     b.toward = (s.numbers[0], s.numbers[1], s.numbers[2])
 
 
-def indirp(b: Builder, s: Statement) -> None:
+def indirp(b: ToolpathBuilder, s: Statement) -> None:
     """INDIRP/x, y, z: a point towards which the next curve begins."""
     start = b.last_point()
     if len(s.numbers) != 3 or start is None or math.isnan(start[0]):
@@ -38,7 +38,7 @@ def indirp(b: Builder, s: Statement) -> None:
     b.toward = (x, y, z)
 
 
-def tlon(b: Builder, s: Statement) -> None:
+def tlon(b: ToolpathBuilder, s: Statement) -> None:
     """TLON,GOFWD/(CIRCLE/...),ON[,2,INTOF],(LINE/center, end) or /(CYLNDR/...),ON,(PLANE/...(POINT/end)), or of
     PostWorks (NCL) /(CIRCLE/CANON,center,axis,radius),ON|TANTO,(PLANE/a, b, c, d).
 
@@ -65,7 +65,7 @@ def tlon(b: Builder, s: Statement) -> None:
 _HELICAL = {"CENTER": 3, "INDIRV": 3, "AXIS": 3, "PITCH": 1, "RADIUS": 1, "ANGLE": 1, "HEIGHT": 1, "ROUND": 1, "END": 3}
 
 
-def helical(b: Builder, s: Statement) -> None:
+def helical(b: ToolpathBuilder, s: Statement) -> None:
     """CATIA: HELICAL/CENTER, x, y, z, INDIRV, i, j, k, AXIS, i, j, k, PITCH, p, RADIUS, r, ANGLE, a, HEIGHT, h, ROUND, n,
     END, x, y, z: a helix that turns by h / p turns (by a degrees where it does not rise) and carries its end."""
     b.arc_records += 1
@@ -112,7 +112,8 @@ def _end_of(found: list[tuple[str, list[float]]]) -> Triple | None:
     return (ends[-1][0], ends[-1][1], ends[-1][2]) if ends else None
 
 
-def _end_on_plane(b: Builder, arc: list[float], found: list[tuple[str, list[float]]], tangent: bool) -> Triple | None:
+def _end_on_plane(b: ToolpathBuilder, arc: list[float], found: list[tuple[str, list[float]]],
+                  tangent: bool) -> Triple | None:
     """End of an arc at the plane n . p = d: where the plane touches it, or crosses it through its centre.
 
     Of the two crossings it is the first one after the start in the direction of INDIRP.
@@ -140,7 +141,7 @@ def _end_on_plane(b: Builder, arc: list[float], found: list[tuple[str, list[floa
     return x, y, z
 
 
-def nurbs(b: Builder, s: Statement) -> None:
+def nurbs(b: ToolpathBuilder, s: Statement) -> None:
     """NURBS, KNOT/values, CNTRL/x,y,z ...: a clamped cubic that begins at the current point.
 
     The knots written are the inner ones and the end; with the first point there are three more control points than
@@ -168,7 +169,7 @@ def nurbs(b: Builder, s: Statement) -> None:
     b.add_point(control[-1])
 
 
-def _gather(b: Builder) -> tuple[list[float], list[Triple]]:
+def _gather(b: ToolpathBuilder) -> tuple[list[float], list[Triple]]:
     """Knots and control points of the KNOT and CNTRL records that follow, knots also on lines of their own; passes them."""
     knots: list[float] = []
     control: list[Triple] = []

@@ -29,7 +29,7 @@ CYCLE_WORDS = frozenset({*KINDS, *_RETRACT, *_PECKS, *_OTHER, *_UNUSED, *_PLAIN,
 
 
 @dataclass(frozen=True)
-class Values:
+class CycleValues:
     """What a CYCLE record states, file units; NaN or None where it does not."""
 
     kind: str
@@ -64,7 +64,7 @@ def kind_of(words: tuple[Word, ...]) -> tuple[str, tuple[Word, ...]]:
     return next((k for k in kinds if k != "DRILL"), "DRILL"), words[n:]
 
 
-def values(v: Values, words: tuple[Word, ...]) -> Values:
+def values(v: CycleValues, words: tuple[Word, ...]) -> CycleValues:
     """`v` with the parameters `words`; numbers without a word go to `free` in their order."""
     found: dict[str, object] = {}
     free: list[float] = []

@@ -6,8 +6,8 @@ import json
 import math
 from dataclasses import replace
 
-from toolpaths.cl.build import Builder, Heights
-from toolpaths.cl.cycle_words import KINDS, Values, kind_of, values
+from toolpaths.cl.build import Heights, ToolpathBuilder
+from toolpaths.cl.cycle_words import KINDS, CycleValues, kind_of, values
 from toolpaths.cl.feeds import feed_in
 from toolpaths.cl.text.dialects import Planes
 from toolpaths.cl.text.statements import Statement, Word
@@ -28,7 +28,7 @@ _WORDS = "words"
 _LAST = "cycle"
 
 
-def cycle(b: Builder, s: Statement) -> None:
+def cycle(b: ToolpathBuilder, s: Statement) -> None:
     """Arm, end or re-arm a cycle."""
     first = s.words[0] if s.words else ""
     if first in _OFF:
@@ -41,25 +41,25 @@ def cycle(b: Builder, s: Statement) -> None:
         b.cycle_records += 1
         kind, rest = kind_of(s.words)
         rest = _variant(b, kind, s.words, rest)
-        _arm(b, values(Values(kind, s.words), rest))
+        _arm(b, values(CycleValues(kind, s.words), rest))
     else:
         b.cycle_records += 1
         b.log.error("cl.cycle", f"CYCLE/{s.body[:60]}: {first or 'nothing'} is no kind of cycle", b.line,
                     "known kinds: " + ", ".join(sorted(KINDS)))
 
 
-def _again(b: Builder, s: Statement) -> None:
+def _again(b: ToolpathBuilder, s: Statement) -> None:
     """CYCLE/ON arms the last cycle again; right before another cycle (`.clt`) it arms nothing."""
     last = b.memory.get(_LAST)
     if len(s.words) == 1 and b.next_statement_is("CYCLE"):
         return
-    if not isinstance(last, Values):
+    if not isinstance(last, CycleValues):
         b.log.error("cl.cycle", "CYCLE/ON before any cycle", b.line)
         return
     _arm(b, values(replace(last, empty=()), s.words[1:]))
 
 
-def _variant(b: Builder, kind: str, words: tuple[Word, ...], rest: tuple[Word, ...]) -> tuple[Word, ...]:
+def _variant(b: ToolpathBuilder, kind: str, words: tuple[Word, ...], rest: tuple[Word, ...]) -> tuple[Word, ...]:
     """`rest` without the word that makes another cycle of a bore (NX: DRAG, NODRAG, MANUAL); what cannot be carried out as
     the cycle of its kind, a bore from below and a tap in steps, is refused."""
     steps = [str(w) for w in words[:len(words) - len(rest)] if w in _IN_STEPS]
@@ -77,7 +77,7 @@ def _variant(b: Builder, kind: str, words: tuple[Word, ...], rest: tuple[Word, .
     return rest[1:] if rest[0] in _BORES or rest[0] == "BACK" else rest
 
 
-def _arm(b: Builder, v: Values) -> None:
+def _arm(b: ToolpathBuilder, v: CycleValues) -> None:
     """Check what was stated and make the cycle current. `.clt` names pecking in a word of its own."""
     v = _with_planes(b, _placed(_approached(b, v), b.dialect.planes))
     if v.kind == "DRILL" and "PECKING" in v.words and any(v.steps):
@@ -96,7 +96,7 @@ def _arm(b: Builder, v: Values) -> None:
     b.cycles.append(_made(b, v))
 
 
-def _approached(b: Builder, v: Values) -> Values:
+def _approached(b: ToolpathBuilder, v: CycleValues) -> CycleValues:
     """CATIA's cycle of two numbers, depth and another: the start plane where the tool stands so far above the hole."""
     last, hole = b.last_point(), b.next_point()
     if b.dialect.name != "catia" or len(v.free) != 2 or last is None or hole is None:
@@ -106,7 +106,7 @@ def _approached(b: Builder, v: Values) -> Values:
     return replace(v, clear=v.free[1], depth=v.free[0], free=(), placed=True)
 
 
-def _placed(v: Values, planes: Planes) -> Values:
+def _placed(v: CycleValues, planes: Planes) -> CycleValues:
     """Numbers without a word by their place: depth, then feed where no unit stands, then clearance and retract; in the
     posts that tell RAPTO from the clearance, this stands beside it, and goes without a retract plane."""
     free = list(v.free)
@@ -126,7 +126,7 @@ def _placed(v: Values, planes: Planes) -> Values:
 _COUNTED_DOWN = (Planes.BOTTOM, Planes.DOWN, Planes.OVER_BOTTOM)
 
 
-def _with_planes(b: Builder, v: Values) -> Values:
+def _with_planes(b: ToolpathBuilder, v: CycleValues) -> CycleValues:
     """Start and retract plane above the hole's top (`Planes`); those that hang on the hole's height, `heights` finds."""
     planes = b.dialect.planes
     down = 0.0 if math.isnan(v.rapto) else v.rapto
@@ -142,7 +142,7 @@ def _with_planes(b: Builder, v: Values) -> Values:
     return replace(v, clearance=0.0 if math.isnan(v.rapto) or bottom else v.rapto, retract=0.0)
 
 
-def _depth(b: Builder, v: Values) -> float:
+def _depth(b: ToolpathBuilder, v: CycleValues) -> float:
     depth = v.depth * b.dialect.depth_sign
     if math.isnan(depth) and v.kind == "CSINK" and v.diameter > 0.0 and 0.0 < v.angle < 180.0:
         return 0.5 * v.diameter / math.tan(math.radians(0.5 * v.angle))
@@ -157,7 +157,7 @@ def _depth(b: Builder, v: Values) -> float:
     return depth
 
 
-def _cycle_feed(b: Builder, v: Values) -> tuple[float, FeedMode, float | None]:
+def _cycle_feed(b: ToolpathBuilder, v: CycleValues) -> tuple[float, FeedMode, float | None]:
     """(feed, mode, pitch)"""
     pitch = None if math.isnan(v.pitch) else v.pitch * b.scale
     if not math.isnan(v.threads) and v.threads > 0.0:
@@ -179,7 +179,7 @@ def _cycle_feed(b: Builder, v: Values) -> tuple[float, FeedMode, float | None]:
     return feed, mode, pitch
 
 
-def _steps(b: Builder, v: Values) -> tuple[float, ...]:
+def _steps(b: ToolpathBuilder, v: CycleValues) -> tuple[float, ...]:
     """Pecks in mm. A step of 0 behind another changes nothing; alone it is none, which pecking cannot have."""
     if v.kind in _PECKED and not any(v.steps):
         if v.steps:
@@ -195,14 +195,14 @@ def _steps(b: Builder, v: Values) -> tuple[float, ...]:
     return tuple(step * b.scale for step in v.steps if step != 0.0)
 
 
-def _rest(b: Builder, v: Values, value: float) -> float:
+def _rest(b: ToolpathBuilder, v: CycleValues, value: float) -> float:
     """A dwell in seconds or revolutions, 0 where none is stated."""
     if value < 0.0:
         b.log.error("cl.cycle-value", f"CYCLE/{v.kind}: the dwell is {value:g}", b.line, "write 0 or more")
     return 0.0 if math.isnan(value) else value
 
 
-def _made(b: Builder, v: Values) -> Cycle:
+def _made(b: ToolpathBuilder, v: CycleValues) -> Cycle:
     if math.isnan(v.clearance) and v.placed:
         b.log.warning("cl.cycle-start", f"CYCLE/{v.kind} states no start plane, the point of the GOTO is taken", b.line,
                       "state one in the table of the CAM system if the point touches the part")
@@ -221,7 +221,7 @@ def _made(b: Builder, v: Values) -> Cycle:
                  words if isinstance(words, tuple) else v.words, b.line)
 
 
-def words_as_written(b: Builder, s: Statement) -> None:
+def words_as_written(b: ToolpathBuilder, s: Statement) -> None:
     """`$$-> WORDS / [...]` of our writer: how the next CYCLE was written in the file it came from."""
     try:
         found = json.loads(s.body)

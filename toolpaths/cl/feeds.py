@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 
 from toolpaths.arrays import Floats
-from toolpaths.cl.build import Builder
+from toolpaths.cl.build import ToolpathBuilder
 from toolpaths.cl.text.statements import Statement, Word
 from toolpaths.toolpath import FeedMode
 from toolpaths.units import MM_PER_FOOT, MM_PER_INCH
 
-Feed = tuple[float, FeedMode]
+FeedValue = tuple[float, FeedMode]
 MINUTE = 60.0
 PER_MINUTE = {"MMPM": 1.0, "IPM": MM_PER_INCH, "FPM": MM_PER_FOOT, "MPM": 1000.0, "PERMIN": math.nan}
 PER_SECOND = {"MMPS": 1.0, "IPS": MM_PER_INCH}
@@ -23,7 +23,7 @@ _MODIFIERS = (*_CHANGING, "MAXRPM", "OVPLOT")
 """Words of FEDRAT (NCL) whose number is no feed."""
 
 
-def feed_in(value: float, unit: str, scale: float) -> Feed:
+def feed_in(value: float, unit: str, scale: float) -> FeedValue:
     """`value` in the named unit as (mm/s or mm/rev, mode); `scale` is mm per unit of the part, "" per minute in it."""
     if unit in PER_REVOLUTION:
         factor = PER_REVOLUTION[unit]
@@ -39,7 +39,7 @@ def unit_of(words: tuple[Word, ...]) -> str:
     return next((w for w in words if isinstance(w, str) and w in UNITS), "")
 
 
-def fedrat(b: Builder, s: Statement) -> None:
+def fedrat(b: ToolpathBuilder, s: Statement) -> None:
     """Set the modal feed."""
     if s.has("INVERS"):
         _inverse(b, s)
@@ -64,7 +64,7 @@ def fedrat(b: Builder, s: Statement) -> None:
     b.feed.set(b.row, feed_in(numbers[0] if value is None else value, unit, b.scale))
 
 
-def many(b: Builder, s: Statement, numbers: Floats) -> None:
+def many(b: ToolpathBuilder, s: Statement, numbers: Floats) -> None:
     """Set the modal feed by neighbouring statements (`feed_lines`) from the current one on, `s` but for their numbers."""
     unit, at = unit_of(s.words), b.index
     feeds = [feed_in(number, unit, b.scale) for number in numbers.tolist()]
@@ -81,7 +81,7 @@ def _feeds(words: tuple[Word, ...]) -> list[float]:
             if isinstance(w, float) and not (isinstance(before, str) and before in _MODIFIERS)]
 
 
-def _inverse(b: Builder, s: Statement) -> None:
+def _inverse(b: ToolpathBuilder, s: Statement) -> None:
     value = s.after("INVERS")
     if s.has("PERSEC"):
         value = s.after("PERSEC")

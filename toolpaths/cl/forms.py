@@ -15,15 +15,15 @@ from itertools import pairwise
 from toolpaths.cl.cycle_words import CYCLE_WORDS
 from toolpaths.cl.feeds import UNITS
 from toolpaths.cl.text.dialects import UNIT_WORDS, Dialect
-from toolpaths.cl.text.log import Log
+from toolpaths.cl.text.log import DiagnosticLog
 from toolpaths.cl.text.near import nearest
-from toolpaths.cl.text.statements import COMMENT, DATA_COMMENT, Program, Statement, statement_of
+from toolpaths.cl.text.statements import COMMENT, DATA_COMMENT, Statement, StatementList, statement_of
 from toolpaths.cl.text.subprograms import NAME
 from toolpaths.cl.text.words import BARE_WORDS, NEUTRAL, SILENT, TEXT_WORDS
 
 
 @dataclass(frozen=True)
-class Form:
+class RecordForm:
     """Words of a record, counts of its numbers (empty: any), whether other words pass, whether fields may be empty."""
 
     words: frozenset[str] = frozenset()
@@ -39,16 +39,16 @@ class Form:
 
 
 def _form(words: str = "", *counts: int, closed: bool = False, gaps: bool = False, lengths: bool = False,
-          named: bool = False) -> Form:
-    return Form(frozenset(words.split()), frozenset(counts), not closed, gaps, lengths, named)
+          named: bool = False) -> RecordForm:
+    return RecordForm(frozenset(words.split()), frozenset(counts), not closed, gaps, lengths, named)
 
 
 _TABLE = _form("AAXIS BAXIS CAXIS INCR ABS CLW CCLW TABLE HEAD ATANGL NEXT ROTREF AXIS", 1)
 _ALONE = _form("", 0, closed=True)
-_MESSAGE = Form(text=True)
+_MESSAGE = RecordForm(text=True)
 _FEED_MODIFIERS = frozenset({"SCALE", "LENGTH", "LOCK", "MAXIPM", "MAXRPM", "OVPLOT"})
-FORMS: dict[str, Form] = {
-    "FEDRAT": Form(UNITS | _FEED_MODIFIERS | {"INVERS", "AUTO", "ON", "OFF", "PERSEC"}, frozenset({0, 1})),
+FORMS: dict[str, RecordForm] = {
+    "FEDRAT": RecordForm(UNITS | _FEED_MODIFIERS | {"INVERS", "AUTO", "ON", "OFF", "PERSEC"}, frozenset({0, 1})),
     "SPINDL": _form("RPM SFM SMM CLW CCLW BOTH ON OFF LOCK UNLOCK MAXRPM ORIENT LOW MEDIUM HIGH RANGE NEUTRL AUTO MILL "
                     "TURN RADIUS DIAMTR", 0, 1),
     "COOLNT": _form("ON OFF FLOOD MIST AIR TAP TAPKUL THRU LOW MEDIUM HIGH ALL NOW NEXT TOOL", 0, 1),
@@ -64,7 +64,7 @@ FORMS: dict[str, Form] = {
     "CSI_SET_FLUTE_LENGTH": _form("", 1),
     "CIRCLE": _form("TIMES SWEEP CLOCKWISE COUNTERCLOCKWISE CLW CCLW", 4, 5, 6, 7, 8, 11, 12, closed=True),
     "MOVARC": _form("CENTER AXIS RADIUS ANGLE TIMES", closed=True),
-    "CYCLE": Form(CYCLE_WORDS),
+    "CYCLE": RecordForm(CYCLE_WORDS),
     "FROM": _form("", 3, 6, closed=True), "GOHOME": _form("", 0, 3, 6),
     "TLAXIS": _form("", 3, closed=True), "INDIRV": _form("", 3, closed=True), "INDIRP": _form("", 3, closed=True),
     "RAPID": _form("FEDTO SCALE", closed=True),
@@ -72,7 +72,8 @@ FORMS: dict[str, Form] = {
     "CAMERA": _form("", 12, closed=True), "MCS": _form("", 12, closed=True), "MCS2": _form("", 9, closed=True),
     "TRANS": _form("", 3), "ZERO": _form("", 1), "ORIGIN": _form("", 3, 9), "TRNTYP": _form("WORLD"),
     "ROTATE": _TABLE, "ROTABL": _TABLE, "ROTHED": _TABLE,
-    "UNITS": Form(frozenset(UNIT_WORDS), frozenset({0}), False), "UNIT": Form(frozenset(UNIT_WORDS), frozenset({0}), False),
+    "UNITS": RecordForm(frozenset(UNIT_WORDS), frozenset({0}), False),
+    "UNIT": RecordForm(frozenset(UNIT_WORDS), frozenset({0}), False),
     "MULTAX": _form("ON OFF", 0),
     "STOP": _MESSAGE, "OPSTOP": _MESSAGE, "FINI": _ALONE, "END": _ALONE, "END-OF-PATH": _ALONE, "ENDSUB": _form("", 0, 1),
     "NURBS": _ALONE, "AUTOPS": _ALONE,
@@ -120,7 +121,7 @@ _STARTS_NUMBER = frozenset("+-.0123456789")
 _LEADING_ZEROS = re.compile(r"[+-]?(?:0\d+|\.0*)")
 
 
-def check_forms(program: Program, log: Log, allowed: Iterable[str], dialect: Dialect) -> None:
+def check_forms(program: StatementList, log: DiagnosticLog, allowed: Iterable[str], dialect: Dialect) -> None:
     """An error for each different statement that departs from the form of its word, where its line has none yet."""
     allow, refused = frozenset(allowed), log.lines_with_errors()
     for statement, line in program.first.items():
@@ -193,7 +194,7 @@ def _message_fault(s: Statement) -> str:
     return f"{inner[:30]} stands within it: the end of a line is missing" if inner else ""
 
 
-def _words_fault(s: Statement, form: Form, allow: frozenset[str]) -> str:
+def _words_fault(s: Statement, form: RecordForm, allow: frozenset[str]) -> str:
     if "/" in s.body:
         return "a second slash"
     if not s.body.isascii():
@@ -214,7 +215,7 @@ def _words_fault(s: Statement, form: Form, allow: frozenset[str]) -> str:
     return ""
 
 
-def _split_word(s: Statement, form: Form) -> str:
+def _split_word(s: Statement, form: RecordForm) -> str:
     """A word with a comma or a blank in it, a number with a blank: GOTO and CYCLE alone have numbers without commas."""
     words = [w for w in s.words if isinstance(w, str) and w and w[0].isalpha()]
     for a, b in pairwise(words):
@@ -232,7 +233,7 @@ def _bare_gap(s: Statement) -> bool:
     return s.major == "GOHOME"
 
 
-def _word_fault(word: str, form: Form) -> str:
+def _word_fault(word: str, form: RecordForm) -> str:
     if word[0] in _STARTS_NUMBER or _NUMBER_LIKE.fullmatch(word) or (len(word) > 1 and _ONE_LETTER.fullmatch(word)):
         return f"{word[:30]} is not a number"
     meant = nearest(word, sorted(form.words))
@@ -251,7 +252,7 @@ def _word_fault(word: str, form: Form) -> str:
     return "" if re.fullmatch(r"[A-Z0-9_.-]+", word) else f"{word[:30]} is no word"
 
 
-def _numbers_fault(s: Statement, form: Form) -> str:
+def _numbers_fault(s: Statement, form: RecordForm) -> str:
     count = sum(isinstance(w, float) for w in s.words)
     counts = form.counts
     if s.major == "TLDATA" and s.words[:1] == ("MILL",):

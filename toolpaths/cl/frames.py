@@ -6,7 +6,7 @@ import numpy as np
 
 from toolpaths.arrays import Floats
 from toolpaths.cl import indexing
-from toolpaths.cl.build import Builder, Map
+from toolpaths.cl.build import Map, ToolpathBuilder
 from toolpaths.cl.text.statements import Statement, words_of
 from toolpaths.rotations import rotation
 from toolpaths.toolpath import Frame
@@ -16,7 +16,7 @@ _ORTHOGONAL = 2e-3
 _WORK_OFFSET = "work offset"
 
 
-def set_system(b: Builder, name: str, matrix: Floats, origin: Floats) -> None:
+def set_system(b: ToolpathBuilder, name: str, matrix: Floats, origin: Floats) -> None:
     """Points from here on are in that system; the tool axis is its z until a point says otherwise."""
     b.here = (matrix, origin)
     b.turned = np.eye(3)
@@ -27,7 +27,7 @@ def set_system(b: Builder, name: str, matrix: Floats, origin: Floats) -> None:
     b.axis_marks.append((b.row, (0.0, 0.0, 1.0)))
 
 
-def _name_system(b: Builder, name: str, matrix: Floats, origin: Floats) -> None:
+def _name_system(b: ToolpathBuilder, name: str, matrix: Floats, origin: Floats) -> None:
     """Operations from here on are in that system; a position of an indexed table is none."""
     frame = Frame("", tuple(origin.tolist()), tuple(tuple(row) for row in matrix.tolist()))
     index = b.frame_index.setdefault((frame.origin, frame.rotation), len(b.frames))
@@ -36,7 +36,7 @@ def _name_system(b: Builder, name: str, matrix: Floats, origin: Floats) -> None:
     b.system.set(b.row, index)
 
 
-def refresh(b: Builder) -> None:
+def refresh(b: ToolpathBuilder) -> None:
     """The map of points from the system, the table and the shift (TRANS) that hold now."""
     if b.dialect.table_frames:
         b.dropped_at.set(b.row, False)
@@ -61,7 +61,7 @@ def rotation_of(x: Floats, y: Floats) -> Floats | None:
     return np.column_stack([x, np.cross(z, x), z]) + 0.0
 
 
-def system_of_rows(b: Builder, numbers: list[float], word: str) -> Map | None:
+def system_of_rows(b: ToolpathBuilder, numbers: list[float], word: str) -> Map | None:
     """Rotation and origin (mm) of three rows of four; None and a diagnostic where they are no system."""
     if len(numbers) != 12:
         b.log.error("cl.frame", f"{word} has {len(numbers)} numbers, it takes 12", b.line)
@@ -74,7 +74,7 @@ def system_of_rows(b: Builder, numbers: list[float], word: str) -> Map | None:
     return matrix, rows[:, 3] * b.scale
 
 
-def msys(b: Builder, s: Statement) -> None:
+def msys(b: ToolpathBuilder, s: Statement) -> None:
     """MSYS/origin, X axis, Y axis (nine numbers)."""
     numbers = s.numbers
     if len(numbers) != 9:
@@ -88,14 +88,14 @@ def msys(b: Builder, s: Statement) -> None:
     set_system(b, "MSYS", matrix, n[:3] * b.scale)
 
 
-def csys(b: Builder, s: Statement) -> None:
+def csys(b: ToolpathBuilder, s: Statement) -> None:
     """CSYS or CAMERA with three rows of four: rotation, and the origin in the fourth place."""
     found = system_of_rows(b, s.numbers, s.major)
     if found is not None:
         set_system(b, "CSYS", *found)
 
 
-def mcs(b: Builder, s: Statement) -> None:
+def mcs(b: ToolpathBuilder, s: Statement) -> None:
     """MCS/X axis, Y axis, Z axis, origin (12 numbers): the work plane of Autodesk's posts for CAMplete and MANUSnc."""
     if len(s.numbers) != 12:
         b.log.error("cl.frame", f"MCS has {len(s.numbers)} numbers, it takes X, Y and Z axis and origin (12)", b.line)
@@ -108,7 +108,7 @@ def mcs(b: Builder, s: Statement) -> None:
     set_system(b, "MCS", matrix, axes[3] * b.scale)
 
 
-def mcsys(b: Builder, s: Statement) -> None:
+def mcsys(b: ToolpathBuilder, s: Statement) -> None:
     """MCSYS/NUM, offset, POINT, origin, VECTOR, X axis, VECTOR, Y axis: the work plane of Autodesk's post for MfgSuite."""
     n = [w for w in s.words if isinstance(w, float)]
     shape = tuple(w for w in s.words if isinstance(w, str))
@@ -124,7 +124,7 @@ def mcsys(b: Builder, s: Statement) -> None:
         set_system(b, "MCSYS", matrix, np.array(n[1:4]) * b.scale)
 
 
-def zero(b: Builder, s: Statement) -> None:
+def zero(b: ToolpathBuilder, s: Statement) -> None:
     """ZERO/n: the work offset of the control that the points after it are in."""
     if len(s.numbers) != 1:
         b.log.error("cl.frame", f"ZERO/{s.body}: it takes the number of a work offset", b.line)
@@ -132,7 +132,7 @@ def zero(b: Builder, s: Statement) -> None:
         work_offset(b, s.numbers[0])
 
 
-def work_offset(b: Builder, number: float) -> None:
+def work_offset(b: ToolpathBuilder, number: float) -> None:
     """The file tells nothing of where work offsets lie, so all its points must be in one."""
     first = b.memory.setdefault(_WORK_OFFSET, number)
     if first != number:
@@ -140,7 +140,7 @@ def work_offset(b: Builder, number: float) -> None:
                     "says how one lies to the other", b.line, "write one file for each work offset", key=_WORK_OFFSET)
 
 
-def trans(b: Builder, s: Statement) -> None:
+def trans(b: ToolpathBuilder, s: Statement) -> None:
     """TRANS/x, y, z: points from here on are shifted by it; the next TRANS replaces it."""
     if len(s.numbers) != 3 or len(s.words) != 3:
         b.log.error("cl.frame", f"TRANS/{s.body}: only three numbers are understood", b.line)
@@ -150,7 +150,7 @@ def trans(b: Builder, s: Statement) -> None:
     refresh(b)
 
 
-def origin(b: Builder, s: Statement) -> None:
+def origin(b: ToolpathBuilder, s: Statement) -> None:
     """CATIA: ORIGIN/origin, X axis, Z axis. Three numbers place the part on a machine and do not move its points."""
     numbers = s.numbers
     if len(numbers) == 9:
@@ -166,7 +166,7 @@ def origin(b: Builder, s: Statement) -> None:
         b.log.error("cl.frame", f"ORIGIN has {len(numbers)} numbers, it takes 3 or 9", b.line)
 
 
-def comment(b: Builder, s: Statement) -> None:
+def comment(b: ToolpathBuilder, s: Statement) -> None:
     """CATIA's axis system: the comment *CATIA0, a name, and three rows of four numbers."""
     if s.body.startswith("*CATIA0"):
         b.axis_system = []
@@ -192,7 +192,7 @@ _TURNED = frozenset({"creo", "solidworks-clt"})
 _NO_AXIS_WORDS = frozenset({"CLW", "CCLW", "INCR", "ATANGL", "TABLE", "HEAD", "NEXT", "ROTREF", "AXIS"})
 
 
-def rotate(b: Builder, s: Statement) -> None:
+def rotate(b: ToolpathBuilder, s: Statement) -> None:
     """ROTATE, ROTABL, ROTHED: an event. In Creo and `.clt`, points after it are in the turned frame, unless a system
     (CSYS) follows, which then says where they are. In Creo the table turns by the angle, so the frame turns by less that
     angle in the part; in `.clt` the frame itself does, as the TLAXIS of the same operation shows."""
@@ -219,7 +219,7 @@ def _radians(angle: float) -> float:
     return near if abs(near - angle) <= _RADIAN_ROUNDING else angle
 
 
-def _turn(b: Builder, axis: int, angle: float, incremental: bool) -> None:
+def _turn(b: ToolpathBuilder, axis: int, angle: float, incremental: bool) -> None:
     angles = b.table
     step = angle if incremental else angle - angles[axis]
     angles[axis] += step
@@ -235,7 +235,7 @@ def _turn(b: Builder, axis: int, angle: float, incremental: bool) -> None:
         use_world_axis(b)
 
 
-def use_world_axis(b: Builder) -> None:
+def use_world_axis(b: ToolpathBuilder) -> None:
     """`.clt`: points of three numbers are along the z of the turned frame, along TLAXIS where the frame is not turned."""
     stated = b.world_axes[-1][1] if b.world_axes else (0.0, 0.0, 1.0)
     turned = bool(np.abs(b.turned - np.eye(3)).max() > _SAME_FRAME)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from toolpaths.arrays import Array, Floats, Ints
-from toolpaths.cl.build import Builder, Heights
+from toolpaths.cl.build import Heights, ToolpathBuilder
 from toolpaths.toolpath import Cycle
 
 _SAME_HEIGHT = 6
@@ -22,7 +22,7 @@ def height_of(tip: Floats, axis: Floats) -> Floats:
     return found
 
 
-def place(b: Builder, tip: Floats, axis: Floats, height: Floats, cycle: Array, line: Ints) -> Array:
+def place(b: ToolpathBuilder, tip: Floats, axis: Floats, height: Floats, cycle: Array, line: Ints) -> Array:
     """Cycle per row (N,), cycles of one height each appended to those of the builder; tips at a bottom go to the top.
 
     Args:
@@ -54,7 +54,7 @@ def _above(cycle: Cycle, planes: Heights, top: float) -> Cycle:
     return replace(cycle, clearance=clearance, retract=planes.retract - top)
 
 
-def _check_clearance(b: Builder, planes: Heights, height: Floats, cycle: Array, row: int, line: Ints) -> None:
+def _check_clearance(b: ToolpathBuilder, planes: Heights, height: Floats, cycle: Array, row: int, line: Ints) -> None:
     """The tool stands at the clearance height before the first hole; else the numbers are not what they are taken for."""
     if row == 0 or cycle[row - 1] >= 0 or abs(height[row - 1] - planes.retract) <= _AT_CLEARANCE:
         return

@@ -13,7 +13,7 @@ from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.rotations import rotation
 
 if TYPE_CHECKING:
-    from toolpaths.cl.build import Builder, Map
+    from toolpaths.cl.build import Map, ToolpathBuilder
 from toolpaths.cl.text.subprograms import Called, called
 
 SAME_AXIS = 2e-3
@@ -26,13 +26,13 @@ TRANS_HINT = ("have Creo write the sequence with MULTAX/ON (six numbers) and wit
               "TRANS or the CSYS remark")
 
 
-def in_force(b: Builder) -> bool:
+def in_force(b: ToolpathBuilder) -> bool:
     """True where points stand about the rotation axis: the table is turned, or a subroutine runs that is called under a
     turned table elsewhere."""
     return b.dialect.table_frames and (any(b.table) or b.about_axis)
 
 
-def indexed_subprograms(b: Builder) -> frozenset[Called]:
+def indexed_subprograms(b: ToolpathBuilder) -> frozenset[Called]:
     """Numbers and names of the subroutines that some CALSUB calls after a ROTATE, found once."""
     if b.indexed_subs is None:
         turned, found = False, set()
@@ -45,7 +45,7 @@ def indexed_subprograms(b: Builder) -> frozenset[Called]:
     return b.indexed_subs
 
 
-def turn_table(b: Builder, axis: int, step: float) -> None:
+def turn_table(b: ToolpathBuilder, axis: int, step: float) -> None:
     """ROTATE by `step` rad about a machine axis: the frame of the points turns by less that angle in the part.
 
     A CSYS remark right before ROTATE may hold the new position already: then its z is where ROTATE takes the tool axis.
@@ -60,7 +60,7 @@ def turn_table(b: Builder, axis: int, step: float) -> None:
     b.turns_at.append(b.row)
 
 
-def map_of(b: Builder) -> tuple[Map, str]:
+def map_of(b: ToolpathBuilder) -> tuple[Map, str]:
     """(rotation and origin of the points from here on, "" or what the file contradicts)."""
     matrix, place = b.turned @ b.here[0], b.turned @ b.here[1]
     shift = matrix @ b.shift
@@ -79,7 +79,7 @@ def map_of(b: Builder) -> tuple[Map, str]:
         "are one translation")
 
 
-def _axis_fault(b: Builder, matrix: Floats) -> str:
+def _axis_fault(b: ToolpathBuilder, matrix: Floats) -> str:
     """ROTATE turns the tool axis to where z of the CSYS remark must stand."""
     if any(b.table) and _apart(matrix[:, 2], b.table_turn[:, 2]) > SAME_AXIS:
         return (f"by ROTATE the tool axis is ({_text(b.table_turn[:, 2])}) in the part, by the CSYS remark it is "
@@ -87,7 +87,7 @@ def _axis_fault(b: Builder, matrix: Floats) -> str:
     return ""
 
 
-def cancels(b: Builder, shift: Floats) -> bool:
+def cancels(b: ToolpathBuilder, shift: Floats) -> bool:
     """True where TRANS/-h after TRANS/+h ends that shift, as Creo writes it around a CALSUB; under a turned table alone, and
     not where the next CALSUB runs at -h."""
     if not in_force(b) or not b.shift.any() or _apart(shift, -b.shift) > _STEP * float(np.abs(shift).max()):
@@ -100,13 +100,13 @@ def cancels(b: Builder, shift: Floats) -> bool:
     return True
 
 
-def note_call(b: Builder, begun: int) -> None:
+def note_call(b: ToolpathBuilder, begun: int) -> None:
     """A subroutine runs from here on; the caller's own points since the last one begin at row `begun`."""
     if b.dialect.table_frames and b.row > begun and (b.turns_at or b.shift.any()):
         b.entries.append((begun, b.row))
 
 
-def approaches(b: Builder, tip: Floats, rapid: Bools, index: Ints) -> tuple[Ints, Bools]:
+def approaches(b: ToolpathBuilder, tip: Floats, rapid: Bools, index: Ints) -> tuple[Ints, Bools]:
     """(`index` (N,) of maps with that of a subroutine for the points that lead to it, those points (N,)): the last one
     before CALSUB, and rapids before that straight above it; not one that stands over the subroutine's start as is."""
     index, found = index.copy(), np.zeros(len(index), dtype=np.bool_)
@@ -124,7 +124,7 @@ def approaches(b: Builder, tip: Floats, rapid: Bools, index: Ints) -> tuple[Ints
     return index, found
 
 
-def _over(b: Builder, tip: Floats, first: int, map_index: int, there: int) -> float:
+def _over(b: ToolpathBuilder, tip: Floats, first: int, map_index: int, there: int) -> float:
     """mm between the point before row `first`, in a frame, and the line along the tool axis through that row, in `there`."""
     away = _placed(b, map_index, tip[first - 1] * b.scale) - _placed(b, there, tip[first] * b.scale)
     found = b.maps[there]
@@ -132,12 +132,12 @@ def _over(b: Builder, tip: Floats, first: int, map_index: int, there: int) -> fl
     return float(np.linalg.norm(away - (away @ z) * z))
 
 
-def _placed(b: Builder, map_index: int, point: Floats) -> Floats:
+def _placed(b: ToolpathBuilder, map_index: int, point: Floats) -> Floats:
     found = b.maps[map_index]
     return point if found is None else found[0] @ point + found[1]
 
 
-def local_rows(b: Builder, given: Bools, inside: Bools, approach: Bools, axis: Floats, index: Ints) -> Bools:
+def local_rows(b: ToolpathBuilder, given: Bools, inside: Bools, approach: Bools, axis: Floats, index: Ints) -> Bools:
     """True (N,) for points of six numbers that are in the local frame: those of subroutines, and those under a turned table
     whose tool axis is the local z and not that of the frame in the part."""
     local: Bools = inside.copy()
@@ -154,7 +154,7 @@ def local_rows(b: Builder, given: Bools, inside: Bools, approach: Bools, axis: F
     return local
 
 
-def check_frames(b: Builder, index: Ints, local: Bools, lines: Ints) -> None:
+def check_frames(b: ToolpathBuilder, index: Ints, local: Bools, lines: Ints) -> None:
     """Errors for points in frames that the file contradicts; a note where a translation was not added."""
     n = len(index)
     for start, end, fault in _spans(b.frame_faults.starts, b.frame_faults.values, n):
@@ -168,7 +168,7 @@ def check_frames(b: Builder, index: Ints, local: Bools, lines: Ints) -> None:
                    "the CSYS remark is not added", int(lines[dropped[0]]))
 
 
-def check_axes(b: Builder, inside: Bools, given: Bools, axis: Floats, index: Ints, lines: Ints) -> None:
+def check_axes(b: ToolpathBuilder, inside: Bools, given: Bools, axis: Floats, index: Ints, lines: Ints) -> None:
     """Points of six numbers of a subroutine are local: an axis that is radial as it stands would be turned twice."""
     if not b.turns_at:
         return
@@ -187,7 +187,7 @@ def check_axes(b: Builder, inside: Bools, given: Bools, axis: Floats, index: Int
                         "frame of its CALSUB it would be turned twice", int(lines[bad[0]]), TRANS_HINT)
 
 
-def check_cuts(b: Builder, cutting: Bools, index: Ints, lines: Ints) -> None:
+def check_cuts(b: ToolpathBuilder, cutting: Bools, index: Ints, lines: Ints) -> None:
     """No cut begins in one position of the table and ends in another."""
     if not b.turns_at:
         return

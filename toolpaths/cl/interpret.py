@@ -1,4 +1,4 @@
-"""Statements to the state of `Builder`: which word goes to which handler, and what becomes of the others."""
+"""Statements to the state of `ToolpathBuilder`: which word goes to which handler, and what becomes of the others."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ import re
 from collections.abc import Callable
 
 from toolpaths.cl import curves, cycles, feeds, frames, indexing, motion, structure, tools
-from toolpaths.cl.build import Builder
+from toolpaths.cl.build import ToolpathBuilder
 from toolpaths.cl.text import listing_text
 from toolpaths.cl.text.near import nearest
 from toolpaths.cl.text.statements import DATA_COMMENT, TEXT, Statement, words_of
 from toolpaths.cl.text.subprograms import Subprograms, called, shown, subprograms_of
 from toolpaths.cl.text.words import SILENT, UNSUPPORTED_MOTION
 
-Handler = Callable[[Builder, Statement], None]
+Handler = Callable[[ToolpathBuilder, Statement], None]
 HANDLERS: dict[str, Handler] = {**dict.fromkeys(SILENT, structure.nothing), **structure.HANDLERS, **feeds.HANDLERS,
                                 **motion.HANDLERS, **curves.HANDLERS, **frames.HANDLERS, **tools.HANDLERS,
                                 **cycles.HANDLERS}
@@ -34,7 +34,7 @@ def known(major: str) -> bool:
     return major in HANDLERS or major in UNSUPPORTED_MOTION
 
 
-def run(b: Builder, start: int, stop: int) -> None:
+def run(b: ToolpathBuilder, start: int, stop: int) -> None:
     """Carry out statements `start` to `stop`; plain points between them are only counted."""
     statements, lines, before, handlers = b.program.statements, b.program.lines, b.program.before, HANDLERS
     outer, b.stop = b.stop, stop
@@ -57,14 +57,14 @@ def run(b: Builder, start: int, stop: int) -> None:
     b.stop = outer
 
 
-def _subprograms(b: Builder) -> Subprograms:
+def _subprograms(b: ToolpathBuilder) -> Subprograms:
     """Where the subprograms of the file stand, found once."""
     if b.subprograms is None:
         b.subprograms = subprograms_of(b.program.statements)
     return b.subprograms
 
 
-def defsub(b: Builder, s: Statement) -> None:
+def defsub(b: ToolpathBuilder, s: Statement) -> None:
     """Pass over the subprogram; CALSUB carries it out."""
     end = _subprograms(b).ends.get(b.index)
     if end is None or called(s) == "":
@@ -76,7 +76,7 @@ def defsub(b: Builder, s: Statement) -> None:
     b.index = end
 
 
-def calsub(b: Builder, s: Statement) -> None:
+def calsub(b: ToolpathBuilder, s: Statement) -> None:
     """Carry out the statements and points of a subprogram here, under the frame that holds here."""
     known, name = _subprograms(b), called(s)
     found = known.place(name, b.index) if name != "" else None
@@ -107,7 +107,7 @@ def calsub(b: Builder, s: Statement) -> None:
     _stand_about_axis(b, about_axis)
 
 
-def _stand_about_axis(b: Builder, value: bool) -> None:
+def _stand_about_axis(b: ToolpathBuilder, value: bool) -> None:
     if b.about_axis != value:
         b.about_axis = value
         frames.refresh(b)
@@ -122,7 +122,7 @@ VOCABULARY = frozenset(HANDLERS) | UNSUPPORTED_MOTION
 """Every word the reader has an answer to"""
 
 
-def _other(b: Builder, s: Statement) -> None:
+def _other(b: ToolpathBuilder, s: Statement) -> None:
     word = s.major.rpartition("=")[2].strip()
     if word in UNSUPPORTED_MOTION:
         _unsupported(b, s, word)
@@ -136,7 +136,7 @@ def _other(b: Builder, s: Statement) -> None:
         b.texts.append((b.line, s.major))
 
 
-def _remark(b: Builder, s: Statement) -> None:
+def _remark(b: ToolpathBuilder, s: Statement) -> None:
     """A `$$->` remark that nobody reads is a comment, unless it is what a damaged byte leaves of one that says something:
     its word is one edit from that word, or that word stands with a body in its form and no slash between."""
     word = s.major.removeprefix(DATA_COMMENT)
@@ -166,7 +166,7 @@ def _bodied(text: str) -> str:
     return first[1] if whole or (numbers == 0 and rest[:3].lstrip()[:1] in ("{", "[") and rest) else ""
 
 
-def _unsupported(b: Builder, s: Statement, word: str) -> None:
+def _unsupported(b: ToolpathBuilder, s: Statement, word: str) -> None:
     if word in b.allow_unknown:
         b.note_unknown(s, word)
         return
@@ -178,7 +178,7 @@ def _unsupported(b: Builder, s: Statement, word: str) -> None:
                 key=word)
 
 
-def report_others(b: Builder) -> dict[str, int]:
+def report_others(b: ToolpathBuilder) -> dict[str, int]:
     """Diagnostics of unknown words and of text that is no record; how often each unknown word stands."""
     if 0 <= b.finished < b.row:
         b.log.warning("cl.after-fini", f"{b.row - b.finished} points stand after FINI, they are read too")
@@ -208,7 +208,7 @@ def report_others(b: Builder) -> dict[str, int]:
     return counts
 
 
-def _report_uncalled(b: Builder) -> None:
+def _report_uncalled(b: ToolpathBuilder) -> None:
     """What stands in a subroutine that no CALSUB runs is not executed."""
     known = _subprograms(b)
     for name, start, end in ((name, *place) for name, places in known.named.items() for place in places):
@@ -223,7 +223,7 @@ def _report_uncalled(b: Builder) -> None:
                         b.program.lines[start], "--allow-unknown DEFSUB leaves it out", key=f"uncalled {name}")
 
 
-def _report_word(b: Builder, word: str, found: list[tuple[int, int, int]]) -> None:
+def _report_word(b: ToolpathBuilder, word: str, found: list[tuple[int, int, int]]) -> None:
     meant = nearest(word, HANDLERS)
     hint = f"{f'write {meant}, or ' if meant else ''}--allow-unknown {word} leaves it out"
     for line, row, numbers in found:
@@ -237,7 +237,7 @@ def _report_word(b: Builder, word: str, found: list[tuple[int, int, int]]) -> No
             b.log.error("cl.unknown-word", f"unknown word {word}", line, hint, key=word)
 
 
-def _extent(b: Builder) -> tuple[int, int]:
+def _extent(b: ToolpathBuilder) -> tuple[int, int]:
     """First and last line of a known record."""
     lines = [line for s, line in _known_ends(b)]
     if len(b.points):
@@ -245,7 +245,7 @@ def _extent(b: Builder) -> tuple[int, int]:
     return (min(lines), max(lines)) if lines else (0, 0)
 
 
-def _known_ends(b: Builder) -> list[tuple[Statement, int]]:
+def _known_ends(b: ToolpathBuilder) -> list[tuple[Statement, int]]:
     pairs = list(zip(b.program.statements, b.program.lines, strict=True))
     found = []
     for order in (pairs, reversed(pairs)):

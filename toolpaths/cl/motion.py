@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from toolpaths.cl.build import NO_NUMBERS, Builder, Triple
+from toolpaths.cl.build import NO_NUMBERS, ToolpathBuilder, Triple
 from toolpaths.cl.frames import use_world_axis
 from toolpaths.cl.text.dialects import Planes
 from toolpaths.cl.text.statements import Statement
@@ -25,7 +25,7 @@ def _triple(numbers: list[float], at: int) -> Triple:
     return numbers[at], numbers[at + 1], numbers[at + 2]
 
 
-def goto(b: Builder, s: Statement) -> None:
+def goto(b: ToolpathBuilder, s: Statement) -> None:
     """A point of 3, 6 or 9 numbers; 2: z from ZSURF."""
     numbers = s.numbers
     if s.tail and s.tail != ("CONTACT",):
@@ -46,7 +46,7 @@ def goto(b: Builder, s: Statement) -> None:
     b.add_point(_triple(numbers, 0), _triple(numbers, 3), _triple(numbers, 6))
 
 
-def godlta(b: Builder, s: Statement) -> None:
+def godlta(b: ToolpathBuilder, s: Statement) -> None:
     """A move by (dx, dy, dz), or by one number along the tool axis, away from the part where positive."""
     numbers = s.numbers
     if len(numbers) != len(s.words) or len(numbers) not in (1, 3, 6):
@@ -60,7 +60,7 @@ def godlta(b: Builder, s: Statement) -> None:
     b.add_point(NO_NUMBERS, _triple(numbers, 3))
 
 
-def from_(b: Builder, s: Statement) -> None:
+def from_(b: ToolpathBuilder, s: Statement) -> None:
     """Where the tool stands; a RAPID before it counts for the move after it."""
     numbers = s.numbers
     if len(numbers) not in (3, 6):
@@ -72,7 +72,7 @@ def from_(b: Builder, s: Statement) -> None:
         b.rapids.append(b.row)
 
 
-def gohome(b: Builder, s: Statement) -> None:
+def gohome(b: ToolpathBuilder, s: Statement) -> None:
     """A rapid to the point; without one, an event."""
     numbers = s.numbers
     if len(numbers) >= 3:
@@ -84,14 +84,14 @@ def gohome(b: Builder, s: Statement) -> None:
         b.event("GOHOME", tuple(w for w in s.words if w != ""))
 
 
-def rapid(b: Builder, s: Statement) -> None:
+def rapid(b: ToolpathBuilder, s: Statement) -> None:
     """The next move is rapid."""
     b.rapids.append(b.row)
     if s.words:
         b.log.warning("cl.rapid-option", f"RAPID/{s.body}: the parameters are not used", b.line)
 
 
-def tlaxis(b: Builder, s: Statement) -> None:
+def tlaxis(b: ToolpathBuilder, s: Statement) -> None:
     """The tool axis of points of three numbers from here on. In `.clt` it is that in the part, whatever ROTABL says."""
     if len(s.numbers) != 3:
         b.log.error("cl.tlaxis", f"TLAXIS/{s.body}: only three numbers are understood", b.line)
@@ -102,7 +102,7 @@ def tlaxis(b: Builder, s: Statement) -> None:
         b.axis_marks.append((b.row, _triple(s.numbers, 0)))
 
 
-def zsurf(b: Builder, s: Statement) -> None:
+def zsurf(b: ToolpathBuilder, s: Statement) -> None:
     """The height of points of two numbers from here on."""
     if len(s.words) == 1 and s.numbers:
         b.zsurf = s.numbers[0]
@@ -110,7 +110,7 @@ def zsurf(b: Builder, s: Statement) -> None:
         b.log.error("cl.motion-word", f"ZSURF/{s.body}: only a single height is understood", b.line)
 
 
-def circle(b: Builder, s: Statement) -> None:
+def circle(b: ToolpathBuilder, s: Statement) -> None:
     """An arc that ends in the very next GOTO."""
     b.arc_records += 1
     if not b.next_is_point():
@@ -126,7 +126,7 @@ def circle(b: Builder, s: Statement) -> None:
     b.arcs.add(b.row, numbers[:3] + vector, b.line, numbers[6], _turns(b, s), sense, _NAN if sweep is None else sweep)
 
 
-def _turns(b: Builder, s: Statement) -> float:
+def _turns(b: ToolpathBuilder, s: Statement) -> float:
     """The whole turns of TIMES, 0 without it."""
     times = s.after("TIMES")
     if s.has("TIMES") and (times is None or times < 0.0 or times != math.floor(times)):
@@ -144,7 +144,7 @@ def _circle_numbers(n: list[float]) -> tuple[float, ...] | None:
     return tuple(n[:7]) if len(n) >= 7 else None
 
 
-def _axis_and_sense(b: Builder, s: Statement, numbers: tuple[float, ...]) -> tuple[tuple[float, ...], int]:
+def _axis_and_sense(b: ToolpathBuilder, s: Statement, numbers: tuple[float, ...]) -> tuple[tuple[float, ...], int]:
     for word in s.tail:
         if isinstance(word, str) and word in _CLOCKWISE:
             return (0.0, 0.0, 1.0), _CLOCKWISE[word]
@@ -153,7 +153,7 @@ def _axis_and_sense(b: Builder, s: Statement, numbers: tuple[float, ...]) -> tup
     return numbers[3:6], b.dialect.arc_sense or 1
 
 
-def movarc(b: Builder, s: Statement) -> None:
+def movarc(b: ToolpathBuilder, s: Statement) -> None:
     """MOVARC/center, axis, radius, ANGLE, degrees, or MOVARC/CENTER, x, y, z, AXIS, i, j, k, RADIUS, r[, TIMES, n]
     with or without ANGLE; the next GOTO is its end."""
     b.arc_records += 1

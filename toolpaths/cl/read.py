@@ -8,7 +8,7 @@ from difflib import get_close_matches
 from pathlib import Path
 
 from toolpaths.cl.assemble import assemble
-from toolpaths.cl.build import Builder
+from toolpaths.cl.build import ToolpathBuilder
 from toolpaths.cl.forms import check_forms
 from toolpaths.cl.indexing import TRANS_HINT
 from toolpaths.cl.interpret import HANDLERS, known, report_others, run
@@ -16,10 +16,10 @@ from toolpaths.cl.rapid_heights import low_rapids
 from toolpaths.cl.records import counted
 from toolpaths.cl.structure import open_paths
 from toolpaths.cl.text.dialects import DIALECTS, Dialect, detect, units_said
-from toolpaths.cl.text.log import Log
-from toolpaths.cl.text.scan import LARGEST, LARGEST_OWN, Progress, scan
+from toolpaths.cl.text.log import DiagnosticLog
+from toolpaths.cl.text.scan import LARGEST, LARGEST_OWN, ReadProgress, scan
 from toolpaths.cl.text.source import normalise
-from toolpaths.cl.text.statements import Lexer, Program
+from toolpaths.cl.text.statements import Lexer, StatementList
 from toolpaths.diagnostics import Diagnostic, Severity
 from toolpaths.input_files import read_input, unreadable
 from toolpaths.toolpath import ClSource, Toolpath
@@ -50,7 +50,7 @@ class ReadResult:
 
 
 def read_file(path: str | Path, *, units: str | None = None, dialect: str | None = None,
-              allow_unknown: Iterable[str] = (), progress: Progress | None = None) -> ReadResult:
+              allow_unknown: Iterable[str] = (), progress: ReadProgress | None = None) -> ReadResult:
     """Read the file at `path` (- for standard input); see `read_bytes`. A file that cannot be opened is a diagnostic too."""
     try:
         data = read_input(path, standard_input=True)
@@ -62,7 +62,7 @@ def read_file(path: str | Path, *, units: str | None = None, dialect: str | None
 
 
 def read_bytes(data: bytes | str, *, file: str = "", units: str | None = None, dialect: str | None = None,
-               allow_unknown: Iterable[str] = (), progress: Progress | None = None) -> ReadResult:
+               allow_unknown: Iterable[str] = (), progress: ReadProgress | None = None) -> ReadResult:
     """Read the text of a CL file.
 
     Args:
@@ -77,14 +77,14 @@ def read_bytes(data: bytes | str, *, file: str = "", units: str | None = None, d
     """
     _check_options(units, dialect)
     allow_unknown = frozenset(allow_unknown)
-    log = Log(file)
+    log = DiagnosticLog(file)
     plain = normalise(data.encode("utf-8", "replace") if isinstance(data, str) else bytes(data), log)
     largest = LARGEST_OWN if plain.startswith(_OWN_HEAD) else LARGEST
     parts = scan(plain, progress, largest)
     program = Lexer(plain, parts, log, known, largest).program()
     del plain
     found, evidence = (DIALECTS[dialect], "given") if dialect else detect(program)
-    b = Builder(program, parts.points, found, _units(program, units, log), log, allow_unknown)
+    b = ToolpathBuilder(program, parts.points, found, _units(program, units, log), log, allow_unknown)
     run(b, 0, len(program.statements))
     b.finish_rows()
     open_paths(b)
@@ -105,7 +105,7 @@ def read_bytes(data: bytes | str, *, file: str = "", units: str | None = None, d
                       b.arc_records, b.cycle_records, parts.lines)
 
 
-def _check_rapids(b: Builder, toolpath: Toolpath) -> None:
+def _check_rapids(b: ToolpathBuilder, toolpath: Toolpath) -> None:
     """Rapids below all that their tool cuts: an error where an indexed part may stand in the wrong frame, else a warning."""
     rows = low_rapids(toolpath)
     indexed = bool(b.turns_at or b.entries)
@@ -114,7 +114,7 @@ def _check_rapids(b: Builder, toolpath: Toolpath) -> None:
                TRANS_HINT if indexed else "look at the point in the CAM system")
 
 
-def _cut_off(data: bytes | str, lines: int, log: Log) -> None:
+def _cut_off(data: bytes | str, lines: int, log: DiagnosticLog) -> None:
     """A warning where the last line has no end and is not one that ends a file."""
     tail = data[-_TAIL:].encode("utf-8", "replace") if isinstance(data, str) else bytes(data[-_TAIL:])
     *before, last = (line.strip() for line in tail.replace(b"\r", b"\n").rstrip(b"\x1a\x00").split(b"\n"))
@@ -135,7 +135,7 @@ def _check_options(units: str | None, dialect: str | None) -> None:
                          + ", ".join(DIALECTS))
 
 
-def _units(program: Program, given: str | None, log: Log) -> str:
+def _units(program: StatementList, given: str | None, log: DiagnosticLog) -> str:
     """The unit of the file: as given, by its UNITS word, by its feed units, else mm."""
     said = units_said(program)
     for body, line in said.wrong:
@@ -152,7 +152,7 @@ def _units(program: Program, given: str | None, log: Log) -> str:
     return _units_of_feeds(said.feeds, log)
 
 
-def _units_of_feeds(feeds: dict[str, int], log: Log) -> str:
+def _units_of_feeds(feeds: dict[str, int], log: DiagnosticLog) -> str:
     if len(feeds) == 1:
         (unit, line), = feeds.items()
         add = log.info if unit == "mm" else log.warning
@@ -168,8 +168,8 @@ def _with_faults(toolpath: Toolpath, diagnostics: list[Diagnostic]) -> Toolpath:
 
 
 def _empty(file: str) -> Toolpath:
-    log = Log(file)
-    b = Builder(Program(), scan(b"").points, _GENERIC, "mm", log)
+    log = DiagnosticLog(file)
+    b = ToolpathBuilder(StatementList(), scan(b"").points, _GENERIC, "mm", log)
     return assemble(b)
 
 

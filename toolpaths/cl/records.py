@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections import Counter
 from operator import attrgetter
 
-from toolpaths.cl.build import Builder
+from toolpaths.cl.build import ToolpathBuilder
 from toolpaths.cl.text.statements import COMMENT, DATA_COMMENT
 from toolpaths.cl.text.words import NEUTRAL, UNSUPPORTED_MOTION
 from toolpaths.diagnostics import has_errors
-from toolpaths.toolpath import Records
+from toolpaths.toolpath import RecordCounts
 
 
-def counted(b: Builder, known: frozenset[str]) -> Records:
+def counted(b: ToolpathBuilder, known: frozenset[str]) -> RecordCounts:
     """Records (continued lines are one, comments none): executed, neutral by the list in `words`, by the rules for text
     around the program or as --allow-unknown asks, dropped. A file with dropped records has errors that name them; where
     it has none, no handler answered for the record, which is an error here (`cl.dropped`)."""
@@ -30,17 +30,17 @@ def counted(b: Builder, known: frozenset[str]) -> Records:
     dropped += len({line for line, _ in b.texts} - unknown) - b.neutral_texts
     if dropped > 0 and not has_errors(b.log.diagnostics()):
         _report(b, dropped, unmoved)
-    return Records(total, total - neutral - dropped, neutral, dropped)
+    return RecordCounts(total, total - neutral - dropped, neutral, dropped)
 
 
-def _unmoved(b: Builder, known: frozenset[str], named: frozenset[str]) -> list[tuple[int, str]]:
+def _unmoved(b: ToolpathBuilder, known: frozenset[str], named: frozenset[str]) -> list[tuple[int, str]]:
     """Line and word of the motion records that no handler answered for; those of `named` are counted by their word."""
     asked = UNSUPPORTED_MOTION - known - named
     return [(line, s.major) for i, (s, line) in enumerate(zip(b.program.statements, b.program.lines, strict=True))
             if s.major in asked and i not in b.taken]
 
 
-def _report(b: Builder, dropped: int, unmoved: list[tuple[int, str]]) -> None:
+def _report(b: ToolpathBuilder, dropped: int, unmoved: list[tuple[int, str]]) -> None:
     """The error of records that nobody executed and no other error names."""
     found = ([(line, word) for line, word in unmoved if word not in b.allow_unknown]
              or [(line, "(TEXT)") for line, _ in b.texts] or [(0, "WORD")])

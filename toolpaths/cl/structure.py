@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable
 
 from toolpaths.cl import frames
-from toolpaths.cl.build import Builder, Declared
+from toolpaths.cl.build import Declared, ToolpathBuilder
 from toolpaths.cl.text.statements import Statement
 from toolpaths.cl.text.words import EVENTS, LENGTH_EVENTS
 from toolpaths.cl.tools import describe
@@ -17,7 +17,7 @@ _TOOL_PATH = re.compile(r"(.*?),\s*TOOL\s*(?:,(.*))?$", re.IGNORECASE | re.DOTAL
 _CATIA_OPERATION = re.compile(r"OPERATION NAME\s*:\s*(.*)", re.IGNORECASE)
 
 
-def begin_operation(b: Builder, name: str, tool_name: str = "") -> None:
+def begin_operation(b: ToolpathBuilder, name: str, tool_name: str = "") -> None:
     """A new operation from here on; a cycle that is still armed ends."""
     end_cycle(b)
     b.operations.append(Operation(name, tool_name, 0, False, b.line))
@@ -26,14 +26,14 @@ def begin_operation(b: Builder, name: str, tool_name: str = "") -> None:
         b.axis_marks.append((b.row, (0.0, 0.0, 1.0)))
 
 
-def end_cycle(b: Builder) -> None:
+def end_cycle(b: ToolpathBuilder) -> None:
     """Disarm a cycle that the file has not ended."""
     if b.cycle.now >= 0:
         b.log.warning("cl.cycle-open", "the operation ends with a cycle still armed; it is ended here", b.line)
         b.cycle.set(b.row, -1)
 
 
-def tool_path(b: Builder, s: Statement) -> None:
+def tool_path(b: ToolpathBuilder, s: Statement) -> None:
     """TOOL PATH/name, TOOL, tool name."""
     found = _TOOL_PATH.match(s.body)
     name, tool_name = (found[1].strip(), (found[2] or "").strip()) if found else (s.body, "")
@@ -43,7 +43,7 @@ def tool_path(b: Builder, s: Statement) -> None:
         describe(b, name=tool_name)
 
 
-def open_paths(b: Builder) -> None:
+def open_paths(b: ToolpathBuilder) -> None:
     """A warning where a TOOL PATH stands without END-OF-PATH, in a file that has that record."""
     if not b.paths_ended:
         return
@@ -52,46 +52,46 @@ def open_paths(b: Builder) -> None:
                       "write the file anew in the CAM system", key=name)
 
 
-def end_of_path(b: Builder, s: Statement) -> None:
+def end_of_path(b: ToolpathBuilder, s: Statement) -> None:
     """END-OF-PATH."""
     b.paths_ended = True
     del b.open_paths[-1:]
     end_cycle(b)
 
 
-def feature(b: Builder, s: Statement) -> None:
+def feature(b: ToolpathBuilder, s: Statement) -> None:
     """Creo: $$-> FEATNO / n begins the sequence of feature n."""
     begin_operation(b, f"FEATNO {s.body}")
 
 
-def named_operation(b: Builder, s: Statement) -> None:
+def named_operation(b: ToolpathBuilder, s: Statement) -> None:
     """CSI_TOOL_PATH/name (CAMplete, MANUSnc) and OPNAME/'name' (MfgSuite) begin an operation."""
     begin_operation(b, s.body.strip("' "))
 
 
-def solidworks_feature(b: Builder, s: Statement) -> None:
+def solidworks_feature(b: ToolpathBuilder, s: Statement) -> None:
     """`.clt`: OPFEATSTART/operation-feature begins an operation."""
     begin_operation(b, s.body.strip())
 
 
-def turn_type(b: Builder, s: Statement) -> None:
+def turn_type(b: ToolpathBuilder, s: Statement) -> None:
     """SolidWorks CAM's `.apt` has TRNTYP at the head of each operation, before its CSYS, and names none of them."""
     if b.dialect.name == "solidworks":
         begin_operation(b, f"OP {len(b.operations) + 1}")
 
 
-def apply(b: Builder, s: Statement) -> None:
+def apply(b: ToolpathBuilder, s: Statement) -> None:
     """APPLY/MILL or TURN (MfgSuite)."""
     if s.has("TURN"):
         b.turns()
 
 
-def partno(b: Builder, s: Statement) -> None:
+def partno(b: ToolpathBuilder, s: Statement) -> None:
     """The name of the part; the first one counts."""
     b.name = b.name or s.body.strip("'")
 
 
-def comment(b: Builder, s: Statement) -> None:
+def comment(b: ToolpathBuilder, s: Statement) -> None:
     """CATIA names its axis system and its operations in comments."""
     frames.comment(b, s)
     found = _CATIA_OPERATION.match(s.body) if b.dialect.name == "catia" else None
@@ -99,13 +99,13 @@ def comment(b: Builder, s: Statement) -> None:
         begin_operation(b, found[1].strip())
 
 
-def text_event(b: Builder, s: Statement) -> None:
+def text_event(b: ToolpathBuilder, s: Statement) -> None:
     """PPRINT and INSERT, one text each; INSERT of SolidWorks is for people: a PPRINT."""
     word = "PPRINT" if b.dialect.insert_is_comment else s.major
     b.event(word, (s.body,) if s.body else ())
 
 
-def plain_event(b: Builder, s: Statement) -> None:
+def plain_event(b: ToolpathBuilder, s: Statement) -> None:
     """Words that only the machine needs; lengths to mm."""
     words = tuple(w for w in s.words if w != "")
     if s.major in LENGTH_EVENTS:
@@ -113,53 +113,53 @@ def plain_event(b: Builder, s: Statement) -> None:
     b.event(s.major, words)
 
 
-def stop(b: Builder, s: Statement) -> None:
+def stop(b: ToolpathBuilder, s: Statement) -> None:
     """STOP or OPSTOP, with the text for the operator (NX: stop_text and opstop_text of its events) printed before it."""
     if s.body:
         b.event("PPRINT", (s.body,))
     b.event(s.major)
 
 
-def opskip(b: Builder, s: Statement) -> None:
+def opskip(b: ToolpathBuilder, s: Statement) -> None:
     """DELETE/ON or OFF: another word for OPSKIP (the vocabulary of APT CL files gives both one code)."""
     b.event("OPSKIP", tuple(w for w in s.words if w != ""))
 
 
-def selctl(b: Builder, s: Statement) -> None:
+def selctl(b: ToolpathBuilder, s: Statement) -> None:
     """SELECTL/number: another spelling of SELCTL (CATIA V5)."""
     b.event("SELCTL", s.words)
 
 
-def dwell(b: Builder, s: Statement) -> None:
+def dwell(b: ToolpathBuilder, s: Statement) -> None:
     """DWELL/seconds, or revolutions with REV: another word for DELAY."""
     b.event("DELAY", tuple(w for w in s.words if w != ""))
 
 
-def spindl(b: Builder, s: Statement) -> None:
+def spindl(b: ToolpathBuilder, s: Statement) -> None:
     """An event; a surface speed belongs to turning."""
     if s.has("SFM", "SMM"):
         b.turns()
     plain_event(b, s)
 
 
-def nothing(b: Builder, s: Statement) -> None:
+def nothing(b: ToolpathBuilder, s: Statement) -> None:
     """Read elsewhere (UNITS), or of no meaning here."""
 
 
-def multax(b: Builder, s: Statement) -> None:
+def multax(b: ToolpathBuilder, s: Statement) -> None:
     """MULTAX/ON, OFF: the points tell by themselves; after OFF those of three numbers keep the last axis (CATIA: APT
     formats, MULTAX influence on output), which others may not mean."""
     if s.has("OFF") and b.dialect.name != "catia":
         b.multax_off.append((b.row, b.line))
 
 
-def fini(b: Builder, s: Statement) -> None:
+def fini(b: ToolpathBuilder, s: Statement) -> None:
     """The end of the program."""
     if b.finished < 0:
         b.finished = b.row
 
 
-def mode(b: Builder, s: Statement) -> None:
+def mode(b: ToolpathBuilder, s: Statement) -> None:
     """MODE and SET: incremental coordinates are refused, the rest is an event (MODE) or nothing (SET)."""
     if s.has("INCR", "INCRE", "INCREM") and not s.has("OFF"):
         b.log.error("cl.motion-word", f"{s.major}/{s.body}: incremental coordinates are not supported", b.line)
@@ -167,14 +167,14 @@ def mode(b: Builder, s: Statement) -> None:
         plain_event(b, s)
 
 
-def own_header(b: Builder, s: Statement) -> None:
+def own_header(b: ToolpathBuilder, s: Statement) -> None:
     """$$-> TOOLPATH / {...}: text of our own writer; lists of frames, tools, operations follow."""
     found = _json(b, s)
     if found is not None:
         b.declared = Declared("inch" if found.get("units") == "inch" else "mm")
 
 
-def _json(b: Builder, s: Statement) -> dict[str, object] | None:
+def _json(b: ToolpathBuilder, s: Statement) -> dict[str, object] | None:
     try:
         found = json.loads(s.body)
     except (ValueError, RecursionError):
@@ -185,7 +185,7 @@ def _json(b: Builder, s: Statement) -> dict[str, object] | None:
     return None
 
 
-def own_item(b: Builder, s: Statement) -> None:
+def own_item(b: ToolpathBuilder, s: Statement) -> None:
     """$$-> FRAME | TOOL | OPERATION / {...}: one more of the list."""
     found = _json(b, s) if b.declared is not None else None
     if found is None or b.declared is None:
@@ -232,7 +232,7 @@ def _tool(found: dict[str, object]) -> Tool:
                 **sizes, length_register=register, cutter=_numbers(found.get("cutter", []), None))
 
 
-def own_spline(b: Builder, s: Statement) -> None:
+def own_spline(b: ToolpathBuilder, s: Statement) -> None:
     """$$-> SPLINE / n: the next n points lie on a spline between its ends."""
     count = s.numbers[0] if s.numbers else -1.0
     if b.declared is None:
@@ -243,7 +243,7 @@ def own_spline(b: Builder, s: Statement) -> None:
     b.roles.update(dict.fromkeys(range(b.row, b.row + int(count)), Role.SPLINE))
 
 
-def own_use(b: Builder, s: Statement) -> None:
+def own_use(b: ToolpathBuilder, s: Statement) -> None:
     """$$-> USE / operation, tool: indices into the lists from here on."""
     if b.declared is None:
         return
@@ -256,7 +256,7 @@ def own_use(b: Builder, s: Statement) -> None:
     b.declared.tool.set(b.row, values[1])
 
 
-HANDLERS: dict[str, Callable[[Builder, Statement], None]] = {
+HANDLERS: dict[str, Callable[[ToolpathBuilder, Statement], None]] = {
     "TOOL PATH": tool_path, "END-OF-PATH": end_of_path, "$$->FEATNO": feature, "PARTNO": partno, "$$": comment,
     "PPRINT": text_event, "INSERT": text_event, "REMARK": nothing, "LPRINT": nothing, "PPLABEL": nothing,
     "LETTER": nothing, "UNITS": nothing, "UNIT": nothing, "MULTAX": multax, "FINI": fini, "SET": mode,

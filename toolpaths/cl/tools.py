@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from itertools import takewhile
 from typing import Any
 
-from toolpaths.cl.build import Builder
+from toolpaths.cl.build import ToolpathBuilder
 from toolpaths.cl.text.statements import Statement
 from toolpaths.toolpath import Tool
 
@@ -33,7 +33,7 @@ class _State:
     by_number: dict[int, dict[str, Any]] = field(default_factory=dict)
 
 
-def _state(b: Builder) -> _State:
+def _state(b: ToolpathBuilder) -> _State:
     state = b.memory.setdefault("tools", _State())
     assert isinstance(state, _State)
     if state.row != b.row:
@@ -42,14 +42,14 @@ def _state(b: Builder) -> _State:
     return state
 
 
-def describe(b: Builder, **fields: Any) -> None:
+def describe(b: ToolpathBuilder, **fields: Any) -> None:
     """Add what is known of the tool in use from here on."""
     state = _state(b)
     state.fields.update(fields)
     _use(b, state)
 
 
-def _use(b: Builder, state: _State) -> None:
+def _use(b: ToolpathBuilder, state: _State) -> None:
     state.by_number[state.number] = state.fields
     b.tool.set(b.row, Tool(state.number, **state.fields))
 
@@ -61,7 +61,7 @@ def _renumber(state: _State, number: int) -> None:
     state.number = number
 
 
-def _register(b: Builder, register: float | None) -> float | None:
+def _register(b: ToolpathBuilder, register: float | None) -> float | None:
     """The length register that a record names; 0 is the one without a length on every control, so none is named."""
     if register is None or (register == math.floor(register) and 0 < register < _MAX_NUMBER):
         return register
@@ -74,7 +74,7 @@ def _register(b: Builder, register: float | None) -> float | None:
     return None
 
 
-def change(b: Builder, number: float, register: float | None, more: tuple[float, ...] = ()) -> None:
+def change(b: ToolpathBuilder, number: float, register: float | None, more: tuple[float, ...] = ()) -> None:
     """Load tool `number`; the event LOADTL and the tool index follow."""
     if number != math.floor(number) or not 0 <= number < _MAX_NUMBER:
         b.log.error("cl.tool-number", f"{number:g} is no tool number", b.line)
@@ -92,7 +92,7 @@ def change(b: Builder, number: float, register: float | None, more: tuple[float,
         _use(b, state)
 
 
-def _drop_plain_load(b: Builder, number: float) -> None:
+def _drop_plain_load(b: ToolpathBuilder, number: float) -> None:
     """Drop LOADTL/number right before another of the same tool: CATIA writes one at the change, and one with the register
     at each operation (NC_COMPENSATION in its tables of post-processor words)."""
     for k in range(len(b.events) - 1, -1, -1):
@@ -104,7 +104,7 @@ def _drop_plain_load(b: Builder, number: float) -> None:
             return
 
 
-def loadtl(b: Builder, s: Statement) -> None:
+def loadtl(b: ToolpathBuilder, s: Statement) -> None:
     """LOADTL/number[, register][, LENGTH, length][, ADJUST | OSETNO | OFFSET, register][, MILL | TURN], or number, pocket,
     length, register (ISO): numbers behind a word belong to it."""
     numbers = s.numbers
@@ -124,7 +124,7 @@ def loadtl(b: Builder, s: Statement) -> None:
     change(b, numbers[0], register)
 
 
-def load(b: Builder, s: Statement) -> None:
+def load(b: ToolpathBuilder, s: Statement) -> None:
     """LOAD/TOOL | TURRET, number[, ADJUST, register]."""
     number = s.after("TOOL", "TURRET")
     if number is None and s.has("WIRE"):
@@ -136,7 +136,7 @@ def load(b: Builder, s: Statement) -> None:
     change(b, number, s.after("ADJUST", "OSETNO"))
 
 
-def turret(b: Builder, s: Statement) -> None:
+def turret(b: ToolpathBuilder, s: Statement) -> None:
     """TURRET/number[, OSETNO, register, ...]."""
     if not s.numbers:
         b.log.error("cl.tool-number", f"TURRET/{s.body}: it takes a station number", b.line)
@@ -144,7 +144,7 @@ def turret(b: Builder, s: Statement) -> None:
     change(b, s.numbers[0], s.after("OSETNO"))
 
 
-def toolno(b: Builder, s: Statement) -> None:
+def toolno(b: ToolpathBuilder, s: Statement) -> None:
     """CATIA: TOOLNO/number, kind[, diameter[, corner radius[, length]]] describes, LOADTL loads.
 
     The longer forms follow a table of the user: their numbers are left alone, CUTTER has the sizes. MfgSuite: TOOLNO/number,
@@ -165,12 +165,12 @@ def toolno(b: Builder, s: Statement) -> None:
     describe(b, **fields, **_register_field(b, register))
 
 
-def _register_field(b: Builder, register: float | None) -> dict[str, Any]:
+def _register_field(b: ToolpathBuilder, register: float | None) -> dict[str, Any]:
     found = _register(b, register)
     return {} if found is None else {"length_register": int(found)}
 
 
-def cutcom(b: Builder, s: Statement) -> None:
+def cutcom(b: ToolpathBuilder, s: Statement) -> None:
     """An event, but for CUTCOM/ON, LENGTH, register, which names the length register of the tool (MfgSuite), and CUTCOM/ON
     right before the CUTCOM that says the side."""
     register = s.after("LENGTH")
@@ -180,7 +180,7 @@ def cutcom(b: Builder, s: Statement) -> None:
         b.event("CUTCOM", tuple(w for w in s.words if w != ""))
 
 
-def tldata(b: Builder, s: Statement) -> None:
+def tldata(b: ToolpathBuilder, s: Statement) -> None:
     """TLDATA/MILL, d, r, length, taper, tip, ... or DRILL[, MILL], d, r, length, point angle, flute length; with MILL
     behind it THREAD is a thread mill, without a tool of a lathe."""
     kinds = [w for w in s.words if isinstance(w, str) and w]
@@ -200,7 +200,7 @@ def tldata(b: Builder, s: Statement) -> None:
     describe(b, shape=shape, **fields)
 
 
-def cutter(b: Builder, s: Statement) -> None:
+def cutter(b: ToolpathBuilder, s: Statement) -> None:
     """CUTTER/d[, r, e, f, a, b, h], the seven parameters of APT."""
     n = s.numbers
     if not n:
@@ -212,20 +212,20 @@ def cutter(b: Builder, s: Statement) -> None:
     describe(b, diameter=params[0], cutter=params, **corner)
 
 
-def flute_length(b: Builder, s: Statement) -> None:
+def flute_length(b: ToolpathBuilder, s: Statement) -> None:
     """CSI_SET_FLUTE_LENGTH/length."""
     if s.numbers:
         describe(b, flute_length=s.numbers[0] * b.scale)
 
 
-def tprint(b: Builder, s: Statement) -> None:
+def tprint(b: ToolpathBuilder, s: Statement) -> None:
     """TPRINT/name, ...: the name of the tool."""
     name = s.body.split(",")[0].strip()
     if name:
         describe(b, name=name)
 
 
-def select(b: Builder, s: Statement) -> None:
+def select(b: ToolpathBuilder, s: Statement) -> None:
     """SELECT/TOOL, number: the tool to prepare. SELECT/number alone is a work offset in SURFCAM (INC2APT) and a tool to
     prepare elsewhere: one number says nothing under either reading, two are refused."""
     number = next((w for w in s.words if isinstance(w, float)), None)

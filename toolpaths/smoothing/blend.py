@@ -35,7 +35,7 @@ def ramp(u: Floats) -> Floats:
 
 
 @dataclass(frozen=True)
-class Blends:
+class SegmentBlends:
     """The G - 1 joints between segments: parameter, half length a (0 at stops), which are stops, and the turn in rad."""
 
     s: Floats
@@ -67,7 +67,7 @@ class Blends:
         return np.asarray(members.at(joint, s) + members.at(joint + 1, there) - members.at(joint, there))
 
 
-def chosen(members: Members, turn: Floats, tolerance: float, beside_splines: float, sharpest: float) -> Blends:
+def chosen(members: Members, turn: Floats, tolerance: float, beside_splines: float, sharpest: float) -> SegmentBlends:
     """Blends as long as room and tolerance allow.
 
     Args:
@@ -89,7 +89,7 @@ def chosen(members: Members, turn: Floats, tolerance: float, beside_splines: flo
         wide = off > allowed[joint]
         joint, off = joint[wide], off[wide]
         half[joint] *= np.maximum(0.999 * allowed[joint] / off, 0.5)
-    return Blends(s, half, stop, turn)
+    return SegmentBlends(s, half, stop, turn)
 
 
 def _off(members: Members, joint: Ints, s: Floats, half: Floats) -> Floats:

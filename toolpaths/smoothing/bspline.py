@@ -19,7 +19,7 @@ ORDER = DEGREE + 1
 
 
 @dataclass(frozen=True)
-class Knots:
+class KnotVectors:
     """Knots of G stretches.
 
     Attributes:
@@ -31,17 +31,17 @@ class Knots:
     first: Ints
 
     @staticmethod
-    def clamped(values: Floats, first: Ints) -> Knots:
+    def clamped(values: Floats, first: Ints) -> KnotVectors:
         """From simple knots `values`, ends included, of stretches that begin at `first` (G + 1,)."""
         repeat = np.ones(len(values), dtype=np.int64)
         repeat[first[:-1]] = ORDER
         repeat[first[1:] - 1] = ORDER
-        return Knots(np.repeat(values, repeat), first + 2 * DEGREE * np.arange(len(first)))
+        return KnotVectors(np.repeat(values, repeat), first + 2 * DEGREE * np.arange(len(first)))
 
-    def taken(self, which: Bools) -> Knots:
+    def taken(self, which: Bools) -> KnotVectors:
         """Those of some stretches (G,)."""
         size = np.diff(self.first)
-        return Knots(self.t[np.repeat(which, size)], np.concatenate(([0], np.cumsum(size[which]))))
+        return KnotVectors(self.t[np.repeat(which, size)], np.concatenate(([0], np.cumsum(size[which]))))
 
     @property
     def count(self) -> int:

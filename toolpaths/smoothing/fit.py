@@ -12,7 +12,7 @@ import numpy as np
 from scipy.linalg import solveh_banded
 
 from toolpaths.arrays import Bools, Floats, Ints
-from toolpaths.smoothing.bspline import DEGREE, ORDER, Knots
+from toolpaths.smoothing.bspline import DEGREE, ORDER, KnotVectors
 from toolpaths.smoothing.sweep import WIDTH, Data, Normal, evaluate, sweep_for
 
 PENALTY = 1000.0
@@ -31,10 +31,10 @@ GOOD = 0.95
 
 
 @dataclass(frozen=True)
-class Fit:
+class SplineFit:
     """Splines of G stretches: knots and coefficients (K, 6)."""
 
-    knots: Knots
+    knots: KnotVectors
     c: Floats
 
 
@@ -48,12 +48,13 @@ class Spline:
     ratio: Floats
 
 
-def assembled(splines: list[Spline], shift: float) -> Fit | None:
+def assembled(splines: list[Spline], shift: float) -> SplineFit | None:
     """All of them, their parameters less by `shift`; None for none."""
     if not splines:
         return None
     first = np.concatenate(([0], np.cumsum([len(one.t) for one in splines])))
-    return Fit(Knots(np.concatenate([one.t for one in splines]) - shift, first), np.concatenate([one.c for one in splines]))
+    return SplineFit(KnotVectors(np.concatenate([one.t for one in splines]) - shift, first),
+                     np.concatenate([one.c for one in splines]))
 
 
 @dataclass(frozen=True)
@@ -100,7 +101,7 @@ def fit(s: Floats, p: Floats, first: Ints, tolerance: float) -> list[Spline]:
     return [found[k] for k in range(len(found))]
 
 
-def _one(made: Fit, ratio: Floats, first: Ints, k: int) -> Spline:
+def _one(made: SplineFit, ratio: Floats, first: Ints, k: int) -> Spline:
     """Stretch k of a fit."""
     begin, last = made.knots.ends
     return Spline(made.knots.t[made.knots.first[k]:made.knots.first[k + 1]], made.c[begin[k]:last[k] + 1],
@@ -125,7 +126,7 @@ def heights(s: Floats, p: Floats, first: Ints) -> Floats:
     return np.asarray(result)
 
 
-def _first_knots(s: Floats, first: Ints, height: Floats) -> Knots:
+def _first_knots(s: Floats, first: Ints, height: Floats) -> KnotVectors:
     """Knots at points, denser where the chords are far from the curve, and at the ends of each stretch."""
     share = np.concatenate(([0.0], np.cumsum(np.where(height > NEAR, 1.0 / DENSE, 1.0 / SPARSE))))
     passed = np.floor(share - np.repeat(share[first[:-1]], np.diff(first)) + 1e-9)
@@ -133,7 +134,7 @@ def _first_knots(s: Floats, first: Ints, height: Floats) -> Knots:
     keep[np.minimum(first[:-1] + 1, len(s) - 1)] = False
     keep[first[1:] - 2] = False
     keep[first[:-1]], keep[first[1:] - 1] = True, True
-    return Knots.clamped(s[keep], np.concatenate(([0], np.cumsum(keep)))[first])
+    return KnotVectors.clamped(s[keep], np.concatenate(([0], np.cumsum(keep)))[first])
 
 
 def _polyline(s: Floats, p: Floats, first: Ints, height: Floats) -> _Polyline:
@@ -152,7 +153,7 @@ def _polyline(s: Floats, p: Floats, first: Ints, height: Floats) -> _Polyline:
     return _Polyline(every, values, number, weight, s, chord, row)
 
 
-def _rounds(knots: Knots, line: _Polyline, fixed: tuple[Floats, Floats], tolerance: float) -> tuple[Fit, Floats]:
+def _rounds(knots: KnotVectors, line: _Polyline, fixed: tuple[Floats, Floats], tolerance: float) -> tuple[SplineFit, Floats]:
     """The fit on these knots after some rounds of raising weights, and the bound on each chord (P - 1,).
 
     A stretch that is good enough stays as it is.
@@ -170,11 +171,11 @@ def _rounds(knots: Knots, line: _Polyline, fixed: tuple[Floats, Floats], toleran
         if turn == ROUNDS or good.all():
             break
         c = np.where(good[of_stretch][:, None], c, _solved(knots, normal, fixed))
-    made = Fit(knots, c)
+    made = SplineFit(knots, c)
     return made, _bound(made, line, ratio, tolerance)
 
 
-def _penalty(knots: Knots) -> Floats:
+def _penalty(knots: KnotVectors) -> Floats:
     """Lower bands (6, K) of the penalty's matrix."""
     rows, exists = knots.derivative_rows(3)
     rows = rows * np.where(exists, knots.widths() ** 3, 0.0)[:, None] * np.sqrt(PENALTY)
@@ -186,7 +187,7 @@ def _penalty(knots: Knots) -> Floats:
     return bands
 
 
-def _solved(knots: Knots, normal: Normal, fixed: tuple[Floats, Floats]) -> Floats:
+def _solved(knots: KnotVectors, normal: Normal, fixed: tuple[Floats, Floats]) -> Floats:
     """Coefficients (K, 6) with the first and last of each stretch as given."""
     bands, right = normal.bands, normal.right
     begin, last = knots.ends
@@ -201,7 +202,7 @@ def _solved(knots: Knots, normal: Normal, fixed: tuple[Floats, Floats]) -> Float
     return np.asarray(solveh_banded(bands, right, lower=True, overwrite_ab=True, overwrite_b=True, check_finite=False))
 
 
-def _bound(made: Fit, line: _Polyline, ratio: Floats, tolerance: float) -> Floats:
+def _bound(made: SplineFit, line: _Polyline, ratio: Floats, tolerance: float) -> Floats:
     """(P - 1,) bound of deviation over tolerance on each chord, 0 on those between stretches.
 
     From values on the chord: between two places a distance d apart a function stays within d^2/8 of its second
@@ -220,7 +221,7 @@ def _bound(made: Fit, line: _Polyline, ratio: Floats, tolerance: float) -> Float
     return result
 
 
-def _ratio_at(made: Fit, line: _Polyline, which: Ints, part: float, tolerance: float) -> Floats:
+def _ratio_at(made: SplineFit, line: _Polyline, which: Ints, part: float, tolerance: float) -> Floats:
     """Deviation over tolerance (N,) at that part of the chords `which` (N,)."""
     row = line.row[which]
     s = line.s[row] + part * (line.s[row + 2] - line.s[row])
@@ -230,7 +231,7 @@ def _ratio_at(made: Fit, line: _Polyline, which: Ints, part: float, tolerance: f
     return np.asarray(np.maximum(np.linalg.norm(off[:, :3], axis=1), np.linalg.norm(off[:, 3:], axis=1)) / tolerance)
 
 
-def steepest(knots: Knots, c: Floats, begin: Floats, end: Floats) -> Floats:
+def steepest(knots: KnotVectors, c: Floats, begin: Floats, end: Floats) -> Floats:
     """(N,) bound of the second derivative's length, of tip or axis, between begin and end (N,).
 
     A spline stays within the hull of its coefficients, and its second derivative is a spline, too.
@@ -247,7 +248,7 @@ def steepest(knots: Knots, c: Floats, begin: Floats, end: Floats) -> Floats:
     return np.asarray(np.maximum.reduceat(spans, np.stack((low, high), axis=1).ravel())[::2])
 
 
-def _halved(knots: Knots, s: Floats, bad: Bools) -> Knots:
+def _halved(knots: KnotVectors, s: Floats, bad: Bools) -> KnotVectors:
     """Knots with one more in the middle of each span that a bad chord (P - 1,) touches, and of those beside."""
     values, begin = knots.simple()
     chord = np.flatnonzero(bad)
@@ -259,4 +260,4 @@ def _halved(knots: Knots, s: Floats, bad: Bools) -> Knots:
     where = np.flatnonzero((np.cumsum(mark[:-1]) > 0) & inside)
     added = np.searchsorted(where, begin)
     middle = 0.5 * (values[where] + values[where + 1])
-    return Knots.clamped(np.insert(values, where + 1, middle), begin + added)
+    return KnotVectors.clamped(np.insert(values, where + 1, middle), begin + added)

@@ -9,8 +9,8 @@ import numpy as np
 
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.shape import Curves
-from toolpaths.smoothing.bspline import Knots
-from toolpaths.smoothing.fit import Fit
+from toolpaths.smoothing.bspline import KnotVectors
+from toolpaths.smoothing.fit import SplineFit
 from toolpaths.smoothing.sweep import WIDTH, Data, evaluate
 
 CHUNK = 65536
@@ -33,7 +33,7 @@ class Members:
     first: Ints
     spline: Bools
     scale: float
-    fit: Fit | None
+    fit: SplineFit | None
 
     @cached_property
     def s(self) -> Floats:
@@ -46,7 +46,7 @@ class Members:
         return np.cumsum(self.spline) - 1
 
     @property
-    def knots(self) -> Knots | None:
+    def knots(self) -> KnotVectors | None:
         """of the splines"""
         return None if self.fit is None else self.fit.knots
 

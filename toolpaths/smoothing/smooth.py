@@ -16,10 +16,10 @@ import numpy as np
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.rotations import angle_between
 from toolpaths.shape import Curves
-from toolpaths.smoothing.blend import SHARPEST, Blends, chosen
+from toolpaths.smoothing.blend import SHARPEST, SegmentBlends, chosen
 from toolpaths.smoothing.fit import Spline, assembled, fit
 from toolpaths.smoothing.members import Members
-from toolpaths.smoothing.stretches import Segments, corners, segments
+from toolpaths.smoothing.stretches import ChainSegments, corners, segments
 from toolpaths.smoothing.tangents import lengths, rates, turns
 
 STILL = 1e-7
@@ -55,7 +55,7 @@ class Smooth:
 
     s: Floats
     members: Members
-    blends: Blends
+    blends: SegmentBlends
     worst: float
     tolerance: Tolerance
 
@@ -110,7 +110,8 @@ def smooth_all(curves: Curves, first: Ints, tolerance: Tolerance, sharpest: floa
     return result
 
 
-def _chain(members: Members, blends: Blends, splines: list[Spline], rows: Ints, s: Floats, tolerance: Tolerance) -> Smooth:
+def _chain(members: Members, blends: SegmentBlends, splines: list[Spline], rows: Ints, s: Floats,
+           tolerance: Tolerance) -> Smooth:
     """One chain, moves [rows[0], rows[1]), of the members of all; its parameter begins at 0."""
     low, high = np.searchsorted(members.first, rows).tolist()
     start = float(members.ends[rows[0]])
@@ -122,13 +123,13 @@ def _chain(members: Members, blends: Blends, splines: list[Spline], rows: Ints, 
     mine = Members(curves, ends, members.first[low:high + 1] - rows[0],
                    members.spline[low:high], members.scale, assembled(own, start))
     joints = slice(low, high - 1)
-    joined = Blends(blends.s[joints] - start, blends.half[joints], blends.stop[joints], blends.turn[joints])
+    joined = SegmentBlends(blends.s[joints] - start, blends.half[joints], blends.stop[joints], blends.turn[joints])
     worst = SHARE * max((float(one.ratio.max()) for one in own), default=0.0)
     return Smooth(s, mine, joined, worst, tolerance)
 
 
 def _fitted(curves: Curves, s: Floats, way: Floats, turn: Floats, apart: Bools,
-            tolerance: Tolerance) -> tuple[Segments, list[Spline]]:
+            tolerance: Tolerance) -> tuple[ChainSegments, list[Spline]]:
     """Segments, and the splines of those that are splines; `apart` are joints of two chains.
 
     Chords that no spline keeps to end up between corners; after some tries all chords of such a spline do, so that
@@ -165,7 +166,7 @@ def _fit(curves: Curves, s: Floats, moves: list[tuple[int, int]], tolerance: Tol
     return fit(s[row], np.hstack((tip, tolerance.scale * axis)), first, SHARE * tolerance.tip)
 
 
-def _more_corners(corner: Bools, parts: Segments, chord: Ints, all_of_it: bool) -> Bools:
+def _more_corners(corner: Bools, parts: ChainSegments, chord: Ints, all_of_it: bool) -> Bools:
     """Corners at both ends of these moves; or at every joint of the splines that hold them."""
     more = corner.copy()
     if all_of_it:

@@ -23,7 +23,7 @@ TURN_SPAN = 2.0
 
 
 @dataclass(frozen=True)
-class Segments:
+class ChainSegments:
     """G segments of a chain of moves.
 
     Attributes:
@@ -63,7 +63,7 @@ def _long(length: Floats, chain: Ints) -> Bools:
     return np.asarray(length > LONG * np.sort(around, axis=0)[1])
 
 
-def segments(corner: Bools, is_arc: Bools) -> Segments:
+def segments(corner: Bools, is_arc: Bools) -> ChainSegments:
     """Moves between corners as splines where they are enough of them, else one by one."""
     moves = len(corner) + 1
     begin = np.concatenate(([0], np.flatnonzero(corner) + 1, [moves]))
@@ -72,4 +72,4 @@ def segments(corner: Bools, is_arc: Bools) -> Segments:
     pieces = np.where(spline, 1, size)
     which = np.repeat(np.arange(len(size)), pieces)
     local = np.arange(len(which)) - np.repeat(np.cumsum(pieces) - pieces, pieces)
-    return Segments(np.append(begin[:-1][which] + local, moves), spline[which])
+    return ChainSegments(np.append(begin[:-1][which] + local, moves), spline[which])

@@ -16,7 +16,7 @@ from machines.geometric_error.actual.lost_motion import carried_on
 from machines.kinematics.base import Kinematics
 from toolpaths.arrays import Bools, Floats
 
-Placed = tuple[Floats, Floats, Floats]
+ToolPlace = tuple[Floats, Floats, Floats]
 """tip, tool axis, x of the tool, each (N, 3), in the table frame"""
 RESTS = 1e-6
 """part of the largest motion that counts as none"""
@@ -43,7 +43,7 @@ class Actual(ABC):
         """q (N, J), NaN where the machine cannot go."""
 
     @abstractmethod
-    def place(self, w: Floats, direction: Floats | None = None) -> Placed:
+    def place(self, w: Floats, direction: Floats | None = None) -> ToolPlace:
         """Where the tool is, exactly, when w (N, 3 + R) is commanded.
 
         Args:

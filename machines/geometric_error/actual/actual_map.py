@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from machines.geometric_error.actual.actual import EDGE, Actual, Placed
+from machines.geometric_error.actual.actual import EDGE, Actual, ToolPlace
 from machines.geometric_error.actual.error_rates import ErrorRates, arms_of
 from machines.geometric_error.actual.serial_errors import SerialErrors
 from machines.geometric_error.tables.lattice import POINT, ErrorMap
@@ -69,7 +69,7 @@ class ActualByMap(Actual):
         return np.stack([point[:, POINT.index(letter)] if letter in POINT else q[:, names.index(letter)]
                          for letter in self.map.letters], axis=1)
 
-    def place(self, w: Floats, direction: Floats | None = None) -> Placed:
+    def place(self, w: Floats, direction: Floats | None = None) -> ToolPlace:
         """See the base class."""
         tip, axis, side = self.nominal.place(w)
         error = self.map.at(self.lattice_places(w))

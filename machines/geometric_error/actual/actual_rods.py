@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from machines.geometric_error.actual.actual import EDGE, Actual, Placed
+from machines.geometric_error.actual.actual import EDGE, Actual, ToolPlace
 from machines.geometric_error.actual.axis_motion import Line, actual_line, actual_tool, along, driven
 from machines.geometric_error.actual.rods import RodErrors, RodFrame, platform_turn, rod_frame
 from machines.geometric_error.actual.serial_errors import SerialErrors
@@ -102,7 +102,7 @@ class ActualDelta(ActualRods):
         place = w + self.kinematics.tool_length * UP
         return place, np.tile(np.eye(3), (len(w), 1, 1)), self.joints(w)
 
-    def place(self, w: Floats, direction: Floats | None = None) -> Placed:
+    def place(self, w: Floats, direction: Floats | None = None) -> ToolPlace:
         """See the base class."""
         if not self.any:
             return w, np.tile(UP, (len(w), 1)), np.tile(np.eye(3)[0], (len(w), 1))
@@ -177,7 +177,7 @@ class ActualH4(ActualRods):
     def _platform(self, w: Floats) -> tuple[Floats, Floats, Floats]:
         return w[:, :3], platform_turn(w[:, 3]), self.kinematics.platform.inverse(w[:, :4])
 
-    def place(self, w: Floats, direction: Floats | None = None) -> Placed:
+    def place(self, w: Floats, direction: Floats | None = None) -> ToolPlace:
         """See the base class."""
         if not self.any:
             return self.kinematics.place(w[:, :4], w[:, 4])

@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from machines.geometric_error.actual.actual import EDGE, Actual, Placed
+from machines.geometric_error.actual.actual import EDGE, Actual, ToolPlace
 from machines.geometric_error.actual.axis_motion import Line, actual_line, actual_tool, along, driven
 from machines.geometric_error.actual.error_rates import ErrorRates, serial_rates
 from machines.geometric_error.actual.serial_errors import SerialErrors
@@ -65,7 +65,7 @@ class ActualSerial(Actual):
 
     # ---- exact -----------------------------------------------------------------------------------------------------
 
-    def place(self, w: Floats, direction: Floats | None = None) -> Placed:
+    def place(self, w: Floats, direction: Floats | None = None) -> ToolPlace:
         """See the base class."""
         tip, axis, side = self._sweep(w, direction, self.tool())
         return tip, axis, side

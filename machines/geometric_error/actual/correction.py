@@ -38,7 +38,7 @@ STEPS = 20
 
 
 @dataclass(frozen=True)
-class Corrected:
+class CorrectedCommands:
     """Corrected commands and what they do on the machine with errors.
 
     Attributes:
@@ -65,7 +65,7 @@ class Corrected:
 
 def correct(actual: Actual, q: Floats, tip: Floats, axis: Floats, *, group: Ints | None = None,
             direction: Floats | None = None, axis_tolerance: float = AXIS_TOLERANCE, turn: bool = True,
-            beyond: bool | Bools = False) -> Corrected:
+            beyond: bool | Bools = False) -> CorrectedCommands:
     """Joints near the nominal q (N, J) at which the machine with errors has its tool at tip and axis (N, 3).
 
     Args:
@@ -102,7 +102,7 @@ def correct(actual: Actual, q: Floats, tip: Floats, axis: Floats, *, group: Ints
         steps += 1
     partial = np.zeros(len(q), dtype=np.bool_) if turns is None else np.asarray(np.any(turns.weak, axis=1))
     after = _deviation(at_tip, at_axis, tip, axis)
-    return Corrected(_wound(actual, w, q), *before, *after, at_tip - tip, at_axis - axis, partial, unmeasured, steps)
+    return CorrectedCommands(_wound(actual, w, q), *before, *after, at_tip - tip, at_axis - axis, partial, unmeasured, steps)
 
 
 def _wound(actual: Actual, w: Floats, q: Floats) -> Floats:

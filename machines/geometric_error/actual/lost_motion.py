@@ -19,7 +19,7 @@ GRAIN = 5e-5, 1e-6
 
 
 @dataclass(frozen=True)
-class Steps:
+class PlaySteps:
     """Functions of the way: clip(way + shift, low, high); arrays of one shape."""
 
     shift: Floats
@@ -27,30 +27,30 @@ class Steps:
     high: Floats
 
     @classmethod
-    def of(cls, step: Floats, gap: Floats) -> Steps:
+    def of(cls, step: Floats, gap: Floats) -> PlaySteps:
         """Of steps mm or rad against plays (same shape, above 0)."""
         return cls(2.0 * step / gap, np.full(step.shape, -1.0), np.full(step.shape, 1.0))
 
-    def then(self, after: Steps) -> Steps:
+    def then(self, after: PlaySteps) -> PlaySteps:
         """These, then those."""
         low, high = (np.clip(bound + after.shift, after.low, after.high) for bound in (self.low, self.high))
-        return Steps(self.shift + after.shift, low, high)
+        return PlaySteps(self.shift + after.shift, low, high)
 
     def at(self, way: Floats) -> Floats:
         """The way after them."""
         result: Floats = np.clip(way + self.shift, self.low, self.high)
         return result
 
-    def rows(self, part: slice) -> Steps:
+    def rows(self, part: slice) -> PlaySteps:
         """Some of the rows."""
-        return Steps(self.shift[part], self.low[part], self.high[part])
+        return PlaySteps(self.shift[part], self.low[part], self.high[part])
 
-    def walked(self) -> Steps:
+    def walked(self) -> PlaySteps:
         """Row k: all from the first to k, one after the other (prefix composition in log2 passes; Hillis, Steele, 1986)."""
         done, n, reach = self, len(self.shift), 1
         while reach < n:
             later = done.rows(slice(None, -reach)).then(done.rows(slice(reach, None)))
-            done = Steps(*(np.concatenate([head[:reach], tail]) for head, tail in (
+            done = PlaySteps(*(np.concatenate([head[:reach], tail]) for head, tail in (
                 (done.shift, later.shift), (done.low, later.low), (done.high, later.high))))
             reach *= 2
         return done
@@ -60,7 +60,7 @@ def turning_sign(step: Floats, rotary: Bools) -> Floats:
     """Sign (N, J) of the last motion of joints that go by steps (N, J) one after the other: what goes back by less than the
     grain of words, in one step or in many, turns nothing; 0 before a joint has moved by that much."""
     least = np.broadcast_to(np.where(rotary, GRAIN[1], GRAIN[0]), step.shape)
-    way = Steps.of(step, least).walked().at(np.zeros((1, step.shape[1])))
+    way = PlaySteps.of(step, least).walked().at(np.zeros((1, step.shape[1])))
     return carried_on(np.where(np.abs(way) == 1.0, way, 0.0))
 
 

@@ -21,7 +21,7 @@ from machines.kinematics.linear_delta import LinearDelta
 from machines.kinematics.serial import Serial
 from toolpaths.arrays import Floats, frozen
 
-Place = Literal["post", "control"]
+CorrectedBy = Literal["post", "control"]
 BLOCK = 2048
 """points at a time where a matrix per point and parameter is needed"""
 
@@ -44,7 +44,7 @@ class ErrorModel:
     rods: RodErrors | None = None
     map: ErrorMap | None = None
     covariance: Floats | None = None
-    corrected_by: Place = "post"
+    corrected_by: CorrectedBy = "post"
     name: str = ""
     machine: str = ""
     large: bool = False
@@ -138,7 +138,7 @@ def _check_axes(kinematics: Kinematics, axes: SerialErrors) -> None:
 
 
 @dataclass(frozen=True)
-class Doubt:
+class Uncertainty:
     """Standard deviations that the covariance of a model gives at places of a path.
 
     Attributes:
@@ -152,7 +152,7 @@ class Doubt:
     axis: Floats
 
 
-def doubt(model: ErrorModel, actual: Actual, w: Floats, direction: Floats | None = None) -> Doubt:
+def doubt(model: ErrorModel, actual: Actual, w: Floats, direction: Floats | None = None) -> Uncertainty:
     """Predicted doubt (one standard deviation) of tip and axis at w (N, 3 + R): J Sigma J^T, first order.
 
     Raises:
@@ -171,4 +171,4 @@ def doubt(model: ErrorModel, actual: Actual, w: Floats, direction: Floats | None
         _, along, _ = actual.place(w[part])
         across = np.eye(3) - along[:, :, None] * along[:, None, :]
         axis[part] = np.sqrt(np.maximum(np.linalg.eigvalsh(across @ spread[:, 3:, 3:] @ across)[:, -1], 0.0))
-    return Doubt(tip, worst, axis)
+    return Uncertainty(tip, worst, axis)

@@ -30,11 +30,11 @@ import numpy as np
 
 from machines.geometric_error.actual.lost_motion import GRAIN
 from machines.geometric_error.tables.curve_banks import Bank, banks
-from machines.geometric_error.tables.curves import Curve, Table
+from machines.geometric_error.tables.curves import Curve, TableCurve
 from machines.geometric_error.tables.names import OWN, ErrorName, parse
 from toolpaths.arrays import Bools, Floats
 
-Frame = Literal["fixed", "moving"]
+ErrorFrame = Literal["fixed", "moving"]
 ROTARY = "ABC"
 
 
@@ -61,7 +61,7 @@ class SerialErrors:
     components: tuple[Component, ...] = ()
     constants: Mapping[str, float] = field(default_factory=dict)
     reference: Mapping[str, Floats] = field(default_factory=dict)
-    frame: Mapping[str, Frame] = field(default_factory=dict)
+    frame: Mapping[str, ErrorFrame] = field(default_factory=dict)
 
     # ---- parameters ------------------------------------------------------------------------------------------------
 
@@ -109,7 +109,7 @@ class SerialErrors:
 
     def two_way(self, names: tuple[str, ...]) -> list[int]:
         """Numbers of the axes `names` that have any error with two ways of approach."""
-        found = {c.name.axis for c in self.components if isinstance(c.curve, Table) and c.curve.both}
+        found = {c.name.axis for c in self.components if isinstance(c.curve, TableCurve) and c.curve.both}
         return [j for j, name in enumerate(names) if name in found]
 
     def gaps(self, names: tuple[str, ...], q: Floats, joints: list[int]) -> Floats:

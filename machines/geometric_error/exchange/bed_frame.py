@@ -14,8 +14,8 @@ import numpy as np
 
 from machines.geometric_error.actual.actual_map import part_side
 from machines.geometric_error.actual.model import ErrorModel
-from machines.geometric_error.actual.serial_errors import Component, Frame
-from machines.geometric_error.tables.curves import EVERYWHERE, Curve, Fourier, Table
+from machines.geometric_error.actual.serial_errors import Component, ErrorFrame
+from machines.geometric_error.tables.curves import EVERYWHERE, Curve, Fourier, TableCurve
 from machines.geometric_error.tables.names import DIRECTIONS, ErrorName
 from machines.kinematics.h4_axes import H4SpindleAxis
 from machines.kinematics.h4_linear import H4Linear
@@ -31,7 +31,7 @@ ON_LINE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class Turned(Curve):
+class RotatedCurve(Curve):
     """Sum of curves of one axis, each times an entry of the axis's turn.
 
     Attributes:
@@ -83,12 +83,12 @@ class Turned(Curve):
     @property
     def both(self) -> bool:
         """True where any has two ways."""
-        return any(isinstance(curve, Table) and curve.both for curve in self.curves)
+        return any(isinstance(curve, TableCurve) and curve.both for curve in self.curves)
 
     @cached_property
     def period(self) -> float:
         """A turn where all repeat after one; else 0."""
-        whole = all(isinstance(c, Table | Fourier) and abs(c.period - 2.0 * np.pi) < NONE for c in self.curves)
+        whole = all(isinstance(c, TableCurve | Fourier) and abs(c.period - 2.0 * np.pi) < NONE for c in self.curves)
         return 2.0 * np.pi if whole and self.range == EVERYWHERE else 0.0
 
     def labels(self) -> list[str]:
@@ -102,12 +102,12 @@ class Turned(Curve):
                                for (i, j), component in self.parts], axis=1)
 
 
-def bed_side(machine: Machine, letter: str) -> Frame:
+def bed_side(machine: Machine, letter: str) -> ErrorFrame:
     """The side of a rotary axis that the bed is on."""
     return "moving" if letter in part_side(machine.kinematics, machine.structure) else "fixed"
 
 
-def in_bed_frame(model: ErrorModel, machine: Machine) -> tuple[list[Component], dict[str, Frame]]:
+def in_bed_frame(model: ErrorModel, machine: Machine) -> tuple[list[Component], dict[str, ErrorFrame]]:
     """(components, frame by rotary axis): those of axes in another frame turned into that of the bed.
 
     Axes whose reference point lies off their line stay as they are.
@@ -134,7 +134,8 @@ def _turned(letter: str, mine: dict[int, Component], direction: Floats, back: bo
         parts = tuple(((i, j), mine[group + j]) for j in range(3) if group + j in mine and not zero[i, j])
         if parts:
             alone = len(parts) == 1 and one[parts[0][0]]
-            found.append(parts[0][1] if alone else Component(ErrorName(part, False, letter), Turned(parts, direction, back)))
+            found.append(parts[0][1] if alone else Component(ErrorName(part, False, letter),
+                                                             RotatedCurve(parts, direction, back)))
     return found
 
 

@@ -14,15 +14,15 @@ from machines.geometric_error.actual.axis_motion import ALONG, sense
 from machines.geometric_error.actual.model import ErrorModel
 from machines.geometric_error.actual.serial_errors import Component, SerialErrors
 from machines.geometric_error.exchange.bed_frame import bed_side, in_bed_frame, on_line
-from machines.geometric_error.exchange.lattice_making import MapLoss, map_loss, map_of, nodes_of, probes, refined
+from machines.geometric_error.exchange.make_map import MapLoss, map_loss, map_of, nodes_of, probes, refined
 from machines.geometric_error.exchange.survey import PLACES as WORST_PLACES
 from machines.geometric_error.exchange.survey import apart
-from machines.geometric_error.exchange.tabulate import Rows, loss, merged, rows_for, sampled, tabulated, without
+from machines.geometric_error.exchange.tabulate import TablePositions, loss, merged, rows_for, sampled, tabulated, without
 from machines.geometric_error.exchange.volume import corners, middle, ranges, samples
 from machines.geometric_error.files.covariance import angular
 from machines.geometric_error.tables.averages import SAME
 from machines.geometric_error.tables.csv_table import UNITS, write_csv
-from machines.geometric_error.tables.curves import Polynomial, Table
+from machines.geometric_error.tables.curves import Polynomial, TableCurve
 from machines.geometric_error.tables.lattice import POINT, ROTARY, ErrorMap
 from machines.geometric_error.tables.names import DIRECTIONS, OWN
 from machines.geometric_error.tables.screw_tables import LINUXCNC_ROWS, to_linuxcnc
@@ -43,12 +43,12 @@ TURNS = 2.0, 1.0, 0.5
 """either way, of an axis that goes round: rows of screw compensation are tried over these"""
 PLACES = 5000
 """of the work volume at which an export is compared with its model"""
-Steps = Mapping[str, float]
+GridSteps = Mapping[str, float]
 
 
 # ---- tables per axis --------------------------------------------------------------------------------------------------
 
-def to_tables(model: ErrorModel, machine: Machine, step: Steps, length: float,
+def to_tables(model: ErrorModel, machine: Machine, step: GridSteps, length: float,
               angle: float) -> tuple[ErrorModel, dict[str, float]]:
     """The model with every component a linear table along x, y, z of the bed (ISO 230-1), and what each loses (mm or rad).
 
@@ -89,7 +89,7 @@ class Screws:
     the model without them."""
 
     texts: dict[str, str]
-    tables: dict[str, Table]
+    tables: dict[str, TableCurve]
     losses: dict[str, float]
     held: ErrorModel
     rest: ErrorModel
@@ -97,7 +97,7 @@ class Screws:
     """positioning errors that are not along or about the joint, and why"""
 
 
-def to_screws(model: ErrorModel, machine: Machine, step: Steps, length: float, angle: float) -> Screws:
+def to_screws(model: ErrorModel, machine: Machine, step: GridSteps, length: float, angle: float) -> Screws:
     """Positioning errors as LinuxCNC's files; arguments as `to_tables`.
 
     Axes that go round have rows over two turns either way, or as many as rows allow. Beyond its rows LinuxCNC goes on with
@@ -123,8 +123,8 @@ def to_screws(model: ErrorModel, machine: Machine, step: Steps, length: float, a
     return Screws(texts, tables, losses, held, rest, left)
 
 
-def _screw_rows(components: Sequence[Component], machine: Machine, step: Steps, length: float,
-                angle: float) -> dict[str, Rows]:
+def _screw_rows(components: Sequence[Component], machine: Machine, step: GridSteps, length: float,
+                angle: float) -> dict[str, TablePositions]:
     """Rows by component over as many turns of axes that go round as LinuxCNC has rows for."""
     for turns in TURNS[:-1]:
         with suppress(ValueError):
@@ -196,7 +196,7 @@ class MadeMap:
     doubt_lost: bool
 
 
-def lattice_for(model: ErrorModel, machine: Machine, letters: str, step: Steps, at: Mapping[str, float], length: float,
+def lattice_for(model: ErrorModel, machine: Machine, letters: str, step: GridSteps, at: Mapping[str, float], length: float,
                 directions: str) -> tuple[ErrorMap, Floats]:
     """(an empty lattice, fixed joints (J,)).
 
@@ -244,7 +244,7 @@ def _levels(model: ErrorModel, machine: Machine, letter: str, ends: tuple[float,
     """(nodes, period) of one coordinate."""
     unlimited = letter in machine.axis_names and not np.isfinite(machine.limits.lower[machine.axis_names.index(letter)])
     whole = unlimited and ends == travel(machine)[letter]
-    own = [c.curve.x for c in model.axes.components if c.name.axis == letter and isinstance(c.curve, Table)]
+    own = [c.curve.x for c in model.axes.components if c.name.axis == letter and isinstance(c.curve, TableCurve)]
     if model.map is not None and letter in model.map.letters:
         own = [model.map.nodes[model.map.letters.index(letter)]]
     if whole:

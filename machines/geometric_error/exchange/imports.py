@@ -13,13 +13,13 @@ import numpy as np
 from machines.geometric_error.actual.actual_map import part_side
 from machines.geometric_error.actual.axis_motion import effect
 from machines.geometric_error.actual.model import ErrorModel
-from machines.geometric_error.actual.serial_errors import Component, Frame, SerialErrors
+from machines.geometric_error.actual.serial_errors import Component, ErrorFrame, SerialErrors
 from machines.geometric_error.exchange.bed_frame import bed_side
 from machines.geometric_error.exchange.exports import joint_sense, leans
-from machines.geometric_error.exchange.scatter import with_scatter
 from machines.geometric_error.exchange.tabulate import merged
+from machines.geometric_error.exchange.uncertainty_of_means import with_scatter
 from machines.geometric_error.files.covariance import angular, read_covariance
-from machines.geometric_error.files.sizes import too_large
+from machines.geometric_error.files.implausible_errors import too_large
 from machines.geometric_error.tables.averages import Averaged, averaged
 from machines.geometric_error.tables.csv_table import ANGLES, LENGTHS, UNITS, CsvTable, read_csv, read_text
 from machines.geometric_error.tables.lattice_file import COORDINATES, map_from_csv, zeroed
@@ -51,7 +51,7 @@ _FIRST = 1000
 
 
 @dataclass(frozen=True)
-class How:
+class ImportOptions:
     """How sources are to be read.
 
     Attributes:
@@ -80,7 +80,7 @@ class How:
     large: bool = False
 
 
-def read_sources(sources: Sequence[str], machine: Machine, how: How) -> tuple[ErrorModel | None, list[Diagnostic]]:
+def read_sources(sources: Sequence[str], machine: Machine, how: ImportOptions) -> tuple[ErrorModel | None, list[Diagnostic]]:
     """The model that all sources make together; None where any has a fault.
 
     Args:
@@ -101,7 +101,8 @@ def read_sources(sources: Sequence[str], machine: Machine, how: How) -> tuple[Er
     return (None if has_errors(found) else model), found
 
 
-def _parts(sources: Sequence[str], machine: Machine, how: How) -> tuple[list[tuple[ErrorModel, str]], list[Diagnostic]]:
+def _parts(sources: Sequence[str], machine: Machine,
+           how: ImportOptions) -> tuple[list[tuple[ErrorModel, str]], list[Diagnostic]]:
     """Models of the sources, with what each is of, LinuxCNC's files first."""
     parts, tables, found = list[tuple[ErrorModel, str]](), list[CsvTable](), list[Diagnostic]()
     for source in sources:
@@ -120,14 +121,14 @@ def _parts(sources: Sequence[str], machine: Machine, how: How) -> tuple[list[tup
     return parts, found
 
 
-def _large(model: ErrorModel, sources: Sequence[str], how: How) -> list[Diagnostic]:
+def _large(model: ErrorModel, sources: Sequence[str], how: ImportOptions) -> list[Diagnostic]:
     """Errors above what machines have."""
     return [(error if one.refused(how.large) else warning)(
         "error-model.large", one.message(how.large), file=", ".join(sources)[:200],
         hint=one.hint(how.large, "headers of columns", "--large")) for one in too_large(model)]
 
 
-def _unused(how: How, model: ErrorModel) -> list[Diagnostic]:
+def _unused(how: ImportOptions, model: ErrorModel) -> list[Diagnostic]:
     """What was asked for and concerns none of the sources."""
     letters = {c.name.axis for c in model.axes.components} if model.map is None else set(model.map.letters)
     asked = [f"{letter} repeats" for letter in how.periods if letter not in letters]
@@ -177,7 +178,7 @@ def with_covariance(model: ErrorModel, path: Path) -> tuple[ErrorModel | None, l
 
 # ---- CSV ------------------------------------------------------------------------------------------------------------
 
-def _read(source: str, how: How) -> tuple[CsvTable | None, list[Diagnostic]]:
+def _read(source: str, how: ImportOptions) -> tuple[CsvTable | None, list[Diagnostic]]:
     """The table of a CSV file, its columns by ISO 230-1 names."""
     named = _NAMED.match(source)
     name = parse(named[1]) if named else None
@@ -203,7 +204,7 @@ def _gap(table: CsvTable) -> Fault | None:
     return None
 
 
-def _csv(table: CsvTable, machine: Machine, how: How) -> tuple[ErrorModel | None, list[Diagnostic]]:
+def _csv(table: CsvTable, machine: Machine, how: ImportOptions) -> tuple[ErrorModel | None, list[Diagnostic]]:
     places = [name for name in table.columns if name in COORDINATES]
     runs = [name for name in table.columns if run_of(name)[1]]
     if runs and not how.average:
@@ -225,7 +226,7 @@ def _csv(table: CsvTable, machine: Machine, how: How) -> tuple[ErrorModel | None
     return model, [*found, told]
 
 
-def _averaged(table: CsvTable, places: list[str], how: How) -> Averaged | Fault:
+def _averaged(table: CsvTable, places: list[str], how: ImportOptions) -> Averaged | Fault:
     rows = runs_as_rows(table)
     for letter in (letter for letter in places if letter in how.periods):
         rows = turned_back(rows, letter, how.periods[letter], how.near.get(letter, 0.0))
@@ -241,7 +242,7 @@ def _holes(table: CsvTable) -> bool:
     return any(np.isnan(values).any() for values in table.columns.values())
 
 
-def _map(table: CsvTable, machine: Machine, how: How) -> tuple[ErrorModel | None, list[Diagnostic]]:
+def _map(table: CsvTable, machine: Machine, how: ImportOptions) -> tuple[ErrorModel | None, list[Diagnostic]]:
     periods = {letter: period for letter, period in how.periods.items() if letter in table.columns}
     result, found = map_from_csv(table, periods)
     if result is None or found:
@@ -254,7 +255,7 @@ def _map(table: CsvTable, machine: Machine, how: How) -> tuple[ErrorModel | None
     return ErrorModel(map=moved), []
 
 
-def _told_otherwise(table: CsvTable, how: How) -> list[Diagnostic]:
+def _told_otherwise(table: CsvTable, how: ImportOptions) -> list[Diagnostic]:
     """What the first line of a written map says of its directions and point, where the options say otherwise."""
     told = _TOLD.match(read_input(table.file)[:_FIRST].decode("utf-8", "replace"))
     if told is None:
@@ -271,7 +272,8 @@ def _told_otherwise(table: CsvTable, how: How) -> list[Diagnostic]:
     return found
 
 
-def _axis(table: CsvTable, positions: list[str], machine: Machine, how: How) -> tuple[ErrorModel | None, list[Diagnostic]]:
+def _axis(table: CsvTable, positions: list[str], machine: Machine,
+          how: ImportOptions) -> tuple[ErrorModel | None, list[Diagnostic]]:
     """Component errors over the positions of one axis."""
     letter = positions[0]
     if len(positions) > 1:
@@ -292,7 +294,7 @@ def _axis(table: CsvTable, positions: list[str], machine: Machine, how: How) -> 
     if not names and not found:
         found.append(error("error-model.column", f"no errors of {letter}", file=table.file, lines=[table.head],
                            hint=f"write columns {', '.join(f'E{d}{letter} [{_unit(d)}]' for d in DIRECTIONS)}"))
-    frame: dict[str, Frame] = {letter: bed_side(machine, letter)} if letter in "ABC" else {}
+    frame: dict[str, ErrorFrame] = {letter: bed_side(machine, letter)} if letter in "ABC" else {}
     model = ErrorModel(SerialErrors(tuple(components), frame=frame))
     return (None if found else model), found
 
@@ -318,7 +320,7 @@ def _names(table: CsvTable, letter: str) -> tuple[list[ErrorName], list[Diagnost
     return list(names.values()), found
 
 
-def _location(table: CsvTable, how: How) -> tuple[ErrorModel | None, list[Diagnostic]]:
+def _location(table: CsvTable, how: ImportOptions) -> tuple[ErrorModel | None, list[Diagnostic]]:
     """Location errors: one row, a column each."""
     found, constants = unknown_columns(table), {}
     for column, values in table.columns.items():
@@ -338,7 +340,7 @@ def _location(table: CsvTable, how: How) -> tuple[ErrorModel | None, list[Diagno
 
 # ---- LinuxCNC ----------------------------------------------------------------------------------------------------------
 
-def _screw(letter: str, path: Path, machine: Machine, how: How) -> tuple[ErrorModel | None, list[Diagnostic]]:
+def _screw(letter: str, path: Path, machine: Machine, how: ImportOptions) -> tuple[ErrorModel | None, list[Diagnostic]]:
     rotary = dict(zip(machine.axis_names, machine.rotary, strict=True))
     if letter not in rotary or (not isinstance(machine.kinematics, Serial) and not rotary[letter]):
         mine = [x for x in machine.axis_names if isinstance(machine.kinematics, Serial) or rotary[x]]
@@ -356,5 +358,5 @@ def _screw(letter: str, path: Path, machine: Machine, how: How) -> tuple[ErrorMo
     table, found = from_linuxcnc(text, name, how.sign * joint_sense(machine, letter), how.kind, str(path))
     if table is None:
         return None, found
-    frame: dict[str, Frame] = {letter: bed_side(machine, letter)} if rotary[letter] else {}
+    frame: dict[str, ErrorFrame] = {letter: bed_side(machine, letter)} if rotary[letter] else {}
     return ErrorModel(SerialErrors((Component(name, table),), frame=frame)), []

@@ -14,7 +14,7 @@ from machines.geometric_error.exchange.volume import ranges, samples
 from machines.geometric_error.files.covariance import angular
 from machines.geometric_error.files.fingerprint import fingerprint
 from machines.geometric_error.tables.csv_table import UNITS
-from machines.geometric_error.tables.curves import Curve, Fourier, Polynomial, Table
+from machines.geometric_error.tables.curves import Curve, Fourier, Polynomial, TableCurve
 from machines.geometric_error.tables.lattice import COLUMNS, ErrorMap
 from machines.geometric_error.tables.names import DIRECTIONS, SPINDLE, parse
 from machines.machine import Machine
@@ -107,14 +107,14 @@ def _curve(curve: Curve, turn: bool, axis: str, model: ErrorModel, machine: Mach
     j = machine.axis_names.index(axis)
     lower, upper = (float(x[j]) for x in ranges(model, machine))
     x = np.linspace(lower, upper, FINE)
-    if isinstance(curve, Table):
+    if isinstance(curve, TableCurve):
         x = np.concatenate([x, curve.x])
-    ways = (1.0, -1.0) if isinstance(curve, Table) and curve.both else (0.0,)
+    ways = (1.0, -1.0) if isinstance(curve, TableCurve) and curve.both else (0.0,)
     values = np.array([curve.at(x, way) for way in ways])
     at = np.unravel_index(int(np.argmax(np.abs(values))), values.shape)
     span = [v / position if np.isfinite(v) else None for v in curve.range]
     kind = "series" if isinstance(curve, Fourier) else "polynomial" if isinstance(curve, Polynomial) else \
-        f"{curve.rule} table" if isinstance(curve, Table) else ""
+        f"{curve.rule} table" if isinstance(curve, TableCurve) else ""
     apart = float(np.abs(np.diff(values, axis=0)).max(initial=0.0)) / unit
     return {"kind": kind, "values": len(curve.values), "range": span, "both_ways": len(ways) == 2,
             "unit": "arcsec" if turn else "um", "largest": float(values[at]) / unit, "at": float(x[at[1]]) / position,
@@ -175,7 +175,7 @@ def _volume(model: ErrorModel, machine: Machine, tool_length: float) -> dict[str
 
 def both_ways(model: ErrorModel) -> list[str]:
     """Components with two ways of approach: where no motion is given their mean counts."""
-    return [str(c.name) for c in model.axes.components if isinstance(c.curve, Table) and c.curve.both]
+    return [str(c.name) for c in model.axes.components if isinstance(c.curve, TableCurve) and c.curve.both]
 
 
 def _residual(actual: Actual, nominal: Actual, w: Floats, machine: Machine) -> dict[str, Any]:

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from machines.geometric_error.actual.model import ErrorModel
-from machines.geometric_error.actual.serial_errors import Component, Frame
-from machines.geometric_error.exchange.bed_frame import Turned
-from machines.geometric_error.tables.curves import Curve, Fourier, Table
+from machines.geometric_error.actual.serial_errors import Component, ErrorFrame
+from machines.geometric_error.exchange.bed_frame import RotatedCurve
+from machines.geometric_error.tables.curves import Curve, Fourier, TableCurve
 from machines.geometric_error.tables.names import ErrorName
 from toolpaths.arrays import Floats
 
@@ -23,7 +23,7 @@ ROUND = 12
 
 
 @dataclass(frozen=True)
-class Rows:
+class TablePositions:
     """Positions (M,) mm or rad of a table, and the period after which it repeats (0 for never)."""
 
     x: Floats
@@ -35,34 +35,34 @@ class Rows:
         return np.append(self.x, self.x[0] + self.period) if self.period else self.x
 
 
-def sampled(curve: Curve, x: Floats, period: float = 0.0) -> Table:
+def sampled(curve: Curve, x: Floats, period: float = 0.0) -> TableCurve:
     """A curve as a linear table at positions (M,), mm or rad, both ways where it has them."""
-    if isinstance(curve, Table) and curve.rule == "linear" and curve.period == period and np.array_equal(x, curve.x):
+    if isinstance(curve, TableCurve) and curve.rule == "linear" and curve.period == period and np.array_equal(x, curve.x):
         return curve
     both = both_ways(curve)
     ways = (1.0, -1.0) if both else (0.0,)
-    return Table(x, np.concatenate([curve.at(x, way) for way in ways]), "linear", both, period)
+    return TableCurve(x, np.concatenate([curve.at(x, way) for way in ways]), "linear", both, period)
 
 
 def both_ways(curve: Curve) -> bool:
     """True for a curve with two ways of approach."""
-    return isinstance(curve, Table | Turned) and curve.both
+    return isinstance(curve, TableCurve | RotatedCurve) and curve.both
 
 
-def loss(curve: Curve, rows: Rows) -> float:
+def loss(curve: Curve, rows: TablePositions) -> float:
     """Largest difference of a curve and its table between the rows, mm or rad, the worse way."""
     closed, table = rows.closed, sampled(curve, rows.x, rows.period)
     count = max(PROBES * (len(closed) - 1), LEAST)
     jitter = np.random.default_rng(0).uniform(0.0, 1.0, count)  # a series would hide between even places
     places = np.interp((np.arange(count) + jitter) / count * (len(closed) - 1), np.arange(len(closed)), closed)
-    if isinstance(curve, Table):
+    if isinstance(curve, TableCurve):
         places = np.concatenate([places, curve.x[(curve.x >= closed[0]) & (curve.x <= closed[-1])]])
     ways = (1.0, -1.0) if table.both else (0.0,)
     return max(float(np.abs(table.at(places, way) - curve.at(places, way)).max(initial=0.0)) for way in ways)
 
 
 def rows_for(components: Sequence[Component], travel: Mapping[str, tuple[float, float]], step: Mapping[str, float],
-             length: float, angle: float, most: int, repeat: bool = True) -> dict[str, Rows]:
+             length: float, angle: float, most: int, repeat: bool = True) -> dict[str, TablePositions]:
     """Rows for each component, by its name: the same for those of one axis that were measured over the same range.
 
     Args:
@@ -82,7 +82,7 @@ def rows_for(components: Sequence[Component], travel: Mapping[str, tuple[float, 
     unknown = [axis for axis in step if axis not in {key[0] for key in groups}]
     if unknown:
         raise ValueError(f"a step is given for {', '.join(unknown)}, of which the model has no errors that are written")
-    found: dict[str, Rows] = {}
+    found: dict[str, TablePositions] = {}
     for (axis, span, period), mine in groups.items():
         lower, upper = (0.0, period) if period else span if np.isfinite(span).all() else travel[axis]
         ends = _ends(mine, lower, upper, period)
@@ -94,28 +94,31 @@ def rows_for(components: Sequence[Component], travel: Mapping[str, tuple[float, 
 
 
 def _period(curve: Curve) -> float:
-    return curve.period if isinstance(curve, Table | Fourier | Turned) and not np.isfinite(curve.range).any() else 0.0
+    if isinstance(curve, TableCurve | Fourier | RotatedCurve) and not np.isfinite(curve.range).any():
+        return curve.period
+    return 0.0
 
 
 def _ends(components: Sequence[Component], lower: float, upper: float, period: float) -> Floats:
     """Rows that the components' own tables have, closed where they repeat; else an even few."""
-    tables = [c.curve for c in components if isinstance(c.curve, Table) and c.curve.period == period]
-    own = [Rows(table.x, period).closed for table in tables]
+    tables = [c.curve for c in components if isinstance(c.curve, TableCurve) and c.curve.period == period]
+    own = [TablePositions(table.x, period).closed for table in tables]
     if own and len({x[0] for x in own}) == 1:
         return np.unique(np.concatenate(own))
     return np.linspace(lower, upper, ROUND + 1 if period else 2)
 
 
-def _even(ends: Floats, step: float, period: float) -> Rows:
+def _even(ends: Floats, step: float, period: float) -> TablePositions:
     x = np.linspace(ends[0], ends[-1], 1 + max(int(np.ceil((ends[-1] - ends[0]) / step - 1e-9)), 1))
-    return Rows(x[:-1] if period else x, period)
+    return TablePositions(x[:-1] if period else x, period)
 
 
-def _fine(components: Sequence[Component], ends: Floats, period: float, length: float, angle: float, most: int) -> Rows:
+def _fine(components: Sequence[Component], ends: Floats, period: float, length: float, angle: float,
+          most: int) -> TablePositions:
     parts = 1
     while True:
         x = np.interp(np.arange((len(ends) - 1) * parts + 1) / parts, np.arange(len(ends)), ends)
-        rows = Rows(x[:-1] if period else x, period)
+        rows = TablePositions(x[:-1] if period else x, period)
         worst = max(loss(c.curve, rows) / (angle if c.name.angular else length) for c in components)
         if worst <= 1.0:
             return rows
@@ -125,7 +128,8 @@ def _fine(components: Sequence[Component], ends: Floats, period: float, length: 
         parts = max(parts + 1, min(2 * parts, int(parts * np.sqrt(worst))))
 
 
-def tabulated(model: ErrorModel, components: Sequence[Component], frame: Mapping[str, Frame], rows: Mapping[str, Rows],
+def tabulated(model: ErrorModel, components: Sequence[Component], frame: Mapping[str, ErrorFrame],
+              rows: Mapping[str, TablePositions],
               most: int) -> ErrorModel:
     """The model with components as linear tables, and the covariance of their values.
 
@@ -133,7 +137,7 @@ def tabulated(model: ErrorModel, components: Sequence[Component], frame: Mapping
     tables differ from their curves and there are more than `most` parameters.
 
     Args:
-        components: the model's own, or `Turned` of them, in directions of `frame`
+        components: the model's own, or `RotatedCurve` of them, in directions of `frame`
         rows: by name of the component
     """
     made = [Component(c.name, sampled(c.curve, rows[str(c.name)].x, rows[str(c.name)].period)) for c in components]
@@ -159,8 +163,8 @@ def _derivatives(model: ErrorModel, components: Sequence[Component], made: Seque
     result[:first, :first], row = np.eye(first), first
     for component, table in zip(components, made, strict=True):
         curve = component.curve
-        own = [part.name for _, part in curve.parts] if isinstance(curve, Turned) else [component.name]
-        block = _basis(curve, table.curve.x) if isinstance(table.curve, Table) else np.eye(len(curve.values))
+        own = [part.name for _, part in curve.parts] if isinstance(curve, RotatedCurve) else [component.name]
+        block = _basis(curve, table.curve.x) if isinstance(table.curve, TableCurve) else np.eye(len(curve.values))
         result[row:row + len(block), np.concatenate([starts[name] for name in own])] = block
         row += len(block)
     result[row:, at:] = np.eye(constants)

@@ -12,10 +12,10 @@ from pydantic import Field, model_validator
 
 from machines.geometric_error.tables.names import parse
 from machines.models import Positive, Vector
-from machines.slider_models import Span
+from machines.slider_models import Interval
 from machines.user_file import UserModel
 
-Rows = tuple[Vector, ...]
+MatrixRows = tuple[Vector, ...]
 
 
 class CurveModel(UserModel):
@@ -40,7 +40,7 @@ class CurveModel(UserModel):
     """mm or degrees"""
     scale: Positive = 1.0
     """polynomial: mm or degrees"""
-    range: Span | None = None
+    range: Interval | None = None
     """positions that were measured, mm or degrees; a table has its own, a series of a rotary axis needs none"""
     sign: Literal[1, -1] = 1
     """-1 where the numbers say how the part moves relative to the tool"""
@@ -73,7 +73,7 @@ class ReferenceModel(UserModel):
     part's side of an axis that carries the tool, on the tool's side of one that carries the part"""
 
 
-class LegModel(UserModel):
+class LegErrorModel(UserModel):
     """`[legs.LETTER]` of a parallel machine: dimensional errors of a slide and its rods (Company 2000, annex E)."""
 
     pair: Positive | None = None
@@ -82,9 +82,9 @@ class LegModel(UserModel):
     """place of the rail's point, machine frame"""
     guide: Vector = (0.0, 0.0, 0.0)
     """turns of the slide about x, y, z of the machine frame"""
-    carriage: Rows = ()
+    carriage: MatrixRows = ()
     """per rod: joint on the carriage, guide frame (z along the slide, x from the rail to the joint)"""
-    platform: Rows = ()
+    platform: MatrixRows = ()
     """per rod: joint on the platform, platform frame"""
     length: tuple[float, ...] = ()
     """per rod"""
@@ -139,7 +139,7 @@ class ErrorFileModel(UserModel):
     """location errors: lines of axes, EC0Y, EX0C, ...; zero positions, EX0X, EC0C, ...; of the spindle, EX0S, EA0S, ..."""
     reference: dict[str, ReferenceModel] = Field(default_factory=dict)
     """by axis letter"""
-    legs: dict[str, LegModel] = Field(default_factory=dict)
+    legs: dict[str, LegErrorModel] = Field(default_factory=dict)
     """parallel machines, by axis letter"""
     map: MapModel | None = None
     """instead of all others"""

@@ -11,7 +11,7 @@ from machines.geometric_error.actual.rods import RodErrors
 from machines.geometric_error.actual.serial_errors import SerialErrors
 from machines.geometric_error.files.covariance import angular
 from machines.geometric_error.tables.csv_table import UNITS
-from machines.geometric_error.tables.curves import Curve, Fourier, Polynomial, Table
+from machines.geometric_error.tables.curves import Curve, Fourier, Polynomial, TableCurve
 from machines.geometric_error.tables.lattice import ROTARY, ErrorMap
 from machines.geometric_error.tables.names import ErrorName
 from toolpaths.arrays import Floats
@@ -47,7 +47,7 @@ def _axes(axes: SerialErrors) -> list[str]:
 def _curve(name: ErrorName, curve: Curve) -> str:
     position, unit = DEG if name.axis in ROTARY else 1.0, ANGLE if name.angular else LENGTH
     parts: list[str]
-    if isinstance(curve, Table):
+    if isinstance(curve, TableCurve):
         ways = np.split(curve.values, 2) if curve.both else [curve.values]
         parts = [f"table {curve.rule}", _text([curve.period], position), _text(curve.x, position),
                  *(_text(way, unit) for way in ways)]

@@ -11,10 +11,10 @@ from machines.geometric_error.actual.actual_map import part_side
 from machines.geometric_error.actual.axis_motion import effect
 from machines.geometric_error.actual.model import ErrorModel
 from machines.geometric_error.actual.rods import RodErrors, gives_rods, rod_frame, rod_names
-from machines.geometric_error.actual.serial_errors import Component, Frame, SerialErrors
+from machines.geometric_error.actual.serial_errors import Component, ErrorFrame, SerialErrors
 from machines.geometric_error.files.covariance import covariance_of
 from machines.geometric_error.files.file_models import CurveModel, ErrorFileModel
-from machines.geometric_error.files.sizes import too_large
+from machines.geometric_error.files.implausible_errors import too_large
 from machines.geometric_error.tables.csv_table import UNITS, CsvTable, read_csv
 from machines.geometric_error.tables.curves import EVERYWHERE, Curve, Fourier, Polynomial
 from machines.geometric_error.tables.lattice import ErrorMap
@@ -143,7 +143,7 @@ class _Loader:
         turning = {c.name.axis for c in components} | set(self.checked.reference)
         return SerialErrors(components, constants, reference, {k: self._frame(k) for k in sorted(turning) if k in ROTARY})
 
-    def _frame(self, letter: str) -> Frame:
+    def _frame(self, letter: str) -> ErrorFrame:
         """The directions of an axis's errors; those of the bed are on the side that the axis does not carry."""
         given = self.checked.reference.get(letter)
         if given is not None and given.frame != "bed":

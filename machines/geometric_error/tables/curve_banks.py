@@ -7,7 +7,7 @@ from collections.abc import Hashable, Sequence
 
 import numpy as np
 
-from machines.geometric_error.tables.curves import Curve, Fourier, Polynomial, Table
+from machines.geometric_error.tables.curves import Curve, Fourier, Polynomial, TableCurve
 from toolpaths.arrays import Floats
 
 
@@ -29,8 +29,8 @@ def banks(curves: Sequence[Curve]) -> list[tuple[list[int], Bank]]:
 
 def _key(curve: Curve, number: int) -> Hashable:
     size = len(curve.values)
-    if isinstance(curve, Table):
-        return Table, curve.x.tobytes(), curve.rule, curve.both, curve.period
+    if isinstance(curve, TableCurve):
+        return TableCurve, curve.x.tobytes(), curve.rule, curve.both, curve.period
     if isinstance(curve, Fourier):
         return Fourier, size, curve.period, curve.origin, curve.range
     if isinstance(curve, Polynomial):
@@ -44,7 +44,7 @@ def _bank(curves: list[Curve]) -> Bank:
         return FourierBank(first, values)
     if isinstance(first, Polynomial):
         return PolynomialBank(first, values)
-    if isinstance(first, Table) and len(first.x) > 1:
+    if isinstance(first, TableCurve) and len(first.x) > 1:
         return SplineBank(first, values) if first.rule == "spline" else LinearBank(first, values)
     return OneByOne(curves)
 
@@ -98,7 +98,7 @@ class PolynomialBank(Bank):
 class LinearBank(Bank):
     """Linear tables: the place between the rows is looked up once."""
 
-    def __init__(self, first: Table, values: Floats) -> None:
+    def __init__(self, first: TableCurve, values: Floats) -> None:
         self.first = first
         ways = [first.closed(half) for values_of in values for half in np.split(values_of, 2 if first.both else 1)]
         self.x = ways[0][0]
@@ -116,7 +116,7 @@ class LinearBank(Bank):
 class SplineBank(Bank):
     """Spline tables: one piecewise cubic with a value per curve and way."""
 
-    def __init__(self, first: Table, values: Floats) -> None:
+    def __init__(self, first: TableCurve, values: Floats) -> None:
         from scipy.interpolate import CubicSpline
 
         self.first = first

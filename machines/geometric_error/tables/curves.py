@@ -75,7 +75,7 @@ class Curve(ABC):
 
 
 @dataclass(frozen=True, eq=False)
-class Table(Curve):
+class TableCurve(Curve):
     """Values measured at M ascending positions, both ways where `both`.
 
     Attributes:
@@ -329,4 +329,4 @@ def largest(curve: Curve) -> float:
     """A bound of a curve's absolute values, mm or rad, which linear tables reach."""
     if isinstance(curve, Polynomial):
         return float(np.abs(curve.at(np.linspace(*curve.range, 101))).max())
-    return float(np.abs(curve.values).max() if isinstance(curve, Table) else np.abs(curve.values).sum())
+    return float(np.abs(curve.values).max() if isinstance(curve, TableCurve) else np.abs(curve.values).sum())

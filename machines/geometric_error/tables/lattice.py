@@ -80,7 +80,8 @@ class ErrorMap:
     def most(self) -> tuple[float, float]:
         """Bounds of displacement (mm) and turn (rad) anywhere: values between nodes lie between theirs."""
         parts = self.table.reshape(-1, 6)
-        return tuple(float(np.linalg.norm(part, axis=1).max()) for part in (parts[:, :3], parts[:, 3:]))  # type: ignore[return-value]
+        return tuple(float(np.linalg.norm(part, axis=1).max())
+                     for part in (parts[:, :3], parts[:, 3:]))  # type: ignore[return-value]
 
     @property
     def steepest(self) -> list[tuple[float, float]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from machines.geometric_error.tables.curves import Table
+from machines.geometric_error.tables.curves import TableCurve
 from machines.geometric_error.tables.names import ErrorName
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.units import DEG
@@ -16,7 +16,7 @@ UNLIKELY = {False: 2.0, True: DEG}
 """mm, and rad of a rotary axis: a positioning error that is a file misread"""
 
 
-def to_linuxcnc(name: ErrorName, table: Table, sense: float = 1.0) -> str:
+def to_linuxcnc(name: ErrorName, table: TableCurve, sense: float = 1.0) -> str:
     """A screw compensation file (COMP_FILE with COMP_FILE_TYPE = 0) of a positioning error: nominal, forward, reverse.
 
     Type 0 holds where the axis really is when it is sent to the nominal position; LinuxCNC adds nominal less actual to
@@ -42,7 +42,7 @@ def to_linuxcnc(name: ErrorName, table: Table, sense: float = 1.0) -> str:
 
 
 def from_linuxcnc(text: str, name: ErrorName, sense: float = 1.0, kind: int = 0,
-                  file: str = "") -> tuple[Table | None, list[Diagnostic]]:
+                  file: str = "") -> tuple[TableCurve | None, list[Diagnostic]]:
     """The table of a screw compensation file; None and what is wrong.
 
     Args:
@@ -75,5 +75,5 @@ def from_linuxcnc(text: str, name: ErrorName, sense: float = 1.0, kind: int = 0,
                             file=file, hint=f"it may be of type {1 - kind} (0: positions, 1: nominal less actual), or in "
                             "inches")]
     if np.array_equal(errors[0], errors[1]):
-        return Table(nominal, errors[0]), []
-    return Table(nominal, np.concatenate(errors), both=True), []
+        return TableCurve(nominal, errors[0]), []
+    return TableCurve(nominal, np.concatenate(errors), both=True), []

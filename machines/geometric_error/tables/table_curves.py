@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from machines.geometric_error.tables.csv_table import ANGLES, LENGTHS, UNITS, CsvTable
-from machines.geometric_error.tables.curves import Table
+from machines.geometric_error.tables.curves import TableCurve
 from machines.geometric_error.tables.names import ErrorName
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic, error
@@ -33,7 +33,7 @@ class Fault(NamedTuple):
 
 
 def table_curve(name: ErrorName, table: CsvTable, rule: Literal["linear", "spline"] = "linear", period: float = 0.0,
-                sign: float = 1.0) -> Table | Fault:
+                sign: float = 1.0) -> TableCurve | Fault:
     """The curve of a component over the positions of its axis.
 
     Args:
@@ -61,7 +61,7 @@ def table_curve(name: ErrorName, table: CsvTable, rule: Literal["linear", "splin
                      f"write two rows or more, or [components.{name}] polynomial = [value] and its range", table.lines[0])
     if rule == "spline" and len(x) < 4:
         return Fault("error-model.spline", f"a spline needs 4 rows, the table has {len(x)}", "write linear")
-    return Table(x, np.concatenate(values), rule, len(values) == 2, period)
+    return TableCurve(x, np.concatenate(values), rule, len(values) == 2, period)
 
 
 def _order(table: CsvTable, name: ErrorName, row: int) -> Fault:

@@ -7,13 +7,13 @@ from collections import Counter
 import numpy as np
 
 from machines.machine import Machine
-from postproc.orientation.candidates.held import best_held
+from postproc.orientation.candidates.candidate_times import Candidate
+from postproc.orientation.candidates.free_rotary import best_held
+from postproc.orientation.candidates.initial_axes import aimed_axes, around, reaching_axes
 from postproc.orientation.candidates.ridges import best_on_ridge
-from postproc.orientation.candidates.search import Kind, Search, Tried
-from postproc.orientation.candidates.seeds import aimed_axes, around, reaching_axes
-from postproc.orientation.candidates.timed import Turned
+from postproc.orientation.candidates.search import CandidateSearch, PassSearch, RejectionKind
 from postproc.orientation.candidates.travel import nearest_inside
-from postproc.orientation.passes.allowed import SAME, Allowed
+from postproc.orientation.passes.allowed import SAME, AllowedAxes
 from postproc.orientation.passes.passes import Pass
 from toolpaths.arrays import Floats
 from toolpaths.rotations import angle_between, slerp
@@ -32,13 +32,13 @@ _SHARES = np.arange(15, 0, -1) / 16.0
 """of the way to a neighbour that is not allowed"""
 
 
-def tried(one: Pass, machine: Machine, allowed: Allowed, before: Tried | None = None) -> Tried:
+def tried(one: Pass, machine: Machine, allowed: AllowedAxes, before: PassSearch | None = None) -> PassSearch:
     """All candidates of a pass, planned unless their bound says that they lose.
 
     Args:
         before: of the pass before: its best axis is tried first, and refined by small steps where it is best
     """
-    search = Search(one, machine, allowed)
+    search = CandidateSearch(one, machine, allowed)
     if one.fixed:
         return search.tried(best_held(search, search.own), None)
     aimed = aimed_axes(one, machine, search.own.q[0])
@@ -64,7 +64,7 @@ def tried(one: Pass, machine: Machine, allowed: Allowed, before: Tried | None = 
     return search.tried(best_held(search, best), paper, "" if paper is not None else _unaimed(search, aimed))
 
 
-def _unaimed(search: Search, aimed: dict[str, Floats]) -> str:
+def _unaimed(search: CandidateSearch, aimed: dict[str, Floats]) -> str:
     """Why no vertex is aimed along the mean direction."""
     if "mean" not in aimed:
         return "the pass has no mean direction" if search.one.longest is None else "the cut's own axis is out of reach"
@@ -76,19 +76,19 @@ def _unaimed(search: Search, aimed: dict[str, Floats]) -> str:
     return "of the axes that aim a vertex " + ", ".join(f"{number} {WHY[kind]}" for kind, number in count.items())
 
 
-WHY: dict[Kind, str] = {"limits": "are outside the allowed angles", "travel": "are outside travel",
-                        "reach": "are out of reach"}
+WHY: dict[RejectionKind, str] = {"limits": "are outside the allowed angles", "travel": "are outside travel",
+                                 "reach": "are out of reach"}
 
 
-def _least_turned(made: list[Turned]) -> Turned | None:
+def _least_turned(made: list[Candidate]) -> Candidate | None:
     """The paper's choice: of the solutions within travel that with the smallest angles (section III.B)."""
-    def angles(one: Turned) -> tuple[float, float]:
+    def angles(one: Candidate) -> tuple[float, float]:
         values = [abs(value) for value in one.rotary().values()]
         return round(max(values), 6), round(sum(values), 6)
     return min(made, key=angles, default=None)
 
 
-def _refined(search: Search, best: Turned, step: float) -> Turned:
+def _refined(search: CandidateSearch, best: Candidate, step: float) -> Candidate:
     """The best of an axis and its neighbours; where one gains, those further along."""
     for _ in range(_ROUNDS):
         start = best
@@ -99,7 +99,7 @@ def _refined(search: Search, best: Turned, step: float) -> Turned:
     return best
 
 
-def _hastened(search: Search, best: Turned, step: float) -> Turned:
+def _hastened(search: CandidateSearch, best: Candidate, step: float) -> Candidate:
     """Neighbours of the swiftest so far, and of what is swifter; the best by cuts among all that."""
     for _ in range(_ROUNDS):
         start = search.swift
@@ -110,7 +110,7 @@ def _hastened(search: Search, best: Turned, step: float) -> Turned:
     return best
 
 
-def _neighbours(search: Search, start: Floats, step: float) -> Floats:
+def _neighbours(search: CandidateSearch, start: Floats, step: float) -> Floats:
     """Axes (M, 3) beside one; those that are not allowed as far towards them as is."""
     one, axes = search.one, around(start, search.one.axis, step)
     for k in np.flatnonzero(~search.allowed.mask(one, axes)):

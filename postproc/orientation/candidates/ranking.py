@@ -14,17 +14,17 @@ from scipy.interpolate import BSpline, make_interp_spline
 from scipy.sparse import csr_matrix, diags, identity, vstack
 
 from postproc.base.compiled import compiled, wanted
-from postproc.feedrate.feed import Allowed
+from postproc.feedrate.feed import AllowedFeed
 from postproc.feedrate.kernels.interior import pentadiagonal
 from postproc.feedrate.limits import JointLimits, squared_speed, steady_cap
 from postproc.feedrate.paths import Eased
-from postproc.feedrate.plan import Options
-from postproc.feedrate.problem import Problem
+from postproc.feedrate.plan import PlannerOptions
+from postproc.feedrate.problem import SpeedProblem
 from postproc.feedrate.rows import UNBOUND
 from postproc.feedrate.second_order import least_time, second_order
 from postproc.feedrate.spline import rest_basis
 from postproc.feedrate.windows import KERNEL_FROM, Method, solve_problem
-from postproc.orientation.candidates.timed import Turned
+from postproc.orientation.candidates.candidate_times import Candidate
 from postproc.orientation.passes.passes import Pass
 from postproc.planning.geometry import DEGREE, MachinePath
 from toolpaths.arrays import Floats
@@ -46,13 +46,13 @@ def prepare(passes: Sequence[Pass]) -> None:
 class Ranking:
     """Of one pass. `first`, which must be runnable, is planned in full and lends its knots."""
 
-    def __init__(self, first: Turned) -> None:
+    def __init__(self, first: Candidate) -> None:
         knots = sum(len(each) for each in first.knots)
         method = Method().settled(knots)
-        self._grids = [] if knots > LONG else [_Grid(stretch.s, each, Allowed(stretch.feed), first.jerky, method)
+        self._grids = [] if knots > LONG else [_Grid(stretch.s, each, AllowedFeed(stretch.feed), first.jerky, method)
                                                for stretch, each in zip(first.one.stretches, first.knots, strict=True)]
 
-    def seconds(self, made: Turned) -> float:
+    def seconds(self, made: Candidate) -> float:
         """Least time of the cuts; inf where the machine cannot run them."""
         if made.refused or not self._grids:
             return made.seconds
@@ -66,7 +66,7 @@ class _Grid:
     def __init__(self, s: Floats, sigma: Floats, feed: Callable[[Floats], Floats], jerky: bool, method: Method) -> None:
         self.s, self.sigma, self.jerky, self.method = s, sigma, jerky, method
         path = MachinePath.through(s, np.zeros((len(s), 7)), np.zeros(len(s), dtype=bool))
-        self.eased = Eased.between(path, float(s[0]), float(s[-1]), Options().ease if jerky else 0.0)
+        self.eased = Eased.between(path, float(s[0]), float(s[-1]), PlannerOptions().ease if jerky else 0.0)
         at = self.eased.parameter(sigma)
         self.slopes = _chained(path.fitted, self.eased.inside(at[0]), at)
         with np.errstate(divide="ignore"):
@@ -92,8 +92,8 @@ class _Grid:
         """With jerk; derivatives (K, J) by sigma, `cap` (K,) of the squared speed."""
         basis = rest_basis(self.sigma, self.eased.ease)
         first, second, third = (np.ascontiguousarray(order.T) for order in (dq, d2q, d3q))
-        problem = Problem(basis, first, second, third, limits, cap, np.zeros(len(cap), dtype=np.int64), self.weight,
-                          np.ones((2, len(cap))))
+        problem = SpeedProblem(basis, first, second, third, limits, cap, np.zeros(len(cap), dtype=np.int64), self.weight,
+                               np.ones((2, len(cap))))
         found = solve_problem(problem, self.method.steps, self.near)
         self.near = found.c
         return float(np.sum(self.weight * basis.values(found.c)[0] ** -0.5))

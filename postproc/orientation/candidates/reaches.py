@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from machines.polytope import Polytope, held_axis_polytope
-from postproc.orientation.candidates.timed import Turned
-from postproc.orientation.passes.passes import Stretch
+from postproc.orientation.candidates.candidate_times import Candidate
+from postproc.orientation.passes.passes import CuttingStretch
 from postproc.planning.planned import ORDERS
 from toolpaths.arrays import Floats
 
@@ -34,7 +34,7 @@ class Reach:
     seconds: float
 
 
-def reaches(made: Turned) -> tuple[Reach, ...]:
+def reaches(made: Candidate) -> tuple[Reach, ...]:
     """Reaches of a turned pass in the middle of its longest stretch; none where it cannot be run or has no direction.
 
     Orders without a limit are left out.
@@ -49,7 +49,7 @@ def reaches(made: Turned) -> tuple[Reach, ...]:
     return tuple(found)
 
 
-def feed_of(made: Turned) -> Reach | None:
+def feed_of(made: Candidate) -> Reach | None:
     """The largest feed of the longest stretch, as an order of its own; None where the pass cannot be run or has no
     direction."""
     stretch = made.one.longest
@@ -60,7 +60,7 @@ def feed_of(made: Turned) -> Reach | None:
     return Reach("feed", rate, "", length / rate)
 
 
-def least_under(made: Turned, axes: Floats, near: Floats | None = None) -> Floats:
+def least_under(made: Candidate, axes: Floats, near: Floats | None = None) -> Floats:
     """Seconds (N,) of the slowest order, as `Reach.seconds`, under tool axes (N, 3), table frame; NaN where out of reach.
 
     In the middle of the longest stretch of `made`, on the branch that is fastest; travel is not looked at.
@@ -84,7 +84,7 @@ def least_under(made: Turned, axes: Floats, near: Floats | None = None) -> Float
     return result
 
 
-def least_held(made: Turned, joint: int, angles: Floats) -> Floats:
+def least_held(made: Candidate, joint: int, angles: Floats) -> Floats:
     """As `least_under`, with the axis of `made` and its free rotary `joint` held at `angles` (N,), rad."""
     near = np.tile(made.machine.home, (len(angles), 1))
     near[:, joint] = angles
@@ -107,7 +107,7 @@ def least_seconds(order: str, rate: Floats, length: float) -> Floats:
     return np.asarray(2.0 * np.sqrt(length / rate) if order == "acceleration" else np.cbrt(32.0 * length / rate))
 
 
-def direction_of(stretch: Stretch | None) -> tuple[Floats, float]:
+def direction_of(stretch: CuttingStretch | None) -> tuple[Floats, float]:
     """Mean direction (3,) of a stretch and the length of its chord, mm; (0, 0, 0) and 0 where it has none."""
     mean = None if stretch is None else stretch.directions().get("mean")
     if stretch is None or mean is None:
@@ -115,10 +115,10 @@ def direction_of(stretch: Stretch | None) -> tuple[Floats, float]:
     return mean, float(np.linalg.norm(stretch.tip[-1] - stretch.tip[0]))
 
 
-def polytopes(made: Turned) -> dict[str, Polytope]:
+def polytopes(made: Candidate) -> dict[str, Polytope]:
     """By order, the polytope of tip rates in the middle of the longest stretch, table frame, mm and s.
 
-    Empty where the pass cannot be run, has no direction, the machine cannot move the tip alone, or for a slim `Turned`.
+    Empty where the pass cannot be run, has no direction, the machine cannot move the tip alone, or for a slim `Candidate`.
     """
     one, stretch = made.one, made.one.longest
     if stretch is None or made.refused or not made.sites or not direction_of(stretch)[1]:

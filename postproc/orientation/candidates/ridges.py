@@ -8,9 +8,9 @@ import numpy as np
 
 from machines.machine import Machine
 from machines.polytope import held_axis_polytope
-from postproc.orientation.candidates.search import Search
-from postproc.orientation.candidates.seeds import across, sharpest
-from postproc.orientation.candidates.timed import Turned
+from postproc.orientation.candidates.candidate_times import Candidate
+from postproc.orientation.candidates.initial_axes import across, sharpest
+from postproc.orientation.candidates.search import CandidateSearch
 from postproc.orientation.passes.passes import Pass
 from toolpaths.arrays import Floats, Ints
 from toolpaths.rotations import angle_between
@@ -29,7 +29,7 @@ _LEAST = 1.01
 """reach that the best of a ring must have beside the CL's own axis to be worth anything"""
 
 
-def best_on_ridge(search: Search, best: Turned) -> Turned:
+def best_on_ridge(search: CandidateSearch, best: Candidate) -> Candidate:
     """The best of a candidate and of axes on ridges, ever farther from the CL's own axis, then finer where that ended; where
     that finds nothing, of axes that lead and tilt allow."""
     one, allowed = search.one, search.allowed
@@ -42,12 +42,12 @@ def best_on_ridge(search: Search, best: Turned) -> Turned:
     return _best_of(search, best, reached + rings[0] * np.arange(1, _FINER) / _FINER)
 
 
-def _best_of(search: Search, best: Turned, rings: Floats) -> Turned:
+def _best_of(search: CandidateSearch, best: Candidate, rings: Floats) -> Candidate:
     axes = ridge_axes(search.one, search.machine, rings)
     return _better(search, best, axes[search.allowed.mask(search.one, axes)])
 
 
-def _in_window(search: Search, best: Turned) -> Turned:
+def _in_window(search: CandidateSearch, best: Candidate) -> Candidate:
     """The best of a candidate and of some allowed axes, from the coarsest lattice that has any."""
     for apart in _LATTICES:
         axes = search.allowed.among(search.one, apart)
@@ -57,7 +57,7 @@ def _in_window(search: Search, best: Turned) -> Turned:
     return best
 
 
-def _better(search: Search, best: Turned, axes: Floats) -> Turned:
+def _better(search: CandidateSearch, best: Candidate, axes: Floats) -> Candidate:
     for made in sorted(search.add(axes), key=lambda made: made.bound):
         best = search.better(best, made)
     return best

@@ -8,9 +8,9 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from machines.machine import Machine
+from postproc.orientation.candidates.candidate_times import Candidate, turned, turned_all
 from postproc.orientation.candidates.ranking import Ranking
-from postproc.orientation.candidates.timed import Turned, turned, turned_all
-from postproc.orientation.passes.allowed import SAME, Allowed
+from postproc.orientation.passes.allowed import SAME, AllowedAxes
 from postproc.orientation.passes.passes import Pass
 from toolpaths.arrays import Floats
 from toolpaths.rotations import angle_between
@@ -20,20 +20,20 @@ APART = 0.1 * DEG
 """of orientations that are told as two"""
 _WORTH = 1e-4
 """least part of the time that a candidate must gain to be planned, or to be taken"""
-Kind = Literal["limits", "reach", "travel", "touches", "bound", "slower"]
+RejectionKind = Literal["limits", "reach", "travel", "touches", "bound", "slower"]
 """What a candidate can lose by."""
 
 
-class Lost(NamedTuple):
-    """A candidate that was not taken, why and by what kind of reason; `Turned.slim` but for the CL's own axis."""
+class Rejection(NamedTuple):
+    """A candidate that was not taken, why and by what kind of reason; `Candidate.slim` but for the CL's own axis."""
 
-    made: Turned
+    made: Candidate
     why: str
-    kind: Kind
+    kind: RejectionKind
 
 
 @dataclass(frozen=True)
-class Tried:
+class PassSearch:
     """What was tried of a pass.
 
     Attributes:
@@ -46,35 +46,35 @@ class Tried:
         pruned, planned: how many were discarded by the bound alone, how many timed
     """
 
-    own: Turned
-    best: Turned
-    swift: Turned
-    aimed: Turned | None
+    own: Candidate
+    best: Candidate
+    swift: Candidate
+    aimed: Candidate | None
     gains: tuple[float, float]
-    rejected: tuple[Lost, ...]
+    rejected: tuple[Rejection, ...]
     pruned: int
     planned: int
     unaimed: str = ""
 
 
-class Search:
+class CandidateSearch:
     """Candidates of one pass, each solved once, the runnable ones timed on the same knots."""
 
-    def __init__(self, one: Pass, machine: Machine, allowed: Allowed) -> None:
+    def __init__(self, one: Pass, machine: Machine, allowed: AllowedAxes) -> None:
         self.one, self.machine, self.allowed = one, machine, allowed
         self.own = turned(one, one.axis, machine, allowed.touching)
         self.swift = self.own
         self.known = [self.own]
-        self.lost: dict[int, Lost] = {}
+        self.lost: dict[int, Rejection] = {}
         self.pruned, self.planned = 0, 0
         self._times: dict[int, float] = {}
         self._ranking: Ranking | None = None
 
-    def seconds(self, made: Turned) -> float:
+    def seconds(self, made: Candidate) -> float:
         """As ranked; inf where the machine cannot run it or something is touched."""
         return np.inf if made.refused or made.touching else self._ranked(made)
 
-    def _ranked(self, made: Turned) -> float:
+    def _ranked(self, made: Candidate) -> float:
         """Seconds of a runnable candidate, whatever it touches."""
         if id(made) not in self._times:
             self._ranking = self._ranking or Ranking(made)
@@ -82,7 +82,7 @@ class Search:
             self.planned += 1
         return self._times[id(made)]
 
-    def add(self, axes: Floats, apart: float = SAME, held: float = np.nan) -> list[Turned]:
+    def add(self, axes: Floats, apart: float = SAME, held: float = np.nan) -> list[Candidate]:
         """New candidates of axes (S, 3); those within `apart` of a known one are none, nor those that are not to be had."""
         fresh: list[Floats] = []
         others = [made.axis for made in self.known if made.same(made.axis, held)]
@@ -93,20 +93,20 @@ class Search:
         self.known += made
         return [one for one in made if self._runs(one)]
 
-    def _runs(self, made: Turned) -> bool:
+    def _runs(self, made: Candidate) -> bool:
         """Whether a candidate is allowed and inside travel; why not is noted."""
         why = self.allowed.refused(self.one, made.axis)
         if why or made.refused:
-            kind: Kind = "limits" if why else "travel" if made.refused.startswith("travel") else "reach"
+            kind: RejectionKind = "limits" if why else "travel" if made.refused.startswith("travel") else "reach"
             self.lose(made, why or made.refused, kind)
         return not (why or made.refused)
 
-    def lose(self, made: Turned, why: str, kind: Kind) -> None:
+    def lose(self, made: Candidate, why: str, kind: RejectionKind) -> None:
         """Note what a candidate lost by; times are told at the end."""
         told = made if made is self.own else made.slim(self._times.get(id(made), np.nan))
-        self.lost[id(made)] = Lost(told, why, kind)
+        self.lost[id(made)] = Rejection(told, why, kind)
 
-    def better(self, best: Turned, made: Turned) -> Turned:
+    def better(self, best: Candidate, made: Candidate) -> Candidate:
         """The better of two by their cuts, `made` being runnable.
 
         Where its bound already loses it is not planned, and what it touches is looked at only where it would win.
@@ -126,23 +126,23 @@ class Search:
             return made
         return best
 
-    def known_to_touch(self, made: Turned) -> bool:
+    def known_to_touch(self, made: Candidate) -> bool:
         """Whether something is touched, where that was looked at: a candidate that did not win was not."""
         return id(made) in self.lost and self.lost[id(made)].kind == "touches"
 
-    def whole(self, made: Turned) -> float:
+    def whole(self, made: Candidate) -> float:
         """Seconds of cuts and rapids together; inf as of `seconds`."""
         return self.seconds(made) + made.rapids if np.isfinite(made.rapids) else np.inf
 
     def _least_whole(self) -> float:
         return self.whole(self.swift) * (1.0 - _WORTH)
 
-    def _swifter(self, made: Turned) -> None:
+    def _swifter(self, made: Candidate) -> None:
         """Take note of a candidate whose cuts and rapids together are the least."""
         if self._ranked(made) + made.rapids < self._least_whole() and not made.touching:
             self.swift = made
 
-    def _beaten(self, best: Turned) -> None:
+    def _beaten(self, best: Candidate) -> None:
         """Note why one that was the best no longer is."""
         if best.refused:
             self.lose(best, best.refused, "travel" if best.refused.startswith("travel") else "reach")
@@ -151,7 +151,7 @@ class Search:
         else:
             self.lose(best, "", "slower")
 
-    def settled(self, best: Turned) -> Turned:
+    def settled(self, best: Candidate) -> Candidate:
         """The best, unless planned on knots of its own it is slower than the CL's own axis."""
         if best is self.own or best.seconds < self.own.seconds_allowed:
             return best
@@ -159,30 +159,30 @@ class Search:
         self.lost.pop(id(self.own), None)
         return self.own
 
-    def tried(self, winner: Turned, aimed: Turned | None, unaimed: str = "") -> Tried:
+    def tried(self, winner: Candidate, aimed: Candidate | None, unaimed: str = "") -> PassSearch:
         """The result, `winner` being the best as ranked."""
         best = self.settled(winner)
         lost = [made for made in self.known if id(made) in self.lost and made is not best]
         rejected = tuple(self._told(made, winner) for made in lost if not self._beside(made, best))
         gains = _gain(self.seconds(self.own), self.seconds(best)), _gain(self.whole(self.own), self.whole(self.swift))
-        return Tried(self.own, best, self.swift, aimed, gains, rejected, self.pruned, self.planned, unaimed)
+        return PassSearch(self.own, best, self.swift, aimed, gains, rejected, self.pruned, self.planned, unaimed)
 
-    def _beside(self, made: Turned, best: Turned) -> bool:
+    def _beside(self, made: Candidate, best: Candidate) -> bool:
         """Whether a slower candidate is the best itself to all that can be told of it."""
         return made is not self.own and self.lost[id(made)].kind == "slower" and made.same(best.axis, best.held, APART)
 
-    def _told(self, made: Turned, winner: Turned) -> Lost:
+    def _told(self, made: Candidate, winner: Candidate) -> Rejection:
         """What a candidate lost by; a time as ranked by as much longer as the winner is when planned in full, and no gain
         that is not worth to be taken."""
         lost = self.lost[id(made)]
         if lost.kind != "slower":
             return lost
         if made is self.own or made is winner:
-            return Lost(lost.made if made is self.own else replace(lost.made, told=made.seconds),
-                        f"takes {made.seconds:.4f} s", "slower")
+            return Rejection(lost.made if made is self.own else replace(lost.made, told=made.seconds),
+                             f"takes {made.seconds:.4f} s", "slower")
         longer = winner.seconds / self._ranked(winner) if self._ranked(winner) > 0.0 else 1.0
         about = max(longer * self._ranked(made), winner.seconds)
-        return Lost(replace(lost.made, told=about), f"takes about {about:.4f} s", "slower")
+        return Rejection(replace(lost.made, told=about), f"takes about {about:.4f} s", "slower")
 
 
 def _gain(before: float, after: float) -> float:

@@ -8,9 +8,9 @@ import numpy as np
 
 from machines.machine import Machine
 from postproc.joints.tracks import TRAVEL_SLACK
-from postproc.orientation.candidates.held import poles, ring_of
-from postproc.orientation.candidates.seeds import around, cap, ring
-from postproc.orientation.passes.allowed import Allowed
+from postproc.orientation.candidates.free_rotary import poles, ring_of
+from postproc.orientation.candidates.initial_axes import around, cap, ring
+from postproc.orientation.passes.allowed import AllowedAxes
 from postproc.orientation.passes.passes import Pass
 from postproc.orientation.passes.poses import Solved, held_poses
 from toolpaths.arrays import Floats
@@ -30,7 +30,7 @@ _SOME = 24
 
 
 @dataclass(frozen=True)
-class Lack:
+class MissingTravel:
     """What lacks least: mm, in words, under a tool axis (3,)."""
 
     size: float
@@ -38,7 +38,7 @@ class Lack:
     axis: Floats
 
 
-def nearest_inside(one: Pass, machine: Machine, allowed: Allowed) -> Lack:
+def nearest_inside(one: Pass, machine: Machine, allowed: AllowedAxes) -> MissingTravel:
     """What lacks least under all axes that a pass may take."""
     some = _thinned(one)
     best = min(_lacks(some, machine, one.axis[None]), key=_by_size)
@@ -50,20 +50,20 @@ def nearest_inside(one: Pass, machine: Machine, allowed: Allowed) -> Lack:
     return best
 
 
-def _by_size(lack: Lack) -> float:
+def _by_size(lack: MissingTravel) -> float:
     return lack.size
 
 
-def _seeds(one: Pass, allowed: Allowed) -> Floats:
+def _seeds(one: Pass, allowed: AllowedAxes) -> Floats:
     """Axes (S, 3) all round the own one, more of them beside axes along a rotary joint."""
     tilt = np.pi / 2.0 if len(one.normal) else allowed.tilt
     beside = [ring(pole, lean, _RING) for pole in poles(one) for lean in _LEANS]
     return _allowed(one, np.concatenate([cap(one.axis, min(tilt, np.pi - 0.1), _APART), *beside]), allowed)
 
 
-def _apart(lacks: list[Lack]) -> list[Lack]:
+def _apart(lacks: list[MissingTravel]) -> list[MissingTravel]:
     """The best of those that are not beside one another."""
-    taken: list[Lack] = []
+    taken: list[MissingTravel] = []
     for lack in sorted(lacks, key=_by_size):
         if all(angle_between(lack.axis, other.axis) > _APART for other in taken):
             taken.append(lack)
@@ -72,7 +72,7 @@ def _apart(lacks: list[Lack]) -> list[Lack]:
     return taken
 
 
-def _descended(start: Lack, some: Pass, machine: Machine, allowed: Allowed) -> Lack:
+def _descended(start: MissingTravel, some: Pass, machine: Machine, allowed: AllowedAxes) -> MissingTravel:
     """The best of an axis and its neighbours, by smaller and smaller steps; as it is where nothing is lacking."""
     best = start
     for step in _STEPS if start.size < np.inf else ():
@@ -87,9 +87,9 @@ def _descended(start: Lack, some: Pass, machine: Machine, allowed: Allowed) -> L
     return best
 
 
-def _held(some: Pass, machine: Machine, angles: Floats) -> Lack:
+def _held(some: Pass, machine: Machine, angles: Floats) -> MissingTravel:
     """The own axis with the joint that it leaves free held at one of `angles` (H,), some of them first."""
-    best, at = Lack(np.inf, "", some.axis), 0
+    best, at = MissingTravel(np.inf, "", some.axis), 0
     for step in (6, 2, 1) if len(angles) else ():
         near = range(0, len(angles), step) if step == 6 else (at - 2 * step, at - step, at + step, at + 2 * step)
         for k in near:
@@ -98,15 +98,15 @@ def _held(some: Pass, machine: Machine, angles: Floats) -> Lack:
     return best
 
 
-def _allowed(one: Pass, axes: Floats, allowed: Allowed) -> Floats:
+def _allowed(one: Pass, axes: Floats, allowed: AllowedAxes) -> Floats:
     axes = one.kin.nearest_axis(axes)
     return axes[allowed.mask(one, axes)]
 
 
-def _lacks(some: Pass, machine: Machine, axes: Floats, held: float = np.nan) -> list[Lack]:
+def _lacks(some: Pass, machine: Machine, axes: Floats, held: float = np.nan) -> list[MissingTravel]:
     """What axes (S, 3) lack."""
     solved = held_poses(some, machine, axes, held) if len(axes) else []
-    return [Lack(_size(one, machine), one[1], axis) for one, axis in zip(solved, axes, strict=True)]
+    return [MissingTravel(_size(one, machine), one[1], axis) for one, axis in zip(solved, axes, strict=True)]
 
 
 def _size(solved: Solved, machine: Machine) -> float:

@@ -27,7 +27,7 @@ _CHECKED = np.array([[0.3, 0.7], [-0.8, 2.0], [1.9, -2.6]])
 
 
 @dataclass(frozen=True)
-class Table:
+class TwoAxisTable:
     """A part that turns about two axes, the slides standing as ever: G = rates Rot(second, -t2) Rot(first, -t1).
 
     Attributes:
@@ -59,7 +59,7 @@ def vertex_angles(kin: Kinematics, q: Floats, direction: Floats, limit: Floats) 
     return numeric(kin, q, direction, limit) if _turns_twice(kin, q) else np.zeros((0, 2))
 
 
-def table_of(kin: Kinematics, q: Floats) -> Table | None:
+def table_of(kin: Kinematics, q: Floats) -> TwoAxisTable | None:
     """Where part and slides are related as on a table that turns twice, whatever its axes; None elsewhere."""
     for swapped in (False, True):
         order = -1 if swapped else 1
@@ -71,7 +71,7 @@ def table_of(kin: Kinematics, q: Floats) -> Table | None:
             return None
         found = [rates[0] @ rotation(second, -t2) @ rotation(first, -t1) for t1, t2 in _CHECKED]
         if np.abs(found - rates[3:]).max() < _AGREES:
-            return Table(first, second, rates[0], swapped)
+            return TwoAxisTable(first, second, rates[0], swapped)
     return None
 
 
@@ -95,7 +95,7 @@ def _turns_twice(kin: Kinematics, q: Floats) -> bool:
     return bool((np.abs(rates[1:] - rates[0]).max(axis=(1, 2)) > _AGREES).all())
 
 
-def closed_form(table: Table, direction: Floats, limit: Floats) -> Floats:
+def closed_form(table: TwoAxisTable, direction: Floats, limit: Floats) -> Floats:
     """Rotary positions (S, 2) of all eight vertices of the box `limit` (3,), at most 16 over a full turn.
 
     Rot(first, -t1) f = Rot(second, t2) u, u the unit vector of vertex over rates: the second subproblem of Paden (1986) and

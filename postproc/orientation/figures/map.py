@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from postproc.orientation.candidates.losers import KINDS
+from postproc.orientation.candidates.candidate_times import Candidate
 from postproc.orientation.candidates.reaches import least_under
-from postproc.orientation.candidates.search import Kind, Tried
-from postproc.orientation.candidates.timed import Turned
-from postproc.orientation.passes.passes import Work
+from postproc.orientation.candidates.rejections import KINDS
+from postproc.orientation.candidates.search import PassSearch, RejectionKind
+from postproc.orientation.passes.passes import PassContext
 from toolpaths.arrays import Floats
 from toolpaths.rotations import angle_between
 from toolpaths.units import DEG
@@ -19,8 +19,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 PolarAxes = Any
-MARKS: dict[Kind, tuple[str, str]] = {"limits": ("x", "#7a6a00"), "reach": ("v", "#555555"), "travel": ("+", "#c2453a"),
-                                      "touches": ("X", "#000000"), "bound": ("d", "#ffffff")}
+MARKS: dict[RejectionKind, tuple[str, str]] = {"limits": ("x", "#7a6a00"), "reach": ("v", "#555555"),
+                                               "travel": ("+", "#c2453a"),
+                                               "touches": ("X", "#000000"), "bound": ("d", "#ffffff")}
 """of candidates that were not planned"""
 WIDER = 1.5
 """of the tilt of the planned candidates: refused ones beyond are only counted"""
@@ -31,10 +32,10 @@ FLAT = 1e-3
 """part by which times differ that are not to be told apart"""
 
 
-def axes_map(sheet: Figure, place: PolarAxes, tried: Tried, made: Turned, work: Work) -> None:
+def axes_map(sheet: Figure, place: PolarAxes, tried: PassSearch, made: Candidate, work: PassContext) -> None:
     """Candidates by what became of them; planned ones coloured by their time, on the ground of what the reach allows."""
     frame = _frame(tried, work)
-    groups: dict[Kind, list[Turned]] = {}
+    groups: dict[RejectionKind, list[Candidate]] = {}
     for other, _, kind in tried.rejected:
         groups.setdefault(kind, []).append(other)
     timed = _once([*groups.get("slower", []), *(one for one in (tried.own, tried.best, made) if np.isfinite(one.seconds))])
@@ -60,7 +61,7 @@ def axes_map(sheet: Figure, place: PolarAxes, tried: Tried, made: Turned, work: 
     place.legend(loc="upper center", bbox_to_anchor=(0.6, -0.08), ncols=2, fontsize="x-small", frameon=False)
 
 
-def _ground(place: PolarAxes, tried: Tried, frame: tuple[Floats, ...], work: Work, most: float) -> str:
+def _ground(place: PolarAxes, tried: PassSearch, frame: tuple[Floats, ...], work: PassContext, most: float) -> str:
     """What the reach along the mean direction allows, dark where it is fast; a line for the title."""
     around, out = np.meshgrid(np.linspace(0.0, 2.0 * np.pi, ROUND), np.linspace(0.0, most, OUT))
     least = _least(tried, frame, work, around, out)
@@ -74,7 +75,7 @@ def _ground(place: PolarAxes, tried: Tried, frame: tuple[Floats, ...], work: Wor
     return f"\nground: least seconds by the reach, {low:.3g} (dark) to {high:.3g}"
 
 
-def _timed(sheet: Figure, place: PolarAxes, timed: list[Turned], frame: tuple[Floats, ...], work: Work) -> None:
+def _timed(sheet: Figure, place: PolarAxes, timed: list[Candidate], frame: tuple[Floats, ...], work: PassContext) -> None:
     """The planned candidates, coloured by their time."""
     if not timed:
         return
@@ -85,7 +86,7 @@ def _timed(sheet: Figure, place: PolarAxes, timed: list[Turned], frame: tuple[Fl
     sheet.colorbar(drawn, ax=place, shrink=0.75, pad=0.12).set_label("planned seconds", fontsize="small")
 
 
-def _least(tried: Tried, frame: tuple[Floats, ...], work: Work, around: Floats, out: Floats) -> Floats:
+def _least(tried: PassSearch, frame: tuple[Floats, ...], work: PassContext, around: Floats, out: Floats) -> Floats:
     """Least seconds by the reach (M, K) at azimuths, rad, and tilts, degrees (M, K); NaN for a fixed pass."""
     if tried.own.one.fixed:
         return np.full(around.shape, np.nan)
@@ -95,11 +96,11 @@ def _least(tried: Tried, frame: tuple[Floats, ...], work: Work, around: Floats, 
     return least_under(tried.own, work.placement.directions(axes.reshape(-1, 3))).reshape(around.shape)
 
 
-def _once(made: list[Turned]) -> list[Turned]:
+def _once(made: list[Candidate]) -> list[Candidate]:
     return list({id(one): one for one in made}.values())
 
 
-def _frame(tried: Tried, work: Work) -> tuple[Floats, Floats, Floats]:
+def _frame(tried: PassSearch, work: PassContext) -> tuple[Floats, Floats, Floats]:
     """The CL's axis, and the directions of azimuth 0 and 90 degrees square to it, frame of the part: part x, or y where the
     axis lies along x."""
     own = work.placement.inverse().directions(tried.own.axis[None])[0]
@@ -109,7 +110,7 @@ def _frame(tried: Tried, work: Work) -> tuple[Floats, Floats, Floats]:
     return own, x, np.cross(own, x)
 
 
-def _polar(made: list[Turned], frame: tuple[Floats, ...], work: Work) -> tuple[Floats, Floats]:
+def _polar(made: list[Candidate], frame: tuple[Floats, ...], work: PassContext) -> tuple[Floats, Floats]:
     """Azimuth, rad, and tilt, degrees (N,) of tool axes."""
     own, x, y = frame
     axis = work.placement.inverse().directions(np.stack([one.axis for one in made]))

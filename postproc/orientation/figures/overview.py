@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from postproc.base.options import Orientation
-from postproc.orientation.candidates.timed import Turned
+from postproc.orientation.candidates.candidate_times import Candidate
 from postproc.orientation.plans.choice import OrientationChoice
 from postproc.orientation.plans.plans import OrientationPlan
 from postproc.orientation.plans.shares import shares_of
@@ -108,7 +108,7 @@ def _saved(made: Floats, own: Floats) -> Floats:
     return np.where(good, 100.0 * (1.0 - np.where(good, made, 0.0) / np.where(good, own, 1.0)), np.nan)
 
 
-def _angles(made: tuple[Turned, ...] | list[Turned], name: str) -> Floats:
+def _angles(made: tuple[Candidate, ...] | list[Candidate], name: str) -> Floats:
     return np.array([one.rotary().get(name, np.nan) for one in made])
 
 

@@ -8,10 +8,10 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 from machines.polytope import Polytope
+from postproc.orientation.candidates.candidate_times import Candidate
 from postproc.orientation.candidates.reaches import binding, direction_of, polytopes, reaches
-from postproc.orientation.candidates.search import Tried
-from postproc.orientation.candidates.timed import Turned
-from postproc.orientation.passes.passes import Work
+from postproc.orientation.candidates.search import PassSearch
+from postproc.orientation.passes.passes import PassContext
 from toolpaths.arrays import Floats, Ints
 
 Axes3D = Any
@@ -25,7 +25,7 @@ APART = 4.0
 """times the mean speed of the order that binds, beyond which another order is only named"""
 
 
-def box_panel(place: Axes3D, tried: Tried, work: Work) -> None:
+def box_panel(place: Axes3D, tried: PassSearch, work: PassContext) -> None:
     """The polytope of the order that binds, under the CL's axis and the best one, and its reach along the mean direction."""
     slowest = binding(reaches(tried.own)) or binding(reaches(tried.best))
     if slowest is None:
@@ -47,7 +47,7 @@ def box_panel(place: Axes3D, tried: Tried, work: Work) -> None:
             tried, work)
 
 
-def order_panel(place: Axes3D, tried: Tried, work: Work) -> None:
+def order_panel(place: Axes3D, tried: PassSearch, work: PassContext) -> None:
     """Velocity, acceleration and jerk polytopes under the best axis.
 
     Each is scaled so that it ends the mean direction at the mean speed which this order alone would allow from rest to rest
@@ -79,7 +79,7 @@ def short(value: float) -> str:
     return f"{float(f'{value:.3g}'):.12g}"
 
 
-def _corners(shape: Polytope, work: Work) -> Floats:
+def _corners(shape: Polytope, work: PassContext) -> Floats:
     """Vertices (V, 3) in the frame of the part; none where it is not bounded."""
     try:
         found = shape.vertices()
@@ -88,7 +88,7 @@ def _corners(shape: Polytope, work: Work) -> Floats:
     return work.placement.inverse().directions(found)
 
 
-def _direction(made: Turned, work: Work) -> Floats:
+def _direction(made: Candidate, work: PassContext) -> Floats:
     return np.asarray(work.placement.inverse().directions(direction_of(made.one.longest)[0][None])[0])
 
 
@@ -126,7 +126,7 @@ def hull(corners: Floats) -> tuple[Ints, Ints]:
     return found.simplices.astype(np.int64), np.array(edges, dtype=np.int64).reshape(-1, 2)
 
 
-def _finish(place: Axes3D, size: float, title: str, tried: Tried, work: Work) -> None:
+def _finish(place: Axes3D, size: float, title: str, tried: PassSearch, work: PassContext) -> None:
     """Equal axes, a view across the mean direction, labels."""
     limit = (-size, size)
     place.set(xlim=limit, ylim=limit, zlim=limit, xlabel="x", ylabel="y", zlabel="z")

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from postproc.orientation.candidates.candidate_times import Candidate
 from postproc.orientation.candidates.reaches import Reach, feed_of, reaches
-from postproc.orientation.candidates.search import Tried
-from postproc.orientation.candidates.timed import Turned
+from postproc.orientation.candidates.search import PassSearch
 from postproc.orientation.figures.polytopes import COLOURS, SCALE, SHOWN, short
 from toolpaths.drawing import plain
 
@@ -19,7 +19,7 @@ HIGH = 0.2
 """of a bar, where an orientation takes 1"""
 
 
-def reach_panel(place: Axes, tried: Tried, made: Turned) -> None:
+def reach_panel(place: Axes, tried: PassSearch, made: Candidate) -> None:
     """For the CL's axis, the paper's, the best and the plan's: least seconds of each order, and the planned ones."""
     rows = {"CL axis": tried.own, "paper": tried.aimed, "best": tried.best, "plan": made}
     kept = {name: it for name, it in rows.items() if it is not None}

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from postproc.base.options import Orientation
-from postproc.orientation.candidates.search import Tried
-from postproc.orientation.candidates.timed import Turned
-from postproc.orientation.figures.held import held_panel, is_held
+from postproc.orientation.candidates.candidate_times import Candidate
+from postproc.orientation.candidates.search import PassSearch
+from postproc.orientation.figures.free_rotary import held_panel, is_held
 from postproc.orientation.figures.map import axes_map
 from postproc.orientation.figures.overview import angle_panel, gain_panel, plan_panel
 from postproc.orientation.figures.polytopes import box_panel, order_panel
 from postproc.orientation.figures.reach import reach_panel
-from postproc.orientation.passes.passes import Work
+from postproc.orientation.passes.passes import PassContext
 from postproc.orientation.plans.choice import OrientationChoice
 from postproc.orientation.report.figures_of_choice import gain
 from postproc.orientation.report.text import orientation, percent, seconds
@@ -73,7 +73,7 @@ def _part(sheet: Figure, grid: GridSpec, choice: OrientationChoice, plan: Orient
     gain_panel(sheet.add_subplot(grid[2, :]), choice, plan)
 
 
-def _pass(sheet: Figure, grid: GridSpec, row: int, tried: Tried, made: Turned, work: Work) -> None:
+def _pass(sheet: Figure, grid: GridSpec, row: int, tried: PassSearch, made: Candidate, work: PassContext) -> None:
     head = sheet.add_subplot(grid[row, :])
     head.set_axis_off()
     head.text(0.5, 0.0, plain(_headline(tried)), ha="center", fontweight="bold", fontsize="medium", transform=head.transAxes)
@@ -86,7 +86,7 @@ def _pass(sheet: Figure, grid: GridSpec, row: int, tried: Tried, made: Turned, w
     reach_panel(sheet.add_subplot(grid[row + 2, 1]), tried, made)
 
 
-def _headline(tried: Tried) -> str:
+def _headline(tried: PassSearch) -> str:
     one, own = tried.own.one, seconds(tried.own.seconds)
     head = f"pass {one.number}, line {one.line}"
     if one.fixed and not tried.rejected:

@@ -20,7 +20,7 @@ _FEW = 64
 NO_LIMITS = OrientationLimits()
 
 
-class Bodies(Protocol):
+class CollisionBodies(Protocol):
     """Part, fixtures and table beside cutter, shank and holder."""
 
     def touching(self, one: Pass, axis: Floats) -> str:
@@ -45,7 +45,7 @@ class _Bound:
 
 
 @dataclass(frozen=True)
-class Allowed:
+class AllowedAxes:
     """What holds for every candidate.
 
     Attributes:
@@ -55,7 +55,7 @@ class Allowed:
     """
 
     tilt: float
-    bodies: Bodies | None = None
+    bodies: CollisionBodies | None = None
     limits: OrientationLimits = NO_LIMITS
 
     def refused(self, one: Pass, axis: Floats) -> str:
@@ -91,7 +91,7 @@ class Allowed:
         return axes[self.mask(one, axes)]
 
     def touching(self, one: Pass, axis: Floats) -> str:
-        """As `Bodies.touching`; the own axis of a pass can touch as well."""
+        """As `CollisionBodies.touching`; the own axis of a pass can touch as well."""
         return "" if self.bodies is None else self.bodies.touching(one, axis)
 
     def _planes(self, one: Pass) -> list[tuple[Floats, float]]:
@@ -152,4 +152,4 @@ def _told(one: Pass, bound: _Bound, k: int) -> str:
 
 def own_outside(one: Pass, limits: OrientationLimits) -> str:
     """Which limit of the set-up the CL's own axis of a pass breaks; --max-tilt does not count."""
-    return "" if not len(one.contact) else Allowed(np.pi, None, limits).outside(one, one.axis)
+    return "" if not len(one.contact) else AllowedAxes(np.pi, None, limits).outside(one, one.axis)

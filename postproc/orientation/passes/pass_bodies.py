@@ -7,9 +7,9 @@ from functools import cached_property
 import numpy as np
 
 from postproc.collision.bodies import Scene, Touch, scene, touches
-from postproc.collision.form import Form, tool_form
+from postproc.collision.form import ToolForm, tool_form
 from postproc.collision.swept import Swept, along_curves, joined
-from postproc.orientation.passes.passes import Pass, Work
+from postproc.orientation.passes.passes import Pass, PassContext
 from postproc.reference.moves import Phase
 from toolpaths.arrays import Bools, Floats
 from toolpaths.diagnostics import Diagnostic, has_errors
@@ -23,7 +23,7 @@ _SAME = 1e-6
 class PassBodies:
     """What the passes of `work` would touch; implements `orientation.allowed.Bodies`."""
 
-    def __init__(self, work: Work, bodies: Scene, forms: dict[int, Form]) -> None:
+    def __init__(self, work: PassContext, bodies: Scene, forms: dict[int, ToolForm]) -> None:
         self.work, self.bodies, self.forms = work, bodies, forms
         self._ways: dict[int, Swept] = {}
 
@@ -76,7 +76,7 @@ class PassBodies:
         return np.asarray((moves.hole >= 0) & (moves.phase > Phase.APPROACH))
 
 
-def pass_bodies(work: Work, file: str) -> tuple[PassBodies | None, list[Diagnostic]]:
+def pass_bodies(work: PassContext, file: str) -> tuple[PassBodies | None, list[Diagnostic]]:
     """The bodies of a set-up beside the passes of `work`; None where it (`file`) names none, or a mesh is no good."""
     bodies, found = scene(work.setup, work.placement, file)
     if bodies is None:
@@ -86,7 +86,7 @@ def pass_bodies(work: Work, file: str) -> tuple[PassBodies | None, list[Diagnost
     return (None if has_errors(found) else PassBodies(work, bodies, forms)), found
 
 
-def forms_of(work: Work, file: str) -> tuple[dict[int, Form], list[Diagnostic]]:
+def forms_of(work: PassContext, file: str) -> tuple[dict[int, ToolForm], list[Diagnostic]]:
     """The forms of all tools that passes use, by index."""
     forms, found = {}, []
     for index in sorted({one.tool for one in work.passes}):

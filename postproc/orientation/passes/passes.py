@@ -12,7 +12,7 @@ from machines.machine import Machine
 from postproc.base.options import Options
 from postproc.feedrate.feed import StepFeed
 from postproc.orientation.passes.contact import Contact, contact_of
-from postproc.orientation.passes.drilled import Drilled, drilled_of
+from postproc.orientation.passes.drilling_time import Drilled, drilled_of
 from postproc.orientation.passes.surface import Surface, surface_of
 from postproc.path.links import SafeSpace, safe_space
 from postproc.planning.geometry_sites import sites
@@ -35,7 +35,7 @@ TURNS = 1e-6
 
 
 @dataclass(frozen=True)
-class Stretch:
+class CuttingStretch:
     """Cutting motion from stop to stop: sites s (N,), the smoothed tip and axis (N, 3) there, and the feed along s."""
 
     s: Floats
@@ -87,7 +87,7 @@ class Pass:
     by_home: bool
     tool: int
     kin: Kinematics
-    stretches: tuple[Stretch, ...]
+    stretches: tuple[CuttingStretch, ...]
     line: int
     drilled: Drilled
 
@@ -106,13 +106,13 @@ class Pass:
         return bool((angle_between(self.axes, self.axis[None]) > TURNS).any())
 
     @property
-    def longest(self) -> Stretch | None:
+    def longest(self) -> CuttingStretch | None:
         """The stretch that decides about directions."""
         return max(self.stretches, key=lambda one: one.length, default=None)
 
 
 @dataclass(frozen=True)
-class Work:
+class PassContext:
     """A toolpath on a machine, cut into passes; `moves` in the table frame."""
 
     toolpath: Toolpath
@@ -125,7 +125,7 @@ class Work:
 
 
 def work_of(toolpath: Toolpath, machine: Machine, setup: SetupFile, options: Options,
-            turning: bool = True) -> tuple[Work | None, list[Diagnostic]]:
+            turning: bool = True) -> tuple[PassContext | None, list[Diagnostic]]:
     """The passes of a toolpath on a machine; errors where a pass could be turned but its cutter is not known.
 
     Where none will be turned (`turning` False) the form of the cutter does not matter.
@@ -153,7 +153,7 @@ def work_of(toolpath: Toolpath, machine: Machine, setup: SetupFile, options: Opt
     passes = [_pass(number, rows, cutting)
               for number, rows in enumerate(pairwise([*_beginnings(toolpath, moves).tolist(), len(moves)]))]
     unknown = _unknown_cutters(toolpath, passes) if turning else []
-    work = Work(toolpath, machine, setup, placement, moves, safe_space(moves, setup, placement), tuple(passes))
+    work = PassContext(toolpath, machine, setup, placement, moves, safe_space(moves, setup, placement), tuple(passes))
     return (None if unknown else work), [*found, *more, *faults, *unknown]
 
 
@@ -174,7 +174,7 @@ class _Cutting:
     machine: Machine
     setup: SetupFile
     homes: frozenset[int]
-    stretches: dict[int, list[Stretch]]
+    stretches: dict[int, list[CuttingStretch]]
 
     def contact(self, cuts: Ints, radius: float) -> Contact:
         """Where the surface is known along the moves `cuts` of a ball: from the file, else from the part; 0 for no ball."""
@@ -203,7 +203,7 @@ def _beginnings(toolpath: Toolpath, moves: Moves) -> Ints:
     return np.append(0, np.clip(other[leads] + 1, first, leads))
 
 
-def _stretches(toolpath: Toolpath, moves: Moves, tolerance: Tolerance) -> dict[int, list[Stretch]]:
+def _stretches(toolpath: Toolpath, moves: Moves, tolerance: Tolerance) -> dict[int, list[CuttingStretch]]:
     """Stretches of each unbroken cut, by its first row of Moves."""
     found = chains(moves, stops_of(toolpath, moves))
     if not found:
@@ -215,7 +215,7 @@ def _stretches(toolpath: Toolpath, moves: Moves, tolerance: Tolerance) -> dict[i
             if one is not None}
 
 
-def _cut(path: Smooth, moves: Moves, rows: Ints) -> list[Stretch]:
+def _cut(path: Smooth, moves: Moves, rows: Ints) -> list[CuttingStretch]:
     """A smoothed chain from stop to stop."""
     way = np.diff(path.s)
     moving = way > 0.0
@@ -225,7 +225,7 @@ def _cut(path: Smooth, moves: Moves, rows: Ints) -> list[Stretch]:
     for low, high in pairwise(np.unique(np.concatenate((path.s[:1], path.stops, path.s[-1:]))).tolist()):
         s = sites(path, low, high)
         tip, axis = path.at(s)
-        result.append(Stretch(s, tip, axis, StepFeed(edges, feed)))
+        result.append(CuttingStretch(s, tip, axis, StepFeed(edges, feed)))
     return result
 
 

@@ -5,15 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from postproc.base.options import Orientation
-from postproc.orientation.candidates.search import Tried
-from postproc.orientation.passes.passes import Work
+from postproc.orientation.candidates.search import PassSearch
+from postproc.orientation.passes.passes import PassContext
 from postproc.orientation.plans.plans import OrientationPlan, StateTable
 from postproc.orientation.plans.reoriented import reoriented
 from toolpaths.toolpath import Toolpath
 
 
 @dataclass(frozen=True)
-class Proof:
+class PlanProof:
     """That the program of a plan was made for a controller: written (`ok`) or refused."""
 
     plan: Orientation
@@ -31,12 +31,12 @@ class OrientationChoice:
         proof: what became of the program of the plan that was asked for; None where none was made
     """
 
-    work: Work
-    tried: tuple[Tried, ...]
+    work: PassContext
+    tried: tuple[PassSearch, ...]
     table: StateTable
     plans: dict[Orientation, OrientationPlan]
     paper: OrientationPlan
-    proof: Proof | None = None
+    proof: PlanProof | None = None
 
     def toolpath(self, name: Orientation) -> Toolpath:
         """The CL path with the axes of a plan."""

@@ -9,16 +9,16 @@ import numpy as np
 
 from machines.machine import Machine
 from postproc.base.options import Options, Orientation
+from postproc.orientation.candidates.candidate_times import Candidate
 from postproc.orientation.candidates.candidates import tried
+from postproc.orientation.candidates.infeasible_passes import REACH, out_of_travel, unfit
 from postproc.orientation.candidates.ranking import prepare
-from postproc.orientation.candidates.search import APART, Lost, Tried
-from postproc.orientation.candidates.timed import Turned
-from postproc.orientation.candidates.unfit import REACH, out_of_travel, unfit
-from postproc.orientation.passes.allowed import Allowed
-from postproc.orientation.passes.limited import limit_faults
+from postproc.orientation.candidates.search import APART, PassSearch, Rejection
+from postproc.orientation.passes.allowed import AllowedAxes
+from postproc.orientation.passes.limit_checks import limit_faults
+from postproc.orientation.passes.parallel_map import PassFault, Progress, each_pass
 from postproc.orientation.passes.pass_bodies import pass_bodies
-from postproc.orientation.passes.passes import Work, work_of
-from postproc.orientation.passes.rounds import PassFault, Progress, each_pass
+from postproc.orientation.passes.passes import PassContext, work_of
 from postproc.orientation.plans.choice import OrientationChoice
 from postproc.orientation.plans.plans import OrientationPlan, plans_of, table_of
 from postproc.setup.model import SetupFile
@@ -55,7 +55,7 @@ def planned_choice(toolpath: Toolpath, machine: Machine, setup: SetupFile, optio
     found += limit_faults(work, options.setup, options.max_tilt * DEG) + more
     if has_errors(found):
         return None, found
-    allowed = Allowed(options.max_tilt * DEG, bodies, setup.orientation)
+    allowed = AllowedAxes(options.max_tilt * DEG, bodies, setup.orientation)
     found += out_of_travel(work, allowed)
     if has_errors(found):
         return None, found
@@ -93,7 +93,7 @@ def bettered(choice: OrientationChoice) -> OrientationChoice:
     return replace(choice, tried=tuple(results))
 
 
-def _best_of(tried: Tried, planned: list[Turned]) -> Tried:
+def _best_of(tried: PassSearch, planned: list[Candidate]) -> PassSearch:
     """A pass with the fastest of some orientations as its best, where it is faster than that."""
     made = min((made for made in planned if made is not tried.own and not made.touching), key=lambda made: made.seconds,
                default=tried.best)
@@ -103,18 +103,18 @@ def _best_of(tried: Tried, planned: list[Turned]) -> Tried:
     others = tuple(lost for lost in tried.rejected
                    if lost.made is tried.own or not lost.made.same(made.axis, made.held, APART))
     if before is not tried.own:
-        others = (*others, Lost(before.slim(before.seconds), f"takes {before.seconds:.4f} s", "slower"))
+        others = (*others, Rejection(before.slim(before.seconds), f"takes {before.seconds:.4f} s", "slower"))
     return replace(tried, best=made, rejected=others)
 
 
-def _tried(work: Work, allowed: Allowed, number: int, before: Tried | None) -> Tried:
+def _tried(work: PassContext, allowed: AllowedAxes, number: int, before: PassSearch | None) -> PassSearch:
     """The search in one pass; the pass before lends its axis where it is one of the same kind."""
     one = work.passes[number]
     alike = before is not None and not one.fixed and not before.own.one.fixed and before.own.same(one.axis)
     return tried(one, work.machine, allowed, before if alike else None)
 
 
-def _fixed(work: Work) -> list[Diagnostic]:
+def _fixed(work: PassContext) -> list[Diagnostic]:
     """A warning where no pass can be turned or spun."""
     if not all(one.fixed and not one.spins for one in work.passes):
         return []
@@ -122,7 +122,7 @@ def _fixed(work: Work) -> list[Diagnostic]:
     return [warning("orient.fixed", f"no pass can be turned: {reasons}", file=work.toolpath.file)]
 
 
-def _unlinked(work: Work, auto: OrientationPlan, runs: bool) -> list[Diagnostic]:
+def _unlinked(work: PassContext, auto: OrientationPlan, runs: bool) -> list[Diagnostic]:
     """Ways between passes that cannot be run: a warning where a plan without them `runs`, else an error."""
     bad = np.flatnonzero(~np.isfinite(auto.ways))
     if not len(bad):

@@ -7,19 +7,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from postproc.base.options import Orientation
-from postproc.orientation.candidates.search import Tried
-from postproc.orientation.candidates.timed import Turned
-from postproc.orientation.passes.allowed import Allowed
-from postproc.orientation.passes.passes import Work
-from postproc.orientation.passes.rounds import Progress, each_pass
-from postproc.orientation.plans.choose import groupwise, shortest
+from postproc.orientation.candidates.candidate_times import Candidate
+from postproc.orientation.candidates.search import PassSearch
+from postproc.orientation.passes.allowed import AllowedAxes
+from postproc.orientation.passes.parallel_map import Progress, each_pass
+from postproc.orientation.passes.passes import PassContext
+from postproc.orientation.plans.index_time import PassEnds, all_ends, unwinding, ways_between
+from postproc.orientation.plans.shortest_sequence import groupwise, shortest
 from postproc.orientation.plans.states import CLUSTER, groups_of, index, pools_of, ranked, states_of
-from postproc.orientation.plans.turns import Ends, all_ends, unwinding, ways_between
 from toolpaths.arrays import Bools, Floats
 
 _EQUAL = 2e-4
 """part of the time of a cut by which its best orientations may differ; turns decide among them"""
-_Row = tuple[list[Turned], Floats, list[Ends]]
+_Row = tuple[list[Candidate], Floats, list[PassEnds]]
 """States of a pass, seconds (K,) of their cuts, their ends"""
 
 
@@ -37,7 +37,7 @@ class OrientationPlan:
     """
 
     states: tuple[int, ...]
-    picked: tuple[Turned, ...]
+    picked: tuple[Candidate, ...]
     cuts: Floats
     rapids: Floats
     ways: Floats
@@ -71,9 +71,9 @@ class StateTable:
         paper: the state of each pass that the paper chooses
     """
 
-    work: Work
-    edges: list[list[Ends]]
-    states: list[list[Turned]]
+    work: PassContext
+    edges: list[list[PassEnds]]
+    states: list[list[Candidate]]
     cuts: list[Floats]
     rapids: list[Floats]
     ways: list[Floats]
@@ -138,7 +138,7 @@ def _least(plans: list[OrientationPlan]) -> OrientationPlan:
     return min(reversed(plans), key=lambda plan: (plan.touches, plan.seconds))
 
 
-def table_of(work: Work, results: list[Tried], allowed: Allowed, progress: Progress | None = None,
+def table_of(work: PassContext, results: list[PassSearch], allowed: AllowedAxes, progress: Progress | None = None,
              workers: int | None = None) -> StateTable:
     """All states with their seconds."""
     pools = pools_of(results)

@@ -8,17 +8,17 @@ import numpy as np
 
 from machines.kinematics.frames import spin_about, tool_x
 from postproc.joints.spin import spin_of
-from postproc.orientation.candidates.held import free_value
-from postproc.orientation.candidates.timed import Turned
+from postproc.orientation.candidates.candidate_times import Candidate
+from postproc.orientation.candidates.free_rotary import free_value
 from postproc.orientation.passes.allowed import SAME
-from postproc.orientation.passes.passes import Work
+from postproc.orientation.passes.passes import PassContext
 from postproc.setup.model import Placement
 from toolpaths.arrays import Floats, Ints
 from toolpaths.rotations import angle_between
 from toolpaths.toolpath import Arcs, Toolpath
 
 
-def reoriented(work: Work, picked: tuple[Turned, ...]) -> Toolpath:
+def reoriented(work: PassContext, picked: tuple[Candidate, ...]) -> Toolpath:
     """The CL path with other axes: tips moved by R (axis - axis'), so that the ball stays where it is; arcs with them.
 
     Where a plan turns anything, every tool along a rotary axis is held as that axis was counted (`Toolpath.spin`), else its
@@ -43,12 +43,12 @@ def reoriented(work: Work, picked: tuple[Turned, ...]) -> Toolpath:
     return replace(path, tip=tip, axis=axis, arcs=arcs_moved, spin=spin if np.isfinite(spin).any() else None)
 
 
-def _rows(work: Work, made: Turned) -> Ints:
+def _rows(work: PassContext, made: Candidate) -> Ints:
     """Rows of the Toolpath that belong to a pass."""
     return np.unique(work.moves.row[slice(*made.one.rows)])
 
 
-def _spin(made: Turned, back: Placement, axis: Floats) -> float:
+def _spin(made: Candidate, back: Placement, axis: Floats) -> float:
     """The spin of a pass in the part frame, where its axis is `axis` (3,)."""
     side = tool_x(made.axis[None], np.array([spin_of(made.one.kin, made.q[0])]))
     return float(spin_about(axis[None], back.directions(side))[0])

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from machines.machine import Machine
-from postproc.orientation.candidates.timed import Turned
+from postproc.orientation.candidates.candidate_times import Candidate
 from postproc.orientation.passes.allowed import SAME
 from postproc.orientation.plans.plans import OrientationPlan
 from toolpaths.arrays import Floats
@@ -42,7 +42,7 @@ def shares_of(plan: OrientationPlan) -> PlanShares:
     return PlanShares(cutting, turning, plan.seconds - cutting - turning, int(turned.sum()))
 
 
-def turns(a: Turned, b: Turned) -> bool:
+def turns(a: Candidate, b: Candidate) -> bool:
     """Whether tool or rotary joints turn from the end of one pass to the beginning of the next."""
     return _apart(a.machine, a.q[-1], b.q[0]) or bool(angle_between(a.axis, b.axis) > SAME)
 

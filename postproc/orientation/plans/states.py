@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from postproc.orientation.candidates.held import common_angles
+from postproc.orientation.candidates.candidate_times import Candidate, turned_all
+from postproc.orientation.candidates.free_rotary import common_angles
 from postproc.orientation.candidates.ranking import Ranking
-from postproc.orientation.candidates.search import Tried
-from postproc.orientation.candidates.timed import Turned, turned_all
-from postproc.orientation.passes.allowed import Allowed
+from postproc.orientation.candidates.search import PassSearch
+from postproc.orientation.passes.allowed import AllowedAxes
 from toolpaths.arrays import Floats
 from toolpaths.units import DEG
 
@@ -16,10 +16,10 @@ _POOL = 5
 """axes besides its own choices that every pass may take"""
 CLUSTER = 2.0 * DEG
 Axis = tuple[Floats, float]
-"""Tool axis (3,) and held angle, see `Turned`."""
+"""Tool axis (3,) and held angle, see `Candidate`."""
 
 
-def ranked(states: list[Turned]) -> Floats:
+def ranked(states: list[Candidate]) -> Floats:
     """Seconds (K,) of the cuts of the states of one pass, on the same knots."""
     runs = [made for made in states if not made.refused]
     if len(runs) < 2:
@@ -28,7 +28,7 @@ def ranked(states: list[Turned]) -> Floats:
     return np.array([ranking.seconds(made) for made in states])
 
 
-def pools_of(results: list[Tried]) -> list[list[Axis]]:
+def pools_of(results: list[PassSearch]) -> list[list[Axis]]:
     """Axes that every pass of one CL axis may take: the best and the swiftest of its passes, most gain first, and means."""
     pools: list[list[Axis]] = [[] for _ in results]
     for group in groups_of([one.own for one in results]):
@@ -42,9 +42,9 @@ def pools_of(results: list[Tried]) -> list[list[Axis]]:
     return pools
 
 
-def _common(gains: list[tuple[float, Turned]]) -> list[Axis]:
+def _common(gains: list[tuple[float, Candidate]]) -> list[Axis]:
     """Axes round which passes gain most, in seconds."""
-    clusters: list[tuple[Turned, float]] = []
+    clusters: list[tuple[Candidate, float]] = []
     for gain, best in sorted(gains, key=lambda pair: -pair[0]):
         near = next((k for k, (made, _) in enumerate(clusters) if made.same(best.axis, best.held, CLUSTER)), None)
         if near is None:
@@ -60,9 +60,9 @@ def _means(sets: list[list[Floats]]) -> list[Floats]:
     return [total / size for total in sums if (size := float(np.linalg.norm(total))) > 1e-6]
 
 
-def groups_of(owns: list[Turned]) -> list[list[int]]:
+def groups_of(owns: list[Candidate]) -> list[list[int]]:
     """Numbers of the passes that can be turned or spun, by their CL axis."""
-    groups: list[tuple[Turned, list[int]]] = []
+    groups: list[tuple[Candidate, list[int]]] = []
     for k, own in enumerate(owns):
         if own.one.fixed and not own.one.spins:
             continue
@@ -74,9 +74,9 @@ def groups_of(owns: list[Turned]) -> list[list[int]]:
     return [members for _, members in groups]
 
 
-def states_of(one: Tried, allowed: Allowed, pool: list[Axis]) -> list[Turned]:
+def states_of(one: PassSearch, allowed: AllowedAxes, pool: list[Axis]) -> list[Candidate]:
     """Own, best, aimed and swiftest axes of a pass, then those of its pool that are allowed; no axis twice."""
-    result: list[Turned] = []
+    result: list[Candidate] = []
     for made in (one.own, one.best, one.aimed, one.swift):
         if made is not None and index(result, (made.axis, made.held), -1) < 0:
             result.append(made)
@@ -86,7 +86,7 @@ def states_of(one: Tried, allowed: Allowed, pool: list[Axis]) -> list[Turned]:
     return result
 
 
-def _turned_to(own: Turned, wanted: list[Axis], allowed: Allowed) -> list[Turned]:
+def _turned_to(own: Candidate, wanted: list[Axis], allowed: AllowedAxes) -> list[Candidate]:
     """A pass along those of the wanted axes that it may take, solved together where the same angle is held."""
     by_held: dict[str, list[Axis]] = {}
     for axis, held in wanted:
@@ -97,6 +97,6 @@ def _turned_to(own: Turned, wanted: list[Axis], allowed: Allowed) -> list[Turned
             for made in turned_all(own.one, np.array([axis for axis, _ in some]), own.machine, allowed.touching, some[0][1])]
 
 
-def index(row: list[Turned], axis: Axis, missing: int = 0) -> int:
+def index(row: list[Candidate], axis: Axis, missing: int = 0) -> int:
     """Where an axis stands among the states."""
     return next((k for k, other in enumerate(row) if other.same(*axis)), missing)

@@ -6,11 +6,11 @@ import math
 from typing import Any
 
 from postproc.base.options import Orientation
-from postproc.orientation.candidates.losers import best_loser, grouped
+from postproc.orientation.candidates.candidate_times import Candidate
 from postproc.orientation.candidates.reaches import binding, feed_of, reaches
-from postproc.orientation.candidates.search import Tried
-from postproc.orientation.candidates.timed import Turned
-from postproc.orientation.passes.passes import Work
+from postproc.orientation.candidates.rejections import best_loser, grouped
+from postproc.orientation.candidates.search import PassSearch
+from postproc.orientation.passes.passes import PassContext
 from postproc.orientation.plans.choice import OrientationChoice
 from postproc.orientation.plans.plans import OrientationPlan
 from postproc.orientation.plans.shares import shares_of
@@ -65,23 +65,23 @@ def finite(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
 
 
-def angles(made: Turned) -> dict[str, float | None]:
+def angles(made: Candidate) -> dict[str, float | None]:
     """Rotary positions, degrees."""
     return {name: finite(value) for name, value in made.rotary().items()}
 
 
-def held(made: Turned) -> float | None:
+def held(made: Candidate) -> float | None:
     """The angle asked for of the rotary joint that the tool axis leaves free, degrees; None where none is."""
     return finite(made.held / DEG)
 
 
-def axis_of(made: Turned, work: Work) -> list[float]:
+def axis_of(made: Candidate, work: PassContext) -> list[float]:
     """The tool axis in the frame of the CL file."""
     axis: list[float] = work.placement.inverse().directions(made.axis[None])[0].tolist()
     return axis
 
 
-def _pass(tried: Tried, made: Turned, work: Work) -> dict[str, Any]:
+def _pass(tried: PassSearch, made: Candidate, work: PassContext) -> dict[str, Any]:
     one = tried.own.one
     return {"pass": one.number, "line": one.line, "fixed": one.fixed,
             "orientation_deg": angles(made), "held_deg": held(made),
@@ -99,13 +99,13 @@ def _pass(tried: Tried, made: Turned, work: Work) -> dict[str, Any]:
                          for other, why, kind in tried.rejected]}
 
 
-def _short(made: Turned | None) -> dict[str, Any] | None:
+def _short(made: Candidate | None) -> dict[str, Any] | None:
     """An orientation and its planned time."""
     return None if made is None else {"orientation_deg": angles(made), "held_deg": held(made),
                                       "time_s": finite(made.seconds), "touches": made.touching}
 
 
-def _reach(made: Turned) -> dict[str, Any]:
+def _reach(made: Candidate) -> dict[str, Any]:
     """What each order and the feed allow along the mean direction, and which of them alone takes longest."""
     found, feed = reaches(made), feed_of(made)
     every = found if feed is None else (*found, feed)

@@ -7,10 +7,10 @@ from collections import Counter
 from collections.abc import Sequence
 
 from postproc.base.options import Orientation
-from postproc.orientation.candidates.losers import KINDS, best_loser, grouped, listed
+from postproc.orientation.candidates.candidate_times import Candidate
 from postproc.orientation.candidates.reaches import binding, feed_of, reaches
-from postproc.orientation.candidates.search import Kind, Lost, Tried
-from postproc.orientation.candidates.timed import Turned
+from postproc.orientation.candidates.rejections import KINDS, best_loser, grouped, listed
+from postproc.orientation.candidates.search import PassSearch, Rejection, RejectionKind
 from postproc.orientation.plans.choice import OrientationChoice
 from postproc.orientation.plans.plans import OrientationPlan
 from postproc.orientation.plans.shares import shares_of, turns
@@ -20,7 +20,7 @@ from toolpaths.units import DEG
 
 SHOWN = 40
 """passes in the table; where there are more, those that gain most"""
-LOSERS: dict[Kind, int] = {"slower": 8, "bound": 3, "touches": 4, "travel": 3, "reach": 2, "limits": 3}
+LOSERS: dict[RejectionKind, int] = {"slower": 8, "bound": 3, "touches": 4, "travel": 3, "reach": 2, "limits": 3}
 """candidates of a pass in full, by what they lost by"""
 _WHYS = 3
 """reasons of the paper's choice missing"""
@@ -68,12 +68,12 @@ def _against(choice: OrientationChoice, plan: Orientation) -> str:
     return "proved against the CL file as it is: no tool axis was turned"
 
 
-def _saved(tried: Tried, made: Turned) -> float:
+def _saved(tried: PassSearch, made: Candidate) -> float:
     """Minus the seconds saved: passes that only another axis can run first, those that none can last."""
     return made.seconds - tried.own.seconds if math.isfinite(made.seconds) else math.inf
 
 
-def orientation(made: Turned) -> str:
+def orientation(made: Candidate) -> str:
     """Angles in words: "A45.000 C-12.500"."""
     return " ".join(f"{name}{round(value, 3) + 0.0:.3f}" for name, value in made.rotary().items())
 
@@ -88,7 +88,7 @@ def percent(value: float | None) -> str:
     return "-" if value is None else f"{value + 0.0:.2f}"
 
 
-def _row(tried: Tried, made: Turned) -> str:
+def _row(tried: PassSearch, made: Candidate) -> str:
     one, before = tried.own.one, tried.own.seconds
     limit = " ".join(made.limiting).strip() or "-"
     if not one.stretches:
@@ -106,7 +106,7 @@ def _row(tried: Tried, made: Turned) -> str:
     return f"{start}{seconds(tried.best.seconds):>12} {beaten:>9}  {reasons or '-'}"
 
 
-def _in_full(tried: Tried, made: Turned) -> list[str]:
+def _in_full(tried: PassSearch, made: Candidate) -> list[str]:
     """One pass: what its orientations reach along the mean direction, and each loser with its reason."""
     one = tried.own.one
     lines = [f"pass {one.number}, line {one.line}" + (f", axis kept: {one.fixed}" if one.fixed else "")]
@@ -121,17 +121,17 @@ def _in_full(tried: Tried, made: Turned) -> list[str]:
     return lines
 
 
-def _state(made: Turned) -> str:
+def _state(made: Candidate) -> str:
     """Seconds of an orientation, or why it cannot be run."""
     if made.refused:
         return f"cannot be run ({made.refused})"
     return f"{seconds(made.seconds)} s" + (f", {made.touching}" if made.touching else "")
 
 
-def _named(tried: Tried, made: Turned) -> list[tuple[str, Turned]]:
+def _named(tried: PassSearch, made: Candidate) -> list[tuple[str, Candidate]]:
     """The orientations of a pass that have names, each once."""
     names: list[list[str]] = []
-    kept: list[Turned] = []
+    kept: list[Candidate] = []
     for name, it in (("CL axis", tried.own), ("paper", tried.aimed), ("best alone", tried.best),
                      ("best with its rapids", tried.swift), ("chosen", made)):
         if it is None:
@@ -144,19 +144,19 @@ def _named(tried: Tried, made: Turned) -> list[tuple[str, Turned]]:
     return [(", ".join(some), it) for some, it in zip(names, kept, strict=True)]
 
 
-def _off(made: Turned) -> str:
+def _off(made: Candidate) -> str:
     """By how much a tool is turned off the CL's axis, where its angles do not say it."""
     off = float(angle_between(made.axis, made.one.axis)) / DEG
     return f", {off:.1f} degrees off" if off > 0.05 and sum(made.machine.rotary) < 2 else ""
 
 
-def _rank(lost: Lost) -> tuple[float, float]:
+def _rank(lost: Rejection) -> tuple[float, float]:
     """By time where that is known, then by how far the tool is turned."""
     seconds = lost.made.seconds
     return seconds if math.isfinite(seconds) else math.inf, float(angle_between(lost.made.axis, lost.made.one.axis))
 
 
-def _reached(made: Turned) -> list[str]:
+def _reached(made: Candidate) -> list[str]:
     """What each order allows along the mean direction, and which of them alone is slowest."""
     feed = feed_of(made)
     found = (*reaches(made), *(() if feed is None else (feed,)))

@@ -11,7 +11,7 @@ from postproc.path.links import SafeSpace
 from postproc.readback.comparison.faults import Faults
 from postproc.readback.dialects.readers import reader_for
 from postproc.readback.execution.execute import Motion
-from postproc.readback.execution.poses import Executed, arc_sweeps, coordinates
+from postproc.readback.execution.poses import BlockPoses, arc_sweeps, coordinates
 from postproc.readback.execution.rows import INCH
 from postproc.reference.holes import PECKING, Phase
 from postproc.reference.moves import Moves
@@ -120,7 +120,7 @@ def _turning_points(depth: Floats) -> Bools:
     return np.asarray((way[:-1] > 0.0) & (way[1:] < 0.0))
 
 
-def check_travel(motion: Motion, executed: Executed, moves: Moves, owner: Ints, faults: Faults) -> list[Diagnostic]:
+def check_travel(motion: Motion, executed: BlockPoses, moves: Moves, owner: Ints, faults: Faults) -> list[Diagnostic]:
     """Travel of every axis at the ends of all blocks and between them, whatever the blocks are for."""
     limits, machine = executed.control.machine.limits, executed.control.machine
     slack = ROUNDING_SLACK / executed.control.unit
@@ -139,7 +139,7 @@ def check_travel(motion: Motion, executed: Executed, moves: Moves, owner: Ints, 
     return result
 
 
-def _beyond_travel(motion: Motion, executed: Executed, slack: Floats) -> tuple[Ints, Floats]:
+def _beyond_travel(motion: Motion, executed: BlockPoses, slack: Floats) -> tuple[Ints, Floats]:
     """(blocks (K,) in which an axis goes more than its slack (J,) beyond its travel, by how much (K, J) all of them do)."""
     limits, names = executed.control.machine.limits, executed.control.machine.axis_names
     found, excess = [np.zeros(0, dtype=np.int64)], [np.zeros((0, len(names)))]
@@ -234,7 +234,7 @@ def _seconds(motion: Motion, control: Control, by_radius: bool, rows: Ints, swee
         return np.asarray(np.where(motion.inverse[rows], 60.0 * share / feed, 60.0 * length / feed))
 
 
-def check_links(motion: Motion, executed: Executed, moves: Moves, owner: Ints, space: SafeSpace, tolerance: float,
+def check_links(motion: Motion, executed: BlockPoses, moves: Moves, owner: Ints, space: SafeSpace, tolerance: float,
            faults: Faults) -> list[Diagnostic]:
     """Linking blocks, those after the last point too, stay on the line of retract, clear of the path, or on the line of
     approach; within what corrections of geometric errors change on the way, besides the tolerance."""

@@ -23,14 +23,14 @@ from postproc.readback.comparison.checks import (
 from postproc.readback.comparison.compensated import check_compensated
 from postproc.readback.comparison.deviation_bound import DeviationBound, deviation_bound
 from postproc.readback.comparison.faults import Faults
+from postproc.readback.comparison.free_rotary import check_spins
 from postproc.readback.comparison.reach_bounds import check_reach_bounds
 from postproc.readback.comparison.rewinds import check_rewinds, rewinds
-from postproc.readback.comparison.slow import check_fed_rapids, check_slow
-from postproc.readback.comparison.spins import check_spins
+from postproc.readback.comparison.slow_moves import check_fed_rapids, check_slow
 from postproc.readback.comparison.states import check_states
 from postproc.readback.comparison.taps import check_taps
 from postproc.readback.execution.execute import Motion
-from postproc.readback.execution.poses import SAMPLES, Executed, arc_sweeps
+from postproc.readback.execution.poses import SAMPLES, BlockPoses, arc_sweeps
 from postproc.readback.text.canonical import Canonical
 from postproc.reference.moves import Moves, Phase
 from toolpaths.arrays import Bools, Floats, Ints, as_slice, shared
@@ -69,12 +69,12 @@ class Comparison:
     cuts: int = 0
     bounded_cuts: int = 0
     executed: tuple[Canonical, Motion] | None = None
-    poses: Executed | None = None
+    poses: BlockPoses | None = None
     planned: bool = False
     """the feeds of the program were planned"""
 
 
-def compare(motion: Motion, job: Job, executed: Executed, gcode: str = "", planned: bool = False) -> Comparison:
+def compare(motion: Motion, job: Job, executed: BlockPoses, gcode: str = "", planned: bool = False) -> Comparison:
     """Every block on its stretch of the reference, every move done, in order, as the CL file has it, inside travel.
 
     Faults point into the CL file, or into the program where `gcode` names it. `planned`: its feeds were.
@@ -128,7 +128,7 @@ def _cuts(moves: Moves, owner: Ints, bound: DeviationBound) -> tuple[int, int]:
     return int(cutting.sum()), int(cutting.sum() - cutting[without].sum())
 
 
-def _ends(motion: Motion, executed: Executed) -> tuple[Floats, Floats]:
+def _ends(motion: Motion, executed: BlockPoses) -> tuple[Floats, Floats]:
     """(tip, axis) (E, 3) at the ends of all blocks."""
     tip, axis = np.empty((len(motion), 3)), np.empty((len(motion), 3))
     for at in range(0, len(motion), CHUNK):
@@ -177,12 +177,12 @@ def _aligned(kept: Ints | slice, tip: Floats, axis: Floats, sweep: Floats, moves
     return np.where(match >= 0, np.arange(len(tip))[kept][match], match), owner
 
 
-Worst = tuple[float, tuple[int, int]]
+WorstPlace = tuple[float, tuple[int, int]]
 """a deviation and where it is: CL line, program line"""
 
 
-def _farthest(motion: Motion, executed: Executed, moves: Moves, tip: Floats, axis: Floats, match: Ints, owner: Ints,
-              tolerance: float) -> tuple[Worst, Worst]:
+def _farthest(motion: Motion, executed: BlockPoses, moves: Moves, tip: Floats, axis: Floats, match: Ints, owner: Ints,
+              tolerance: float) -> tuple[WorstPlace, WorstPlace]:
     """The worst deviations of tip and axis, between the points and at them."""
     rows = np.flatnonzero((owner < len(moves)) & ~moves.link[np.minimum(owner, len(moves) - 1)])
     tip_off, axis_off = _deviations(motion, executed, moves, rows, owner, tolerance)
@@ -202,7 +202,7 @@ def _not_reached(motion: Motion, moves: Moves, match: Ints, lost: int, faults: F
                         "the program is not made from this CL file with this machine, set-up and tools")
 
 
-def _bound(motion: Motion, executed: Executed, moves: Moves, owner: Ints, allowed: tuple[float, float],
+def _bound(motion: Motion, executed: BlockPoses, moves: Moves, owner: Ints, allowed: tuple[float, float],
            corrects: bool) -> DeviationBound:
     """Bounds of every block of the moves that are no links. From hole to hole dog-legs are looked at in height alone; so are
     all ways where geometric errors are corrected: a control that drills the holes takes up lost motion on its way."""
@@ -238,7 +238,7 @@ def _off_level(curve: Curves, tip: Floats) -> Floats:
     return np.asarray(np.maximum(np.maximum(np.minimum(first, last) - height, height - np.maximum(first, last)), 0.0))
 
 
-def _deviations(motion: Motion, executed: Executed, moves: Moves, rows: Ints, owner: Ints,
+def _deviations(motion: Motion, executed: BlockPoses, moves: Moves, rows: Ints, owner: Ints,
                 within: float) -> tuple[Floats, Floats]:
     """Worst (tip, axis) deviation (K,) over samples of each block from the curve of its move; `within` mm of its tip.
 
@@ -270,7 +270,7 @@ def _deviations(motion: Motion, executed: Executed, moves: Moves, rows: Ints, ow
     return tip_off, axis_off
 
 
-def _place(motion: Motion, executed: Executed, rows: Ints, owner: Ints, moves: Moves) -> tuple[Floats, Floats]:
+def _place(motion: Motion, executed: BlockPoses, rows: Ints, owner: Ints, moves: Moves) -> tuple[Floats, Floats]:
     """Where on its move each block (K,) begins, and what part of it it is: by length along arcs, else by count."""
     length = np.ones(len(rows))
     on = np.flatnonzero(((moves.arc >= 0) & ~moves.link)[owner[rows]])

@@ -15,15 +15,15 @@ import numpy as np
 from machines.kinematics import columns
 from machines.kinematics.base import Kinematics
 from machines.kinematics.columns import Columns
-from machines.kinematics.jets import Angle, Jet, straight
+from machines.kinematics.taylor import TaylorAngle, TaylorVector, straight
 from machines.straight_blocks import pose_jets
 from postproc.base.group_rows import groups
 from postproc.control.word_arcs import PLANE_AXIS, PLANE_COLUMNS
 from postproc.path.bound import SHORT, axis_reference, curve_parameter, tip_reference
 from postproc.path.model import ARC
-from postproc.readback.comparison.strays import CIRCLE, JOINTS, LINE, TIP, strays
+from postproc.readback.comparison.actual_deviation_bound import CIRCLE, JOINTS, LINE, TIP, strays
 from postproc.readback.execution.execute import Motion
-from postproc.readback.execution.poses import Executed, coordinates, signed_sweep
+from postproc.readback.execution.poses import BlockPoses, coordinates, signed_sweep
 from postproc.reference.moves import Moves
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.rotations import angle_between, cross, lengths
@@ -111,7 +111,7 @@ class _Values:
         return _Values(*changed)
 
 
-def deviation_bound(motion: Motion, executed: Executed, moves: Moves, rows: Ints, owner: Ints, begin: Floats,
+def deviation_bound(motion: Motion, executed: BlockPoses, moves: Moves, rows: Ints, owner: Ints, begin: Floats,
                     share: Floats, allowed: tuple[float, float]) -> DeviationBound:
     """Bounds of the blocks `rows` (K,) from the curves of their moves `owner` (K,).
 
@@ -194,7 +194,7 @@ class _Worst:
         return DeviationBound(tip, axis, tip_row, axis_row, len(without), without)
 
 
-def _whole(motion: Motion, executed: Executed, ends: _Ends, k: Ints) -> list[_Pieces]:
+def _whole(motion: Motion, executed: BlockPoses, ends: _Ends, k: Ints) -> list[_Pieces]:
     """Whole blocks; dog-legs cut at their corners."""
     bent = executed.bent(motion, ends.rows[k])
     pieces = [_Pieces(k[~bent], np.zeros(int((~bent).sum())), np.ones(int((~bent).sum())))]
@@ -207,7 +207,7 @@ def _whole(motion: Motion, executed: Executed, ends: _Ends, k: Ints) -> list[_Pi
     return [p for p in pieces if len(p)]
 
 
-def _values(motion: Motion, executed: Executed, moves: Moves, ends: _Ends, pieces: _Pieces,
+def _values(motion: Motion, executed: BlockPoses, moves: Moves, ends: _Ends, pieces: _Pieces,
             allowed: tuple[float, float]) -> _Values:
     """Deviations and bounds of pieces: from the nearest points of the curves, where that is outside the tolerance from the
     places whose axis fits best among those whose tip is near enough, as `Curves.deviation` has it."""
@@ -219,7 +219,7 @@ def _values(motion: Motion, executed: Executed, moves: Moves, ends: _Ends, piece
     nearest = [curves.project(np.nan_to_num(tip), g) for (tip, _), g in zip(poses, guess, strict=True)]
     off = executed.off_law(motion, rows).any()
     lawful = [executed.lawful(motion, rows, t) for t in places] if off else poses
-    law = _Law.of(motion, executed, rows, pieces, places, lawful)
+    law = _PieceMotion.of(motion, executed, rows, pieces, places, lawful)
     even = law.straight_tip & ~curves.is_arc
     found = _compared(curves, poses, nearest, law, even, even | (curves.length() <= SHORT))
     outside = np.isfinite(found.tip) & (_excess(found, allowed) > 1.0)
@@ -245,7 +245,7 @@ def _best_fit(curves: Curves, tip: Floats, axis: Floats, u: Floats, within: floa
     return np.asarray(np.clip(np.clip(curves.turned(axis, u), u - reach, u + reach), 0.0, 1.0))
 
 
-def _compared(curves: Curves, poses: list[tuple[Floats, Floats]], u: list[Floats], law: _Law, even: Bools,
+def _compared(curves: Curves, poses: list[tuple[Floats, Floats]], u: list[Floats], law: _PieceMotion, even: Bools,
               even_parameter: Bools) -> _Values:
     """Deviations and bounds of N pieces from the poses of their curves at `u`, where they begin, in their middle, where they
     end; `even`: the difference of the tips is straight."""
@@ -268,7 +268,7 @@ def _known(values: Floats) -> Floats:
     return np.where(np.isnan(values), np.inf, values)
 
 
-def _bend(jet: Jet) -> Floats | float:
+def _bend(jet: TaylorVector) -> Floats | float:
     """M of the difference: what its second derivative nowhere exceeds."""
     return jet.bend()
 
@@ -279,19 +279,19 @@ def _angle(chord: Floats) -> Floats:
 
 
 @dataclass(frozen=True)
-class _Law:
+class _PieceMotion:
     """Jets of N pieces by the law of their blocks: tip, axis; `known` where there are any; `straight_tip` where the tip is
     straight and even by the law itself; `strays` (2, N): what the machine may add to it, mm and rad."""
 
-    tip: Jet
-    axis: Jet
+    tip: TaylorVector
+    axis: TaylorVector
     known: Bools
     straight_tip: Bools
     strays: Floats
 
     @classmethod
-    def of(cls, motion: Motion, executed: Executed, rows: Ints, pieces: _Pieces,
-           places: tuple[Floats, Floats, Floats], poses: list[tuple[Floats, Floats]]) -> _Law:
+    def of(cls, motion: Motion, executed: BlockPoses, rows: Ints, pieces: _Pieces,
+           places: tuple[Floats, Floats, Floats], poses: list[tuple[Floats, Floats]]) -> _PieceMotion:
         """By kind: arcs; tip straight and axis standing; straight in joints; tip straight and rotary joints even."""
         n = len(rows)
         third, value = np.zeros((2, n)), np.zeros((2, 3, 3, n))
@@ -313,22 +313,23 @@ class _Law:
                     for d, part in enumerate((jet.value, jet.first, jet.second)):
                         for c in range(3):
                             value[i, d, c, some] = part[c]
-        tip, axis = (Jet(list(value[i, 0]), list(value[i, 1]), list(value[i, 2]), third[i]) for i in range(2))
+        tip, axis = (TaylorVector(list(value[i, 0]), list(value[i, 1]), list(value[i, 2]), third[i]) for i in range(2))
         apart = lengths(value[0, 0].T - poses[1][0])
         off = np.stack(strays(motion, executed, rows, places, law, (poses[0][0], poses[2][0])))
         return cls(tip, axis, known & (apart <= SAME), straight_tip, off)
 
-    def take(self, k: Ints) -> _Law:
+    def take(self, k: Ints) -> _PieceMotion:
         """Some of the pieces."""
         def some(part: Columns) -> list[Floats | float]:
             return [np.broadcast_to(x, self.known.shape)[k] for x in part]
 
-        jets = [Jet(some(jet.value), some(jet.first), some(jet.second), np.broadcast_to(jet.third, self.known.shape)[k])
+        jets = [TaylorVector(some(jet.value), some(jet.first), some(jet.second),
+                             np.broadcast_to(jet.third, self.known.shape)[k])
                 for jet in (self.tip, self.axis)]
-        return _Law(jets[0], jets[1], self.known[k], self.straight_tip[k], self.strays[:, k])
+        return _PieceMotion(jets[0], jets[1], self.known[k], self.straight_tip[k], self.strays[:, k])
 
 
-def _kinds(motion: Motion, executed: Executed, rows: Ints) -> Ints:
+def _kinds(motion: Motion, executed: BlockPoses, rows: Ints) -> Ints:
     """(N,) which law the blocks run under."""
     control = executed.control
     laws = [frame.law for frame in motion.frames]
@@ -342,15 +343,15 @@ def _kinds(motion: Motion, executed: Executed, rows: Ints) -> Ints:
     return np.where(motion.code[rows] == ARC, CIRCLE, kind)
 
 
-def _jets(kind: int, motion: Motion, executed: Executed, rows: Ints, pieces: _Pieces, kin: Kinematics, q0: Floats,
-          q1: Floats, poses: list[tuple[Floats, Floats]]) -> tuple[Jet, Jet] | None:
+def _jets(kind: int, motion: Motion, executed: BlockPoses, rows: Ints, pieces: _Pieces, kin: Kinematics, q0: Floats,
+          q1: Floats, poses: list[tuple[Floats, Floats]]) -> tuple[TaylorVector, TaylorVector] | None:
     """(tip, axis) of pieces of one kind; None where the kinematics gives no bound."""
     (tip0, axis0), _, (tip1, _) = poses
     if kind == CIRCLE:
         return _circle_jets(motion, executed, rows, pieces, tip0, axis0)
     line = straight(list(tip0.T), list(tip1.T))
     if kind == LINE or (kind == TIP and not any(kin.rotary)):
-        return line, Jet(list(axis0.T))
+        return line, TaylorVector(list(axis0.T))
     try:
         tip, axis = pose_jets(kin, q0, q1)
     except TypeError:
@@ -358,8 +359,8 @@ def _jets(kind: int, motion: Motion, executed: Executed, rows: Ints, pieces: _Pi
     return (line, axis) if kind == TIP else (tip, axis)
 
 
-def _circle_jets(motion: Motion, executed: Executed, rows: Ints, pieces: _Pieces, tip0: Floats,
-                 axis0: Floats) -> tuple[Jet, Jet] | None:
+def _circle_jets(motion: Motion, executed: BlockPoses, rows: Ints, pieces: _Pieces, tip0: Floats,
+                 axis0: Floats) -> tuple[TaylorVector, TaylorVector] | None:
     """Arcs and helices: what the words say, seen from the table, where the slides keep lengths and angles."""
     begin, end = coordinates(motion, rows)
     xyz = executed.control.xyz
@@ -389,6 +390,6 @@ def _circle_jets(motion: Motion, executed: Executed, rows: Ints, pieces: _Pieces
     inside = np.einsum("ni,ni->n", first - middle, cross(n_table, last - middle))
     kept &= np.abs(inside - np.einsum("ni,ni->n", points[0] - centre, cross(normal, points[1] - centre))) < 1e-9 * reach**2
     part = Curves(first, last, axis0, axis0, np.ones(n, dtype=bool), middle, n_table, sweep * (pieces.b - pieces.a))
-    jet = tip_reference(part, Angle(np.full(n, 0.5), np.ones(n), np.zeros(n)))
+    jet = tip_reference(part, TaylorAngle(np.full(n, 0.5), np.ones(n), np.zeros(n)))
     lost = np.where(kept, 0.0, np.inf)
-    return Jet(jet.value, jet.first, jet.second, jet.third + lost), Jet(columns.of_rows(axis0))
+    return TaylorVector(jet.value, jet.first, jet.second, jet.third + lost), TaylorVector(columns.of_rows(axis0))

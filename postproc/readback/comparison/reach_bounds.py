@@ -10,14 +10,14 @@ from machines import reach
 from postproc.readback.comparison.checks import CHUNK, ROUNDING_SLACK
 from postproc.readback.comparison.faults import Faults
 from postproc.readback.execution.execute import Motion
-from postproc.readback.execution.poses import Executed
+from postproc.readback.execution.poses import BlockPoses
 from postproc.reference.moves import Moves
 from toolpaths.arrays import Ints
 from toolpaths.diagnostics import Diagnostic
 from toolpaths.units import DEG
 
 
-def check_reach_bounds(motion: Motion, executed: Executed, moves: Moves, owner: Ints, faults: Faults) -> list[Diagnostic]:
+def check_reach_bounds(motion: Motion, executed: BlockPoses, moves: Moves, owner: Ints, faults: Faults) -> list[Diagnostic]:
     """Blocks that end where a rod, a joint or the platform cannot be; nothing for serial machines."""
     kinematics: Any = executed.control.machine.kinematics
     if not reach.is_checked(kinematics):

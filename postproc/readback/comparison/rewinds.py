@@ -11,7 +11,7 @@ import numpy as np
 from postproc.path.links import SafeSpace
 from postproc.readback.comparison.faults import Faults
 from postproc.readback.execution.execute import Motion
-from postproc.readback.execution.poses import Executed
+from postproc.readback.execution.poses import BlockPoses
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.diagnostics import Diagnostic
 
@@ -74,7 +74,7 @@ def _around(k: int, rapid: Bools, tip: Floats, axis: Floats, stops: Floats, angl
     return int(begin[pairs[0, 0]]) + 1, int(end[pairs[0, 1]])
 
 
-def check_rewinds(motion: Motion, executed: Executed, number: Ints, tip: Floats, axis: Floats, space: SafeSpace,
+def check_rewinds(motion: Motion, executed: BlockPoses, number: Ints, tip: Floats, axis: Floats, space: SafeSpace,
                   tolerance: float, axis_grain: float, faults: Faults) -> list[Diagnostic]:
     """Blocks of rewinds stay on the line of the tool axis where they left the cut, or clear of the path.
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from postproc.job.job import Job
-from postproc.readback.comparison.changes import AWAY, lifting
 from postproc.readback.comparison.faults import Faults
+from postproc.readback.comparison.tool_changes import AWAY, lifting
 from postproc.readback.execution.execute import Motion
 from postproc.readback.text.canonical import INCREMENTAL, LAW, Canonical, in_files
 from postproc.readback.text.modal import codes

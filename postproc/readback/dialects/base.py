@@ -17,8 +17,8 @@ from postproc.readback.text.canonical import (
     LOADED,
     STANDS,
     Canonical,
-    LawName,
-    Text,
+    InterpolationModeName,
+    ProgramText,
     added,
     offset_number,
     placed,
@@ -31,7 +31,7 @@ from postproc.reference.coolant import ALL, switched_by
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, has_errors, warning
 
-Program = tuple[Text, Structure]
+ParsedProgram = tuple[ProgramText, Structure]
 UNITS_UNSTATED = "gcode.units_unstated"
 STOPS = (0.0, 1.0)
 """M codes of stops"""
@@ -68,8 +68,9 @@ class Reader(ABC):
         "motion": "G0 or G1", "plane": "G17, G18 or G19", "distance": "G90 or G91", "feed_mode": "G93, G94 or G95",
         "compensation": "G40", "length": "G49, or G43 with H", "level": "G98 or G99",
         "offset": "the work offset (G54 ...)"}
-    leaving: ClassVar[dict[LawName, tuple[str, ...]]] = {}
-    modes_named: ClassVar[dict[LawName, str]] = {"tcp": "the tool-centre-point mode", "tilted": "the tilted plane"}
+    leaving: ClassVar[dict[InterpolationModeName, tuple[str, ...]]] = {}
+    modes_named: ClassVar[dict[InterpolationModeName, str]] = {"tcp": "the tool-centre-point mode",
+                                                               "tilted": "the tilted plane"}
 
     def __init__(self, axes: tuple[str, ...], controller: ControllerFile | None = None, home: Floats | None = None,
                  stop: str = "") -> None:
@@ -81,15 +82,15 @@ class Reader(ABC):
         """(bits on, bits off) by M number, see `postproc.reference.coolant`"""
 
     @abstractmethod
-    def tokens(self, data: bytes, file: str) -> tuple[Text, list[Diagnostic]]:
+    def tokens(self, data: bytes, file: str) -> tuple[ProgramText, list[Diagnostic]]:
         """The words of one file."""
 
     @abstractmethod
-    def structure(self, text: Text, file: str) -> tuple[Structure, list[Diagnostic]]:
+    def structure(self, text: ProgramText, file: str) -> tuple[Structure, list[Diagnostic]]:
         """Its programs, and what they call."""
 
     @abstractmethod
-    def canonical(self, text: Text, line: Ints, file: str) -> tuple[Canonical, list[Diagnostic]]:
+    def canonical(self, text: ProgramText, line: Ints, file: str) -> tuple[Canonical, list[Diagnostic]]:
         """Canonical words of blocks that stand in running order."""
 
     def offset_of(self, text: str) -> float:
@@ -113,7 +114,7 @@ class Reader(ABC):
         """A program, with the files of its subprograms by name, as canonical words; None where it cannot be read."""
         self.main_file = file
         found: list[Diagnostic] = []
-        programs: dict[str, Program] = {}
+        programs: dict[str, ParsedProgram] = {}
         waiting: dict[str, bytes | str] = {file: data}
         others = others or {}
         stems = {PurePath(name).stem.upper(): name for name in others}
@@ -136,7 +137,7 @@ class Reader(ABC):
         last = [*self.units(code, file), *negative_smoothing(code, file), *last]
         return replace(code, files=files), [*found, *more, *placed(last, files)]
 
-    def translated(self, text: Text, line: Ints, file: str) -> tuple[Canonical, list[Diagnostic]]:
+    def translated(self, text: ProgramText, line: Ints, file: str) -> tuple[Canonical, list[Diagnostic]]:
         """Canonical words of blocks in running order, with what turns and flows behind stops."""
         code, found = self.canonical(text, line, file)
         return replace(code, words=self.cooled(self.stopped(code.words))), found
@@ -174,7 +175,7 @@ class Reader(ABC):
                        f"{self.units_from}", file=file, lines=[line], count=count,
                        hint=f"state {self.units_codes} before the first of them")
 
-    def program(self, data: bytes, name: str) -> tuple[Program | None, list[Diagnostic]]:
+    def program(self, data: bytes, name: str) -> tuple[ParsedProgram | None, list[Diagnostic]]:
         """Words and programs of one file; None where its text cannot be read."""
         text, found = self.tokens(data, name)
         del data
@@ -182,7 +183,7 @@ class Reader(ABC):
         if has_errors(found):
             return None, found
         if self.controller is not None:
-            text = Text(drop_passive(text.words, self.controller.program.passive), text.statements)
+            text = ProgramText(drop_passive(text.words, self.controller.program.passive), text.statements)
         structure, more = self.structure(text, name)
         found += [*more, *self.check(text.words, name)]
         if name == self.main_file:
@@ -212,6 +213,6 @@ def _behind_stops(words: Words) -> list[int]:
     return [int(b) + 1 for b in np.unique(codes(words, "M", STOPS)[0]) if b < words.lines]
 
 
-def whole(text: Text) -> Structure:
+def whole(text: ProgramText) -> Structure:
     """A file that is one program without subprograms."""
     return Structure((1, text.words.lines))

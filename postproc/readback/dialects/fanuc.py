@@ -17,10 +17,20 @@ import numpy as np
 
 from postproc.readback.dialects.base import M_CODES, Reader
 from postproc.readback.dialects.iso import IsoReader, New, motion_of
-from postproc.readback.text.canonical import LAW, OFFSET, REGISTER, SMOOTH, Canonical, Law, LawName, Text, offset_number
+from postproc.readback.text.canonical import (
+    LAW,
+    OFFSET,
+    REGISTER,
+    SMOOTH,
+    Canonical,
+    InterpolationModeName,
+    ProgramText,
+    WordMeaning,
+    offset_number,
+)
+from postproc.readback.text.euler_angles import turned
 from postproc.readback.text.flow import Call, Structure
 from postproc.readback.text.modal import CYCLES, GROUPS, Groups, codes, number_of
-from postproc.readback.text.turns import turned
 from postproc.readback.text.words import Words, tokenise
 from toolpaths.arrays import Bools, Ints
 from toolpaths.diagnostics import Diagnostic, error
@@ -39,7 +49,7 @@ class FanucReader(IsoReader):
     letters = "GMFSTHDNIJKRPQLO"
     rises_first = False
     stating = Reader.stating
-    leaving: ClassVar[dict[LawName, tuple[str, ...]]] = {"tilted": ("G69",)}
+    leaving: ClassVar[dict[InterpolationModeName, tuple[str, ...]]] = {"tilted": ("G69",)}
     laws: ClassVar[tuple[float, ...]] = _LAWS
     tcp_code = 43.4
     extended_offset = 54.1
@@ -47,12 +57,12 @@ class FanucReader(IsoReader):
     units_from = "the program before left them, also over power off"
     smoothing_hint = "G05.1 Q1 as the post writes it, or G61"
 
-    def tokens(self, data: bytes, file: str) -> tuple[Text, list[Diagnostic]]:
+    def tokens(self, data: bytes, file: str) -> tuple[ProgramText, list[Diagnostic]]:
         """The words of one file, program numbers among them."""
         words, found = tokenise(data, file)
-        return Text(words), found
+        return ProgramText(words), found
 
-    def structure(self, text: Text, file: str) -> tuple[Structure, list[Diagnostic]]:
+    def structure(self, text: ProgramText, file: str) -> tuple[Structure, list[Diagnostic]]:
         """Programs begin at O numbers and return at M99; M98 P runs one, L times."""
         words = text.words
         starts, numbers = words.pick("O")
@@ -88,9 +98,9 @@ class FanucReader(IsoReader):
             result[b] = Call(b, f"O{number}", times)
         return result
 
-    def canonical(self, text: Text, line: Ints, file: str) -> tuple[Canonical, list[Diagnostic]]:
+    def canonical(self, text: ProgramText, line: Ints, file: str) -> tuple[Canonical, list[Diagnostic]]:
         """Canonical words; laws in order."""
-        self.held: list[Law] = []
+        self.held: list[WordMeaning] = []
         code, found = super().canonical(text, line, file)
         return Canonical(code.words, line, tuple(self.held)), found
 
@@ -202,14 +212,14 @@ class FanucReader(IsoReader):
                 length = float(np.nan_to_num(register[here], nan=-1.0))
                 new.append((here, REGISTER, length))
             if c == self.tcp_code:
-                state = self.hold(new, here, Law("tcp", code), "tcp")
+                state = self.hold(new, here, WordMeaning("tcp", code), "tcp")
             elif c == 49:
                 length = -1.0
-                state = self.hold(new, here, Law("axes", code), "axes") if state == "tcp" else state
+                state = self.hold(new, here, WordMeaning("axes", code), "axes") if state == "tcp" else state
             elif c in (69, 255):
-                state = self.hold(new, here, Law("axes", code), "axes")
+                state = self.hold(new, here, WordMeaning("axes", code), "axes")
             elif c == 254:
-                state = self.hold(new, here, Law("tilted", code), "tilted")
+                state = self.hold(new, here, WordMeaning("tilted", code), "tilted")
             elif c == 68.2:
                 plane, state, begun = self.plane(words, drop, here, line, file, found), "pending", here
             elif c == 53.1:
@@ -228,20 +238,20 @@ class FanucReader(IsoReader):
             return "while a length offset is in force"
         return "between G68.2 and G53.1" if state == "pending" and code != 69 else ""
 
-    def hold(self, new: New, b: int, law: Law, state: str) -> str:
+    def hold(self, new: New, b: int, law: WordMeaning, state: str) -> str:
         """The law in force from block b on."""
         new.append((b, LAW, float(len(self.held))))
         self.held.append(law)
         return state
 
-    def plane(self, words: Words, drop: Bools, b: int, line: Ints, file: str, found: list[Diagnostic]) -> Law:
+    def plane(self, words: Words, drop: Bools, b: int, line: Ints, file: str, found: list[Diagnostic]) -> WordMeaning:
         """G68.2 X Y Z I J K: zero of the plane, Euler angles."""
         stated = take(words, drop, b, "XYZIJKPQR")
         if set(stated) & set("PQR"):
             found.append(error("gcode.mode", "G68.2 by other than Euler angles is not executed by this reader", file=file,
                                lines=[int(line[b])], hint="G68.2 X Y Z I J K"))
         shift = np.array([stated.get(a, 0.0) for a in "XYZ"])
-        return Law("tilted", "G68.2", turned("ZXZ", [stated.get(a, 0.0) for a in "IJK"]), shift)
+        return WordMeaning("tilted", "G68.2", turned("ZXZ", [stated.get(a, 0.0) for a in "IJK"]), shift)
 
     def unmoved(self, words: Words, first: int, last: int, line: Ints, file: str, found: list[Diagnostic]) -> None:
         """Nothing moves between the plane and the tool's alignment; G53.1 P picks another solution."""

@@ -14,7 +14,7 @@ from typing import ClassVar
 from postproc.readback.dialects.base import M_CODES
 from postproc.readback.dialects.fanuc import MILLISECONDS, FanucReader, block, take
 from postproc.readback.dialects.iso import New
-from postproc.readback.text.canonical import SMOOTH, LawName, Text
+from postproc.readback.text.canonical import SMOOTH, InterpolationModeName, ProgramText
 from postproc.readback.text.flow import Call, Structure
 from postproc.readback.text.modal import GROUPS, Groups, codes
 from postproc.readback.text.words import Words
@@ -31,7 +31,7 @@ class HaasReader(FanucReader):
     m_codes = (*M_CODES, 97.0, 98.0, 99.0)
     letters = "GMFSTHDNIJKRPQLOE"
     laws = (43.0, 49.0, 234.0, 254.0, 255.0)
-    leaving: ClassVar[dict[LawName, tuple[str, ...]]] = {"tilted": ("G255",)}
+    leaving: ClassVar[dict[InterpolationModeName, tuple[str, ...]]] = {"tilted": ("G255",)}
     tcp_code = 234.0
     extended_offset = 154.0
     arc_slack = 0.01
@@ -50,7 +50,7 @@ class HaasReader(FanucReader):
         point = words.point is not None and bool(words.point[k])
         return float(words.value[k]) * (1.0 if point else MILLISECONDS)
 
-    def structure(self, text: Text, file: str) -> tuple[Structure, list[Diagnostic]]:
+    def structure(self, text: ProgramText, file: str) -> tuple[Structure, list[Diagnostic]]:
         """Besides programs, what M97 runs: from its N to the next M99."""
         structure, found = super().structure(text, file)
         lines, numbers = text.words.pick("N")

@@ -14,7 +14,7 @@ from postproc.readback.text.canonical import (
     SMOOTH,
     TURNS,
     Canonical,
-    Text,
+    ProgramText,
     added,
 )
 from postproc.readback.text.flow import Structure
@@ -36,16 +36,16 @@ class IsoReader(Reader):
     millimetres = 25.4
     """mm of smoothing per unit under G20"""
 
-    def tokens(self, data: bytes, file: str) -> tuple[Text, list[Diagnostic]]:
+    def tokens(self, data: bytes, file: str) -> tuple[ProgramText, list[Diagnostic]]:
         """The words of one file; O numbers name it and do nothing."""
         words, found = tokenise(data, file)
-        return Text(words.take(words.letter != ord("O"))), found
+        return ProgramText(words.take(words.letter != ord("O"))), found
 
-    def structure(self, text: Text, file: str) -> tuple[Structure, list[Diagnostic]]:
+    def structure(self, text: ProgramText, file: str) -> tuple[Structure, list[Diagnostic]]:
         """One program."""
         return whole(text), []
 
-    def canonical(self, text: Text, line: Ints, file: str) -> tuple[Canonical, list[Diagnostic]]:
+    def canonical(self, text: ProgramText, line: Ints, file: str) -> tuple[Canonical, list[Diagnostic]]:
         """Canonical words."""
         words, found = text.words, list[Diagnostic]()
         new: New = []

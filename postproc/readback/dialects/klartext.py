@@ -16,8 +16,15 @@ import numpy as np
 
 from postproc.readback.dialects.base import M_CODES, Reader
 from postproc.readback.dialects.iso import New
-from postproc.readback.dialects.klartext_run import Run
-from postproc.readback.text.canonical import STATEMENT, Canonical, LawName, Statement, Text, added
+from postproc.readback.dialects.klartext_run import KlartextRun
+from postproc.readback.text.canonical import (
+    STATEMENT,
+    Canonical,
+    DialectStatement,
+    InterpolationModeName,
+    ProgramText,
+    added,
+)
 from postproc.readback.text.flow import Call, Structure
 from postproc.readback.text.modal import GROUPS, Groups
 from postproc.readback.text.words import Words, block_delete, lines_of, read_words
@@ -55,11 +62,12 @@ class KlartextReader(Reader):
 
     stating: ClassVar[dict[str, str]] = {
         "compensation": "R0", "offset": "the preset (CYCL DEF 247)", "length": "a tool (TOOL CALL)"}
-    leaving: ClassVar[dict[LawName, tuple[str, ...]]] = {"tcp": ("FUNCTION RESET TCPM", "M129"), "tilted": ("PLANE RESET",)}
+    leaving: ClassVar[dict[InterpolationModeName, tuple[str, ...]]] = {"tcp": ("FUNCTION RESET TCPM", "M129"),
+                                                                       "tilted": ("PLANE RESET",)}
     units_codes = "BEGIN PGM ... MM"
     units_from = "nobody knows: the control takes no program without"
 
-    def tokens(self, data: bytes, file: str) -> tuple[Text, list[Diagnostic]]:
+    def tokens(self, data: bytes, file: str) -> tuple[ProgramText, list[Diagnostic]]:
         """Words of L blocks; statements of the others."""
         text = lines_of(data).upper()
         text = _COMMENT.sub(lambda m: b"~" if m[0].rstrip().endswith(b"~") else b"", text)
@@ -77,15 +85,15 @@ class KlartextReader(Reader):
             fast = fast.replace(old, short)
         words, more = read_words(fast, file)
         new: New = []
-        statements: list[Statement] = []
+        statements: list[DialectStatement] = []
         for start, row in slow:
             more += self._statement(row, int(np.searchsorted(ends, start)) + 1, new, statements, file)
         words = added(Words(words.letter, words.value, words.line, words.lines), new)
         if rows is not None:
             words, more = _in_file(words, rows), [_moved(d, rows) for d in more]
-        return Text(words, tuple(statements)), found + more
+        return ProgramText(words, tuple(statements)), found + more
 
-    def _statement(self, row: str, line: int, new: New, statements: list[Statement], file: str) -> list[Diagnostic]:
+    def _statement(self, row: str, line: int, new: New, statements: list[DialectStatement], file: str) -> list[Diagnostic]:
         """One block that is no plain L."""
         body = re.sub(r"^\s*\d+\s+", "", row.strip() + " ").strip() if not row.strip().isdigit() else ""
         if not body or body.startswith(_PASSIVE):
@@ -107,7 +115,7 @@ class KlartextReader(Reader):
         letter = np.where(plain.letter >= 97, plain.letter - 32, plain.letter).astype(np.uint8)
         return super().check(Words(letter, plain.value, plain.line, plain.lines), file)
 
-    def structure(self, text: Text, file: str) -> tuple[Structure, list[Diagnostic]]:
+    def structure(self, text: ProgramText, file: str) -> tuple[Structure, list[Diagnostic]]:
         """LBL to LBL 0 are subprograms, also where they are run in passing; CALL LBL REP repeats what stands before."""
         where, index = text.words.pick(STATEMENT)
         here = [(int(b), text.statements[int(k)]) for b, k in zip(where, index, strict=True)]
@@ -156,13 +164,13 @@ class KlartextReader(Reader):
         ends = tuple((b, b) for b in self.ends)
         return ends + tuple(v for k, v in structure.subprograms.items() if k.startswith("LBL"))
 
-    def canonical(self, text: Text, line: Ints, file: str) -> tuple[Canonical, list[Diagnostic]]:
+    def canonical(self, text: ProgramText, line: Ints, file: str) -> tuple[Canonical, list[Diagnostic]]:
         """Canonical words."""
-        run = Run(text, line, file, self.axes)
+        run = KlartextRun(text, line, file, self.axes)
         return run.canonical(), run.found
 
 
-def _frame(here: list[tuple[int, Statement]], file: str, lines: int) -> list[Diagnostic]:
+def _frame(here: list[tuple[int, DialectStatement]], file: str, lines: int) -> list[Diagnostic]:
     names = [s.args[0] for _, s in here if s.name in ("BEGIN PGM", "END PGM")]
     if len(names) == 2 and names[0] == names[1]:
         return []
@@ -180,36 +188,37 @@ def _moved(d: Diagnostic, rows: Ints) -> Diagnostic:
     return replace(d, lines=tuple(int(rows[n - 1]) + 1 for n in d.lines))
 
 
-def _named(body: str) -> Statement | None:
+def _named(body: str) -> DialectStatement | None:
     """Blocks that begin with a name; None where it is none of these."""
     keys = {f"Q{n}": float(v) for n, v in _QWORD.findall(body)}
     if match := re.fullmatch(r"(BEGIN|END) PGM (\S+)\s*(MM|INCH)?", body):
-        return Statement(f"{match[1]} PGM", (match[2], match[3]))
+        return DialectStatement(f"{match[1]} PGM", (match[2], match[3]))
     if match := re.fullmatch(rf"TOOL CALL(?: (\d+))?(?: ([XYZ]))?((?: (?:S|F|DL|DR|DR2) ?=? ?{_NUMBER})*)", body):
-        return Statement("TOOL CALL", (float(match[1]) if match[1] else None, match[2]), _keyed(match[3]))
+        return DialectStatement("TOOL CALL", (float(match[1]) if match[1] else None, match[2]), _keyed(match[3]))
     if match := re.fullmatch(r"CYCL DEF (\d+)(?:\.(\d+))?\b(.*)", body):
         if match[2] is None and not re.fullmatch(rf"[^=]*?(?:\s*Q\d+\s*=\s*{_NUMBER}\s*)*", match[3]):
             return None
         values = keys if match[2] is None else _keyed(match[3])
-        return Statement("CYCL DEF", (float(match[1]), float(match[2]) if match[2] else None, match[3].strip()), values)
+        return DialectStatement("CYCL DEF", (float(match[1]), float(match[2]) if match[2] else None, match[3].strip()),
+                                values)
     if match := re.fullmatch(r"CYCL CALL(?: POS)?(.*)", body):
-        return Statement("CYCL CALL" + (" POS" if " POS" in body else ""), (match[1].replace("POS", "").strip(),))
+        return DialectStatement("CYCL CALL" + (" POS" if " POS" in body else ""), (match[1].replace("POS", "").strip(),))
     if match := re.fullmatch(r"LBL \"?([^\"]+?)\"?", body):
-        return Statement("LBL", (match[1],))
+        return DialectStatement("LBL", (match[1],))
     if match := re.fullmatch(r"CALL LBL \"?([^\"\s]+)\"?(?: REP ?(\d+))?", body):
-        return Statement("CALL LBL", (match[1],), {"REP": float(match[2] or 0.0)})
+        return DialectStatement("CALL LBL", (match[1],), {"REP": float(match[2] or 0.0)})
     if match := re.fullmatch(r"CALL PGM (\S+)", body):
-        return Statement("CALL PGM", (PurePath(match[1].replace("\\", "/")).stem,))
+        return DialectStatement("CALL PGM", (PurePath(match[1].replace("\\", "/")).stem,))
     if match := re.fullmatch(r"(PLANE SPATIAL|PLANE RESET|FUNCTION TCPM|FUNCTION RESET TCPM)\b(.*)", body):
-        return Statement(match[1], tuple(match[2].split()), _keyed(match[2]))
-    return Statement("STOP", (body[4:].strip(),)) if re.fullmatch(r"STOP(?: M0?[01])?", body) else None
+        return DialectStatement(match[1], tuple(match[2].split()), _keyed(match[2]))
+    return DialectStatement("STOP", (body[4:].strip(),)) if re.fullmatch(r"STOP(?: M0?[01])?", body) else None
 
 
 def _keyed(text: str) -> dict[str, float]:
     return {k.strip(": ="): float(v) for k, v in _KEYED.findall(text.replace("=", " "))}
 
 
-def _contour(body: str, line: int, new: New) -> Statement | None:
+def _contour(body: str, line: int, new: New) -> DialectStatement | None:
     """CC, C, CR, CP, LP and L blocks, and blocks of M functions alone: their words, and the statement that is left."""
     name = next((n for n in _CONTOURS if re.match(rf"{n}(?![A-Z])", body)), "")
     at, keys, sense, after = len(name), {}, 0.0, ""
@@ -241,4 +250,4 @@ def _contour(body: str, line: int, new: New) -> Statement | None:
     if name in ("L", "LP"):
         made.insert(0, (line, "G", 1.0))
     new += made
-    return Statement("" if name in ("L", "") else name, (sense,), keys)
+    return DialectStatement("" if name in ("L", "") else name, (sense,), keys)

@@ -86,8 +86,8 @@ def _universal(q: Q, speed: float) -> Made:
     if 0.0 < breaks < len(bottoms) - 1:
         return None, "with fewer breaks (Q213) than pecks is not executed by this reader"
     style, relief = ("break", q.get("Q256", APPROACH)) if breaks else ("peck", APPROACH)
-    return Drill(plane, bottom, out, bottoms, style, relief, q.get("Q211", 0.0), _feed(q.get("Q206", 0.0)),  # type: ignore[arg-type]
-                 _feed(q.get("Q208", 0.0))), ""
+    return Drill(plane, bottom, out, bottoms, style, relief, q.get("Q211", 0.0),  # type: ignore[arg-type]
+                 _feed(q.get("Q206", 0.0)), _feed(q.get("Q208", 0.0))), ""
 
 
 def _deep(q: Q, speed: float) -> Made:

@@ -9,7 +9,7 @@ import numpy as np
 
 from postproc.readback.dialects.iso import New
 from postproc.readback.dialects.klartext_cycles import drill_of
-from postproc.readback.dialects.track import Track
+from postproc.readback.dialects.track import AxisPositions
 from postproc.readback.text.canonical import (
     CALL,
     LAW,
@@ -21,14 +21,14 @@ from postproc.readback.text.canonical import (
     STATEMENT,
     TURNS,
     Canonical,
+    DialectStatement,
     Drill,
-    Law,
-    Statement,
-    Text,
+    ProgramText,
+    WordMeaning,
     added,
 )
+from postproc.readback.text.euler_angles import turned
 from postproc.readback.text.modal import GROUPS, codes, fill, number_of
-from postproc.readback.text.turns import turned
 from toolpaths.arrays import Ints
 from toolpaths.diagnostics import Diagnostic, error
 
@@ -40,17 +40,17 @@ _UNCOMPENSATED = {"PLANE SPATIAL", "PLANE RESET", "FUNCTION TCPM", "FUNCTION RES
 _PLANE = {"TURN", "MOVE", "STAY", "FMAX", "F", "MAX", "TABLE", "COORD", "ROT", "SYM+", "SYM-", "SEQ+", "SEQ-"}
 
 
-class Run:
+class KlartextRun:
     """One pass over the statements; what it puts in force goes into `new` words."""
 
-    def __init__(self, text: Text, line: Ints, file: str, axes: tuple[str, ...]) -> None:
+    def __init__(self, text: ProgramText, line: Ints, file: str, axes: tuple[str, ...]) -> None:
         self.text, self.words, self.line, self.file, self.axes = text, text.words, line, file, axes
         self.new: New = []
         self.found: list[Diagnostic] = []
-        self.laws: list[Law] = []
+        self.laws: list[WordMeaning] = []
         self.drills: list[Drill] = []
         self.pole: dict[str, float] = {}
-        self.track = Track(text.words)
+        self.track = AxisPositions(text.words)
         self.state, self.cycle = "axes", -1
         self.speed = np.array(number_of(text.words, "S"))
         self.side = fill(*codes(text.words, "G", GROUPS["compensation"]), text.words.lines, 40.0)
@@ -66,11 +66,12 @@ class Run:
         words = self.words
         where, index = words.pick(STATEMENT)
         events = [(int(b), 0, self.text.statements[int(k)]) for b, k in zip(where, index, strict=True)]
-        events += [(int(b), 1, Statement(f"M{int(m)}")) for b, m in zip(*codes(words, "M", (91, 99, 128, 129)), strict=True)]
+        events += [(int(b), 1, DialectStatement(f"M{int(m)}")) for b,
+                   m in zip(*codes(words, "M", (91, 99, 128, 129)), strict=True)]
         for b, _, s in sorted(events, key=lambda e: e[:2]):
             self.in_order(b, s)
             self.one(b, s)
-        self.in_order(words.lines, Statement(""))
+        self.in_order(words.lines, DialectStatement(""))
         both = {13.0: (3.0, 8.0), 14.0: (4.0, 8.0)}
         for b, m in zip(*codes(words, "M", (13, 14)), strict=True):
             self.new += [(int(b), "M", v) for v in both[float(m)]]
@@ -78,7 +79,7 @@ class Run:
                                                                                                 128, 129)))
         return Canonical(added(words, self.new, drop), self.line, tuple(self.laws), tuple(self.drills))
 
-    def one(self, b: int, s: Statement) -> None:
+    def one(self, b: int, s: DialectStatement) -> None:
         """One statement of block b."""
         steps = {"CC": self.centre, "C": self.circle, "CR": self.radius, "CP": self.polar_arc, "LP": self.polar_line,
                  "TOOL CALL": self.tool, "CYCL DEF": self.define, "CYCL CALL": self.call, "M99": self.call,
@@ -89,15 +90,15 @@ class Run:
             self.new.append((b, "G", 53.0))
             self.track.lost(b, "XYZ")
         elif s.name == "M128":
-            self.enter(b, "tcp", Law("tcp", s.name))
+            self.enter(b, "tcp", WordMeaning("tcp", s.name))
         elif s.name in ("M129", "FUNCTION RESET TCPM"):
-            self.enter(b, "axes" if self.state == "tcp" else self.state, Law("axes", s.name))
+            self.enter(b, "axes" if self.state == "tcp" else self.state, WordMeaning("axes", s.name))
         elif s.name == "PLANE RESET":
             self.reset(b, s)
         elif s.name == "STOP":
             self.new.append((b, "M", 0.0))
 
-    def in_order(self, b: int, s: Statement) -> None:
+    def in_order(self, b: int, s: DialectStatement) -> None:
         """Parts of cycles 9 and 32 stand one behind the other, and none of these while radius compensation is on."""
         number, part = (s.number(0), s.number(1)) if s.name == "CYCL DEF" else (math.nan, math.nan)
         if self.waiting is not None and ((number, part) != (self.waiting[1], 1.0) or self.between(self.waiting[0], b)):
@@ -136,7 +137,7 @@ class Run:
                 result[key[1:]] = here + value
         return result
 
-    def centre(self, b: int, s: Statement) -> None:
+    def centre(self, b: int, s: DialectStatement) -> None:
         """CC: the pole; without coordinates the last position."""
         keys = s.keys or {"IX": 0.0, "IY": 0.0}
         pole = self.place(b, keys)
@@ -149,7 +150,7 @@ class Run:
             return
         self.pole = pole
 
-    def circle(self, b: int, s: Statement) -> None:
+    def circle(self, b: int, s: DialectStatement) -> None:
         """C: from where the tool is to X, Y about the pole, a full circle where both are one."""
         end = self.place(b, s.keys)
         if end is None or not self.about_pole(b, s):
@@ -159,7 +160,7 @@ class Run:
             return
         self.states(b, end)
 
-    def about_pole(self, b: int, s: Statement) -> bool:
+    def about_pole(self, b: int, s: DialectStatement) -> bool:
         """The codes of an arc about the pole."""
         sense = s.number(0, 0.0)
         if not self.pole or sense == 0.0:
@@ -175,7 +176,7 @@ class Run:
             self.new.append((b, letter, value))
             self.track.put(b, letter, value)
 
-    def radius(self, b: int, s: Statement) -> None:
+    def radius(self, b: int, s: DialectStatement) -> None:
         """CR: X, Y, R, DR."""
         end = self.place(b, {k: v for k, v in s.keys.items() if k != "R"})
         sense = s.number(0, 0.0)
@@ -198,7 +199,7 @@ class Run:
         x, y = float(here[0] or 0.0) - self.pole["X"], float(here[1] or 0.0) - self.pole["Y"]
         return math.hypot(x, y), math.degrees(math.atan2(y, x))
 
-    def polar_arc(self, b: int, s: Statement) -> None:
+    def polar_arc(self, b: int, s: DialectStatement) -> None:
         """CP: about the pole to PA, or by IPA, which may be more than a turn; Z besides makes a helix."""
         now, sense = self.polar(b), s.number(0, 0.0)
         rise = self.place(b, {k: v for k, v in s.keys.items() if k not in ("PA", "IPA")})
@@ -214,7 +215,7 @@ class Run:
                         "Y": self.pole["Y"] + now[0] * math.sin(math.radians(turn)), **rise})
         self.new.append((b, TURNS, float(math.ceil(abs(angle) / 360.0 - 1e-9) - 1)))
 
-    def polar_line(self, b: int, s: Statement) -> None:
+    def polar_line(self, b: int, s: DialectStatement) -> None:
         """LP: straight to PR, PA."""
         now = self.polar(b) if {"IPR", "IPA"} & set(s.keys) or len({"PR", "PA"} & set(s.keys)) < 2 else (0.0, 0.0)
         rest = self.place(b, {k: v for k, v in s.keys.items() if k not in ("PR", "PA", "IPR", "IPA")})
@@ -229,7 +230,7 @@ class Run:
 
     # ---- tools and cycles ---------------------------------------------------------------------------------------
 
-    def tool(self, b: int, s: Statement) -> None:
+    def tool(self, b: int, s: DialectStatement) -> None:
         """TOOL CALL n Z S: the tool, its length and its speed; without n the speed alone."""
         number = s.number(0)
         if s.args[1] not in (None, "Z") or any(s.keys.get(k, 0.0) != 0.0 for k in ("DL", "DR", "DR2")):
@@ -240,7 +241,7 @@ class Run:
         if not math.isnan(number):
             self.new += [(b, LOADED, number), (b, REGISTER, number)]
 
-    def define(self, b: int, s: Statement) -> None:
+    def define(self, b: int, s: DialectStatement) -> None:
         """CYCL DEF: what holds from here on, or a cycle to be called."""
         number, part = s.number(0), s.number(1)
         if number == 247.0:
@@ -264,7 +265,7 @@ class Run:
             self.drills.append(drill)
             self.cycle = len(self.drills) - 1
 
-    def call(self, b: int, s: Statement) -> None:
+    def call(self, b: int, s: DialectStatement) -> None:
         """M99, CYCL CALL, CYCL CALL POS X Y Z+0 F: the cycle defined last."""
         if self.cycle < 0:
             self.fault("gcode.cycle", b, f"{s.name} without a cycle", "CYCL DEF before it")
@@ -284,7 +285,7 @@ class Run:
 
     # ---- laws ---------------------------------------------------------------------------------------------------
 
-    def enter(self, b: int, state: str, law: Law) -> None:
+    def enter(self, b: int, state: str, law: WordMeaning) -> None:
         """A law in force from block b on."""
         if state != "axes" and self.state != "axes" and law.name != "axes":
             self.fault("gcode.mode", b, f"{law.code} while another mode is on", "leave the mode that is on first")
@@ -296,14 +297,14 @@ class Run:
         self.new.append((b, LAW, float(len(self.laws))))
         self.laws.append(law)
 
-    def tcpm(self, b: int, s: Statement) -> None:
+    def tcpm(self, b: int, s: DialectStatement) -> None:
         """FUNCTION TCPM F TCP AXIS POS PATHCTRL AXIS: F at the tip, rotary positions linear."""
         strange = set(s.args) - _TCPM
         if strange or s.args[:4] != ("F", "TCP", "AXIS", "POS") or s.args[4:6] != ("PATHCTRL", "AXIS"):
             self.fault("gcode.mode", b, "FUNCTION TCPM of another kind", "FUNCTION TCPM F TCP AXIS POS PATHCTRL AXIS")
-        self.enter(b, "tcp", Law("tcp", s.name))
+        self.enter(b, "tcp", WordMeaning("tcp", s.name))
 
-    def plane(self, b: int, s: Statement) -> None:
+    def plane(self, b: int, s: DialectStatement) -> None:
         """PLANE SPATIAL SPA SPB SPC."""
         strange = {str(a) for a in s.args if not re.match(r"(SP[ABC]|DIST|ABST|F)[-+]?\d", str(a))} - _PLANE
         if strange or not {"SPA", "SPB", "SPC"} <= set(s.keys) or s.keys.get("DIST", 0.0) != 0.0:
@@ -312,12 +313,12 @@ class Run:
             return
         rotation = turned("XYZ", [s.keys[k] for k in ("SPA", "SPB", "SPC")], fixed=True)
         asked = next((str(a)[3:] for a in s.args if str(a)[:3] in ("SYM", "SEQ")), "nearest")
-        self.enter(b, "tilted", Law("tilted", s.name, rotation, choice=asked))  # type: ignore[arg-type]
+        self.enter(b, "tilted", WordMeaning("tilted", s.name, rotation, choice=asked))  # type: ignore[arg-type]
 
-    def reset(self, b: int, s: Statement) -> None:
+    def reset(self, b: int, s: DialectStatement) -> None:
         """PLANE RESET STAY: the rotary axes stand."""
         if s.args != ("STAY",):
             self.fault("gcode.mode", b, "PLANE RESET that may move the rotary axes", "PLANE RESET STAY")
-        self.enter(b, "tcp" if self.state == "tcp" else "axes", Law("axes", s.name))
+        self.enter(b, "tcp" if self.state == "tcp" else "axes", WordMeaning("axes", s.name))
 
 

@@ -18,7 +18,7 @@ import numpy as np
 from postproc.readback.dialects.base import M_CODES, Reader, as_bytes
 from postproc.readback.dialects.iso import New, relative_words
 from postproc.readback.dialects.siemens_cycles import CYCLES
-from postproc.readback.dialects.siemens_run import LENGTH_AXIS, Run
+from postproc.readback.dialects.siemens_run import LENGTH_AXIS, SiemensRun
 from postproc.readback.text.canonical import (
     LOADED,
     OFFSET,
@@ -29,9 +29,9 @@ from postproc.readback.text.canonical import (
     TURNS,
     UNSTATED,
     Canonical,
-    LawName,
-    Statement,
-    Text,
+    DialectStatement,
+    InterpolationModeName,
+    ProgramText,
     added,
 )
 from postproc.readback.text.flow import Call, Structure
@@ -68,7 +68,7 @@ class SiemensReader(Reader):
     m_codes = (*M_CODES, 17.0)
     letters = "GMFSTDNIJKRLP?~"
     stating = {k: v for k, v in Reader.stating.items() if k != "level"} | {"length": "D, or a tool"}
-    leaving: ClassVar[dict[LawName, tuple[str, ...]]] = {"tcp": ("TRAFOOF",), "tilted": ("CYCLE800",)}
+    leaving: ClassVar[dict[InterpolationModeName, tuple[str, ...]]] = {"tcp": ("TRAFOOF",), "tilted": ("CYCLE800",)}
     units_codes = "G70, G71, G700 or G710"
     units_from = "machine data 20150 and 20152 have the reset position of group 13"
     smoothing_hint = "CYCLE832 as the post writes it, or G60"
@@ -82,7 +82,7 @@ class SiemensReader(Reader):
         self.names |= {m[1].decode() for m in _PROGRAM.finditer(as_bytes(data).upper())}
         return super().read(data, file, others)
 
-    def tokens(self, data: bytes, file: str) -> tuple[Text, list[Diagnostic]]:
+    def tokens(self, data: bytes, file: str) -> tuple[ProgramText, list[Diagnostic]]:
         """Blocks of plain words at once; those with names, calls and = one by one."""
         text = _COMMENT.sub(lambda m: m[1] or b"", lines_of(data)).upper()
         self.programs = [(text.count(b"\n", 0, m.start()) + 1, m[1].decode()) for m in _PROGRAM.finditer(text)]
@@ -90,10 +90,10 @@ class SiemensReader(Reader):
         text, special = _apart(text)
         words, more = read_words(text, file)
         new: New = []
-        statements: list[Statement] = []
+        statements: list[DialectStatement] = []
         for line, row in special:
             more += _parse(row, line, new, statements, file)
-        return Text(added(words, new), tuple(statements)), found + more
+        return ProgramText(added(words, new), tuple(statements)), found + more
 
     def stems(self, call: str) -> tuple[str, ...]:
         """POCKET may be in POCKET, _N_POCKET_SPF, POCKET_SPF."""
@@ -106,7 +106,7 @@ class SiemensReader(Reader):
         plain = Words(np.where(small, letter - 32, letter).astype(np.uint8), words.value, words.line, words.lines)
         return super().check(plain.take(plain.letter != ord(STATEMENT)), file)
 
-    def structure(self, text: Text, file: str) -> tuple[Structure, list[Diagnostic]]:
+    def structure(self, text: ProgramText, file: str) -> tuple[Structure, list[Diagnostic]]:
         """Programs begin at %_N_ lines; a name or an L number that is one's calls it, P times."""
         words, lines = text.words, text.words.lines
         starts = [*self.programs, (lines + 1, "")]
@@ -130,12 +130,12 @@ class SiemensReader(Reader):
             error("gcode.unknown_word", f"{c.name} is not executed by this reader", file=file, lines=[c.line],
                   hint="neither a function that it knows nor the name of a subprogram") for c in unknown]
 
-    def canonical(self, text: Text, line: Ints, file: str) -> tuple[Canonical, list[Diagnostic]]:
+    def canonical(self, text: ProgramText, line: Ints, file: str) -> tuple[Canonical, list[Diagnostic]]:
         """Canonical words."""
         words, found = text.words, list[Diagnostic]()
         new: New = []
         drop = np.zeros(len(words.letter), dtype=bool)
-        run = Run(words, text, line, file, found, new, self.axes)
+        run = SiemensRun(words, text, line, file, found, new, self.axes)
         self._plain(words, new, drop, run)
         laws, drills = run.statements()
         words = relative_words(words, self.axes)
@@ -149,7 +149,7 @@ class SiemensReader(Reader):
         drop |= (letter == ord(STATEMENT)) | np.isin(letter, [ord(a) for a in "LP"])
         return Canonical(added(Words(letter, value, words.line, words.lines), new, drop), line, laws, drills), found
 
-    def _plain(self, words: Words, new: New, drop: Bools, run: Run) -> None:
+    def _plain(self, words: Words, new: New, drop: Bools, run: SiemensRun) -> None:
         """What codes without names set: tools, length, offsets, rests, exact stop."""
         for b in codes(words, "G", (4,))[0].tolist():
             low, high = np.searchsorted(words.line, [b, b + 1])
@@ -194,7 +194,7 @@ def _apart(text: bytes) -> tuple[bytes, list[tuple[int, str]]]:
     return b"".join([*kept, text[done:]]), special
 
 
-def _parse(row: str, line: int, new: New, statements: list[Statement], file: str) -> list[Diagnostic]:
+def _parse(row: str, line: int, new: New, statements: list[DialectStatement], file: str) -> list[Diagnostic]:
     """The words and statements of one block."""
     at = 0
     while at < len(row.rstrip()):
@@ -206,21 +206,21 @@ def _parse(row: str, line: int, new: New, statements: list[Statement], file: str
     return []
 
 
-def _token(match: re.Match[str], line: int, new: New, statements: list[Statement]) -> bool:
+def _token(match: re.Match[str], line: int, new: New, statements: list[DialectStatement]) -> bool:
     """One word or statement; False where it is not read."""
     if match["letter"]:
         new.append((line, match["letter"], float(match["number"])))
     elif match["setting"]:
         new.append((line, STATEMENT, float(len(statements))))
-        statements.append(Statement(match["setting"], (float(match["set"]),)))
+        statements.append(DialectStatement(match["setting"], (float(match["set"]),)))
     elif match["key"]:
         return _assigned(match, line, new)
     elif match["call"] or match["name"]:
         args = _arguments(match["args"]) if match["call"] else ()
         new.append((line, STATEMENT, float(len(statements))))
-        statements.append(Statement(match["call"] or match["name"], args))
+        statements.append(DialectStatement(match["call"] or match["name"], args))
     elif match["text"] is not None and statements and statements[-1].name == "CALL":
-        statements[-1] = Statement(match["text"])
+        statements[-1] = DialectStatement(match["text"])
     return True
 
 

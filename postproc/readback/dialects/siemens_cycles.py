@@ -10,14 +10,14 @@ from __future__ import annotations
 
 import math
 
-from postproc.readback.text.canonical import Drill, Statement
+from postproc.readback.text.canonical import DialectStatement, Drill
 from postproc.readback.text.cycles import pecks
 
 CYCLES = ("CYCLE81", "CYCLE82", "CYCLE83", "CYCLE84", "CYCLE840", "CYCLE85", "CYCLE86")
 _SHALLOW, _LEAD, _MOST = 30.0, 0.6, 7.0
 
 
-def drill_of(s: Statement, speed: float) -> tuple[Drill | None, str]:
+def drill_of(s: DialectStatement, speed: float) -> tuple[Drill | None, str]:
     """(cycle, "") or (None, what is missing or not modelled); `speed` of the spindle, 1/min."""
     out, surface, safety, depth = (s.number(k) for k in range(4))
     if math.isnan(depth):
@@ -35,7 +35,7 @@ def drill_of(s: Statement, speed: float) -> tuple[Drill | None, str]:
     return kinds[s.name](s, plain, surface, speed) if s.name in kinds else (plain, "")
 
 
-def _deep(s: Statement, plain: Drill, surface: float, speed: float) -> tuple[Drill | None, str]:
+def _deep(s: DialectStatement, plain: Drill, surface: float, speed: float) -> tuple[Drill | None, str]:
     first = surface - s.number(5) if not math.isnan(s.number(5)) else s.number(6)
     less, breaks = s.number(7, 0.0), s.number(11, 0.0) == 0.0
     if not first > 0.0:
@@ -49,7 +49,7 @@ def _deep(s: Statement, plain: Drill, surface: float, speed: float) -> tuple[Dri
                  relief, plain.dwell), ""
 
 
-def _tap(s: Statement, plain: Drill, surface: float, speed: float) -> tuple[Drill | None, str]:
+def _tap(s: DialectStatement, plain: Drill, surface: float, speed: float) -> tuple[Drill | None, str]:
     """CYCLE84(..., DTB, SDAC, MPIT, PIT, POSS, SST, SST1), CYCLE840(..., DTB, SDR, SDAC, ENC, MPIT, PIT)."""
     rigid = s.name == "CYCLE84"
     hand = s.number(8 if rigid else 10)
@@ -63,13 +63,13 @@ def _tap(s: Statement, plain: Drill, surface: float, speed: float) -> tuple[Dril
                  hand if rigid else math.nan), ""
 
 
-def _bore(s: Statement, plain: Drill, surface: float, speed: float) -> tuple[Drill | None, str]:
+def _bore(s: DialectStatement, plain: Drill, surface: float, speed: float) -> tuple[Drill | None, str]:
     """CYCLE85(..., DTB, FFR, RFF): in and out at feeds of its own."""
     return Drill(plain.plane, plain.bottom, plain.out, plain.bottoms, "feed_out", 0.0, plain.dwell, s.number(6),
                  s.number(7)), ""
 
 
-def _fine(s: Statement, plain: Drill, surface: float, speed: float) -> tuple[Drill | None, str]:
+def _fine(s: DialectStatement, plain: Drill, surface: float, speed: float) -> tuple[Drill | None, str]:
     """CYCLE86(..., DTB, SDIR, RPA, RPO, RPAP, POSS): the tool is lifted off the wall by RPA, RPO."""
     if any(s.number(k, 0.0) != 0.0 for k in (7, 8, 9)):
         return None, "with RPA, RPO or RPAP is not executed by this reader"

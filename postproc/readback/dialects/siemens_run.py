@@ -6,9 +6,9 @@ import numpy as np
 
 from postproc.readback.dialects.iso import New
 from postproc.readback.dialects.siemens_cycles import CYCLES, drill_of
-from postproc.readback.text.canonical import CALL, LAW, SMOOTH, STATEMENT, Drill, Law, Statement, Text
+from postproc.readback.text.canonical import CALL, LAW, SMOOTH, STATEMENT, DialectStatement, Drill, ProgramText, WordMeaning
+from postproc.readback.text.euler_angles import turned
 from postproc.readback.text.modal import codes, fill, number_of
-from postproc.readback.text.turns import turned
 from postproc.readback.text.words import Words
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
@@ -19,17 +19,17 @@ change); otherwise it turns with G18 and G19"""
 _SEQUENCE = {1: "X", 2: "Y", 3: "Z"}
 
 
-class Run:
+class SiemensRun:
     """The statements of a program in running order."""
 
-    def __init__(self, words: Words, text: Text, line: Ints, file: str, found: list[Diagnostic], new: New,
+    def __init__(self, words: Words, text: ProgramText, line: Ints, file: str, found: list[Diagnostic], new: New,
                  axes: tuple[str, ...]) -> None:
         self.words, self.text, self.line, self.file, self.found, self.new = words, text, line, file, found, new
         self.axes = axes
         self.length: list[tuple[int, float]] = []
         self.kept: list[tuple[int, float]] = []
         self.states: list[tuple[int, float]] = []
-        self.laws: list[Law] = []
+        self.laws: list[WordMeaning] = []
         self.drills: list[Drill] = []
         self.state, self.called, self.oriented = "axes", -1, False
 
@@ -37,10 +37,10 @@ class Run:
         """An ERROR at a block."""
         self.found.append(error(code, message, file=self.file, lines=[int(self.line[b])], hint=hint))
 
-    def statements(self) -> tuple[tuple[Law, ...], tuple[Drill, ...]]:
+    def statements(self) -> tuple[tuple[WordMeaning, ...], tuple[Drill, ...]]:
         """Laws and cycles, with the words that put them in force."""
         where, index = self.words.pick(STATEMENT)
-        blocks: dict[int, list[Statement]] = {}
+        blocks: dict[int, list[DialectStatement]] = {}
         for b, k in zip(where.tolist(), index.tolist(), strict=True):
             blocks.setdefault(b, []).append(self.text.statements[int(k)])
         modal: list[tuple[int, int]] = []
@@ -54,14 +54,14 @@ class Run:
         self.turned_lengths()
         return tuple(self.laws), tuple(self.drills)
 
-    def one(self, b: int, s: Statement, modal: list[tuple[int, int]], is_modal: bool) -> None:
+    def one(self, b: int, s: DialectStatement, modal: list[tuple[int, int]], is_modal: bool) -> None:
         """One statement of block b."""
         if s.name == "SUPA":
             self.machine_move(b)
         elif s.name == "TRAORI":
-            self.enter(b, "tcp", Law("tcp", "TRAORI"))
+            self.enter(b, "tcp", WordMeaning("tcp", "TRAORI"))
         elif s.name == "TRAFOOF":
-            self.enter(b, "axes", Law("axes", s.name))
+            self.enter(b, "axes", WordMeaning("axes", s.name))
         elif s.name == "CYCLE800":
             self.swivel(b, s)
         elif s.name == LENGTH_AXIS:
@@ -82,7 +82,7 @@ class Run:
             else:
                 self.new.append((b, CALL, float(len(self.drills) - 1)))
 
-    def enter(self, b: int, state: str, law: Law) -> None:
+    def enter(self, b: int, state: str, law: WordMeaning) -> None:
         """A law in force from block b on."""
         if state != "axes" and self.state != "axes":
             self.fault("gcode.mode", b, f"{law.code} while another mode is on", "leave the mode that is on first")
@@ -128,10 +128,10 @@ class Run:
             if bad.any():
                 self.fault("gcode.tool_length", int(bad.argmax()), f"G18 or G19 turns the {what} out of Z", hint)
 
-    def swivel(self, b: int, s: Statement) -> None:
+    def swivel(self, b: int, s: DialectStatement) -> None:
         """CYCLE800(_FR, _TC, _ST, _MODE, _X0, _Y0, _Z0, _A, _B, _C, _X1, _Y1, _Z1, _DIR, _FR_I, _DMODE)."""
         if not any(isinstance(a, float) for a in s.args):
-            self.enter(b, "axes", Law("axes", s.name))
+            self.enter(b, "axes", WordMeaning("axes", s.name))
             return
         mode = int(s.number(3, 0.0))
         if s.number(0, 0.0) != 0.0 or s.number(2, 0.0) != 0.0 or mode >> 6:
@@ -148,7 +148,7 @@ class Run:
         shift = shift + rotation @ np.array([s.number(k, 0.0) for k in (10, 11, 12)])
         direction = s.number(13, 0.0)
         choice = "+" if direction > 0.0 else "-" if direction < 0.0 else "nearest"
-        self.enter(b, "tilted", Law("tilted", s.name, rotation, shift, choice))  # type: ignore[arg-type]
+        self.enter(b, "tilted", WordMeaning("tilted", s.name, rotation, shift, choice))  # type: ignore[arg-type]
 
     def modal_calls(self, modal: list[tuple[int, int]]) -> None:
         """Each block that moves calls the cycle of the MCALL in force."""

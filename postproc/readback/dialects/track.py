@@ -8,7 +8,7 @@ from postproc.readback.text.words import Words
 from toolpaths.arrays import Floats, Ints
 
 
-class Track:
+class AxisPositions:
     """Positions of X, Y, Z by the words of a program, and by what its statements work out in running order."""
 
     def __init__(self, words: Words) -> None:

@@ -10,11 +10,11 @@ import numpy as np
 
 from machines.geometric_error.actual.actual import Actual
 from machines.geometric_error.actual.error_rates import STEEPEST_GAP, ErrorRates, joined, unknown_rates
-from machines.geometric_error.actual.lost_motion import GRAIN, Steps
+from machines.geometric_error.actual.lost_motion import GRAIN, PlaySteps
 from machines.geometric_error.actual.model import ErrorModel
 from postproc.correction.error_sampling import changes, looks_between
 from postproc.readback.execution.execute import Motion
-from postproc.readback.execution.poses import Executed, alike, begins
+from postproc.readback.execution.poses import BlockPoses, alike, begins
 from toolpaths.arrays import Bools, Floats, Ints
 
 ARC = 2
@@ -29,8 +29,8 @@ AT_ONCE = 50_000
 
 
 @dataclass(frozen=True)
-class ActualExecuted(Executed):
-    """As `Executed`, but where the tool of the machine with errors is; `motion` is the whole program's."""
+class ActualBlockPoses(BlockPoses):
+    """As `BlockPoses`, but where the tool of the machine with errors is; `motion` is the whole program's."""
 
     model: ErrorModel = field(kw_only=True)
     motion: Motion = field(kw_only=True)
@@ -58,7 +58,7 @@ class ActualExecuted(Executed):
         return found
 
     def joints(self, motion: Motion, rows: Ints, t: float | Floats) -> Floats:
-        """See `Executed`."""
+        """See `BlockPoses`."""
         known = next((found[1] for kept, time, found in self._seen if kept is rows and time is t), None)
         return super().joints(motion, rows, t) if known is None else known
 
@@ -71,27 +71,27 @@ class ActualExecuted(Executed):
         return super().poses(motion, rows, t)
 
     def lawful(self, motion: Motion, rows: Ints, t: float | Floats) -> tuple[Floats, Floats]:
-        """See `Executed`: the law is that of the machine without errors."""
+        """See `BlockPoses`: the law is that of the machine without errors."""
         pose = self._at(motion, rows, t)[0]
         return pose[:, :3], pose[:, 3:]
 
     def off_law(self, motion: Motion, rows: Ints) -> Bools:
-        """See `Executed`: all blocks."""
+        """See `BlockPoses`: all blocks."""
         return np.ones(len(rows), dtype=bool)
 
     def error_rates(self, motion: Motion, rows: Ints, q: Floats, reach: Floats) -> ErrorRates:
-        """See `Executed`: of the errors; none are known where the control's pivots differ from the machine's besides."""
+        """See `BlockPoses`: of the errors; none are known where the control's pivots differ from the machine's besides."""
         if self.control.own_kinematics is not None:
             return unknown_rates(*q.shape)
         return joined((k, self.actual(tool).error_rates(q[k], reach[k]) or unknown_rates(len(k), q.shape[1]))
                       for k, (tool,) in alike(motion.tool[rows]))
 
     def way(self, motion: Motion, rows: Ints, t: float | Floats) -> Floats:
-        """See `Executed`."""
+        """See `BlockPoses`."""
         return self._at(motion, rows, t)[2]
 
     def gaps(self, motion: Motion, rows: Ints, q: Floats, reach: Floats) -> Floats:
-        """See `Executed`: at q, less what it may change by within `reach`."""
+        """See `BlockPoses`: at q, less what it may change by within `reach`."""
         result = np.full(q.shape, np.inf)
         if self._two_way:
             here = self.model.axes.gaps(self.control.machine.axis_names, q, self._two_way)
@@ -104,7 +104,7 @@ class ActualExecuted(Executed):
                               for t in (0.0, 1.0)))
 
     def looks(self, motion: Motion, rows: Ints) -> Iterator[tuple[Ints, Floats]]:
-        """See `Executed`: errors may change their course on the way."""
+        """See `BlockPoses`: errors may change their course on the way."""
         step, before = np.zeros((len(rows), len(self.control.machine.axis_names))), self.joints(motion, rows, 0.0)
         for t in ARC_LOOKS:
             here = self.joints(motion, rows, t)
@@ -141,7 +141,7 @@ class ActualExecuted(Executed):
             way[:, self._two_way] = self._steps(motion, rows, t).at(self._last[rows])
         return way
 
-    def _steps(self, motion: Motion, rows: Ints, t: float | Floats) -> Steps:
+    def _steps(self, motion: Motion, rows: Ints, t: float | Floats) -> PlaySteps:
         """What the motion of blocks up to fraction t does to the ways (K, T)."""
         share = np.broadcast_to(np.asarray(t, dtype=np.float64), len(rows))
         result = self._between(motion, rows, np.zeros(len(rows)), share)
@@ -150,7 +150,7 @@ class ActualExecuted(Executed):
             k = bent[at:at + AT_ONCE]
             looks = self._looked_at(motion, rows[k])
             last = np.minimum((share[k] * LOOKS).astype(np.int64), LOOKS - 1)
-            gone = Steps(*(steps[last, np.arange(len(k))] for steps in looks))
+            gone = PlaySteps(*(steps[last, np.arange(len(k))] for steps in looks))
             before, middle, q = (self.joints(motion, rows[k], t) for t in (
                 last / LOOKS, 0.5 * (last / LOOKS + share[k]), share[k]))
             turn = _turning(before, middle, q)
@@ -180,12 +180,12 @@ class ActualExecuted(Executed):
     def _kept(self) -> dict[str, tuple[Ints, Floats, Floats, Floats]]:
         return {}
 
-    def _between(self, motion: Motion, rows: Ints, one: Floats, two: Floats) -> Steps:
+    def _between(self, motion: Motion, rows: Ints, one: Floats, two: Floats) -> PlaySteps:
         return self._of(self.joints(motion, rows, one), self.joints(motion, rows, two))
 
-    def _of(self, before: Floats, q: Floats) -> Steps:
+    def _of(self, before: Floats, q: Floats) -> PlaySteps:
         step = np.nan_to_num((q - before)[:, self._two_way])
-        return Steps.of(step, self.model.axes.gaps(self.control.machine.axis_names, q, self._two_way))
+        return PlaySteps.of(step, self.model.axes.gaps(self.control.machine.axis_names, q, self._two_way))
 
 
 def _turning(before: Floats, middle: Floats, after: Floats) -> Floats:

@@ -11,7 +11,7 @@ from postproc.control.word_arcs import PLANE_AXIS, PLANE_COLUMNS
 from toolpaths.arrays import Array, Bools, Floats, Ints
 
 if TYPE_CHECKING:
-    from postproc.readback.execution.rows import Rows
+    from postproc.readback.execution.rows import MotionRows
 
 _SMALL = 1e-9
 _RADIUS_SLACK = 0.01
@@ -58,7 +58,8 @@ def _by_radius(first: Floats, last: Floats, radius: Floats, ccw: Bools) -> Float
     return result
 
 
-def whole_turns(rows: Rows, arcs: Ints, turns: Array, start: Floats, plane: Array, ccw: Bools, xyz: Ints) -> Rows:
+def whole_turns(rows: MotionRows, arcs: Ints, turns: Array, start: Floats, plane: Array, ccw: Bools,
+                xyz: Ints) -> MotionRows:
     """Rows in which each arc of `turns` (K,) more turns has a row for each; what is square to the plane rises evenly."""
     extra = np.zeros(len(rows.block), dtype=np.int64)
     extra[arcs] = turns

@@ -7,15 +7,15 @@ from dataclasses import replace
 import numpy as np
 
 from postproc.control.word_arcs import PLANE_AXIS
-from postproc.readback.execution.rows import Section, State
+from postproc.readback.execution.rows import BlockSection, SectionState
 from postproc.readback.text.canonical import Canonical, Drill
-from postproc.readback.text.cycles import MOST, Leg, Sticky, legs, unfit
+from postproc.readback.text.cycles import MOST, CycleLeg, Sticky, legs, unfit
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
 
 
-def spell_holes(state: State, moving: Bools, drilling: Ints, code: Canonical, file: str,
-           found: list[Diagnostic]) -> dict[int, list[Leg]]:
+def spell_holes(state: SectionState, moving: Bools, drilling: Ints, code: Canonical, file: str,
+           found: list[Diagnostic]) -> dict[int, list[CycleLeg]]:
     """Legs of each drilling block; sets where the cycle leaves the tool in `state.columns`."""
     section, offsets, spelt = state.section, state.offsets, {}
     sticky = Sticky(np.full(7, np.nan), relief=offsets.peck_relief)
@@ -65,13 +65,13 @@ def _refused(drill: Drill, line: int, file: str, found: list[Diagnostic]) -> boo
     return wrong is not None
 
 
-def _broken(section: Section, previous: int, n: int) -> bool:
+def _broken(section: BlockSection, previous: int, n: int) -> bool:
     """True where a code of motion or a G80 stands between two blocks of cycles."""
     between = section.motion[previous + 1:n]
     return bool(((between < 73) | (between == 80)).any())
 
 
-def _sticky(state: State, sticky: Sticky, n: int, z: int, code: Canonical, file: str,
+def _sticky(state: SectionState, sticky: Sticky, n: int, z: int, code: Canonical, file: str,
             found: list[Diagnostic]) -> Drill | None:
     section = state.section
     relative = bool(np.isfinite(section.deep[n, :2]).any())
@@ -82,21 +82,22 @@ def _sticky(state: State, sticky: Sticky, n: int, z: int, code: Canonical, file:
                         section.level[n] == 99, relative, file, int(code.line[n + section.first]), found)
 
 
-def _repeated(state: State, n: int, drill: Drill, begun: Floats, target: Floats, z: int, first: float) -> list[Leg]:
+def _repeated(state: SectionState, n: int, drill: Drill, begun: Floats, target: Floats, z: int,
+              first: float) -> list[CycleLeg]:
     """The cycle of one block, as often as it is repeated, each a step further; `first`: see `legs`."""
     times = int(state.section.repeats[n]) if np.isfinite(state.section.repeats[n]) else 1
     step = np.nan_to_num(state.steps[n]) / max(times, 1)
     step[z] = 0.0
-    result: list[Leg] = []
+    result: list[CycleLeg] = []
     for k in range(times):
         result += legs(drill, result[-1][1] if result else begun, target - (times - 1 - k) * step, z,
                        first if state.offsets.rises_first else None)
     return result
 
 
-def _called(state: State, n: int, begun: Floats, target: Floats, z: int, drill: Drill) -> list[Leg]:
+def _called(state: SectionState, n: int, begun: Floats, target: Floats, z: int, drill: Drill) -> list[CycleLeg]:
     """The move of the block itself, then the cycle where it ends."""
-    own: list[Leg] = []
+    own: list[CycleLeg] = []
     absolute, step = state.columns[n, z], state.steps[n, z]
     target[z] = absolute if np.isfinite(absolute) else begun[z] + np.nan_to_num(step)
     if (target != begun).any():

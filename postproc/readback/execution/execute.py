@@ -9,11 +9,11 @@ from itertools import pairwise
 import numpy as np
 
 from postproc.readback.execution import frames
-from postproc.readback.execution.frames import AXES, Frame, FrameTable
+from postproc.readback.execution.frames import AXES, ExecutionFrame, FrameTable
 from postproc.readback.execution.offsets import Offsets
-from postproc.readback.execution.rows import INCH, Rows, Section
+from postproc.readback.execution.rows import INCH, BlockSection, MotionRows
 from postproc.readback.execution.sections import run_section
-from postproc.readback.text.canonical import CALL, LAW, REST, TURNS, Canonical, Law, Text, in_files, placed
+from postproc.readback.text.canonical import CALL, LAW, REST, TURNS, Canonical, ProgramText, WordMeaning, in_files, placed
 from postproc.readback.text.modal import Modal, columns, fill, fill_values, modal_state, number_of
 from postproc.readback.text.words import Words
 from postproc.reference.coolant import FLOOD, MIST
@@ -68,7 +68,7 @@ class Motion:
     pitch: Floats
     floating: Bools
     inch: Bools
-    frames: tuple[Frame, ...] = (AXES,)
+    frames: tuple[ExecutionFrame, ...] = (AXES,)
 
     def __len__(self) -> int:
         return len(self.line)
@@ -109,11 +109,11 @@ def run(code: Canonical, letters: tuple[str, ...], offsets: Offsets, file: str =
         part = run_section(section.cut(first, last), frame, number, position, code, offsets, file, found)
         position = part.end[-1] if len(part.end) else position
         parts.append(part)
-    rows = Rows.joined(parts, len(letters))
+    rows = MotionRows.joined(parts, len(letters))
     return _motion(words, modal, rows, code, tuple(used), offsets, rests, section.call), placed(found, code.files)
 
 
-def _stretches(words: Words, modal: Modal, laws: tuple[Law, ...]) -> list[tuple[int, int, Law | None, int]]:
+def _stretches(words: Words, modal: Modal, laws: tuple[WordMeaning, ...]) -> list[tuple[int, int, WordMeaning | None, int]]:
     """(first, one past the last block, law, length register) of stretches under one law."""
     n = words.lines
     law = fill(*words.pick(LAW), n, -1.0).astype(np.int64)
@@ -127,7 +127,7 @@ def _stretches(words: Words, modal: Modal, laws: tuple[Law, ...]) -> list[tuple[
             for a, b in pairwise(edges) if b > a]
 
 
-def _blocks(words: Words, modal: Modal, letters: tuple[str, ...], offsets: Offsets) -> Section:
+def _blocks(words: Words, modal: Modal, letters: tuple[str, ...], offsets: Offsets) -> BlockSection:
     """The words that move, block by block."""
     n = words.lines
     rest = np.zeros(n + 1, dtype=bool)
@@ -136,12 +136,12 @@ def _blocks(words: Words, modal: Modal, letters: tuple[str, ...], offsets: Offse
     lengths = np.unique(modal.length_register)
     length = shared(np.array([offsets.length(int(r)) for r in lengths])[np.searchsorted(lengths, modal.length_register)])
     steps = columns(words, small)
-    return Section(0, modal.motion, modal.plane, modal.machine, modal.level, modal.inch, columns(words, letters), steps,
-                   rest, length, columns(words, "ijk"), columns(words, "IJK"), columns(words, "ZRQPIJK"),
-                   columns(words, ("z", "r", TURNS)), columns(words, "L")[:, 0], columns(words, CALL)[:, 0])
+    return BlockSection(0, modal.motion, modal.plane, modal.machine, modal.level, modal.inch, columns(words, letters), steps,
+                        rest, length, columns(words, "ijk"), columns(words, "IJK"), columns(words, "ZRQPIJK"),
+                        columns(words, ("z", "r", TURNS)), columns(words, "L")[:, 0], columns(words, CALL)[:, 0])
 
 
-def _cancelled(words: Words, modal: Modal, section: Section, line: Ints, file: str) -> list[Diagnostic]:
+def _cancelled(words: Words, modal: Modal, section: BlockSection, line: Ints, file: str) -> list[Diagnostic]:
     """Axis words while G80 holds: there is no motion they could belong to."""
     blocks = np.flatnonzero((modal.motion == 80) & section.stated.any(axis=1) & ~section.rest)
     if not len(blocks):
@@ -150,7 +150,8 @@ def _cancelled(words: Words, modal: Modal, section: Section, line: Ints, file: s
                   lines=line[blocks][:6].tolist(), count=len(blocks), hint="state G0 or G1")]
 
 
-def _motion(words: Words, modal: Modal, rows: Rows, code: Canonical, used: tuple[Frame, ...], offsets: Offsets,
+def _motion(words: Words, modal: Modal, rows: MotionRows, code: Canonical, used: tuple[ExecutionFrame, ...],
+            offsets: Offsets,
             rests: Floats, call: Floats) -> Motion:
     block = rows.block
     feed, missing = _feeds(words, modal, rows)
@@ -165,7 +166,7 @@ def _motion(words: Words, modal: Modal, rows: Rows, code: Canonical, used: tuple
                   pitch=pitch, floating=floating, frames=used, **state)
 
 
-def _threads(modal: Modal, rows: Rows, feed: Floats, call: Floats, code: Canonical) -> tuple[Floats, Bools]:
+def _threads(modal: Modal, rows: MotionRows, feed: Floats, call: Floats, code: Canonical) -> tuple[Floats, Bools]:
     """(mm per turn of taps (E,), negative for left-hand ones, NaN for other rows; floating (E,)): G84 and G74 by F and S."""
     if not rows.hole.any():
         return repeated(np.nan, len(rows.block)), repeated(False, len(rows.block))
@@ -191,7 +192,7 @@ def _dwell(block: Ints, code: Array, hole: Bools, at_bottom: Floats, rests: Floa
     return dwell
 
 
-def _feeds(words: Words, modal: Modal, rows: Rows) -> tuple[Floats, Bools]:
+def _feeds(words: Words, modal: Modal, rows: MotionRows) -> tuple[Floats, Bools]:
     """(F in force, cutting rows without one): inverse time holds for its own block only, a change of mode clears F."""
     n, block = words.lines, rows.block
     stated = columns(words, "F")[:, 0]
@@ -217,6 +218,6 @@ def execute(words: Words, letters: tuple[str, ...], offsets: Offsets, file: str 
 
     reader = IsoReader(letters)
     found = reader.check(words, file)
-    canonical, more = reader.translated(Text(words), np.arange(words.lines + 1), file)
+    canonical, more = reader.translated(ProgramText(words), np.arange(words.lines + 1), file)
     motion, last = run(canonical, letters, offsets, file)
     return motion, [*found, *more, *last]

@@ -15,7 +15,7 @@ from machines.kinematics.base import Kinematics
 from machines.kinematics.frames import tool_x
 from postproc.control.control import Control
 from postproc.control.modes import table_axes
-from postproc.readback.text.canonical import Law, LawName
+from postproc.readback.text.canonical import InterpolationModeName, WordMeaning
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.rotations import angle_between
@@ -30,10 +30,10 @@ _TURN = 360.0
 
 
 @dataclass(frozen=True, eq=False)
-class Frame:
+class ExecutionFrame:
     """One law in force: its plane, and the kinematics at the tip of the tool that the control reckons with."""
 
-    law: LawName
+    law: InterpolationModeName
     control: Control | None = None
     kinematics: Kinematics | None = None
     rotation: Floats = field(default_factory=lambda: np.eye(3))
@@ -54,7 +54,7 @@ class FrameTable:
 
     owner: Ints
     """(F,) the first frame with the same control and tool length"""
-    frames: tuple[Frame, ...]
+    frames: tuple[ExecutionFrame, ...]
     rotation: Floats
     """(F, 3, 3)"""
     origin: Floats
@@ -66,7 +66,7 @@ class FrameTable:
         return all(frame.kinematics is None or frame.control is None for frame in self.frames)
 
     @classmethod
-    def of(cls, frames: tuple[Frame, ...]) -> FrameTable:
+    def of(cls, frames: tuple[ExecutionFrame, ...]) -> FrameTable:
         first: dict[tuple[int, float], int] = {}
         keys = [(id(f.control), f.kinematics.tool_length) if f.kinematics is not None else (0, 0.0) for f in frames]
         owner = [first.setdefault(key, k) for k, key in enumerate(keys)]
@@ -112,7 +112,7 @@ class FrameTable:
                 yield control, kin, rows[at:at + _CHUNK]
 
 
-AXES = Frame("axes")
+AXES = ExecutionFrame("axes")
 
 
 def tool_frame(kin: Kinematics, q: Floats) -> Floats:
@@ -122,8 +122,8 @@ def tool_frame(kin: Kinematics, q: Floats) -> Floats:
     return np.stack([x[0], np.cross(axis[0], x[0]), axis[0]], axis=1)
 
 
-def frame_of(law: Law, control: Control | None, length: float, position: Floats, at: tuple[str, int],
-             found: list[Diagnostic] | None) -> Frame:
+def frame_of(law: WordMeaning, control: Control | None, length: float, position: Floats, at: tuple[str, int],
+             found: list[Diagnostic] | None) -> ExecutionFrame:
     """The frame of a law entered at machine position (J,), with a tool of that length; `at` is file and line.
 
     A law that the machine cannot have, and rotary axes that do not stand as the control would put them, are errors; None
@@ -146,15 +146,15 @@ def frame_of(law: Law, control: Control | None, length: float, position: Floats,
             found.append(_two_frames(law, control, position, file, line))
         if control.entry_frame != "entry":
             rotation, origin = np.eye(3), control.origin
-        return Frame("tcp", control, kin, rotation, origin)
+        return ExecutionFrame("tcp", control, kin, rotation, origin)
     q = position / control.unit
     rotation = tool_frame(kin, q) if law.rotation is None else law.rotation
     if checked and law.rotation is not None:
         found += _wrong_pose(law, control, kin, q, file, line)
-    return Frame("tilted", control, kin, rotation, control.origin + law.shift)
+    return ExecutionFrame("tilted", control, kin, rotation, control.origin + law.shift)
 
 
-def _wrong_pose(law: Law, control: Control, kin: Kinematics, q: Floats, file: str, line: int) -> list[Diagnostic]:
+def _wrong_pose(law: WordMeaning, control: Control, kin: Kinematics, q: Floats, file: str, line: int) -> list[Diagnostic]:
     """The rotary positions that the control picks for the plane against those in force."""
     assert law.rotation is not None
     names = control.machine.axis_names
@@ -188,7 +188,7 @@ def entered(control: Control, kin: Kinematics, q: Floats) -> tuple[Floats, Float
     return np.asarray(rotation), np.asarray(seen + rotation @ (control.origin - machine))
 
 
-def _two_frames(law: Law, control: Control, position: Floats, file: str, line: int) -> Diagnostic:
+def _two_frames(law: WordMeaning, control: Control, position: Floats, file: str, line: int) -> Diagnostic:
     where = " ".join(f"{control.machine.axis_names[j]}{position[j]:.4f}" for j in table_axes(control))
     return error("gcode.tcp_frame", f"{law.code} is switched on with the tables at {where}: by the maker's pages its frame "
                  "is that of the part, or that of the work offset turned on from there, and the program is right under one "
@@ -196,7 +196,7 @@ def _two_frames(law: Law, control: Control, position: Floats, file: str, line: i
                  'both the control has: [modes.tcp] frame = "table" or "entry" in the controller file')
 
 
-def _picked(law: Law, control: Control, kin: Kinematics, q: Floats) -> Floats | None:
+def _picked(law: WordMeaning, control: Control, kin: Kinematics, q: Floats) -> Floats | None:
     """Rotary positions (R,), degrees, that the control takes for the plane's Z; None where there are none."""
     assert law.rotation is not None
     tip, _ = kin.forward(q[None, :])
@@ -227,7 +227,7 @@ def _lead(control: Control) -> int:
     return int(tilts.argmax())
 
 
-def _pose_error(law: Law, control: Control, stands: Floats, picked: Floats, file: str, line: int) -> Diagnostic:
+def _pose_error(law: WordMeaning, control: Control, stands: Floats, picked: Floats, file: str, line: int) -> Diagnostic:
     letters = [control.machine.axis_names[j] for j in control.rotary]
 
     def text(values: Floats) -> str:

@@ -20,7 +20,7 @@ SAMPLES = (0.2, 0.4, 0.6, 0.8, 1.0)
 
 
 @dataclass(frozen=True)
-class Executed:
+class BlockPoses:
     """Gives the poses of a program's blocks: control, kinematics by tool number, gauge length by register.
 
     `before` (E, 6) is the gauge point's pose where each block begins, on machines whose joints do not tell it alone.
@@ -30,12 +30,12 @@ class Executed:
     kinematics: Callable[[int], Kinematics]
     lengths: dict[int, float]
     before: Floats | None = None
-    _asked: list[tuple[Motion, Ints, Ways]] = field(default_factory=list, init=False, repr=False, compare=False)
+    _asked: list[tuple[Motion, Ints, BlockMotions]] = field(default_factory=list, init=False, repr=False, compare=False)
 
-    def _ways(self, motion: Motion, rows: Ints) -> Ways:
+    def _ways(self, motion: Motion, rows: Ints) -> BlockMotions:
         """Those of the blocks asked for last are kept: the same ones are asked for at several fractions."""
         if not self._asked or self._asked[0][0] is not motion or self._asked[0][1] is not rows:
-            self._asked[:] = [(motion, rows, Ways.of(motion, self.control, rows))]
+            self._asked[:] = [(motion, rows, BlockMotions.of(motion, self.control, rows))]
         return self._asked[0][2]
 
     def poses(self, motion: Motion, rows: Ints, t: float | Floats) -> tuple[Floats, Floats]:
@@ -156,7 +156,7 @@ class Executed:
 
 
 def poses_before(motion: Motion, control: Control) -> Floats | None:
-    """`Executed.before` of a program; None where the joints alone tell the pose."""
+    """`BlockPoses.before` of a program; None where the joints alone tell the pose."""
     kin = control.machine.kinematics
     if control.base == "tcp" or kin.slides_affine:
         return None
@@ -173,7 +173,7 @@ def begins(motion: Motion, rows: Ints) -> Floats:
 
 def positions(motion: Motion, control: Control, rows: Ints, t: float | Floats) -> Floats:
     """Machine coordinates (K, J) of blocks at fraction t, one or (K,): as the law of each block has it."""
-    return motion.end[rows] if _whole(t) else Ways.of(motion, control, rows).at(t)
+    return motion.end[rows] if _whole(t) else BlockMotions.of(motion, control, rows).at(t)
 
 
 def _whole(t: float | Floats) -> bool:
@@ -181,7 +181,7 @@ def _whole(t: float | Floats) -> bool:
 
 
 @dataclass(frozen=True)
-class Ways:
+class BlockMotions:
     """Blocks `rows` (K,) with what of their motion does not depend on the fraction: machine coordinates (K, J) at both ends,
     and the coordinates of their frames there."""
 
@@ -195,7 +195,7 @@ class Ways:
     last: Floats
 
     @classmethod
-    def of(cls, motion: Motion, control: Control, rows: Ints) -> Ways:
+    def of(cls, motion: Motion, control: Control, rows: Ints) -> BlockMotions:
         """What `at` needs."""
         before, end, frame = begins(motion, rows), motion.end[rows], taken(motion.frame, rows)
         first, last = motion.table.coordinates(frame, before), motion.table.coordinates(frame, end)

@@ -17,7 +17,7 @@ INCH = 25.4
 
 
 @dataclass(frozen=True)
-class Section:
+class BlockSection:
     """Blocks `first` and on (N), as their words and modal state have them.
 
     `columns`, `steps` (N, J) are absolute and relative axis words, `relative`, `absolute` (N, 3) centres of arcs from the
@@ -42,7 +42,7 @@ class Section:
     repeats: Floats
     call: Floats
 
-    def cut(self, first: int, last: int) -> Section:
+    def cut(self, first: int, last: int) -> BlockSection:
         """Blocks first to before last."""
         values = {f.name: getattr(self, f.name) for f in fields(self)}
         parts: dict[str, Any] = {name: value[first:last] for name, value in values.items() if isinstance(value, np.ndarray)}
@@ -66,7 +66,7 @@ class Section:
 
 
 @dataclass(frozen=True)
-class Rows:
+class MotionRows:
     """R rows of motion: block, code, end (R, J) in machine coordinates, centre (R, 3) in those of the frame, number of the
     frame; hole, feed (NaN: the F word in force), rest of cycles."""
 
@@ -80,22 +80,22 @@ class Rows:
     dwell: Floats
 
     @staticmethod
-    def joined(parts: list[Rows], width: int) -> Rows:
+    def joined(parts: list[MotionRows], width: int) -> MotionRows:
         """Parts in order; none is no rows."""
         if len(parts) == 1:
             return parts[0]
         if not parts:
             none = np.zeros(0)
-            return Rows(none.astype(np.int64), none.astype(np.int8), np.zeros((0, width)), np.zeros((0, 3)),
-                        none.astype(np.int64), none.astype(bool), none, none)
-        return Rows(*(joined([getattr(p, f.name) for p in parts]) for f in fields(Rows)))
+            return MotionRows(none.astype(np.int64), none.astype(np.int8), np.zeros((0, width)), np.zeros((0, 3)),
+                              none.astype(np.int64), none.astype(bool), none, none)
+        return MotionRows(*(joined([getattr(p, f.name) for p in parts]) for f in fields(MotionRows)))
 
 
 @dataclass
-class State:
+class SectionState:
     """What a section is worked out on: absolute words (N, J) in coordinates, and where the blocks begin (J,)."""
 
-    section: Section
+    section: BlockSection
     columns: Floats
     steps: Floats
     start: Floats

@@ -10,10 +10,10 @@ import numpy as np
 from postproc.control.word_arcs import PLANE_AXIS
 from postproc.readback.execution.arcs import centres, whole_turns
 from postproc.readback.execution.drilling import spell_holes
-from postproc.readback.execution.frames import Frame
-from postproc.readback.execution.rows import Rows, Section, State
+from postproc.readback.execution.frames import ExecutionFrame
+from postproc.readback.execution.rows import BlockSection, MotionRows, SectionState
 from postproc.readback.text.canonical import Canonical
-from postproc.readback.text.cycles import Leg
+from postproc.readback.text.cycles import CycleLeg
 from postproc.readback.text.modal import CYCLES
 from toolpaths.arrays import Bools, Floats, Ints, repeated, shared
 from toolpaths.diagnostics import Diagnostic, error
@@ -27,32 +27,34 @@ _PART = 100_000
 """blocks that are run together, where nothing asks for what came long before"""
 
 
-def run_section(section: Section, frame: Frame, number: int, position: Floats, code: Canonical, offsets: Offsets,
-                file: str, found: list[Diagnostic]) -> Rows:
+def run_section(section: BlockSection, frame: ExecutionFrame, number: int, position: Floats, code: Canonical,
+                offsets: Offsets,
+                file: str, found: list[Diagnostic]) -> MotionRows:
     """Rows of the blocks of one law, begun at machine position (J,)."""
     start, moving = frame.coordinates(position[None, :])[0], _moving(section)
     _refused(section, frame, moving, code.line, file, found)
     cycles = bool((moving & np.isin(section.motion, CYCLES)).any() or np.isfinite(section.call).any())
     size = len(moving) if cycles or section.has_steps else _PART
-    parts: list[Rows] = []
+    parts: list[MotionRows] = []
     for first in range(0, len(moving), size):
         part = slice(first, first + size)
         rows, start = _rows(section.cut(first, first + size), frame, number, start, moving[part], code, offsets, file, found)
         parts.append(rows)
-    rows = Rows.joined(parts, len(position))
+    rows = MotionRows.joined(parts, len(position))
     _still(rows, position, frame, code.line, file, found)
     return rows
 
 
-def _moving(section: Section) -> Bools:
+def _moving(section: BlockSection) -> Bools:
     """(N,) blocks that move, or drill where the tool stands."""
     moving = section.stated.any(axis=1) & ~section.rest
     arc = np.isin(section.motion, (2, 3)) & ~section.rest
     return np.asarray(moving | (arc & (np.isfinite(section.relative) | np.isfinite(section.absolute)).any(axis=1)))
 
 
-def _rows(section: Section, frame: Frame, number: int, start: Floats, moving: Bools, code: Canonical, offsets: Offsets,
-          file: str, found: list[Diagnostic]) -> tuple[Rows, Floats]:
+def _rows(section: BlockSection, frame: ExecutionFrame, number: int, start: Floats, moving: Bools, code: Canonical,
+          offsets: Offsets,
+          file: str, found: list[Diagnostic]) -> tuple[MotionRows, Floats]:
     """(rows of blocks, begun at `start` (J,) in the coordinates of the frame, where they end in those)."""
     state = _state(section, start, frame, offsets)
     drilling = np.flatnonzero((moving & np.isin(section.motion, CYCLES)) | np.isfinite(section.call))
@@ -65,7 +67,7 @@ def _rows(section: Section, frame: Frame, number: int, start: Floats, moving: Bo
     end = ends[line]
     motion = section.motion[line]
     kind = np.where(motion == 0, 0, np.where(np.isin(motion, (2, 3)), 2, 1)).astype(np.int8)
-    rows = Rows(line + section.first, kind, end, *(repeated(one, len(line)) for one in (
+    rows = MotionRows(line + section.first, kind, end, *(repeated(one, len(line)) for one in (
         np.zeros(3), number, False, np.nan, 0.0)))
     if spelt:
         rows = _with_legs(rows, line, spelt)
@@ -73,7 +75,7 @@ def _rows(section: Section, frame: Frame, number: int, start: Floats, moving: Bo
     return replace(rows, end=frame.position(rows.end)), ends[-1]
 
 
-def _state(section: Section, start: Floats, frame: Frame, offsets: Offsets) -> State:
+def _state(section: BlockSection, start: Floats, frame: ExecutionFrame, offsets: Offsets) -> SectionState:
     """Words in the coordinates of the law."""
     xyz = offsets.xyz[offsets.xyz >= 0]
     drilling = np.isin(section.motion, CYCLES)
@@ -91,10 +93,10 @@ def _state(section: Section, start: Floats, frame: Frame, offsets: Offsets) -> S
         z = int(offsets.xyz[PLANE_AXIS[plane]])
         drills = drilling & (section.plane == plane)
         columns[drills, z] = steps[drills, z] = np.nan
-    return State(section, columns, steps, start, shift, offsets)
+    return SectionState(section, columns, steps, start, shift, offsets)
 
 
-def _shift(section: Section, frame: Frame, offsets: Offsets) -> Floats:
+def _shift(section: BlockSection, frame: ExecutionFrame, offsets: Offsets) -> Floats:
     """(N, J) from the program's words to coordinates."""
     row, xyz = offsets.work.copy(), offsets.xyz[offsets.xyz >= 0]
     if frame.control is not None:
@@ -107,7 +109,8 @@ def _shift(section: Section, frame: Frame, offsets: Offsets) -> Floats:
     return shift
 
 
-def _refused(section: Section, frame: Frame, moving: Bools, line: Ints, file: str, found: list[Diagnostic]) -> None:
+def _refused(section: BlockSection, frame: ExecutionFrame, moving: Bools, line: Ints, file: str,
+             found: list[Diagnostic]) -> None:
     """Machine coordinates under a law that has none."""
     bad = np.flatnonzero(section.machine & moving)
     if frame.control is not None and len(bad):
@@ -116,7 +119,8 @@ def _refused(section: Section, frame: Frame, moving: Bools, line: Ints, file: st
                            hint="leave the mode before it"))
 
 
-def _still(rows: Rows, position: Floats, frame: Frame, line: Ints, file: str, found: list[Diagnostic]) -> None:
+def _still(rows: MotionRows, position: Floats, frame: ExecutionFrame, line: Ints, file: str,
+           found: list[Diagnostic]) -> None:
     """Rotary axes that move while a tilted plane is in force."""
     if frame.law != "tilted" or frame.control is None:
         return
@@ -128,7 +132,7 @@ def _still(rows: Rows, position: Floats, frame: Frame, line: Ints, file: str, fo
                            hint="leave the plane, index, enter the plane of the new position"))
 
 
-def _with_legs(rows: Rows, line: Ints, spelt: dict[int, list[Leg]]) -> Rows:
+def _with_legs(rows: MotionRows, line: Ints, spelt: dict[int, list[CycleLeg]]) -> MotionRows:
     """Rows with the legs of cycles at their blocks."""
     hole = np.isin(line, list(spelt))
     flat = [leg for n in sorted(spelt) for leg in spelt[n]]
@@ -141,7 +145,8 @@ def _with_legs(rows: Rows, line: Ints, spelt: dict[int, list[Leg]]) -> Rows:
     return replace(rows, code=code, end=end, feed=feed, dwell=dwell, hole=hole)
 
 
-def _with_arcs(rows: Rows, state: State, line: Ints, where: Ints, file: str, found: list[Diagnostic]) -> Rows:
+def _with_arcs(rows: MotionRows, state: SectionState, line: Ints, where: Ints, file: str,
+               found: list[Diagnostic]) -> MotionRows:
     """Rows with the centres of arcs, and a row for each turn of those of several."""
     arcs = np.flatnonzero((rows.code == 2) & ~rows.hole)
     if not len(arcs):

@@ -48,7 +48,7 @@ EXTENDED_OFFSETS = 1000.0
 
 
 @dataclass(frozen=True)
-class Statement:
+class DialectStatement:
     """What a dialect writes in words of its own, e.g. ("CYCLE81", (50.0, 0.0, ...))."""
 
     name: str
@@ -62,20 +62,20 @@ class Statement:
 
 
 @dataclass(frozen=True)
-class Text:
+class ProgramText:
     """One file in words, statements among them by their index."""
 
     words: Words
-    statements: tuple[Statement, ...] = ()
+    statements: tuple[DialectStatement, ...] = ()
 
 
 Files = tuple[tuple[str, int], ...]
-LawName = Literal["axes", "tcp", "tilted"]
-Choice = Literal["nearest", "+", "-"]
+InterpolationModeName = Literal["axes", "tcp", "tilted"]
+RotaryDirection = Literal["nearest", "+", "-"]
 
 
 @dataclass(frozen=True)
-class Law:
+class WordMeaning:
     """What words mean from a block on.
 
     Attributes:
@@ -85,11 +85,11 @@ class Law:
         choice: how the control picks the rotary positions: the nearest, or those with the first tilting axis at + or -
     """
 
-    name: LawName
+    name: InterpolationModeName
     code: str
     rotation: Floats | None = None
     shift: Floats = field(default_factory=lambda: np.zeros(3))
-    choice: Choice = "nearest"
+    choice: RotaryDirection = "nearest"
 
 
 @dataclass(frozen=True)
@@ -129,7 +129,7 @@ class Canonical:
 
     words: Words
     line: Ints
-    laws: tuple[Law, ...] = ()
+    laws: tuple[WordMeaning, ...] = ()
     drills: tuple[Drill, ...] = ()
     files: Files = ()
 

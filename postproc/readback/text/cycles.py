@@ -10,14 +10,14 @@ from postproc.readback.text.canonical import Drill
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic, error
 
-Leg = tuple[int, Floats, float, float]
+CycleLeg = tuple[int, Floats, float, float]
 """code, end, feed (NaN: the F word in force), rest at the end (s) of one leg"""
 EPSILON = 1e-9
 MOST = 10_000
 """pecks of one hole, and holes of one block: more are a slip of the pen"""
 
 
-def legs(drill: Drill, start: Floats, target: Floats, z: int, first: float | None = None) -> list[Leg]:
+def legs(drill: Drill, start: Floats, target: Floats, z: int, first: float | None = None) -> list[CycleLeg]:
     """The legs from `start` (J,) over the hole, whose place is that of `target` (J,), to the level where the cycle ends.
 
     `z` is the column of the tool's axis. `first`: the level where the sequence of cycles began, on controls that leave the
@@ -45,9 +45,9 @@ def _at(base: Floats, z: int, height: float) -> Floats:
     return point
 
 
-def _down(drill: Drill, target: Floats, z: int) -> list[Leg]:
+def _down(drill: Drill, target: Floats, z: int) -> list[CycleLeg]:
     """From the plane to the bottom, peck by peck."""
-    result: list[Leg] = []
+    result: list[CycleLeg] = []
     nothing = float("nan")
     for depth in drill.bottoms[:-1]:
         result.append((1, _at(target, z, depth), drill.feed, 0.0))
@@ -58,8 +58,8 @@ def _down(drill: Drill, target: Floats, z: int) -> list[Leg]:
     return [*result, (1, _at(target, z, drill.bottom), drill.feed, drill.dwell)]
 
 
-def _out(drill: Drill, target: Floats, z: int) -> list[Leg]:
-    result: list[Leg] = []
+def _out(drill: Drill, target: Floats, z: int) -> list[CycleLeg]:
+    result: list[CycleLeg] = []
     nothing = float("nan")
     if drill.style == "feed_out":
         result.append((1, _at(target, z, drill.plane), drill.feed_out, 0.0))
@@ -131,4 +131,5 @@ class Sticky:
             bottoms = pecks(plane, bottom, q * scale) if code in (73, 83) else (bottom,)
         style = {73: "break", 83: "peck", 74: "feed_out", 84: "feed_out", 85: "feed_out", 89: "feed_out"}.get(code, "drill")
         rest = dwell if code not in (81, 85) and np.isfinite(dwell) else 0.0
-        return Drill(plane, bottom, out, bottoms, style, self.relief if code in (73, 83) else 0.0, rest)  # type: ignore[arg-type]
+        return Drill(plane, bottom, out, bottoms, style,  # type: ignore[arg-type]
+                     self.relief if code in (73, 83) else 0.0, rest)

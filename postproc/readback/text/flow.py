@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from postproc.readback.text.canonical import STATEMENT, Text
+from postproc.readback.text.canonical import STATEMENT, ProgramText
 from postproc.readback.text.words import Words
 from toolpaths.arrays import Ints
 from toolpaths.diagnostics import Diagnostic, error
@@ -14,7 +14,7 @@ from toolpaths.diagnostics import Diagnostic, error
 DEEPEST = 10
 """levels of subprograms: the fewest that the controls take (Fanuc 30i: 10 with M98)"""
 MOST_BLOCKS = 20_000_000
-Span = tuple[int, int, int]
+LineSpan = tuple[int, int, int]
 """number of the file, first and last line"""
 
 
@@ -41,7 +41,7 @@ class Structure:
     calls: dict[int, Call] = field(default_factory=dict)
 
 
-def expand(texts: list[Text], structures: list[Structure], file: str) -> tuple[Text, Ints, list[Diagnostic]]:
+def expand(texts: list[ProgramText], structures: list[Structure], file: str) -> tuple[ProgramText, Ints, list[Diagnostic]]:
     """(text whose lines are blocks in running order, line of each block (B + 1,) counted through all files, faults).
 
     The first file holds the main program; the names of all files are one list, the calling file's own come first.
@@ -49,7 +49,7 @@ def expand(texts: list[Text], structures: list[Structure], file: str) -> tuple[T
     if not structures[0].calls and structures[0].main == (1, texts[0].words.lines):
         return texts[0], np.arange(texts[0].words.lines + 1), []
     found: list[Diagnostic] = []
-    spans: list[Span] = []
+    spans: list[LineSpan] = []
     _run(0, *structures[0].main, structures, spans, found, file, 0)
     if found:
         return texts[0], np.arange(texts[0].words.lines + 1), found[:1]
@@ -64,7 +64,7 @@ def expand(texts: list[Text], structures: list[Structure], file: str) -> tuple[T
     words = Words(np.concatenate([p.letter for p in parts]), np.concatenate([p.value for p in parts]),
                   np.concatenate([p.line for p in parts]), at,
                   np.concatenate([p.point for p in parts if p.point is not None]))
-    return Text(words, statements), np.concatenate(lines), []
+    return ProgramText(words, statements), np.concatenate(lines), []
 
 
 def _slice(words: Words, first: int, last: int, at: int, statements: int) -> Words:
@@ -75,13 +75,13 @@ def _slice(words: Words, first: int, last: int, at: int, statements: int) -> Wor
     return Words(part.letter, value, part.line - first + 1 + at, words.lines, point)
 
 
-def _run(k: int, first: int, last: int, structures: list[Structure], spans: list[Span], found: list[Diagnostic],
+def _run(k: int, first: int, last: int, structures: list[Structure], spans: list[LineSpan], found: list[Diagnostic],
          file: str, depth: int) -> None:
     """The spans of lines first..last of file k, with those of the subprograms that they call."""
     here = first
     for line in sorted(n for n in structures[k].calls if first <= n <= last):
         call = structures[k].calls[line]
-        where: Span | None = next(((j, *structures[j].subprograms[call.name]) for j in (k, *range(len(structures)))
+        where: LineSpan | None = next(((j, *structures[j].subprograms[call.name]) for j in (k, *range(len(structures)))
                       if call.name in structures[j].subprograms), None)
         if where is None or depth >= DEEPEST or sum(b - a for _, a, b in spans) > MOST_BLOCKS:
             found.append(_cannot(where is None, call, structures, file))

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from postproc.readback.text.canonical import SMOOTH, STATEMENT, Canonical, Text
+from postproc.readback.text.canonical import SMOOTH, STATEMENT, Canonical, ProgramText
 from toolpaths.diagnostics import Diagnostic, error
 
 LARGEST = 1e10
 """controls hold eight or nine digits"""
 
 
-def too_large(text: Text, file: str) -> list[Diagnostic]:
+def too_large(text: ProgramText, file: str) -> list[Diagnostic]:
     """An error where a number of a word or statement has more than ten digits before its point."""
     words = text.words
     wrong = ~(np.abs(words.value) <= LARGEST)

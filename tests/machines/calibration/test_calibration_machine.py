@@ -88,7 +88,7 @@ def test_ball_bar_gives_the_squareness_of_the_slides() -> None:
 
 def test_laser_along_x_gives_the_positioning_table() -> None:
     from machines.geometric_error.actual.serial_errors import Component
-    from machines.geometric_error.tables.curves import Table
+    from machines.geometric_error.tables.curves import TableCurve
     from machines.geometric_error.tables.names import parse
 
     kin, name = mikron(), parse("EXX")
@@ -96,8 +96,8 @@ def test_laser_along_x_gives_the_positioning_table() -> None:
     x, values = np.linspace(-300.0, 300.0, 13), np.random.default_rng(3).normal(size=13) * 0.01
     q = np.zeros((13, 5))
     q[:, 0] = x
-    truth = ErrorModel(SerialErrors((Component(name, Table(x, values - values[0])),)))
-    start = ErrorModel(SerialErrors((Component(name, Table(x, 0.0 * x)),)))
+    truth = ErrorModel(SerialErrors((Component(name, TableCurve(x, values - values[0])),)))
+    start = ErrorModel(SerialErrors((Component(name, TableCurve(x, 0.0 * x)),)))
     read = truth.on(kin).place(q)[0][:, 0] - kin.forward(q)[0][:, 0]
     laser = Measurements("along", q, read, 1e-4, toward=np.array([1.0, 0.0, 0.0]), zeroed=False)
     assert fit(start, kin, laser).model.values == pytest.approx(truth.values, abs=1e-12)

@@ -8,10 +8,10 @@ import pytest
 import machines
 from machines.geometric_error.actual.actual import Actual
 from machines.geometric_error.actual.actual_kinematics import ActualKinematics
-from machines.geometric_error.actual.correction import POLE, Corrected, correct
+from machines.geometric_error.actual.correction import POLE, CorrectedCommands, correct
 from machines.geometric_error.actual.model import ErrorModel, doubt
 from machines.geometric_error.actual.serial_errors import Component, SerialErrors
-from machines.geometric_error.tables.curves import Table
+from machines.geometric_error.tables.curves import TableCurve
 from machines.geometric_error.tables.names import parse
 from machines.kinematics.base import Kinematics
 from tests.machines.error_models import ARCSEC, REACH, joints, model
@@ -122,7 +122,7 @@ def test_beyond_the_measured_range_is_refused_unless_asked_for() -> None:
 
 def test_each_way_of_approach_gets_its_own_correction() -> None:
     kin = machines.load("mill-3axis").kinematics
-    both = Table(np.array([-500.0, 500.0]), np.array([0.02, 0.02, -0.01, -0.01]), both=True)
+    both = TableCurve(np.array([-500.0, 500.0]), np.array([0.02, 0.02, -0.01, -0.01]), both=True)
     actual = ErrorModel(SerialErrors((Component(parse("EXX"), both),))).on(kin)
     q = np.zeros((3, 3))
     way = np.array([[1.0, 0, 0], [-1.0, 0, 0], [0.0, 0, 0]])
@@ -172,5 +172,5 @@ def test_all_is_told(recwarn: pytest.WarningsRecorder) -> None:
     q = q.copy()
     q[0] = np.nan
     found = correct(actual, q, tip, axis)
-    assert isinstance(found, Corrected) and np.isnan(found.q[0]).all() and np.isfinite(found.q[1:]).all()
+    assert isinstance(found, CorrectedCommands) and np.isnan(found.q[0]).all() and np.isfinite(found.q[1:]).all()
     assert not recwarn.list

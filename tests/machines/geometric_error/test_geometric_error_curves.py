@@ -8,22 +8,23 @@ from scipy.interpolate import CubicSpline
 
 from machines.geometric_error.actual.actual import approach
 from machines.geometric_error.tables.curve_banks import banks
-from machines.geometric_error.tables.curves import FINEST, Curve, Fourier, Polynomial, Table
+from machines.geometric_error.tables.curves import FINEST, Curve, Fourier, Polynomial, TableCurve
 
 X = np.array([-100.0, 0.0, 50.0, 120.0])
 V = np.array([0.01, -0.02, 0.03, 0.0])
-CURVES = [Table(X, V), Table(X, V, "spline"), Table(X, np.concatenate([V, 2.0 * V]), both=True),
-          Table(X, V, "linear", period=300.0), Table(X, V, "spline", period=300.0), Table(X[:1], V[:1]),
+CURVES = [TableCurve(X, V), TableCurve(X, V, "spline"), TableCurve(X, np.concatenate([V, 2.0 * V]), both=True),
+          TableCurve(X, V, "linear", period=300.0), TableCurve(X, V, "spline", period=300.0), TableCurve(X[:1], V[:1]),
           Fourier(np.array([0.1, 0.2, 0.3, -0.1, 0.05]), 240.0, 10.0), Polynomial(V, (-100.0, 120.0), 10.0, 50.0)]
 
 
 def test_table_is_linear_between_its_rows() -> None:
-    assert Table(X, V).at(np.array([-100.0, -50.0, 25.0, 120.0])) == pytest.approx([0.01, -0.005, 0.005, 0.0], abs=1e-15)
+    assert TableCurve(X, V).at(np.array([-100.0, -50.0, 25.0, 120.0])) == pytest.approx([0.01, -0.005, 0.005, 0.0],
+                                                                                        abs=1e-15)
 
 
 def test_spline_is_the_cubic_through_the_rows() -> None:
     x = np.linspace(-100.0, 120.0, 50)
-    assert Table(X, V, "spline").at(x) == pytest.approx(CubicSpline(X, V)(x), abs=1e-15)
+    assert TableCurve(X, V, "spline").at(x) == pytest.approx(CubicSpline(X, V)(x), abs=1e-15)
 
 
 def test_series_and_polynomial_are_what_they_say() -> None:
@@ -37,7 +38,7 @@ def test_series_and_polynomial_are_what_they_say() -> None:
 
 @pytest.mark.parametrize("rule", ["linear", "spline"])
 def test_a_period_joins_the_ends(rule: str) -> None:
-    curve = Table(X, V, rule, period=300.0)  # type: ignore[arg-type]
+    curve = TableCurve(X, V, rule, period=300.0)  # type: ignore[arg-type]
     x = np.linspace(-100.0, 200.0, 31)
     assert curve.at(x + 900.0) == pytest.approx(curve.at(x), abs=1e-14)
     assert curve.at(np.array([200.0 - 1e-9]))[0] == pytest.approx(V[0], abs=1e-11)
@@ -60,7 +61,7 @@ def test_value_is_basis_times_parameters(curve: Curve) -> None:
 
 
 def test_outside_tells_and_keeps_the_end_value() -> None:
-    curve, x = Table(X, V), np.array([-101.0, -100.0, 120.0, 121.0])
+    curve, x = TableCurve(X, V), np.array([-101.0, -100.0, 120.0, 121.0])
     assert curve.outside(x).tolist() == [True, False, False, True]
     assert not curve.outside(x, 2.0).any()
     assert curve.at(x).tolist() == [0.01, 0.01, 0.0, 0.0]
@@ -76,10 +77,11 @@ def test_curves_of_one_basis_are_evaluated_together_as_one_by_one() -> None:
     x, turn = np.sort(rng.uniform(-1.0, 1.0, 9)), np.linspace(0.0, 6.0, 7)
     curves: list[Curve] = []
     for _ in range(2):
-        curves += [Table(x, rng.normal(size=9)), Table(x, rng.normal(size=18), both=True), Table(turn, rng.normal(size=7),
+        curves += [TableCurve(x, rng.normal(size=9)), TableCurve(x, rng.normal(size=18), both=True),
+                   TableCurve(turn, rng.normal(size=7),
                                                                                               period=2.0 * np.pi),
-                   Table(x, rng.normal(size=9), "spline"), Table(x, rng.normal(size=18), "spline", both=True),
-                   Table(turn, rng.normal(size=7), "spline", period=2.0 * np.pi), Table(x[:1], rng.normal(size=1)),
+                   TableCurve(x, rng.normal(size=9), "spline"), TableCurve(x, rng.normal(size=18), "spline", both=True),
+                   TableCurve(turn, rng.normal(size=7), "spline", period=2.0 * np.pi), TableCurve(x[:1], rng.normal(size=1)),
                    Fourier(rng.normal(size=7)), Fourier(rng.normal(size=1)),
                    Fourier(rng.normal(size=7), 0.7, 0.1, (-0.5, 0.5)),
                    Polynomial(rng.normal(size=4), (-0.8, 0.9), 0.2, 0.5), Polynomial(rng.normal(size=1), (-1.0, 1.0))]
@@ -96,7 +98,7 @@ def test_curves_of_one_basis_are_evaluated_together_as_one_by_one() -> None:
 def test_rows_of_one_place_ask_for_no_closer_look() -> None:
     """Two readings half a micrometre apart among rows of 50 mm; a table that repeats ends where it begins again."""
     rows = np.linspace(-350.0, 350.0, 15)
-    assert Table(rows, np.zeros(15)).detail == pytest.approx(50.0)
-    assert Table(np.sort(np.append(rows, 0.0005)), np.zeros(16)).detail == pytest.approx(700.0 * FINEST)
-    assert Table(np.array([0.0, 1.0, 2.0]), np.zeros(3), period=2.5).detail == pytest.approx(0.5)
-    assert Table(np.array([3.0]), np.zeros(1)).detail == np.inf
+    assert TableCurve(rows, np.zeros(15)).detail == pytest.approx(50.0)
+    assert TableCurve(np.sort(np.append(rows, 0.0005)), np.zeros(16)).detail == pytest.approx(700.0 * FINEST)
+    assert TableCurve(np.array([0.0, 1.0, 2.0]), np.zeros(3), period=2.5).detail == pytest.approx(0.5)
+    assert TableCurve(np.array([3.0]), np.zeros(1)).detail == np.inf

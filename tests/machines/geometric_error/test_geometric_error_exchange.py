@@ -12,12 +12,12 @@ import machines
 from machines.geometric_error.actual.model import ErrorModel, doubt
 from machines.geometric_error.actual.serial_errors import SerialErrors
 from machines.geometric_error.exchange.bed_frame import bed_side
-from machines.geometric_error.exchange.exchange import save, write_model
 from machines.geometric_error.exchange.exports import ini_lines, location_csv, notices, to_screws, to_tables
-from machines.geometric_error.exchange.imports import How, read_sources, with_covariance
+from machines.geometric_error.exchange.imports import ImportOptions, read_sources, with_covariance
+from machines.geometric_error.exchange.write_model import save, write_model
 from machines.geometric_error.files.covariance import write_covariance
 from machines.geometric_error.files.loader import load
-from machines.geometric_error.tables.curves import Fourier, Polynomial, Table
+from machines.geometric_error.tables.curves import Fourier, Polynomial, TableCurve
 from machines.kinematics.serial import Serial
 from machines.machine import Machine
 from tests.machines.error_models import ARCSEC, component, correlated, joints, model
@@ -38,7 +38,7 @@ def test_curves_become_tables_that_lose_what_is_told_and_keep_the_doubt(name: st
     own = {str(c.name): c.curve for c in full.axes.components}
     for new in made.axes.components:
         old, lost = own[str(new.name)], losses[str(new.name)]
-        assert isinstance(new.curve, Table) and new.curve.rule == "linear"
+        assert isinstance(new.curve, TableCurve) and new.curve.rule == "linear"
         assert lost <= (angle if new.name.angular else length)
         if full.axes.frame.get(new.name.axis, "fixed") != made.axes.frame.get(new.name.axis, "fixed"):
             continue  # turned into the bed's directions
@@ -86,9 +86,9 @@ def test_tables_keep_their_own_rows_and_stay_as_they_are() -> None:
     full = load(SAMPLES / "mikron-ucp710.toml", machine)
     made, losses = to_tables(full, machine, {}, 1e-4, 0.1 * ARCSEC)
     for old, new in zip(full.axes.components, made.axes.components, strict=True):
-        if isinstance(old.curve, Table):
+        if isinstance(old.curve, TableCurve):
             assert np.array_equal(old.curve.values, new.curve.values) and losses[str(old.name)] < 1e-15
-    assert {type(c.curve) for c in full.axes.components} == {Table, Fourier}
+    assert {type(c.curve) for c in full.axes.components} == {TableCurve, Fourier}
     stepped, _ = to_tables(full, machine, {"X": 100.0, "C": 45.0 * DEG}, 1e-4, 0.1 * ARCSEC)
     curves = {str(c.name): c.curve for c in stepped.axes.components}
     assert curves["EXX"].x.tolist() == pytest.approx(np.linspace(-355, 355, 9).tolist())
@@ -130,7 +130,7 @@ def test_linuxcnc_with_the_files_leaves_the_rest(name: str, way: float) -> None:
     kin = machine.kinematics
     assert isinstance(kin, Serial)
     full = model(kin, 3)
-    two_way = Table(np.linspace(-900.0, 900.0, 9), np.linspace(-0.02, 0.03, 18) ** 2 * 30.0, both=True)
+    two_way = TableCurve(np.linspace(-900.0, 900.0, 9), np.linspace(-0.02, 0.03, 18) ** 2 * 30.0, both=True)
     rest = tuple(c for c in full.axes.components if str(c.name) != "EXX")
     full = replace(full, axes=replace(full.axes, components=(*rest, component("EXX", two_way))))
     screws = to_screws(full, machine, {}, 1e-4, 0.02 * ARCSEC)
@@ -180,7 +180,7 @@ def test_an_axis_whose_errors_act_about_a_point_beside_it_is_left(tmp_path: Path
 def test_where_rows_end_inside_travel_the_rest_ends_too(tmp_path: Path) -> None:
     machine = machines.load("mill-3axis")
     ends = {"EXX": (-500.0, 500.0), "EYY": (-300.0, 400.0), "EZZ": (-300.0, 400.0)}
-    full = ErrorModel(SerialErrors(tuple(component(name, Table(np.array(x), np.array([0.0, 0.01])))
+    full = ErrorModel(SerialErrors(tuple(component(name, TableCurve(np.array(x), np.array([0.0, 0.01])))
                                          for name, x in ends.items())), machine=machine.name)
     full = replace(full, covariance=np.diag(np.full(6, 1e-8)))
     screws = to_screws(full, machine, {}, 1e-4, ARCSEC)
@@ -200,18 +200,18 @@ def test_linuxcnc_files_come_back_to_their_resolution(name: str, tmp_path: Path)
     for letter, text in screws.texts.items():
         (tmp_path / f"{letter}.comp").write_text(text)
         sources.append(f"{letter}={tmp_path / letter}.comp")
-    back, found = read_sources(sources, machine, How())
+    back, found = read_sources(sources, machine, ImportOptions())
     assert back is not None and not found
     for c in back.axes.components:
         table = screws.tables[c.name.axis]
-        assert isinstance(c.curve, Table) and c.curve.both == table.both
+        assert isinstance(c.curve, TableCurve) and c.curve.both == table.both
         assert c.curve.x == pytest.approx(table.x, abs=1e-9) and c.curve.values == pytest.approx(table.values, abs=2e-9)
     trims = tmp_path / "X1.comp"
     rows = np.array([[float(x) for x in line.split()] for line in screws.texts["X"].splitlines()])
     trims.write_text("\n".join(f"{a} {a - b:.9f} {a - c:.9f}" for a, b, c in rows))
-    same, _ = read_sources([f"X={trims}"], machine, How(kind=1))
+    same, _ = read_sources([f"X={trims}"], machine, ImportOptions(kind=1))
     assert same is not None and same.values == pytest.approx(back.values[: len(same.values)], abs=2e-9)
-    wrong, found = read_sources([f"X={trims}"], machine, How(kind=0))
+    wrong, found = read_sources([f"X={trims}"], machine, ImportOptions(kind=0))
     assert wrong is None and found[0].code == "error-table.kind" and "type 1" in found[0].hint
 
 
@@ -233,7 +233,7 @@ def test_tables_per_axis_come_back_with_location_and_covariance(tmp_path: Path) 
     for name, text in {**write_model(made), **more}.items():
         (tmp_path / name).write_text(text)
     sources = [str(tmp_path / f"t-{x}.csv") for x in ("X", "Y", "Z", "A", "C", "location")]
-    back, found = read_sources(sources, machine, How(periods={"A": 2 * np.pi, "C": 2 * np.pi}))
+    back, found = read_sources(sources, machine, ImportOptions(periods={"A": 2 * np.pi, "C": 2 * np.pi}))
     assert back is not None and not found and back.names == made.names
     assert back.values == pytest.approx(made.values, rel=1e-10, abs=1e-14)
     assert back.axes.frame == {"A": "moving", "C": "moving"}  # the bed: both carry the part
@@ -247,7 +247,7 @@ def test_tables_per_axis_come_back_with_location_and_covariance(tmp_path: Path) 
 def test_a_lattice_of_others_comes_in_as_they_say(tmp_path: Path) -> None:
     (tmp_path / "m.csv").write_text("C [deg];dx [um];dy [um];dz [um]\n0;1,5;2;3\n120;2;2;3\n240;1;2;3\n")
     machine = machines.load("mikron-ucp710")
-    how = How(periods={"C": 2 * np.pi}, sign=-1.0, tool_length=80.0, directions="machine")
+    how = ImportOptions(periods={"C": 2 * np.pi}, sign=-1.0, tool_length=80.0, directions="machine")
     found, faults = read_sources([str(tmp_path / "m.csv")], machine, how)
     assert found is not None and found.map is not None and not faults
     assert found.map.table[0, :3].tolist() == pytest.approx([-0.0015, -0.002, -0.003])
@@ -262,7 +262,7 @@ def test_readings_of_the_same_place_are_averaged_and_scatter_is_the_doubt(tmp_pa
     rows = [f"{x[k]},{run[k, 0]:.6f},{run[k, 1]:.6f}" for n, run in enumerate(runs) for k in range(13)[:: 1 - 2 * (n % 2)]]
     (tmp_path / "x.csv").write_text("X [mm],EXX+ [um],EXX- [um]\n" + "\n".join(rows))
     machine = machines.load("mikron-ucp710")
-    found, told = read_sources([str(tmp_path / "x.csv")], machine, How(average=True))
+    found, told = read_sources([str(tmp_path / "x.csv")], machine, ImportOptions(average=True))
     assert found is not None and found.covariance is not None
     assert found.values == pytest.approx(np.mean(runs, axis=0).T.ravel() * 1e-3, abs=1e-9)
     sigma = np.sqrt(np.diag(found.covariance)) * 1e3
@@ -271,7 +271,7 @@ def test_readings_of_the_same_place_are_averaged_and_scatter_is_the_doubt(tmp_pa
     pooled = np.sqrt(np.var([r[:, 0] for r in runs], axis=0, ddof=1).mean() / 5)
     assert sigma[0] == pytest.approx(pooled, rel=1e-6)
     assert [d.code for d in told] == ["error-import.averaged"] and "65 readings at 13 places" in told[0].message
-    plain, faults = read_sources([str(tmp_path / "x.csv")], machine, How())
+    plain, faults = read_sources([str(tmp_path / "x.csv")], machine, ImportOptions())
     assert plain is None and faults[0].code == "error-model.order"
 
 
@@ -282,7 +282,7 @@ def test_a_lattice_of_several_readings_that_goes_round_has_a_doubt_by_node(tmp_p
     rows = [f"{z},{c},{value[z, c]:.6f},{d:.6f},2,5" for z, c in nodes for d in ([1.0, 3.0] if z else [1.0, 3.0, 2.0, 2.0])]
     head = "Z [mm],C [deg],dx [um],dy [um],dz [um],rx [arcsec]"
     (tmp_path / "m.csv").write_text("\n".join([head, *rng.permutation(rows)]))
-    how = How(average=True, periods={"C": 2 * np.pi}, zero={"Z": 100.0, "C": np.pi / 2})
+    how = ImportOptions(average=True, periods={"C": 2 * np.pi}, zero={"Z": 100.0, "C": np.pi / 2})
     found, told = read_sources([str(tmp_path / "m.csv")], machines.load("mikron-ucp710"), how)
     assert found is not None and found.map is not None and found.covariance is not None
     assert found.map.table.shape == (2, 4, 6)
@@ -346,7 +346,7 @@ def test_faults_of_sources(tmp_path: Path, files: dict[str, str], code: str, wor
     for name, text in files.items():
         (tmp_path / name).write_text(text)
     sources = [str(tmp_path / name) for name in files or {"a.csv": ""}]
-    found, faults = read_sources(sources, machines.load("mikron-ucp710"), How())
+    found, faults = read_sources(sources, machines.load("mikron-ucp710"), ImportOptions())
     assert found is None
     first = next(d for d in faults if d.code == code)
     assert word in first.message and first.hint and len(faults) <= 2
@@ -360,11 +360,11 @@ SCREWS = [("a b c\n0 0 0\n", "error-table.row"), ("0 0 0\n0 0 0\n", "error-table
 @pytest.mark.parametrize(("text", "code"), SCREWS)
 def test_faults_of_screw_files(tmp_path: Path, text: str, code: str) -> None:
     (tmp_path / "x.comp").write_text(text)
-    found, faults = read_sources([f"X={tmp_path / 'x.comp'}"], machines.load("mill-3axis"), How())
+    found, faults = read_sources([f"X={tmp_path / 'x.comp'}"], machines.load("mill-3axis"), ImportOptions())
     assert found is None and [d.code for d in faults] == [code] and faults[0].hint and faults[0].file.endswith("x.comp")
-    none, faults = read_sources([f"B={tmp_path / 'x.comp'}"], machines.load("mill-3axis"), How())
+    none, faults = read_sources([f"B={tmp_path / 'x.comp'}"], machines.load("mill-3axis"), ImportOptions())
     assert none is None and faults[0].code == "error-model.axis"
-    leaning, faults = read_sources([f"B={tmp_path / 'x.comp'}"], machines.load("nutating-head"), How())
+    leaning, faults = read_sources([f"B={tmp_path / 'x.comp'}"], machines.load("nutating-head"), ImportOptions())
     assert leaning is None and "B of nutating-head leans" in faults[0].message
-    rods, faults = read_sources([f"X={tmp_path / 'x.comp'}"], machines.load("uranesx"), How())
+    rods, faults = read_sources([f"X={tmp_path / 'x.comp'}"], machines.load("uranesx"), ImportOptions())
     assert rods is None and faults[0].code == "error-model.axis" and "it has none" in faults[0].hint

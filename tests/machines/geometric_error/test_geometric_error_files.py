@@ -14,13 +14,13 @@ import machines
 from machines.geometric_error.actual.actual_map import ActualByMap
 from machines.geometric_error.actual.model import ErrorModel, doubt
 from machines.geometric_error.actual.serial_errors import Component, SerialErrors
-from machines.geometric_error.exchange.exchange import save, table_to_csv
-from machines.geometric_error.exchange.lattice_making import deviations, map_loss, map_of
+from machines.geometric_error.exchange.make_map import deviations, map_loss, map_of
 from machines.geometric_error.exchange.tabulate import merged, sampled
+from machines.geometric_error.exchange.write_model import save, table_to_csv
 from machines.geometric_error.files.covariance import read_covariance
 from machines.geometric_error.files.loader import error_model_schema, load, load_checked
 from machines.geometric_error.tables.csv_table import read_csv, write_csv
-from machines.geometric_error.tables.curves import Fourier, Table
+from machines.geometric_error.tables.curves import Fourier, TableCurve
 from machines.geometric_error.tables.lattice import ErrorMap
 from machines.geometric_error.tables.lattice_file import map_from_csv, map_to_csv
 from machines.geometric_error.tables.names import parse
@@ -171,7 +171,7 @@ def test_a_written_model_reads_back_the_same(tmp_path: Path, name: str) -> None:
 
 
 def test_tables_of_one_axis_with_iso_names_come_back(tmp_path: Path) -> None:
-    table, name = Table(np.linspace(-0.3, 2.0, 7), np.linspace(-1, 1, 14) * 1e-5, both=True), parse("EAC")
+    table, name = TableCurve(np.linspace(-0.3, 2.0, 7), np.linspace(-1, 1, 14) * 1e-5, both=True), parse("EAC")
     assert name is not None
     (tmp_path / "c.csv").write_text(table_to_csv([Component(name, table)]))
     back, found = read_csv(tmp_path / "c.csv")
@@ -231,7 +231,8 @@ def test_samples_are_realistic(path: Path) -> None:
 
 
 def test_the_schema_knows_the_tables() -> None:
-    assert {"components", "location", "legs", "map", "base"} <= set(error_model_schema()["properties"])  # type: ignore[call-overload]
+    assert {"components", "location", "legs", "map",
+            "base"} <= set(error_model_schema()["properties"])  # type: ignore[call-overload]
 
 
 # ---- LinuxCNC ------------------------------------------------------------------------------------------------------
@@ -239,7 +240,7 @@ def test_the_schema_knows_the_tables() -> None:
 def test_linuxcnc_table_round_trip_both_kinds() -> None:
     name = parse("EXX")
     assert name is not None
-    table = Table(np.array([-100.0, 0.0, 250.0]), np.array([0.01, 0.0, -0.02, 0.013, 0.001, -0.03]), both=True)
+    table = TableCurve(np.array([-100.0, 0.0, 250.0]), np.array([0.01, 0.0, -0.02, 0.013, 0.001, -0.03]), both=True)
     text = to_linuxcnc(name, table)
     assert text.splitlines()[0] == "-100.000000000 -99.990000000 -99.987000000"
     back, _ = from_linuxcnc(text, name)
@@ -248,7 +249,8 @@ def test_linuxcnc_table_round_trip_both_kinds() -> None:
     assert trims is not None and trims.values == pytest.approx(table.values, abs=1e-9)
     turning = parse("ECC")
     assert turning is not None
-    one, _ = from_linuxcnc(to_linuxcnc(turning, Table(np.array([0.0, 1.0]), np.array([1e-5, -1e-5])), -1.0), turning, -1.0)
+    one, _ = from_linuxcnc(to_linuxcnc(turning, TableCurve(np.array([0.0, 1.0]), np.array([1e-5, -1e-5])), -1.0), turning,
+                           -1.0)
     assert one is not None and not one.both and one.values == pytest.approx([1e-5, -1e-5], abs=1e-10)
 
 
@@ -263,9 +265,9 @@ def test_linuxcnc_tables_that_are_none(text: str) -> None:
 def test_linuxcnc_holds_positioning_errors_of_256_rows() -> None:
     straightness, positioning = parse("EYX"), parse("EXX")
     assert straightness is not None and positioning is not None
-    table = Table(np.arange(300.0), np.zeros(300))
+    table = TableCurve(np.arange(300.0), np.zeros(300))
     for name, given, word in ((straightness, table, "positioning"), (positioning, table, "256"),
-                              (positioning, Table(np.arange(5.0), np.zeros(5), "spline"), "sampled")):
+                              (positioning, TableCurve(np.arange(5.0), np.zeros(5), "spline"), "sampled")):
         with pytest.raises(ValueError, match=word):
             to_linuxcnc(name, given)
     fewer = sampled(Fourier(np.array([0.0, 0.01, 0.0]), 100.0), np.linspace(0.0, 200.0, 81))
@@ -354,10 +356,10 @@ def test_lattice_csv_round_trip_in_any_order(tmp_path: Path) -> None:
 def test_a_component_can_be_put_in_and_the_doubt_of_the_others_stays() -> None:
     name = parse("EXX")
     assert name is not None
-    old = Component(name, Table(np.array([0.0, 9.0]), np.ones(2)))
+    old = Component(name, TableCurve(np.array([0.0, 9.0]), np.ones(2)))
     start = ErrorModel(SerialErrors((old,), {"EC0Y": 1e-5, "EB0Z": 1e-5}),
                        covariance=np.diag([1.0, 1.0, 4.0, 9.0]) + np.eye(4)[:, ::-1])
-    new = ErrorModel(SerialErrors((Component(name, Table(np.array([0.0, 1.0]), np.zeros(2))),), {"EB0Z": 3e-5}))
+    new = ErrorModel(SerialErrors((Component(name, TableCurve(np.array([0.0, 1.0]), np.zeros(2))),), {"EB0Z": 3e-5}))
     more = merged(start, new)
     assert more.names == ["EXX[0]", "EXX[1]", "EC0Y", "EB0Z"] and more.values.tolist() == [0.0, 0.0, 1e-5, 3e-5]
     assert more.covariance is not None and more.covariance.tolist() == np.diag([0.0, 0.0, 4.0, 0.0]).tolist()

@@ -11,7 +11,7 @@ import pytest
 import machines
 from machines.geometric_error import load
 from machines.geometric_error.actual.model import ErrorModel
-from machines.geometric_error.exchange.exchange import save
+from machines.geometric_error.exchange.write_model import save
 from machines.geometric_error.files.fingerprint import fingerprint
 
 MIKRON = machines.load("mikron-ucp710")

@@ -9,7 +9,7 @@ import pytest
 
 import machines
 from machines.geometric_error.actual.model import ErrorModel
-from machines.geometric_error.exchange.exchange import save
+from machines.geometric_error.exchange.write_model import save
 from machines.geometric_error.files.loader import load
 from machines.kinematics.serial import Serial
 from toolpaths.arrays import Floats

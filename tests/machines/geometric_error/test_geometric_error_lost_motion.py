@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from machines.geometric_error.actual.lost_motion import GRAIN, Steps, turning_sign
+from machines.geometric_error.actual.lost_motion import GRAIN, PlaySteps, turning_sign
 from machines.geometric_error.actual.serial_errors import Component, SerialErrors
-from machines.geometric_error.tables.curves import Table
+from machines.geometric_error.tables.curves import TableCurve
 from machines.geometric_error.tables.names import parse
 
 
@@ -18,13 +18,13 @@ def test_walked_steps_are_the_play_of_a_loop() -> None:
     for d, g in zip(step, gap, strict=True):
         way = np.clip(way + 2.0 * d / g, -1.0, 1.0)
         expected.append(way)
-    found = Steps.of(step, gap).walked().at(begin)
+    found = PlaySteps.of(step, gap).walked().at(begin)
     np.testing.assert_allclose(found, expected, atol=1e-12)
     assert (np.abs(found) < 1.0).any() and (np.abs(found) == 1.0).any()
 
 
 def test_one_after_the_other_is_both_at_once() -> None:
-    one, two = Steps.of(np.array([[0.4]]), np.array([[1.0]])), Steps.of(np.array([[-0.3]]), np.array([[1.0]]))
+    one, two = PlaySteps.of(np.array([[0.4]]), np.array([[1.0]])), PlaySteps.of(np.array([[-0.3]]), np.array([[1.0]]))
     for way in (-1.0, -0.2, 0.9):
         start = np.array([[way]])
         np.testing.assert_allclose(one.then(two).at(start), two.at(one.at(start)), atol=1e-15)
@@ -39,8 +39,8 @@ def test_small_steps_back_turn_when_they_add_up() -> None:
 
 def test_lost_motion_of_axes() -> None:
     x = np.array([-100.0, 100.0])
-    both = Table(x, np.array([0.0, 0.0, 0.004, 0.002]), both=True)
-    curves = {"EYY": both, "EZX": both, "EXX": both, "EZZ": Table(x, np.array([0.0, 1.0]))}
+    both = TableCurve(x, np.array([0.0, 0.0, 0.004, 0.002]), both=True)
+    curves = {"EYY": both, "EZX": both, "EXX": both, "EZZ": TableCurve(x, np.array([0.0, 1.0]))}
     errors = SerialErrors(tuple(Component(name, c) for text, c in curves.items() if (name := parse(text)) is not None))
     names = ("X", "Y", "Z")
     assert errors.two_way(names) == [0, 1]
@@ -50,7 +50,7 @@ def test_lost_motion_of_axes() -> None:
 
 def test_lost_motion_of_an_axis_named_after_another() -> None:
     """EXU is the positioning error of U, which moves along X (ISO 841)."""
-    both = Table(np.array([-100.0, 100.0]), np.array([0.0, 0.0, 0.004, 0.002]), both=True)
+    both = TableCurve(np.array([-100.0, 100.0]), np.array([0.0, 0.0, 0.004, 0.002]), both=True)
     name = parse("EXU")
     assert name is not None
     found = SerialErrors((Component(name, both),)).gaps(("U",), np.array([[100.0]]), [0])

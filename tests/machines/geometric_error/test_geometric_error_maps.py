@@ -12,9 +12,9 @@ import machines
 from machines.geometric_error.actual.actual_map import ActualByMap, part_side
 from machines.geometric_error.actual.model import ErrorModel, doubt
 from machines.geometric_error.actual.serial_errors import SerialErrors
-from machines.geometric_error.exchange.exchange import save
-from machines.geometric_error.exchange.lattice_making import map_loss, map_of, nodes_of, refined
+from machines.geometric_error.exchange.make_map import map_loss, map_of, nodes_of, refined
 from machines.geometric_error.exchange.volume import middle, samples
+from machines.geometric_error.exchange.write_model import save
 from machines.geometric_error.files.loader import load, load_checked
 from machines.geometric_error.tables.csv_table import read_csv
 from machines.geometric_error.tables.lattice import ErrorMap

@@ -10,8 +10,8 @@ import pytest
 from machines.geometric_error.actual.error_rates import pivot_rates, standing_arm
 from machines.geometric_error.actual.model import ErrorModel
 from machines.geometric_error.actual.serial_errors import Component, SerialErrors
-from machines.geometric_error.exchange.bed_frame import Turned
-from machines.geometric_error.tables.curves import Curve, Fourier, Polynomial, Table
+from machines.geometric_error.exchange.bed_frame import RotatedCurve
+from machines.geometric_error.tables.curves import Curve, Fourier, Polynomial, TableCurve
 from machines.geometric_error.tables.lattice import ErrorMap
 from machines.geometric_error.tables.names import parse
 from machines.kinematics.serial import Serial
@@ -24,18 +24,18 @@ STEPS = 40
 REACH = {False: (-900.0, 900.0), True: (-2.5, 2.5)}
 """mm; rad"""
 CURVES: dict[str, Curve] = {
-    "linear": Table(np.array([-3.0, -1.0, 0.5, 4.0]), RNG.normal(size=4)),
-    "linear, two ways": Table(np.array([-3.0, -1.0, 0.5, 4.0]), RNG.normal(size=8), both=True),
-    "spline": Table(np.linspace(-3.0, 4.0, 7), RNG.normal(size=7), rule="spline"),
-    "spline, two ways": Table(np.linspace(-3.0, 4.0, 7), RNG.normal(size=14), rule="spline", both=True),
-    "periodic": Table(np.linspace(0.0, 5.0, 6), RNG.normal(size=6), period=6.0),
-    "periodic spline": Table(np.linspace(0.0, 5.0, 6), RNG.normal(size=6), rule="spline", period=6.0),
-    "one row": Table(np.array([1.0]), np.array([0.4])),
+    "linear": TableCurve(np.array([-3.0, -1.0, 0.5, 4.0]), RNG.normal(size=4)),
+    "linear, two ways": TableCurve(np.array([-3.0, -1.0, 0.5, 4.0]), RNG.normal(size=8), both=True),
+    "spline": TableCurve(np.linspace(-3.0, 4.0, 7), RNG.normal(size=7), rule="spline"),
+    "spline, two ways": TableCurve(np.linspace(-3.0, 4.0, 7), RNG.normal(size=14), rule="spline", both=True),
+    "periodic": TableCurve(np.linspace(0.0, 5.0, 6), RNG.normal(size=6), period=6.0),
+    "periodic spline": TableCurve(np.linspace(0.0, 5.0, 6), RNG.normal(size=6), rule="spline", period=6.0),
+    "one row": TableCurve(np.array([1.0]), np.array([0.4])),
     "fourier": Fourier(RNG.normal(size=7), period=5.0, origin=1.0),
     "polynomial": Polynomial(RNG.normal(size=5), (-3.0, 4.0), origin=0.5, scale=2.0)}
-CURVES["turned"] = Turned((((0, 0), Component(parse("EXC"), CURVES["linear"])),  # type: ignore[arg-type]
-                           ((0, 1), Component(parse("EYC"), CURVES["fourier"]))),  # type: ignore[arg-type]
-                          np.array([0.0, 0.6, 0.8]), back=True)
+CURVES["turned"] = RotatedCurve((((0, 0), Component(parse("EXC"), CURVES["linear"])),  # type: ignore[arg-type]
+                                 ((0, 1), Component(parse("EYC"), CURVES["fourier"]))),  # type: ignore[arg-type]
+                                np.array([0.0, 0.6, 0.8]), back=True)
 
 
 @pytest.mark.parametrize("kind", CURVES)
@@ -64,7 +64,7 @@ def with_two_ways(kin: Serial) -> SerialErrors:
             name = parse(text)
             assert name is not None
             size = 2e-5 if name.angular else 8e-3
-            found.append(Component(name, Table(x, size * RNG.normal(size=18), both=True)))
+            found.append(Component(name, TableCurve(x, size * RNG.normal(size=18), both=True)))
     return SerialErrors(tuple(found))
 
 

@@ -17,7 +17,7 @@ from machines.geometric_error.actual.correction import correct
 from machines.geometric_error.actual.model import ErrorModel
 from machines.geometric_error.actual.rods import RodErrors, RodFrame, platform_turn, rod_frame
 from machines.geometric_error.actual.serial_errors import SerialErrors
-from machines.geometric_error.exchange.exchange import save
+from machines.geometric_error.exchange.write_model import save
 from machines.geometric_error.files.loader import load, load_checked
 from machines.kinematics.h4_linear import H4Linear
 from machines.kinematics.linear_delta import LinearDelta

@@ -10,7 +10,7 @@ import machines
 from machines.geometric_error.actual.actual_serial import ActualSerial
 from machines.geometric_error.actual.serial_errors import Component, SerialErrors
 from machines.geometric_error.actual.transforms import about, homogeneous, inverse, transport, turns
-from machines.geometric_error.tables.curves import Polynomial, Table
+from machines.geometric_error.tables.curves import Polynomial, TableCurve
 from machines.geometric_error.tables.names import parse
 from machines.kinematics.serial import Serial
 from tests.machines.error_models import joints, serial_errors
@@ -124,7 +124,7 @@ def test_cases_that_one_can_draw() -> None:
     def moved(errors: SerialErrors) -> Floats:
         return ActualSerial(kin, errors).place(q)[0][0] - nominal
 
-    straightness = SerialErrors((Component(parse("EYX"), Table(np.array([0.0, 200.0]), np.array([0.0, 0.04]))),))
+    straightness = SerialErrors((Component(parse("EYX"), TableCurve(np.array([0.0, 200.0]), np.array([0.0, 0.04]))),))
     assert moved(straightness) == pytest.approx([0.0, 0.02, 0.0], abs=1e-13)
     assert moved(SerialErrors(constants={"EC0Y": 1e-4})) == pytest.approx([-50.0 * 1e-4, 0.0, 0.0], abs=1e-6)
     pitch = SerialErrors((Component(parse("EBX"), Polynomial(np.array([1e-4]), (-500.0, 500.0))),))
@@ -167,7 +167,7 @@ def test_the_zero_of_a_nutated_axis_is_about_its_own_line() -> None:
 def test_a_series_stays_in_the_bed_or_turns_with_the_table() -> None:
     """The same radial error at C = 90 degrees: seen from the part it differs by the turn of the table."""
     kin, q = kinematics("mikron-ucp710"), np.array([[0.0, 0.0, 50.0, 0.0, np.pi / 2]])
-    radial = (Component(parse("EXC"), Table(np.array([-4.0, 4.0]), np.array([0.02, 0.02]))),)
+    radial = (Component(parse("EXC"), TableCurve(np.array([-4.0, 4.0]), np.array([0.02, 0.02]))),)
     fixed = ActualSerial(kin, SerialErrors(radial)).place(q)[0] - kin.forward(q)[0]
     moving = ActualSerial(kin, SerialErrors(radial, frame={"C": "moving"})).place(q)[0] - kin.forward(q)[0]
     assert fixed[0] == pytest.approx([0.02, 0.0, 0.0], abs=1e-12)

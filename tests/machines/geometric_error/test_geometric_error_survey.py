@@ -12,12 +12,12 @@ from machines.geometric_error.actual.correction import correct
 from machines.geometric_error.actual.model import ErrorModel, doubt
 from machines.geometric_error.actual.serial_errors import SerialErrors
 from machines.geometric_error.exchange.exports import lattice_for, to_map, worst
-from machines.geometric_error.exchange.imports import How, read_sources
+from machines.geometric_error.exchange.imports import ImportOptions, read_sources
 from machines.geometric_error.exchange.survey import absent, beyond_travel, survey, unmeasured
 from machines.geometric_error.exchange.tabulate import without
 from machines.geometric_error.exchange.volume import ranges
 from machines.geometric_error.files.loader import load
-from machines.geometric_error.tables.curves import Fourier, Table
+from machines.geometric_error.tables.curves import Fourier, TableCurve
 from machines.geometric_error.tables.names import parse
 from tests.machines.error_models import ARCSEC, component, correlated, model
 from toolpaths.diagnostics import Severity
@@ -57,7 +57,7 @@ def test_a_map_carries_the_doubt_of_its_model_at_its_nodes() -> None:
 def test_a_map_goes_round_where_its_model_does() -> None:
     machine = machines.load("mikron-ucp710")
     for curve, period, last in ((Fourier(np.array([0.0, 0.01, 0.0])), 2 * np.pi, 330.0),
-                                (Table(np.array([0.0, 1.0, 4.0]), np.zeros(3)), 0.0, np.degrees(4.0))):
+                                (TableCurve(np.array([0.0, 1.0, 4.0]), np.zeros(3)), 0.0, np.degrees(4.0))):
         full = ErrorModel(SerialErrors((component("EXC", curve),)))
         lattice, fixed = lattice_for(full, machine, "C", {}, {}, 0.0, "machine")
         assert lattice.periods == (period,) and np.degrees(lattice.nodes[0][-1]) == pytest.approx(last)
@@ -86,8 +86,8 @@ def test_figures_of_a_model() -> None:
     assert absent(less, machine) == ["EXX", "EZC"] and len(less.names) == len(full.names) - 35
     assert less.covariance is not None and np.diag(less.covariance)[0] == pytest.approx((0.5e-3) ** 2)
     assert unmeasured(full, machine, "e") == []
-    short = ErrorModel(SerialErrors((component("EXX", Table(np.array([0.0, 10.0]), np.zeros(2))),)))
-    turn = ErrorModel(SerialErrors((component("EXC", Table(np.array([0.0, 2 * np.pi]), np.zeros(2))),)))
+    short = ErrorModel(SerialErrors((component("EXX", TableCurve(np.array([0.0, 10.0]), np.zeros(2))),)))
+    turn = ErrorModel(SerialErrors((component("EXC", TableCurve(np.array([0.0, 2 * np.pi]), np.zeros(2))),)))
     told = unmeasured(turn, machine, "e.toml")
     assert len(told) == 1 and "C goes round, the model holds from 0 to 360" in told[0].message and "repeats" in told[0].hint
     assert ranges(turn, machine)[1][4] == pytest.approx(2 * np.pi)
@@ -122,7 +122,7 @@ def test_what_correction_leaves_is_what_the_commands_leave_where_it_is_told(name
 def test_a_range_far_beyond_travel_is_told(text: str, told: str, tmp_path: Path) -> None:
     machine = machines.load("mikron-ucp710")
     (tmp_path / "x.csv").write_text(text)
-    found, _ = read_sources([str(tmp_path / "x.csv")], machine, How())
+    found, _ = read_sources([str(tmp_path / "x.csv")], machine, ImportOptions())
     assert found is not None
     warned = beyond_travel(found, machine, "e.toml")
     assert [d.code for d in warned] == ["error-model.travel"] * bool(told)

@@ -15,10 +15,10 @@ from typer.testing import CliRunner
 import machines
 from machines.calibration.calibrate import calibrate
 from machines.calibration.measurement_file import COLUMNS, JOINT, WAY, MeasurementModel
-from machines.calibration.text import text
+from machines.calibration.result_text import text
 from machines.geometric_error.actual.model import ErrorModel
 from machines.geometric_error.actual.rods import RodErrors, rod_frame, rod_names
-from machines.geometric_error.exchange.exchange import save
+from machines.geometric_error.exchange.write_model import save
 from machines.geometric_error.files.loader import load
 from machines.geometric_error.tables.csv_table import read_csv, write_csv
 from postproc.cli.app import app

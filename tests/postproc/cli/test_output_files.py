@@ -15,7 +15,7 @@ from postproc.cli.app import app
 from postproc.setup.fingerprint import fingerprint
 from postproc.setup.model import load_setup
 from tests.postproc.kit import SAMPLES, TOOLS
-from toolpaths import leftovers
+from toolpaths import interrupted_runs
 
 GOLDEN = Path(__file__).parents[2] / "golden"
 MIKRON = ["-m", "mikron-ucp710", "-c", "fanuc-30i"]
@@ -161,12 +161,13 @@ def test_fingerprints_follow_meshes_not_names(tmp_path: Path) -> None:
 def test_a_killed_run_is_reported_by_verify_and_put_right_by_convert(shop: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert convert(shop).exit_code == 0
     out = shop / "out"
-    run_of_dead = f"postproc-{leftovers._where()}-999999999-1-00000000"
-    old = leftovers.temporary(out / "O1001", run_of_dead, leftovers.OLD)
+    run_of_dead = f"postproc-{interrupted_runs._where()}-999999999-1-00000000"
+    old = interrupted_runs.temporary(out / "O1001", run_of_dead, interrupted_runs.OLD)
     (out / "O1001").rename(old)
     (out / "O1001").write_text("new text of a run that was killed")
-    entry = leftovers.Entry("O1001", "gone", old.name, leftovers.mark_of(out / "O1001"))
-    leftovers.temporary(out / "main.nc", run_of_dead, leftovers.JOURNAL).write_text(leftovers.journal_text([entry]))
+    entry = interrupted_runs.Entry("O1001", "gone", old.name, interrupted_runs.mark_of(out / "O1001"))
+    interrupted_runs.temporary(out / "main.nc", run_of_dead,
+                               interrupted_runs.JOURNAL).write_text(interrupted_runs.journal_text([entry]))
     verify = ["verify", out / "main.nc", shop / "part.cls", *MIKRON, "--setup", shop / "shop.toml"]
     got = run(*verify)
     assert got.exit_code == 1 and "warning [file.unfinished]" in got.stderr

@@ -20,7 +20,7 @@ from postproc.placement.figure import margins_at
 from postproc.placement.place import place
 from postproc.placement.space import ANGLES
 from postproc.placement.write import placed_text
-from postproc.setup.bodies import Bodies
+from postproc.setup.bodies import BodiesModel
 from postproc.setup.model import PartPlacement, Placement, load_setup
 from tests.postproc.kit import SAMPLES, machine
 from tests.postproc.placement.test_placement import passes, placed, setup_of
@@ -171,7 +171,7 @@ def box(low: tuple[float, ...], high: tuple[float, ...], **more: object) -> dict
 
 def test_bodies_that_stand_are_kept_clear_of() -> None:
     """A post stands where the part would: it is named, and the part goes beside it; resting on the table is no touch."""
-    bodies = Bodies.model_validate({
+    bodies = BodiesModel.model_validate({
         "table": box((-400.0, -300.0, -120.0), (400.0, 300.0, -50.0)),
         "fixtures": [box((0.0, -10.0, -50.0), (80.0, 20.0, -5.0), name="blank", frame="part"),
                      box((150.0, -80.0, -50.0), (170.0, 80.0, 40.0), name="post")]})
@@ -192,7 +192,7 @@ def test_bodies_that_stand_are_kept_clear_of() -> None:
 def test_tools_keep_clear_of_what_stands() -> None:
     """A clamp higher than the cut beside the part: the cutter must not come near, although the part itself stands free."""
     clamp = box((85.0, -40.0, -50.0), (95.0, 40.0, 30.0), name="clamp")
-    bodies = Bodies.model_validate({"fixtures": [clamp], "clearance": 2.0})
+    bodies = BodiesModel.model_validate({"fixtures": [clamp], "clearance": 2.0})
     tool = setup_of().tools["1"].model_copy(update={"flute_length": 40.0})
     setup = setup_of((0.0, 0.0, 0.0), x=(-60.0, 0.0)).model_copy(update={"bodies": bodies, "tools": {"1": tool}})
     choice = placed(passes((1.0, 0.0)), machine("mill-3axis"), setup)

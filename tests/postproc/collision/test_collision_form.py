@@ -10,21 +10,21 @@ import trimesh
 from typer.testing import CliRunner
 
 from postproc.cli.app import app
-from postproc.collision.form import CUTTER, HOLDER, SHANK, Form, tool_form
+from postproc.collision.form import CUTTER, HOLDER, SHANK, ToolForm, tool_form
+from postproc.collision.holder_hull import spun
 from postproc.collision.mesh import load_mesh
 from postproc.collision.revolution import signed
-from postproc.collision.spun import spun
-from postproc.setup.bodies import Section
+from postproc.setup.bodies import HolderSection
 from postproc.setup.model import SetupFile, ToolSetup, load_setup
 from tests.postproc.kit import SAMPLES
 from toolpaths.arrays import Floats
 from toolpaths.toolpath import Tool
 
-FULL = ToolSetup(gauge_length=100.0, flute_length=20.0, shank=[Section(diameter=8.0, length=30.0)],
-                 holder=[Section(lower=20.0, upper=30.0, length=25.0), Section(diameter=40.0, length=30.0)])
+FULL = ToolSetup(gauge_length=100.0, flute_length=20.0, shank=[HolderSection(diameter=8.0, length=30.0)],
+                 holder=[HolderSection(lower=20.0, upper=30.0, length=25.0), HolderSection(diameter=40.0, length=30.0)])
 
 
-def form(tool: Tool | None, setup: ToolSetup | None = FULL) -> tuple[Form, list[str]]:
+def form(tool: Tool | None, setup: ToolSetup | None = FULL) -> tuple[ToolForm, list[str]]:
     made, found = tool_form(7, tool, setup, "s.toml")
     return made, [str(d) for d in found]
 
@@ -153,7 +153,7 @@ def test_a_gap_below_a_holders_mesh_is_told(tmp_path: Path) -> None:
     trimesh.creation.box(bounds=[(-20, -20, 60), (20, 20, 100)]).export(tmp_path / "h.stl")
     mill = Tool(7, diameter=10.0, corner_radius=0.0)
     for shank, told in (([], "between 20 mm over the tip and the holder, which begins at 60 mm"),
-                        ([Section(diameter=8.0, length=40.0)], "")):
+                        ([HolderSection(diameter=8.0, length=40.0)], "")):
         setup = FLAT.model_copy(update={"holder_mesh": "h.stl", "shank": shank})
         _, found = tool_form(7, mill, setup, str(tmp_path / "s.toml"))
         assert [told in str(d) for d in found] == ([True] if told else [])
@@ -210,7 +210,7 @@ def test_a_spun_mesh_with_many_levels_is_held_by_few_pieces() -> None:
 
 def test_what_ends_between_two_levels_is_held_too(monkeypatch: pytest.MonkeyPatch) -> None:
     """A thorn to z = 20 beside a rod to z = 50, in one piece."""
-    monkeypatch.setattr("postproc.collision.spun._MOST", 1)
+    monkeypatch.setattr("postproc.collision.holder_hull._MOST", 1)
     thorn = trimesh.convex.convex_hull(np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 2.0, 0.0], [20.0, 0.0, 20.0]]))
     mesh = trimesh.util.concatenate([thorn, trimesh.creation.box(bounds=[(-2, -2, 0), (2, 2, 50)])])
     pieces = spun(np.asarray(mesh.vertices), np.asarray(mesh.edges_unique))

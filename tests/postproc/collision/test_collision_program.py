@@ -12,7 +12,7 @@ import postproc
 from postproc.collision import search
 from postproc.collision.program import touching_parts
 from postproc.pipeline.result import PostResult
-from postproc.readback.execution.poses import Executed
+from postproc.readback.execution.poses import BlockPoses
 from tests.postproc.kit import machine, toolpath
 from toolpaths.diagnostics import Diagnostic
 from toolpaths.toolpath import Toolpath
@@ -274,7 +274,7 @@ def test_the_worst_of_each_part_of_a_program(tmp_path: Path) -> None:
     result = converted(line(), setup_file(tmp_path, fixture((20, -5, -40), (60, 5, 51))))
     assert result.job is not None and result.comparison is not None and result.comparison.executed is not None
     motion, owner = result.comparison.executed[1], result.comparison.owner
-    executed = Executed(result.job.control, result.job.kinematics_of, result.job.register_lengths(), None)
+    executed = BlockPoses(result.job.control, result.job.kinematics_of, result.job.register_lengths(), None)
     told = {d.message.split(" touches ")[0]: float(d.message.split(" by ")[1].split(" mm")[0])
             for d in collisions(result.diagnostics)}
     worst = max(told, key=lambda name: told[name])

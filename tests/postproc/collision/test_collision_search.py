@@ -8,10 +8,10 @@ import trimesh
 
 from postproc.collision import search
 from postproc.collision.bodies import Body, Scene, touches
-from postproc.collision.form import CUTTER, Form
+from postproc.collision.form import CUTTER, ToolForm
 from postproc.collision.revolution import around, signed, support
 from postproc.collision.search import EXACT, PART, Nearest, nearest
-from postproc.collision.solid import Solid, solid
+from postproc.collision.solid import TriangleSolid, solid
 from postproc.collision.swept import Swept, joined
 from postproc.setup.model import Placement
 from toolpaths.arrays import Floats
@@ -25,7 +25,7 @@ BULL = np.array([[4.0, 2.0, 4.0, 2.0, 2.0], [6.0, 2.0, 6.0, 40.0, 0.0]])
 UP = (0.0, 0.0, 1.0)
 
 
-def block() -> Solid:
+def block() -> TriangleSolid:
     """100 x 100 x 20 mm, its top at z = 10."""
     return solid(trimesh.creation.box((100.0, 100.0, 20.0)), HERE)
 
@@ -176,7 +176,7 @@ def dense(mesh: trimesh.Trimesh, parts: int) -> Floats:
 def test_a_stretch_that_begins_inside_a_body_is_found() -> None:
     """The first one passes far beside the body, the second one is in it altogether."""
     scene = Scene((Body("fixture a", solid(trimesh.creation.box((300.0, 300.0, 300.0)), HERE)),), 1.0, 0.02)
-    form = Form(1, CYLINDER, np.array([CUTTER]))
+    form = ToolForm(1, CYLINDER, np.array([CUTTER]))
     outside, inside = way((400.0, 0.0, 0.0), (500.0, 0.0, 0.0)), way((0.0, 0.0, 0.0), (5.0, 0.0, 0.0))
     assert not touches(scene, form, outside)
     found = touches(scene, form, joined([outside, Swept(inside.tip, inside.axis, inside.row + 7)]))

@@ -13,7 +13,7 @@ import toolpaths
 from postproc.base.options import Options
 from postproc.pipeline.result import PostResult
 from postproc.readback.execution.actual import _turning
-from postproc.verification.errors_left import after_formatting
+from postproc.verification.residual_errors import after_formatting
 
 RADIUS = 50.0
 PLAY = "[components.EYY]\ntable = 'y.csv'\n"

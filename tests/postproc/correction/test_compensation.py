@@ -16,7 +16,7 @@ import postproc
 import toolpaths
 from machines.geometric_error.actual.model import ErrorModel
 from machines.geometric_error.actual.serial_errors import SerialErrors
-from machines.geometric_error.exchange.exchange import save
+from machines.geometric_error.exchange.write_model import save
 from machines.geometric_error.files.loader import load
 from postproc.base.options import Options
 from postproc.cli.app import app

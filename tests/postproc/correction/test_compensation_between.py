@@ -145,7 +145,8 @@ def test_a_short_rapid_before_a_rapid_takes_up_lost_motion() -> None:
     tip = np.cumsum([[0.0], [10.0], [0.005], [20.0], [0.005], [0.005], [0.005], [10.0], [0.005], [20.0], [0.001]], axis=0)
     motion = SimpleNamespace(code=np.array([0, 1, 0, 0, 0, 0, 0, 1, 1, 0, 1]))
     job = SimpleNamespace(errors=True, options=Options(), rounding=SimpleNamespace(tip=1e-4))
-    assert np.flatnonzero(_taken_up(job, motion, tip * np.ones(3) / np.sqrt(3.0))).tolist() == [2, 10]  # type: ignore[arg-type]
+    assert np.flatnonzero(_taken_up(job, motion, tip * np.ones(3) / np.sqrt(3.0))).tolist() == [2,
+                                                                                                10]  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(("feed_beside", "told"), [(0.008, False), (0.001, True)])

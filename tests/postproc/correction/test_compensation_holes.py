@@ -12,16 +12,16 @@ import pytest
 
 import postproc
 import toolpaths
-from machines.geometric_error.actual.lost_motion import Steps
+from machines.geometric_error.actual.lost_motion import PlaySteps
 from postproc.base.options import Options
-from postproc.correction import settled
-from postproc.correction.runs import Runs
-from postproc.correction.settled import _composed
-from postproc.correction.walk import Ends, walk
+from postproc.correction import backlash_words
+from postproc.correction.backlash_steps import BlockEnds, walk
+from postproc.correction.backlash_words import _composed
+from postproc.correction.runs import RowRuns
 from postproc.pipeline.result import PostResult
 from postproc.readback.comparison.compare import _taken_up
 from postproc.setup.model import load_setup
-from postproc.verification.errors_left import after_formatting
+from postproc.verification.residual_errors import after_formatting
 from tests.postproc.correction.test_compensation_points import two_ways_of_all
 from toolpaths.arrays import Floats
 
@@ -35,7 +35,7 @@ PLACES = ((-28, -29), (-25, 18), (2, 21), (50, 28), (-37, -52), (56, -58), (49, 
 def test_runs_are_those_of_a_loop() -> None:
     rng = np.random.default_rng(5)
     number = np.repeat(rng.permutation(40), rng.integers(1, 6, 40))
-    runs = Runs.of(number).some(np.arange(40) % 3 != 1)
+    runs = RowRuns.of(number).some(np.arange(40) % 3 != 1)
     parts = [np.arange(a, a + n) for a, n in zip(runs.begin.tolist(), runs.size.tolist(), strict=True)]
     assert len(parts) == 27 and all(len(set(number[part].tolist())) == 1 for part in parts)
     np.testing.assert_array_equal(runs.rows, np.concatenate(parts))
@@ -57,7 +57,7 @@ def test_blocks_compose_as_one_after_the_other() -> None:
         there = way
         for block in range(first[k], first[k] + count[k]):
             there = np.clip(np.clip(there + bend[0, block], bend[1, block], bend[2, block]) + last[block], -1.0, 1.0)
-        np.testing.assert_allclose(Steps(*found[:, k]).at(way), there, rtol=0.0, atol=1e-12)
+        np.testing.assert_allclose(PlaySteps(*found[:, k]).at(way), there, rtol=0.0, atol=1e-12)
     assert not np.isfinite(found[1:, 1]).any() and np.isfinite(found[1:, 2]).all()
 
 
@@ -182,10 +182,11 @@ def test_slides_of_other_letters_lose_motion_too(tmp_path: Path) -> None:
 def test_blocks_that_are_nearly_straight_need_no_pieces(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The words are those that pieces of all blocks lead to; some blocks are not straight enough to go without."""
     model, texts, counts = two_ways_of_all(tmp_path, "mikron-ucp710", 3), [], []
-    runs = settled._runs
-    monkeypatch.setattr(settled, "_runs", lambda pieces: (lambda found: counts.append(len(found[1])) or found)(runs(pieces)))
-    for near in (settled.NEAR, np.inf):
-        monkeypatch.setattr(settled, "NEAR", near)
+    runs = backlash_words._runs
+    monkeypatch.setattr(backlash_words, "_runs", lambda pieces: (lambda found: counts.append(len(found[1]))
+                                                                 or found)(runs(pieces)))
+    for near in (backlash_words.NEAR, np.inf):
+        monkeypatch.setattr(backlash_words, "NEAR", near)
         path, found = toolpaths.read("samples/tool_axis_tour.apt")
         options = Options(error_model=str(model), setup="samples/tools.setup.toml", output="tcp")
         texts.append(checked(postproc.convert(path, "mikron-ucp710", "haas-ngc", options=options, diagnostics=found)).text)
@@ -194,13 +195,13 @@ def test_blocks_that_are_nearly_straight_need_no_pieces(tmp_path: Path, monkeypa
 
 def test_blocks_of_a_hole_are_moved_as_far_as_its_first(monkeypatch: pytest.MonkeyPatch) -> None:
     """So are their joints: else the ways behind the first block would be those of a hole that was moved back."""
-    seen: list[Ends] = []
+    seen: list[BlockEnds] = []
 
-    def kept(ends: Ends) -> tuple[Floats, Floats]:
+    def kept(ends: BlockEnds) -> tuple[Floats, Floats]:
         seen.append(ends)
         return walk(ends)
 
-    monkeypatch.setattr("postproc.correction.settled.walk", kept)
+    monkeypatch.setattr("postproc.correction.backlash_words.walk", kept)
     path, found = toolpaths.read("samples/five_faces.cls")
     result = postproc.convert(path, "mikron-ucp710", "fanuc-30i", diagnostics=found, options=Options(
         setup="samples/tools.setup.toml", error_model="samples/errors/mikron-ucp710.toml"))

@@ -20,7 +20,7 @@ from postproc.correction.compensation import unstated
 from postproc.pipeline.convert import verify
 from postproc.pipeline.result import PostResult
 from postproc.setup.model import load_setup
-from postproc.verification.errors_left import after_formatting, beyond_bound
+from postproc.verification.residual_errors import after_formatting, beyond_bound
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Severity
 from toolpaths.units import DEG

@@ -20,7 +20,7 @@ import toolpaths
 from postproc.base.options import Options
 from postproc.pipeline.result import PostResult
 from postproc.reference.holes import Phase
-from postproc.verification.errors_left import after_formatting
+from postproc.verification.residual_errors import after_formatting
 from tests.machines.independent_machine import Errors, Machine
 from tests.machines.random_error_files import Draw
 from tests.postproc.independent_reader import End, read

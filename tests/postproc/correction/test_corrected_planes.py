@@ -9,7 +9,7 @@ import pytest
 import postproc
 import toolpaths
 from postproc.base.options import Options
-from postproc.verification.errors_left import after_formatting
+from postproc.verification.residual_errors import after_formatting
 
 PART = """PARTNO P
 UNITS/MM

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from postproc.cycle_time.blocks import Blocks
-from postproc.cycle_time.calibrate import Fit, as_toml, calibrate
+from postproc.cycle_time.blocks import MotionBlocks
+from postproc.cycle_time.calibrate import CalibratedModel, as_toml, calibrate
 from postproc.cycle_time.estimate import estimate, timed, total
-from postproc.cycle_time.log import Log, read_log
+from postproc.cycle_time.log import RunLog, read_log
 from postproc.cycle_time.model import CycleTimeModel, load_model
 from tests.postproc.time_kit import blocks, machine, model
 from toolpaths.diagnostics import DiagnosticError
@@ -21,7 +21,7 @@ CLOCK = 0.002
 
 
 @cache
-def finishing(seed: int) -> Blocks:
+def finishing(seed: int) -> MotionBlocks:
     """Waves cut in short lines, with long and short rapids between the passes."""
     rng = np.random.default_rng(seed)
     x = np.cumsum(rng.uniform(0.05, 1.2, 500)) - 150.0
@@ -42,13 +42,13 @@ def hidden(rng: np.random.Generator) -> CycleTimeModel:
     return model("lookahead").model_copy(update={name: float(v) for name, v in values.items()})
 
 
-def log_of(b: Blocks, truth: CycleTimeModel, rng: np.random.Generator) -> Log:
+def log_of(b: MotionBlocks, truth: CycleTimeModel, rng: np.random.Generator) -> RunLog:
     line, first = np.unique(b.line, return_index=True)
     stamps = np.maximum.accumulate(timed(b, truth).begin[first] + rng.normal(0.0, CLOCK, len(first))) + 17.0
-    return Log(line, stamps, np.full((len(line), 3), np.nan), np.arange(2, len(line) + 2))
+    return RunLog(line, stamps, np.full((len(line), 3), np.nan), np.arange(2, len(line) + 2))
 
 
-def fit(truth: CycleTimeModel, rng: np.random.Generator) -> Fit:
+def fit(truth: CycleTimeModel, rng: np.random.Generator) -> CalibratedModel:
     made, found = calibrate(finishing(0), log_of(finishing(0), truth, rng), model("lookahead"), "log.csv", machine())
     assert made is not None and not found
     return made
@@ -137,7 +137,7 @@ def test_bad_logs_are_told(tmp_path: Path, text: str, code: str, lines: tuple[in
 
 def test_a_log_of_another_program_is_refused() -> None:
     line = np.arange(9000, 9020)
-    log = Log(line, np.arange(20.0), np.full((20, 3), np.nan), line)
+    log = RunLog(line, np.arange(20.0), np.full((20, 3), np.nan), line)
     made, found = calibrate(finishing(0), log, model("lookahead"), "log.csv")
     assert made is None and [d.code for d in found] == ["log.lines"]
 
@@ -145,7 +145,7 @@ def test_a_log_of_another_program_is_refused() -> None:
 def test_a_log_in_which_the_program_takes_no_time() -> None:
     b = finishing(0)
     line = np.append(np.unique(b.line)[:20], 10**6)
-    log = Log(line, np.append(np.full(20, 3.0), 9.0), np.full((21, 3), np.nan), np.arange(2, 23))
+    log = RunLog(line, np.append(np.full(20, 3.0), 9.0), np.full((21, 3), np.nan), np.arange(2, 23))
     made, found = calibrate(b, log, model("lookahead"), "log.csv")
     assert made is None and [d.code for d in found] == ["log.time"]
 

@@ -9,7 +9,7 @@ import pytest
 from ruckig import InputParameter, Ruckig, Trajectory
 
 from postproc.base.compiled import compiled
-from postproc.cycle_time.blocks import Blocks
+from postproc.cycle_time.blocks import MotionBlocks
 from postproc.cycle_time.bound import lower_bound
 from postproc.cycle_time.estimate import estimate, timed, total
 from postproc.cycle_time.linuxcnc import SETTLED
@@ -26,7 +26,7 @@ KINDS = ("linuxcnc", "lookahead", "ideal")
 CASES = [("mill-3axis", "", 300.0), ("mikron-ucp710", "AC", 150.0), ("mill-4axis", "A", 400.0)]
 
 
-def programs(count: int) -> list[tuple[str, Blocks]]:
+def programs(count: int) -> list[tuple[str, MotionBlocks]]:
     return [(name, blocks(random_program(seed, rotary, top), machine(name)))
             for seed in range(count) for name, rotary, top in CASES]
 

@@ -8,7 +8,7 @@ import pytest
 import postproc
 import toolpaths
 from postproc.controllers.model import load_controller
-from postproc.cycle_time.blocks import Blocks, Cause, Path
+from postproc.cycle_time.blocks import Cause, CornerMode, MotionBlocks
 from postproc.cycle_time.estimate import estimate
 from postproc.cycle_time.shape import shape
 from postproc.cycle_time.source import from_conversion, from_gcode, looks_like_gcode
@@ -17,7 +17,7 @@ from tests.postproc.kit import SAMPLES, TOOLS
 from tests.postproc.time_kit import HEAD, blocks, machine, model
 
 
-def pauses(b: Blocks, cause: Cause) -> list[tuple[int, float]]:
+def pauses(b: MotionBlocks, cause: Cause) -> list[tuple[int, float]]:
     p = b.pauses
     return [(int(k), float(s)) for k, s in zip(p.block[p.cause == cause], p.seconds[p.cause == cause], strict=True)]
 
@@ -56,11 +56,12 @@ def test_slowest_inverse_time() -> None:
 
 def test_path_modes() -> None:
     b = blocks(f"{HEAD}\nF600\nG1 X1\nG61\nG1 X2\nG61.1\nG1 X3\nG64 P0.02\nG1 X4\nG64 P0.03 Q0.01\nG1 X5\nG64\nG1 X6")
-    assert b.path.tolist() == [Path.BLEND, Path.EXACT, Path.STOP, Path.BLEND, Path.BLEND, Path.BLEND]
+    assert b.path.tolist() == [CornerMode.BLEND, CornerMode.EXACT, CornerMode.STOP, CornerMode.BLEND, CornerMode.BLEND,
+                               CornerMode.BLEND]
     assert b.tolerance.tolist() == [np.inf, np.inf, np.inf, 0.02, 0.03, np.inf]
     assert b.chain.tolist() == [0.0, 0.0, 0.0, 0.02, 0.01, 0.0]
     cycle = blocks(f"{HEAD} G64 P0.01\nG0 Z300\nG98 G81 X0 Y0 Z280 R290 F600\nG80\nG0 X9")
-    assert cycle.path.tolist()[-1] == Path.BLEND and Path.EXACT in cycle.path.tolist()
+    assert cycle.path.tolist()[-1] == CornerMode.BLEND and CornerMode.EXACT in cycle.path.tolist()
 
 
 def test_a_control_without_path_modes_uses_the_models_tolerance() -> None:

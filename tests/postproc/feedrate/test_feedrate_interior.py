@@ -13,7 +13,7 @@ from postproc.feedrate.kernels.coefficients import tie_ends
 from postproc.feedrate.limits import JointLimits
 from postproc.feedrate.mesh import Spacing, mesh
 from postproc.feedrate.paths import Eased, SplinePath
-from postproc.feedrate.problem import Knots
+from postproc.feedrate.problem import MotionKnots
 from postproc.feedrate.spline import REST, rest_basis, rest_law, stencils
 from postproc.feedrate.windows import solve_problem
 from tests.postproc.feedrate_kit import MIKRON, bezier, random_path, uniform, unlimited
@@ -91,7 +91,7 @@ def test_twice_the_knots_change_the_time_little() -> None:
     times = []
     for dt in (4e-3, 1e-3):
         eased = Eased.between(bezier(), 0.0, 80.0, 25.0)
-        grid = Knots(eased, mesh(eased, MIKRON, lambda s: np.full(len(s), np.inf), Spacing(dt)), MIKRON, unlimited)
+        grid = MotionKnots(eased, mesh(eased, MIKRON, lambda s: np.full(len(s), np.inf), Spacing(dt)), MIKRON, unlimited)
         problem = grid.problem()
         times.append(float(np.sum(problem.weight * problem.basis.values(solve_problem(problem, NumpySteps).c)[0] ** -0.5)))
     assert times[0] == pytest.approx(times[1], rel=5e-4)

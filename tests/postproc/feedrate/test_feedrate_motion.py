@@ -12,13 +12,13 @@ from postproc.feedrate.limits import JointLimits, ToolLimits
 from postproc.feedrate.mesh import Spacing
 from postproc.feedrate.motion import Plan
 from postproc.feedrate.paths import Derivatives, Eased
-from postproc.feedrate.plan import Options, plan, plan_second_order
+from postproc.feedrate.plan import PlannerOptions, plan, plan_second_order
 from postproc.feedrate.rows import tool
 from postproc.feedrate.windows import Method
 from tests.postproc.feedrate_kit import MIKRON, PolynomialPath, only_jerk, random_path, zigzag
 from toolpaths.arrays import Floats
 
-STRICT = Options(strict=True)
+STRICT = PlannerOptions(strict=True)
 
 
 @pytest.fixture(scope="module")
@@ -83,7 +83,7 @@ def test_chunks_are_the_whole(made: Plan) -> None:
 def test_shares_are_the_slopes_of_the_time() -> None:
     """Each share is -n dT/dln L, by differences of plans with changed limits; the sum is the time."""
     path, limits = zigzag(100.0), MIKRON
-    fine = Options(spacing=Spacing(1.5e-3))
+    fine = PlannerOptions(spacing=Spacing(1.5e-3))
     base = plan(path, limits, feed=100.0, options=fine)
     shares = base.shares
     assert shares.seconds == pytest.approx(base.seconds, rel=1e-12)
@@ -119,20 +119,21 @@ def test_shares_of_known_motions() -> None:
 @pytest.mark.parametrize("kernel", [True, False])
 def test_shares_do_not_depend_on_windows(kernel: bool) -> None:
     path = zigzag(300.0)
-    whole = plan(path, MIKRON, feed=120.0, options=Options(method=Method(kernel=False)))
-    parts = plan(path, MIKRON, feed=120.0, options=Options(method=Method(window=800, overlap=600, kernel=kernel)))
+    whole = plan(path, MIKRON, feed=120.0, options=PlannerOptions(method=Method(kernel=False)))
+    parts = plan(path, MIKRON, feed=120.0, options=PlannerOptions(method=Method(window=800, overlap=600, kernel=kernel)))
     np.testing.assert_allclose(parts.shares.limits, whole.shares.limits, atol=4e-3 * whole.seconds)
     assert parts.shares.feed == pytest.approx(whole.shares.feed, abs=4e-3 * whole.seconds)
 
 
 def test_override_scales_the_feed_alone() -> None:
     path = random_path(6)
-    slow = plan(path, MIKRON, feed=8.0, options=Options(override=0.5))
+    slow = plan(path, MIKRON, feed=8.0, options=PlannerOptions(override=0.5))
     np.testing.assert_allclose(slow.seconds, plan(path, MIKRON, feed=4.0).seconds)
-    samples = plan(path, MIKRON, feed=lambda s: 8.0 + 0.0 * s, options=Options(override=1e6, strict=True)).trajectory()
+    samples = plan(path, MIKRON, feed=lambda s: 8.0 + 0.0 * s,
+                   options=PlannerOptions(override=1e6, strict=True)).trajectory()
     assert samples.usage(MIKRON).worst <= 1.0
     with pytest.raises(ValueError, match="override"):
-        plan(path, MIKRON, feed=8.0, options=Options(override=0.0))
+        plan(path, MIKRON, feed=8.0, options=PlannerOptions(override=0.0))
 
 
 class Circle:

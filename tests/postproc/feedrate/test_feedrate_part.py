@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.polynomial import Polynomial
 
-from postproc.feedrate.plan import Options, plan
+from postproc.feedrate.plan import PlannerOptions, plan
 from tests.postproc.feedrate_kit import PolynomialPath, only_jerk
 from toolpaths.arrays import Floats
 
@@ -75,12 +75,12 @@ def on_vertices(f: Floats) -> list[tuple[float, float]]:
     return found
 
 
-def seconds(polynomials: Floats, end: float, turn: Floats, options: Options | None = None) -> float:
+def seconds(polynomials: Floats, end: float, turn: Floats, options: PlannerOptions | None = None) -> float:
     return plan(PolynomialPath((turn @ polynomials).tolist(), end), LIMITS, options=options).seconds
 
 
-@pytest.mark.parametrize(("options", "close"), [(Options(), 0.005), (Options(strict=True), 0.01)])
-def test_pass_0_as_printed(options: Options, close: float) -> None:
+@pytest.mark.parametrize(("options", "close"), [(PlannerOptions(), 0.005), (PlannerOptions(strict=True), 0.01)])
+def test_pass_0_as_printed(options: PlannerOptions, close: float) -> None:
     """0.7268 s at A = C = 0."""
     polynomials, end, _ = programmed(0.0)
     assert seconds(polynomials, end, np.eye(3), options) == pytest.approx(0.7268, rel=close)

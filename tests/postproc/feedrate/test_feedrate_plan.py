@@ -8,19 +8,19 @@ from itertools import cycle
 import numpy as np
 import pytest
 
-from postproc.feedrate import interior, retried, windows
-from postproc.feedrate.feed import Allowed, StepFeed
+from postproc.feedrate import interior, solve_again, windows
+from postproc.feedrate.feed import AllowedFeed, StepFeed
 from postproc.feedrate.lift import gains
 from postproc.feedrate.limits import JointLimits
 from postproc.feedrate.mesh import Spacing
-from postproc.feedrate.plan import Options, Plan, plan, plan_second_order
-from postproc.feedrate.problem import Knots
+from postproc.feedrate.plan import Plan, PlannerOptions, plan, plan_second_order
+from postproc.feedrate.problem import MotionKnots
 from postproc.feedrate.trajectory import JointTrajectory
-from postproc.feedrate.windows import Method, Solved, solved
+from postproc.feedrate.windows import Method, SolvedWindows, solved
 from tests.postproc.feedrate_kit import MIKRON, PolynomialPath, only_jerk, random_path, uniform, zigzag
 from toolpaths.arrays import Floats
 
-STRICT = Options(strict=True)
+STRICT = PlannerOptions(strict=True)
 PASS_0 = PolynomialPath([[0.0], [0.0, 1.0], [0.0, 0.0, 30.0 / 60.0**2, -20.0 / 60.0**3]], 60.0)
 """Pass Xp = 0 of the bicubic part: control points (0, 0), (20, 0), (40, 10), (60, 10) of equation 8 in (Yp, Zp)."""
 
@@ -52,8 +52,8 @@ def test_gain_of_a_straight_pass() -> None:
     assert 1.0 - diagonal / along == pytest.approx(1.0 - 3.0 ** (-1.0 / 6.0), abs=2e-4)
 
 
-@pytest.mark.parametrize(("options", "close"), [(Options(), 0.005), (STRICT, 0.01)])
-def test_pass_of_the_bicubic_part(options: Options, close: float) -> None:
+@pytest.mark.parametrize(("options", "close"), [(PlannerOptions(), 0.005), (STRICT, 0.01)])
+def test_pass_of_the_bicubic_part(options: PlannerOptions, close: float) -> None:
     """Printed figures, 15: 0.7268 s with A = C = 0 under a jerk of 5 m/s3 in X, Y, Z alone."""
     made = plan(PASS_0, only_jerk([5000.0] * 3), options=options)
     assert made.seconds == pytest.approx(0.7268, rel=close)
@@ -134,7 +134,7 @@ def test_feed_binds_and_steps() -> None:
 def test_what_binds_is_what_limits() -> None:
     """Straight in the second joint, jerk alone: jerk of joint 1 everywhere but at its three reversals."""
     limits, path = only_jerk([5000.0, 5000.0]), PolynomialPath([[0.0], [0.0, 1.0]], 60.0)
-    bound = plan(path, limits, options=Options(spacing=Spacing(1e-3))).trajectory().binding(limits)
+    bound = plan(path, limits, options=PlannerOptions(spacing=Spacing(1e-3))).trajectory().binding(limits)
     assert np.mean((bound.axis == 1) & (bound.order == 3)) > 0.9
     assert np.all(bound.ratio <= 1.01)
 
@@ -142,7 +142,7 @@ def test_what_binds_is_what_limits() -> None:
 def stitched(method: Method) -> tuple[Plan, Plan]:
     path = zigzag(300.0)
     knots = uniform(path, 3000).sigma
-    return plan(path, MIKRON, knots=knots), plan(path, MIKRON, options=Options(method=method), knots=knots)
+    return plan(path, MIKRON, knots=knots), plan(path, MIKRON, options=PlannerOptions(method=method), knots=knots)
 
 
 @pytest.mark.numeric
@@ -155,7 +155,7 @@ def test_windows_equal_the_whole(kernel: bool) -> None:
 
 
 def test_short_overlaps_are_widened() -> None:
-    grid: Knots = uniform(zigzag(300.0), 3000)
+    grid: MotionKnots = uniform(zigzag(300.0), 3000)
     report = solved(grid, Method(window=800, overlap=40))
     assert report.mismatch < 1e-3
     assert grid.problem().ratios(report.c).max() < 1.002
@@ -170,7 +170,7 @@ def test_windows_that_stop_early_are_slow_not_wrong(monkeypatch: pytest.MonkeyPa
     report = solved(grid, Method(window=800, overlap=100))
     assert not report.solved and report.mismatch > 0.1
     assert grid.problem().ratios(report.c).max() < 1.0
-    again = plan(path, MIKRON, knots=grid.sigma, options=Options(method=Method(window=800, overlap=100)))
+    again = plan(path, MIKRON, knots=grid.sigma, options=PlannerOptions(method=Method(window=800, overlap=100)))
     assert again.solved and again.seconds == pytest.approx(plan(path, MIKRON, knots=grid.sigma).seconds, rel=1e-3)
 
 
@@ -178,11 +178,11 @@ def test_what_is_not_solved_is_solved_on_finer_knots(monkeypatch: pytest.MonkeyP
     path = random_path(2)
     good, sizes = plan(path, MIKRON), list[int]()
 
-    def failing(knots: Knots, method: Method, near: Floats | None = None) -> Solved:
+    def failing(knots: MotionKnots, method: Method, near: Floats | None = None) -> SolvedWindows:
         sizes.append(len(knots.sigma))
         return replace(solved(knots, method, near), solved=len(sizes) > 2)
 
-    monkeypatch.setattr(retried, "solved", failing)
+    monkeypatch.setattr(solve_again, "solved", failing)
     made = plan(path, MIKRON)
     assert made.solved and sizes == [sizes[0], sizes[0], 2 * sizes[0] - 1]
     assert made.seconds == pytest.approx(good.seconds, rel=2e-3)
@@ -203,7 +203,7 @@ def test_nothing_depends_on_units() -> None:
     plain = plan(PASS_0, only_jerk([5000.0] * 3)).seconds
     big = PolynomialPath([[0.0], [0.0, 1.0], [0.0, 0.0, 30.0 / 60.0**2 * 1e-3, -20.0 / 60.0**3 * 1e-6]], 60e3)
     spacing = Spacing(longest=250.0)
-    micro = plan(big, only_jerk([5e6] * 3), options=Options(ease=25e3, spacing=spacing)).seconds
+    micro = plan(big, only_jerk([5e6] * 3), options=PlannerOptions(ease=25e3, spacing=spacing)).seconds
     assert micro == pytest.approx(plain, rel=1e-9)
 
 
@@ -223,7 +223,7 @@ def test_feeds_of_blocks_cost_nothing_between_them() -> None:
     """Steps of the feed lie on knots: strict holds them at once, and a slow cruise needs few knots."""
     rng = np.random.default_rng(3)
     feed = StepFeed(np.linspace(0.0, 100.0, 51), rng.uniform(5.0, 40.0, 50))
-    fast, strict = (plan(random_path(1), MIKRON, feed=feed, options=Options(strict=mode)) for mode in (False, True))
+    fast, strict = (plan(random_path(1), MIKRON, feed=feed, options=PlannerOptions(strict=mode)) for mode in (False, True))
     assert fast.usage().feed < 1.04 and strict.usage().worst <= 1.0
     assert strict.seconds < 1.002 * fast.seconds
     sigma = strict.pieces[0].profile.sigma
@@ -236,7 +236,7 @@ def test_feeds_of_blocks_by_their_edges() -> None:
     feed = StepFeed(np.array([0.0, 10.0, 20.0, 30.0]), np.array([5.0, 5.0, 9.0]))
     assert feed.breaks.tolist() == [20.0]
     assert feed(np.array([-1.0, 9.0, 25.0, 31.0])).tolist() == [5.0, 5.0, 9.0, 9.0]
-    assert Allowed(feed, 2.0)(np.array([19.9, 20.0, 20.1])).tolist() == [10.0, 10.0, 18.0]
+    assert AllowedFeed(feed, 2.0)(np.array([19.9, 20.0, 20.1])).tolist() == [10.0, 10.0, 18.0]
     with pytest.raises(ValueError, match="rise"):
         StepFeed(np.array([0.0, 0.0]), np.array([5.0]))
     with pytest.raises(ValueError, match="positive"):

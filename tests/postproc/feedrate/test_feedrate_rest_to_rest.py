@@ -11,7 +11,7 @@ import pytest
 import ruckig
 
 from postproc.feedrate.limits import JointLimits
-from postproc.feedrate.rest_to_rest import Law, rest_seconds, rest_to_rest
+from postproc.feedrate.rest_to_rest import PointToPointMode, rest_seconds, rest_to_rest
 from tests.postproc.feedrate_kit import MIKRON
 
 ROOT = Path(__file__).parents[3]
@@ -27,8 +27,8 @@ def moves(count: int, seed: int = 5) -> tuple[np.ndarray, np.ndarray]:  # type: 
     return q0, q0 + way
 
 
-@pytest.mark.parametrize("law", Law)
-def test_closed_form_equals_ruckig(law: Law) -> None:
+@pytest.mark.parametrize("law", PointToPointMode)
+def test_closed_form_equals_ruckig(law: PointToPointMode) -> None:
     """Duration to the sample: the last one is the first multiple of the step at which all stands still."""
     q0, q1 = moves(60)
     seconds = rest_seconds(q0, q1, LIMITS, law)
@@ -51,14 +51,14 @@ def ruckig_seconds(way: float, v: float, a: float, j: float) -> float:
 def test_duration_of_one_joint_is_ruckigs(j: float) -> None:
     limits = JointLimits(np.array([90.0]), np.array([1100.0]), np.array([j]))
     way = 10.0 ** np.linspace(-5.0, 3.5, 60)
-    found = rest_seconds(np.zeros((60, 1)), -way[:, None], limits, Law.DOG_LEG)
+    found = rest_seconds(np.zeros((60, 1)), -way[:, None], limits, PointToPointMode.DOG_LEG)
     np.testing.assert_allclose(found, [ruckig_seconds(one, 90.0, 1100.0, j) for one in way], rtol=1e-9)
 
 
 def test_laws() -> None:
     """Straight stays on the line and uses the joint that allows least; dog-leg joints end one by one; together otherwise."""
     q0, q1 = np.array([1.0, 2.0, 3.0]), np.array([41.0, -18.0, 3.1])
-    straight, leg, together = (rest_to_rest(q0, q1, LIMITS, law) for law in Law)
+    straight, leg, together = (rest_to_rest(q0, q1, LIMITS, law) for law in PointToPointMode)
     share = (straight.q - q0) / (q1 - q0)
     np.testing.assert_allclose(share, share[:, :1] * np.ones(3), atol=1e-12)
     used = straight.usage(LIMITS)
@@ -72,7 +72,7 @@ def test_laws() -> None:
 
 
 def test_samples_are_derivatives_of_each_other() -> None:
-    made = rest_to_rest(np.zeros(5), np.array([300.0, -20.0, 1.0, 0.4, 0.0]), MIKRON, Law.SYNCHRONISED)
+    made = rest_to_rest(np.zeros(5), np.array([300.0, -20.0, 1.0, 0.4, 0.0]), MIKRON, PointToPointMode.SYNCHRONISED)
     for low, high in ((made.q, made.qd), (made.qd, made.qdd)):
         slope = (low[2:] - low[:-2]) / 2e-3
         np.testing.assert_allclose(slope, high[1:-1], atol=2e-3 * np.abs(high).max() + 1e-9)
@@ -88,7 +88,7 @@ def test_limits_of_acceleration_only() -> None:
 
 
 def test_nothing_moves_takes_no_time() -> None:
-    for law in Law:
+    for law in PointToPointMode:
         assert rest_seconds(np.ones((2, 3)), np.ones((2, 3)), LIMITS, law).tolist() == [0.0, 0.0]
         assert rest_to_rest(np.ones(3), np.ones(3), LIMITS, law).t.tolist() == [0.0]
 
@@ -134,7 +134,7 @@ class Planner:
 def test_way_points_are_never_set(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(ruckig, "InputParameter", Watched)
     monkeypatch.setattr(ruckig, "Ruckig", Planner)
-    for law in Law:
+    for law in PointToPointMode:
         rest_to_rest(np.zeros(3), np.ones(3), LIMITS, law)
     assert Watched.names == {"current_position", "target_position", "max_velocity", "max_acceleration", "max_jerk",
                              "synchronization"}

@@ -12,7 +12,7 @@ import pytest
 
 from postproc.feedrate.limits import JointLimits, squared_speed
 from postproc.feedrate.paths import Derivatives, SplinePath
-from postproc.feedrate.plan import Options, plan_second_order
+from postproc.feedrate.plan import PlannerOptions, plan_second_order
 from postproc.feedrate.second_order import FLAT, least_time, second_order
 from tests.postproc.feedrate_kit import MIKRON, PolynomialPath, bezier, random_path, zigzag
 from tests.postproc.feedrate_reference import exact_rows, exact_second_order, largest_second_order
@@ -127,7 +127,7 @@ def test_straight_line(velocity: float, seconds: float) -> None:
 
 def test_feed_and_stops() -> None:
     path = random_path(1)
-    made = plan_second_order(path, MIKRON, feed=30.0, stops=[40.0], options=Options())
+    made = plan_second_order(path, MIKRON, feed=30.0, stops=[40.0], options=PlannerOptions())
     samples = made.trajectory()
     assert samples.usage(MIKRON).feed <= 1.0 + 1e-9 and samples.sd.max() == pytest.approx(30.0, rel=1e-6)
     assert made.seconds == pytest.approx(sum(piece.seconds for piece in made.pieces))

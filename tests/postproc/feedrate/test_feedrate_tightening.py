@@ -10,8 +10,8 @@ import pytest
 from postproc.feedrate.interior import NumpySteps
 from postproc.feedrate.limits import JointLimits, ToolLimits
 from postproc.feedrate.paths import Eased
-from postproc.feedrate.plan import Options, plan
-from postproc.feedrate.problem import Knots
+from postproc.feedrate.plan import PlannerOptions, plan
+from postproc.feedrate.problem import MotionKnots
 from postproc.feedrate.profile import spline_profile
 from postproc.feedrate.spline import rest_basis
 from postproc.feedrate.tightening import BETWEEN, tightened, worst_ratios
@@ -62,11 +62,11 @@ def test_limits_at_the_tool_are_tightened_too() -> None:
     """On coarse knots: what is seen between them is the tool's, and strict holds it in the samples at little cost."""
     limits = replace(MIKRON, velocity=np.full(3, 1e4), acceleration=np.full(3, 1e6), jerk=np.full(3, 1e7),
                      tool=ToolLimits(acceleration=800.0, jerk=9000.0))
-    fast, strict = (plan(Circle(5.0), limits, options=Options(strict=mode)) for mode in (False, True))
+    fast, strict = (plan(Circle(5.0), limits, options=PlannerOptions(strict=mode)) for mode in (False, True))
     assert strict.usage().worst <= 1.0 and strict.seconds < 1.01 * fast.seconds
     eased = Eased.between(Screw(60.0), 0.0, 60.0, 20.0)
     limits = JointLimits(np.array([1e4]), np.array([1e6]), np.array([1e7]), ToolLimits(jerk=500.0))
-    grid = Knots(eased, np.linspace(0.0, eased.end, 400), limits, unlimited)
+    grid = MotionKnots(eased, np.linspace(0.0, eased.end, 400), limits, unlimited)
     found = solve_problem(grid.problem(), NumpySteps)
     factor, better = tightened(grid, spline_profile(grid.sigma, rest_basis(grid.sigma, grid.eased.ease), found.c), 1.02)
     assert factor > 1.05 and better is not None

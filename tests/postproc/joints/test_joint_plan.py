@@ -10,8 +10,8 @@ import pytest
 
 from machines.machine import Limits
 from postproc.joints import states
-from postproc.joints.lattice import Run
-from postproc.joints.plan import Solution, Wishes, plan_runs
+from postproc.joints.lattice import PoseRun
+from postproc.joints.plan import JointPreferences, RunSolution, plan_runs
 from tests.postproc.joint_kit import DEG, machine, tilted
 
 NAMES = ["mikron-ucp710", "head-table", "fork-head-ab", "nutating-head"]
@@ -72,7 +72,7 @@ def apart(limits: Limits, a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return (np.abs(step) / limits.velocity).max(axis=2)
 
 
-def brute(runs: list[Run], limits: Limits, start: np.ndarray, side: tuple[int, int] | None = None) -> Cost:
+def brute(runs: list[PoseRun], limits: Limits, start: np.ndarray, side: tuple[int, int] | None = None) -> Cost:
     """Bellman forwards over every pose with every branch, every turn from -3 to 3, and a rewind at every pose."""
     cost, at = np.zeros(1, dtype=np.int64), start[None]
     after = cost
@@ -111,7 +111,7 @@ def onwards(branches: np.ndarray, i: int, every: list[tuple[int, ...]], index: d
     return after
 
 
-def measured(found: list[Solution], runs: list[Run], limits: Limits, start: np.ndarray,
+def measured(found: list[RunSolution], runs: list[PoseRun], limits: Limits, start: np.ndarray,
              side: tuple[int, int] | None = None) -> Cost:
     """The cost of what was planned, gone through pose by pose; every pose and every rewind stands where it should."""
     cost: Cost = (0, 0, 0, 0, 0)
@@ -140,7 +140,7 @@ def measured(found: list[Solution], runs: list[Run], limits: Limits, start: np.n
     return cost
 
 
-def random_case(name: str, rng: np.random.Generator) -> tuple[list[Run], Limits, np.ndarray]:
+def random_case(name: str, rng: np.random.Generator) -> tuple[list[PoseRun], Limits, np.ndarray]:
     m = machine(name)
     lower, upper = m.limits.lower.copy(), m.limits.upper.copy()
     for j in (3, 4):
@@ -154,7 +154,7 @@ def random_case(name: str, rng: np.random.Generator) -> tuple[list[Run], Limits,
     for _ in range(int(rng.integers(1, 4))):
         n = int(rng.integers(3, 7))
         axis = tilted(rng.uniform(12, 40), rng.uniform(0, 360) + np.arange(n) * rng.uniform(-20, 150))
-        runs.append(Run(m.kinematics, rng.uniform(-20, 20, (n, 3)), axis, rng.random(n) < 0.3, rng.uniform(0, 3, n)))
+        runs.append(PoseRun(m.kinematics, rng.uniform(-20, 20, (n, 3)), axis, rng.random(n) < 0.3, rng.uniform(0, 3, n)))
     return runs, replace(m.limits, lower=lower, upper=upper), np.append(np.zeros(3), rng.uniform(-3, 3, 2))
 
 
@@ -177,7 +177,7 @@ def test_side_of_the_tilt_axis_comes_before_time_but_after_travel() -> None:
     for _ in range(5):
         runs, _, start = random_case(name, rng)
         limits = limits_of(name, A=(-60, 60))
-        found = plan_runs(runs, limits, start, Wishes(side={3: -1}))
+        found = plan_runs(runs, limits, start, JointPreferences(side={3: -1}))
         got, want = measured(found, runs, limits, start, (3, -1)), brute(runs, limits, start, (3, -1))
         assert got[:4] == want[:4] and got[3] == 0.0
         assert got[4] == pytest.approx(want[4], abs=1e-6)
@@ -185,10 +185,10 @@ def test_side_of_the_tilt_axis_comes_before_time_but_after_travel() -> None:
 
 
 def test_start_angle_chooses_the_winding() -> None:
-    run = Run(machine("mikron-ucp710").kinematics, np.zeros((5, 3)), tilted(30, np.linspace(0, 40, 5)))
+    run = PoseRun(machine("mikron-ucp710").kinematics, np.zeros((5, 3)), tilted(30, np.linspace(0, 40, 5)))
     for turns in (-2, 0, 3):
         limits = limits_of("mikron-ucp710", C=(-1500, 1500))
-        q = plan_runs([run], limits, np.zeros(5), Wishes(start={4: turns * 360 * DEG + 0.1}))[0].q
+        q = plan_runs([run], limits, np.zeros(5), JointPreferences(start={4: turns * 360 * DEG + 0.1}))[0].q
         assert abs(q[0, 4] / DEG - turns * 360) <= 185
 
 
@@ -210,7 +210,7 @@ def test_rewinds_of_a_spiral_are_the_fewest_and_stand_where_the_tool_does_not_cu
     n = 10 * 72 + 1
     phi = np.arange(n) * 5.0
     rest = np.arange(n) % 18 == 0
-    run = Run(machine("mikron-ucp710").kinematics, np.zeros((n, 3)), tilted(30, phi), rest)
+    run = PoseRun(machine("mikron-ucp710").kinematics, np.zeros((n, 3)), tilted(30, phi), rest)
     limits = limits_of("mikron-ucp710", C=(-400, 400), A=(0, 120))
     found = plan_runs([run], limits, np.zeros(5))[0]
     assert len(found.rewinds) == 5 and found.outside == 0
@@ -224,8 +224,8 @@ def test_tool_along_the_table_all_the_way_takes_the_table_as_it_stands() -> None
     """Between two runs at C 70 and 110 a third along C takes one of them; the linking way is the shorter for it."""
     m = machine("mikron-ucp710")
     tip = np.linspace(0, 1, 4)[:, None] * [10.0, 5, 0]
-    leaning = [Run(m.kinematics, tip, np.tile(tilted(30, phi), (4, 1))) for phi in (70.0, 110.0)]
-    upright = Run(m.kinematics, tip, np.tile([0.0, 0, 1], (4, 1)))
+    leaning = [PoseRun(m.kinematics, tip, np.tile(tilted(30, phi), (4, 1))) for phi in (70.0, 110.0)]
+    upright = PoseRun(m.kinematics, tip, np.tile([0.0, 0, 1], (4, 1)))
     first, middle, last = plan_runs([leaning[0], upright, leaning[1]], m.limits, m.home)
     assert np.ptp(middle.q[:, 4]) < 1e-9
     ends = first.q[-1, 4], last.q[0, 4]
@@ -235,7 +235,7 @@ def test_tool_along_the_table_all_the_way_takes_the_table_as_it_stands() -> None
 def test_losers_say_by_how_much() -> None:
     """A within -30 to 120: the branch with A -40 is outside on every pose, so it is not among those that go through."""
     m = machine("mikron-ucp710")
-    run = Run(m.kinematics, np.zeros((6, 3)), tilted(20, np.linspace(10, 60, 6)))
+    run = PoseRun(m.kinematics, np.zeros((6, 3)), tilted(20, np.linspace(10, 60, 6)))
     found = plan_runs([run], m.limits, m.home)[0]
     assert [round(x.q[3] / DEG) for x in found.losers] == [-round(found.q[0, 3] / DEG)]
     assert found.losers[0].dearer[4] >= 0.0

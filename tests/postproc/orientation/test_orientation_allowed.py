@@ -10,8 +10,8 @@ import pytest
 import trimesh
 
 from postproc.base.options import Options
-from postproc.orientation.candidates.timed import turned_all
-from postproc.orientation.passes.allowed import Allowed, lattice, off_centre
+from postproc.orientation.candidates.candidate_times import turned_all
+from postproc.orientation.passes.allowed import AllowedAxes, lattice, off_centre
 from postproc.orientation.passes.contact import Contact, contact_of
 from postproc.orientation.passes.passes import Pass, work_of
 from postproc.orientation.plans.choice import OrientationChoice
@@ -99,7 +99,7 @@ def test_the_feed_of_a_slope_lies_in_its_tangent_plane() -> None:
     at = contact_of(down, both, np.array([[1, 2]]))
     assert len(at) == 2 and np.isnan(at.way).all()
     limits = OrientationLimits(lead=(5.0, 10.0), off_centre=10.0)
-    allowed = Allowed(60.0 * DEG, None, limits)
+    allowed = AllowedAxes(60.0 * DEG, None, limits)
     assert allowed.mask(only_pass(along_x()), leaning(7.0, 30.0)[None])[0]
 
 
@@ -122,7 +122,7 @@ def test_points_without_normal_do_not_count() -> None:
 def test_a_refusal_says_where_what_and_what_is_allowed(keys: dict[str, object], axis: Floats, told: str) -> None:
     setup = limited(**keys)
     one = only_pass(along_x(), setup)
-    assert Allowed(60.0 * DEG, None, setup.orientation).refused(one, axis) == told
+    assert AllowedAxes(60.0 * DEG, None, setup.orientation).refused(one, axis) == told
 
 
 def test_the_worst_point_decides() -> None:
@@ -130,20 +130,20 @@ def test_the_worst_point_decides() -> None:
     lines = ["MULTAX", "RAPID", "GOTO/0,0,30,0,0,1", "RAPID", "GOTO/0,0,0,0,0,1,0,0,1", "GOTO/10,0,0,0,0,1,0,0,1",
              "GOTO/20,0,0,0,0,1,-0.5,0,0.8660254037844386", "GOTO/30,0,0,0,0,1,0,0,1", "RAPID", "GOTO/30,0,30,0,0,1"]
     one = only_pass(toolpath(*lines, head=BALL))
-    allowed = Allowed(80.0 * DEG, None, OrientationLimits(lead=(-60.0, 40.0)))
+    allowed = AllowedAxes(80.0 * DEG, None, OrientationLimits(lead=(-60.0, 40.0)))
     assert allowed.refused(one, leaning(20.0, 0.0)) == "lead 50.000 degrees at line 12, allowed -60.000 to 40.000"
     assert allowed.refused(one, leaning(9.0, 0.0)) == ""
 
 
 def test_own_axis_is_always_allowed() -> None:
     one = only_pass(along_x())
-    allowed = Allowed(60.0 * DEG, None, OrientationLimits(off_centre=10.0))
+    allowed = AllowedAxes(60.0 * DEG, None, OrientationLimits(off_centre=10.0))
     assert allowed.refused(one, Z) == "" and "allowed 10.000" in allowed.outside(one, Z)
 
 
 def test_many_axes_at_once_as_one_by_one() -> None:
     one = only_pass(along_x())
-    allowed = Allowed(50.0 * DEG, None, OrientationLimits(lead=(-20.0, 30.0), tilt=(-10.0, 35.0), off_centre=5.0))
+    allowed = AllowedAxes(50.0 * DEG, None, OrientationLimits(lead=(-20.0, 30.0), tilt=(-10.0, 35.0), off_centre=5.0))
     axes = lattice(6.0 * DEG)
     found = allowed.mask(one, axes)
     assert 10 < found.sum() < len(axes)
@@ -154,9 +154,9 @@ def test_many_axes_at_once_as_one_by_one() -> None:
 def test_without_normals_the_tilt_is_from_the_own_axis() -> None:
     one = only_pass(along_x(normals=False))
     assert not len(one.contact)
-    assert Allowed(20.0 * DEG).refused(one, leaning(25.0, 0.0)) == \
+    assert AllowedAxes(20.0 * DEG).refused(one, leaning(25.0, 0.0)) == \
         "tilt 25.000 degrees from the axis of the CL file, allowed 20.000"
-    assert Allowed(20.0 * DEG).refused(one, leaning(19.0, 0.0)) == ""
+    assert AllowedAxes(20.0 * DEG).refused(one, leaning(19.0, 0.0)) == ""
 
 
 def test_the_lattice_is_even() -> None:
@@ -221,7 +221,7 @@ def test_limits_of_very_many_points() -> None:
     way /= np.linalg.norm(way, axis=1, keepdims=True)
     way[::50] = np.nan
     one = replace(only_pass(along_x()), contact=Contact(normal, way, np.arange(10_000)))
-    allowed = Allowed(50.0 * DEG, None, OrientationLimits(lead=(-48.0, 45.0), tilt=(-90.0, 46.0), off_centre=0.01))
+    allowed = AllowedAxes(50.0 * DEG, None, OrientationLimits(lead=(-48.0, 45.0), tilt=(-90.0, 46.0), off_centre=0.01))
     axes = rng.normal(size=(300, 3)) * 0.3 + Z
     axes /= np.linalg.norm(axes, axis=1, keepdims=True)
     found = allowed.mask(one, axes)

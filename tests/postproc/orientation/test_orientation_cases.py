@@ -12,10 +12,10 @@ import pytest
 import postproc
 from machines.machine import Machine, Timing
 from postproc.base.options import Options, Orientation
-from postproc.orientation.candidates.held import common_angles, free_value, held_angles
-from postproc.orientation.candidates.search import Tried
-from postproc.orientation.candidates.timed import turned, turned_all
-from postproc.orientation.passes.allowed import Allowed
+from postproc.orientation.candidates.candidate_times import turned, turned_all
+from postproc.orientation.candidates.free_rotary import common_angles, free_value, held_angles
+from postproc.orientation.candidates.search import PassSearch
+from postproc.orientation.passes.allowed import AllowedAxes
 from postproc.orientation.passes.pass_bodies import pass_bodies
 from postproc.orientation.passes.passes import work_of
 from postproc.orientation.plans.choice import OrientationChoice
@@ -99,7 +99,7 @@ def walled(*walls: tuple[float, float], holder: float) -> SetupFile:
     return SetupFile.model_validate_json(json.dumps({"bodies": {"fixtures": fixtures}, "tools": {"1": tool}}))
 
 
-def behind(*walls: tuple[float, float], holder: float = 56.0) -> Tried:
+def behind(*walls: tuple[float, float], holder: float = 56.0) -> PassSearch:
     """A strip along x between walls."""
     return chosen(strips([0.0]), machine("mikron-ucp710"), walled(*walls, holder=holder)).tried[0]
 
@@ -126,7 +126,7 @@ def test_between_two_walls_the_tool_leans_as_far_as_it_can() -> None:
     work, _ = work_of(strips([0.0]), machine("mikron-ucp710"), walled(*walls, holder=56.0), Options())
     assert work is not None
     bodies, _ = pass_bodies(work, "")
-    one, allowed = work.passes[0], Allowed(60.0 * DEG, bodies)
+    one, allowed = work.passes[0], AllowedAxes(60.0 * DEG, bodies)
     a, c = (g.ravel() * DEG for g in np.meshgrid(np.arange(10.0, 45.0, 3.5), np.arange(30.0, 60.0, 5.0)))
     axes = np.column_stack([np.sin(a) * np.sin(c), -np.sin(a) * np.cos(c), np.cos(a)])
     grid = turned_all(one, np.vstack([axes, -axes * [1.0, 1.0, -1.0]]), machine("mikron-ucp710"), allowed.touching)
@@ -254,7 +254,7 @@ def test_search_beside_a_full_grid(direction: float, cap: float) -> None:
     work, _ = work_of(strips([direction]), m, setup_of(""), Options())
     assert work is not None
     one = work.passes[0]
-    assert -0.02 < compared("strip", one, m, Allowed(cap * DEG), one.axis, cap * DEG, cap / 5.0 * DEG) < 0.005
+    assert -0.02 < compared("strip", one, m, AllowedAxes(cap * DEG), one.axis, cap * DEG, cap / 5.0 * DEG) < 0.005
 
 
 def test_auto_beside_all_sequences() -> None:

@@ -10,11 +10,11 @@ import pytest
 from machines.machine import Machine
 from machines.polytope import box_vertices, held_axis_polytope
 from postproc.base.options import Options
+from postproc.orientation.candidates.candidate_times import turned
 from postproc.orientation.candidates.candidates import tried
-from postproc.orientation.candidates.timed import turned
-from postproc.orientation.candidates.vertices import Table, closed_form, numeric, rotation, table_of, vertex_angles
+from postproc.orientation.candidates.vertices import TwoAxisTable, closed_form, numeric, rotation, table_of, vertex_angles
 from postproc.orientation.figures import polytopes
-from postproc.orientation.passes.allowed import Allowed
+from postproc.orientation.passes.allowed import AllowedAxes
 from postproc.orientation.passes.passes import Pass, work_of
 from postproc.setup.model import SetupFile
 from tests.postproc.kit import SAMPLES, machine
@@ -48,7 +48,7 @@ def part_passes(name: str = "mikron-ucp710") -> tuple[Machine, dict[int, Pass]]:
 
 
 
-def mikron() -> Table:
+def mikron() -> TwoAxisTable:
     """The table C on A of the paper."""
     table = table_of(machine("mikron-ucp710").kinematics, np.zeros(5))
     assert table is not None
@@ -116,7 +116,7 @@ def test_reach_at_solutions_is_that_of_a_vertex(name: str) -> None:
 def test_choice_within_travel_with_smallest_angles() -> None:
     """A of the Mikron ends at -30 degrees: of the solutions of a level pass A = +45 is left; the least |C| is taken."""
     m, passes = part_passes()
-    found = tried(passes[30], m, Allowed(90.0 * DEG))
+    found = tried(passes[30], m, AllowedAxes(90.0 * DEG))
     assert found.aimed is not None
     angles = found.aimed.rotary()
     assert 30.0 < angles["A"] < 60.0 and abs(angles["C"]) < 90.0
@@ -131,7 +131,7 @@ def test_heads_do_not_turn_the_polytope(name: str) -> None:
     limit = np.where(kin.rotary, 1.0, 5.0)
     assert len(vertex_angles(kin, np.zeros(5), np.array([0.8, 0.6, 0.0]), limit)) == 0
     m, passes = part_passes(name)
-    found = tried(passes[30], m, Allowed(60.0 * DEG))
+    found = tried(passes[30], m, AllowedAxes(60.0 * DEG))
     assert found.best is found.own
 
 
@@ -139,7 +139,7 @@ def test_heads_do_not_turn_the_polytope(name: str) -> None:
 def test_gain_as_printed(plane: int, least: float, most: float) -> None:
     """Xp = 30 gains 16 % within a point (table 2); no pass more than the ideal 1 - 3^(-1/6) of a straight one."""
     m, passes = part_passes()
-    found = tried(passes[plane], m, Allowed(60.0 * DEG))
+    found = tried(passes[plane], m, AllowedAxes(60.0 * DEG))
     assert found.aimed is not None
     gain = 100.0 * (1.0 - found.aimed.seconds / found.own.seconds)
     assert least < gain < most

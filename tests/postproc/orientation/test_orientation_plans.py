@@ -17,8 +17,8 @@ from machines.machine import Machine, Timing
 from postproc.base.options import Options
 from postproc.cli.app import app
 from postproc.orientation.plans.choice import OrientationChoice
-from postproc.orientation.plans.choose import seconds, shortest
 from postproc.orientation.plans.orient import orient
+from postproc.orientation.plans.shortest_sequence import seconds, shortest
 from postproc.reference.cutter import ball_radius
 from postproc.setup.model import SetupFile
 from tests.postproc.kit import SAMPLES, machine

@@ -16,9 +16,9 @@ from machines.machine import Machine, Timing
 from postproc.base.options import Options, Orientation
 from postproc.cli.app import app
 from postproc.orientation.plans.choice import OrientationChoice
-from postproc.orientation.plans.choose import shortest
 from postproc.orientation.plans.orient import orient
 from postproc.orientation.plans.plans import OrientationPlan
+from postproc.orientation.plans.shortest_sequence import shortest
 from postproc.pipeline import convert as pipeline
 from postproc.pipeline.convert import choose_axes
 from postproc.pipeline.proved_axes import proved

@@ -18,9 +18,9 @@ from typer.testing import CliRunner, Result
 import toolpaths
 from postproc.base.options import Options, Orientation
 from postproc.cli.app import app
-from postproc.orientation.candidates import losers, reaches
-from postproc.orientation.candidates.timed import turned
-from postproc.orientation.figures import held, sheet
+from postproc.orientation.candidates import reaches, rejections
+from postproc.orientation.candidates.candidate_times import turned
+from postproc.orientation.figures import free_rotary, sheet
 from postproc.orientation.plans import shares
 from postproc.orientation.plans.choice import OrientationChoice
 from postproc.orientation.plans.orient import orient
@@ -128,13 +128,14 @@ def test_reach_of_an_axis_is_that_of_its_pass() -> None:
 def test_every_loser_is_counted_once() -> None:
     for choice in (part(), of_text(written(2))):
         for tried in choice.tried:
-            told = losers.grouped([tried])
+            told = rejections.grouped([tried])
             assert sum(told.values()) == len([lost for lost in tried.rejected if lost.made is not tried.own])
             assert told.get("bound", 0) == tried.pruned
-            after = losers.best_loser(tried)
+            after = rejections.best_loser(tried)
             assert after is not None and after.seconds >= tried.best.seconds
             assert after.seconds == min(lost.made.seconds for lost in tried.rejected if np.isfinite(lost.made.seconds))
-        assert sum(losers.grouped(choice.tried).values()) == sum(sum(losers.grouped([one]).values()) for one in choice.tried)
+        assert sum(rejections.grouped(choice.tried).values()) == sum(sum(rejections.grouped([one]).values())
+                                                                     for one in choice.tried)
 
 
 def test_no_loser_is_told_as_faster_than_the_best_or_where_it_stands() -> None:
@@ -181,7 +182,7 @@ def test_json_has_the_keys_that_others_read() -> None:
         assert one["gain_percent"] == pytest.approx(100.0 * (1.0 - one["time_s"] / one["reference_time_s"]))
         assert sum(one["lost"].values()) >= one["planned"] + one["pruned"] - 2
         assert one["reach"]["own"]["slowest"] == "jerk" and one["next_best"]["time_s"] >= one["best"]["time_s"]
-        assert {it["kind"] for it in one["rejected"]} <= set(losers.KINDS)
+        assert {it["kind"] for it in one["rejected"]} <= set(rejections.KINDS)
     assert {"keep", "per_pass", "whole_part", "auto"} <= set(values["plans"])
     for plan in values["plans"].values():
         assert plan["time_s"] == pytest.approx(plan["cutting_s"] + plan["turning_s"] + plan["other_s"])
@@ -222,7 +223,8 @@ def test_held_angles_are_told_and_drawn() -> None:
     tried = choice.tried[0]
     assert abs(abs(tried.best.rotary()["C"]) % 90.0 - 45.0) < 0.5
     ball = part().tried[0]
-    assert held.is_held(tried) and not held.is_held(ball) and held.is_held(replace(ball, best=replace(ball.best, held=0.3)))
+    assert free_rotary.is_held(tried) and not free_rotary.is_held(ball)
+    assert free_rotary.is_held(replace(ball, best=replace(ball.best, held=0.3)))
     told = text.as_text(choice, "per-pass", [0])
     assert told.count("axis kept: the cutter is no ball") == 3 and "bound; axis kept" in told
     one = report.as_dict(choice, "per-pass")["passes"][0]

@@ -12,20 +12,20 @@ import pytest
 import toolpaths
 from machines.machine import Machine
 from postproc.base.options import Options
+from postproc.orientation.candidates.candidate_times import turned, turned_all
 from postproc.orientation.candidates.candidates import tried
+from postproc.orientation.candidates.initial_axes import around
 from postproc.orientation.candidates.ranking import Ranking
-from postproc.orientation.candidates.seeds import around
-from postproc.orientation.candidates.timed import turned, turned_all
-from postproc.orientation.candidates.vertices import Table, closed_form, rotation
-from postproc.orientation.passes import rounds
-from postproc.orientation.passes.allowed import Allowed
-from postproc.orientation.passes.passes import Pass, Work, work_of
+from postproc.orientation.candidates.vertices import TwoAxisTable, closed_form, rotation
+from postproc.orientation.passes import parallel_map
+from postproc.orientation.passes.allowed import AllowedAxes
+from postproc.orientation.passes.parallel_map import CHUNK, PassFault, each_pass
+from postproc.orientation.passes.passes import Pass, PassContext, work_of
 from postproc.orientation.passes.poses import held_poses
-from postproc.orientation.passes.rounds import CHUNK, PassFault, each_pass
 from postproc.orientation.plans.choice import OrientationChoice
-from postproc.orientation.plans.choose import groupwise, seconds
 from postproc.orientation.plans.orient import orient
 from postproc.orientation.plans.plans import plans_of, table_of
+from postproc.orientation.plans.shortest_sequence import groupwise, seconds
 from postproc.setup.model import SetupFile, load_setup
 from tests.postproc.kit import SAMPLES, machine
 from toolpaths.arrays import Floats
@@ -47,7 +47,7 @@ def strips(ways: Sequence[float], length: float = 60.0, axis: str = "0,0,1") -> 
     return path
 
 
-def work(path: Toolpath, m: Machine, setup: SetupFile | None = None) -> Work:
+def work(path: Toolpath, m: Machine, setup: SetupFile | None = None) -> PassContext:
     made, found = work_of(path, m, setup or SetupFile(), Options())
     assert made is not None, found
     return made
@@ -103,7 +103,7 @@ def test_vertices_of_any_table() -> None:
     found = 0
     for _ in range(40):
         first, second = leaning(rng, 2, 2.0)
-        table = Table(first, second, np.linalg.qr(rng.normal(size=(3, 3)))[0], bool(rng.integers(2)))
+        table = TwoAxisTable(first, second, np.linalg.qr(rng.normal(size=(3, 3)))[0], bool(rng.integers(2)))
         limit, f = rng.uniform(1.0, 3.0, 3), leaning(rng, 1, 3.0)[0]
         angles = closed_form(table, f, limit)
         found += len(angles)
@@ -138,8 +138,8 @@ def test_groups_are_moved_together() -> None:
 
 def test_the_choice_does_not_depend_on_the_cores(monkeypatch: pytest.MonkeyPatch) -> None:
     """Forked workers hand back what one process finds, to the last digit."""
-    monkeypatch.setattr(rounds, "CHUNK", 2)
-    monkeypatch.setattr(rounds, "_FEWEST", 2)
+    monkeypatch.setattr(parallel_map, "CHUNK", 2)
+    monkeypatch.setattr(parallel_map, "_FEWEST", 2)
     path, m = strips([0.0, 20.0, 40.0]), machine("mikron-ucp710")
     alone, shared = chosen(path, m, 1), chosen(path, m, 2)
     for name in ("keep", "per-pass", "whole-part", "auto"):
@@ -161,7 +161,7 @@ def test_faults_name_the_line_of_their_pass(workers: int) -> None:
         return number
 
     with pytest.raises(PassFault, match="no") as fault:
-        each_pass(failing, made, Allowed(1.0), "trying", lambda *args: told.append(args), workers)
+        each_pass(failing, made, AllowedAxes(1.0), "trying", lambda *args: told.append(args), workers)
     assert fault.value.line == made.passes[4 * CHUNK + 3].line
     assert told[-1][0] == "trying" and told[-1][2] == 5 * CHUNK and 3 * CHUNK <= told[-1][1] < 5 * CHUNK
 
@@ -171,8 +171,8 @@ def test_the_pass_before_lends_its_axis() -> None:
     m = machine("mikron-ucp710")
     passes = work(toolpaths.read(SAMPLES / "test_part.cls")[0], m).passes
     for one, other in itertools.pairwise(passes[:3]):
-        before = tried(one, m, Allowed(60.0 * DEG))
-        alone, lent = tried(other, m, Allowed(60.0 * DEG)), tried(other, m, Allowed(60.0 * DEG), before)
+        before = tried(one, m, AllowedAxes(60.0 * DEG))
+        alone, lent = tried(other, m, AllowedAxes(60.0 * DEG)), tried(other, m, AllowedAxes(60.0 * DEG), before)
         assert lent.best.seconds < alone.best.seconds * 1.002
         assert lent.swift.seconds + lent.swift.rapids < (alone.swift.seconds + alone.swift.rapids) * 1.002
 
@@ -237,7 +237,7 @@ def test_states_that_touch_are_in_no_plan_but_keep() -> None:
         def touching(self, one: Pass, axis: Floats) -> str:
             return "holder touches ceiling" if axis[2] > 0.97 else ""
 
-    made, allowed = work(strips([0.0, 30.0, 60.0]), machine("mikron-ucp710")), Allowed(60.0 * DEG, Ceiling())
+    made, allowed = work(strips([0.0, 30.0, 60.0]), machine("mikron-ucp710")), AllowedAxes(60.0 * DEG, Ceiling())
     results = [tried(one, made.machine, allowed) for one in made.passes]
     plans = plans_of(table_of(made, results, allowed, workers=1)).named
     assert plans["keep"].touches and not any(plans[name].touches for name in ("per-pass", "whole-part", "auto"))

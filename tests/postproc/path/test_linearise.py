@@ -7,7 +7,7 @@ import pytest
 
 from postproc.control.control import Control
 from postproc.joints.joint_path import nearest_solution, solve
-from postproc.path.linearise import Pieces, _Front, family_turns, linearise
+from postproc.path.linearise import CurvePieces, _Front, family_turns, linearise
 from tests.postproc.kit import angle, great_circle, machine, pose_of, tilted, unit
 from toolpaths.shape import Curves
 
@@ -35,7 +35,7 @@ def ends(name: str, curves: Curves) -> tuple[np.ndarray, np.ndarray]:
     return np.array(q0), np.array(q1)
 
 
-def split(name: str, curves: Curves, tip: float = TIP, axis: float = AXIS) -> tuple[Pieces, np.ndarray]:
+def split(name: str, curves: Curves, tip: float = TIP, axis: float = AXIS) -> tuple[CurvePieces, np.ndarray]:
     m = machine(name)
     q0, q1 = ends(name, curves)
     control = Control(m, "axes", np.zeros(3))
@@ -49,7 +49,7 @@ def dense_poses(name: str, a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np
     return pose_of(name, (a + t * (b - a)) * scale, 0.0)
 
 
-def worst(name: str, curves: Curves, pieces: Pieces, q0: np.ndarray) -> tuple[float, float]:
+def worst(name: str, curves: Curves, pieces: CurvePieces, q0: np.ndarray) -> tuple[float, float]:
     """Largest tip distance from the line segment, and axis angle from the great circle at the nearest point."""
     tip_off = axis_off = 0.0
     for i in range(len(curves)):

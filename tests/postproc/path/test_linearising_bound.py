@@ -10,7 +10,7 @@ from machines.kinematics.serial import Serial
 from machines.straight_blocks import UNBOUNDED, pose_jets
 from postproc.control.control import Control
 from postproc.joints.joint_path import nearest_solution
-from postproc.path.bound import Stretch, bounds
+from postproc.path.bound import CurveBlocks, bounds
 from postproc.path.linearise import linearise
 from tests.postproc.joint_kit import DEG, angle, machine, segments, tilted, unit
 from toolpaths.shape import Curves
@@ -106,7 +106,7 @@ def test_bound_is_never_below_dense_truth(name: str, law: str) -> None:
     assert len(curves) >= 15
     n = len(curves)
     for near in (1e9, 1e-9):
-        stretch = Stretch(curves, np.zeros(n), np.ones(n), q0, q1, kin.forward(q0), kin.forward(q1))
+        stretch = CurveBlocks(curves, np.zeros(n), np.ones(n), q0, q1, kin.forward(q0), kin.forward(q1))
         bound = bounds(control, kin, stretch, near, near)
         real = truth(name, control, curves, q0, q1, np.zeros(n), np.ones(n))
         assert (bound[0] >= real[0] - 1e-9).all() and (bound[1] >= real[1] - 1e-9).all()
@@ -136,7 +136,7 @@ def test_no_longer_block_passes_the_same_bound(name: str) -> None:
     pick, u1 = curves.take(got.curve[longer]), (ua + 1.2 * (got.u - ua))[longer]
     tip, axis = pick.at(u1)
     qb = nearest_solution(kin, tip, axis, got.q[longer])
-    stretch = Stretch(pick, ua[longer], u1, qa[longer], qb, kin.forward(qa[longer]), kin.forward(qb))
+    stretch = CurveBlocks(pick, ua[longer], u1, qa[longer], qb, kin.forward(qa[longer]), kin.forward(qb))
     tip_bound, axis_bound = bounds(control, kin, stretch, TIP, AXIS)
     assert ((tip_bound > TIP) | (axis_bound > AXIS)).mean() > 0.97
 

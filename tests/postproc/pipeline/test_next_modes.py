@@ -89,7 +89,8 @@ def test_frame_of_the_tool_is_that_of_its_axes_in_every_pose(name: str) -> None:
 
 
 @pytest.mark.parametrize("controller", ["siemens-840d", "fanuc-30i"])
-def test_one_operation_takes_the_next_mode_and_the_warning_names_it(controller: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_one_operation_takes_the_next_mode_and_the_warning_names_it(controller: str,
+                                                                    monkeypatch: pytest.MonkeyPatch) -> None:
     refusing(monkeypatch, lambda law, q: law.rotation is not None and law.rotation[2, 2] < -0.999)
     result = casting(controller)
     assert result.ok, errors_of(result)

@@ -14,7 +14,7 @@ import toolpaths
 from postproc.base.options import Options
 from postproc.pipeline import stages
 from postproc.pipeline.convert import convert
-from postproc.pipeline.stage_values import Begun, Verified
+from postproc.pipeline.stage_values import BegunStage, VerifiedStage
 from postproc.pipeline.stages import STAGES, Stage
 from postproc.report.trace import as_text, trace_line
 from toolpaths.diagnostics import error
@@ -30,12 +30,12 @@ def taken_and_handed_on(stage: Stage) -> tuple[type, set[type]]:
 
 
 def test_each_stage_takes_what_the_one_before_hands_on() -> None:
-    given: type = Begun
+    given: type = BegunStage
     for stage in STAGES:
         takes, hands_on = taken_and_handed_on(stage)
         assert takes is given and hands_on <= {takes, given := max(hands_on, key=lambda kind: len(kind.__mro__))}
         assert issubclass(given, takes)
-    assert given is Verified
+    assert given is VerifiedStage
 
 
 @pytest.mark.parametrize("at", range(len(STAGES)), ids=[stage.name for stage in STAGES])
@@ -43,7 +43,7 @@ def test_an_error_ends_the_conversion(at: int, monkeypatch: pytest.MonkeyPatch) 
     ran: list[str] = []
 
     def counted(number: int, stage: Stage) -> Stage:
-        def run(made: Begun, progress: stages.Progress | None) -> tuple[Begun, list[stages.Diagnostic]]:
+        def run(made: BegunStage, progress: stages.Progress | None) -> tuple[BegunStage, list[stages.Diagnostic]]:
             ran.append(stage.name)
             value, found = stage.run(made, progress)
             return value, [*found, error("test.stage", "planted", hint="none")] if number == at else found

@@ -13,7 +13,7 @@ from postproc.base.options import Options
 from postproc.path import travel
 from postproc.pipeline.convert import convert
 from postproc.pipeline.result import PostResult
-from postproc.readback.comparison import checks, compare, slow, states
+from postproc.readback.comparison import checks, compare, slow_moves, states
 from postproc.readback.execution import sections
 from postproc.readback.text import modal, words
 from postproc.reference import moves
@@ -22,7 +22,7 @@ from toolpaths.rotations import cross, lengths
 
 SAMPLES = Path(__file__).parents[3] / "samples"
 SIZES = ((words, "_STRETCH", 64), (words, "_NEAR", 7), (modal, "_PART", 11), (sections, "_PART", 5), (checks, "CHUNK", 9),
-         (compare, "CHUNK", 9), (slow, "CHUNK", 9), (states, "CHUNK", 9), (travel, "PART", 6), (moves, "_PART", 11))
+         (compare, "CHUNK", 9), (slow_moves, "CHUNK", 9), (states, "CHUNK", 9), (travel, "PART", 6), (moves, "_PART", 11))
 CASES = (("five_faces.cls", "linuxcnc"), ("five_faces.cls", "fanuc-30i"), ("five_faces.cls", "heidenhain-tnc640"),
          ("tool_axis_tour.apt", "siemens-840d"), ("tool_axis_tour.apt", "haas-ngc"), ("pocket.cls", "generic-iso"))
 

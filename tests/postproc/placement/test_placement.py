@@ -14,12 +14,12 @@ from postproc.base.options import Options
 from postproc.orientation.passes.contact import Contact
 from postproc.orientation.passes.passes import work_of
 from postproc.orientation.plans.orient import orient
-from postproc.placement.moved import moved
 from postproc.placement.place import PlacementChoice, _proved, place
+from postproc.placement.place_times import TimedPlace
+from postproc.placement.rigid_move import moved
 from postproc.placement.search import EQUAL
 from postproc.placement.space import ANGLES, angles_of, matrix, space_of
-from postproc.placement.timed import Tried
-from postproc.setup.model import Clearance, PartPlacement, Placement, SetupFile, ToolSetup, part_placement
+from postproc.setup.model import LinkClearance, PartPlacement, Placement, SetupFile, ToolSetup, part_placement
 from postproc.setup.place import PlaceBox, PlacementLimits
 from tests.postproc.kit import machine
 from toolpaths.diagnostics import Diagnostic, error, has_errors
@@ -117,7 +117,7 @@ def test_what_lacks_most_travel_is_said() -> None:
 def test_turning_the_part_finds_the_longer_travel() -> None:
     """A way of 900 mm fits along X (1000) and not along Y (800)."""
     setup = setup_of((0.0, -400.0, 0.0), x=(-450.0, 450.0), y=(-450.0, 450.0), turns=[0.0, 90.0, -90.0])
-    setup = setup.model_copy(update={"clearance": Clearance(distance=60.0)})
+    setup = setup.model_copy(update={"clearance": LinkClearance(distance=60.0)})
     choice = placed(passes((0.0, 1.0), length=900.0), machine("mill-3axis"), setup)
     assert "axis Y" in choice.found.now.refused
     assert abs(choice.best.place[ANGLES]) == pytest.approx(90 * DEG)
@@ -229,8 +229,9 @@ def test_the_space_states_what_it_places() -> None:
     assert there[1] == space.now[1]
 
 
-def tried_at(x: float, seconds: float) -> Tried:
-    return Tried(np.array([x, 0.0, 0.0, 0.0, 0.0, 0.0]), seconds, seconds, 0.0, seconds, np.zeros(3), np.zeros(3), np.inf)
+def tried_at(x: float, seconds: float) -> TimedPlace:
+    return TimedPlace(np.array([x, 0.0, 0.0, 0.0, 0.0, 0.0]), seconds, seconds, 0.0, seconds, np.zeros(3), np.zeros(3),
+                      np.inf)
 
 
 @pytest.mark.parametrize(("good_from", "taken", "failures"), [(-1.0, 0.0, 0), (250.0, 300.0, 1), (np.inf, 7.0, 6)])

@@ -14,10 +14,10 @@ from machines.singular_distance import singular_distance
 from postproc.base.options import Options
 from postproc.orientation.passes.passes import work_of
 from postproc.placement.place import place
+from postproc.placement.place_times import Timer
 from postproc.placement.region import Slabs, region_of
-from postproc.placement.search import Search
+from postproc.placement.search import PlaceSearch
 from postproc.placement.space import ANGLES, Space, matrix, space_of
-from postproc.placement.timed import Timer
 from postproc.setup.model import PartPlacement, Placement, SetupFile, load_setup, part_placement
 from postproc.setup.place import PlacementLimits
 from tests.postproc.kit import SAMPLES, machine
@@ -83,11 +83,11 @@ def test_stated_distance_from_singular_positions_is_kept() -> None:
     now = Placement(matrix(np.array([np.pi / 2, 0.0, 0.0])), np.array([-240.0, 0.0, -270.0]))
     space = space_of(limits, now, (np.zeros(3), np.zeros(3)))
     timer = timer_of(on_delta(), m, space, 0.518155)
-    found = Search(timer, space).run()
+    found = PlaceSearch(timer, space).run()
     assert "platform (direct) comes to 0.5181 of a singular position" in found.now.refused
     assert found.best is not None
     assert found.best.singular >= 0.518155
-    assert Search(timer_of(on_delta(), m, space, 0.99), space).run().best is None
+    assert PlaceSearch(timer_of(on_delta(), m, space, 0.99), space).run().best is None
 
 
 @pytest.mark.parametrize("name", [DELTA, "mikron-ucp710", "trunnion-bc"])

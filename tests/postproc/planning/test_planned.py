@@ -12,9 +12,9 @@ from scipy.interpolate import BSpline
 
 from machines.machine import Machine
 from postproc.feedrate.limits import JointLimits
-from postproc.feedrate.plan import Options
+from postproc.feedrate.plan import PlannerOptions
 from postproc.pipeline.result import PostResult
-from postproc.planning.geometry import MachinePath, Stretch, machine_path, machine_paths
+from postproc.planning.geometry import MachinePath, PathStretch, machine_path, machine_paths
 from postproc.planning.pass_geometry import PassGeometry, chains, pass_geometry, stops_of
 from postproc.planning.planned import PassFeed, PlannedMotion, Source, joint_limits, plan_pass, planned_motion
 from postproc.planning.steady_feed import CORNER, steady_speed
@@ -161,7 +161,7 @@ def test_plan_keeps_limits_and_feed_and_rests_at_both_ends() -> None:
     result = waves("mikron-ucp710")
     assert result.job is not None
     one, = geometry(result)
-    made = plan_pass(one, result.job.moves, limits_of(machine("mikron-ucp710")), Options(strict=True))
+    made = plan_pass(one, result.job.moves, limits_of(machine("mikron-ucp710")), PlannerOptions(strict=True))
     assert made.usage().worst <= 1.0 + 1e-9
     run = made.trajectory()
     tip = one.smooth.at(run.s)[0]
@@ -303,7 +303,7 @@ def test_stretches_together_are_those_alone_and_one_out_of_reach_spoils_no_other
     paths = [smooth(straight(*tips), TOLERANCE) for tips in (
         ((0.0, 0.0, 0.0), (50.0, 0.0, 0.0), (50.0, 40.0, -20.0)), ((0.0, 0.0, 0.0), (5000.0, 0.0, 0.0)),
         ((-80.0, 10.0, 5.0), (-20.0, 60.0, 5.0)))]
-    stretches = [Stretch(path, 0.0, float(path.s[-1]), lambda s: np.tile(home, (len(s), 1))) for path in paths
+    stretches = [PathStretch(path, 0.0, float(path.s[-1]), lambda s: np.tile(home, (len(s), 1))) for path in paths
                  if path is not None]
     found = machine_paths(stretches, kin)
     assert [isinstance(one, MachinePath) for one in found] == [True, False, True]

@@ -14,7 +14,7 @@ from postproc.cycle_time.planned import planned_times
 from postproc.cycle_time.source import from_conversion
 from postproc.feedrate.motion import Plan
 from postproc.feedrate.plan import plan
-from postproc.orientation.candidates import timed
+from postproc.orientation.candidates import candidate_times
 from postproc.orientation.plans.orient import orient
 from postproc.planning import planned
 from postproc.setup.model import SetupFile
@@ -46,6 +46,6 @@ def test_times_of_passes(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_times_of_orientations(monkeypatch: pytest.MonkeyPatch) -> None:
     path, _ = toolpaths.read_bytes(written(1).encode(), file="passes.apt")
-    monkeypatch.setattr(timed, "plan", unsolved)
+    monkeypatch.setattr(candidate_times, "plan", unsolved)
     choice, found = orient(path, machine("mikron-ucp710"), SetupFile(), Options(), workers=1)
     assert choice is not None and only(found, "orient.unsolved").count == 1

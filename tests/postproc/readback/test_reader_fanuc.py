@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from postproc.verification.files_beside import Beside
+from postproc.verification.neighbour_files import NeighbourFiles
 from tests.postproc.reader_kit import FANUC, HAAS, executed, faults, good, words
 from tests.postproc.reader_kit import controller as spec
 
@@ -152,7 +152,7 @@ def test_a_fault_in_another_file_points_there() -> None:
 def test_files_beside_a_program(tmp_path: Path) -> None:
     for name in ("MAIN.nc", "o0077.NC"):
         (tmp_path / name).write_bytes(b"%\nO0077\nX3.\nM99\n%\n")
-    beside = Beside(tmp_path / "MAIN.nc")
+    beside = NeighbourFiles(tmp_path / "MAIN.nc")
     assert list(beside) == ["o0077.NC"] and len(beside) == 1 and "MAIN.nc" not in beside
     motion = good(FANUC, program("G0 X0. Y0. Z0.\nM98 P77\n"), others=beside)
     assert words(motion)[-1] == [3, 0, 0]

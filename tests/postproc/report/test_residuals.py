@@ -17,7 +17,7 @@ from postproc.pipeline.result import PostResult
 from postproc.report.residual_files import contents
 from postproc.report.residuals import ARCSEC, UM, Residuals, residuals
 from postproc.setup.model import SetupFile, load_setup
-from postproc.verification.errors_left import after_formatting
+from postproc.verification.residual_errors import after_formatting
 from toolpaths.arrays import Floats
 from toolpaths.units import DEG
 
@@ -36,7 +36,8 @@ def turned(name: str) -> SetupFile:
 def field(sample: str, machine: str, setup: SetupFile, **options: object) -> tuple[PostResult, Residuals]:
     path, found = toolpaths.read(f"samples/{sample}")
     result = postproc.convert(path, machine, "linuxcnc", setup=setup, diagnostics=found,
-                              options=Options(error_model=f"samples/errors/{machine}.toml", **options))  # type: ignore[arg-type]
+                              options=Options(error_model=f"samples/errors/{machine}.toml",
+                                              **options))  # type: ignore[arg-type]
     told = residuals(result)
     assert result.ok and told is not None, [str(d) for d in result.diagnostics]
     return result, told

@@ -49,7 +49,7 @@ def test_a_foreign_import_is_noticed(line: str) -> None:
 def test_running_the_witness_loads_nothing_of_the_project() -> None:
     """Read and placed: the modules that are then loaded. (The package above it names its own version and loads nothing.)"""
     code = ("import sys; from postproc.witness.clfile import commanded; from postproc.witness import testify, machine;"
-            "import postproc.witness.testify; commanded(b'GOTO/1,2,3\\nCYCLE/DRILL,FEDTO,1,RAPTO,2,MMPM,3\\n');"
+            "import postproc.witness.second_reading; commanded(b'GOTO/1,2,3\\nCYCLE/DRILL,FEDTO,1,RAPTO,2,MMPM,3\\n');"
             "print(*(m for m in sys.modules if m.split('.')[0] in ('toolpaths', 'machines', 'postproc')))")
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
     assert {m for m in done.stdout.split() if not m.startswith("postproc.witness")} == {"postproc"}

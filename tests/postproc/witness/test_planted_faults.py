@@ -32,7 +32,7 @@ from postproc.job.job import Job
 from postproc.pipeline.result import PostResult
 from postproc.setup.model import Placement, SetupFile
 from postproc.verification.second_witness import second_witness
-from toolpaths.cl.build import Builder
+from toolpaths.cl.build import ToolpathBuilder
 from toolpaths.cl.feeds import PER_MINUTE
 from toolpaths.toolpath import Kind, Toolpath
 
@@ -176,11 +176,11 @@ def path_changed(change: Callable[[Toolpath], Toolpath]) -> Plant:
 
 
 def events(change: Callable[[str, tuple[Any, ...]], tuple[str, tuple[Any, ...]] | None]) -> Plant:
-    def event(old: Any, self: Builder, word: str, values: tuple[Any, ...]) -> None:
+    def event(old: Any, self: ToolpathBuilder, word: str, values: tuple[Any, ...]) -> None:
         found = change(word, values)
         if found is not None:
             old(self, *found)
-    return wrapped(Builder, "event", event)
+    return wrapped(ToolpathBuilder, "event", event)
 
 
 def moved(rows: dict[int, int | tuple[int, int]]) -> Callable[[Toolpath], Toolpath]:
@@ -258,7 +258,7 @@ def next_tools(p: Toolpath) -> Toolpath:
     return replace(p, tools=tuple(replace(t, number=t.number + 1) for t in p.tools), events=events)
 
 
-def delta_turned(old: Any, b: Builder, rows: Any) -> None:
+def delta_turned(old: Any, b: ToolpathBuilder, rows: Any) -> None:
     b.deltas[:] = [(row, tuple(-v for v in step)) for row, step in b.deltas]
     old(b, rows)
 
@@ -274,7 +274,7 @@ def other_way(word: str, values: tuple[Any, ...]) -> tuple[str, tuple[Any, ...]]
     return word, tuple({"CLW": "CCLW"}.get(v, v) for v in values) if word == "SPINDL" else values
 
 
-def flooded(old: Any, self: Builder, word: str, values: tuple[Any, ...]) -> None:
+def flooded(old: Any, self: ToolpathBuilder, word: str, values: tuple[Any, ...]) -> None:
     old(self, word, values)
     if word == "SPINDL":
         old(self, "COOLNT", ("FLOOD",))
@@ -341,7 +341,7 @@ FAULTS: dict[str, tuple[str, str, str, str, Plant]] = {
                       of_word("SPINDL", lambda v: tuple(2000.0 if x == 3000.0 else x for x in v))),
     "coolant dropped": (NX, "mill-3axis", "linuxcnc", "plain", of_word("COOLNT", lambda v: None)),
     "mist for flood": (NX, "mill-3axis", "linuxcnc", "plain", of_word("COOLNT", lambda v: ("MIST",))),
-    "coolant that nobody asks for": (FLAT, "mill-3axis", "linuxcnc", "plain", wrapped(Builder, "event", flooded)),
+    "coolant that nobody asks for": (FLAT, "mill-3axis", "linuxcnc", "plain", wrapped(ToolpathBuilder, "event", flooded)),
     "point dropped": (NX, "mill-3axis", "linuxcnc", "plain", path_changed(moved({5: (4, 6)}))),
     "points exchanged": (NX, "mill-3axis", "linuxcnc", "plain", path_changed(moved({4: 5, 5: 4}))),
     "point moved by 0.02 mm": (NX, "mill-3axis", "linuxcnc", "plain",

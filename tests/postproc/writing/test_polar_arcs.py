@@ -16,7 +16,7 @@ import toolpaths
 from postproc.base.options import Options
 from postproc.compile.program import Hole
 from postproc.pipeline.result import PostResult
-from postproc.verification.errors_left import after_formatting
+from postproc.verification.residual_errors import after_formatting
 from postproc.writing.polar_arc import REACH, polar_arc
 from tests.postproc.program_kit import blocks, program, step
 from toolpaths.arrays import Floats

@@ -12,7 +12,7 @@ from toolpaths.cl import interpret
 from toolpaths.cl.inspect import inspect, summary
 from toolpaths.cl.read import read_bytes, read_file
 from toolpaths.diagnostics import Severity, has_errors
-from toolpaths.toolpath import Records
+from toolpaths.toolpath import RecordCounts
 
 SAMPLES = Path(__file__).parents[3] / "samples"
 FILES = sorted(p for p in SAMPLES.rglob("*") if p.suffix in (".cls", ".apt", ".ncl", ".clt", ".as", ".aptsource"))
@@ -29,15 +29,15 @@ def test_every_record_of_a_sample_is_executed_or_neutral(path: Path) -> None:
 
 
 @pytest.mark.parametrize(("text", "counts"), [
-    (HEAD + "$$ note\nPAINT/PATH\nRAPID\nGOTO/1,2,3\nGOTO/1,2, $\n4\nFINI\n", Records(7, 6, 1, 0)),
-    (HEAD + "GOTO/1,2,3\nFLUB/1\n@@ text\nTRACUT/5\nGOTO/1,2,4\n", Records(7, 4, 0, 3)),
-    ("$$-> MFGNO / A\n" + HEAD + "DEFSUB / 1\nGOTO / 1,2,3\nENDSUB\nCALSUB / 1\nCALSUB / 1\n", Records(7, 7, 0, 0)),
+    (HEAD + "$$ note\nPAINT/PATH\nRAPID\nGOTO/1,2,3\nGOTO/1,2, $\n4\nFINI\n", RecordCounts(7, 6, 1, 0)),
+    (HEAD + "GOTO/1,2,3\nFLUB/1\n@@ text\nTRACUT/5\nGOTO/1,2,4\n", RecordCounts(7, 4, 0, 3)),
+    ("$$-> MFGNO / A\n" + HEAD + "DEFSUB / 1\nGOTO / 1,2,3\nENDSUB\nCALSUB / 1\nCALSUB / 1\n", RecordCounts(7, 7, 0, 0)),
     (HEAD + "RAPID\nGOTO/0,0,0\nNURBS/\nKNOT/0.5\n$$ note\nKNOT/1.0\nCNTRL/1,0,0\nCNTRL/3,1,0\nCNTRL/5,2,0\nCNTRL/8,2,0\n"
-     "GOTO/9,2,0\n", Records(12, 12, 0, 0)),
-    (HEAD + "COPY/NOMORE\nGOTO/1,2,3\nTRACUT/NOMORE\n", Records(5, 5, 0, 0)),
-    ("=====\nDate : today\n" + HEAD + "GOTO/1,2,3\nTool Path Listing has 5 lines.\n", Records(6, 3, 3, 0)),
+     "GOTO/9,2,0\n", RecordCounts(12, 12, 0, 0)),
+    (HEAD + "COPY/NOMORE\nGOTO/1,2,3\nTRACUT/NOMORE\n", RecordCounts(5, 5, 0, 0)),
+    ("=====\nDate : today\n" + HEAD + "GOTO/1,2,3\nTool Path Listing has 5 lines.\n", RecordCounts(6, 3, 3, 0)),
 ])
-def test_counts(text: str, counts: Records) -> None:
+def test_counts(text: str, counts: RecordCounts) -> None:
     path, diagnostics = toolpaths.read_bytes(text)
     assert path.records == counts
     assert has_errors(diagnostics) == (counts.dropped > 0)
@@ -46,7 +46,7 @@ def test_counts(text: str, counts: Records) -> None:
 def test_what_is_allowed_is_neutral() -> None:
     text = HEAD + "GOTO/1,2,3\nFLUB/1\n@@ text\nGOTO/1,2,4\n"
     result = read_bytes(text, allow_unknown=["FLUB", "(TEXT)"])
-    assert not has_errors(result.diagnostics) and result.toolpath.records == Records(6, 4, 2, 0)
+    assert not has_errors(result.diagnostics) and result.toolpath.records == RecordCounts(6, 4, 2, 0)
 
 
 @pytest.mark.parametrize("record", ["STOP/RAPID", "OPSTOP/CHECK GOTO/1", "MULTAX/ON,4", "COOLNT/FLOOD,1,2,3",
@@ -71,7 +71,7 @@ def test_a_dropped_record_that_nobody_names_is_an_error(monkeypatch: pytest.Monk
     rest = read_bytes(text, allow_unknown=["TRACUT"])
     assert rest.toolpath.records.dropped == 1 and [d.lines for d in rest.diagnostics if d.code == "cl.dropped"] == [(7,)]
     whole = read_bytes(text, allow_unknown=["TRACUT", "COPY"])
-    assert not has_errors(whole.diagnostics) and whole.toolpath.records == Records(8, 4, 4, 0)
+    assert not has_errors(whole.diagnostics) and whole.toolpath.records == RecordCounts(8, 4, 4, 0)
 
 
 def test_an_uncalled_subroutine_with_motion_words_is_left_out_once() -> None:

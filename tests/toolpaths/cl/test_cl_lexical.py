@@ -9,7 +9,7 @@ import pytest
 
 from toolpaths.cl.read import ReadResult, read_bytes
 from toolpaths.cl.text import scan
-from toolpaths.cl.text.log import Log
+from toolpaths.cl.text.log import DiagnosticLog
 from toolpaths.cl.text.source import normalise
 from toolpaths.cl.text.statements import statement_of, words_of
 from toolpaths.cl.write import text_of
@@ -133,12 +133,12 @@ def test_numbers_of_points_in_columns_73_to_80_are_left_out() -> None:
 @pytest.mark.parametrize("tail", ["PT     1,", "PT 1", "XY     1", "9PT     1"])
 def test_what_only_resembles_numbers_of_points_stays(tail: str) -> None:
     data = f"UNITS/MM\n{'PPRINT':<72}{tail}\n{'PPRINT':<71}PT     1\n".encode()
-    assert normalise(data, Log()) == data
+    assert normalise(data, DiagnosticLog()) == data
 
 
 def test_long_lines_are_not_cut() -> None:
     numbers = ",".join(["1.00000000000000000000000"] * 3) + ",0.00000000000000000000,0.0000000000000000,1.000000000000"
-    log = Log()
+    log = DiagnosticLog()
     data = ("UNITS/MM\n" + f"GOTO/{numbers}\n" * 8).encode()
     assert normalise(data, log) == data
     assert not log.diagnostics()

@@ -10,7 +10,7 @@ from toolpaths.arrays import Floats
 from toolpaths.rotations import angle_between, rotation
 from toolpaths.shape import Curves
 from toolpaths.smoothing.blend import HIGHEST, ramp
-from toolpaths.smoothing.bspline import DEGREE, Knots, basis
+from toolpaths.smoothing.bspline import DEGREE, KnotVectors, basis
 from toolpaths.smoothing.fit import fit
 from toolpaths.smoothing.smooth import Smooth, Tolerance, smooth, smooth_all
 from toolpaths.smoothing.stretches import corners
@@ -185,7 +185,7 @@ def test_turning_the_part_turns_the_path() -> None:
 @pytest.mark.numeric
 def test_compiled_pass_equals_numpy() -> None:
     rng = np.random.default_rng(3)
-    knots = Knots.clamped(np.array([0.0, 1, 2.5, 3, 4, 6, 7, 8.5]), np.array([0, 5, 8]))
+    knots = KnotVectors.clamped(np.array([0.0, 1, 2.5, 3, 4, 6, 7, 8.5]), np.array([0, 5, 8]))
     s = np.sort(rng.uniform(0.0, 4.0, 60))
     stretch = np.zeros(60, dtype=np.int64)
     k = knots.span(s, stretch)
@@ -201,7 +201,7 @@ def test_compiled_pass_equals_numpy() -> None:
 
 
 def test_splines_of_two_stretches_equal_scipy() -> None:
-    knots = Knots.clamped(np.array([0.0, 1, 2.5, 3, 4, 4, 5, 6]), np.array([0, 5, 8]))
+    knots = KnotVectors.clamped(np.array([0.0, 1, 2.5, 3, 4, 4, 5, 6]), np.array([0, 5, 8]))
     rng = np.random.default_rng(1)
     c = rng.normal(size=knots.count)
     begin, last = knots.ends

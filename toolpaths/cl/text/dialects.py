@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
-from toolpaths.cl.text.statements import COMMENT, DATA_COMMENT, Program, Statement
+from toolpaths.cl.text.statements import COMMENT, DATA_COMMENT, Statement, StatementList
 from toolpaths.units import MM_PER_INCH
 
 
@@ -89,7 +89,7 @@ OWN = DATA_COMMENT + "TOOLPATH"
 """Mark of the text that `write` makes."""
 
 
-def detect(program: Program) -> tuple[Dialect, str]:
+def detect(program: StatementList) -> tuple[Dialect, str]:
     """(dialect, evidence): by the words that only one system writes, in order of how sure they are."""
     majors: dict[str, int] = {}
     for statement, line in program.first.items():
@@ -119,7 +119,7 @@ def detect(program: Program) -> tuple[Dialect, str]:
     return DIALECTS["generic"], "no word that only one system writes"
 
 
-def _clockwise_word(program: Program) -> int:
+def _clockwise_word(program: StatementList) -> int:
     for statement, line in program.first.items():
         if statement.major == "CIRCLE" and statement.has("CLOCKWISE", "COUNTERCLOCKWISE"):
             return line
@@ -129,7 +129,7 @@ def _clockwise_word(program: Program) -> int:
 _ISO_LOADTL = 4
 
 
-def _autodesk(program: Program) -> tuple[Dialect, str] | None:
+def _autodesk(program: StatementList) -> tuple[Dialect, str] | None:
     """Posts of Autodesk that write no word of their own: PARTNO in quotes, and the form of LOADTL; MODE in ISO 4343."""
     first = {s.major: s for s in reversed(program.first)}
     load = first.get("LOADTL")
@@ -143,7 +143,7 @@ def _autodesk(program: Program) -> tuple[Dialect, str] | None:
     return None
 
 
-def _by_text(program: Program) -> tuple[str, str] | None:
+def _by_text(program: StatementList) -> tuple[str, str] | None:
     """A system named in a comment, PARTNO, MACHIN or PPRINT; the first of `_TEXTS` that is there."""
     found: dict[str, tuple[str, str]] = {}
     for statement, line in program.first.items():
@@ -171,7 +171,7 @@ SCALE = {"mm": 1.0, "inch": MM_PER_INCH}
 
 
 @dataclass(frozen=True)
-class Units:
+class FileUnits:
     """What a file says of its units: by the word UNITS, and by the units of its feeds."""
 
     words: dict[str, int]
@@ -179,7 +179,7 @@ class Units:
     wrong: tuple[tuple[str, int], ...] = ()
 
 
-def units_said(program: Program) -> Units:
+def units_said(program: StatementList) -> FileUnits:
     """Unit words and feed units with their first lines."""
     words: dict[str, int] = {}
     feeds: dict[str, int] = {}
@@ -193,7 +193,7 @@ def units_said(program: Program) -> Units:
                 words.setdefault(unit, line)
         elif statement.major in ("FEDRAT", "CYCLE"):
             _note_feed_unit(statement, line, feeds)
-    return Units(words, feeds, tuple(wrong))
+    return FileUnits(words, feeds, tuple(wrong))
 
 
 def _note_feed_unit(statement: Statement, line: int, feeds: dict[str, int]) -> None:

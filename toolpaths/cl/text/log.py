@@ -19,7 +19,7 @@ class _Entry:
         self.count = 0
 
 
-class Log:
+class DiagnosticLog:
     """Diagnostics of one file, merged by code and `key` (the first message stands for all)."""
 
     def __init__(self, file: str = ""):

@@ -27,7 +27,7 @@ LARGEST = 1e12
 LARGEST_OWN = 1e18
 """the same for text of our own writer, where converted numbers may be larger than the ones that were read"""
 Bytes = npt.NDArray[np.uint8]
-Progress = Callable[[int, int], None]
+ReadProgress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ class _Chunk:
     lines: int
 
 
-def scan(data: bytes, progress: Progress | None = None, largest: float = LARGEST) -> Scan:
+def scan(data: bytes, progress: ReadProgress | None = None, largest: float = LARGEST) -> Scan:
     """Split normalised `data`; `progress(bytes done, bytes in all)` is called now and then."""
     chunks: list[_Chunk] = []
     position, lines = 0, 0

@@ -6,7 +6,7 @@ import codecs
 import re
 from itertools import pairwise
 
-from toolpaths.cl.text.log import Log
+from toolpaths.cl.text.log import DiagnosticLog
 
 _BOMS = ((codecs.BOM_UTF32_LE, "utf-32"), (codecs.BOM_UTF32_BE, "utf-32"), (codecs.BOM_UTF8, "utf-8-sig"),
          (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))
@@ -17,7 +17,7 @@ _DECK_SAMPLE = 200
 _DECK_LEAST = 5
 
 
-def normalise(data: bytes, log: Log) -> bytes:
+def normalise(data: bytes, log: DiagnosticLog) -> bytes:
     """`data` as UTF-8 (or Latin-1 where it is not UTF-8) with LF line ends, without NULs and card numbers.
 
     Line numbers stay those of the file: a CR, LF or CRLF ends a line.
@@ -54,7 +54,7 @@ def _decode_wide(data: bytes) -> bytes:
     return data
 
 
-def _without_labels(data: bytes, log: Log) -> bytes:
+def _without_labels(data: bytes, log: DiagnosticLog) -> bytes:
     """Columns 73 to 80 removed from lines that count their points there (CATIA: `PT     7`), where one of the first does."""
     found = _LABEL.search(data, 0, _LABEL_SAMPLE)
     if found is None:
@@ -64,7 +64,7 @@ def _without_labels(data: bytes, log: Log) -> bytes:
     return _LABEL.sub(rb"\1", data)
 
 
-def _without_card_numbers(data: bytes, log: Log) -> bytes:
+def _without_card_numbers(data: bytes, log: DiagnosticLog) -> bytes:
     """Columns 73 to 80 removed where every line of the head of the file is a card with a rising number there."""
     head = data[:81 * _DECK_SAMPLE].split(b"\n")
     cards = [line for line in (head[:-1] if len(head) > 1 else head) if line.strip()]

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 
 from toolpaths.arrays import Floats
 from toolpaths.cl.text.feed_lines import FeedLines, feed_lines
-from toolpaths.cl.text.log import Log
+from toolpaths.cl.text.log import DiagnosticLog
 from toolpaths.cl.text.near import nearest
 from toolpaths.cl.text.scan import LARGEST, LARGEST_OWN, Scan
 from toolpaths.cl.text.source import text_of
@@ -72,7 +72,7 @@ class Statement:
 
 
 @dataclass
-class Program:
+class StatementList:
     """The slow part of a file in order: statement, its first line, and how many plain points stand before it.
 
     `first` tells for each different statement (points apart) the line where it stands first. `feeds` holds, by the index of
@@ -154,14 +154,14 @@ def _comment(text: str) -> Statement:
 class Lexer:
     """Cuts the slow lines of a file into statements; equal lines are looked at once."""
 
-    def __init__(self, data: bytes, scan: Scan, log: Log, known: Callable[[str], bool], largest: float = LARGEST):
+    def __init__(self, data: bytes, scan: Scan, log: DiagnosticLog, known: Callable[[str], bool], largest: float = LARGEST):
         self.data, self.scan, self.log, self.known, self.largest = data, scan, log, known, largest
         self.memo: dict[bytes, Statement | None] = {}
         self.next = 0
 
-    def program(self) -> Program:
+    def program(self) -> StatementList:
         """All statements of the file."""
-        out, scan, memo, data = Program(), self.scan, self.memo, self.data
+        out, scan, memo, data = StatementList(), self.scan, self.memo, self.data
         total, feeds = len(scan.start), feed_lines(self.data, self.scan, self.largest)
         while self.next < total:
             i = self.next
@@ -185,7 +185,7 @@ class Lexer:
                 out.before.append(scan.before[i])
         return out
 
-    def _feeds(self, out: Program, feeds: FeedLines, i: int, stop: int) -> None:
+    def _feeds(self, out: StatementList, feeds: FeedLines, i: int, stop: int) -> None:
         """Slow lines i to before `stop`, which state feeds in the form of one line."""
         scan, first = self.scan, feeds.first
         raw = self.data[scan.start[first]:scan.end[first]]

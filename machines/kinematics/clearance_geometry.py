@@ -1,0 +1,54 @@
+"""The parts of a parallel machine that may touch each other or reach a stop, and where they are (thesis II.4.2)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from toolpaths.arrays import Floats, Ints
+
+
+@dataclass(frozen=True, eq=False)
+class ClearanceSizes:
+    """Thickness and stops of rods, slides and spindle; a part that the machine file does not give is None.
+
+    Attributes:
+        leg: (R,) leg of each rod
+        shift: (R, 3) mm, each rod's place beside its leg's line, at both ends
+        rod_radius: mm
+        spindle_radius: mm
+        spindle: (from, to) mm above the gauge point along the tool axis
+        rail_radius: mm, the fixed part of a slide as a round bar
+        rail_offset: (K, 3) mm from the line of the carriage joint to the bar's axis
+        rail_ends: (K, 2) mm of q, the ends of the bar
+        carriage_angle, platform_angle: rad, largest swing of a rod's joint at either end from its direction in the
+            middle of the workspace
+    """
+
+    leg: Ints
+    shift: Floats
+    rod_radius: float | None = None
+    spindle_radius: float | None = None
+    spindle: tuple[float, float] = (0.0, 0.0)
+    rail_radius: float | None = None
+    rail_offset: Floats | None = None
+    rail_ends: Floats | None = None
+    carriage_angle: float | None = None
+    platform_angle: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class ClearanceGeometry:
+    """Where the parts are at N joints, in the machine frame, mm and rad.
+
+    Attributes:
+        place, tilt: reference point (N, 3) of the platform and its turn (N,) about x
+        carriages, ends: (N, K, 3) joints of the legs at the slides and at the platform
+        gauge, axis: (N, 3) gauge point and tool axis
+    """
+
+    place: Floats
+    tilt: Floats
+    carriages: Floats
+    ends: Floats
+    gauge: Floats
+    axis: Floats

@@ -1,0 +1,137 @@
+"""The same done for every pass, on all cores where there are many; the results do not depend on how many cores there are.
+
+Workers are forked, so that they have passes, machine and bodies without copying; only results travel back, in which these
+are named instead of written (`_Packer`). Where a system cannot fork, one process does it all.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+import pickle
+import signal
+import sys
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from itertools import repeat
+from multiprocessing import get_context
+from typing import Any, TypeVar
+
+from postproc.orientation.passes.allowed import AllowedAxes
+from postproc.orientation.passes.passes import PassContext
+
+Progress = Callable[[str, int, int], None]
+T = TypeVar("T")
+CHUNK = 8
+"""passes that are done one after the other"""
+_FEWEST = 4 * CHUNK
+"""passes from which processes pay"""
+_shared: list[tuple[Callable[[int, Any], Any], PassContext, AllowedAxes]] = []
+"""what the workers are to do; theirs by inheritance"""
+
+
+class PassFault(Exception):
+    """No motion could be planned for the pass of a line."""
+
+    def __init__(self, message: str, line: int) -> None:
+        super().__init__(message, line)
+        self.line = line
+
+    def __str__(self) -> str:
+        return str(self.args[0])
+
+
+def each_pass(function: Callable[[int, T | None], T], work: PassContext, allowed: AllowedAxes, name: str,
+              progress: Progress | None = None, workers: int | None = None) -> list[T]:
+    """`function` of the numbers of all passes, in order; `progress` is told `name` and how far it is.
+
+    Args:
+        function: of the number and of what it gave for the pass before, None for the first of each CHUNK
+        workers: processes, None for as many as there are cores; 1 for this one alone
+
+    Raises:
+        PassFault: where no motion can be planned.
+    """
+    count = len(work.passes)
+    chunks = [range(first, min(first + CHUNK, count)) for first in range(0, count, CHUNK)]
+    result: list[T] = []
+
+    def take(found: list[T]) -> None:
+        result.extend(found)
+        if progress is not None:
+            progress(name, len(result) - 1, count)
+
+    workers = min(_cores() if workers is None else workers, len(chunks))
+    if workers < 2 or count < _FEWEST:
+        for chunk in chunks:
+            for found in _in_turn(function, chunk, work):
+                take([found])
+        return result
+    _shared.append((function, work, allowed))
+    pool = ProcessPoolExecutor(workers, get_context("fork"), _ignore_interrupt)
+    try:
+        for packed in pool.map(_chunk, chunks, repeat(len(_shared) - 1)):
+            take(_unpacked(packed, work, allowed))
+        pool.shutdown()
+    finally:
+        pool.shutdown(wait=False, cancel_futures=True)
+        _shared.pop()
+    return result
+
+
+def _cores() -> int:
+    """Cores that this process may use; 1 where it should not fork."""
+    return len(os.sched_getaffinity(0)) if sys.platform == "linux" else 1
+
+
+def _ignore_interrupt() -> None:
+    """Ctrl-C is the parent's business."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _chunk(passes: range, which: int) -> bytes:
+    """In a worker: results of some passes, packed."""
+    function, work, allowed = _shared[which]
+    out = io.BytesIO()
+    _Packer(out, work, allowed).dump(list(_in_turn(function, passes, work)))
+    return out.getvalue()
+
+
+def _in_turn(function: Callable[[int, T | None], T], passes: range, work: PassContext) -> Iterator[T]:
+    """Of one pass after the other; faults of planning are told by the line of the pass."""
+    before: T | None = None
+    for one in work.passes[passes.start:passes.stop]:
+        try:
+            before = function(one.number, before)
+        except (ValueError, ArithmeticError) as fault:
+            raise PassFault(str(fault), one.line) from fault
+        yield before
+
+
+class _Packer(pickle.Pickler):
+    """Names passes, machine and what is allowed, which the parent has."""
+
+    def __init__(self, out: io.BytesIO, work: PassContext, allowed: AllowedAxes) -> None:
+        super().__init__(out, pickle.HIGHEST_PROTOCOL)
+        self._names = {id(work.machine): "machine", id(allowed): "allowed"} | {id(one): one.number for one in work.passes}
+
+    def persistent_id(self, value: Any) -> str | int | None:
+        """Its name, None for all else."""
+        return self._names.get(id(value))
+
+
+class _Unpacker(pickle.Unpickler):
+    """The other way."""
+
+    def __init__(self, packed: bytes, work: PassContext, allowed: AllowedAxes) -> None:
+        super().__init__(io.BytesIO(packed))
+        self._named: dict[str | int, Any] = {"machine": work.machine, "allowed": allowed}
+        self._named |= {one.number: one for one in work.passes}
+
+    def persistent_load(self, name: Any) -> Any:
+        """What has the name."""
+        return self._named[name]
+
+
+def _unpacked(packed: bytes, work: PassContext, allowed: AllowedAxes) -> Any:
+    return _Unpacker(packed, work, allowed).load()

@@ -1,0 +1,62 @@
+"""The planned time of a file whose tool axes are chosen anew at each place of its part."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from postproc.base.options import Options
+from postproc.orientation.passes.passes import PassContext
+from postproc.orientation.plans.choice import OrientationChoice
+from postproc.orientation.plans.orient import orient
+from postproc.placement.bodies import StationaryBodies
+from postproc.placement.place_times import TimedPlace, Timer, extents
+from postproc.placement.space import Space
+from postproc.setup.model import SetupFile
+from toolpaths.arrays import Floats
+from toolpaths.diagnostics import Severity
+
+_CHOICES = 400
+"""choices of the axis of a pass, all places together"""
+_LEAST, _MOST = 8, 40
+"""places"""
+
+
+class OrientedTimer(Timer):
+    """As `Timer`, with the plan that `options.orient` names instead of the axes of the file.
+
+    There is no bound on what a choice of axes can reach, and the axes of the file need not be inside travel: every place
+    costs a whole choice, so that few are looked at.
+    """
+
+    def __init__(self, work: PassContext, space: Space, setup: SetupFile, options: Options,
+                 bodies: StationaryBodies | None) -> None:
+        super().__init__(work, space, setup.joints.singular_distance, bodies)
+        self.setup, self.options = setup, options
+        self.most = min(_MOST, max(_LEAST, _CHOICES // len(work.passes)))
+
+    def _tried(self, place: Floats, best: float) -> TimedPlace:
+        why = self.stands(place)
+        if why:
+            return self._refused(place, why)
+        here = self.setup.model_copy(update={"part": self.space.part(place)})
+        choice, found = orient(self.work.toolpath, self.machine, here, self.options)
+        if choice is None:
+            return self._refused(place, next(d.message for d in found if d.severity == Severity.ERROR))
+        return self._of(place, choice)
+
+    def _of(self, place: Floats, choice: OrientationChoice) -> TimedPlace:
+        plan = choice.plans[self.options.orient]
+        low, high = extents(plan.picked)
+        refused = next((f"line {made.one.line}: {made.refused}" for made in plan.picked if made.refused), "")
+        if refused or not np.isfinite(plan.seconds):
+            return self._refused(place, refused or "no safe plane above some pass is inside travel", low, high)
+        singular, why = self._singular(plan.picked)
+        if why:
+            return self._refused(place, why, low, high, singular)
+        self.planned += len(plan.picked)
+        cutting, limiting = float(plan.cuts.sum()), dict[str, float]()
+        for made, spent in zip(plan.picked, plan.cuts.tolist(), strict=True):
+            name = " ".join(made.limiting).strip()
+            limiting[name] = limiting.get(name, 0.0) + spent
+        return TimedPlace(place, plan.seconds, cutting, plan.seconds - cutting, plan.seconds, low, high, singular, "",
+                          limiting)

@@ -1,0 +1,219 @@
+"""The planned time of a whole file at one place of its part: cuts, rapids, turns, ways from home and back."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from hashlib import blake2b
+
+import numpy as np
+
+from machines.machine import Machine
+from machines.singular_distance import NAMES as SINGULAR
+from machines.singular_distance import has_singular_distance, singular_distance
+from postproc.orientation.candidates.candidate_times import Candidate, turned
+from postproc.orientation.candidates.ranking import prepare
+from postproc.orientation.passes.passes import PassContext
+from postproc.orientation.plans.index_time import PassEnds, ends, ways_between
+from postproc.orientation.plans.shortest_sequence import seconds
+from postproc.placement.bodies import StationaryBodies
+from postproc.placement.rigid_move import moved
+from postproc.placement.space import Space
+from toolpaths.arrays import Floats
+
+_WORTH = 1e-4
+"""least part of the time that a place must gain to be planned"""
+_LEAST, _MOST, _SITES = 24, 300, 2_000_000
+"""places, and sites of cuts at all of them together"""
+_DIGITS = 7
+"""of joint positions, mm or rad: cuts that differ by less are one"""
+
+
+@dataclass(frozen=True)
+class TimedPlace:
+    """A place that was looked at.
+
+    Attributes:
+        place (6,): see `postproc.placement.space`
+        seconds: of the whole file; inf where it is refused or its bound lost
+        cutting, linking: seconds of the cuts, and of rapids, turns and ways home
+        bound: least seconds that the file can take there
+        low, high (J,): extents of the joints over all cuts and rapids, NaN where the machine does not reach
+        singular: least distance from singular positions, inf for serial machines
+        refused: why the part cannot stand there, "" where it can
+        limiting: planned seconds by what limits the passes most, e.g. {"X jerk": 3.2}
+    """
+
+    place: Floats
+    seconds: float
+    cutting: float
+    linking: float
+    bound: float
+    low: Floats
+    high: Floats
+    singular: float
+    refused: str = ""
+    limiting: dict[str, float] = field(default_factory=dict)
+
+    def margins(self, machine: Machine) -> Floats:
+        """(J,) mm or rad that each joint stays inside its travel, negative outside, inf where it has no end."""
+        return np.asarray(np.minimum(self.low - machine.limits.lower, machine.limits.upper - self.high))
+
+    def shares(self, machine: Machine) -> tuple[float, ...]:
+        """Margins of the joints that have an end over half their travel, least first."""
+        half = 0.5 * (machine.limits.upper - machine.limits.lower)
+        ends = np.isfinite(half)
+        return tuple(np.sort(self.margins(machine)[ends] / half[ends]).round(6).tolist())
+
+
+@dataclass(frozen=True)
+class _Cut:
+    """What is known of a pass whose joints go this way, wherever they begin."""
+
+    bound: float
+    planned: tuple[float, str] | None = None
+
+
+class Timer:
+    """Times of a file at places, each way of the joints planned once.
+
+    A plan depends on how the joints go, not on where: on serial machines moving the part along its table does not change
+    passes during which no rotary joint turns, and a table that turns back what the part is turned changes nothing at all.
+
+    Args:
+        work: the file with its part frame on the table frame
+        least: distance that a parallel machine keeps from its singular positions
+        bodies: that do not move with the part
+
+    Attributes:
+        most: places that may be looked at, fewer of long files
+        looked, refused, pruned: places that were, where the part cannot stand, and that lost by their bound alone
+        planned: cuts
+        unsolved: lines of passes with a plan that was not solved, whose time is longer than need be
+    """
+
+    def __init__(self, work: PassContext, space: Space, least: float, bodies: StationaryBodies | None = None) -> None:
+        self.work, self.space, self.least, self.bodies = work, space, least, bodies
+        self.planned, self.looked, self.pruned, self.refused = 0, 0, 0, 0
+        self.unsolved: set[int] = set()
+        self._cuts: dict[tuple[int, bytes], _Cut] = {}
+        self._known: dict[bytes, TimedPlace] = {}
+        prepare(work.passes)
+        sites = sum(len(each.s) for one in work.passes for each in one.stretches)
+        self.most = min(_MOST, max(_LEAST, _SITES // max(1, sites)))
+
+    @property
+    def machine(self) -> Machine:
+        return self.work.machine
+
+    def known(self) -> list[TimedPlace]:
+        """Every place that was looked at."""
+        return list(self._known.values())
+
+    def tried(self, place: Floats, best: float = np.inf) -> TimedPlace:
+        """A place (6,); its seconds are inf where they are proved not to be below `best`."""
+        key = (np.round(place, 9) + 0.0).tobytes()
+        found = self._known.get(key)
+        if found is not None and (np.isfinite(found.seconds) or found.refused or found.bound >= best * (1.0 - _WORTH)):
+            return found
+        if found is None:
+            self.looked += 1
+        self._known[key] = made = self._tried(place, best)
+        self.refused += bool(made.refused) and found is None
+        return made
+
+    def _tried(self, place: Floats, best: float) -> TimedPlace:
+        why = self.stands(place)
+        if why:
+            return self._refused(place, why)
+        work = moved(self.work, self.space.placement(place))
+        made = [turned(one, one.axis, work.machine) for one in work.passes]
+        low, high = extents(made)
+        why = next((f"line {one.one.line}: {one.refused}" for one in made if one.refused), "")
+        if why:
+            return self._refused(place, why, low, high)
+        singular, why = self._singular(made)
+        edge = [ends(one, work) for one in made]
+        why = why or _no_height(edge, made) or ("" if self.bodies is None else self.bodies.tool(work))
+        if why:
+            return self._refused(place, why, low, high, singular)
+        linking = _linking(work, edge)
+        cuts, bound, lost = self._cutting(made, best - linking)
+        if lost:
+            self.pruned += 1
+            return TimedPlace(place, np.inf, np.inf, linking, bound + linking, low, high, singular)
+        cutting = float(sum(each[0] for each in cuts))
+        limiting: dict[str, float] = {}
+        for spent, name in cuts:
+            limiting[name] = limiting.get(name, 0.0) + spent
+        return TimedPlace(place, cutting + linking, cutting, linking, bound + linking, low, high, singular, "", limiting)
+
+    def stands(self, place: Floats) -> str:
+        """What the part would stand in or hang over, "" where it stands free."""
+        over = self.space.overhang(place)
+        return over or ("" if self.bodies is None else self.bodies.against(self.space.placement(place)))
+
+    def _refused(self, place: Floats, why: str, low: Floats | None = None, high: Floats | None = None,
+                 singular: float = np.nan) -> TimedPlace:
+        none = np.full(len(self.machine.axis_names), np.nan)
+        return TimedPlace(place, np.inf, np.inf, np.inf, np.inf, none if low is None else low,
+                          none if high is None else high,
+                          singular, why)
+
+    def _singular(self, made: Sequence[Candidate]) -> tuple[float, str]:
+        """Least distance from singular positions over all poses of a parallel machine, and what stands against it."""
+        if not has_singular_distance(self.machine.kinematics):
+            return np.inf, ""
+        found = np.concatenate([singular_distance(self.machine.kinematics, q) for one in made for q in (one.q, *one.sites)])
+        row, which = np.unravel_index(int(np.nanargmin(found)), found.shape)
+        value = float(found[row, which])
+        why = f"{SINGULAR[int(which)]} comes to {value:.4f} of a singular position, allowed at least {self.least:g}"
+        return value, why if value < self.least else ""
+
+    def _cutting(self, made: Sequence[Candidate], best: float) -> tuple[list[tuple[float, str]], float, bool]:
+        """(seconds and what limits of each pass, bound, True where all together are proved not to be below `best`)."""
+        keys = [(one.one.number, _way(one)) for one in made]
+        for one, key in zip(made, keys, strict=True):
+            if key not in self._cuts:
+                self._cuts[key] = _Cut(one.bound)
+        bounds = [self._cuts[key].bound for key in keys]
+        total = bound = float(sum(bounds))
+        for k in np.argsort(-np.array(bounds), kind="stable").tolist():
+            cut = self._cuts[keys[k]]
+            if cut.planned is None:
+                if total >= best * (1.0 - _WORTH):
+                    return [], total, True
+                self.planned += 1
+                cut = self._cuts[keys[k]] = _Cut(cut.bound, (made[k].seconds, " ".join(made[k].limiting).strip()))
+                self.unsolved |= set() if made[k].solved else {made[k].one.line}
+            assert cut.planned is not None
+            total += cut.planned[0] - bounds[k]
+        done = [self._cuts[key].planned for key in keys]
+        return [one for one in done if one is not None], bound, False
+
+
+def _linking(work: PassContext, edge: list[PassEnds]) -> float:
+    """Seconds of rapids, turns, and ways from home and back."""
+    rapids = [np.array([one.rapids]) for one in edge]
+    return seconds([0] * len(edge), rapids, ways_between(work, [[one] for one in edge]))
+
+
+def _no_height(edge: list[PassEnds], made: Sequence[Candidate]) -> str:
+    """A pass above which the safe plane is outside travel."""
+    line = next((one.one.line for one, end in zip(made, edge, strict=True) if not np.isfinite(end.down + end.up)), None)
+    return "" if line is None else f"line {line}: no safe plane above the pass is inside travel"
+
+
+def extents(made: Sequence[Candidate]) -> tuple[Floats, Floats]:
+    """Least and greatest joints (J,) of all rows and sites."""
+    every = [q for one in made for q in (one.q, *one.sites)]
+    return (np.min([q.min(axis=0) for q in every], axis=0), np.max([q.max(axis=0) for q in every], axis=0))
+
+
+def _way(made: Candidate) -> bytes:
+    """A mark of how the joints go along the cuts of a pass, whatever they begin at."""
+    mark = blake2b(digest_size=16)
+    rows = made.one.drilled.rows
+    for way in (*(q - q[0] for q in made.sites), made.q[rows] - made.q[rows - 1]):
+        mark.update((np.round(way, _DIGITS) + 0.0).tobytes())
+    return mark.digest()

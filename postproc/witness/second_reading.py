@@ -1,0 +1,133 @@
+"""The whole of the second witness: read, place, walk, compare, and say what was not compared."""
+
+from __future__ import annotations
+
+import math
+from time import process_time
+
+import numpy as np
+
+from postproc.witness.clfile import commanded
+from postproc.witness.commanded import ARC, LINE, Commanded
+from postproc.witness.evidence import Case, ExecutedBlocks, Finding, Testimony
+from postproc.witness.machine import ROD, Chain, kinematics_of, merged
+from postproc.witness.motion import Walked, check_arcs, check_way
+from postproc.witness.place import Poses, Unplaced, cut_of, placement, zero_of
+from postproc.witness.states import (
+    check_feeds,
+    check_holes,
+    check_states,
+    check_velocities,
+    tools_of,
+    with_spindle,
+)
+from postproc.witness.stretches import BOTTOM, matched, targets_of, turns_of
+from postproc.witness.text import Array
+
+_NAMES = {"tool": "tools", "length": "length registers", "spindle": "spindle states", "coolant": "coolant states"}
+ZERO = 1e-6
+"""mm that reckoning may move the zero of the work offset"""
+
+
+def testify(case: Case, executed: ExecutedBlocks) -> Testimony:
+    """What this witness says of an executed program; it never raises for what it does not understand."""
+    began = process_time()
+    if case.oriented:
+        return _nothing("all (the tool axes were chosen, the CL file has others)", began)
+    try:
+        c = with_spindle(commanded(case.cl, case.units, case.dialect), case.setup)
+        place = placement(case.setup, c)
+    except Unplaced as fault:
+        return _nothing(f"all (system {fault} was not found)", began)
+    missing = [f"{what} (line {line})" for what, line in c.unread.items()]
+    if not len(c) or not c.known.any():
+        return _nothing("all: " + (", ".join(missing) or "no position was understood"), began)
+    table = merged(case.machine)
+    machine = kinematics_of(table) if not case.errors else None
+    if machine is None:
+        missing.append("kinematics (machine with geometric errors: poses of the read-back)" if case.errors
+                       else "kinematics (no machine file of a known family: poses of the read-back)")
+    poses = Poses(case, executed, machine, machine is not None, [], max(int(tools_of(c, case.setup).max(initial=0)), 0))
+    with np.errstate(all="ignore"):
+        found, worst, counts, silent = _compare(case, executed, c, place, poses, table)
+    compared = [f"{n} {what}" for what, n in counts.items() if n]
+    return Testimony(tuple(compared), (*missing, *silent), tuple(found), int(c.known.sum()), *worst, process_time() - began)
+
+
+def _nothing(why: str, began: float) -> Testimony:
+    return Testimony((), (why,), seconds=process_time() - began)
+
+
+def _compare(case: Case, executed: ExecutedBlocks, c: Commanded, place: tuple[Array, Array], poses: Poses,
+             table: dict[str, object]) -> tuple[list[Finding], tuple[float, float], dict[str, int], list[str]]:
+    rotation, origin = place
+    same = bool((rotation == np.eye(3)).all())
+    tip = c.tip if same and not origin.any() else c.tip @ rotation.T + origin
+    axis = c.axis if same else c.axis @ rotation.T
+    centre, normal = c.centre @ rotation.T + origin, c.normal @ rotation.T
+    targets = targets_of(c, tip, axis, centre, normal)
+    if not len(targets):
+        return [], (0.0, 0.0), {}, []
+    cut = cut_of(case, c, tip, axis, centre, normal, place)
+    there, along = poses.at(np.arange(len(executed)), 1.0)
+    turns = turns_of(poses)
+    match, owner = matched(targets, there, along, turns, case.tolerance + 1e-6, case.axis_tolerance + 1e-6)
+    found: list[Finding] = []
+    lost = np.flatnonzero(match < 0)
+    if len(lost):
+        i = int(lost[0])
+        last = int(match[i - 1]) if i else 0
+        x, y, z = targets.tip[i]
+        found.append(Finding("position", f"the program does not come to ({x:.4f}, {y:.4f}, {z:.4f}) mm of the table frame"
+                             + _arriving(targets.axis[i]), int(c.line[targets.row[i]]), int(executed.line[last]), len(lost)))
+    w = Walked(poses, targets, owner, there, along, (case.tolerance, case.axis_tolerance))
+    w.measure()
+    clearance = case.setup.get("clearance") or {}
+    margin, link_angle = float(clearance.get("margin", 50.0)), float(clearance.get("link_angle", 5.0))
+    if not len(lost):
+        found += check_way(w, c.line, cut, margin, link_angle, case.bent_rapids, table)
+        found += check_arcs(w, turns, c.line)
+    faults, holes = check_holes(w, c, case, match)
+    found += faults
+    faults, feeds = check_feeds(w, c, case, table, match)
+    found += faults
+    found += check_velocities(w, c, table)
+    faults, states, silent = check_states(w, c, case)
+    found += faults
+    found += _rods(poses)
+    faults, zeros = _zero(case, c, place, poses)
+    found += faults
+    good = w.on_way() & np.isin(w.kind, (LINE, ARC, BOTTOM))
+    worst = float(w.away[good].max(initial=0.0)), float(w.tilt[good].max(initial=0.0))
+    counts = {"positions": int((match >= 0).sum()), "arcs": int((targets.sweep != 0.0).sum()),
+              "holes": holes, "feeds": feeds, **{_NAMES[k]: v for k, v in states.items()}, "work offset": zeros}
+    return found, worst, counts, silent
+
+
+def _zero(case: Case, c: Commanded, place: tuple[Array, Array], poses: Poses) -> tuple[list[Finding], int]:
+    """The zero of the work offset, and the joints that it holds, against set-up and CL file; 1 where it was compared."""
+    wanted = zero_of(case.setup, c, place)
+    if wanted is None or case.origin is None:
+        return [], 0
+    off = float(np.abs(case.origin - wanted).max())
+    if off <= ZERO and case.work_offset is not None and isinstance(poses.machine, Chain):
+        there = poses.machine.pose(case.work_offset[None], poses.executed.letters, np.zeros(1))[0]
+        off = float(np.abs(there[0] - wanted).max())
+    if off <= ZERO:
+        return [], 1
+    return [Finding("offset", f"the work offset is {off:.6f} mm off the system of the CL file that it is for", 0, 0)], 1
+
+
+def _arriving(axis: Array) -> str:
+    return "" if axis[2] == 1.0 else f" along ({axis[0]:.6f}, {axis[1]:.6f}, {axis[2]:.6f})"
+
+
+def _rods(poses: Poses) -> list[Finding]:
+    """Rods that miss their length where the tool is said to be."""
+    worst = max(poses.misfits, default=(0.0, 0))
+    if worst[0] <= ROD:
+        return []
+    said = f"rods miss their length by {worst[0]:.6f} mm"
+    if math.isinf(worst[0]):
+        said = "a carriage stands on the wrong side of its rod"
+    return [Finding("rods", f"{said} where the tool is said to be", 0, int(poses.executed.line[worst[1]]))]

@@ -1,0 +1,96 @@
+"""Set-ups and files that the second witness has to understand as the project does, and what it says in words."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import postproc
+import postproc.verification.second_witness
+import toolpaths
+from postproc.base.options import Options
+from postproc.pipeline.result import PostResult
+from postproc.setup.model import SetupFile
+from postproc.verification.second_witness import second_witness
+from postproc.witness.clfile import commanded
+from postproc.witness.states import tools_of
+from toolpaths.cl.build import ToolpathBuilder
+
+BARE = b"PARTNO bare\nFEDRAT/500\nGOTO/-10,5,30\nGOTO/-10,5,0\nGOTO/10,5,0\nGOTO/10,5,30\nFINI\n"
+LOADED = BARE.replace(b"FEDRAT", b"UNITS/MM\nLOADTL/1\nSPINDL/RPM,3000,CLW\nFEDRAT")
+
+
+def converted(text: bytes, setup: dict[str, object], control: str = "linuxcnc", **options: object) -> PostResult:
+    path, found = toolpaths.read_bytes(text, file="part.apt")
+    return postproc.convert(path, "mill-3axis", control, SetupFile.model_validate(setup),
+                            Options(**options), diagnostics=found)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("control", ["linuxcnc", "fanuc-30i", "siemens-840d", "haas-ngc", "generic-iso"])
+@pytest.mark.parametrize(("text", "number"), [(BARE, "0"), (LOADED, "1")])
+def test_a_tool_measured_into_the_work_offset(control: str, text: bytes, number: str) -> None:
+    result = converted(text, {"tools": {number: {"gauge_length": 120.0}}, "output": {
+        "tool_call": False, "spindle": {"rpm": 3000.0}}}, control)
+    assert result.ok and result.witness is not None, [str(d) for d in result.diagnostics]
+    assert not result.witness.not_compared and any("positions" in said for said in result.witness.compared)
+
+
+def test_systems_are_kept_once() -> None:
+    """Many systems, few different: each position by its own, also on arcs."""
+    systems = [f"MSYS/{k % 7},2,3,0,1,0,-1,0,0\nGOTO/{k},0,0\nCIRCLE/{k - 10},0,0,0,0,-1,10,.03,.5,10,0\n"
+               f"GOTO/{k - 10},10,0\n"
+               for k in range(50)]
+    text = ("TOOL PATH/A,TOOL,B\n" + "".join(systems) + "END-OF-PATH\n").encode()
+    c, (path, _) = commanded(text), toolpaths.read_bytes(text)
+    assert len(c.systems) == 7 and c.known.all()
+    np.testing.assert_allclose(c.tip, path.tip, atol=1e-9)
+    np.testing.assert_allclose(c.centre, path.arcs.center, atol=1e-9)
+    np.testing.assert_allclose(c.normal, path.arcs.normal, atol=1e-12)
+
+
+@pytest.mark.parametrize(("numbers", "tools"), [({}, [3, 4]), ({"MILL": 7}, [7, 4]), ({"OTHER": 7}, [3, 4])])
+def test_tools_keep_their_number_where_the_setup_gives_none(numbers: dict[str, int], tools: list[int]) -> None:
+    c = commanded(b"TOOL PATH/A,TOOL,MILL\nLOAD/TOOL,3\nGOTO/1,2,3\nEND-OF-PATH\nTOOL PATH/B,TOOL,DRILL\nLOAD/TOOL,4\n"
+                  b"GOTO/1,2,3\nEND-OF-PATH\n")
+    assert tools_of(c, {"tool_numbers": numbers}).tolist() == tools
+
+
+@pytest.mark.parametrize("setup", [
+    {"output": {"spindle": {"rpm": 3000.0}}}, {"tools": {"1": {"spindle": {"rpm": 3000.0, "direction": "anti-clockwise"}}}}])
+def test_the_spindle_of_the_setup_is_expected(setup: dict[str, object], monkeypatch: pytest.MonkeyPatch) -> None:
+    text = LOADED.replace(b"SPINDL/RPM,3000,CLW\n", b"")
+    result = converted(text, setup)
+    assert result.ok and result.witness is not None, [str(d) for d in result.diagnostics]
+    assert not result.witness.not_compared and "spindle states" in str(result.witness.compared)
+    old = ToolpathBuilder.event
+
+    def hidden(self: ToolpathBuilder, word: str, values: tuple[object, ...]) -> None:
+        old(self, word, values)  # type: ignore[arg-type]
+        if word == "LOADTL":
+            old(self, "SPINDL", ("RPM", 2000.0, "CLW"))
+    monkeypatch.setattr(ToolpathBuilder, "event", hidden)
+    assert "witness.spindle" in {d.code for d in converted(text, setup).diagnostics}
+
+
+def test_a_finding_is_in_words(monkeypatch: pytest.MonkeyPatch) -> None:
+    old = ToolpathBuilder.event
+
+    def flooded(self: ToolpathBuilder, word: str, values: tuple[object, ...]) -> None:
+        old(self, word, values)  # type: ignore[arg-type]
+        if word == "SPINDL":
+            old(self, "COOLNT", ("FLOOD",))
+    monkeypatch.setattr(ToolpathBuilder, "event", flooded)
+    said = [d.message for d in converted(LOADED, {}).diagnostics if d.code == "witness.coolant"]
+    assert said and "the coolant is flood, the CL file says nothing" in said[0]
+
+
+@pytest.mark.parametrize("proof", [False, True])
+def test_a_witness_that_fails_proves_nothing(proof: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails(*_: object) -> None:
+        raise IndexError("planted")
+    monkeypatch.setattr(postproc.verification.second_witness, "testify", fails)
+    result = converted(LOADED, {}, require_proof=proof)
+    assert result.witness is not None and "failed: IndexError: planted" in result.witness.not_compared[0]
+    assert [d.code for d in result.diagnostics if d.code.startswith("witness")] == ["witness.failed"] * proof
+    assert result.ok is not proof
+    assert second_witness(None, SetupFile(), Options(), result.job, result.comparison)[1] == []  # type: ignore[arg-type]
