@@ -68,6 +68,9 @@ class _Writing:
         self.first_move = np.searchsorted(moves.row, np.arange(len(toolpath) + 1))
         self.changes = {(c.index, c.line): c for c in tool_changes(toolpath)}
         self.registers = {(c.index, c.line): c for c in register_changes(toolpath)}
+        self.at_row: dict[int, list[Event]] = {}
+        for event in toolpath.events if restart else ():
+            self.at_row.setdefault(event.index, []).append(event)
         self.to_come = [c.number for c in self.changes.values()]
         self.selects = controller.tools.preload and not any(e.word == "SELECT" for e in toolpath.events)
         self.loaded: ToolChange | None = None
@@ -111,7 +114,7 @@ class _Writing:
         """The tool in the spindle anew, unless the operation changes it."""
         assert self.loaded is not None
         row = int(self.moves.row[move])
-        here = [e for e in self.toolpath.events if e.index == row and e.line >= line]
+        here = [e for e in self.at_row.get(row, ()) if e.line >= line]
         if not any((e.index, e.line) in self.changes for e in here):
             out += self.state.change(replace(self.loaded, line=line), {e.word for e in here}, True)
             self._preload(out, line)

@@ -44,14 +44,27 @@ def cutting(toolpath: Toolpath) -> Bools:
 
 def tool_loads(toolpath: Toolpath) -> tuple[tuple[ToolChange, int, bool], ...]:
     """Every record that names a tool: (the record, length register then in force, True where it is another tool)."""
-    return _loads(toolpath.events)
+    return _loads(_Records(toolpath.events))
+
+
+class _Records:
+    """Records of one path as a key: the very same tuple, not one that is equal, which would be compared value by value."""
+
+    def __init__(self, events: tuple[Event, ...]) -> None:
+        self.events = events
+
+    def __hash__(self) -> int:
+        return id(self.events)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Records) and other.events is self.events
 
 
 @lru_cache(maxsize=4)
-def _loads(events: tuple[Event, ...]) -> tuple[tuple[ToolChange, int, bool], ...]:
+def _loads(records: _Records) -> tuple[tuple[ToolChange, int, bool], ...]:
     """Kept, as most stages ask for it."""
     result: list[tuple[ToolChange, int, bool]] = []
-    for event in events:
+    for event in records.events:
         if event.word not in TOOL_WORDS or not numbers(event):
             continue
         number, *rest = (int(v) for v in numbers(event))
@@ -85,8 +98,14 @@ class Spindle:
 
 def speed_said(event: Event) -> float | None:
     """rev/min of a SPINDL record: the number after RPM, else the only one that belongs to no other word."""
+    return _speed(event.values)
+
+
+@lru_cache(maxsize=256)
+def _speed(values: tuple[str | float, ...]) -> float | None:
+    """Kept, as a file repeats few of them."""
     loose: list[float] = []
-    for before, value in zip(("", *event.values), event.values, strict=False):
+    for before, value in zip(("", *values), values, strict=False):
         if isinstance(value, (int, float)):
             word = str(before).upper()
             if word == "RPM":
@@ -99,10 +118,18 @@ def speed_said(event: Event) -> float | None:
 _RANGES = frozenset({"RANGE", "LOW", "MEDIUM", "HIGH"})
 
 
+_STOPPING = frozenset({"OFF", "NEUTRL", "NEUTRAL"})
+
+
+@lru_cache(maxsize=256)
+def _words(values: tuple[str | float, ...]) -> frozenset[str]:
+    return frozenset(v.upper() for v in values if isinstance(v, str))
+
+
 def spindle_after(event: Event, before: Spindle) -> Spindle:
     """The spindle after a SPINDL record; ON takes the last speed and direction up again, NEUTRL stops it."""
-    said, speed = words(event), speed_said(event)
-    if {"OFF", "NEUTRL", "NEUTRAL"} & set(said):
+    said, speed = _words(event.values), _speed(event.values)
+    if not said.isdisjoint(_STOPPING):
         return Spindle(before.rpm, 0, before.last)
     direction = -1 if "CCLW" in said else 1 if "CLW" in said else before.last
     return Spindle(before.rpm if speed is None else speed, direction, direction)

@@ -58,8 +58,8 @@ def assembled(e: Execution) -> Commanded:
     return Commanded(tip, axis, kind, line, known, gap, feed[:, 0], feed[:, 1] > 0, feed[:, 2] > 0, arc, centre, normal,
                      sweep, cycle, tuple(e.cycles), e.tool.column(n, np.int64), e.register.column(n, np.int64),
                      e.name.column(n, np.int64), tuple(e.names),
-                     spindle[:, 0].astype(np.int64), spindle[:, 1], turned, e.coolant.column(n, np.int64), e.systems,
-                     _first_system(e, place), e.unread)
+                     spindle[:, 0].astype(np.int64), spindle[:, 1], turned, e.coolant.column(n, np.int64),
+                     np.array(e.coolant.rows, np.int64)[_index(e.coolant, n)], e.systems, _first_system(e, place), e.unread)
 
 
 def _first_system(e: Execution, place: Array) -> str | None:

@@ -34,7 +34,7 @@ def with_spindle(c: Commanded, setup: dict[str, Any]) -> Commanded:
     if not len(c) or not (output or own):
         return c
     tool, silent = tools_of(c, setup), c.spindle == UNKNOWN
-    begin = np.maximum.accumulate(np.where(np.diff(tool, prepend=tool[:1] - 1) != 0, np.arange(len(c)), 0))
+    begin = _loads(tool)
     others = (c.turned < begin) | ((c.turned == begin) & (c.spindle == 0))
     known = ~silent & (c.spindle != UNFOLLOWED)
     spindle, rpm = c.spindle.copy(), c.rpm.copy()
@@ -47,6 +47,11 @@ def with_spindle(c: Commanded, setup: dict[str, Any]) -> Commanded:
         rpm[taken | none] = wanted["rpm"]
         spindle[taken] = 1 if wanted["direction"] == "clockwise" else -1
     return replace(c, spindle=spindle, rpm=rpm)
+
+
+def _loads(tool: Array) -> Array:
+    """(N,) row at which the tool of each row was loaded."""
+    return np.maximum.accumulate(np.where(np.diff(tool, prepend=tool[:1] - 1) != 0, np.arange(len(tool)), 0))
 
 
 def feeds_of(c: Commanded, setup: dict[str, Any]) -> Array:
@@ -170,18 +175,17 @@ def check_states(w: Walked, c: Commanded, case: Case) -> tuple[list[Finding], di
     cuts = (w.kind == LINE) | (w.kind == ARC) | (w.kind == BOTTOM)
     rows = np.flatnonzero(w.inside & (w.code > 0) & cuts & (w.on_way() | w.gap | w.returns))
     row = w.targets.row[w.owner[rows] - w.returns[rows]]
-    tool, coolant = tools_of(c, case.setup)[row], c.coolant[row]
+    tool, coolant = tools_of(c, case.setup)[row], _coolants(c, case.setup)[row]
     register = np.where((c.register[row] == OWN) | (not case.registers), tool, c.register[row])
     register = np.where(e.lengthless[rows] | (not (case.setup.get("output") or {}).get("tool_call", True)), -1, register)
     direction, rpm = c.spindle[row], c.rpm[row]
     if not (case.setup.get("output") or {}).get("tool_call", True):
         tool = np.full(len(rows), -1)
-    coolant = _coolants(tool, coolant, case.setup)
     tap = np.array([x.kind == "TAP" for x in c.cycles] + [False])[c.cycle[row]]
     flow = e.coolant[rows]
     stated = (direction != UNKNOWN) & (direction != UNFOLLOWED)
     speed = stated & (direction != 0) & np.isfinite(rpm) & ~tap
-    some = _states_coolant(case.setup.get("tools")) or _states_coolant(case.setup.get("output"))
+    some = any(_stated_coolant(case.setup))
     wet = np.where(coolant == UNKNOWN, some | (flow == 0), np.where(coolant == 0, flow == 0, flow > 0))
     for kind, bit in BITS.items():
         wet &= (coolant != kind) | ((flow & bit) > 0) | (not case.coolants & bit)
@@ -208,15 +212,18 @@ def check_states(w: Walked, c: Commanded, case: Case) -> tuple[list[Finding], di
     return found, counts, [f"spindle (stated by no record, line {c.line[row[silent[0]]]})"] if len(silent) else []
 
 
-def _coolants(tool: Array, coolant: Array, setup: dict[str, Any]) -> Array:
-    """(K,) coolant with that of the set-up where no record states any: of the tool, else of [output]."""
-    own = {int(n): t["coolant"] for n, t in (setup.get("tools") or {}).items() if (t or {}).get("coolant")}
-    default = (setup.get("output") or {}).get("coolant")
-    result = coolant.copy()
-    of = [(tool == number, word) for number, word in own.items()]
-    of += [(~np.isin(tool, list(own)), default)] if default else []
-    for here, word in of:
-        result[here & (coolant == UNKNOWN)] = {"off": 0, "flood": 1, "mist": 11, "through": 12, "air": 13}.get(str(word), 2)
+def _coolants(c: Commanded, setup: dict[str, Any]) -> Array:
+    """(N,) coolant, the set-up's for a tool that no COOLNT record is for: its own, or [output] where none flows."""
+    own, default = _stated_coolant(setup)
+    tool, result, silent = tools_of(c, setup), c.coolant.copy(), c.coolant == UNKNOWN
+    begin = _loads(tool)
+    later = np.isin(begin, begin[~silent & (c.flowed >= begin) & (c.coolant != 0)])
+    others = ~later & (silent | ((c.flowed < begin) & (c.coolant != UNFOLLOWED)))
+    for number in np.unique(tool[np.isin(tool, list(own)) | bool(default)]).tolist():
+        word = own.get(number) or default
+        taken = (tool == number) & ((number in own) | silent | (c.coolant == 0))
+        result[taken & others] = {"off": 0, "flood": 1, "mist": 11, "through": 12, "air": 13}.get(str(word), 2)
+        result[taken & ~silent & (c.flowed == begin) & (c.coolant == 0)] = UNFOLLOWED
     return result
 
 
@@ -236,11 +243,10 @@ def _said(code: str, value: float) -> str:
     return names.get(int(value), f"{value:g}") if code != "coolant" or value in names else "on"
 
 
-def _states_coolant(table: Any) -> bool:
-    """True where a table of the set-up, or one in it, says what coolant flows where the CL file does not."""
-    if not isinstance(table, dict):
-        return False
-    return any((key == "coolant" and bool(value)) or _states_coolant(value) for key, value in table.items())
+def _stated_coolant(setup: dict[str, Any]) -> tuple[dict[int, str], str | None]:
+    """The set-up's coolant by number of tool, and that of [output]."""
+    own = {int(n): t["coolant"] for n, t in (setup.get("tools") or {}).items() if (t or {}).get("coolant")}
+    return own, (setup.get("output") or {}).get("coolant")
 
 
 def tools_of(c: Commanded, setup: dict[str, Any]) -> Array:

@@ -72,6 +72,23 @@ def test_the_spindle_of_the_setup_is_expected(setup: dict[str, object], monkeypa
     assert "witness.spindle" in {d.code for d in converted(text, setup).diagnostics}
 
 
+SECOND = b"LOADTL/2\nSPINDL/RPM,3000,CLW\nGOTO/0,0,20\nGOTO/0,0,-1\nGOTO/5,0,-1\n"
+
+
+@pytest.mark.parametrize("between", [b"", b"COOLNT/OFF\n"])
+@pytest.mark.parametrize("stated", [{"tools": {"2": {"coolant": "mist"}}}, {"output": {"coolant": "flood"}}])
+def test_coolant_of_the_setup_for_a_tool_behind_one_with_its_own(stated: dict[str, object], between: bytes,
+                                                                 monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first tool's COOLNT is not the second's; where it still flows, `[output]` adds nothing."""
+    text = LOADED.replace(b"SPINDL", b"COOLNT/FLOOD\nSPINDL", 1).replace(b"FINI", between + SECOND + b"FINI")
+    result = converted(text, stated)
+    assert result.ok and result.witness is not None, [str(d) for d in result.diagnostics]
+    old = ToolpathBuilder.event
+    monkeypatch.setattr(ToolpathBuilder, "event",
+                        lambda self, word, values: old(self, word, ("AIR",) if word == "COOLNT" else values))
+    assert "witness.coolant" in {d.code for d in converted(text, stated).diagnostics}
+
+
 def test_a_finding_is_in_words(monkeypatch: pytest.MonkeyPatch) -> None:
     old = ToolpathBuilder.event
 
