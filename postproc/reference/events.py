@@ -98,11 +98,11 @@ class Spindle:
 
 def speed_said(event: Event) -> float | None:
     """rev/min of a SPINDL record: the number after RPM, else the only one that belongs to no other word."""
-    return _speed(event.values)
+    return _rpm_said(event.values)
 
 
 @lru_cache(maxsize=256)
-def _speed(values: tuple[str | float, ...]) -> float | None:
+def _rpm_said(values: tuple[str | float, ...]) -> float | None:
     """Kept, as a file repeats few of them."""
     loose: list[float] = []
     for before, value in zip(("", *values), values, strict=False):
@@ -128,7 +128,7 @@ def _words(values: tuple[str | float, ...]) -> frozenset[str]:
 
 def spindle_after(event: Event, before: Spindle) -> Spindle:
     """The spindle after a SPINDL record; ON takes the last speed and direction up again, NEUTRL stops it."""
-    said, speed = _words(event.values), _speed(event.values)
+    said, speed = _words(event.values), _rpm_said(event.values)
     if not said.isdisjoint(_STOPPING):
         return Spindle(before.rpm, 0, before.last)
     direction = -1 if "CCLW" in said else 1 if "CLW" in said else before.last

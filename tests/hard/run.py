@@ -195,7 +195,12 @@ def run(tasks: list[Task], workers: int) -> Counter[tuple[str, str, str]]:
         todo = iter(tasks)
         running = {pool.submit(worked, task): task for task in islice(todo, 2 * workers)}
         while running:
-            done = next(as_completed(running))
+            try:
+                done = next(as_completed(running))
+            except KeyboardInterrupt:
+                print(f"interrupted: {len(tasks) - len(running) - sum(1 for _ in todo)} of {len(tasks)} done")
+                pool.shutdown(wait=False, cancel_futures=True)
+                return found
             task = running.pop(done)
             try:
                 found += done.result()

@@ -131,7 +131,7 @@ FAULTS = (
           "named = tuple(numbers(event)[:1])", "named = tuple(n + 1.0 for n in numbers(event)[:1])"),
     Fault("spindle the other way", "states", "spindle_after", 'direction = -1 if "CCLW" in said else 1',
           'direction = 1 if "CCLW" in said else -1'),
-    Fault("spindle speed + 1 %", "states", "speed_said", "return float(value)", "return 1.01 * float(value)"),
+    Fault("spindle speed + 1 %", "states", "_rpm_said", "return float(value)", "return 1.01 * float(value)"),
     Fault("coolant of the file dropped", "states", "SpindleCoolantState.coolant",
           'self.cooling, self.unsure["coolant"] = wanted, False\n        return [wanted]',
           'self.cooling, self.unsure["coolant"] = wanted, False\n        return []'),
