@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import create_model
 
 from machines.kinematics.base import Kinematics
-from machines.machine import Limits, Machine, Timing
+from machines.machine import Limits, Machine, Timing, Turns
 from machines.models import KinematicsModel, MachineModel
 from machines.user_file import UserFile, nearest, read_toml, schema, validate
 from toolpaths.diagnostics import Diagnostic, DiagnosticError, has_errors
@@ -105,7 +105,8 @@ def assemble(file: UserFile, model: MachineModel) -> Machine:
         home=np.array([model.axes[name].home for name in names]) * _scale(kinematics), retract_axis=retract,
         timing=Timing(timing.tool_change, timing.clamp, timing.unclamp, frozenset(timing.assumed)),
         control_kinematics=model.control_kinematics(), file=file.file,
-        stop=model.control.stop or "" if model.control is not None else "")
+        stop=model.control.stop or "" if model.control is not None else "",
+        turns=tuple(Turns(a.modulo, a.modulo_range[0], a.rollover or "", a.park) for a in map(model.axes.get, names) if a))
 
 
 def _limits(model: MachineModel, kinematics: Kinematics) -> Limits:

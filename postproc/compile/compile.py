@@ -11,6 +11,7 @@ from postproc.compile.canned import holes_of
 from postproc.compile.commands import commands_of
 from postproc.compile.cycle_refusals import not_native
 from postproc.compile.feed import Feeds, PlannedTimes, plan_feeds
+from postproc.compile.long_turns import long_turns
 from postproc.compile.program import Command, Commands, Hole, Program
 from postproc.compile.sections import sections_of, with_sections
 from postproc.compile.word_rows import WordRows, block_tools, joints_of, with_turns, word_rows
@@ -52,7 +53,9 @@ def compile_program(job: Job, moves: Moves, path: JointPath,
     program = Program(control.machine.axis_names, end[keep], words.write[keep], path.code[keep], feeds.feed[keep],
                       feeds.mode[keep], path.plane[keep], path.ccw[keep], path.center[keep], path.home[keep],
                       np.isnan(path.u[keep]), moves.row[path.move[keep]], line,
-                      placed, kept_holes, places, sections, skip[keep])
+                      placed, kept_holes, places, sections, skip[keep], control.rolls,
+                      control.machine.home * control.unit)
+    found += long_turns(program, toolpath.file)
     return program, feeds, [*diagnostics, *found, *_slowed(feeds, moves, path, planned is not None, toolpath.file),
                             *_mapped(feeds, moves, path, job),
                             *not_native(toolpath, moves, path, native, controller, skip)]

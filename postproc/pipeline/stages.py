@@ -21,6 +21,7 @@ from postproc.path.reach import check_reach
 from postproc.path.rewinds import drawing_of
 from postproc.path.singular import check_singular
 from postproc.path.travel import check_travel
+from postproc.path.turn_steps import with_short_turns
 from postproc.pipeline.program_header import header_lines
 from postproc.pipeline.program_lines import with_cl_lines
 from postproc.pipeline.result import PostResult, shared_fields
@@ -133,7 +134,9 @@ def solved(made: PlacedStage, progress: Progress | None) -> tuple[PlacedStage | 
                              shares["linearising"], shares["axis_linearising"] * DEG, made.toolpath.file, progress,
                              made.drawing)
     found = with_system(found, job.work_system, job.placement)
-    return (made if path is None else handed_on(SolvedStage, made, path=path)), found
+    if path is None:
+        return made, found
+    return handed_on(SolvedStage, made, path=with_short_turns(path, made.moves, job.control, job.kinematics)), found
 
 
 def corrected(made: SolvedStage, progress: Progress | None) -> tuple[SolvedStage | CorrectedStage, DiagnosticList]:

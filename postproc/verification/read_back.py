@@ -83,7 +83,7 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Callable[[str, i
     give_back()
     machine, control = job.machine, job.control
     home = control.words(machine.home[None, :], machine.kinematics, 0.0)[0] + control.work_offset
-    reader = reader_for(job.controller, machine.axis_names, home, machine.stop)
+    reader = reader_for(job.controller, machine.axis_names, home, machine.stop, control.rolls)
     code, diagnostics = reader.read(data, gcode, others)
     head = head_of(as_bytes(data[:HEADER]))
     diagnostics = [_located(_judged(d, reader.units_stay), job.toolpath.file) for d in diagnostics]

@@ -1,4 +1,4 @@
-"""`auto` takes the next output mode where one cannot be written or proved for an operation: what one mode converts it does."""
+"""`auto` takes the next output mode where one cannot be written or proved for an operation."""
 
 from __future__ import annotations
 

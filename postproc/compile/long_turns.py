@@ -1,0 +1,25 @@
+"""Words of modulo axes that could not say which way they turn."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from postproc.compile.program import Program
+from postproc.control.rollover import LEAST, TURN
+from toolpaths.diagnostics import Diagnostic, error
+
+
+def long_turns(program: Program, file: str) -> list[Diagnostic]:
+    """Blocks that turn a modulo axis by half a turn or more where the control takes the shorter way, else by a whole one."""
+    found = []
+    for axis, roll in program.rolls.items():
+        most = TURN / 2.0 if roll.rule == "shortest" and not roll.stated else TURN
+        step = np.abs(program.words[:, axis] - program.before(axis))
+        bad = np.flatnonzero(program.write[:, axis] & (step > most - LEAST))
+        if len(bad):
+            k = int(bad[0])
+            found.append(error("rollover.turn", f"axis {program.letters[axis]} turns by {step[k]:.4f} degrees in one block, and "
+                               f"its words say the direction of less than {most:g} only", file=file,
+                               lines=program.line[bad[:6]].tolist(), count=len(bad),
+                               hint='rollover = "none" for this axis in the machine file, where the control counts turns'))
+    return found
