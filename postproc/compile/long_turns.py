@@ -18,8 +18,8 @@ def long_turns(program: Program, file: str) -> list[Diagnostic]:
         bad = np.flatnonzero(program.write[:, axis] & (step > most - LEAST))
         if len(bad):
             k = int(bad[0])
-            found.append(error("rollover.turn", f"axis {program.letters[axis]} turns by {step[k]:.4f} degrees in one block, and "
-                               f"its words say the direction of less than {most:g} only", file=file,
+            found.append(error("rollover.turn", f"axis {program.letters[axis]} turns by {step[k]:.4f} degrees in one block, "
+                               f"and its words say the direction of less than {most:g} only", file=file,
                                lines=program.line[bad[:6]].tolist(), count=len(bad),
                                hint='rollover = "none" for this axis in the machine file, where the control counts turns'))
     return found

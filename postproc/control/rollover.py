@@ -64,8 +64,8 @@ def rollovers(machine: Machine, controller: ControllerFile) -> tuple[dict[int, R
         if rule not in rules.rules:
             had = ", ".join(f'"{r}"' for r in rules.rules)
             found.append(error("machine.rollover", f'axis {name} of {machine.name} has rollover = "{rule}", which this '
-                               "control has not", file=machine.file, hint=f"allowed are {had} under [axes.{name}]; left out it is "
-                               f'"{rules.default}"'))
+                               "control has not", file=machine.file,
+                               hint=f'allowed are {had} under [axes.{name}]; left out it is "{rules.default}"'))
         elif rule == "sign" and turns.low:
             found.append(error("machine.rollover", f"axis {name} of {machine.name}: this control takes the sign of a word "
                                "as its direction, so that words are 0 to 360 degrees", file=machine.file,
@@ -80,9 +80,26 @@ def parked(machine: Machine, rolls: dict[int, Rollover], q: Floats) -> Floats:
     """Home (J,) or (N, J) as axes stand there that come from joints q: at the nearest whole turn, but for those that are to
     unwind all their turns."""
     home = np.broadcast_to(machine.home, q.shape).copy()
-    for j, turns in enumerate(machine.turns):
-        endless = machine.rotary[j] and not np.isfinite(machine.limits.upper[j] - machine.limits.lower[j])
-        if endless and (j in rolls or turns.park == "turn"):
-            turn = TURN * DEG
-            home[..., j] += turn * np.round((q[..., j] - home[..., j]) / turn)
+    for j in parking(machine, rolls):
+        turn = TURN * DEG
+        home[..., j] += turn * np.round((q[..., j] - home[..., j]) / turn)
     return home
+
+
+def parking(machine: Machine, rolls: dict[int, Rollover]) -> list[int]:
+    """The joints that park at whole turns."""
+    return [j for j in endless(machine) if j in rolls or machine.turns[j].park == "turn"]
+
+
+def endless(machine: Machine) -> list[int]:
+    """The rotary joints whose travel has no end."""
+    return [j for j, rotary in enumerate(machine.rotary)
+            if rotary and not np.isfinite(machine.limits.upper[j] - machine.limits.lower[j])]
+
+
+def off_home(machine: Machine, rolls: dict[int, Rollover], place: Floats, home: Floats) -> Floats:
+    """mm and degrees by which places (..., J) are off home (J,), whole turns of axes that park at them aside."""
+    away = np.abs(place - home)
+    for j in parking(machine, rolls):
+        away[..., j] = np.abs(away[..., j] - TURN * np.round(away[..., j] / TURN))
+    return np.asarray(away)

@@ -140,6 +140,6 @@ def verify(gcode: str | FilePath, path: Toolpath, machine: Machine | str | FileP
     found = [*other_setup(data, options, has_errors(more), str(gcode)), *found, *more]
     said = None
     if comparison is not None and not has_errors(found):
-        said, more = second_witness(start.source, start.asked or start.setup, options, job, comparison)
+        said, more = second_witness(start.source, start.asked or start.setup, options, job, comparison, data)
         found += more
     return replace(begun, comparison=comparison, diagnostics=tuple(found), witness=said)

@@ -232,7 +232,8 @@ def verified(made: WrittenStage, progress: Progress | None) -> tuple[VerifiedSta
     if not made.files:
         found = with_cl_lines(found, made.text, made.program, made.controller)
     if comparison is not None and not has_errors(found):
-        witness, more = second_witness(made.source, made.asked or made.setup, made.options, job, comparison)
+        witness, more = second_witness(made.source, made.asked or made.setup, made.options, job, comparison,
+                                       b"" if made.files else made.text)
         found = [*found, *more]
     value = handed_on(VerifiedStage, made, comparison=comparison, witness=witness, after_formatting=None)
     if made.compensation is None:
