@@ -1,4 +1,4 @@
-"""Modulo (roll-over) rotary axes: words inside one turn, executed by each control's own rule, in plan, text, reader, time and
+"""Modulo (roll-over) rotary axes: words inside one turn, run by each control's own rule, in plan, text, reader, time and
 second witness alike."""
 
 from __future__ import annotations
@@ -299,3 +299,22 @@ def test_a_rule_that_the_control_has_not_is_refused(controller: str, rule: str, 
 def test_haas_counts_turns_unless_the_machine_file_says_so() -> None:
     assert np.abs(values(converted("haas-ngc", "").text)).max() > 1000.0
     assert "map" in converted("haas-ngc", "shortest").text.lower()
+
+
+@pytest.mark.parametrize(("base", "key", "code", "shown"), [
+    ("heidenhain-tnc640", "on = []", "gcode.rollover", ""), ("haas-ngc", 'default = "shortest"', "", "MAPPED TO ONE TURN"),
+    ("siemens-840d", 'shortest = "{letter}={value}"', "gcode.rollover", ""),
+    ("siemens-840d", 'positive = "{letter} = ACP({value})"', "", "C = ACP(180"),
+    ("siemens-840d", 'negative = "{letter} = ACN({value})"', "", "C = ACN(0"),
+    ("linuxcnc", 'zero_negative = "-360"', "", "C-360"), ("fanuc-30i", 'rules = ["none"]', "machine.rollover", ""),
+    ("linuxcnc", 'needs = { sign = "OWN WORDS {axes}" }', "", "OWN WORDS C"),
+])
+def test_each_key_of_a_controller_file_counts(base: str, key: str, code: str, shown: str, tmp_path: Path) -> None:
+    shop = tmp_path / "shop.toml"
+    shop.write_text(f'base = "{base}"\n[rollover]\n{key}\n')
+    path = toolpath("RAPID", "GOTO/0,40,60,0,0.6,0.8", "FEDRAT/MMPM,500", "GOTO/0,10,20,0,0.6,0.8", "RAPID",
+                    "GOTO/0,40,60,0,0.6,0.8", "RAPID", "GOTO/0,-40,60,0,-0.6,0.8", "GOTO/0,-10,20,0,-0.6,0.8")
+    result = postproc.convert(path, rolling(), shop, TOOLS, Options(output="axes"))
+    assert result.ok == (not code), [str(d) for d in result.diagnostics]
+    assert not code or (any(e.startswith(code) for e in errors(result)) and result.text == "")
+    assert shown in result.text
