@@ -1,12 +1,28 @@
-"""Words of modulo axes that could not say which way they turn."""
+"""Words of modulo axes that could not say which way they turn, or that would turn an axis which stands."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from postproc.compile.program import Program
-from postproc.control.rollover import LEAST, TURN
+from postproc.control.rollover import LEAST, TURN, Rollover
+from toolpaths.arrays import Bools, Floats
 from toolpaths.diagnostics import Diagnostic, error
+
+
+def without_standing(write: Bools, positions: Floats, rolls: dict[int, Rollover]) -> Bools:
+    """(K, J) the words that blocks state, without those of axes that stand, where the sign of a word is the direction.
+
+    LinuxCNC takes a word that is less than its own position by the last bit of a number for one that lies a whole turn ahead
+    (`unwrap_rotary` of its interpreter). The first word of an axis stays: nobody knows where it stands before.
+    """
+    for axis, roll in rolls.items():
+        rows = np.flatnonzero(write[:, axis])
+        stands = rows[1:][np.abs(np.diff(positions[rows, axis])) < LEAST]
+        if roll.rule == "sign" and len(stands):
+            write = write.copy()
+            write[stands, axis] = False
+    return write
 
 
 def long_turns(program: Program, file: str) -> list[Diagnostic]:

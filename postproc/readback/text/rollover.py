@@ -74,7 +74,8 @@ def _rules(words: Words, axis: _Axis, letter: str, roll: Rollover, by_codes: boo
 
 
 def _positions(axis: _Axis, rule: Array, low: float, start: float) -> tuple[Floats, Bools]:
-    """(degrees (N,) that count every turn behind each word, (N,) True where a turn is exactly half of one)."""
+    """(degrees (N,) that count every turn behind each word, (N,) True where a turn is exactly half of one,
+    or none though the sign of the word says which way)."""
     target = np.mod(np.where(rule == SIGN, np.abs(axis.value), axis.value) - low, TURN) + low
     walked = np.cumsum(np.where(axis.relative, axis.value, 0.0))
     last = np.maximum.accumulate(np.concatenate([[0], np.where(axis.relative, 0, np.arange(1, len(target) + 1))]))[:-1]
@@ -87,6 +88,7 @@ def _positions(axis: _Axis, rule: Array, low: float, start: float) -> tuple[Floa
     ways = np.stack([shorter, ahead, back, onward, target - before, shorter])
     step = np.where(axis.relative, axis.value, ways[rule, np.arange(len(target))])
     half = ~axis.relative & (rule == SHORTEST) & (np.abs(ahead - TURN / 2.0) < LEAST)
+    half |= ~axis.relative & (rule == SIGN) & (step == 0.0)
     return start + np.cumsum(step), half
 
 
@@ -104,7 +106,10 @@ def _faults(axis: _Axis, rule: Array, half: Bools, letter: str, roll: Rollover, 
         (axis.value < roll.low) | (axis.value >= roll.low + TURN))
     half[0] = False  # where the axis stands before its first word is not known: it is stated above the part
     span = f"{roll.low:g} to {roll.low + TURN:g}" if roll.rule != "sign" else f"-{TURN:g} to {TURN:g}"
-    cases = ((half, f"{letter} turns by exactly 180 degrees, and nothing says which way", "a word between the two"),
+    cases = ((half & (rule == SHORTEST), f"{letter} turns by exactly 180 degrees, and nothing says which way",
+              "a word between the two"),
+             (half & (rule == SIGN), f"{letter} is stated where it stands: the control may turn it by a whole turn",
+              "leave the word out where the axis stands"),
              (stated & (rule == UNKNOWN), f"{letter} is a modulo axis, and nothing says which way it turns",
               "DC(), ACP() or ACN()" if roll.stated else "M126 before it"),
              (wide, f"{letter} is a modulo axis, its words are {span} degrees", "write the word inside one turn"))
