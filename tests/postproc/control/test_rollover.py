@@ -234,7 +234,7 @@ SHORT, SIGNED, STATED = Rollover("shortest"), Rollover("sign"), Rollover("shorte
     ("fanuc-30i", SHORT, ["G1 C10. F100", "C350.", "C171.", "C340.", "C100."], [10, -10, -189, -20, 100]),
     ("fanuc-30i", Rollover("sign", whole=True), ["G1 C10. F100", "C350.", "C-340.", "C-360.", "C10.", "C-350."],
      [10, 350, 340, 0, 10, -10]),
-    ("linuxcnc", SIGNED, ["G1 C10 F100", "C350", "C-340", "C-0", "C-350", "C350"], [10, 350, 340, 0, -10, -10]),
+    ("linuxcnc", SIGNED, ["G1 C10 F100", "C350", "C-340", "C-0", "C-350"], [10, 350, 340, 0, -10]),
     ("linuxcnc", SIGNED, ["G1 C10 F100", "G91 C-30", "G90 C20", "G91 C400", "G90 C-19"], [10, 20, 379]),
     ("siemens-840d", STATED, ["G1 C=DC(10) F100", "C=DC(350)", "C=ACP(340)", "C=ACN(350)"], [10, -10, 340, -10]),
     ("heidenhain-tnc640", SHORT, ["M126", "L C+10 F100", "L C+350", "M127", "L C+10", "M126", "L C+350"],
@@ -248,7 +248,7 @@ def test_words_as_the_makers_pages_have_them(controller: str, rolls: Rollover, b
 
 @pytest.mark.parametrize(("controller", "rolls", "blocks"), [
     ("fanuc-30i", SHORT, ["G1 C10. F100", "C190."]),
-    ("linuxcnc", SIGNED, ["G1 C10 F100", "C360"]),
+    ("linuxcnc", SIGNED, ["G1 C10 F100", "C360"]), ("linuxcnc", SIGNED, ["G1 C10 F100", "C-10"]),
     ("siemens-840d", STATED, ["G1 C=DC(10) F100", "C20"]),
     ("siemens-840d", STATED, ["G1 C=DC(10) F100", "C=DC(-20)"]),
     ("siemens-840d", STATED, ["G1 A=DC(10) F100"]),
