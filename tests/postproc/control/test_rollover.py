@@ -59,7 +59,8 @@ def winding(sense: float = 1.0) -> Toolpath:
 
 @cache
 def converted(controller: str, rule: str, sense: float = 1.0, output: str = "axes", low: float = 0.0) -> PostResult:
-    return postproc.convert(winding(sense), rolling(rule, low), controller, TOOLS, Options(output=output))  # type: ignore[arg-type]
+    return postproc.convert(winding(sense), rolling(rule, low), controller, TOOLS,
+                            Options(output=output))  # type: ignore[arg-type]
 
 
 @cache
@@ -206,7 +207,8 @@ def test_tip_modes_enter_at_the_nearest_whole_turn() -> None:
     """Fanuc's G43.4 is switched on with the tables at zero: a modulo axis does not unwind for that."""
     path = winding()
     seconds = {m: estimate_of(postproc.convert(path, rolling(modulo=m), "fanuc-30i", TOOLS,
-                                               Options(output="tcp"))).seconds for m in (True, False)}  # type: ignore[union-attr]
+                                               Options(output="tcp"))).seconds
+               for m in (True, False)}  # type: ignore[union-attr]
     assert seconds[True] <= seconds[False] + 0.01
 
 
